@@ -1,0 +1,1 @@
+"""Doors for people: flags, progress bars, exit codes."""

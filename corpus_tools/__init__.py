@@ -1,0 +1,1 @@
+"""Recordings to talkers, heads to faces, and the measures of both."""

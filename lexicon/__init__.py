@@ -1,0 +1,1 @@
+"""Text to phones: normalisation, dictionaries, grapheme-to-phoneme, the phone table."""

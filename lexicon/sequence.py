@@ -1,0 +1,110 @@
+"""Phones in time: labels and the edges that they share, so that a gap or an overlap cannot be written."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lexicon.errors import InputError
+
+SILENCE = "sil"  # the label of every stretch without speech
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PhoneSequence:
+    """N phones that follow each other without gap.
+
+    Parameters
+    ----------
+    phones : N labels
+        IPA symbols of the phone table (`lexicon.phones`), or `SILENCE`.
+    edges : (N + 1,)
+        Seconds, strictly increasing: phone i sounds in [edges[i], edges[i + 1]).
+
+    Raises
+    ------
+    InputError
+        There is no phone, the number of edges is not N + 1, an edge is not finite, or they do not increase.
+    """
+
+    phones: tuple[str, ...]
+    edges: NDArray[np.float64]
+
+    def __init__(self, phones: Sequence[str], edges: ArrayLike) -> None:
+        locked = np.array(edges, dtype=np.float64)
+        if not phones:
+            raise InputError("a phone sequence needs at least one phone; give SILENCE for a stretch without speech")
+        if locked.shape != (len(phones) + 1,):
+            raise InputError(f"{len(phones)} phones need {len(phones) + 1} edges, not an array of shape {locked.shape}")
+        if not np.isfinite(locked).all():
+            raise InputError(f"phone edges must be finite seconds; edge {int(np.argmin(np.isfinite(locked)))} is not")
+        steps = np.diff(locked)
+        if (steps <= 0).any():
+            at = int(np.argmax(steps <= 0))
+            raise InputError(
+                f"phone edges must increase; phone {at} ({phones[at]}) runs from {locked[at]} s to {locked[at + 1]} s"
+            )
+        locked.setflags(write=False)
+        object.__setattr__(self, "phones", tuple(phones))
+        object.__setattr__(self, "edges", locked)
+
+    def __len__(self) -> int:
+        """Count the phones, silences included."""
+        return len(self.phones)
+
+    @property
+    def durations(self) -> NDArray[np.float64]:
+        """(N,) seconds."""
+        return np.diff(self.edges)
+
+    @property
+    def start(self) -> float:
+        """Seconds at which the first phone begins."""
+        return float(self.edges[0])
+
+    @property
+    def end(self) -> float:
+        """Seconds at which the last phone ends."""
+        return float(self.edges[-1])
+
+    def index_at(self, seconds: float) -> int:
+        """Index of the phone that sounds at an instant; the first or last one outside the sequence."""
+        at = int(np.searchsorted(self.edges, seconds, side="right")) - 1
+        return min(max(at, 0), len(self.phones) - 1)
+
+    def shifted(self, seconds: float) -> "PhoneSequence":
+        """Same phones, moved along the clock."""
+        return PhoneSequence(self.phones, self.edges + seconds)
+
+
+@dataclass(frozen=True, slots=True)
+class WordSpan:
+    """A written word and the half-open range of phones, ``[first, last)``, that speak it."""
+
+    text: str
+    first: int
+    last: int
+
+    def __post_init__(self) -> None:
+        """Refuse an empty or reversed range."""
+        if not 0 <= self.first < self.last:
+            raise InputError(f"word {self.text!r} needs a range of phones, not [{self.first}, {self.last})")
+
+
+def concatenated(parts: Sequence[PhoneSequence]) -> PhoneSequence:
+    """Put sequences one behind the other; each must begin at 0 s. Neighbouring silences become one."""
+    phones: list[str] = []
+    edges: list[float] = [0.0]
+    offset = 0.0
+    for part in parts:
+        if part.start != 0.0:
+            raise InputError(f"sequences are joined from 0 s on, and one begins at {part.start} s; shift it first")
+        for phone, end in zip(part.phones, part.edges[1:], strict=True):
+            if phones and phone == SILENCE == phones[-1]:
+                edges[-1] = offset + float(end)
+            else:
+                phones.append(phone)
+                edges.append(offset + float(end))
+        offset = edges[-1]
+    return PhoneSequence(phones, edges)

@@ -1,0 +1,1 @@
+"""Linear face models and the way of motion onto them."""

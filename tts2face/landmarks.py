@@ -1,0 +1,34 @@
+"""The landmarks that talkers and faces have in common: the 478 points of the MediaPipe face mesh.
+
+Indices follow the topology of Kartynnik et al. 2019, "Real-time facial surface geometry from monocular video on
+mobile GPUs" (468 points) with ten iris points behind it. "Left" and "right" are the person's own. Landmark
+coordinates: x to the person's left, y up, z out of the face, millimetres, head pose removed.
+"""
+
+N_LANDMARKS = 478
+
+UPPER_LIP_INNER_MID = 13
+LOWER_LIP_INNER_MID = 14
+MOUTH_CORNER_RIGHT = 61
+MOUTH_CORNER_LEFT = 291
+EYE_OUTER_RIGHT = 33
+EYE_OUTER_LEFT = 263
+CHIN = 152
+
+# Inner lip line from the right corner to the left; entry k of one lies opposite entry k of the other.
+INNER_LIP_UPPER = (78, 191, 80, 81, 82, 13, 312, 311, 310, 415, 308)
+INNER_LIP_LOWER = (78, 95, 88, 178, 87, 14, 317, 402, 318, 324, 308)
+OUTER_LIP_UPPER = (61, 185, 40, 39, 37, 0, 267, 269, 270, 409, 291)
+OUTER_LIP_LOWER = (61, 146, 91, 181, 84, 17, 314, 405, 321, 375, 291)
+
+# What speech moves: every point of the canonical mesh lower than 0.5 mm under the base of the nose (landmark 2).
+# This is region P of Ju and Lee 2008, Fig. 5; its complement carries expression.
+MOUTH_REGION = (
+    0, 11, 12, 13, 14, 15, 16, 17, 18, 32, 37, 38, 39, 40, 41, 42, 43, 57, 58, 61, 62, 72, 73, 74, 76, 77, 78, 80, 81,
+    82, 83, 84, 85, 86, 87, 88, 89, 90, 91, 92, 95, 96, 106, 132, 135, 136, 138, 140, 146, 148, 149, 150, 152, 164,
+    165, 167, 169, 170, 171, 172, 175, 176, 177, 178, 179, 180, 181, 182, 183, 184, 185, 186, 187, 191, 192, 194, 199,
+    200, 201, 202, 204, 206, 207, 208, 210, 211, 212, 213, 214, 215, 216, 262, 267, 268, 269, 270, 271, 272, 273, 287,
+    288, 291, 292, 302, 303, 304, 306, 307, 308, 310, 311, 312, 313, 314, 315, 316, 317, 318, 319, 320, 321, 322, 324,
+    325, 335, 361, 364, 365, 367, 369, 375, 377, 378, 379, 391, 393, 394, 395, 396, 397, 400, 401, 402, 403, 404, 405,
+    406, 407, 408, 409, 410, 411, 415, 416, 418, 421, 422, 424, 426, 427, 428, 430, 431, 432, 433, 434, 435, 436,
+)  # fmt: skip

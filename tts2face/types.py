@@ -1,0 +1,133 @@
+"""What flows between the rooms: sound, motion and the clip that joins them on one clock.
+
+Units: seconds, millimetres, radians. Frame i is the instant i / fps.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lexicon.errors import InputError
+from lexicon.sequence import PhoneSequence, WordSpan
+
+HEAD_CHANNELS = ("pitch", "yaw", "roll", "x", "y", "z")  # radians (nod down, turn to own left, tilt) and mm
+
+
+def frame_count(duration_s: float, fps: float) -> int:
+    """Fewest frames whose time covers a duration; at least one. The only place where seconds become frames."""
+    return max(1, math.ceil(duration_s * fps - 1e-6))
+
+
+def _locked(values: ArrayLike, what: str, ndim: int) -> NDArray[np.float32]:
+    array = np.array(values, dtype=np.float32)
+    if array.ndim != ndim:
+        raise InputError(f"{what} must have {ndim} dimension(s), not shape {array.shape}")
+    if not np.isfinite(array).all():
+        raise InputError(f"{what} must be finite; it holds NaN or infinity")
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Waveform:
+    """Mono sound: samples (n,) float32 in [-1, 1] at `rate` Hz."""
+
+    samples: NDArray[np.float32]
+    rate: int
+
+    def __init__(self, samples: ArrayLike, rate: int) -> None:
+        locked = _locked(samples, "samples", 1)
+        if rate <= 0:
+            raise InputError(f"a waveform's rate must be above 0 Hz, not {rate}")
+        if locked.size and float(np.abs(locked).max()) > 1.0:
+            raise InputError(f"samples must lie in [-1, 1]; the largest is {float(np.abs(locked).max()):.3f}")
+        object.__setattr__(self, "samples", locked)
+        object.__setattr__(self, "rate", int(rate))
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return len(self.samples) / self.rate
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """Named channels over time: values (T, D) float32; row i is the instant i / fps."""
+
+    channels: tuple[str, ...]
+    values: NDArray[np.float32]
+    fps: float
+
+    def __init__(self, channels: Sequence[str], values: ArrayLike, fps: float) -> None:
+        locked = _locked(values, "trajectory values", 2)
+        if len(set(channels)) != len(channels):
+            raise InputError("trajectory channels must have different names")
+        if locked.shape[1] != len(channels):
+            raise InputError(f"{len(channels)} channels need {len(channels)} columns, not {locked.shape[1]}")
+        if not fps > 0:
+            raise InputError(f"frames per second must be above 0, not {fps}")
+        object.__setattr__(self, "channels", tuple(channels))
+        object.__setattr__(self, "values", locked)
+        object.__setattr__(self, "fps", float(fps))
+
+    def __len__(self) -> int:
+        """Count the frames."""
+        return len(self.values)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Speech:
+    """A voice's answer: sound, the phones it consists of, and the words they belong to.
+
+    ``phones`` starts at 0 and its last edge is the length of the sound to the sample.
+    """
+
+    waveform: Waveform
+    phones: PhoneSequence
+    words: tuple[WordSpan, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse phones that do not cover the sound exactly, and words beyond the phones."""
+        if self.phones.start != 0.0 or abs(self.phones.end - self.waveform.duration) > 0.5 / self.waveform.rate:
+            raise InputError(
+                f"phones cover {self.phones.start}-{self.phones.end} s but the sound lasts {self.waveform.duration} s"
+            )
+        if any(word.last > len(self.phones) for word in self.words):
+            raise InputError("a word reaches beyond the last phone")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clip:
+    """A talking face on one clock.
+
+    Parameters
+    ----------
+    motion : (T, K)
+        Weights of the face's named shapes.
+    head : (T, 6)
+        `HEAD_CHANNELS`, relative to the face at rest.
+    speech
+        Sound, phones and words; the T frames cover the sound and end within one frame of it.
+    """
+
+    motion: Trajectory
+    head: Trajectory
+    speech: Speech
+
+    def __post_init__(self) -> None:
+        """Refuse parts that are not on one clock."""
+        if self.head.channels != HEAD_CHANNELS:
+            raise InputError(f"head pose needs the channels {HEAD_CHANNELS}, not {self.head.channels}")
+        if (len(self.motion), self.motion.fps) != (len(self.head), self.head.fps):
+            raise InputError("face motion and head pose must have the same frames")
+        expected = frame_count(self.speech.waveform.duration, self.motion.fps)
+        if len(self.motion) != expected:
+            raise InputError(f"the sound needs {expected} frames, the motion has {len(self.motion)}")
+
+    @property
+    def fps(self) -> float:
+        """Frames per second."""
+        return self.motion.fps

@@ -1,0 +1,1 @@
+"""Watching: pictures to landmarks and head pose."""
