@@ -17,8 +17,11 @@ HEAD_CHANNELS = ("pitch", "yaw", "roll", "x", "y", "z")  # radians (nod down, tu
 
 
 def frame_count(duration_s: float, fps: float) -> int:
-    """Fewest frames whose time covers a duration; at least one. The only place where seconds become frames."""
-    return max(1, math.ceil(duration_s * fps - 1e-6))
+    """Fewest frames whose time covers a duration; at least one. The only place where seconds become frames.
+
+    A duration is a whole number of samples: up to a hundredth of a frame beyond a frame's end counts as rounding.
+    """
+    return max(1, math.ceil(duration_s * fps - 0.01))
 
 
 def _locked(values: ArrayLike, what: str, ndim: int) -> NDArray[np.float32]:
