@@ -92,19 +92,27 @@ class WordSpan:
             raise InputError(f"word {self.text!r} needs a range of phones, not [{self.first}, {self.last})")
 
 
-def concatenated(parts: Sequence[PhoneSequence]) -> PhoneSequence:
-    """Put sequences one behind the other; each must begin at 0 s. Neighbouring silences become one."""
+def concatenated(
+    parts: Sequence[PhoneSequence], words: Sequence[Sequence[WordSpan]]
+) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+    """Put sequences and their words one behind the other; silences that meet at a joint become one.
+
+    Raises
+    ------
+    InputError
+        A sequence does not begin at 0 s.
+    """
     phones: list[str] = []
     edges: list[float] = [0.0]
-    offset = 0.0
-    for part in parts:
+    spans: list[WordSpan] = []
+    for part, part_words in zip(parts, words, strict=True):
         if part.start != 0.0:
             raise InputError(f"sequences are joined from 0 s on, and one begins at {part.start} s; shift it first")
-        for phone, end in zip(part.phones, part.edges[1:], strict=True):
-            if phones and phone == SILENCE == phones[-1]:
-                edges[-1] = offset + float(end)
-            else:
-                phones.append(phone)
-                edges.append(offset + float(end))
         offset = edges[-1]
-    return PhoneSequence(phones, edges)
+        if phones and phones[-1] == SILENCE == part.phones[0]:
+            phones.pop()
+            edges.pop()
+        spans += [WordSpan(word.text, word.first + len(phones), word.last + len(phones)) for word in part_words]
+        phones += part.phones
+        edges += [offset + float(end) for end in part.edges[1:]]
+    return PhoneSequence(phones, edges), tuple(spans)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lexicon.errors import InputError
-from lexicon.sequence import PhoneSequence, WordSpan
+from lexicon.sequence import PhoneSequence, WordSpan, concatenated
 
 HEAD_CHANNELS = ("pitch", "yaw", "roll", "x", "y", "z")  # radians (nod down, turn to own left, tilt) and mm
 
@@ -134,3 +134,27 @@ class Clip:
     def fps(self) -> float:
         """Frames per second."""
         return self.motion.fps
+
+
+def joined_speech(parts: Sequence[Speech]) -> Speech:
+    """Speech put one behind the other, at one sample rate."""
+    rate = parts[0].waveform.rate
+    if any(part.waveform.rate != rate for part in parts):
+        raise InputError("speech is joined at one sample rate only; resample it first")
+    phones, words = concatenated([part.phones for part in parts], [part.words for part in parts])
+    samples = np.concatenate([part.waveform.samples for part in parts])
+    edges = phones.edges.copy()
+    edges[-1] = len(samples) / rate
+    return Speech(Waveform(samples, rate), PhoneSequence(phones.phones, edges), words)
+
+
+def joined_clips(clips: Sequence[Clip]) -> Clip:
+    """Clips put one behind the other; all but the last must end on a frame, as `tts2face.api.stream` makes them."""
+    first = clips[0]
+    motion = np.concatenate([clip.motion.values for clip in clips])
+    head = np.concatenate([clip.head.values for clip in clips])
+    return Clip(
+        Trajectory(first.motion.channels, motion, first.fps),
+        Trajectory(HEAD_CHANNELS, head, first.fps),
+        joined_speech([clip.speech for clip in clips]),
+    )

@@ -1,0 +1,45 @@
+"""Flags made from the fields of option dataclasses, so that every option is named and explained once."""
+
+import inspect
+from collections.abc import Callable
+from dataclasses import MISSING, Field, fields
+from typing import Annotated, Any, get_type_hints
+
+from cyclopts import Group, Parameter
+
+
+def flags_from(*groups: tuple[str, type], without: frozenset[str] = frozenset()) -> Callable[..., Any]:
+    """Give a command one keyword flag for each field of the option dataclasses, under a heading for each class.
+
+    The command takes them as ``**options``; `chosen` turns them back into an instance.
+    """
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        own = [
+            parameter
+            for parameter in inspect.signature(command).parameters.values()
+            if parameter.kind is not inspect.Parameter.VAR_KEYWORD
+        ]
+        added = [
+            _parameter(option, get_type_hints(options)[option.name], Group.create_ordered(heading))
+            for heading, options in groups
+            for option in fields(options)
+            if option.name not in without
+        ]
+        command.__signature__ = inspect.Signature([*own, *added])  # type: ignore[attr-defined]
+        command.__annotations__ = {parameter.name: parameter.annotation for parameter in [*own, *added]}
+        return command
+
+    return decorate
+
+
+def _parameter(option: "Field[Any]", kind: Any, group: Group) -> inspect.Parameter:
+    default = inspect.Parameter.empty if option.default is MISSING else option.default
+    annotation = Annotated[kind, Parameter(help=option.metadata["help"], group=group, negative="")]
+    return inspect.Parameter(option.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+def chosen(options: type, flags: dict[str, Any], **more: Any) -> Any:
+    """An instance of an option dataclass from the flags that belong to it."""
+    names = {option.name for option in fields(options)}
+    return options(**{name: value for name, value in flags.items() if name in names}, **more)

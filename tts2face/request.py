@@ -1,0 +1,53 @@
+"""The Request: the single list of options for what is said and how the face moves.
+
+Flags, JSON fields and studio controls are made from these fields and their help texts. Imports nothing heavy.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from lexicon.errors import InputError
+
+RATES = (0.5, 2.0)
+VOLUMES = (0.0, 2.0)
+FRAMES_PER_SECOND = (1.0, 120.0)
+
+
+def option(default: Any, help_text: str) -> Any:
+    """A dataclass field that carries its own help text."""
+    return field(default=default, metadata={"help": help_text})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """What is said, by which voice, and how the face moves with it.
+
+    Raises
+    ------
+    InputError
+        A number lies outside its range.
+    """
+
+    text: str = field(metadata={"help": "What to say."})
+    language: str = option("en-us", "Language of the text: an espeak-ng code such as en-us, de, fr-fr, ja.")
+    voice: str | None = option(None, "heart (English), espeak (every language), or a Piper voice by path (x.onnx).")
+    rate: float = option(1.0, "Speed of speech, 0.5 to 2.")
+    volume: float = option(1.0, "Loudness of the sound, 0 to 2.")
+    seed: int = option(0, "The same seed gives the same sound and motion.")
+    dictionary: Path | None = option(None, "Your own pronunciations, which win over the built-in ones.")
+    fps: float = option(30.0, "Frames per second, 1 to 120.")
+
+    def __post_init__(self) -> None:
+        """Refuse numbers outside their range."""
+        _check("rate", self.rate, RATES)
+        _check("volume", self.volume, VOLUMES)
+        _check("fps", self.fps, FRAMES_PER_SECOND)
+        if self.seed < 0:
+            raise InputError(f"seed must be 0 or more, not {self.seed}")
+
+
+def _check(name: str, value: float, limits: tuple[float, float]) -> None:
+    low, high = limits
+    if not low <= value <= high:
+        raise InputError(f"{name} must lie between {low:g} and {high:g}, not {value:g}")
