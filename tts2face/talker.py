@@ -33,20 +33,23 @@ class ShapeModel:
         Standard deviation of each parameter over the training frames, millimetres.
     n_speech
         Number of leading modes that speech moves.
+    rest : (M,)
+        Parameters of the talker at rest: silent, lips closed.
     """
 
     mean: NDArray[np.float32]
     basis: NDArray[np.float32]
     spread: NDArray[np.float32]
     n_speech: int
+    rest: NDArray[np.float32]
 
     def __post_init__(self) -> None:
         """Refuse parts that do not fit each other."""
         modes, landmarks = self.basis.shape[:2]
-        fits = self.mean.shape == (landmarks, 3) and self.basis.shape[2:] == (3,) and self.spread.shape == (modes,)
-        if not fits or not 0 < self.n_speech <= modes:
-            raise DataError("the shape model's mean, basis and spread do not fit each other; build the talker again")
-        for array in (self.mean, self.basis, self.spread):
+        fits = self.mean.shape == (landmarks, 3) and self.basis.shape[2:] == (3,)
+        if not fits or not self.spread.shape == self.rest.shape == (modes,) or not 0 < self.n_speech <= modes:
+            raise DataError("the shape model's mean, basis, spread and rest do not fit each other; build it again")
+        for array in (self.mean, self.basis, self.spread, self.rest):
             array.setflags(write=False)
 
     def shapes(self, parameters: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -116,6 +119,7 @@ def write_talker(path: Path, talker: Talker) -> None:
         "mean": talker.model.mean,
         "basis": talker.model.basis,
         "spread": talker.model.spread,
+        "rest": talker.model.rest,
         "shape": np.clip(np.rint(shape), -32768, 32767).astype(np.int16),
         "head": np.concatenate([utterance.head for utterance in utterances]).astype(np.float16),
         "intensity": np.concatenate([utterance.intensity for utterance in utterances]).astype(np.float16),
@@ -156,7 +160,8 @@ def read_talker(path: Path) -> Talker:
 
 
 def _assembled(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> Talker:
-    model = ShapeModel(arrays["mean"], arrays["basis"], arrays["spread"], int(header.pop("n_speech")))
+    n_speech = int(header.pop("n_speech"))
+    model = ShapeModel(arrays["mean"], arrays["basis"], arrays["spread"], n_speech, arrays["rest"])
     inventory, fps = header.pop("inventory"), float(header.pop("fps"))
     header.pop("head_channels")
     frames = np.concatenate([[0], np.cumsum(arrays["n_frames"])])
