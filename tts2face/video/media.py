@@ -1,0 +1,183 @@
+"""Recordings as they come from disk: pictures and sound on the clock of their file, frame by frame.
+
+Time 0 is the beginning of the file's clock, for pictures and for sound, so that both stay in step.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError, InputError
+from tts2face.types import Waveform
+
+if TYPE_CHECKING:
+    from av.audio.frame import AudioFrame
+    from av.container import InputContainer
+    from av.video.frame import VideoFrame
+    from av.video.stream import VideoStream
+
+LONGEST_SHORTFALL_S = 0.25  # a file that ends this much before its stated end is truncated; codecs pad by less
+QUARTER_TURN_DEG = 90
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What a file says about itself; `rate` is the sound's in Hz, 0 without sound. `duration` in seconds."""
+
+    duration: float
+    fps: float
+    width: int
+    height: int
+    rate: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """One frame upright: `pixels` (H, W, 3) sRGB uint8, shown from `time` seconds on."""
+
+    time: float
+    pixels: NDArray[np.uint8]
+
+
+def media_facts(path: Path) -> Facts:
+    """What a file says about itself, without decoding it.
+
+    Raises
+    ------
+    InputError
+        There is no such file.
+    DataError
+        It is damaged or holds no video.
+    """
+    with _opened(path) as container:
+        stream = _video(container, path)
+        audio = container.streams.audio
+        rate = stream.average_rate or stream.guessed_rate
+        if not rate:
+            raise DataError(f"{path} does not say how many frames it shows per second; convert it with ffmpeg -r")
+        context = stream.codec_context
+        return Facts(
+            (container.duration or 0) / 1e6, float(rate), context.width, context.height, audio[0].rate if audio else 0
+        )
+
+
+def read_pictures(path: Path) -> Iterator[Picture]:
+    """Yield every frame of the first video stream, upright, one at a time.
+
+    Raises
+    ------
+    InputError
+        There is no such file.
+    DataError
+        It holds no video, a frame cannot be decoded, or the file ends before the time that it states.
+    """
+    with _opened(path) as container:
+        stream = _video(container, path)
+        stream.thread_type = "NONE"  # recordings are read in parallel, one process each
+        n_frames, end = 0, 0.0
+        for packet in container.demux():
+            if packet.pts is not None and packet.time_base:
+                end = max(end, float((packet.pts + (packet.duration or 0)) * packet.time_base))
+            if packet.stream is not stream:
+                continue
+            for frame in stream.decode(packet):
+                if frame.is_corrupt:
+                    raise DataError(f"{path} is damaged at {frame.time or 0:.2f} s; copy or record it again")
+                yield Picture(_instant(frame, path), _upright(frame))
+                n_frames += 1
+        _check_complete(path, n_frames, end, (container.duration or 0) / 1e6)
+
+
+def read_sound(path: Path, rate: int) -> Waveform:
+    """Sound of a file as one channel at `rate` Hz; sample 0 is the file's time 0.
+
+    Raises
+    ------
+    InputError
+        There is no such file.
+    DataError
+        It holds no sound or the sound cannot be decoded.
+    """
+    import soxr
+
+    blocks: list[NDArray[np.float32]] = []
+    with _opened(path) as container:
+        if not container.streams.audio:
+            raise DataError(f"{path} holds no sound; give a recording with its sound track")
+        stream = container.streams.audio[0]
+        start = 0.0
+        for frame in container.decode(stream):
+            if not blocks:
+                start = float(frame.time or 0.0)
+            blocks.append(_mono(frame))
+        source_rate = stream.rate
+    if not blocks:
+        raise DataError(f"{path} holds a sound track without a sample; give a recording with its sound")
+    sound = _placed(np.concatenate(blocks), round(start * source_rate))
+    return Waveform(np.clip(soxr.resample(sound, source_rate, rate), -1.0, 1.0), rate)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator["InputContainer"]:
+    import av
+
+    if not path.is_file():
+        raise InputError(f"there is no recording {path}; check the path")
+    if path.stat().st_size == 0:
+        raise DataError(f"{path} is empty (0 bytes); copy or record it again")
+    try:
+        with av.open(str(path)) as container:
+            yield container
+    except (av.FFmpegError, OSError) as broken:
+        reason = getattr(broken, "strerror", None) or broken
+        raise DataError(f"{path} cannot be read as video or sound ({reason}); copy or convert it") from broken
+
+
+def _video(container: "InputContainer", path: Path) -> "VideoStream":
+    if not container.streams.video:
+        raise DataError(f"{path} holds no video; give a recording with pictures")
+    return container.streams.video[0]
+
+
+def _instant(frame: "VideoFrame", path: Path) -> float:
+    if frame.time is None:
+        raise DataError(f"{path} has frames without a time; convert it with ffmpeg")
+    return float(frame.time)
+
+
+def _upright(frame: "VideoFrame") -> NDArray[np.uint8]:
+    pixels = frame.to_ndarray(format="rgb24").astype(np.uint8, copy=False)
+    turns = round(frame.rotation / QUARTER_TURN_DEG) % 4
+    return np.ascontiguousarray(np.rot90(pixels, turns)) if turns else pixels
+
+
+def _check_complete(path: Path, n_frames: int, end: float, stated: float) -> None:
+    if n_frames == 0:
+        raise DataError(f"{path} holds a video track without a frame; copy or record it again")
+    if end < stated - LONGEST_SHORTFALL_S:
+        raise DataError(f"{path} is truncated: it ends at {end:.2f} s of {stated:.2f} s; copy it again")
+
+
+def _mono(frame: "AudioFrame") -> NDArray[np.float32]:
+    samples: NDArray[Any] = frame.to_ndarray()
+    channels = frame.layout.nb_channels
+    if not frame.format.is_planar:
+        samples = samples.reshape(-1, channels).T
+    mean: NDArray[np.float64] = samples.astype(np.float64).mean(axis=0)
+    if samples.dtype == np.uint8:
+        mean = (mean - 128.0) / 128.0
+    elif np.issubdtype(samples.dtype, np.integer):
+        mean = mean / -float(np.iinfo(samples.dtype).min)
+    return mean.astype(np.float32)
+
+
+def _placed(samples: NDArray[np.float32], offset: int) -> NDArray[np.float32]:
+    """Samples on a clock on which they begin `offset` samples after 0."""
+    if offset >= 0:
+        return np.concatenate([np.zeros(offset, np.float32), samples])
+    return samples[-offset:]

@@ -1,0 +1,227 @@
+"""Face landmarks in pictures: 478 points per frame with a score, no filter over time.
+
+Networks: BlazeFace finds the face once, the face mesh (Kartynnik et al. 2019) reads each frame from a square around the
+previous frame's landmarks. A filter over time would blunt lip closures and lag (docs/decisions.md), so there is none.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import astuple, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import BackendError, DataError
+from tts2face.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS
+from tts2face.video.model import find_bundle, load_network
+
+N_MESH = 468  # landmarks of the face mesh; the iris points follow
+LEAST_SCORE = 0.5  # the mesh network's own face probability; below it the landmarks are noise
+LEAST_CONTRAST = 2.0  # standard deviation of pixel values; a blank frame has 0, a dark face about 20
+DETECTOR_SIZE = 128  # pixels of the detector's square input
+MESH_SIZE = 256  # pixels of the mesh network's square input
+CROP_SCALE = 1.5  # side of the square over the longer side of the landmarks' box, as the mesh network was trained
+CROP_SMOOTHING_S = 0.16  # standard deviation; slower than speech, faster than a turn of the head
+CROP_STEP = 0.015  # of the square's side: the second pass's two squares lie this much either side
+DETECTOR_GRIDS = ((16, 2), (8, 6))  # cells per side and anchors per cell of BlazeFace's two feature maps
+
+
+@dataclass(frozen=True, slots=True)
+class Crop:
+    """A square of the picture, turned so that the eyes lie level: centre and side in pixels, angle in radians."""
+
+    x: float
+    y: float
+    side: float
+    angle: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracking:
+    """Landmarks of T frames.
+
+    Parameters
+    ----------
+    points : (T, 478, 3)
+        Pixels: x right, y down from the top left pixel's centre, z away from the camera on the scale of x; NaN where
+        there is no face.
+    scores : (T,)
+        Probability that the landmarks lie on a face; 0 for a blank frame.
+    """
+
+    points: NDArray[np.float32]
+    scores: NDArray[np.float32]
+
+    @property
+    def is_missing(self) -> NDArray[np.bool_]:
+        """(T,) frames without a face."""
+        return np.isnan(self.points[:, 0, 0])
+
+
+class FaceTracker:
+    """Reads landmarks; one face per picture, on one thread.
+
+    Parameters
+    ----------
+    model
+        Bundle of the networks; found as `tts2face.video.model.find_bundle` says when None.
+
+    Raises
+    ------
+    BackendError
+        LiteRT, OpenCV or the bundle is missing.
+    """
+
+    def __init__(self, model: Path | None = None) -> None:
+        bundle = find_bundle(model)
+        self._cv = _opencv()
+        self._detector = load_network(bundle, "face_detector")
+        self._mesh = load_network(bundle, "face_landmarks_detector")
+        self._anchors = _anchors()
+
+    def track(self, pictures: Callable[[], Iterable[NDArray[np.uint8]]], fps: float) -> Tracking:
+        """Landmarks of each (H, W, 3) RGB picture in turn.
+
+        Parameters
+        ----------
+        pictures
+            Gives the pictures from the first on; it is called twice, so that none has to be kept.
+        fps
+            Pictures per second.
+
+        Raises
+        ------
+        DataError
+            There is no picture.
+
+        Notes
+        -----
+        The first pass follows the face. The second reads each picture again from squares whose place is smoothed
+        without lag, and averages them: the square's own jitter is noise on the landmarks, above all on z. The
+        landmarks are never smoothed over time.
+        """
+        followed = [crop for _, crop in self._follow(pictures())]
+        if not followed:
+            raise DataError("there is no picture to track a face in; check the recording")
+        points = np.full((len(followed), N_LANDMARKS, 3), np.nan, np.float32)
+        scores = np.zeros(len(followed), np.float32)
+        for at, (pixels, crop) in enumerate(zip(pictures(), smoothed_crops(followed, fps), strict=False)):
+            if crop is not None:
+                readings = [self.read_crop(pixels, moved) for moved in _moved(crop)]
+                scores[at] = np.mean([score for _, score in readings])
+                if scores[at] >= LEAST_SCORE:
+                    points[at] = np.mean([found for found, _ in readings], axis=0)
+        return Tracking(points, scores)
+
+    def read(self, pixels: NDArray[np.uint8]) -> tuple[NDArray[np.float32], float]:
+        """(478, 3) landmarks of one picture and their score; NaN and 0 where there is no face."""
+        return next((found, score) for (found, score), _ in self._follow([pixels]))
+
+    def detect(self, pixels: NDArray[np.uint8]) -> Crop | None:
+        """Square around the most prominent face, or None."""
+        height, width = pixels.shape[:2]
+        scale = DETECTOR_SIZE / max(height, width)
+        shift = np.array([DETECTOR_SIZE - scale * width, DETECTOR_SIZE - scale * height]) / 2
+        affine = np.array([[scale, 0, shift[0]], [0, scale, shift[1]]])
+        small = self._cv.warpAffine(pixels, affine, (DETECTOR_SIZE, DETECTOR_SIZE), flags=self._cv.INTER_AREA)
+        boxes, logits = self._detector((small.astype(np.float32) / 127.5 - 1.0)[None])
+        best = int(logits[0, :, 0].argmax())
+        if logits[0, best, 0] < 0:
+            return None
+        row = boxes[0, best].reshape(8, 2)  # centre, size, then right eye, left eye, nose, mouth, ears
+        centre, right_eye, left_eye = (row[[0, 2, 3]] + self._anchors[best] * DETECTOR_SIZE - shift) / scale
+        side = CROP_SCALE * float(row[1].max()) / scale
+        level = left_eye - right_eye
+        return Crop(float(centre[0]), float(centre[1]), side, float(np.arctan2(level[1], level[0])))
+
+    def read_crop(self, pixels: NDArray[np.uint8], crop: Crop) -> tuple[NDArray[np.float32], float]:
+        """(478, 3) landmarks in pixels of the picture, and their score, from one square of it."""
+        scale = MESH_SIZE / crop.side
+        cos, sin = np.cos(crop.angle) * scale, np.sin(crop.angle) * scale
+        turn = np.array([[cos, sin], [-sin, cos]])
+        shift = MESH_SIZE / 2 - turn @ (crop.x, crop.y)
+        small = self._cv.warpAffine(
+            pixels,
+            np.column_stack([turn, shift]),
+            (MESH_SIZE, MESH_SIZE),
+            flags=self._cv.INTER_LINEAR if scale > 0.5 else self._cv.INTER_AREA,
+            borderMode=self._cv.BORDER_REPLICATE,
+        )
+        raw = self._mesh((small.astype(np.float32) / 255.0)[None])
+        local = raw[0].reshape(N_LANDMARKS, 3).astype(np.float64)
+        flat = (
+            (local[:, :2] - shift) @ turn / scale**2
+        )  # the inverse of a scaled rotation is its transpose over scale^2
+        score = 1.0 / (1.0 + np.exp(-float(raw[1].ravel()[0])))
+        return np.column_stack([flat, local[:, 2] / scale]).astype(np.float32), score
+
+    def _follow(
+        self, pictures: Iterable[NDArray[np.uint8]]
+    ) -> Iterator[tuple[tuple[NDArray[np.float32], float], Crop | None]]:
+        """Landmarks and score of each picture, and the square around them."""
+        crop: Crop | None = None
+        for pixels in pictures:
+            points, score = np.full((N_LANDMARKS, 3), np.nan, np.float32), 0.0
+            if float(pixels.std()) >= LEAST_CONTRAST:
+                crop = crop or self._found(pixels)
+                if crop is not None:
+                    points, score = self.read_crop(pixels, crop)
+            crop = crop_around(points) if score >= LEAST_SCORE else None
+            yield (points, score), crop
+
+    def _found(self, pixels: NDArray[np.uint8]) -> Crop | None:
+        coarse = self.detect(pixels)
+        return crop_around(self.read_crop(pixels, coarse)[0]) if coarse else None
+
+
+def crop_around(points: NDArray[np.floating]) -> Crop:
+    """Square from which the next frame is read, around (478, 3) landmarks in pixels."""
+    level = points[EYE_OUTER_LEFT, :2] - points[EYE_OUTER_RIGHT, :2]
+    angle = float(np.arctan2(level[1], level[0]))
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    turned = points[:N_MESH, :2].astype(np.float64) @ turn.T
+    low, high = turned.min(axis=0), turned.max(axis=0)
+    centre = turn.T @ ((low + high) / 2)
+    return Crop(float(centre[0]), float(centre[1]), CROP_SCALE * float((high - low).max()), angle)
+
+
+def smoothed_crops(crops: Sequence[Crop | None], fps: float) -> list[Crop | None]:
+    """Squares smoothed over time without lag, each run of pictures with a face by itself."""
+    from scipy.ndimage import gaussian_filter1d
+
+    smooth = list(crops)
+    present = np.array([crop is not None for crop in crops])
+    borders = np.flatnonzero(np.diff(np.concatenate([[False], present, [False]])))
+    for first, last in borders.reshape(-1, 2):
+        rows = np.array([astuple(crop) for crop in crops[first:last] if crop is not None])
+        rows[:, 3] = np.unwrap(rows[:, 3])
+        rows = gaussian_filter1d(rows, CROP_SMOOTHING_S * fps, axis=0, mode="nearest")
+        smooth[first:last] = [Crop(*(float(value) for value in row)) for row in rows]
+    return smooth
+
+
+def _moved(crop: Crop) -> Iterator[Crop]:
+    for sign in (1.0, -1.0):
+        step = sign * CROP_STEP * crop.side
+        yield Crop(crop.x + step, crop.y + step, crop.side * (1.0 + 2.0 * sign * CROP_STEP), crop.angle)
+
+
+def _anchors() -> NDArray[np.float64]:
+    """(896, 2) centres of the detector's anchors as fractions of its input."""
+    rows = []
+    for cells, per_cell in DETECTOR_GRIDS:
+        y, x = np.divmod(np.arange(cells * cells), cells)
+        rows.append(np.repeat(np.column_stack([x + 0.5, y + 0.5]) / cells, per_cell, axis=0))
+    return np.concatenate(rows)
+
+
+def _opencv() -> Any:
+    try:
+        import cv2
+    except ImportError as missing:
+        raise BackendError(
+            "tracking a face needs the package opencv-python-headless: run `pip install 'tts2face[capture]'`"
+        ) from missing
+    cv2.setNumThreads(1)  # recordings are tracked in parallel, one process each
+    return cv2
