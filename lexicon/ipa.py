@@ -19,7 +19,7 @@ SEPARATORS = frozenset("_ .|‖‿\t\n-")
 _TIES = "\u0361\u035c"
 _SYLLABIC = frozenset("\u0329\u030d")
 # Marks that change a phone by less than its neighbours do: they are read and not kept. Superscripts (aspiration,
-# palatalisation, ...), tone letters and digits, ejective and unreleased marks, and signs that espeak-ng leaves as they are
+# palatalisation, ...), tone letters and digits, ejective and unreleased marks, and signs that espeak-ng leaves bare
 # (Quechua p`, Icelandic l#, Korean p-).
 _IGNORED = frozenset('ʰʱʲʷˠˤⁿˡʼ̚ʴʵʶᵝᵊᵐᶮᵑ˞˥˦˧˨˩↗↘ꜛꜜ0123456789¹²³⁴⁵⁶⁷⁸⁹`#^~*?!"ˀˁ\u200d')
 

