@@ -1,0 +1,60 @@
+"""The camera set up for a face: framed so that head and neck fill a picture of any size and aspect."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.face.model import Face
+from tts2face.landmarks import CHIN
+from tts2face.render.views import Camera
+
+FIELD_RAD = math.radians(22.0)  # opening angle across the frame: a portrait lens, which keeps the nose small
+AIR = 0.06  # free space on each side, of the head's size
+NECK = 0.28  # of the head's height, shown under the chin
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Optics:
+    """The camera as the kernels take it.
+
+    `view` (3, 4) brings the world to camera space (x right, y down, z ahead, mm); `lens` (4,) is focal length in
+    samples, centre x, centre y, near plane in mm.
+    """
+
+    view: NDArray[np.float64]
+    lens: NDArray[np.float64]
+
+
+def optics(camera: Camera, face: Face, size: tuple[int, int]) -> Optics:
+    """The camera set up for a face and a picture of `size` (width, height) in samples."""
+    low, high = framed_box(face)
+    yaw, pitch = math.radians(camera.yaw_deg), math.radians(camera.pitch_deg)
+    ahead = -np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)])
+    right = np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
+    turned = np.stack([right, np.cross(ahead, right), ahead])
+    half = np.abs(turned) @ (high - low) / 2  # of the box as the camera sees it
+    half_height = max(half[1], half[0] * size[1] / size[0])
+    reach = half_height / math.tan(FIELD_RAD / 2) + 0.5 * half[2]
+    focal = size[1] / 2 / math.tan(FIELD_RAD / 2) / camera.share
+    distance = camera.distance or float(reach)
+    view = np.column_stack([turned, -turned @ ((low + high) / 2 - distance * ahead)])
+    extent = float(np.abs(face.vertices).max()) + distance
+    near = max(distance / 50, extent * focal * 256 / 2**29)  # keeps places on the grid far from overflow
+    return Optics(view, np.array([focal, size[0] / 2, size[1] / 2, near]))
+
+
+def framed_box(face: Face) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lowest and highest corner, mm, of what shall be in the picture: the head with a piece of neck, and air."""
+    rest = face.vertices.astype(np.float64)
+    low, high = rest.min(axis=0), rest.max(axis=0)
+    chin = np.flatnonzero(face.landmarks == CHIN)
+    if len(chin):
+        chin_y = float(rest[face.landmark_vertices[chin[0]], 1] @ face.landmark_weights[chin[0]])
+        head = rest[rest[:, 1] > chin_y]
+        bottom = max(chin_y - NECK * (high[1] - chin_y), low[1])
+        low, high = head.min(axis=0), head.max(axis=0)
+        low[1] = bottom
+        return low - AIR * (high - low) * [1, 0, 1], high + AIR * (high - low)
+    return low - AIR * (high - low), high + AIR * (high - low)

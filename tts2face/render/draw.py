@@ -1,0 +1,158 @@
+"""A clip's frames as pictures, drawn one after the other and never kept."""
+
+import os
+from collections import deque
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from tts2face.face.linear import REST_HEAD
+from tts2face.face.model import Face
+from tts2face.render.background import background
+from tts2face.render.camera import Optics, optics
+from tts2face.render.light import studio
+from tts2face.render.picture import Picture
+from tts2face.render.resolve import paint
+from tts2face.render.shade import TONE_STEPS
+from tts2face.render.surface import Surface, encoding_table, linear_table, surfaced
+from tts2face.types import Clip
+
+BAND_ROWS = 32  # rows of samples that are drawn, then lit: their buffers stay in a core's cache
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stage:
+    """Everything that stays the same while a face is drawn into pictures."""
+
+    face: Face
+    picture: Picture
+    surface: Surface
+    optics: Optics
+    lights: NDArray[np.float32]
+    behind: NDArray[np.uint8]
+
+
+def staged(face: Face, picture: Picture) -> Stage:
+    """The stage for a face and a picture; make it once, draw many times."""
+    side = picture.supersampling
+    camera = optics(picture.view, face, (picture.width * side, picture.height * side))
+    return Stage(face, picture, surfaced(face), camera, studio(camera), background(picture))
+
+
+def draw(
+    face: Face | Stage,
+    weights: NDArray[np.floating],
+    head: NDArray[np.floating] = REST_HEAD,
+    picture: Picture | None = None,
+) -> NDArray[np.uint8]:
+    """One picture of a face.
+
+    Parameters
+    ----------
+    face
+        A face, or a stage when more pictures follow.
+    weights : (K,)
+        Of the face's shapes.
+    head : (6,)
+        Pose of `tts2face.types.HEAD_CHANNELS`.
+    picture
+        How to draw; the default options without it. Not needed with a stage.
+
+    Returns
+    -------
+    (H, W, 3) or (H, W, 4)
+        sRGB, with coverage (not premultiplied) when the background is transparent.
+
+    Raises
+    ------
+    InputError
+        The number of weights is not the number of the face's shapes.
+    """
+    stage = face if isinstance(face, Stage) else staged(face, picture or Picture())
+    n_shapes = len(stage.face.shape_names)
+    if np.shape(weights) != (n_shapes,):
+        raise InputError(f"the face has {n_shapes} shapes, not weights of shape {np.shape(weights)}")
+    return _drawn(stage, np.asarray(weights, np.float32), np.asarray(head, np.float32), _scratch(stage))
+
+
+def frames(clip: Clip, face: Face | Stage, picture: Picture, threads: int | None = None) -> Iterator[NDArray[np.uint8]]:
+    """Pictures of a clip's frames in order; as many are drawn ahead as there are threads, the rest not yet.
+
+    The bytes do not depend on the number of threads: one thread draws one picture.
+
+    Raises
+    ------
+    InputError
+        The clip's motion is not in the face's shapes.
+    """
+    stage = face if isinstance(face, Stage) else staged(face, picture)
+    if clip.motion.channels != stage.face.shape_names:
+        raise InputError("the clip's motion is not in the shapes of this face; retarget it to the face first")
+    n_threads = threads or available_cores()
+    rooms = deque(_scratch(stage) for _ in range(n_threads))
+
+    def one(weights: NDArray[np.float32], head: NDArray[np.float32]) -> NDArray[np.uint8]:
+        room = rooms.popleft()
+        try:
+            return _drawn(stage, weights, head, room)
+        finally:
+            rooms.append(room)
+
+    with ThreadPoolExecutor(n_threads, "draw") as pool:
+        ahead: deque[Future[NDArray[np.uint8]]] = deque()
+        try:
+            for weights, head in zip(clip.motion.values, clip.head.values, strict=True):
+                ahead.append(pool.submit(one, weights, head))
+                if len(ahead) > n_threads:
+                    yield ahead.popleft().result()
+            while ahead:
+                yield ahead.popleft().result()
+        finally:
+            for waiting in ahead:
+                waiting.cancel()
+
+
+def available_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _scratch(stage: Stage) -> tuple[Any, ...]:
+    n_vertices, n_triangles = len(stage.surface.rig.rest), len(stage.surface.triangles)
+    return (
+        np.zeros((n_vertices, 3), np.float32),
+        np.zeros((n_vertices, 2), np.int32),
+        np.zeros((2 * n_triangles, 6), np.int32),
+        np.zeros(2 * n_triangles, np.int32),
+        np.zeros((n_triangles, 3), np.float32),
+        np.zeros((n_vertices, 3), np.float32),
+    )
+
+
+TABLES = (linear_table(), encoding_table(TONE_STEPS))
+
+
+def _drawn(
+    stage: Stage, weights: NDArray[np.float32], head: NDArray[np.float32], scratch: tuple[Any, ...]
+) -> NDArray[np.uint8]:
+    surface, picture = stage.surface, stage.picture
+    drawn = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
+    points = surface.rig.posed(weights, head)
+    exposure = np.ones((len(points), 4), np.float32)
+    paint(
+        points,
+        (
+            surface.triangles, surface.colours, surface.uv, surface.texture, TABLES[0], surface.textured,
+            surface.part_of, surface.translucent, surface.materials, surface.starts, surface.members, exposure,
+        ),
+        (stage.optics.view, stage.optics.lens, picture.supersampling, BAND_ROWS // 2 * picture.supersampling),
+        (stage.lights, stage.behind, TABLES),
+        scratch,
+        drawn,
+    )  # fmt: skip
+    return drawn

@@ -1,0 +1,116 @@
+"""The Picture: the single list of options for how a clip is drawn. Imports nothing heavy."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from lexicon.errors import InputError
+from tts2face.render.views import Camera, camera_named
+from tts2face.request import option
+
+SIDES = (16, 4096)  # px
+SUPERSAMPLING = (1, 2, 3)
+RENDERERS = ("numba", "pyvista")
+STUDIO, TRANSPARENT = "studio", "transparent"
+COLOURS = {
+    "black": "000000", "white": "ffffff", "grey": "808080", "gray": "808080", "red": "c8282d", "green": "00b140",
+    "blue": "0047bb", "navy": "14213d", "sky": "9ec9e8", "teal": "127475", "yellow": "f2c14e", "orange": "e07a1f",
+    "pink": "f4b6c2", "purple": "5f4b8b", "brown": "6b4f3a", "cream": "f6f0e2",
+}  # fmt: skip  # sRGB; green and blue are those of studio walls for keying
+IMAGES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """How a clip is drawn.
+
+    Raises
+    ------
+    InputError
+        An option is out of range or unknown.
+    """
+
+    size: str = option("512x512", "Width x height in pixels, even numbers from 16 to 4096.")
+    camera: str = option("front", "front, three-quarter, profile, close, or yaw,pitch[,distance] in degrees and mm.")
+    background: str = option("studio", "studio, transparent, a colour (name or #rrggbb), or an image file.")
+    supersampling: int = option(2, "Samples along each side of a pixel: 1, 2 or 3.")
+    renderer: str = option("numba", "numba (any machine) or pyvista (VTK, with a GPU or software GL).")
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be drawn."""
+        sides_of(self.size)
+        camera_named(self.camera)
+        background_kind(self.background)
+        if self.supersampling not in SUPERSAMPLING:
+            raise InputError(f"supersampling must be 1, 2 or 3, not {self.supersampling}")
+        if self.renderer not in RENDERERS:
+            raise InputError(f"there is no renderer {self.renderer!r}; choose numba or pyvista")
+
+    @property
+    def width(self) -> int:
+        """Pixels across."""
+        return sides_of(self.size)[0]
+
+    @property
+    def height(self) -> int:
+        """Pixels down."""
+        return sides_of(self.size)[1]
+
+    @property
+    def view(self) -> Camera:
+        """The camera that `camera` names."""
+        return camera_named(self.camera)
+
+    @property
+    def is_transparent(self) -> bool:
+        """Whether pictures have a fourth channel, their coverage."""
+        return self.background == TRANSPARENT
+
+    @property
+    def channels(self) -> int:
+        """Channels of a picture: 3, or 4 with coverage."""
+        return 4 if self.is_transparent else 3
+
+
+def sides_of(size: str) -> tuple[int, int]:
+    """Width and height of a size such as ``640x480`` or ``512``.
+
+    Raises
+    ------
+    InputError
+        It is not a size, or a side is odd or out of range.
+    """
+    match = re.fullmatch(r"\s*(\d{1,9})\s*(?:[xX×,]\s*(\d{1,9})\s*)?", size)
+    if match is None:
+        raise InputError(f"size must be width x height such as 640x480, not {size!r}")
+    width, height = int(match[1]), int(match[2] or match[1])
+    for side in (width, height):
+        if not SIDES[0] <= side <= SIDES[1] or side % 2:
+            raise InputError(f"size must be even numbers from {SIDES[0]} to {SIDES[1]} pixels, not {width}x{height}")
+    return width, height
+
+
+def background_kind(background: str) -> tuple[int, int, int] | Path | str:
+    """Colour (sRGB, 0-255), image path, or the word ``studio`` or ``transparent``.
+
+    Raises
+    ------
+    InputError
+        It is none of them, or there is no such image.
+    """
+    if background in (STUDIO, TRANSPARENT):
+        return background
+    digits = COLOURS.get(background.lower(), background.removeprefix("#"))
+    if re.fullmatch(r"[0-9a-fA-F]{3}", digits):
+        digits = "".join(2 * digit for digit in digits)
+    if re.fullmatch(r"[0-9a-fA-F]{6}", digits):
+        return int(digits[:2], 16), int(digits[2:4], 16), int(digits[4:], 16)
+    path = Path(background)
+    if path.suffix.lower() not in IMAGES:
+        raise InputError(
+            f"there is no background {background!r}; give studio, transparent, #rrggbb, an image file, "
+            f"or one of {', '.join(COLOURS)}"
+        )
+    if not path.is_file():
+        raise InputError(f"there is no background image {background}; check the path")
+    return path

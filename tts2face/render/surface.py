@@ -1,0 +1,116 @@
+"""What stays the same from picture to picture: a face's triangles, colours and materials, ready for the kernels."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.face.linear import FaceRig, rigged
+from tts2face.face.model import Face
+
+OPEN_SHARE = 0.05  # parts with more than this share of free edges are sheets that both sides of are lit
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """A face made ready to be drawn.
+
+    ``triangles`` (F, 3); ``colours`` (V, 3) linear light; ``uv`` (V, 2), ``texture`` (H, W, 3) sRGB; ``textured``,
+    ``part_of``, ``translucent`` (F,); ``materials`` (P, 6) as `tts2face.render.shade` names its columns; the triangles
+    around vertex v are ``members[starts[v]:starts[v + 1]]``, those of vertices at the same place and of the same
+    part included, so that a seam of the texture does not show.
+    """
+
+    rig: FaceRig
+    triangles: NDArray[np.int32]
+    colours: NDArray[np.float32]
+    uv: NDArray[np.float32]
+    texture: NDArray[np.uint8]
+    textured: NDArray[np.bool_]
+    part_of: NDArray[np.int32]
+    translucent: NDArray[np.int8]
+    materials: NDArray[np.float32]
+    starts: NDArray[np.int64]
+    members: NDArray[np.int32]
+
+
+def surfaced(face: Face) -> Surface:
+    """The surface of a face."""
+    parts = face.parts
+    counts = [part.count for part in parts]
+    part_of = np.repeat(np.arange(len(parts), dtype=np.int32), counts)
+    has_texture = face.uv is not None and face.texture is not None
+    textured = np.repeat([part.textured and has_texture for part in parts], counts)
+    translucent = np.repeat([part.opacity < 1 for part in parts], counts)
+    triangles = np.array(face.triangles, np.int32)
+    starts, members = _neighbours(face, triangles, part_of)
+    return Surface(
+        rig=rigged(face),
+        triangles=triangles,
+        colours=linear_light(face.colours),
+        uv=np.array(face.uv, np.float32) if face.uv is not None else np.zeros((1, 2), np.float32),
+        texture=np.array(face.texture) if face.texture is not None else np.zeros((1, 1, 3), np.uint8),
+        textured=textured.astype(np.bool_),
+        part_of=part_of,
+        translucent=translucent.astype(np.int8),
+        materials=_materials(face, triangles, part_of),
+        starts=starts,
+        members=members,
+    )
+
+
+def linear_light(srgb: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Linear light in [0, 1] of 8-bit sRGB values (IEC 61966-2-1)."""
+    return linear_table()[srgb]
+
+
+def linear_table() -> NDArray[np.float32]:
+    """(256,) linear light of each 8-bit sRGB value."""
+    value = np.arange(256) / 255.0
+    table: NDArray[np.float32] = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4).astype(
+        np.float32
+    )
+    return table
+
+
+def encoding_table(n_steps: int) -> NDArray[np.uint8]:
+    """(n_steps,) 8-bit sRGB values of linear light from 0 to 1 in equal steps."""
+    light = np.linspace(0.0, 1.0, n_steps)
+    srgb = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    return np.rint(255.0 * srgb).astype(np.uint8)
+
+
+def _materials(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> NDArray[np.float32]:
+    rows = []
+    for number, part in enumerate(face.parts):
+        sheet = _free_edge_share(triangles[part_of == number]) > OPEN_SHARE
+        rows.append((part.specular, part.shininess, part.wrap, part.opacity, part.textured, sheet))
+    return np.array(rows, np.float32).reshape(-1, 6)
+
+
+def _free_edge_share(triangles: NDArray[np.int32]) -> float:
+    if not len(triangles):
+        return 0.0
+    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, uses = np.unique(edges, axis=0, return_counts=True)
+    return float((uses == 1).mean())
+
+
+def _neighbours(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> tuple[Any, Any]:
+    """Triangles around each vertex, vertices welded that lie and move together in one part."""
+    n_vertices = len(face.vertices)
+    vertex_part = np.full(n_vertices, -1)
+    vertex_part[triangles.ravel()] = np.repeat(part_of, 3)
+    mix = np.cos(np.arange(1, len(face.shapes) + 1))  # any fixed numbers: tells apart vertices that move differently
+    key = np.column_stack([face.vertices, np.tensordot(mix, face.shapes, axes=1), vertex_part])
+    _, weld = np.unique(np.rint(key * 1000).astype(np.int64), axis=0, return_inverse=True)
+    corner = weld.ravel()[triangles.ravel()]
+    order = np.argsort(corner, kind="stable")
+    counts = np.bincount(corner, minlength=int(weld.max(initial=-1)) + 1)
+    begins = np.concatenate([[0], np.cumsum(counts)])
+    around = (order // 3).astype(np.int32)
+    sizes = counts[weld.ravel()]
+    starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+    picks = np.repeat(begins[weld.ravel()] - starts[:-1], sizes) + np.arange(starts[-1])
+    return starts, around[picks]

@@ -1,0 +1,57 @@
+"""Where the camera may stand: named views, or angles and a distance."""
+
+import math
+from dataclasses import dataclass
+
+from lexicon.errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """A view of the head.
+
+    Degrees towards the face's own left and from above; mm from its middle (0: as far as frames it well); share of the
+    head that is shown.
+    """
+
+    yaw_deg: float
+    pitch_deg: float
+    distance: float = 0.0
+    share: float = 1.0
+
+
+NAMED = {
+    "front": Camera(0.0, 3.0),
+    "three-quarter": Camera(38.0, 4.0),
+    "profile": Camera(88.0, 2.0),
+    "close": Camera(0.0, 2.0, share=0.62),
+}
+FURTHEST_MM = 100_000.0
+NEAREST_MM = 50.0
+
+
+def camera_named(text: str) -> Camera:
+    """The camera of a name, or of ``yaw,pitch`` or ``yaw,pitch,distance`` in degrees and mm.
+
+    Raises
+    ------
+    InputError
+        There is no such name, or the numbers are out of range.
+    """
+    if text in NAMED:
+        return NAMED[text]
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if not 2 <= len(numbers) <= 3 or not all(math.isfinite(number) for number in numbers):
+        raise InputError(
+            f"there is no camera {text!r}; choose one of {', '.join(NAMED)}, or give yaw,pitch,distance such as 20,5,900"
+        )
+    yaw, pitch = numbers[:2]
+    distance = numbers[2] if len(numbers) == 3 else 0.0
+    if abs(yaw) > 180 or abs(pitch) > 85 or (len(numbers) == 3 and not NEAREST_MM <= distance <= FURTHEST_MM):
+        raise InputError(
+            f"camera {text!r} is out of range; yaw is -180 to 180 and pitch -85 to 85 degrees, distance 50 to 100000 mm"
+        )
+    return Camera(yaw, pitch, distance)
