@@ -100,7 +100,7 @@ def read_dictionary(path: Path) -> Dictionary:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as missing:
-        raise DataError(f"dictionary {path} cannot be read ({missing.strerror}); give the path of a text file") from missing
+        raise DataError(f"dictionary {path} cannot be read ({missing.strerror}); give a text file") from missing
     except UnicodeDecodeError as wrong:
         raise DataError(f"dictionary {path} is not UTF-8 (byte {wrong.start}); save it as UTF-8 text") from wrong
     return parse_dictionary(text, str(path))

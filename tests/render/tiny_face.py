@@ -28,9 +28,9 @@ def ball(centre, radius, n_rings):
     return np.asarray(centre) + radius * points, np.array(triangles)
 
 
-def tiny_face(textured=False):
+def tiny_face(textured=False, n_rings=14):
     """The face; with `textured`, the skin is chequered by a texture."""
-    skin, skin_triangles = ball((0, -20, -60), RADIUS, 14)
+    skin, skin_triangles = ball((0, -20, -60), RADIUS, n_rings)
     left, eye_triangles = ball((32, 0, 14), 13, 8)
     right, _ = ball((-32, 0, 14), 13, 8)
     tongue, tongue_triangles = ball((0, -60, 18), 8, 6)

@@ -202,7 +202,7 @@ def _assembled(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) ->
         limits=arrays["limits"],
         eyes=tuple(eyes),
         colours=arrays["colours"],
-        uv=arrays["uv"].astype(np.float32) / 65535 if "uv" in arrays else None,
+        uv=(arrays["uv"] / 65535).astype(np.float32) if "uv" in arrays else None,
         texture=_pixels(arrays["texture"]) if "texture" in arrays else None,
         landmarks=arrays["landmarks"],
         landmark_vertices=arrays["landmark_vertices"],

@@ -15,14 +15,16 @@ from tts2face.face.linear import REST_HEAD
 from tts2face.face.model import Face
 from tts2face.render.background import background
 from tts2face.render.camera import Optics, optics
+from tts2face.render.fragments import COLOUR, EXPOSURE, N_ROWS, N_VERTEX_COLUMNS, UV
 from tts2face.render.light import studio
 from tts2face.render.picture import Picture
+from tts2face.render.raster import N_LAYERS
 from tts2face.render.resolve import paint
-from tts2face.render.shade import TONE_STEPS
 from tts2face.render.surface import Surface, encoding_table, linear_table, surfaced
 from tts2face.types import Clip
 
-BAND_ROWS = 32  # rows of samples that are drawn, then lit: their buffers stay in a core's cache
+BAND_SAMPLES = 32_768  # of a band of rows that is drawn, then lit: its buffers stay in a core's cache
+TONE_STEPS = 8192  # entries of the table from linear light to 8 bits; fine enough for its darkest step
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,14 +125,31 @@ def available_cores() -> int:
 
 
 def _scratch(stage: Stage) -> tuple[Any, ...]:
-    n_vertices, n_triangles = len(stage.surface.rig.rest), len(stage.surface.triangles)
+    """Room for one picture at a time, and in its vertex table what does not change."""
+    surface, side = stage.surface, stage.picture.supersampling
+    n_vertices, n_triangles = len(surface.rig.rest), len(surface.triangles)
+    width, height = stage.picture.width * side, stage.picture.height * side
+    rows = side * max(1, BAND_SAMPLES // (width * side))
+    n_pixels, n_hits = width * rows // side**2, N_LAYERS * width * rows + 80  # rows that do not begin in one set of the cache
+    vertex = np.zeros((n_vertices, N_VERTEX_COLUMNS), np.float32)
+    vertex[:, EXPOSURE : EXPOSURE + 4] = 1.0
+    vertex[:, COLOUR : COLOUR + 3] = surface.colours
+    vertex[:, UV : UV + 2] = surface.uv
+    hits = (np.zeros(n_hits, np.int32), np.zeros((n_hits, 3), np.float32), *np.zeros((2, n_hits), np.int32))
+    table = tuple(np.zeros((n_rows, n_hits), np.float32) for n_rows in (N_ROWS, 4, 3))
     return (
-        np.zeros((n_vertices, 3), np.float32),
+        vertex,
         np.zeros((n_vertices, 2), np.int32),
+        np.zeros((n_triangles, 3), np.float32),
         np.zeros((2 * n_triangles, 6), np.int32),
         np.zeros(2 * n_triangles, np.int32),
-        np.zeros((n_triangles, 3), np.float32),
-        np.zeros((n_vertices, 3), np.float32),
+        np.zeros(-(-height // rows) + 1, np.int64),
+        np.zeros(3 * n_triangles, np.int32),
+        np.zeros((N_LAYERS, rows, width), np.float32),
+        np.zeros((N_LAYERS, rows, width), np.int32),
+        hits,
+        table,
+        np.zeros((n_pixels, 6), np.int32),
     )
 
 
@@ -142,17 +161,19 @@ def _drawn(
 ) -> NDArray[np.uint8]:
     surface, picture = stage.surface, stage.picture
     drawn = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
-    points = surface.rig.posed(weights, head)
-    exposure = np.ones((len(points), 4), np.float32)
+    drawn[:, :, :3] = stage.behind
     paint(
-        points,
+        surface.rig.posed(weights, head),
         (
-            surface.triangles, surface.colours, surface.uv, surface.texture, TABLES[0], surface.textured,
-            surface.part_of, surface.translucent, surface.materials, surface.starts, surface.members, exposure,
+            surface.triangles,
+            surface.translucent,
+            (surface.part_of, surface.materials, surface.texture),
+            surface.starts,
+            surface.members,
         ),
-        (stage.optics.view, stage.optics.lens, picture.supersampling, BAND_ROWS // 2 * picture.supersampling),
-        (stage.lights, stage.behind, TABLES),
+        (stage.optics.view, stage.optics.lens, picture.supersampling),
+        (stage.lights, TABLES),
         scratch,
         drawn,
-    )  # fmt: skip
+    )
     return drawn

@@ -7,8 +7,14 @@ on one thread: pictures are drawn side by side, so their bytes cannot depend on 
 right, y down, z ahead, mm. Sources: Pineda 1988 (edge functions), Olano and Greer 1997 (planes of the uncut triangle).
 """
 
+from typing import Any
+
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
+
+from tts2face.render.compiled import inlined, kernel
+
+Array = NDArray[Any]
 
 SHIFT = 8
 GRID = 1 << SHIFT  # steps of the snapping grid in one sample
@@ -18,11 +24,12 @@ BACK_BIAS = np.float32(1.0 - 3e-4)  # back faces lie 0.3 permille further away: 
 N_LAYERS = 3  # the opaque surface and the two nearest translucent ones before it
 
 
-@njit(cache=True, nogil=True)
-def to_camera(points, view, lens, camera, grid):  # type: ignore[no-untyped-def]
+@kernel
+def to_camera(points: Array, view: Array, lens: Array, camera: Array, grid: Array) -> None:
     """Write camera space and snapped picture place of (V, 3) world points; the latter only beyond the near plane.
 
     `view` (3, 4) brings the world to camera space; `lens` is (focal length in samples, centre x, centre y, near plane).
+    The first three columns of `camera` are written.
     """
     focal, middle_x, middle_y, near = lens[0], lens[1], lens[2], lens[3]
     for v in range(len(points)):
@@ -36,71 +43,67 @@ def to_camera(points, view, lens, camera, grid):  # type: ignore[no-untyped-def]
             grid[v, 1] = np.int32(np.rint((middle_y + focal * down / ahead) * GRID))
 
 
-@njit(cache=True, nogil=True)
-def cut(camera, inside, outside, lens):  # type: ignore[no-untyped-def]
-    """Snapped place where an edge meets the near plane; the same for both triangles of the edge."""
-    near = lens[3]
-    depth_in, depth_out = np.float64(camera[inside, 2]), np.float64(camera[outside, 2])
-    share = (depth_in - near) / (depth_in - depth_out)
-    right = camera[inside, 0] + share * (camera[outside, 0] - camera[inside, 0])
-    down = camera[inside, 1] + share * (camera[outside, 1] - camera[inside, 1])
-    column = np.int64(np.rint((lens[1] + lens[0] * right / near) * GRID))
-    row = np.int64(np.rint((lens[2] + lens[0] * down / near) * GRID))
-    return column, row
-
-
-@njit(cache=True, nogil=True)
-def area_in_picture(x0, y0, x1, y1, x2, y2, size):  # type: ignore[no-untyped-def]
-    """Twice the signed area on the grid, or 0 when no sample of the picture lies inside."""
-    low_x, high_x = min(x0, x1, x2), max(x0, x1, x2)
-    low_y, high_y = min(y0, y1, y2), max(y0, y1, y2)
-    left, right = max((low_x + HALF - 1) >> SHIFT, 0), min((high_x - HALF) >> SHIFT, size[0] - 1)
-    top, bottom = max((low_y + HALF - 1) >> SHIFT, 0), min((high_y - HALF) >> SHIFT, size[1] - 1)
-    if left > right or top > bottom:
-        return np.int64(0)
-    return (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
-
-
-@njit(cache=True, nogil=True)
-def clipped(camera, grid, triangle, lens, polygon):  # type: ignore[no-untyped-def]
+@kernel
+def near_cut(camera: Array, grid: Array, triangle: Array, lens: Array, polygon: Array) -> int:
     """Snapped corners of the part of a triangle beyond the near plane; returns how many (0, 3 or 4)."""
     near = lens[3]
     n_corners = 0
     for c in range(3):
         here, after = triangle[c], triangle[(c + 1) % 3]
-        if camera[here, 2] >= near:
+        here_seen, after_seen = camera[here, 2] >= near, camera[after, 2] >= near
+        if here_seen:
             polygon[n_corners, 0], polygon[n_corners, 1] = grid[here, 0], grid[here, 1]
             n_corners += 1
-            if camera[after, 2] < near:
-                polygon[n_corners, 0], polygon[n_corners, 1] = cut(camera, here, after, lens)
-                n_corners += 1
-        elif camera[after, 2] >= near:
-            polygon[n_corners, 0], polygon[n_corners, 1] = cut(camera, after, here, lens)
-            n_corners += 1
+        if here_seen == after_seen:
+            continue
+        inside, outside = (here, after) if here_seen else (after, here)  # the same for both triangles of the edge
+        depth_in, depth_out = np.float64(camera[inside, 2]), np.float64(camera[outside, 2])
+        share = (depth_in - near) / (depth_in - depth_out)
+        right = camera[inside, 0] + share * (camera[outside, 0] - camera[inside, 0])
+        down = camera[inside, 1] + share * (camera[outside, 1] - camera[inside, 1])
+        polygon[n_corners, 0] = np.int64(np.rint((lens[1] + lens[0] * right / near) * GRID))
+        polygon[n_corners, 1] = np.int64(np.rint((lens[2] + lens[0] * down / near) * GRID))
+        n_corners += 1
     return n_corners
 
 
-@njit(cache=True, nogil=True)
-def gather(camera, grid, triangles, lens, size, corners, source):  # type: ignore[no-untyped-def]
+@inlined
+def may_be_seen(low: int, high: int, n_samples: int) -> bool:
+    """Whether a sample's middle lies within a range of the grid and of the picture."""
+    return bool(max((low + HALF - 1) >> SHIFT, 0) <= min((high - HALF) >> SHIFT, n_samples - 1))
+
+
+@kernel
+def gather(camera: Array, grid: Array, triangles: Array, optics: tuple[Any, Any], corners: Array, source: Array) -> int:
     """Triangles that may be seen, as snapped corners in one winding; returns how many.
 
     Parameters
     ----------
-    size
-        (width, height) of the picture in samples.
+    optics
+        Lens, and (width, height) of the picture in samples.
     corners : (2 F, 6)
         Out: x, y of three corners on the grid, positive area.
     source : (2 F,)
         Out: the triangle's number t, or ~t where its back is seen.
     """
+    lens, size = optics
     count = 0
     polygon = np.zeros((4, 2), np.int64)
     for t in range(len(triangles)):
-        n_corners = clipped(camera, grid, triangles[t], lens, polygon)
+        n_corners = 3
+        if min(camera[triangles[t, 0], 2], camera[triangles[t, 1], 2], camera[triangles[t, 2], 2]) >= lens[3]:
+            for c in range(3):
+                polygon[c, 0], polygon[c, 1] = grid[triangles[t, c], 0], grid[triangles[t, c], 1]
+        else:
+            n_corners = near_cut(camera, grid, triangles[t], lens, polygon)
         for c in range(1, n_corners - 1):
             x0, y0, x1, y1 = polygon[0, 0], polygon[0, 1], polygon[c, 0], polygon[c, 1]
             x2, y2 = polygon[c + 1, 0], polygon[c + 1, 1]
-            area = area_in_picture(x0, y0, x1, y1, x2, y2, size)
+            if not may_be_seen(min(x0, x1, x2), max(x0, x1, x2), size[0]):
+                continue
+            if not may_be_seen(min(y0, y1, y2), max(y0, y1, y2), size[1]):
+                continue
+            area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
             if area == 0:
                 continue
             if area < 0:  # y runs down: counter-clockwise seen from outside has negative area
@@ -112,38 +115,45 @@ def gather(camera, grid, triangles, lens, size, corners, source):  # type: ignor
     return count
 
 
-@njit(cache=True, nogil=True)
-def bands_of(corners, i, band_rows, n_bands):  # type: ignore[no-untyped-def]
-    """First and last band of rows that a triangle touches."""
-    low = np.int64(min(corners[i, 1], corners[i, 3], corners[i, 5])) >> SHIFT
-    high = np.int64(max(corners[i, 1], corners[i, 3], corners[i, 5])) >> SHIFT
-    return max(low // band_rows, 0), min(high // band_rows, n_bands - 1)
+@kernel
+def sort_into_bands(corners: Array, count: int, band_rows: int, starts: Array, members: Array) -> None:
+    """Triangles by the bands of rows that they touch, in their own order (counting sort).
+
+    Band b is ``members[starts[b]:starts[b + 1]]``. With `members` too short, only `starts` is written.
+    """
+    n_bands = len(starts) - 1
+    starts[:] = 0
+    for turn in range(2):
+        for i in range(count):
+            low = np.int64(min(corners[i, 1], corners[i, 3], corners[i, 5])) >> SHIFT
+            high = np.int64(max(corners[i, 1], corners[i, 3], corners[i, 5])) >> SHIFT
+            for band in range(max(low // band_rows, 0), min(high // band_rows, n_bands - 1) + 1):
+                if turn == 0:
+                    starts[band + 1] += 1
+                else:
+                    members[starts[band]] = i
+                    starts[band] += 1
+        if turn == 0:
+            for band in range(n_bands):
+                starts[band + 1] += starts[band]
+            if starts[n_bands] > len(members):
+                return
+    for band in range(n_bands, 0, -1):
+        starts[band] = starts[band - 1]
+    starts[0] = 0
 
 
-@njit(cache=True, nogil=True)
-def sort_into_bands(corners, count, band_rows, n_bands):  # type: ignore[no-untyped-def]
-    """Triangles by the bands of rows that they touch, in their own order: (starts, members) (counting sort)."""
-    starts = np.zeros(n_bands + 1, np.int64)
-    for i in range(count):
-        low, high = bands_of(corners, i, band_rows, n_bands)
-        for band in range(low, high + 1):
-            starts[band + 1] += 1
-    for band in range(n_bands):
-        starts[band + 1] += starts[band]
-    members = np.zeros(starts[n_bands], np.int32)
-    at = starts[:-1].copy()
-    for i in range(count):
-        low, high = bands_of(corners, i, band_rows, n_bands)
-        for band in range(low, high + 1):
-            members[at[band]] = i
-            at[band] += 1
-    return starts, members
+@inlined
+def edge(ax: int, ay: int, bx: int, by: int, px: int, py: int) -> int:
+    """Edge function of a directed edge at a point, lowered by one where the edge does not own its samples."""
+    owns = (by < ay) | ((by == ay) & (bx > ax))  # left edges and top edges
+    return (bx - ax) * (py - ay) - (by - ay) * (px - ax) - (0 if owns else 1)
 
 
-@njit(cache=True, nogil=True)
-def depth_plane(camera, triangle, lens):  # type: ignore[no-untyped-def]
+@kernel
+def depth_plane(camera: Array, triangles: Array, t: int, lens: Array) -> tuple[float, float, float, float, float]:
     """1/z of a triangle as a linear function of the sample's place: (per column, per row, at 0, least, most)."""
-    a, b, c = triangle[0], triangle[1], triangle[2]
+    a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     ax, ay, az = np.float64(camera[a, 0]), np.float64(camera[a, 1]), np.float64(camera[a, 2])
     e1x, e1y, e1z = camera[b, 0] - ax, camera[b, 1] - ay, camera[b, 2] - az
     e2x, e2y, e2z = camera[c, 0] - ax, camera[c, 1] - ay, camera[c, 2] - az
@@ -158,89 +168,68 @@ def depth_plane(camera, triangle, lens):  # type: ignore[no-untyped-def]
     return across, along, nz / distance - across * lens[1] - along * lens[2], least, most
 
 
-@njit(cache=True, nogil=True)
-def edge(ax, ay, bx, by, px, py):  # type: ignore[no-untyped-def]
-    """Edge function of a directed edge at a point, lowered by one where the edge does not own its samples."""
-    value = (bx - ax) * (py - ay) - (by - ay) * (px - ax)
-    owns = by < ay or (by == ay and bx > ax)  # left edges and top edges
-    return value if owns else value - 1
-
-
-@njit(cache=True, nogil=True)
-def enter(depth, owner, layer, r, x, near, number):  # type: ignore[no-untyped-def]
-    """Put a sample of a triangle where its depth belongs."""
-    if near <= depth[0, r, x]:
-        return
-    if layer == 0:
-        depth[0, r, x], owner[0, r, x] = near, number
-    elif near > depth[1, r, x]:
-        depth[2, r, x], owner[2, r, x] = depth[1, r, x], owner[1, r, x]
-        depth[1, r, x], owner[1, r, x] = near, number
-    elif near > depth[2, r, x]:
-        depth[2, r, x], owner[2, r, x] = near, number
-
-
-@njit(cache=True, nogil=True)
-def draw_triangle(corner, number, layer, plane, first_row, depth, owner):  # type: ignore[no-untyped-def]
-    """Enter one triangle into a band's samples.
+@kernel
+def draw_band(
+    geometry: tuple[Any, Any, Any, Any], batch: tuple[Any, Any, Any], first_row: int, depth: Array, owner: Array
+) -> int:
+    """Clear a band of rows and draw its triangles, first the opaque ones; returns how many are translucent.
 
     Parameters
     ----------
-    corner : (6,)
-        Snapped corners with positive area.
-    number
-        What `owner` shall hold.
-    layer
-        0: opaque; 1: translucent, to be drawn after everything opaque.
-    plane
-        Of `depth_plane`.
+    geometry
+        Camera space (V, 3 or more), triangles (F, 3), marks of translucent ones (F,), lens.
+    batch
+        Corners, source, and the rows of both that touch the band.
     first_row
         The band's first row of samples.
     depth, owner : (3, R, W)
         1/z and number of the opaque surface and of the two nearest translucent ones before it.
     """
-    x0, y0, x1 = np.int64(corner[0]), np.int64(corner[1]), np.int64(corner[2])
-    y1, x2, y2 = np.int64(corner[3]), np.int64(corner[4]), np.int64(corner[5])
-    left = max((min(x0, x1, x2) + HALF - 1) >> SHIFT, 0)
-    right = min((max(x0, x1, x2) - HALF) >> SHIFT, depth.shape[2] - 1)
-    top = max((min(y0, y1, y2) + HALF - 1) >> SHIFT, first_row)
-    bottom = min((max(y0, y1, y2) - HALF) >> SHIFT, first_row + depth.shape[1] - 1)
-    px, py = (left << SHIFT) + HALF, (top << SHIFT) + HALF
-    row_0, row_1, row_2 = edge(x1, y1, x2, y2, px, py), edge(x2, y2, x0, y0, px, py), edge(x0, y0, x1, y1, px, py)
-    across, along, origin, least, most = plane
-    bias = np.float32(1.0) if number >= 0 else BACK_BIAS
-    for y in range(top, bottom + 1):
-        e0, e1, e2 = row_0, row_1, row_2
-        base = origin + along * (y + 0.5) + across * (left + 0.5)
-        for x in range(left, right + 1):
-            if (e0 | e1 | e2) >= 0:
-                near = np.float32(min(max(base, least), most)) * bias
-                enter(depth, owner, layer, y - first_row, x, near, number)
-            base += across
-            e0, e1, e2 = e0 - ((y2 - y1) << SHIFT), e1 - ((y0 - y2) << SHIFT), e2 - ((y1 - y0) << SHIFT)
-        row_0, row_1 = row_0 + ((x2 - x1) << SHIFT), row_1 + ((x0 - x2) << SHIFT)
-        row_2 += (x1 - x0) << SHIFT
-
-
-@njit(cache=True, nogil=True)
-def draw_band(camera, triangles, lens, translucent, batch, first_row, depth, owner):  # type: ignore[no-untyped-def]
-    """Clear a band of rows and draw its triangles, first the opaque ones; returns how many are translucent.
-
-    `translucent` (F,) marks triangles; `batch` is (corners, source, members) of this band.
-    """
+    camera, triangles, translucent, lens = geometry
     corners, source, members = batch
-    depth[:] = 0
-    owner[:] = NOTHING
+    n_rows, width = depth.shape[1], depth.shape[2]
+    depth[0], owner[0] = np.float32(0), NOTHING
     n_translucent = 0
-    for layer in range(2):
-        if layer == 1 and n_translucent == 0:
-            break
+    for i in members:
+        number = source[i]
+        n_translucent += translucent[number if number >= 0 else ~number]
+    if n_translucent:
+        depth[1:], owner[1:] = np.float32(0), NOTHING
+    for layer in range(2 if n_translucent else 1):
         for i in members:
             number = source[i]
             t = number if number >= 0 else ~number
-            if translucent[t] == layer:
-                plane = depth_plane(camera, triangles[t], lens)
-                draw_triangle(corners[i], number, layer, plane, first_row, depth, owner)
-            elif layer == 0:
-                n_translucent += 1
-    return n_translucent
+            if translucent[t] != layer:
+                continue
+            x0, y0, x1 = np.int64(corners[i, 0]), np.int64(corners[i, 1]), np.int64(corners[i, 2])
+            y1, x2, y2 = np.int64(corners[i, 3]), np.int64(corners[i, 4]), np.int64(corners[i, 5])
+            left = max((min(x0, x1, x2) + HALF - 1) >> SHIFT, 0)
+            right = min((max(x0, x1, x2) - HALF) >> SHIFT, width - 1)
+            top = max((min(y0, y1, y2) + HALF - 1) >> SHIFT, first_row)
+            bottom = min((max(y0, y1, y2) - HALF) >> SHIFT, first_row + n_rows - 1)
+            px, py = (left << SHIFT) + HALF, (top << SHIFT) + HALF
+            row_0, row_1 = edge(x1, y1, x2, y2, px, py), edge(x2, y2, x0, y0, px, py)
+            row_2 = edge(x0, y0, x1, y1, px, py)
+            right_0, right_1, right_2 = (y1 - y2) << SHIFT, (y2 - y0) << SHIFT, (y0 - y1) << SHIFT
+            across, along, origin, least, most = depth_plane(camera, triangles, t, lens)
+            bias = np.float32(1) if number >= 0 else BACK_BIAS
+            for y in range(top, bottom + 1):
+                e0, e1, e2 = row_0, row_1, row_2
+                r = y - first_row
+                base = origin + along * (y + 0.5) + across * (left + 0.5)
+                for x in range(left, right + 1):
+                    if (e0 | e1 | e2) >= 0:
+                        near = np.float32(min(max(base, least), most)) * bias
+                        if near > depth[0, r, x]:
+                            if layer == 0:
+                                depth[0, r, x], owner[0, r, x] = near, number
+                            elif near > depth[1, r, x]:
+                                depth[2, r, x], owner[2, r, x] = depth[1, r, x], owner[1, r, x]
+                                depth[1, r, x], owner[1, r, x] = near, number
+                            elif near > depth[2, r, x]:
+                                depth[2, r, x], owner[2, r, x] = near, number
+                    base += across
+                    e0, e1, e2 = e0 + right_0, e1 + right_1, e2 + right_2
+                row_0, row_1 = row_0 + ((x2 - x1) << SHIFT), row_1 + ((x0 - x2) << SHIFT)
+                row_2 += (x1 - x0) << SHIFT
+    return int(n_translucent)

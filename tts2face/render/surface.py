@@ -16,8 +16,8 @@ OPEN_SHARE = 0.05  # parts with more than this share of free edges are sheets th
 class Surface:
     """A face made ready to be drawn.
 
-    ``triangles`` (F, 3); ``colours`` (V, 3) linear light; ``uv`` (V, 2), ``texture`` (H, W, 3) sRGB; ``textured``,
-    ``part_of``, ``translucent`` (F,); ``materials`` (P, 6) as `tts2face.render.shade` names its columns; the triangles
+    ``triangles`` (F, 3); ``colours`` (V, 3) linear light; ``uv`` (V, 2), ``texture`` (H, W, 3) sRGB; ``part_of`` and
+    ``translucent`` (F,); ``materials`` (P, 6) as `tts2face.render.fragments` names its columns; the triangles
     around vertex v are ``members[starts[v]:starts[v + 1]]``, those of vertices at the same place and of the same
     part included, so that a seam of the texture does not show.
     """
@@ -27,7 +27,6 @@ class Surface:
     colours: NDArray[np.float32]
     uv: NDArray[np.float32]
     texture: NDArray[np.uint8]
-    textured: NDArray[np.bool_]
     part_of: NDArray[np.int32]
     translucent: NDArray[np.int8]
     materials: NDArray[np.float32]
@@ -40,8 +39,6 @@ def surfaced(face: Face) -> Surface:
     parts = face.parts
     counts = [part.count for part in parts]
     part_of = np.repeat(np.arange(len(parts), dtype=np.int32), counts)
-    has_texture = face.uv is not None and face.texture is not None
-    textured = np.repeat([part.textured and has_texture for part in parts], counts)
     translucent = np.repeat([part.opacity < 1 for part in parts], counts)
     triangles = np.array(face.triangles, np.int32)
     starts, members = _neighbours(face, triangles, part_of)
@@ -51,7 +48,6 @@ def surfaced(face: Face) -> Surface:
         colours=linear_light(face.colours),
         uv=np.array(face.uv, np.float32) if face.uv is not None else np.zeros((1, 2), np.float32),
         texture=np.array(face.texture) if face.texture is not None else np.zeros((1, 1, 3), np.uint8),
-        textured=textured.astype(np.bool_),
         part_of=part_of,
         translucent=translucent.astype(np.int8),
         materials=_materials(face, triangles, part_of),
@@ -82,10 +78,11 @@ def encoding_table(n_steps: int) -> NDArray[np.uint8]:
 
 
 def _materials(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> NDArray[np.float32]:
+    has_texture = face.uv is not None and face.texture is not None
     rows = []
     for number, part in enumerate(face.parts):
         sheet = _free_edge_share(triangles[part_of == number]) > OPEN_SHARE
-        rows.append((part.specular, part.shininess, part.wrap, part.opacity, part.textured, sheet))
+        rows.append((part.specular, part.shininess, part.wrap, part.opacity, part.textured and has_texture, sheet))
     return np.array(rows, np.float32).reshape(-1, 6)
 
 
