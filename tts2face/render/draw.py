@@ -130,13 +130,16 @@ def _scratch(stage: Stage) -> tuple[Any, ...]:
     n_vertices, n_triangles = len(surface.rig.rest), len(surface.triangles)
     width, height = stage.picture.width * side, stage.picture.height * side
     rows = side * max(1, BAND_SAMPLES // (width * side))
-    n_pixels, n_hits = width * rows // side**2, N_LAYERS * width * rows + 80  # rows that do not begin in one set of the cache
+    n_pixels, n_hits = (
+        width * rows // side**2,
+        N_LAYERS * width * rows + 80,
+    )  # rows that do not begin in one set of the cache
     vertex = np.zeros((n_vertices, N_VERTEX_COLUMNS), np.float32)
     vertex[:, EXPOSURE : EXPOSURE + 4] = 1.0
     vertex[:, COLOUR : COLOUR + 3] = surface.colours
     vertex[:, UV : UV + 2] = surface.uv
     hits = (np.zeros(n_hits, np.int32), np.zeros((n_hits, 3), np.float32), *np.zeros((2, n_hits), np.int32))
-    table = tuple(np.zeros((n_rows, n_hits), np.float32) for n_rows in (N_ROWS, 4, 3))
+    table = tuple(np.zeros((n_rows, n_hits), np.float32) for n_rows in (N_ROWS, 9, 3))
     return (
         vertex,
         np.zeros((n_vertices, 2), np.int32),

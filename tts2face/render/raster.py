@@ -21,6 +21,7 @@ GRID = 1 << SHIFT  # steps of the snapping grid in one sample
 HALF = GRID >> 1
 NOTHING = np.int32(2**31 - 1)  # no triangle at this sample
 BACK_BIAS = np.float32(1.0 - 3e-4)  # back faces lie 0.3 permille further away: a front face wins where both meet
+TILE = 8  # samples along a side of the squares by which hidden back faces are left out
 N_LAYERS = 3  # the opaque surface and the two nearest translucent ones before it
 
 
@@ -150,7 +151,7 @@ def edge(ax: int, ay: int, bx: int, by: int, px: int, py: int) -> int:
     return (bx - ax) * (py - ay) - (by - ay) * (px - ax) - (0 if owns else 1)
 
 
-@kernel
+@inlined
 def depth_plane(camera: Array, triangles: Array, t: int, lens: Array) -> tuple[float, float, float, float, float]:
     """1/z of a triangle as a linear function of the sample's place: (per column, per row, at 0, least, most)."""
     a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -159,20 +160,29 @@ def depth_plane(camera: Array, triangles: Array, t: int, lens: Array) -> tuple[f
     e2x, e2y, e2z = camera[c, 0] - ax, camera[c, 1] - ay, camera[c, 2] - az
     nx, ny, nz = e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x
     distance = nx * ax + ny * ay + nz * az
-    most = 1.0 / max(min(az, az + e1z, az + e2z), lens[3])
     furthest = max(az, az + e1z, az + e2z)
-    least = 1.0 / max(furthest, lens[3])
-    if abs(distance) <= 1e-9 * (abs(nx) + abs(ny) + abs(nz)) * furthest:
-        return 0.0, 0.0, most, least, most  # seen edge-on
-    across, along = nx / (lens[0] * distance), ny / (lens[0] * distance)
-    return across, along, nz / distance - across * lens[1] - along * lens[2], least, most
+    least, most = 1.0 / max(furthest, lens[3]), 1.0 / max(min(az, az + e1z, az + e2z), lens[3])
+    edge_on = abs(distance) <= 1e-9 * (abs(nx) + abs(ny) + abs(nz)) * furthest
+    inverse = 0.0 if edge_on else 1.0 / distance
+    across, along = nx * inverse / lens[0], ny * inverse / lens[0]
+    origin = most if edge_on else nz * inverse - across * lens[1] - along * lens[2]
+    return across, along, origin, least, most
 
 
 @kernel
-def draw_band(
-    geometry: tuple[Any, Any, Any, Any], batch: tuple[Any, Any, Any], first_row: int, depth: Array, owner: Array
-) -> int:
-    """Clear a band of rows and draw its triangles, first the opaque ones; returns how many are translucent.
+def covered_depth(depth: Array, tiles: Array) -> None:
+    """Write for each tile of samples the 1/z before which everything in it lies; 0 where a sample is still free."""
+    tiles[:] = np.float32(np.inf)
+    for r in range(depth.shape[0]):
+        for x in range(depth.shape[1]):
+            tile = tiles[r // TILE, x // TILE]
+            tiles[r // TILE, x // TILE] = min(tile, depth[r, x])
+
+
+@kernel
+def draw_band(geometry: Any, batch: Any, first_row: int, depth: Array, owner: Array) -> int:
+    """Clear a band of rows and draw its triangles: opaque front faces, back faces, translucent ones; returns how many
+    of the last there are.
 
     Parameters
     ----------
@@ -189,47 +199,57 @@ def draw_band(
     corners, source, members = batch
     n_rows, width = depth.shape[1], depth.shape[2]
     depth[0], owner[0] = np.float32(0), NOTHING
+    tiles = np.zeros(((n_rows + TILE - 1) // TILE, (width + TILE - 1) // TILE), np.float32)
     n_translucent = 0
-    for i in members:
-        number = source[i]
-        n_translucent += translucent[number if number >= 0 else ~number]
-    if n_translucent:
-        depth[1:], owner[1:] = np.float32(0), NOTHING
-    for layer in range(2 if n_translucent else 1):
+    for turn in range(3):
+        if turn == 1:
+            covered_depth(depth[0], tiles)
+        if turn == 2 and n_translucent:
+            depth[1:], owner[1:] = np.float32(0), NOTHING
         for i in members:
             number = source[i]
             t = number if number >= 0 else ~number
-            if translucent[t] != layer:
+            if turn == 0:
+                n_translucent += translucent[t]
+            if turn != (2 if translucent[t] else 0 if number >= 0 else 1):
                 continue
             x0, y0, x1 = np.int64(corners[i, 0]), np.int64(corners[i, 1]), np.int64(corners[i, 2])
             y1, x2, y2 = np.int64(corners[i, 3]), np.int64(corners[i, 4]), np.int64(corners[i, 5])
             left = max((min(x0, x1, x2) + HALF - 1) >> SHIFT, 0)
             right = min((max(x0, x1, x2) - HALF) >> SHIFT, width - 1)
-            top = max((min(y0, y1, y2) + HALF - 1) >> SHIFT, first_row)
-            bottom = min((max(y0, y1, y2) - HALF) >> SHIFT, first_row + n_rows - 1)
-            px, py = (left << SHIFT) + HALF, (top << SHIFT) + HALF
+            top = max((min(y0, y1, y2) + HALF - 1) >> SHIFT, first_row) - first_row
+            bottom = min((max(y0, y1, y2) - HALF) >> SHIFT, first_row + n_rows - 1) - first_row
+            if turn == 1:
+                ahead = min(camera[triangles[t, 0], 2], camera[triangles[t, 1], 2], camera[triangles[t, 2], 2])
+                nearest, hidden = np.float32(1) / max(ahead, np.float32(lens[3])), True
+                for r in range(top // TILE, bottom // TILE + 1):
+                    for x in range(left // TILE, right // TILE + 1):
+                        hidden &= tiles[r, x] >= nearest
+                if hidden:
+                    continue
+            across, along, origin, least, most = depth_plane(camera, triangles, t, lens)
+            bias = np.float32(1) if number >= 0 else BACK_BIAS
+            px, py = (left << SHIFT) + HALF, ((top + first_row) << SHIFT) + HALF
             row_0, row_1 = edge(x1, y1, x2, y2, px, py), edge(x2, y2, x0, y0, px, py)
             row_2 = edge(x0, y0, x1, y1, px, py)
             right_0, right_1, right_2 = (y1 - y2) << SHIFT, (y2 - y0) << SHIFT, (y0 - y1) << SHIFT
-            across, along, origin, least, most = depth_plane(camera, triangles, t, lens)
-            bias = np.float32(1) if number >= 0 else BACK_BIAS
-            for y in range(top, bottom + 1):
-                e0, e1, e2 = row_0, row_1, row_2
-                r = y - first_row
-                base = origin + along * (y + 0.5) + across * (left + 0.5)
+            base = origin + along * (top + first_row + 0.5) + across * (left + 0.5)
+            for r in range(top, bottom + 1):
+                e0, e1, e2, value = row_0, row_1, row_2, base
                 for x in range(left, right + 1):
                     if (e0 | e1 | e2) >= 0:
-                        near = np.float32(min(max(base, least), most)) * bias
+                        near = np.float32(min(max(value, least), most)) * bias
                         if near > depth[0, r, x]:
-                            if layer == 0:
+                            if turn < 2:
                                 depth[0, r, x], owner[0, r, x] = near, number
                             elif near > depth[1, r, x]:
                                 depth[2, r, x], owner[2, r, x] = depth[1, r, x], owner[1, r, x]
                                 depth[1, r, x], owner[1, r, x] = near, number
                             elif near > depth[2, r, x]:
                                 depth[2, r, x], owner[2, r, x] = near, number
-                    base += across
+                    value += across
                     e0, e1, e2 = e0 + right_0, e1 + right_1, e2 + right_2
+                base += along
                 row_0, row_1 = row_0 + ((x2 - x1) << SHIFT), row_1 + ((x0 - x2) << SHIFT)
                 row_2 += (x1 - x0) << SHIFT
     return int(n_translucent)

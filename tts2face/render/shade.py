@@ -27,7 +27,7 @@ SKY, FLOOR, UP, LIGHTS = 0, 1, 2, 3  # rows of the table of lights; a light has 
 
 
 @streaming
-def light(table: Array, n: int, lights: Array, ambient: Array, colour: Array) -> None:
+def light(table: Array, n: int, lights: Array, scratch: Array, colour: Array) -> None:
     """Write the light of n fragments.
 
     Parameters
@@ -36,43 +36,53 @@ def light(table: Array, n: int, lights: Array, ambient: Array, colour: Array) ->
         Fragments, by the rows of `tts2face.render.fragments`.
     lights : (L, 6)
         Sky and floor colour, direction up, then one row for each light: direction towards it, colour.
-    ambient : (4, H)
-        Scratch.
+    scratch : (9, H)
+        Room for what is on the way.
     colour : (3, H)
         Out: light in [0, 1) that a fragment adds, its opacity counted in.
     """
-    one, zero, half = np.float32(1), np.float32(0), np.float32(0.5)
+    one, zero = np.float32(1), np.float32(0)
     nx, ny, nz = table[AT_NORMAL], table[AT_NORMAL + 1], table[AT_NORMAL + 2]
-    gloss, view_x, view_y, view_z = ambient[0], ambient[1], ambient[2], ambient[3]
+    gloss, view_x, view_y, view_z = scratch[0], scratch[1], scratch[2], scratch[3]
+    towards, lobe, wrap = scratch[4], scratch[5], table[AT_WRAP]
+    ray_x, ray_y, specular, shininess = table[AT_RAY], table[AT_RAY + 1], table[AT_SPECULAR], table[AT_SHININESS]
     for i in range(n):
         scale = one / np.sqrt(nx[i] * nx[i] + ny[i] * ny[i] + nz[i] * nz[i] + np.float32(1e-20))
         nx[i], ny[i], nz[i] = nx[i] * scale, ny[i] * scale, nz[i] * scale
-        dx, dy = table[AT_RAY, i], table[AT_RAY + 1, i]
-        towards = one / np.sqrt(dx * dx + dy * dy + one)
-        view_x[i], view_y[i], view_z[i] = -dx * towards, -dy * towards, -towards
+        scale = -one / np.sqrt(ray_x[i] * ray_x[i] + ray_y[i] * ray_y[i] + one)
+        view_x[i], view_y[i], view_z[i] = ray_x[i] * scale, ray_y[i] * scale, scale
         edge = one - max(nx[i] * view_x[i] + ny[i] * view_y[i] + nz[i] * view_z[i], zero)
-        gloss[i] = table[AT_SPECULAR, i] * (one + np.float32(3) * edge * edge * edge)  # after Schlick 1994
+        gloss[i] = specular[i] * (one + np.float32(3) * edge * edge * edge)  # after Schlick 1994
+        towards[i] = nx[i] * lights[UP, 0] + ny[i] * lights[UP, 1] + nz[i] * lights[UP, 2]
     for c in range(3):
+        matt, shine, albedo, seen = colour[c], scratch[6 + c], table[AT_ALBEDO + c], table[AT_EXPOSURE]
+        middle = np.float32(0.5) * (lights[SKY, c] + lights[FLOOR, c])
+        swing = np.float32(0.5) * (lights[SKY, c] - lights[FLOOR, c])
         for i in range(n):
-            seen, albedo = table[AT_EXPOSURE, i], table[AT_ALBEDO + c, i]
-            sky = half + half * (nx[i] * lights[UP, 0] + ny[i] * lights[UP, 1] + nz[i] * lights[UP, 2])
-            around = (lights[FLOOR, c] + (lights[SKY, c] - lights[FLOOR, c]) * sky) * seen
-            matt = around / (one - (one - seen) * albedo * BOUNCE)
-            shine = zero
-            reach = table[AT_WRAP, i] * REACH[c]
-            for k in range(LIGHTS, len(lights)):
-                lx, ly, lz = lights[k, 0], lights[k, 1], lights[k, 2]
-                arriving = lights[k, 3 + c] * table[AT_EXPOSURE + 1 + k - LIGHTS, i]
-                towards = nx[i] * lx + ny[i] * ly + nz[i] * lz
-                matt += arriving * max(towards + reach, zero) / (one + reach)
-                hx, hy, hz = lx + view_x[i], ly + view_y[i], lz + view_z[i]
-                length = np.sqrt(hx * hx + hy * hy + hz * hz + np.float32(1e-20))
-                off = one - max((nx[i] * hx + ny[i] * hy + nz[i] * hz) / length, zero)
-                lobe = one / (one + off * table[AT_SHININESS, i] * np.float32(0.125))  # eighth power: near exp(-off s)
-                lobe *= lobe
-                lobe *= lobe
-                shine += arriving * lobe * lobe * min(max(towards * np.float32(4), zero), one)
-            opacity = table[AT_OPACITY, i]
-            value = opacity * matt * albedo + gloss[i] * (shine + SKY_GLOSS * around)
+            around = (middle + swing * towards[i]) * seen[i]
+            matt[i] = around / (one - (one - seen[i]) * albedo[i] * BOUNCE)
+            shine[i] = SKY_GLOSS * around
+    for k in range(LIGHTS, len(lights)):
+        lx, ly, lz = lights[k, 0], lights[k, 1], lights[k, 2]
+        seen = table[AT_EXPOSURE + 1 + k - LIGHTS]
+        for i in range(n):
+            towards[i] = nx[i] * lx + ny[i] * ly + nz[i] * lz
+            hx, hy, hz = lx + view_x[i], ly + view_y[i], lz + view_z[i]
+            length = np.sqrt(hx * hx + hy * hy + hz * hz + np.float32(1e-20))
+            off = one - max((nx[i] * hx + ny[i] * hy + nz[i] * hz) / length, zero)
+            base = one / (one + off * shininess[i] * np.float32(0.125))  # its eighth power is near exp(-off s)
+            base *= base
+            base *= base
+            lobe[i] = base * base * min(max(towards[i] * np.float32(4), zero), one) * seen[i]
+        for c in range(3):
+            matt, shine, strength, reach = colour[c], scratch[6 + c], lights[k, 3 + c], REACH[c]
+            for i in range(n):
+                around_edge = wrap[i] * reach
+                matt[i] += strength * seen[i] * max(towards[i] + around_edge, zero) / (one + around_edge)
+                shine[i] += strength * lobe[i]
+    for c in range(3):
+        matt, shine, albedo, opacity = colour[c], scratch[6 + c], table[AT_ALBEDO + c], table[AT_OPACITY]
+        for i in range(n):
+            value = opacity[i] * matt[i] * albedo[i] + gloss[i] * shine[i]
             over = max(value - SHOULDER, zero) / (one - SHOULDER)
-            colour[c, i] = min(value, SHOULDER) + (one - SHOULDER) * over / (one + over)
+            matt[i] = min(value, SHOULDER) + (one - SHOULDER) * over / (one + over)

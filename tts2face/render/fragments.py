@@ -1,0 +1,220 @@
+"""What lies under the pixels of a band: the samples of a pixel, joined where they lie on one smooth surface.
+
+Lighting one fragment in place of its samples makes the picture of full supersampling for a third of its time.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.render.compiled import kernel
+from tts2face.render.raster import NOTHING
+
+Array = NDArray[Any]
+
+SMOOTH = np.float32(0.85)  # cosine between normals down to which samples of a part are lit together
+INSIDE = np.float32(0.3)  # share of the light that reaches the back of a closed part
+SPECULAR, SHININESS, WRAP, OPACITY, TEXTURED, OPEN = range(6)  # columns of the material table
+CAMERA, NORMAL, EXPOSURE, COLOUR, UV = 0, 3, 6, 10, 13  # columns of the vertex table: 3, 3, 4, 3, 2 numbers
+N_VERTEX_COLUMNS = 16  # one cache line
+# Rows of the fragment table: normal 3, albedo 3, exposure 4, ray 2, material 4, share of the pixel.
+AT_NORMAL, AT_ALBEDO, AT_EXPOSURE, AT_RAY, AT_SPECULAR, AT_SHININESS, AT_WRAP, AT_OPACITY, AT_SHARE = (
+    0, 3, 6, 10, 12, 13, 14, 15, 16,
+)  # fmt: skip
+N_ROWS = 17
+N_SUMMED = 10  # rows that are averaged when hits are joined
+PIXEL_X, PIXEL_Y, PIXEL_ENDS = 0, 1, 2  # columns of the pixel table; from 2 on: begin, then the end of each layer
+
+
+@kernel
+def face_normals(vertex: Array, triangles: Array, normals: Array) -> None:
+    """Write (F, 3) normals of triangles in camera space, as long as twice their area."""
+    for t in range(len(triangles)):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        ux, uy, uz = vertex[b, 0] - vertex[a, 0], vertex[b, 1] - vertex[a, 1], vertex[b, 2] - vertex[a, 2]
+        vx, vy, vz = vertex[c, 0] - vertex[a, 0], vertex[c, 1] - vertex[a, 1], vertex[c, 2] - vertex[a, 2]
+        normals[t, 0], normals[t, 1], normals[t, 2] = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+
+
+@kernel
+def vertex_normals(flat: Array, starts: Array, members: Array, vertex: Array) -> None:
+    """Write unit normals: the sum over the triangles ``members[starts[v]:starts[v + 1]]`` around each vertex."""
+    for v in range(len(vertex)):
+        x, y, z = np.float32(0), np.float32(0), np.float32(0)
+        for i in range(starts[v], starts[v + 1]):
+            t = members[i]
+            x, y, z = x + flat[t, 0], y + flat[t, 1], z + flat[t, 2]
+        scale = np.float32(1) / np.sqrt(x * x + y * y + z * z + np.float32(1e-20))
+        vertex[v, NORMAL], vertex[v, NORMAL + 1], vertex[v, NORMAL + 2] = x * scale, y * scale, z * scale
+
+
+@kernel
+def find_hits(owner: Array, n_layers: int, place: tuple[int, int], hits: Any, pixels: Array) -> int:
+    """List for each pixel of a band the triangles under it; returns how many pixels are not empty.
+
+    Parameters
+    ----------
+    owner : (3, R, W)
+        Of `draw_band`.
+    place
+        The band's first row of samples, samples along a pixel's side.
+    hits
+        Out: triangle (H,); sums over its samples of column, row and 1 (H, 3). Room for kind (H,) and fragment (H,).
+    pixels : (P, 6)
+        Out: x, y, first hit, end of the hits of each layer.
+    """
+    first_row, side = place
+    number_of, spread = hits[0], hits[1]
+    n_hits = n_pixels = 0
+    one = np.float32(1)
+    for r in range(0, owner.shape[1], side):
+        for x in range(0, owner.shape[2], side):
+            begin = n_hits
+            for layer in range(n_layers):
+                first = n_hits
+                pixels[n_pixels, PIXEL_ENDS + layer] = first
+                number = owner[layer, r, x]
+                n_alike = 0
+                for row in range(r, r + side):
+                    for column in range(x, x + side):
+                        n_alike += owner[layer, row, column] == number
+                if n_alike == side * side:
+                    if number != NOTHING:
+                        number_of[n_hits] = number
+                        spread[n_hits, 0] = (x + 0.5 * (side - 1)) * n_alike
+                        spread[n_hits, 1] = (r + first_row + 0.5 * (side - 1)) * n_alike
+                        spread[n_hits, 2] = n_alike
+                        n_hits += 1
+                    continue
+                for row in range(r, r + side):
+                    for column in range(x, x + side):
+                        number = owner[layer, row, column]
+                        if number == NOTHING:
+                            continue
+                        h = first
+                        while h < n_hits and number_of[h] != number:
+                            h += 1
+                        if h == n_hits:
+                            n_hits += 1
+                            number_of[h] = number
+                            spread[h, 0] = spread[h, 1] = spread[h, 2] = np.float32(0)
+                        spread[h, 0] += np.float32(column)
+                        spread[h, 1] += np.float32(row + first_row)
+                        spread[h, 2] += one
+            if n_hits > begin:
+                for layer in range(n_layers, 4):
+                    pixels[n_pixels, PIXEL_ENDS + layer] = n_hits
+                pixels[n_pixels, PIXEL_X], pixels[n_pixels, PIXEL_Y] = x // side, (r + first_row) // side
+                n_pixels += 1
+    return n_pixels
+
+
+@kernel
+def texel(texture: Array, linear: Array, u: float, v: float, c: int) -> Any:
+    """One channel of the bilinear colour of a texture in linear light."""
+    height, width = texture.shape[0], texture.shape[1]
+    one, half, zero = np.float32(1), np.float32(0.5), np.float32(0)
+    x = min(max(u * np.float32(width) - half, zero), np.float32(width - 1))
+    y = min(max(v * np.float32(height) - half, zero), np.float32(height - 1))
+    left, top = int(x), int(y)
+    right, below = min(left + 1, width - 1), min(top + 1, height - 1)
+    across, along = x - np.float32(left), y - np.float32(top)
+    upper = linear[texture[top, left, c]] * (one - across) + linear[texture[top, right, c]] * across
+    lower = linear[texture[below, left, c]] * (one - across) + linear[texture[below, right, c]] * across
+    return upper * (one - along) + lower * along
+
+
+@kernel
+def evaluate(hits: Any, n_hits: int, vertex: Array, scene: Any, lens: Array, table: Array) -> None:
+    """Write what each hit triangle is like at the middle of its samples (Moeller and Trumbore 1997).
+
+    Parameters
+    ----------
+    scene
+        Triangles (F, 3), part of each (F,), materials (P, 6), texture (H, W, 3), linear table (256,).
+    table : (17, H)
+        Out: the rows named above.
+    """
+    number_of, spread, kinds = hits[0], hits[1], hits[2]
+    triangles, part_of, materials, texture, linear = scene
+    one, zero = np.float32(1), np.float32(0)
+    focal, middle_x, middle_y = np.float32(1 / lens[0]), np.float32(lens[1] - 0.5), np.float32(lens[2] - 0.5)
+    for h in range(n_hits):
+        number = number_of[h]
+        t = number if number >= 0 else ~number
+        share = one / spread[h, 2]
+        dx, dy = (spread[h, 0] * share - middle_x) * focal, (spread[h, 1] * share - middle_y) * focal
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        sx, sy, sz = -vertex[a, 0], -vertex[a, 1], -vertex[a, 2]
+        e1x, e1y, e1z = vertex[b, 0] + sx, vertex[b, 1] + sy, vertex[b, 2] + sz
+        e2x, e2y, e2z = vertex[c, 0] + sx, vertex[c, 1] + sy, vertex[c, 2] + sz
+        qx, qy, qz = dy * e2z - e2y, e2x - dx * e2z, dx * e2y - dy * e2x
+        determinant = e1x * qx + e1y * qy + e1z * qz
+        inverse = one / determinant if determinant != zero else zero
+        rx, ry, rz = sy * e1z - sz * e1y, sz * e1x - sx * e1z, sx * e1y - sy * e1x
+        wb = min(max((sx * qx + sy * qy + sz * qz) * inverse, zero), one)
+        wc = min(max((dx * rx + dy * ry + rz) * inverse, zero), one - wb)
+        wa = one - wb - wc
+        for k in range(3):
+            n, o = NORMAL + k, COLOUR + k
+            table[AT_NORMAL + k, h] = wa * vertex[a, n] + wb * vertex[b, n] + wc * vertex[c, n]
+            table[AT_ALBEDO + k, h] = wa * vertex[a, o] + wb * vertex[b, o] + wc * vertex[c, o]
+        material = part_of[t]
+        if materials[material, TEXTURED] != zero:
+            u = wa * vertex[a, UV] + wb * vertex[b, UV] + wc * vertex[c, UV]
+            v = wa * vertex[a, UV + 1] + wb * vertex[b, UV + 1] + wc * vertex[c, UV + 1]
+            for k in range(3):
+                table[AT_ALBEDO + k, h] = texel(texture, linear, u, v, k)
+        length = table[AT_NORMAL, h] ** 2 + table[AT_NORMAL + 1, h] ** 2 + table[AT_NORMAL + 2, h] ** 2
+        turn = (one if number >= 0 else -one) / np.sqrt(length + np.float32(1e-20))
+        inner = INSIDE if number < 0 and materials[material, OPEN] == zero else one
+        for k in range(3):
+            table[AT_NORMAL + k, h] *= turn
+        for k in range(4):
+            mean = wa * vertex[a, EXPOSURE + k] + wb * vertex[b, EXPOSURE + k] + wc * vertex[c, EXPOSURE + k]
+            table[AT_EXPOSURE + k, h] = mean * inner
+        table[AT_RAY, h], table[AT_RAY + 1, h] = dx, dy
+        for k in range(4):
+            table[AT_SPECULAR + k, h] = materials[material, k]
+        table[AT_SHARE, h] = spread[h, 2]
+        kinds[h] = 2 * material + (1 if number < 0 else 0)
+
+
+@kernel
+def join(table: Array, hits: Any, pixels: Array, n_pixels: int) -> int:
+    """Join hits of a pixel's layer that lie on one smooth surface, in place; returns how many fragments remain.
+
+    The last of `hits` tells for each hit its fragment; the ends in `pixels` stay those of the hits.
+    """
+    kinds, fragment_of = hits[2], hits[3]
+    n_fragments = 0
+    for p in range(n_pixels):
+        for layer in range(3):
+            first = n_fragments
+            for h in range(pixels[p, PIXEL_ENDS + layer], pixels[p, PIXEL_ENDS + layer + 1]):
+                share, kind, g = table[AT_SHARE, h], kinds[h], first
+                while g < n_fragments:
+                    cosine, size = np.float32(0), np.float32(0)
+                    for k in range(3):
+                        cosine += table[k, g] * table[k, h]
+                        size += table[k, g] * table[k, g]
+                    if kind == kinds[g] and cosine > SMOOTH * np.sqrt(size):
+                        break
+                    g += 1
+                fragment_of[h] = g
+                if g == n_fragments:
+                    n_fragments += 1
+                    kinds[g] = kind
+                    for k in range(N_SUMMED):
+                        table[k, g] = table[k, h] * share
+                    for k in range(N_SUMMED, N_ROWS):
+                        table[k, g] = table[k, h]
+                else:
+                    table[AT_SHARE, g] += share
+                    for k in range(N_SUMMED):
+                        table[k, g] += table[k, h] * share
+    for k in range(AT_ALBEDO, N_SUMMED):
+        for g in range(n_fragments):
+            table[k, g] /= table[AT_SHARE, g]
+    return n_fragments
