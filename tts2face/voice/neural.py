@@ -1,0 +1,195 @@
+"""The neural English voice ``heart`` of hibari-tts, with phone edges found in its own sound."""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import BackendError, DataError, InputError
+from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from tts2face.speech.align import Aligner, increasing
+from tts2face.types import Speech, Waveform, joined_speech
+from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, at_volume
+from tts2face.voice.symbols import letters_of, phones_of
+
+MOST_LETTERS = 400  # the model hears at most this many letters at once
+UNIT_S = 0.025  # length of one step of the model's durations
+LATE_S = 0.045  # the model's own boundaries lie this much behind the sound (41-51 ms)
+DURATIONS = "/Cast_32_output_0"  # inner tensor of the ONNX graph: steps of 25 ms for each letter
+SAYABLE = re.compile(r"[^\W_]")
+"""Anything that must be heard: a letter or a digit."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Token:
+    """A written word with the letters that speak it, or punctuation, and whether a space follows."""
+
+    text: str
+    letters: str
+    has_space: bool
+
+
+class NeuralVoice:
+    """The voice ``heart``: American English, 24 kHz. One thread at a time."""
+
+    def __init__(self, own_words: Pronouncing) -> None:
+        self._own_words = {word: letters_of(segments) for word, segments in own_words.items()}
+        try:
+            from hibari import Hibari
+        except ImportError as missing:
+            raise BackendError("the voice heart needs hibari-tts; run: pip install hibari-tts") from missing
+        self._model: Any = Hibari(voice="heart", threads=1)
+        self._aligner = Aligner()
+
+    @property
+    def sample_rate(self) -> int:
+        """Hz."""
+        return int(self._model.sample_rate)
+
+    def speak(self, spoken: Spoken, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
+        """Speech of a sentence; see `tts2face.voice.engine.Voice`."""
+        parts = list(self._parts(spoken))
+        if not any(phones_of(token.letters)[0] for part in parts for token in part):
+            raise InputError("there is nothing to say in the text; give at least one word")
+        return joined_speech([self._said(part, rate, volume, seed) for part in parts])
+
+    def _parts(self, spoken: Spoken) -> Iterator[list[_Token]]:
+        if isinstance(spoken, str):
+            sentences = [self._tokens(sentence) for sentence in self._model.split_sentences(spoken)]
+        else:
+            sentences = [[_given(word) for word in spoken]]
+        for sentence in sentences:
+            for part in _cut(sentence):
+                if any(token.letters.strip() for token in part):
+                    yield part
+
+    def _tokens(self, sentence: str) -> list[_Token]:
+        from hibari.g2p.normalize import normalize
+
+        reader = self._model.g2p
+        read = reader.phonemize_tokens(reader.tokenize(normalize(self._with_own_words(sentence))))
+        tokens = [_Token(token.text, self._known(token.phonemes), bool(token.whitespace)) for token in read]
+        unsaid = [token.text for token in tokens if SAYABLE.search(token.text) and not phones_of(token.letters)[0]]
+        if unsaid:
+            raise InputError(f"the voice heart cannot say {unsaid[0]!r}; write it in English words, or choose a voice")
+        return tokens
+
+    def _with_own_words(self, sentence: str) -> str:
+        """The sentence with a user's words as ``[word](/letters/)``, which the reader takes as they are."""
+
+        def marked(match: "re.Match[str]") -> str:
+            letters = self._own_words.get(match[0].lower())
+            return match[0] if letters is None else f"[{match[0]}](/{letters}/)"
+
+        plain = re.sub(r"[\[\]]", " ", sentence)
+        return re.sub(r"[^\W_]+(?:['’-][^\W_]+)*", marked, plain) if self._own_words else plain
+
+    def _known(self, letters: str | None) -> str:
+        return "".join(letter for letter in letters or "" if letter in self._model.vocab)
+
+    def _said(self, tokens: Sequence[_Token], rate: float, volume: float, seed: int) -> Speech:
+        letters = "".join(token.letters + " " * token.has_space for token in tokens).strip()
+        samples = self._model.from_phonemes(letters, speed=rate, seed=seed)
+        sound = Waveform(at_volume(samples, 1.0), self.sample_rate)
+        try:
+            phones, spans = self._aligned(tokens, sound)
+        except DataError:
+            phones, spans = self._predicted(tokens, letters, rate, sound)
+        return Speech(Waveform(at_volume(samples, volume), self.sample_rate), phones, spans)
+
+    def _aligned(self, tokens: Sequence[_Token], sound: Waveform) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+        words = [(str(owner), [phones]) for owner, phones, _ in _spoken_words(tokens)]
+        found = self._aligner.align(sound, words)
+        return found.phones, _token_spans(found.words, tokens)
+
+    def _predicted(
+        self, tokens: Sequence[_Token], letters: str, rate: float, sound: Waveform
+    ) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+        """Phones where the model meant to put them, less its lateness: for sound that cannot be aligned."""
+        begins = np.concatenate([[0.0], np.cumsum(self._durations(letters, rate) * UNIT_S)])[1:]
+        labels, starts, spans = [SILENCE], [0.0], []
+        for owner, phones, places in _spoken_words(tokens):
+            spans.append(WordSpan(str(owner), len(labels), len(labels) + len(phones)))
+            labels += phones
+            starts += [float(begins[place]) - LATE_S for place in places]
+        labels.append(SILENCE)
+        starts.append(min(float(begins[len(letters)]) - LATE_S, sound.duration))
+        edges = increasing(np.array([*starts, sound.duration]))
+        return PhoneSequence(labels, edges), _token_spans(spans, tokens)
+
+    def _durations(self, letters: str, rate: float) -> NDArray[np.float64]:
+        """Steps of `UNIT_S` for the letters with one pad before and one behind."""
+        import onnxruntime
+
+        graph = with_output(Path(self._model.model_path).read_bytes(), DURATIONS)
+        session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
+        given = {
+            "ids": np.array([self._model.ids(letters)], np.int64),
+            "speed": np.array([rate], np.float32),
+        }
+        steps: NDArray[np.float64] = np.asarray(session.run([DURATIONS], given)[0], np.float64).ravel()
+        return steps
+
+
+def _given(word: SpokenWord) -> _Token:
+    return _Token(word.text, letters_of(word.segments) + word.after, True)
+
+
+def _cut(tokens: Sequence[_Token]) -> Iterator[list[_Token]]:
+    """Stretches of at most `MOST_LETTERS` letters, cut behind a clause mark where there is one."""
+    part: list[_Token] = []
+    length = 0
+    for token in tokens:
+        if part and length + len(token.letters) + 1 > MOST_LETTERS:
+            marks = [at for at, earlier in enumerate(part) if earlier.letters[-1:] in {",", ";", ":", "—"}]
+            keep = marks[-1] + 1 if marks else len(part)
+            yield part[:keep]
+            part = part[keep:]
+            length = sum(len(earlier.letters) + 1 for earlier in part)
+        part.append(token)
+        length += len(token.letters) + 1
+    if part:
+        yield part
+
+
+def _spoken_words(tokens: Sequence[_Token]) -> Iterator[tuple[int, tuple[str, ...], tuple[int, ...]]]:
+    """For each spoken word the number of its token, its phones, and the place of each in the joined letters.
+
+    A token such as a number is spoken as several words.
+    """
+    at = 0
+    for number, token in enumerate(tokens):
+        for word in re.finditer(r"\S+", token.letters):
+            phones, places = phones_of(word[0])
+            if phones:
+                yield number, phones, tuple(at + word.start() + place for place in places)
+        at += len(token.letters) + token.has_space
+
+
+def _token_spans(spans: Sequence[WordSpan], tokens: Sequence[_Token]) -> tuple[WordSpan, ...]:
+    """Spans named by token number to one span for each token, named by its text."""
+    joined: dict[str, WordSpan] = {}
+    for span in spans:
+        first = joined[span.text].first if span.text in joined else span.first
+        joined[span.text] = WordSpan(span.text, first, span.last)
+    return tuple(WordSpan(tokens[int(span.text)].text, span.first, span.last) for span in joined.values())
+
+
+def with_output(model: bytes, tensor: str) -> bytes:
+    """An ONNX model with one more output: protocol buffers merge what is appended (ONNX IR, ``GraphProto.output``)."""
+    graph_field, output_field, name_field = 7, 12, 1
+    message = _delimited(name_field, tensor.encode())
+    return model + _delimited(graph_field, _delimited(output_field, message))
+
+
+def _delimited(field: int, content: bytes) -> bytes:
+    return _varint(field << 3 | 2) + _varint(len(content)) + content
+
+
+def _varint(number: int) -> bytes:
+    low, rest = number & 0x7F, number >> 7
+    return bytes([low | 0x80]) + _varint(rest) if rest else bytes([low])
