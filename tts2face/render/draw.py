@@ -5,7 +5,6 @@ from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +14,11 @@ from tts2face.face.linear import REST_HEAD
 from tts2face.face.model import Face
 from tts2face.render.background import background
 from tts2face.render.camera import Optics, optics
-from tts2face.render.fragments import COLOUR, EXPOSURE, N_ROWS, N_VERTEX_COLUMNS, UV
 from tts2face.render.light import studio
+from tts2face.render.paint import Room, paint, room_for
 from tts2face.render.picture import Picture
-from tts2face.render.raster import N_LAYERS
-from tts2face.render.resolve import paint
-from tts2face.render.surface import Surface, encoding_table, linear_table, surfaced
+from tts2face.render.surface import Surface, surfaced
 from tts2face.types import Clip
-
-BAND_SAMPLES = 32_768  # of a band of rows that is drawn, then lit: its buffers stay in a core's cache
-TONE_STEPS = 8192  # entries of the table from linear light to 8 bits; fine enough for its darkest step
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +73,7 @@ def draw(
     n_shapes = len(stage.face.shape_names)
     if np.shape(weights) != (n_shapes,):
         raise InputError(f"the face has {n_shapes} shapes, not weights of shape {np.shape(weights)}")
-    return _drawn(stage, np.asarray(weights, np.float32), np.asarray(head, np.float32), _scratch(stage))
+    return _drawn(stage, np.asarray(weights, np.float32), np.asarray(head, np.float32), _room(stage))
 
 
 def frames(clip: Clip, face: Face | Stage, picture: Picture, threads: int | None = None) -> Iterator[NDArray[np.uint8]]:
@@ -96,7 +90,7 @@ def frames(clip: Clip, face: Face | Stage, picture: Picture, threads: int | None
     if clip.motion.channels != stage.face.shape_names:
         raise InputError("the clip's motion is not in the shapes of this face; retarget it to the face first")
     n_threads = threads or available_cores()
-    rooms = deque(_scratch(stage) for _ in range(n_threads))
+    rooms = deque(_room(stage) for _ in range(n_threads))
 
     def one(weights: NDArray[np.float32], head: NDArray[np.float32]) -> NDArray[np.uint8]:
         room = rooms.popleft()
@@ -124,59 +118,15 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _scratch(stage: Stage) -> tuple[Any, ...]:
-    """Room for one picture at a time, and in its vertex table what does not change."""
-    surface, side = stage.surface, stage.picture.supersampling
-    n_vertices, n_triangles = len(surface.rig.rest), len(surface.triangles)
-    width, height = stage.picture.width * side, stage.picture.height * side
-    rows = side * max(1, BAND_SAMPLES // (width * side))
-    n_pixels, n_hits = (
-        width * rows // side**2,
-        N_LAYERS * width * rows + 80,
-    )  # rows that do not begin in one set of the cache
-    vertex = np.zeros((n_vertices, N_VERTEX_COLUMNS), np.float32)
-    vertex[:, EXPOSURE : EXPOSURE + 4] = 1.0
-    vertex[:, COLOUR : COLOUR + 3] = surface.colours
-    vertex[:, UV : UV + 2] = surface.uv
-    hits = (np.zeros(n_hits, np.int32), np.zeros((n_hits, 3), np.float32), *np.zeros((2, n_hits), np.int32))
-    table = tuple(np.zeros((n_rows, n_hits), np.float32) for n_rows in (N_ROWS, 9, 3))
-    return (
-        vertex,
-        np.zeros((n_vertices, 2), np.int32),
-        np.zeros((n_triangles, 3), np.float32),
-        np.zeros((2 * n_triangles, 6), np.int32),
-        np.zeros(2 * n_triangles, np.int32),
-        np.zeros(-(-height // rows) + 1, np.int64),
-        np.zeros(3 * n_triangles, np.int32),
-        np.zeros((N_LAYERS, rows, width), np.float32),
-        np.zeros((N_LAYERS, rows, width), np.int32),
-        hits,
-        table,
-        np.zeros((n_pixels, 6), np.int32),
-    )
+def _room(stage: Stage) -> Room:
+    picture = stage.picture
+    return room_for(stage.surface, (picture.width, picture.height), picture.supersampling)
 
 
-TABLES = (linear_table(), encoding_table(TONE_STEPS))
-
-
-def _drawn(
-    stage: Stage, weights: NDArray[np.float32], head: NDArray[np.float32], scratch: tuple[Any, ...]
-) -> NDArray[np.uint8]:
-    surface, picture = stage.surface, stage.picture
+def _drawn(stage: Stage, weights: NDArray[np.float32], head: NDArray[np.float32], room: Room) -> NDArray[np.uint8]:
+    picture = stage.picture
     drawn = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
     drawn[:, :, :3] = stage.behind
-    paint(
-        surface.rig.posed(weights, head),
-        (
-            surface.triangles,
-            surface.translucent,
-            (surface.part_of, surface.materials, surface.texture),
-            surface.starts,
-            surface.members,
-        ),
-        (stage.optics.view, stage.optics.lens, picture.supersampling),
-        (stage.lights, TABLES),
-        scratch,
-        drawn,
-    )
+    points = stage.surface.rig.posed(weights, head)
+    paint(points, stage.surface, stage.optics, stage.lights, room, drawn)
     return drawn

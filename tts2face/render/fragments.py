@@ -50,7 +50,7 @@ def vertex_normals(flat: Array, starts: Array, members: Array, vertex: Array) ->
 
 
 @kernel
-def find_hits(owner: Array, n_layers: int, place: tuple[int, int], hits: Any, pixels: Array) -> int:
+def find_hits(owner: Array, n_layers: int, place: tuple[int, int, int], hits: Any, pixels: Array) -> int:
     """List for each pixel of a band the triangles under it; returns how many pixels are not empty.
 
     Parameters
@@ -58,17 +58,17 @@ def find_hits(owner: Array, n_layers: int, place: tuple[int, int], hits: Any, pi
     owner : (3, R, W)
         Of `draw_band`.
     place
-        The band's first row of samples, samples along a pixel's side.
+        The band's first row of samples, its number of rows, samples along a pixel's side.
     hits
         Out: triangle (H,); sums over its samples of column, row and 1 (H, 3). Room for kind (H,) and fragment (H,).
     pixels : (P, 6)
         Out: x, y, first hit, end of the hits of each layer.
     """
-    first_row, side = place
+    first_row, n_rows, side = place
     number_of, spread = hits[0], hits[1]
     n_hits = n_pixels = 0
     one = np.float32(1)
-    for r in range(0, owner.shape[1], side):
+    for r in range(0, n_rows, side):
         for x in range(0, owner.shape[2], side):
             begin = n_hits
             for layer in range(n_layers):

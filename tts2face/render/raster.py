@@ -123,7 +123,8 @@ def sort_into_bands(corners: Array, count: int, band_rows: int, starts: Array, m
     Band b is ``members[starts[b]:starts[b + 1]]``. With `members` too short, only `starts` is written.
     """
     n_bands = len(starts) - 1
-    starts[:] = 0
+    for band in range(len(starts)):
+        starts[band] = 0
     for turn in range(2):
         for i in range(count):
             low = np.int64(min(corners[i, 1], corners[i, 3], corners[i, 5])) >> SHIFT
@@ -172,11 +173,21 @@ def depth_plane(camera: Array, triangles: Array, t: int, lens: Array) -> tuple[f
 @kernel
 def covered_depth(depth: Array, tiles: Array) -> None:
     """Write for each tile of samples the 1/z before which everything in it lies; 0 where a sample is still free."""
-    tiles[:] = np.float32(np.inf)
+    for r in range(tiles.shape[0]):
+        for x in range(tiles.shape[1]):
+            tiles[r, x] = np.float32(np.inf)
     for r in range(depth.shape[0]):
         for x in range(depth.shape[1]):
             tile = tiles[r // TILE, x // TILE]
             tiles[r // TILE, x // TILE] = min(tile, depth[r, x])
+
+
+@kernel
+def clear(depth: Array, owner: Array, layer: int) -> None:
+    """Empty a layer of a band."""
+    for r in range(depth.shape[1]):
+        for x in range(depth.shape[2]):
+            depth[layer, r, x], owner[layer, r, x] = np.float32(0), NOTHING
 
 
 @kernel
@@ -198,14 +209,15 @@ def draw_band(geometry: Any, batch: Any, first_row: int, depth: Array, owner: Ar
     camera, triangles, translucent, lens = geometry
     corners, source, members = batch
     n_rows, width = depth.shape[1], depth.shape[2]
-    depth[0], owner[0] = np.float32(0), NOTHING
+    clear(depth, owner, 0)
     tiles = np.zeros(((n_rows + TILE - 1) // TILE, (width + TILE - 1) // TILE), np.float32)
     n_translucent = 0
     for turn in range(3):
         if turn == 1:
             covered_depth(depth[0], tiles)
         if turn == 2 and n_translucent:
-            depth[1:], owner[1:] = np.float32(0), NOTHING
+            clear(depth, owner, 1)
+            clear(depth, owner, 2)
         for i in members:
             number = source[i]
             t = number if number >= 0 else ~number

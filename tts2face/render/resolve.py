@@ -6,20 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.render.compiled import kernel
-from tts2face.render.fragments import (
-    AT_OPACITY,
-    AT_SHARE,
-    PIXEL_ENDS,
-    PIXEL_X,
-    PIXEL_Y,
-    evaluate,
-    face_normals,
-    find_hits,
-    join,
-    vertex_normals,
-)
-from tts2face.render.raster import NOTHING, draw_band, gather, sort_into_bands, to_camera
-from tts2face.render.shade import light
+from tts2face.render.fragments import AT_OPACITY, AT_SHARE, PIXEL_ENDS, PIXEL_X, PIXEL_Y
+from tts2face.render.raster import NOTHING
 
 Array = NDArray[Any]
 
@@ -84,7 +72,7 @@ def mix_samples(
 @kernel
 def compose(
     owner: Array,
-    place: tuple[int, int],
+    place: tuple[int, int, int],
     pixels: tuple[Any, int],
     hits: Any,
     shown: tuple[Any, Any],
@@ -95,7 +83,7 @@ def compose(
     Parameters
     ----------
     place
-        The band's first row of samples, samples along a pixel's side.
+        The band's first row of samples, its number of rows, samples along a pixel's side.
     pixels
         Pixel table and how many of its rows count.
     shown
@@ -103,7 +91,7 @@ def compose(
     out
         The picture, holding the background, and the tables between 8 bits and linear light.
     """
-    first_row, side = place
+    first_row, side = place[0], place[2]
     table, colour = shown
     picture, tables = out
     share = np.float32(1) / np.float32(side * side)
@@ -112,7 +100,7 @@ def compose(
     for p in range(pixels[1]):
         row = pixels[0][p]
         begin, end = row[PIXEL_ENDS], row[PIXEL_ENDS + 3]
-        total[:] = 0
+        total[0] = total[1] = total[2] = total[3] = np.float32(0)
         if row[PIXEL_ENDS + 1] < end:
             samples = (owner, row[PIXEL_Y] * side - first_row, row[PIXEL_X] * side, side)
             mix_samples(samples, row[PIXEL_ENDS:], hits, shown, total)
@@ -123,55 +111,3 @@ def compose(
                     total[c] += colour[c, g] * weight
                 total[3] += weight
         write_pixel(total, tables, picture, row[PIXEL_X], row[PIXEL_Y])
-
-
-@kernel
-def paint(points: Array, surface: Any, optics: Any, light_of: Any, scratch: Any, picture: Array) -> None:
-    """Draw one picture over the background that it holds.
-
-    Parameters
-    ----------
-    points : (V, 3)
-        The face in the world, mm.
-    surface
-        Triangles, marks of translucent ones, (part of triangle, materials, texture), neighbour starts and members.
-    optics
-        View (3, 4), lens (4,), samples along a pixel's side.
-    light_of
-        Lights (L, 6), (linear table, encoding table).
-    scratch
-        As `tts2face.render.draw` makes it; its vertex table holds exposure, colour and uv.
-    picture : (H, W, 3) or (H, W, 4)
-        sRGB, with coverage.
-    """
-    triangles, translucent, materials, starts, members = surface
-    view, lens, side = optics
-    lights, tables = light_of
-    vertex, grid, flat, corners, source, band_starts, band_members, depth, owner, hits, table, pixels = scratch
-    band_rows = depth.shape[1]
-    height, width = picture.shape[0] * side, picture.shape[1] * side
-    to_camera(points, view, lens, vertex, grid)
-    face_normals(vertex, triangles, flat)
-    vertex_normals(flat, starts, members, vertex)
-    count = gather(vertex, grid, triangles, (lens, (width, height)), corners, source)
-    sort_into_bands(corners, count, band_rows, band_starts, band_members)
-    if band_starts[-1] > len(band_members):
-        band_members = np.zeros(band_starts[-1], np.int32)
-        sort_into_bands(corners, count, band_rows, band_starts, band_members)
-    scene = (triangles, materials[0], materials[1], materials[2], tables[0])
-    fragment, ambient, colour = table
-    for band in range(len(band_starts) - 1):
-        if band_starts[band] == band_starts[band + 1]:
-            continue
-        first_row = band * band_rows
-        rows = min(band_rows, height - first_row)
-        batch = (corners, source, band_members[band_starts[band] : band_starts[band + 1]])
-        here = owner[:, :rows]
-        n_translucent = draw_band((vertex, triangles, translucent, lens), batch, first_row, depth[:, :rows], here)
-        n_pixels = find_hits(here, 3 if n_translucent else 1, (first_row, side), hits, pixels)
-        if n_pixels == 0:
-            continue
-        evaluate(hits, pixels[n_pixels - 1, PIXEL_ENDS + 3], vertex, scene, lens, fragment)
-        n_fragments = join(fragment, hits, pixels, n_pixels)
-        light(fragment, n_fragments, lights, ambient, colour)
-        compose(here, (first_row, side), (pixels, n_pixels), hits, (fragment, colour), (picture, tables))

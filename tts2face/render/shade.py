@@ -23,6 +23,7 @@ REACH = np.array([1.0, 0.5, 0.36], np.float32)  # of red, green and blue light u
 BOUNCE = np.float32(0.8)  # share of the light between walls of a hollow that stays in it
 SKY_GLOSS = np.float32(0.1)  # of the sky that a glossy part mirrors
 SHOULDER = np.float32(0.65)  # linear light from which bright places are pressed together, below 1
+N_SCRATCH_ROWS = 9
 SKY, FLOOR, UP, LIGHTS = 0, 1, 2, 3  # rows of the table of lights; a light has a direction and a colour
 
 
@@ -36,7 +37,7 @@ def light(table: Array, n: int, lights: Array, scratch: Array, colour: Array) ->
         Fragments, by the rows of `tts2face.render.fragments`.
     lights : (L, 6)
         Sky and floor colour, direction up, then one row for each light: direction towards it, colour.
-    scratch : (9, H)
+    scratch : (N_SCRATCH_ROWS, H)
         Room for what is on the way.
     colour : (3, H)
         Out: light in [0, 1) that a fragment adds, its opacity counted in.

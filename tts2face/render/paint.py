@@ -1,0 +1,131 @@
+"""One picture: the kernels of this room in their order, band by band."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.render.camera import Optics
+from tts2face.render.fragments import (
+    COLOUR,
+    EXPOSURE,
+    N_ROWS,
+    N_VERTEX_COLUMNS,
+    PIXEL_ENDS,
+    UV,
+    evaluate,
+    face_normals,
+    find_hits,
+    join,
+    vertex_normals,
+)
+from tts2face.render.raster import N_LAYERS, draw_band, gather, sort_into_bands, to_camera
+from tts2face.render.resolve import compose
+from tts2face.render.shade import N_SCRATCH_ROWS, light
+from tts2face.render.surface import Surface, encoding_table, linear_table
+
+BAND_SAMPLES = 65_536  # of a band of rows that is drawn, then lit; from 16,384 to 262,144 the time is the same
+TONE_STEPS = 8192  # entries of the table from linear light to 8 bits; fine enough for its darkest step
+ODD = 80  # entries beyond the last of a table's row, so that its rows do not all begin in one set of the cache
+TABLES = (linear_table(), encoding_table(TONE_STEPS))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Room:
+    """What one picture at a time needs while it is drawn; `tts2face.render.raster` and its neighbours name the parts.
+
+    ``vertex`` holds exposure, colour and uv from the start.
+    """
+
+    side: int
+    vertex: NDArray[np.float32]
+    grid: NDArray[np.int32]
+    flat: NDArray[np.float32]
+    corners: NDArray[np.int32]
+    source: NDArray[np.int32]
+    band_starts: NDArray[np.int64]
+    depth: NDArray[np.float32]
+    owner: NDArray[np.int32]
+    hits: tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]
+    fragments: NDArray[np.float32]
+    scratch: NDArray[np.float32]
+    colour: NDArray[np.float32]
+    pixels: NDArray[np.int32]
+
+
+def room_for(surface: Surface, size: tuple[int, int], side: int) -> Room:
+    """Room to draw a surface into pictures of `size` (width, height) px with side x side samples in a pixel."""
+    n_vertices, n_triangles = len(surface.rig.rest), len(surface.triangles)
+    width, height = size[0] * side, size[1] * side
+    rows = side * max(1, BAND_SAMPLES // (width * side))
+    n_hits = N_LAYERS * width * rows + ODD
+    vertex = np.zeros((n_vertices, N_VERTEX_COLUMNS), np.float32)
+    vertex[:, EXPOSURE : EXPOSURE + 4] = 1.0
+    vertex[:, COLOUR : COLOUR + 3] = surface.colours
+    vertex[:, UV : UV + 2] = surface.uv
+    number, kind, fragment = np.zeros((3, n_hits), np.int32)
+    return Room(
+        side=side,
+        vertex=vertex,
+        grid=np.zeros((n_vertices, 2), np.int32),
+        flat=np.zeros((n_triangles, 3), np.float32),
+        corners=np.zeros((2 * n_triangles, 6), np.int32),
+        source=np.zeros(2 * n_triangles, np.int32),
+        band_starts=np.zeros(-(-height // rows) + 1, np.int64),
+        depth=np.zeros((N_LAYERS, rows, width), np.float32),
+        owner=np.zeros((N_LAYERS, rows, width), np.int32),
+        hits=(number, np.zeros((n_hits, 3), np.float32), kind, fragment),
+        fragments=np.zeros((N_ROWS, n_hits), np.float32),
+        scratch=np.zeros((N_SCRATCH_ROWS, n_hits), np.float32),
+        colour=np.zeros((3, n_hits), np.float32),
+        pixels=np.zeros((width * rows // side**2, PIXEL_ENDS + N_LAYERS + 1), np.int32),
+    )
+
+
+def paint(
+    points: NDArray[np.float32],
+    surface: Surface,
+    optics: Optics,
+    lights: NDArray[np.float32],
+    room: Room,
+    picture: NDArray[np.uint8],
+) -> None:
+    """Draw the surface, its vertices (V, 3) in the world, over the background that the picture holds."""
+    lens, side = optics.lens, room.side
+    height, width = picture.shape[0] * side, picture.shape[1] * side
+    batch = _projected(points, surface, optics, room, (width, height))
+    geometry = (room.vertex, surface.triangles, surface.translucent, lens)
+    scene = (surface.triangles, surface.part_of, surface.materials, surface.texture, TABLES[0])
+    n_rows = room.depth.shape[1]
+    for band, (begin, end) in enumerate(zip(room.band_starts[:-1], room.band_starts[1:], strict=True)):
+        if begin == end:
+            continue
+        place = (band * n_rows, min(n_rows, height - band * n_rows), side)
+        members = batch[begin:end]
+        n_translucent = draw_band(geometry, (room.corners, room.source, members), place[0], room.depth, room.owner)
+        n_pixels = find_hits(room.owner, N_LAYERS if n_translucent else 1, place, room.hits, room.pixels)
+        if n_pixels == 0:
+            continue
+        n_hits = int(room.pixels[n_pixels - 1, PIXEL_ENDS + N_LAYERS])
+        evaluate(room.hits, n_hits, room.vertex, scene, lens, room.fragments)
+        n_fragments = join(room.fragments, room.hits, room.pixels, n_pixels)
+        light(room.fragments, n_fragments, lights, room.scratch, room.colour)
+        shown = (room.fragments, room.colour)
+        compose(room.owner, place, (room.pixels, n_pixels), room.hits, shown, (picture, TABLES))
+
+
+def _projected(
+    points: NDArray[np.float32], surface: Surface, optics: Optics, room: Room, size: tuple[int, int]
+) -> NDArray[np.int32]:
+    """Bring the surface before the camera; returns the triangles of all bands, one band behind the other."""
+    to_camera(points, optics.view, optics.lens, room.vertex, room.grid)
+    face_normals(room.vertex, surface.triangles, room.flat)
+    vertex_normals(room.flat, surface.starts, surface.members, room.vertex)
+    count = gather(room.vertex, room.grid, surface.triangles, (optics.lens, size), room.corners, room.source)
+    n_rows = room.depth.shape[1]
+    members = np.zeros(2 * len(surface.triangles), np.int32)
+    sort_into_bands(room.corners, count, n_rows, room.band_starts, members)
+    if room.band_starts[-1] > len(members):
+        members = np.zeros(room.band_starts[-1], np.int32)
+        sort_into_bands(room.corners, count, n_rows, room.band_starts, members)
+    return members
