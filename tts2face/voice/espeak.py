@@ -1,0 +1,192 @@
+"""espeak-ng: a formant voice for every language, whose phoneme events are the phone edges."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import BackendError, InputError
+from lexicon.g2p import check_language, segments_of
+from lexicon.ipa import Segment
+from lexicon.phones import PHONES, nearest_phones
+from lexicon.scripts import check_script
+from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from tts2face.speech.align import increasing
+from tts2face.types import Speech, Waveform
+from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, at_volume
+
+CHILD = Path(__file__).with_name("espeak_child.py")
+WORD_EVENT, PHONEME_EVENT = 1, 7
+USUAL_WORDS_PER_MINUTE = 175  # espeak-ng's default; its events go wrong above 400
+PATIENCE_S = 60.0  # a sentence takes some 50 ms
+LONGEST_CLOSURE_S = 0.06  # the event of a stop stands at its burst; the closure before it is 38-46 ms
+CLOSED_LEVEL = 0.006  # of full scale: espeak-ng's closures are digital silence but for the tail of what went before
+QUIET_LEVEL = 0.03  # of full scale: what a pause may still hold of the phone before it
+WINDOW_S = 0.001
+LEAST_PAUSE_S = 0.03
+QUIET_S = 0.25  # put before and behind: espeak-ng begins at once, lips begin to move earlier
+# espeak-ng's own names of phonemes for [[...]] input (docs/phonemes.md of espeak-ng).
+MNEMONICS = MappingProxyType({
+    "ɑ": "A:", "æ": "a", "ʌ": "V", "ɔ": "O:", "aʊ": "aU", "aɪ": "aI", "ɛ": "E", "ɝ": "3:", "eɪ": "eI", "ɪ": "I",
+    "i": "i:", "oʊ": "oU", "ɔɪ": "OI", "ʊ": "U", "u": "u:", "ə": "@", "ɚ": "3", "b": "b", "tʃ": "tS", "d": "d",
+    "ð": "D", "f": "f", "ɡ": "g", "h": "h", "dʒ": "dZ", "k": "k", "l": "l", "m": "m", "n": "n", "ŋ": "N", "p": "p",
+    "ɹ": "r", "s": "s", "ʃ": "S", "t": "t", "θ": "T", "v": "v", "w": "w", "j": "j", "z": "z", "ʒ": "Z",
+})  # fmt: skip
+STRESS_MARKS = MappingProxyType({1: "'", 2: ","})
+
+
+@dataclass(frozen=True, slots=True)
+class _Sounded:
+    """What one phoneme event says: phones, where they begin, and the word they belong to."""
+
+    phones: tuple[str, ...]
+    start: float
+    word: int
+
+
+class EspeakVoice:
+    """A voice of espeak-ng, 22.05 kHz; every request runs in a process of its own."""
+
+    def __init__(self, language: str, own_words: Pronouncing) -> None:
+        check_language(language)
+        self._language, self._own_words = language, own_words
+        self._rate = 22050
+
+    @property
+    def sample_rate(self) -> int:
+        """Hz."""
+        return self._rate
+
+    def speak(self, spoken: Spoken, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
+        """Speech of a sentence; see `tts2face.voice.engine.Voice`. Nothing is random: `seed` changes nothing."""
+        text, words = self._written(spoken)
+        header, samples = _ask(text, self._language, round(USUAL_WORDS_PER_MINUTE * rate), bool(words))
+        sound = np.pad(samples / np.float32(32768), round(QUIET_S * self._rate)).astype(np.float32)
+        sounded, names = self._sounded(header, text, sound)
+        if not any(phone != SILENCE for event in sounded for phone in event.phones):
+            raise InputError(f"there is nothing to say in {text[:40]!r}; give at least one word")
+        phones, spans = _sequence(sounded, words or names, len(sound) / self._rate)
+        return Speech(Waveform(at_volume(sound, volume), self._rate), phones, spans)
+
+    def _written(self, spoken: Spoken) -> tuple[str, list[str]]:
+        """Text for espeak-ng; and the words, where they are given as phones."""
+        if isinstance(spoken, str):
+            check_script(spoken, self._language)
+            plain = spoken.replace("[[", " ").replace("]]", " ")
+            chosen = [self._own_words.get(word.strip(".,;:!?\"'()").lower()) for word in plain.split()]
+            if not any(chosen):
+                return plain, []
+            spoken = [
+                SpokenWord(word, own) if own else SpokenWord(word, ())
+                for word, own in zip(plain.split(), chosen, strict=True)
+            ]
+        return " ".join(_mnemonic(word) for word in spoken), [word.text for word in spoken]
+
+    def _sounded(
+        self, header: dict[str, Any], text: str, sound: NDArray[np.float32]
+    ) -> tuple[list[_Sounded], list[str]]:
+        found: list[_Sounded] = []
+        names: list[str] = []
+        for kind, sample, value in header["events"]:
+            if kind == WORD_EVENT:
+                names.append(text[value[0] : value[0] + value[1]])
+                continue
+            phones = tuple(segment.phone for segment in segments_of(value, self._language)) if value else ()
+            at = sample + round(QUIET_S * self._rate)
+            start = at / self._rate
+            if phones and PHONES[phones[0]].kind in {"stop", "affricate"}:
+                start = _closure_start(sound, at, self._rate)
+            found.append(_Sounded(phones or (SILENCE,), start, len(names) - 1))
+        return _true_silences(found, sound, self._rate), names
+
+
+def _true_silences(found: Sequence[_Sounded], sound: NDArray[np.float32], rate: int) -> list[_Sounded]:
+    """Events less those that name no phone though something sounds (a mark of the phone before, such as ʲ)."""
+    ends = [event.start for event in found[1:]] + [len(sound) / rate]
+    return [
+        event
+        for event, end in zip(found, ends, strict=True)
+        if event.phones != (SILENCE,)
+        or float(np.abs(sound[round(event.start * rate) : round(end * rate)]).max(initial=0.0)) < QUIET_LEVEL
+    ]
+
+
+def _mnemonic(word: SpokenWord) -> str:
+    if not word.segments:
+        return word.text
+    return f"[[{''.join(_mnemonics(segment) for segment in word.segments)}]]{word.after}"
+
+
+def _mnemonics(segment: Segment) -> str:
+    phones = nearest_phones(segment.phone, MNEMONICS.keys())
+    return STRESS_MARKS.get(segment.stress, "") + "".join(MNEMONICS[phone] for phone in phones)
+
+
+def _ask(
+    text: str, language: str, words_per_minute: int, has_phonemes: bool
+) -> tuple[dict[str, Any], NDArray[np.int16]]:
+    request = {
+        "text": text, "language": language, "words_per_minute": words_per_minute, "has_phonemes": has_phonemes,
+    }  # fmt: skip
+    try:
+        answer = subprocess.run(
+            [sys.executable, "-I", str(CHILD)],
+            input=json.dumps(request).encode(),
+            capture_output=True,
+            timeout=PATIENCE_S,
+            check=False,
+        )
+    except subprocess.TimeoutExpired as late:
+        raise BackendError(f"espeak-ng did not answer within {PATIENCE_S:.0f} s; try a shorter text") from late
+    if answer.returncode != 0:
+        reason = answer.stderr.decode("utf-8", "replace").strip().splitlines()[-1:] or [f"exit {answer.returncode}"]
+        raise BackendError(f"espeak-ng failed ({reason[0]}); reinstall espeakng-loader")
+    head, _, content = answer.stdout.partition(b"\n")
+    header: dict[str, Any] = json.loads(head)
+    if "error" in header:
+        raise BackendError(f"{header['error']}; reinstall espeakng-loader")
+    return header, np.frombuffer(content, "<i2")
+
+
+def _closure_start(sound: NDArray[np.float32], burst: int, rate: int) -> float:
+    """Seconds at which the silence before a stop's burst begins, at most `LONGEST_CLOSURE_S` before it."""
+    window = max(1, round(WINDOW_S * rate))
+    earliest = max(0, burst - round(LONGEST_CLOSURE_S * rate))
+    at = burst
+    while at - window >= earliest and float(np.abs(sound[at - window : at]).max()) < CLOSED_LEVEL:
+        at -= window
+    return at / rate
+
+
+def _sequence(
+    sounded: Sequence[_Sounded], words: Sequence[str], duration: float
+) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+    """Events to phones without gap; an event of several phones is shared equally among them."""
+    ends = [event.start for event in sounded[1:]] + [duration]
+    labels: list[str] = []
+    starts: list[float] = []
+    owners: list[int] = []
+    if sounded[0].start > LEAST_PAUSE_S and sounded[0].phones != (SILENCE,):
+        labels, starts, owners = [SILENCE], [0.0], [-1]
+    for event, end in zip(sounded, ends, strict=True):
+        if end <= event.start or (event.phones == (SILENCE,) and labels[-1:] == [SILENCE]):
+            continue
+        length = (end - event.start) / len(event.phones)
+        for number, phone in enumerate(event.phones):
+            labels.append(phone)
+            starts.append(event.start + number * length)
+            owners.append(event.word if phone != SILENCE else -1)
+    edges = np.array([*starts, duration])
+    edges[0] = 0.0
+    spans = []
+    for word in sorted(set(owners) - {-1}):
+        mine = [at for at, owner in enumerate(owners) if owner == word]
+        spans.append(WordSpan(words[min(word, len(words) - 1)], mine[0], mine[-1] + 1))
+    return PhoneSequence(labels, increasing(edges)), tuple(spans)
