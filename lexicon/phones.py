@@ -110,8 +110,22 @@ def _row(line: str, where: str) -> Phone:
     cells = line.split("\t")
     if len(cells) != 13:
         raise DataError(f"{where}: {len(cells)} cells instead of 13; the cells stand between tabs")
-    *simple, parts, aliases, example = cells
-    phone = Phone(*simple, tuple(parts.split()), tuple(aliases.split()), example)
+    symbol, arpabet, kind, place, manner, voicing, height, backness, rounding, nasality, parts, aliases, example = cells
+    phone = Phone(
+        symbol=symbol,
+        arpabet=arpabet,
+        kind=kind,
+        place=place,
+        manner=manner,
+        voicing=voicing,
+        height=height,
+        backness=backness,
+        rounding=rounding,
+        nasality=nasality,
+        parts=tuple(parts.split()),
+        aliases=tuple(aliases.split()),
+        example=example,
+    )
     allowed: tuple[tuple[str, Collection[str]], ...] = (
         (phone.kind, KINDS),
         (phone.place, (*PLACES, "")),

@@ -1,0 +1,153 @@
+"""Spelling to IPA by espeak-ng, through phonemizer, in every language that espeak-ng has.
+
+espeak-ng is a library with global state: one lock guards all calls.
+"""
+
+import difflib
+import functools
+import logging
+import re
+import threading
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
+
+from lexicon.errors import BackendError, InputError
+from lexicon.ipa import Segment, parse_ipa
+
+DEFAULT_LANGUAGE = "en-us"
+LONGEST_DATA_PATH = 150  # characters; espeak-ng cuts longer paths off (its buffer holds 160)
+_OTHER_CODES = MappingProxyType(
+    {"zh": "cmn yue hak", "zh-cn": "cmn", "zh-tw": "cmn", "no": "nb", "iw": "he", "jp": "ja"}
+)
+_LOCK = threading.RLock()
+_SWITCH = re.compile(r"\([a-z0-9-]+\)")  # espeak-ng marks a foreign word: (en)...(fr); its phones are read as well
+
+# What espeak-ng writes in a tone language is partly no IPA: tones as digits and as ɜ (a "3"), retroflexes with a dot.
+_TONE_LANGUAGES = frozenset({"cmn", "hak", "yue", "vi", "th", "my", "shn"})
+_TONE_SPELLINGS = (
+    (re.compile(r"ɜ|[0-9]|-"), ""),
+    (re.compile(r"ts\.?h"), "tsh"),
+    (re.compile(r"ts\."), "ʈʂ"),
+    (re.compile(r"s\."), "ʂ"),
+    (re.compile(r"(?<=[ptkqscɕʂ])h"), "ʰ"),
+    (re.compile(r"nɡ"), "ŋ"),
+)
+_SPELLINGS = (
+    (re.compile(r"r\."), "ɽ"),
+    (re.compile(r"sx"), "ɧ"),  # Swedish sju
+    (re.compile(r"(?<=`)_?ʔ"), "ʼ"),  # Quechua ejectives
+    (re.compile(r"(?<=[tc])_h"), "ʰ"),  # Korean aspirates
+)
+
+
+@functools.cache
+def _wrapper() -> Any:
+    """Phonemizer's espeak-ng class, told where the library and its data lie."""
+    try:
+        import espeakng_loader
+        from phonemizer.backend.espeak.wrapper import EspeakWrapper
+    except ImportError as missing:
+        raise BackendError(f"{missing.name} is missing; install it with `pip install tts2face`") from missing
+    data = str(espeakng_loader.get_data_path())
+    if len(data) > LONGEST_DATA_PATH:
+        raise BackendError(
+            f"espeak-ng cannot read data under a path of more than {LONGEST_DATA_PATH} characters ({data}); "
+            "install tts2face in a folder nearer to the root"
+        )
+    EspeakWrapper.set_library(espeakng_loader.get_library_path())
+    EspeakWrapper.set_data_path(data)
+    return EspeakWrapper
+
+
+@functools.cache
+def languages() -> Mapping[str, str]:
+    """Names of all languages that espeak-ng speaks, by code.
+
+    Raises
+    ------
+    BackendError
+        espeak-ng is not installed or cannot be loaded.
+    """
+    with _LOCK:
+        wrapper = _wrapper()
+        try:
+            voices = wrapper().available_voices()
+        except RuntimeError as broken:
+            raise BackendError(f"espeak-ng does not start: {broken}; reinstall espeakng-loader") from broken
+    return MappingProxyType({voice.language: voice.name.strip() for voice in voices})
+
+
+def check_language(language: str) -> None:
+    """Refuse a language that espeak-ng does not have.
+
+    Raises
+    ------
+    InputError
+        There is no such code; the message names close ones.
+    """
+    if language == DEFAULT_LANGUAGE:
+        return
+    known = languages()
+    if language in known:
+        return
+    wanted = language.casefold()
+    start = _OTHER_CODES.get(wanted, wanted.partition("-")[0].partition("_")[0])
+    close = [code for code in known if code.partition("-")[0] in start.split()]
+    close += [code for code, name in known.items() if wanted and name.casefold().startswith(wanted)]
+    close = close or difflib.get_close_matches(wanted, list(known), n=4, cutoff=0.5)
+    hint = f"did you mean {', '.join(dict.fromkeys(close))}?" if close else "codes look like en-us, de, fr-fr, ja"
+    raise InputError(f"there is no language {language!r}; {hint}")
+
+
+@functools.cache
+def _backend(language: str) -> Any:
+    _wrapper()
+    from phonemizer.backend import EspeakBackend
+
+    quiet = logging.getLogger("tts2face.phonemizer")
+    quiet.setLevel(logging.CRITICAL)
+    return EspeakBackend(language, with_stress=True, language_switch="keep-flags", logger=quiet)
+
+
+def phonemize(lines: Sequence[str], language: str) -> tuple[tuple[str, ...], ...]:
+    """IPA of each line as espeak-ng writes it: one string a spoken word, phones between underscores.
+
+    espeak-ng joins and splits words at will (``of the`` is one, a year is four).
+
+    Raises
+    ------
+    InputError
+        The language does not exist.
+    BackendError
+        espeak-ng is not installed.
+    """
+    check_language(language)
+    if not lines:
+        return ()
+    with _LOCK:
+        backend = _backend(language)
+        from phonemizer.separator import Separator
+
+        flat = [line.replace("\n", " ") for line in lines]
+        kept = [at for at, line in enumerate(flat) if line.strip()]
+        spoken = backend.phonemize([flat[at] for at in kept], separator=Separator(phone="_", word=" "), strip=True)
+    written: list[tuple[str, ...]] = [()] * len(flat)
+    for at, line in zip(kept, spoken, strict=True):
+        words = (_SWITCH.sub("", word).strip("_") for word in line.split())
+        written[at] = tuple(word for word in words if word)
+    return tuple(written)
+
+
+def segments_of(written: str, language: str) -> tuple[Segment, ...]:
+    """Phones of one word as espeak-ng wrote it.
+
+    Raises
+    ------
+    InputError
+        It holds a letter that is no phone of the table.
+    """
+    is_tonal = language.partition("-")[0] in _TONE_LANGUAGES
+    for pattern, ipa in (*_TONE_SPELLINGS, *_SPELLINGS) if is_tonal else _SPELLINGS:
+        written = pattern.sub(ipa, written)
+    return parse_ipa(written)
