@@ -11,7 +11,7 @@ _DEVANAGARI = frozenset({"DEVANAGARI"})
 _HAN = frozenset({"CJK"})
 
 # First words of the Unicode names of a language's letters, by its espeak-ng code or the first part of it. Latin is read
-# in every language (espeak-ng spells it or switches to English) and is all that a language without a line reads. Chinese
+# in every language (espeak-ng spells it or switches to English); a language without a line reads nothing else. Chinese
 # characters are missing under ja, ko and hak: espeak-ng says "Chinese letter" for each. Japanese goes in as kana.
 SCRIPTS = MappingProxyType({
     "am": frozenset({"ETHIOPIC"}), "ar": _ARABIC, "as": frozenset({"BENGALI"}), "ba": _CYRILLIC,
