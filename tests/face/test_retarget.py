@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
@@ -45,6 +45,7 @@ def talker_of(seed: int = 0, opening: float = 8.0) -> Talker:
     """Orthonormal modes; the first opens the inner lips; one recorded /p/ with the lips at rest."""
     rng = np.random.default_rng(seed)
     modes = rng.normal(size=(N_MODES, N_LANDMARKS, 3))
+    modes[:, [*INNER_LIP_UPPER, *INNER_LIP_LOWER]] = 0
     modes[0] = 0
     modes[0, INNER_LIP_LOWER, 1] = -1
     flat = np.linalg.qr(modes.reshape(N_MODES, -1).T)[0].T
@@ -91,6 +92,7 @@ def motion_of(talker: Talker, n_frames: int = 12, seed: int = 3) -> Trajectory:
     return Trajectory(speech_channels(talker.model), values, 25.0)
 
 
+@settings(deadline=None)  # the first example compiles
 @given(st.integers(0, 10_000))
 def test_agrees_with_scipy_within_limits(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -102,6 +104,7 @@ def test_agrees_with_scipy_within_limits(seed: int) -> None:
         assert frame == pytest.approx(known.x, abs=10e-5)
 
 
+@settings(deadline=None)
 @given(st.integers(0, 10_000))
 def test_inner_products_are_the_orthonormal_case_of_least_squares(seed: int) -> None:
     """T07 eq. 5; and a flipped source vector flips its column only: signs look after themselves."""
