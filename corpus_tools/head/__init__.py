@@ -1,0 +1,1 @@
+"""Builds the shipped faces from the CC0 data of MakeHuman."""

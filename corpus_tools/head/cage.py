@@ -1,0 +1,54 @@
+"""The control cage of one identity: MakeHuman's vertices and face units in millimetres about the eyes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.head.source import Source
+
+Floats = NDArray[np.float64]
+
+SCALE = 107.6  # mm per unit of the source, a decimetre: the default identity gets 62 mm between the eyes
+SIDES = ("l", "r")  # the person's own left has x > 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cage:
+    """Vertices (N, 3) of one identity and displacements (N, 3) of its shapes by name; mm, origin between the eyes."""
+
+    source: Source
+    vertices: Floats
+    units: Mapping[str, Floats]
+
+    def group(self, name: str) -> NDArray[np.int64]:
+        """Vertex numbers of a group of the source."""
+        return np.unique(self.source.groups[name].corners)
+
+
+def caged(source: Source, targets: Mapping[str, float]) -> Cage:
+    """The cage with weighted targets."""
+    vertices = source.vertices.copy()
+    for name, weight in targets.items():
+        vertices += weight * source.target(name)
+    vertices *= SCALE
+    eyes = [sphere_of(vertices[np.unique(source.groups[f"helper-{side}-eye"].corners)])[0] for side in SIDES]
+    units = {name: SCALE * moved for name, moved in source.face_units().items()}
+    return Cage(source, vertices - np.mean(eyes, axis=0), units)
+
+
+def sphere_of(points: Floats) -> tuple[Floats, float]:
+    """Centre and radius of the sphere nearest to points (algebraic least squares)."""
+    rows = np.column_stack([2.0 * points, np.ones(len(points))])
+    solved = np.linalg.lstsq(rows, (points**2).sum(axis=1), rcond=None)[0]
+    return solved[:3], float(np.sqrt(solved[3] + solved[:3] @ solved[:3]))
+
+
+def rotation_between(before: Floats, after: Floats) -> tuple[Floats, Floats]:
+    """Rotation (3, 3) and translation (3,) that bring points nearest to their new places (Kabsch 1976)."""
+    middle, there = before.mean(axis=0), after.mean(axis=0)
+    left, _, right = np.linalg.svd((before - middle).T @ (after - there))
+    flip = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    rotation = (left * flip @ right).T
+    return rotation, there - rotation @ middle

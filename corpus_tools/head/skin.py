@@ -1,0 +1,68 @@
+"""The skin: MakeHuman's head subdivided once, with its own texture layout that gives the face most pixels."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.head.cage import Cage
+from corpus_tools.head.subdivide import catmull_clark
+
+Floats = NDArray[np.float64]
+
+LOWEST, WIDEST = 5.1, 2.25  # of the head with its shoulders, in units of the source
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Skin:
+    """The subdivided head.
+
+    Parameters
+    ----------
+    vertices : (N, 3)
+        mm; split where the texture layout is cut.
+    shapes
+        Displacement (N, 3) by name.
+    quads : (F, 4)
+    source_uv : (N, 2)
+        Texture coordinates in MakeHuman's own layout, v up.
+    base : (N, 3)
+        Where the vertex lies on the source's base mesh, the same for every identity: where paint goes.
+    matrix : (N, cage)
+        Sparse; what makes N points of the cage's.
+    """
+
+    vertices: Floats
+    shapes: dict[str, Floats]
+    quads: NDArray[np.int64]
+    source_uv: Floats
+    base: Floats
+
+
+def skinned(cage: Cage) -> Skin:
+    """The skin of a cage, one Catmull-Clark step finer."""
+    body = cage.source.groups["body"]
+    places = cage.source.vertices[body.corners]
+    kept = (places[:, :, 1] > LOWEST).all(axis=1) & (np.abs(places[:, :, 0]) < WIDEST).all(axis=1)
+    used, quads = np.unique(body.corners[kept], return_inverse=True)
+    matrix, fine = catmull_clark(len(used), quads.reshape(-1, 4))
+    fine_uv = _halved(cage.source.uv[body.uv_corners[kept]])
+    keys = np.column_stack([fine.ravel(), np.rint(fine_uv.reshape(-1, 2) * 1e6).astype(np.int64)])
+    _, first, corner = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    rows = fine.ravel()[first]
+    split = matrix[rows]
+    return Skin(
+        vertices=split @ cage.vertices[used],
+        shapes={name: split @ moved[used] for name, moved in cage.units.items()},
+        quads=corner.reshape(-1, 4).astype(np.int64),
+        source_uv=fine_uv.reshape(-1, 2)[first],
+        base=split @ cage.source.vertices[used],
+    )
+
+
+def _halved(corners: Floats) -> Floats:
+    """(4 F, 4, 2) texture coordinates of quads split in four as `catmull_clark` does, each in its middle."""
+    after = (corners + np.roll(corners, -1, axis=1)) / 2
+    centre = corners.mean(axis=1)
+    new = [np.stack([corners[:, k], after[:, k], centre, after[:, k - 1]], axis=1) for k in range(4)]
+    return np.stack(new, axis=1).reshape(-1, 4, 2)

@@ -1,0 +1,184 @@
+"""Teeth: two arches of single crowns in a gum, laid along the curve of MakeHuman's strip of teeth."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.head.cage import SCALE
+from corpus_tools.head.piece import Piece, Span
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arch:
+    """One row of teeth.
+
+    Parameters
+    ----------
+    curve : (K, 2)
+        x and z of the crowns' outer faces from the middle to the left end, mm.
+    edge_y : float
+        Height of the biting edge, mm.
+    up : float
+        1 when the roots are above the edge, -1 below.
+    widths, heights, depths : (7,)
+        Crowns from the middle to the second molar, mm.
+    """
+
+    curve: Floats
+    edge_y: float
+    up: float
+    widths: Floats
+    heights: Floats
+    depths: Floats
+
+
+# Sizes after Wheeler, Dental Anatomy; outer curves after MakeHuman's strip, in units of the source.
+UPPER_CURVE = SCALE * np.array([(0, 0.196), (0.080, 0.184), (0.150, 0.140), (0.197, 0.080), (0.230, 0.010), (0.258, -0.070), (0.278, -0.170)])
+LOWER_CURVE = SCALE * np.array([(0, 0.166), (0.072, 0.156), (0.138, 0.114), (0.186, 0.056), (0.222, -0.012), (0.254, -0.090), (0.276, -0.190)])
+UPPER = Arch(
+    UPPER_CURVE, -0.606 * SCALE, 1.0,
+    np.array([8.6, 6.7, 7.7, 7.0, 6.8, 9.8, 9.2]),
+    np.array([10.6, 9.3, 10.2, 8.6, 8.0, 7.4, 6.8]),
+    np.array([5.0, 4.6, 6.0, 8.0, 8.4, 9.6, 9.6]),
+)  # fmt: skip
+LOWER = Arch(
+    LOWER_CURVE, -0.598 * SCALE, -1.0,
+    np.array([5.6, 6.1, 7.0, 7.0, 7.1, 10.4, 10.0]),
+    np.array([9.0, 9.2, 10.0, 8.6, 8.0, 7.4, 7.0]),
+    np.array([4.6, 4.8, 6.0, 7.2, 8.0, 9.4, 9.4]),
+)  # fmt: skip
+TOOTH, TOOTH_DARK = np.array([0.90, 0.865, 0.79]), np.array([0.78, 0.70, 0.58])
+GUM = np.array([0.68, 0.36, 0.36])
+N_AROUND, LEVELS = 12, np.array([0.0, 0.03, 0.10, 0.25, 0.5, 0.75, 1.0])
+MATERIALS = {"teeth": {"specular": 0.5, "shininess": 60.0, "wrap": 0.3}, "gums": {"specular": 0.4, "shininess": 40.0, "wrap": 0.3}}
+
+
+def arch_piece(arch: Arch, name: str) -> Piece:
+    """Crowns and gum of an arch; its two spans are ``teeth_<name>`` and ``gums_<name>``."""
+    path = _path(arch.curve)
+    points, colours, triangles, count = [], [], [], 0
+    for side in (1.0, -1.0):
+        along = 0.0
+        for width, height, depth in zip(arch.widths, arch.heights, arch.depths, strict=True):
+            crown, shade = _crown(width, height, depth)
+            points.append(_placed(crown, path, side * (along + width / 2), arch))
+            colours.append(shade)
+            triangles.append(_tube_triangles(len(LEVELS), N_AROUND, closed_start=True) + count)
+            count += len(crown)
+            along += width
+    n_crowns = sum(len(block) for block in triangles)
+    gum = _gum(path, arch)
+    triangles.append(_tube_triangles(*_GUM_GRID, closed_start=False) + count)
+    points.append(gum)
+    colours.append(np.tile(GUM, (len(gum), 1)))
+    vertices, faces = np.concatenate(points), np.concatenate(triangles)
+    faces = _outward(vertices, faces, arch.up)
+    spans = (
+        Span(f"teeth_{name}", faces[:n_crowns], MATERIALS["teeth"]),
+        Span(f"gums_{name}", faces[n_crowns:], MATERIALS["gums"]),
+    )
+    return Piece(vertices, spans, np.concatenate(colours))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Path:
+    """The curve by arc length from the middle, left positive: (n,) lengths, (n, 2) x and z, (n, 2) outward normals."""
+
+    lengths: Floats
+    places: Floats
+    normals: Floats
+
+    def at(self, along: Floats) -> tuple[Floats, Floats]:
+        """Places and normals (..., 2) at arc lengths."""
+        both = [np.stack([np.interp(along, self.lengths, line[:, k]) for k in (0, 1)], axis=-1)
+                for line in (self.places, self.normals)]  # fmt: skip
+        return both[0], both[1]
+
+
+def _path(curve: Floats) -> Path:
+    from scipy.interpolate import CubicSpline
+
+    mirrored = np.concatenate([curve[:0:-1] * [-1, 1], curve])
+    knots = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(mirrored, axis=0), axis=1))])
+    places = CubicSpline(knots, mirrored)(np.linspace(0, knots[-1], 601))
+    lengths = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
+    tangents = np.gradient(places, lengths, axis=0)
+    normals = np.column_stack([-tangents[:, 1], tangents[:, 0]])
+    return Path(lengths - lengths[-1] / 2, places, normals)
+
+
+def _crown(width: float, height: float, depth: float) -> tuple[Floats, Floats]:
+    """Points (n, 3) along the arch, up from the edge and out of the face, and their colours (n, 3)."""
+    around = np.linspace(0, 2 * np.pi, N_AROUND, endpoint=False)
+    corner = np.stack([np.cos(around), np.sin(around)], axis=1)
+    corner = np.sign(corner) * np.abs(corner) ** 0.7  # between an ellipse and a box
+    is_cutting = depth < 6.5
+    breadth = np.interp(LEVELS, [0, 0.03, 0.10, 0.25, 0.6, 1], [0.70, 0.86, 0.955, 0.985, 0.95, 0.80]) * width / 2
+    edge = 0.28 if is_cutting else 0.62
+    thick = np.interp(LEVELS, [0, 0.03, 0.10, 0.25, 0.6, 1], [0.6 * edge, edge, edge + 0.1, edge + 0.2, 0.86, 1.0]) * depth
+    front = -np.interp(LEVELS, [0, 0.1, 0.35, 1], [0.9, 0.35, 0.0, 0.5]) - thick / 2
+    rings = np.stack([
+        breadth[:, None] * corner[:, 0],
+        np.broadcast_to((LEVELS * (height + 1.5))[:, None], (len(LEVELS), N_AROUND)),
+        front[:, None] + thick[:, None] / 2 * corner[:, 1],
+    ], axis=-1)  # fmt: skip
+    cap = np.array([[0.0, -0.05, front[0]]])
+    share = np.concatenate([np.repeat(LEVELS, N_AROUND), [0.0]])[:, None]
+    colours = TOOTH + (TOOTH_DARK - TOOTH) * np.clip((share - 0.35) / 0.65, 0, 1) ** 1.5
+    return np.concatenate([rings.reshape(-1, 3), cap]), colours
+
+
+def _placed(points: Floats, path: Path, along: float, arch: Arch) -> Floats:
+    """Points of a crown in the face, standing straight on the arch's curve."""
+    place, normal = path.at(np.array(along))
+    normal = normal / np.linalg.norm(normal)
+    tangent = np.array([normal[1], -normal[0]])
+    flat = place + points[:, :1] * tangent + points[:, 2:] * normal
+    return np.column_stack([flat[:, 0], arch.edge_y + arch.up * points[:, 1], flat[:, 1]])
+
+
+_GUM_GRID = (85, 8)
+
+
+def _gum(path: Path, arch: Arch) -> Floats:
+    """A tube along the arch, scalloped about the necks of the teeth."""
+    total = arch.widths.sum()
+    along = np.linspace(-total, total, _GUM_GRID[0])
+    bounds = np.concatenate([[0], np.cumsum(arch.widths)])
+    tooth = np.clip(np.searchsorted(bounds, np.abs(along), side="right") - 1, 0, 6)
+    within = (np.abs(along) - bounds[tooth]) / arch.widths[tooth]
+    middles = (bounds[1:] + bounds[:-1]) / 2
+    height = np.interp(np.abs(along), middles, arch.heights)
+    depth = np.interp(np.abs(along), middles, arch.depths)
+    line = height * (0.80 + 0.20 * np.abs(np.sin(np.pi * within)) ** 0.8)
+    one = np.ones_like(line)
+    ring = [  # height, outwards
+        (line, -0.5 * one), (line + 0.8, 0.45 * one), (height + 3.0, 1.0 * one), (height + 6.5, 0.3 * one),
+        (height + 7.0, -depth - 1), (height + 3.0, -depth - 2.5), (line + 0.8, -depth - 1.0), (line, -depth + 0.3),
+    ]  # fmt: skip
+    place, normal = path.at(along)
+    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    rows = []
+    for up, out in ring:
+        flat = place + out[:, None] * normal
+        rows.append(np.column_stack([flat[:, 0], arch.edge_y + arch.up * up, flat[:, 1]]))
+    return np.stack(rows, axis=1).reshape(-1, 3)
+
+
+def _tube_triangles(n_rings: int, n_around: int, closed_start: bool) -> NDArray[np.int64]:
+    """Triangles of rings one after the other, each closed; with a cap vertex behind the last for the first ring."""
+    row, column = (grid.ravel() for grid in np.meshgrid(np.arange(n_rings - 1), np.arange(n_around), indexing="ij"))
+    a, b = row * n_around + column, row * n_around + (column + 1) % n_around
+    faces = [np.stack([a, b, b + n_around], 1), np.stack([a, b + n_around, a + n_around], 1)]
+    if closed_start:
+        k = np.arange(n_around)
+        faces.append(np.stack([np.full(n_around, n_rings * n_around), (k + 1) % n_around, k], 1))
+    return np.concatenate(faces).astype(np.int64)
+
+
+def _outward(vertices: Floats, faces: NDArray[np.int64], up: float) -> NDArray[np.int64]:
+    """Crowns are wound alike; mirrored heights turn them inside out."""
+    return faces if up < 0 else faces[:, ::-1]
