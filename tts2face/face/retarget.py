@@ -115,7 +115,7 @@ def retargeter(talker: Talker, face: Face) -> Retargeter:
     lower = [known[landmark] for landmark in INNER_LIP_LOWER]
     gap_per_weight = per_weight[upper, 1] - per_weight[lower, 1]
     curvature = plain + GAP_WEIGHT * gap_per_weight.T @ gap_per_weight
-    curvature += EFFORT * np.trace(curvature) / len(moving) * np.eye(len(moving))
+    curvature += EFFORT * np.trace(plain) / len(moving) * np.eye(len(moving))
     return Retargeter(
         face.shape_names,
         moving,
