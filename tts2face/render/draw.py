@@ -13,8 +13,9 @@ from lexicon.errors import InputError
 from tts2face.face.linear import REST_HEAD
 from tts2face.face.model import Face
 from tts2face.render.background import background
+from tts2face.render.bake import Exposure, exposed
 from tts2face.render.camera import Optics, optics
-from tts2face.render.light import studio
+from tts2face.render.light import lamps, light_table
 from tts2face.render.paint import Room, paint, room_for
 from tts2face.render.picture import Picture
 from tts2face.render.surface import Surface, surfaced
@@ -30,14 +31,17 @@ class Stage:
     surface: Surface
     optics: Optics
     lights: NDArray[np.float32]
+    exposure: Exposure
     behind: NDArray[np.uint8]
 
 
 def staged(face: Face, picture: Picture) -> Stage:
     """The stage for a face and a picture; make it once, draw many times."""
     side = picture.supersampling
+    surface, towards = surfaced(face), lamps(picture.view)
     camera = optics(picture.view, face, (picture.width * side, picture.height * side))
-    return Stage(face, picture, surfaced(face), camera, studio(camera), background(picture))
+    exposure = exposed(face, surface, towards, available_cores())
+    return Stage(face, picture, surface, camera, light_table(towards, camera), exposure, background(picture))
 
 
 def draw(
@@ -128,5 +132,5 @@ def _drawn(stage: Stage, weights: NDArray[np.float32], head: NDArray[np.float32]
     drawn = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
     drawn[:, :, :3] = stage.behind
     points = stage.surface.rig.posed(weights, head)
-    paint(points, stage.surface, stage.optics, stage.lights, room, drawn)
+    paint(points, stage.surface, stage.optics, (stage.lights, stage.exposure.at(weights)), room, drawn)
     return drawn

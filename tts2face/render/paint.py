@@ -1,6 +1,7 @@
 """One picture: the kernels of this room in their order, band by band."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ TABLES = (linear_table(), encoding_table(TONE_STEPS))
 class Room:
     """What one picture at a time needs while it is drawn; `tts2face.render.raster` and its neighbours name the parts.
 
-    ``vertex`` holds exposure, colour and uv from the start.
+    ``vertex`` holds colour and uv from the start.
     """
 
     side: int
@@ -60,7 +61,6 @@ def room_for(surface: Surface, size: tuple[int, int], side: int) -> Room:
     rows = side * max(1, BAND_SAMPLES // (width * side))
     n_hits = N_LAYERS * width * rows + ODD
     vertex = np.zeros((n_vertices, N_VERTEX_COLUMNS), np.float32)
-    vertex[:, EXPOSURE : EXPOSURE + 4] = 1.0
     vertex[:, COLOUR : COLOUR + 3] = surface.colours
     vertex[:, UV : UV + 2] = surface.uv
     number, kind, fragment = np.zeros((3, n_hits), np.int32)
@@ -86,14 +86,20 @@ def paint(
     points: NDArray[np.float32],
     surface: Surface,
     optics: Optics,
-    lights: NDArray[np.float32],
+    lights: tuple[NDArray[np.float32], NDArray[np.float32]],
     room: Room,
     picture: NDArray[np.uint8],
 ) -> None:
-    """Draw the surface, its vertices (V, 3) in the world, over the background that the picture holds."""
+    """Draw the surface, its vertices (V, 3) in the world, over the background that the picture holds.
+
+    `lights` are the table of `tts2face.render.shade.light` and how much of each reaches every vertex (V, 4).
+    """
+    room.vertex[:, EXPOSURE : EXPOSURE + 4] = lights[1]
     lens, side = optics.lens, room.side
     height, width = picture.shape[0] * side, picture.shape[1] * side
-    batch = _projected(points, surface, optics, room, (width, height))
+    batch = project(points, surface, (optics.view, optics.lens), room, (width, height))
+    face_normals(room.vertex, surface.triangles, room.flat)
+    vertex_normals(room.flat, surface.starts, surface.members, room.vertex)
     geometry = (room.vertex, surface.triangles, surface.translucent, lens)
     scene = (surface.triangles, surface.part_of, surface.materials, surface.texture, TABLES[0])
     n_rows = room.depth.shape[1]
@@ -109,19 +115,18 @@ def paint(
         n_hits = int(room.pixels[n_pixels - 1, PIXEL_ENDS + N_LAYERS])
         evaluate(room.hits, n_hits, room.vertex, scene, lens, room.fragments)
         n_fragments = join(room.fragments, room.hits, room.pixels, n_pixels)
-        light(room.fragments, n_fragments, lights, room.scratch, room.colour)
+        light(room.fragments, n_fragments, lights[0], room.scratch, room.colour)
         shown = (room.fragments, room.colour)
         compose(room.owner, place, (room.pixels, n_pixels), room.hits, shown, (picture, TABLES))
 
 
-def _projected(
-    points: NDArray[np.float32], surface: Surface, optics: Optics, room: Room, size: tuple[int, int]
+def project(
+    points: NDArray[np.float32], surface: Surface, optics: tuple[Any, Any], room: Room, size: tuple[int, int]
 ) -> NDArray[np.int32]:
-    """Bring the surface before the camera; returns the triangles of all bands, one band behind the other."""
-    to_camera(points, optics.view, optics.lens, room.vertex, room.grid)
-    face_normals(room.vertex, surface.triangles, room.flat)
-    vertex_normals(room.flat, surface.starts, surface.members, room.vertex)
-    count = gather(room.vertex, room.grid, surface.triangles, (optics.lens, size), room.corners, room.source)
+    """Bring the surface before a camera (view, lens); returns the triangles of all bands, one band behind the other."""
+    view, lens = optics
+    to_camera(points, view, lens, room.vertex, room.grid)
+    count = gather(room.vertex, room.grid, surface.triangles, (lens, size), room.corners, room.source)
     n_rows = room.depth.shape[1]
     members = np.zeros(2 * len(surface.triangles), np.int32)
     sort_into_bands(room.corners, count, n_rows, room.band_starts, members)

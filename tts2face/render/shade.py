@@ -79,7 +79,8 @@ def light(table: Array, n: int, lights: Array, scratch: Array, colour: Array) ->
             matt, shine, strength, reach = colour[c], scratch[6 + c], lights[k, 3 + c], REACH[c]
             for i in range(n):
                 around_edge = wrap[i] * reach
-                matt[i] += strength * seen[i] * max(towards[i] + around_edge, zero) / (one + around_edge)
+                soaked = seen[i] + around_edge * seen[i] * (one - seen[i])  # a shadow's edge is redder under skin
+                matt[i] += strength * soaked * max(towards[i] + around_edge, zero) / (one + around_edge)
                 shine[i] += strength * lobe[i]
     for c in range(3):
         matt, shine, albedo, opacity = colour[c], scratch[6 + c], table[AT_ALBEDO + c], table[AT_OPACITY]
