@@ -1,0 +1,159 @@
+"""Phones become lip motion: the talker's recorded exemplars, chosen, blended and brought to rest in silence."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.exemplar import blend
+from tts2face.exemplar.contacts import Contacts, Gap, contact_poses, makes_lip_contact, with_contacts
+from tts2face.exemplar.options import SynthesisOptions
+from tts2face.exemplar.select import ContextIndex, Found, Wanted, best_tokens, context_index, log_durations
+from tts2face.exemplar.similarity import Similarity, phone_similarity, token_samples
+from tts2face.exemplar.targets import Targets, targets_of
+from tts2face.exemplar.tokens import Tokens, contexts, tokens_of
+from tts2face.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
+from tts2face.talker import Talker, speech_channels
+from tts2face.types import Trajectory
+
+RELEASE_FROM_S = 0.08  # this far from speech the face begins to leave what the exemplars did ...
+REST_FROM_S = 0.20  # ... and this far it is at rest; recorded lips settle within 0.2 s
+LEAST_EASE_S = 0.06  # a chunk that begins or ends within speech still eases from and to rest over this time
+DEFAULT_OPTIONS = SynthesisOptions()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VisualVoice:
+    """A talker made ready for synthesis: tokens, their index, the similarity of phones, the pose at rest.
+
+    ``spread`` and ``rest`` are (D,), of the speech parameters; ``names`` are the utterances'.
+    """
+
+    tokens: Tokens
+    index: ContextIndex
+    similarity: Similarity
+    spread: NDArray[np.float32]
+    rest: NDArray[np.float32]
+    lip_gap: Gap
+    channels: tuple[str, ...]
+    names: tuple[str, ...]
+
+
+def visual_voice(talker: Talker) -> VisualVoice:
+    """Index a talker's tokens and measure the similarity of the phones; once for any number of texts."""
+    model, n_speech = talker.model, talker.model.n_speech
+    tokens = tokens_of(talker)
+    spread = np.maximum(model.spread[:n_speech], 1e-6).astype(np.float32)
+    upper, lower = UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID
+    return VisualVoice(
+        tokens,
+        context_index(tokens),
+        phone_similarity(token_samples(tokens), tokens.phone, tokens.inventory, spread),
+        spread,
+        model.rest[:n_speech].astype(np.float32),
+        Gap(
+            np.ascontiguousarray(model.mean[upper] - model.mean[lower]),
+            np.ascontiguousarray(model.basis[:n_speech, upper] - model.basis[:n_speech, lower]),
+        ),
+        speech_channels(model),
+        tuple(spoken.name for spoken in talker.utterances),
+    )
+
+
+def chosen_tokens(phones: PhoneSequence, voice: VisualVoice, options: SynthesisOptions) -> tuple[Targets, Found]:
+    """What is shown for each phone, and the recorded tokens that show it."""
+    tokens = voice.tokens
+    number = {label: at for at, label in enumerate(tokens.inventory)}
+    targets = targets_of(phones, tokens.inventory)
+    labels = np.array([number[label] for label in targets.labels], np.int32)
+    around = contexts(labels, np.zeros(len(labels), np.int32), number[SILENCE])
+    wanted = Wanted(labels, around, log_durations(targets.spans))
+    found = best_tokens(
+        wanted,
+        voice.index,
+        voice.similarity.matrix,
+        context=options.context,
+        k=options.k,
+        duration=options.duration,
+    )
+    return targets, found
+
+
+def speech_trajectory(
+    phones: PhoneSequence,
+    voice: VisualVoice,
+    *,
+    fps: float,
+    n_frames: int,
+    options: SynthesisOptions = DEFAULT_OPTIONS,
+) -> Trajectory:
+    """Motion of the talker's speech parameters for phones in time; the first and the last frame are at rest.
+
+    Raises
+    ------
+    InputError
+        A phone is not in the phone table, the sequence does not begin at 0 s, or an option is out of range.
+
+    Notes
+    -----
+    Time and memory grow linearly with the number of phones. The motion is made on a clock of its own and then read at
+    the frames, so that frame rates agree. In silence farther than `REST_FROM_S` from speech the face is at rest.
+    """
+    if phones.start != 0.0:
+        raise InputError(f"phones to be animated begin at 0 s, not at {phones.start} s; shift them first")
+    targets, found = chosen_tokens(phones, voice, options)
+    frame_times = np.arange(n_frames) / fps
+    n_instants = int(np.ceil(max(phones.end, frame_times[-1]) * blend.CLOCK_HZ)) + 2
+    made = _motion(targets, found, voice, n_instants, options)
+    at = frame_times * blend.CLOCK_HZ
+    low = at.astype(np.int64)
+    part = (at - low)[:, None].astype(np.float32)
+    values = (1 - part) * made[low] + part * made[low + 1]
+    pull = stillness(phones, frame_times)[:, None].astype(np.float32)
+    return Trajectory(voice.channels, (1 - pull) * values + pull * voice.rest, fps)
+
+
+def _motion(
+    targets: Targets, found: Found, voice: VisualVoice, n_instants: int, options: SynthesisOptions
+) -> NDArray[np.float32]:
+    """(n, D) motion at the instants of the clock."""
+    weights = blend.exemplar_weights(found.scores, options.sharpness)
+    pieces = blend.averaged_pieces(voice.tokens, found.tokens, weights, voice.spread, options)
+    joined, told = blend.joined_pieces(pieces, targets, n_instants, options)
+    motion = np.where(told[:, None], joined * voice.spread, voice.rest)
+    motion = blend.smoothed(motion, options.smoothing_s, blend.CLOCK_HZ)
+    if not options.contacts:
+        return motion
+    touching = np.array([makes_lip_contact(label) for label in targets.labels])
+    poses = contact_poses(voice.tokens, found.tokens[touching], weights[touching], voice.lip_gap)
+    contacts = Contacts(targets.spans[touching, 1:3], poses)
+    return with_contacts(motion, contacts, voice.lip_gap, blend.CLOCK_HZ)
+
+
+def stillness(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(T,) how far the face is drawn to its rest at each of T instants: 0 in speech, 1 in silence, 1 at both ends."""
+    sounding = np.array([label != SILENCE for label in phones.phones])
+    if not sounding.any():
+        return np.ones(len(times))
+    starts, ends = phones.edges[:-1][sounding], phones.edges[1:][sounding]
+    next_start = np.searchsorted(starts, times, side="right")
+    ahead = np.append(starts, np.inf)[next_start] - times
+    behind = times - np.concatenate([[-np.inf], ends])[next_start]
+    away = np.minimum(ahead, np.maximum(behind, 0.0))
+    pull = _ease((away - RELEASE_FROM_S) / (REST_FROM_S - RELEASE_FROM_S))
+    last = times[-1]
+    onset = np.clip(starts[0], LEAST_EASE_S, REST_FROM_S)
+    offset = np.clip(last - ends[-1], LEAST_EASE_S, REST_FROM_S)
+    if onset < REST_FROM_S:
+        pull = np.maximum(pull, 1.0 - _ease(times / onset))
+    if offset < REST_FROM_S:
+        pull = np.maximum(pull, 1.0 - _ease((last - times) / offset))
+    return pull
+
+
+def _ease(part: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rise from 0 to 1 without a corner."""
+    part = np.clip(part, 0.0, 1.0)
+    return np.asarray(part * part * (3.0 - 2.0 * part))

@@ -1,0 +1,110 @@
+"""Lips that meet in the recordings meet in the result: averaging opens closures, this closes them again."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from lexicon.phones import phone_of
+from tts2face.exemplar.tokens import Tokens
+
+LIP_PLACES = frozenset({"bilabial", "labiodental"})
+NON_CONTACTS = frozenset({"approximant"})  # narrowed, not closed
+WINDOW_S = 0.03  # a closure may lie this far outside its phone's edges (video frames are 40 ms, edges +- 10 ms)
+HOLD_S = 0.03  # lips stay together this long: recorded closures last 60-100 ms from first to last touch
+EASE_S = 0.07  # way into and out of the closure; recorded lips need 60-80 ms from open to closed
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gap:
+    """Distance between two landmarks as a linear model sees it: ``|rest + parameters @ basis|``, (3,) and (D, 3)."""
+
+    rest: NDArray[np.float32]
+    basis: NDArray[np.float32]
+
+    def of(self, parameters: NDArray[np.floating]) -> NDArray[np.float32]:
+        """(T,) mm for (T, D) parameters."""
+        return np.asarray(np.linalg.norm(self.rest + parameters.astype(np.float32) @ self.basis, axis=1))
+
+
+def makes_lip_contact(label: str) -> bool:
+    """The phone closes the lips, or lays the lower lip to the teeth."""
+    phone = phone_of(label)
+    return phone.place in LIP_PLACES and phone.manner not in NON_CONTACTS
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contacts:
+    """Lip contacts to be kept: spans (C, 2) in seconds of the phones that make them, poses (C, D) of the exemplars."""
+
+    spans: NDArray[np.float64]
+    poses: NDArray[np.float32]
+
+
+def contact_poses(
+    tokens: Tokens, chosen: NDArray[np.int32], weights: NDArray[np.float64], gap: Gap
+) -> NDArray[np.float32]:
+    """(N, D) average pose of the chosen tokens (N, k), each at the frame where its own lips are closest."""
+    poses = np.zeros((len(chosen), tokens.frames.shape[1]), np.float32)
+    corpus = (tokens.frames, tokens.first_frame, tokens.utterance, tokens.spans, tokens.fps)
+    _closest_poses(corpus, chosen, weights, (gap.rest, gap.basis), poses)
+    return poses
+
+
+@njit(cache=True)
+def _closest_poses(corpus, chosen, weights, gap, poses):  # type: ignore[no-untyped-def]
+    frames, first_frame, utterance, spans, fps = corpus
+    for n in range(len(chosen)):
+        for e in range(chosen.shape[1]):
+            token = chosen[n, e]
+            if token < 0:
+                continue
+            first, last = first_frame[utterance[token]], first_frame[utterance[token] + 1] - 1
+            low = first + int(np.ceil((spans[token, 1] - WINDOW_S) * fps))
+            high = first + int(np.floor((spans[token, 2] + WINDOW_S) * fps))
+            low = min(max(low, first), last)
+            closest = _closest_row(frames, low, max(low, min(high, last)), gap)
+            poses[n] += np.float32(weights[n, e]) * frames[closest]
+
+
+@njit(cache=True)
+def _closest_row(frames, low, high, gap):  # type: ignore[no-untyped-def]
+    """Row of [low, high] where the gap is least."""
+    rest, basis = gap
+    closest, least = low, np.inf
+    for row in range(low, high + 1):
+        squared = 0.0
+        for axis in range(3):
+            apart = rest[axis]
+            for d in range(len(basis)):
+                apart += frames[row, d] * basis[d, axis]
+            squared += apart * apart
+        if squared < least:
+            closest, least = row, squared
+    return closest
+
+
+def with_contacts(values: NDArray[np.float32], contacts: Contacts, gap: Gap, rate_hz: float) -> NDArray[np.float32]:
+    """(T, D) values at `rate_hz` whose lips come as close in every contact as the exemplars' did.
+
+    Where the lips are closest already, the motion is drawn to the exemplars' pose: fully for `HOLD_S`, easing in and
+    out over `EASE_S`. A contact that is closed enough is left alone.
+    """
+    kept = values.copy()
+    wanted = gap.of(contacts.poses)
+    times = np.arange(len(values)) / rate_hz
+    for (start, end), pose, want in zip(contacts.spans, contacts.poses, wanted, strict=True):
+        low, high = np.searchsorted(times, (start - WINDOW_S, end + WINDOW_S))
+        if low >= high:
+            continue
+        gaps = gap.of(kept[low:high])
+        at = low + int(np.argmin(gaps))
+        if gaps[at - low] <= want:
+            continue
+        reach = int((HOLD_S / 2 + EASE_S) * rate_hz)
+        here = slice(max(0, at - reach), min(len(kept), at + reach + 1))
+        away = np.maximum(np.abs(times[here] - times[at]) - HOLD_S / 2, 0.0) / EASE_S
+        pull = 0.5 + 0.5 * np.cos(np.pi * np.minimum(away, 1.0))
+        kept[here] += (pull[:, None] * (pose - kept[at])).astype(np.float32)
+    return kept

@@ -1,0 +1,161 @@
+"""Which recorded tokens fit a phone best, judged by the phones around it (T07 section 3.3)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from tts2face.exemplar.tokens import MAX_CONTEXT, Tokens
+
+_ROUNDING = 1e-9  # a bound may fall below the score it bounds by rounding; scores are of order 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Wanted:
+    """N phones to be found: labels (N,), contexts (N, 2 `MAX_CONTEXT`) and log durations (N, 3).
+
+    Columns of `log_durations`: the phone before, the phone itself, the phone behind, each as far as it is reached into.
+    """
+
+    phone: NDArray[np.int32]
+    context: NDArray[np.int32]
+    log_durations: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContextIndex:
+    """Tokens sorted into groups with the same phone and the same direct neighbours.
+
+    The tokens ``order[group_first[g]:group_first[g + 1]]`` form group g, whose neighbours are ``neighbours[g]``; the
+    groups ``phone_first[p]:phone_first[p + 1]`` belong to phone p.
+    """
+
+    order: NDArray[np.int32]
+    group_first: NDArray[np.int32]
+    neighbours: NDArray[np.int32]
+    phone_first: NDArray[np.int32]
+    context: NDArray[np.int32]
+    log_durations: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """Best tokens of N phones: `tokens` and `scores` (N, k), best first; -1 and -inf where there are fewer."""
+
+    tokens: NDArray[np.int32]
+    scores: NDArray[np.float64]
+
+
+def log_durations(spans: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 3) logarithms of the durations before, in and behind a token, from its (N, 4) span; at least 10 ms."""
+    return np.log(np.maximum(np.diff(spans, axis=1), 0.01))
+
+
+def context_index(tokens: Tokens) -> ContextIndex:
+    """Index of a talker's tokens."""
+    left, right = tokens.context[:, 0], tokens.context[:, 1]
+    order = np.lexsort((right, left, tokens.phone)).astype(np.int32)
+    keys = np.stack([tokens.phone, left, right], axis=1)[order]
+    new = np.concatenate([[True], (keys[1:] != keys[:-1]).any(1)])
+    firsts = np.flatnonzero(new)
+    phone_first = np.searchsorted(keys[firsts, 0], np.arange(len(tokens.inventory) + 1)).astype(np.int32)
+    return ContextIndex(
+        order,
+        np.concatenate([firsts, [len(order)]]).astype(np.int32),
+        np.ascontiguousarray(keys[firsts, 1:]),
+        phone_first,
+        tokens.context,
+        log_durations(tokens.spans),
+    )
+
+
+def context_weights(n_context: int) -> NDArray[np.float64]:
+    """(C,) weights 1 / (d + 1) of the phones at distance d = 1..C."""
+    return np.asarray(1.0 / (np.arange(1, n_context + 1) + 1.0))
+
+
+def best_tokens(
+    wanted: Wanted, index: ContextIndex, similarity: NDArray[np.float64], *, context: int, k: int, duration: float
+) -> Found:
+    """The k tokens of each wanted phone that lie in the most similar surroundings.
+
+    Score = sum over d = 1..context of [S(left_d, its left_d) + S(right_d, its right_d)] / (d + 1), less, where
+    `duration` is above 0, ``duration`` x (|log ratio of durations| + half of the neighbours' ones). Equal scores go to
+    the token that comes first in the corpus.
+
+    Raises
+    ------
+    InputError
+        `context` is not 1 to `MAX_CONTEXT`, `k` is below 1, or `duration` below 0.
+
+    Notes
+    -----
+    Exactly the answer of scoring every token. Groups of tokens with the same neighbours are visited from the highest
+    bound of their score downwards, until the bound falls below the k-th best: those that cannot win are not scored.
+    """
+    if not 1 <= context <= MAX_CONTEXT:
+        raise InputError(f"context must be 1 to {MAX_CONTEXT} phones, not {context}")
+    if k < 1:
+        raise InputError(f"the number of exemplars must be at least 1, not {k}")
+    if not duration >= 0:
+        raise InputError(f"the weight of durations must be 0 or more, not {duration}")
+    tokens = np.full((len(wanted.phone), k), -1, np.int32)
+    scores = np.full((len(wanted.phone), k), -np.inf)
+    _search(
+        (wanted.phone, wanted.context, wanted.log_durations),
+        (index.order, index.group_first, index.neighbours, index.phone_first, index.context, index.log_durations),
+        (similarity, context_weights(context), duration),
+        tokens,
+        scores,
+    )
+    return Found(tokens, scores)
+
+
+@njit(cache=True)
+def _score(target, target_durations, token, token_durations, rule):  # type: ignore[no-untyped-def]
+    similarity, weights, duration = rule
+    total = 0.0
+    for d in range(len(weights)):
+        left, right = 2 * d, 2 * d + 1
+        total += weights[d] * (similarity[target[left], token[left]] + similarity[target[right], token[right]])
+    if duration > 0.0:
+        before, own, behind = target_durations[0], target_durations[1], target_durations[2]
+        neighbours = abs(before - token_durations[0]) + abs(behind - token_durations[2])
+        total -= duration * (abs(own - token_durations[1]) + 0.5 * neighbours)
+    return total
+
+
+@njit(cache=True)
+def _insert(tokens, scores, token, score):  # type: ignore[no-untyped-def]
+    """Put a token into the ranking if it belongs there: higher score first, then lower token."""
+    k = len(tokens)
+    if score < scores[k - 1] or (score == scores[k - 1] and token > tokens[k - 1] >= 0):
+        return
+    at = k - 1
+    while at > 0 and (scores[at - 1] < score or (scores[at - 1] == score and tokens[at - 1] > token)):
+        scores[at], tokens[at] = scores[at - 1], tokens[at - 1]
+        at -= 1
+    scores[at], tokens[at] = score, token
+
+
+@njit(cache=True)
+def _search(wanted, index, rule, tokens, scores):  # type: ignore[no-untyped-def]
+    phone, contexts, durations = wanted
+    order, group_first, neighbours, phone_first, token_contexts, token_durations = index
+    similarity, weights, _ = rule
+    beyond = 2.0 * weights[1:].sum() + _ROUNDING  # the most that farther phones can add
+    for n in range(len(phone)):
+        first, last = phone_first[phone[n]], phone_first[phone[n] + 1]
+        bounds = np.zeros(last - first)
+        for g in range(first, last):
+            left, right = similarity[contexts[n, 0], neighbours[g, 0]], similarity[contexts[n, 1], neighbours[g, 1]]
+            bounds[g - first] = weights[0] * (left + right) + beyond
+        for g in np.argsort(-bounds):
+            if bounds[g] < scores[n, -1]:
+                break
+            for at in range(group_first[first + g], group_first[first + g + 1]):
+                token = order[at]
+                score = _score(contexts[n], durations[n], token_contexts[token], token_durations[token], rule)
+                _insert(tokens[n], scores[n], token, score)

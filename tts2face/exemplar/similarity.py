@@ -1,0 +1,100 @@
+"""Similarity of phones as the talker's face shows them (T07 section 3.3, Table 1)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from tts2face.exemplar.motion import sampled_tokens
+from tts2face.exemplar.tokens import Tokens
+
+N_SAMPLES = 5  # per token: onset, rise, middle, fall, offset
+PRIOR_TOKENS = 10.0  # a phone with this many tokens takes half of its spread from all phones together
+SHARPNESS = 2.0  # similarity at the mean distance between phones is exp(-SHARPNESS)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Similarity:
+    """How alike P phones look: `matrix` (P, P) in [0, 1], symmetric, 1 on the diagonal."""
+
+    phones: tuple[str, ...]
+    matrix: NDArray[np.float64]
+
+    def nearest(self, phone: str, n: int = 3) -> list[tuple[str, float]]:
+        """The n most similar other phones, most similar first, as in T07 Table 1."""
+        row = self.matrix[self.phones.index(phone)]
+        order = [at for at in np.argsort(-row, kind="stable") if self.phones[at] != phone]
+        return [(self.phones[at], float(row[at])) for at in order[:n]]
+
+
+def token_samples(tokens: Tokens, n_samples: int = N_SAMPLES) -> NDArray[np.float32]:
+    """(N, n_samples, D) speech parameters of every token from its onset to its offset."""
+    steps = np.linspace(0.0, 1.0, n_samples)
+    starts, ends = tokens.spans[:, 1:2], tokens.spans[:, 2:3]
+    positions = (starts + (ends - starts) * steps) * tokens.fps
+    bounds = np.stack([tokens.first_frame[tokens.utterance], tokens.first_frame[tokens.utterance + 1]], axis=1)
+    return np.asarray(sampled_tokens(tokens.frames, bounds, positions))
+
+
+def phone_similarity(
+    samples: NDArray[np.floating], phone: NDArray[np.integer], phones: tuple[str, ...], spread: NDArray[np.floating]
+) -> Similarity:
+    """Similarity of phones from their tokens' trajectories.
+
+    Parameters
+    ----------
+    samples : (N, S, D)
+        Each token's trajectory resampled to S instants.
+    phone : (N,)
+        Index into `phones` of each token.
+    phones : P labels
+        A phone without a token is similar to itself only.
+    spread : (D,)
+        Standard deviation of each parameter over all frames; above 0.
+
+    Raises
+    ------
+    InputError
+        The arrays do not fit each other, or a spread is not above 0.
+
+    Notes
+    -----
+    ``d(p, q)^2 = sum_sd a_d g_sd (M_psd - M_qsd)^2 / sum_sd a_d g_sd``: M are mean trajectories in units of `spread`;
+    ``a_d`` is the parameter's share of the face's motion (its variance); ``g_sd`` its consistency, the inverse of the
+    phones' own variance there, so that a parameter that coarticulation moves freely counts little. Similarity is
+    ``exp(-SHARPNESS d / mean d)``.
+    """
+    if samples.ndim != 3 or phone.shape != samples.shape[:1] or spread.shape != samples.shape[2:]:
+        raise InputError(
+            f"samples (N, S, D), phone (N,) and spread (D,) do not fit: {samples.shape}, {phone.shape}, {spread.shape}"
+        )
+    if not (spread > 0).all():
+        raise InputError(f"every parameter's spread must be above 0; number {int(np.argmin(spread))} is not")
+    counts = np.bincount(phone, minlength=len(phones)).astype(np.float64)
+    mean, variance = _statistics(samples / spread, phone, counts)
+    share = np.square(spread.astype(np.float64))
+    consistency = 2.0 / (variance[:, None] + variance[None, :])
+    weight = share * consistency
+    squared = (weight * np.square(mean[:, None] - mean[None, :])).sum((2, 3)) / weight.sum((2, 3))
+    distance = np.sqrt(squared)
+    said = counts > 0
+    between = distance[np.ix_(said, said)]
+    scale = between.sum() / max(1, said.sum() * (said.sum() - 1))
+    matrix = np.where(np.outer(said, said), np.exp(-SHARPNESS * distance / (scale if scale > 0 else 1.0)), 0.0)
+    np.fill_diagonal(matrix, 1.0)
+    return Similarity(phones, matrix)
+
+
+def _statistics(
+    z: NDArray[np.floating], phone: NDArray[np.integer], counts: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(P, S, D) mean and variance of the tokens of each phone; few tokens borrow the variance within all phones."""
+    sums = np.zeros((len(counts), *z.shape[1:]))
+    np.add.at(sums, phone, z)
+    mean = sums / np.maximum(counts, 1.0)[:, None, None]
+    scatter = np.zeros_like(sums)
+    np.add.at(scatter, phone, np.square(z - mean[phone]))
+    pooled = scatter.sum(0) / max(1, len(z)) + 1e-6
+    n = counts[:, None, None]
+    return mean, (scatter + PRIOR_TOKENS * pooled) / (n + PRIOR_TOKENS)

@@ -1,0 +1,103 @@
+"""The phones to be shown, told in phones that the talker said."""
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.phones import nearest_phones
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.exemplar.tokens import PAUSE_REACH_S, reaching_spans
+
+# Sounds of the throat have no shape of their own: lips and tongue already stand as for what follows.
+TRANSPARENT = frozenset({"h", "ɦ", "ʔ"})
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Targets:
+    """N phones that the talker said, in order.
+
+    Parameters
+    ----------
+    labels : N labels
+    spans : (N, 4)
+        Seconds, as in `tts2face.exemplar.tokens.Tokens`; parts of silence far from speech belong to no target.
+    source : (N,)
+        Index of the phone of the wanted sequence that each one stands for.
+    """
+
+    labels: tuple[str, ...]
+    spans: NDArray[np.float64]
+    source: NDArray[np.int64]
+
+
+@functools.lru_cache(maxsize=4096)
+def stand_ins(label: str, inventory: tuple[str, ...]) -> tuple[str, ...]:
+    """What the talker shows for a phone: itself, its nearest, its parts' nearest; nothing for a transparent one.
+
+    Raises
+    ------
+    InputError
+        The label is not in the phone table, or the inventory has no phone but silence.
+    """
+    if label not in inventory and label in TRANSPARENT:
+        return ()
+    return nearest_phones(label, inventory)
+
+
+def targets_of(phones: PhoneSequence, inventory: tuple[str, ...]) -> Targets:
+    """Targets of a phone sequence.
+
+    The time of a transparent phone goes to the next phone, or before silence to the last one. A silence between speech
+    that is longer than two reaches becomes two targets, one behind the speech and one before it.
+
+    Raises
+    ------
+    InputError
+        A label is not in the phone table, or the inventory has no phone but silence.
+    """
+    rows = _stand_in_rows(phones, inventory)
+    rows = [part for at, row in enumerate(rows) for part in _near_speech(row, at > 0, at + 1 < len(rows))]
+    starts, ends = np.array([row[1] for row in rows]), np.array([row[2] for row in rows])
+    return Targets(
+        tuple(row[0] for row in rows), reaching_spans(starts, ends), np.array([row[3] for row in rows], np.int64)
+    )
+
+
+Row = tuple[str, float, float, int]  # label, start, end, index of the wanted phone
+
+
+def _stand_in_rows(phones: PhoneSequence, inventory: tuple[str, ...]) -> list[Row]:
+    rows: list[Row] = []
+    waiting: float | None = None  # onset of a transparent phone
+    for at, label in enumerate(phones.phones):
+        start, end = float(phones.edges[at]), float(phones.edges[at + 1])
+        shown = stand_ins(label, inventory)
+        if not shown:
+            waiting = start if waiting is None else waiting
+            continue
+        if waiting is not None and label == SILENCE and rows:
+            rows[-1] = (rows[-1][0], rows[-1][1], start, rows[-1][3])
+        elif waiting is not None:
+            start = waiting
+        waiting = None
+        cuts = np.linspace(start, end, len(shown) + 1)
+        rows += [(part, float(cuts[i]), float(cuts[i + 1]), at) for i, part in enumerate(shown)]
+    if waiting is not None:
+        rows.append((SILENCE, waiting, phones.end, len(phones) - 1))
+    return rows
+
+
+def _near_speech(row: Row, behind_speech: bool, before_speech: bool) -> list[Row]:
+    label, start, end, source = row
+    if label != SILENCE or end - start <= PAUSE_REACH_S:
+        return [row]
+    parts = []
+    if behind_speech and before_speech and end - start <= 2 * PAUSE_REACH_S:
+        return [row]
+    if behind_speech:
+        parts.append((label, start, start + PAUSE_REACH_S, source))
+    if before_speech:
+        parts.append((label, end - PAUSE_REACH_S, end, source))
+    return parts or [row]

@@ -1,0 +1,104 @@
+"""Tokens: every phone that a talker was recorded saying, with its place in the recorded motion."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.sequence import SILENCE
+from tts2face.talker import Talker
+
+MAX_CONTEXT = 6  # phones either side that a token remembers
+PAUSE_REACH_S = 0.25  # how far from speech a silence belongs to it: lips open and come to rest within this time
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tokens:
+    """N phone tokens over the recorded motion of all utterances.
+
+    Parameters
+    ----------
+    inventory : P labels
+        Sorted; `SILENCE` is always one of them.
+    phone, utterance : (N,), (N,)
+        Index into `inventory`, index of the talker's utterance.
+    spans : (N, 4)
+        Seconds on the utterance's clock: where the previous phone begins, this one begins, this one ends, the next one
+        ends. Silence is cut to the `PAUSE_REACH_S` beside speech, and so is the reach into a neighbour.
+    context : (N, 2 MAX_CONTEXT)
+        Labels around the token: left at distance 1, right at 1, left at 2, ...; `SILENCE` beyond the utterance.
+    frames, first_frame : (F, D), (U + 1,)
+        Speech parameters of all frames, and where each utterance begins.
+    fps
+        Frames per second of the recordings.
+    """
+
+    inventory: tuple[str, ...]
+    phone: NDArray[np.int32]
+    utterance: NDArray[np.int32]
+    spans: NDArray[np.float64]
+    context: NDArray[np.int32]
+    frames: NDArray[np.float32]
+    first_frame: NDArray[np.int64]
+    fps: float
+
+    def __len__(self) -> int:
+        """Count the tokens."""
+        return len(self.phone)
+
+
+def tokens_of(talker: Talker) -> Tokens:
+    """Tokens of all utterances of a talker, in the talker's order."""
+    n_speech = talker.model.n_speech
+    labels = [phone for spoken in talker.utterances for phone in spoken.phones.phones]
+    inventory = tuple(sorted({*labels, SILENCE}))
+    number = {label: at for at, label in enumerate(inventory)}
+    phone = np.array([number[label] for label in labels], np.int32)
+    counts = [len(spoken.phones) for spoken in talker.utterances]
+    utterance = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
+    lengths = [len(spoken.shape) for spoken in talker.utterances]
+    return Tokens(
+        inventory,
+        phone,
+        utterance,
+        np.concatenate([spoken_spans(spoken.phones.phones, spoken.phones.edges) for spoken in talker.utterances]),
+        contexts(phone, utterance, number[SILENCE]),
+        np.concatenate([spoken.shape[:, :n_speech] for spoken in talker.utterances]).astype(np.float32),
+        np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
+        talker.fps,
+    )
+
+
+def contexts(phone: NDArray[np.int32], utterance: NDArray[np.int32], silence: int) -> NDArray[np.int32]:
+    """(N, 2 `MAX_CONTEXT`) labels left and right of each of N phones, nearest first; `silence` beyond an utterance."""
+    n = len(phone)
+    around = np.full((n, 2 * MAX_CONTEXT), silence, np.int32)
+    for distance in range(1, min(MAX_CONTEXT, n - 1) + 1):
+        together = utterance[distance:] == utterance[:-distance]
+        around[distance:, 2 * distance - 2][together] = phone[:-distance][together]
+        around[:-distance, 2 * distance - 1][together] = phone[distance:][together]
+    return around
+
+
+def spoken_spans(phones: tuple[str, ...], edges: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 4) seconds at which the previous phone begins, each phone begins and ends, and the next one ends.
+
+    A silence at either end of the utterance keeps only the `PAUSE_REACH_S` beside speech; a neighbour is reached into
+    by at most that much.
+    """
+    starts, ends = edges[:-1].copy(), edges[1:].copy()
+    if len(phones) > 1:
+        if phones[0] == SILENCE:
+            starts[0] = max(starts[0], ends[0] - PAUSE_REACH_S)
+        if phones[-1] == SILENCE:
+            ends[-1] = min(ends[-1], starts[-1] + PAUSE_REACH_S)
+    return reaching_spans(starts, ends)
+
+
+def reaching_spans(starts: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 4): starts and ends, with the reach into the neighbours before and behind them."""
+    before = np.concatenate([[starts[0] - PAUSE_REACH_S], starts[:-1]])
+    behind = np.concatenate([ends[1:], [ends[-1] + PAUSE_REACH_S]])
+    return np.stack(
+        [np.maximum(before, starts - PAUSE_REACH_S), starts, ends, np.minimum(behind, ends + PAUSE_REACH_S)], axis=1
+    )
