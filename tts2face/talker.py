@@ -61,7 +61,7 @@ class ShapeModel:
 
     def parameters(self, shapes: NDArray[np.floating]) -> NDArray[np.float32]:
         """(T, M) parameters of (T, L, 3) landmarks."""
-        offsets = (shapes - self.mean).astype(np.float32).reshape(len(shapes), -1)
+        offsets = (shapes - self.mean).astype(np.float32).reshape(len(shapes), self.mean.size)
         return offsets @ self.basis.reshape(len(self.basis), -1).T
 
 

@@ -1,0 +1,120 @@
+"""A folder of recordings: which videos there are and which words each one says."""
+
+import csv
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from lexicon.dictionary import cmudict_lookup
+from lexicon.errors import DataError, InputError
+
+VIDEO_SUFFIXES = frozenset({".mkv", ".mp4", ".mov", ".webm", ".avi", ".mpg", ".mpeg", ".m4v"})
+MANIFEST = "manifest.csv"
+# Names of letters in ARPABET, as speakers of southern British English and of American English say them.
+LETTER_NAMES = {
+    "a": ("EY1",), "b": ("B IY1",), "c": ("S IY1",), "d": ("D IY1",), "e": ("IY1",), "f": ("EH1 F",),
+    "g": ("JH IY1",), "h": ("EY1 CH",), "i": ("AY1",), "j": ("JH EY1",), "k": ("K EY1",), "l": ("EH1 L",),
+    "m": ("EH1 M",), "n": ("EH1 N",), "o": ("OW1",), "p": ("P IY1",), "q": ("K Y UW1",), "r": ("AA1", "AA1 R"),
+    "s": ("EH1 S",), "t": ("T IY1",), "u": ("Y UW1",), "v": ("V IY1",), "w": ("D AH1 B AH0 L Y UW0",),
+    "x": ("EH1 K S",), "y": ("W AY1",), "z": ("Z EH1 D", "Z IY1"),
+}  # fmt: skip
+
+Ways = tuple[tuple[str, ...], ...]  # pronunciations of one word, each a row of phones
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """One video and what is said in it; `is_spelling` marks words of one letter as names of letters.
+
+    ``transcript`` is None where the folder does not say what is spoken.
+    """
+
+    name: str
+    video: Path
+    transcript: str | None
+    is_spelling: bool = False
+
+
+def find_recordings(folder: Path) -> tuple[Recording, ...]:
+    """Every video of a folder with its transcript, by name.
+
+    Two layouts are read: ``manifest.csv`` (columns clip, transcript) beside a folder ``clips``, as the GRID corpus is
+    kept here, where single letters are names of letters; and videos with a text file of the same name beside each.
+
+    Raises
+    ------
+    InputError
+        There is no such folder, or no video in it.
+    DataError
+        The manifest cannot be read.
+    """
+    if not folder.is_dir():
+        raise InputError(f"there is no folder {folder}; give the folder of recordings")
+    manifest = folder / MANIFEST
+    found = _listed(folder, manifest) if manifest.is_file() else _plain(folder)
+    if not found:
+        raise InputError(f"{folder} holds no video ({', '.join(sorted(VIDEO_SUFFIXES))}); give a folder of recordings")
+    return found
+
+
+def spoken_words(recording: Recording) -> tuple[tuple[str, Ways], ...]:
+    """Each word of a transcript with its pronunciations.
+
+    Raises
+    ------
+    DataError
+        There is no transcript, no word in it, or a word that the dictionary does not hold.
+    """
+    if recording.transcript is None:
+        raise DataError(f"{recording.name} has no transcript; put its words into {recording.video.stem}.txt beside it")
+    words = re.findall(r"[^\W_]+(?:['’][^\W_]+)*", recording.transcript)
+    if not words:
+        raise DataError(f"the transcript of {recording.name} holds no word; write what is said")
+    return tuple((word, pronunciations(word, is_letter=recording.is_spelling and len(word) == 1)) for word in words)
+
+
+def pronunciations(word: str, *, is_letter: bool) -> Ways:
+    """All ways to say a word, in phones of the table; the letter's names if it stands for one.
+
+    Raises
+    ------
+    DataError
+        The dictionary does not hold it.
+    """
+    from lexicon.dictionary import arpabet_segments
+
+    if is_letter and word.lower() in LETTER_NAMES:
+        found = [arpabet_segments(names) for names in LETTER_NAMES[word.lower()]]
+    else:
+        found = []
+        while variant := cmudict_lookup(word if not found else f"{word}({len(found) + 1})"):
+            found.append(variant)
+    if not found:
+        raise DataError(f"no pronunciation is known for {word!r}; check the transcript's spelling")
+    return tuple(dict.fromkeys(tuple(segment.phone for segment in segments) for segments in found))
+
+
+def _listed(folder: Path, manifest: Path) -> tuple[Recording, ...]:
+    try:
+        with manifest.open(encoding="utf-8-sig", newline="") as file:
+            said = {row["clip"]: row["transcript"] for row in csv.DictReader(file)}
+    except (OSError, UnicodeDecodeError, KeyError, csv.Error) as broken:
+        raise DataError(f"{manifest} needs the columns clip and transcript in UTF-8; mend it") from broken
+    clips = folder / "clips"
+    videos = _videos(clips if clips.is_dir() else folder)
+    return tuple(Recording(video.stem, video, said.get(video.stem), is_spelling=True) for video in videos)
+
+
+def _plain(folder: Path) -> tuple[Recording, ...]:
+    return tuple(Recording(video.stem, video, _text_beside(video)) for video in _videos(folder))
+
+
+def _videos(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.iterdir() if path.suffix.lower() in VIDEO_SUFFIXES)
+
+
+def _text_beside(video: Path) -> str | None:
+    try:
+        return video.with_suffix(".txt").read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError):
+        return None
