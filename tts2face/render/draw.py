@@ -80,7 +80,9 @@ def draw(
     return _drawn(stage, np.asarray(weights, np.float32), np.asarray(head, np.float32), _room(stage))
 
 
-def frames(clip: Clip, face: Face | Stage, picture: Picture, threads: int | None = None) -> Iterator[NDArray[np.uint8]]:
+def frames(
+    clip: Clip, face: Face | Stage, picture: Picture | None = None, *, threads: int | None = None
+) -> Iterator[NDArray[np.uint8]]:
     """Pictures of a clip's frames in order; as many are drawn ahead as there are threads, the rest not yet.
 
     The bytes do not depend on the number of threads: one thread draws one picture.
@@ -90,7 +92,7 @@ def frames(clip: Clip, face: Face | Stage, picture: Picture, threads: int | None
     InputError
         The clip's motion is not in the face's shapes.
     """
-    stage = face if isinstance(face, Stage) else staged(face, picture)
+    stage = face if isinstance(face, Stage) else staged(face, picture or Picture())
     if clip.motion.channels != stage.face.shape_names:
         raise InputError("the clip's motion is not in the shapes of this face; retarget it to the face first")
     n_threads = threads or available_cores()

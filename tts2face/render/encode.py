@@ -1,45 +1,38 @@
 """Clips into a file while they are drawn: .mp4, .webm, .gif, or a folder of .png."""
 
 import contextlib
-import os
-import queue
-import shutil
-import tempfile
-import threading
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import BackendError, InputError
+from lexicon.errors import InputError
 from tts2face.face.model import Face
 from tts2face.render.clock import exact_rate, first_sample
-from tts2face.render.draw import Stage, frames, staged
-from tts2face.render.movie import MP4, WEBM, Movie
+from tts2face.render.draw import Stage, draw, frames, staged
+from tts2face.render.gif import Gif
+from tts2face.render.lane import Lane, Sink
+from tts2face.render.movie import MP4_MOVIE, WEBM_MOVIE, Movie
+from tts2face.render.output import (
+    FOLDER,
+    GIF,
+    WEBM,
+    checked_output,
+    kind_of,
+    place_beside,
+    put_in_place,
+    refusals,
+    remove,
+)
 from tts2face.render.picture import Picture
+from tts2face.render.stills import Stills
 from tts2face.types import Clip
 
-SUFFIXES = (".mp4", ".webm", ".gif")
-AHEAD = 8  # pictures that may wait for the encoder
+N_SWATCHES = 6  # frames of the first clip from which a GIF's palette is made
 
-
-class Sink(Protocol):
-    """Something that takes pictures and sound in turn."""
-
-    def picture(self, pixels: NDArray[np.uint8]) -> None:
-        """Append one picture."""
-
-    def sound(self, samples: NDArray[np.float32]) -> None:
-        """Append mono samples."""
-
-    def finish(self) -> None:
-        """Complete what is written."""
-
-    def abandon(self) -> None:
-        """Let go of what is written so far."""
+Progress = Callable[[int, int], None]
 
 
 class ClipWriter:
@@ -52,22 +45,28 @@ class ClipWriter:
     Parameters
     ----------
     path
-        What is written, by suffix: .mp4, .webm, .gif; a folder of .png when there is no suffix.
+        What is written, by suffix: .mp4, .webm, .gif; a folder of .png pictures with a slash at its end or no suffix.
     face
         The face, or a stage.
     picture
-        How to draw.
+        How to draw; not needed with a stage.
     on_progress
         Called with frames done and frames given so far.
     threads
-        How many pictures are drawn at a time; all cores without it.
+        How many pictures are drawn at a time; as many as there are cores without it.
 
     Raises
     ------
     InputError
-        The suffix is unknown, or the folder does not exist; or no clip was given before the end.
+        The suffix is unknown, or the folder does not exist; clips do not share fps and sound rate; there is no clip.
     BackendError
         The disk is full or cannot be written.
+
+    Examples
+    --------
+    >>> with ClipWriter("talk.mp4", face) as writer:  # doctest: +SKIP
+    ...     for clip in clips:
+    ...         writer.add(clip)
     """
 
     def __init__(
@@ -76,19 +75,20 @@ class ClipWriter:
         face: Face | Stage,
         picture: Picture | None = None,
         *,
-        on_progress: Callable[[int, int], None] | None = None,
+        on_progress: Progress | None = None,
         threads: int | None = None,
     ) -> None:
-        self.path = checked_output(path)
+        self.path, self._kind = checked_output(path), kind_of(path)
         self._stage = face if isinstance(face, Stage) else staged(face, picture or Picture())
         self._on_progress, self._threads = on_progress, threads
         self._n_frames = self._n_given = self._n_samples = 0
         self._clock: tuple[float, int] | None = None
-        self._lane: _Lane | None = None
+        self._lane: Lane | None = None
         self._beside: Path | None = None
 
     def __enter__(self) -> "ClipWriter":
-        """Give the writer."""
+        """Take a place on the disk."""
+        self._beside = place_beside(self.path, self._kind)
         return self
 
     def __exit__(
@@ -103,148 +103,74 @@ class ClipWriter:
 
     def add(self, clip: Clip) -> None:
         """Draw and encode one more clip."""
-        lane = self._lane or self._opened(clip)
-        if self._clock != (clip.fps, clip.speech.waveform.rate):
-            raise InputError(f"clips of one file must share fps and sound rate; this one has {clip.fps:g} fps")
-        samples, rate, fps = clip.speech.waveform.samples, clip.speech.waveform.rate, exact_rate(clip.fps)
-        begin = first_sample(self._n_frames, rate, fps)
-        if begin > self._n_samples:  # the clip before ended within its last frame
-            lane.put(sound=np.zeros(begin - self._n_samples, np.float32))
-        self._n_given += len(clip.motion)
-        at = 0
-        for pixels in frames(clip, self._stage, self._stage.picture, self._threads):
-            self._n_frames += 1
-            until = min(max(first_sample(self._n_frames, rate, fps) - begin, at), len(samples))
-            lane.put(pixels, samples[at:until])
-            at = until
-            if self._on_progress:
-                self._on_progress(self._n_frames, self._n_given)
-        if at < len(samples):
-            at_most = first_sample(self._n_frames, rate, fps) - begin
-            lane.put(sound=samples[at : max(at, min(len(samples), at_most))])
-        self._n_samples = begin + at
+        with refusals(self.path):
+            lane = self._lane or self._opened(clip)
+            if self._clock != (clip.fps, clip.speech.waveform.rate):
+                raise InputError(f"clips of one file must share fps and sound rate; this one has {clip.fps:g} fps")
+            begin = self._sample_of(self._n_frames)
+            lane.put(samples=np.zeros(begin - self._n_samples, np.float32))  # the clip before ended within a frame
+            self._n_given += len(clip.motion)
+            at, samples = 0, clip.speech.waveform.samples
+            for pixels in frames(clip, self._stage, threads=self._threads):
+                self._n_frames += 1
+                until = min(self._sample_of(self._n_frames) - begin, len(samples))
+                lane.put(pixels, samples[at:until])
+                at = until
+                if self._on_progress:
+                    self._on_progress(self._n_frames, self._n_given)
+            self._n_samples = begin + at
 
-    def _opened(self, clip: Clip) -> "_Lane":
+    def _sample_of(self, frame: int) -> int:
+        fps, rate = self._clock or (1.0, 1)
+        return first_sample(frame, rate, exact_rate(fps))
+
+    def _opened(self, clip: Clip) -> Lane:
         self._clock = (clip.fps, clip.speech.waveform.rate)
-        self._beside = _place_beside(self.path)
-        picture = self._stage.picture
-        shape = (picture.height, picture.width, picture.channels)
-        with _refusals(self.path):
-            sink = _sink(self.path, self._beside, shape, clip)
-        self._lane = _Lane(sink, self.path)
+        self._lane = Lane(self._sink(clip))
         return self._lane
+
+    def _sink(self, clip: Clip) -> Sink:
+        if self._beside is None:
+            raise InputError("a clip writer is used in a with statement")
+        fps, rate, picture = exact_rate(clip.fps), clip.speech.waveform.rate, self._stage.picture
+        if self._kind == FOLDER:
+            return Stills(self._beside, rate)
+        if self._kind == GIF:
+            chosen = np.linspace(0, len(clip.motion) - 1, N_SWATCHES).astype(int)
+            return Gif(self._beside, [self._still(clip, i) for i in chosen], fps)
+        shape = (picture.height, picture.width, picture.channels)
+        return Movie(self._beside, WEBM_MOVIE if self._kind == WEBM else MP4_MOVIE, shape, fps, rate)
+
+    def _still(self, clip: Clip, frame: int) -> NDArray[np.uint8]:
+        return draw(self._stage, clip.motion.values[frame], clip.head.values[frame])
 
     def _complete(self) -> None:
         if self._lane is None or self._beside is None:
             raise InputError(f"there is no clip to write to {self.path}")
-        self._lane.finish()
+        with refusals(self.path):
+            self._lane.finish()
         self._lane = None
-        with _refusals(self.path):
-            if self.path.is_dir():
-                shutil.rmtree(self.path)
-            os.replace(self._beside, self.path)
+        put_in_place(self._beside, self.path)
         self._beside = None
 
     def _clear(self) -> None:
         if self._lane is not None:
-            self._lane.abandon()
+            with contextlib.suppress(OSError):  # the file goes anyway
+                self._lane.abandon()
             self._lane = None
         if self._beside is not None:
-            if self._beside.is_dir():
-                shutil.rmtree(self._beside, ignore_errors=True)
-            else:
-                self._beside.unlink(missing_ok=True)
+            remove(self._beside)
             self._beside = None
 
 
-class _Lane:
-    """The encoder in a thread of its own, behind a short queue."""
-
-    def __init__(self, sink: Sink, path: Path) -> None:
-        self._sink, self._path = sink, path
-        self._queue: queue.Queue[tuple[Any, Any] | None] = queue.Queue(AHEAD)
-        self._error: Exception | None = None
-        self._thread = threading.Thread(target=self._work, name="encode", daemon=True)
-        self._thread.start()
-
-    def _work(self) -> None:
-        while (item := self._queue.get()) is not None:
-            if self._error is not None:
-                continue
-            try:
-                pixels, sound = item
-                if pixels is not None:
-                    self._sink.picture(pixels)
-                if sound is not None and len(sound):
-                    self._sink.sound(sound)
-            except (OSError, ValueError, RuntimeError) as error:
-                self._error = error
-
-    def put(self, pixels: Any = None, sound: Any = None) -> None:
-        self._check()
-        self._queue.put((pixels, sound))
-
-    def _check(self) -> None:
-        if self._error is not None:
-            with _refusals(self._path):
-                raise self._error
-
-    def finish(self) -> None:
-        self._queue.put(None)
-        self._thread.join()
-        self._check()
-        with _refusals(self._path):
-            self._sink.finish()
-
-    def abandon(self) -> None:
-        if self._thread.is_alive():
-            self._error = self._error or RuntimeError("abandoned")
-            self._queue.put(None)
-            self._thread.join()
-        with contextlib.suppress(OSError, ValueError, RuntimeError):
-            self._sink.abandon()
-
-
-@contextlib.contextmanager
-def _refusals(path: Path) -> Any:
-    try:
-        yield
-    except OSError as refused:
-        reason = os.strerror(refused.errno) if refused.errno else str(refused)
-        raise BackendError(f"cannot write {path}: {reason}; free some space or choose another folder") from refused
-
-
-def checked_output(path: Path | str) -> Path:
-    """The path of what shall be written.
-
-    Raises
-    ------
-    InputError
-        The suffix is unknown, the folder does not exist, or the name belongs to something else.
-    """
-    where = Path(path)
-    if where.suffix.lower() not in ("", *SUFFIXES):
-        raise InputError(
-            f"{where} has the unknown suffix {where.suffix}; give one of {', '.join(SUFFIXES)}, "
-            "or a folder without a suffix for .png files"
-        )
-    if not where.parent.is_dir():
-        raise InputError(f"there is no folder {where.parent} to write {where.name} to; make it first")
-    return where
-
-
-def _place_beside(path: Path) -> Path:
-    try:
-        if path.suffix:
-            handle, beside = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=path.suffix, dir=path.parent)
-            os.close(handle)
-            os.chmod(beside, 0o644)
-            return Path(beside)
-        return Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
-    except OSError as refused:
-        raise BackendError(f"cannot write {path}: {refused.strerror}; choose another folder") from refused
-
-
-def _sink(path: Path, beside: Path, shape: tuple[int, ...], clip: Clip) -> Sink:
-    fps, rate = exact_rate(clip.fps), clip.speech.waveform.rate
-    return Movie(beside, WEBM if path.suffix.lower() == ".webm" else MP4, shape, fps, rate)
+def write_clip(
+    path: Path | str,
+    clip: Clip,
+    face: Face | Stage,
+    picture: Picture | None = None,
+    *,
+    on_progress: Progress | None = None,
+) -> None:
+    """Write one clip; see `ClipWriter`."""
+    with ClipWriter(path, face, picture, on_progress=on_progress) as writer:
+        writer.add(clip)

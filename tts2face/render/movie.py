@@ -27,12 +27,12 @@ class MovieKind:
 
 
 # CRF: the highest at which a still of the head shows no difference at 200 % beside the drawn one.
-MP4 = MovieKind(
+MP4_MOVIE = MovieKind(
     "mp4", "libx264", "aac", 128_000,
     MappingProxyType({"crf": "18", "preset": "veryfast", "profile": "high"}),
     MappingProxyType({"movflags": "+faststart"}),
 )  # fmt: skip
-WEBM = MovieKind(
+WEBM_MOVIE = MovieKind(
     "webm", "libvpx-vp9", "libopus", 96_000,
     MappingProxyType({"crf": "24", "deadline": "realtime", "cpu-used": "6", "row-mt": "1", "tile-columns": "1",
                       "auto-alt-ref": "0", "lag-in-frames": "0"}),

@@ -1,0 +1,78 @@
+"""An animated GIF with one good palette for all its pictures; it has no sound."""
+
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+TICKS = 100  # a GIF's clock, per second
+LEAST_TICKS = 2  # a shorter stay is played as a tenth of a second by browsers
+BITS = 6  # of each channel by which a colour finds its place in the palette
+BAYER = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]], np.int16)
+DITHER = 10  # 8-bit steps between the extremes of the ordered dither: still where the picture is still
+SOLID = 128  # coverage from which a pixel is drawn
+
+
+class Gif:
+    """A GIF being written."""
+
+    def __init__(self, path: Path, swatches: Sequence[NDArray[np.uint8]], fps: Fraction) -> None:
+        """Open a file; the palette serves the colours of some pictures, the swatches."""
+        import av
+
+        self._fps, self._n_frames, self._last = fps, 0, -LEAST_TICKS
+        height, width, channels = swatches[0].shape
+        self._palette, self._nearest = _palette(swatches, 256 if channels == 3 else 255)
+        pattern = np.tile(BAYER, (-(-height // 4), -(-width // 4)))[:height, :width, None]
+        self._dither = (pattern * DITHER // 16 - DITHER // 2).astype(np.int16)
+        self._container: Any = av.open(str(path), "w", format="gif", options={"loop": "0"})
+        self._video: Any = self._container.add_stream("gif", rate=fps)
+        self._video.width, self._video.height, self._video.pix_fmt = width, height, "pal8"
+        self._video.codec_context.time_base = Fraction(1, TICKS)
+
+    def picture(self, pixels: NDArray[np.uint8]) -> None:
+        """Append one picture, unless it would stay for too short."""
+        import av
+
+        tick = round(self._n_frames * TICKS / self._fps)
+        self._n_frames += 1
+        if tick - self._last < LEAST_TICKS:
+            return
+        self._last = tick
+        levels = np.clip(pixels[:, :, :3] + self._dither, 0, 255).astype(np.int32) >> (8 - BITS)
+        indices = self._nearest[(levels[:, :, 0] << 2 * BITS) | (levels[:, :, 1] << BITS) | levels[:, :, 2]]
+        if pixels.shape[2] == 4:
+            indices[pixels[:, :, 3] < SOLID] = 255
+        frame = av.VideoFrame.from_ndarray((indices, self._palette), format="pal8")
+        frame.pts, frame.time_base = tick, Fraction(1, TICKS)
+        self._container.mux(self._video.encode(frame))
+
+    def sound(self, samples: NDArray[np.float32]) -> None:
+        """Leave the sound out."""
+
+    def finish(self) -> None:
+        """Write what the encoder still holds and close the file."""
+        self._container.mux(self._video.encode(None))
+        self._container.close()
+
+    def abandon(self) -> None:
+        """Close the file unfinished."""
+        self._container.close()
+
+
+def _palette(swatches: Sequence[NDArray[np.uint8]], n_colours: int) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """(256, 4) alpha, red, green, blue by median cut, and the nearest entry for every colour of `BITS` bits."""
+    from PIL import Image
+    from scipy.spatial import cKDTree
+
+    seen = np.concatenate([swatch[:, :, :3].reshape(-1, 3) for swatch in swatches])
+    mosaic = Image.fromarray(seen[:: max(1, len(seen) // 400_000)][None])
+    chosen = mosaic.quantize(n_colours, Image.Quantize.MEDIANCUT, kmeans=1, dither=Image.Dither.NONE).getpalette() or []
+    colours = np.array(chosen, np.uint8).reshape(-1, 3)[:n_colours]
+    palette = np.zeros((256, 4), np.uint8)
+    palette[: len(colours), 0], palette[: len(colours), 1:] = 255, colours
+    levels = np.indices((1 << BITS,) * 3).reshape(3, -1).T * (1 << (8 - BITS)) + (1 << (7 - BITS))
+    return palette, cKDTree(colours).query(levels)[1].astype(np.uint8)
