@@ -55,8 +55,8 @@ class Retargeter:
         Linear term: ``pull[:, :S] @ parameters + pull[:, S]``, without the gaps.
     gap_basis, gap_rest : (P, S), (P,)
         The talker's lip gaps in the face's size, mm; contact is 0.
-    gap_pull, gap_face : (k, P), (P,)
-        What a gap adds to the linear term; the face's own gaps at rest, mm.
+    gap_pull : (k, P)
+        What a gap adds to the linear term. A face rests with its lips closed: its gaps are counted from there.
     """
 
     shape_names: tuple[str, ...]
@@ -67,7 +67,6 @@ class Retargeter:
     gap_basis: FloatArray
     gap_rest: FloatArray
     gap_pull: FloatArray
-    gap_face: FloatArray
 
     def retarget(self, speech: Trajectory) -> Trajectory:
         """Weights of all shapes of the face, (T, K), for a trajectory of speech parameters, (T, S).
@@ -75,7 +74,7 @@ class Retargeter:
         Each frame is solved on its own: the answer does not depend on what came before.
         """
         parameters = speech.values.astype(np.float64)
-        gaps = np.maximum(parameters @ self.gap_basis.T + self.gap_rest, 0.0) - self.gap_face
+        gaps = np.maximum(parameters @ self.gap_basis.T + self.gap_rest, 0.0)
         linear = parameters @ self.pull[:, :-1].T + self.pull[:, -1] + gaps @ self.gap_pull.T
         solved = bounded_least_squares(self.curvature, linear, self.limits)
         weights = np.zeros((len(parameters), len(self.shape_names)), np.float32)
@@ -125,7 +124,6 @@ def retargeter(talker: Talker, face: Face) -> Retargeter:
         gap_basis,
         gap_rest,
         GAP_WEIGHT * gap_per_weight.T,
-        rest[upper, 1] - rest[lower, 1],
     )
 
 
