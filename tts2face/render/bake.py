@@ -22,7 +22,7 @@ from tts2face.render.raster import SHIFT, draw_band, to_camera
 from tts2face.render.surface import Surface
 
 SIDE = 192  # samples along a side of the views: 1.5 mm of a head
-N_SKY, N_LAMP = 48, 10  # views for the sky and for each lamp
+N_SKY, N_LAMP = 36, 7  # views for the sky and for each lamp
 LIFT_MM, SLACK_MM = 1.2, 1.2  # a vertex is looked for this far before the surface, and this far before what hides it
 FAR_MM = 20_000.0  # distance of the views: almost parallel light
 OPEN_JAW = 0.6  # weight of the wide open mouth
@@ -81,14 +81,13 @@ def _exposure(
     normals = _normals(surface, points)
     directions = np.concatenate([sphere(N_SKY), *(cone(lamp, N_LAMP, LAMP_RADIUS_RAD) for lamp in lamps)])
     seen = _seen_from(surface, points, normals, directions, threads)
-    facing = normals @ directions.T
-    weights = np.maximum(facing[:, :N_SKY], 0.02)
+    weights = np.maximum(directions[:N_SKY] @ normals.T, 0.02)
     exposure = np.ones((len(points), 1 + len(lamps)), np.float32)
-    exposure[:, 0] = (weights * seen[:, :N_SKY]).sum(axis=1) / weights.sum(axis=1)
+    exposure[:, 0] = (weights * seen[:N_SKY]).sum(axis=0) / weights.sum(axis=0)
     for k, lamp in enumerate(lamps):
         of_lamp = slice(N_SKY + k * N_LAMP, N_SKY + (k + 1) * N_LAMP)
-        turned = np.clip((normals @ lamp + 0.15) / 0.4, 0.0, 1.0)[:, None]  # its own turning away is no shadow
-        exposure[:, 1 + k] = (1 - turned + turned * seen[:, of_lamp]).mean(axis=1)
+        turned = np.clip((normals @ lamp + 0.15) / 0.4, 0.0, 1.0)  # turning away is no shadow
+        exposure[:, 1 + k] = 1 - turned + turned * seen[of_lamp].mean(axis=0)
     return _smoothed(surface, exposure)
 
 
@@ -104,11 +103,11 @@ def _normals(surface: Surface, points: NDArray[np.float32]) -> NDArray[np.float3
 def _seen_from(
     surface: Surface, points: Any, normals: Any, directions: NDArray[np.float64], threads: int
 ) -> NDArray[np.float32]:
-    """(V, D) 1 where a vertex is seen from a direction."""
+    """(D, V) 1 where a vertex is seen from a direction."""
     lifted = points + np.float32(LIFT_MM) * normals
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     radius = float(np.linalg.norm(points - middle, axis=1).max()) + LIFT_MM
-    seen = np.zeros((len(points), len(directions)), np.float32)
+    seen = np.zeros((len(directions), len(points)), np.float32)
 
     def look(share: range) -> None:
         room = room_for(surface, (SIDE, SIDE), 1)
@@ -119,7 +118,7 @@ def _seen_from(
             geometry = (room.vertex, surface.triangles, surface.translucent, lens)
             draw_band(geometry, (room.corners, room.source, members), 0, room.depth, room.owner)
             to_camera(lifted, view, lens, camera, grid)
-            mark_seen(camera, grid, room.depth, np.float32(SLACK_MM), seen, d)
+            mark_seen(camera, grid, room.depth, np.float32(SLACK_MM), seen[d])
 
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(look, [range(i, len(directions), threads) for i in range(threads)]))
@@ -136,13 +135,13 @@ def _view(direction: NDArray[np.float64], middle: Any, radius: float) -> tuple[N
 
 
 @kernel
-def mark_seen(camera: Any, grid: Any, depth: Any, slack: Any, seen: Any, column: int) -> None:
-    """Mark in a column of `seen` the vertices before which nothing nearer than `slack` mm lies."""
+def mark_seen(camera: Any, grid: Any, depth: Any, slack: Any, seen: Any) -> None:
+    """Mark in `seen` (V,) the vertices before which nothing nearer than `slack` mm lies."""
     for v in range(len(camera)):
         x = min(max(grid[v, 0] >> SHIFT, 0), depth.shape[2] - 1)
         y = min(max(grid[v, 1] >> SHIFT, 0), depth.shape[1] - 1)
         if depth[0, y, x] * (camera[v, 2] - slack) <= np.float32(1):
-            seen[v, column] = np.float32(1)
+            seen[v] = np.float32(1)
 
 
 def _smoothed(surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -49,12 +49,21 @@ def framed_box(face: Face) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Lowest and highest corner, mm, of what shall be in the picture: the head with a piece of neck, and air."""
     rest = face.vertices.astype(np.float64)
     low, high = rest.min(axis=0), rest.max(axis=0)
-    chin = np.flatnonzero(face.landmarks == CHIN)
-    if len(chin):
-        chin_y = float(rest[face.landmark_vertices[chin[0]], 1] @ face.landmark_weights[chin[0]])
+    chin_y = _chin_height(face, float(high[1]))
+    if chin_y is not None:
         head = rest[rest[:, 1] > chin_y]
         bottom = max(chin_y - NECK * (high[1] - chin_y), low[1])
         low, high = head.min(axis=0), head.max(axis=0)
         low[1] = bottom
         return low - AIR * (high - low) * [1, 0, 1], high + AIR * (high - low)
     return low - AIR * (high - low), high + AIR * (high - low)
+
+
+def _chin_height(face: Face, top: float) -> float | None:
+    """Height of the chin, mm, from its landmark; without one about as far below the eyes as the top is above them."""
+    chin = np.flatnonzero(face.landmarks == CHIN)
+    if len(chin):
+        return float(face.vertices[face.landmark_vertices[chin[0]], 1] @ face.landmark_weights[chin[0]])
+    if face.eyes:
+        return float(np.mean([eye.centre[1] for eye in face.eyes])) * 2 - top
+    return None

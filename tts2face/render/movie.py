@@ -49,6 +49,7 @@ class Movie:
         self._has_alpha = shape[2] == 4
         self._fps, self._rate = fps, sound_rate
         self._n_frames = self._n_samples = 0
+        self._filling: NDArray[np.uint8] | None = None
         self._container: Any = av.open(str(path), "w", format=kind.container, options=dict(kind.container_options))
         video: Any = self._container.add_stream(kind.video, rate=fps, options=dict(kind.video_options))
         video.width, video.height = shape[1], shape[0]
@@ -67,6 +68,8 @@ class Movie:
         """Append one picture."""
         import av
 
+        if self._has_alpha:
+            pixels = self._filled(pixels)
         frame = av.VideoFrame.from_ndarray(pixels, format="rgba" if self._has_alpha else "rgb24")
         frame = frame.reformat(
             format=self._video.pix_fmt, dst_colorspace="ITU709", src_color_range="JPEG", dst_color_range="MPEG"
@@ -74,6 +77,16 @@ class Movie:
         frame.pts, frame.time_base = self._n_frames, 1 / self._fps
         self._n_frames += 1
         self._container.mux(self._video.encode(frame))
+
+    def _filled(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Pixels whose empty places have a colour of the head, so that coding does not darken its outline."""
+        empty = pixels[:, :, 3] == 0
+        if self._filling is None and not empty.all():
+            self._filling = pixels[~empty][:, :3].mean(axis=0).astype(np.uint8)
+        filled = pixels.copy()
+        if self._filling is not None:
+            filled[empty, :3] = self._filling
+        return filled
 
     def sound(self, samples: NDArray[np.float32]) -> None:
         """Append mono samples."""
