@@ -12,6 +12,7 @@ from lexicon.errors import InputError
 RATES = (0.5, 2.0)
 VOLUMES = (0.0, 2.0)
 FRAMES_PER_SECOND = (1.0, 120.0)
+SYNTHESES = ("exemplar", "theobald2007")
 
 
 def option(default: Any, help_text: str) -> Any:
@@ -36,6 +37,9 @@ class Request:
     volume: float = option(1.0, "Loudness of the sound, 0 to 2.")
     seed: int = option(0, "The same seed gives the same sound and motion.")
     dictionary: Path | None = option(None, "Your own pronunciations, which win over the built-in ones.")
+    synthesis: str = option("exemplar", "How lips are made from exemplars: exemplar, or theobald2007 as published.")
+    context: int | None = option(None, "Phones either side by which exemplars are chosen; the method's own without it.")
+    exemplars: int | None = option(None, "Exemplars averaged for each phone; the method's own without it.")
     fps: float = option(30.0, "Frames per second, 1 to 120.")
 
     def __post_init__(self) -> None:
@@ -43,6 +47,8 @@ class Request:
         _check("rate", self.rate, RATES)
         _check("volume", self.volume, VOLUMES)
         _check("fps", self.fps, FRAMES_PER_SECOND)
+        if self.synthesis not in SYNTHESES:
+            raise InputError(f"there is no synthesis {self.synthesis!r}; choose {' or '.join(SYNTHESES)}")
         if self.seed < 0:
             raise InputError(f"seed must be 0 or more, not {self.seed}")
 

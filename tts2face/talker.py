@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import DataError
+from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.tensors import read_tensors, write_tensors
 from tts2face.types import HEAD_CHANNELS, Trajectory
@@ -16,6 +16,7 @@ from tts2face.types import HEAD_CHANNELS, Trajectory
 KIND = "talker"
 FORMAT_VERSION = 1
 STEPS_PER_SPREAD = 2000.0
+SHIPPED = Path(__file__).parent / "data"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,6 +158,17 @@ def read_talker(path: Path) -> Talker:
         return _assembled(arrays, header)
     except (KeyError, IndexError, ValueError, TypeError) as broken:
         raise DataError(f"{path} lacks a part of a talker ({broken}); build it again") from broken
+
+
+def load_talker(name: str) -> Talker:
+    """A shipped talker by name, or one from a ``.talker`` file; errors as `read_talker`."""
+    shipped = SHIPPED / f"{name}.talker"
+    if shipped.parent == SHIPPED and shipped.is_file():
+        return read_talker(shipped)
+    if Path(name).suffix or Path(name).exists():
+        return read_talker(Path(name))
+    known = ", ".join(sorted(file.stem for file in SHIPPED.glob("*.talker")))
+    raise InputError(f"there is no talker {name!r}; give {known}, or the path of a .talker file")
 
 
 def _assembled(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> Talker:
