@@ -22,6 +22,9 @@ DELAY_S = (
     0.009  # the model's frames lie this much early; measured on the TIMIT sample, confirmed on an Australian voice
 )
 PADDING_S = 0.1  # quiet noise before and behind, so that the first and last phone have a silence to begin from
+MARGIN_S = 0.15  # kept of the silence at either end: the model normalises by the mean, which more silence would shift
+AUDIBLE = 0.01  # of the loudest window's level
+WINDOW_S = 0.01
 NOISE = 1e-4  # of full scale; digital silence has no logarithm
 PEAK = 0.7  # level at which the model hears the sound
 SHORTEST_S = 0.005  # one frame: shorter phones and silences are not found
@@ -70,11 +73,12 @@ class Aligner:
         if not words:
             raise DataError("there is no word to align; give a transcript")
         names = [self._name(tuple(tuple(way) for way in ways)) for _, ways in words]
-        entries = self._decoded(_heard(sound), " ".join(names))
+        part, begin = _audible(sound)
+        entries = self._decoded(_heard(part), " ".join(names))
         if [entry.name.split("(")[0] for entry in entries] != names:
             found = len(entries)
             raise DataError(f"only {found} of {len(names)} words could be aligned; check the transcript")
-        return _alignment(entries, words, sound)
+        return _alignment(entries, words, sound.duration, begin)
 
     def _name(self, ways: tuple[tuple[str, ...], ...]) -> str:
         """The decoder's name of a word with these pronunciations."""
@@ -134,6 +138,20 @@ def acoustic_phones(phones: Sequence[str]) -> list[str]:
 _MODELLED = frozenset(ARPABET.values())
 
 
+def _audible(sound: Waveform) -> tuple[Waveform, float]:
+    """The part of a sound from a margin before to a margin behind what can be heard, and the second it begins at."""
+    window = max(1, round(WINDOW_S * sound.rate))
+    n_windows = len(sound.samples) // window
+    levels = np.abs(sound.samples[: n_windows * window].reshape(n_windows, window)).max(axis=1, initial=0.0)
+    loud = np.flatnonzero(levels > AUDIBLE * levels.max(initial=0.0))
+    if not len(loud):
+        return sound, 0.0
+    margin = round(MARGIN_S * sound.rate)
+    first = max(0, int(loud[0]) * window - margin)
+    last = min(len(sound.samples), (int(loud[-1]) + 1) * window + margin)
+    return Waveform(sound.samples[first:last], sound.rate), first / sound.rate
+
+
 def _heard(sound: Waveform) -> bytes:
     """16-bit samples for the acoustic model, padded and at one level."""
     import soxr
@@ -149,25 +167,28 @@ def _heard(sound: Waveform) -> bytes:
     return pcm.tobytes()
 
 
-def _alignment(entries: "Sequence[_Entry]", words: Sequence[tuple[str, Pronunciations]], sound: Waveform) -> Alignment:
+def _alignment(
+    entries: Sequence[_Entry], words: Sequence[tuple[str, Pronunciations]], duration: float, begin: float
+) -> Alignment:
+    """Edges on the clock of a whole sound, of which the decoder heard what begins at `begin`."""
     labels: list[str] = []
     starts: list[float] = []
     spans: list[WordSpan] = []
     end, score, n_frames = 0.0, 0.0, 0
     for entry, (text, ways) in zip(entries, words, strict=True):
-        begin = _seconds(entry.phones[0][1])
-        if begin - end >= SHORTEST_S:  # silence, at the beginning too
+        onset = begin + _seconds(entry.phones[0][1])
+        if onset - end >= SHORTEST_S:  # silence, at the beginning too
             labels.append(SILENCE)
             starts.append(end)
         spans.append(WordSpan(text, len(labels), len(labels) + len(entry.phones)))
         for phone, (_, first, count, fit) in zip(ways[entry.way], entry.phones, strict=True):
             labels.append(phone)
-            starts.append(_seconds(first))
-            end, score, n_frames = _seconds(first + count), score + fit, n_frames + count
-    if sound.duration - end >= SHORTEST_S:
+            starts.append(begin + _seconds(first))
+            end, score, n_frames = begin + _seconds(first + count), score + fit, n_frames + count
+    if duration - end >= SHORTEST_S:
         labels.append(SILENCE)
         starts.append(end)
-    edges = np.array([*starts, sound.duration])
+    edges = np.array([*starts, duration])
     edges[0] = 0.0
     return Alignment(PhoneSequence(labels, increasing(edges)), tuple(spans), score / max(n_frames, 1) * FRAME_RATE)
 

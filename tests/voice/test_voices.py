@@ -1,0 +1,149 @@
+"""Every voice keeps the same promises."""
+
+import numpy as np
+import pytest
+
+from lexicon.errors import DataError, InputError
+from lexicon.ipa import parse_ipa
+from lexicon.phones import PHONES
+from lexicon.sequence import SILENCE
+from tts2face.types import Speech
+from tts2face.voice.engine import SpokenWord, Voice, at_volume, load_voice
+
+SENTENCE = "Bob may move five big maps."
+WORDS = ["Bob", "may", "move", "five", "big", "maps"]
+IN_OTHER_LANGUAGES = {
+    "de": ("Guten Morgen, schöne Welt.", 4),
+    "fr-fr": ("Bonjour, où est la gare?", 5),
+    "es": ("¿Dónde está la biblioteca?", 4),
+    "it": ("La vita è bella.", 4),
+    "pl": ("Dzień dobry, świecie.", 3),
+    "ru": ("Привет, мир.", 2),
+    "ja": ("こんにちは", 1),
+    "cmn": ("你好世界", 1),
+    "hi": ("नमस्ते दुनिया", 2),
+    "tr": ("Günaydın dünya.", 2),
+}
+
+
+@pytest.fixture(scope="module", params=["heart", "espeak"])
+def voice(request: pytest.FixtureRequest) -> Voice:
+    return load_voice(request.param, "en-us")
+
+
+def spoken_words(speech: Speech) -> dict[str, str]:
+    return {word.text.strip(".,"): "".join(speech.phones.phones[word.first : word.last]) for word in speech.words}
+
+
+def test_speech_is_sound_with_phones_of_the_table_and_words(voice: Voice) -> None:
+    speech = voice.speak(SENTENCE)
+    assert speech.waveform.rate == voice.sample_rate
+    assert speech.phones.end == speech.waveform.duration
+    assert set(speech.phones.phones) <= PHONES.keys()
+    assert speech.phones.phones[0] == speech.phones.phones[-1] == SILENCE
+    assert spoken_words(speech) == {
+        "Bob": "bɑb",
+        "may": "meɪ",
+        "move": "muv",
+        "five": "faɪv",
+        "big": "bɪɡ",
+        "maps": "mæps",
+    }
+    assert float(np.abs(speech.waveform.samples).max()) > 0.05
+
+
+def test_the_same_request_gives_the_same_bytes(voice: Voice) -> None:
+    first, second = voice.speak(SENTENCE, seed=3), voice.speak(SENTENCE, seed=3)
+    assert np.array_equal(first.waveform.samples, second.waveform.samples)
+    assert np.array_equal(first.phones.edges, second.phones.edges)
+
+
+def test_rate_and_volume_act(voice: Voice) -> None:
+    usual, fast = voice.speak(SENTENCE), voice.speak(SENTENCE, rate=1.5)
+    spoken = [speech.phones.end - 0.5 for speech in (usual, fast)]  # half a second of it is silence that may stay
+    assert spoken[1] < 0.8 * spoken[0]
+    quiet = voice.speak(SENTENCE, volume=0.5)
+    assert np.allclose(quiet.waveform.samples, usual.waveform.samples * 0.5, atol=1e-6)
+
+
+def test_silences_are_silent_and_phones_are_not(voice: Voice) -> None:
+    speech = voice.speak(SENTENCE)
+    rate = speech.waveform.rate
+    power = {True: 0.0, False: 0.0}
+    for phone, start, end in zip(speech.phones.phones, speech.phones.edges, speech.phones.edges[1:], strict=False):
+        part = speech.waveform.samples[round(start * rate) : round(end * rate)]
+        power[phone == SILENCE] += float((part**2).sum())
+    assert power[True] < 0.02 * power[False]
+
+
+def test_phones_in_instead_of_text(voice: Voice) -> None:
+    words = [SpokenWord("map", parse_ipa("mˈæp")), SpokenWord("you", parse_ipa("jˈuː"), ".")]
+    assert spoken_words(voice.speak(words)) == {"map": "mæp", "you": "ju"}
+
+
+@pytest.mark.parametrize("name", ["heart", "espeak"])
+def test_a_users_words_win(name: str) -> None:
+    voice = load_voice(name, "en-us", {"bob": parse_ipa("ʃˈiː")})
+    assert spoken_words(voice.speak("May Bob move?"))["Bob"] == "ʃi"
+
+
+@pytest.mark.parametrize(("language", "text", "n_words"), [(code, *case) for code, case in IN_OTHER_LANGUAGES.items()])
+def test_espeak_speaks_other_languages(language: str, text: str, n_words: int) -> None:
+    speech = load_voice(None, language).speak(text)
+    assert len(speech.words) >= n_words
+    assert speech.phones.end == speech.waveform.duration
+    assert SILENCE not in [phone for word in speech.words for phone in speech.phones.phones[word.first : word.last]]
+
+
+def test_a_stops_closure_belongs_to_it() -> None:
+    """espeak-ng's event stands at the burst; the /p/ of "happy" begins where the sound before it ends."""
+    speech = load_voice("espeak", "en-us").speak("A happy apple.")
+    rate = speech.waveform.rate
+    at = speech.phones.phones.index("p")
+    start, end = (round(edge * rate) for edge in speech.phones.edges[at : at + 2])
+    closure = speech.waveform.samples[start : start + round(0.02 * rate)]
+    assert float(np.abs(closure).max()) < 0.02
+    assert (end - start) / rate > 0.05
+
+
+@pytest.mark.parametrize("text", ["", "...", "?!"])
+def test_nothing_to_say_is_refused(voice: Voice, text: str) -> None:
+    with pytest.raises(InputError, match="nothing to say"):
+        voice.speak(text)
+
+
+def test_what_the_neural_voice_cannot_say_is_refused() -> None:
+    with pytest.raises(InputError, match="cannot say '你好'"):
+        load_voice("heart", "en-us").speak("Hello 你好 there.")
+
+
+def test_letters_of_another_script_are_refused() -> None:
+    with pytest.raises(InputError, match="cannot read"):
+        load_voice("espeak", "de").speak("Привет")
+
+
+@pytest.mark.parametrize(
+    ("name", "language", "reason"),
+    [
+        ("nobody", "en-us", "no voice 'nobody'; give heart, espeak"),
+        ("heart", "de", "speaks English, not de"),
+        ("espeak", "xx", "no language 'xx'"),
+        ("missing.onnx", "en-us", r"no Piper voice missing\.onnx"),
+    ],
+)
+def test_unknown_voices_are_refused(name: str, language: str, reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        load_voice(name, language)
+
+
+def test_a_piper_voice_without_settings_is_refused(tmp_path) -> None:
+    path = tmp_path / "voice.onnx"
+    path.write_bytes(b"x")
+    with pytest.raises(DataError, match=r"put voice\.onnx\.json beside it"):
+        load_voice(str(path), "en-us")
+
+
+def test_loud_sound_is_turned_down_as_a_whole() -> None:
+    loud = at_volume(np.array([0.5, -1.0, 0.25]), 2.0)
+    assert loud == pytest.approx([0.5, -1.0, 0.25])
+    assert at_volume(np.array([0.25, -0.5]), 2.0) == pytest.approx([0.5, -1.0])
