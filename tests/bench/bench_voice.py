@@ -1,0 +1,104 @@
+"""How fast the neural voice is, and what aligning its sound with its own phones gains.
+
+Run: ``python tests/bench/bench_voice.py``. Edges are compared with landmarks of the sound that no aligner had a part in:
+the instant at which the energy above 4 kHz rises or falls most steeply where a sibilant meets a vowel, and the first and
+last audible instant of the sentence.
+"""
+
+import argparse
+import time
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+from sentences import sentences
+
+from lexicon.phones import PHONES
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.types import Waveform
+from tts2face.voice import neural
+
+SIBILANTS = frozenset({"s", "z", "ʃ", "ʒ"})
+HIGH_HZ = 4000
+SEARCH_S = 0.1  # either side of the middle between the two edges that are compared
+STEP_S = 0.001
+SMOOTHING_S = 0.005
+AUDIBLE = 0.02
+
+
+def high_energy(sound: Waveform) -> NDArray[np.float64]:
+    """Log energy above `HIGH_HZ` at steps of `STEP_S`."""
+    sections = butter(4, HIGH_HZ, "highpass", fs=sound.rate, output="sos")
+    power = sosfiltfilt(sections, sound.samples.astype(np.float64)) ** 2
+    window = np.hanning(round(2 * SMOOTHING_S * sound.rate))
+    smooth = np.convolve(power, window / window.sum(), "same")
+    return 10 * np.log10(smooth[:: round(STEP_S * sound.rate)] + 1e-9)
+
+
+def landmarks(phones: PhoneSequence) -> Iterator[tuple[int, int]]:
+    """Number of each edge between a sibilant and a vowel, and +1 where energy rises there, -1 where it falls."""
+    for at, (before, behind) in enumerate(zip(phones.phones, phones.phones[1:], strict=False), start=1):
+        if before in SIBILANTS and PHONES[behind].is_vowel:
+            yield at, -1
+        elif behind in SIBILANTS and PHONES[before].is_vowel:
+            yield at, 1
+
+
+def sounding(phones: PhoneSequence) -> PhoneSequence:
+    """The sequence with inner silences given to the phone before them, so that both ways have the same phones."""
+    kept = [at for at, phone in enumerate(phones.phones) if phone != SILENCE]
+    edges = [phones.edges[at] for at in kept] + [phones.edges[kept[-1] + 1]]
+    return PhoneSequence([phones.phones[at] for at in kept], edges)
+
+
+def main() -> None:
+    """Print the table of docs/performance.md."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("-n", type=int, default=100, help="sentences")
+    n = parser.parse_args().n
+    voice = neural.NeuralVoice({})
+    errors: dict[str, list[float]] = {"own": [], "own less 45 ms": [], "aligned": []}
+    ends: dict[str, list[float]] = {name: [] for name in errors}
+    spent = length = 0.0
+    failed = 0
+    for text in sentences(n):
+        began = time.perf_counter()
+        speech = voice.speak(text)
+        spent, length = spent + time.perf_counter() - began, length + speech.waveform.duration
+        (tokens,) = voice._parts(text)
+        letters = "".join(token.letters + " " * token.has_space for token in tokens).strip()
+        shifted = sounding(voice._predicted(tokens, letters, 1.0, speech.waveform)[0])
+        ways = {
+            "own": PhoneSequence(shifted.phones, shifted.edges + neural.LATE_S),
+            "own less 45 ms": shifted,
+            "aligned": sounding(speech.phones),
+        }
+        if ways["aligned"].phones != shifted.phones:
+            failed += 1
+            continue
+        energy = high_energy(speech.waveform)
+        slope = np.gradient(energy)
+        level = np.abs(speech.waveform.samples)
+        audible = np.flatnonzero(level > AUDIBLE * level.max()) / speech.waveform.rate
+        for name, phones in ways.items():
+            ends[name] += [phones.start - audible[0], phones.end - audible[-1]]
+        for at, sign in landmarks(shifted):
+            middle = (shifted.edges[at] + ways["aligned"].edges[at]) / 2
+            first = max(0, round((middle - SEARCH_S) / STEP_S))
+            true = (first + int(np.argmax(sign * slope[first : round((middle + SEARCH_S) / STEP_S)]))) * STEP_S
+            for name, phones in ways.items():
+                errors[name].append(float(phones.edges[at] - true))
+    print(f"{n} sentences, {length:.0f} s of speech, real-time factor {spent / length:.3f}, {failed} not aligned")
+    print("| edges | sibilant edges | median error | median absolute | within 20 ms | sentence ends, median absolute |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    for name, found in errors.items():
+        ms = 1000 * np.array(found)
+        near = f"{np.mean(np.abs(ms) <= 20):.0%}"
+        apart = 1000 * np.median(np.abs(ends[name]))
+        middle, size = np.median(ms), np.median(np.abs(ms))
+        print(f"| {name} | {len(ms)} | {middle:+.0f} ms | {size:.0f} ms | {near} | {apart:.0f} ms |")
+
+
+if __name__ == "__main__":
+    main()
