@@ -1,8 +1,8 @@
 """How fast the neural voice is, and what aligning its sound with its own phones gains.
 
-Run: ``python tests/bench/bench_voice.py``. Edges are compared with landmarks of the sound that no aligner had a part in:
-the instant at which the energy above 4 kHz rises or falls most steeply where a sibilant meets a vowel, and the first and
-last audible instant of the sentence.
+Run: ``python tests/bench/bench_voice.py``. Edges are compared with landmarks of the sound that no aligner had a part
+in: the instant at which the energy above 4 kHz rises or falls most steeply where a sibilant meets a vowel, and the
+first and last audible instant of the sentence.
 """
 
 import argparse

@@ -1,0 +1,58 @@
+"""A long text in sentence-sized pieces, in bounded memory."""
+
+import re
+from collections.abc import Iterator
+
+from lexicon.errors import InputError
+
+# A sentence ends at ., !, ? or … (with closing quotes) before a space and no small letter, at an end mark of East Asian
+# or Indic writing, or at a blank line.
+_END = re.compile(r"""[.!?…]+["'”’)\]]*(?=\s+[^\sa-z])|[。！？｡।॥؟۔]+["'”’」』）]*|\n\s*\n""")
+_CLAUSE = re.compile(r"[,;:—–、，；：،؛](?=\s)|[、，；：]")
+# What a full stop behind does not end a sentence: titles, and initials.
+_NO_END = re.compile(r"(?:\b(?:Mr|Mrs|Ms|Dr|Prof|St|Rev|Gen|Col|Capt|Lt|Sgt|Jr|Sr|vs|etc|No|e\.g|i\.e)|\b[A-Z])\.$")
+
+
+def chunks(text: str, limit: int) -> Iterator[str]:
+    """Sentences of a text, none longer than `limit` characters unless a single word is.
+
+    A longer sentence is cut behind the last clause mark that fits, else at the last space, and where a text has neither
+    (Chinese, Japanese) behind `limit` characters. Nothing but space is lost.
+
+    Raises
+    ------
+    InputError
+        `limit` is below 1.
+    """
+    if limit < 1:
+        raise InputError(f"a piece of text needs at least 1 character, not {limit}")
+    begin = 0
+    for match in _END.finditer(text):
+        if _NO_END.search(text, max(begin, match.end() - 12), match.end()):
+            continue
+        yield from _fitting(text[begin : match.end()], limit)
+        begin = match.end()
+    yield from _fitting(text[begin:], limit)
+
+
+def _fitting(sentence: str, limit: int) -> Iterator[str]:
+    rest = " ".join(sentence.split())
+    while len(rest) > limit:
+        at = _cut(rest, limit)
+        yield rest[:at].rstrip()
+        rest = rest[at:].lstrip()
+    if rest:
+        yield rest
+
+
+def _cut(text: str, limit: int) -> int:
+    """Where a text that is too long is cut."""
+    clauses = [match.end() for match in _CLAUSE.finditer(text, limit // 3, limit)]
+    if clauses:
+        return clauses[-1]
+    space = text.rfind(" ", 1, limit + 1)
+    if space > 0:
+        return space
+    word_end = text.find(" ", limit)
+    is_word = text[limit - 1].isascii() and text[limit].isascii()
+    return (word_end if word_end > 0 else len(text)) if is_word else limit
