@@ -6,11 +6,13 @@ from pathlib import Path
 import numpy as np
 
 from corpus_tools.head.cage import caged
+from corpus_tools.head.correspondence import TABLE, with_landmarks
+from corpus_tools.head.hair import Cut
 from corpus_tools.head.head import ADULT, built_head
 from corpus_tools.head.piece import joined
 from corpus_tools.head.skin import skinned
 from corpus_tools.head.source import CARRIER, fetched, read_source
-from corpus_tools.head.texture import painted
+from corpus_tools.head.texture import Palette, painted
 from tts2face.face.file import write_face
 from tts2face.face.model import Face
 
@@ -29,8 +31,10 @@ def head_face(data: Path) -> Face:
     source = read_source(data)
     cage = caged(source, ADULT)
     skin = skinned(cage)
-    texture = painted(source, skin, np.random.default_rng(SEED))
-    return joined(built_head(cage, skin, SEED), sorted(cage.units), texture, METADATA)
+    texture = painted(source, skin, Palette(), np.random.default_rng(SEED))
+    face = joined(built_head(cage, skin, skin, Palette(), Cut(), SEED), sorted(cage.units), texture, METADATA)
+    known = TABLE.is_file() and TABLE.read_text().startswith("landmark,x")
+    return with_landmarks(face, skin.base) if known else face
 
 
 def main() -> None:

@@ -8,9 +8,10 @@ from corpus_tools.head.piece import Ball, Piece, Span
 
 Floats = NDArray[np.float64]
 
-N_AROUND = 64
+N_AROUND = 52
 IRIS_RAD, PUPIL_RAD = 0.385, 0.15  # half angles seen from the centre: MakeHuman's balls are a third too large
-BULGE = 0.055  # of the radius, height of the cornea at its top
+RECEDE_MM = 1.6  # how far a ball sinks while its lids are shut, which nobody sees: lids move on straight lines
+BULGE = 0.04  # of the radius, height of the cornea at its top
 RINGS = np.concatenate([
     np.linspace(0.0, PUPIL_RAD, 4), np.linspace(PUPIL_RAD + 0.02, IRIS_RAD, 12), np.linspace(IRIS_RAD + 0.03, 0.7, 6),
     np.linspace(0.8, 1.7, 10),
@@ -33,24 +34,29 @@ def balls_of(cage: Cage) -> tuple[Ball, Ball]:
     return found[0], found[1]
 
 
-def eyeball(ball: Ball, generator: np.random.Generator) -> Piece:
-    """The drawn eyeball."""
+def ball_radius(ball: Ball, off: Floats) -> Floats:
+    """Distance of the surface from the centre, mm, at angles from the gaze, radians."""
+    return ball.radius * (1.0 + BULGE * np.clip(1.0 - (off / (IRIS_RAD * 1.15)) ** 2, 0, None) ** 1.3)
+
+
+def eyeball(ball: Ball, side: str, generator: np.random.Generator) -> Piece:
+    """The drawn eyeball of the side ``Left`` or ``Right``."""
     around = np.linspace(0, 2 * np.pi, N_AROUND, endpoint=False)
     off, turn = (grid.ravel() for grid in np.meshgrid(RINGS, around, indexing="ij"))
     towards = np.stack([np.sin(off) * np.cos(turn), np.sin(off) * np.sin(turn), np.cos(off)], axis=1)
-    height = 1.0 + BULGE * np.clip(1.0 - (off / (IRIS_RAD * 1.15)) ** 2, 0, None) ** 1.3
     row, column = np.meshgrid(np.arange(len(RINGS) - 1), np.arange(N_AROUND), indexing="ij")
     a, b = row * N_AROUND + column, row * N_AROUND + (column + 1) % N_AROUND
     quads = np.stack([a, a + N_AROUND, b + N_AROUND, b], axis=-1).reshape(-1, 4)
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     in_iris = off[triangles].max(axis=1) <= IRIS_RAD + 0.031
     return Piece(
-        vertices=ball.centre + ball.radius * height[:, None] * towards,
+        vertices=ball.centre + ball_radius(ball, off)[:, None] * towards,
         spans=(
             Span("sclera", triangles[~in_iris], MATERIALS["sclera"]),
             Span("iris", triangles[in_iris], MATERIALS["iris"]),
         ),
         colours=_painted(off, turn, towards[:, 1], generator),
+        shapes={f"eyeBlink{side}": np.tile([0.0, 0.0, -RECEDE_MM], (len(towards), 1))},
     )
 
 

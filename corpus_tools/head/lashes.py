@@ -1,26 +1,104 @@
-"""Lashes: fine blades along MakeHuman's strips of lashes, moving with the lids."""
+"""Lashes: fine curved blades along MakeHuman's strips of lashes, moving with the lids."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import shortest_path
+from scipy.spatial import cKDTree
 
 from corpus_tools.head.cage import Cage
 from corpus_tools.head.piece import Piece, Span
-from corpus_tools.head.subdivide import triangulated
+from corpus_tools.head.skin import Skin
 
 Floats = NDArray[np.float64]
 
-COLOUR = np.array([0.10, 0.065, 0.05])
-MATERIAL = {"specular": 0.1, "shininess": 20.0, "opacity": 0.85}
-STRIPS = tuple(f"helper-{side}-eyelashes-{number}" for side in "lr" for number in (1, 2))
+COLOUR = np.array([0.11, 0.075, 0.06])
+MATERIAL = {"specular": 0.05, "shininess": 20.0}
 
 
-def lash_piece(cage: Cage) -> Piece:
-    """The strips as they are."""
-    used, quads = np.unique(np.concatenate([cage.source.groups[name].corners for name in STRIPS]), return_inverse=True)
-    points = cage.vertices[used]
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Lashes of one lid: the strip's number in the source, blades, length in rows of the strip, width in mm."""
+
+    strip: int
+    n_blades: int
+    length: float
+    width: float
+
+
+UPPER, LOWER = Row(2, 60, 3.7, 0.24), Row(1, 34, 2.1, 0.15)
+ROOT_ROW = 0.85  # the strip's first row lies within the lid
+
+
+def lash_piece(cage: Cage, skin: Skin, generator: np.random.Generator) -> Piece:
+    """The lashes of both eyes; what was mended in the skin's shapes moves them too."""
+    nearest = cKDTree(skin.vertices)
+    points, triangles, shapes, count = [], [], {name: [] for name in cage.units}, 0
+    for side in "lr":
+        for row in (UPPER, LOWER):
+            strip = cage.source.groups[f"helper-{side}-eyelashes-{row.strip}"].corners
+            used = np.unique(strip)
+            carry, offset, faces = _blades(cage.vertices[used], np.searchsorted(used, strip), row, generator)
+            points.append(carry @ cage.vertices[used] + offset)
+            beside = nearest.query(points[-1])[1]
+            for name, moved in cage.units.items():
+                own = carry @ moved[used]
+                shapes[name].append(own + skin.mended[name][beside] if name in skin.mended else own)
+            triangles.append(faces + count)
+            count += len(offset)
+    vertices = np.concatenate(points)
     return Piece(
-        points,
-        (Span("lashes", triangulated(quads.reshape(-1, 4)), MATERIAL),),
-        np.tile(COLOUR, (len(points), 1)),
-        {name: moved[used] for name, moved in cage.units.items()},
+        vertices,
+        (Span("lashes", np.concatenate(triangles), MATERIAL),),
+        np.tile(COLOUR, (len(vertices), 1)),
+        {name: np.concatenate(blocks) for name, blocks in shapes.items()},
     )
+
+
+def grid_of(quads: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Vertex numbers (across, along) of a strip of quads (F, 4) that forms a grid, the short side first."""
+    n = int(quads.max()) + 1
+    sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2)
+    steps = shortest_path(sparse.coo_array((np.ones(len(sides)), sides.T), shape=(n, n)), directed=False, unweighted=True)
+    corners = np.flatnonzero(np.bincount(quads.ravel(), minlength=n) == 1)
+    first = corners[0]
+    second = min(corners[1:], key=lambda corner: steps[first, corner])
+    n_across = int(steps[first, second]) + 1
+    one, two = steps[first].astype(int), steps[second].astype(int)
+    across, along = (one - two + n_across - 1) // 2, (one + two - n_across + 1) // 2
+    grid = np.zeros((n_across, n // n_across), np.int64)
+    grid[across, along] = np.arange(n)
+    return grid
+
+
+def _blades(
+    places: Floats, quads: NDArray[np.int64], row: Row, generator: np.random.Generator
+) -> tuple[sparse.csr_array, Floats, NDArray[np.int64]]:
+    """What carries 5 vertices per blade from the strip's (5 B, S), what is added (5 B, 3), triangles (3 B, 3)."""
+    grid = grid_of(quads)
+    if places[grid[0], 2].mean() > places[grid[-1], 2].mean():
+        grid = grid[::-1]  # the root lies behind the tip
+    n_across, n_along = grid.shape
+    n = row.n_blades
+    root = (np.arange(n) + generator.uniform(0.2, 0.8, n)) / n * (n_along - 1)
+    ends = np.sin(np.pi * np.clip(root / (n_along - 1), 0.06, 0.94)) ** 0.5  # shorter towards the corners
+    reach = row.length * ends * generator.uniform(0.72, 1.1, n)
+    lean = np.interp(root / (n_along - 1), [0, 1], [-0.35, 0.35]) + generator.normal(0, 0.16, n)
+    weights = sparse.lil_array((5 * n, len(places)))
+    for blade in range(n):
+        for vertex, share in ((0, 0.0), (1, 0.0), (2, 0.55), (3, 0.55), (4, 1.0)):
+            along = np.clip(root[blade] + lean[blade] * share, 0, n_along - 1 - 1e-6)
+            out = ROOT_ROW + share * reach[blade]
+            i, j = min(int(out), n_across - 2), int(along)
+            u, v = out - i, along - j
+            for step, part in (((0, 0), (1 - u) * (1 - v)), ((1, 0), u * (1 - v)), ((0, 1), (1 - u) * v), ((1, 1), u * v)):
+                weights[5 * blade + vertex, grid[i + step[0], j + step[1]]] += part
+    carry = weights.tocsr()
+    tangent = np.gradient(places[grid[0]], axis=0)
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    aside = np.stack([np.interp(root, np.arange(n_along), tangent[:, k]) for k in range(3)], axis=1) * row.width / 2
+    offset = np.stack([aside, -aside, 0.7 * aside, -0.7 * aside, 0 * aside], axis=1).reshape(-1, 3)
+    one = np.array([(0, 1, 2), (1, 3, 2), (2, 3, 4)])
+    return carry, offset, (one + 5 * np.arange(n)[:, None, None]).reshape(-1, 3)

@@ -1,6 +1,7 @@
 """The skin: MakeHuman's head subdivided once, with its own texture layout that gives the face most pixels."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,15 +29,16 @@ class Skin:
         Texture coordinates in MakeHuman's own layout, v up.
     base : (N, 3)
         Where the vertex lies on the source's base mesh, the same for every identity: where paint goes.
-    matrix : (N, cage)
-        Sparse; what makes N points of the cage's.
+    mended
+        What was added to shapes, (N, 3) by name; lashes follow it.
     """
 
     vertices: Floats
-    shapes: dict[str, Floats]
+    shapes: Mapping[str, Floats]
     quads: NDArray[np.int64]
     source_uv: Floats
     base: Floats
+    mended: Mapping[str, Floats] = field(default_factory=dict)
 
 
 def skinned(cage: Cage) -> Skin:
@@ -66,3 +68,15 @@ def _halved(corners: Floats) -> Floats:
     centre = corners.mean(axis=1)
     new = [np.stack([corners[:, k], after[:, k], centre, after[:, k - 1]], axis=1) for k in range(4)]
     return np.stack(new, axis=1).reshape(-1, 4, 2)
+
+
+def vertex_normals(vertices: Floats, quads: NDArray[np.int64], base: Floats) -> Floats:
+    """(N, 3) unit normals, those of a seam's vertices alike."""
+    diagonals = vertices[quads[:, 2]] - vertices[quads[:, 0]], vertices[quads[:, 3]] - vertices[quads[:, 1]]
+    faces = np.cross(*diagonals)
+    _, weld = np.unique(np.rint(base * 1e6).astype(np.int64), axis=0, return_inverse=True)
+    weld = weld.ravel()
+    total = np.zeros((int(weld.max()) + 1, 3))
+    for corner in quads.T:
+        np.add.at(total, weld[corner], faces)
+    return (total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12))[weld]

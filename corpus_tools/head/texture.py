@@ -1,32 +1,122 @@
 """The skin's texture, painted by rule: every texel knows its place on the head, so seams do not show."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, map_coordinates
+from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates
 
+from corpus_tools.head.brows import brow_cover
+from corpus_tools.head.hair import hair_share, strand_colour, strand_field
 from corpus_tools.head.layout import SIDE, laid_out, texels_of
+from corpus_tools.head.noise import bell, lumps, ramp
 from corpus_tools.head.skin import Skin
 from corpus_tools.head.source import Source
 from corpus_tools.head.subdivide import triangulated
 
 Floats = NDArray[np.float64]
 
-SKIN = np.array([0.835, 0.640, 0.545])
-LIPS = np.array([0.70, 0.385, 0.36])
-CAVITY = np.array([0.36, 0.13, 0.13])
+
+@dataclass(frozen=True, slots=True)
+class Palette:
+    """Colours, sRGB 0..1, and how strongly the skin varies (1 is natural, 0 flat)."""
+
+    skin: tuple[float, float, float] = (0.815, 0.625, 0.535)
+    lips: tuple[float, float, float] = (0.70, 0.40, 0.375)
+    cavity: tuple[float, float, float] = (0.40, 0.16, 0.155)
+    hair: tuple[float, float, float] = (0.205, 0.135, 0.095)
+    variation: float = 1.0
+    brow_thickness: float = 1.0
 
 
-def painted(source: Source, skin: Skin, generator: np.random.Generator) -> NDArray[np.uint8]:
+# Places (|x|, y, z) and reach in mm, then what is multiplied in at full strength: the blood and the shadows of a face.
+TINTS = (
+    ((39, -27, 15), (17, 15, 30), (1.01, 0.885, 0.90)),  # cheeks
+    ((0, -40, 40), (12, 10, 16), (1.00, 0.88, 0.88)),  # tip of the nose
+    ((14, -43, 25), (7, 7, 12), (0.99, 0.89, 0.89)),  # wings of the nose
+    ((0, -101, 20), (13, 9, 20), (1.00, 0.93, 0.93)),  # chin
+    ((0, 55, 30), (40, 24, 40), (1.01, 1.005, 0.985)),  # forehead
+    ((17, 1, 15), (6, 9, 14), (0.93, 0.86, 0.86)),  # inner corner of the eye
+    ((30, -14, 15), (14, 5, 14), (0.965, 0.925, 0.935)),  # under the eye
+    ((33, 9, 15), (17, 6, 14), (0.965, 0.915, 0.915)),  # upper lid
+    ((0, -80, 24), (14, 4, 12), (0.955, 0.93, 0.93)),  # under the lower lip
+)
+FOLD = np.array([(16, -43), (22, -52), (27, -61), (29, -69)])  # from the nose to beside the mouth: |x|, y in mm
+N_FRECKLES = 240
+
+
+def painted(source: Source, skin: Skin, palette: Palette, generator: np.random.Generator) -> NDArray[np.uint8]:
     """(SIDE, SIDE, 3) texture of a skin."""
     texels = texels_of(laid_out(skin.source_uv), triangulated(skin.quads), SIDE)
-    place = texels.carried(skin.base)
+    place = texels.carried(skin.vertices)
     where = texels.carried(skin.source_uv)
-    colour = np.tile(SKIN, (len(place), 1))
-    lips, inside = _sampled(source.mask("lips"), where), _sampled(source.mask("inside-mouth"), where)
-    colour += lips[:, None] * (LIPS - colour)
-    colour += inside[:, None] * (CAVITY - colour)
-    colour *= 1 + 0.012 * generator.standard_normal((len(place), 1))
+    colour = _flesh(place, where, source, palette, generator)
+    lips = _sampled(gaussian_filter(source.mask("lips"), 2.5), where)
+    colour += _lip_share(lips)[:, None] * (_lip_colour(place, palette, generator) - colour)
+    inside = np.maximum(_sampled(gaussian_filter(source.mask("inside-mouth"), 2.0), where), _in_mouth(where))
+    colour += ramp(inside, 0.15, 0.95)[:, None] * (np.array(palette.cavity) - colour)
+    brows = brow_cover(place, generator, palette.brow_thickness)
+    colour += brows[:, None] * (np.array(palette.hair) * 0.9 - colour)
+    hair = hair_share(place)
+    strands = strand_colour(place, np.array(palette.hair), generator)
+    ragged = np.clip(hair * 1.6 - 0.3 + 0.45 * lumps(strand_field(place, 1.4, 16.0), 1.0, generator) * (hair < 0.97), 0, 1)
+    colour += (ragged * (hair > 0.02))[:, None] * (strands - colour)
     return _filled(texels.rows, texels.columns, colour)
+
+
+def _flesh(place: Floats, where: Floats, source: Source, palette: Palette, generator: np.random.Generator) -> Floats:
+    strength = palette.variation
+    factors = np.ones((len(place), 3))
+    for centre, reach, tint in TINTS:
+        factors *= 1 + strength * bell(place, centre, reach)[:, None] * (np.array(tint) - 1)
+    factors *= 1 - strength * _sampled(source.mask("ears"), where)[:, None] * np.array([0.0, 0.10, 0.09])
+    factors *= 1 - strength * _sampled(gaussian_filter(source.mask("eyelids"), 3), where)[:, None] * np.array([0.04, 0.10, 0.09])
+    factors *= 1 - strength * 0.07 * _fold(place)[:, None] * np.array([0.7, 1.0, 1.0])
+    blotch = 0.6 * lumps(place, 14.0, generator) + 0.4 * lumps(place, 5.0, generator)
+    factors *= 1 + strength * 0.016 * blotch[:, None] * np.array([0.4, 1.3, 1.2])
+    factors *= 1 + strength * 0.018 * lumps(place, 0.9, generator)[:, None]
+    factors *= 1 - strength * _freckles(place, generator)[:, None] * np.array([0.10, 0.17, 0.20])
+    return np.array(palette.skin) * factors
+
+
+def _fold(place: Floats) -> Floats:
+    nearest = np.full(len(place), np.inf)
+    flat = np.column_stack([np.abs(place[:, 0]), place[:, 1]])
+    for start, end in zip(FOLD[:-1], FOLD[1:], strict=True):
+        share = np.clip((flat - start) @ (end - start) / ((end - start) @ (end - start)), 0, 1)
+        nearest = np.minimum(nearest, np.linalg.norm(flat - start - share[:, None] * (end - start), axis=1))
+    return np.exp(-((nearest / 3.0) ** 2)) * (place[:, 2] > 0)
+
+
+def _freckles(place: Floats, generator: np.random.Generator) -> Floats:
+    """(P,) small spots on cheeks, nose and forehead."""
+    chance = 0.9 * bell(place, (32, -22), (24, 18)) + 0.5 * bell(place, (0, -25), (16, 20)) + 0.12
+    chance *= place[:, 2] > -30
+    centres = place[generator.choice(len(place), N_FRECKLES, p=chance / chance.sum())]
+    spots = np.zeros(len(place))
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(place)
+    for centre, size in zip(centres, generator.uniform(0.35, 0.9, N_FRECKLES), strict=True):
+        near = tree.query_ball_point(centre, 2.2 * size)
+        spots[near] += generator.uniform(0.15, 0.7) * np.exp(-(((place[near] - centre) / size) ** 2).sum(axis=1))
+    return np.clip(spots, 0, 1)
+
+
+def _lip_share(mask: Floats) -> Floats:
+    return 0.92 * ramp(mask, 0.22, 0.80)
+
+
+def _lip_colour(place: Floats, palette: Palette, generator: np.random.Generator) -> Floats:
+    lines = lumps(place * np.array([1.0, 0.22, 0.3]), 0.9, generator)  # fine creases from edge to edge
+    colour = np.tile(np.array(palette.lips), (len(place), 1))
+    return colour * (1 + palette.variation * (0.035 * lines + 0.03 * lumps(place, 4.0, generator))[:, None])
+
+
+def _in_mouth(where: Floats) -> Floats:
+    """(P,) 1 on the island of the mouth's cavity, fading to the lips' colour at its rim."""
+    inside = (where[:, 0] > 0.75) & (where[:, 0] < 0.93) & (where[:, 1] < 0.14)
+    return inside.astype(float)
 
 
 def _sampled(mask: Floats, where: Floats) -> Floats:

@@ -1,0 +1,104 @@
+"""A round-necked shirt: the shoulders cut along a tilted plane and raised a little, so that the bust ends cleanly."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.head.piece import Piece, Span
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+COLLAR_Y, COLLAR_SLOPE = -164.0, -0.30  # height in front of the neck, mm, and rise per mm towards the back
+BAND_MM = 13.0  # height of the collar's band
+BAND_OFF, BODY_OFF = 3.0, 1.8  # mm off the skin
+UNDER_MM = 10.0  # skin reaches this far under the collar
+BOTTOM_Y, WIDEST = -226.0, 205.0  # where the bust ends, mm
+MATERIAL = {"specular": 0.04, "shininess": 8.0, "wrap": 0.2}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sheet:
+    """Points (N, D) of any attributes, and triangles (F, 3)."""
+
+    points: Floats
+    triangles: Ints
+
+
+def above_collar(places: Floats) -> Floats:
+    """(P,) mm above the collar's edge, for places on the default skin; negative below."""
+    return places[:, 1] - COLLAR_Y - COLLAR_SLOPE * np.minimum(places[:, 2], 20.0)
+
+
+def is_bare(places: Floats, quads: Ints) -> NDArray[np.bool_]:
+    """(F,) quads of which something shows above the shirt."""
+    return above_collar(places)[quads].max(axis=1) > -UNDER_MM
+
+
+def shirt(places: Floats, vertices: Floats, normals: Floats, triangles: Ints, colour: Floats) -> Piece:
+    """The shirt over `vertices` of any identity; `places` are those of the default one and say where it is cut."""
+    height = above_collar(places)
+    whole = Sheet(np.column_stack([places, vertices, normals]), triangles[(height[triangles] < 5).any(axis=1)])
+    whole = clipped(clipped(whole, whole.points[:, 1] - BOTTOM_Y), None)
+    whole = clipped(whole, WIDEST - np.abs(whole.points[:, 0]))
+    below = clipped(whole, -above_collar(whole.points))
+    band = clipped(below, above_collar(below.points) + BAND_MM)
+    body = clipped(below, -above_collar(below.points) - BAND_MM + 0.6)
+    points, faces, colours, count = [], [], [], 0
+    for sheet, off, shade in ((body, BODY_OFF, 1.0), (band, BAND_OFF, 0.90)):
+        rolled = _rolled(sheet, off)
+        points.append(rolled.points)
+        faces.append(rolled.triangles + count)
+        colours.append(np.tile(colour * shade, (len(rolled.points), 1)))
+        count += len(rolled.points)
+    return Piece(np.concatenate(points), (Span("shirt", np.concatenate(faces), MATERIAL),), np.concatenate(colours))
+
+
+def clipped(sheet: Sheet, inside: Floats | None) -> Sheet:
+    """The part of a sheet where `inside` (N,) is not negative, cut exactly; unused points are dropped."""
+    points, triangles = sheet.points, sheet.triangles
+    if inside is not None:
+        points, triangles = _cut(points, triangles, inside)
+    used, packed = np.unique(triangles, return_inverse=True)
+    return Sheet(points[used], packed.reshape(-1, 3).astype(np.int64))
+
+
+def _cut(points: Floats, triangles: Ints, inside: Floats) -> tuple[Floats, Ints]:
+    is_in = inside >= 0
+    n_in = is_in[triangles].sum(axis=1)
+    new_points: list[Floats] = []
+    known: dict[tuple[int, int], int] = {}
+
+    def crossing(a: int, b: int) -> int:
+        key = (min(a, b), max(a, b))
+        if key not in known:
+            share = inside[key[0]] / (inside[key[0]] - inside[key[1]])
+            known[key] = len(points) + len(new_points)
+            new_points.append(points[key[0]] + share * (points[key[1]] - points[key[0]]))
+        return known[key]
+
+    faces: list[tuple[int, int, int]] = []
+    for corners in triangles[(n_in > 0) & (n_in < 3)].tolist():
+        while is_in[corners[0]] == is_in[corners[2]] or is_in[corners[0]] == is_in[corners[1]]:
+            corners = corners[1:] + corners[:1]  # the odd one comes first
+        odd, one, two = corners
+        to_one, to_two = crossing(odd, one), crossing(odd, two)
+        faces += [(odd, to_one, to_two)] if is_in[odd] else [(to_one, one, two), (to_one, two, to_two)]
+    cut = np.array(faces, np.int64).reshape(-1, 3)
+    return np.concatenate([points, np.array(new_points).reshape(-1, points.shape[1])]), np.concatenate([triangles[n_in == 3], cut])
+
+
+def _rolled(sheet: Sheet, off: float) -> Sheet:
+    """The sheet raised off the skin, its upper edge rolled in to it."""
+    raised = sheet.points[:, 3:6] + off * sheet.points[:, 6:9]
+    sides = np.stack([sheet.triangles, np.roll(sheet.triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
+    _, first, uses = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
+    free = sides[first[uses == 1]]
+    height = above_collar(sheet.points)
+    top = free[(height[free] > height.max() - 1.0).all(axis=1)]
+    n = len(raised)
+    low = sheet.points[:, 3:6] - 0.5 * sheet.points[:, 6:9] + [0.0, 0.8, 0.0]
+    strip = np.concatenate([top[:, ::-1], top + n], axis=1)  # b, a, a', b'
+    rim = np.concatenate([strip[:, [0, 1, 2]], strip[:, [0, 2, 3]]])
+    return clipped(Sheet(np.concatenate([raised, low]), np.concatenate([sheet.triangles, rim])), None)

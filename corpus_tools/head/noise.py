@@ -1,0 +1,40 @@
+"""Smooth random fields over points in space, for colours without seams."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+Floats = NDArray[np.float64]
+
+SIZE = 32  # lattice points each way; the field repeats beyond
+
+
+def lumps(points: Floats, size_mm: float, generator: np.random.Generator) -> Floats:
+    """(P,) about -1..1 with spots of about `size_mm`, at points (P, 3) in mm."""
+    lattice = generator.standard_normal((SIZE, SIZE, SIZE))
+    field = map_coordinates(lattice, (points / size_mm).T % SIZE, order=1, mode="grid-wrap")
+    return np.clip(field / 1.2, -2, 2)
+
+
+def bell(points: Floats, centre: tuple[float, ...], reach: tuple[float, ...]) -> Floats:
+    """(P,) 1 at the centre, falling as a Gaussian; |x| counts, so that both sides are alike."""
+    mirrored = np.column_stack([np.abs(points[:, 0]), points[:, 1:]])[:, : len(centre)]
+    return np.exp(-(((mirrored - np.array(centre)) / np.array(reach)) ** 2).sum(axis=1))
+
+
+def ramp(values: Floats, low: float, high: float) -> Floats:
+    """0 below `low`, 1 above `high`, smooth between; `high` may be the smaller."""
+    share = np.clip((values - low) / (high - low), 0, 1)
+    return share * share * (3 - 2 * share)
+
+
+def stroke_cover(places: Floats, starts: Floats, ends: Floats, widths: Floats) -> Floats:
+    """(P,) how far strokes cover places (P, 2): 1 on a stroke's line, tapering to its end; `widths` in mm at the root."""
+    cover = np.zeros(len(places))
+    for start, end, width in zip(starts, ends, widths, strict=True):
+        near = np.flatnonzero(np.abs(places - (start + end) / 2).max(axis=1) < np.abs(end - start).max() / 2 + width)
+        along = end - start
+        share = np.clip((places[near] - start) @ along / (along @ along), 0, 1)
+        off = np.linalg.norm(places[near] - start - share[:, None] * along, axis=1)
+        cover[near] = np.maximum(cover[near], np.clip(1.3 - off / (width * (1.05 - 0.75 * share)), 0, 1))
+    return cover
