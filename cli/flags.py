@@ -14,6 +14,8 @@ def flags_from(*groups: tuple[str, type], without: frozenset[str] = frozenset())
     The command takes them as ``**options``; `chosen` turns them back into an instance.
     """
 
+    headed = [(Group.create_ordered(heading), options) for heading, options in groups]
+
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         own = [
             parameter
@@ -21,8 +23,8 @@ def flags_from(*groups: tuple[str, type], without: frozenset[str] = frozenset())
             if parameter.kind is not inspect.Parameter.VAR_KEYWORD
         ]
         added = [
-            _parameter(option, get_type_hints(options)[option.name], Group.create_ordered(heading))
-            for heading, options in groups
+            _parameter(option, get_type_hints(options)[option.name], heading)
+            for heading, options in headed
             for option in fields(options)
             if option.name not in without
         ]

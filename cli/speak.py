@@ -1,0 +1,102 @@
+"""``tts2face "text"``: what the command does once its flags are read."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cli.progress import progress_bar, say
+from lexicon.errors import InputError
+from tts2face.render.picture import Picture
+from tts2face.request import Request
+
+if TYPE_CHECKING:
+    from tts2face.api import Cast
+    from tts2face.types import Clip
+
+EXPLANATIONS = (".json", ".txt")
+
+
+@dataclass(frozen=True, slots=True)
+class Errand:
+    """What is wanted beside the request and the picture."""
+
+    out: Path | None
+    talker: str
+    face: str
+    identity: str | None
+    explain: Path | None
+    view: bool
+    quiet: bool
+
+
+def run(request: Request, picture: Picture, errand: Errand) -> None:
+    """Write, explain or show what was asked for."""
+    if errand.out is None and errand.explain is None and not errand.view:
+        raise InputError("say where the clip goes: --out clip.mp4 (or .webm, .gif, a folder for .png files)")
+    if errand.explain is not None and errand.explain.suffix not in EXPLANATIONS:
+        raise InputError(f"an explanation is written as .json or .txt, not {errand.explain.name}")
+    if not request.text.strip():
+        raise InputError("the text is empty; give something to say")
+    if errand.out is not None:
+        _make(request, picture, errand, errand.out)
+    else:
+        _only_told(request, errand)
+    if errand.view:
+        from tts2face.render.view import view
+
+        from tts2face.api import synthesize
+        from tts2face.face.file import load_face
+        from tts2face.talker import load_talker
+
+        face = load_face(errand.face, errand.identity)
+        view(synthesize(request, load_talker(errand.talker), face), face, picture)
+
+
+def _make(request: Request, picture: Picture, errand: Errand, out: Path) -> None:
+    began = time.perf_counter()
+    from tts2face.render.output import checked_output
+
+    checked_output(out)
+    from tts2face.render.compiled import kernels_are_compiled
+
+    if not kernels_are_compiled() and not errand.quiet:
+        say("first run on this machine: compiling the renderer, which takes some seconds once")
+    from tts2face.api import write_clip
+
+    ready = _ready(errand)
+    told: list[Clip] = []
+    with progress_bar("speaking and drawing", errand.quiet) as on_progress:
+        keep = told.append if errand.explain else None
+        written = write_clip(request, picture, ready, out, on_progress=on_progress, on_clip=keep)
+    if errand.explain:
+        _explain(told, ready, request, errand.explain)
+    if not errand.quiet:
+        took = time.perf_counter() - began
+        say(
+            f"wrote {written.path}: {written.seconds:.1f} s, {written.n_frames} frames, "
+            f"made in {took:.1f} s ({written.seconds / took:.1f} x real time)"
+        )
+
+
+def _only_told(request: Request, errand: Errand) -> None:
+    if errand.explain is None:
+        return
+    from tts2face.api import stream
+
+    ready = _ready(errand)
+    _explain([piece.clip for piece in stream(request, ready)], ready, request, errand.explain)
+
+
+def _ready(errand: Errand) -> "Cast":
+    from tts2face.api import cast
+    from tts2face.face.file import load_face
+    from tts2face.talker import load_talker
+
+    return cast(load_talker(errand.talker), load_face(errand.face, errand.identity))
+
+
+def _explain(clips: "list[Clip]", ready: "Cast", request: Request, path: Path) -> None:
+    from tts2face.api import explained
+
+    path.write_text(explained(clips, ready, request, as_json=path.suffix == ".json"), encoding="utf-8")

@@ -1,0 +1,200 @@
+"""The one core call: a request, a talker and a face become a clip, whole, piece by piece, or as a file."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+from lexicon.chunks import chunks
+from lexicon.dictionary import read_dictionary
+from lexicon.errors import InputError
+from lexicon.g2p import check_language
+from lexicon.normalize import normalize
+from lexicon.scripts import check_script
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.ahead import made_ahead
+from tts2face.exemplar.animate import VisualVoice, speech_trajectory, visual_voice
+from tts2face.exemplar.options import METHODS, SynthesisOptions
+from tts2face.face.model import Face
+from tts2face.face.retarget import Retargeter, retargeter
+from tts2face.render.clock import exact_rate, first_sample
+from tts2face.render.encode import ClipWriter
+from tts2face.render.output import checked_output
+from tts2face.render.picture import Picture
+from tts2face.request import Request
+from tts2face.talker import Talker
+from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, frame_count, joined_clips
+from tts2face.voice.engine import Voice, load_voice
+
+CLIPS_AHEAD = 2  # pieces that may wait to be drawn while the next is spoken
+PIECE_CHARACTERS = 300  # a sentence that is longer is cut at a clause mark or a space
+
+
+@dataclass(frozen=True, slots=True)
+class Cast:
+    """A talker and a face made ready for each other; serves any number of requests."""
+
+    face: Face
+    visual_voice: VisualVoice
+    retargeter: Retargeter
+
+
+def cast(talker: Talker, face: Face) -> Cast:
+    """Index the talker's exemplars and prepare the way of their motion onto the face."""
+    return Cast(face, visual_voice(talker), retargeter(talker, face))
+
+
+def synthesize(request: Request, talker: Talker, face: Face) -> Clip:
+    """The whole clip of a request.
+
+    The same request, talker, face and version give the same bytes, in any process and with any number of threads.
+
+    Raises
+    ------
+    InputError
+        The text is empty or holds something that the voice cannot say; the language or voice does not exist.
+    BackendError
+        The voice is not installed.
+    """
+    return joined_clips([piece.clip for piece in stream(request, cast(talker, face))])
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A sentence's clip, and how many characters of the request's text are spoken with it."""
+
+    clip: Clip
+    n_characters: int
+
+
+def stream(request: Request, ready: Cast) -> Iterator[Piece]:
+    """A request sentence by sentence; the clips put together are what `synthesize` gives.
+
+    Each clip begins and ends at rest, and ends on a frame, so that a text of any length stays in step in bounded
+    memory.
+    """
+    voice = _voice(request)
+    first_frame = 0
+    for text in pieces(request):
+        clip = _animated(_spoken(voice, text, request, first_frame), ready, request)
+        first_frame += len(clip.motion)
+        yield Piece(clip, len(text))
+    if first_frame == 0:
+        raise InputError(f"there is nothing to say in {request.text[:40]!r}; give at least one word")
+
+
+def pieces(request: Request) -> Iterator[str]:
+    """Sentences of a request's text that hold something to say; English ones as they are said.
+
+    Raises
+    ------
+    InputError
+        The language does not exist or cannot read the text.
+    """
+    check_language(request.language)
+    check_script(request.text, request.language)
+    for chunk in chunks(request.text, PIECE_CHARACTERS):
+        text = normalize(chunk) if request.language.startswith("en") else chunk
+        if any(character.isalnum() for character in text):
+            yield text
+
+
+def _voice(request: Request) -> Voice:
+    own = read_dictionary(request.dictionary).entries if request.dictionary else None
+    return load_voice(request.voice, request.language, own)
+
+
+def _options(request: Request) -> SynthesisOptions:
+    options = METHODS[request.synthesis]
+    if request.context is not None:
+        options = replace(options, context=request.context)
+    if request.exemplars is not None:
+        options = replace(options, k=request.exemplars)
+    return options
+
+
+def _spoken(voice: Voice, text: str, request: Request, first_frame: int) -> Speech:
+    speech = voice.speak(text, rate=request.rate, volume=request.volume, seed=request.seed)
+    return on_frames(speech, first_frame, exact_rate(request.fps))
+
+
+def on_frames(speech: Speech, first_frame: int, fps: Fraction) -> Speech:
+    """Speech lengthened by silence to the last sample of a frame, counted from the start of the whole sound."""
+    rate, samples = speech.waveform.rate, speech.waveform.samples
+    n_frames = frame_count(speech.waveform.duration, float(fps))
+    wanted = first_sample(first_frame + n_frames, rate, fps) - first_sample(first_frame, rate, fps)
+    padded = np.zeros(max(wanted, len(samples)), np.float32)
+    padded[: len(samples)] = samples
+    phones, edges = list(speech.phones.phones), list(speech.phones.edges)
+    if phones[-1] != SILENCE and len(padded) > len(samples):
+        phones.append(SILENCE)
+        edges.append(edges[-1])
+    edges[-1] = len(padded) / rate
+    return Speech(Waveform(padded, rate), PhoneSequence(phones, edges), speech.words)
+
+
+def _animated(speech: Speech, ready: Cast, request: Request) -> Clip:
+    fps = float(exact_rate(request.fps))
+    n_frames = frame_count(speech.waveform.duration, fps)
+    lips = speech_trajectory(speech.phones, ready.visual_voice, fps=fps, n_frames=n_frames, options=_options(request))
+    head = Trajectory(HEAD_CHANNELS, np.zeros((n_frames, len(HEAD_CHANNELS)), np.float32), fps)
+    return Clip(ready.retargeter.retarget(lips), head, speech)
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """What a file holds: seconds of sound, and frames."""
+
+    path: Path
+    seconds: float
+    n_frames: int
+
+
+def write_clip(
+    request: Request,
+    picture: Picture,
+    ready: Cast,
+    out: Path,
+    *,
+    on_progress: Callable[[int, int], None] | None = None,
+    on_clip: Callable[[Clip], None] | None = None,
+) -> Written:
+    """Speak, animate, draw and encode a request into a file; the next sentence is spoken while one is drawn.
+
+    Parameters
+    ----------
+    out
+        .mp4, .webm, .gif, or a folder of .png. It appears when all is done; after an error nothing is left.
+    on_progress
+        Called with characters of the text drawn, and characters in all.
+    on_clip
+        Called with each piece before it is drawn.
+
+    Raises
+    ------
+    InputError, BackendError
+        As `synthesize`; or the file cannot be written.
+    """
+    checked_output(out)
+    of, before, seconds, n_frames = max(len(request.text), 1), 0, 0.0, 0
+    piece_length, given_before = 0, 0
+
+    def tell(done: int, given: int) -> None:
+        if on_progress:
+            share = (done - given_before) / max(given - given_before, 1)
+            on_progress(min(of, int(before + piece_length * share)), of)
+
+    with ClipWriter(out, ready.face, picture, on_progress=tell) as writer:
+        for piece in made_ahead(stream(request, ready), CLIPS_AHEAD):
+            if on_clip:
+                on_clip(piece.clip)
+            piece_length, given_before = piece.n_characters, n_frames
+            writer.add(piece.clip)
+            before += piece_length
+            seconds += piece.clip.speech.waveform.duration
+            n_frames += len(piece.clip.motion)
+    if on_progress:
+        on_progress(of, of)
+    return Written(out, seconds, n_frames)
