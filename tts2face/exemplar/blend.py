@@ -10,7 +10,7 @@ from tts2face.exemplar.motion import read_motion
 from tts2face.exemplar.options import SynthesisOptions
 from tts2face.exemplar.targets import Targets
 from tts2face.exemplar.tokens import Tokens
-from tts2face.exemplar.warp import aligned
+from tts2face.exemplar.warp import lay_over
 
 CLOCK_HZ = 100.0  # instants at which motion is made; lips move below 15 Hz, so nothing is lost
 KNOTS = 6  # samples a phone
@@ -56,32 +56,28 @@ def averaged_pieces(
     parts = np.arange(3) if options.overlap else np.array([1])
     knots = np.concatenate([part + np.arange(KNOTS) / KNOTS for part in parts] + [[parts[-1] + 1.0]])
     shape = (len(chosen), len(knots), tokens.frames.shape[1])
-    mean, variance = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
+    mean, square = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
     _average(
         (tokens.frames, tokens.first_frame, tokens.utterance, tokens.spans, tokens.fps),
         (chosen, weights, knots, 1.0 / spread, ALIGN_BAND if options.align else 0),
         mean,
-        variance,
+        square,
     )
-    return Pieces(mean, variance)
+    return Pieces(mean, np.maximum(square - np.square(mean), np.float32(0.0)))
 
 
 @njit(cache=True)
-def _average(corpus, plan, mean, variance):  # type: ignore[no-untyped-def]
+def _average(corpus, plan, mean, square):  # type: ignore[no-untyped-def]
     chosen, weights, knots, scale, band = plan
-    best, piece = np.zeros_like(mean[0]), np.zeros_like(mean[0])
+    best, piece, laid = np.zeros_like(mean[0]), np.zeros_like(mean[0]), np.zeros_like(mean[0])
     for n in range(len(chosen)):
         for e in range(chosen.shape[1]):
-            weight = np.float32(weights[n, e])
-            if chosen[n, e] < 0 or weight == 0.0:
+            if chosen[n, e] < 0 or weights[n, e] == 0.0:
                 continue
-            _read_piece(corpus, chosen[n, e], knots, scale, piece)
-            if e == 0:
-                best[:] = piece
-            laid = aligned(piece, best, scale**-2, band) if band > 0 and e > 0 else piece
-            mean[n] += weight * laid
-            variance[n] += weight * laid * laid
-        variance[n] = np.maximum(variance[n] - mean[n] * mean[n], np.float32(0.0))
+            _read_piece(corpus, chosen[n, e], knots, scale, best if e == 0 else piece)
+            if e > 0 and band > 0:
+                lay_over(piece, best, scale, band, laid)
+            _add(best if e == 0 else (laid if band > 0 else piece), weights[n, e], mean[n], square[n])
 
 
 @njit(cache=True)
@@ -93,7 +89,16 @@ def _read_piece(corpus, token, knots, scale, piece):  # type: ignore[no-untyped-
         part = min(int(knots[s]), 2)
         start, end = spans[token, part], spans[token, part + 1]
         read_motion(frames, first, last, (start + (end - start) * (knots[s] - part)) * fps, piece[s])
-        piece[s] *= scale
+        for d in range(len(scale)):
+            piece[s, d] *= scale[d]
+
+
+@njit(cache=True)
+def _add(piece, weight, mean, square):  # type: ignore[no-untyped-def]
+    for s in range(piece.shape[0]):
+        for d in range(piece.shape[1]):
+            mean[s, d] += weight * piece[s, d]
+            square[s, d] += weight * piece[s, d] * piece[s, d]
 
 
 def joined_pieces(

@@ -145,17 +145,31 @@ def _search(wanted, index, rule, tokens, scores):  # type: ignore[no-untyped-def
     phone, contexts, durations = wanted
     order, group_first, neighbours, phone_first, token_contexts, token_durations = index
     similarity, weights, _ = rule
-    beyond = 2.0 * weights[1:].sum() + _ROUNDING  # the most that farther phones can add
+    beyond = _ROUNDING  # the most that farther phones can add
+    for d in range(1, len(weights)):
+        beyond += 2.0 * weights[d]
     for n in range(len(phone)):
         first, last = phone_first[phone[n]], phone_first[phone[n] + 1]
         bounds = np.zeros(last - first)
         for g in range(first, last):
             left, right = similarity[contexts[n, 0], neighbours[g, 0]], similarity[contexts[n, 1], neighbours[g, 1]]
             bounds[g - first] = weights[0] * (left + right) + beyond
-        for g in np.argsort(-bounds):
+        for _ in range(last - first):
+            g = _highest(bounds)
             if bounds[g] < scores[n, -1]:
                 break
+            bounds[g] = -np.inf
             for at in range(group_first[first + g], group_first[first + g + 1]):
                 token = order[at]
                 score = _score(contexts[n], durations[n], token_contexts[token], token_durations[token], rule)
                 _insert(tokens[n], scores[n], token, score)
+
+
+@njit(cache=True)
+def _highest(values):  # type: ignore[no-untyped-def]
+    """Index of the first highest value; `numpy.argmax` takes seconds to compile."""
+    at = 0
+    for i in range(1, len(values)):
+        if values[i] > values[at]:
+            at = i
+    return at

@@ -103,27 +103,26 @@ def warped_times(path: IntArray, n_target: int) -> FloatArray:
 
 
 @njit(cache=True)
-def aligned(source, reference, weights, band):  # type: ignore[no-untyped-def]
-    """(S, D) source resampled so that its events fall on those of an (S, D) reference.
+def lay_over(source, reference, scale, band, out):  # type: ignore[no-untyped-def]
+    """Write (S, D) source into `out`, resampled so that its events fall on those of an (S, D) reference.
 
-    Frames are compared by squared differences times `weights` (D,); the path stays within `band` samples.
+    The arrays are in units that `scale` (D,) made out of millimetres; frames are compared in millimetres. The path
+    stays within `band` samples.
     """
     n, n_dims = source.shape
     cost = np.zeros((n, n))
     for i in range(n):
         for j in range(max(0, i - band), min(n, i + band + 1)):
             for k in range(n_dims):
-                cost[i, j] += weights[k] * (source[i, k] - reference[j, k]) ** 2
+                cost[i, j] += ((source[i, k] - reference[j, k]) / scale[k]) ** 2
     path, length = _cheapest_path(cost, band)
     total, count = np.zeros(n), np.zeros(n)
     for at in range(len(path) - length, len(path)):
         total[path[at, 1]] += path[at, 0]
         count[path[at, 1]] += 1.0
-    out = np.zeros_like(source)
     for j in range(n):
         time = total[j] / count[j] if 0 < j < n - 1 else float(j)
         low = min(int(time), n - 2)
         part = time - low
         for k in range(n_dims):
             out[j, k] = (1.0 - part) * source[low, k] + part * source[low + 1, k]
-    return out

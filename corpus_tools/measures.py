@@ -1,0 +1,130 @@
+"""How near synthesised lips come to real ones: each measure a pure function of arrays.
+
+Openings and widths are distances between landmarks over the distance of the outer eye corners; frame i is the instant
+i / fps of the phones' clock.
+"""
+
+from collections.abc import Collection
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from lexicon.phones import phone_of, vowels
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.exemplar.warp import distances, path_cost, warp_path
+from tts2face.landmarks import (
+    EYE_OUTER_LEFT,
+    EYE_OUTER_RIGHT,
+    LOWER_LIP_INNER_MID,
+    MOUTH_CORNER_LEFT,
+    MOUTH_CORNER_RIGHT,
+    UPPER_LIP_INNER_MID,
+)
+
+SPEECH_MARGIN_S = 0.1  # judged from this long before the first phone to this long behind the last
+CLOSURE_MARGIN_S = 0.03  # a closure may lie this far outside its phone's edges: frames are 40 ms, edges good to 10 ms
+CLOSURE_SHARE = 0.9  # of the real closures count as closed: the threshold is this quantile of their least openings
+DTW_BAND_S = 0.12  # of time by which synthesis may lead or lag unpunished by the warping cost
+DTW_PARAMETERS = 6  # shape parameters that the warping cost compares: 95 % of the motion
+BILABIALS = ("p", "b", "m")
+OPEN_HEIGHTS = ("open", "near-open", "open-mid")
+
+Values = NDArray[np.floating]
+
+
+def lip_opening(landmarks: Values) -> NDArray[np.float64]:
+    """(T,) distance of the inner lips at their middle over the eye distance, of (T, 478, 3) landmarks."""
+    return _apart(landmarks, UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID)
+
+
+def lip_width(landmarks: Values) -> NDArray[np.float64]:
+    """(T,) distance of the mouth's corners over the eye distance, of (T, 478, 3) landmarks."""
+    return _apart(landmarks, MOUTH_CORNER_RIGHT, MOUTH_CORNER_LEFT)
+
+
+def _apart(landmarks: Values, one: int, other: int) -> NDArray[np.float64]:
+    eyes = np.linalg.norm(landmarks[:, EYE_OUTER_LEFT] - landmarks[:, EYE_OUTER_RIGHT], axis=1)
+    return np.asarray(np.linalg.norm(landmarks[:, one] - landmarks[:, other], axis=1) / eyes, np.float64)
+
+
+def judged_frames(phones: PhoneSequence, n_frames: int, fps: float) -> slice:
+    """Frames from `SPEECH_MARGIN_S` before the first sounding phone to as much behind the last.
+
+    Raises
+    ------
+    InputError
+        There is nothing but silence.
+    """
+    sounding = [at for at, label in enumerate(phones.phones) if label != SILENCE]
+    if not sounding:
+        raise InputError("an utterance without speech cannot be judged; leave it out")
+    start = phones.edges[sounding[0]] - SPEECH_MARGIN_S
+    end = phones.edges[sounding[-1] + 1] + SPEECH_MARGIN_S
+    times = np.arange(n_frames) / fps
+    return slice(int(np.searchsorted(times, start)), int(np.searchsorted(times, end, side="right")))
+
+
+def correlation(real: Values, made: Values) -> float:
+    """Pearson's r of two series (T,); 0 where one of them stands still."""
+    a, b = real - real.mean(dtype=np.float64), made - made.mean(dtype=np.float64)
+    norm = float(np.sqrt((a @ a) * (b @ b)))
+    return float(a @ b) / norm if norm > 1e-9 * len(a) else 0.0
+
+
+def range_ratio(real: Values, made: Values) -> float:
+    """Standard deviation of the made series over that of the real one: 1 = articulated as strongly."""
+    return float(made.std(dtype=np.float64) / real.std(dtype=np.float64))
+
+
+def rmse_z(real: Values, made: Values, spread: Values) -> float:
+    """Root mean square difference of (T, D) parameters in units of their training spread (D,)."""
+    return float(np.sqrt(np.mean(np.square((real - made) / spread))))
+
+
+def warping_cost(real: Values, made: Values, spread: Values, fps: float) -> float:
+    """Mean distance of two (T, D) motions in units of `spread` (D,), along the cheapest warp within `DTW_BAND_S`."""
+    cost = distances(real / spread, made / spread)
+    path = warp_path(cost, band=round(DTW_BAND_S * fps))
+    return path_cost(cost, path) / len(path)
+
+
+def least_openings(
+    opening: Values, phones: PhoneSequence, fps: float, labels: Collection[str] = BILABIALS
+) -> NDArray[np.float64]:
+    """Least opening within each phone with one of the labels, `CLOSURE_MARGIN_S` either side included."""
+    times = np.arange(len(opening)) / fps
+    least = []
+    for at, label in enumerate(phones.phones):
+        start, end = phones.edges[at] - CLOSURE_MARGIN_S, phones.edges[at + 1] + CLOSURE_MARGIN_S
+        low, high = np.searchsorted(times, (start, end))
+        if label in labels and low < high:
+            least.append(float(opening[low:high].min()))
+    return np.array(least, np.float64)
+
+
+def midpoint_openings(
+    opening: Values, phones: PhoneSequence, fps: float, labels: Collection[str] | None = None
+) -> NDArray[np.float64]:
+    """Opening in the middle of each phone with one of the labels; by default the open vowels."""
+    labels = open_vowels() if labels is None else labels
+    middles = (phones.edges[:-1] + phones.edges[1:]) / 2
+    wanted = np.array([label in labels for label in phones.phones])
+    return np.asarray(np.interp(middles[wanted], np.arange(len(opening)) / fps, opening))
+
+
+def open_vowels() -> frozenset[str]:
+    """Vowels spoken with open lips, and diphthongs that begin with one."""
+    first = {label: phone_of(label).parts[0] if phone_of(label).parts else label for label in vowels()}
+    heights = {label: phone_of(start) for label, start in first.items()}
+    return frozenset(label for label, phone in heights.items() if phone.height in OPEN_HEIGHTS and not phone.nasality)
+
+
+def closure_threshold(real_least: Values) -> float:
+    """Opening below which `CLOSURE_SHARE` of the real closures lie."""
+    return float(np.quantile(real_least, CLOSURE_SHARE)) if len(real_least) else 0.0
+
+
+def share_below(openings: Values, threshold: float) -> float:
+    """Share of openings at or below a threshold; 0 where there are none."""
+    return float(np.mean(openings <= threshold)) if len(openings) else 0.0
