@@ -3,53 +3,58 @@
 import contextlib
 import queue
 import threading
-from collections.abc import Generator, Iterable
-from typing import Any, TypeVar
+from collections.abc import Iterable, Iterator
+from types import TracebackType
+from typing import Any, Generic, TypeVar
 
 Item = TypeVar("Item")
 Offer = tuple[Any, BaseException | None]
 PATIENCE_S = 0.1  # how soon the maker notices that nobody wants its items any more
 
 
-class _Maker(threading.Thread):
-    """Takes items from a source and offers each, until there is none, one fails, or it is told to stop."""
+class Ahead(Generic[Item]):
+    """The items of a source in their order; up to `room` of them are made before they are asked for.
 
-    def __init__(self, source: Iterable[Any], room: int) -> None:
-        super().__init__(name="ahead", daemon=True)
-        self.items: queue.Queue[Offer] = queue.Queue(room)
-        self.stopped = threading.Event()
+    Making begins at once and ends with the ``with`` block. An error of the source is raised where its item would come.
+    """
+
+    def __init__(self, source: Iterable[Item], room: int) -> None:
         self._source = source
+        self._made: queue.Queue[Offer] = queue.Queue(room)
+        self._stopped = threading.Event()
+        threading.Thread(target=self._make, name="ahead", daemon=True).start()
 
-    def run(self) -> None:
+    def __enter__(self) -> "Ahead[Item]":
+        """Give the items."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Let the maker end."""
+        self._stopped.set()
+
+    def __iter__(self) -> Iterator[Item]:
+        """Items in their order."""
+        while True:
+            item, error = self._made.get()
+            if isinstance(error, StopIteration):
+                return
+            if error is not None:
+                raise error
+            yield item
+
+    def _make(self) -> None:
         try:
             for item in self._source:
                 self._offer((item, None))
-                if self.stopped.is_set():
+                if self._stopped.is_set():
                     return
             self._offer((None, StopIteration()))
         except BaseException as error:  # noqa: BLE001 - raised again in the thread that asked
             self._offer((None, error))
 
     def _offer(self, item: Offer) -> None:
-        while not self.stopped.is_set():
+        while not self._stopped.is_set():
             with contextlib.suppress(queue.Full):
-                return self.items.put(item, timeout=PATIENCE_S)
-
-
-def made_ahead(source: Iterable[Item], room: int) -> Generator[Item, None, None]:
-    """The same items in the same order; up to `room` of them are made before they are asked for.
-
-    An error of the source is raised here, where its item would have come.
-    """
-    maker = _Maker(source, room)
-    maker.start()
-    try:
-        while True:
-            item, error = maker.items.get()
-            if isinstance(error, StopIteration):
-                return
-            if error is not None:
-                raise error
-            yield item
-    finally:
-        maker.stopped.set()
+                return self._made.put(item, timeout=PATIENCE_S)

@@ -14,7 +14,7 @@ from lexicon.g2p import check_language
 from lexicon.normalize import normalize
 from lexicon.scripts import check_script
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.ahead import made_ahead
+from tts2face.ahead import Ahead
 from tts2face.exemplar.animate import VisualVoice, speech_trajectory, visual_voice
 from tts2face.exemplar.options import METHODS, SynthesisOptions
 from tts2face.face.model import Face
@@ -186,8 +186,11 @@ def write_clip(
             share = (done - given_before) / max(given - given_before, 1)
             on_progress(min(of, int(before + piece_length * share)), of)
 
-    with ClipWriter(out, ready.face, picture, on_progress=tell) as writer:
-        for piece in made_ahead(stream(request, ready), CLIPS_AHEAD):
+    with (
+        Ahead(stream(request, ready), CLIPS_AHEAD) as spoken,
+        ClipWriter(out, ready.face, picture, on_progress=tell) as writer,
+    ):
+        for piece in spoken:
             if on_clip:
                 on_clip(piece.clip)
             piece_length, given_before = piece.n_characters, n_frames

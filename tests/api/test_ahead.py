@@ -6,11 +6,12 @@ from collections.abc import Iterator
 
 import pytest
 
-from tts2face.ahead import made_ahead
+from tts2face.ahead import Ahead
 
 
 def test_same_items_in_the_same_order() -> None:
-    assert list(made_ahead(range(50), 3)) == list(range(50))
+    with Ahead(range(50), 3) as items:
+        assert list(items) == list(range(50))
 
 
 def test_no_more_than_the_room_is_made_ahead() -> None:
@@ -21,11 +22,10 @@ def test_no_more_than_the_room_is_made_ahead() -> None:
             made.append(number)
             yield number
 
-    items = made_ahead(source(), 2)
-    assert next(items) == 0
-    time.sleep(0.3)
-    assert len(made) <= 5
-    items.close()
+    with Ahead(source(), 2) as items:
+        assert next(iter(items)) == 0
+        time.sleep(0.3)
+        assert 3 <= len(made) <= 5
 
 
 def test_an_error_comes_where_its_item_would() -> None:
@@ -33,16 +33,16 @@ def test_an_error_comes_where_its_item_would() -> None:
         yield 1
         raise ValueError("broken")
 
-    items = made_ahead(source(), 2)
-    assert next(items) == 1
-    with pytest.raises(ValueError, match="broken"):
-        next(items)
+    with Ahead(source(), 2) as ahead:
+        items = iter(ahead)
+        assert next(items) == 1
+        with pytest.raises(ValueError, match="broken"):
+            next(items)
 
 
 def test_the_maker_ends_when_nobody_asks_any_more() -> None:
     before = threading.active_count()
-    items = made_ahead(iter(int, 1), 1)  # endless
-    next(items)
-    items.close()
+    with Ahead(iter(int, 1), 1) as items:  # endless
+        next(iter(items))
     time.sleep(0.5)
     assert threading.active_count() <= before
