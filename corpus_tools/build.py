@@ -1,0 +1,94 @@
+"""From a folder of recordings to a talker file."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from corpus_tools.learn import learn_talker
+from corpus_tools.observe import Effort, Progress, Refusal, observe
+from lexicon.errors import DataError
+from tts2face.talker import write_talker
+
+PROVENANCE = "provenance.json"  # in the folder of recordings: where they come from and how they may be used
+PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
+UNSTATED = "not stated"
+CONTENT = "motion only: landmark shapes, head pose, phones and loudness; no image and no sound"
+
+
+@dataclass(frozen=True, slots=True)
+class Built:
+    """What a build gave: recordings kept, minutes of them, and those refused."""
+
+    n_kept: int
+    minutes: float
+    refused: tuple[Refusal, ...]
+
+
+def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
+    recordings: Path,
+    out: Path,
+    *,
+    name: str | None = None,
+    provenance: Path | None = None,
+    effort: Effort | None = None,
+    created: str | None = None,
+    on_progress: Progress | None = None,
+) -> Built:
+    """Observe recordings, learn their talker, and write it; the same recordings give the same bytes but for `created`.
+
+    Parameters
+    ----------
+    name
+        Whose talker it is; the provenance's name, or the folder's, when None.
+    provenance
+        JSON file as `read_provenance` reads it; ``provenance.json`` in the folder when None.
+    created
+        Date for the metadata; today when None.
+
+    Raises
+    ------
+    InputError
+        The folder is missing or holds no video, or no recording could be used.
+    DataError
+        The provenance cannot be read.
+    BackendError
+        A package or the landmark models are missing, or a file cannot be written.
+    """
+    stated = read_provenance(provenance or recordings / PROVENANCE, must_exist=provenance is not None)
+    observations = observe(recordings, effort=effort, on_progress=on_progress)
+    metadata = {
+        **dict.fromkeys(PROVENANCE_FIELDS, UNSTATED),
+        "name": recordings.resolve().name,
+        **stated,
+        **({"name": name} if name else {}),
+        "command": f"tts2face corpus build {recordings.name} --out {out.name}",
+        "created": created or datetime.now(UTC).date().isoformat(),
+        "content": CONTENT,
+        "refused": [[refusal.name, refusal.reason] for refusal in observations.refused],
+    }
+    talker = learn_talker(observations.kept, metadata=metadata)
+    write_talker(out, talker)
+    seconds = sum(len(utterance.shape) for utterance in talker.utterances) / talker.fps
+    return Built(len(talker.utterances), seconds / 60.0, observations.refused)
+
+
+def read_provenance(path: Path, *, must_exist: bool) -> Mapping[str, Any]:
+    """Where recordings come from: a JSON object with any of name, language, sources, licence and attribution.
+
+    Raises
+    ------
+    DataError
+        The file is missing though it must exist, is no JSON object, or has other fields.
+    """
+    if not must_exist and not path.is_file():
+        return {}
+    try:
+        stated = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as broken:
+        raise DataError(f"{path} cannot be read as JSON ({broken}); mend it") from broken
+    if not isinstance(stated, dict) or not set(stated) <= set(PROVENANCE_FIELDS):
+        raise DataError(f"{path} must be a JSON object with fields out of {', '.join(PROVENANCE_FIELDS)}")
+    return stated
