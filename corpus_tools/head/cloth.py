@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.head.piece import Piece, Span
+from corpus_tools.head.skin import Skin, vertex_normals
+from corpus_tools.head.subdivide import triangulated
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -13,7 +15,6 @@ Ints = NDArray[np.int64]
 COLLAR_Y, COLLAR_SLOPE = -164.0, -0.30  # height in front of the neck, mm, and rise per mm towards the back
 BAND_MM = 13.0  # height of the collar's band
 BAND_OFF, BODY_OFF = 3.0, 1.8  # mm off the skin
-UNDER_MM = 10.0  # skin reaches this far under the collar
 BOTTOM_Y, WIDEST = -226.0, 205.0  # where the bust ends, mm
 MATERIAL = {"specular": 0.04, "shininess": 8.0, "wrap": 0.2}
 
@@ -31,22 +32,17 @@ def above_collar(places: Floats) -> Floats:
     return places[:, 1] - COLLAR_Y - COLLAR_SLOPE * np.minimum(places[:, 2], 20.0)
 
 
-def is_bare(places: Floats, quads: Ints) -> NDArray[np.bool_]:
-    """(F,) quads of which something shows above the shirt."""
-    return above_collar(places)[quads].max(axis=1) > -UNDER_MM
-
-
-def shirt(places: Floats, vertices: Floats, normals: Floats, triangles: Ints, colour: Floats) -> Piece:
-    """The shirt over `vertices` of any identity; `places` are those of the default one and say where it is cut."""
-    height = above_collar(places)
-    whole = Sheet(np.column_stack([places, vertices, normals]), triangles[(height[triangles] < 5).any(axis=1)])
+def shirt(default: Skin, own: Skin, colour: Floats) -> Piece:
+    """The shirt over the shoulders of any identity; those of the default one say where it is cut."""
+    normals = vertex_normals(own.vertices, own.quads, own.base)
+    whole = Sheet(np.column_stack([default.vertices, own.vertices, normals]), triangulated(own.quads))
     whole = clipped(clipped(whole, whole.points[:, 1] - BOTTOM_Y), None)
     whole = clipped(whole, WIDEST - np.abs(whole.points[:, 0]))
     below = clipped(whole, -above_collar(whole.points))
     band = clipped(below, above_collar(below.points) + BAND_MM)
     body = clipped(below, -above_collar(below.points) - BAND_MM + 0.6)
     points, faces, colours, count = [], [], [], 0
-    for sheet, off, shade in ((body, BODY_OFF, 1.0), (band, BAND_OFF, 0.90)):
+    for sheet, off, shade in ((body, BODY_OFF, 1.0), (band, BAND_OFF, 0.88)):
         rolled = _rolled(sheet, off)
         points.append(rolled.points)
         faces.append(rolled.triangles + count)

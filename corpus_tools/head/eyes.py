@@ -8,13 +8,13 @@ from corpus_tools.head.piece import Ball, Piece, Span
 
 Floats = NDArray[np.float64]
 
-N_AROUND = 52
+N_AROUND = 44
 IRIS_RAD, PUPIL_RAD = 0.385, 0.15  # half angles seen from the centre: MakeHuman's balls are a third too large
 RECEDE_MM = 1.6  # how far a ball sinks while its lids are shut, which nobody sees: lids move on straight lines
 BULGE = 0.04  # of the radius, height of the cornea at its top
 RINGS = np.concatenate([
-    np.linspace(0.0, PUPIL_RAD, 4), np.linspace(PUPIL_RAD + 0.02, IRIS_RAD, 12), np.linspace(IRIS_RAD + 0.03, 0.7, 6),
-    np.linspace(0.8, 1.7, 10),
+    np.linspace(0.0, PUPIL_RAD, 4), np.linspace(PUPIL_RAD + 0.02, IRIS_RAD, 10), np.linspace(IRIS_RAD + 0.03, 0.66, 4),
+    np.linspace(0.8, 1.6, 7),
 ])  # fmt: skip  # the back is never seen
 LOOKS = {"eyeLookUp": (-1, 0, 24.0), "eyeLookDown": (1, 0, 24.0), "eyeLookOut": (0, 1, 28.0), "eyeLookIn": (0, -1, 28.0)}
 IRIS = np.array([0.44, 0.50, 0.46])  # light, so that a tint can make it any colour

@@ -28,7 +28,7 @@ class Cut:
     top: float = 13.0
     side: float = 8.0
     nape: float = 3.5
-    n_locks: int = 760
+    n_locks: int = 620
 
 
 def hair_share(places: Floats) -> Floats:
@@ -83,8 +83,14 @@ def strand_colour(places: Floats, colour: Floats, generator: np.random.Generator
     return np.clip(colour * light[:, None] * np.where(fine[:, None] > 0.4, warm, 1.0), 0.02, 1)
 
 
-def locks(skin_points: Floats, normals: Floats, share: Floats, cut: Cut, colour: Floats, generator: np.random.Generator) -> Piece:
-    """Loose locks on the cap: curved blades of three joints along the strands."""
+def locks(
+    surface: tuple[Floats, Floats, Floats], share: Floats, cut: Cut, colour: Floats, generator: np.random.Generator
+) -> Piece:
+    """Loose locks on the cap: bent blades along the strands.
+
+    `surface` holds points, normals, and the points' places on the default skin, (N, 3) each.
+    """
+    skin_points, normals, default = surface
     chance = share * (share > 0.5)
     roots = generator.choice(len(skin_points), cut.n_locks, p=chance / chance.sum())
     place, normal = skin_points[roots], normals[roots]
@@ -96,13 +102,13 @@ def locks(skin_points: Floats, normals: Floats, share: Floats, cut: Cut, colour:
     length = generator.uniform(12, 26, (len(roots), 1))
     width = generator.uniform(0.35, 0.9, (len(roots), 1))
     start = place - 0.5 * normal + generator.normal(0, 1.5, (len(roots), 1)) * aside
-    mid = start + 0.5 * length * flow + generator.uniform(0.2, 1.3, (len(roots), 1)) * normal
+    mid = start + 0.4 * length * flow + generator.uniform(0.4, 1.4, (len(roots), 1)) * normal
     tip = start + length * flow + generator.uniform(-1.8, 0.8, (len(roots), 1)) * normal
-    points = np.stack([start + width * aside, start - width * aside, mid + 0.8 * width * aside, mid - 0.8 * width * aside, tip], 1)
-    one = np.array([(0, 1, 2), (1, 3, 2), (2, 3, 4)])
-    shades = strand_colour(start, colour, generator)
+    points = np.stack([start, mid + width * aside, mid - width * aside, tip], 1)
+    one = np.array([(0, 1, 2), (1, 3, 2)])
+    shades = strand_colour(default[roots], colour, generator)
     return Piece(
         points.reshape(-1, 3),
-        (Span("hair_locks", (one + 5 * np.arange(len(roots))[:, None, None]).reshape(-1, 3), LOCK_MATERIAL),),
-        np.repeat(shades, 5, axis=0),
+        (Span("hair_locks", (one + 4 * np.arange(len(roots))[:, None, None]).reshape(-1, 3), LOCK_MATERIAL),),
+        np.repeat(shades, 4, axis=0),
     )

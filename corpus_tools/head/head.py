@@ -1,55 +1,104 @@
-"""The default head: its pieces for any identity, in one order."""
+"""The head: its pieces for any identity, in one order, so that vertex for vertex they are the same."""
+
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from corpus_tools.head.cage import Cage
-from corpus_tools.head.cloth import is_bare, shirt
+from corpus_tools.head.cloth import shirt
 from corpus_tools.head.eyes import balls_of, eyeball
 from corpus_tools.head.hair import MATERIAL as HAIR_MATERIAL
 from corpus_tools.head.hair import Cut, hair_share, locks, thickness
-from corpus_tools.head.jaw import jaw_of
+from corpus_tools.head.jaw import Jaw, jaw_of
 from corpus_tools.head.lashes import lash_piece
 from corpus_tools.head.layout import laid_out
 from corpus_tools.head.lids import cleared
 from corpus_tools.head.lips import closed
 from corpus_tools.head.piece import Built, Piece, Span
-from corpus_tools.head.skin import Skin, vertex_normals
+from corpus_tools.head.skin import Skin, shoulders, skinned, vertex_normals
 from corpus_tools.head.subdivide import triangulated
-from corpus_tools.head.teeth import LOWER, UPPER, arch_piece
+from corpus_tools.head.teeth import LOWER, UPPER, arch_piece, fitted
 from corpus_tools.head.texture import Palette
 from corpus_tools.head.tongue import tongue_piece
 
+Floats = NDArray[np.float64]
+
 SKIN_MATERIAL = {"specular": 0.16, "shininess": 14.0, "wrap": 0.35, "textured": True}
-SHIRT = np.array([0.20, 0.29, 0.36])
+PIVOT = np.array([0.0, -75.0, -95.0])  # where the skull sits on the neck
 ADULT = {"macrodetails/caucasian-female-young": 1.0, "macrodetails/universal-female-young-averagemuscle-averageweight": 1.0}
 
 
-def built_head(cage: Cage, skin: Skin, painted_on: Skin, palette: Palette, cut: Cut, seed: int) -> Built:
-    """Skin, eyeballs, teeth, tongue and lashes of a cage."""
+@dataclass(frozen=True, slots=True)
+class Look:
+    """Everything about a head that is not its shape."""
+
+    palette: Palette = field(default_factory=Palette)
+    cut: Cut = field(default_factory=Cut)
+    shirt: tuple[float, float, float] = (0.20, 0.29, 0.36)
+    seed: int = 7
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ground:
+    """The default identity, on whose skin is measured where paint, hair and shirt go."""
+
+    cage: Cage
+    skin: Skin
+    shoulders: Skin
+
+
+def grounded(cage: Cage) -> Ground:
+    """The ground that a default identity's cage gives."""
+    return Ground(cage, skinned(cage), shoulders(cage))
+
+
+def built_head(cage: Cage, ground: Ground, look: Look) -> Built:
+    """Skin with hair, eyeballs, teeth, tongue, lashes, locks and shirt of a cage."""
     jaw = jaw_of(cage)
     balls = balls_of(cage)
-    skin = cleared(closed(skin), balls)
-    default_places = painted_on.vertices
-    share = hair_share(default_places)
-    normals = vertex_normals(skin.vertices, skin.quads, skin.base)
-    raised = thickness(default_places, cut, np.random.default_rng(seed))
-    vertices = skin.vertices + raised[:, None] * normals
-    has_hair = share[skin.quads].mean(axis=1) > 0.45
-    bare = is_bare(default_places, skin.quads)
-    top = shirt(default_places, skin.vertices, normals, triangulated(skin.quads), SHIRT)
-    flesh = Piece(
-        vertices,
-        (
-            Span("skin", triangulated(skin.quads[bare & ~has_hair]), SKIN_MATERIAL),
-            Span("hair", triangulated(skin.quads[has_hair]), HAIR_MATERIAL),
-        ),
-        np.tile(np.array([0.835, 0.640, 0.545]), (len(skin.vertices), 1)),
-        skin.shapes,
-        laid_out(skin.source_uv),
+    skin = cleared(closed(skinned(cage)), balls)
+    flesh, hairs = _flesh(skin, ground, look)
+    eyes = [eyeball(ball, side, _generator(look)) for ball, side in zip(balls, ("Left", "Right"), strict=True)]
+    pieces = (
+        flesh,
+        *eyes,
+        *_teeth(cage, ground, jaw),
+        tongue_piece(cage, jaw),
+        lash_piece(cage, skin, _generator(look)),
+        hairs,
+        shirt(ground.shoulders, shoulders(cage), np.array(look.shirt)),
     )
-    eyes = [eyeball(ball, side, np.random.default_rng(seed)) for ball, side in zip(balls, ("Left", "Right"), strict=True)]
-    upper, lower = arch_piece(UPPER, "upper"), arch_piece(LOWER, "lower")
-    lower = Piece(lower.vertices, lower.spans, lower.colours, jaw.shapes(lower.vertices))
-    hairs = locks(vertices, normals, share, cut, np.array(palette.hair), np.random.default_rng(seed))
-    pieces = (flesh, *eyes, upper, lower, tongue_piece(cage, jaw), lash_piece(cage, skin, np.random.default_rng(seed)), hairs, top)
-    return Built(pieces, (1, 2), balls, np.array([0.0, -75.0, -95.0]))
+    return Built(pieces, (1, 2), balls, PIVOT)
+
+
+def _generator(look: Look) -> np.random.Generator:
+    return np.random.default_rng(look.seed)
+
+
+def _flesh(skin: Skin, ground: Ground, look: Look) -> tuple[Piece, Piece]:
+    """The skin, its scalp raised by the hair, and the loose locks."""
+    places = ground.skin.vertices
+    share = hair_share(places)
+    normals = vertex_normals(skin.vertices, skin.quads, skin.base)
+    vertices = skin.vertices + thickness(places, look.cut, _generator(look))[:, None] * normals
+    has_hair = share[skin.quads].mean(axis=1) > 0.45
+    spans = (
+        Span("skin", triangulated(skin.quads[~has_hair]), SKIN_MATERIAL),
+        Span("hair", triangulated(skin.quads[has_hair]), HAIR_MATERIAL),
+    )
+    colours = np.tile(np.array(look.palette.skin), (len(vertices), 1))
+    colours[np.unique(spans[1].triangles)] = look.palette.hair
+    hairs = locks((vertices, normals, places), share, look.cut, np.array(look.palette.hair), _generator(look))
+    return Piece(vertices, spans, colours, skin.shapes, laid_out(skin.source_uv)), hairs
+
+
+def _teeth(cage: Cage, ground: Ground, jaw: Jaw) -> tuple[Piece, Piece]:
+    pieces = []
+    for arch, name in ((UPPER, "upper"), (LOWER, "lower")):
+        strip = cage.group(f"helper-{name}-teeth")
+        piece = arch_piece(arch, name)
+        points = fitted(piece.vertices, ground.cage.vertices[strip], cage.vertices[strip])
+        moved = jaw.shapes(points) if name == "lower" else {}
+        pieces.append(Piece(points, piece.spans, piece.colours, moved))
+    return pieces[0], pieces[1]

@@ -11,7 +11,10 @@ from corpus_tools.head.subdivide import catmull_clark
 
 Floats = NDArray[np.float64]
 
-LOWEST, WIDEST = 5.1, 2.25  # of the head with its shoulders, in units of the source
+LOWEST, WIDEST = 5.1, 2.25  # of the bust, in units of the source
+NECK_Y, NECK_SLOPE = 5.80, -0.272  # the head ends below this plane, which a shirt's collar hides
+SHOULDER_Y = 6.35  # the bust ends above this
+SOCKET_U, SOCKET_Z = 0.2, 1.30  # MakeHuman's islands of the sockets; what lies further back is behind the eyeballs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,10 +45,23 @@ class Skin:
 
 
 def skinned(cage: Cage) -> Skin:
-    """The skin of a cage, one Catmull-Clark step finer."""
+    """The head and neck of a cage, one Catmull-Clark step finer."""
     body = cage.source.groups["body"]
-    places = cage.source.vertices[body.corners]
-    kept = (places[:, :, 1] > LOWEST).all(axis=1) & (np.abs(places[:, :, 0]) < WIDEST).all(axis=1)
+    places, where = cage.source.vertices[body.corners], cage.source.uv[body.uv_corners]
+    kept = (places[:, :, 1] - NECK_SLOPE * places[:, :, 2] > NECK_Y).any(axis=1) & (np.abs(places[:, :, 0]) < 1.2).all(axis=1)
+    kept &= ~((where[:, :, 0] < SOCKET_U) & (places[:, :, 2] < SOCKET_Z)).all(axis=1)
+    return _finer(cage, kept & (places[:, :, 1] > LOWEST).all(axis=1))
+
+
+def shoulders(cage: Cage) -> Skin:
+    """Neck and shoulders of a cage, on which a shirt lies."""
+    places = cage.source.vertices[cage.source.groups["body"].corners]
+    inside = (places[:, :, 1] > LOWEST) & (places[:, :, 1] < SHOULDER_Y) & (np.abs(places[:, :, 0]) < WIDEST)
+    return _finer(cage, inside.all(axis=1))
+
+
+def _finer(cage: Cage, kept: NDArray[np.bool_]) -> Skin:
+    body = cage.source.groups["body"]
     used, quads = np.unique(body.corners[kept], return_inverse=True)
     matrix, fine = catmull_clark(len(used), quads.reshape(-1, 4))
     fine_uv = _halved(cage.source.uv[body.uv_corners[kept]])

@@ -23,8 +23,8 @@ class Arch:
         Height of the biting edge, mm.
     up : float
         1 when the roots are above the edge, -1 below.
-    widths, heights, depths : (7,)
-        Crowns from the middle to the second molar, mm.
+    widths, heights, depths : (6,)
+        Crowns from the middle to the first molar, mm.
     """
 
     curve: Floats
@@ -39,20 +39,20 @@ class Arch:
 UPPER_CURVE = SCALE * np.array([(0, 0.196), (0.080, 0.184), (0.150, 0.140), (0.197, 0.080), (0.230, 0.010), (0.258, -0.070), (0.278, -0.170)])
 LOWER_CURVE = SCALE * np.array([(0, 0.166), (0.072, 0.156), (0.138, 0.114), (0.186, 0.056), (0.222, -0.012), (0.254, -0.090), (0.276, -0.190)])
 UPPER = Arch(
-    UPPER_CURVE, -0.627 * SCALE, 1.0,
-    np.array([8.6, 6.7, 7.7, 7.0, 6.8, 9.8, 9.2]),
-    np.array([10.6, 9.3, 10.2, 8.6, 8.0, 7.4, 6.8]),
-    np.array([5.0, 4.6, 6.0, 8.0, 8.4, 9.6, 9.6]),
+    UPPER_CURVE, -0.636 * SCALE, 1.0,
+    np.array([8.6, 6.7, 7.7, 7.0, 6.8, 9.8]),
+    np.array([10.6, 9.3, 10.2, 8.6, 8.0, 7.4]),
+    np.array([5.0, 4.6, 6.0, 8.0, 8.4, 9.6]),
 )  # fmt: skip
 LOWER = Arch(
-    LOWER_CURVE, -0.612 * SCALE, -1.0,
-    np.array([5.6, 6.1, 7.0, 7.0, 7.1, 10.4, 10.0]),
-    np.array([9.0, 9.2, 10.0, 8.6, 8.0, 7.4, 7.0]),
-    np.array([4.6, 4.8, 6.0, 7.2, 8.0, 9.4, 9.4]),
+    LOWER_CURVE, -0.615 * SCALE, -1.0,
+    np.array([5.6, 6.1, 7.0, 7.0, 7.1, 10.4]),
+    np.array([9.0, 9.2, 10.0, 8.6, 8.0, 7.4]),
+    np.array([4.6, 4.8, 6.0, 7.2, 8.0, 9.4]),
 )  # fmt: skip
-TOOTH, TOOTH_DARK = np.array([0.90, 0.865, 0.79]), np.array([0.78, 0.70, 0.58])
+TOOTH, TOOTH_DARK = np.array([0.985, 0.965, 0.915]), np.array([0.90, 0.84, 0.74])
 GUM = np.array([0.68, 0.36, 0.36])
-N_AROUND, LEVELS = 12, np.array([0.0, 0.03, 0.10, 0.25, 0.5, 0.75, 1.0])
+N_AROUND, LEVELS = 12, np.array([0.0, 0.04, 0.13, 0.45, 1.0])
 MATERIALS = {"teeth": {"specular": 0.5, "shininess": 60.0, "wrap": 0.3}, "gums": {"specular": 0.4, "shininess": 40.0, "wrap": 0.3}}
 
 
@@ -81,6 +81,12 @@ def arch_piece(arch: Arch, name: str) -> Piece:
         Span(f"gums_{name}", faces[n_crowns:], MATERIALS["gums"]),
     )
     return Piece(vertices, spans, np.concatenate(colours))
+
+
+def fitted(points: Floats, before: Floats, after: Floats) -> Floats:
+    """Points moved and scaled along each axis as a strip of teeth (N, 3) is from one identity to another."""
+    scale = after.std(axis=0) / before.std(axis=0)
+    return after.mean(axis=0) + scale * (points - before.mean(axis=0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,7 +146,7 @@ def _placed(points: Floats, path: Path, along: float, arch: Arch) -> Floats:
     return np.column_stack([flat[:, 0], arch.edge_y + arch.up * points[:, 1], flat[:, 1]])
 
 
-_GUM_GRID = (85, 8)
+_GUM_GRID = (61, 8)
 
 
 def _gum(path: Path, arch: Arch) -> Floats:
@@ -148,7 +154,7 @@ def _gum(path: Path, arch: Arch) -> Floats:
     total = arch.widths.sum()
     along = np.linspace(-total, total, _GUM_GRID[0])
     bounds = np.concatenate([[0], np.cumsum(arch.widths)])
-    tooth = np.clip(np.searchsorted(bounds, np.abs(along), side="right") - 1, 0, 6)
+    tooth = np.clip(np.searchsorted(bounds, np.abs(along), side="right") - 1, 0, 5)
     within = (np.abs(along) - bounds[tooth]) / arch.widths[tooth]
     middles = (bounds[1:] + bounds[:-1]) / 2
     height = np.interp(np.abs(along), middles, arch.heights)

@@ -10,7 +10,7 @@ from corpus_tools.head.subdivide import catmull_clark, triangulated
 
 Floats = NDArray[np.float64]
 
-DROP_MM = 4.5  # MakeHuman's tongue stands up to the upper teeth and hides them when the jaw opens
+DROP_MM = 2.5  # MakeHuman's tongue stands up to the upper teeth and hides them when the jaw opens
 FLATTER = 0.75
 COLOUR, ROOT = np.array([0.72, 0.36, 0.36]), np.array([0.40, 0.13, 0.14])
 MATERIAL = {"specular": 0.35, "shininess": 30.0, "wrap": 0.3}

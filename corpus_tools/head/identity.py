@@ -1,0 +1,78 @@
+"""Presets of age, sex and ancestry: MakeHuman's macro targets, blended, and tints of skin, hair and eyes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from corpus_tools.head.cage import caged
+from corpus_tools.head.head import Ground, Look, built_head
+from corpus_tools.head.piece import Built, stacked_vertices
+from corpus_tools.head.source import Source
+from tts2face.face.file import Identity
+
+Tint = tuple[float, float, float]
+PLAIN: Tint = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Person:
+    """A preset: sex and age as MakeHuman's words, shares of ancestry, tints, further targets, and a summary."""
+
+    summary: str
+    sex: str
+    ages: Mapping[str, float]
+    ancestry: Mapping[str, float]
+    skin: Tint = PLAIN
+    hair: Tint = PLAIN
+    iris: Tint = PLAIN
+    shirt: Tint = PLAIN
+    more: Mapping[str, float] | None = None
+
+    def targets(self) -> dict[str, float]:
+        """Weights of the targets."""
+        found: dict[str, float] = dict(self.more or {})
+        for age, share in self.ages.items():
+            found[f"macrodetails/universal-{self.sex}-{age}-averagemuscle-averageweight"] = share
+            for ancestry, part in self.ancestry.items():
+                found[f"macrodetails/{ancestry}-{self.sex}-{age}"] = share * part
+        return found
+
+
+BROWN, DARK = (0.72, 0.50, 0.36), (0.46, 0.31, 0.22)  # eyes; the drawn iris is light
+BLACK, BLOND, GREY = (0.55, 0.55, 0.6), (2.6, 2.5, 2.1), (2.7, 3.7, 4.8)  # hair
+YOUNG, MATURE, OLD, CHILD = {"young": 1.0}, {"young": 0.5, "old": 0.5}, {"old": 1.0}, {"child": 0.85, "young": 0.15}
+PERSONS: dict[str, Person] = {
+    "erik": Person("man, about 30, European", "male", YOUNG, {"caucasian": 1}, (0.98, 0.95, 0.93), shirt=(1.2, 0.9, 0.8)),
+    "amara": Person("woman, about 30, West African", "female", YOUNG, {"african": 1}, (0.56, 0.47, 0.42), BLACK, DARK, (2.6, 1.5, 0.7)),
+    "kofi": Person("man, about 35, West African", "male", {"young": 0.85, "old": 0.15}, {"african": 1}, (0.48, 0.40, 0.36), BLACK, DARK),
+    "mei": Person("woman, about 28, East Asian", "female", YOUNG, {"asian": 1}, (1.01, 0.985, 0.93), BLACK, DARK, (2.8, 1.2, 1.1)),
+    "kenji": Person("man, about 40, East Asian", "male", {"young": 0.75, "old": 0.25}, {"asian": 1}, (0.95, 0.91, 0.86), BLACK, DARK),
+    "leila": Person("woman, about 35, mixed ancestry", "female", {"young": 0.85, "old": 0.15},
+                    {"caucasian": 0.45, "african": 0.3, "asian": 0.25}, (0.80, 0.72, 0.66), BLACK, BROWN, (1.2, 2.0, 1.3)),
+    "ravi": Person("man, about 30, mixed ancestry", "male", YOUNG, {"caucasian": 0.5, "african": 0.2, "asian": 0.3},
+                   (0.70, 0.61, 0.55), BLACK, DARK, (1.7, 1.7, 1.6)),
+    "ingrid": Person("woman, about 70, European", "female", OLD, {"caucasian": 1}, (1.0, 0.965, 0.955), GREY, PLAIN, (2.0, 0.8, 1.1)),
+    "walter": Person("man, about 65, European", "male", OLD, {"caucasian": 1}, (0.98, 0.93, 0.91), GREY, PLAIN),
+    "nia": Person("child, about 9, mixed ancestry", "female", CHILD, {"caucasian": 0.4, "african": 0.4, "asian": 0.2},
+                  (0.82, 0.75, 0.70), BLACK, BROWN, (3.2, 2.4, 0.7)),
+}  # fmt: skip
+
+
+def identities(source: Source, ground: Ground, look: Look, default: Built) -> dict[str, Identity]:
+    """Every preset as a displacement of the default head."""
+    rest = stacked_vertices(default)
+    found = {}
+    for name, person in PERSONS.items():
+        own = stacked_vertices(built_head(caged(source, person.targets()), ground, look))
+        tints = {
+            "skin": person.skin, "hair": person.hair, "hair_locks": person.hair, "iris": person.iris,
+            "shirt": person.shirt, "gums_upper": _half(person.skin), "gums_lower": _half(person.skin),
+        }  # fmt: skip
+        found[name] = Identity((own - rest).astype(np.float32), tints, person.summary)
+    return found
+
+
+def _half(tint: Tint) -> Tint:
+    red, green, blue = (0.6 + 0.4 * part for part in tint)
+    return red, green, blue
