@@ -28,7 +28,9 @@ class Pieces:
 
 def exemplar_weights(scores: NDArray[np.float64], sharpness: float) -> NDArray[np.float64]:
     """(N, k) weights that sum to 1: ``exp(-sharpness (best - score))``, 0 where there is no exemplar."""
-    weights = np.where(np.isfinite(scores), np.exp(sharpness * np.minimum(scores - scores[:, :1], 0.0)), 0.0)
+    present = np.isfinite(scores)
+    behind = np.where(present, scores - scores[:, :1], 0.0)
+    weights = np.where(present, np.exp(sharpness * behind), 0.0)
     return np.asarray(weights / weights.sum(1, keepdims=True))
 
 

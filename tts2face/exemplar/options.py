@@ -37,13 +37,13 @@ class SynthesisOptions:
         A number lies outside its range.
     """
 
-    context: int = 4
-    k: int = 30
-    duration: float = 0.3
-    sharpness: float = 3.0
+    context: int = 3
+    k: int = 40
+    duration: float = 0.6
+    sharpness: float = 2.5
     overlap: bool = True
     precision: float = 1.5
-    align: bool = False
+    align: bool = True
     smoothing_s: float = 0.01
     contacts: bool = True
 
