@@ -30,13 +30,15 @@ from tts2face.types import Trajectory
 FloatArray = NDArray[np.float64]
 
 SPEECH_SHAPES = ("jaw", "mouth")  # how the names of the shapes that speech moves begin
+CORNERS_LEFT, CORNERS_RIGHT = (OUTER_LIP_UPPER[-1], INNER_LIP_UPPER[-1]), (OUTER_LIP_UPPER[0], INNER_LIP_UPPER[0])
 BILABIALS = frozenset({"p", "b", "m"})
 SURE_CONTACT = 75  # percentile of the least gaps in bilabials: up to this gap the talker's lips touch
 MOST_CONTACT_MM = 1.5  # a tracker that reads more than this on touching lips is not to be trusted
-LIP_WEIGHT = 4.0  # a lip landmark against one of the jaw or cheek
+LIP_WEIGHT = 10.0  # a lip landmark against one of the jaw or cheek
 DEPTH_WEIGHT = 0.1  # z against x and y: a single camera sees depth with some ten times their error
 GAP_WEIGHT = 60.0  # the gap between facing lip points against a lip landmark: whether lips touch is what a viewer sees
-EFFORT = 0.003  # share of the mean curvature that draws every weight to 0: makes the answer unique and calm
+WIDTH_WEIGHT = 60.0  # the mouth's width, likewise: rounding is the other thing that a viewer reads from lips
+EFFORT = 0.005  # share of the mean curvature that draws every weight to 0: makes the answer unique and calm
 STOP = 1e-5  # change of a weight at which the iteration ends
 MOST_SWEEPS = 2000
 
@@ -108,13 +110,18 @@ def retargeter(talker: Talker, face: Face) -> Retargeter:
     at_rest = wanted @ model.rest[: model.n_speech].astype(np.float64)
     moved = per_weight[rows]
     plain = np.einsum("ldk,ld,ldj->kj", moved, weights, moved)
-    pull = np.einsum("ldk,ld,lds->ks", moved, weights, np.concatenate([wanted, -at_rest[..., None]], axis=2))
+    from_rest = np.concatenate([wanted, -at_rest[..., None]], axis=2)
+    pull = np.einsum("ldk,ld,lds->ks", moved, weights, from_rest)
+    left, right = (np.array([common.index(corner) for corner in corners]) for corners in (CORNERS_LEFT, CORNERS_RIGHT))
+    widened = moved[left, 0] - moved[right, 0]
+    effort = EFFORT * np.trace(plain) / len(moving)
+    curvature = plain + WIDTH_WEIGHT * widened.T @ widened
+    pull += WIDTH_WEIGHT * widened.T @ (from_rest[left, 0] - from_rest[right, 0])
     gap_basis, gap_rest = _talker_gaps(talker, turn, scale)
     upper = [known[landmark] for landmark in INNER_LIP_UPPER]
     lower = [known[landmark] for landmark in INNER_LIP_LOWER]
     gap_per_weight = per_weight[upper, 1] - per_weight[lower, 1]
-    curvature = plain + GAP_WEIGHT * gap_per_weight.T @ gap_per_weight
-    curvature += EFFORT * np.trace(plain) / len(moving) * np.eye(len(moving))
+    curvature += GAP_WEIGHT * gap_per_weight.T @ gap_per_weight + effort * np.eye(len(moving))
     return Retargeter(
         face.shape_names,
         moving,

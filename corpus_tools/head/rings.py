@@ -1,0 +1,102 @@
+"""Rings of edges around the mouth and the eyes: where lips and lids meet."""
+
+from collections import defaultdict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+LONGEST = 400  # vertices; the head's own rings around mouth and eyes have under 100
+
+
+class Strips:
+    """Edges of a quad mesh that run straight on from vertex to vertex.
+
+    Parameters
+    ----------
+    quads : (F, 4)
+    places : (N, 3)
+        Vertices at one place count as one: a texture may have cut the mesh there.
+    """
+
+    def __init__(self, quads: Ints, places: Floats) -> None:
+        rounded = np.rint(places * 1e6).astype(np.int64)
+        _, first, where = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+        self._beside: defaultdict[int, set[int]] = defaultdict(set)
+        self._around: defaultdict[int, list[set[int]]] = defaultdict(list)
+        for quad in first[where.ravel()][quads].tolist():
+            for k, corner in enumerate(quad):
+                self._beside[corner] |= {quad[k - 1], quad[(k + 1) % 4]}
+                self._around[corner].append(set(quad))
+        self.vertices = sorted(self._beside)
+
+    def ring(self, start: int, towards: int) -> list[int] | None:
+        """The closed ring of vertices that leaves `start` by the edge to `towards`; None if it does not close."""
+        path = [start, towards]
+        while len(path) < LONGEST:
+            onward = self._onward(path[-2], path[-1])
+            if onward is None or onward == start:
+                return path if onward is not None else None
+            path.append(onward)
+        return None
+
+    def rings_from(self, start: int) -> list[list[int]]:
+        """Closed rings that pass `start`."""
+        found = [self.ring(start, towards) for towards in sorted(self._beside[start])]
+        return [ring for ring in found if ring is not None]
+
+    def _onward(self, before: int, here: int) -> int | None:
+        passed = [quad for quad in self._around[here] if before in quad]
+        ahead = [n for n in self._beside[here] if n != before and not any(n in quad for quad in passed)]
+        return ahead[0] if len(ahead) == 1 and len(self._beside[here]) == 4 else None
+
+
+def narrowest_ring(strips: Strips, vertices: Floats, inside: Floats, reach: float, clear: float = 0.0) -> Ints:
+    """The ring around a hole that encloses least, seen from the front: the edge of lips or lids.
+
+    Parameters
+    ----------
+    vertices : (N, 3)
+    inside : (3,)
+        A point in the hole, or behind it.
+    reach
+        No ring goes further than this from the point, seen from the front, mm.
+    clear
+        Every ring stays further than this from the point, on average, mm: an eyeball's radius.
+
+    Raises
+    ------
+    DataError
+        No ring goes around the point.
+    """
+    near = np.hypot(*(vertices[strips.vertices] - inside).T[:2]) < reach
+    best, least = None, np.inf
+    seen: set[int] = set()
+    for start in np.array(strips.vertices)[near].tolist():
+        for ring in strips.rings_from(start) if start not in seen else ():
+            seen.update(ring)
+            flat = vertices[ring, :2] - inside[:2]
+            is_clear = np.linalg.norm(vertices[ring] - inside, axis=1).mean() > clear
+            if np.hypot(*flat.T).max() > reach or not _winds(flat) or not is_clear:
+                continue
+            area = abs(_area(flat))
+            if area < least:
+                best, least = ring, area
+    if best is None:
+        raise DataError(f"no ring of edges goes around {inside}; the mesh is not the one that this was made for")
+    return np.array(best, np.int64)
+
+
+def _winds(flat: Floats) -> bool:
+    """Whether a closed line goes once around the origin."""
+    angles = np.unwrap(np.arctan2(*np.concatenate([flat, flat[:1]]).T[::-1]))
+    return bool(abs(abs(angles[-1] - angles[0]) - 2 * np.pi) < 0.1)
+
+
+def _area(flat: Floats) -> float:
+    after = np.roll(flat, -1, axis=0)
+    return float((flat[:, 0] * after[:, 1] - flat[:, 1] * after[:, 0]).sum() / 2)
