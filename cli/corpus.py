@@ -1,12 +1,17 @@
 """``tts2face corpus``: recordings become talkers, and talkers are measured."""
 
+from json import dumps
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
+from cli.files import write_beside
 from cli.progress import progress_bar, say
 from lexicon.errors import InputError
+
+if TYPE_CHECKING:
+    from corpus_tools.observation import Observation
 
 corpus = App(name="corpus", help="Build, show and measure talkers.")
 
@@ -24,12 +29,16 @@ def setup() -> None:
 
 
 @corpus.command
-def build(
+def build(  # noqa: PLR0913 - one parameter a flag
     recordings: Annotated[Path, Parameter(help="Folder of recordings with transcripts.")],
     /,
     *,
     out: Annotated[Path, Parameter(help="The talker to write (.talker).", alias="-o")],
     name: Annotated[str | None, Parameter(help="Whose talker it is; the folder's name without it.")] = None,
+    provenance: Annotated[
+        Path | None,
+        Parameter(help="JSON with name, language, sources, licence, attribution; provenance.json of the folder."),
+    ] = None,
     jobs: Jobs = None,
     cache: Cache = None,
     model: Model = None,
@@ -38,11 +47,11 @@ def build(
     if out.suffix != ".talker":
         raise InputError(f"a talker is written as .talker, not {out.name}")
     from corpus_tools.build import build_talker
-
     from corpus_tools.observe import Effort
 
     with progress_bar("reading recordings") as on_progress:
-        built = build_talker(recordings, out, name=name, effort=Effort(cache, jobs, model), on_progress=on_progress)
+        effort = Effort(cache, jobs, model)
+        built = build_talker(recordings, out, name=name, provenance=provenance, effort=effort, on_progress=on_progress)
     for refusal in built.refused:
         say(f"refused {refusal.name}: {refusal.reason}")
     say(f"wrote {out}: {built.n_kept} recordings, {built.minutes:.1f} minutes, {len(built.refused)} refused")
@@ -52,7 +61,45 @@ def build(
 def show(talker: Annotated[str, Parameter(help="A shipped talker or a .talker file.")], /) -> None:
     """Print what a talker holds: utterances, phones, modes, provenance."""
     from corpus_tools.show import describe
-
     from tts2face.talker import load_talker
 
     print(describe(load_talker(talker)).text())  # noqa: T201 - the answer
+
+
+@corpus.command
+def evaluate(  # noqa: PLR0913 - one parameter a flag
+    *,
+    recordings: Annotated[Path | None, Parameter(help="Folder to split into training and held-out utterances.")] = None,
+    hold_out: Annotated[int, Parameter(help="Utterances held out of --recordings.")] = 100,
+    seed: Annotated[int, Parameter(help="Which utterances are held out.")] = 0,
+    train: Annotated[Path | None, Parameter(help="Folder to learn from, instead of --recordings.")] = None,
+    test: Annotated[Path | None, Parameter(help="Folder to test on, with --train.")] = None,
+    json: Annotated[Path | None, Parameter(help="Write all figures, utterance by utterance.")] = None,
+    jobs: Jobs = None,
+    cache: Cache = None,
+    model: Model = None,
+) -> None:
+    """Measure synthesised lips against real ones that were not learnt from."""
+    if (recordings is None) == (train is None) or (train is None) != (test is None):
+        raise InputError("give --recordings to split, or both --train and --test")
+    from corpus_tools.evaluate import evaluate as evaluated
+    from corpus_tools.evaluate import split
+    from corpus_tools.observe import Effort, observe
+
+    def observations_of(folder: Path) -> "tuple[Observation, ...]":
+        with progress_bar(f"reading {folder.name}") as on_progress:
+            found = observe(folder, effort=Effort(cache, jobs, model), on_progress=on_progress)
+        for refusal in found.refused:
+            say(f"refused {refusal.name}: {refusal.reason}")
+        return found.kept
+
+    if recordings is not None:
+        learnt, held = split(observations_of(recordings), hold_out=hold_out, seed=seed)
+    elif train is not None and test is not None:
+        learnt, held = observations_of(train), observations_of(test)
+    with progress_bar("measuring") as on_progress:
+        result = evaluated(learnt, held, on_progress=on_progress)
+    print(f"{result.n_train} utterances learnt from, {result.n_test} held out\n")  # noqa: T201 - the answer
+    print(result.table())  # noqa: T201
+    if json is not None:
+        write_beside(json, dumps(result.to_json(), indent=1))

@@ -13,7 +13,6 @@ def flags_from(*groups: tuple[str, type], without: frozenset[str] = frozenset())
 
     The command takes them as ``**options``; `chosen` turns them back into an instance.
     """
-
     headed = [(Group.create_ordered(heading), options) for heading, options in groups]
 
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cli.files import write_beside
 from cli.progress import progress_bar, say
 from lexicon.errors import InputError
 from tts2face.render.picture import Picture
@@ -99,4 +100,4 @@ def _ready(errand: Errand) -> "Cast":
 def _explain(clips: "list[Clip]", ready: "Cast", request: Request, path: Path) -> None:
     from tts2face.api import explained
 
-    path.write_text(explained(clips, ready, request, as_json=path.suffix == ".json"), encoding="utf-8")
+    write_beside(path, explained(clips, ready, request, as_json=path.suffix == ".json"))
