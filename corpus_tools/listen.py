@@ -48,14 +48,14 @@ def heard(video: Path, words: Sequence[tuple[str, Ways]], cache: Path, aligner: 
     """
     sound = read_sound(video, SOUND_RATE)
     said = hashlib.sha256(json.dumps(words).encode()).hexdigest()[:8]
-    kept = cache / f"{content_key(video)}-{said}.{KIND}"
+    kept = cache / f"{content_key(video)}-{said}-{ALIGNMENT_VERSION}.{KIND}"
     if kept.is_file():
         try:
             arrays, header = read_tensors(kept, KIND, ALIGNMENT_VERSION)
             spans = tuple(WordSpan(text, first, last) for text, first, last in header["words"])
             return Heard(PhoneSequence(header["phones"], arrays["edges"]), spans, float(header["confidence"]), sound)
         except (DataError, KeyError):
-            kept.unlink(missing_ok=True)  # of an earlier version or damaged: made again
+            pass  # damaged: made again
     found: Alignment = aligner.align(sound, words)
     header = {
         "phones": found.phones.phones,

@@ -40,13 +40,13 @@ def watched(video: Path, cache: Path, tracker: FaceTracker) -> Watched:
     DataError
         The video cannot be read.
     """
-    kept = cache / f"{content_key(video)}-{MODEL_SHA256[:8]}.{KIND}"
+    kept = cache / f"{content_key(video)}-{MODEL_SHA256[:8]}-{TRACKING_VERSION}.{KIND}"
     if kept.is_file():
         try:
             arrays, header = read_tensors(kept, KIND, TRACKING_VERSION)
             return Watched(Tracking(arrays["points"], arrays["scores"]), arrays["times"], float(header["fps"]))
         except (DataError, KeyError):
-            kept.unlink(missing_ok=True)  # of an earlier version or damaged: made again
+            pass  # damaged: made again
     found = track_video(video, tracker)
     arrays = {"points": found.tracking.points, "scores": found.tracking.scores, "times": found.times}
     write_tensors(kept, KIND, TRACKING_VERSION, arrays, {"fps": found.fps})

@@ -1,0 +1,81 @@
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from lexicon.errors import DataError, InputError
+from tts2face.video.media import _placed, _upright, media_facts, read_pictures, read_sound
+
+
+def test_pictures_come_in_order_with_their_times(make_video):
+    pictures = list(read_pictures(make_video("grey.mkv", n_frames=10, fps=25, tone_s=0.4)))
+    np.testing.assert_allclose([picture.time for picture in pictures], np.arange(10) / 25, atol=0.001)
+    levels = [picture.pixels.mean() for picture in pictures]
+    np.testing.assert_allclose(levels, 20 + 4 * np.arange(10), atol=2)  # of 255: 8-bit colour conversion
+    assert pictures[0].pixels.shape == (48, 64, 3)
+
+
+def test_facts(make_video):
+    facts = media_facts(make_video("grey.mkv", n_frames=10, fps=25, tone_s=0.4))
+    assert (facts.fps, facts.width, facts.height, facts.rate) == (25.0, 64, 48, 16000)
+    assert facts.duration == pytest.approx(0.4, abs=0.01)
+
+
+@pytest.mark.parametrize("rate", [16000, 8000, 24000])
+def test_a_tone_keeps_its_pitch_and_level_at_every_rate(make_video, rate):
+    sound = read_sound(make_video("tone.mkv", tone_s=1.0), rate)
+    assert sound.duration == pytest.approx(1.0, abs=0.001)
+    spectrum = np.abs(np.fft.rfft(sound.samples))
+    assert np.argmax(spectrum) * rate / len(sound.samples) == pytest.approx(440, abs=1)
+    assert sound.samples[rate // 4 : rate // 2].std() == pytest.approx(0.5 / np.sqrt(2), rel=0.01)
+
+
+def test_sound_lies_on_the_clock_of_the_file():
+    samples = np.arange(1, 4, dtype=np.float32)
+    np.testing.assert_array_equal(_placed(samples, 2), [0, 0, 1, 2, 3])
+    np.testing.assert_array_equal(_placed(samples, -1), [2, 3])
+
+
+@pytest.mark.parametrize(("degrees", "corner"), [(0, (0, 0)), (90, (1, 0)), (180, (1, 2)), (-90, (0, 1))])
+def test_a_turned_film_is_put_upright(degrees, corner):
+    pixels = np.zeros((2, 3, 3), np.uint8)
+    pixels[0, 0] = 255
+    upright = _upright(SimpleNamespace(rotation=degrees, to_ndarray=lambda format: pixels))
+    turned = {0: (0, 0), 90: (2, 0), 180: (1, 2), -90: (0, 1)}[degrees]  # counter-clockwise, by hand
+    assert upright[turned].tolist() == [255, 255, 255], corner
+
+
+def test_no_such_file(tmp_path):
+    with pytest.raises(InputError, match="there is no recording"):
+        list(read_pictures(tmp_path / "none.mkv"))
+
+
+def test_empty_file(tmp_path):
+    (tmp_path / "a.mkv").touch()
+    with pytest.raises(DataError, match="is empty"):
+        list(read_pictures(tmp_path / "a.mkv"))
+
+
+def test_text_that_calls_itself_a_film(tmp_path):
+    (tmp_path / "a.mkv").write_text("no film at all\n" * 100)
+    with pytest.raises(DataError, match="cannot be read as video or sound"):
+        list(read_pictures(tmp_path / "a.mkv"))
+
+
+def test_truncated_film(make_video, tmp_path: Path):
+    whole = make_video("whole.mkv", n_frames=50, tone_s=2.0)
+    cut = tmp_path / "cut.mkv"
+    cut.write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
+    with pytest.raises(DataError, match="truncated"):
+        list(read_pictures(cut))
+
+
+def test_no_pictures(make_video):
+    with pytest.raises(DataError, match="holds no video"):
+        list(read_pictures(make_video("sound.mkv", n_frames=0, tone_s=1.0)))
+
+
+def test_no_sound(make_video):
+    with pytest.raises(DataError, match="holds no sound"):
+        read_sound(make_video("silent.mkv"), 16000)
