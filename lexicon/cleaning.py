@@ -1,0 +1,101 @@
+"""Unicode text to plain characters in canonical form: one kind of quote, dash and space, no invisible characters.
+
+What is taken away here is never spoken (marks, quotes, decoration); what is spoken stays, for `lexicon.normalize`.
+"""
+
+import functools
+import re
+import unicodedata
+from collections.abc import Callable
+
+_VULGAR = re.compile(r"(?<=[0-9])\s*([¼-¾⅐-⅞↉])")
+_AREA_CODE = re.compile(r"\(([0-9]{2,4})\) ?(?=[0-9]{3}[ .-][0-9]{4})")
+_SINGLE_QUOTES = "‘’‚‛′`´ʹʻʼʽˈ"
+_DOUBLE_QUOTES = '“”„‟«»″‹›"「」『』〈〉《》'
+_BRACKETS = "()[]{}"
+_DASHES = "–—―‐‑‒−⁃"
+_DROPPED = "™®*_~|\\•·●○◦▪▫■□★☆◆◇►▶◀»※†‡\u20e3"
+_FULL_STOPS = "。｡।॥۔።"
+_TRANSLATION = (
+    {ord(c): "'" for c in _SINGLE_QUOTES}
+    | {ord(c): " " for c in _DOUBLE_QUOTES + _DROPPED}
+    | {ord(c): ", " for c in _BRACKETS}
+    | {ord(c): "-" for c in "‐‑‒"}
+    | {ord(c): "–" for c in "–—―"}
+    | {ord("−"): "-", ord("⁃"): " ", ord("²"): "^2", ord("³"): "^3", ord("⁄"): "/", ord("№"): "No. ", ord("…"): "..."}
+    | {ord(c): ". " for c in _FULL_STOPS}
+    | {ord(c): ", " for c in "，、،؛；"}
+    | {ord(c): "? " for c in "？؟"}
+    | {ord("！"): "! ", ord("："): ": ", ord("¿"): " ", ord("¡"): " "}
+)
+
+
+_SPOKEN_PUNCTUATION = frozenset(".,;:!?'-–/&@#%‰§¶^")
+
+
+def _kept(code: int) -> int | str:
+    """What stands for a character: itself, a space, a newline, an ASCII digit, or nothing."""
+    category = unicodedata.category(chr(code))
+    if code in {10, 13, 0x2028, 0x2029}:
+        return "\n"
+    is_mute = (category[0] == "P" or category == "Sk") and chr(code) not in _SPOKEN_PUNCTUATION
+    if code == 9 or category[0] == "Z" or is_mute:
+        return " " if not 0x1F3FB <= code <= 0x1F3FF else ""
+    if category[0] in "CM":
+        return "" if category[0] == "C" or 0xFE00 <= code <= 0xFE0F else code
+    return str(unicodedata.digit(chr(code))) if category == "Nd" and code > 127 else code
+
+
+class _Table(dict[int, int | str | None]):
+    """Translation that decides once for each character it meets."""
+
+    def __missing__(self, code: int) -> int | str:
+        self[code] = kept = _kept(code)
+        return kept
+
+
+@functools.cache
+def _table() -> _Table:
+    return _Table(_TRANSLATION)
+
+
+_MARKS = re.compile("[\u0300-\u036f\u0483-\u0489\u1ab0-\u1aff\u1dc0-\u1dff\u20d0-\u20ff\ufe20-\ufe2f]+")
+
+
+# In order; each is linear in the text: no pattern repeats over what another repeat may take.
+_STEPS: tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...] = (
+    (re.compile(r"\r"), "\n"),
+    (re.compile(r"(?<!\.)\.{2,}+(?= ?\n?[a-z])"), ","),
+    (re.compile(r"\.{2,}"), "."),
+    (re.compile(r"[ \n]{2,}|\n"), lambda run: ". " if run.group().count("\n") > 1 else " "),
+    (re.compile(r"(?<=[0-9]) ?– ?(?=[0-9$£€])"), "–"),
+    (re.compile(r"–(?![0-9$£€])|(?<![0-9])–|--+"), ", "),
+    (re.compile(r"(?<![0-9]) -(?= )|(?<= )-(?= ?[^0-9$£€¥.\s-])|-(?![\w$£€¥.])"), ", "),
+    (re.compile(r"-(?=\.(?![0-9]))"), ""),
+    (re.compile(r"(?<![\w)' ,])-(?=[^\W0-9])"), " "),
+    (re.compile(r"(?<!\w)'(?!(?:em|cause|til|tis|twas|bout|round|n)\b|[0-9]0s\b)|(?<=[^\W0-9])'(?!\w)"), " "),
+    (re.compile(r"'{2,}"), " "),
+    (re.compile(r" {2,}"), " "),
+    (re.compile(r" +(?=[.,;:!?](?![\w]))"), ""),
+)
+_PUNCTUATION_RUN = re.compile(r"[.,;:!?](?: ?[.,;:!?](?![0-9]))+")
+_STRENGTH = ",;:.!?"
+
+
+def _strongest(run: re.Match[str]) -> str:
+    return max(run.group(), key=_STRENGTH.find) + (" " if run.group()[-1] == " " else "")
+
+
+def plain(text: str, *, keep_marks: bool = False) -> str:
+    """The text in canonical characters: NFKC, ASCII digits, plain quotes, single spaces, no two marks together.
+
+    Loose combining marks go, unless they are kept for a script that is written with them.
+    """
+    text = _AREA_CODE.sub(r"\1-", text)
+    text = _VULGAR.sub(r" \1", text).translate(_table())
+    text = unicodedata.normalize("NFKC", text).translate(_table())
+    if not keep_marks:
+        text = unicodedata.normalize("NFKC", _MARKS.sub("", text)).translate(_table())
+    for pattern, replacement in _STEPS:
+        text = pattern.sub(replacement, text)
+    return _PUNCTUATION_RUN.sub(_strongest, text).strip(" ,;:")

@@ -1,0 +1,181 @@
+"""English text as it is said: numbers, dates, money, units, abbreviations, addresses and symbols become words.
+
+One scan from left to right: each written form has a pattern and a reader. What comes out is words, the apostrophes and
+hyphens inside them, and sentence punctuation; a second normalisation changes nothing. The time is linear in the text.
+"""
+
+import functools
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from lexicon import forms, readings
+from lexicon.cleaning import plain
+
+MARKS = frozenset(".,;:!?")
+_FULL_MONTH = "|".join(readings.MONTHS)
+_MONTH = rf"(?:{_FULL_MONTH}|(?:Jan|Feb|Mar|Apr|Jun|Jul|Aug|Sept?|Oct|Nov|Dec)\b\.?)"
+_AMOUNT = r"(?:[0-9]{1,3}(?:,[0-9]{3}){1,6}(?:\.[0-9]{1,20})?(?!,?[0-9])|[0-9]{1,400}(?:\.[0-9]{1,20})?|\.[0-9]{1,20})"
+_SIGNED = rf"(?:(?<![\w.)])[+-])?{_AMOUNT}"
+_SIGN = r"(?:US\$|[$£€¥₹₩₽₺₿])"
+_CODE = "|".join(code for code in readings.CURRENCIES if code.isalpha())
+_MAGNITUDE = r"(?:thousand|million|billion|trillion|bn|mn|tn|[kKmMbBT])\b"
+_TLD = r"(?:com|org|net|edu|gov|io|ai|app|dev|info|uk|us|de|fr|eu|tv|me|ca|ch|au|nz|jp|cn|ru|es|nl|se|pl)"
+_LABEL = r"[A-Za-z0-9][A-Za-z0-9-]{0,62}"
+_TAIL = r"[^\s,;!]{0,500}[^\s,;!.:?]"
+_HALF = r"(?:[aApP]\.[mM]\.?|[aApP][mM]\b)"
+_START, _STOP = r"(?<![^\W\d_])", r"(?![^\W\d_])"  # no letter stands before, behind
+_LETTERS = r"[^\W\d_]+"
+
+
+@dataclass(frozen=True, slots=True)
+class Token:
+    """A written form and the words that it is said with; a punctuation mark stands for itself."""
+
+    source: str
+    spoken: str
+
+
+def _unit_pattern() -> str:
+    units = sorted(readings.table("units.tsv"), key=len, reverse=True)
+    return "(?:" + "|".join(re.escape(unit) + (r"(?![\w^/'])" if unit[-1].isalnum() else "") for unit in units) + ")"
+
+
+def _abbreviation_pattern() -> str:
+    written = sorted(readings.table("abbreviations.tsv"), key=len, reverse=True)
+    dotless = rf"(?:Mr|Mrs|Ms|Dr|Prof|etc|vs|approx){_STOP}"
+    return rf"(?P<abbr>(?:{'|'.join(map(re.escape, written))})(?=\.)|{dotless})\.?"
+
+
+# Name, pattern and reader, in the order in which they are tried at each place; every repeat over letters is bounded or
+# cannot be tried again from its own middle, so that the scan is linear.
+def _forms() -> tuple[tuple[str, str, forms.Reader], ...]:
+    unit = _unit_pattern()
+    return (
+        ("quick", r"(?!(?:etc|vs|approx|et)\b)[a-z]+(?= |$|[,;!?](?: |$))", forms.same),
+        ("space", r" +", forms.nothing),
+        ("mark", r"[.,;:!?](?= |$)", forms.same),
+        ("email", rf"[\w+-](?:[\w.+-]{{0,62}}[\w+-])?@{_LABEL}(?:\.{_LABEL}){{1,5}}", forms.address),
+        ("url", rf"(?:(?:https?|ftp)://|www\.){_TAIL}", forms.address),
+        ("host", rf"(?:{_LABEL}\.){{1,4}}{_TLD}\b(?![.]\w)(?:/(?:{_TAIL})?)?", forms.address),
+        ("tag", r"[#@](?=[0-9_]{0,60}[^\W\d_])\w{1,140}", forms.hashtag),
+        ("slashed", r"and/or\b|w/o\b|w/(?= )|[nN]/[aA]\b", forms.slashed),
+        ("iso", r"(?P<isoy>[0-9]{4})-(?P<isom>[0-9]{2})-(?P<isod>[0-9]{2})(?![\w-])", forms.iso_date),
+        (
+            "monthday",
+            rf"(?P<mf>{_MONTH}) (?P<mfd>[0-9]{{1,2}})(?:st|nd|rd|th)?(?![\w:/%-]|[.,][0-9])"
+            r"(?:,? (?P<mfy>[12][0-9]{3})(?![\w-]|[.,:][0-9]))?",
+            forms.month_first,
+        ),
+        ("monthyear", rf"(?P<my>{_MONTH}),? (?P<myy>[12][0-9]{{3}})(?![\w-]|[.,:][0-9])", forms.month_year),
+        (
+            "daymonth",
+            rf"(?P<dfd>[0-9]{{1,2}})(?:st|nd|rd|th)?(?: of)?[ -](?P<df>{_MONTH})"
+            r"(?:,?[ -](?P<dfy>[12][0-9]{3})(?![\w-]))?",
+            forms.day_first,
+        ),
+        (
+            "numericdate",
+            r"(?P<nd1>[0-9]{1,2})(?P<ndsep>[/.-])(?P<nd2>[0-9]{1,2})(?P=ndsep)(?P<ndy>[12][0-9]{3}|[0-9]{2})"
+            r"(?![\w/-]|\.[0-9])",
+            forms.numeric_date,
+        ),
+        ("version", r"[0-9]{1,4}(?:\.[0-9]{1,4}){2,6}(?!\w)", forms.version),
+        (
+            "clock",
+            rf"(?P<hh>[0-9]{{1,2}}):(?P<mm>[0-9]{{2}})(?::(?P<ss>[0-9]{{2}}))?(?![\w:])(?: ?(?P<half>{_HALF}))?"
+            rf"|(?P<hh2>[0-9]{{1,2}}) ?(?P<half2>{_HALF})|(?P<hh3>[0-9]{{1,2}}):(?P<mm3>[0-9]{{2}})(?P<half3>{_HALF})",
+            forms.clock,
+        ),
+        ("ratio", r"(?P<ra>[0-9]{1,3}):(?P<rb>[0-9]{1,3})(?![\w:])", forms.proportion),
+        (
+            "money",
+            rf"(?P<moneyminus>(?<![\w.])-)?(?P<sign>{_SIGN}) ?(?P<moneya>-?{_AMOUNT})"
+            rf"(?:[–-](?:{_SIGN})?(?P<moneyto>{_AMOUNT})(?![\w-]))?(?: ?(?P<mag>{_MAGNITUDE}))?",
+            forms.money,
+        ),
+        (
+            "moneyafter",
+            rf"(?P<moneyb>{_SIGNED})(?: ?(?P<mag2>thousand|million|billion|trillion|bn))?"
+            rf" ?(?:(?P<sign2>[$£€¥₹₩₽₺₿¢])|(?P<sign3>{_CODE})\b)",
+            forms.money_after,
+        ),
+        (
+            "telephone",
+            r"(?:\+[0-9]{1,3}[ .-]?)?(?:\([0-9]{2,4}\) ?|[0-9]{3,4}[ .-])[0-9]{3}[ .-][0-9]{4}(?![\w-])"
+            r"|\+[0-9]{1,3}(?:[ .-][0-9]{2,4}){2,5}(?![\w-])|(?<![\w-])[0-9]{3}-[0-9]{4}(?![\w-])|\+[0-9]{8,15}(?!\w)",
+            forms.telephone,
+        ),
+        ("feet", r"(?P<feet>[1-9])'(?P<inches>[0-9]{1,2})?(?![\w'])", forms.feet),
+        ("decade", r"'?(?P<decade>[1-9]0|[12][0-9]{2}0)'?s\b", forms.decade),
+        ("ordinal", r"(?P<ord>[0-9]{1,3}(?:,[0-9]{3}){1,5}|[0-9]{1,15})(?:st|nd|rd|th)\b", forms.ordinal_number),
+        (
+            "fraction",
+            r"(?:(?P<whole>[0-9]{1,6})[ -])?(?P<frac>(?P<top>[0-9]{1,3})/(?P<bottom>[0-9]{1,3}))(?![\w/])",
+            forms.fraction,
+        ),
+        (
+            "range",
+            rf"(?P<from>{_AMOUNT})[–-](?P<sign4>[$£€])?(?P<to>{_AMOUNT})(?![\w-])(?: ?(?P<runit>{unit}))?",
+            forms.span,
+        ),
+        ("measure", rf"(?P<amount>{_SIGNED})[ -]?(?P<unit>{unit})", forms.measure),
+        ("power", r"\^(?P<power>-?[0-9]{1,3})(?![0-9])", forms.power),
+        ("kilo", rf"(?P<kilo>{_AMOUNT})k\b", forms.thousands),
+        ("number", _SIGNED, forms.plain_number),
+        ("abbreviation", rf"{_START}{_abbreviation_pattern()}{_STOP}", forms.abbreviation),
+        (
+            "dotted",
+            rf"{_START}(?:[^\W\d_]\.){{2,12}}{_STOP}|{_START}[^\W\d_](?:\.[^\W\d_]){{1,12}}(?![\w.])",
+            forms.dotted,
+        ),
+        ("initial", rf"{_START}[A-Z]\.(?= [A-Z])", forms.initial),
+        ("roman", rf"{_START}[IVXLCDM]{{1,15}}{_STOP}(?!['-][^\W\d_])", forms.roman_numeral),
+        ("greek", r"(?<![^\W\d_])[πΩµμαβγδΔλσΣθφω](?![^\W\d_])", forms.symbol),
+        ("word", rf"{_LETTERS}(?:['-]{_LETTERS})*", forms.same),
+        ("sentence", r"(?<=[a-z])\.(?=[A-Z])|[,;:!?]", forms.same),
+        ("dot", r"\.", forms.dot),
+        ("symbol", r"[\s\S]", forms.symbol),
+    )
+
+
+@functools.cache
+def _scanner() -> tuple[re.Pattern[str], dict[str, forms.Reader]]:
+    rows = _forms()
+    return re.compile("|".join(f"(?P<f_{name}>{pattern})" for name, pattern, _ in rows)), {
+        f"f_{name}": reader for name, _, reader in rows
+    }
+
+
+def tokens(text: str) -> Iterator[Token]:
+    """Written forms of an English text in order, each with what it says; text between them is white space."""
+    pattern, readers = _scanner()
+    previous = ""
+    for match in pattern.finditer(plain(text)):
+        spoken = readers[match.lastgroup or ""](match, previous)
+        if spoken:
+            yield Token(match.group(), spoken)
+            previous = spoken.rpartition(" ")[2]
+
+
+def joined(spoken: list[str]) -> str:
+    """Words with single spaces, marks behind their word; of marks that meet, the first of the strongest stays."""
+    pieces: list[str] = []
+    for piece in spoken:
+        if piece not in MARKS:
+            pieces += [" ", piece] if pieces else [piece]
+        elif pieces and pieces[-1][-1] in MARKS:
+            pieces[-1] = pieces[-1][:-1] + max(pieces[-1][-1], piece, key=",;:.!?".find)
+        elif pieces:
+            pieces.append(piece)
+    return "".join(pieces).rstrip(" ,;:")
+
+
+def normalize(text: str, language: str = "en-us") -> str:
+    """The text in the words that it is said with; other languages than English: canonical characters only.
+
+    espeak-ng itself reads the numbers of the other languages.
+    """
+    if not language.startswith("en"):
+        return plain(text, keep_marks=True)
+    return joined([token.spoken for token in tokens(text)])

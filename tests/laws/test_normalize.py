@@ -1,0 +1,136 @@
+"""Normalisation never fails, changes its own output no more, and takes time in proportion to the text."""
+
+import time
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from lexicon.normalize import MARKS, normalize
+
+FORMS = st.sampled_from(
+    [
+        "Dr.",
+        "St.",
+        "Main",
+        "No.",
+        "5",
+        "12:30",
+        "$3.50",
+        "50%",
+        "e.g.",
+        "etc.",
+        "U.S.",
+        "1/2",
+        "-7",
+        "3-4",
+        "mp3",
+        "a@b.com",
+        "#Tag",
+        "www.x.org",
+        "VIII",
+        "Henry",
+        "'em",
+        "it's",
+        "(",
+        ")",
+        "“",
+        "…",
+        "—",
+        "–",
+        "-",
+        "/",
+        "&",
+        "½",
+        "²",
+        "😀",
+        "👍🏽",
+        "1990s",
+        "km",
+        "5",
+        "m²",
+        "March",
+        "3,",
+        "2024",
+        ".",
+        ",",
+        "!",
+        "?",
+        ":",
+        ";",
+        "\n",
+        "\n\n",
+        "\u200b",
+        "́",
+        "™",
+        "I.",
+        "A.B",
+        "p.m.",
+        "007",
+        "1,000",
+        "10^",
+        "^2",
+        "٣",
+        "π",
+        "漢",
+        "ß",
+        "ﬁ",
+    ]
+)
+TEXTS = st.one_of(st.text(), st.lists(FORMS, max_size=12).map("".join), st.lists(FORMS, max_size=12).map(" ".join))
+
+
+@given(TEXTS)
+@example("Dr .")
+@example("St™.")
+@example("St).")
+@example("5\u0301 km")
+@example("\ud800")
+def test_normalising_twice_is_normalising_once(text: str) -> None:
+    once = normalize(text)
+    assert normalize(once) == once
+
+
+@given(TEXTS)
+def test_no_digit_and_no_symbol_is_left(text: str) -> None:
+    spoken = normalize(text)
+    assert not any(character.isdigit() and character.isascii() for character in spoken)
+    assert not set(spoken) & set('$£€%&@#*_()[]{}<>"/\\+=~^|\n\t')
+    assert "  " not in spoken
+    assert not spoken[:1] or spoken[0] not in MARKS
+
+
+@given(st.text(), st.sampled_from(["de", "fr-fr", "hi", "ja", "ar"]))
+def test_other_languages_never_fail(text: str, language: str) -> None:
+    once = normalize(text, language)
+    assert normalize(once, language) == once
+
+
+@pytest.mark.parametrize(
+    "piece",
+    [
+        "It cost $5.20 on March 3, 2024 (e.g. 10:30 pm). ",
+        "a.",
+        "1",
+        "1,",
+        "a@",
+        "-",
+        "'",
+        "x ",
+        "....",
+        "w.",
+        "Dr ",
+        "\u0301",
+        "V",
+    ],
+)
+def test_time_grows_with_the_text_and_not_with_its_square(piece: str) -> None:
+    def seconds(length: int) -> float:
+        text = (piece * (length // len(piece) + 1))[:length]
+        began = time.perf_counter()
+        normalize(text)
+        return time.perf_counter() - began
+
+    seconds(1000)
+    small = min(seconds(3_000) for _ in range(3))
+    assert seconds(60_000) < 100 * max(small, 1e-3)  # 20 times the text: 400 times the time would be quadratic
