@@ -14,7 +14,7 @@ PRESS_MM = 0.12  # lips overlap by this at rest, so that no light falls between 
 REACH_MM = 5.0  # how far from the line of contact the skin follows
 N_COLUMNS = 61
 MOUTH_BOX = ((-0.32, 0.32), (6.45, 6.75), (1.25, 1.75))  # around the lips on the source's base mesh
-DEPTH_MM = 8.0  # behind the foremost place of a lip at its x begins the cavity
+DEPTH_MM = 12.0  # behind the foremost place of a lip at its x begins the cavity; lips touch up to 10 mm behind it
 
 
 def closed(skin: Skin) -> Skin:
