@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import dataclass
+from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ from tts2face.request import Request
 
 if TYPE_CHECKING:
     from tts2face.api import Cast
+    from tts2face.exemplar.explain import ShownPhone
     from tts2face.types import Clip
 
 EXPLANATIONS = (".json", ".txt")
@@ -66,12 +68,12 @@ def _make(request: Request, picture: Picture, errand: Errand, out: Path) -> None
     from tts2face.api import write_clip
 
     ready = _ready(errand)
-    told: list[Clip] = []
+    told = _Explanation(ready, request)
     with progress_bar("speaking and drawing", errand.quiet) as on_progress:
-        keep = told.append if errand.explain else None
+        keep = told.add if errand.explain else None
         written = write_clip(request, picture, ready, out, on_progress=on_progress, on_clip=keep)
     if errand.explain:
-        _explain(told, ready, request, errand.explain)
+        told.write(errand.explain)
     if not errand.quiet:
         took = time.perf_counter() - began
         say(
@@ -86,7 +88,10 @@ def _only_told(request: Request, errand: Errand) -> None:
     from tts2face.api import stream
 
     ready = _ready(errand)
-    _explain([piece.clip for piece in stream(request, ready)], ready, request, errand.explain)
+    told = _Explanation(ready, request)
+    for piece in stream(request, ready):
+        told.add(piece.clip)
+    told.write(errand.explain)
 
 
 def _ready(errand: Errand) -> "Cast":
@@ -97,7 +102,25 @@ def _ready(errand: Errand) -> "Cast":
     return cast(load_talker(errand.talker), load_face(errand.face, errand.identity))
 
 
-def _explain(clips: "list[Clip]", ready: "Cast", request: Request, path: Path) -> None:
-    from tts2face.api import explained
+class _Explanation:
+    """Gathers which recorded phones moved the lips, clip by clip."""
 
-    write_beside(path, explained(clips, ready, request, as_json=path.suffix == ".json"))
+    def __init__(self, ready: "Cast", request: Request) -> None:
+        self._ready, self._request = ready, request
+        self._seconds = 0.0
+        self._shown: list[ShownPhone] = []
+
+    def add(self, clip: "Clip") -> None:
+        """Explain one more clip."""
+        from tts2face.api import explain
+
+        self._shown += explain(clip, self._ready, self._request, begins=self._seconds)
+        self._seconds += clip.speech.waveform.duration
+
+    def write(self, path: Path) -> None:
+        """Write all as JSON or text, by suffix."""
+        from tts2face.exemplar.explain import explanation_json, explanation_text
+
+        shown = tuple(self._shown)
+        is_json = path.suffix == ".json"
+        write_beside(path, dumps(explanation_json(shown), ensure_ascii=False) if is_json else explanation_text(shown))

@@ -16,6 +16,7 @@ from lexicon.scripts import check_script
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.ahead import Ahead
 from tts2face.exemplar.animate import VisualVoice, speech_trajectory, visual_voice
+from tts2face.exemplar.explain import ShownPhone, explained
 from tts2face.exemplar.options import METHODS, SynthesisOptions
 from tts2face.face.model import Face
 from tts2face.face.retarget import Retargeter, retargeter
@@ -141,6 +142,12 @@ def _animated(speech: Speech, ready: Cast, request: Request) -> Clip:
     lips = speech_trajectory(speech.phones, ready.visual_voice, fps=fps, n_frames=n_frames, options=_options(request))
     head = Trajectory(HEAD_CHANNELS, np.zeros((n_frames, len(HEAD_CHANNELS)), np.float32), fps)
     return Clip(ready.retargeter.retarget(lips), head, speech)
+
+
+def explain(clip: Clip, ready: Cast, request: Request, *, begins: float = 0.0) -> tuple[ShownPhone, ...]:
+    """For each phone of a clip, which recorded tokens moved the lips; `begins` is the clip's second in the whole."""
+    shown = explained(clip.speech.phones, ready.visual_voice, options=_options(request))
+    return tuple(replace(phone, start=phone.start + begins, end=phone.end + begins) for phone in shown)
 
 
 @dataclass(frozen=True, slots=True)
