@@ -33,7 +33,9 @@ def _hairs(generator: np.random.Generator, thickness: float) -> tuple[Floats, Fl
     slope = np.gradient(np.interp(ARCH[:, 0], ARCH[:, 0], ARCH[:, 1]), ARCH[:, 0])
     thick = thickness * np.interp(x, ARCH[:, 0], THICK_MM)
     roots = np.column_stack([x, np.interp(x, ARCH[:, 0], ARCH[:, 1]) + across * thick / 2])
-    lift = np.interp(along, [0, 0.12, 0.4, 1], [1.35, 1.0, 0.45, -0.05])  # hairs stand up at the nose and lie down outside
+    lift = np.interp(
+        along, [0, 0.12, 0.4, 1], [1.35, 1.0, 0.45, -0.05]
+    )  # hairs stand up at the nose and lie down outside
     turn = np.arctan(np.interp(x, ARCH[:, 0], slope)) + lift - 0.55 * across * np.clip(along + 0.3, 0, 1)
     turn += generator.normal(0, 0.13, N_HAIRS)
     length = np.interp(along, [0, 0.3, 1], [4.2, 6.2, 4.6]) * generator.uniform(0.75, 1.15, N_HAIRS)

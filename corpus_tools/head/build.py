@@ -5,7 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from corpus_tools.head import cartoon
 from corpus_tools.head.cage import caged
+from corpus_tools.head.cartoon import cartooned
 from corpus_tools.head.correspondence import TABLE, with_landmarks
 from corpus_tools.head.head import ADULT, Look, built_head, grounded
 from corpus_tools.head.identity import identities
@@ -39,6 +41,15 @@ def head_with_identities(source: Source, wants_identities: bool = False) -> tupl
     return face, identities(source, ground, look, built) if wants_identities else {}
 
 
+def cartoon_face(source: Source) -> Face:
+    """The cartoon: painted on the default head's skin, so that the same places get the same paint."""
+    ground, cage = grounded(caged(source, ADULT)), cartooned(caged(source, cartoon.TARGETS))
+    texture = painted(source, ground.skin, cartoon.LOOK.palette, np.random.default_rng(cartoon.LOOK.seed))
+    built = built_head(cage, ground, cartoon.LOOK)
+    face = joined(built, sorted(cage.units), texture, {"name": "cartoon", **METADATA})
+    return with_landmarks(face, ground.skin.base) if TABLE.is_file() else face
+
+
 def main() -> None:
     """Build and write."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -48,6 +59,7 @@ def main() -> None:
     source = read_source(arguments.data or fetched(Path.home() / ".cache/tts2face"))
     arguments.out.mkdir(parents=True, exist_ok=True)
     write_face(arguments.out / "head.face", *head_with_identities(source, wants_identities=True))
+    write_face(arguments.out / "cartoon.face", cartoon_face(source))
 
 
 if __name__ == "__main__":

@@ -82,7 +82,9 @@ def _cut(points: Floats, triangles: Ints, inside: Floats) -> tuple[Floats, Ints]
         to_one, to_two = crossing(odd, one), crossing(odd, two)
         faces += [(odd, to_one, to_two)] if is_in[odd] else [(to_one, one, two), (to_one, two, to_two)]
     cut = np.array(faces, np.int64).reshape(-1, 3)
-    return np.concatenate([points, np.array(new_points).reshape(-1, points.shape[1])]), np.concatenate([triangles[n_in == 3], cut])
+    return np.concatenate([points, np.array(new_points).reshape(-1, points.shape[1])]), np.concatenate(
+        [triangles[n_in == 3], cut]
+    )
 
 
 def _rolled(sheet: Sheet, off: float) -> Sheet:

@@ -1,5 +1,7 @@
 """Eyeballs: a sphere with a cornea, an iris with fibres and a dark rim, a pupil, a sclera that is not white."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,73 +11,98 @@ from corpus_tools.head.piece import Ball, Piece, Span
 Floats = NDArray[np.float64]
 
 N_AROUND = 44
-IRIS_RAD, PUPIL_RAD = 0.385, 0.15  # half angles seen from the centre: MakeHuman's balls are a third too large
 RECEDE_MM = 1.6  # how far a ball sinks while its lids are shut, which nobody sees: lids move on straight lines
 BULGE = 0.04  # of the radius, height of the cornea at its top
-RINGS = np.concatenate([
-    np.linspace(0.0, PUPIL_RAD, 4), np.linspace(PUPIL_RAD + 0.02, IRIS_RAD, 10), np.linspace(IRIS_RAD + 0.03, 0.66, 4),
-    np.linspace(0.8, 1.6, 7),
-])  # fmt: skip  # the back is never seen
-LOOKS = {"eyeLookUp": (-1, 0, 24.0), "eyeLookDown": (1, 0, 24.0), "eyeLookOut": (0, 1, 28.0), "eyeLookIn": (0, -1, 28.0)}
-IRIS = np.array([0.44, 0.50, 0.46])  # light, so that a tint can make it any colour
+BACK_RAD = 1.6  # the ball ends here; what is further back is never seen
+LOOKS = {
+    "eyeLookUp": (-1, 0, 24.0),
+    "eyeLookDown": (1, 0, 24.0),
+    "eyeLookOut": (0, 1, 28.0),
+    "eyeLookIn": (0, -1, 28.0),
+}
 SCLERA = np.array([0.90, 0.875, 0.855])
+
+
+@dataclass(frozen=True, slots=True)
+class EyeStyle:
+    """Half angles of iris and pupil seen from the centre, radians, and the iris' colour.
+
+    MakeHuman's balls are a third too large, so a natural iris takes a smaller angle than on a real eye. Its colour is
+    light, so that a tint can make it any.
+    """
+
+    iris: float = 0.385
+    pupil: float = 0.15
+    colour: tuple[float, float, float] = (0.44, 0.50, 0.46)
+
+
 MATERIALS = {"sclera": {"specular": 0.55, "shininess": 140.0}, "iris": {"specular": 0.9, "shininess": 260.0}}
 
 
-def balls_of(cage: Cage) -> tuple[Ball, Ball]:
+def balls_of(cage: Cage, style: EyeStyle | None = None) -> tuple[Ball, Ball]:
     """Left and right eyeball of a cage."""
-    found = []
+    found, drawn = [], style or EyeStyle()
     for side, word, sign in (("l", "Left", 1.0), ("r", "Right", -1.0)):
         centre, radius = sphere_of(cage.vertices[cage.group(f"helper-{side}-eye")])
         turns = {}
         for look, (about_x, about_y, degrees) in LOOKS.items():
             turns[look + word] = np.radians(degrees) * np.array([about_x, sign * about_y, 0.0])
-        found.append(Ball(centre, radius, turns))
+        found.append(Ball(centre, radius, turns, drawn.iris, drawn.pupil))
     return found[0], found[1]
 
 
 def ball_radius(ball: Ball, off: Floats) -> Floats:
     """Distance of the surface from the centre, mm, at angles from the gaze, radians."""
-    return ball.radius * (1.0 + BULGE * np.clip(1.0 - (off / (IRIS_RAD * 1.15)) ** 2, 0, None) ** 1.3)
+    return ball.radius * (1.0 + BULGE * np.clip(1.0 - (off / (ball.iris * 1.15)) ** 2, 0, None) ** 1.3)
 
 
-def eyeball(ball: Ball, side: str, generator: np.random.Generator) -> Piece:
+def eyeball(ball: Ball, side: str, style: EyeStyle, generator: np.random.Generator) -> Piece:
     """The drawn eyeball of the side ``Left`` or ``Right``."""
+    rings = _rings(style)
     around = np.linspace(0, 2 * np.pi, N_AROUND, endpoint=False)
-    off, turn = (grid.ravel() for grid in np.meshgrid(RINGS, around, indexing="ij"))
+    off, turn = (grid.ravel() for grid in np.meshgrid(rings, around, indexing="ij"))
     towards = np.stack([np.sin(off) * np.cos(turn), np.sin(off) * np.sin(turn), np.cos(off)], axis=1)
-    row, column = np.meshgrid(np.arange(len(RINGS) - 1), np.arange(N_AROUND), indexing="ij")
+    row, column = np.meshgrid(np.arange(len(rings) - 1), np.arange(N_AROUND), indexing="ij")
     a, b = row * N_AROUND + column, row * N_AROUND + (column + 1) % N_AROUND
     quads = np.stack([a, a + N_AROUND, b + N_AROUND, b], axis=-1).reshape(-1, 4)
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    in_iris = off[triangles].max(axis=1) <= IRIS_RAD + 0.031
+    in_iris = off[triangles].max(axis=1) <= style.iris + 0.031
     return Piece(
         vertices=ball.centre + ball_radius(ball, off)[:, None] * towards,
         spans=(
             Span("sclera", triangles[~in_iris], MATERIALS["sclera"]),
             Span("iris", triangles[in_iris], MATERIALS["iris"]),
         ),
-        colours=_painted(off, turn, towards[:, 1], generator),
+        colours=_painted((off, turn, towards[:, 1]), style, generator),
         shapes={f"eyeBlink{side}": np.tile([0.0, 0.0, -RECEDE_MM], (len(towards), 1))},
     )
 
 
-def _painted(off: Floats, turn: Floats, up: Floats, generator: np.random.Generator) -> Floats:
+def _rings(style: EyeStyle) -> Floats:
+    """Angles from the gaze at which the ball's vertices lie."""
+    inner = np.linspace(style.pupil + 0.02, style.iris, 10)
+    outer = np.linspace(style.iris + 0.03, style.iris + 0.27, 4)
+    return np.concatenate([np.linspace(0, style.pupil, 4), inner, outer, np.linspace(style.iris + 0.4, BACK_RAD, 7)])
+
+
+def _painted(at: tuple[Floats, Floats, Floats], style: EyeStyle, generator: np.random.Generator) -> Floats:
     """(N, 3) colours by the angle from the gaze, the angle around it and the height on the ball."""
+    off, turn, up = at
     fibres = np.zeros_like(turn)
     for waves in (5, 9, 14, 23, 31):
         fibres += np.sin(waves * turn + generator.uniform(0, 2 * np.pi) + 3.0 * off) / 5
-    depth = np.clip((off - PUPIL_RAD) / (IRIS_RAD - PUPIL_RAD), 0, 1)
+    depth = np.clip((off - style.pupil) / (style.iris - style.pupil), 0, 1)
     warm = np.exp(-(((depth - 0.12) / 0.22) ** 2))[:, None]  # the lighter frill about the pupil
-    iris = IRIS * (0.72 + 0.30 * fibres + 0.28 * depth)[:, None]
+    base = np.array(style.colour)
+    iris = base * (0.72 + 0.30 * fibres + 0.28 * depth)[:, None]
     iris = iris * (1 - 0.5 * warm) + 0.5 * warm * np.array([0.50, 0.40, 0.24]) * (0.9 + 0.3 * fibres)[:, None]
     iris *= (1.0 - 0.72 * np.clip((depth - 0.78) / 0.22, 0, 1) ** 1.5)[:, None]
-    pink = np.clip((off - 0.62) / 0.7, 0, 1)[:, None]
+    pink = np.clip((off - style.iris - 0.24) / 0.7, 0, 1)[:, None]
     sclera = SCLERA * (1 - pink * np.array([0.06, 0.20, 0.20]))
     veins = np.clip(np.sin(11 * turn + 2.5 * np.sin(9 * off)) - 0.86, 0, 1)[:, None] * pink
     sclera *= 1 - 1.4 * veins * np.array([0.1, 0.9, 0.9])
-    edge = np.clip((off - IRIS_RAD) / 0.07, 0, 1)[:, None]
-    colours = np.where(off[:, None] <= PUPIL_RAD + 1e-9, 0.015, iris)
-    colours = np.where(off[:, None] > IRIS_RAD, (1 - edge) * IRIS * 0.35 + edge * sclera, colours)
+    edge = np.clip((off - style.iris) / 0.07, 0, 1)[:, None]
+    colours = np.where(off[:, None] <= style.pupil + 1e-9, 0.015, iris)
+    colours = np.where(off[:, None] > style.iris + 1e-9, (1 - edge) * base * 0.35 + edge * sclera, colours)
     shade = 1.0 - 0.45 * np.clip((up - 0.12) / 0.42, 0, 1)  # the upper lid's shadow
     return colours * shade[:, None]

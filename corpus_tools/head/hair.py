@@ -36,7 +36,9 @@ def hair_share(places: Floats) -> Floats:
     off = places - MIDDLE
     angle = np.degrees(np.arctan2(np.abs(off[:, 0]), off[:, 2]))
     line = np.interp(angle, LINE_DEG, LINE_Y)
-    ragged = 1.6 * np.sin(0.55 * places[:, 0] + 0.31 * places[:, 2]) + 1.1 * np.sin(1.3 * places[:, 0] - 0.9 * places[:, 2])
+    ragged = 1.6 * np.sin(0.55 * places[:, 0] + 0.31 * places[:, 2]) + 1.1 * np.sin(
+        1.3 * places[:, 0] - 0.9 * places[:, 2]
+    )
     share = ramp(places[:, 1] + ragged - line, -SOFT_MM / 2, SOFT_MM / 2)
     mirrored = np.column_stack([np.abs(places[:, 0]), places[:, 1:]])
     ear = np.linalg.norm((mirrored - EAR[0]) / EAR[1], axis=1)
@@ -78,7 +80,7 @@ def strand_colour(places: Floats, colour: Floats, generator: np.random.Generator
     """(P, 3) hair at places."""
     fine = lumps(strand_field(places, 1.6, 38.0), 1.0, generator)
     broad = lumps(strand_field(places, 6.0, 55.0), 1.0, generator)
-    light = 1 + 0.42 * fine + 0.26 * broad
+    light = 1 + 0.34 * fine + 0.22 * broad
     warm = np.array([1.06, 1.0, 0.92])
     return np.clip(colour * light[:, None] * np.where(fine[:, None] > 0.4, warm, 1.0), 0.02, 1)
 

@@ -1,13 +1,15 @@
 """The head: its pieces for any identity, in one order, so that vertex for vertex they are the same."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.head.cage import Cage
 from corpus_tools.head.cloth import shirt
-from corpus_tools.head.eyes import balls_of, eyeball
+from corpus_tools.head.eyes import EyeStyle, balls_of, eyeball
 from corpus_tools.head.hair import MATERIAL as HAIR_MATERIAL
 from corpus_tools.head.hair import Cut, hair_share, locks, thickness
 from corpus_tools.head.jaw import Jaw, jaw_of
@@ -16,6 +18,7 @@ from corpus_tools.head.layout import laid_out
 from corpus_tools.head.lids import cleared
 from corpus_tools.head.lips import closed
 from corpus_tools.head.piece import Built, Piece, Span
+from corpus_tools.head.shapes import softened
 from corpus_tools.head.skin import Skin, shoulders, skinned, vertex_normals
 from corpus_tools.head.subdivide import triangulated
 from corpus_tools.head.teeth import LOWER, UPPER, arch_piece, fitted
@@ -25,8 +28,12 @@ from corpus_tools.head.tongue import tongue_piece
 Floats = NDArray[np.float64]
 
 SKIN_MATERIAL = {"specular": 0.16, "shininess": 14.0, "wrap": 0.35, "textured": True}
+HAIR_PART_SHARE = 0.88  # of a quad that counts as hair; below it the hairline is painted on skin
 PIVOT = np.array([0.0, -75.0, -95.0])  # where the skull sits on the neck
-ADULT = {"macrodetails/caucasian-female-young": 1.0, "macrodetails/universal-female-young-averagemuscle-averageweight": 1.0}
+ADULT = {
+    "macrodetails/caucasian-female-young": 1.0,
+    "macrodetails/universal-female-young-averagemuscle-averageweight": 1.0,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +42,9 @@ class Look:
 
     palette: Palette = field(default_factory=Palette)
     cut: Cut = field(default_factory=Cut)
+    eyes: EyeStyle = field(default_factory=EyeStyle)
     shirt: tuple[float, float, float] = (0.20, 0.29, 0.36)
+    skin_material: Mapping[str, Any] = field(default_factory=lambda: SKIN_MATERIAL)
     seed: int = 7
 
 
@@ -56,10 +65,12 @@ def grounded(cage: Cage) -> Ground:
 def built_head(cage: Cage, ground: Ground, look: Look) -> Built:
     """Skin with hair, eyeballs, teeth, tongue, lashes, locks and shirt of a cage."""
     jaw = jaw_of(cage)
-    balls = balls_of(cage)
-    skin = cleared(closed(skinned(cage)), balls)
+    balls = balls_of(cage, look.eyes)
+    skin = cleared(softened(closed(skinned(cage))), balls)
     flesh, hairs = _flesh(skin, ground, look)
-    eyes = [eyeball(ball, side, _generator(look)) for ball, side in zip(balls, ("Left", "Right"), strict=True)]
+    eyes = [
+        eyeball(ball, side, look.eyes, _generator(look)) for ball, side in zip(balls, ("Left", "Right"), strict=True)
+    ]
     pieces = (
         flesh,
         *eyes,
@@ -82,9 +93,9 @@ def _flesh(skin: Skin, ground: Ground, look: Look) -> tuple[Piece, Piece]:
     share = hair_share(places)
     normals = vertex_normals(skin.vertices, skin.quads, skin.base)
     vertices = skin.vertices + thickness(places, look.cut, _generator(look))[:, None] * normals
-    has_hair = share[skin.quads].mean(axis=1) > 0.45
+    has_hair = share[skin.quads].mean(axis=1) > HAIR_PART_SHARE
     spans = (
-        Span("skin", triangulated(skin.quads[~has_hair]), SKIN_MATERIAL),
+        Span("skin", triangulated(skin.quads[~has_hair]), look.skin_material),
         Span("hair", triangulated(skin.quads[has_hair]), HAIR_MATERIAL),
     )
     colours = np.tile(np.array(look.palette.skin), (len(vertices), 1))

@@ -40,13 +40,13 @@ class Person:
 
 
 BROWN, DARK = (0.72, 0.50, 0.36), (0.46, 0.31, 0.22)  # eyes; the drawn iris is light
-BLACK, BLOND, GREY = (0.55, 0.55, 0.6), (2.6, 2.5, 2.1), (2.7, 3.7, 4.8)  # hair
+BLACK, BLOND, GREY = (0.45, 0.46, 0.52), (2.35, 2.75, 2.5), (2.0, 2.8, 3.8)  # hair
 YOUNG, MATURE, OLD, CHILD = {"young": 1.0}, {"young": 0.5, "old": 0.5}, {"old": 1.0}, {"child": 0.85, "young": 0.15}
 PERSONS: dict[str, Person] = {
-    "erik": Person("man, about 30, European", "male", YOUNG, {"caucasian": 1}, (0.98, 0.95, 0.93), shirt=(1.2, 0.9, 0.8)),
+    "erik": Person("man, about 30, European", "male", YOUNG, {"caucasian": 1}, (0.98, 0.95, 0.93), BLOND, (0.9, 1.0, 1.2), (1.2, 0.9, 0.8)),
     "amara": Person("woman, about 30, West African", "female", YOUNG, {"african": 1}, (0.56, 0.47, 0.42), BLACK, DARK, (2.6, 1.5, 0.7)),
     "kofi": Person("man, about 35, West African", "male", {"young": 0.85, "old": 0.15}, {"african": 1}, (0.48, 0.40, 0.36), BLACK, DARK),
-    "mei": Person("woman, about 28, East Asian", "female", YOUNG, {"asian": 1}, (1.01, 0.985, 0.93), BLACK, DARK, (2.8, 1.2, 1.1)),
+    "mei": Person("woman, about 28, East Asian", "female", YOUNG, {"asian": 1}, (1.01, 0.99, 0.94), BLACK, DARK, (2.8, 1.2, 1.1)),
     "kenji": Person("man, about 40, East Asian", "male", {"young": 0.75, "old": 0.25}, {"asian": 1}, (0.95, 0.91, 0.86), BLACK, DARK),
     "leila": Person("woman, about 35, mixed ancestry", "female", {"young": 0.85, "old": 0.15},
                     {"caucasian": 0.45, "african": 0.3, "asian": 0.25}, (0.80, 0.72, 0.66), BLACK, BROWN, (1.2, 2.0, 1.3)),

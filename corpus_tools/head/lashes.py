@@ -61,7 +61,9 @@ def grid_of(quads: NDArray[np.int64]) -> NDArray[np.int64]:
     """Vertex numbers (across, along) of a strip of quads (F, 4) that forms a grid, the short side first."""
     n = int(quads.max()) + 1
     sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2)
-    steps = shortest_path(sparse.coo_array((np.ones(len(sides)), sides.T), shape=(n, n)), directed=False, unweighted=True)
+    steps = shortest_path(
+        sparse.coo_array((np.ones(len(sides)), sides.T), shape=(n, n)), directed=False, unweighted=True
+    )
     corners = np.flatnonzero(np.bincount(quads.ravel(), minlength=n) == 1)
     first = corners[0]
     second = min(corners[1:], key=lambda corner: steps[first, corner])
@@ -93,7 +95,12 @@ def _blades(
             out = ROOT_ROW + share * reach[blade]
             i, j = min(int(out), n_across - 2), int(along)
             u, v = out - i, along - j
-            for step, part in (((0, 0), (1 - u) * (1 - v)), ((1, 0), u * (1 - v)), ((0, 1), (1 - u) * v), ((1, 1), u * v)):
+            for step, part in (
+                ((0, 0), (1 - u) * (1 - v)),
+                ((1, 0), u * (1 - v)),
+                ((0, 1), (1 - u) * v),
+                ((1, 1), u * v),
+            ):
                 weights[5 * blade + vertex, grid[i + step[0], j + step[1]]] += part
     carry = weights.tocsr()
     tangent = np.gradient(places[grid[0]], axis=0)

@@ -8,6 +8,7 @@ from scipy import sparse
 
 from corpus_tools.head.eyes import RECEDE_MM, ball_radius
 from corpus_tools.head.piece import Ball
+from corpus_tools.head.shapes import neighbours
 from corpus_tools.head.skin import Skin
 from tts2face.face.linear import rotation_matrix
 
@@ -39,20 +40,6 @@ def overlap(vertices: Floats, ball: Ball, name: str, weight: float) -> Floats:
     distance = np.linalg.norm(off, axis=1)
     angle = np.arccos(np.clip((off @ turn)[:, 2] / distance, -1, 1))
     return ball_radius(ball, angle) - distance
-
-
-def neighbours(skin: Skin) -> sparse.csr_array:
-    """(N, N) means over the vertices that share an edge, those of a seam counting as one."""
-    _, weld = np.unique(np.rint(skin.base * 1e6).astype(np.int64), axis=0, return_inverse=True)
-    weld = weld.ravel()
-    n, m = len(weld), int(weld.max()) + 1
-    sides = weld[np.stack([skin.quads, np.roll(skin.quads, -1, axis=1)], axis=-1).reshape(-1, 2)]
-    pairs = np.unique(np.concatenate([sides, sides[:, ::-1]]), axis=0)
-    one = sparse.csr_array((np.ones(len(pairs)), pairs.T), shape=(m, m))
-    mean = sparse.diags_array(1.0 / one.sum(axis=1)) @ one
-    first = np.zeros(m, np.int64)
-    first[weld] = np.arange(n)
-    return mean[weld][:, weld] @ sparse.diags_array((first[weld] == np.arange(n)).astype(float))
 
 
 def _push(vertices: Floats, moved: Floats, ball: Ball, name: str, beside: sparse.csr_array) -> Floats:

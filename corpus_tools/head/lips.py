@@ -33,7 +33,9 @@ def lip_gaps(skin: Skin) -> tuple[Floats, Floats, Floats]:
     is_lower = lower_share(skin)[edges].mean(axis=1) > 0
     half = _half_width(skin)
     columns = np.linspace(-half, half, N_COLUMNS)
-    upper, lower = (_rims(skin.vertices, edges[is_lower == low], columns, -1.0 if low else 1.0) for low in (False, True))
+    upper, lower = (
+        _rims(skin.vertices, edges[is_lower == low], columns, -1.0 if low else 1.0) for low in (False, True)
+    )
     return columns, upper, lower
 
 
@@ -45,7 +47,9 @@ def lower_share(skin: Skin) -> Floats:
 
 
 def _mouth(skin: Skin) -> NDArray[np.bool_]:
-    return np.all([(skin.base[:, k] > low) & (skin.base[:, k] < high) for k, (low, high) in enumerate(MOUTH_BOX)], axis=0)
+    return np.all(
+        [(skin.base[:, k] > low) & (skin.base[:, k] < high) for k, (low, high) in enumerate(MOUTH_BOX)], axis=0
+    )
 
 
 def _half_width(skin: Skin) -> float:
@@ -77,7 +81,9 @@ def _closing(skin: Skin) -> Floats:
     x = skin.vertices[:, 0]
     moved = np.zeros_like(skin.vertices)
     for sign, rim in ((-1.0, upper), (1.0, lower)):
-        line = np.stack([np.interp(x, columns, np.nan_to_num(rim[:, k], nan=float(np.nanmean(rim[:, k])))) for k in (0, 1)], 1)
+        line = np.stack(
+            [np.interp(x, columns, np.nan_to_num(rim[:, k], nan=float(np.nanmean(rim[:, k])))) for k in (0, 1)], 1
+        )
         off = np.linalg.norm((skin.vertices[:, 1:] - line) * [1.0, 0.7], axis=1)
         reach = np.exp(-((off / REACH_MM) ** 2)) * np.clip(sign * share, 0, 1) * (np.abs(x) < columns.max())
         moved[:, 1] += sign * 0.5 * reach * np.interp(x, columns, gap)

@@ -34,11 +34,16 @@ class Piece:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ball:
-    """An eyeball: centre (3,), radius in mm, and its turns by gaze shape, rotation vectors (3,) in radians."""
+    """An eyeball: centre (3,), radius in mm, and its turns by gaze shape, rotation vectors (3,) in radians.
+
+    ``iris`` and ``pupil`` are half angles seen from the centre, radians.
+    """
 
     centre: Floats
     radius: float
     turns: Mapping[str, Floats]
+    iris: float
+    pupil: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -48,7 +48,9 @@ def skinned(cage: Cage) -> Skin:
     """The head and neck of a cage, one Catmull-Clark step finer."""
     body = cage.source.groups["body"]
     places, where = cage.source.vertices[body.corners], cage.source.uv[body.uv_corners]
-    kept = (places[:, :, 1] - NECK_SLOPE * places[:, :, 2] > NECK_Y).any(axis=1) & (np.abs(places[:, :, 0]) < 1.2).all(axis=1)
+    kept = (places[:, :, 1] - NECK_SLOPE * places[:, :, 2] > NECK_Y).any(axis=1) & (np.abs(places[:, :, 0]) < 1.2).all(
+        axis=1
+    )
     kept &= ~((where[:, :, 0] < SOCKET_U) & (places[:, :, 2] < SOCKET_Z)).all(axis=1)
     return _finer(cage, kept & (places[:, :, 1] > LOWEST).all(axis=1))
 

@@ -36,8 +36,12 @@ class Arch:
 
 
 # Sizes after Wheeler, Dental Anatomy; outer curves after MakeHuman's strip, in units of the source.
-UPPER_CURVE = SCALE * np.array([(0, 0.196), (0.080, 0.184), (0.150, 0.140), (0.197, 0.080), (0.230, 0.010), (0.258, -0.070), (0.278, -0.170)])
-LOWER_CURVE = SCALE * np.array([(0, 0.166), (0.072, 0.156), (0.138, 0.114), (0.186, 0.056), (0.222, -0.012), (0.254, -0.090), (0.276, -0.190)])
+UPPER_CURVE = SCALE * np.array(
+    [(0, 0.196), (0.080, 0.184), (0.150, 0.140), (0.197, 0.080), (0.230, 0.010), (0.258, -0.070), (0.278, -0.170)]
+)
+LOWER_CURVE = SCALE * np.array(
+    [(0, 0.166), (0.072, 0.156), (0.138, 0.114), (0.186, 0.056), (0.222, -0.012), (0.254, -0.090), (0.276, -0.190)]
+)
 UPPER = Arch(
     UPPER_CURVE, -0.636 * SCALE, 1.0,
     np.array([8.6, 6.7, 7.7, 7.0, 6.8, 9.8]),
@@ -53,7 +57,10 @@ LOWER = Arch(
 TOOTH, TOOTH_DARK = np.array([0.985, 0.965, 0.915]), np.array([0.90, 0.84, 0.74])
 GUM = np.array([0.68, 0.36, 0.36])
 N_AROUND, LEVELS = 12, np.array([0.0, 0.04, 0.13, 0.45, 1.0])
-MATERIALS = {"teeth": {"specular": 0.5, "shininess": 60.0, "wrap": 0.3}, "gums": {"specular": 0.4, "shininess": 40.0, "wrap": 0.3}}
+MATERIALS = {
+    "teeth": {"specular": 0.5, "shininess": 60.0, "wrap": 0.3},
+    "gums": {"specular": 0.4, "shininess": 40.0, "wrap": 0.3},
+}
 
 
 def arch_piece(arch: Arch, name: str) -> Piece:
@@ -124,7 +131,9 @@ def _crown(width: float, height: float, depth: float) -> tuple[Floats, Floats]:
     is_cutting = depth < 6.5
     breadth = np.interp(LEVELS, [0, 0.03, 0.10, 0.25, 0.6, 1], [0.70, 0.86, 0.955, 0.985, 0.95, 0.80]) * width / 2
     edge = 0.28 if is_cutting else 0.62
-    thick = np.interp(LEVELS, [0, 0.03, 0.10, 0.25, 0.6, 1], [0.6 * edge, edge, edge + 0.1, edge + 0.2, 0.86, 1.0]) * depth
+    thick = (
+        np.interp(LEVELS, [0, 0.03, 0.10, 0.25, 0.6, 1], [0.6 * edge, edge, edge + 0.1, edge + 0.2, 0.86, 1.0]) * depth
+    )
     front = -np.interp(LEVELS, [0, 0.1, 0.35, 1], [0.9, 0.35, 0.0, 0.5]) - thick / 2
     rings = np.stack([
         breadth[:, None] * corner[:, 0],

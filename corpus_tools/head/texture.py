@@ -59,7 +59,9 @@ def painted(source: Source, skin: Skin, palette: Palette, generator: np.random.G
     colour += brows[:, None] * (np.array(palette.hair) * 0.9 - colour)
     hair = hair_share(place)
     strands = strand_colour(place, np.array(palette.hair), generator)
-    ragged = np.clip(hair * 1.6 - 0.3 + 0.45 * lumps(strand_field(place, 1.4, 16.0), 1.0, generator) * (hair < 0.97), 0, 1)
+    ragged = np.clip(
+        hair * 1.6 - 0.3 + 0.45 * lumps(strand_field(place, 1.4, 16.0), 1.0, generator) * (hair < 0.97), 0, 1
+    )
     colour += (ragged * (hair > 0.02))[:, None] * (strands - colour)
     return _filled(texels.rows, texels.columns, colour)
 
@@ -70,7 +72,9 @@ def _flesh(place: Floats, where: Floats, source: Source, palette: Palette, gener
     for centre, reach, tint in TINTS:
         factors *= 1 + strength * bell(place, centre, reach)[:, None] * (np.array(tint) - 1)
     factors *= 1 - strength * _sampled(source.mask("ears"), where)[:, None] * np.array([0.0, 0.10, 0.09])
-    factors *= 1 - strength * _sampled(gaussian_filter(source.mask("eyelids"), 3), where)[:, None] * np.array([0.04, 0.10, 0.09])
+    factors *= 1 - strength * _sampled(gaussian_filter(source.mask("eyelids"), 3), where)[:, None] * np.array(
+        [0.04, 0.10, 0.09]
+    )
     factors *= 1 - strength * 0.07 * _fold(place)[:, None] * np.array([0.7, 1.0, 1.0])
     blotch = 0.6 * lumps(place, 14.0, generator) + 0.4 * lumps(place, 5.0, generator)
     factors *= 1 + strength * 0.016 * blotch[:, None] * np.array([0.4, 1.3, 1.2])

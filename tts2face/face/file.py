@@ -212,6 +212,19 @@ def _assembled(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) ->
     )
 
 
+def _texel_share(face: Face, part: Part, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """(H, W) 1 on the texels of a part, a little less across its edge, 0 elsewhere."""
+    from PIL import Image, ImageDraw, ImageFilter
+
+    mask = Image.new("L", (shape[1], shape[0]))
+    pen = ImageDraw.Draw(mask)
+    places = np.asarray(face.uv, np.float64) * [shape[1], shape[0]] - 0.5
+    for corners in places[face.triangles[part.first : part.first + part.count]].tolist():
+        pen.polygon([tuple(corner) for corner in corners], fill=255, outline=255)
+    soft = mask.filter(ImageFilter.MaxFilter(3)).filter(ImageFilter.GaussianBlur(1.5))
+    return np.asarray(soft, np.float32) / 255
+
+
 def _identified(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], number: int) -> Face:
     moved = arrays[f"identity{number}"] * arrays[f"identity{number}_step"][0]
     name, tints, _ = header["identities"][number]
@@ -221,7 +234,8 @@ def _identified(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapping[
         used = np.unique(face.triangles[part.first : part.first + part.count])
         colours[used] = np.clip(face.colours[used] * tint, 0, 255).astype(np.uint8)
         if part.textured and texture is not None and not np.all(tint == 1):
-            texture = np.clip(texture * tint, 0, 255).astype(np.uint8)
+            share = _texel_share(face, part, texture.shape)[:, :, None]
+            texture = np.clip(texture * (1 + share * (tint - 1)), 0, 255).astype(np.uint8)
     eyes = [
         replace(eye, centre=eye.centre + moved[eye.first : eye.first + eye.count].mean(axis=0).astype(np.float32))
         for eye in face.eyes
