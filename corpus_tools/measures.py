@@ -27,6 +27,7 @@ CLOSURE_MARGIN_S = 0.03  # a closure may lie this far outside its phone's edges:
 CLOSURE_SHARE = 0.9  # of the real closures count as closed: the threshold is this quantile of their least openings
 DTW_BAND_S = 0.12  # of time by which synthesis may lead or lag unpunished by the warping cost
 DTW_PARAMETERS = 6  # shape parameters that the warping cost compares: 95 % of the motion
+ROUNDING_S = 1e-6  # a frame that falls on an edge counts, whatever the sum of floats says
 BILABIALS = ("p", "b", "m")
 OPEN_HEIGHTS = ("open", "near-open", "open-mid")
 
@@ -59,8 +60,8 @@ def judged_frames(phones: PhoneSequence, n_frames: int, fps: float) -> slice:
     sounding = [at for at, label in enumerate(phones.phones) if label != SILENCE]
     if not sounding:
         raise InputError("an utterance without speech cannot be judged; leave it out")
-    start = phones.edges[sounding[0]] - SPEECH_MARGIN_S
-    end = phones.edges[sounding[-1] + 1] + SPEECH_MARGIN_S
+    start = phones.edges[sounding[0]] - SPEECH_MARGIN_S - ROUNDING_S
+    end = phones.edges[sounding[-1] + 1] + SPEECH_MARGIN_S + ROUNDING_S
     times = np.arange(n_frames) / fps
     return slice(int(np.searchsorted(times, start)), int(np.searchsorted(times, end, side="right")))
 

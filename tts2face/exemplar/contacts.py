@@ -12,8 +12,8 @@ from tts2face.exemplar.tokens import Tokens
 LIP_PLACES = frozenset({"bilabial", "labiodental"})
 NON_CONTACTS = frozenset({"approximant"})  # narrowed, not closed
 WINDOW_S = 0.03  # a closure may lie this far outside its phone's edges (video frames are 40 ms, edges +- 10 ms)
-HOLD_S = 0.03  # lips stay together this long: recorded closures last 60-100 ms from first to last touch
-EASE_S = 0.07  # way into and out of the closure; recorded lips need 60-80 ms from open to closed
+HOLD_S = 0.03  # lips stay together at least this long: shorter, and the touch falls between two frames at 30 fps
+EASE_S = 0.05  # way into and out of it; longer eats into the vowels (0.06: r of opening falls by .001)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,6 +115,6 @@ def with_contacts(values: NDArray[np.float32], contacts: Contacts, gap: Gap, rat
         reach = int((HOLD_S / 2 + EASE_S) * rate_hz)
         here = slice(max(0, at - reach), min(len(kept), at + reach + 1))
         away = np.maximum(np.abs(times[here] - times[at]) - HOLD_S / 2, 0.0) / EASE_S
-        pull = 0.5 + 0.5 * np.cos(np.pi * np.minimum(away, 1.0))
-        kept[here] += (pull[:, None] * (pose - kept[at])).astype(np.float32)
+        pull = (0.5 + 0.5 * np.cos(np.pi * np.minimum(away, 1.0)))[:, None].astype(np.float32)
+        kept[here] += pull * (pose - kept[here])
     return kept

@@ -1,0 +1,89 @@
+import numpy as np
+import pytest
+
+from corpus_tools import measures
+from lexicon.errors import InputError
+from lexicon.sequence import SILENCE, PhoneSequence
+
+SPEECH = PhoneSequence([SILENCE, "p", "ɑ", "s", SILENCE], [0.0, 0.4, 0.5, 0.7, 0.8, 1.2])
+
+
+def landmarks(opening, width=50.0, eyes=80.0):
+    points = np.zeros((len(opening), 478, 3))
+    points[:, 14, 1] = -np.asarray(opening)
+    points[:, 61, 0], points[:, 291, 0] = -width / 2, width / 2
+    points[:, 33, 0], points[:, 263, 0] = -eyes / 2, eyes / 2
+    return points
+
+
+def test_opening_and_width_are_told_in_eye_distances():
+    points = landmarks([0.0, 8.0, 16.0])
+    assert measures.lip_opening(points).tolist() == [0.0, 0.1, 0.2]
+    assert measures.lip_width(points).tolist() == [0.625, 0.625, 0.625]
+
+
+def test_judged_from_a_tenth_of_a_second_before_speech_to_a_tenth_behind():
+    assert measures.judged_frames(SPEECH, 60, 50.0) == slice(15, 46)  # 0.30 s to 0.90 s, both frames included
+
+
+def test_silence_cannot_be_judged():
+    with pytest.raises(InputError, match="without speech"):
+        measures.judged_frames(PhoneSequence([SILENCE], [0.0, 1.0]), 25, 25.0)
+
+
+def test_correlation_of_known_series():
+    assert measures.correlation(np.array([1.0, 2.0, 3.0]), np.array([2.0, 4.0, 6.0])) == pytest.approx(1.0)
+    assert measures.correlation(np.array([1.0, 2.0, 3.0]), np.array([3.0, 2.0, 1.0])) == pytest.approx(-1.0)
+    assert measures.correlation(np.array([1.0, 2.0, 3.0, 4.0]), np.array([1.0, 3.0, 2.0, 4.0])) == pytest.approx(0.8)
+    assert measures.correlation(np.array([1.0, 2.0, 3.0]), np.ones(3)) == 0.0
+
+
+def test_range_ratio_is_the_ratio_of_spreads():
+    assert measures.range_ratio(np.array([0.0, 2.0]), np.array([5.0, 6.0])) == pytest.approx(0.5)
+
+
+def test_rmse_is_in_units_of_spread():
+    real, made = np.zeros((2, 2)), np.array([[2.0, 0.0], [0.0, 6.0]])
+    assert measures.rmse_z(real, made, np.array([2.0, 3.0])) == pytest.approx(((1 + 4) / 4) ** 0.5)
+
+
+def test_warping_cost_forgives_a_small_delay_and_divides_by_the_path():
+    pulse = np.zeros((10, 1))
+    pulse[4] = 1.0
+    late = np.roll(pulse, 2, axis=0)
+    assert measures.warping_cost(pulse, late, np.ones(1), 25.0) == 0.0
+    # 4 frames (160 ms) lie beyond the band of 3: one pulse must be matched to stillness on either side.
+    assert measures.warping_cost(pulse, np.roll(pulse, 4, axis=0), np.ones(1), 25.0) == pytest.approx(2 / 10)
+    # Two still motions one spread apart: 10 pairs of distance 2 / 2.
+    assert measures.warping_cost(np.zeros((10, 1)), np.full((10, 1), 2.0), np.full(1, 2.0), 25.0) == pytest.approx(1.0)
+
+
+def test_least_opening_looks_a_little_beyond_the_phone():
+    opening = np.full(60, 1.0)
+    opening[19] = 0.3  # 0.38 s: 20 ms before the p
+    opening[40] = 0.1  # in the silence
+    assert measures.least_openings(opening, SPEECH, 50.0).tolist() == [0.3]
+    opening[18] = 0.2  # 0.36 s: 40 ms before, too far
+    assert measures.least_openings(opening, SPEECH, 50.0).tolist() == [0.3]
+    assert measures.least_openings(opening, SPEECH, 50.0, ("m",)).tolist() == []
+
+
+def test_open_vowels_are_read_in_their_middle():
+    opening = np.arange(60) / 50.0  # equals its own time
+    np.testing.assert_allclose(measures.midpoint_openings(opening, SPEECH, 50.0), [0.6])
+    np.testing.assert_allclose(measures.midpoint_openings(opening, SPEECH, 50.0, ("p", "s")), [0.45, 0.75])
+
+
+def test_knows_the_open_vowels():
+    found = measures.open_vowels()
+    assert {"ɑ", "æ", "ɛ", "aɪ", "aʊ", "ʌ"} <= found
+    assert not {"i", "u", "eɪ", "oʊ", "ə", "p", SILENCE} & found
+
+
+def test_nine_of_ten_real_closures_lie_below_the_threshold():
+    real = np.arange(1.0, 12.0)
+    threshold = measures.closure_threshold(real)
+    assert threshold == 10.0
+    assert measures.share_below(real, threshold) == pytest.approx(10 / 11)
+    assert measures.share_below(np.array([9.0, 10.5]), threshold) == 0.5
+    assert measures.closure_threshold(np.array([])) == measures.share_below(np.array([]), 1.0) == 0.0
