@@ -1,6 +1,7 @@
 """From a folder of recordings to a talker file."""
 
 import json
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -64,7 +65,7 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
         "name": recordings.resolve().name,
         **stated,
         **({"name": name} if name else {}),
-        "command": f"tts2face corpus build {recordings.name} --out {out.name}",
+        "command": _command(recordings, out, name, provenance),
         "created": created or datetime.now(UTC).date().isoformat(),
         "content": CONTENT,
         "refused": [[refusal.name, refusal.reason] for refusal in observations.refused],
@@ -92,3 +93,10 @@ def read_provenance(path: Path, *, must_exist: bool) -> Mapping[str, Any]:
     if not isinstance(stated, dict) or not set(stated) <= set(PROVENANCE_FIELDS):
         raise DataError(f"{path} must be a JSON object with fields out of {', '.join(PROVENANCE_FIELDS)}")
     return stated
+
+
+def _command(recordings: Path, out: Path, name: str | None, provenance: Path | None) -> str:
+    words = ["tts2face", "corpus", "build", recordings.name]
+    words += ["--name", name] if name else []
+    words += ["--provenance", provenance.name] if provenance else []
+    return shlex.join([*words, "--out", out.name])

@@ -1,0 +1,80 @@
+"""A made corpus with a known answer, and a small folder of real recordings."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from corpus_tools.observation import Observation, Quality
+from lexicon.errors import BackendError
+from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from tts2face.landmarks import MOUTH_REGION, N_LANDMARKS
+from tts2face.video.model import find_bundle
+
+CLIPS = ("bbaf2n", "bbaf3s", "bbaf5a")
+FPS = 25.0
+
+
+@pytest.fixture(scope="session")
+def face_model() -> Path:
+    pytest.importorskip("ai_edge_litert", reason="needs `pip install 'tts2face[capture]'`")
+    pytest.importorskip("cv2", reason="needs `pip install 'tts2face[capture]'`")
+    try:
+        return find_bundle()
+    except BackendError as missing:
+        pytest.skip(str(missing))
+
+
+@pytest.fixture
+def real_folder(tmp_path: Path, shared_recordings: Path) -> Path:
+    """Three recordings of GRID s1 in its own layout."""
+    folder = tmp_path / "recordings"
+    (folder / "clips").mkdir(parents=True)
+    for clip in CLIPS:
+        shutil.copy(shared_recordings / "grid_s1" / "clips" / f"{clip}.mkv", folder / "clips")
+    lines = (shared_recordings / "grid_s1" / "manifest.csv").read_text().splitlines()
+    wanted = [line for line in lines if line.startswith(("clip,", *CLIPS))]
+    (folder / "manifest.csv").write_text("\n".join(wanted) + "\n")
+    return folder
+
+
+def made_observation(name: str, seed: int, n_frames: int = 60) -> Observation:
+    """Faces that move along two known directions of the mouth and one of the rest, and lips that start closed."""
+    generator = np.random.default_rng(seed)
+    mean = np.random.default_rng(99).normal(0, 40, (N_LANDMARKS, 3))
+    mean[33], mean[263] = (-44.5, 0, 0), (44.5, 0, 0)
+    mean[14] = mean[13]
+    directions = known_directions()
+    amounts = generator.normal(0, (9.0, 4.0, 3.0), (n_frames, 3))
+    amounts[:20] = 0
+    landmarks = mean + np.einsum("tk,klc->tlc", amounts, directions)
+    head = generator.normal((0.3, -0.2, 0.1, 0, 0, 0), (0.05, 0.05, 0.02, 1, 1, 1), (n_frames, 6))
+    phones = PhoneSequence([SILENCE, "b", "ɪ", "n", SILENCE], [0.0, 1.0, 1.1, 1.3, 1.5, n_frames / FPS])
+    return Observation(
+        name,
+        FPS,
+        landmarks.astype(np.float32),
+        head.astype(np.float32),
+        phones,
+        (WordSpan("bin", 1, 4),),
+        generator.uniform(30, 80, n_frames).astype(np.float32),
+        Quality(-3000.0, 1.0, 0, 0.0),
+    )
+
+
+def known_directions() -> np.ndarray:
+    """(3, 478, 3) orthonormal: two of the mouth, one of the rest; the first two part the lips."""
+    mouth = np.isin(np.arange(N_LANDMARKS), MOUTH_REGION)
+    raw = np.random.default_rng(5).normal(size=(3, N_LANDMARKS, 3))
+    raw[:2, ~mouth] = 0
+    raw[2, mouth] = 0
+    raw[2, [33, 263]] = 0
+    vectors, _ = np.linalg.qr(raw.reshape(3, -1).T)
+    return vectors.T.reshape(3, N_LANDMARKS, 3)
+
+
+@pytest.fixture
+def make_observation() -> Callable[..., Observation]:
+    return made_observation

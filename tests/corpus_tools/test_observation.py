@@ -1,0 +1,102 @@
+"""Clock, gaps and cuts, on made values."""
+
+import numpy as np
+import pytest
+
+from corpus_tools.listen import Heard, intensity
+from corpus_tools.observation import face_span, filled_gaps, on_grid, trimmed
+from lexicon.errors import DataError
+from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from tts2face.types import Waveform
+
+FPS = 25.0
+
+
+def _line(times: np.ndarray) -> np.ndarray:
+    """(T, 2, 3) points that move in a straight line."""
+    return (times[:, None, None] * np.arange(1, 7).reshape(1, 2, 3)).astype(np.float32)
+
+
+def test_times_rounded_to_milliseconds_are_frames():
+    times = np.round(np.arange(30) / 30, 3)
+    points, first = on_grid(_line(times), times, 30.0)
+    assert first == 0
+    np.testing.assert_array_equal(points, _line(times))
+
+
+def test_uneven_times_are_put_on_even_ones():
+    times = np.array([0.0, 0.03, 0.09, 0.11, 0.17, 0.2])
+    points, first = on_grid(_line(times), times, FPS)
+    assert first == 0
+    np.testing.assert_allclose(points, _line(np.arange(6) / FPS), atol=1e-6)
+
+
+def test_a_late_start_keeps_its_place_on_the_clock():
+    times = 0.5 + np.arange(10) / FPS
+    points, first = on_grid(_line(times), times, FPS)
+    assert first == 13
+    np.testing.assert_allclose(points, _line(np.arange(13, 13 + len(points)) / FPS), atol=1e-5)
+
+
+def test_times_that_run_back():
+    with pytest.raises(DataError, match="do not follow each other"):
+        on_grid(_line(np.arange(3.0)), np.array([0.0, 0.08, 0.04]), FPS)
+
+
+def test_blank_frames_at_the_ends_and_short_gaps():
+    points = _line(np.arange(20) / FPS)
+    whole = points.copy()
+    points[[0, 1, 2, 9, 10, 19]] = np.nan
+    start, end = face_span(points)
+    assert (start, end) == (3, 19)
+    filled, n_filled = filled_gaps(points[start:end], FPS)
+    assert n_filled == 2
+    np.testing.assert_allclose(filled, whole[3:19], atol=1e-6)
+
+
+def test_a_long_gap():
+    points = _line(np.arange(20) / FPS)
+    points[5:9] = np.nan
+    with pytest.raises(DataError, match=r"out of sight for 0\.16 s"):
+        filled_gaps(points, FPS)
+
+
+def _heard() -> Heard:
+    phones = PhoneSequence([SILENCE, "b", "i", SILENCE], [0.0, 1.0, 1.1, 1.5, 3.0])
+    return Heard(phones, (WordSpan("b", 1, 3),), -3000.0, Waveform(np.zeros(100), 100))
+
+
+def test_a_cut_moves_phones_and_pictures_together():
+    phones, words = trimmed(_heard(), 0.2, 2.0)
+    assert phones.phones == (SILENCE, "b", "i", SILENCE)
+    np.testing.assert_allclose(phones.edges, [0, 0.8, 0.9, 1.3, 1.8])
+    assert words == (WordSpan("b", 1, 3),)
+
+
+def test_a_silence_that_is_cut_away_leaves_no_phone():
+    phones, words = trimmed(_heard(), 1.0, 1.5)
+    assert phones.phones == ("b", "i")
+    np.testing.assert_allclose(phones.edges, [0, 0.1, 0.5])
+    assert words == (WordSpan("b", 0, 2),)
+
+
+@pytest.mark.parametrize(("begin", "stop"), [(1.05, 3.0), (0.0, 1.4)])
+def test_words_without_a_face(begin, stop):
+    with pytest.raises(DataError, match="words are spoken while no face is seen"):
+        trimmed(_heard(), begin, stop)
+
+
+def test_level_of_a_known_tone():
+    tone = np.sin(2 * np.pi * 200 * np.arange(16000) / 16000) * 0.1
+    level = intensity(Waveform(tone, 16000), np.array([0.3, 0.5]))
+    expected = 20 * np.log10(0.1 / np.sqrt(2) / 2e-5)  # dB against 20 micropascals, as Praat counts
+    np.testing.assert_allclose(level, expected, atol=0.1)
+
+
+def test_digital_silence_has_a_level():
+    assert intensity(Waveform(np.zeros(16000), 16000), np.array([0.5])).tolist() == [0.0]
+
+
+def test_a_sound_too_short_for_a_level():
+    with pytest.raises(DataError, match="too short to measure"):
+        intensity(Waveform(np.zeros(50), 16000), np.array([0.0]))

