@@ -16,7 +16,6 @@ from tts2face.face.model import Face
 from tts2face.landmarks import (
     INNER_LIP_LOWER,
     INNER_LIP_UPPER,
-    LOWER_LIP_INNER_MID,
     MOUTH_CORNER_LEFT,
     MOUTH_CORNER_RIGHT,
     MOUTH_REGION,
@@ -31,12 +30,13 @@ FloatArray = NDArray[np.float64]
 
 SPEECH_SHAPES = ("jaw", "mouth")  # how the names of the shapes that speech moves begin
 CORNERS_LEFT, CORNERS_RIGHT = (OUTER_LIP_UPPER[-1], INNER_LIP_UPPER[-1]), (OUTER_LIP_UPPER[0], INNER_LIP_UPPER[0])
+MIDDLE_PAIR = INNER_LIP_UPPER.index(UPPER_LIP_INNER_MID)
 BILABIALS = frozenset({"p", "b", "m"})
-SURE_CONTACT = 75  # percentile of the least gaps in bilabials: up to this gap the talker's lips touch
+SURE_CONTACT = 90  # percentile of the least gaps in bilabials: up to this gap the talker's lips touch
 MOST_CONTACT_MM = 1.5  # a tracker that reads more than this on touching lips is not to be trusted
 LIP_WEIGHT = 10.0  # a lip landmark against one of the jaw or cheek
 DEPTH_WEIGHT = 0.1  # z against x and y: a single camera sees depth with some ten times their error
-GAP_WEIGHT = 60.0  # the gap between facing lip points against a lip landmark: whether lips touch is what a viewer sees
+GAP_WEIGHT = 100.0  # the gap between facing lip points against one of the cheek: whether lips touch is what is seen
 WIDTH_WEIGHT = 60.0  # the mouth's width, likewise: rounding is the other thing that a viewer reads from lips
 EFFORT = 0.005  # share of the mean curvature that draws every weight to 0: makes the answer unique and calm
 STOP = 1e-5  # change of a weight at which the iteration ends
@@ -54,11 +54,14 @@ class Retargeter:
     curvature : (k, k)
         Normal matrix of the weighted least squares.
     pull : (k, S + 1)
-        Linear term: ``pull[:, :S] @ parameters + pull[:, S]``, without the gaps.
-    gap_basis, gap_rest : (P, S), (P,)
-        The talker's lip gaps in the face's size, mm; contact is 0.
-    gap_pull : (k, P)
-        What a gap adds to the linear term. A face rests with its lips closed: its gaps are counted from there.
+        Linear term of landmarks and width: ``pull[:, :S] @ parameters + pull[:, S]``.
+    gaps : (P, S + 1)
+        The talker's lip gaps in the face's size less those on touching lips, mm: ``gaps[:, :S] @ parameters + ...``.
+    gap_rest : (P,)
+        The same at the talker's rest.
+    gap_pull, lip_pull : (k, P)
+        What a gap that shall be seen adds to the linear term, and what the landmarks of its two lips do per mm that
+        they shall go apart further than the talker's.
     """
 
     shape_names: tuple[str, ...]
@@ -66,9 +69,10 @@ class Retargeter:
     limits: FloatArray
     curvature: FloatArray
     pull: FloatArray
-    gap_basis: FloatArray
+    gaps: FloatArray
     gap_rest: FloatArray
     gap_pull: FloatArray
+    lip_pull: FloatArray
 
     def retarget(self, speech: Trajectory) -> Trajectory:
         """Weights of all shapes of the face, (T, K), for a trajectory of speech parameters, (T, S).
@@ -76,8 +80,10 @@ class Retargeter:
         Each frame is solved on its own: the answer does not depend on what came before.
         """
         parameters = speech.values.astype(np.float64)
-        gaps = np.maximum(parameters @ self.gap_basis.T + self.gap_rest, 0.0)
-        linear = parameters @ self.pull[:, :-1].T + self.pull[:, -1] + gaps @ self.gap_pull.T
+        read = parameters @ self.gaps[:, :-1].T + self.gaps[:, -1]
+        shown = np.maximum(read, 0.0)  # a face rests with its lips closed: its gaps are counted from there
+        linear = parameters @ self.pull[:, :-1].T + self.pull[:, -1]
+        linear += shown @ self.gap_pull.T + (shown - read + self.gap_rest) @ self.lip_pull.T
         solved = bounded_least_squares(self.curvature, linear, self.limits)
         weights = np.zeros((len(parameters), len(self.shape_names)), np.float32)
         weights[:, self.moving] = solved
@@ -93,44 +99,34 @@ def retargeter(talker: Talker, face: Face) -> Retargeter:
         The face lacks the lips' landmarks, or has no shape that speech could move.
     """
     moving = np.array([i for i, name in enumerate(face.shape_names) if name.startswith(SPEECH_SHAPES)])
-    known = {int(landmark): row for row, landmark in enumerate(face.landmarks)}
-    lips = (*INNER_LIP_UPPER, *INNER_LIP_LOWER, *OUTER_LIP_UPPER, *OUTER_LIP_LOWER)
-    missing = [landmark for landmark in lips if landmark not in known]
-    if missing or not len(moving):
-        what = f"landmark {missing[0]} of the lips" if missing else "shapes named jaw... or mouth..."
-        raise DataError(f"the face lacks {what}, so no speech can move it; build it with its landmark table")
-    common = [landmark for landmark in MOUTH_REGION if landmark in known]
-    rows = [known[landmark] for landmark in common]
+    _check_lips(face, moving)
+    common = [landmark for landmark in MOUTH_REGION if landmark in set(face.landmarks.tolist())]
+    at = {landmark: row for row, landmark in enumerate(common)}
     rest, per_weight = _landmarks(face, moving)
     turn, scale = _onto_face(talker, face, rest)
-    model = talker.model
-    speech = model.basis[: model.n_speech].astype(np.float64)
+    moved = per_weight[[int(np.flatnonzero(face.landmarks == landmark)[0]) for landmark in common]]
+    wanted = _displacements(talker, common, scale * turn)
     weights = _row_weights(common)
-    wanted = scale * np.einsum("slc,dc->lds", speech[:, common], turn)
-    at_rest = wanted @ model.rest[: model.n_speech].astype(np.float64)
-    moved = per_weight[rows]
-    plain = np.einsum("ldk,ld,ldj->kj", moved, weights, moved)
-    from_rest = np.concatenate([wanted, -at_rest[..., None]], axis=2)
-    pull = np.einsum("ldk,ld,lds->ks", moved, weights, from_rest)
-    left, right = (np.array([common.index(corner) for corner in corners]) for corners in (CORNERS_LEFT, CORNERS_RIGHT))
-    widened = moved[left, 0] - moved[right, 0]
-    effort = EFFORT * np.trace(plain) / len(moving)
-    curvature = plain + WIDTH_WEIGHT * widened.T @ widened
-    pull += WIDTH_WEIGHT * widened.T @ (from_rest[left, 0] - from_rest[right, 0])
-    gap_basis, gap_rest = _talker_gaps(talker, turn, scale)
-    upper = [known[landmark] for landmark in INNER_LIP_UPPER]
-    lower = [known[landmark] for landmark in INNER_LIP_LOWER]
-    gap_per_weight = per_weight[upper, 1] - per_weight[lower, 1]
-    curvature += GAP_WEIGHT * gap_per_weight.T @ gap_per_weight + effort * np.eye(len(moving))
+    weighted = moved * weights[..., None]
+    curvature = np.einsum("ldk,ldj->kj", weighted, moved)
+    effort = EFFORT * np.trace(curvature) / len(moving)
+    pull = np.einsum("ldk,lds->ks", weighted, wanted)
+    left, right = ([at[corner] for corner in corners] for corners in (CORNERS_LEFT, CORNERS_RIGHT))
+    upper, lower = ([at[lip] for lip in lips] for lips in (INNER_LIP_UPPER, INNER_LIP_LOWER))
+    widened, opened = moved[left, 0] - moved[right, 0], moved[upper, 1] - moved[lower, 1]
+    curvature += WIDTH_WEIGHT * widened.T @ widened + GAP_WEIGHT * opened.T @ opened + effort * np.eye(len(moving))
+    pull += WIDTH_WEIGHT * widened.T @ (wanted[left, 0] - wanted[right, 0])
+    gaps, gap_rest = _talker_gaps(talker, scale * turn[1])
     return Retargeter(
-        face.shape_names,
-        moving,
-        face.limits[moving].astype(np.float64),
-        curvature,
-        pull,
-        gap_basis,
-        gap_rest,
-        GAP_WEIGHT * gap_per_weight.T,
+        shape_names=face.shape_names,
+        moving=moving,
+        limits=face.limits[moving].astype(np.float64),
+        curvature=curvature,
+        pull=pull,
+        gaps=gaps,
+        gap_rest=gap_rest,
+        gap_pull=GAP_WEIGHT * opened.T,
+        lip_pull=(weighted[upper, 1] - weighted[lower, 1]).T / 2,
     )
 
 
@@ -185,12 +181,30 @@ def _descend(curvature, linear, low, high, weights):  # type: ignore[no-untyped-
     return weights
 
 
+def _check_lips(face: Face, moving: NDArray[np.int64]) -> None:
+    known = set(face.landmarks.tolist())
+    lips = (*INNER_LIP_UPPER, *INNER_LIP_LOWER, *OUTER_LIP_UPPER, *OUTER_LIP_LOWER)
+    missing = [landmark for landmark in lips if landmark not in known]
+    if missing or not len(moving):
+        what = f"landmark {missing[0]} of the lips" if missing else "shapes named jaw... or mouth..."
+        raise DataError(f"the face lacks {what}, so no speech can move it; build it with its landmark table")
+
+
 def _landmarks(face: Face, moving: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
     """(L, 3) landmarks of the face at rest, and (L, 3, k) their motion per weight, mm."""
     mixed = face.landmark_weights.astype(np.float64)[..., None]
     rest = (face.vertices[face.landmark_vertices] * mixed).sum(axis=1)
     per_weight = [(face.shapes[k][face.landmark_vertices] * mixed).sum(axis=1) for k in moving]
     return rest, np.stack(per_weight, axis=-1)
+
+
+def _displacements(talker: Talker, common: list[int], onto_face: FloatArray) -> FloatArray:
+    """(L, 3, S + 1) motion of the talker's landmarks per parameter, and from rest to the origin of parameters, mm."""
+    n_speech = talker.model.n_speech
+    basis = talker.model.basis[:n_speech, common].astype(np.float64)
+    wanted = np.einsum("slc,dc->lds", basis, onto_face)
+    at_rest = wanted @ talker.model.rest[:n_speech].astype(np.float64)
+    return np.concatenate([wanted, -at_rest[..., None]], axis=2)
 
 
 def _row_weights(common: list[int]) -> FloatArray:
@@ -214,31 +228,39 @@ def _onto_face(talker: Talker, face: Face, rest: FloatArray) -> tuple[FloatArray
     return (left @ mirror @ right).T, float(width / np.linalg.norm(own[MOUTH_CORNER_LEFT] - own[MOUTH_CORNER_RIGHT]))
 
 
-def _talker_gaps(talker: Talker, turn: FloatArray, scale: float) -> tuple[FloatArray, FloatArray]:
-    """(P, S) and (P,): gaps of facing inner lip points over the talker's contact, in the face's size and axes."""
-    model = talker.model
+def _talker_gaps(talker: Talker, up: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(P, S + 1) and (P,): gaps of facing inner lip points over the talker's contact along `up`, and those at rest."""
+    model, n_speech = talker.model, talker.model.n_speech
     upper, lower = list(INNER_LIP_UPPER), list(INNER_LIP_LOWER)
-    up = turn[1] * scale
-    basis = (model.basis[: model.n_speech, upper] - model.basis[: model.n_speech, lower]).astype(np.float64) @ up
+    basis = (model.basis[:n_speech, upper] - model.basis[:n_speech, lower]).astype(np.float64) @ up
     mean = (model.mean[upper] - model.mean[lower]).astype(np.float64) @ up
-    return basis.T, mean - contact_gap(talker) * scale
+    mean -= contact_gaps(talker) * np.linalg.norm(up)
+    return np.column_stack([basis.T, mean]), mean + model.rest[:n_speech] @ basis
 
 
-def contact_gap(talker: Talker) -> float:
-    """Gap in mm, mid lips, up to which the tracked lips of a talker touch: most bilabials come at least so near."""
-    model = talker.model
-    mid = model.basis[: model.n_speech, UPPER_LIP_INNER_MID, 1] - model.basis[: model.n_speech, LOWER_LIP_INNER_MID, 1]
-    mean = float(model.mean[UPPER_LIP_INNER_MID, 1] - model.mean[LOWER_LIP_INNER_MID, 1])
-    least: list[float] = []
+def contact_gaps(talker: Talker) -> FloatArray:
+    """(P,) gaps in mm up to which the tracked facing lip points of a talker touch: most bilabials come so near.
+
+    Taken where each bilabial's middle pair is nearest; without bilabials in the corpus, 0.
+    """
+    model, n_speech = talker.model, talker.model.n_speech
+    apart = model.basis[:n_speech, INNER_LIP_UPPER, 1] - model.basis[:n_speech, INNER_LIP_LOWER, 1]
+    mean = (model.mean[list(INNER_LIP_UPPER), 1] - model.mean[list(INNER_LIP_LOWER), 1]).astype(np.float64)
+    least = [np.zeros((0, len(mean)))]
     for utterance in talker.utterances:
-        gaps = utterance.shape[:, : model.n_speech] @ mid + mean
-        least += _least_in_bilabials(gaps, utterance.phones, talker.fps)
-    return float(np.clip(np.percentile(least, SURE_CONTACT), 0.0, MOST_CONTACT_MM)) if least else 0.0
+        gaps = utterance.shape[:, :n_speech].astype(np.float64) @ apart + mean
+        least.append(_least_in_bilabials(gaps, utterance.phones, talker.fps))
+    found = np.concatenate(least)
+    return (
+        np.clip(np.percentile(found, SURE_CONTACT, axis=0), 0.0, MOST_CONTACT_MM) if len(found) else np.zeros(len(mean))
+    )
 
 
-def _least_in_bilabials(gaps: NDArray[np.floating], phones: PhoneSequence, fps: float) -> list[float]:
-    spans = zip(phones.phones, phones.edges[:-1], phones.edges[1:], strict=True)
-    frames = [
-        (int(np.floor(start * fps)), int(np.ceil(end * fps)) + 1) for phone, start, end in spans if phone in BILABIALS
-    ]
-    return [float(gaps[first:last].min()) for first, last in frames if gaps[first:last].size]
+def _least_in_bilabials(gaps: FloatArray, phones: PhoneSequence, fps: float) -> FloatArray:
+    """(B, P) gaps of (T, P) at the frame of each bilabial where the middle pair is nearest."""
+    rows = []
+    for phone, start, end in zip(phones.phones, phones.edges[:-1], phones.edges[1:], strict=True):
+        first, last = int(np.floor(start * fps)), int(np.ceil(end * fps)) + 1
+        if phone in BILABIALS and len(gaps[first:last]):
+            rows.append(first + int(gaps[first:last, MIDDLE_PAIR].argmin()))
+    return gaps[rows]
