@@ -5,13 +5,12 @@ The knowledge stands in `phones.tsv`, one phone a line, for a phonetician to rea
 
 import functools
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from types import MappingProxyType
 
 from lexicon.errors import DataError, InputError
-from lexicon.sequence import SILENCE
 
 KINDS = (
     "silence", "vowel", "diphthong", "stop", "affricate", "fricative", "nasal", "approximant", "lateral", "tap",
@@ -166,6 +165,7 @@ def read_phones(text: str, name: str = "phones.tsv") -> dict[str, Phone]:
 PHONES: Mapping[str, Phone] = MappingProxyType(
     read_phones(resources.files("lexicon").joinpath("phones.tsv").read_text(encoding="utf-8"))
 )
+SILENCE = next(symbol for symbol, phone in PHONES.items() if phone.kind == "silence")  # as in lexicon.sequence
 ARPABET: Mapping[str, str] = MappingProxyType({p.arpabet: p.symbol for p in PHONES.values() if p.arpabet})
 
 
@@ -299,8 +299,3 @@ def nearest_phones(label: str, available: Collection[str]) -> tuple[str, ...]:
         2
     )
     return parts if apart < phone_distance(label, whole) and len(set(parts)) > 1 else (whole,)
-
-
-def vowels() -> Iterator[str]:
-    """Symbols of all vowels and diphthongs, in the table's order."""
-    return (symbol for symbol, phone in PHONES.items() if phone.is_vowel)

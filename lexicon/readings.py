@@ -128,7 +128,10 @@ _SPELLED_ENDINGS = re.compile("uk|us|de|fr|eu|io|ai|tv|ca|ch|at|au|nz|jp|cn|ru|e
 def _name_word(written: str) -> str:
     """A word of an address or tag, in a form that is read in no other way: small, or an initialism in capitals."""
     is_initialism = written.isupper() and len(written) > 1 and not re.fullmatch("[IVXLCDM]+", written)
-    return _SPELT_OUT.get(written.lower(), written if is_initialism else written.lower())
+    if is_initialism:
+        return written
+    small = written.lower()
+    return _SPELT_OUT.get(small) or table("symbols.tsv").get(small, (small,))[0]
 
 
 def address(written: str) -> str:
