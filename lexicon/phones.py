@@ -299,3 +299,8 @@ def nearest_phones(label: str, available: Collection[str]) -> tuple[str, ...]:
         2
     )
     return parts if apart < phone_distance(label, whole) and len(set(parts)) > 1 else (whole,)
+
+
+def vowels() -> tuple[str, ...]:
+    """Symbols of all vowels and diphthongs, in the table's order."""
+    return tuple(symbol for symbol, phone in PHONES.items() if phone.is_vowel)
