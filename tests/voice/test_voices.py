@@ -95,6 +95,12 @@ def test_espeak_speaks_other_languages(language: str, text: str, n_words: int) -
     assert SILENCE not in [phone for word in speech.words for phone in speech.phones.phones[word.first : word.last]]
 
 
+def test_a_foreign_word_is_spoken_in_its_own_language() -> None:
+    """espeak-ng switches to English for "move" and says so among its phonemes; the marks are no phones."""
+    speech = load_voice("espeak", "de").speak("Bob may move.")
+    assert {"m", "u", "v"} <= set(speech.phones.phones)
+
+
 def test_a_stops_closure_belongs_to_it() -> None:
     """espeak-ng's event stands at the burst; the /p/ of "happy" begins where the sound before it ends."""
     speech = load_voice("espeak", "en-us").speak("A happy apple.")

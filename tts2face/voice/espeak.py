@@ -1,6 +1,7 @@
 """espeak-ng: a formant voice for every language, whose phoneme events are the phone edges."""
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -24,6 +25,7 @@ from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, at_volume
 
 CHILD = Path(__file__).with_name("espeak_child.py")
 WORD_EVENT, PHONEME_EVENT = 1, 7
+SWITCH = re.compile(r"\([a-z0-9-]+\)")  # espeak-ng marks where a foreign word begins and ends: (en)...(fr)
 USUAL_WORDS_PER_MINUTE = 175  # espeak-ng's default; its events go wrong above 400
 PATIENCE_S = 60.0  # a sentence takes some 50 ms
 LONGEST_CLOSURE_S = 0.06  # the event of a stop stands at its burst; the closure before it is 38-46 ms
@@ -98,7 +100,8 @@ class EspeakVoice:
             if kind == WORD_EVENT:
                 names.append(text[value[0] : value[0] + value[1]])
                 continue
-            phones = tuple(segment.phone for segment in segments_of(value, self._language)) if value else ()
+            written = SWITCH.sub("", value)
+            phones = tuple(segment.phone for segment in segments_of(written, self._language)) if written else ()
             at = sample + round(QUIET_S * self._rate)
             start = at / self._rate
             if phones and PHONES[phones[0]].kind in {"stop", "affricate"}:

@@ -1,0 +1,24 @@
+"""``tts2face phones "text"``: words and phones of a text."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+
+def phones(
+    text: Annotated[str, Parameter(help="What to transcribe.")],
+    /,
+    *,
+    format: Annotated[Literal["text", "json", "textgrid"], Parameter(help="How to print it.")] = "text",
+    language: Annotated[str, Parameter(help="Language of the text: an espeak-ng code.")] = "en-us",
+    dictionary: Annotated[Path | None, Parameter(help="Your own pronunciations, which win.")] = None,
+) -> None:
+    """Print the words of a text and their phones, in ARPABET and IPA, with stress and syllables."""
+    from tts2face.export.text import FORMATS
+
+    from lexicon.dictionary import read_dictionary
+    from lexicon.pronounce import pronounce
+
+    spoken = pronounce(text, language, read_dictionary(dictionary) if dictionary else None)
+    print(FORMATS[format](spoken), end="")  # noqa: T201 - the answer

@@ -1,0 +1,172 @@
+"""The command line as a person uses it."""
+
+import json
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from cli.exits import EXIT_CODES
+from cli.main import run
+from lexicon import errors
+from tts2face.render.picture import Picture
+from tts2face.request import Request
+
+README = Path(__file__).parents[2] / "README.md"
+COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
+SMALL = ["--size", "64x64", "--fps", "5"]
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def readme_commands() -> list[str]:
+    block = re.findall(r"^    (.*tts2face .*)$", README.read_text(encoding="utf-8"), re.MULTILINE)
+    return [line.split(" #")[0].strip() for line in block if not line.startswith("pip")]
+
+
+@pytest.mark.parametrize("line", readme_commands())
+def test_every_command_of_the_readme_works(line: str, here: Path, shared_recordings: Path) -> None:
+    (here / "chapter.txt").write_text("Chapter one. It was late.", encoding="utf-8")
+    few = here / "recordings"
+    (few / "clips").mkdir(parents=True)
+    (few / "align").mkdir()
+    source = shared_recordings / "grid_s1"
+    rows = (source / "manifest.csv").read_text().splitlines()[:7]
+    (few / "manifest.csv").write_text("\n".join(rows))
+    for row in rows[1:]:
+        name = row.split(",")[0]
+        (few / "clips" / f"{name}.mkv").symlink_to(source / "clips" / f"{name}.mkv")
+        (few / "align" / f"{name}.align").symlink_to(source / "align" / f"{name}.align")
+    if "corpus" in line:
+        pytest.importorskip("ai_edge_litert", reason="needs the extra [capture]")
+        line = line.replace("--hold-out 100", "--hold-out 2")
+        if "show" in line:
+            line = line.replace("me.talker", "grid_s1")
+    told, _, command = line.rpartition("| ")
+    given = shlex.split(told)[1] if told else None
+    words = shlex.split(command)[1:]
+    if words[0] not in {"phones", "corpus"}:
+        words += SMALL
+    done = subprocess.run([*COMMAND, *words], input=given, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    for flag in ("--out", "--explain"):
+        if flag in words:
+            assert (here / words[words.index(flag) + 1]).exists()
+
+
+def test_help_names_every_option_and_is_quick(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["--help"]) == 0
+    told = capsys.readouterr().out
+    for options in (Request, Picture):
+        for option in fields(options):
+            assert option.name == "text" or f"--{option.name}" in told
+    loaded = "import sys; from cli.main import run; run(['--help']); print(*sys.modules)"
+    modules = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True).stdout
+    heavy = {"numpy", "numba", "scipy", "onnxruntime", "av", "PIL", "hibari", "pocketsphinx", "pyvista", "parselmouth"}
+    assert not heavy & set(modules.split())
+
+
+def test_every_kind_of_error_has_an_exit_code() -> None:
+    kinds = errors.Tts2faceError.__subclasses__()
+    assert len(kinds) == 3
+    assert {EXIT_CODES[kind] for kind in kinds} == {2, 3, 4}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "reason"),
+    [
+        (["", "--out", "x.mp4"], 2, "the text is empty"),
+        (["...", "--out", "x.mp4"], 2, "nothing to say"),
+        (["Hi.", "--out", "x.mp4", "--language", "tlh"], 2, "no language 'tlh'"),
+        (["Привет", "--out", "x.mp4"], 2, "cannot read"),
+        (["Hi.", "--out", "x.avi"], 2, "unknown suffix .avi"),
+        (["Hi.", "--out", "none/x.mp4"], 2, "no folder none"),
+        (["Hi.", "--out", "x.mp4", "--talker", "none.talker"], 2, "no talker file none.talker"),
+        (["Hi.", "--out", "x.mp4", "--talker", "junk.talker"], 3, "junk.talker is damaged or not a talker file"),
+        (["Hi.", "--out", "x.mp4", "--talker", "face.talker"], 3, "face.talker is not a talker file"),
+        (["Hi.", "--out", "x.mp4", "--talker", "old.talker"], 3, "of version 0, this one reads 1"),
+        (["Hi.", "--out", "x.mp4", "--face", "half.face"], 3, "half.face is damaged or not a face file"),
+        (["Hi.", "--out", "x.mp4", "--face", "nobody"], 2, "no face 'nobody'"),
+        (["Hi.", "--out", "x.mp4", "--identity", "nobody"], 2, "no identity 'nobody'"),
+        (["Hi.", "--out", "x.mp4", "--fps", "0"], 2, "fps must lie between 1 and 120, not 0"),
+        (["Hi.", "--out", "x.mp4", "--size", "9x9"], 2, "even numbers from 16 to 4096"),
+        (["Hi.", "--out", "x.mp4", "--fps", "many"], 2, 'unable to convert "many"'),
+        (["Hi.", "--out", "x.mp4", "--flag", "1"], 2, "--flag"),
+        (["Hi."], 2, "say where the clip goes"),
+        (["Hi.", "--file", "x.txt", "--out", "x.mp4"], 2, "not both"),
+        (["--file", "none.txt", "--out", "x.mp4"], 2, "cannot read the text from none.txt"),
+        (["--file", "latin.txt", "--out", "x.mp4"], 2, "latin.txt is not UTF-8 text (byte 1)"),
+    ],
+)
+def test_bad_input_gets_one_sentence_and_leaves_nothing(
+    arguments: list[str], code: int, reason: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from tts2face.face.file import SHIPPED
+    from tts2face.tensors import write_tensors
+
+    (here / "junk.talker").write_bytes(b"no talker at all")
+    (here / "face.talker").write_bytes((SHIPPED / "head.face").read_bytes())
+    (here / "half.face").write_bytes((SHIPPED / "head.face").read_bytes()[:100_000])
+    (here / "latin.txt").write_bytes(b"h\xe9llo")
+    write_tensors(here / "old.talker", "talker", 0, {}, {})
+    before = set(here.iterdir())
+    assert run(arguments) == code
+    told = capsys.readouterr()
+    assert reason in told.err
+    assert len(told.err.strip().splitlines()) == 1
+    assert set(here.iterdir()) == before
+
+
+def test_a_folder_that_cannot_be_written_is_named(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    if os.geteuid() == 0:
+        pytest.skip("root may write everywhere")
+    locked = here / "locked"
+    locked.mkdir(mode=0o555)
+    assert run(["Hi.", "--out", "locked/x.mp4"]) == 4
+    assert "cannot write locked/x.mp4" in capsys.readouterr().err
+
+
+def test_text_from_standard_input_and_from_a_file(here: Path) -> None:
+    (here / "text.txt").write_text("\ufeffHello.", encoding="utf-8")
+    for words, given in ((["--file", "text.txt"], ""), ([], "Hello."), (["-"], "Hello.")):
+        out = here / f"{len(words)}{len(given)}.mp4"
+        done = subprocess.run(
+            [*COMMAND, *words, "--out", str(out), *SMALL], input=given, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        assert re.search(r"wrote .*: \d+\.\d s, \d+ frames, made in \d+\.\d s \(\d+\.\d x real time\)", done.stderr)
+        assert out.stat().st_size > 1000
+
+
+def test_an_interruption_leaves_nothing(here: Path) -> None:
+    text = "This is a rather long sentence that takes some time to speak. " * 20
+    process = subprocess.Popen([*COMMAND, text, "--out", "x.mp4"], stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 60
+    while not list(here.glob(".x*")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert list(here.glob(".x*"))
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "stopped; nothing was written" in told
+    assert list(here.iterdir()) == []
+
+
+def test_an_explanation_names_recorded_phones(here: Path) -> None:
+    assert run(["Bob may.", "--explain", "why.json", "--quiet"]) == 0
+    shown = json.loads((here / "why.json").read_text(encoding="utf-8"))
+    assert [phone["phone"] for phone in shown if phone["phone"] != "sil"] == ["b", "ɑ", "b", "m", "eɪ"]
+    for phone in shown:
+        assert phone["tokens"]
+        assert sum(token["weight"] for token in phone["tokens"]) == pytest.approx(1, abs=1e-6)

@@ -1,0 +1,127 @@
+"""Every option of a request matters, and the same request gives the same bytes."""
+
+import hashlib
+import subprocess
+import sys
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lexicon.errors import DataError, InputError
+from tts2face.api import cast, stream, synthesize
+from tts2face.face.file import load_face
+from tts2face.face.model import Face
+from tts2face.request import Request
+from tts2face.talker import Talker, load_talker
+from tts2face.types import Clip, joined_clips
+
+TEXT = "Bob may move. We were away."
+CHANGES = {
+    "text": "Bob may move. You were away.",
+    "language": "de",
+    "voice": "espeak",
+    "rate": 1.3,
+    "volume": 0.5,
+    "seed": 7,
+    "synthesis": "theobald2007",
+    "context": 1,
+    "exemplars": 3,
+    "fps": 25.0,
+}
+
+
+@pytest.fixture(scope="module")
+def talker() -> Talker:
+    return load_talker("grid_s1")
+
+
+@pytest.fixture(scope="module")
+def face() -> Face:
+    return load_face("head")
+
+
+@pytest.fixture(scope="module")
+def clip(talker: Talker, face: Face) -> Clip:
+    return synthesize(Request(text=TEXT), talker, face)
+
+
+def digest(clip: Clip) -> str:
+    parts = (clip.motion.values, clip.head.values, clip.speech.waveform.samples, clip.speech.phones.edges)
+    return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()
+
+
+@pytest.mark.parametrize("name", [option.name for option in fields(Request)])
+def test_every_option_changes_the_clip(name: str, clip: Clip, talker: Talker, face: Face, tmp_path: Path) -> None:
+    own = tmp_path / "own.txt"
+    own.write_text("bob  B IY1 M\n")
+    value = own if name == "dictionary" else CHANGES[name]
+    changed = synthesize(replace(Request(text=TEXT), **{name: value}), talker, face)
+    assert digest(changed) != digest(clip)
+
+
+def test_the_same_request_gives_the_same_bytes_in_another_process(clip: Clip) -> None:
+    code = (
+        "import sys; sys.path.insert(0, 'tests/doors')\n"
+        "from test_requests import *\n"
+        "print(digest(synthesize(Request(text=TEXT), load_talker('grid_s1'), load_face('head'))))"
+    )
+    environment = {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PATH": ""}
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
+    assert answer.stdout.strip() == digest(clip)
+
+
+def test_a_stream_is_the_whole_in_pieces(clip: Clip, talker: Talker, face: Face) -> None:
+    pieces = list(stream(Request(text=TEXT), cast(talker, face)))
+    assert len(pieces) == 2
+    assert digest(joined_clips([piece.clip for piece in pieces])) == digest(clip)
+
+
+@pytest.mark.parametrize("fps", [23.976, 24.0, 25.0, 29.97, 50.0, 59.94])
+def test_pieces_end_on_frames_at_any_rate(fps: float, talker: Talker, face: Face) -> None:
+    """Sound and picture of a long text stay together: each piece's sound is as long as its frames, to half a sample."""
+    pieces = list(stream(Request(text="One. Two. Three.", fps=fps), cast(talker, face)))
+    n_frames = sum(len(piece.clip.motion) for piece in pieces)
+    n_samples = sum(len(piece.clip.speech.waveform.samples) for piece in pieces)
+    rate = pieces[0].clip.speech.waveform.rate
+    assert abs(n_samples / rate - n_frames / pieces[0].clip.fps) < 1 / rate
+
+
+def test_lips_rest_in_silence_and_at_both_ends(clip: Clip) -> None:
+    weights = clip.motion.values
+    for frame in (0, -1):
+        assert np.abs(weights[frame] - weights[0]).max() < 1e-4
+    assert np.abs(np.diff(weights[:5], axis=0)).max() < 0.02
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"text": ""}, "nothing to say"),
+        ({"text": "?!..."}, "nothing to say"),
+        ({"language": "xx-none"}, "no language 'xx-none'"),
+        ({"text": "Привет"}, "cannot read"),
+        ({"voice": "nobody"}, "no voice 'nobody'"),
+        ({"dictionary": Path("missing.txt")}, "missing.txt cannot be read"),
+    ],
+)
+def test_what_cannot_be_said_is_refused(change: dict, reason: str, talker: Talker, face: Face) -> None:
+    with pytest.raises((InputError, DataError), match=reason):
+        synthesize(replace(Request(text=TEXT), **change), talker, face)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"rate": 5.0}, "rate must lie between 0.5 and 2, not 5"),
+        ({"volume": -1.0}, "volume must lie between 0 and 2, not -1"),
+        ({"fps": 500.0}, "fps must lie between 1 and 120, not 500"),
+        ({"fps": float("nan")}, "fps must lie between"),
+        ({"seed": -1}, "seed must be 0 or more, not -1"),
+        ({"synthesis": "magic"}, "no synthesis 'magic'"),
+    ],
+)
+def test_options_out_of_range_are_refused(change: dict, reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        Request(text="Hi.", **change)
