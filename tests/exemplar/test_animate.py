@@ -180,7 +180,7 @@ def test_explains_which_tokens_were_used(voice: VisualVoice):
     assert [phone.phone for phone in shown] == [SILENCE, "b", "ɔɪ", SILENCE] or len(shown) == 5
     b = shown[1]
     assert (b.phone, b.shown, b.left[-1], b.right[0]) == ("b", "b", SILENCE, shown[2].shown)
-    assert len(b.tokens) <= 40
+    assert len(b.tokens) <= 30
     assert sum(used.weight for used in b.tokens) == pytest.approx(1.0)
     assert [used.score for used in b.tokens] == sorted((used.score for used in b.tokens), reverse=True)
     first = b.tokens[0]

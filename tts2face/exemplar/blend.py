@@ -13,8 +13,8 @@ from tts2face.exemplar.tokens import Tokens
 from tts2face.exemplar.warp import lay_over
 
 CLOCK_HZ = 100.0  # instants at which motion is made; lips move below 15 Hz, so nothing is lost
-KNOTS = 6  # samples a phone
-ALIGN_BAND = 2  # knots by which an exemplar's event may lie off the best one's; a third of a phone
+KNOTS = 8  # samples a phone; 10 are no better (docs/decisions.md)
+ALIGN_BAND = 1  # knots by which an exemplar's event may lie off the best one's; 2 lose .002 of r opening
 LEAST_SPREAD = 0.15  # of a parameter's spread: exemplars that happen to agree are not surer than this
 
 

@@ -38,9 +38,9 @@ class SynthesisOptions:
     """
 
     context: int = 3
-    k: int = 40
+    k: int = 30
     duration: float = 0.6
-    sharpness: float = 2.5
+    sharpness: float = 3.0
     overlap: bool = True
     precision: float = 1.5
     align: bool = True
