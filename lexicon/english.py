@@ -11,54 +11,17 @@ _INVENTORY = frozenset(ARPABET.values())
 # espeak-ng's finer English phones in the phones that CMUdict knows; whatever is not listed goes to its nearest.
 _FOLDED = MappingProxyType({
     "ɜ": ("ɝ",), "ɐ": ("ə",), "ɾ": ("t",), "ʔ": ("t",), "ɒ": ("ɑ",), "a": ("æ",), "e": ("ɛ",), "o": ("oʊ",),
-    "r": ("ɹ",), "ɫ": ("l",), "x": ("k",), "əʊ": ("oʊ",), "iə": ("i", "ə"), "ɪə": ("ɪ", "ə"), "eə": ("ɛ", "ə"), "ʊə": ("ʊ", "ə"),
+    "r": ("ɹ",), "ɫ": ("l",), "x": ("k",), "əʊ": ("oʊ",), "iə": ("i", "ə"), "ɪə": ("ɪ", "ə"), "eə": ("ɛ", "ə"),
+    "ʊə": ("ʊ", "ə"),
 })  # fmt: skip
 _REDUCED = MappingProxyType({"ʌ": "ə", "ɝ": "ɚ"})
 _FULL = MappingProxyType({reduced: full for full, reduced in _REDUCED.items()})
 SPELLED_LENGTH = 3  # letters; longer capitals are a word (NASA) where CMUdict or its vowels say so
 _SAID_AS_WORDS = frozenset({"AIDS", "SIM", "RAM", "ROM", "PIN", "GIF", "LED", "ZIP", "LAN", "WAN", "NATO", "NASA"})
-SHOUTED = frozenset(
-    {
-        "THE",
-        "AND",
-        "NOT",
-        "YOU",
-        "ARE",
-        "FOR",
-        "BUT",
-        "ALL",
-        "NO",
-        "YES",
-        "SO",
-        "GO",
-        "OF",
-        "TO",
-        "IN",
-        "ON",
-        "IS",
-        "BE",
-    }
-    | {
-        "AT",
-        "AN",
-        "AS",
-        "BY",
-        "DO",
-        "HE",
-        "ME",
-        "MY",
-        "WE",
-        "IF",
-        "UP",
-        "WAS",
-        "CAN",
-        "HIS",
-        "HER",
-        "OUR",
-        "NEW",
-        "NOW",
-    }
-)  # short words that are never initialisms: where they stand in capitals, so do their neighbours
+SHOUTED = frozenset({
+    "THE", "AND", "NOT", "YOU", "ARE", "FOR", "BUT", "ALL", "NO", "YES", "SO", "GO", "OF", "TO", "IN", "ON", "IS", "BE",
+    "AT", "AN", "AS", "BY", "DO", "HE", "ME", "MY", "WE", "IF", "UP", "WAS", "CAN", "HIS", "HER", "OUR", "NEW", "NOW",
+})  # fmt: skip  # short words that are never initialisms: where they stand in capitals, so do their neighbours
 _VOICELESS_ENDINGS = frozenset({"p", "t", "k", "f", "θ"})
 _SIBILANTS = frozenset({"s", "z", "ʃ", "ʒ", "tʃ", "dʒ"})
 

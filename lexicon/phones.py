@@ -38,8 +38,9 @@ VOICINGS = ("voiced", "voiceless")
 WEIGHTS = MappingProxyType({
     "silence": 10.0,  # nothing that sounds is like a pause
     "vowel": 2.0,  # a vowel stands in for a vowel, a consonant for a consonant
-    "bilabial": 3.0,  # closed or narrowed lips
-    "labiodental": 3.0,  # lower lip at the teeth
+    "labial": 2.5,  # the lips make the sound
+    "bilabial": 2.0,  # with each other
+    "labiodental": 2.0,  # the lower lip with the teeth
     "rounding": 1.5,
     "opening": 1.2,  # jaw and lips: 0 closed, 1 as in /a/
     "dental": 0.6,  # tongue between the teeth
@@ -53,6 +54,7 @@ WEIGHTS = MappingProxyType({
     "click": 0.1,
 })  # fmt: skip
 
+_LABIALITY = MappingProxyType({"bilabial": 1.0, "labiodental": 1.0, "labial-velar": 0.5, "labial-palatal": 0.5})
 _OPENING_OF_CLOSE_VOWEL = 0.3  # of the way from closed lips to /a/
 _OPENINGS = MappingProxyType({
     "plosive": 0.05, "implosive": 0.05, "affricate": 0.05, "nasal": 0.05, "click": 0.05, "sibilant": 0.05,
@@ -229,6 +231,7 @@ def _features(phone: Phone) -> dict[str, float]:
     return {
         "silence": float(phone.kind == "silence"),
         "vowel": float(phone.kind == "vowel"),
+        "labial": _LABIALITY.get(phone.place, 0.0),
         "bilabial": float(phone.place == "bilabial"),
         "labiodental": float(phone.place == "labiodental"),
         "rounding": ROUNDINGS[phone.rounding],
@@ -288,13 +291,14 @@ def nearest_phones(label: str, available: Collection[str]) -> tuple[str, ...]:
     phone = phone_of(label)
     if label in available:
         return (label,)
-    sounding = frozenset(available) - ({SILENCE} if label != SILENCE else frozenset())
+    sounding = {phone_of(other).symbol for other in available} - {SILENCE}
     if not sounding:
         raise InputError(f"nothing can stand in for {label}: no phone is available")
     whole = _nearest(label, sounding)
     if not phone.parts:
         return (whole,)
-    parts = tuple(_nearest(part, sounding) for part in phone.parts)
+    simple = {other for other in sounding if not PHONES[other].parts} or sounding
+    parts = tuple(_nearest(part, simple) for part in phone.parts)
     apart = math.hypot(*(phone_distance(part, own) for part, own in zip(parts, phone.parts, strict=True))) / math.sqrt(
         2
     )

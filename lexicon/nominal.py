@@ -1,0 +1,35 @@
+"""Phones on a clock where no voice has spoken them: nominal durations by class.
+
+Round figures of the order that is found in read English, to give tables and TextGrids an axis; they predict nothing. A
+voice's own durations or an alignment take their place as soon as there is sound.
+"""
+
+from types import MappingProxyType
+
+from lexicon.phones import PHONES
+from lexicon.pronounce import Pronunciation
+from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+
+NOMINAL_S = MappingProxyType({
+    "vowel": 0.09, "diphthong": 0.14, "stop": 0.07, "affricate": 0.11, "fricative": 0.09, "nasal": 0.07,
+    "approximant": 0.06, "lateral": 0.06, "tap": 0.03, "trill": 0.07, "click": 0.08,
+})  # fmt: skip
+STRESSED = 1.3  # times as long is a vowel with stress
+LEAD_S = 0.1  # silence before the first word and, at least, behind the last
+
+
+def nominal_sequence(spoken: Pronunciation) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+    """Phones, with a silence at each punctuation mark, and the words as ranges of them."""
+    phones, edges = [SILENCE], [0.0, LEAD_S]
+    spans = []
+    for word in spoken.words:
+        first = len(phones)
+        for phone, stress in zip(word.phones, word.stress, strict=True):
+            phones.append(phone)
+            edges.append(round(edges[-1] + NOMINAL_S[PHONES[phone].kind] * (STRESSED if stress else 1.0), 6))
+        spans.append(WordSpan(word.text, first, len(phones)))
+        pause = max(word.pause_s, LEAD_S if word is spoken.words[-1] else 0.0)
+        if pause:
+            phones.append(SILENCE)
+            edges.append(round(edges[-1] + pause, 6))
+    return PhoneSequence(phones, edges), tuple(spans)

@@ -1,0 +1,74 @@
+"""CMUdict and the user's dictionary."""
+
+from pathlib import Path
+
+import pytest
+
+from lexicon import dictionary
+from lexicon.dictionary import cmudict_lookup, parse_dictionary, read_dictionary
+from lexicon.errors import DataError
+
+
+def _phones(word: str) -> str | None:
+    segments = cmudict_lookup(word)
+    return None if segments is None else " ".join(segment.phone for segment in segments)
+
+
+@pytest.mark.parametrize(
+    ("word", "phones"),
+    [
+        ("hello", "h ə l oʊ"),
+        ("Water", "w ɔ t ɚ"),
+        ("don’t", "d oʊ n t"),
+        ("aalborg", "ɔ l b ɔ ɹ ɡ"),
+        ("zzxq", None),
+        ("", None),
+        ("a b", None),
+    ],
+)
+def test_words_are_found(word: str, phones: str | None) -> None:
+    assert _phones(word) == phones
+
+
+def test_scanning_and_table_agree() -> None:
+    for word in ["'bout", "a", "zyuganov's", "zywicki", "middle", "no-such-word", "read"]:
+        assert dictionary._scanned(word) == dictionary._cmudict_table().get(word)
+
+
+def test_user_entries() -> None:
+    own = parse_dictionary("# names\nSiobhan   SH IH0 V AO1 N  # Irish\n\nNguyen\t/ŋwiˈən/\nsiobhan /ʃɪˈvɔːn/\n")
+    assert [s.phone for s in own.lookup("SIOBHAN") or ()] == ["ʃ", "ɪ", "v", "ɔ", "n"]
+    assert [(s.phone, s.stress) for s in own.lookup("nguyen") or ()] == [
+        ("ŋ", 0),
+        ("w", 0),
+        ("i", 0),
+        ("ə", 1),
+        ("n", 0),
+    ]
+    assert own.lookup("other") is None
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        ("word", "dictionary, line 2: 'word' has no pronunciation"),
+        ("word XX", "line 2: 'XX' is no ARPABET name"),
+        ("word /həˈloʊ", "line 2: IPA stands between two slashes"),
+        ("word /hЖ/", "line 2: 'Ж' .* is no phone"),
+        ("word //", "line 2: the pronunciation of 'word' holds no phone"),
+    ],
+)
+def test_wrong_lines_are_named(line: str, reason: str) -> None:
+    with pytest.raises(DataError, match=reason):
+        parse_dictionary(f"good G UH1 D\n{line}\n")
+
+
+def test_files(tmp_path: Path) -> None:
+    path = tmp_path / "own.txt"
+    path.write_bytes(b"\xef\xbb\xbfword W ER1 D\r\n")
+    assert read_dictionary(path).lookup("word") is not None
+    with pytest.raises(DataError, match="cannot be read"):
+        read_dictionary(tmp_path / "missing.txt")
+    path.write_bytes(b"w\xff")
+    with pytest.raises(DataError, match=r"is not UTF-8 \(byte 1\)"):
+        read_dictionary(path)

@@ -1,0 +1,47 @@
+"""Written English in words: a table of cases to read, and what other languages keep."""
+
+from pathlib import Path
+
+import pytest
+
+from lexicon.normalize import normalize, tokens
+
+TABLE = Path(__file__).with_name("normalization.tsv")
+CASES = [line.split("\t") for line in TABLE.read_text(encoding="utf-8").splitlines()[1:]]
+
+
+@pytest.mark.parametrize(("written", "spoken"), CASES, ids=[written for written, _ in CASES])
+def test_written_forms_are_said(written: str, spoken: str) -> None:
+    assert normalize(written.replace("\\n", "\n")) == spoken
+
+
+def test_the_table_is_large() -> None:
+    assert len(CASES) >= 120
+
+
+def test_a_token_knows_what_was_written() -> None:
+    assert [(t.source, t.spoken) for t in tokens("It cost $5.")] == [
+        ("It", "It"), ("cost", "cost"), ("$5", "five dollars"), (".", "."),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("written", "kept", "language"),
+    [
+        ("Das kostet 25 €.", "Das kostet 25 €.", "de"),
+        ("हिन्दी।", "हिन्दी.", "hi"),
+        ("«Bonjour»…", "Bonjour.", "fr-fr"),
+        ("你好，世界。", "你好, 世界.", "cmn"),
+    ],
+)
+def test_other_languages_keep_their_numbers_and_marks(written: str, kept: str, language: str) -> None:
+    assert normalize(written, language) == kept
+
+
+def test_a_megabyte_is_said() -> None:
+    sentence = "We met Dr. Smith on March 3, 2024; it cost $5.20. "
+    spoken = normalize(sentence * (1_000_000 // len(sentence)))
+    assert spoken.startswith(
+        "We met Doctor Smith on March third, twenty twenty-four; it cost five dollars and twenty cents. We"
+    )
+    assert spoken.count("twenty twenty-four") == 1_000_000 // len(sentence)

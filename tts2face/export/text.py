@@ -1,0 +1,127 @@
+"""Words and phones as text: a table to read, JSON, and a Praat TextGrid; with a voice's times or nominal ones."""
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from lexicon.errors import InputError
+
+if TYPE_CHECKING:
+    from lexicon.pronounce import Pronunciation, Word
+    from lexicon.sequence import PhoneSequence, WordSpan
+
+NOMINAL_NOTE = "nominal durations: no voice has spoken this"
+Interval = tuple[float, float, str]
+
+
+def pronunciation_table(spoken: "Pronunciation") -> str:
+    """One line a word, in aligned columns: what is written, what is said, IPA, and ARPABET where it is English."""
+    rows = [("written", "said", "IPA", "ARPABET")]
+    rows += [(w.source, w.text + w.mark, w.ipa, " ".join(w.arpabet)) for w in spoken.words]
+    widths = [max(len(row[column]) for row in rows) for column in range(3)]
+    lines = [
+        "  ".join([*(cell.ljust(width) for cell, width in zip(row[:3], widths, strict=True)), row[3]]) for row in rows
+    ]
+    return "".join(f"{line.rstrip()}\n" for line in lines)
+
+
+def _word_json(word: "Word") -> dict[str, Any]:
+    return {
+        "text": word.text,
+        "source": word.source,
+        "ipa": word.ipa,
+        "phones": list(word.phones),
+        "stress": list(word.stress),
+        "arpabet": list(word.arpabet),
+        "syllables": [list(span) for span in word.syllables],
+        "mark": word.mark,
+    }
+
+
+def pronunciation_json(spoken: "Pronunciation") -> str:
+    """The same as JSON, with stress and syllables (half-open ranges of the word's phones)."""
+    content = {"text": spoken.text, "language": spoken.language, "words": [_word_json(word) for word in spoken.words]}
+    return json.dumps(content, ensure_ascii=False, indent=2) + "\n"
+
+
+def pronunciation_textgrid(spoken: "Pronunciation") -> str:
+    """A TextGrid of a text that no voice has spoken: nominal durations, and a tier that says so."""
+    from lexicon.nominal import nominal_sequence
+
+    phones, words = nominal_sequence(spoken)
+    return textgrid(phones, words, note=NOMINAL_NOTE)
+
+
+FORMATS: Mapping[str, Callable[["Pronunciation"], str]] = MappingProxyType(
+    {"text": pronunciation_table, "json": pronunciation_json, "textgrid": pronunciation_textgrid}
+)
+
+
+def _word_of(words: Sequence["WordSpan"]) -> dict[int, str]:
+    return {at: word.text for word in words for at in range(word.first, word.last)}
+
+
+def timed_table(phones: "PhoneSequence", words: Sequence["WordSpan"]) -> str:
+    """One line a phone: start and end in seconds, phone, word; between tabs, with a header."""
+    word_of = _word_of(words)
+    lines = ["start_s\tend_s\tphone\tword"]
+    for at, phone in enumerate(phones.phones):
+        lines.append(f"{phones.edges[at]:.6f}\t{phones.edges[at + 1]:.6f}\t{phone}\t{word_of.get(at, '')}")
+    return "\n".join(lines) + "\n"
+
+
+def timed_json(phones: "PhoneSequence", words: Sequence["WordSpan"]) -> str:
+    """Phones, the edges in seconds that they share, and words as half-open ranges of phones."""
+    content = {
+        "phones": list(phones.phones),
+        "edges_s": [float(edge) for edge in phones.edges],
+        "words": [{"text": word.text, "first": word.first, "last": word.last} for word in words],
+    }
+    return json.dumps(content, ensure_ascii=False, indent=2) + "\n"
+
+
+def _word_intervals(phones: "PhoneSequence", words: Sequence["WordSpan"]) -> Iterator[Interval]:
+    """Words and the empty stretches between them, without gap."""
+    at = 0
+    for word in words:
+        if word.first < at or word.last > len(phones):
+            raise InputError(f"word {word.text!r} does not lie behind the word before it, or ends after the last phone")
+        if word.first > at:
+            yield float(phones.edges[at]), float(phones.edges[word.first]), ""
+        yield float(phones.edges[word.first]), float(phones.edges[word.last]), word.text
+        at = word.last
+    if at < len(phones):
+        yield float(phones.edges[at]), phones.end, ""
+
+
+def _tier(number: int, name: str, intervals: Sequence[Interval]) -> Iterator[str]:
+    yield f"    item [{number}]:"
+    yield '        class = "IntervalTier"'
+    yield f'        name = "{name}"'
+    yield f"        xmin = {intervals[0][0]!r}"
+    yield f"        xmax = {intervals[-1][1]!r}"
+    yield f"        intervals: size = {len(intervals)}"
+    for at, (start, end, label) in enumerate(intervals, start=1):
+        quoted = label.replace('"', '""')
+        yield from (f"        intervals [{at}]:", f"            xmin = {start!r}", f"            xmax = {end!r}")
+        yield f'            text = "{quoted}"'
+
+
+def textgrid(phones: "PhoneSequence", words: Sequence["WordSpan"], *, note: str = "") -> str:
+    """A Praat TextGrid with the tiers words and phones, and a tier ``note`` where there is one; save it as UTF-8.
+
+    Raises
+    ------
+    InputError
+        The words overlap or reach beyond the last phone.
+    """
+    spoken = [(float(phones.edges[at]), float(phones.edges[at + 1]), label) for at, label in enumerate(phones.phones)]
+    tiers = [("words", list(_word_intervals(phones, words))), ("phones", spoken)]
+    if note:
+        tiers.append(("note", [(phones.start, phones.end, note)]))
+    lines = ['File type = "ooTextFile"', 'Object class = "TextGrid"', "", f"xmin = {phones.start!r}"]
+    lines += [f"xmax = {phones.end!r}", "tiers? <exists>", f"size = {len(tiers)}", "item []:"]
+    for number, (name, intervals) in enumerate(tiers, start=1):
+        lines += _tier(number, name, intervals)
+    return "\n".join(lines) + "\n"
