@@ -49,4 +49,5 @@ def _shadow(flat: Floats, thickness: float) -> Floats:
     off = np.abs(flat[:, 1] - np.interp(x, ARCH[:, 0], ARCH[:, 1]) - 0.6)
     thick = thickness * np.interp(x, ARCH[:, 0], THICK_MM) / 2
     ends = np.clip((x - ARCH[0, 0] + 2.5) / 6, 0, 1) * np.clip((ARCH[-1, 0] + 3 - x) / 7, 0, 1)
-    return np.exp(-((off / (thick + 0.4)) ** 2)) * ends
+    body: Floats = np.exp(-((off / (thick + 0.4)) ** 2)) * ends
+    return body

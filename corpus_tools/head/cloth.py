@@ -75,10 +75,9 @@ def _cut(points: Floats, triangles: Ints, inside: Floats) -> tuple[Floats, Ints]
         return known[key]
 
     faces: list[tuple[int, int, int]] = []
-    for corners in triangles[(n_in > 0) & (n_in < 3)].tolist():
-        while is_in[corners[0]] == is_in[corners[2]] or is_in[corners[0]] == is_in[corners[1]]:
-            corners = corners[1:] + corners[:1]  # the odd one comes first
-        odd, one, two = corners
+    for a, b, c in triangles[(n_in > 0) & (n_in < 3)].tolist():
+        turns = ((a, b, c), (b, c, a), (c, a, b))
+        odd, one, two = next(turn for turn in turns if is_in[turn[0]] != is_in[turn[1]] == is_in[turn[2]])
         to_one, to_two = crossing(odd, one), crossing(odd, two)
         faces += [(odd, to_one, to_two)] if is_in[odd] else [(to_one, one, two), (to_one, two, to_two)]
     cut = np.array(faces, np.int64).reshape(-1, 3)

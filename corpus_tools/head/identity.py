@@ -43,20 +43,76 @@ BROWN, DARK = (0.72, 0.50, 0.36), (0.46, 0.31, 0.22)  # eyes; the drawn iris is 
 BLACK, BLOND, GREY = (0.45, 0.46, 0.52), (2.35, 2.75, 2.5), (2.0, 2.8, 3.8)  # hair
 YOUNG, MATURE, OLD, CHILD = {"young": 1.0}, {"young": 0.5, "old": 0.5}, {"old": 1.0}, {"child": 0.85, "young": 0.15}
 PERSONS: dict[str, Person] = {
-    "erik": Person("man, about 30, European", "male", YOUNG, {"caucasian": 1}, (0.98, 0.95, 0.93), BLOND, (0.9, 1.0, 1.2), (1.2, 0.9, 0.8)),
-    "amara": Person("woman, about 30, West African", "female", YOUNG, {"african": 1}, (0.56, 0.47, 0.42), BLACK, DARK, (2.6, 1.5, 0.7)),
-    "kofi": Person("man, about 35, West African", "male", {"young": 0.85, "old": 0.15}, {"african": 1}, (0.48, 0.40, 0.36), BLACK, DARK),
-    "mei": Person("woman, about 28, East Asian", "female", YOUNG, {"asian": 1}, (1.01, 0.99, 0.94), BLACK, DARK, (2.8, 1.2, 1.1)),
-    "kenji": Person("man, about 40, East Asian", "male", {"young": 0.75, "old": 0.25}, {"asian": 1}, (0.95, 0.91, 0.86), BLACK, DARK),
-    "leila": Person("woman, about 35, mixed ancestry", "female", {"young": 0.85, "old": 0.15},
-                    {"caucasian": 0.45, "african": 0.3, "asian": 0.25}, (0.80, 0.72, 0.66), BLACK, BROWN, (1.2, 2.0, 1.3)),
-    "ravi": Person("man, about 30, mixed ancestry", "male", YOUNG, {"caucasian": 0.5, "african": 0.2, "asian": 0.3},
-                   (0.70, 0.61, 0.55), BLACK, DARK, (1.7, 1.7, 1.6)),
-    "ingrid": Person("woman, about 70, European", "female", OLD, {"caucasian": 1}, (1.0, 0.965, 0.955), GREY, PLAIN, (2.0, 0.8, 1.1)),
+    "erik": Person(
+        "man, about 30, European",
+        "male",
+        YOUNG,
+        {"caucasian": 1},
+        (0.98, 0.95, 0.93),
+        BLOND,
+        (0.9, 1.0, 1.2),
+        (1.2, 0.9, 0.8),
+    ),
+    "amara": Person(
+        "woman, about 30, West African",
+        "female",
+        YOUNG,
+        {"african": 1},
+        (0.56, 0.47, 0.42),
+        BLACK,
+        DARK,
+        (2.6, 1.5, 0.7),
+    ),
+    "kofi": Person(
+        "man, about 35, West African",
+        "male",
+        {"young": 0.85, "old": 0.15},
+        {"african": 1},
+        (0.48, 0.40, 0.36),
+        BLACK,
+        DARK,
+    ),
+    "mei": Person(
+        "woman, about 28, East Asian", "female", YOUNG, {"asian": 1}, (1.01, 0.99, 0.94), BLACK, DARK, (2.8, 1.2, 1.1)
+    ),
+    "kenji": Person(
+        "man, about 40, East Asian", "male", {"young": 0.75, "old": 0.25}, {"asian": 1}, (0.95, 0.91, 0.86), BLACK, DARK
+    ),
+    "leila": Person(
+        "woman, about 35, mixed ancestry",
+        "female",
+        {"young": 0.85, "old": 0.15},
+        {"caucasian": 0.45, "african": 0.3, "asian": 0.25},
+        (0.80, 0.72, 0.66),
+        BLACK,
+        BROWN,
+        (1.2, 2.0, 1.3),
+    ),
+    "ravi": Person(
+        "man, about 30, mixed ancestry",
+        "male",
+        YOUNG,
+        {"caucasian": 0.5, "african": 0.2, "asian": 0.3},
+        (0.70, 0.61, 0.55),
+        BLACK,
+        DARK,
+        (1.7, 1.7, 1.6),
+    ),
+    "ingrid": Person(
+        "woman, about 70, European", "female", OLD, {"caucasian": 1}, (1.0, 0.965, 0.955), GREY, PLAIN, (2.0, 0.8, 1.1)
+    ),
     "walter": Person("man, about 65, European", "male", OLD, {"caucasian": 1}, (0.98, 0.93, 0.91), GREY, PLAIN),
-    "nia": Person("child, about 9, mixed ancestry", "female", CHILD, {"caucasian": 0.4, "african": 0.4, "asian": 0.2},
-                  (0.82, 0.75, 0.70), BLACK, BROWN, (3.2, 2.4, 0.7)),
-}  # fmt: skip
+    "nia": Person(
+        "child, about 9, mixed ancestry",
+        "female",
+        CHILD,
+        {"caucasian": 0.4, "african": 0.4, "asian": 0.2},
+        (0.82, 0.75, 0.70),
+        BLACK,
+        BROWN,
+        (3.2, 2.4, 0.7),
+    ),
+}
 
 
 def identities(source: Source, ground: Ground, look: Look, default: Built) -> dict[str, Identity]:

@@ -35,7 +35,8 @@ ROOT_ROW = 0.85  # the strip's first row lies within the lid
 def lash_piece(cage: Cage, skin: Skin, generator: np.random.Generator) -> Piece:
     """The lashes of both eyes; what was mended in the skin's shapes moves them too."""
     nearest = cKDTree(skin.vertices)
-    points, triangles, shapes, count = [], [], {name: [] for name in cage.units}, 0
+    points, triangles, count = [], [], 0
+    shapes: dict[str, list[Floats]] = {name: [] for name in cage.units}
     for side in "lr":
         for row in (UPPER, LOWER):
             strip = cage.source.groups[f"helper-{side}-eyelashes-{row.strip}"].corners

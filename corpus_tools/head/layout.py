@@ -37,7 +37,8 @@ def _stretched(values: Floats, box: tuple[float, float], face: tuple[float, floa
     grid = np.linspace(box[0], box[1], 2001)
     density = 1.0 + FACE_GAIN * np.exp(-(((grid - face[0]) / face[1]) ** 4))
     share = np.concatenate([[0], np.cumsum((density[1:] + density[:-1]) / 2)])
-    return np.interp(values, grid, share / share[-1])
+    placed: Floats = np.interp(values, grid, share / share[-1])
+    return placed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +52,8 @@ class Texels:
 
     def carried(self, values: Floats) -> Floats:
         """Values (N, D) of vertices brought to the texels, (P, D)."""
-        return np.einsum("pk,pkd->pd", self.weights, values[self.corners])
+        found: Floats = np.einsum("pk,pkd->pd", self.weights, values[self.corners])
+        return found
 
 
 def texels_of(uv: Floats, triangles: NDArray[np.int64], side: int) -> Texels:

@@ -39,7 +39,8 @@ def overlap(vertices: Floats, ball: Ball, name: str, weight: float) -> Floats:
     off = vertices - ball.centre + [0.0, 0.0, sink]
     distance = np.linalg.norm(off, axis=1)
     angle = np.arccos(np.clip((off @ turn)[:, 2] / distance, -1, 1))
-    return ball_radius(ball, angle) - distance
+    depth: Floats = ball_radius(ball, angle) - distance
+    return depth
 
 
 def _push(vertices: Floats, moved: Floats, ball: Ball, name: str, beside: sparse.csr_array) -> Floats:

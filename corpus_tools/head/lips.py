@@ -43,13 +43,14 @@ def lower_share(skin: Skin) -> Floats:
     """(N,) -1 on the upper lip, 1 on the lower, between at the corners."""
     moved = np.linalg.norm(skin.shapes["jawOpen"], axis=1)
     low, high = np.percentile(moved[_mouth(skin)], [5, 95])
-    return np.clip((moved - (low + high) / 2) / (0.18 * (high - low)), -1, 1)
+    share: Floats = np.clip((moved - (low + high) / 2) / (0.18 * (high - low)), -1, 1)
+    return share
 
 
 def _mouth(skin: Skin) -> NDArray[np.bool_]:
-    return np.all(
-        [(skin.base[:, k] > low) & (skin.base[:, k] < high) for k, (low, high) in enumerate(MOUTH_BOX)], axis=0
-    )
+    low, high = np.array(MOUTH_BOX).T
+    inside: NDArray[np.bool_] = np.all((skin.base > low) & (skin.base < high), axis=1)
+    return inside
 
 
 def _half_width(skin: Skin) -> float:

@@ -19,7 +19,8 @@ def lumps(points: Floats, size_mm: float, generator: np.random.Generator) -> Flo
 def bell(points: Floats, centre: tuple[float, ...], reach: tuple[float, ...]) -> Floats:
     """(P,) 1 at the centre, falling as a Gaussian; |x| counts, so that both sides are alike."""
     mirrored = np.column_stack([np.abs(points[:, 0]), points[:, 1:]])[:, : len(centre)]
-    return np.exp(-(((mirrored - np.array(centre)) / np.array(reach)) ** 2).sum(axis=1))
+    falling: Floats = np.exp(-(((mirrored - np.array(centre)) / np.array(reach)) ** 2).sum(axis=1))
+    return falling
 
 
 def ramp(values: Floats, low: float, high: float) -> Floats:
@@ -29,7 +30,7 @@ def ramp(values: Floats, low: float, high: float) -> Floats:
 
 
 def stroke_cover(places: Floats, starts: Floats, ends: Floats, widths: Floats) -> Floats:
-    """(P,) how far strokes cover places (P, 2): 1 on a stroke's line, tapering to its end; `widths` in mm at the root."""
+    """(P,) cover of places (P, 2) by strokes: 1 on a stroke's line, tapering to its end; `widths` in mm at the root."""
     cover = np.zeros(len(places))
     for start, end, width in zip(starts, ends, widths, strict=True):
         near = np.flatnonzero(np.abs(places - (start + end) / 2).max(axis=1) < np.abs(end - start).max() / 2 + width)

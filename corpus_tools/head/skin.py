@@ -13,6 +13,7 @@ Floats = NDArray[np.float64]
 
 LOWEST, WIDEST = 5.1, 2.25  # of the bust, in units of the source
 NECK_Y, NECK_SLOPE = 5.80, -0.272  # the head ends below this plane, which a shirt's collar hides
+HEAD_WIDEST = 1.2  # half the head's width with its neck; arms lie further out
 SHOULDER_Y = 6.35  # the bust ends above this
 SOCKET_U, SOCKET_Z = 0.2, 1.30  # MakeHuman's islands of the sockets; what lies further back is behind the eyeballs
 
@@ -48,18 +49,18 @@ def skinned(cage: Cage) -> Skin:
     """The head and neck of a cage, one Catmull-Clark step finer."""
     body = cage.source.groups["body"]
     places, where = cage.source.vertices[body.corners], cage.source.uv[body.uv_corners]
-    kept = (places[:, :, 1] - NECK_SLOPE * places[:, :, 2] > NECK_Y).any(axis=1) & (np.abs(places[:, :, 0]) < 1.2).all(
-        axis=1
-    )
-    kept &= ~((where[:, :, 0] < SOCKET_U) & (places[:, :, 2] < SOCKET_Z)).all(axis=1)
-    return _finer(cage, kept & (places[:, :, 1] > LOWEST).all(axis=1))
+    kept: NDArray[np.bool_] = np.any(places[:, :, 1] - NECK_SLOPE * places[:, :, 2] > NECK_Y, axis=1)
+    kept &= np.all((np.abs(places[:, :, 0]) < HEAD_WIDEST) & (places[:, :, 1] > LOWEST), axis=1)
+    kept &= ~np.all((where[:, :, 0] < SOCKET_U) & (places[:, :, 2] < SOCKET_Z), axis=1)
+    return _finer(cage, kept)
 
 
 def shoulders(cage: Cage) -> Skin:
     """Neck and shoulders of a cage, on which a shirt lies."""
     places = cage.source.vertices[cage.source.groups["body"].corners]
     inside = (places[:, :, 1] > LOWEST) & (places[:, :, 1] < SHOULDER_Y) & (np.abs(places[:, :, 0]) < WIDEST)
-    return _finer(cage, inside.all(axis=1))
+    kept: NDArray[np.bool_] = np.all(inside, axis=1)
+    return _finer(cage, kept)
 
 
 def _finer(cage: Cage, kept: NDArray[np.bool_]) -> Skin:
@@ -97,4 +98,5 @@ def vertex_normals(vertices: Floats, quads: NDArray[np.int64], base: Floats) -> 
     total = np.zeros((int(weld.max()) + 1, 3))
     for corner in quads.T:
         np.add.at(total, weld[corner], faces)
-    return (total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12))[weld]
+    unit: Floats = (total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12))[weld]
+    return unit

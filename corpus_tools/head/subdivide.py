@@ -68,4 +68,5 @@ def _averages(rows: NDArray[np.integer], columns: NDArray[np.integer], shape: tu
 
 
 def _scaled(factors: NDArray[np.floating], matrix: sparse.csr_array) -> sparse.csr_array:
-    return sparse.diags_array(factors.astype(float)) @ matrix
+    scaled: sparse.csr_array = sparse.diags_array(factors.astype(float)) @ matrix
+    return scaled

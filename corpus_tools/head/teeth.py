@@ -93,7 +93,8 @@ def arch_piece(arch: Arch, name: str) -> Piece:
 def fitted(points: Floats, before: Floats, after: Floats) -> Floats:
     """Points moved and scaled along each axis as a strip of teeth (N, 3) is from one identity to another."""
     scale = after.std(axis=0) / before.std(axis=0)
-    return after.mean(axis=0) + scale * (points - before.mean(axis=0))
+    moved: Floats = after.mean(axis=0) + scale * (points - before.mean(axis=0))
+    return moved
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,6 +1,7 @@
 """The skin's texture, painted by rule: every texel knows its place on the head, so seams do not show."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,7 +87,7 @@ def _flesh(place: Floats, where: Floats, source: Source, palette: Palette, gener
 def _fold(place: Floats) -> Floats:
     nearest = np.full(len(place), np.inf)
     flat = np.column_stack([np.abs(place[:, 0]), place[:, 1]])
-    for start, end in zip(FOLD[:-1], FOLD[1:], strict=True):
+    for start, end in pairwise(FOLD):
         share = np.clip((flat - start) @ (end - start) / ((end - start) @ (end - start)), 0, 1)
         nearest = np.minimum(nearest, np.linalg.norm(flat - start - share[:, None] * (end - start), axis=1))
     return np.exp(-((nearest / 3.0) ** 2)) * (place[:, 2] > 0)
