@@ -18,6 +18,8 @@ LETTER_NAMES = {
     "s": ("EH1 S",), "t": ("T IY1",), "u": ("Y UW1",), "v": ("V IY1",), "w": ("D AH1 B AH0 L Y UW0",),
     "x": ("EH1 K S",), "y": ("W AY1",), "z": ("Z EH1 D", "Z IY1"),
 }  # fmt: skip
+# The older "hw" of "white" (Wells 1982, "glide cluster reduction"); aligned, it makes an h of the rounded lips of w.
+BREATHED_W = ("h", "w")
 
 Ways = tuple[tuple[str, ...], ...]  # pronunciations of one word, each a row of phones
 
@@ -91,7 +93,9 @@ def pronunciations(word: str, *, is_letter: bool) -> Ways:
             found.append(variant)
     if not found:
         raise DataError(f"no pronunciation is known for {word!r}; check the transcript's spelling")
-    return tuple(dict.fromkeys(tuple(segment.phone for segment in segments) for segments in found))
+    ways = dict.fromkeys(tuple(segment.phone for segment in segments) for segments in found)
+    plain = [way for way in ways if way[:2] != BREATHED_W]
+    return tuple(plain or ways)
 
 
 def _listed(folder: Path, manifest: Path) -> tuple[Recording, ...]:

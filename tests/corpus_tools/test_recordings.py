@@ -37,6 +37,10 @@ def test_all_variants_of_the_dictionary_are_offered():
     assert set(pronunciations("either", is_letter=False)) == {("i", "ð", "ɚ"), ("aɪ", "ð", "ɚ")}
 
 
+def test_white_begins_with_w():
+    assert pronunciations("white", is_letter=False) == (("w", "aɪ", "t"),)
+
+
 def test_letters_have_names_in_the_phone_table():
     assert sorted(LETTER_NAMES) == [chr(code) for code in range(ord("a"), ord("z") + 1)]
     assert all(arpabet_segments(names) for ways in LETTER_NAMES.values() for names in ways)
