@@ -10,8 +10,9 @@ from scipy.optimize import lsq_linear
 
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.face.bounded import bounded_least_squares
 from tts2face.face.model import Face, Part
-from tts2face.face.retarget import bounded_least_squares, contact_gaps, inner_product_map, retargeter
+from tts2face.face.retarget import contact_gaps, inner_product_map, retargeter
 from tts2face.landmarks import (
     INNER_LIP_LOWER,
     INNER_LIP_UPPER,
@@ -101,7 +102,7 @@ def test_agrees_with_scipy_within_limits(seed: int) -> None:
     solved = bounded_least_squares(design.T @ design, wanted @ design, limits)
     for frame, target in zip(solved, wanted, strict=True):
         known = lsq_linear(design, target, (limits[:, 0], limits[:, 1]), tol=1e-12)
-        assert frame == pytest.approx(known.x, abs=10e-5)
+        assert frame == pytest.approx(known.x, abs=1e-8)
 
 
 @settings(deadline=None)
@@ -146,6 +147,29 @@ def test_lips_that_touch_on_the_talker_touch_on_the_face() -> None:
     closed = Trajectory(speech_channels(talker.model), np.zeros((1, N_MODES)), 25.0)
     moved = np.tensordot(retargeter(talker, face).retarget(closed).values[0], face.shapes, axes=1)
     assert abs(moved[UPPER_LIP_INNER_MID, 1] - moved[LOWER_LIP_INNER_MID, 1]) < 0.1
+
+
+def test_known_weights_are_found_again() -> None:
+    """Landmarks made from weights of the face's shapes, read by a talker whose modes are the shapes."""
+    talker = talker_of()
+    shapes = talker.model.basis * SCALE
+    turned = np.linalg.qr(np.random.default_rng(2).normal(size=(N_MODES, N_MODES)))[0]
+    face = face_of(np.tensordot(turned, shapes, axes=1))
+    motion = Trajectory(speech_channels(talker.model), [[12.0, 1.0, -2.0], [20.0, -1.0, 0.5]], 25.0)  # open lips
+    weights = retargeter(talker, face).retarget(motion).values
+    closed = np.array([0.4 * np.sqrt(len(INNER_LIP_UPPER)), 0, 0])  # the face opens from lips that touch
+    assert weights == pytest.approx((motion.values + closed) @ turned.T, rel=0.01, abs=0.1)
+
+
+def test_no_motion_gives_no_weights() -> None:
+    talker = talker_of()
+    still = Trajectory(speech_channels(talker.model), np.tile(talker.model.rest, (3, 1)), 25.0)
+    assert np.abs(retargeter(talker, face_of(talker.model.basis)).retarget(still).values).max() < 1e-6
+
+
+def test_shapes_that_cannot_be_told_apart_are_refused() -> None:
+    with pytest.raises(DataError, match="cannot be told apart"):
+        bounded_least_squares(np.ones((2, 2)) - 2 * np.eye(2), np.ones((1, 2)), np.array([[0.0, 1.0], [0.0, 1.0]]))
 
 
 def test_limits_hold_and_frames_do_not_know_each_other() -> None:

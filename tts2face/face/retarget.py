@@ -7,11 +7,11 @@ target without limits.
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence
+from tts2face.face.bounded import bounded_least_squares
 from tts2face.face.model import Face
 from tts2face.landmarks import (
     INNER_LIP_LOWER,
@@ -34,13 +34,12 @@ MIDDLE_PAIR = INNER_LIP_UPPER.index(UPPER_LIP_INNER_MID)
 BILABIALS = frozenset({"p", "b", "m"})
 SURE_CONTACT = 90  # percentile of the least gaps in bilabials: up to this gap the talker's lips touch
 MOST_CONTACT_MM = 1.5  # a tracker that reads more than this on touching lips is not to be trusted
+CLEAR_MM = 3.0  # this far beyond contact a gap is shown in full
 LIP_WEIGHT = 10.0  # a lip landmark against one of the jaw or cheek
 DEPTH_WEIGHT = 0.1  # z against x and y: a single camera sees depth with some ten times their error
-GAP_WEIGHT = 100.0  # the gap between facing lip points against one of the cheek: whether lips touch is what is seen
+GAP_WEIGHT = 300.0  # the gap between facing lip points against one of the cheek: whether lips touch is what is seen
 WIDTH_WEIGHT = 60.0  # the mouth's width, likewise: rounding is the other thing that a viewer reads from lips
 EFFORT = 0.005  # share of the mean curvature that draws every weight to 0: makes the answer unique and calm
-STOP = 1e-5  # change of a weight at which the iteration ends
-MOST_SWEEPS = 2000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,9 +55,9 @@ class Retargeter:
     pull : (k, S + 1)
         Linear term of landmarks and width: ``pull[:, :S] @ parameters + pull[:, S]``.
     gaps : (P, S + 1)
-        The talker's lip gaps in the face's size less those on touching lips, mm: ``gaps[:, :S] @ parameters + ...``.
-    gap_rest : (P,)
-        The same at the talker's rest.
+        The talker's lip gaps in the face's size less `contact`: ``gaps[:, :S] @ parameters + gaps[:, S]``, mm.
+    contact, gap_rest : (P,)
+        Gaps that the tracker reads on touching lips; `gaps` at the talker's rest.
     gap_pull, lip_pull : (k, P)
         What a gap that shall be seen adds to the linear term, and what the landmarks of its two lips do per mm that
         they shall go apart further than the talker's.
@@ -70,6 +69,7 @@ class Retargeter:
     curvature: FloatArray
     pull: FloatArray
     gaps: FloatArray
+    contact: FloatArray
     gap_rest: FloatArray
     gap_pull: FloatArray
     lip_pull: FloatArray
@@ -81,7 +81,8 @@ class Retargeter:
         """
         parameters = speech.values.astype(np.float64)
         read = parameters @ self.gaps[:, :-1].T + self.gaps[:, -1]
-        shown = np.maximum(read, 0.0)  # a face rests with its lips closed: its gaps are counted from there
+        over = np.maximum(read, 0.0)  # a face rests with its lips closed: its gaps are counted from there
+        shown = over + self.contact * np.minimum(over / CLEAR_MM, 1.0)
         linear = parameters @ self.pull[:, :-1].T + self.pull[:, -1]
         linear += shown @ self.gap_pull.T + (shown - read + self.gap_rest) @ self.lip_pull.T
         solved = bounded_least_squares(self.curvature, linear, self.limits)
@@ -116,7 +117,8 @@ def retargeter(talker: Talker, face: Face) -> Retargeter:
     widened, opened = moved[left, 0] - moved[right, 0], moved[upper, 1] - moved[lower, 1]
     curvature += WIDTH_WEIGHT * widened.T @ widened + GAP_WEIGHT * opened.T @ opened + effort * np.eye(len(moving))
     pull += WIDTH_WEIGHT * widened.T @ (wanted[left, 0] - wanted[right, 0])
-    gaps, gap_rest = _talker_gaps(talker, scale * turn[1])
+    contact = scale * contact_gaps(talker)
+    gaps = _talker_gaps(talker, scale * turn[1], contact)
     return Retargeter(
         shape_names=face.shape_names,
         moving=moving,
@@ -124,7 +126,8 @@ def retargeter(talker: Talker, face: Face) -> Retargeter:
         curvature=curvature,
         pull=pull,
         gaps=gaps,
-        gap_rest=gap_rest,
+        contact=contact,
+        gap_rest=gaps[:, :-1] @ talker.model.rest[: talker.model.n_speech] + gaps[:, -1],
         gap_pull=GAP_WEIGHT * opened.T,
         lip_pull=(weighted[upper, 1] - weighted[lower, 1]).T / 2,
     )
@@ -138,47 +141,6 @@ def inner_product_map(source: NDArray[np.floating], target: NDArray[np.floating]
     Theobald et al. 2007, eq. 5: the inner products of the basis vectors. Signs look after themselves.
     """
     return np.asarray(target, np.float64) @ np.asarray(source, np.float64).T
-
-
-def bounded_least_squares(curvature: FloatArray, linear: FloatArray, limits: FloatArray) -> FloatArray:
-    """(T, k) minimisers of ``w' H w / 2 - f' w`` within limits, one for each row f of `linear`.
-
-    Parameters
-    ----------
-    curvature : (k, k)
-        H, symmetric and positive definite: the answer is unique.
-    linear : (T, k)
-    limits : (k, 2)
-
-    Notes
-    -----
-    Cyclic coordinate descent from the unlimited solution, held within the limits (Wright 2015). O(T k^2) a sweep.
-    """
-    low, high = np.ascontiguousarray(limits[:, 0]), np.ascontiguousarray(limits[:, 1])
-    start = np.ascontiguousarray(np.clip(np.linalg.solve(curvature, linear.T).T, low, high))
-    solved: FloatArray = _descend(np.ascontiguousarray(curvature), np.ascontiguousarray(linear), low, high, start)
-    return solved
-
-
-@njit(cache=True, nogil=True)
-def _descend(curvature, linear, low, high, weights):  # type: ignore[no-untyped-def]
-    n_frames, k = linear.shape
-    for t in range(n_frames):
-        slope = linear[t] - curvature @ weights[t]
-        for _ in range(MOST_SWEEPS):
-            largest = 0.0
-            for i in range(k):
-                before = weights[t, i]
-                after = min(max(before + slope[i] / curvature[i, i], low[i]), high[i])
-                step = after - before
-                if step != 0.0:
-                    weights[t, i] = after
-                    for j in range(k):
-                        slope[j] -= curvature[j, i] * step
-                    largest = max(largest, abs(step))
-            if largest < STOP:
-                break
-    return weights
 
 
 def _check_lips(face: Face, moving: NDArray[np.int64]) -> None:
@@ -228,18 +190,17 @@ def _onto_face(talker: Talker, face: Face, rest: FloatArray) -> tuple[FloatArray
     return (left @ mirror @ right).T, float(width / np.linalg.norm(own[MOUTH_CORNER_LEFT] - own[MOUTH_CORNER_RIGHT]))
 
 
-def _talker_gaps(talker: Talker, up: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(P, S + 1) and (P,): gaps of facing inner lip points over the talker's contact along `up`, and those at rest."""
+def _talker_gaps(talker: Talker, up: FloatArray, contact: FloatArray) -> FloatArray:
+    """(P, S + 1) gaps of facing inner lip points over `contact`, along `up`."""
     model, n_speech = talker.model, talker.model.n_speech
     upper, lower = list(INNER_LIP_UPPER), list(INNER_LIP_LOWER)
     basis = (model.basis[:n_speech, upper] - model.basis[:n_speech, lower]).astype(np.float64) @ up
     mean = (model.mean[upper] - model.mean[lower]).astype(np.float64) @ up
-    mean -= contact_gaps(talker) * np.linalg.norm(up)
-    return np.column_stack([basis.T, mean]), mean + model.rest[:n_speech] @ basis
+    return np.column_stack([basis.T, mean - contact])
 
 
 def contact_gaps(talker: Talker) -> FloatArray:
-    """(P,) gaps in mm up to which the tracked facing lip points of a talker touch: most bilabials come so near.
+    """(P,) gaps, in the talker's mm, up to which its tracked facing lip points touch: most bilabials come so near.
 
     Taken where each bilabial's middle pair is nearest; without bilabials in the corpus, 0.
     """
