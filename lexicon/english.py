@@ -31,6 +31,8 @@ def folded(segments: tuple[Segment, ...]) -> tuple[Segment, ...]:
     result: list[Segment] = []
     for segment in segments:
         phone, stress = segment.phone, segment.stress
+        if phone == "ɹ" and result and result[-1].phone == "ɹ":
+            continue  # espeak-ng writes a linking r twice: ɑːɹ ɹ
         phones = (phone,) if phone in _INVENTORY else _FOLDED.get(phone) or nearest_phones(phone, _INVENTORY)
         if segment.is_syllabic and not PHONES[phone].is_vowel:
             result.append(Segment("ə", stress, is_syllabic=True))

@@ -17,7 +17,8 @@ from lexicon.phones import ipa_to_arpabet
 from lexicon.scripts import check_script
 from lexicon.syllables import syllables
 
-PAUSES_S = MappingProxyType({"": 0.0, ",": 0.2, ":": 0.3, ";": 0.3, ".": 0.5, "!": 0.5, "?": 0.5})  # nominal
+PAUSES_S = MappingProxyType({"": 0.0, ",": 0.2, ";": 0.3, ":": 0.3, ".": 0.5, "!": 0.5, "?": 0.5})  # nominal
+_STRENGTH = tuple(PAUSES_S)  # of two marks that meet, the later one here stays
 _PIECE = re.compile(r"[^\s.,;:!?]+|[.,;:!?]")
 
 
@@ -95,7 +96,7 @@ def _spoken_words(forms: Iterator[tuple[str, str]]) -> list[_Spoken]:
             if piece not in MARKS:
                 words.append(_Spoken(piece, written.strip(" .,;:!?") or piece))
             elif words:
-                words[-1].mark = max(words[-1].mark, piece, key=",;:.!?".find)
+                words[-1].mark = max(words[-1].mark, piece, key=_STRENGTH.index)
     return words
 
 
