@@ -1,0 +1,133 @@
+import numpy as np
+import pytest
+
+from tts2face.exemplar.animate import VisualVoice
+from tts2face.exemplar.blend import Pieces, averaged_pieces, exemplar_weights, joined_pieces, smoothed
+from tts2face.exemplar.contacts import Contacts, Gap, contact_poses, makes_lip_contact, with_contacts
+from tts2face.exemplar.options import THEOBALD_2007, SynthesisOptions
+from tts2face.exemplar.targets import Targets
+from tts2face.exemplar.tokens import reaching_spans
+
+GAP = Gap(np.zeros(3, np.float32), np.array([[0.0, 1.0, 0.0]], np.float32))
+
+
+def targets(*edges):
+    starts, ends = np.array(edges[:-1]), np.array(edges[1:])
+    return Targets(("x",) * len(starts), reaching_spans(starts, ends), np.arange(len(starts)))
+
+
+def test_weights_fall_with_the_score_and_sum_to_one():
+    weights = exemplar_weights(np.array([[2.0, 1.0, -np.inf]]), 1.0)
+    np.testing.assert_allclose(weights, [[1 / (1 + np.exp(-1)), np.exp(-1) / (1 + np.exp(-1)), 0.0]], rtol=1e-12)
+    np.testing.assert_allclose(exemplar_weights(np.array([[2.0, 1.0, -np.inf]]), 0.0), [[0.5, 0.5, 0.0]])
+
+
+def test_the_average_of_one_token_is_its_own_motion(voice: VisualVoice):
+    options = SynthesisOptions(overlap=False)
+    pieces = averaged_pieces(voice.tokens, np.array([[30]], np.int32), np.array([[1.0]]), voice.spread, options)
+    start, end = voice.tokens.spans[30, 1:3] * voice.tokens.fps
+    first = voice.tokens.first_frame[voice.tokens.utterance[30]]
+    knots = np.linspace(start, end, pieces.mean.shape[1])
+    frames = voice.tokens.frames[first : first + 60]
+    straight = np.stack([np.interp(knots, np.arange(60), frames[:, d]) for d in range(2)], axis=1)
+    np.testing.assert_allclose(pieces.mean[0, :, :2] * voice.spread[:2], straight, atol=0.8)  # mm, cubic against lines
+    assert pieces.variance.max() < 1e-6
+
+
+def test_mean_and_variance_of_several_tokens(voice: VisualVoice):
+    options = SynthesisOptions(align=False)
+    chosen = np.array([[30, 100, 200, -1]], np.int32)
+    weights = np.array([[0.5, 0.3, 0.2, 0.0]])
+    together = averaged_pieces(voice.tokens, chosen, weights, voice.spread, options)
+    alone = np.concatenate(
+        [
+            averaged_pieces(voice.tokens, chosen[:, e : e + 1], np.ones((1, 1)), voice.spread, options).mean
+            for e in range(3)
+        ]
+    )
+    np.testing.assert_allclose(together.mean[0], np.average(alone, axis=0, weights=weights[0, :3]), atol=1e-5)
+    np.testing.assert_allclose(
+        together.variance[0], np.average((alone - together.mean) ** 2, axis=0, weights=weights[0, :3]), atol=1e-5
+    )
+
+
+def pieces_of(*values, knots=25):
+    mean = np.tile(np.array(values, np.float32)[:, None, None], (1, knots, 1))
+    return Pieces(mean, np.zeros_like(mean))
+
+
+def test_pieces_edge_to_edge_stand_where_they_belong():
+    joined, told = joined_pieces(pieces_of(1.0, 3.0, knots=9), targets(0.1, 0.2, 0.4), 60, THEOBALD_2007)
+    assert told.nonzero()[0].tolist() == list(range(10, 41))
+    np.testing.assert_allclose(joined[11:20, 0], 1.0)
+    np.testing.assert_allclose(joined[21:41, 0], 3.0)
+    assert (joined[~told] == 0).all()
+
+
+def test_overlapping_pieces_hand_over_without_a_jump():
+    joined, told = joined_pieces(pieces_of(0.0, 1.0), targets(0.0, 0.2, 0.4), 41, SynthesisOptions(precision=0.0))
+    assert told.all()
+    steps = np.diff(joined[:, 0])
+    assert (steps >= -1e-6).all()
+    assert steps.max() < 0.06
+    assert joined[20, 0] == pytest.approx(0.5, abs=0.01)  # at the shared edge both count alike
+
+
+def test_the_surer_piece_wins_where_they_overlap():
+    even = pieces_of(0.0, 1.0)
+    unsure = Pieces(even.mean, np.where(even.mean == 0, 1.0, 0.0).astype(np.float32))
+    joined, _ = joined_pieces(unsure, targets(0.0, 0.2, 0.4), 41, SynthesisOptions(precision=1.5))
+    assert joined[20, 0] > 0.95
+
+
+def test_smoothing_is_a_gaussian_in_seconds():
+    pulse = np.zeros((201, 1))
+    pulse[100] = 1.0
+    made = smoothed(pulse, 0.05, 100.0)[:, 0]
+    times = (np.arange(201) - 100) / 100
+    gauss = np.exp(-(times**2) / (2 * 0.05**2))
+    np.testing.assert_allclose(made, gauss / gauss.sum(), atol=2e-5)  # the kernel ends at four sigma
+    np.testing.assert_allclose(smoothed(np.full((30, 2), 3.0), 0.05, 100.0), 3.0, rtol=1e-6)  # edges do not sag
+    assert smoothed(pulse, 0.0, 100.0)[100, 0] == 1.0
+
+
+def test_knows_the_phones_that_bring_the_lips_together():
+    assert all(makes_lip_contact(label) for label in ("p", "b", "m", "f", "v"))
+    assert not any(makes_lip_contact(label) for label in ("w", "t", "u", "ɹ", "sil"))
+
+
+def test_a_contact_closes_what_averaging_left_open():
+    values = np.full((100, 1), 4.0, np.float32)
+    values[45:56, 0] = 2.0
+    contact = Contacts(np.array([[0.46, 0.54]]), np.array([[0.1]], np.float32))
+    kept = with_contacts(values, contact, GAP, 100.0)
+    low = int(kept[:, 0].argmin())
+    assert 43 <= low <= 57
+    np.testing.assert_allclose(kept[low, 0], 0.1, atol=1e-6)
+    assert (kept[:35] == values[:35]).all()
+    assert (kept[65:] == values[65:]).all()
+    assert (kept <= values + 1e-6).all()
+
+
+def test_a_closed_contact_is_left_alone():
+    values = np.full((100, 1), 0.05, np.float32)
+    contact = Contacts(np.array([[0.46, 0.54]]), np.array([[0.1]], np.float32))
+    assert (with_contacts(values, contact, GAP, 100.0) == values).all()
+    beyond = Contacts(np.array([[5.0, 5.1]]), np.array([[0.0]], np.float32))
+    assert (with_contacts(values + 1, beyond, GAP, 100.0) == values + 1).all()
+
+
+def test_poses_are_taken_where_each_token_is_closest(voice: VisualVoice):
+    """Two p tokens, and one that never closes: the closer half by weight tells the pose."""
+    label = voice.tokens.inventory.index("p")
+    p = np.flatnonzero(voice.tokens.phone == label)[:2]
+    open_one = np.flatnonzero(voice.tokens.phone == voice.tokens.inventory.index("ɑ"))[0]
+    chosen = np.array([[open_one, *p]], np.int32)
+    pose = contact_poses(voice.tokens, chosen, np.array([[0.4, 0.3, 0.3]]), voice.lip_gap)
+    least = []
+    for token in p:
+        first, last = voice.tokens.first_frame[voice.tokens.utterance[token] :][:2]
+        times = np.arange(last - first) / voice.tokens.fps
+        near = (times >= voice.tokens.spans[token, 1] - 0.03) & (times <= voice.tokens.spans[token, 2] + 0.03)
+        least.append(np.abs(voice.tokens.frames[first:last][near, 0]).min())
+    assert pose[0, 0] == pytest.approx(np.mean(least), abs=1e-5)
