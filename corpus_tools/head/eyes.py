@@ -15,10 +15,10 @@ RECEDE_MM = 1.6  # how far a ball sinks while its lids are shut, which nobody se
 BULGE = 0.04  # of the radius, height of the cornea at its top
 BACK_RAD = 1.6  # the ball ends here; what is further back is never seen
 LOOKS = {
-    "eyeLookUp": (-1, 0, 24.0),
-    "eyeLookDown": (1, 0, 24.0),
-    "eyeLookOut": (0, 1, 28.0),
-    "eyeLookIn": (0, -1, 28.0),
+    "eyeLookUp": (-1, 0, 20.0),
+    "eyeLookDown": (1, 0, 20.0),
+    "eyeLookOut": (0, 1, 25.0),
+    "eyeLookIn": (0, -1, 25.0),
 }
 SCLERA = np.array([0.90, 0.875, 0.855])
 

@@ -12,7 +12,13 @@ from corpus_tools.head.skin import Skin
 Floats = NDArray[np.float64]
 
 SOFTENED = ("mouthSmileLeft", "mouthSmileRight", "mouthDimpleLeft", "mouthDimpleRight", "cheekPuff")
-STRONGER = {"browInnerUp": 1.6, "browOuterUpLeft": 1.4, "browOuterUpRight": 1.4}  # a real brow rises 8 mm, theirs 5
+STRONGER = {  # a real brow rises 8 mm, theirs 5; their upper lids hardly follow a gaze that goes up
+    "browInnerUp": 1.6,
+    "browOuterUpLeft": 1.4,
+    "browOuterUpRight": 1.4,
+    "eyeLookUpLeft": 1.7,
+    "eyeLookUpRight": 1.7,
+}
 N_MEANS = 14  # means over neighbours: folds narrower than about 10 mm go
 MOUTH = np.array([0.0, 6.585, 1.50])  # on the source's base mesh, its units
 NEAR, FAR = 0.30, 0.46  # lips closer than this keep their shape; cheeks further than that are smoothed

@@ -26,6 +26,7 @@ N_SKY, N_LAMP = 36, 7  # views for the sky and for each lamp
 LIFT_MM, SLACK_MM = 1.2, 1.2  # a vertex is looked for this far before the surface, and this far before what hides it
 FAR_MM = 20_000.0  # distance of the views: almost parallel light
 OPEN_JAW = 0.6  # weight of the wide open mouth
+HIDDEN_EYE = 0.75  # light on the parts of an eyeball that come out when it turns, of its lit parts' light
 SMOOTHINGS = 2  # means over neighbours, against the grain of few views
 
 
@@ -88,7 +89,11 @@ def _exposure(
         of_lamp = slice(N_SKY + k * N_LAMP, N_SKY + (k + 1) * N_LAMP)
         turned = np.clip((normals @ lamp + 0.15) / 0.4, 0.0, 1.0)  # turning away is no shadow
         exposure[:, 1 + k] = 1 - turned + turned * seen[of_lamp].mean(axis=0)
-    return _smoothed(surface, exposure)
+    smooth = _smoothed(surface, exposure)
+    for first, end in surface.rig.eye_spans:
+        ball = smooth[first:end]
+        np.maximum(ball, HIDDEN_EYE * np.percentile(ball, 85, axis=0), out=ball)
+    return smooth
 
 
 def _normals(surface: Surface, points: NDArray[np.float32]) -> NDArray[np.float32]:
