@@ -21,6 +21,7 @@ app = App(
     help='Text becomes a talking face: tts2face "Hello there." --out hello.mp4',
     version=__version__,
     help_flags=["--help", "-h"],
+    suppress_keyboard_interrupt=False,
 )
 app.command(phones)
 app.command(corpus)
@@ -31,7 +32,9 @@ app.command(corpus)
     ("What is said and how the face moves", Request), ("How it is drawn", Picture), without=frozenset({"text"})
 )  # fmt: skip
 def speak(  # noqa: PLR0913 - one parameter a flag
-    text: Annotated[str | None, Parameter(help="What to say; without it, --file or standard input.")] = None,
+    text: Annotated[
+        str | None, Parameter(help="What to say; without it, --file or standard input.", allow_leading_hyphen=True)
+    ] = None,
     /,
     *,
     out: Annotated[

@@ -22,7 +22,8 @@ class Ahead(Generic[Item]):
         self._source = source
         self._made: queue.Queue[Offer] = queue.Queue(room)
         self._stopped = threading.Event()
-        threading.Thread(target=self._make, name="ahead", daemon=True).start()
+        self._maker = threading.Thread(target=self._make, name="ahead", daemon=True)
+        self._maker.start()
 
     def __enter__(self) -> "Ahead[Item]":
         """Give the items."""
@@ -31,8 +32,9 @@ class Ahead(Generic[Item]):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Let the maker end."""
+        """Let the maker finish the item at hand and end: a process that ends around running native code aborts."""
         self._stopped.set()
+        self._maker.join()
 
     def __iter__(self) -> Iterator[Item]:
         """Items in their order."""
