@@ -29,6 +29,7 @@ def word_key(word: str) -> str:
     return word.translate(_APOSTROPHES).casefold()
 
 
+@functools.lru_cache(maxsize=50_000)
 def arpabet_segments(names: str) -> tuple[Segment, ...]:
     """Phones of ARPABET names between spaces, with their stress.
 

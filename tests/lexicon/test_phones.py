@@ -5,6 +5,7 @@ import itertools
 import pytest
 
 from lexicon.errors import DataError, InputError
+from lexicon.phone_table import read_phones
 from lexicon.phones import (
     ARPABET,
     PHONES,
@@ -13,7 +14,6 @@ from lexicon.phones import (
     nearest_phones,
     phone_distance,
     phone_of,
-    read_phones,
     vowels,
 )  # fmt: skip
 from lexicon.sequence import SILENCE

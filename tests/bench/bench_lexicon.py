@@ -1,0 +1,38 @@
+"""How fast text becomes words and phones: run ``python tests/bench/bench_lexicon.py``."""
+
+import time
+from collections.abc import Callable
+
+from lexicon.normalize import normalize
+from lexicon.pronounce import pronounce
+
+SENTENCE = (
+    "We met Dr. Smith on March 3, 2024 at 10:30 pm in St. Paul; it cost $5.20 (about 5%), see www.example.com. "
+    "The quick brown fox jumps over the lazy dog, and nobody cared at all. "
+)
+GERMAN = "Schöne Grüße aus München, zwölf Boxkämpfer jagen Viktor quer über den großen Sylter Deich. "
+
+
+def _report(name: str, text: str, work: Callable[[str], object]) -> None:
+    began = time.perf_counter()
+    work(text)
+    seconds = time.perf_counter() - began
+    print(f"{name:36} {len(text):9,} characters {seconds:7.3f} s {len(text) / seconds / 1e3:9.0f} kB/s")
+
+
+def main() -> None:
+    """Print one line a measurement."""
+    normalize("warm")
+    for size in (10_000, 100_000, 1_000_000):
+        _report("normalize", SENTENCE * (size // len(SENTENCE)), normalize)
+    for piece in ("....", "a.", "1,", "- ", "Dr "):
+        for size in (100_000, 1_000_000):
+            _report(f"normalize, {piece!r} over and over", piece * (size // len(piece)), normalize)
+    pronounce("warm")
+    for size in (200, 10_000, 100_000):
+        _report("pronounce en-us", SENTENCE * max(1, size // len(SENTENCE)), pronounce)
+        _report("pronounce de", GERMAN * max(1, size // len(GERMAN)), lambda text: pronounce(text, "de"))
+
+
+if __name__ == "__main__":
+    main()
