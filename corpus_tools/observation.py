@@ -72,10 +72,10 @@ def observed(recording: Recording, cache: Path, tracker: "FaceTracker", aligner:
         The recording cannot serve; the message says why.
     """
     words = spoken_words(recording)
-    seen = watched(recording.video, cache, tracker)
     sound = heard(recording.video, words, cache, aligner)
     if sound.confidence < LEAST_CONFIDENCE:
         raise DataError(f"the sound does not fit the transcript (confidence {sound.confidence:.0f}); correct the words")
+    seen = watched(recording.video, cache, tracker)
     points, first = on_grid(seen.tracking.points, seen.times, seen.fps)
     if np.isnan(points).all():
         raise DataError("no frame shows a face")

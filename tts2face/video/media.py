@@ -79,18 +79,10 @@ def read_pictures(path: Path) -> Iterator[Picture]:
     with _opened(path) as container:
         stream = _video(container, path)
         stream.thread_type = "NONE"  # recordings are read in parallel, one process each
-        n_frames, end = 0, 0.0
-        for packet in container.demux():
-            if packet.pts is not None and packet.time_base:
-                end = max(end, float((packet.pts + (packet.duration or 0)) * packet.time_base))
-            if packet.stream is not stream:
-                continue
-            for frame in stream.decode(packet):
-                if frame.is_corrupt:
-                    raise DataError(f"{path} is damaged at {frame.time or 0:.2f} s; copy or record it again")
-                yield Picture(_instant(frame, path), _upright(frame))
-                n_frames += 1
-        _check_complete(path, n_frames, end, (container.duration or 0) / 1e6)
+        for frame in _decoded(container, stream, path):
+            if frame.is_corrupt:
+                raise DataError(f"{path} is damaged at {frame.time or 0:.2f} s; copy or record it again")
+            yield Picture(_instant(frame, path), _upright(frame))
 
 
 def read_sound(path: Path, rate: int) -> Waveform:
@@ -101,7 +93,7 @@ def read_sound(path: Path, rate: int) -> Waveform:
     InputError
         There is no such file.
     DataError
-        It holds no sound or the sound cannot be decoded.
+        It holds no sound, the sound cannot be decoded, or the file ends before the time that it states.
     """
     import soxr
 
@@ -111,13 +103,11 @@ def read_sound(path: Path, rate: int) -> Waveform:
             raise DataError(f"{path} holds no sound; give a recording with its sound track")
         stream = container.streams.audio[0]
         start = 0.0
-        for frame in container.decode(stream):
+        for frame in _decoded(container, stream, path):
             if not blocks:
                 start = float(frame.time or 0.0)
             blocks.append(_mono(frame))
         source_rate = stream.rate
-    if not blocks:
-        raise DataError(f"{path} holds a sound track without a sample; give a recording with its sound")
     sound = _placed(np.concatenate(blocks), round(start * source_rate))
     return Waveform(np.clip(soxr.resample(sound, source_rate, rate), -1.0, 1.0), rate)
 
@@ -156,9 +146,19 @@ def _upright(frame: "VideoFrame") -> NDArray[np.uint8]:
     return np.ascontiguousarray(np.rot90(pixels, turns)) if turns else pixels
 
 
-def _check_complete(path: Path, n_frames: int, end: float, stated: float) -> None:
+def _decoded(container: "InputContainer", stream: Any, path: Path) -> Iterator[Any]:
+    """Frames of one stream; the end of all streams tells whether the file is whole."""
+    n_frames, end = 0, 0.0
+    for packet in container.demux():
+        if packet.pts is not None and packet.time_base:
+            end = max(end, float((packet.pts + (packet.duration or 0)) * packet.time_base))
+        if packet.stream is stream:
+            for frame in packet.decode():
+                yield frame
+                n_frames += 1
     if n_frames == 0:
-        raise DataError(f"{path} holds a video track without a frame; copy or record it again")
+        raise DataError(f"{path} holds a {stream.type} track without a frame; copy or record it again")
+    stated = (container.duration or 0) / 1e6
     if end < stated - LONGEST_SHORTFALL_S:
         raise DataError(f"{path} is truncated: it ends at {end:.2f} s of {stated:.2f} s; copy it again")
 

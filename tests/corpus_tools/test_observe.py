@@ -1,0 +1,170 @@
+"""The way from a folder of real recordings to a talker: refusals with reasons, resuming, any number of processes."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from corpus_tools.build import build_talker, read_provenance
+from corpus_tools.observe import Effort, observe
+from lexicon.errors import DataError, InputError
+from tts2face.talker import read_talker
+from tts2face.video.track import FaceTracker
+
+CHILD = """
+import sys
+from pathlib import Path
+from corpus_tools.observe import Effort, observe
+observe(Path(sys.argv[1]), effort=Effort(Path(sys.argv[2]), 1, Path(sys.argv[3])))
+"""
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory) -> Path:
+    """Tracked once for the tests that do not ask about tracking."""
+    return tmp_path_factory.mktemp("cache")
+
+
+def _muxed(source: Path, target: Path, kind: str) -> None:
+    """Copy of a recording with only its pictures or only its sound."""
+    import av
+
+    with av.open(str(source)) as incoming, av.open(str(target), "w") as outgoing:
+        stream = next(stream for stream in incoming.streams if stream.type == kind)
+        copied = outgoing.add_stream_from_template(stream)
+        for packet in incoming.demux(stream):
+            if packet.dts is not None:
+                packet.stream = copied
+                outgoing.mux(packet)
+
+
+def test_good_recordings_are_kept_and_bad_ones_refused_with_their_reason(real_folder, cache, face_model):
+    clips = real_folder / "clips"
+    good = clips / "bbaf2n.mkv"
+    (clips / "empty.mkv").touch()
+    (clips / "text.mkv").write_text("this is no film\n" * 50)
+    (clips / "cut.mkv").write_bytes(good.read_bytes()[:50_000])
+    _muxed(good, clips / "dumb.mkv", "video")
+    _muxed(good, clips / "dark.mkv", "audio")
+    shutil.copy(good, clips / "unsaid.mkv")
+    shutil.copy(good, clips / "other.mkv")
+    with (real_folder / "manifest.csv").open("a") as file:
+        file.writelines(f"{name},bin blue at f two now\n" for name in ("empty", "text", "cut", "dumb", "dark"))
+        file.write("other,yesterday my seventeen elephants remembered nothing whatsoever\n")
+    seen = []
+    found = observe(
+        real_folder, effort=Effort(cache, 1, face_model), on_progress=lambda done, of: seen.append((done, of))
+    )
+    assert [one.name for one in found.kept] == ["bbaf2n", "bbaf3s", "bbaf5a"]
+    reasons = {refusal.name: refusal.reason for refusal in found.refused}
+    expected = {
+        "empty": "is empty (0 bytes)",
+        "text": "cannot be read as video or sound",
+        "cut": "is truncated",
+        "dumb": "holds no sound",
+        "dark": "holds no video",
+        "unsaid": "has no transcript",
+        "other": "transcript",
+    }
+    assert set(reasons) == set(expected)
+    assert [reasons[name] for name in expected if expected[name] not in reasons[name]] == []
+    assert seen == [(done, 10) for done in range(1, 11)]
+
+
+def test_an_observation_is_on_one_clock(real_folder, cache, face_model):
+    one = observe(real_folder, effort=Effort(cache, 1, face_model)).kept[0]
+    assert one.landmarks.shape == (75, 478, 3)
+    assert one.head.shape == (75, 6)
+    assert one.intensity.shape == (75,)
+    assert [word.text for word in one.words] == ["bin", "blue", "at", "f", "two", "now"]
+    assert one.phones.end <= 75 / 25
+    eyes = np.linalg.norm(one.landmarks[:, 33] - one.landmarks[:, 263], axis=1)
+    assert abs(eyes.mean() - 89) < 5  # mm of the canonical face
+    loud = one.intensity[round(1.0 * 25) : round(2.0 * 25)].mean()
+    assert loud > one.intensity[:12].mean() + 10  # dB: speech over silence
+
+
+def test_processes_change_nothing(real_folder, tmp_path, face_model):
+    alone = observe(real_folder, effort=Effort(tmp_path / "a", 1, face_model)).kept
+    together = observe(real_folder, effort=Effort(tmp_path / "b", 2, face_model)).kept
+    for one, other in zip(alone, together, strict=True):
+        assert one.name == other.name
+        np.testing.assert_array_equal(one.landmarks, other.landmarks)
+        np.testing.assert_array_equal(one.phones.edges, other.phones.edges)
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="needs POSIX signals")
+def test_a_killed_run_goes_on_where_it_stopped(real_folder, tmp_path, face_model, monkeypatch):
+    kept = tmp_path / "cache"
+    command = [sys.executable, "-c", CHILD, str(real_folder), str(kept), str(face_model)]
+    child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 60
+    while not list(kept.glob("[!.]*.tracking")) and time.monotonic() < deadline and child.poll() is None:
+        time.sleep(0.005)
+    child.send_signal(signal.SIGKILL)
+    child.wait()
+    before = {path: path.stat().st_mtime_ns for path in kept.glob("[!.]*.tracking")}
+    assert 0 < len(before) < 3
+    tracked = []
+    track = FaceTracker.track
+    monkeypatch.setattr(FaceTracker, "track", lambda *args: tracked.append(1) or track(*args))
+    assert len(observe(real_folder, effort=Effort(kept, 1, face_model)).kept) == 3
+    assert len(tracked) == 3 - len(before)
+    assert all(path.stat().st_mtime_ns == stamp for path, stamp in before.items())
+
+
+def test_a_damaged_part_of_the_cache_is_made_again(real_folder, tmp_path, face_model):
+    effort = Effort(tmp_path / "cache", 1, face_model)
+    first = observe(real_folder, effort=effort).kept
+    for path in (tmp_path / "cache").iterdir():
+        path.write_bytes(path.read_bytes()[:100])
+    again = observe(real_folder, effort=effort).kept
+    for one, other in zip(first, again, strict=True):
+        np.testing.assert_array_equal(one.landmarks, other.landmarks)
+
+
+def test_a_talker_is_built_and_says_where_it_comes_from(real_folder, cache, tmp_path, face_model):
+    (real_folder / "provenance.json").write_text('{"licence": "CC BY 4.0", "language": "en-gb"}')
+    (real_folder / "clips" / "empty.mkv").touch()
+    out = tmp_path / "made.talker"
+    built = build_talker(real_folder, out, name="s1", effort=Effort(cache, 1, face_model), created="2000-01-01")
+    assert (built.n_kept, [refusal.name for refusal in built.refused]) == (3, ["empty"])
+    assert built.minutes == pytest.approx(3 * 75 / 25 / 60)
+    talker = read_talker(out)
+    assert talker.metadata["name"] == "s1"
+    assert talker.metadata["licence"] == "CC BY 4.0"
+    assert talker.metadata["attribution"] == "not stated"
+    assert talker.metadata["command"] == "tts2face corpus build recordings --name s1 --out made.talker"
+    assert talker.metadata["refused"][0][0] == "empty"
+
+
+def test_nothing_is_written_when_every_recording_is_refused(tmp_path, face_model):
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    (folder / "a.mkv").touch()
+    with pytest.raises(InputError, match="no recording could be used"):
+        build_talker(folder, tmp_path / "x.talker", effort=Effort(tmp_path / "cache", 1, face_model))
+    assert not (tmp_path / "x.talker").exists()
+
+
+def test_a_provenance_with_other_fields(tmp_path):
+    (tmp_path / "p.json").write_text('{"license": "CC0"}')
+    with pytest.raises(DataError, match="fields out of name, language, sources, licence, attribution"):
+        read_provenance(tmp_path / "p.json", must_exist=True)
+
+
+def test_a_provenance_that_is_not_there(tmp_path):
+    assert read_provenance(tmp_path / "p.json", must_exist=False) == {}
+    with pytest.raises(DataError, match="cannot be read as JSON"):
+        read_provenance(tmp_path / "p.json", must_exist=True)
+
+
+def test_no_job(real_folder, tmp_path):
+    with pytest.raises(InputError, match="jobs must be 1 or more"):
+        observe(real_folder, effort=Effort(tmp_path, -1))
