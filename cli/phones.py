@@ -15,10 +15,9 @@ def phones(
     dictionary: Annotated[Path | None, Parameter(help="Your own pronunciations, which win.")] = None,
 ) -> None:
     """Print the words of a text and their phones, in ARPABET and IPA, with stress and syllables."""
-    from tts2face.export.text import FORMATS
-
     from lexicon.dictionary import read_dictionary
     from lexicon.pronounce import pronounce
+    from tts2face.export.text import FORMATS
 
     spoken = pronounce(text, language, read_dictionary(dictionary) if dictionary else None)
     print(FORMATS[format](spoken), end="")  # noqa: T201 - the answer

@@ -46,10 +46,9 @@ def run(request: Request, picture: Picture, errand: Errand) -> None:
     else:
         _only_told(request, errand)
     if errand.view:
-        from tts2face.render.view import view
-
         from tts2face.api import synthesize
         from tts2face.face.file import load_face
+        from tts2face.render.view import view
         from tts2face.talker import load_talker
 
         face = load_face(errand.face, errand.identity)
