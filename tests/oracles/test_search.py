@@ -52,7 +52,7 @@ def test_finds_exactly_what_scoring_every_token_finds(tokens, similarity, contex
     around = contexts(phone, np.zeros(30, np.int32), 0)
     wanted = select.Wanted(phone, around, np.log(stream.uniform(0.03, 0.3, (30, 3))))
     found = select.best_tokens(
-        wanted, select.context_index(tokens), similarity, context=context, k=k, duration=duration
+        wanted, select.context_index(tokens, similarity), context=context, k=k, duration=duration
     )
     for n in range(30):
         same = np.flatnonzero(tokens.phone == phone[n])
@@ -87,5 +87,5 @@ def test_equal_scores_go_to_the_first_in_the_corpus():
         25.0,
     )
     wanted = select.Wanted(phone[:1], tokens.context[:1], select.log_durations(spans[:1]))
-    found = select.best_tokens(wanted, select.context_index(tokens), np.ones((1, 1)), context=2, k=3, duration=0.5)
+    found = select.best_tokens(wanted, select.context_index(tokens, np.ones((1, 1))), context=2, k=3, duration=0.5)
     assert found.tokens.tolist() == [[0, 1, 2]]

@@ -47,10 +47,11 @@ def visual_voice(talker: Talker) -> VisualVoice:
     tokens = tokens_of(talker)
     spread = np.maximum(model.spread[:n_speech], 1e-6).astype(np.float32)
     upper, lower = UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID
+    similarity = phone_similarity(token_samples(tokens), tokens.phone, tokens.inventory, spread)
     return VisualVoice(
         tokens,
-        context_index(tokens),
-        phone_similarity(token_samples(tokens), tokens.phone, tokens.inventory, spread),
+        context_index(tokens, similarity.matrix),
+        similarity,
         spread,
         model.rest[:n_speech].astype(np.float32),
         Gap(
@@ -73,7 +74,6 @@ def chosen_tokens(phones: PhoneSequence, voice: VisualVoice, options: SynthesisO
     found = best_tokens(
         wanted,
         voice.index,
-        voice.similarity.matrix,
         context=options.context,
         k=options.k,
         duration=options.duration,

@@ -28,16 +28,20 @@ class Wanted:
 class ContextIndex:
     """Tokens sorted into groups with the same phone and the same direct neighbours.
 
-    The tokens ``order[group_first[g]:group_first[g + 1]]`` form group g, whose neighbours are ``neighbours[g]``; the
-    groups ``phone_first[p]:phone_first[p + 1]`` belong to phone p.
+    The tokens ``order[group_first[g]:group_first[g + 1]]`` form group g; the groups
+    ``phone_first[p]:phone_first[p + 1]`` belong to phone p. ``likeness[g, c, q]`` is the highest similarity of label q
+    to what any token of group g has in context column c; ``log_range[g]`` are the group's least and greatest log
+    durations: both bound a group's scores from above.
     """
 
     order: NDArray[np.int32]
     group_first: NDArray[np.int32]
-    neighbours: NDArray[np.int32]
     phone_first: NDArray[np.int32]
+    likeness: NDArray[np.float64]
+    log_range: NDArray[np.float64]
     context: NDArray[np.int32]
     log_durations: NDArray[np.float64]
+    similarity: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,21 +57,24 @@ def log_durations(spans: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.log(np.maximum(np.diff(spans, axis=1), 0.01))
 
 
-def context_index(tokens: Tokens) -> ContextIndex:
-    """Index of a talker's tokens."""
+def context_index(tokens: Tokens, similarity: NDArray[np.float64]) -> ContextIndex:
+    """Index of a talker's tokens for the (P, P) similarity of its phones."""
     left, right = tokens.context[:, 0], tokens.context[:, 1]
     order = np.lexsort((right, left, tokens.phone)).astype(np.int32)
     keys = np.stack([tokens.phone, left, right], axis=1)[order]
-    new = np.concatenate([[True], (keys[1:] != keys[:-1]).any(1)])
-    firsts = np.flatnonzero(new)
-    phone_first = np.searchsorted(keys[firsts, 0], np.arange(len(tokens.inventory) + 1)).astype(np.int32)
+    firsts = np.flatnonzero(np.concatenate([[True], (keys[1:] != keys[:-1]).any(1)]))
+    durations = log_durations(tokens.spans)
+    own = durations[order, 1]
+    likeness = [np.maximum.reduceat(similarity[column[order]], firsts, axis=0) for column in tokens.context.T]
     return ContextIndex(
         order,
         np.concatenate([firsts, [len(order)]]).astype(np.int32),
-        np.ascontiguousarray(keys[firsts, 1:]),
-        phone_first,
+        np.searchsorted(keys[firsts, 0], np.arange(len(tokens.inventory) + 1)).astype(np.int32),
+        np.stack(likeness, axis=1),
+        np.stack([np.minimum.reduceat(own, firsts), np.maximum.reduceat(own, firsts)], axis=1),
         tokens.context,
-        log_durations(tokens.spans),
+        durations,
+        similarity,
     )
 
 
@@ -76,9 +83,7 @@ def context_weights(n_context: int) -> NDArray[np.float64]:
     return np.asarray(1.0 / (np.arange(1, n_context + 1) + 1.0))
 
 
-def best_tokens(
-    wanted: Wanted, index: ContextIndex, similarity: NDArray[np.float64], *, context: int, k: int, duration: float
-) -> Found:
+def best_tokens(wanted: Wanted, index: ContextIndex, *, context: int, k: int, duration: float) -> Found:
     """The k tokens of each wanted phone that lie in the most similar surroundings.
 
     Score = sum over d = 1..context of [S(left_d, its left_d) + S(right_d, its right_d)] / (d + 1), less, where
@@ -105,8 +110,9 @@ def best_tokens(
     scores = np.full((len(wanted.phone), k), -np.inf)
     _search(
         (wanted.phone, wanted.context, wanted.log_durations),
-        (index.order, index.group_first, index.neighbours, index.phone_first, index.context, index.log_durations),
-        (similarity, context_weights(context), duration),
+        (index.order, index.group_first, index.phone_first, index.context, index.log_durations),
+        (index.likeness, index.log_range),
+        (index.similarity, context_weights(context), duration),
         tokens,
         scores,
     )
@@ -141,19 +147,26 @@ def _insert(tokens, scores, token, score):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _search(wanted, index, rule, tokens, scores):  # type: ignore[no-untyped-def]
+def _bound(target, log_duration, likeness, log_range, rule):  # type: ignore[no-untyped-def]
+    """Score that no token of a group exceeds."""
+    _, weights, duration = rule
+    total = _ROUNDING
+    for d in range(len(weights)):
+        left, right = 2 * d, 2 * d + 1
+        total += weights[d] * (likeness[left, target[left]] + likeness[right, target[right]])
+    return total - duration * max(log_range[0] - log_duration, log_duration - log_range[1], 0.0)
+
+
+@njit(cache=True)
+def _search(wanted, index, limits, rule, tokens, scores):  # type: ignore[no-untyped-def]
     phone, contexts, durations = wanted
-    order, group_first, neighbours, phone_first, token_contexts, token_durations = index
-    similarity, weights, _ = rule
-    beyond = _ROUNDING  # the most that farther phones can add
-    for d in range(1, len(weights)):
-        beyond += 2.0 * weights[d]
+    order, group_first, phone_first, token_contexts, token_durations = index
+    likeness, log_range = limits
     for n in range(len(phone)):
         first, last = phone_first[phone[n]], phone_first[phone[n] + 1]
         bounds = np.zeros(last - first)
         for g in range(first, last):
-            left, right = similarity[contexts[n, 0], neighbours[g, 0]], similarity[contexts[n, 1], neighbours[g, 1]]
-            bounds[g - first] = weights[0] * (left + right) + beyond
+            bounds[g - first] = _bound(contexts[n], durations[n, 1], likeness[g], log_range[g], rule)
         for _ in range(last - first):
             g = _highest(bounds)
             if bounds[g] < scores[n, -1]:
