@@ -30,6 +30,7 @@ FloatArray = NDArray[np.float64]
 
 SPEECH_SHAPES = ("jaw", "mouth")  # how the names of the shapes that speech moves begin
 CORNERS_LEFT, CORNERS_RIGHT = (OUTER_LIP_UPPER[-1], INNER_LIP_UPPER[-1]), (OUTER_LIP_UPPER[0], INNER_LIP_UPPER[0])
+CHIN_POINTS = (199, 200, 175, 18, 83, 313, 201, 421, 208, 428)  # from under the lower lip to the tip of the chin
 MIDDLE_PAIR = INNER_LIP_UPPER.index(UPPER_LIP_INNER_MID)
 BILABIALS = frozenset({"p", "b", "m"})
 SURE_CONTACT = 90  # percentile of the least gaps in bilabials: up to this gap the talker's lips touch
@@ -39,6 +40,7 @@ LIP_WEIGHT = 10.0  # a lip landmark against one of the jaw or cheek
 DEPTH_WEIGHT = 0.1  # z against x and y: a single camera sees depth with some ten times their error
 GAP_WEIGHT = 300.0  # the gap between facing lip points against one of the cheek: whether lips touch is what is seen
 WIDTH_WEIGHT = 60.0  # the mouth's width, likewise: rounding is the other thing that a viewer reads from lips
+CHIN_WEIGHT = 400.0  # the drop of the chin, likewise: it sets how far the teeth go apart
 EFFORT = 0.005  # share of the mean curvature that draws every weight to 0: makes the answer unique and calm
 
 
@@ -80,11 +82,11 @@ class Retargeter:
         Each frame is solved on its own: the answer does not depend on what came before.
         """
         parameters = speech.values.astype(np.float64)
-        read = parameters @ self.gaps[:, :-1].T + self.gaps[:, -1]
+        read = product(parameters, self.gaps[:, :-1].T) + self.gaps[:, -1]
         over = np.maximum(read, 0.0)  # a face rests with its lips closed: its gaps are counted from there
         shown = over + self.contact * np.minimum(over / CLEAR_MM, 1.0)
-        linear = parameters @ self.pull[:, :-1].T + self.pull[:, -1]
-        linear += shown @ self.gap_pull.T + (shown - read + self.gap_rest) @ self.lip_pull.T
+        linear = product(parameters, self.pull[:, :-1].T) + self.pull[:, -1]
+        linear += product(shown, self.gap_pull.T) + product(shown - read + self.gap_rest, self.lip_pull.T)
         solved = bounded_least_squares(self.curvature, linear, self.limits)
         weights = np.zeros((len(parameters), len(self.shape_names)), np.float32)
         weights[:, self.moving] = solved
@@ -115,8 +117,9 @@ def retargeter(talker: Talker, face: Face) -> Retargeter:
     left, right = ([at[corner] for corner in corners] for corners in (CORNERS_LEFT, CORNERS_RIGHT))
     upper, lower = ([at[lip] for lip in lips] for lips in (INNER_LIP_UPPER, INNER_LIP_LOWER))
     widened, opened = moved[left, 0] - moved[right, 0], moved[upper, 1] - moved[lower, 1]
-    curvature += WIDTH_WEIGHT * widened.T @ widened + GAP_WEIGHT * opened.T @ opened + effort * np.eye(len(moving))
-    pull += WIDTH_WEIGHT * widened.T @ (wanted[left, 0] - wanted[right, 0])
+    curvature += WIDTH_WEIGHT * product(widened.T, widened) + GAP_WEIGHT * product(opened.T, opened)
+    curvature += effort * np.eye(len(moving))
+    pull += WIDTH_WEIGHT * product(widened.T, wanted[left, 0] - wanted[right, 0])
     contact = scale * contact_gaps(talker)
     gaps = _talker_gaps(talker, scale * turn[1], contact)
     return Retargeter(
@@ -127,10 +130,16 @@ def retargeter(talker: Talker, face: Face) -> Retargeter:
         pull=pull,
         gaps=gaps,
         contact=contact,
-        gap_rest=gaps[:, :-1] @ talker.model.rest[: talker.model.n_speech] + gaps[:, -1],
+        gap_rest=product(gaps[:, :-1], talker.model.rest[: talker.model.n_speech]) + gaps[:, -1],
         gap_pull=GAP_WEIGHT * opened.T,
         lip_pull=(weighted[upper, 1] - weighted[lower, 1]).T / 2,
     )
+
+
+def product(a: NDArray[np.floating], b: NDArray[np.floating]) -> FloatArray:
+    """Matrix product whose bits do not depend on the number of threads, as those of a threaded BLAS do."""
+    summed: FloatArray = np.einsum("...k,kj->...j" if b.ndim > 1 else "...k,k->...", a, b)
+    return summed
 
 
 def inner_product_map(source: NDArray[np.floating], target: NDArray[np.floating]) -> FloatArray:
@@ -165,7 +174,7 @@ def _displacements(talker: Talker, common: list[int], onto_face: FloatArray) -> 
     n_speech = talker.model.n_speech
     basis = talker.model.basis[:n_speech, common].astype(np.float64)
     wanted = np.einsum("slc,dc->lds", basis, onto_face)
-    at_rest = wanted @ talker.model.rest[:n_speech].astype(np.float64)
+    at_rest = product(wanted, talker.model.rest[:n_speech].astype(np.float64))
     return np.concatenate([wanted, -at_rest[..., None]], axis=2)
 
 
@@ -180,22 +189,23 @@ def _row_weights(common: list[int]) -> FloatArray:
 def _onto_face(talker: Talker, face: Face, rest: FloatArray) -> tuple[FloatArray, float]:
     """Rotation (3, 3) of the talker's axes into the face's, and the face's size over the talker's at the mouth."""
     model = talker.model
-    own = (model.mean + np.tensordot(model.rest, model.basis, axes=1)).astype(np.float64)
+    own = (model.mean + np.einsum("m,mld->ld", model.rest, model.basis)).astype(np.float64)
     rows = {int(landmark): row for row, landmark in enumerate(face.landmarks)}
     of_talker, of_face = own[face.landmarks], rest
-    inertia = (of_talker - of_talker.mean(axis=0)).T @ (of_face - of_face.mean(axis=0))
+    inertia = product((of_talker - of_talker.mean(axis=0)).T, of_face - of_face.mean(axis=0))
     left, _, right = np.linalg.svd(inertia)
     mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
     width = np.linalg.norm(rest[rows[MOUTH_CORNER_LEFT]] - rest[rows[MOUTH_CORNER_RIGHT]])
-    return (left @ mirror @ right).T, float(width / np.linalg.norm(own[MOUTH_CORNER_LEFT] - own[MOUTH_CORNER_RIGHT]))
+    turn = np.round((left @ mirror @ right).T, 9)  # the last bits of an SVD depend on the threads of LAPACK
+    return turn, float(width / np.linalg.norm(own[MOUTH_CORNER_LEFT] - own[MOUTH_CORNER_RIGHT]))
 
 
 def _talker_gaps(talker: Talker, up: FloatArray, contact: FloatArray) -> FloatArray:
     """(P, S + 1) gaps of facing inner lip points over `contact`, along `up`."""
     model, n_speech = talker.model, talker.model.n_speech
     upper, lower = list(INNER_LIP_UPPER), list(INNER_LIP_LOWER)
-    basis = (model.basis[:n_speech, upper] - model.basis[:n_speech, lower]).astype(np.float64) @ up
-    mean = (model.mean[upper] - model.mean[lower]).astype(np.float64) @ up
+    basis = product((model.basis[:n_speech, upper] - model.basis[:n_speech, lower]).astype(np.float64), up)
+    mean = product((model.mean[upper] - model.mean[lower]).astype(np.float64), up)
     return np.column_stack([basis.T, mean - contact])
 
 
@@ -209,7 +219,7 @@ def contact_gaps(talker: Talker) -> FloatArray:
     mean = (model.mean[list(INNER_LIP_UPPER), 1] - model.mean[list(INNER_LIP_LOWER), 1]).astype(np.float64)
     least = [np.zeros((0, len(mean)))]
     for utterance in talker.utterances:
-        gaps = utterance.shape[:, :n_speech].astype(np.float64) @ apart + mean
+        gaps = product(utterance.shape[:, :n_speech].astype(np.float64), apart) + mean
         least.append(_least_in_bilabials(gaps, utterance.phones, talker.fps))
     found = np.concatenate(least)
     return (
