@@ -72,7 +72,7 @@ _STEPS: tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...]
     (re.compile(r"–(?![0-9$£€])|(?<![0-9])–|--+"), ", "),
     (re.compile(r"(?<![0-9]) -(?= )|(?<= )-(?= ?[^0-9$£€¥.\s-])|-(?![\w$£€¥.])"), ", "),
     (re.compile(r"-(?=\.(?![0-9]))"), ""),
-    (re.compile(r"(?<![\w)' ,])-(?=[^\W0-9])"), " "),
+    (re.compile(r"(?<!\w)-(?=[^\W0-9])"), " "),
     (re.compile(r"(?<!\w)'(?!(?:em|cause|til|tis|twas|bout|round|n)\b|[0-9]0s\b)|(?<=[^\W0-9])'(?!\w)"), " "),
     (re.compile(r"'{2,}"), " "),
     (re.compile(r" {2,}"), " "),

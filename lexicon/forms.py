@@ -74,9 +74,8 @@ def clock(m: re.Match[str], _: str) -> str:
     hour, minute = m["hh"] or m["hh2"] or m["hh3"], m["mm"] or m["mm3"] or "0"
     half = m["half"] or m["half2"] or m["half3"] or ""
     if int(hour) > 24 or int(minute) > 59:
-        return (
-            " to ".join(cardinal(int(part)) for part in (hour, minute, m["ss"]) if part) + f" {half.upper()}".rstrip()
-        )
+        after = f" {half.replace('.', '').upper()}".rstrip()
+        return " to ".join(cardinal(int(part)) for part in (hour, minute, m["ss"]) if part) + after
     return _ended(readings.time_of_day(int(hour), int(minute), int(m["ss"] or 0), half), m)
 
 
@@ -135,6 +134,8 @@ def plain_number(m: re.Match[str], previous: str) -> str:
 
 def initial(m: re.Match[str], previous: str) -> str:
     """The J of J. Smith; a letter that ends a sentence keeps its full stop."""
+    if m.group()[0] in "IVXLCDM" and previous.lower() in _RULERS | _BEFORE_ROMAN:
+        return m.group()
     starts_name = not previous or previous in _MARKS or previous[:1].isupper() or previous in {"by", "and", "with"}
     return m.group()[0] if starts_name else m.group()
 

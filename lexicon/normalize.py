@@ -55,7 +55,7 @@ def _forms() -> tuple[tuple[str, str, forms.Reader], ...]:
         ("quick", r"(?!(?:etc|vs|approx|et)\b)[a-z]+(?= |$|[,;!?](?: |$))", forms.same),
         ("space", r" +", forms.nothing),
         ("mark", r"[.,;:!?](?= |$)", forms.same),
-        ("email", rf"[\w+-](?:[\w.+-]{{0,62}}[\w+-])?@{_LABEL}(?:\.{_LABEL}){{1,5}}", forms.address),
+        ("email", rf"[\w+-](?:[\w.+-]{{0,62}}[\w+-])?@{_LABEL}(?:\.{_LABEL}){{1,5}}(?!\w)", forms.address),
         ("url", rf"(?:(?:https?|ftp)://|www\.){_TAIL}", forms.address),
         ("host", rf"(?:{_LABEL}\.){{1,4}}{_TLD}\b(?![.]\w)(?:/(?:{_TAIL})?)?", forms.address),
         ("tag", r"[#@](?=[0-9_]{0,60}[^\W\d_])\w{1,140}", forms.hashtag),
@@ -129,7 +129,7 @@ def _forms() -> tuple[tuple[str, str, forms.Reader], ...]:
             rf"{_START}(?:[^\W\d_]\.){{2,12}}{_STOP}|{_START}[^\W\d_](?:\.[^\W\d_]){{1,12}}(?![\w.])",
             forms.dotted,
         ),
-        ("initial", rf"{_START}[A-Z]\.(?= [A-Z])", forms.initial),
+        ("initial", rf"{_START}[A-Z]\.(?= [A-Z](?:[a-z]|\.))", forms.initial),
         ("roman", rf"{_START}[IVXLCDM]{{1,15}}{_STOP}(?!['-][^\W\d_])", forms.roman_numeral),
         ("greek", r"(?<![^\W\d_])[πΩµμαβγδΔλσΣθφω](?![^\W\d_])", forms.symbol),
         ("word", rf"{_LETTERS}(?:['-]{_LETTERS})*", forms.same),
@@ -155,7 +155,7 @@ def tokens(text: str) -> Iterator[Token]:
         spoken = readers[match.lastgroup or ""](match, previous)
         if spoken:
             yield Token(match.group(), spoken)
-            previous = spoken.rpartition(" ")[2]
+            previous = spoken[-1] if spoken[-1] in MARKS else spoken.rpartition(" ")[2]
 
 
 def joined(spoken: list[str]) -> str:

@@ -82,6 +82,7 @@ TEXTS = st.one_of(st.text(), st.lists(FORMS, max_size=12).map("".join), st.lists
 @example("Dr .")
 @example("St™.")
 @example("St).")
+@example('E.g."I."A')
 @example("5\u0301 km")
 @example("\ud800")
 def test_normalising_twice_is_normalising_once(text: str) -> None:
