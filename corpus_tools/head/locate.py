@@ -34,6 +34,7 @@ Ints = NDArray[np.int64]
 
 YAWS, PITCHES, SIZES = (-14, -7, 0, 7, 14), (-3, 3, 9), (640, 900)
 LEAST_FACING = 0.25  # cosine between a surface's normal and the ray; a more slanting hit is no measurement
+GRAZE_MM = (3.0, 12.0)  # a ray that passes the surface so near, this far before what it meets, was meant for it
 LEAST_VIEWS = 6  # with sure hits; below it the landmark lies on the outline of the face
 EYE_RIGHT = ((33, 246, 161, 160, 159, 158, 157, 173, 133), (33, 7, 163, 144, 145, 153, 154, 155, 133))
 EYE_LEFT = ((263, 466, 388, 387, 386, 385, 384, 398, 362), (263, 249, 390, 373, 374, 380, 381, 382, 362))
@@ -95,7 +96,8 @@ def cast(face: Face, picture: Picture, tracker: FaceTracker) -> tuple[Floats, ND
 def first_hit(origin: Floats, ray: Floats, corners: Floats) -> tuple[Floats, float]:
     """Where a ray first meets triangles (F, 3, 3), and how squarely: the cosine between it and the surface's normal.
 
-    A ray that passes them by gives the corner that it comes nearest to, and 0. Source: Moeller and Trumbore 1997.
+    A ray that passes them by gives the corner that it comes nearest to, and 0; one that grazes an outline on its way
+    gives the corner there. Source: Moeller and Trumbore 1997.
     """
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     across, off = np.cross(ray, two), origin - corners[:, 0]
@@ -109,6 +111,11 @@ def first_hit(origin: Floats, ray: Floats, corners: Floats) -> tuple[Floats, flo
         away = np.linalg.norm(np.cross(off, ray), axis=1)
         return corners[int(away.argmin()), 0], 0.0
     first = int(np.where(inside, depth, np.inf).argmin())
+    along = -off @ ray
+    grazed = along < depth[first] - GRAZE_MM[1]
+    away = np.linalg.norm(np.cross(off[grazed], ray), axis=1)
+    if away.size and away.min() < GRAZE_MM[0]:  # past the outline of the face onto what lies far behind it
+        return corners[grazed][int(away.argmin()), 0], 1.0
     normal = np.cross(one[first], two[first])
     return origin + depth[first] * ray, -float(normal @ ray) / max(float(np.linalg.norm(normal)), 1e-30)
 

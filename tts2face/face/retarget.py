@@ -30,7 +30,7 @@ FloatArray = NDArray[np.float64]
 
 SPEECH_SHAPES = ("jaw", "mouth")  # how the names of the shapes that speech moves begin
 CORNERS_LEFT, CORNERS_RIGHT = (OUTER_LIP_UPPER[-1], INNER_LIP_UPPER[-1]), (OUTER_LIP_UPPER[0], INNER_LIP_UPPER[0])
-CHIN_POINTS = (199, 200, 175, 18, 83, 313, 201, 421, 208, 428)  # from under the lower lip to the tip of the chin
+CHIN_POINTS = (175, 199, 171, 396, 208, 428)  # where the skin lies on the bone of the jaw
 MIDDLE_PAIR = INNER_LIP_UPPER.index(UPPER_LIP_INNER_MID)
 BILABIALS = frozenset({"p", "b", "m"})
 SURE_CONTACT = 90  # percentile of the least gaps in bilabials: up to this gap the talker's lips touch
@@ -40,7 +40,7 @@ LIP_WEIGHT = 10.0  # a lip landmark against one of the jaw or cheek
 DEPTH_WEIGHT = 0.1  # z against x and y: a single camera sees depth with some ten times their error
 GAP_WEIGHT = 300.0  # the gap between facing lip points against one of the cheek: whether lips touch is what is seen
 WIDTH_WEIGHT = 60.0  # the mouth's width, likewise: rounding is the other thing that a viewer reads from lips
-CHIN_WEIGHT = 400.0  # the drop of the chin, likewise: it sets how far the teeth go apart
+CHIN_WEIGHT = 600.0  # the drop of the chin, likewise: it sets how far the teeth go apart
 EFFORT = 0.005  # share of the mean curvature that draws every weight to 0: makes the answer unique and calm
 
 
@@ -120,6 +120,10 @@ def retargeter(talker: Talker, face: Face) -> Retargeter:
     curvature += WIDTH_WEIGHT * product(widened.T, widened) + GAP_WEIGHT * product(opened.T, opened)
     curvature += effort * np.eye(len(moving))
     pull += WIDTH_WEIGHT * product(widened.T, wanted[left, 0] - wanted[right, 0])
+    chin = [at[landmark] for landmark in CHIN_POINTS if landmark in at]
+    dropped = moved[chin, 1].mean(axis=0)
+    curvature += CHIN_WEIGHT * np.outer(dropped, dropped)
+    pull += CHIN_WEIGHT * np.outer(dropped, wanted[chin, 1].mean(axis=0))
     contact = scale * contact_gaps(talker)
     gaps = _talker_gaps(talker, scale * turn[1], contact)
     return Retargeter(
