@@ -56,7 +56,8 @@ def _proportioned(points: Floats, eyes: list[Floats]) -> Floats:
     moved *= 1 - low * np.array([0.20, 0.0, 0.0])
     moved[:, 1] += 9.0 * ramp(-moved[:, 1], 45.0, 110.0)
     skull = ramp(moved[:, 1], 5.0, 90.0)[:, None]
-    return moved * (1 + skull * np.array([0.07, 0.06, 0.05]))
+    placed: Floats = moved * (1 + skull * np.array([0.07, 0.06, 0.05]))
+    return placed
 
 
 def _swollen(points: Floats, centre: Floats, gain: float, reach: float) -> Floats:

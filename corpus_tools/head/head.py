@@ -28,7 +28,7 @@ from corpus_tools.head.tongue import tongue_piece
 Floats = NDArray[np.float64]
 
 SKIN_MATERIAL = {"specular": 0.16, "shininess": 14.0, "wrap": 0.35, "textured": True}
-HAIR_PART_SHARE = 0.88  # of a quad that counts as hair; below it the hairline is painted on skin
+HAIR_PART_SHARE = 0.66  # of a quad that counts as hair; below it the hairline is painted on skin
 PIVOT = np.array([0.0, -75.0, -95.0])  # where the skull sits on the neck
 ADULT = {
     "macrodetails/caucasian-female-young": 1.0,

@@ -44,7 +44,7 @@ def test_reads_a_target_packed_or_not(tmp_path):
 
 
 def test_refuses_what_is_not_the_data(tmp_path):
-    with pytest.raises(DataError, match="has no mpfb2/3dobjs/base.obj"):
+    with pytest.raises(DataError, match=r"has no mpfb2/3dobjs/base\.obj"):
         source.read_source(tmp_path)
     with pytest.raises(DataError, match="there is no target"):
         source.read_target(tmp_path / "b.target", 4)
