@@ -17,6 +17,7 @@ KIND = "face"
 FORMAT_VERSION = 1
 STEPS_PER_SHAPE = 32000.0  # a shape's largest displacement in 16-bit steps: below 0.002 mm for 60 mm
 JPEG_QUALITY = 92
+LIGHTENED = 150  # a tint lightens texels up to this and no further: skin at the edge of dark hair stays skin
 SHIPPED = Path(__file__).parents[1] / "data"
 
 
@@ -235,7 +236,8 @@ def _identified(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapping[
         colours[used] = np.clip(face.colours[used] * tint, 0, 255).astype(np.uint8)
         if part.textured and texture is not None and not np.all(tint == 1):
             share = _texel_share(face, part, texture.shape)[:, :, None]
-            texture = np.clip(texture * (1 + share * (tint - 1)), 0, 255).astype(np.uint8)
+            tinted = texture * (1 + share * (tint - 1))
+            texture = np.clip(tinted, 0, np.maximum(texture, LIGHTENED)).astype(np.uint8)
     eyes = [
         replace(eye, centre=eye.centre + moved[eye.first : eye.first + eye.count].mean(axis=0).astype(np.float32))
         for eye in face.eyes
