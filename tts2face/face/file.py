@@ -223,7 +223,8 @@ def _texel_share(face: Face, part: Part, shape: tuple[int, ...]) -> NDArray[np.f
     for corners in places[face.triangles[part.first : part.first + part.count]].tolist():
         pen.polygon([tuple(corner) for corner in corners], fill=255, outline=255)
     soft = mask.filter(ImageFilter.MaxFilter(3)).filter(ImageFilter.GaussianBlur(1.5))
-    return np.asarray(soft, np.float32) / 255
+    share: NDArray[np.float32] = np.asarray(soft, np.float32) / np.float32(255)
+    return share
 
 
 def _identified(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], number: int) -> Face:
