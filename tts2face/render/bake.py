@@ -2,7 +2,7 @@
 
 The head is looked at from many directions by the rasteriser itself; a vertex that is seen from a direction gets the
 light that comes from there. Shadows stay on the skin while the head moves a little, as they would under large lamps;
-between the mouth closed and wide open they are mixed by the weight of ``jawOpen``.
+between the mouth closed and wide open they are mixed by how far the shapes part the lips.
 """
 
 import math
@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.face.model import Face
+from tts2face.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.render.compiled import kernel
 from tts2face.render.fragments import NORMAL, face_normals, vertex_normals
 from tts2face.render.light import LAMP_RADIUS_RAD
-from tts2face.render.paint import Room, project, room_for
+from tts2face.render.paint import project, room_for
 from tts2face.render.raster import SHIFT, draw_band, to_camera
 from tts2face.render.surface import Surface
 
@@ -27,23 +28,25 @@ LIFT_MM, SLACK_MM = 1.2, 1.2  # a vertex is looked for this far before the surfa
 FAR_MM = 20_000.0  # distance of the views: almost parallel light
 OPEN_JAW = 0.6  # weight of the wide open mouth
 HIDDEN_EYE = 0.75  # light on the parts of an eyeball that come out when it turns, of its lit parts' light
+HIDDEN_TOOTH = 0.6  # likewise of teeth behind the lips of the open mouth: enamel scatters light along itself
 SMOOTHINGS = 2  # means over neighbours, against the grain of few views
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Exposure:
-    """Light that reaches each vertex: ``rest`` (V, 4) of the sky and of three lamps, plus ``gain`` with open mouth."""
+    """Light that reaches each vertex: ``rest`` (V, 4) of the sky and of three lamps, plus ``gain`` with open mouth.
+
+    ``opening`` (K,) is how far each shape at weight 1 opens the lips, of the wide open mouth.
+    """
 
     rest: NDArray[np.float32]
     gain: NDArray[np.float32]
-    jaw: int
+    opening: NDArray[np.float32]
 
     def at(self, weights: NDArray[np.floating]) -> NDArray[np.float32]:
-        """(V, 4) for the weights of the face's shapes."""
-        if self.jaw < 0:
-            return self.rest
-        share = np.float32(min(max(float(weights[self.jaw]) / OPEN_JAW, 0.0), 1.0))
-        return self.rest + share * self.gain
+        """(V, 4) for the weights of the face's shapes; light enters through a slit faster than the slit opens."""
+        opened = min(max(float(np.dot(self.opening, weights)), 0.0), 1.0)
+        return self.rest + np.float32(math.sqrt(opened)) * self.gain
 
 
 def exposed(face: Face, surface: Surface, lamps: NDArray[np.float64], threads: int) -> Exposure:
@@ -53,7 +56,31 @@ def exposed(face: Face, surface: Surface, lamps: NDArray[np.float64], threads: i
     if jaw >= 0:
         poses[1, jaw] = OPEN_JAW
     baked = [_exposure(surface, surface.rig.posed(pose), lamps, threads) for pose in poses]
-    return Exposure(baked[0], baked[-1] - baked[0], jaw)
+    for part in face.parts:
+        if part.name.startswith("teeth"):
+            teeth = np.unique(face.triangles[part.first : part.first + part.count])
+            lit = HIDDEN_TOOTH * np.percentile(baked[-1][teeth], 90, axis=0)
+            baked[-1][teeth] = np.maximum(baked[-1][teeth], lit)
+    return Exposure(baked[0], baked[-1] - baked[0], lip_opening(face, jaw))
+
+
+def lip_opening(face: Face, jaw: int) -> NDArray[np.float32]:
+    """(K,) how far each shape parts the middle of the lips, of what the wide open jaw does.
+
+    On a face without landmarks the jaw alone is known to.
+    """
+    opening = np.zeros(len(face.shape_names), np.float32)
+    if jaw >= 0:
+        opening[jaw] = 1 / OPEN_JAW
+    rows = {int(number): row for row, number in enumerate(face.landmarks)}
+    if jaw < 0 or not {UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID} <= rows.keys():
+        return opening
+    upper, lower = (
+        np.einsum("kv,v->k", face.shapes[:, face.landmark_vertices[rows[lip]], 1], face.landmark_weights[rows[lip]])
+        for lip in (UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID)
+    )
+    parted = upper - lower
+    return (parted / (OPEN_JAW * parted[jaw])).astype(np.float32) if parted[jaw] > 0 else opening
 
 
 def sphere(n: int) -> NDArray[np.float64]:
