@@ -60,13 +60,15 @@ def _make(request: Request, picture: Picture, errand: Errand, out: Path) -> None
     from tts2face.render.output import checked_output
 
     checked_output(out)
+    from tts2face.api import check
     from tts2face.render.compiled import kernels_are_compiled
 
+    check(request)
+    ready = _ready(errand)
     if not kernels_are_compiled() and not errand.quiet:
         say("first run on this machine: compiling the renderer, which takes some seconds once")
     from tts2face.api import write_clip
 
-    ready = _ready(errand)
     told = _Explanation(ready, request)
     with progress_bar("speaking and drawing", errand.quiet) as on_progress:
         keep = told.add if errand.explain else None

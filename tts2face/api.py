@@ -76,13 +76,24 @@ def stream(request: Request, ready: Cast) -> Iterator[Piece]:
     Each clip begins and ends at rest, and ends on a frame, so that a text of any length stays in step in bounded
     memory.
     """
+    check(request)
     voice = _voice(request)
     first_frame = 0
     for text in pieces(request):
         clip = _animated(_spoken(voice, text, request, first_frame), ready, request)
         first_frame += len(clip.motion)
         yield Piece(clip, len(text))
-    if first_frame == 0:
+
+
+def check(request: Request) -> None:
+    """Refuse a request whose text holds nothing to say or cannot be read in its language; cheap at any length.
+
+    Raises
+    ------
+    InputError
+        As `pieces`; or there is no word in the text.
+    """
+    if next(pieces(request), None) is None:
         raise InputError(f"there is nothing to say in {request.text[:40]!r}; give at least one word")
 
 

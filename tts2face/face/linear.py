@@ -123,7 +123,8 @@ def rotation_matrix(turn: NDArray[np.floating]) -> NDArray[np.float64]:
         return np.eye(3)
     x, y, z = np.asarray(turn, np.float64) / angle
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross)
+    rotation: NDArray[np.float64] = np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross)
+    return rotation
 
 
 def head_rotation(pitch: float, yaw: float, roll: float) -> NDArray[np.float64]:
@@ -148,7 +149,8 @@ def eye_rotations(turns: NDArray[np.float32], weights: NDArray[np.floating]) -> 
 
 @njit(cache=True, nogil=True)
 def _pose(rest, starts, indices, deltas, weights, vertices):  # type: ignore[no-untyped-def]
-    vertices[:] = rest
+    for v in range(len(rest)):
+        vertices[v, 0], vertices[v, 1], vertices[v, 2] = rest[v, 0], rest[v, 1], rest[v, 2]
     for k in range(len(weights)):
         weight = weights[k]
         if weight == 0:

@@ -46,7 +46,8 @@ class Gif:
         indices = self._nearest[(levels[:, :, 0] << 2 * BITS) | (levels[:, :, 1] << BITS) | levels[:, :, 2]]
         if pixels.shape[2] == 4:
             indices[pixels[:, :, 3] < SOLID] = 255
-        frame = av.VideoFrame.from_ndarray((indices, self._palette), format="pal8")
+        coloured: Any = (indices, self._palette)  # PyAV takes a pair for pal8; its stubs do not say so
+        frame = av.VideoFrame.from_ndarray(coloured, format="pal8")
         frame.pts, frame.time_base = tick, Fraction(1, TICKS)
         self._container.mux(self._video.encode(frame))
 
@@ -75,4 +76,5 @@ def _palette(swatches: Sequence[NDArray[np.uint8]], n_colours: int) -> tuple[NDA
     palette = np.zeros((256, 4), np.uint8)
     palette[: len(colours), 0], palette[: len(colours), 1:] = 255, colours
     levels = np.indices((1 << BITS,) * 3).reshape(3, -1).T * (1 << (8 - BITS)) + (1 << (7 - BITS))
-    return palette, cKDTree(colours).query(levels)[1].astype(np.uint8)
+    nearest = np.asarray(cKDTree(colours).query(levels)[1], np.uint8)
+    return palette, nearest

@@ -192,8 +192,7 @@ def clear(depth: Array, owner: Array, layer: int) -> None:
 
 @kernel
 def draw_band(geometry: Any, batch: Any, first_row: int, depth: Array, owner: Array) -> int:
-    """Clear a band of rows and draw its triangles: opaque front faces, back faces, translucent ones; returns how many
-    of the last there are.
+    """Clear a band of rows and draw its triangles, translucent ones last; returns how many of those there are.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The light that fragments send to the camera: soft lights, light under skin, highlights, a bright sky; linear light."""
+"""The light that fragments send to the camera: soft lamps, light under skin, highlights, a bright sky; linear."""
 
 from typing import Any
 

@@ -46,7 +46,7 @@ def camera_named(text: str) -> Camera:
         numbers = []
     if not 2 <= len(numbers) <= 3 or not all(math.isfinite(number) for number in numbers):
         raise InputError(
-            f"there is no camera {text!r}; choose one of {', '.join(NAMED)}, or give yaw,pitch,distance such as 20,5,900"
+            f"there is no camera {text!r}; choose {', '.join(NAMED)}, or give yaw,pitch,distance such as 20,5,900"
         )
     yaw, pitch = numbers[:2]
     distance = numbers[2] if len(numbers) == 3 else 0.0

@@ -1,0 +1,115 @@
+"""From text to a finished clip: speed, cold start, memory.
+
+Run: ``python tests/bench/bench_clip.py`` (``--minutes 10`` for the long text). Beside the figures stands a reference
+loop of plain numpy, run before and after, so that machines and moments can be compared.
+"""
+
+import argparse
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from sentences import sentences
+
+from tts2face.api import cast, stream, write_clip
+from tts2face.face.file import load_face
+from tts2face.render.encode import ClipWriter
+from tts2face.render.picture import Picture
+from tts2face.request import Request
+from tts2face.talker import load_talker
+
+COMMAND = "from cli.main import main; main()"
+SHORT = "We were away a year ago, but Bob may move five big maps."
+TEN_SECONDS = f"{SHORT} Peter Piper picked a peck of pickled peppers, and she sells sea shells by the shore."
+
+
+def reference_s() -> float:
+    """Seconds of a fixed amount of single-threaded numpy work."""
+    values = np.random.default_rng(0).normal(size=400_000)
+    began = time.perf_counter()
+    for _ in range(20):
+        values = np.sort(values * 1.0001 - 0.5)
+    return time.perf_counter() - began
+
+
+def whole_clip(folder: Path, n_runs: int = 3) -> None:
+    """Speak, animate, draw, encode: 512 x 512, 30 frames a second, 2 x 2 samples; after one warm-up."""
+    ready = cast(load_talker("grid_s1"), load_face("head"))
+    rates, before = [], reference_s()
+    for run in range(n_runs + 1):
+        began = time.perf_counter()
+        written = write_clip(Request(text=TEN_SECONDS), Picture(), ready, folder / "clip.mp4")
+        if run:
+            rates.append(written.seconds / (time.perf_counter() - began))
+    print(
+        f"whole clip of {written.seconds:.1f} s: {np.median(rates):.2f} x real time ({min(rates):.2f}-{max(rates):.2f})"
+    )
+    clips = [piece.clip for piece in stream(Request(text=TEN_SECONDS), ready)]
+    began = time.perf_counter()
+    with ClipWriter(folder / "drawn.mp4", ready.face, Picture()) as writer:
+        for clip in clips:
+            writer.add(clip)
+    frames = sum(len(clip.motion) for clip in clips)
+    spent = time.perf_counter() - began
+    print(f"drawing and encoding alone: {frames / spent:.0f} frames/s")
+    print(f"reference loop: {before:.2f} s before, {reference_s():.2f} s after")
+
+
+def cold_start(folder: Path) -> None:
+    """Time of the whole command in a new process, and to its first frame, with compiled kernels on disk."""
+    for what, arguments in {"--help": ["--help"], "clip of one word": ["Hi.", "--out", str(folder / "hi.mp4")]}.items():
+        spent = []
+        for _ in range(5):
+            began = time.perf_counter()
+            subprocess.run([sys.executable, "-c", COMMAND, *arguments], check=True, capture_output=True)
+            spent.append(time.perf_counter() - began)
+        print(f"{what}: {np.median(spent):.2f} s ({min(spent):.2f}-{max(spent):.2f})")
+    code = (
+        "import sys, time; began = time.perf_counter()\n"
+        "import tts2face.render.encode as e\n"
+        "from tts2face.render import draw as d; frames = d.frames\n"
+        "def first(*a, **k):\n"
+        "    for n, x in enumerate(frames(*a, **k)):\n"
+        "        if n == 0: print(time.perf_counter() - began)\n"
+        "        yield x\n"
+        "e.frames = first\n"
+        "from cli.main import run; run(sys.argv[1:])"
+    )
+    spent = []
+    for _ in range(5):
+        arguments = [SHORT, "--out", str(folder / "first.mp4"), "--quiet"]
+        told = subprocess.run([sys.executable, "-c", code, *arguments], check=True, capture_output=True, text=True)
+        spent.append(float(told.stdout.split()[0]))
+    print(f"cold start to the first frame: {np.median(spent):.2f} s ({min(spent):.2f}-{max(spent):.2f})")
+
+
+def long_text(folder: Path, minutes: float) -> None:
+    """Peak memory and speed for a text of many minutes, in a process of its own."""
+    text = folder / "long.txt"
+    text.write_text("\n".join(sentences(round(minutes * 60 / 4.1))), encoding="utf-8")
+    began = time.perf_counter()
+    arguments = ["--file", str(text), "--out", str(folder / "long.mp4")]
+    done = subprocess.run([sys.executable, "-c", COMMAND, *arguments], check=True, capture_output=True, text=True)
+    spent = time.perf_counter() - began
+    peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+    print(f"{minutes:g} minutes of text: peak memory {peak:.0f} MB, {spent:.0f} s; {done.stderr.strip()}")
+
+
+def main() -> None:
+    """Print the figures of docs/performance.md."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--minutes", type=float, default=0.0, help="also speak a text of so many minutes")
+    minutes = parser.parse_args().minutes
+    with tempfile.TemporaryDirectory() as name:
+        if minutes:
+            long_text(Path(name), minutes)
+        whole_clip(Path(name))
+        cold_start(Path(name))
+
+
+if __name__ == "__main__":
+    main()
