@@ -60,15 +60,10 @@ def _make(request: Request, picture: Picture, errand: Errand, out: Path) -> None
     from tts2face.render.output import checked_output
 
     checked_output(out)
-    from tts2face.api import check
-    from tts2face.render.compiled import kernels_are_compiled
+    from tts2face.api import check, write_clip
 
     check(request)
     ready = _ready(errand)
-    if not kernels_are_compiled() and not errand.quiet:
-        say("first run on this machine: compiling the renderer, which takes some seconds once")
-    from tts2face.api import write_clip
-
     told = _Explanation(ready, request)
     with progress_bar("speaking and drawing", errand.quiet) as on_progress:
         keep = told.add if errand.explain else None
@@ -98,9 +93,17 @@ def _only_told(request: Request, errand: Errand) -> None:
 def _ready(errand: Errand) -> "Cast":
     from tts2face.api import cast
     from tts2face.face.file import load_face
+    from tts2face.render.compiled import kernels_are_compiled
     from tts2face.talker import load_talker
 
-    return cast(load_talker(errand.talker), load_face(errand.face, errand.identity))
+    talker, face = load_talker(errand.talker), load_face(errand.face, errand.identity)
+    if not kernels_are_compiled():
+        from tts2face.first_run import compile_kernels
+
+        if not errand.quiet:
+            say("first run on this machine: compiling the kernels, which takes some ten seconds once")
+        compile_kernels(face)
+    return cast(talker, face)
 
 
 class _Explanation:

@@ -39,37 +39,62 @@ def bounded_least_squares(curvature: FloatArray, linear: FloatArray, limits: Flo
     """
     low, high = np.ascontiguousarray(limits[:, 0]), np.ascontiguousarray(limits[:, 1])
     solved: FloatArray = np.zeros(linear.shape)
-    rounds = _solve_all(np.ascontiguousarray(curvature), np.ascontiguousarray(linear), low, high, solved)
+    slack = UNEVEN * float(np.trace(curvature)) / len(curvature)
+    bounds = (low, high, slack)
+    rounds = _solve_all(np.ascontiguousarray(curvature), np.ascontiguousarray(linear), bounds, solved)
     if rounds >= MOST_ROUNDS or not np.isfinite(solved).all():
         raise DataError("the face's shapes cannot be told apart, so their weights are not unique; build the face again")
     return solved
 
 
 @njit(cache=True, nogil=True)
-def _solve_all(curvature, linear, low, high, weights):  # type: ignore[no-untyped-def]
-    """Write the minimisers; returns the most rounds that a frame took."""
+def _solve_all(curvature, linear, bounds, weights):  # type: ignore[no-untyped-def]
+    """Write the minimisers; returns the most rounds that a frame took. Plain loops: they compile in a second."""
+    low, high, _ = bounds
     n_frames, k = linear.shape
     state, belongs = np.zeros(k, np.int8), np.zeros(k, np.int8)  # -1 at the lower limit, 0 free, 1 at the upper limit
     room = np.zeros((k + 1, k))  # the factor, and below it the right side
-    slack = UNEVEN * np.trace(curvature) / k
+    free = np.zeros(k, np.int64)
     longest = 0
     for t in range(n_frames):
-        state[:] = 0
+        for i in range(k):
+            state[i] = 0
         fewest, patience, rounds = k + 1, PATIENCE, 0
         while rounds < MOST_ROUNDS:
             rounds += 1
+            n_free = 0
             for i in range(k):
                 weights[t, i] = low[i] if state[i] < 0 else high[i] if state[i] > 0 else 0.0
-            _solve_free(curvature, linear[t], np.flatnonzero(state == 0), room, weights[t])
-            n_wrong = _judge(curvature, linear[t], (low, high, slack), weights[t], (state, belongs))
+                if state[i] == 0:
+                    free[n_free] = i
+                    n_free += 1
+            _solve_free(curvature, linear[t], free[:n_free], room, weights[t])
+            n_wrong = _judge(curvature, linear[t], bounds, weights[t], (state, belongs))
             if n_wrong == 0:
                 break
             patience = PATIENCE if n_wrong < fewest else patience - 1
             fewest = min(fewest, n_wrong)
-            first = 0 if patience >= 0 else np.flatnonzero(state != belongs)[-1]
-            state[first:] = belongs[first:]
+            _exchange(state, belongs, patience < 0)
         longest = max(longest, rounds)
     return longest
+
+
+@njit(cache=True, nogil=True)
+def _exchange(state, belongs, only_last):  # type: ignore[no-untyped-def]
+    """Put weights where they belong: all of them, or only the last that is elsewhere."""
+    for i in range(len(state) - 1, -1, -1):
+        if state[i] != belongs[i]:
+            state[i] = belongs[i]
+            if only_last:
+                return
+
+
+@njit(cache=True, nogil=True)
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for i in range(len(a)):
+        total += a[i] * b[i]
+    return total
 
 
 @njit(cache=True, nogil=True)
@@ -82,7 +107,7 @@ def _judge(curvature, linear, bounds, weights, states):  # type: ignore[no-untyp
         if state[i] == 0:
             belongs[i] = (weights[i] > high[i] + BEYOND) - (weights[i] < low[i] - BEYOND)
         else:
-            slope = np.dot(curvature[i], weights) - linear[i]
+            slope = _dot(curvature[i], weights) - linear[i]
             belongs[i] = 0 if low[i] < high[i] and state[i] * slope > slack else state[i]
         n_wrong += belongs[i] != state[i]
     return n_wrong
@@ -94,7 +119,7 @@ def _solve_free(curvature, linear, free, room, weights):  # type: ignore[no-unty
     n = len(free)
     right = room[-1]
     for a in range(n):
-        right[a] = linear[free[a]] - np.dot(curvature[free[a]], weights)  # free weights are still 0
+        right[a] = linear[free[a]] - _dot(curvature[free[a]], weights)  # free weights are still 0
     for a in range(n):
         for b in range(a + 1):
             total = curvature[free[a], free[b]]

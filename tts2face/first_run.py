@@ -1,0 +1,48 @@
+"""The first run on a machine compiles the kernels; afterwards they lie on disk.
+
+What moves the lips is compiled in a process of its own while this one compiles what draws, for numba compiles one kernel
+at a time in a process.
+"""
+
+import subprocess
+import sys
+
+import numpy as np
+
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.face.model import Face
+from tts2face.render.draw import draw
+from tts2face.render.picture import Picture
+from tts2face.talker import Talker
+
+COMPILE_MOTION = "from tts2face.first_run import compile_motion; compile_motion()"
+PATIENCE_S = 120.0
+
+
+def compile_kernels(face: Face) -> None:
+    """Compile all kernels that a clip needs. Where the other process fails they are compiled at their first use."""
+    other = subprocess.Popen(
+        [sys.executable, "-c", COMPILE_MOTION], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    try:
+        draw(face, np.zeros(len(face.shape_names), np.float32), picture=Picture(size="64x64"))
+        other.wait(PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        other.kill()
+    finally:
+        if other.poll() is None:
+            other.kill()
+        other.wait()
+
+
+def compile_motion() -> None:
+    """Compile what turns phones into a face's weights, by moving the shipped faces a little."""
+    from tts2face.api import cast
+    from tts2face.exemplar.animate import speech_trajectory
+    from tts2face.face.file import load_face
+    from tts2face.talker import load_talker
+
+    talker: Talker = load_talker("grid_s1")
+    ready = cast(talker, load_face("head"))
+    phones = PhoneSequence([SILENCE, "p", "f", "ɑ", SILENCE], [0.0, 0.3, 0.4, 0.5, 0.7, 1.0])
+    ready.retargeter.retarget(speech_trajectory(phones, ready.visual_voice, fps=30.0, n_frames=30))
