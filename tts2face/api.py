@@ -1,7 +1,7 @@
 """The one core call: a request, a talker and a face become a clip, whole, piece by piece, or as a file."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from tts2face.exemplar.options import METHODS, SynthesisOptions
 from tts2face.face.model import Face
 from tts2face.face.retarget import Retargeter, retargeter
 from tts2face.render.clock import exact_rate, first_sample
+from tts2face.render.draw import Stage, staged
 from tts2face.render.encode import ClipWriter
 from tts2face.render.output import checked_output
 from tts2face.render.picture import Picture
@@ -29,17 +30,30 @@ from tts2face.talker import Talker
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, frame_count, joined_clips
 from tts2face.voice.engine import Voice, load_voice
 
+STAGES_KEPT = 2  # kinds of picture; each keeps some 30 MB
 CLIPS_AHEAD = 2  # pieces that may wait to be drawn while the next is spoken
 PIECE_CHARACTERS = 300  # a sentence that is longer is cut at a clause mark or a space
 
 
 @dataclass(frozen=True, slots=True)
 class Cast:
-    """A talker and a face made ready for each other; serves any number of requests."""
+    """A talker and a face made ready for each other; serves any number of requests.
+
+    ``stages`` keeps what was made ready to draw the face into the last few kinds of picture.
+    """
 
     face: Face
     visual_voice: VisualVoice
     retargeter: Retargeter
+    stages: dict[Picture, Stage] = field(default_factory=dict)
+
+    def stage(self, picture: Picture) -> Stage:
+        """The face made ready to be drawn into a kind of picture; its soft shadows take most of a second."""
+        if picture not in self.stages:
+            while len(self.stages) >= STAGES_KEPT:
+                self.stages.pop(next(iter(self.stages)))
+            self.stages[picture] = staged(self.face, picture)
+        return self.stages[picture]
 
 
 def cast(talker: Talker, face: Face) -> Cast:
@@ -206,7 +220,7 @@ def write_clip(
 
     with (
         Ahead(stream(request, ready), CLIPS_AHEAD) as spoken,
-        ClipWriter(out, ready.face, picture, on_progress=tell) as writer,
+        ClipWriter(out, ready.stage(picture), on_progress=tell) as writer,
     ):
         for piece in spoken:
             if on_clip:

@@ -1,6 +1,6 @@
 """The first run on a machine compiles the kernels; afterwards they lie on disk.
 
-What moves the lips is compiled in a process of its own while this one compiles what draws, for numba compiles one kernel
+What moves the lips is compiled in a process of its own while this one compiles what draws: numba compiles one kernel
 at a time in a process.
 """
 

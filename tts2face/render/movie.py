@@ -55,6 +55,7 @@ class Movie:
         video.width, video.height = shape[1], shape[0]
         video.pix_fmt = "yuva420p" if self._has_alpha else "yuv420p"
         video.codec_context.time_base = 1 / fps
+        video.codec_context.thread_count = 1  # drawing fills the other cores; more threads here cost twice the work
         video.codec_context.bit_rate = 0  # the quality of `crf` rules alone
         video.codec_context.color_primaries = video.codec_context.color_trc = BT709
         video.codec_context.colorspace, video.codec_context.color_range = BT709, LIMITED

@@ -1,0 +1,77 @@
+"""The pictures of the README and the docs: ``python docs/make_pictures.py``."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from lexicon.sequence import SILENCE
+from tts2face.api import cast, stream
+from tts2face.face.file import face_path, identities_of, load_face
+from tts2face.render.draw import draw, staged
+from tts2face.render.picture import Picture
+from tts2face.request import Request
+from tts2face.talker import load_talker
+
+HERE = Path(__file__).parent / "pictures"
+SENTENCE = "We were away a year ago, but Bob may move five big maps."
+SPOKEN = ("w", "ɝ", "eɪ", "oʊ", "b", "ɑ", "m", "u", "f", "aɪ", "v", "æ")  # one frame for each, in the order of speech
+SIDE = 240
+WORD_PIXELS = 16
+
+
+def labelled(pixels: NDArray[np.uint8], text: str) -> Image.Image:
+    """A picture with a word in its corner."""
+    picture = Image.fromarray(pixels)
+    pen = ImageDraw.Draw(picture)
+    pen.text((8, 6), text, fill="white", font=ImageFont.load_default(WORD_PIXELS))
+    return picture
+
+
+def sheet(pictures: list[Image.Image], columns: int) -> Image.Image:
+    """Pictures in rows."""
+    rows = -(-len(pictures) // columns)
+    whole = Image.new("RGB", (columns * SIDE, rows * SIDE), "#39424e")
+    for at, picture in enumerate(pictures):
+        whole.paste(picture, (at % columns * SIDE, at // columns * SIDE))
+    return whole
+
+
+def clip_sheet() -> Image.Image:
+    """Frames of one clip at the middle of twelve of its phones."""
+    face = load_face("head")
+    stage = staged(face, Picture(size=f"{SIDE}x{SIDE}", camera="close"))
+    (piece,) = stream(Request(text=SENTENCE), cast(load_talker("grid_s1"), face))
+    phones, pictures, after = piece.clip.speech.phones, [], 0
+    for wanted in SPOKEN:
+        at = phones.phones.index(wanted, after)
+        after = at + 1
+        middle = round((phones.edges[at] + phones.edges[at + 1]) / 2 * piece.clip.fps)
+        word = next((word.text for word in piece.clip.speech.words if word.first <= at < word.last), SILENCE)
+        pictures.append(labelled(draw(stage, piece.clip.motion.values[middle]), f"/{wanted}/ {word}"))
+    return sheet(pictures, 6)
+
+
+def faces_sheet() -> Image.Image:
+    """The shipped faces and the identities of the head, at rest."""
+    chosen: list[tuple[str, str | None]] = [("head", None), ("cartoon", None)]
+    chosen += [("head", name) for name in identities_of(face_path("head"))]
+    pictures = []
+    for name, identity in chosen:
+        face = load_face(name, identity)
+        still = np.zeros(len(face.shape_names), np.float32)
+        pixels = draw(face, still, picture=Picture(size=f"{SIDE}x{SIDE}"))
+        pictures.append(labelled(pixels, identity or name))
+    return sheet(pictures, 6)
+
+
+def main() -> None:
+    """Write both sheets."""
+    HERE.mkdir(exist_ok=True)
+    clip_sheet().save(HERE / "clip.png", optimize=True)
+    faces_sheet().save(HERE / "faces.png", optimize=True)
+
+
+if __name__ == "__main__":
+    main()
