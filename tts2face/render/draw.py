@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from tts2face.face.linear import REST_HEAD
 from tts2face.face.model import Face
+from tts2face.render import vtk
 from tts2face.render.background import background
 from tts2face.render.bake import Exposure, exposed
 from tts2face.render.camera import Optics, optics
 from tts2face.render.light import lamps, light_table
 from tts2face.render.paint import Room, paint, room_for
-from tts2face.render.picture import Picture
+from tts2face.render.picture import PYVISTA, Picture
 from tts2face.render.surface import Surface, surfaced
 from tts2face.types import Clip
 
@@ -36,7 +37,15 @@ class Stage:
 
 
 def staged(face: Face, picture: Picture) -> Stage:
-    """The stage for a face and a picture; make it once, draw many times."""
+    """The stage for a face and a picture; make it once, draw many times.
+
+    Raises
+    ------
+    BackendError
+        The picture wants a renderer that this machine lacks.
+    """
+    if picture.renderer == PYVISTA:
+        vtk.require_gl()
     side = picture.supersampling
     surface, towards = surfaced(face), lamps(picture.view)
     camera = optics(picture.view, face, (picture.width * side, picture.height * side))
@@ -77,7 +86,11 @@ def draw(
     n_shapes = len(stage.face.shape_names)
     if np.shape(weights) != (n_shapes,):
         raise InputError(f"the face has {n_shapes} shapes, not weights of shape {np.shape(weights)}")
-    return _drawn(stage, np.asarray(weights, np.float32), np.asarray(head, np.float32), _room(stage))
+    pose = np.asarray(weights, np.float32), np.asarray(head, np.float32)
+    if stage.picture.renderer == PYVISTA:
+        (drawn,) = vtk.frames(stage, [pose])
+        return drawn
+    return _drawn(stage, *pose, _room(stage))
 
 
 def frames(
@@ -95,6 +108,9 @@ def frames(
     stage = face if isinstance(face, Stage) else staged(face, picture or Picture())
     if clip.motion.channels != stage.face.shape_names:
         raise InputError("the clip's motion is not in the shapes of this face; retarget it to the face first")
+    if stage.picture.renderer == PYVISTA:
+        yield from vtk.frames(stage, zip(clip.motion.values, clip.head.values, strict=True))
+        return
     n_threads = threads or available_cores()
     rooms = deque(_room(stage) for _ in range(n_threads))
 

@@ -10,7 +10,7 @@ from tts2face.request import option
 
 SIDES = (16, 4096)  # px
 SUPERSAMPLING = (1, 2, 3)
-RENDERERS = ("numba", "pyvista")
+NUMBA, PYVISTA = RENDERERS = ("numba", "pyvista")
 STUDIO, TRANSPARENT = "studio", "transparent"
 COLOURS = {
     "black": "000000", "white": "ffffff", "grey": "808080", "gray": "808080", "red": "c8282d", "green": "00b140",

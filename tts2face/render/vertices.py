@@ -1,0 +1,134 @@
+"""The light of a face's vertices in 8-bit colours, for renderers that draw smooth colours between vertices."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.render.compiled import kernel
+from tts2face.render.fragments import (
+    AT_ALBEDO,
+    AT_EXPOSURE,
+    AT_NORMAL,
+    AT_RAY,
+    AT_SHARE,
+    AT_SPECULAR,
+    INSIDE,
+    N_ROWS,
+    NORMAL,
+    OPEN,
+    TEXTURED,
+    face_normals,
+    texel,
+    vertex_normals,
+)
+from tts2face.render.shade import N_SCRATCH_ROWS, light
+from tts2face.render.surface import Surface, encoding_table, linear_table
+
+ENCODED = (encoding_table(4096) / 255.0).astype(np.float32)  # sRGB in [0, 1] of linear light in equal steps
+SHADE_STEP, N_SHADES = 1.5, 6  # of colours of a texture that are drawn with one copy of it
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VertexLight:
+    """Room to light the vertices of one surface again and again.
+
+    ``table`` (17, V) holds fragments as `tts2face.render.fragments` names them, one for each vertex; ``albedo`` (V, 3)
+    is their sRGB colour in [0, 1] without light, and ``divisor`` (V, 3) that colour where a texture is drawn, else the
+    opacity; ``front`` and ``back`` (V, 3) are the last light seen from outside and from inside, sRGB over the divisor.
+    """
+
+    surface: Surface
+    camera: NDArray[np.float32]
+    flat: NDArray[np.float32]
+    table: NDArray[np.float32]
+    inside: NDArray[np.float32]
+    albedo: NDArray[np.float32]
+    divisor: NDArray[np.float32]
+    front: NDArray[np.float32]
+    back: NDArray[np.float32]
+
+    def lit(
+        self, points: NDArray[np.float32], view: NDArray[np.floating], lights: tuple[NDArray[Any], NDArray[Any]]
+    ) -> None:
+        """Light the vertices (V, 3) of the world for a camera `view` (3, 4); writes ``front`` and ``back``.
+
+        `lights` are the table of `tts2face.render.shade.light` in camera space and the exposure (V, 4).
+        """
+        self.camera[:, :3] = points @ view[:, :3].T.astype(np.float32) + view[:, 3].astype(np.float32)
+        face_normals(self.camera, self.surface.triangles, self.flat)
+        vertex_normals(self.flat, self.surface.starts, self.surface.members, self.camera)
+        for side, colours in ((1.0, self.front), (-1.0, self.back)):
+            self._write(np.float32(side), lights, colours)
+
+    def _write(self, side: np.float32, lights: tuple[NDArray[Any], NDArray[Any]], colours: NDArray[np.float32]) -> None:
+        table, n_vertices = self.table, len(self.camera)
+        table[AT_NORMAL : AT_NORMAL + 3] = side * self.camera[:, NORMAL : NORMAL + 3].T
+        table[AT_EXPOSURE : AT_EXPOSURE + 4] = lights[1].T * (np.float32(1) if side > 0 else self.inside)
+        table[AT_RAY : AT_RAY + 2] = (self.camera[:, :2] / np.maximum(self.camera[:, 2:3], np.float32(1))).T
+        light_of = np.zeros((3, n_vertices), np.float32)
+        light(table, n_vertices, lights[0], np.zeros((N_SCRATCH_ROWS, n_vertices), np.float32), light_of)
+        colours[:] = encoded(light_of.T) / self.divisor
+
+
+def vertex_light(surface: Surface) -> VertexLight:
+    """Room to light a surface's vertices."""
+    n_vertices = len(surface.rig.rest)
+    part_of = np.zeros(n_vertices, np.int32)
+    part_of[surface.triangles.ravel()] = np.repeat(surface.part_of, 3)
+    material = surface.materials[part_of]
+    textured = material[:, TEXTURED] > 0
+    linear = surface.colours.copy()
+    sample(surface.texture, linear_table(), surface.uv, textured, linear)
+    table = np.zeros((N_ROWS, n_vertices), np.float32)
+    table[AT_ALBEDO : AT_ALBEDO + 3] = linear.T
+    table[AT_SPECULAR : AT_SPECULAR + 4] = material[:, :4].T
+    table[AT_SHARE] = 1
+    albedo = np.maximum(encoded(linear), np.float32(1 / 255))
+    light_of = np.zeros((2, n_vertices, 3), np.float32)
+    return VertexLight(
+        surface=surface,
+        camera=np.zeros((n_vertices, NORMAL + 3), np.float32),
+        flat=np.zeros((len(surface.triangles), 3), np.float32),
+        table=table,
+        inside=np.where(material[:, OPEN] > 0, np.float32(1), INSIDE),
+        albedo=albedo,
+        divisor=np.where(textured[:, None], albedo, np.maximum(material[:, 3:4], np.float32(1 / 255))),
+        front=light_of[0],
+        back=light_of[1],
+    )
+
+
+def encoded(linear: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Linear light as sRGB in [0, 1]."""
+    steps = np.clip(linear, 0.0, 1.0) * np.float32(len(ENCODED) - 1) + np.float32(0.5)
+    srgb: NDArray[np.float32] = ENCODED[steps.astype(np.intp)]
+    return srgb
+
+
+def brightened(texture: NDArray[np.uint8], peak: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """A texture (H, W, 3) in which `peak` (3,), sRGB in [0, 1], is full brightness."""
+    scaled: NDArray[np.uint8] = np.rint(np.minimum(texture / peak, 255.0)).astype(np.uint8)
+    return scaled
+
+
+def shades(light_of: VertexLight) -> NDArray[np.int64]:
+    """(F,) shade of each triangle: 0 the brightest, each next one darker by a factor; -1 where no texture is drawn.
+
+    A texture can only be darkened by the light that multiplies it, so each shade takes a texture brightened for it.
+    """
+    surface = light_of.surface
+    tone = light_of.albedo.mean(axis=1)[surface.triangles].max(axis=1)
+    steps = np.clip(np.floor(-np.log(tone) / np.log(SHADE_STEP)), 0, N_SHADES - 1).astype(np.int64)
+    chosen: NDArray[np.int64] = np.where(surface.materials[surface.part_of, TEXTURED] > 0, steps, -1)
+    return chosen
+
+
+@kernel
+def sample(texture: Any, linear: Any, uv: Any, textured: Any, albedo: Any) -> None:
+    """Write the texture's linear colour at the vertices that are textured."""
+    for v in range(len(textured)):
+        if textured[v]:
+            for c in range(3):
+                albedo[v, c] = texel(texture, linear, uv[v, 0], uv[v, 1], c)
