@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from lexicon.phones import ipa_to_arpabet
 from lexicon.sequence import SILENCE
 from tts2face.api import cast, stream
 from tts2face.face.file import face_path, identities_of, load_face
@@ -49,7 +50,7 @@ def clip_sheet() -> Image.Image:
         after = at + 1
         middle = round((phones.edges[at] + phones.edges[at + 1]) / 2 * piece.clip.fps)
         word = next((word.text for word in piece.clip.speech.words if word.first <= at < word.last), SILENCE)
-        pictures.append(labelled(draw(stage, piece.clip.motion.values[middle]), f"/{wanted}/ {word}"))
+        pictures.append(labelled(draw(stage, piece.clip.motion.values[middle]), f"{ipa_to_arpabet(wanted)}  {word}"))
     return sheet(pictures, 6)
 
 
