@@ -3,6 +3,7 @@
 VTK ends the process when it finds no GL at all, so a child process tries first.
 """
 
+import math
 import os
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError
+from tts2face.render.camera import Optics
 from tts2face.render.compiled import kernel
 from tts2face.render.fragments import OPACITY
 from tts2face.render.surface import Surface, encoding_table, linear_table
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from tts2face.render.draw import Stage
 
 OFF_SCREEN, ON_SCREEN = "vtkEGLRenderWindow", "vtkXOpenGLRenderWindow"  # the first falls back to OSMesa by itself
+UNSEEN = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
 PROBE_SECONDS = 60.0
 PROBE = """
 import numpy, pyvista
@@ -32,7 +35,8 @@ plotter = pyvista.Plotter(off_screen={off_screen}, window_size=(32, 32))
 plotter.add_mesh(pyvista.Sphere(), color="red", lighting=False)
 plotter.show(auto_close=False, interactive=False)
 seen = numpy.asarray(plotter.screenshot(return_img=True))
-raise SystemExit(0 if int(seen[16, 16, 0]) > 200 else 3)
+opened = plotter.render_window.GetClassName()
+raise SystemExit(0 if int(seen[16, 16, 0]) > 200 and opened not in {refused} else 3)
 """
 TONE = (linear_table(), encoding_table(8192))
 
@@ -70,7 +74,8 @@ def require_pyvista(purpose: str) -> None:
 @cache
 def probe(window: str) -> bool:
     """Whether a child process can draw with VTK in a window of a class; it is what crashes if VTK does."""
-    code = PROBE.format(off_screen=window == OFF_SCREEN)
+    is_off_screen = window == OFF_SCREEN  # without a display VTK falls back to a window that nobody sees
+    code = PROBE.format(off_screen=is_off_screen, refused=() if is_off_screen else UNSEEN)
     environment = os.environ | window_choice(window)
     try:
         done = subprocess.run(
@@ -195,6 +200,17 @@ class Puppet:
             self._sheets.append(Sheet(mesh, used, light_of, scale))
 
 
+def aim(plotter: Any, optics: Optics, height: int) -> None:
+    """Set a plotter's camera up as a camera whose pictures are `height` samples high."""
+    view = optics.view
+    place = -view[:, :3].T @ view[:, 3]
+    camera = plotter.camera
+    camera.position = tuple(place)
+    camera.focal_point = tuple(place + max(float(view[2, 3]), 1.0) * view[2, :3])  # before the point between the eyes
+    camera.up = tuple(-view[1, :3])
+    camera.view_angle = math.degrees(2 * math.atan(height / 2 / float(optics.lens[0])))
+
+
 def _plotter(size: tuple[int, int], stage: "Stage") -> Any:
     import pyvista
 
@@ -202,13 +218,7 @@ def _plotter(size: tuple[int, int], stage: "Stage") -> Any:
         plotter = pyvista.Plotter(off_screen=True, window_size=list(size), lighting="none")
     plotter.disable_anti_aliasing()
     plotter.set_background("black")
-    view, focal = stage.optics.view, float(stage.optics.lens[0])
-    place = -view[:, :3].T @ view[:, 3]
-    camera = plotter.camera
-    camera.position, camera.focal_point = tuple(place), tuple(place + 500.0 * view[2, :3])
-    camera.up = tuple(-view[1, :3])
-    camera.view_angle = float(np.degrees(2 * np.arctan(size[1] / 2 / focal)))
-    plotter.renderer.SetUseDepthPeeling(False)
+    aim(plotter, stage.optics, size[1])
     return plotter
 
 
