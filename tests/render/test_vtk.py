@@ -1,0 +1,133 @@
+"""Both renderers show the same head; a machine without GL is told so and nothing crashes."""
+
+import subprocess
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from lexicon.errors import BackendError
+from lexicon.sequence import SILENCE, PhoneSequence
+from tests.render.tiny_face import tiny_face
+from tts2face.face.file import load_face
+from tts2face.render import vtk
+from tts2face.render.draw import draw, frames, staged
+from tts2face.render.picture import NUMBA, PYVISTA, Picture
+from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
+
+BOUND = 1.5  # of 255: mean difference between the renderers' pictures
+TURNED = np.array([0.05, 0.2, 0.0, 3.0, 0.0, 0.0])
+
+
+@pytest.fixture(scope="module")
+def gl():
+    pytest.importorskip("pyvista", reason="needs pyvista: pip install 'tts2face[view]'")
+    if not vtk.probe(vtk.OFF_SCREEN):
+        pytest.skip("needs a GPU or software GL, and VTK finds neither on this machine")
+
+
+@pytest.fixture
+def _fresh_probe():
+    vtk.probe.cache_clear()
+    yield
+    vtk.probe.cache_clear()
+
+
+def both(face, weights, head=TURNED * 0, **options):
+    pictures = [draw(staged(face, Picture(renderer=name, **options)), weights, head) for name in (NUMBA, PYVISTA)]
+    return [picture.astype(int) for picture in pictures]
+
+
+@pytest.mark.usefixtures("gl")
+@pytest.mark.parametrize("name", ["head", "cartoon"])
+@pytest.mark.parametrize(("jaw", "camera"), [(0.0, "front"), (0.6, "front"), (0.6, "three-quarter")])
+def test_the_shipped_heads_look_alike_in_both_renderers(name, jaw, camera):
+    face = load_face(name)
+    weights = np.zeros(len(face.shape_names))
+    weights[face.shape_names.index("jawOpen")] = jaw
+    ours, theirs = both(face, weights, TURNED, size="256x256", camera=camera)
+    assert np.abs(ours - theirs).mean() <= BOUND
+    on_head = np.abs(ours - ours[0, 0]).max(axis=2) > 40
+    assert np.abs(ours - theirs)[on_head].mean() <= 4 * BOUND
+    assert np.abs((ours - theirs)[on_head].mean(axis=0)).max() <= BOUND  # neither is darker or redder
+
+
+@pytest.mark.usefixtures("gl")
+@pytest.mark.parametrize("supersampling", [1, 2, 3])
+def test_a_transparent_picture_has_the_same_coverage(supersampling):
+    face = tiny_face(n_rings=40)
+    ours, theirs = both(face, [0, 0, 0, 0], size="128x96", background="transparent", supersampling=supersampling)
+    assert ours.shape == theirs.shape == (96, 128, 4)
+    differing = np.abs(ours[..., 3] - theirs[..., 3]) > 255 / supersampling**2 + 1
+    assert differing.mean() < 0.002
+    solid = (ours[..., 3] == 255) & (theirs[..., 3] == 255)
+    assert 0.2 < solid.mean() < 0.9
+    assert np.abs(ours - theirs)[solid].mean() < 4 * BOUND
+
+
+@pytest.mark.usefixtures("gl")
+def test_a_texture_lies_the_same_way_up():
+    # Light changes hard between vertices where the chequers do, so that colours agree less than on a face.
+    ours, theirs = both(tiny_face(textured=True, n_rings=40), [0, 0, 0, 0], TURNED, size="128x128")
+    alike = np.corrcoef(ours.ravel(), theirs.ravel())[0, 1]
+    upside_down = np.corrcoef(ours.ravel(), theirs[::-1].ravel())[0, 1]
+    assert alike > 0.9
+    assert upside_down < 0.5
+
+
+@pytest.mark.usefixtures("gl")
+def test_a_clip_is_drawn_frame_by_frame_in_one_window():
+    face = tiny_face()
+    motion = np.linspace(0, 1, 3)[:, None] * [1, 0, 0, 0]
+    speech = Speech(Waveform(np.zeros(2400), 24_000), PhoneSequence((SILENCE,), np.array([0.0, 0.1])), ())
+    clip = Clip(Trajectory(face.shape_names, motion, 30), Trajectory(HEAD_CHANNELS, np.zeros((3, 6)), 30), speech)
+    stage = staged(face, Picture(size="64x64", renderer=PYVISTA))
+    drawn = list(frames(clip, stage))
+    assert len(drawn) == 3
+    for weights, picture in zip(motion, drawn, strict=True):
+        np.testing.assert_array_equal(picture, draw(stage, weights))
+    assert (drawn[0] != drawn[2]).any()
+
+
+def test_without_pyvista_one_sentence_says_what_to_install(monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(BackendError, match=r"--renderer pyvista needs pyvista.*pip install 'tts2face\[view\]'"):
+        staged(tiny_face(), Picture(renderer=PYVISTA))
+
+
+def test_without_gl_one_sentence_says_what_to_install(monkeypatch):
+    monkeypatch.setattr(vtk, "require_pyvista", lambda purpose: None)
+    monkeypatch.setattr(vtk, "probe", lambda window: False)
+    with pytest.raises(BackendError, match=r"neither a GPU nor software GL.*--renderer numba"):
+        staged(tiny_face(), Picture(renderer=PYVISTA))
+
+
+@pytest.mark.usefixtures("_fresh_probe")
+@pytest.mark.parametrize("code", ["import os; os.abort()", "raise SystemExit(3)", "import time; time.sleep(60)"])
+def test_a_child_that_crashes_fails_or_hangs_means_no_gl(monkeypatch, code):
+    monkeypatch.setattr(vtk, "PROBE", code)
+    monkeypatch.setattr(vtk, "PROBE_SECONDS", 1.0)
+    assert not vtk.probe(vtk.OFF_SCREEN)
+
+
+@pytest.mark.usefixtures("_fresh_probe")
+def test_a_child_is_asked_once_and_with_the_window_class(monkeypatch):
+    asked = []
+
+    def run(command, env, **options):
+        asked.append(env)
+        return subprocess.CompletedProcess(command, 0)
+
+    monkeypatch.setattr(vtk.subprocess, "run", run)
+    monkeypatch.setattr(vtk, "sys", SimpleNamespace(platform="linux", executable="python"))
+    assert vtk.probe(vtk.OFF_SCREEN)
+    assert vtk.probe(vtk.OFF_SCREEN)
+    assert [env["VTK_DEFAULT_OPENGL_WINDOW"] for env in asked] == ["vtkEGLRenderWindow"]
+
+
+def test_the_environment_is_left_as_it_was(monkeypatch):
+    monkeypatch.setattr(vtk, "sys", SimpleNamespace(platform="linux"))
+    monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "mine")
+    with vtk.windows_of(vtk.OFF_SCREEN):
+        assert vtk.os.environ["VTK_DEFAULT_OPENGL_WINDOW"] == "vtkEGLRenderWindow"
+    assert vtk.os.environ["VTK_DEFAULT_OPENGL_WINDOW"] == "mine"
