@@ -41,6 +41,10 @@ def run(request: Request, picture: Picture, errand: Errand) -> None:
         raise InputError(f"an explanation is written as .json or .txt, not {errand.explain.name}")
     if not request.text.strip():
         raise InputError("the text is empty; give something to say")
+    if errand.view:
+        from tts2face.render.view import require_display
+
+        require_display()
     if errand.out is not None:
         _make(request, picture, errand, errand.out)
     else:
