@@ -74,8 +74,18 @@ def tiny_face(textured=False, n_rings=14):
         shapes=np.stack([jaw, smile, still, still]).astype(np.float32),
         limits=np.array([[0, 1]] * 4, np.float32),
         eyes=(
-            Eye(int(starts[1]), len(left), np.array([32, 0, 14], np.float32), {"eyeLookInLeft": np.array([0, -0.5, 0], np.float32)}),
-            Eye(int(starts[2]), len(right), np.array([-32, 0, 14], np.float32), {"eyeLookInRight": np.array([0, 0.5, 0], np.float32)}),
+            Eye(
+                int(starts[1]),
+                len(left),
+                np.array([32, 0, 14], np.float32),
+                {"eyeLookInLeft": np.array([0, -0.5, 0], np.float32)},
+            ),
+            Eye(
+                int(starts[2]),
+                len(right),
+                np.array([-32, 0, 14], np.float32),
+                {"eyeLookInRight": np.array([0, 0.5, 0], np.float32)},
+            ),
         ),
         colours=colours,
         landmarks=np.zeros(0, np.int32),
