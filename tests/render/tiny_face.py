@@ -28,6 +28,11 @@ def ball(centre, radius, n_rings):
     return np.asarray(centre) + radius * points, np.array(triangles)
 
 
+def at(*values):
+    """A point or a rotation vector."""
+    return np.array(values, np.float32)
+
+
 def tiny_face(textured=False, n_rings=14):
     """The face; with `textured`, the skin is chequered by a texture."""
     skin, skin_triangles = ball((0, -20, -60), RADIUS, n_rings)

@@ -28,7 +28,9 @@ class Gif:
         self._palette, self._nearest = _palette(swatches, 256 if channels == 3 else 255)
         pattern = np.tile(BAYER, (-(-height // 4), -(-width // 4)))[:height, :width, None]
         self._dither = (pattern * DITHER // 16 - DITHER // 2).astype(np.int16)
-        self._container: Any = av.open(str(path), "w", format="gif", options={"loop": "0"})
+        stay = max(LEAST_TICKS, round(TICKS / fps))  # of the last picture
+        options = {"loop": "0", "final_delay": str(stay)}
+        self._container: Any = av.open(str(path), "w", format="gif", options=options)
         self._video: Any = self._container.add_stream("gif", rate=fps)
         self._video.width, self._video.height, self._video.pix_fmt = width, height, "pal8"
         self._video.codec_context.time_base = Fraction(1, TICKS)

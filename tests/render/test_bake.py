@@ -1,0 +1,74 @@
+"""Soft shadows with a known answer: convex is bright, inside is dark, behind a wall the lamp is hidden."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tests.render.tiny_face import ball, tiny_face
+from tts2face.face.model import Part
+from tts2face.render.bake import cone, exposed, sphere
+from tts2face.render.surface import surfaced
+
+LAMPS = np.array([[0, 0, 1.0], [1.0, 0, 0], [0, 1.0, 0]])
+
+
+def of_parts(*bodies):
+    """A face of plain bodies without shapes."""
+    blank = tiny_face()
+    starts = np.cumsum([0] + [len(points) for points, _ in bodies])
+    vertices = np.vstack([points for points, _ in bodies]).astype(np.float32)
+    triangles = np.vstack([t + s for (_, t), s in zip(bodies, starts[:-1], strict=True)]).astype(np.int32)
+    counts = [len(t) for _, t in bodies]
+    firsts = np.cumsum([0, *counts])
+    return dataclasses.replace(
+        blank,
+        vertices=vertices,
+        triangles=triangles,
+        parts=tuple(Part(f"body{i}", int(firsts[i]), counts[i]) for i in range(len(bodies))),
+        shape_names=(),
+        shapes=np.zeros((0, len(vertices), 3), np.float32),
+        limits=np.zeros((0, 2), np.float32),
+        eyes=(),
+        colours=np.full((len(vertices), 3), 200, np.uint8),
+    )
+
+
+def rest(*bodies):
+    face = of_parts(*bodies)
+    return exposed(face, surfaced(face), LAMPS, threads=1).rest
+
+
+def test_nothing_shades_a_lone_ball():
+    assert rest(ball((0, 0, 0), 80, 16)).min() > 0.93
+
+
+def test_what_lies_inside_gets_no_light():
+    shell, core = ball((0, 0, 0), 80, 16), ball((0, 0, 0), 30, 8)
+    exposure = rest(shell, core)[len(shell[0]) :]
+    assert exposure[:, 0].max() < 0.05
+    assert exposure[:, 1:].min() < 0.05
+
+
+def test_a_ball_in_front_hides_one_lamp_and_not_the_others():
+    far, near = ball((0, 0, 0), 40, 12), ball((0, 0, 90), 40, 12)
+    exposure = rest(far, near)
+    facing = np.argmax(far[0][:, 2])
+    assert exposure[facing, 1] < 0.1  # the lamp along z
+    assert exposure[len(far[0]) + np.argmax(near[0][:, 2]), 1] > 0.9
+
+
+def test_directions_are_unit_vectors_spread_evenly():
+    np.testing.assert_allclose(np.linalg.norm(sphere(40), axis=1), 1)
+    np.testing.assert_allclose(sphere(40).mean(axis=0), 0, atol=0.02)
+    around = cone(np.array([0.6, 0.0, 0.8]), 12, 0.2)
+    assert np.arccos(np.clip(around @ [0.6, 0.0, 0.8], -1, 1)).max() <= 0.2 + 1e-9
+    np.testing.assert_allclose(np.linalg.norm(around, axis=1), 1)
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+def test_threads_do_not_matter(threads):
+    face = tiny_face()
+    one, many = (exposed(face, surfaced(face), LAMPS, n) for n in (1, threads))
+    np.testing.assert_array_equal(one.rest, many.rest)
+    np.testing.assert_array_equal(one.gain, many.gain)
