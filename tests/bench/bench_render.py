@@ -1,0 +1,67 @@
+"""How fast pictures are drawn and files written: python tests/bench/bench_render.py [frames].
+
+Beside the figures stands a reference loop of plain numpy: each line tells how often it ran in the time of one frame.
+"""
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from bench_renderers import clip_of
+
+from tts2face.face.file import load_face
+from tts2face.render.draw import available_cores, frames, staged
+from tts2face.render.encode import write_clip
+from tts2face.render.picture import Picture
+
+SIZES = ("256x256", "512x512", "1280x720", "1920x1080")
+
+
+def reference_s() -> float:
+    """Seconds of sorting 200,000 numbers, the best of five."""
+    values = np.random.default_rng(0).normal(size=200_000)
+    spent = []
+    for _ in range(5):
+        began = time.perf_counter()
+        np.sort(values)
+        spent.append(time.perf_counter() - began)
+    return min(spent)
+
+
+def line(name, n_frames, seconds):
+    """Print one figure."""
+    each = seconds / n_frames
+    print(f"{name}: {n_frames / seconds:.1f} frames/s, {each * 1e3:.1f} ms a frame = {each / reference_s():.2f} sorts")
+
+
+def main():
+    n_frames = int(sys.argv[1]) if len(sys.argv) > 1 else 150
+    face = load_face("head")
+    clip = clip_of(face, n_frames)
+    began = time.perf_counter()
+    stage = staged(face, Picture())
+    print(f"stage with compiling or loading of kernels: {time.perf_counter() - began:.2f} s")
+    began = time.perf_counter()
+    stage = staged(face, Picture())
+    print(f"stage: {time.perf_counter() - began:.2f} s; {len(face.vertices)} vertices, {len(face.triangles)} triangles")
+    for threads in range(1, available_cores() + 1):
+        began = time.perf_counter()
+        for _ in frames(clip, stage, threads=threads):
+            pass
+        line(f"drawing 512x512, 2 x 2, {threads} thread(s)", n_frames, time.perf_counter() - began)
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ("a.mp4", "a.webm", "a.gif", "pictures"):
+            began = time.perf_counter()
+            write_clip(Path(folder) / name, clip, stage)
+            line(f"drawing and writing {name}", n_frames, time.perf_counter() - began)
+        for size in SIZES:
+            stage = staged(face, Picture(size=size))
+            began = time.perf_counter()
+            write_clip(Path(folder) / "a.mp4", clip, stage)
+            line(f"drawing and writing {size} .mp4", n_frames, time.perf_counter() - began)
+
+
+if __name__ == "__main__":
+    main()
