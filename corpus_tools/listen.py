@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from tts2face.speech.align import Aligner, Alignment
 
 KIND = "alignment"
-ALIGNMENT_VERSION = 2  # rises when alignment gives other edges, so that cached ones are made again
+ALIGNMENT_VERSION = 3  # rises when alignment gives other edges, so that cached ones are made again
 SOUND_RATE = 16_000  # Hz; what the aligner hears
 LOWEST_PITCH_HZ = 100.0  # of a voice: intensity is averaged over 3.2 periods of it, 32 ms (parselmouth's rule)
 QUIETEST_DB = 0.0  # digital silence has no level; it counts as the threshold of hearing

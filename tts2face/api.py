@@ -1,6 +1,8 @@
 """The one core call: a request, a talker and a face become a clip, whole, piece by piece, or as a file."""
 
-from collections.abc import Callable, Iterator
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
@@ -30,6 +32,7 @@ from tts2face.talker import Talker
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, frame_count, joined_clips
 from tts2face.voice.engine import Voice, load_voice
 
+VOICES_KEPT = 2  # kinds of voice; each keeps some 100 MB
 STAGES_KEPT = 2  # kinds of picture; each keeps some 30 MB
 CLIPS_AHEAD = 2  # pieces that may wait to be drawn while the next is spoken
 PIECE_CHARACTERS = 300  # a sentence that is longer is cut at a clause mark or a space
@@ -39,13 +42,15 @@ PIECE_CHARACTERS = 300  # a sentence that is longer is cut at a clause mark or a
 class Cast:
     """A talker and a face made ready for each other; serves any number of requests.
 
-    ``stages`` keeps what was made ready to draw the face into the last few kinds of picture.
+    ``stages`` keeps what was made ready to draw the face into the last few kinds of picture; ``voices`` the voices that
+    wait to speak again, by name, language and the user's own words.
     """
 
     face: Face
     visual_voice: VisualVoice
     retargeter: Retargeter
     stages: dict[Picture, Stage] = field(default_factory=dict)
+    voices: "OrderedDict[Hashable, Voice]" = field(default_factory=OrderedDict)
 
     def stage(self, picture: Picture) -> Stage:
         """The face made ready to be drawn into a kind of picture; its soft shadows take most of a second."""
@@ -54,6 +59,19 @@ class Cast:
                 self.stages.pop(next(iter(self.stages)))
             self.stages[picture] = staged(self.face, picture)
         return self.stages[picture]
+
+    @contextmanager
+    def voice(self, request: Request) -> Iterator[Voice]:
+        """A voice for the time of a request, used by nobody else; loading one takes half a second."""
+        own = read_dictionary(request.dictionary).entries if request.dictionary else {}
+        key = (request.voice, request.language, frozenset(own.items()))
+        voice = self.voices.pop(key, None) or load_voice(request.voice, request.language, own)
+        try:
+            yield voice
+        finally:
+            self.voices[key] = voice
+            while len(self.voices) > VOICES_KEPT:
+                self.voices.popitem(last=False)
 
 
 def cast(talker: Talker, face: Face) -> Cast:
@@ -91,12 +109,12 @@ def stream(request: Request, ready: Cast) -> Iterator[Piece]:
     memory.
     """
     check(request)
-    voice = _voice(request)
     first_frame = 0
-    for text in pieces(request):
-        clip = _animated(_spoken(voice, text, request, first_frame), ready, request)
-        first_frame += len(clip.motion)
-        yield Piece(clip, len(text))
+    with ready.voice(request) as voice:
+        for text in pieces(request):
+            clip = _animated(_spoken(voice, text, request, first_frame), ready, request)
+            first_frame += len(clip.motion)
+            yield Piece(clip, len(text))
 
 
 def check(request: Request) -> None:
@@ -125,11 +143,6 @@ def pieces(request: Request) -> Iterator[str]:
         text = normalize(chunk) if request.language.startswith("en") else chunk
         if any(character.isalnum() for character in text):
             yield text
-
-
-def _voice(request: Request) -> Voice:
-    own = read_dictionary(request.dictionary).entries if request.dictionary else None
-    return load_voice(request.voice, request.language, own)
 
 
 def _options(request: Request) -> SynthesisOptions:

@@ -104,5 +104,5 @@ def _painted(at: tuple[Floats, Floats, Floats], style: EyeStyle, generator: np.r
     edge = np.clip((off - style.iris) / 0.07, 0, 1)[:, None]
     colours = np.where(off[:, None] <= style.pupil + 1e-9, 0.015, iris)
     colours = np.where(off[:, None] > style.iris + 1e-9, (1 - edge) * base * 0.35 + edge * sclera, colours)
-    shade = 1.0 - 0.45 * np.clip((up - 0.12) / 0.42, 0, 1)  # the upper lid's shadow
+    shade = 1.0 - 0.5 * np.clip((up - 0.04) / 0.34, 0, 1)  # the upper lid's shadow
     return colours * shade[:, None]

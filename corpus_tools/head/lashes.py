@@ -29,7 +29,10 @@ class Row:
 
 
 UPPER, LOWER = Row(2, 60, 3.7, 0.24), Row(1, 34, 2.1, 0.15)
+N_OF_BLADE = 5  # vertices; the first two are its root
 ROOT_ROW = 0.85  # the strip's first row lies within the lid
+SHUT_DOWN, SHUT_AHEAD = 0.5, 0.87  # where upper lashes point when the lids are shut, of their length
+BELOW_MM, BEHIND_MM = 0.3, 0.3  # the lower lashes' roots then lie so far under and behind the upper ones'
 
 
 def lash_piece(cage: Cage, skin: Skin, generator: np.random.Generator) -> Piece:
@@ -37,16 +40,21 @@ def lash_piece(cage: Cage, skin: Skin, generator: np.random.Generator) -> Piece:
     nearest = cKDTree(skin.vertices)
     points, triangles, count = [], [], 0
     shapes: dict[str, list[Floats]] = {name: [] for name in cage.units}
-    for side in "lr":
+    for side, word in (("l", "Left"), ("r", "Right")):
+        line = np.zeros((0, 3))  # the upper lashes' roots when the lids are shut
         for row in (UPPER, LOWER):
             strip = cage.source.groups[f"helper-{side}-eyelashes-{row.strip}"].corners
             used = np.unique(strip)
             carry, offset, faces = _blades(cage.vertices[used], np.searchsorted(used, strip), row, generator)
-            points.append(carry @ cage.vertices[used] + offset)
-            beside = nearest.query(points[-1])[1]
+            blades = carry @ cage.vertices[used] + offset
+            beside = np.repeat(nearest.query(_roots(blades))[1], N_OF_BLADE)
             for name, moved in cage.units.items():
-                own = carry @ moved[used]
-                shapes[name].append(own + skin.mended[name][beside] if name in skin.mended else own)
+                own = carry @ moved[used] + (skin.mended[name][beside] if name in skin.mended else 0.0)
+                if name == f"eyeBlink{word}":
+                    own = _lowered(blades, own) if row is UPPER else _kept_under(blades, own, line)
+                    line = _roots(blades + own)
+                shapes[name].append(own)
+            points.append(blades)
             triangles.append(faces + count)
             count += len(offset)
     vertices = np.concatenate(points)
@@ -74,6 +82,33 @@ def grid_of(quads: NDArray[np.int64]) -> NDArray[np.int64]:
     grid = np.zeros((n_across, n // n_across), np.int64)
     grid[across, along] = np.arange(n)
     return grid
+
+
+def _roots(blades: Floats) -> Floats:
+    """(B, 3) where blades (5 B, 3) grow."""
+    roots: Floats = blades.reshape(-1, N_OF_BLADE, 3)[:, :2].mean(axis=1)
+    return roots
+
+
+def _lowered(blades: Floats, moved: Floats) -> Floats:
+    """(5 B, 3) the motion of upper lashes that go with their roots and turn to point ahead and down."""
+    off = blades - np.repeat(_roots(blades), N_OF_BLADE, axis=0)
+    length = np.linalg.norm(off[:, 1:], axis=1)
+    turned = np.column_stack([off[:, 0], -SHUT_DOWN * length, SHUT_AHEAD * length])
+    lowered: Floats = np.repeat(_roots(moved), N_OF_BLADE, axis=0) + turned - off
+    return lowered
+
+
+def _kept_under(blades: Floats, moved: Floats, line: Floats) -> Floats:
+    """(5 B, 3) the motion of lower lashes, whose roots stay under and about as far ahead as a line (N, 3)."""
+    roots = _roots(blades + moved)
+    order = np.argsort(line[:, 0])
+    y, z = (np.interp(roots[:, 0], line[order, 0], line[order, k]) for k in (1, 2))
+    more = np.zeros_like(roots)
+    more[:, 1] = np.minimum(y - BELOW_MM - roots[:, 1], 0)
+    more[:, 2] = np.maximum(z - BEHIND_MM - roots[:, 2], 0)
+    kept: Floats = moved + np.repeat(more, N_OF_BLADE, axis=0)
+    return kept
 
 
 def _blades(

@@ -54,6 +54,7 @@ LOWER = Arch(
     np.array([9.0, 9.2, 10.0, 8.6, 8.0, 7.4]),
     np.array([4.6, 4.8, 6.0, 7.2, 8.0, 9.4]),
 )  # fmt: skip
+SHADE = np.array([1.0, 1.0, 0.95, 0.84, 0.70, 0.56])  # cheeks keep light from the crowns further back
 TOOTH, TOOTH_DARK = np.array([0.985, 0.965, 0.915]), np.array([0.90, 0.84, 0.74])
 GUM = np.array([0.68, 0.36, 0.36])
 N_AROUND, LEVELS = 12, np.array([0.0, 0.04, 0.13, 0.45, 1.0])
@@ -69,10 +70,10 @@ def arch_piece(arch: Arch, name: str) -> Piece:
     points, colours, triangles, count = [], [], [], 0
     for side in (1.0, -1.0):
         along = 0.0
-        for width, height, depth in zip(arch.widths, arch.heights, arch.depths, strict=True):
-            crown, shade = _crown(width, height, depth)
+        for width, height, depth, light in zip(arch.widths, arch.heights, arch.depths, SHADE, strict=True):
+            crown, enamel = _crown(width, height, depth)
             points.append(_placed(crown, path, side * (along + width / 2), arch))
-            colours.append(shade)
+            colours.append(light * enamel)
             triangles.append(_tube_triangles(len(LEVELS), N_AROUND, closed_start=True) + count)
             count += len(crown)
             along += width
@@ -80,7 +81,7 @@ def arch_piece(arch: Arch, name: str) -> Piece:
     gum = _gum(path, arch)
     triangles.append(_tube_triangles(*_GUM_GRID, closed_start=False) + count)
     points.append(gum)
-    colours.append(np.tile(GUM, (len(gum), 1)))
+    colours.append(np.repeat(_light_along(arch), _GUM_GRID[1])[:, None] * GUM)
     vertices, faces = np.concatenate(points), np.concatenate(triangles)
     faces = _outward(vertices, faces, arch.up)
     spans = (
@@ -157,6 +158,14 @@ def _placed(points: Floats, path: Path, along: float, arch: Arch) -> Floats:
 
 
 _GUM_GRID = (61, 8)
+
+
+def _light_along(arch: Arch) -> Floats:
+    """(61,) how much of the light reaches the rings of a gum."""
+    ends = np.cumsum(arch.widths)
+    along = np.linspace(-ends[-1], ends[-1], _GUM_GRID[0])
+    light: Floats = np.interp(np.abs(along), ends - arch.widths / 2, SHADE)
+    return light
 
 
 def _gum(path: Path, arch: Arch) -> Floats:

@@ -72,6 +72,14 @@ def test_the_same_request_gives_the_same_bytes_in_another_process(clip: Clip) ->
     assert answer.stdout.strip() == digest(clip)
 
 
+def test_a_voice_that_has_spoken_before_gives_the_same_bytes(clip: Clip, talker: Talker, face: Face) -> None:
+    ready = cast(talker, face)
+    for text in ("Something else was said. Bob may have been away.", TEXT):
+        said = joined_clips([piece.clip for piece in stream(Request(text=text), ready)])
+    assert digest(said) == digest(clip)
+    assert len(ready.voices) == 1
+
+
 def test_a_stream_is_the_whole_in_pieces(clip: Clip, talker: Talker, face: Face) -> None:
     pieces = list(stream(Request(text=TEXT), cast(talker, face)))
     assert len(pieces) == 2

@@ -9,6 +9,7 @@ from PIL import Image
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_face import tiny_face
+from tts2face.face.file import load_face
 from tts2face.render.draw import draw, frames, staged
 from tts2face.render.picture import Picture
 from tts2face.render.surface import linear_table
@@ -84,6 +85,16 @@ def test_a_transparent_picture_laid_over_a_colour_is_the_picture_on_that_colour(
     light = table[clear[:, :, :3]] * share + table[np.array([0x20, 0x40, 0x60])] * (1 - share)
     srgb = 255 * np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
     assert np.abs(srgb - solid).max() <= 3  # 8-bit coverage
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.5])
+def test_coverage_is_the_share_of_samples_that_the_head_covers(yaw):
+    face = load_face("head")
+    pose = np.zeros(len(face.shape_names)), np.array([0, yaw, 0, 0, 0, 0])
+    joined = draw(face, *pose, picture=Picture(size="96x96", supersampling=3, background="transparent"))
+    single = draw(face, *pose, picture=Picture(size="288x288", supersampling=1, background="transparent"))
+    covered = (single[:, :, 3] / 255).reshape(96, 3, 96, 3).mean(axis=(1, 3))
+    assert np.abs(joined[:, :, 3] / 255 - covered).max() <= 0.01
 
 
 def test_an_image_behind_fills_the_picture(tmp_path):

@@ -23,7 +23,6 @@ AT_NORMAL, AT_ALBEDO, AT_EXPOSURE, AT_RAY, AT_SPECULAR, AT_SHININESS, AT_WRAP, A
     0, 3, 6, 10, 12, 13, 14, 15, 16,
 )  # fmt: skip
 N_ROWS = 17
-N_SUMMED = 10  # rows that are averaged when hits are joined
 PIXEL_X, PIXEL_Y, PIXEL_ENDS = 0, 1, 2  # columns of the pixel table; from 2 on: begin, then the end of each layer
 
 
@@ -50,8 +49,23 @@ def vertex_normals(flat: Array, starts: Array, members: Array, vertex: Array) ->
 
 
 @kernel
-def find_hits(owner: Array, n_layers: int, place: tuple[int, int, int], hits: Any, pixels: Array) -> int:
-    """List for each pixel of a band the triangles under it; returns how many pixels are not empty.
+def is_alike(number: int, other: int, flat: Array, part_of: Array) -> bool:
+    """Whether two seen triangles lie on one smooth surface: the same part, the same side of it, near normals."""
+    if (number < 0) != (other < 0):
+        return number == other
+    t, u = (number, other) if number >= 0 else (~number, ~other)
+    cosine = flat[t, 0] * flat[u, 0] + flat[t, 1] * flat[u, 1] + flat[t, 2] * flat[u, 2]
+    squared = flat[t, 0] ** 2 + flat[t, 1] ** 2 + flat[t, 2] ** 2
+    squared *= flat[u, 0] ** 2 + flat[u, 1] ** 2 + flat[u, 2] ** 2
+    smooth = (cosine > 0) & (cosine * cosine > SMOOTH * SMOOTH * squared) & (part_of[t] == part_of[u])
+    return bool(smooth | (t == u))
+
+
+@kernel
+def find_fragments(
+    owner: Array, n_layers: int, place: tuple[int, int, int], facets: tuple[Any, Any], found: Any, pixels: Array
+) -> int:
+    """List for each pixel of a band the smooth surfaces under it; returns how many pixels are not empty.
 
     Parameters
     ----------
@@ -59,52 +73,57 @@ def find_hits(owner: Array, n_layers: int, place: tuple[int, int, int], hits: An
         Of `draw_band`.
     place
         The band's first row of samples, its number of rows, samples along a pixel's side.
-    hits
-        Out: triangle (H,); sums over its samples of column, row and 1 (H, 3). Room for kind (H,) and fragment (H,).
+    facets
+        Normals of the triangles (F, 3) and part of each (F,).
+    found
+        Out, for each fragment: its first triangle (G,); sums over its samples of column, row and 1 (G, 3).
     pixels : (P, 6)
-        Out: x, y, first hit, end of the hits of each layer.
+        Out: x, y, first fragment, end of the fragments of each layer.
     """
     first_row, n_rows, side = place
-    number_of, spread = hits[0], hits[1]
-    n_hits = n_pixels = 0
+    number_of, spread = found
+    flat, part_of = facets
+    n_fragments = n_pixels = 0
     one = np.float32(1)
     for r in range(0, n_rows, side):
         for x in range(0, owner.shape[2], side):
-            begin = n_hits
+            begin = n_fragments
             for layer in range(n_layers):
-                first = n_hits
+                first = n_fragments
                 pixels[n_pixels, PIXEL_ENDS + layer] = first
                 number = owner[layer, r, x]
-                n_alike = 0
+                n_same = 0
                 for row in range(r, r + side):
                     for column in range(x, x + side):
-                        n_alike += owner[layer, row, column] == number
-                if n_alike == side * side:
+                        n_same += owner[layer, row, column] == number
+                if n_same == side * side:
                     if number != NOTHING:
-                        number_of[n_hits] = number
-                        spread[n_hits, 0] = (x + 0.5 * (side - 1)) * n_alike
-                        spread[n_hits, 1] = (r + first_row + 0.5 * (side - 1)) * n_alike
-                        spread[n_hits, 2] = n_alike
-                        n_hits += 1
+                        number_of[n_fragments] = number
+                        spread[n_fragments, 0] = (x + 0.5 * (side - 1)) * n_same
+                        spread[n_fragments, 1] = (r + first_row + 0.5 * (side - 1)) * n_same
+                        spread[n_fragments, 2] = n_same
+                        n_fragments += 1
                     continue
+                last, g = NOTHING, first
                 for row in range(r, r + side):
                     for column in range(x, x + side):
                         number = owner[layer, row, column]
                         if number == NOTHING:
                             continue
-                        h = first
-                        while h < n_hits and number_of[h] != number:
-                            h += 1
-                        if h == n_hits:
-                            n_hits += 1
-                            number_of[h] = number
-                            spread[h, 0] = spread[h, 1] = spread[h, 2] = np.float32(0)
-                        spread[h, 0] += np.float32(column)
-                        spread[h, 1] += np.float32(row + first_row)
-                        spread[h, 2] += one
-            if n_hits > begin:
+                        if number != last:
+                            last, g = number, first
+                            while g < n_fragments and not is_alike(number, number_of[g], flat, part_of):
+                                g += 1
+                        if g == n_fragments:
+                            n_fragments += 1
+                            number_of[g] = number
+                            spread[g, 0] = spread[g, 1] = spread[g, 2] = np.float32(0)
+                        spread[g, 0] += np.float32(column)
+                        spread[g, 1] += np.float32(row + first_row)
+                        spread[g, 2] += one
+            if n_fragments > begin:
                 for layer in range(n_layers, 4):
-                    pixels[n_pixels, PIXEL_ENDS + layer] = n_hits
+                    pixels[n_pixels, PIXEL_ENDS + layer] = n_fragments
                 pixels[n_pixels, PIXEL_X], pixels[n_pixels, PIXEL_Y] = x // side, (r + first_row) // side
                 n_pixels += 1
     return n_pixels
@@ -126,25 +145,25 @@ def texel(texture: Array, linear: Array, u: float, v: float, c: int) -> Any:
 
 
 @kernel
-def evaluate(hits: Any, n_hits: int, vertex: Array, scene: Any, lens: Array, table: Array) -> None:
-    """Write what each hit triangle is like at the middle of its samples (Moeller and Trumbore 1997).
+def evaluate(found: Any, n_fragments: int, vertex: Array, scene: Any, lens: Array, table: Array) -> None:
+    """Write what each fragment's first triangle is like at the middle of its samples (Moeller and Trumbore 1997).
 
     Parameters
     ----------
     scene
         Triangles (F, 3), part of each (F,), materials (P, 6), texture (H, W, 3), linear table (256,).
-    table : (17, H)
+    table : (17, G)
         Out: the rows named above.
     """
-    number_of, spread, kinds = hits[0], hits[1], hits[2]
+    number_of, spread = found
     triangles, part_of, materials, texture, linear = scene
     one, zero = np.float32(1), np.float32(0)
     focal, middle_x, middle_y = np.float32(1 / lens[0]), np.float32(lens[1] - 0.5), np.float32(lens[2] - 0.5)
-    for h in range(n_hits):
-        number = number_of[h]
+    for g in range(n_fragments):
+        number = number_of[g]
         t = number if number >= 0 else ~number
-        share = one / spread[h, 2]
-        dx, dy = (spread[h, 0] * share - middle_x) * focal, (spread[h, 1] * share - middle_y) * focal
+        share = one / spread[g, 2]
+        dx, dy = (spread[g, 0] * share - middle_x) * focal, (spread[g, 1] * share - middle_y) * focal
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         sx, sy, sz = -vertex[a, 0], -vertex[a, 1], -vertex[a, 2]
         e1x, e1y, e1z = vertex[b, 0] + sx, vertex[b, 1] + sy, vertex[b, 2] + sz
@@ -158,63 +177,22 @@ def evaluate(hits: Any, n_hits: int, vertex: Array, scene: Any, lens: Array, tab
         wa = one - wb - wc
         for k in range(3):
             n, o = NORMAL + k, COLOUR + k
-            table[AT_NORMAL + k, h] = wa * vertex[a, n] + wb * vertex[b, n] + wc * vertex[c, n]
-            table[AT_ALBEDO + k, h] = wa * vertex[a, o] + wb * vertex[b, o] + wc * vertex[c, o]
+            table[AT_NORMAL + k, g] = wa * vertex[a, n] + wb * vertex[b, n] + wc * vertex[c, n]
+            table[AT_ALBEDO + k, g] = wa * vertex[a, o] + wb * vertex[b, o] + wc * vertex[c, o]
         material = part_of[t]
         if materials[material, TEXTURED] != zero:
             u = wa * vertex[a, UV] + wb * vertex[b, UV] + wc * vertex[c, UV]
             v = wa * vertex[a, UV + 1] + wb * vertex[b, UV + 1] + wc * vertex[c, UV + 1]
             for k in range(3):
-                table[AT_ALBEDO + k, h] = texel(texture, linear, u, v, k)
-        length = table[AT_NORMAL, h] ** 2 + table[AT_NORMAL + 1, h] ** 2 + table[AT_NORMAL + 2, h] ** 2
-        turn = (one if number >= 0 else -one) / np.sqrt(length + np.float32(1e-20))
+                table[AT_ALBEDO + k, g] = texel(texture, linear, u, v, k)
+        turn = one if number >= 0 else -one
         inner = INSIDE if number < 0 and materials[material, OPEN] == zero else one
         for k in range(3):
-            table[AT_NORMAL + k, h] *= turn
+            table[AT_NORMAL + k, g] *= turn
         for k in range(4):
             mean = wa * vertex[a, EXPOSURE + k] + wb * vertex[b, EXPOSURE + k] + wc * vertex[c, EXPOSURE + k]
-            table[AT_EXPOSURE + k, h] = mean * inner
-        table[AT_RAY, h], table[AT_RAY + 1, h] = dx, dy
+            table[AT_EXPOSURE + k, g] = mean * inner
+        table[AT_RAY, g], table[AT_RAY + 1, g] = dx, dy
         for k in range(4):
-            table[AT_SPECULAR + k, h] = materials[material, k]
-        table[AT_SHARE, h] = spread[h, 2]
-        kinds[h] = 2 * material + (1 if number < 0 else 0)
-
-
-@kernel
-def join(table: Array, hits: Any, pixels: Array, n_pixels: int) -> int:
-    """Join hits of a pixel's layer that lie on one smooth surface, in place; returns how many fragments remain.
-
-    The last of `hits` tells for each hit its fragment; the ends in `pixels` stay those of the hits.
-    """
-    kinds, fragment_of = hits[2], hits[3]
-    n_fragments = 0
-    for p in range(n_pixels):
-        for layer in range(3):
-            first = n_fragments
-            for h in range(pixels[p, PIXEL_ENDS + layer], pixels[p, PIXEL_ENDS + layer + 1]):
-                share, kind, g = table[AT_SHARE, h], kinds[h], first
-                while g < n_fragments:
-                    cosine, size = np.float32(0), np.float32(0)
-                    for k in range(3):
-                        cosine += table[k, g] * table[k, h]
-                        size += table[k, g] * table[k, g]
-                    if kind == kinds[g] and cosine > SMOOTH * np.sqrt(size):
-                        break
-                    g += 1
-                fragment_of[h] = g
-                if g == n_fragments:
-                    n_fragments += 1
-                    kinds[g] = kind
-                    for k in range(N_SUMMED):
-                        table[k, g] = table[k, h] * share
-                    for k in range(N_SUMMED, N_ROWS):
-                        table[k, g] = table[k, h]
-                else:
-                    table[AT_SHARE, g] += share
-                    for k in range(N_SUMMED):
-                        table[k, g] += table[k, h] * share
-    for k in range(AT_ALBEDO, N_SUMMED):
-        for g in range(n_fragments):
-            table[k, g] /= table[AT_SHARE, g]
-    return n_fragments
+            table[AT_SPECULAR + k, g] = materials[material, k]
+        table[AT_SHARE, g] = spread[g, 2]

@@ -16,8 +16,7 @@ from tts2face.render.fragments import (
     UV,
     evaluate,
     face_normals,
-    find_hits,
-    join,
+    find_fragments,
     vertex_normals,
 )
 from tts2face.render.raster import N_LAYERS, draw_band, gather, sort_into_bands, to_camera
@@ -47,7 +46,7 @@ class Room:
     band_starts: NDArray[np.int64]
     depth: NDArray[np.float32]
     owner: NDArray[np.int32]
-    hits: tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]
+    found: tuple[NDArray[np.int32], NDArray[np.float32]]
     fragments: NDArray[np.float32]
     scratch: NDArray[np.float32]
     colour: NDArray[np.float32]
@@ -59,11 +58,10 @@ def room_for(surface: Surface, size: tuple[int, int], side: int) -> Room:
     n_vertices, n_triangles = len(surface.rig.rest), len(surface.triangles)
     width, height = size[0] * side, size[1] * side
     rows = side * max(1, BAND_SAMPLES // (width * side))
-    n_hits = N_LAYERS * width * rows + ODD
+    n_most = N_LAYERS * width * rows + ODD
     vertex = np.zeros((n_vertices, N_VERTEX_COLUMNS), np.float32)
     vertex[:, COLOUR : COLOUR + 3] = surface.colours
     vertex[:, UV : UV + 2] = surface.uv
-    number, kind, fragment = np.zeros((3, n_hits), np.int32)
     return Room(
         side=side,
         vertex=vertex,
@@ -74,10 +72,10 @@ def room_for(surface: Surface, size: tuple[int, int], side: int) -> Room:
         band_starts=np.zeros(-(-height // rows) + 1, np.int64),
         depth=np.zeros((N_LAYERS, rows, width), np.float32),
         owner=np.zeros((N_LAYERS, rows, width), np.int32),
-        hits=(number, np.zeros((n_hits, 3), np.float32), kind, fragment),
-        fragments=np.zeros((N_ROWS, n_hits), np.float32),
-        scratch=np.zeros((N_SCRATCH_ROWS, n_hits), np.float32),
-        colour=np.zeros((3, n_hits), np.float32),
+        found=(np.zeros(n_most, np.int32), np.zeros((n_most, 3), np.float32)),
+        fragments=np.zeros((N_ROWS, n_most), np.float32),
+        scratch=np.zeros((N_SCRATCH_ROWS, n_most), np.float32),
+        colour=np.zeros((3, n_most), np.float32),
         pixels=np.zeros((width * rows // side**2, PIXEL_ENDS + N_LAYERS + 1), np.int32),
     )
 
@@ -102,6 +100,7 @@ def paint(
     vertex_normals(room.flat, surface.starts, surface.members, room.vertex)
     geometry = (room.vertex, surface.triangles, surface.translucent, lens)
     scene = (surface.triangles, surface.part_of, surface.materials, surface.texture, TABLES[0])
+    facets = (room.flat, surface.part_of)
     n_rows = room.depth.shape[1]
     for band, (begin, end) in enumerate(zip(room.band_starts[:-1], room.band_starts[1:], strict=True)):
         if begin == end:
@@ -109,15 +108,15 @@ def paint(
         place = (band * n_rows, min(n_rows, height - band * n_rows), side)
         members = batch[begin:end]
         n_translucent = draw_band(geometry, (room.corners, room.source, members), place[0], room.depth, room.owner)
-        n_pixels = find_hits(room.owner, N_LAYERS if n_translucent else 1, place, room.hits, room.pixels)
+        layers = N_LAYERS if n_translucent else 1
+        n_pixels = find_fragments(room.owner, layers, place, facets, room.found, room.pixels)
         if n_pixels == 0:
             continue
-        n_hits = int(room.pixels[n_pixels - 1, PIXEL_ENDS + N_LAYERS])
-        evaluate(room.hits, n_hits, room.vertex, scene, lens, room.fragments)
-        n_fragments = join(room.fragments, room.hits, room.pixels, n_pixels)
+        n_fragments = int(room.pixels[n_pixels - 1, PIXEL_ENDS + N_LAYERS])
+        evaluate(room.found, n_fragments, room.vertex, scene, lens, room.fragments)
         light(room.fragments, n_fragments, lights[0], room.scratch, room.colour)
         shown = (room.fragments, room.colour)
-        compose(room.owner, place, (room.pixels, n_pixels), room.hits, shown, (picture, TABLES))
+        compose(room.owner, place, (room.pixels, n_pixels), (room.found[0], *facets), shown, (picture, TABLES))
 
 
 def project(

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.render.compiled import kernel
-from tts2face.render.fragments import AT_OPACITY, AT_SHARE, PIXEL_ENDS, PIXEL_X, PIXEL_Y
+from tts2face.render.fragments import AT_OPACITY, AT_SHARE, PIXEL_ENDS, PIXEL_X, PIXEL_Y, is_alike
 from tts2face.render.raster import NOTHING
 
 Array = NDArray[Any]
@@ -29,7 +29,7 @@ def write_pixel(total: Array, tables: tuple[Any, Any], picture: Array, x: int, y
 
 @kernel
 def mix_samples(
-    samples: tuple[Any, int, int, int], begins: Array, hits: Any, shown: tuple[Any, Any], total: Array
+    samples: tuple[Any, int, int, int], begins: Array, which: tuple[Any, Any, Any], shown: tuple[Any, Any], total: Array
 ) -> None:
     """Write the mean over a pixel's samples of the layers over each other: light and coverage (4,).
 
@@ -38,12 +38,14 @@ def mix_samples(
     samples
         Owner (3, R, W), the pixel's first row and column in it, samples along its side.
     begins : (4,)
-        First hit of each layer, and the end.
+        First fragment of each layer, and the end.
+    which
+        First triangle of each fragment, and the facets of `find_fragments`.
     shown
         Fragment table and colours.
     """
     owner, row, column, side = samples
-    number_of, fragment_of = hits[0], hits[3]
+    number_of, flat, part_of = which
     table, colour = shown
     one = np.float32(1)
     for s in range(side * side):
@@ -53,10 +55,9 @@ def mix_samples(
             number = owner[layer, row + s // side, column + s % side]
             if number == NOTHING:
                 continue
-            h = begins[layer]
-            while number_of[h] != number:
-                h += 1
-            g = fragment_of[h]
+            g = begins[layer]
+            while not is_alike(number, number_of[g], flat, part_of):
+                g += 1
             through = one - table[AT_OPACITY, g]
             red, green, blue = (
                 red * through + colour[0, g],
@@ -74,7 +75,7 @@ def compose(
     owner: Array,
     place: tuple[int, int, int],
     pixels: tuple[Any, int],
-    hits: Any,
+    which: tuple[Any, Any, Any],
     shown: tuple[Any, Any],
     out: tuple[Any, Any],
 ) -> None:
@@ -86,6 +87,8 @@ def compose(
         The band's first row of samples, its number of rows, samples along a pixel's side.
     pixels
         Pixel table and how many of its rows count.
+    which
+        First triangle of each fragment, and the facets of `find_fragments`.
     shown
         Fragment table and colours.
     out
@@ -96,16 +99,15 @@ def compose(
     picture, tables = out
     share = np.float32(1) / np.float32(side * side)
     total = np.zeros(4, np.float32)
-    g = 0
     for p in range(pixels[1]):
         row = pixels[0][p]
         begin, end = row[PIXEL_ENDS], row[PIXEL_ENDS + 3]
         total[0] = total[1] = total[2] = total[3] = np.float32(0)
         if row[PIXEL_ENDS + 1] < end:
             samples = (owner, row[PIXEL_Y] * side - first_row, row[PIXEL_X] * side, side)
-            mix_samples(samples, row[PIXEL_ENDS:], hits, shown, total)
+            mix_samples(samples, row[PIXEL_ENDS:], which, shown, total)
         else:
-            for g in range(hits[3][begin], hits[3][end - 1] + 1):
+            for g in range(begin, end):
                 weight = table[AT_SHARE, g] * share
                 for c in range(3):
                     total[c] += colour[c, g] * weight

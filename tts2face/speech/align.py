@@ -92,6 +92,7 @@ class Aligner:
 
     def _decoded(self, pcm: bytes, text: str) -> "list[_Entry]":
         decoder = self._decoder
+        decoder.reinit_feat()  # forgets the level of what was heard before: the same sound gives the same edges
         decoder.set_align_text(text)
         for second_pass in (False, True):
             try:
