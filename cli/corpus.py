@@ -1,5 +1,7 @@
 """``tts2face corpus``: recordings become talkers, and talkers are measured."""
 
+import sys
+from collections.abc import Mapping
 from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -39,6 +41,12 @@ def build(  # noqa: PLR0913 - one parameter a flag
         Path | None,
         Parameter(help="JSON with name, language, sources, licence, attribution; provenance.json of the folder."),
     ] = None,
+    appearance: Annotated[
+        bool, Parameter(help="Learn how the talker looks, too, for `--face self`.", negative="")
+    ] = False,
+    consent: Annotated[
+        str | None, Parameter(help="With --appearance: the consent of the person shown, kept with name and date.")
+    ] = None,
     jobs: Jobs = None,
     cache: Cache = None,
     model: Model = None,
@@ -49,12 +57,29 @@ def build(  # noqa: PLR0913 - one parameter a flag
     from corpus_tools.build import build_talker
     from corpus_tools.observe import Effort
 
-    with progress_bar("reading recordings") as on_progress:
-        effort = Effort(cache, jobs, model)
-        built = build_talker(recordings, out, name=name, provenance=provenance, effort=effort, on_progress=on_progress)
+    agreed = _consent(name or recordings.resolve().name, consent) if appearance else None
+    with progress_bar("learning from recordings") as on_progress:
+        built = build_talker(
+            recordings,
+            out,
+            name=name,
+            provenance=provenance,
+            effort=Effort(cache, jobs, model),
+            consent=agreed,
+            on_progress=on_progress,
+        )
     for refusal in built.refused:
         say(f"refused {refusal.name}: {refusal.reason}")
     say(f"wrote {out}: {built.n_kept} recordings, {built.minutes:.1f} minutes, {len(built.refused)} refused")
+
+
+def _consent(name: str, statement: str | None) -> Mapping[str, str]:
+    """The consent of the person shown; asked for where somebody sits at the keyboard."""
+    from corpus_tools.consent import consent_of
+
+    if statement is None and sys.stdin.isatty():
+        statement = input(f"The talker will carry pictures of {name}'s face. State the consent: ")
+    return consent_of(name, statement)
 
 
 @corpus.command

@@ -42,7 +42,9 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     ] = None,
     file: Annotated[Path | None, Parameter(help="Read the text from a UTF-8 file.")] = None,
     talker: Annotated[str, Parameter(help="Whose lips move: a shipped talker or a .talker file.")] = "grid_s1",
-    face: Annotated[str, Parameter(help="What is shown: head, cartoon, or a .face file.")] = "head",
+    face: Annotated[
+        str, Parameter(help="What is shown: head, cartoon, a .face file, or self (the talker's own).")
+    ] = "head",
     identity: Annotated[str | None, Parameter(help="A preset of the face's age, sex and ancestry.")] = None,
     explain: Annotated[
         Path | None, Parameter(help="Write, for each phone, which recorded phones were used (.json or .txt).")

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from tts2face.exemplar.explain import ShownPhone
     from tts2face.types import Clip
 
+OWN = "self"  # the face that the talker herself shows
 EXPLANATIONS = (".json", ".txt")
 
 
@@ -41,6 +42,8 @@ def run(request: Request, picture: Picture, errand: Errand) -> None:
         raise InputError(f"an explanation is written as .json or .txt, not {errand.explain.name}")
     if not request.text.strip():
         raise InputError("the text is empty; give something to say")
+    if errand.view and errand.face == OWN:
+        raise InputError("a window shows heads that can be turned; leave --view away, or choose --face head")
     if errand.view:
         from tts2face.render.view import require_display
 
@@ -100,7 +103,12 @@ def _ready(errand: Errand) -> "Cast":
     from tts2face.render.compiled import kernels_are_compiled
     from tts2face.talker import load_talker
 
-    talker, face = load_talker(errand.talker), load_face(errand.face, errand.identity)
+    talker = load_talker(errand.talker)
+    if errand.face == OWN:
+        if errand.identity is not None:
+            raise InputError("her own face has one identity; leave --identity away, or choose --face head")
+        return cast(talker, None)
+    face = load_face(errand.face, errand.identity)
     if not kernels_are_compiled():
         from tts2face.first_run import compile_kernels
 

@@ -16,6 +16,9 @@ from tts2face.talker import write_talker
 PROVENANCE = "provenance.json"  # in the folder of recordings: where they come from and how they may be used
 PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
 UNSTATED = "not stated"
+CONTENT_WITH_PICTURES = (
+    "landmark shapes, head pose, phones, loudness, and with the stated consent pictures of the person's face; no sound"
+)
 CONTENT = "motion only: landmark shapes, head pose, phones and loudness; no image and no sound"
 
 
@@ -36,6 +39,7 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
     provenance: Path | None = None,
     effort: Effort | None = None,
     created: str | None = None,
+    consent: Mapping[str, str] | None = None,
     on_progress: Progress | None = None,
 ) -> Built:
     """Observe recordings, learn their talker, and write it; the same recordings give the same bytes but for `created`.
@@ -48,6 +52,10 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
         JSON file as `read_provenance` reads it; ``provenance.json`` in the folder when None.
     created
         Date for the metadata; today when None.
+    consent
+        Of the person shown, from `corpus_tools.consent.consent_of`; with it the talker gets an appearance.
+    on_progress
+        Called with steps done and of all; with an appearance every recording is three steps.
 
     Raises
     ------
@@ -59,7 +67,8 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
         A package or the landmark models are missing, or a file cannot be written.
     """
     stated = read_provenance(provenance or recordings / PROVENANCE, must_exist=provenance is not None)
-    observations = observe(recordings, effort=effort, on_progress=on_progress)
+    observing = on_progress if consent is None else _first_third(on_progress)
+    observations = observe(recordings, effort=effort, on_progress=observing)
     metadata = {
         **dict.fromkeys(PROVENANCE_FIELDS, UNSTATED),
         "name": recordings.resolve().name,
@@ -67,13 +76,27 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
         **({"name": name} if name else {}),
         "command": _command(recordings, out, name, provenance),
         "created": created or datetime.now(UTC).date().isoformat(),
-        "content": CONTENT,
+        "content": CONTENT if consent is None else CONTENT_WITH_PICTURES,
+        **({} if consent is None else {"consent": dict(consent)}),
         "refused": [[refusal.name, refusal.reason] for refusal in observations.refused],
     }
     talker = learn_talker(observations.kept, metadata=metadata)
+    if consent is not None:
+        from corpus_tools.aam.attach import with_appearance
+
+        learning = _shifted(on_progress, len(observations.kept))
+        talker = with_appearance(talker, observations.kept, effort=effort or Effort(), on_progress=learning)
     write_talker(out, talker)
     seconds = sum(len(utterance.shape) for utterance in talker.utterances) / talker.fps
     return Built(len(talker.utterances), seconds / 60.0, observations.refused)
+
+
+def _first_third(on_progress: Progress | None) -> Progress | None:
+    return on_progress and (lambda done, of: on_progress(done, 3 * of))
+
+
+def _shifted(on_progress: Progress | None, before: int) -> Progress | None:
+    return on_progress and (lambda done, of: on_progress(before + done, before + of))
 
 
 def read_provenance(path: Path, *, must_exist: bool) -> Mapping[str, Any]:

@@ -41,7 +41,7 @@ class Quality:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """One recording; frame i is the instant ``i / fps`` of the clock of ``phones``.
+    """One recording; frame i is the instant ``i / fps`` of the clock of ``phones``, ``quality.cut`` later in ``video``.
 
     Parameters
     ----------
@@ -61,6 +61,7 @@ class Observation:
     words: tuple[WordSpan, ...]
     intensity: NDArray[np.float32]
     quality: Quality
+    video: Path
 
 
 def observed(recording: Recording, cache: Path, tracker: "FaceTracker", aligner: "Aligner") -> Observation:
@@ -87,7 +88,9 @@ def observed(recording: Recording, cache: Path, tracker: "FaceTracker", aligner:
     times = begin + np.arange(end - start) / seen.fps
     quality = Quality(sound.confidence, _lowest_score(seen), n_filled, begin)
     loudness = intensity(sound.sound, times)
-    return Observation(recording.name, seen.fps, posed.landmarks, _head(posed), phones, spans, loudness, quality)
+    return Observation(
+        recording.name, seen.fps, posed.landmarks, _head(posed), phones, spans, loudness, quality, recording.video
+    )
 
 
 def on_grid(points: NDArray[np.float32], times: NDArray[np.float64], fps: float) -> tuple[NDArray[np.float32], int]:

@@ -19,14 +19,16 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.ahead import Ahead
 from tts2face.exemplar.animate import VisualVoice, speech_trajectory, visual_voice
 from tts2face.exemplar.explain import ShownPhone, explained
+from tts2face.exemplar.looks import Looks, looks_of, looks_trajectory
 from tts2face.exemplar.options import METHODS, SynthesisOptions
 from tts2face.face.model import Face
 from tts2face.face.retarget import Retargeter, retargeter
 from tts2face.render.clock import exact_rate, first_sample
-from tts2face.render.draw import Stage, staged
+from tts2face.render.draw import AnyStage, staged
 from tts2face.render.encode import ClipWriter
 from tts2face.render.output import checked_output
 from tts2face.render.picture import Picture
+from tts2face.render.plate import plate_staged
 from tts2face.request import Request
 from tts2face.talker import Talker
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, frame_count, joined_clips
@@ -42,22 +44,26 @@ PIECE_CHARACTERS = 300  # a sentence that is longer is cut at a clause mark or a
 class Cast:
     """A talker and a face made ready for each other; serves any number of requests.
 
+    With ``face`` None the talker shows her own face: there is nothing to retarget to, and her ``looks`` are spoken too.
     ``stages`` keeps what was made ready to draw the face into the last few kinds of picture; ``voices`` the voices that
     wait to speak again, by name, language and the user's own words.
     """
 
-    face: Face
+    talker: Talker
+    face: Face | None
     visual_voice: VisualVoice
-    retargeter: Retargeter
-    stages: dict[Picture, Stage] = field(default_factory=dict)
+    retargeter: Retargeter | None
+    looks: Looks | None = None
+    stages: dict[Picture, AnyStage] = field(default_factory=dict)
     voices: "OrderedDict[Hashable, Voice]" = field(default_factory=OrderedDict)
 
-    def stage(self, picture: Picture) -> Stage:
+    def stage(self, picture: Picture) -> AnyStage:
         """The face made ready to be drawn into a kind of picture; its soft shadows take most of a second."""
         if picture not in self.stages:
             while len(self.stages) >= STAGES_KEPT:
                 self.stages.pop(next(iter(self.stages)))
-            self.stages[picture] = staged(self.face, picture)
+            made = staged(self.face, picture) if self.face is not None else plate_staged(self.talker, picture)
+            self.stages[picture] = made
         return self.stages[picture]
 
     @contextmanager
@@ -74,13 +80,22 @@ class Cast:
                 self.voices.popitem(last=False)
 
 
-def cast(talker: Talker, face: Face) -> Cast:
-    """Index the talker's exemplars and prepare the way of their motion onto the face."""
-    return Cast(face, visual_voice(talker), retargeter(talker, face))
+def cast(talker: Talker, face: Face | None) -> Cast:
+    """Index the talker's exemplars and prepare the way of their motion onto the face, or onto her own without one.
+
+    Raises
+    ------
+    InputError
+        There is no face, and the talker has motion only.
+    """
+    voice = visual_voice(talker)
+    if face is None:
+        return Cast(talker, None, voice, None, looks_of(talker, voice))
+    return Cast(talker, face, voice, retargeter(talker, face))
 
 
-def synthesize(request: Request, talker: Talker, face: Face) -> Clip:
-    """The whole clip of a request.
+def synthesize(request: Request, talker: Talker, face: Face | None) -> Clip:
+    """The whole clip of a request; with `face` None in the channels of the talker's own face.
 
     The same request, talker, face and version give the same bytes, in any process and with any number of threads.
 
@@ -179,7 +194,18 @@ def _animated(speech: Speech, ready: Cast, request: Request) -> Clip:
     n_frames = frame_count(speech.waveform.duration, fps)
     lips = speech_trajectory(speech.phones, ready.visual_voice, fps=fps, n_frames=n_frames, options=_options(request))
     head = Trajectory(HEAD_CHANNELS, np.zeros((n_frames, len(HEAD_CHANNELS)), np.float32), fps)
-    return Clip(ready.retargeter.retarget(lips), head, speech)
+    return Clip(_shown(lips, speech, ready, request), head, speech)
+
+
+def _shown(lips: Trajectory, speech: Speech, ready: Cast, request: Request) -> Trajectory:
+    if ready.retargeter is not None:
+        return ready.retargeter.retarget(lips)
+    if ready.looks is None:
+        raise InputError("a cast without a face needs the talker's looks; make it with `cast`")
+    looks = looks_trajectory(
+        speech.phones, ready.visual_voice, ready.looks, fps=lips.fps, n_frames=len(lips), options=_options(request)
+    )
+    return Trajectory(lips.channels + looks.channels, np.concatenate([lips.values, looks.values], axis=1), lips.fps)
 
 
 def explain(clip: Clip, ready: Cast, request: Request, *, begins: float = 0.0) -> tuple[ShownPhone, ...]:

@@ -37,12 +37,12 @@ def compile_kernels(face: Face) -> None:
 
 def compile_motion() -> None:
     """Compile what turns phones into a face's weights, by moving the shipped faces a little."""
-    from tts2face.api import cast
-    from tts2face.exemplar.animate import speech_trajectory
+    from tts2face.exemplar.animate import speech_trajectory, visual_voice
     from tts2face.face.file import load_face
+    from tts2face.face.retarget import retargeter
     from tts2face.talker import load_talker
 
     talker: Talker = load_talker("grid_s1")
-    ready = cast(talker, load_face("head"))
+    way = retargeter(talker, load_face("head"))
     phones = PhoneSequence([SILENCE, "p", "f", "ɑ", SILENCE], [0.0, 0.3, 0.4, 0.5, 0.7, 1.0])
-    ready.retargeter.retarget(speech_trajectory(phones, ready.visual_voice, fps=30.0, n_frames=30))
+    way.retarget(speech_trajectory(phones, visual_voice(talker), fps=30.0, n_frames=30))

@@ -21,6 +21,12 @@ INNER_LIP_LOWER = (78, 95, 88, 178, 87, 14, 317, 402, 318, 324, 308)
 OUTER_LIP_UPPER = (61, 185, 40, 39, 37, 0, 267, 269, 270, 409, 291)
 OUTER_LIP_LOWER = (61, 146, 91, 181, 84, 17, 314, 405, 321, 375, 291)
 
+# Once around the face, from the top of the forehead over the person's left cheek and the chin.
+FACE_OVAL = (
+    10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377, 152, 148, 176, 149, 150,
+    136, 172, 58, 132, 93, 234, 127, 162, 21, 54, 103, 67, 109,
+)  # fmt: skip
+
 # What speech moves: every point of the canonical mesh lower than 0.5 mm under the base of the nose (landmark 2).
 # This is region P of Ju and Lee 2008, Fig. 5; its complement carries expression.
 MOUTH_REGION = (

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence, WordSpan
+from tts2face.appearance import STEPS_PER_LOOK, Appearance, appearance_arrays, appearance_of
 from tts2face.tensors import read_tensors, write_tensors
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
@@ -72,7 +73,7 @@ class Utterance:
 
     ``shape`` (T, M) are shape parameters, ``head`` (T, 6) the head pose (`HEAD_CHANNELS`, relative to the talker's
     mean pose), ``intensity`` (T,) dB of the sound; all on the frames of the video, frame i at ``i / fps`` of the
-    clock of ``phones``.
+    clock of ``phones``. ``looks`` (T, A) are parameters of the talker's appearance, None without one.
     """
 
     name: str
@@ -81,11 +82,12 @@ class Utterance:
     shape: NDArray[np.float32]
     head: NDArray[np.float32]
     intensity: NDArray[np.float32]
+    looks: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Talker:
-    """A person's visual speech: shape model, utterances, and where they come from.
+    """A person's visual speech: shape model, utterances, where they come from, and with consent how she looks.
 
     ``metadata`` holds at least name, language, sources, licence, attribution, command, created.
     """
@@ -94,6 +96,7 @@ class Talker:
     model: ShapeModel
     utterances: tuple[Utterance, ...]
     metadata: Mapping[str, Any]
+    appearance: Appearance | None = None
 
     def speech_trajectory(self, utterance: Utterance) -> Trajectory:
         """Speech parameters of a recorded utterance."""
@@ -129,6 +132,11 @@ def write_talker(path: Path, talker: Talker) -> None:
         "n_phones": np.array([len(utterance.phones) for utterance in utterances], np.int32),
         "edges": np.concatenate([utterance.phones.edges for utterance in utterances]),
     }
+    if talker.appearance is not None:
+        looks = np.concatenate([utterance.looks for utterance in utterances if utterance.looks is not None])
+        steps = looks / (talker.appearance.spread / STEPS_PER_LOOK)
+        arrays["looks"] = np.clip(np.rint(steps), -32768, 32767).astype(np.int16)
+        arrays |= appearance_arrays(talker.appearance)
     header = {
         **talker.metadata,
         "fps": talker.fps,
@@ -180,11 +188,14 @@ def _assembled(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> Talke
     phones = np.concatenate([[0], np.cumsum(arrays["n_phones"])])
     shape = arrays["shape"].astype(np.float32) * (model.spread / STEPS_PER_SPREAD)
     head, intensity = arrays["head"].astype(np.float32), arrays["intensity"].astype(np.float32)
+    appearance = appearance_of(arrays)
+    looks = arrays["looks"] * (appearance.spread / STEPS_PER_LOOK) if appearance is not None else None
     utterances = []
     for i, (name, words) in enumerate(header.pop("utterances")):
         labels = [inventory[number] for number in arrays["phones"][phones[i] : phones[i + 1]]]
         sequence = PhoneSequence(labels, arrays["edges"][phones[i] + i : phones[i + 1] + i + 1])
         spans = tuple(WordSpan(text, first, last) for text, first, last in words)
         here = slice(frames[i], frames[i + 1])
-        utterances.append(Utterance(name, sequence, spans, shape[here], head[here], intensity[here]))
-    return Talker(fps, model, tuple(utterances), header)
+        seen = None if looks is None else looks[here]
+        utterances.append(Utterance(name, sequence, spans, shape[here], head[here], intensity[here], seen))
+    return Talker(fps, model, tuple(utterances), header, appearance)

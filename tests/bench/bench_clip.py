@@ -50,7 +50,7 @@ def whole_clip(folder: Path, n_runs: int = 3) -> None:
     )
     clips = [piece.clip for piece in stream(Request(text=TEN_SECONDS), ready)]
     began = time.perf_counter()
-    with ClipWriter(folder / "drawn.mp4", ready.face, Picture()) as writer:
+    with ClipWriter(folder / "drawn.mp4", ready.stage(Picture())) as writer:
         for clip in clips:
             writer.add(clip)
     frames = sum(len(clip.motion) for clip in clips)

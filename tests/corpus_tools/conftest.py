@@ -61,6 +61,7 @@ def made_observation(name: str, seed: int, n_frames: int = 60) -> Observation:
         (WordSpan("bin", 1, 4),),
         generator.uniform(30, 80, n_frames).astype(np.float32),
         Quality(-3000.0, 1.0, 0, 0.0),
+        Path(f"{name}.mkv"),
     )
 
 

@@ -1,6 +1,7 @@
 """The comparison on a made corpus in which every phone has one mouth opening: the answer is known to be good."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,7 +31,9 @@ def observation(number: int) -> Observation:
     points[:, [33, 263]] = ((-45.0, 0.0, 0.0), (45.0, 0.0, 0.0))
     head = np.zeros((len(times), 6), np.float32)
     quality = Quality(0.0, 1.0, 0, 0.0)
-    return Observation(f"u{number:02d}", FPS, points.astype(np.float32), head, phones, (), head[:, 0], quality)
+    return Observation(
+        f"u{number:02d}", FPS, points.astype(np.float32), head, phones, (), head[:, 0], quality, Path("u.mkv")
+    )
 
 
 @pytest.fixture(scope="module")

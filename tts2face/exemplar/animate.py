@@ -107,12 +107,20 @@ def speech_trajectory(
     frame_times = np.arange(n_frames) / fps
     n_instants = int(np.ceil(max(phones.end, frame_times[-1]) * blend.CLOCK_HZ)) + 2
     made = _motion(targets, found, voice, n_instants, options)
-    at = frame_times * blend.CLOCK_HZ
+    return Trajectory(voice.channels, read_at_frames(made, phones, frame_times, voice.rest), fps)
+
+
+def read_at_frames(
+    made: NDArray[np.float32], phones: PhoneSequence, times: NDArray[np.float64], rest: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """(T, D) what was made at the instants of the clock (n, D), read at T times and drawn to rest in silence."""
+    at = times * blend.CLOCK_HZ
     low = at.astype(np.int64)
     part = (at - low)[:, None].astype(np.float32)
     values = (1 - part) * made[low] + part * made[low + 1]
-    pull = stillness(phones, frame_times)[:, None].astype(np.float32)
-    return Trajectory(voice.channels, (1 - pull) * values + pull * voice.rest, fps)
+    pull = stillness(phones, times)[:, None].astype(np.float32)
+    drawn: NDArray[np.float32] = (1 - pull) * values + pull * rest
+    return drawn
 
 
 def _motion(

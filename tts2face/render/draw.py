@@ -3,7 +3,6 @@
 import os
 from collections import deque
 from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,12 +12,14 @@ from lexicon.errors import InputError
 from tts2face.face.linear import REST_HEAD
 from tts2face.face.model import Face
 from tts2face.render import vtk
+from tts2face.render.ahead import drawn_ahead
 from tts2face.render.background import background
 from tts2face.render.bake import Exposure, exposed
 from tts2face.render.camera import Optics, optics
 from tts2face.render.light import lamps, light_table
 from tts2face.render.paint import Room, paint, room_for
 from tts2face.render.picture import PYVISTA, Picture
+from tts2face.render.plate import PlateStage, plate_drawn, plate_frame, plate_frames
 from tts2face.render.surface import Surface, surfaced
 from tts2face.types import Clip
 
@@ -34,6 +35,14 @@ class Stage:
     lights: NDArray[np.float32]
     exposure: Exposure
     behind: NDArray[np.uint8]
+
+    @property
+    def notice(self) -> str:
+        """What every file of it says about itself: nothing, for a drawn head is plainly none of a person."""
+        return ""
+
+
+AnyStage = Stage | PlateStage
 
 
 def staged(face: Face, picture: Picture) -> Stage:
@@ -94,45 +103,50 @@ def draw(
 
 
 def frames(
-    clip: Clip, face: Face | Stage, picture: Picture | None = None, *, threads: int | None = None
+    clip: Clip,
+    face: Face | AnyStage,
+    picture: Picture | None = None,
+    *,
+    threads: int | None = None,
+    first: int = 0,
 ) -> Iterator[NDArray[np.uint8]]:
     """Pictures of a clip's frames in order; as many are drawn ahead as there are threads, the rest not yet.
 
-    The bytes do not depend on the number of threads: one thread draws one picture.
+    The bytes do not depend on the number of threads: one thread draws one picture. `first` is the number of the clip's
+    first frame in the whole, which a talker's own plate goes on from.
 
     Raises
     ------
     InputError
         The clip's motion is not in the face's shapes.
     """
+    n_threads = threads or available_cores()
+    if isinstance(face, PlateStage):
+        yield from plate_frames(clip, face, n_threads, first)
+        return
     stage = face if isinstance(face, Stage) else staged(face, picture or Picture())
     if clip.motion.channels != stage.face.shape_names:
         raise InputError("the clip's motion is not in the shapes of this face; retarget it to the face first")
     if stage.picture.renderer == PYVISTA:
         yield from vtk.frames(stage, zip(clip.motion.values, clip.head.values, strict=True))
         return
-    n_threads = threads or available_cores()
     rooms = deque(_room(stage) for _ in range(n_threads))
 
-    def one(weights: NDArray[np.float32], head: NDArray[np.float32]) -> NDArray[np.uint8]:
+    def one(pose: tuple[NDArray[np.float32], NDArray[np.float32]]) -> NDArray[np.uint8]:
         room = rooms.popleft()
         try:
-            return _drawn(stage, weights, head, room)
+            return _drawn(stage, *pose, room)
         finally:
             rooms.append(room)
 
-    with ThreadPoolExecutor(n_threads, "draw") as pool:
-        ahead: deque[Future[NDArray[np.uint8]]] = deque()
-        try:
-            for weights, head in zip(clip.motion.values, clip.head.values, strict=True):
-                ahead.append(pool.submit(one, weights, head))
-                if len(ahead) > n_threads:
-                    yield ahead.popleft().result()
-            while ahead:
-                yield ahead.popleft().result()
-        finally:
-            for waiting in ahead:
-                waiting.cancel()
+    yield from drawn_ahead(one, zip(clip.motion.values, clip.head.values, strict=True), n_threads)
+
+
+def still(clip: Clip, stage: AnyStage, number: int) -> NDArray[np.uint8]:
+    """One frame of a clip."""
+    if isinstance(stage, PlateStage):
+        return plate_drawn(stage, clip.motion.values[number], plate_frame(stage, number / clip.fps))
+    return draw(stage, clip.motion.values[number], clip.head.values[number])
 
 
 def available_cores() -> int:

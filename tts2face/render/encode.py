@@ -6,12 +6,11 @@ from pathlib import Path
 from types import TracebackType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.face.model import Face
 from tts2face.render.clock import exact_rate, first_sample
-from tts2face.render.draw import Stage, draw, frames, staged
+from tts2face.render.draw import AnyStage, frames, staged, still
 from tts2face.render.gif import Gif
 from tts2face.render.lane import Lane, Sink
 from tts2face.render.movie import MP4_MOVIE, WEBM_MOVIE, Movie
@@ -72,14 +71,14 @@ class ClipWriter:
     def __init__(
         self,
         path: Path | str,
-        face: Face | Stage,
+        face: Face | AnyStage,
         picture: Picture | None = None,
         *,
         on_progress: Progress | None = None,
         threads: int | None = None,
     ) -> None:
         self.path, self._kind = checked_output(path), kind_of(path)
-        self._stage = face if isinstance(face, Stage) else staged(face, picture or Picture())
+        self._stage = staged(face, picture or Picture()) if isinstance(face, Face) else face
         self._on_progress, self._threads = on_progress, threads
         self._n_frames = self._n_given = self._n_samples = 0
         self._clock: tuple[float, int] | None = None
@@ -111,7 +110,7 @@ class ClipWriter:
             lane.put(samples=np.zeros(begin - self._n_samples, np.float32))  # the clip before ended within a frame
             self._n_given += len(clip.motion)
             at, samples = 0, clip.speech.waveform.samples
-            for pixels in frames(clip, self._stage, threads=self._threads):
+            for pixels in frames(clip, self._stage, threads=self._threads, first=self._n_frames):
                 self._n_frames += 1
                 until = min(self._sample_of(self._n_frames) - begin, len(samples))
                 lane.put(pixels, samples[at:until])
@@ -134,15 +133,14 @@ class ClipWriter:
             raise InputError("a clip writer is used in a with statement")
         fps, rate, picture = exact_rate(clip.fps), clip.speech.waveform.rate, self._stage.picture
         if self._kind == FOLDER:
-            return Stills(self._beside, rate)
+            return Stills(self._beside, rate, self._stage.notice)
         if self._kind == GIF:
             chosen = np.linspace(0, len(clip.motion) - 1, N_SWATCHES).astype(int)
-            return Gif(self._beside, [self._still(clip, i) for i in chosen], fps)
+            return Gif(self._beside, [still(clip, self._stage, int(i)) for i in chosen], fps, self._stage.notice)
         shape = (picture.height, picture.width, picture.channels)
-        return Movie(self._beside, WEBM_MOVIE if self._kind == WEBM else MP4_MOVIE, shape, fps, rate)
-
-    def _still(self, clip: Clip, frame: int) -> NDArray[np.uint8]:
-        return draw(self._stage, clip.motion.values[frame], clip.head.values[frame])
+        return Movie(
+            self._beside, WEBM_MOVIE if self._kind == WEBM else MP4_MOVIE, shape, (fps, rate), self._stage.notice
+        )
 
     def _complete(self) -> None:
         if self._lane is None or self._beside is None:
@@ -166,7 +164,7 @@ class ClipWriter:
 def write_clip(
     path: Path | str,
     clip: Clip,
-    face: Face | Stage,
+    face: Face | AnyStage,
     picture: Picture | None = None,
     *,
     on_progress: Progress | None = None,

@@ -19,10 +19,11 @@ SOLID = 128  # coverage from which a pixel is drawn
 class Gif:
     """A GIF being written."""
 
-    def __init__(self, path: Path, swatches: Sequence[NDArray[np.uint8]], fps: Fraction) -> None:
-        """Open a file; the palette serves the colours of some pictures, the swatches."""
+    def __init__(self, path: Path, swatches: Sequence[NDArray[np.uint8]], fps: Fraction, notice: str = "") -> None:
+        """Open a file that says `notice`; the palette serves the colours of some pictures, the swatches."""
         import av
 
+        self._path, self._notice = path, notice
         self._fps, self._n_frames, self._last = fps, 0, -LEAST_TICKS
         height, width, channels = swatches[0].shape
         self._palette, self._nearest = _palette(swatches, 256 if channels == 3 else 255)
@@ -60,10 +61,22 @@ class Gif:
         """Write what the encoder still holds and close the file."""
         self._container.mux(self._video.encode(None))
         self._container.close()
+        if self._notice:
+            _say(self._path, self._notice)
 
     def abandon(self) -> None:
         """Close the file unfinished."""
         self._container.close()
+
+
+def _say(path: Path, notice: str) -> None:
+    """Put a comment (GIF89a, section 24) before the last byte of a file, the trailer; the muxer writes none."""
+    said = notice.encode("ascii", "replace")[:255]
+    with path.open("r+b") as file:
+        file.seek(-1, 2)
+        trailer = file.read(1)
+        file.seek(-1, 2)
+        file.write(b"\x21\xfe" + bytes([len(said)]) + said + b"\x00" + trailer)
 
 
 def _palette(swatches: Sequence[NDArray[np.uint8]], n_colours: int) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:

@@ -42,15 +42,20 @@ WEBM_MOVIE = MovieKind(
 class Movie:
     """A movie being written: pictures and sound in, a finished file after `finish`."""
 
-    def __init__(self, path: Path, kind: MovieKind, shape: tuple[int, ...], fps: Fraction, sound_rate: int) -> None:
-        """Open a file for pictures of `shape` (H, W, 3 or 4) and mono sound."""
+    def __init__(
+        self, path: Path, kind: MovieKind, shape: tuple[int, ...], clock: tuple[Fraction, int], notice: str = ""
+    ) -> None:
+        """Open a file for pictures of `shape` (H, W, 3 or 4) and mono sound at `clock` (fps, Hz); it says `notice`."""
         import av
 
         self._has_alpha = shape[2] == 4
-        self._fps, self._rate = fps, sound_rate
+        self._fps, self._rate = clock
+        fps = self._fps
         self._n_frames = self._n_samples = 0
         self._filling: NDArray[np.uint8] | None = None
         self._container: Any = av.open(str(path), "w", format=kind.container, options=dict(kind.container_options))
+        if notice:
+            self._container.metadata["comment"] = notice
         video: Any = self._container.add_stream(kind.video, rate=fps, options=dict(kind.video_options))
         video.width, video.height = shape[1], shape[0]
         video.pix_fmt = "yuva420p" if self._has_alpha else "yuv420p"

@@ -1,0 +1,49 @@
+"""A talker given an appearance: learnt from the recordings that the talker was learnt from."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from corpus_tools.aam.filmed import filmed
+from corpus_tools.aam.learn import TextureOptions, learn_appearance
+from corpus_tools.observation import Observation
+from corpus_tools.observe import Effort
+from tts2face.talker import Talker
+from tts2face.video.model import user_cache
+from tts2face.video.track import FaceTracker
+
+Progress = Callable[[int, int], None]
+
+
+def with_appearance(
+    talker: Talker,
+    observations: Sequence[Observation],
+    *,
+    effort: Effort,
+    options: TextureOptions | None = None,
+    on_progress: Progress | None = None,
+) -> Talker:
+    """The talker with texture models, a plate, and the looks of every utterance.
+
+    Parameters
+    ----------
+    observations
+        Those that the talker was learnt from, in the order of its utterances.
+
+    Raises
+    ------
+    InputError
+        There are too few frames for the modes.
+    BackendError
+        A package or the landmark models are missing.
+    """
+    cache = effort.cache or user_cache() / "recordings"
+    tracker = FaceTracker(effort.model)
+    recordings = [
+        filmed(observation, spoken.shape, cache, tracker)
+        for observation, spoken in zip(observations, talker.utterances, strict=True)
+    ]
+    learnt = learn_appearance(recordings, options, on_progress=on_progress)
+    utterances = tuple(
+        replace(spoken, looks=looks) for spoken, looks in zip(talker.utterances, learnt.looks, strict=True)
+    )
+    return replace(talker, utterances=utterances, appearance=learnt.appearance)

@@ -1,0 +1,41 @@
+"""The light of a recording, taken out of its textures: gain and offset of each colour (after Cootes et al. 2001).
+
+Lamps, white balance and exposure differ from recording to recording. Looks that carried them would tint the mouth of
+one word like one recording and that of the next like another.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+GAINS = (0.5, 2.0)  # beyond them it is another scene, not another light
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Light:
+    """``texture in the reference's light = gain * texture + offset``, each (3,)."""
+
+    gain: Floats
+    offset: Floats
+
+    def removed(self, texture: Floats) -> Floats:
+        """(P, 3) a texture in the reference's light."""
+        return self.gain * texture + self.offset
+
+
+def light_of(texture: Floats, reference: Floats, still: NDArray[np.bool_]) -> Light:
+    """The light of a recording whose mean texture (P, 3) this is, by least squares on the pixels that speech leaves.
+
+    Parameters
+    ----------
+    still : (P,)
+        Pixels to compare.
+    """
+    here, there = texture[still].astype(np.float64), reference[still].astype(np.float64)
+    centred = here - here.mean(axis=0)
+    gain = (centred * (there - there.mean(axis=0))).sum(axis=0) / np.maximum((centred**2).sum(axis=0), 1e-9)
+    gain = np.clip(gain, *GAINS)
+    offset = there.mean(axis=0) - gain * here.mean(axis=0)
+    return Light(gain.astype(np.float32), offset.astype(np.float32))

@@ -1,0 +1,111 @@
+"""Recordings become a talker who speaks any text with her own face: the whole way, on real recordings."""
+
+import csv
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from cli.main import run
+from lexicon.errors import BackendError
+from tts2face.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
+from tts2face.talker import read_talker
+from tts2face.video.model import find_bundle
+from tts2face.video.track import FaceTracker
+
+N_RECORDINGS = 10
+CONSENT = "The speakers of GRID agreed to research and publication"
+TEXT = "Bob may move. We were away."
+
+
+@pytest.fixture(scope="module")
+def bundle() -> Path:
+    try:
+        return find_bundle(None)
+    except BackendError as missing:
+        pytest.skip(str(missing))
+
+
+@pytest.fixture(scope="module")
+def recordings(shared_recordings: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    source, folder = shared_recordings / "grid_s1", tmp_path_factory.mktemp("few")
+    with (source / "manifest.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))[::80][:N_RECORDINGS]
+    (folder / "clips").mkdir()
+    with (folder / "manifest.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    for row in rows:
+        (folder / "clips" / f"{row['clip']}.mkv").symlink_to(source / "clips" / f"{row['clip']}.mkv")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def talker(recordings: Path, bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("talker") / "me.talker"
+    words = ["corpus", "build", str(recordings), "--out", str(out), "--appearance", "--consent", CONSENT]
+    assert run([*words, "--jobs", "1", "--cache", str(out.parent / "cache"), "--model", str(bundle)]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def pictures(talker: Path) -> np.ndarray:
+    out = talker.with_name("clip.mp4")
+    assert run([TEXT, "--talker", str(talker), "--face", "self", "--out", str(out), "--fps", "25", "--quiet"]) == 0
+    with av.open(str(out)) as container:
+        assert "Synthetic" in container.metadata["comment"]
+        return np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)])
+
+
+def test_the_file_says_who_agreed_and_is_small(talker: Path) -> None:
+    made = read_talker(talker)
+    assert made.metadata["consent"]["statement"] == CONSENT
+    assert made.metadata["consent"]["date"]
+    assert "pictures of the person's face" in made.metadata["content"]
+    assert talker.stat().st_size < 25e6
+    assert made.appearance is not None
+    assert made.appearance.face.n_modes == 40
+    assert all(spoken.looks is not None and len(spoken.looks) == len(spoken.shape) for spoken in made.utterances)
+
+
+def test_the_clip_shows_a_face_whose_lips_part_and_close(pictures: np.ndarray, bundle: Path) -> None:
+    points = FaceTracker(bundle).track(lambda: iter(pictures), 25.0).points
+    assert not np.isnan(points).any()
+    gap = np.linalg.norm(points[:, UPPER_LIP_INNER_MID] - points[:, LOWER_LIP_INNER_MID], axis=1)
+    eyes = np.linalg.norm(points[:, EYE_OUTER_LEFT] - points[:, EYE_OUTER_RIGHT], axis=1)
+    assert (gap / eyes).max() > 0.06
+    assert (gap / eyes)[[0, -1]].max() < 0.02
+
+
+def test_a_picture_between_two_others_has_no_jump(pictures: np.ndarray) -> None:
+    """Cheeks and chin change slowly: no seam flickers, no recording's light shines through."""
+    height, width = pictures.shape[1:3]
+    face = pictures[:, height // 2 : height * 8 // 10, width // 3 : width * 2 // 3].astype(float).mean(axis=(1, 2))
+    assert np.abs(np.diff(face, axis=0)).max() < 8  # a fast mouth makes 4 to 5; a tinted word made 30
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["Hi.", "--face", "self", "--out", "x.mp4"], "motion only"),
+        (["Hi.", "--face", "self", "--identity", "mei", "--out", "x.mp4"], "her own face has one identity"),
+        (["Hi.", "--face", "self", "--view"], "leave --view away"),
+    ],
+)
+def test_what_an_own_face_cannot_do_is_refused(
+    words: list[str], reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(words) != 0
+    assert reason in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_pictures_without_consent_are_refused(
+    recordings: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["corpus", "build", str(recordings), "--out", str(tmp_path / "me.talker"), "--appearance"]) != 0
+    assert "state the consent" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,184 @@
+"""A talker's own face: bent pictures against a slow exact one, and a plate that speech leaves alone."""
+
+import numpy as np
+import pytest
+
+from corpus_tools.aam.frame import framed
+from corpus_tools.aam.mesh import MOUTH_POINTS, N_MESH, face_triangles, mouth_triangles, ring
+from corpus_tools.aam.plates import film_of
+from lexicon.errors import InputError
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.appearance import Appearance, Plate, TextureModel
+from tts2face.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.render.draw import frames
+from tts2face.render.picture import Picture
+from tts2face.render.plate import plate_drawn, plate_frame, plate_staged
+from tts2face.render.warp import bend, lay
+from tts2face.talker import ShapeModel, Talker
+from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
+
+SIZE = 96
+
+
+def face_points() -> np.ndarray:
+    """(468, 2) points in a picture of 96 x 96: an oval, lips apart, the rest anywhere between."""
+    shape = np.random.default_rng(3).uniform(-20, 20, (N_MESH, 2))
+    angles = np.linspace(0, 2 * np.pi, len(FACE_OVAL), endpoint=False)
+    shape[list(FACE_OVAL)] = 30 * np.stack([np.sin(angles), -np.cos(angles)], axis=1)
+    lips = np.linspace(0, np.pi, len(INNER_LIP_UPPER))
+    shape[list(INNER_LIP_UPPER)] = np.stack([-8 * np.cos(lips), 12 - 4 * np.sin(lips)], axis=1)
+    shape[list(INNER_LIP_LOWER)] = np.stack([-8 * np.cos(lips), 12 + 4 * np.sin(lips)], axis=1)
+    return shape + SIZE / 2
+
+
+def texture_model(shape: np.ndarray, triangles: np.ndarray, side: int, level: float) -> TextureModel:
+    frame = framed(shape, triangles, side)
+    n_pixels = len(frame.pixels)
+    basis, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3 * n_pixels, 2)))
+    return TextureModel(
+        reference=frame.points,
+        triangles=frame.triangles,
+        size=frame.size,
+        pixels=frame.pixels,
+        mean=np.full((n_pixels, 3), level, np.float32),
+        basis=basis.T.reshape(2, n_pixels, 3).astype(np.float32),
+        spread=np.full(2, 5.0, np.float32),
+    )
+
+
+def own_talker(*, has_face: bool = True) -> Talker:
+    generator = np.random.default_rng(0)
+    basis, _ = np.linalg.qr(generator.normal(size=(3 * 478, 3)))
+    model = ShapeModel(
+        generator.normal(0, 40, (478, 3)).astype(np.float32),
+        basis.T.reshape(3, 478, 3).astype(np.float32),
+        np.ones(3, np.float32),
+        2,
+        np.zeros(3, np.float32),
+    )
+    if not has_face:
+        return Talker(25.0, model, (), {"name": "Ada"})
+    shape = face_points()
+    face = texture_model(shape, face_triangles(shape), 48, 100.0)
+    points = np.concatenate([shape, ring(shape)])
+    y, x = np.mgrid[:SIZE, :SIZE]
+    pictures = [np.stack([2 * x + k, 2 * y, x + y], axis=2).clip(0, 255).astype(np.uint8) for k in range(4)]
+    plate = Plate(
+        video=film_of(pictures),
+        points=np.repeat(points[None], 4, axis=0).astype(np.float32),
+        axes=np.tile(np.array([[1.0, 0, 0], [0, -1.0, 0]], np.float32), (4, 1, 1)),
+        shape=generator.normal(0, 1, (4, 3)).astype(np.float32),
+        looks=generator.normal(0, 5, (4, 2)).astype(np.float32),
+    )
+    mouth = texture_model(shape[list(MOUTH_POINTS)], mouth_triangles(), 24, 30.0)
+    changed = np.ones(len(face.pixels), np.float32)
+    appearance = Appearance(face, mouth, np.array(MOUTH_POINTS, np.int32), changed, plate)
+    return Talker(25.0, model, (), {"name": "Ada"}, appearance)
+
+
+def motion_of_plate(talker: Talker, number: int) -> np.ndarray:
+    plate = talker.appearance.plate
+    return np.concatenate([plate.shape[number, :2], plate.looks[number], np.zeros(2)]).astype(np.float32)
+
+
+def clip_of(channels: tuple[str, ...], values: np.ndarray) -> Clip:
+    n_frames = len(values)
+    speech = Speech(
+        Waveform(np.zeros(320 * n_frames, np.float32), 8000), PhoneSequence([SILENCE], [0, 0.04 * n_frames]), ()
+    )
+    head = Trajectory(HEAD_CHANNELS, np.zeros((n_frames, len(HEAD_CHANNELS))), 25.0)
+    return Clip(Trajectory(channels, values, 25.0), head, speech)
+
+
+def test_bending_follows_the_corners_exactly():
+    target = np.array([[5.2, 4.1], [40.7, 8.3], [12.9, 38.2]])
+    source = np.array([[10.0, 10.0], [50.0, 14.0], [16.0, 48.0]])
+    y, x = np.mgrid[:64, :64]
+    plate = np.stack([x * 2.0, y * 3.0, x + y], axis=2)
+    drawn = np.full((50, 50, 3), -1.0, np.float32)
+    none = np.zeros((2, 2, 3), np.float32), np.zeros((0, 2))
+    bend(np.array([[0, 1, 2]], np.int32), target, source, plate, none, drawn)
+    affine = np.linalg.solve(np.column_stack([target, np.ones(3)]), source)
+    edges = np.roll(target, -1, axis=0) - target
+    for row in range(50):
+        for column in range(50):
+            off = np.array([column, row]) - target
+            inside = (edges[:, 0] * off[:, 1] - edges[:, 1] * off[:, 0] > 1e-3).all()
+            outside = (edges[:, 0] * off[:, 1] - edges[:, 1] * off[:, 0] < -1e-3).any()
+            if inside:
+                u, v = np.array([column, row, 1.0]) @ affine
+                assert drawn[row, column] == pytest.approx([2 * u, 3 * v, u + v], abs=1e-3)
+            elif outside:
+                assert (drawn[row, column] == -1).all()
+
+
+def test_a_texture_is_laid_where_its_points_are():
+    places = np.array([[0.0, 0], [7, 0], [0, 7]])
+    texture = np.mgrid[:8, :8].transpose(1, 2, 0)[:, :, [1, 0, 0]].astype(np.float32)
+    drawn = np.zeros((16, 16, 3), np.float32)
+    lay(np.array([[0, 1, 2]], np.int32), 2 * places, texture, places, drawn)
+    assert drawn[4, 6].tolist() == [3.0, 2.0, 2.0]
+
+
+def test_the_plate_s_own_parameters_leave_the_plate_alone_but_for_the_open_mouth():
+    talker = own_talker()
+    stage = plate_staged(talker, Picture(size=f"{SIZE}x{SIZE}"))
+    drawn = plate_drawn(stage, motion_of_plate(talker, 2), 2)
+    changed = np.abs(drawn.astype(int) - stage.plate[2]).max(axis=2) > 1
+    y, x = np.nonzero(changed)
+    lips = face_points()[list(MOUTH_POINTS)]
+    assert changed.any()
+    assert lips[:, 0].min() - 2 <= x.min() <= x.max() <= lips[:, 0].max() + 2
+    assert lips[:, 1].min() - 2 <= y.min() <= y.max() <= lips[:, 1].max() + 2
+    assert np.abs(drawn[int(lips[:, 1].mean()), int(lips[:, 0].mean())] - 30.0).max() <= 1
+
+
+def test_motion_moves_the_face_and_neither_corner_of_the_picture():
+    talker = own_talker()
+    stage = plate_staged(talker, Picture(size=f"{SIZE}x{SIZE}"))
+    motion = motion_of_plate(talker, 0)
+    motion[0] += 40
+    moved = plate_drawn(stage, motion, 0)
+    assert np.abs(moved.astype(int) - stage.plate[0]).max() > 10
+    assert np.array_equal(moved[:6, :6], stage.plate[0][:6, :6])
+
+
+def test_looks_change_the_texture_by_their_basis():
+    talker = own_talker()
+    stage = plate_staged(talker, Picture(size=f"{SIZE}x{SIZE}"))
+    motion = motion_of_plate(talker, 1)
+    motion[2] += 2000
+    difference = plate_drawn(stage, motion, 1).astype(float) - stage.plate[1]
+    wanted = 2000 * talker.appearance.face.basis[0]
+    assert 0.3 * np.abs(wanted).max() < np.abs(difference).max() <= np.abs(wanted).max() + 1
+
+
+@pytest.mark.parametrize(("instant", "number"), [(0.0, 0), (0.08, 2), (0.12, 3), (0.16, 2), (0.24, 0), (0.28, 1)])
+def test_the_plate_goes_to_its_end_and_back(instant, number):
+    assert plate_frame(plate_staged(own_talker(), Picture(size="96x96")), instant) == number
+
+
+def test_a_clip_goes_on_where_the_one_before_it_ended():
+    talker = own_talker()
+    stage = plate_staged(talker, Picture(size="96x96"))
+    values = np.array([motion_of_plate(talker, 0)] * 4)
+    whole = list(frames(clip_of(stage.channels, values), stage, threads=2))
+    rest = list(frames(clip_of(stage.channels, values[2:]), stage, first=2))
+    assert np.array_equal(whole[2], rest[0])
+    assert np.array_equal(whole[3], rest[1])
+
+
+def test_a_talker_without_pictures_is_refused():
+    with pytest.raises(InputError, match="Ada has motion only"):
+        plate_staged(own_talker(has_face=False), Picture())
+
+
+def test_a_plate_is_not_transparent():
+    with pytest.raises(InputError, match="her own video"):
+        plate_staged(own_talker(), Picture(background="transparent"))
+
+
+def test_a_clip_for_another_face_is_refused():
+    stage = plate_staged(own_talker(), Picture(size="96x96"))
+    with pytest.raises(InputError, match="not in the channels"):
+        list(frames(clip_of(("jawOpen",), np.zeros((1, 1))), stage))

@@ -1,0 +1,194 @@
+"""How a talker looks: texture models over the landmarks, and a stretch of her own video to draw them on.
+
+The appearance model of Theobald et al. 2007, section 2: the picture inside the landmarks' mesh, warped to a reference
+shape, is ``mean + sum_i b_i basis_i`` (eq. 2). The inside of the mouth has a model of its own, so that teeth and tongue
+stay sharp (design of Cosker et al. 2004; decided by measurement, docs/decisions.md).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+
+STEPS_PER_LOOK = 1000.0  # looks are kept as 16-bit integers in steps of this part of their spread
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TextureModel:
+    """Pictures on one reference shape: ``texture = mean + sum_i b_i basis_i``, sRGB values from 0 to 255.
+
+    Parameters
+    ----------
+    reference : (N, 2)
+        Places of the model's points in the texture, pixels (x right, y down, from the top left pixel's centre).
+    triangles : (F, 3)
+        Of the points.
+    size
+        (width, height) of the texture, pixels.
+    pixels : (P,)
+        The texture's pixels that lie in the mesh, as ``y * width + x``.
+    mean : (P, 3)
+    basis : (A, P, 3)
+        Orthonormal as rows of (A, 3 P).
+    spread : (A,)
+        Standard deviation of each parameter over the training frames.
+    """
+
+    reference: NDArray[np.float32]
+    triangles: NDArray[np.int32]
+    size: tuple[int, int]
+    pixels: NDArray[np.int32]
+    mean: NDArray[np.float32]
+    basis: NDArray[np.float32]
+    spread: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        """Refuse parts that do not fit each other."""
+        n_modes, n_pixels = self.basis.shape[:2]
+        fits = self.mean.shape == (n_pixels, 3) and self.pixels.shape == (n_pixels,) and self.spread.shape == (n_modes,)
+        if not fits or self.basis.shape[2:] != (3,) or self.reference.shape[1:] != (2,):
+            raise DataError("the texture model's mean, basis, spread and pixels do not fit each other; build it again")
+
+    @property
+    def n_modes(self) -> int:
+        """Number of parameters."""
+        return len(self.basis)
+
+    def parameters(self, textures: NDArray[np.floating]) -> NDArray[np.float32]:
+        """(T, A) parameters of (T, P, 3) textures."""
+        offsets = (textures.astype(np.float32) - self.mean).reshape(len(textures), -1)
+        return np.asarray(offsets @ self.basis.reshape(self.n_modes, -1).T, np.float32)
+
+    def textures(self, parameters: NDArray[np.floating]) -> NDArray[np.float32]:
+        """(T, P, 3) textures of (T, a) parameters of the first a modes."""
+        n_modes = parameters.shape[1]
+        moved = parameters.astype(np.float32) @ self.basis[:n_modes].reshape(n_modes, -1)
+        return self.mean + moved.reshape(len(parameters), *self.mean.shape)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plate:
+    """A stretch of the talker's own video on which synthesised frames are drawn.
+
+    Parameters
+    ----------
+    video
+        The stretch as an MP4 file's bytes, (H, W) as recorded.
+    points : (T, N, 2)
+        Landmarks and then the ring around them, pixels.
+    axes : (T, 2, 3)
+        Picture pixels (right, down) for a millimetre along each landmark axis: the head's pose without its place.
+    shape : (T, M)
+        Parameters of the talker's shape model.
+    looks : (T, A)
+        Parameters of the face's texture model.
+    """
+
+    video: NDArray[np.uint8]
+    points: NDArray[np.float32]
+    axes: NDArray[np.float32]
+    shape: NDArray[np.float32]
+    looks: NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Appearance:
+    """A talker's face in pictures.
+
+    Parameters
+    ----------
+    face
+        Texture model of the landmarks' mesh, whose points are the landmarks and a ring around them.
+    mouth
+        Texture model of what lies between the inner lips; its points are `mouth_points`.
+    mouth_points : (R,)
+        Landmarks of the inner lips' ring, in the order of the mouth's reference.
+    moved_by_speech : (P,)
+        Of the face texture's pixels: 1 where speech changes the picture, 0 where the plate's own picture stays.
+    plate
+        Where it is drawn.
+    """
+
+    face: TextureModel
+    mouth: TextureModel
+    mouth_points: NDArray[np.int32]
+    moved_by_speech: NDArray[np.float32]
+    plate: Plate
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the looks: parameters of the face's texture, then of the mouth's."""
+        faces = tuple(f"face{i}" for i in range(self.face.n_modes))
+        return faces + tuple(f"mouth{i}" for i in range(self.mouth.n_modes))
+
+    @property
+    def spread(self) -> NDArray[np.float32]:
+        """(A + B,) standard deviations of the looks."""
+        return np.concatenate([self.face.spread, self.mouth.spread])
+
+
+def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
+    """The appearance as arrays of a talker's file; `appearance_of` reads them."""
+    arrays: dict[str, NDArray[Any]] = {
+        "appearance.mouth_points": appearance.mouth_points,
+        "appearance.moved_by_speech": appearance.moved_by_speech.astype(np.float16),
+    }
+    for name, model in (("face", appearance.face), ("mouth", appearance.mouth)):
+        arrays |= {
+            f"appearance.{name}.reference": model.reference,
+            f"appearance.{name}.triangles": model.triangles,
+            f"appearance.{name}.size": np.array(model.size, np.int32),
+            f"appearance.{name}.pixels": model.pixels,
+            f"appearance.{name}.mean": model.mean.astype(np.float16),
+            f"appearance.{name}.basis": model.basis.astype(np.float16),
+            f"appearance.{name}.spread": model.spread,
+        }
+    for part in ("video", "points", "axes", "shape", "looks"):
+        arrays[f"appearance.plate.{part}"] = getattr(appearance.plate, part)
+    return arrays
+
+
+def appearance_of(arrays: Mapping[str, NDArray[Any]]) -> Appearance | None:
+    """The appearance in a talker's file, None where the talker has motion only.
+
+    Raises
+    ------
+    KeyError
+        A part is missing.
+    """
+    if "appearance.mouth_points" not in arrays:
+        return None
+
+    def model(name: str) -> TextureModel:
+        def part(what: str) -> NDArray[Any]:
+            return arrays[f"appearance.{name}.{what}"]
+
+        width, height = (int(side) for side in part("size"))
+        return TextureModel(
+            reference=part("reference"),
+            triangles=part("triangles"),
+            size=(width, height),
+            pixels=part("pixels"),
+            mean=part("mean").astype(np.float32),
+            basis=part("basis").astype(np.float32),
+            spread=part("spread"),
+        )
+
+    plate = Plate(
+        video=arrays["appearance.plate.video"],
+        points=arrays["appearance.plate.points"],
+        axes=arrays["appearance.plate.axes"],
+        shape=arrays["appearance.plate.shape"],
+        looks=arrays["appearance.plate.looks"],
+    )
+    return Appearance(
+        face=model("face"),
+        mouth=model("mouth"),
+        mouth_points=arrays["appearance.mouth_points"],
+        moved_by_speech=arrays["appearance.moved_by_speech"].astype(np.float32),
+        plate=plate,
+    )
