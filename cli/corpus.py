@@ -83,6 +83,28 @@ def _consent(name: str, statement: str | None) -> Mapping[str, str]:
 
 
 @corpus.command
+def clone(
+    source: Annotated[str, Parameter(help="Who speaks: a shipped talker or a .talker file.")],
+    target: Annotated[str, Parameter(help="Whose face moves: a shipped talker or a .talker file.")],
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="The talker to write (.talker).", alias="-o")],
+    gain: Annotated[float, Parameter(help="Factor on the motion from rest; 1.2 amplifies, 0.8 attenuates.")] = 1.0,
+    append_missing: Annotated[
+        bool, Parameter(help="Add the motion that the target's own modes lack.", negative="")
+    ] = False,
+) -> None:
+    """Carry one talker's speech to another's face: write a talker with the target's face and the source's motion."""
+    if out.suffix != ".talker":
+        raise InputError(f"a talker is written as .talker, not {out.name}")
+    from corpus_tools.clone import clone_talker
+
+    made = clone_talker(source, target, out, gain=gain, append=append_missing)
+    added = f", {made.n_appended} modes added" if append_missing else ""
+    say(f"wrote {out}: {len(made.talker.utterances)} utterances{added}, {made.at_limits:.1%} of frames at limits")
+
+
+@corpus.command
 def show(talker: Annotated[str, Parameter(help="A shipped talker or a .talker file.")], /) -> None:
     """Print what a talker holds: utterances, phones, modes, provenance."""
     from corpus_tools.show import describe

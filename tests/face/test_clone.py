@@ -11,9 +11,16 @@ from scipy.optimize import lsq_linear, minimize
 from lexicon.errors import DataError, InputError
 from tts2face.face.bounded import bounded_least_squares
 from tts2face.face.clone import append_missing, cloning, face_size, largest_parameters
-from tts2face.face.lips import LOWER, UPPER, apart, facing_gaps
+from tts2face.face.lips import LOWER, UPPER, nearest_allowed
 from tts2face.face.retarget import inner_product_map
-from tts2face.landmarks import LOWER_LIP_INNER_MID, MOUTH_REGION, N_LANDMARKS, UPPER_LIP_INNER_MID
+from tts2face.landmarks import (
+    EYE_OUTER_LEFT,
+    EYE_OUTER_RIGHT,
+    LOWER_LIP_INNER_MID,
+    MOUTH_REGION,
+    N_LANDMARKS,
+    UPPER_LIP_INNER_MID,
+)
 from tts2face.talker import ShapeModel, load_talker
 from tts2face.types import Trajectory
 
@@ -26,6 +33,7 @@ def plate(gap: float = 0.4, size: float = 1.0) -> np.ndarray:
     """Landmarks of a face without features; facing inner lip points are `gap` mm apart."""
     shape = np.random.default_rng(1).uniform(-60, 60, (N_LANDMARKS, 3))
     shape[UPPER], shape[LOWER] = (0, gap / 2, 0), (0, -gap / 2, 0)
+    shape[EYE_OUTER_RIGHT], shape[EYE_OUTER_LEFT] = (-45, 60, 0), (45, 60, 0)
     return shape * size
 
 
@@ -38,7 +46,7 @@ def model_of(seed: int, n_speech: int = 4, n_other: int = 2, size: float = 1.0) 
         vectors = np.linalg.qr(rng.normal(size=(3 * int(region.sum()), n_modes)))[0].T
         modes[:, region] = vectors.reshape(n_modes, -1, 3)
         rows.append(modes)
-    spread = np.sort(rng.uniform(0.5, 8, n_speech + n_other))[::-1]
+    spread = np.sort(rng.uniform(1, 8, n_speech + n_other))[::-1]
     rest = spread * rng.uniform(-0.5, 0.5, len(spread))
     basis = np.concatenate(rows)
     mean = plate(40.0, size)  # lips far apart: they never cross
@@ -238,29 +246,42 @@ def test_lips_that_overlap_at_rest_cross_no_further() -> None:
 
 @some
 @given(seeds)
-def test_parted_lips_are_the_nearest_allowed(seed: int) -> None:
-    """Against the same problem by sequential quadratic programming, and by pivoting where no limit matters."""
+def test_lips_are_set_right_by_the_least_motion(seed: int) -> None:
+    """Against the same problem by sequential quadratic programming, and by pivoting where only crossing matters."""
     rng = np.random.default_rng(seed)
     gaps = np.column_stack([rng.normal(size=(3, 5)), rng.uniform(0.1, 0.5, 3)])
     wanted, limits = rng.normal(size=(2, 5)) * 2, rng.uniform(0.5, 1.5, 5)
-    found = apart(wanted, limits, gaps)
-    assert (found @ gaps[:, :-1].T + gaps[:, -1] > -1e-8).all()
+    least, most = np.zeros(3), rng.uniform(0.6, 1.5, (2, 3))
+    sides, heights = gaps[:, :-1], gaps[:, -1]
+    found = nearest_allowed(wanted, limits, gaps, (least, most))
+    reached = found @ sides.T + heights
+    assert (reached > -1e-8).all()
+    assert (reached < most + 1e-8).all()
     assert (np.abs(found) < limits + 1e-8).all()
-    for frame, start in zip(found, wanted, strict=True):
+    for frame, start, highest in zip(found, wanted, most, strict=True):
+        rules = (lambda p: sides @ p + heights, lambda p, highest=highest: highest - sides @ p - heights)
         known = minimize(
             lambda p, start=start: ((p - start) ** 2).sum(),
             np.zeros(5),
             jac=lambda p, start=start: 2 * (p - start),
             method="SLSQP",
             bounds=np.stack([-limits, limits], axis=1),
-            constraints={"type": "ineq", "fun": lambda p: gaps[:, :-1] @ p + gaps[:, -1]},
+            constraints=[{"type": "ineq", "fun": rule} for rule in rules],
             options={"ftol": 1e-14, "maxiter": 500},
         )
         assert frame == pytest.approx(known.x, abs=1e-4)
-    free = apart(wanted, np.full(5, 1e3), gaps)
-    sides = gaps[:, :-1]
-    forces = bounded_least_squares(sides @ sides.T, -(wanted @ sides.T + gaps[:, -1]), np.tile([0.0, 1e6], (3, 1)))
+    free = nearest_allowed(wanted, np.full(5, 1e3), gaps, (least, np.full((2, 3), 1e3)))
+    forces = bounded_least_squares(sides @ sides.T, -(wanted @ sides.T + heights), np.tile([0.0, 1e6], (3, 1)))
     assert free == pytest.approx(wanted + forces @ sides, abs=1e-4)
+
+
+def test_lips_that_touch_on_the_source_touch_under_gain_and_open_lips_open_wide() -> None:
+    """0.4 mm apart at rest; 0.8 mm, which is contact, stays 0.8 mm; 10 mm becomes 20 mm less the rest's 0.4."""
+    model, per_mm = opening_model(), np.sqrt(len(LOWER))
+    values = np.array([[0.4 * per_mm, 2.0], [9.6 * per_mm, 2.0]], np.float32)
+    mapped = cloning(model, replace(model, spread=np.full(2, 100, np.float32)), gain=2).parameters(values)
+    assert gaps_of(model, mapped)[:, 0] == pytest.approx([0.8, 19.6], abs=1e-3)
+    assert mapped[:, 1] == pytest.approx([4.0, 4.0], abs=1e-5)
 
 
 @some
@@ -278,8 +299,8 @@ def test_frames_never_come_further_apart(seed: int) -> None:
 
 
 def test_lips_that_nothing_parts_are_refused() -> None:
-    with pytest.raises(DataError, match="lips cross wherever its limits"):
-        apart(np.zeros((1, 1)), np.ones(1), np.array([[1.0, -2.0]]))
+    with pytest.raises(DataError, match="lips cannot be as they must within its limits"):
+        nearest_allowed(np.zeros((1, 1)), np.ones(1), np.array([[1.0, -2.0]]), (np.zeros(1), np.full((1, 1), 9.0)))
 
 
 def test_frames_do_not_know_each_other() -> None:
@@ -330,7 +351,6 @@ def test_a_real_talker_keeps_limits_and_lips_under_gain() -> None:
     assert (np.abs(mapped) <= largest_parameters(half)).all()
     at_rest = gaps_of(half, half.rest[None])
     assert (gaps_of(half, mapped) >= np.minimum(at_rest, 0) - 1e-5).all()
-    assert (facing_gaps(half)[:, :-1] @ mapped.T + facing_gaps(half)[:, -1:] > -1e-4).all()
     middle = [UPPER.index(UPPER_LIP_INNER_MID)]
     assert LOWER[middle[0]] == LOWER_LIP_INNER_MID
     opened = [gaps_of(model, frames)[:, middle[0]] for model, frames in ((own, values), (half, mapped))]

@@ -11,7 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.lips import apart, facing_gaps
+from tts2face.face.lips import (
+    LEAST_GAP_MM,
+    contact_mm,
+    facing_gaps,
+    largest_gaps,
+    nearest_allowed,
+    resting_gaps,
+)
 from tts2face.face.retarget import inner_product_map, product
 from tts2face.landmarks import N_LANDMARKS
 from tts2face.talker import ShapeModel
@@ -20,7 +27,7 @@ from tts2face.types import Trajectory
 FloatArray = NDArray[np.float64]
 
 SPREADS = 3.0  # a mapped parameter stays within so many standard deviations of the target's mean; T07, section 3.1
-MISSING_MM = 0.05  # a component that moves all landmarks together less than this (root of the sum) is not missed
+MISSING_MM = 0.5  # root of the sum over all landmarks; a component that moves less is not missed: 0.02 mm a landmark
 
 UNREAL_MM = 1e-4  # far above the rounding of a basis kept as float32, far below any measured motion
 ROUNDING = 1e-12  # an entry of a unit vector below this is a rounding error of float64
@@ -42,8 +49,12 @@ class Cloning:
         Modes of either that speech moves.
     limits : (q,)
         Largest size of each mapped parameter.
-    gaps : (P, q + 1)
-        What facing inner lip points are apart over what they must be: ``gaps[:, :q] @ parameters + gaps[:, q]``, mm.
+    source_gaps, target_gaps : (P, r + 1), (P, q + 1)
+        Gaps of facing inner lip points in the target's size, as `facing_gaps` gives them.
+    resting_gaps : (P,)
+        The target's gaps at rest.
+    contact
+        Gap up to which the source's lips touch, in the target's size.
     """
 
     relation: FloatArray
@@ -53,7 +64,10 @@ class Cloning:
     n_source: int
     n_target: int
     limits: NDArray[np.float32]
-    gaps: FloatArray
+    source_gaps: FloatArray
+    target_gaps: FloatArray
+    resting_gaps: FloatArray
+    contact: float
 
     def clone(self, motion: Trajectory) -> Trajectory:
         """Motion of the source as the target makes it: speech parameters become speech parameters, all become all.
@@ -75,14 +89,18 @@ class Cloning:
     def parameters(self, source: NDArray[np.floating]) -> NDArray[np.float32]:
         """(T, q) parameters of the target for (T, m) of the source's first m modes; the other modes are at rest.
 
-        Each frame is the nearest to eq. 5 that keeps the limits and whose lips do not cross; it does not depend on
-        other frames.
+        Each frame is the nearest to eq. 5 that keeps the limits, whose lips do not cross, and whose lips touch where
+        the source's do; it does not depend on other frames. Lips count as crossed below `LEAST_GAP_MM`, or below the
+        target's rest where they overlap there: tracked lips may, and a talker at rest is right by definition.
         """
         wanted = self.unlimited(source)
         limits = self.limits.astype(np.float64)
         held = np.clip(wanted, -limits, limits)
-        crossed = np.flatnonzero((product(held, self.gaps[:, :-1].T) + self.gaps[:, -1] < 0).any(axis=1))
-        held[crossed] = apart(wanted[crossed], limits, self.gaps)
+        least = np.minimum(LEAST_GAP_MM, self.resting_gaps)
+        most = largest_gaps(self._seen_gaps(source), self.contact, self.resting_gaps)
+        gaps = product(held, self.target_gaps[:, :-1].T) + self.target_gaps[:, -1]
+        wrong = np.flatnonzero(((gaps < least) | (gaps > most)).any(axis=1))
+        held[wrong] = nearest_allowed(wanted[wrong], limits, self.target_gaps, (least, most[wrong]))
         return np.clip(held.astype(np.float32), -self.limits, self.limits)
 
     def unlimited(self, source: NDArray[np.floating]) -> FloatArray:
@@ -90,6 +108,12 @@ class Cloning:
         n_modes = source.shape[1]
         moved = source.astype(np.float64) - self.source_rest[:n_modes]
         return self.target_rest + product(moved, self.relation[:, :n_modes].T)
+
+    def _seen_gaps(self, source: NDArray[np.floating]) -> FloatArray:
+        """(T, P) gaps of the source in the target's size."""
+        n_modes = source.shape[1]
+        others = product(self.source_gaps[:, n_modes:-1], self.source_rest[n_modes:]) + self.source_gaps[:, -1]
+        return product(source.astype(np.float64), self.source_gaps[:, :n_modes].T) + others
 
 
 def cloning(source: ShapeModel, target: ShapeModel, *, gain: float = 1.0) -> Cloning:
@@ -123,7 +147,10 @@ def cloning(source: ShapeModel, target: ShapeModel, *, gain: float = 1.0) -> Clo
         n_source=source.n_speech,
         n_target=target.n_speech,
         limits=limits,
-        gaps=facing_gaps(target),
+        source_gaps=size * facing_gaps(source),
+        target_gaps=facing_gaps(target),
+        resting_gaps=resting_gaps(target),
+        contact=size * contact_mm(source),
     )
 
 
@@ -133,7 +160,7 @@ def append_missing(source: ShapeModel, target: ShapeModel, n: int | None = None)
     Parameters
     ----------
     n
-        How many, those that move most first; every one above `MISSING_MM` when None.
+        How many, those that move most first; all that move more than `MISSING_MM` when None.
 
     Returns
     -------
@@ -157,10 +184,10 @@ def append_missing(source: ShapeModel, target: ShapeModel, n: int | None = None)
     mouth, mouth_spread = _lost(source, slice(None, speech), own)
     other, other_spread = _lost(source, slice(speech, None), np.concatenate([own, mouth]))
     found = size * np.concatenate([mouth_spread, other_spread])
-    n_missing = int((found > MISSING_MM).sum())
-    if n is not None and not 0 <= n <= n_missing:
-        raise InputError(f"{n_missing} components of the source are missing in the target, not {n}; ask for fewer")
-    chosen = np.sort(np.argsort(-found, kind="stable")[: n_missing if n is None else n])
+    if n is not None and not 0 <= n <= len(found):
+        raise InputError(f"{len(found)} components of the source are missing in the target, not {n}; ask for fewer")
+    n_added = int((found > MISSING_MM).sum()) if n is None else n
+    chosen = np.sort(np.argsort(-found, kind="stable")[:n_added])
     of_mouth, others = chosen[chosen < len(mouth)], chosen[chosen >= len(mouth)]
     added = np.concatenate([mouth, other])
 

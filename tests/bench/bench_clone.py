@@ -1,0 +1,147 @@
+"""How faithful and how fast motion is cloned between talkers (Theobald et al. 2007, eq. 5).
+
+Run: ``PYTHONPATH=. python tests/bench/bench_clone.py RECORDINGS [--cache FOLDER]``. The source is the starter talker
+grid_s1. There is one recorded person, so second talkers are learnt from the two halves of RECORDINGS, with other
+numbers of modes, and from the landmarks of the shipped faces while they speak the source's utterances with brows and
+eyelids that move by themselves. Closed: at the frame of a bilabial where the middle lip points are nearest, they are
+less than 1 % of the distance of the outer eye corners apart, as in `corpus_tools.learn`.
+"""
+
+import argparse
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.learn import CLOSED, learn_shapes, lip_gap
+from corpus_tools.observation import Observation, Quality
+from corpus_tools.observe import Effort, observe
+from tests.bench.bench_retarget import bilabial_frames, landmarks_of, opening
+from tts2face.face.clone import append_missing, cloning
+from tts2face.face.file import load_face
+from tts2face.face.lips import LEAST_GAP_MM, facing_gaps, resting_gaps
+from tts2face.face.retarget import retargeter
+from tts2face.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, MOUTH_REGION
+from tts2face.talker import ShapeModel, Talker, load_talker
+
+Floats = NDArray[np.float64]
+
+N_FRAMES = 100  # compared with least squares
+EVERY = 8  # utterance of the source is cloned
+
+
+def driven(talker: Talker, name: str) -> list[Observation]:
+    """A shipped face that speaks the talker's utterances, observed without error; brows and eyelids move, too."""
+    face = load_face(name)
+    ready, rng = retargeter(talker, face), np.random.default_rng(0)
+    free = [i for i, shape in enumerate(face.shape_names) if shape.startswith(("brow", "eyeBlink", "eyeWide", "cheek"))]
+    found = []
+    for utterance in talker.utterances[1::EVERY]:
+        weights = ready.retarget(talker.speech_trajectory(utterance)).values.astype(np.float64)
+        times = np.arange(len(weights))[:, None] / talker.fps
+        waves = np.sin(times * rng.uniform(2, 9, len(free)) + rng.uniform(0, 7, len(free)))
+        weights[:, free] = np.maximum(waves, 0.0) * rng.uniform(0.1, 0.6, len(free))
+        shapes, n = landmarks_of(face, weights).astype(np.float32), len(weights)
+        found.append(
+            Observation(utterance.name, talker.fps, shapes, np.zeros((n, 6), np.float32), utterance.phones, (),
+                        utterance.intensity, Quality(0.0, 1.0, 0, 0.0), Path(name))
+        )  # fmt: skip
+    return found
+
+
+def targets(recordings: Path, cache: Path | None, talker: Talker) -> Iterator[tuple[str, ShapeModel]]:
+    """Second talkers by name."""
+    kept = observe(recordings, effort=Effort(cache, 1)).kept
+    yield "even half, 12 + 6 modes", learn_shapes(kept[::2], 12, 6)
+    yield "odd half, 30 + 15 modes", learn_shapes(kept[1::2], 30, 15)
+    for name in ("head", "cartoon"):
+        yield f"{name}, 20 + 10 modes", learn_shapes(driven(talker, name), 20, 10)
+
+
+def distance(one: NDArray[np.floating], other: NDArray[np.floating]) -> Floats:
+    """(T,) root mean square distance of the mouth's landmarks, mm."""
+    squares = ((one - other)[:, list(MOUTH_REGION)].astype(np.float64) ** 2).sum(axis=2)
+    return np.asarray(np.sqrt(squares.mean(axis=1)), np.float64)
+
+
+def least_squares(source: ShapeModel, target: ShapeModel, values: NDArray[np.float32], size: float) -> Floats:
+    """(T, q) parameters by full least squares on all landmark coordinates."""
+    wanted = np.tensordot((values - source.rest).astype(np.float64), source.basis.astype(np.float64), axes=1) * size
+    design = target.basis.reshape(len(target.basis), -1).T.astype(np.float64)
+    solved = np.linalg.lstsq(design, wanted.reshape(len(values), -1).T, rcond=None)[0].T
+    return np.asarray(solved + target.rest, np.float64)
+
+
+def closed(talker: Talker, shapes: list[NDArray[np.float32]], at: list[list[int]]) -> float:
+    """Share of bilabials with closed lips."""
+    gaps = [lip_gap(one[frames]) * np.sign(opening(one[frames])) for one, frames in zip(shapes, at, strict=True)]
+    return float((np.concatenate(gaps) < CLOSED).mean())
+
+
+def report(talker: Talker, name: str, target: ShapeModel, gain: float = 1.0) -> None:
+    """Print the figures of one target."""
+    source, utterances = talker.model, talker.utterances[::EVERY]
+    values = np.concatenate([utterance.shape for utterance in utterances])
+    ready = cloning(source, target, gain=gain)
+    began = time.perf_counter()
+    mapped = ready.parameters(values)
+    spent = time.perf_counter() - began
+    some = np.linspace(0, len(values) - 1, N_FRAMES).astype(int)
+    wanted = ready.unlimited(values)
+    apart = wanted[some] - (
+        target.rest + gain * (least_squares(source, target, values[some], ready.size) - target.rest)
+    )
+    spans = np.cumsum([len(utterance.shape) for utterance in utterances])[:-1]
+    before, after = np.split(source.shapes(values), spans), np.split(target.shapes(mapped), spans)
+    at = [bilabial_frames(u, opening(one), talker.fps) for u, one in zip(utterances, before, strict=True)]
+    lines, least = facing_gaps(target), np.minimum(LEAST_GAP_MM, resting_gaps(target))
+    held = np.clip(wanted, -ready.limits, ready.limits)
+    crossing, crossed = ((one @ lines[:, :-1].T + lines[:, -1] < least - 1e-4).any(axis=1) for one in (held, mapped))
+    parted = distance(target.shapes(mapped), target.shapes(held))
+    changed = np.any(np.abs(mapped - held) > 1e-3, axis=1)
+    kept_back = distance(target.shapes(held), target.shapes(wanted))
+    limited = np.abs(wanted) > ready.limits
+    back = cloning(target, source, gain=1 / gain)
+    returned = distance(source.shapes(back.parameters(mapped)), source.shapes(values))
+    linear = distance(source.shapes(back.unlimited(wanted)), source.shapes(values))
+    kept = ((ready.relation[:, : source.n_speech] / (gain * ready.size)) ** 2).sum(axis=0)
+    share = (kept * source.spread[: source.n_speech] ** 2).sum() / (source.spread[: source.n_speech] ** 2).sum()
+    open_ = [np.concatenate([opening(one) for one in parts]) for parts in (before, after)]
+    eyes = float(np.linalg.norm(target.mean[EYE_OUTER_LEFT] - target.mean[EYE_OUTER_RIGHT]))
+    print(f"\n{name}, gain {gain:g}: size {ready.size:.3f}, {len(values)} frames")
+    print(f"  mouth variance that the target can show {share:.2%}")
+    print(f"  eq. 5 against least squares, {N_FRAMES} frames: {np.abs(apart).max():.1e} mm at most")
+    print(f"  there and back, mouth landmarks: {linear.mean():.3f} mm (95 %: {np.percentile(linear, 95):.3f}), "
+          f"{returned.mean():.3f} mm (95 %: {np.percentile(returned, 95):.3f}) with limits and lips")  # fmt: skip
+    beyond, in_mouth = limited.any(axis=1).mean(), limited[:, : target.n_speech].any(axis=1).mean()
+    print(
+        f"  beyond the limits: {beyond:.1%} of frames ({in_mouth:.1%} in the mouth), {limited.mean():.2%} of parameters"
+    )
+    print(f"  after: {(np.abs(mapped) > ready.limits).sum()}; the limits move the mouth by {kept_back.mean():.3f} mm")
+    print(f"  lips that cross: {crossing.mean():.1%} of frames; after: {crossed.sum()}")
+    print(f"  lips set right in {changed.mean():.1%}, by {parted[changed].mean():.3f} mm (most {parted.max():.2f})")
+    print(f"  {sum(map(len, at))} bilabials: closed {closed(talker, before, at):.3f} in the source, "
+          f"{closed(talker, after, at):.3f} after (gap below {CLOSED * eyes:.2f} mm)")  # fmt: skip
+    print(f"  opening: r {np.corrcoef(*open_)[0, 1]:.4f}, slope {np.polyfit(*open_, 1)[0]:.3f}; "
+          f"{len(values) / spent:.0f} frames/s")  # fmt: skip
+
+
+def main() -> None:
+    """Make the talkers and report."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("recordings", type=Path)
+    parser.add_argument("--cache", type=Path)
+    arguments = parser.parse_args()
+    talker = load_talker("grid_s1")
+    report(talker, "itself", talker.model)
+    for name, model in targets(arguments.recordings, arguments.cache, talker):
+        report(talker, name, model)
+        joined = append_missing(talker.model, model)
+        report(talker, f"{name}, {len(joined.spread) - len(model.spread)} appended", joined)
+        report(talker, name, model, gain=1.3)
+
+
+if __name__ == "__main__":
+    main()
