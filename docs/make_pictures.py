@@ -1,5 +1,6 @@
-"""The pictures of the README and the docs: ``python docs/make_pictures.py``."""
+"""The pictures of the README and the docs: ``python docs/make_pictures.py [--own-face me.talker]``."""
 
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from lexicon.phones import ipa_to_arpabet
 from lexicon.sequence import SILENCE
 from tts2face.api import cast, stream
 from tts2face.face.file import face_path, identities_of, load_face
-from tts2face.render.draw import draw, staged
+from tts2face.render.draw import draw, staged, still
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.talker import load_talker
@@ -18,6 +19,11 @@ from tts2face.talker import load_talker
 HERE = Path(__file__).parent / "pictures"
 SENTENCE = "We were away a year ago, but Bob may move five big maps."
 SPOKEN = ("w", "ɝ", "eɪ", "oʊ", "b", "ɑ", "m", "u", "f", "aɪ", "v", "æ")  # one frame for each, in the order of speech
+NEW_SENTENCES = (
+    "The quick brown fox jumps over the lazy dog.",
+    "She sells sea shells, please believe me.",
+    "My mother baked five big apple pies for Bob.",
+)
 SIDE = 240
 WORD_PIXELS = 16
 
@@ -67,9 +73,28 @@ def faces_sheet() -> Image.Image:
     return sheet(pictures, 6)
 
 
+def own_face_sheet(talker: Path) -> Image.Image:
+    """Frames of new sentences on the talker's own face, in the order of speech."""
+    ready = cast(load_talker(str(talker)), None)
+    stage = ready.stage(Picture(size=f"{SIDE}x{SIDE}"))
+    pictures = []
+    for text in NEW_SENTENCES:
+        (piece,) = stream(Request(text=text, fps=25.0), ready)
+        phones = piece.clip.speech.phones
+        for instant in np.linspace(phones.edges[1], phones.edges[-2], 6, endpoint=False):
+            label = ipa_to_arpabet(phones.phones[phones.index_at(instant)])
+            pictures.append(labelled(still(piece.clip, stage, round(instant * piece.clip.fps)), label))
+    return sheet(pictures, 6)
+
+
 def main() -> None:
-    """Write both sheets."""
+    """Write the sheets."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--own-face", type=Path, help="a talker with an appearance, for own_face.jpg")
+    talker = parser.parse_args().own_face
     HERE.mkdir(exist_ok=True)
+    if talker is not None:
+        own_face_sheet(talker).save(HERE / "own_face.jpg", quality=85)
     clip_sheet().save(HERE / "clip.png", optimize=True)
     faces_sheet().save(HERE / "faces.png", optimize=True)
 
