@@ -102,6 +102,8 @@ def clone(
     made = clone_talker(source, target, out, gain=gain, append=append_missing)
     added = f", {made.n_appended} modes added" if append_missing else ""
     say(f"wrote {out}: {len(made.talker.utterances)} utterances{added}, {made.at_limits:.1%} of frames at limits")
+    if made.left_pictures:
+        say("it carries motion only: pictures show other frames than these and were left behind")
 
 
 @corpus.command

@@ -23,12 +23,13 @@ class Cloned:
     """A cloned talker and what happened on the way.
 
     ``n_appended`` modes were added to the target's; ``at_limits`` is the share of frames with a parameter at the
-    target's limits.
+    target's limits; ``left_pictures`` tells that a talker had pictures, which are not carried over.
     """
 
     talker: Talker
     n_appended: int
     at_limits: float
+    left_pictures: bool
 
 
 def clone_talker(
@@ -88,7 +89,8 @@ def cloned_talker(source: Talker, target: Talker, *, gain: float = 1.0, append: 
     about = {"gain": gain, "size": round(ready.size, 4), "appended_modes": n_appended}
     metadata = _metadata(source.metadata, target.metadata, about)
     at_limits = float((np.abs(shapes) >= ready.limits).any(axis=1).mean())
-    return Cloned(Talker(source.fps, model, utterances, metadata), n_appended, at_limits)
+    left = source.appearance is not None or target.appearance is not None
+    return Cloned(Talker(source.fps, model, utterances, metadata), n_appended, at_limits, left)
 
 
 def _carried(utterance: Utterance, ready: Cloning) -> Utterance:

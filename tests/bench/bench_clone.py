@@ -4,7 +4,8 @@ Run: ``PYTHONPATH=. python tests/bench/bench_clone.py RECORDINGS [--cache FOLDER
 grid_s1. There is one recorded person, so second talkers are learnt from the two halves of RECORDINGS, with other
 numbers of modes, and from the landmarks of the shipped faces while they speak the source's utterances with brows and
 eyelids that move by themselves. Closed: at the frame of a bilabial where the middle lip points are nearest, they are
-less than 1 % of the distance of the outer eye corners apart, as in `corpus_tools.learn`.
+less than 1 % of the distance of the outer eye corners apart, as in `corpus_tools.learn`. The rule for lips that touch
+has the same threshold, so that closures are also counted before it.
 """
 
 import argparse
@@ -19,11 +20,11 @@ from corpus_tools.learn import CLOSED, learn_shapes, lip_gap
 from corpus_tools.observation import Observation, Quality
 from corpus_tools.observe import Effort, observe
 from tests.bench.bench_retarget import bilabial_frames, landmarks_of, opening
-from tts2face.face.clone import append_missing, cloning
+from tts2face.face.clone import Cloning, append_missing, cloning
 from tts2face.face.file import load_face
-from tts2face.face.lips import LEAST_GAP_MM, facing_gaps, resting_gaps
+from tts2face.face.lips import facing_gaps
 from tts2face.face.retarget import retargeter
-from tts2face.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, MOUTH_REGION
+from tts2face.landmarks import MOUTH_REGION
 from tts2face.talker import ShapeModel, Talker, load_talker
 
 Floats = NDArray[np.float64]
@@ -66,18 +67,27 @@ def distance(one: NDArray[np.floating], other: NDArray[np.floating]) -> Floats:
     return np.asarray(np.sqrt(squares.mean(axis=1)), np.float64)
 
 
-def least_squares(source: ShapeModel, target: ShapeModel, values: NDArray[np.float32], size: float) -> Floats:
-    """(T, q) parameters by full least squares on all landmark coordinates."""
-    wanted = np.tensordot((values - source.rest).astype(np.float64), source.basis.astype(np.float64), axes=1) * size
+def least_squares(source: ShapeModel, target: ShapeModel, values: NDArray[np.float32], ready: Cloning) -> Floats:
+    """(T, q) displacements from rest by full least squares on all landmark coordinates."""
+    moved = values.astype(np.float64) - ready.source_rest
+    wanted = np.tensordot(moved, source.basis.astype(np.float64), axes=1) * ready.size
     design = target.basis.reshape(len(target.basis), -1).T.astype(np.float64)
-    solved = np.linalg.lstsq(design, wanted.reshape(len(values), -1).T, rcond=None)[0].T
-    return np.asarray(solved + target.rest, np.float64)
+    return np.asarray(np.linalg.lstsq(design, wanted.reshape(len(values), -1).T, rcond=None)[0].T, np.float64)
 
 
 def closed(talker: Talker, shapes: list[NDArray[np.float32]], at: list[list[int]]) -> float:
     """Share of bilabials with closed lips."""
     gaps = [lip_gap(one[frames]) * np.sign(opening(one[frames])) for one, frames in zip(shapes, at, strict=True)]
     return float((np.concatenate(gaps) < CLOSED).mean())
+
+
+def there_and_back(
+    source: ShapeModel, back: Cloning, values: NDArray[np.float32], mapped: tuple[Floats, NDArray[np.float32]]
+) -> tuple[Floats, Floats]:
+    """(T,) distances from the source of what comes back by eq. 5 alone, and with limits and lips."""
+    by_rule, all_done = back.unlimited(mapped[0]), back.parameters(mapped[1])
+    wanted = source.shapes(values)
+    return distance(source.shapes(by_rule), wanted), distance(source.shapes(all_done), wanted)
 
 
 def report(talker: Talker, name: str, target: ShapeModel, gain: float = 1.0) -> None:
@@ -90,26 +100,21 @@ def report(talker: Talker, name: str, target: ShapeModel, gain: float = 1.0) -> 
     spent = time.perf_counter() - began
     some = np.linspace(0, len(values) - 1, N_FRAMES).astype(int)
     wanted = ready.unlimited(values)
-    apart = wanted[some] - (
-        target.rest + gain * (least_squares(source, target, values[some], ready.size) - target.rest)
-    )
+    apart = wanted[some] - ready.target_rest - gain * least_squares(source, target, values[some], ready)
     spans = np.cumsum([len(utterance.shape) for utterance in utterances])[:-1]
     before, after = np.split(source.shapes(values), spans), np.split(target.shapes(mapped), spans)
     at = [bilabial_frames(u, opening(one), talker.fps) for u, one in zip(utterances, before, strict=True)]
-    lines, least = facing_gaps(target), np.minimum(LEAST_GAP_MM, resting_gaps(target))
+    lines = facing_gaps(target)
     held = np.clip(wanted, -ready.limits, ready.limits)
-    crossing, crossed = ((one @ lines[:, :-1].T + lines[:, -1] < least - 1e-4).any(axis=1) for one in (held, mapped))
+    crossing = (held @ lines[:, :-1].T + lines[:, -1] < 0).any(axis=1)
     parted = distance(target.shapes(mapped), target.shapes(held))
     changed = np.any(np.abs(mapped - held) > 1e-3, axis=1)
     kept_back = distance(target.shapes(held), target.shapes(wanted))
     limited = np.abs(wanted) > ready.limits
-    back = cloning(target, source, gain=1 / gain)
-    returned = distance(source.shapes(back.parameters(mapped)), source.shapes(values))
-    linear = distance(source.shapes(back.unlimited(wanted)), source.shapes(values))
+    linear, returned = there_and_back(source, cloning(target, source, gain=1 / gain), values, (wanted, mapped))
     kept = ((ready.relation[:, : source.n_speech] / (gain * ready.size)) ** 2).sum(axis=0)
     share = (kept * source.spread[: source.n_speech] ** 2).sum() / (source.spread[: source.n_speech] ** 2).sum()
     open_ = [np.concatenate([opening(one) for one in parts]) for parts in (before, after)]
-    eyes = float(np.linalg.norm(target.mean[EYE_OUTER_LEFT] - target.mean[EYE_OUTER_RIGHT]))
     print(f"\n{name}, gain {gain:g}: size {ready.size:.3f}, {len(values)} frames")
     print(f"  mouth variance that the target can show {share:.2%}")
     print(f"  eq. 5 against least squares, {N_FRAMES} frames: {np.abs(apart).max():.1e} mm at most")
@@ -120,10 +125,15 @@ def report(talker: Talker, name: str, target: ShapeModel, gain: float = 1.0) -> 
         f"  beyond the limits: {beyond:.1%} of frames ({in_mouth:.1%} in the mouth), {limited.mean():.2%} of parameters"
     )
     print(f"  after: {(np.abs(mapped) > ready.limits).sum()}; the limits move the mouth by {kept_back.mean():.3f} mm")
-    print(f"  lips that cross: {crossing.mean():.1%} of frames; after: {crossed.sum()}")
+    reached = mapped.astype(np.float64) @ lines[:, :-1].T + lines[:, -1]
+    print(
+        f"  lips cross in {crossing.mean():.1%} of frames; after: {(reached < 0).sum()}, least {reached.min():.3f} mm"
+    )
     print(f"  lips set right in {changed.mean():.1%}, by {parted[changed].mean():.3f} mm (most {parted.max():.2f})")
-    print(f"  {sum(map(len, at))} bilabials: closed {closed(talker, before, at):.3f} in the source, "
-          f"{closed(talker, after, at):.3f} after (gap below {CLOSED * eyes:.2f} mm)")  # fmt: skip
+    from_mean = values @ ready.relation.T
+    ways = {"eq. 5 from rest": wanted, "eq. 5 from the mean": from_mean, "within limits": held, "all": mapped}
+    shares = [f"{way} {closed(talker, np.split(target.shapes(one), spans), at):.3f}" for way, one in ways.items()]
+    print(f"  {sum(map(len, at))} bilabials closed: source {closed(talker, before, at):.3f}, {', '.join(shares)}")
     print(f"  opening: r {np.corrcoef(*open_)[0, 1]:.4f}, slope {np.polyfit(*open_, 1)[0]:.3f}; "
           f"{len(values) / spent:.0f} frames/s")  # fmt: skip
 

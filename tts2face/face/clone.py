@@ -17,7 +17,7 @@ from tts2face.face.lips import (
     facing_gaps,
     largest_gaps,
     nearest_allowed,
-    resting_gaps,
+    parted_rest,
 )
 from tts2face.face.retarget import inner_product_map, product
 from tts2face.landmarks import N_LANDMARKS
@@ -44,7 +44,7 @@ class Cloning:
     size
         The target's face over the source's.
     source_rest, target_rest : (r,), (q,)
-        Parameters at rest.
+        Parameters at rest, the lips parted where they overlap.
     n_source, n_target
         Modes of either that speech moves.
     limits : (q,)
@@ -90,17 +90,15 @@ class Cloning:
         """(T, q) parameters of the target for (T, m) of the source's first m modes; the other modes are at rest.
 
         Each frame is the nearest to eq. 5 that keeps the limits, whose lips do not cross, and whose lips touch where
-        the source's do; it does not depend on other frames. Lips count as crossed below `LEAST_GAP_MM`, or below the
-        target's rest where they overlap there: tracked lips may, and a talker at rest is right by definition.
+        the source's do; it does not depend on other frames.
         """
         wanted = self.unlimited(source)
         limits = self.limits.astype(np.float64)
         held = np.clip(wanted, -limits, limits)
-        least = np.minimum(LEAST_GAP_MM, self.resting_gaps)
         most = largest_gaps(self._seen_gaps(source), self.contact, self.resting_gaps)
         gaps = product(held, self.target_gaps[:, :-1].T) + self.target_gaps[:, -1]
-        wrong = np.flatnonzero(((gaps < least) | (gaps > most)).any(axis=1))
-        held[wrong] = nearest_allowed(wanted[wrong], limits, self.target_gaps, (least, most[wrong]))
+        wrong = np.flatnonzero(((gaps < LEAST_GAP_MM) | (gaps > most)).any(axis=1))
+        held[wrong] = nearest_allowed(wanted[wrong], limits, self.target_gaps, most[wrong])
         return np.clip(held.astype(np.float32), -self.limits, self.limits)
 
     def unlimited(self, source: NDArray[np.floating]) -> FloatArray:
@@ -129,27 +127,24 @@ def cloning(source: ShapeModel, target: ShapeModel, *, gain: float = 1.0) -> Clo
     InputError
         The gain is negative or not finite.
     DataError
-        A model does not have the 478 landmarks, or the target's rest lies beyond its limits.
+        A model does not have the 478 landmarks, its rest lies beyond its limits, or its lips overlap everywhere.
     """
     if not (math.isfinite(gain) and gain >= 0.0):
         raise InputError(f"the gain must be 0 or more, not {gain}; 1 leaves the motion as large as it is")
     size = face_size(target) / face_size(source)
-    limits = largest_parameters(target)
-    beyond = np.flatnonzero(np.abs(target.rest) > limits)
-    if len(beyond):
-        raise DataError(f"the target rests beyond {SPREADS:g} spreads in mode {beyond[0]}; build it again")
+    rests, target_gaps = (_rest(source), _rest(target)), facing_gaps(target)
     relation = np.round(inner_product_map(_rows(source), _rows(target)), 9)  # last bits depend on the threads of BLAS
     return Cloning(
         relation=gain * size * relation,
         size=size,
-        source_rest=source.rest.astype(np.float64),
-        target_rest=target.rest.astype(np.float64),
+        source_rest=rests[0],
+        target_rest=rests[1],
         n_source=source.n_speech,
         n_target=target.n_speech,
-        limits=limits,
+        limits=largest_parameters(target),
         source_gaps=size * facing_gaps(source),
-        target_gaps=facing_gaps(target),
-        resting_gaps=resting_gaps(target),
+        target_gaps=target_gaps,
+        resting_gaps=product(target_gaps[:, :-1], rests[1]) + target_gaps[:, -1],
         contact=size * contact_mm(source),
     )
 
@@ -219,6 +214,14 @@ def largest_parameters(model: ShapeModel) -> NDArray[np.float32]:
     exact = SPREADS * model.spread.astype(np.float64)
     rounded = exact.astype(np.float32)
     return np.where(rounded > exact, np.nextafter(rounded, np.float32(0)), rounded)
+
+
+def _rest(model: ShapeModel) -> FloatArray:
+    limits = largest_parameters(model)
+    beyond = np.flatnonzero(np.abs(model.rest) > limits)
+    if len(beyond):
+        raise DataError(f"a talker rests beyond {SPREADS:g} spreads in mode {beyond[0]}; build it again")
+    return parted_rest(model, limits)
 
 
 def _channels(n_modes: int) -> tuple[str, ...]:

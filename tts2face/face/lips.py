@@ -12,6 +12,7 @@ FloatArray = NDArray[np.float64]
 UPPER, LOWER = list(INNER_LIP_UPPER[1:-1]), list(INNER_LIP_LOWER[1:-1])  # at the corners both lips are one point
 LEAST_GAP_MM = 0.01  # so that lips stay apart when parameters are rounded for a talker file
 CONTACT = 0.01  # of the distance of the outer eye corners: tracked lips that touch are up to so far apart
+UNBOUNDED_MM = 1e3  # no lips are so far apart
 STEEP = 10.0  # how much faster than the source's the gap may open beyond contact: 1 mm on, nothing is held back
 
 
@@ -21,10 +22,20 @@ def facing_gaps(model: ShapeModel) -> FloatArray:
     return np.column_stack([per_mode, (model.mean[UPPER, 1] - model.mean[LOWER, 1]).astype(np.float64)])
 
 
-def resting_gaps(model: ShapeModel) -> FloatArray:
-    """(P,) gaps at rest, mm."""
-    gaps = facing_gaps(model)
-    return np.asarray(np.einsum("pm,m->p", gaps[:, :-1], model.rest.astype(np.float64)) + gaps[:, -1], np.float64)
+def parted_rest(model: ShapeModel, limits: NDArray[np.floating]) -> FloatArray:
+    """(M,) parameters at rest; where tracked lips overlap there, as they may by some 0.1 mm, the nearest that do not.
+
+    Raises
+    ------
+    DataError
+        The lips overlap wherever the limits let them go.
+    """
+    gaps, rest = facing_gaps(model), model.rest.astype(np.float64)
+    if (np.einsum("pm,m->p", gaps[:, :-1], rest) + gaps[:, -1] >= LEAST_GAP_MM).all():
+        return rest
+    any_gap = np.full((1, len(gaps)), UNBOUNDED_MM)
+    parted: FloatArray = nearest_allowed(rest[None], limits.astype(np.float64), gaps, any_gap)[0]
+    return parted
 
 
 def contact_mm(model: ShapeModel) -> float:
@@ -40,10 +51,8 @@ def largest_gaps(seen: FloatArray, contact: float, at_rest: FloatArray) -> Float
     return np.maximum(seen + STEEP * np.maximum(seen - contact, 0.0), at_rest)
 
 
-def nearest_allowed(
-    wanted: FloatArray, limits: FloatArray, gaps: FloatArray, between: tuple[FloatArray, FloatArray]
-) -> FloatArray:
-    """(T, M) parameters nearest to `wanted` within limits and with lip gaps between two bounds.
+def nearest_allowed(wanted: FloatArray, limits: FloatArray, gaps: FloatArray, most: FloatArray) -> FloatArray:
+    """(T, M) parameters nearest to `wanted` within limits, with lips that do not cross and are not too far apart.
 
     Parameters
     ----------
@@ -52,8 +61,8 @@ def nearest_allowed(
         Largest size of each parameter.
     gaps : (P, M + 1)
         As `facing_gaps` gives them.
-    between : (P,), (T, P)
-        Least gaps, and each frame's largest.
+    most : (T, P)
+        Each frame's largest gaps; the least is `LEAST_GAP_MM`.
 
     Raises
     ------
@@ -68,7 +77,7 @@ def nearest_allowed(
     """
     from scipy.optimize import nnls
 
-    n_modes, (least, most) = len(limits), between
+    n_modes = len(limits)
     pairs, unit = gaps[:, :-1], np.eye(n_modes)
     sides = np.concatenate([pairs, -pairs, unit, -unit])
     only = np.zeros(n_modes + 1)
@@ -76,7 +85,7 @@ def nearest_allowed(
     found = np.zeros_like(wanted)
     for frame, start in enumerate(wanted):
         here = pairs @ start + gaps[:, -1]
-        short = -np.concatenate([here - least, most[frame] - here, start + limits, limits - start])
+        short = -np.concatenate([here - LEAST_GAP_MM, most[frame] - here, start + limits, limits - start])
         system = np.vstack([sides.T, short])
         forces, left_over = nnls(system, only)
         if left_over < 1e-9:
