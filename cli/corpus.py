@@ -83,6 +83,31 @@ def _consent(name: str, statement: str | None) -> Mapping[str, str]:
 
 
 @corpus.command
+def face(
+    recordings: Annotated[Path, Parameter(help="Folder of recordings, or one video; no transcripts needed.")],
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="The face to write (.face).", alias="-o")],
+    name: Annotated[str | None, Parameter(help="Who is shown; the name of the folder or video without it.")] = None,
+    consent: Annotated[
+        str | None, Parameter(help="The consent of the person shown, kept with name and date; asked for without it.")
+    ] = None,
+    cache: Cache = None,
+    model: Model = None,
+) -> None:
+    """Make a head with the shape and skin of the person in videos, to be shown with `--face`."""
+    if out.suffix != ".face":
+        raise InputError(f"a face is written as .face, not {out.name}")
+    from corpus_tools.dense.build import build_face
+    from corpus_tools.observe import Effort
+
+    agreed = _consent(name or recordings.resolve().stem, consent)
+    with progress_bar("looking at videos") as on_progress:
+        built = build_face(recordings, out, consent=agreed, effort=Effort(cache, None, model), on_progress=on_progress)
+    say(f"wrote {out}: {built.n_videos} of {built.n_found} videos, {built.error_mm:.2f} mm off the talker's landmarks")
+
+
+@corpus.command
 def clone(
     source: Annotated[str, Parameter(help="Who speaks: a shipped talker or a .talker file.")],
     target: Annotated[str, Parameter(help="Whose face moves: a shipped talker or a .talker file.")],

@@ -1,0 +1,1 @@
+"""From a talker's videos to a textured head of the talker."""

@@ -1,0 +1,98 @@
+"""From videos of a talker to a textured head of the talker."""
+
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from corpus_tools.dense.adapt import adapted
+from corpus_tools.dense.gather import fitter, gathered
+from corpus_tools.dense.paint import painted_like
+from corpus_tools.dense.region import canvas_of
+from corpus_tools.dense.seen import Progress, resting_landmarks, seen_in, videos_of
+from corpus_tools.dense.warp import N_MESH, aligned, fitting, landmarks_of, settled
+from corpus_tools.observe import Effort
+from tts2face.face.file import face_path, read_face, write_face
+from tts2face.video.model import find_bundle, user_cache
+from tts2face.video.track import FaceTracker
+
+HEAD = "head"  # the shipped face that is adapted
+CONTENT = "a head with the shape and, with the stated consent, the skin of a real person"
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltFace:
+    """What was made: videos used of those found, and the mean distance of the head's landmarks from the talker's."""
+
+    n_videos: int
+    n_found: int
+    error_mm: float
+
+
+def build_face(
+    recordings: Path,
+    out: Path,
+    *,
+    consent: Mapping[str, str],
+    effort: Effort | None = None,
+    on_progress: Progress | None = None,
+) -> BuiltFace:
+    """Adapt the default head to the talker in videos, and write it as a face.
+
+    Parameters
+    ----------
+    recordings
+        A folder of recordings, or one video; transcripts are not needed.
+    consent
+        Of the person shown, from `corpus_tools.consent.consent_of`; kept in the file.
+    effort
+        Its cache and landmark models; the work is done in one process.
+    on_progress
+        Called with steps done and of all, two for each video.
+
+    Raises
+    ------
+    InputError
+        There is no video.
+    DataError
+        No video shows a face.
+    BackendError
+        A package or the landmark models are missing, or the file cannot be written.
+    """
+    effort = effort or Effort()
+    videos = videos_of(recordings)
+    tracker = FaceTracker(find_bundle(effort.model))
+    cache = effort.cache or user_cache() / "recordings"
+    cache.mkdir(parents=True, exist_ok=True)
+    report = on_progress or (lambda done, of: None)
+    seen = seen_in(videos, cache, tracker, lambda done, of: report(done, 2 * of))
+    head = read_face(face_path(HEAD))
+    talker = resting_landmarks(seen)
+    rest = landmarks_of(head, head.vertices)[:N_MESH]
+    target = aligned(talker, rest)
+    used = np.flatnonzero(fitting(rest, settled(rest, target)))
+    shaped = adapted(head, talker)
+    canvas = canvas_of(shaped)
+    painting = gathered(
+        shaped,
+        canvas,
+        fitter(shaped, canvas.opened, used),
+        seen,
+        lambda done, of: report(len(videos) + done * len(videos) // of, 2 * len(videos)),
+    )
+    face = painted_like(shaped, canvas, painting)
+    metadata = {
+        **head.metadata,
+        "name": consent["name"],
+        "content": CONTENT,
+        "consent": dict(consent),
+        "command": shlex.join(["tts2face", "corpus", "face", recordings.name, "--out", out.name]),
+        "created": datetime.now(UTC).date().isoformat(),
+    }
+    write_face(out, replace(face, metadata=metadata))
+    reached = landmarks_of(shaped, shaped.vertices)[:N_MESH]
+    again = aligned(talker, reached)
+    return BuiltFace(len(seen), len(videos), float(np.linalg.norm(again - reached, axis=1)[used].mean()))
