@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -109,6 +110,17 @@ def test_the_written_talker_keeps_limits_and_lips(tmp_path: Path) -> None:
     clone_talker("grid_s1", "grid_s1", again, gain=1.3, append=True, created="2026-01-01")
     assert again.read_bytes() == (tmp_path / "c.talker").read_bytes()
     assert made.n_appended == 0
+
+
+def test_pictures_are_left_behind_and_that_is_told() -> None:
+    source, target = talkers()
+    assert not cloned_talker(source, target).left_pictures
+    looks = SimpleNamespace()  # whatever they are
+    for one, other in ((source, replace(target, appearance=looks)), (replace(source, appearance=looks), target)):
+        made = cloned_talker(one, other)
+        assert made.left_pictures
+        assert made.talker.appearance is None
+        assert all(utterance.looks is None for utterance in made.talker.utterances)
 
 
 def test_a_source_without_speech_is_refused() -> None:
