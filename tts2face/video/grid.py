@@ -1,0 +1,63 @@
+"""Tracked points on the even grid of the frames i / fps, and the gaps in them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+
+LONGEST_GAP_S = 0.12  # frames without a face that are filled in; lips make no full movement in less
+SAME_INSTANT_S = 0.001  # times in a file are rounded to milliseconds
+
+
+def on_grid(points: NDArray[np.float32], times: NDArray[np.float64], fps: float) -> tuple[NDArray[np.float32], int]:
+    """Points at the instants i / fps between the first time and the last, and the first i.
+
+    Parameters
+    ----------
+    points : (T, ...)
+        Values at `times`.
+    times : (T,)
+        Seconds; they must increase.
+
+    Raises
+    ------
+    DataError
+        Times do not increase.
+    """
+    if (np.diff(times) <= 0).any():
+        raise DataError("frames do not follow each other in time; convert the recording with ffmpeg")
+    first = int(np.ceil((times[0] - SAME_INSTANT_S) * fps))
+    last = int(np.floor((times[-1] + SAME_INSTANT_S) * fps))
+    instants = np.arange(first, last + 1) / fps
+    if len(instants) == len(times) and np.abs(instants - times).max() <= SAME_INSTANT_S:
+        return points, first
+    after = np.clip(np.searchsorted(times, instants), 1, len(times) - 1)
+    share = np.clip((instants - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0)
+    share = share.reshape(-1, *[1] * (points.ndim - 1)).astype(np.float32)
+    between = points[after - 1] * (1 - share) + points[after] * share
+    return between.astype(np.float32), first
+
+
+def face_span(points: NDArray[np.float32]) -> tuple[int, int]:
+    """Half-open range from the first frame with a face to the last, of (T, L, 3) points that are NaN without one."""
+    present = np.flatnonzero(~np.isnan(points[:, 0, 0]))
+    return int(present[0]), int(present[-1]) + 1
+
+
+def filled_gaps(points: NDArray[np.float32], fps: float) -> tuple[NDArray[np.float32], int]:
+    """Points with short gaps bridged by straight lines, and the number of frames filled.
+
+    Raises
+    ------
+    DataError
+        A gap is longer than `LONGEST_GAP_S`.
+    """
+    missing = np.isnan(points[:, 0, 0])
+    if not missing.any():
+        return points, 0
+    present = np.flatnonzero(~missing)
+    longest = int(np.diff(present).max()) - 1
+    if longest > round(LONGEST_GAP_S * fps):
+        raise DataError(f"the face is out of sight for {longest / fps:.2f} s")
+    grid, _ = on_grid(points[present], present / fps, fps)
+    return grid, int(missing.sum())
