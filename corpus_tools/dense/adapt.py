@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.dense.warp import Warp, eyes_from_right, part_vertices, warp_onto
 from tts2face.face.model import Eye, Face
+from tts2face.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.video.pose import similarity
 
 Floats = NDArray[np.float64]
@@ -33,10 +34,14 @@ def adapted(face: Face, talker: NDArray[np.floating]) -> Face:
     moved = rest.copy()
     moved[soft] = warp.carried(rest[soft], soft)
     linear, shift = _as_one(rest[bone], rest[bone] + warp.field(rest[bone]))
+    shift[2] += _lips_forward(warp) - (rest[bone] @ linear.T + shift - rest[bone])[:, 2].max()
     moved[bone] = rest[bone] @ linear.T + shift
     eyes = _eyes(face, warp, rest, moved)
     shapes = _carried_shapes(face, warp, soft, moved)
     shapes[:, bone] = face.shapes[:, bone] @ linear.T
+    for eye, socket in zip(eyes_from_right(face), warp.sockets, strict=True):
+        span = slice(eye.first, eye.first + eye.count)
+        shapes[:, span] = socket.scale * face.shapes[:, span]  # an eyeball gives way to a lid that closes
     origin = np.mean([eye.centre for eye in eyes], axis=0)
     turning = _pivot(face, warp)
     return replace(
@@ -53,6 +58,13 @@ def _as_one(before: Floats, after: Floats) -> tuple[Floats, Floats]:
     turns, scales = similarity(before[None], after, np.full(len(before), 1.0 / len(before)))
     linear = scales[0] * turns[0]
     return linear, after.mean(axis=0) - linear @ before.mean(axis=0)
+
+
+def _lips_forward(warp: Warp) -> float:
+    """How far the lips come forward, mm: teeth and tongue stay as far behind them as they were."""
+    lips = np.isin(warp.landmarks, (*INNER_LIP_UPPER, *INNER_LIP_LOWER))
+    centres = warp.field.centres[lips]
+    return float(warp.field(centres)[:, 2].mean())
 
 
 def _eyes(face: Face, warp: Warp, rest: Floats, moved: Floats) -> list[Eye]:

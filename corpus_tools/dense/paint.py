@@ -21,8 +21,10 @@ TINT_BOUNDS = (0.35, 1.6)
 SHADE_BOUNDS = (0.75, 1.35)  # a lamp's shading that is taken out; more would amplify noise at the rim
 BROWS = (105, 66, 334, 296)  # upper edges
 FRINGE_MM = (2.0, 7.0)  # above the brows: where dark texels begin to be taken for hair, and where they surely are
+STRAND_TEXELS = 25  # about 4 mm of the forehead: around a strand its shadow is not skin either
 FRINGE_LUMA = (0.78, 0.95)  # of the usual skin: hair, and skin
 N_SAMPLES = 1500  # seen texels that stand for all of them
+SHARP_TEXELS, SHARP_GAIN = 4.0, 0.7  # unsharp masking, Gaussian of this deviation
 LEAST_WEIGHT = 0.02  # of the largest: texels seen less count less than in full
 
 
@@ -39,6 +41,7 @@ def painted_like(face: Face, canvas: Canvas, seen: Gathered) -> Face:
     strands = np.clip(seen.hair / np.maximum(usual, 1.0), *TINT_BOUNDS) if np.isfinite(seen.hair).all() else np.ones(3)
     tint = tint * (1 - hair)[:, None] + strands * hair[:, None]
     tint[canvas.in_mouth] = 1.0
+    own = sharpened(own, share, texels, len(canvas.texture))
     colour = share[:, None] * own + (1 - share)[:, None] * base * tint
     colours = face.colours.astype(np.float64)
     for part in face.parts:
@@ -75,13 +78,18 @@ def _directions(normals: Floats) -> Floats:
 
 def _without_fringe(face: Face, canvas: Canvas, own: Floats, share: Floats) -> Floats:
     """Shares (P,) without the dark strands that hang over the forehead: hair is no skin."""
+    from scipy.ndimage import gaussian_filter, minimum_filter
+
     marks = landmarks_of(face, face.vertices)
     above = canvas.texels.carried(face.vertices.astype(np.float64))[:, 1] - float(marks[list(BROWS), 1].max())
     luma = own @ LUMA
     usual = float(np.median(luma[share > 0.5]))
     clear = ramp(luma / usual, *FRINGE_LUMA)
     near = 1.0 - ramp(above, *FRINGE_MM)
-    kept: Floats = share * np.maximum(clear, near)
+    picture = np.ones(canvas.texture.shape[:2])
+    picture[canvas.texels.rows, canvas.texels.columns] = np.maximum(clear, near)
+    grown = gaussian_filter(minimum_filter(picture, STRAND_TEXELS), STRAND_TEXELS / 3)
+    kept: Floats = share * grown[canvas.texels.rows, canvas.texels.columns]
     return kept
 
 
@@ -103,6 +111,22 @@ def _tint(face: Face, canvas: Canvas, ratio: Floats, told: tuple[Floats, Floats]
     of_vertices[used] = mixed
     factors: Floats = np.exp(canvas.texels.carried(of_vertices))
     return factors
+
+
+def sharpened(colour: Floats, share: Floats, texels: Texels, side: int) -> Floats:
+    """Colours (P, 3) with edges as crisp as in one frame: an average over frames is blurred by the tracker's jitter."""
+    from scipy.ndimage import gaussian_filter
+
+    weight = np.zeros((side, side))
+    weight[texels.rows, texels.columns] = share
+    around = np.maximum(gaussian_filter(weight, SHARP_TEXELS), 1e-3)[texels.rows, texels.columns]
+    crisp = colour.copy()
+    for channel in range(3):
+        picture = np.zeros((side, side))
+        picture[texels.rows, texels.columns] = colour[:, channel] * share
+        smooth = gaussian_filter(picture, SHARP_TEXELS)[texels.rows, texels.columns] / around
+        crisp[:, channel] += SHARP_GAIN * share * (colour[:, channel] - smooth)
+    return crisp
 
 
 def _filled(texture: NDArray[np.uint8], texels: Texels, colour: Floats) -> NDArray[np.uint8]:

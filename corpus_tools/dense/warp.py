@@ -52,12 +52,14 @@ class Socket:
 class Warp:
     """Carries places of the default head to the talker.
 
-    ``opened`` (V, 3) is what a slightly open jaw adds to each vertex: the field is asked there.
+    ``opened`` (V, 3) is what a slightly open jaw adds to each vertex: the field is asked there. ``landmarks`` (N,) are
+    the numbers of the field's centres.
     """
 
     field: Interpolant
     opened: Floats
     sockets: tuple[Socket, ...]
+    landmarks: NDArray[np.int64]
 
     def carried(self, places: Floats, rows: NDArray[np.int64]) -> Floats:
         """(P, 3) new places of the vertices `rows` (P,), each at its place (P, 3) on the head with closed lips."""
@@ -72,15 +74,15 @@ def warp_onto(face: Face, talker: NDArray[np.floating]) -> Warp:
     opened = OPEN_JAW * face.shapes[face.shape_names.index("jawOpen")].astype(np.float64)
     rest = landmarks_of(face, face.vertices)[:N_MESH]
     target = settled(rest, aligned(talker, rest))
-    used = fitting(rest, target)
+    used = np.flatnonzero(fitting(rest, target))
     centres = (rest + landmarks_of(face, opened)[:N_MESH])[used]
     width = face_width(rest)
     missing = (target - rest)[used]
-    warp = Warp(interpolant(centres, missing, width), opened, sockets(face, rest, target))
+    warp = Warp(interpolant(centres, missing, width), opened, sockets(face, rest, target), used)
     for _ in range(ROUNDS - 1):
         reached = face.vertices + warp.field(face.vertices + opened)
         missing = missing + (target - landmarks_of(face, reached)[:N_MESH])[used]
-        warp = Warp(interpolant(centres, missing, width), opened, warp.sockets)
+        warp = Warp(interpolant(centres, missing, width), opened, warp.sockets, used)
     return warp
 
 
