@@ -15,6 +15,7 @@ from corpus_tools.dense.region import canvas_of
 from corpus_tools.dense.seen import Progress, resting_landmarks, seen_in, videos_of
 from corpus_tools.dense.warp import N_MESH, aligned, fitting, landmarks_of, settled
 from corpus_tools.observe import Effort
+from lexicon.errors import BackendError
 from tts2face.face.file import face_path, read_face, write_face
 from tts2face.video.model import find_bundle, user_cache
 from tts2face.video.track import FaceTracker
@@ -66,7 +67,10 @@ def build_face(
     videos = videos_of(recordings)
     tracker = FaceTracker(find_bundle(effort.model))
     cache = effort.cache or user_cache() / "recordings"
-    cache.mkdir(parents=True, exist_ok=True)
+    try:
+        cache.mkdir(parents=True, exist_ok=True)
+    except OSError as refused:
+        raise BackendError(f"cannot write {cache}: {refused.strerror}; choose another cache folder") from refused
     report = on_progress or (lambda done, of: None)
     seen = seen_in(videos, cache, tracker, lambda done, of: report(done, 2 * of))
     head = read_face(face_path(HEAD))

@@ -13,7 +13,7 @@ from tts2face.video.pose import similarity
 Floats = NDArray[np.float64]
 
 N_MESH = 468  # the iris points behind them follow the gaze and say nothing about the shape of the face
-OPEN_JAW = 0.25  # weight of jawOpen in whose space the lips lie apart: a closed mouth would be torn
+OPEN_JAW = 0.12  # weight of jawOpen in whose space the lips lie apart; a closed mouth would be torn, a wide one gape
 # The edge of the lids, once around, from the outer corner; the person's right eye, then the left.
 LIDS = (
     (33, 246, 161, 160, 159, 158, 157, 173, 133, 155, 154, 153, 145, 144, 163, 7),
