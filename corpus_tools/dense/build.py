@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from corpus_tools.build import PROVENANCE, UNSTATED, read_provenance
 from corpus_tools.dense.adapt import adapted
 from corpus_tools.dense.gather import fitter, gathered
 from corpus_tools.dense.paint import painted_like
@@ -46,7 +47,8 @@ def build_face(
     Parameters
     ----------
     recordings
-        A folder of recordings, or one video; transcripts are not needed.
+        A folder of recordings, or one video; transcripts are not needed. A ``provenance.json`` in the folder tells the
+        licence of the person's likeness; the mesh's own says nothing about it.
     consent
         Of the person shown, from `corpus_tools.consent.consent_of`; kept in the file.
     effort
@@ -59,12 +61,13 @@ def build_face(
     InputError
         There is no video.
     DataError
-        No video shows a face.
+        No video shows a face, or the provenance cannot be read.
     BackendError
         A package or the landmark models are missing, or the file cannot be written.
     """
     effort = effort or Effort()
     videos = videos_of(recordings)
+    stated = read_provenance(recordings / PROVENANCE, must_exist=False)
     tracker = FaceTracker(find_bundle(effort.model))
     cache = effort.cache or user_cache() / "recordings"
     try:
@@ -91,6 +94,8 @@ def build_face(
     metadata = {
         **head.metadata,
         "name": consent["name"],
+        "licence": f"mesh: {head.metadata['licence']}; likeness of the person: {stated.get('licence', UNSTATED)}",
+        "attribution": "; ".join(filter(None, [head.metadata["attribution"], stated.get("attribution")])),
         "content": CONTENT,
         "consent": dict(consent),
         "command": shlex.join(["tts2face", "corpus", "face", recordings.name, "--out", out.name]),

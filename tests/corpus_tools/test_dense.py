@@ -162,6 +162,7 @@ def test_a_real_talkers_head(real_folder: Path, face_model: Path, tmp_path: Path
     assert built.error_mm < 0.6
     assert out.stat().st_size < 6e6
     assert face.metadata["consent"] == dict(consent)
+    assert face.metadata["licence"] == "mesh: CC0-1.0; likeness of the person: not stated"
     assert len(face.landmarks) == N_LANDMARKS
     assert face.shape_names == head.shape_names
     assert face.texture is not None
