@@ -38,8 +38,19 @@ class Heard:
     sound: Waveform
 
 
-def heard(video: Path, words: Sequence[tuple[str, Ways]], cache: Path, aligner: "Aligner") -> Heard:
+def heard(
+    video: Path,
+    words: Sequence[tuple[str, Ways]],
+    cache: Path,
+    aligner: "Aligner",
+    span: tuple[float, float] | None = None,
+) -> Heard:
     """Phones of a recording's sound, from the cache when the same sound and words were aligned before.
+
+    Parameters
+    ----------
+    span
+        Seconds of the file that are listened to, the clock of the phones beginning with them; all without it.
 
     Raises
     ------
@@ -47,7 +58,11 @@ def heard(video: Path, words: Sequence[tuple[str, Ways]], cache: Path, aligner: 
         There is no sound, or it does not hold these words.
     """
     sound = read_sound(video, SOUND_RATE)
-    said = hashlib.sha256(json.dumps(words).encode()).hexdigest()[:8]
+    if span is not None:
+        first, last = (round(second * SOUND_RATE) for second in span)
+        sound = Waveform(sound.samples[first:last], SOUND_RATE)
+    asked = json.dumps(words) if span is None else json.dumps([words, span])
+    said = hashlib.sha256(asked.encode()).hexdigest()[:8]
     kept = cache / f"{content_key(video)}-{said}-{ALIGNMENT_VERSION}.{KIND}"
     if kept.is_file():
         try:

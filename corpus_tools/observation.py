@@ -13,6 +13,7 @@ from corpus_tools.watch import Watched, watched
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.video.grid import face_span, filled_gaps, on_grid
+from tts2face.video.media import media_facts
 from tts2face.video.pose import Posed, head_angles, remove_pose
 
 if TYPE_CHECKING:
@@ -72,11 +73,15 @@ def observed(recording: Recording, cache: Path, tracker: "FaceTracker", aligner:
         The recording cannot serve; the message says why.
     """
     words = spoken_words(recording)
-    sound = heard(recording.video, words, cache, aligner)
+    span = _on_frames(recording)
+    sound = heard(recording.video, words, cache, aligner, span)
     if sound.confidence < LEAST_CONFIDENCE:
         raise DataError(f"the sound does not fit the transcript (confidence {sound.confidence:.0f}); correct the words")
     seen = watched(recording.video, cache, tracker)
     points, first = on_grid(seen.tracking.points, seen.times, seen.fps)
+    if span is not None:
+        points, first = _within(points, first, seen.fps, span)
+    origin = span[0] if span is not None else 0.0
     if np.isnan(points).all():
         raise DataError("no frame shows a face")
     start, end = face_span(points)
@@ -85,11 +90,31 @@ def observed(recording: Recording, cache: Path, tracker: "FaceTracker", aligner:
     phones, spans = trimmed(sound, begin, stop)
     posed = remove_pose(filled, seen.fps)
     times = begin + np.arange(end - start) / seen.fps
-    quality = Quality(sound.confidence, _lowest_score(seen), n_filled, begin)
+    quality = Quality(sound.confidence, _lowest_score(seen), n_filled, origin + begin)
     loudness = intensity(sound.sound, times)
     return Observation(
         recording.name, seen.fps, posed.landmarks, _head(posed), phones, spans, loudness, quality, recording.video
     )
+
+
+def _on_frames(recording: Recording) -> tuple[float, float] | None:
+    """The span of a recording from the instant of a frame to that of another."""
+    if recording.span is None:
+        return None
+    fps = media_facts(recording.video).fps
+    begin, end = int(np.ceil(recording.span[0] * fps)), int(np.floor(recording.span[1] * fps))
+    return begin / fps, max(end, begin) / fps
+
+
+def _within(
+    points: NDArray[np.float32], first: int, fps: float, span: tuple[float, float]
+) -> tuple[NDArray[np.float32], int]:
+    """The frames of a span of the video, and the number of the first of them counted from the span's beginning."""
+    begin, end = (round(second * fps) for second in span)
+    here = points[max(begin - first, 0) : max(end - first, 0)]
+    if not len(here):
+        raise DataError(f"the video shows nothing from {span[0]:.2f} s to {span[1]:.2f} s; check the subtitles' times")
+    return here, max(first - begin, 0)
 
 
 def trimmed(sound: Heard, begin: float, stop: float) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:

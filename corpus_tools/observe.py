@@ -2,7 +2,7 @@
 
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
@@ -94,8 +94,8 @@ def _outcomes(found: tuple[Recording, ...], cache: Path, model: Path, jobs: int)
         return
     pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_start, initargs=(cache, model))
     try:
-        for future in as_completed([pool.submit(_work, recording) for recording in found]):
-            yield future.result()
+        for future in as_completed([pool.submit(_work, together) for together in by_video(found)]):
+            yield from future.result()
     except BrokenProcessPool as died:
         raise BackendError(
             "a process that read recordings died; run the command again (it goes on), with fewer jobs"
@@ -131,5 +131,13 @@ def _start(cache: Path, model: Path) -> None:
     _worker.append(_Worker(cache, model))
 
 
-def _work(recording: Recording) -> Observation | Refusal:
-    return _worker[0].outcome(recording)
+def _work(recordings: tuple[Recording, ...]) -> list[Observation | Refusal]:
+    return [_worker[0].outcome(recording) for recording in recordings]
+
+
+def by_video(recordings: Sequence[Recording]) -> list[tuple[Recording, ...]]:
+    """Recordings of one video together, so that one process tracks it once."""
+    together: dict[Path, list[Recording]] = {}
+    for recording in recordings:
+        together.setdefault(recording.video, []).append(recording)
+    return [tuple(group) for group in together.values()]

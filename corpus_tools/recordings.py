@@ -2,11 +2,14 @@
 
 import csv
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from corpus_tools.subtitles import read_cues, subtitles_beside
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import DataError, InputError
+from lexicon.normalize import normalize
 
 VIDEO_SUFFIXES = frozenset({".mkv", ".mp4", ".mov", ".webm", ".avi", ".mpg", ".mpeg", ".m4v"})
 MANIFEST = "manifest.csv"
@@ -28,20 +31,23 @@ Ways = tuple[tuple[str, ...], ...]  # pronunciations of one word, each a row of 
 class Recording:
     """One video and what is said in it; `is_spelling` marks words of one letter as names of letters.
 
-    ``transcript`` is None where the folder does not say what is spoken.
+    ``transcript`` is None where the folder does not say what is spoken. ``span`` are the seconds of the video that the
+    recording takes, None where it takes all.
     """
 
     name: str
     video: Path
     transcript: str | None
     is_spelling: bool = False
+    span: tuple[float, float] | None = None
 
 
 def find_recordings(folder: Path) -> tuple[Recording, ...]:
-    """Every video of a folder with its transcript, by name.
+    """Every video of a folder with its transcript, by name; or one video.
 
     Two layouts are read: ``manifest.csv`` (columns clip, transcript) beside a folder ``clips``, as the GRID corpus is
-    kept here, where single letters are names of letters; and videos with a text file of the same name beside each.
+    kept here, where single letters are names of letters; and videos with subtitles (.srt, .vtt; every cue is a
+    recording) or a text file (.txt) of the same name beside each.
 
     Raises
     ------
@@ -50,6 +56,8 @@ def find_recordings(folder: Path) -> tuple[Recording, ...]:
     DataError
         The manifest cannot be read.
     """
+    if folder.is_file() and folder.suffix.lower() in VIDEO_SUFFIXES:
+        return tuple(_said_in(folder))
     if not folder.is_dir():
         raise InputError(f"there is no folder {folder}; give the folder of recordings")
     manifest = folder / MANIFEST
@@ -65,11 +73,12 @@ def spoken_words(recording: Recording) -> tuple[tuple[str, Ways], ...]:
     Raises
     ------
     DataError
-        There is no transcript, no word in it, or a word that the dictionary does not hold.
+        There is no transcript, no word in it, or a word that nobody can say.
     """
     if recording.transcript is None:
         raise DataError(f"{recording.name} has no transcript; put its words into {recording.video.stem}.txt beside it")
-    words = re.findall(r"[^\W_]+(?:['’][^\W_]+)*", recording.transcript)
+    text = recording.transcript if recording.is_spelling else normalize(recording.transcript)
+    words = re.findall(r"[^\W_]+(?:['’][^\W_]+)*", text)
     if not words:
         raise DataError(f"the transcript of {recording.name} holds no word; write what is said")
     return tuple((word, pronunciations(word, is_letter=recording.is_spelling and len(word) == 1)) for word in words)
@@ -78,10 +87,12 @@ def spoken_words(recording: Recording) -> tuple[tuple[str, Ways], ...]:
 def pronunciations(word: str, *, is_letter: bool) -> Ways:
     """All ways to say a word, in phones of the table; the letter's names if it stands for one.
 
+    A word that the dictionary does not hold is said by rule.
+
     Raises
     ------
     DataError
-        The dictionary does not hold it.
+        There is no way to say it.
     """
     from lexicon.dictionary import arpabet_segments
 
@@ -92,10 +103,20 @@ def pronunciations(word: str, *, is_letter: bool) -> Ways:
         while variant := cmudict_lookup(word if not found else f"{word}({len(found) + 1})"):
             found.append(variant)
     if not found:
-        raise DataError(f"no pronunciation is known for {word!r}; check the transcript's spelling")
+        return (_by_rule(word),)
     ways = dict.fromkeys(tuple(segment.phone for segment in segments) for segments in found)
     plain = [way for way in ways if way[:2] != BREATHED_W]
     return tuple(plain or ways)
+
+
+def _by_rule(word: str) -> tuple[str, ...]:
+    from lexicon.pronounce import pronounce
+
+    try:
+        spoken = pronounce(word)
+    except InputError as unsayable:
+        raise DataError(f"no pronunciation is known for {word!r}; check the transcript's spelling") from unsayable
+    return tuple(phone for said in spoken.words for phone in said.phones)
 
 
 def _listed(folder: Path, manifest: Path) -> tuple[Recording, ...]:
@@ -110,7 +131,17 @@ def _listed(folder: Path, manifest: Path) -> tuple[Recording, ...]:
 
 
 def _plain(folder: Path) -> tuple[Recording, ...]:
-    return tuple(Recording(video.stem, video, _text_beside(video)) for video in _videos(folder))
+    return tuple(recording for video in _videos(folder) for recording in _said_in(video))
+
+
+def _said_in(video: Path) -> Iterator[Recording]:
+    """The recordings in a video: one for each cue of its subtitles, or the whole."""
+    subtitles = subtitles_beside(video)
+    if subtitles is None:
+        yield Recording(video.stem, video, _text_beside(video))
+        return
+    for number, cue in enumerate(read_cues(subtitles), start=1):
+        yield Recording(f"{video.stem}-{number:04d}", video, cue.text, span=(cue.begin, cue.end))
 
 
 def _videos(folder: Path) -> list[Path]:

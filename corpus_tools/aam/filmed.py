@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.observation import Observation
-from tts2face.video.grid import filled_gaps, on_grid
 from corpus_tools.watch import watched
+from tts2face.video.grid import filled_gaps, on_grid
 from tts2face.video.media import read_pictures
 from tts2face.video.track import FaceTracker
 

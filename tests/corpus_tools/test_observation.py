@@ -5,10 +5,10 @@ import pytest
 
 from corpus_tools.listen import Heard, intensity
 from corpus_tools.observation import trimmed
-from tts2face.video.grid import face_span, filled_gaps, on_grid
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.types import Waveform
+from tts2face.video.grid import face_span, filled_gaps, on_grid
 
 FPS = 25.0
 

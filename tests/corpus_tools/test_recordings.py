@@ -73,6 +73,15 @@ def test_a_transcript_of_nothing_but_signs(tmp_path):
         spoken_words(Recording("r", tmp_path / "r.mkv", "... !"))
 
 
-def test_a_word_that_nobody_knows(tmp_path):
-    with pytest.raises(DataError, match="no pronunciation is known for 'xqzzt'"):
-        spoken_words(Recording("r", tmp_path / "r.mkv", "bin xqzzt"))
+def test_a_word_that_the_dictionary_lacks_is_said_by_rule(tmp_path):
+    words = dict(spoken_words(Recording("r", tmp_path / "r.mkv", "the zorblatt")))
+    assert words["zorblatt"] == (("z", "ɔ", "ɹ", "b", "l", "æ", "t"),)
+
+
+def test_numbers_of_a_transcript_are_written_out(tmp_path):
+    assert [word for word, _ in spoken_words(Recording("r", tmp_path / "r.mkv", "I have 2."))] == ["I", "have", "two"]
+
+
+def test_a_word_that_nobody_can_say(tmp_path):
+    with pytest.raises(DataError, match="no pronunciation is known for '東京'"):
+        spoken_words(Recording("r", tmp_path / "r.mkv", "bin 東京"))

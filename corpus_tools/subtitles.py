@@ -1,0 +1,61 @@
+"""Subtitles beside a video: what is said, and about when."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from lexicon.errors import DataError
+
+FORMATS = {".srt": "srt", ".vtt": "vtt"}  # stated to the reader: it guesses wrongly for files without a header
+MARGIN_S = 0.3  # before and behind a cue; subtitles are rarely nearer to the speech
+
+
+@dataclass(frozen=True, slots=True)
+class Cue:
+    """Words said between two instants in seconds."""
+
+    begin: float
+    end: float
+    text: str
+
+
+def subtitles_beside(video: Path) -> Path | None:
+    """The file of subtitles of a video, if there is one."""
+    return next((path for suffix in FORMATS if (path := video.with_suffix(suffix)).is_file()), None)
+
+
+def read_cues(path: Path) -> tuple[Cue, ...]:
+    """Cues in the order of time, each widened by `MARGIN_S` but not beyond the middle to its neighbour.
+
+    Raises
+    ------
+    DataError
+        The file is no subtitles, or holds none.
+    BackendError
+        The package pysubs2 is missing.
+    """
+    import pysubs2
+
+    try:
+        read = pysubs2.SSAFile.from_string(_decoded(path), format_=FORMATS[path.suffix.lower()])
+    except (pysubs2.exceptions.Pysubs2Error, ValueError) as broken:
+        raise DataError(f"{path} cannot be read as subtitles ({broken}); export them again") from broken
+    spoken = sorted((event.start / 1000, event.end / 1000, event.plaintext.strip()) for event in read)
+    spoken = [(begin, end, text) for begin, end, text in spoken if text and end > begin]
+    if not spoken:
+        raise DataError(f"{path} holds no subtitles; export them again")
+    cues = []
+    for number, (begin, end, text) in enumerate(spoken):
+        before = spoken[number - 1][1] if number else 0.0
+        behind = spoken[number + 1][0] if number + 1 < len(spoken) else end + 2 * MARGIN_S
+        earliest, latest = min((before + begin) / 2, begin), max((end + behind) / 2, end)
+        cues.append(Cue(max(begin - MARGIN_S, earliest, 0.0), min(end + MARGIN_S, latest), " ".join(text.split())))
+    return tuple(cues)
+
+
+def _decoded(path: Path) -> str:
+    """Text of a file in UTF-8, or in the code page that old tools write."""
+    content = path.read_bytes()
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("cp1252", "replace")

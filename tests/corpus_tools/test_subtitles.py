@@ -1,0 +1,113 @@
+"""Subtitles beside videos: cues become recordings of parts of a video."""
+
+import csv
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from corpus_tools.observe import Effort, by_video, observe
+from corpus_tools.recordings import Recording, find_recordings
+from corpus_tools.subtitles import read_cues
+from lexicon.errors import DataError
+from tts2face.video.media import read_pictures, read_sound
+
+SRT = "1\n00:00:01,000 --> 00:00:02,000\n<i>Hello</i>\nthere.\n\n2\n00:00:02,100 --> 00:00:03,500\nIt is £5.\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("a.srt", SRT.encode()),
+        ("a.srt", b"\xef\xbb\xbf" + SRT.encode()),
+        ("a.srt", SRT.replace("\n", "\r\n").encode("cp1252")),
+        ("a.vtt", b"WEBVTT\n\n" + SRT.replace(",", ".").encode()),
+    ],
+)
+def test_cues_are_read_and_widened_up_to_their_neighbours(name: str, content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    first, second = read_cues(path)
+    assert first.text == "Hello there."
+    assert second.text == "It is £5."
+    assert (first.begin, first.end) == pytest.approx((0.7, 2.05))
+    assert (second.begin, second.end) == pytest.approx((2.05, 3.8))
+
+
+@pytest.mark.parametrize("content", [b"", b"no subtitles at all", b"\x00\xff\xfe\x01" * 50])
+def test_a_file_without_subtitles_is_refused(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "a.srt"
+    path.write_bytes(content)
+    with pytest.raises(DataError, match="export them again"):
+        read_cues(path)
+
+
+def test_a_video_with_subtitles_is_a_recording_for_each_cue(tmp_path: Path) -> None:
+    (tmp_path / "talk.mp4").write_bytes(b"")
+    (tmp_path / "talk.srt").write_text(SRT, encoding="utf-8")
+    found = find_recordings(tmp_path)
+    assert [one.name for one in found] == ["talk-0001", "talk-0002"]
+    assert found[0].span == pytest.approx((0.7, 2.05))
+    assert find_recordings(tmp_path / "talk.mp4") == found
+    assert by_video([*found, Recording("x", tmp_path / "x.mp4", "A.")])[0] == found
+
+
+def joined(sources: list[Path], out: Path) -> list[tuple[float, float]]:
+    """Clips one behind the other in one MP4 with 44.1 kHz stereo sound; returns when each begins and ends."""
+    import soxr
+
+    spans, sounds, n_frames = [], [], 0
+    with av.open(str(out), "w") as container:
+        video = container.add_stream("libx264", rate=25, options={"crf": "15"})
+        audio = container.add_stream("aac", rate=44_100, layout="stereo")
+        for source in sources:
+            pictures = list(read_pictures(source))
+            if not n_frames:
+                video.height, video.width = pictures[0].pixels.shape[:2]
+                video.pix_fmt = "yuv420p"
+            for picture in pictures:
+                frame = av.VideoFrame.from_ndarray(picture.pixels, format="rgb24")
+                frame.pts, frame.time_base = n_frames, Fraction(1, 25)
+                container.mux(video.encode(frame))
+                n_frames += 1
+            sound = read_sound(source, 16_000).samples
+            whole = np.zeros(len(pictures) * 640, np.float32)
+            whole[: len(sound)] = sound[: len(whole)]
+            sounds.append(whole)
+            spans.append(((n_frames - len(pictures)) / 25, n_frames / 25))
+        samples = soxr.resample(np.concatenate(sounds), 16_000, 44_100)
+        frame = av.AudioFrame.from_ndarray(np.stack([samples, samples]).astype(np.float32), "fltp", "stereo")
+        frame.sample_rate = 44_100
+        container.mux(audio.encode(frame))
+        container.mux(audio.encode(None))
+        container.mux(video.encode(None))
+    return spans
+
+
+def test_one_long_video_with_subtitles_gives_what_its_parts_gave(
+    shared_recordings: Path, face_model: Path, tmp_path: Path
+) -> None:
+    source = shared_recordings / "grid_s1"
+    with (source / "manifest.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))[:3]
+    clips = [source / "clips" / f"{row['clip']}.mkv" for row in rows]
+    (tmp_path / "long").mkdir()
+    spans = joined(clips, tmp_path / "long" / "talk.mp4")
+    lines = []
+    for number, (row, (begin, _)) in enumerate(zip(rows, spans, strict=True), start=1):
+        start, end = begin + float(row["speech_start_s"]), begin + float(row["speech_end_s"])
+        lines += [str(number), f"00:00:{start:06.3f} --> 00:00:{end:06.3f}".replace(".", ","), row["transcript"], ""]
+    (tmp_path / "long" / "talk.srt").write_text("\n".join(lines), encoding="utf-8")
+    effort = Effort(tmp_path / "cache", 1, face_model)
+    cut = observe(tmp_path / "long", effort=effort)
+    assert not cut.refused
+    assert [one.name for one in cut.kept] == ["talk-0001", "talk-0002", "talk-0003"]
+    for one, row, (begin, _) in zip(cut.kept, rows, spans, strict=True):
+        said = [word.text for word in one.words]
+        assert len(said) == len(row["transcript"].split())
+        onset = begin + float(row["speech_start_s"])
+        first = one.quality.cut + one.phones.edges[one.words[0].first]
+        assert abs(first - onset) < 0.25
+        assert len(one.landmarks) == len(one.intensity) >= 25
