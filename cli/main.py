@@ -10,6 +10,7 @@ from cyclopts import App, CycloptsError, Parameter
 from cli.corpus import corpus
 from cli.exits import exit_code, sentence
 from cli.flags import chosen, flags_from
+from cli.mimic import mimic
 from cli.phones import phones
 from lexicon.errors import InputError, Tts2faceError
 from tts2face import __version__
@@ -24,6 +25,7 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 app.command(phones)
+app.command(mimic)
 app.command(corpus)
 
 

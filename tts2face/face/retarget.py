@@ -93,8 +93,13 @@ class Retargeter:
         return Trajectory(self.shape_names, weights, speech.fps)
 
 
-def retargeter(talker: Talker, face: Face) -> Retargeter:
+def retargeter(talker: Talker, face: Face, *, contact: FloatArray | None = None) -> Retargeter:
     """Prepare the way from a talker to a face.
+
+    Parameters
+    ----------
+    contact : (P,)
+        Gaps, in the talker's mm, up to which facing lip points touch; `contact_gaps` of the talker without it.
 
     Raises
     ------
@@ -124,7 +129,7 @@ def retargeter(talker: Talker, face: Face) -> Retargeter:
     dropped = moved[chin, 1].mean(axis=0)
     curvature += CHIN_WEIGHT * np.outer(dropped, dropped)
     pull += CHIN_WEIGHT * np.outer(dropped, wanted[chin, 1].mean(axis=0))
-    contact = scale * contact_gaps(talker)
+    contact = scale * (contact_gaps(talker) if contact is None else contact)
     gaps = _talker_gaps(talker, scale * turn[1], contact)
     return Retargeter(
         shape_names=face.shape_names,

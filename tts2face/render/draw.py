@@ -19,7 +19,7 @@ from tts2face.render.camera import Optics, optics
 from tts2face.render.light import lamps, light_table
 from tts2face.render.paint import Room, paint, room_for
 from tts2face.render.picture import PYVISTA, Picture
-from tts2face.render.plate import PlateStage, plate_drawn, plate_frame, plate_frames
+from tts2face.render.plate import SYNTHETIC, PlateStage, plate_drawn, plate_frame, plate_frames
 from tts2face.render.surface import Surface, surfaced
 from tts2face.types import Clip
 
@@ -38,8 +38,10 @@ class Stage:
 
     @property
     def notice(self) -> str:
-        """What every file of it says about itself: nothing, for a drawn head is plainly none of a person."""
-        return ""
+        """What every file of it says about itself; a drawn head says nothing unless it is a real person's likeness."""
+        if "consent" not in self.face.metadata:
+            return ""
+        return SYNTHETIC.format(name=self.face.metadata.get("name", "a person"))
 
 
 AnyStage = Stage | PlateStage

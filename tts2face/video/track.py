@@ -24,6 +24,10 @@ MESH_SIZE = 256  # pixels of the mesh network's square input
 CROP_SCALE = 1.5  # side of the square over the longer side of the landmarks' box, as the mesh network was trained
 CROP_SMOOTHING_S = 0.16  # standard deviation; slower than speech, faster than a turn of the head
 CROP_STEP = 0.015  # of the square's side: the second pass's two squares lie this much either side
+APART = 0.4  # of a square's side: faces whose middles are nearer are one face found twice
+SURE_LOGIT = 0.0  # the detector's logit from which the best detection is a face
+COUNTED_LOGIT = 1.0  # and from which further ones count
+SAME_FACE = 0.5  # of a face's size between the middles of two detections of it
 DETECTOR_GRIDS = ((16, 2), (8, 6))  # cells per side and anchors per cell of BlazeFace's two feature maps
 
 
@@ -101,14 +105,14 @@ class FaceTracker:
         without lag, and averages them: the square's own jitter is noise on the landmarks, above all on z. The
         landmarks are never smoothed over time.
         """
-        followed = [crop for _, crop in self._follow(pictures())]
+        followed = [crop for _, crop in self.follow(pictures())]
         if not followed:
             raise DataError("there is no picture to track a face in; check the recording")
         points = np.full((len(followed), N_LANDMARKS, 3), np.nan, np.float32)
         scores = np.zeros(len(followed), np.float32)
         for at, (pixels, crop) in enumerate(zip(pictures(), smoothed_crops(followed, fps), strict=False)):
             if crop is not None:
-                readings = [self.read_crop(pixels, moved) for moved in _moved(crop)]
+                readings = [self.read_crop(pixels, near) for near in moved(crop)]
                 scores[at] = np.mean([score for _, score in readings])
                 if scores[at] >= LEAST_SCORE:
                     points[at] = np.mean([found for found, _ in readings], axis=0)
@@ -116,24 +120,45 @@ class FaceTracker:
 
     def read(self, pixels: NDArray[np.uint8]) -> tuple[NDArray[np.float32], float]:
         """(478, 3) landmarks of one picture and their score; NaN and 0 where there is no face."""
-        return next((found, score) for (found, score), _ in self._follow([pixels]))
+        return next((found, score) for (found, score), _ in self.follow([pixels]))
 
     def detect(self, pixels: NDArray[np.uint8]) -> Crop | None:
         """Square around the most prominent face, or None."""
+        boxes, scores, shift, scale = self._detections(pixels)
+        best = int(scores.argmax())
+        if scores[best] < SURE_LOGIT:
+            return None
+        row = boxes[best].reshape(8, 2)  # centre, size, then right eye, left eye, nose, mouth, ears
+        centre, right_eye, left_eye = (row[[0, 2, 3]] + self._anchors[best] * DETECTOR_SIZE - shift) / scale
+        side = CROP_SCALE * float(row[1].max()) / scale
+        level = left_eye - right_eye
+        return Crop(float(centre[0]), float(centre[1]), side, float(np.arctan2(level[1], level[0])))
+
+    def count(self, pixels: NDArray[np.uint8]) -> int:
+        """How many faces a picture shows; detections nearer than half a face to a surer one are the same face."""
+        boxes, scores, _, _ = self._detections(pixels)
+        rows = boxes.reshape(len(boxes), 8, 2)
+        centres, sizes = rows[:, 0] + self._anchors * DETECTOR_SIZE, rows[:, 1].max(axis=1)
+        kept: list[int] = []
+        for number in np.argsort(scores)[::-1]:
+            if scores[number] < COUNTED_LOGIT:
+                break
+            away = [float(np.linalg.norm(centres[number] - centres[other])) / sizes[other] for other in kept]
+            if all(distance > SAME_FACE for distance in away):
+                kept.append(int(number))
+        return len(kept)
+
+    def _detections(
+        self, pixels: NDArray[np.uint8]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64], float]:
+        """Boxes (896, 16) and logits (896,) of the anchors, and the shift and scale of the detector's square."""
         height, width = pixels.shape[:2]
         scale = DETECTOR_SIZE / max(height, width)
         shift = np.array([DETECTOR_SIZE - scale * width, DETECTOR_SIZE - scale * height]) / 2
         affine = np.array([[scale, 0, shift[0]], [0, scale, shift[1]]])
         small = self._cv.warpAffine(pixels, affine, (DETECTOR_SIZE, DETECTOR_SIZE), flags=self._cv.INTER_AREA)
         boxes, logits = self._detector((small.astype(np.float32) / 127.5 - 1.0)[None])
-        best = int(logits[0, :, 0].argmax())
-        if logits[0, best, 0] < 0:
-            return None
-        row = boxes[0, best].reshape(8, 2)  # centre, size, then right eye, left eye, nose, mouth, ears
-        centre, right_eye, left_eye = (row[[0, 2, 3]] + self._anchors[best] * DETECTOR_SIZE - shift) / scale
-        side = CROP_SCALE * float(row[1].max()) / scale
-        level = left_eye - right_eye
-        return Crop(float(centre[0]), float(centre[1]), side, float(np.arctan2(level[1], level[0])))
+        return boxes[0], logits[0, :, 0], shift, scale
 
     def read_crop(self, pixels: NDArray[np.uint8], crop: Crop) -> tuple[NDArray[np.float32], float]:
         """(478, 3) landmarks in pixels of the picture, and their score, from one square of it."""
@@ -156,10 +181,10 @@ class FaceTracker:
         score = 1.0 / (1.0 + np.exp(-float(raw[1].ravel()[0])))
         return np.column_stack([flat, local[:, 2] / scale]).astype(np.float32), score
 
-    def _follow(
+    def follow(
         self, pictures: Iterable[NDArray[np.uint8]]
     ) -> Iterator[tuple[tuple[NDArray[np.float32], float], Crop | None]]:
-        """Landmarks and score of each picture, and the square around them."""
+        """Landmarks and score of each picture in turn, as soon as it comes, and the square around them."""
         crop: Crop | None = None
         for pixels in pictures:
             points, score = np.full((N_LANDMARKS, 3), np.nan, np.float32), 0.0
@@ -201,7 +226,8 @@ def smoothed_crops(crops: Sequence[Crop | None], fps: float) -> list[Crop | None
     return smooth
 
 
-def _moved(crop: Crop) -> Iterator[Crop]:
+def moved(crop: Crop) -> Iterator[Crop]:
+    """The two squares, a little either side of a crop, from which a picture is read."""
     for sign in (1.0, -1.0):
         step = sign * CROP_STEP * crop.side
         yield Crop(crop.x + step, crop.y + step, crop.side * (1.0 + 2.0 * sign * CROP_STEP), crop.angle)

@@ -1,0 +1,141 @@
+"""``tts2face mimic``: a video of a person, or a capture of her face, drives any face."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from cli.progress import progress_bar, say
+from lexicon.errors import InputError
+
+if TYPE_CHECKING:
+    from tts2face.mimic import Motion
+    from tts2face.render.draw import AnyStage
+    from tts2face.render.picture import Picture
+    from tts2face.types import Waveform
+
+OWN, CAPTURE = "self", ".csv"
+SOUND_RATE = 48000  # Hz
+MOST_FPS = 30.0  # captures run faster than films need
+
+Progress = Callable[[int, int], None]
+
+
+def mimic(  # noqa: PLR0913 - one parameter a flag
+    take: Annotated[Path, Parameter(help="A video of one person, or a .csv file of Live Link Face.")],
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="The clip: .mp4, .webm, .gif, or a folder for .png files.", alias="-o")],
+    face: Annotated[
+        str, Parameter(help="What is shown: head, cartoon, a .face file, or self (with --talker).")
+    ] = "head",
+    identity: Annotated[str | None, Parameter(help="A preset of the face's age, sex and ancestry.")] = None,
+    talker: Annotated[Path | None, Parameter(help="With --face self: the talker whose own face is shown.")] = None,
+    gain: Annotated[float, Parameter(help="Factor on the motion of lips and brows.")] = 1.0,
+    fps: Annotated[float | None, Parameter(help="Frames per second; the take's own, at most 30 of a capture.")] = None,
+    audio: Annotated[Path | None, Parameter(help="The sound that belongs to a capture.")] = None,
+    size: Annotated[str, Parameter(help="Width x height in pixels.")] = "512x512",
+    background: Annotated[str, Parameter(help="studio, transparent, a colour, or an image file.")] = "studio",
+    model: Annotated[Path | None, Parameter(help="face_landmarker.task; found or set up without it.")] = None,
+    quiet: Annotated[bool, Parameter(help="No progress bar and no last line.", negative="")] = False,
+) -> None:
+    """Let a recorded person drive a face: lips, eyes, brows and head; her sound is kept."""
+    began = time.perf_counter()
+    from tts2face.render.output import checked_output
+    from tts2face.render.picture import Picture
+
+    checked_output(out)
+    if not 0.0 <= gain <= 4.0:
+        raise InputError(f"the gain must lie from 0 to 4, not {gain:g}; 1 leaves the motion as it is")
+    if (face == OWN) != (talker is not None):
+        raise InputError("--face self shows a talker's own face: give both --face self and --talker FILE")
+    if audio is not None and take.suffix.lower() != CAPTURE:
+        raise InputError("--audio belongs to a capture; a film brings its own sound")
+    wanted = Wanted(take, face, identity, talker, gain, Picture(size=size, background=background))
+    with progress_bar("watching", quiet) as on_progress:
+        motion, stage = _capture(wanted) if take.suffix.lower() == CAPTURE else _film(wanted, model, on_progress)
+    if fps is not None or take.suffix.lower() == CAPTURE:
+        from tts2face.mimic import at_rate
+
+        motion = at_rate(motion, fps or min(motion.face.fps, MOST_FPS))
+    seconds = len(motion.face) / motion.face.fps
+    _write(motion, _sound(take, audio, quiet), stage, out, quiet)
+    if not quiet:
+        took = time.perf_counter() - began
+        say(f"wrote {out}: {seconds:.1f} s, made in {took:.1f} s ({seconds / took:.1f} x real time)")
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """Who drives what, and how it is drawn."""
+
+    take: Path
+    face: str
+    identity: str | None
+    talker: Path | None
+    gain: float
+    picture: "Picture"
+
+
+def _capture(wanted: Wanted) -> "tuple[Motion, AnyStage]":
+    from tts2face.face.file import load_face
+    from tts2face.mimic import motion_of_capture
+    from tts2face.render.draw import staged
+    from tts2face.video.livelink import read_livelink
+
+    if wanted.talker is not None:
+        raise InputError("a capture has no landmarks to clone; choose --face head, cartoon or a .face file")
+    shown = load_face(wanted.face, wanted.identity)
+    return motion_of_capture(read_livelink(wanted.take), shown, gain=wanted.gain), staged(shown, wanted.picture)
+
+
+def _film(wanted: Wanted, model: Path | None, on_progress: "Progress | None") -> "tuple[Motion, AnyStage]":
+    from tts2face.face.file import load_face
+    from tts2face.mimic import motion_of_own, motion_of_take
+    from tts2face.render.draw import staged
+    from tts2face.render.plate import plate_staged
+    from tts2face.talker import read_talker
+    from tts2face.video.blendshapes import BlendshapeReader
+    from tts2face.video.perform import read_take
+    from tts2face.video.track import FaceTracker
+
+    shown = None if wanted.talker is not None else load_face(wanted.face, wanted.identity)
+    hers = None if wanted.talker is None else read_talker(wanted.talker)
+    stage = plate_staged(hers, wanted.picture) if hers is not None else None
+    seen = read_take(wanted.take, FaceTracker(model), BlendshapeReader(model), on_progress=on_progress)
+    if hers is not None and stage is not None:
+        return motion_of_own(seen, hers, gain=wanted.gain), stage
+    if shown is None:
+        raise InputError("there is no face to drive; choose --face head")
+    return motion_of_take(seen, shown, gain=wanted.gain), staged(shown, wanted.picture)
+
+
+def _sound(take: Path, audio: Path | None, quiet: bool) -> "Waveform":
+    """The sound of a take; silence, and a word about it, where there is none."""
+    import numpy as np
+
+    from tts2face.types import Waveform
+    from tts2face.video.media import media_facts, read_sound
+
+    if audio is not None:
+        return read_sound(audio, SOUND_RATE)
+    if take.suffix.lower() != CAPTURE and media_facts(take).rate:
+        return read_sound(take, SOUND_RATE)
+    if not quiet:
+        say(f"{take} holds no sound; the clip is silent")
+    return Waveform(np.zeros(0, np.float32), SOUND_RATE)
+
+
+def _write(motion: "Motion", sound: "Waveform", stage: "AnyStage", out: Path, quiet: bool) -> None:
+    from tts2face.mimic import clips_of
+    from tts2face.render.encode import ClipWriter
+
+    n_frames = len(motion.face)
+    with progress_bar("drawing", quiet) as on_progress:
+        tell = on_progress and (lambda done, _: on_progress(done, n_frames))
+        with ClipWriter(out, stage, on_progress=tell) as writer:
+            for clip in clips_of(motion, sound):
+                writer.add(clip)

@@ -1,0 +1,183 @@
+"""A person's video drives a face: found again by the tracker in the clip; what cannot be read is refused."""
+
+import re
+import shutil
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from cli.main import run
+from lexicon.errors import BackendError
+from tts2face.face.performer import aperture
+from tts2face.video.media import media_facts, read_pictures
+from tts2face.video.model import find_bundle
+from tts2face.video.pose import head_angles, remove_pose
+from tts2face.video.track import FaceTracker
+
+FPS = 25.0
+
+
+@pytest.fixture(scope="module")
+def bundle() -> Path:
+    pytest.importorskip("cv2", reason="needs `pip install 'tts2face[capture]'`")
+    try:
+        return find_bundle(None)
+    except BackendError as missing:
+        pytest.skip(str(missing))
+
+
+@pytest.fixture(scope="module")
+def film(shared_recordings: Path) -> Path:
+    return shared_recordings / "grid_s1" / "clips" / "bbaf2n.mkv"
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def watched(path: Path, bundle: Path) -> tuple[np.ndarray, np.ndarray]:
+    """(T, 478, 3) landmarks in mm and (T, 3) head angles in degrees against their middle."""
+    points = FaceTracker(bundle).track(lambda: (picture.pixels for picture in read_pictures(path)), FPS).points
+    posed = remove_pose(points, FPS)
+    angles = np.degrees(head_angles(posed.rotations))
+    return posed.landmarks, angles - np.median(angles, axis=0)
+
+
+def gap(landmarks: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(landmarks[:, 13] - landmarks[:, 14], axis=1)
+
+
+@pytest.mark.parametrize("face", ["head", "cartoon"])
+def test_lips_lids_and_head_of_the_clip_are_the_performer_s(face: str, film: Path, bundle: Path, here: Path) -> None:
+    assert run(["mimic", str(film), "--face", face, "--out", "m.mp4", "--quiet", "--model", str(bundle)]) == 0
+    facts = media_facts(here / "m.mp4")
+    assert facts.fps == FPS
+    assert facts.rate == 48_000
+    source, source_head = watched(film, bundle)
+    shown, shown_head = watched(here / "m.mp4", bundle)
+    assert len(shown) == len(source)
+    assert np.corrcoef(gap(source), gap(shown))[0, 1] >= 0.95
+    assert (np.abs(source_head - shown_head).mean(axis=0) <= 1.0).all()
+    if face == "head":
+        for side in ("Left", "Right"):
+            assert np.corrcoef(aperture(source, side), aperture(shown, side))[0, 1] > 0.8
+
+
+def test_a_capture_moves_the_shapes_of_its_names(shared_recordings: Path, here: Path) -> None:
+    folder = shared_recordings / "livelink"
+    rows = (folder / "testset_arkit61_60fps.csv").read_text().splitlines()
+    (here / "short.csv").write_text("\n".join(rows[:121]) + "\n")
+    sound = str(folder / "testset_audio.flac")
+    assert run(["mimic", "short.csv", "--audio", sound, "--out", "m.mp4", "--size", "64x64", "--quiet"]) == 0
+    facts = media_facts(here / "m.mp4")
+    assert facts.fps == 30.0
+    assert facts.duration == pytest.approx(2.0, abs=0.1)
+
+
+def test_a_film_without_sound_makes_a_silent_clip_and_says_so(
+    film: Path, bundle: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written(here / "mute.mp4", [picture.pixels for picture in read_pictures(film)][:20])
+    assert run(["mimic", "mute.mp4", "--out", "m.mp4", "--size", "64x64", "--model", str(bundle)]) == 0
+    assert "holds no sound; the clip is silent" in capsys.readouterr().err
+    assert (here / "m.mp4").exists()
+
+
+def written(path: Path, pictures: list[np.ndarray]) -> None:
+    height, width = (side - side % 2 for side in pictures[0].shape[:2])
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=Fraction(25))
+        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+        for picture in pictures:
+            even = np.ascontiguousarray(picture[:height, :width])
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(even, format="rgb24")))
+        container.mux(stream.encode(None))
+
+
+def test_films_that_cannot_drive_a_face_are_refused(
+    film: Path, bundle: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pictures = [picture.pixels for picture in read_pictures(film)][:6]
+    blue = np.zeros_like(pictures[0])
+    blue[:, :, 2] = np.arange(blue.shape[1])
+    written(here / "nobody.mp4", [blue] * 6)
+    written(here / "two.mp4", [np.concatenate([picture, picture], axis=1) for picture in pictures])
+    (here / "empty.mp4").touch()
+    (here / "cut.mkv").write_bytes(film.read_bytes()[:40_000])
+    (here / "words.mp4").write_text("no film\n" * 100)
+    for name, reason in {
+        "nobody.mp4": "shows no face",
+        "two.mp4": "shows 2 faces",
+        "empty.mp4": "is empty (0 bytes)",
+        "cut.mkv": "is truncated",
+        "words.mp4": "cannot be read as video",
+        "none.mp4": "there is no recording",
+    }.items():
+        before = sorted(here.iterdir())
+        assert run(["mimic", name, "--out", "m.mp4", "--quiet", "--model", str(bundle)]) != 0
+        assert reason in capsys.readouterr().err
+        assert sorted(here.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["--out", "m.txt"], "m.txt"),
+        (["--out", "m.mp4", "--gain", "9"], "gain must lie from 0 to 4"),
+        (["--out", "m.mp4", "--face", "self"], "give both --face self and --talker"),
+        (["--out", "m.mp4", "--audio", "x.wav"], "a film brings its own sound"),
+        (["--out", "m.mp4", "--face", "nobody"], "nobody"),
+    ],
+)
+def test_orders_that_make_no_sense_are_refused(
+    words: list[str], reason: str, film: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["mimic", str(film), *words]) != 0
+    assert reason in capsys.readouterr().err
+    assert not list(here.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ("", "not a CSV file of Live Link Face"),
+        ("a,b\n1,2\n3,4\n", "needs the columns Timecode"),
+        ("Timecode,BlendshapeCount,JawOpen\n10:00:00:00.0,61,0.1\n10:00:00:01.0,61\n", "line 3 of .* has 2 columns"),
+        ("Timecode,BlendshapeCount,JawOpen\n10:00:00:00.0,61,x\n10:00:00:01.0,61,0\n", "line 2 of .* cannot be read"),
+        ("Timecode,BlendshapeCount,JawOpen\n10:00:00:02.0,61,0\n10:00:00:01.0,61,0\n", "do not run evenly"),
+    ],
+)
+def test_captures_that_cannot_be_read_are_refused(
+    content: str, reason: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "x.csv").write_text(content)
+    assert run(["mimic", "x.csv", "--out", "m.mp4"]) != 0
+    assert re.search(reason, capsys.readouterr().err)
+    assert [path.name for path in here.iterdir()] == ["x.csv"]
+
+
+def test_a_copy_under_another_name_gives_the_same_bytes(film: Path, bundle: Path, here: Path) -> None:
+    shutil.copy(film, here / "take.mkv")
+    for source, out in ((str(film), "a"), ("take.mkv", "b")):
+        words = [
+            "mimic",
+            source,
+            "--out",
+            f"{out}/",
+            "--size",
+            "64x64",
+            "--fps",
+            "5",
+            "--quiet",
+            "--model",
+            str(bundle),
+        ]
+        assert run(words) == 0
+    names = sorted(path.name for path in (here / "a").iterdir())
+    assert len(names) > 10
+    assert all((here / "a" / name).read_bytes() == (here / "b" / name).read_bytes() for name in names)

@@ -1,0 +1,92 @@
+"""Facial capture of the app Live Link Face: a CSV file with 61 ARKit channels a frame."""
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError, InputError
+from tts2face.types import HEAD_CHANNELS, Trajectory
+
+HEAD = ("HeadPitch", "HeadYaw", "HeadRoll")
+LEAST_FPS, MOST_FPS = 10.0, 240.0
+MOST_GAP_S = 0.5
+COUNTED_RATES = (24, 25, 30, 50, 60, 120)  # frames in a second of timecode
+SIGNS = np.array([-1.0, -1.0, 1.0])  # the app's pitch is up, its yaw towards the right of the person
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Capture:
+    """Weights (T, 52) by ARKit name and the head's pose (T, 6), its place unknown, at an even rate."""
+
+    weights: Trajectory
+    head: Trajectory
+
+
+def read_livelink(path: Path) -> Capture:
+    """The capture in a Live Link Face file.
+
+    Raises
+    ------
+    InputError
+        There is no such file.
+    DataError
+        It is not such a file, or a row of it is damaged.
+    """
+    if not path.is_file():
+        raise InputError(f"there is no capture {path}; check the path")
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = [row for row in csv.reader(file) if row]
+    except (UnicodeDecodeError, csv.Error) as broken:
+        raise DataError(f"{path} is not a CSV file of Live Link Face ({broken})") from broken
+    if not rows or rows[0][:1] != ["Timecode"] or "JawOpen" not in rows[0] or len(rows) < 3:
+        raise DataError(f"{path} is not a CSV file of Live Link Face: it needs the columns Timecode, JawOpen, ...")
+    names, times, values = _numbers(path, rows)
+    fps = _rate(path, times)
+    n_frames = int(np.floor((times[-1] - times[0]) * fps + 0.5)) + 1
+    even = times[0] + np.arange(n_frames) / fps
+    read = np.stack([np.interp(even, times, column) for column in values.T], axis=1)
+    shapes = [at for at, name in enumerate(names) if not name.startswith(("Head", "LeftEye", "RightEye"))]
+    channels = tuple(names[at][0].lower() + names[at][1:] for at in shapes)
+    head = np.zeros((n_frames, len(HEAD_CHANNELS)))
+    if all(name in names for name in HEAD):
+        turns = read[:, [names.index(name) for name in HEAD]]
+        head[:, :3] = SIGNS * (turns - np.median(turns, axis=0))
+    return Capture(Trajectory(channels, read[:, shapes], fps), Trajectory(HEAD_CHANNELS, head, fps))
+
+
+def _numbers(path: Path, rows: list[list[str]]) -> tuple[list[str], NDArray[np.float64], NDArray[np.float64]]:
+    names = rows[0][2:]
+    times, values = [], []
+    for number, row in enumerate(rows[1:], start=2):
+        if len(row) != len(rows[0]):
+            raise DataError(f"line {number} of {path} has {len(row)} columns, not {len(rows[0])}; export it again")
+        try:
+            times.append(_timecode(row[0]))
+            values.append([float(cell) for cell in row[2:]])
+        except ValueError as broken:
+            raise DataError(f"line {number} of {path} cannot be read ({broken}); export it again") from broken
+    if not np.isfinite(values).all():
+        raise DataError(f"{path} holds values that are no numbers; export it again")
+    seconds, frames = np.array(times).T
+    counted = next((rate for rate in COUNTED_RATES if rate > frames.max()), COUNTED_RATES[-1])
+    return names, seconds + frames / counted, np.array(values)
+
+
+def _timecode(text: str) -> tuple[float, float]:
+    """Seconds and frames of ``hours:minutes:seconds:frames``."""
+    hours, minutes, seconds, frames = text.split(":")
+    return int(hours) * 3600.0 + int(minutes) * 60.0 + float(seconds), float(frames)
+
+
+def _rate(path: Path, times: NDArray[np.float64]) -> float:
+    steps = np.diff(times)
+    if (steps <= 0).any() or steps.max() > MOST_GAP_S:
+        raise DataError(f"the times of {path} do not run evenly from row to row; export it again")
+    fps = float(np.round(1.0 / np.mean(steps)))
+    if not LEAST_FPS <= fps <= MOST_FPS:
+        raise DataError(f"{path} has {fps:g} frames a second; {LEAST_FPS:g} to {MOST_FPS:g} can be read")
+    return fps
