@@ -100,12 +100,12 @@ def _film(wanted: Wanted, model: Path | None, on_progress: "Progress | None") ->
     from tts2face.talker import read_talker
     from tts2face.video.blendshapes import BlendshapeReader
     from tts2face.video.perform import read_take
-    from tts2face.video.track import FaceTracker
+    from tts2face.video.steady import FilmReader
 
     shown = None if wanted.talker is not None else load_face(wanted.face, wanted.identity)
     hers = None if wanted.talker is None else read_talker(wanted.talker)
     stage = plate_staged(hers, wanted.picture) if hers is not None else None
-    seen = read_take(wanted.take, FaceTracker(model), BlendshapeReader(model), on_progress=on_progress)
+    seen = read_take(wanted.take, FilmReader(model), BlendshapeReader(model), on_progress=on_progress)
     if hers is not None and stage is not None:
         return motion_of_own(seen, hers, gain=wanted.gain), stage
     if shown is None:

@@ -14,7 +14,7 @@ HEAD = ("HeadPitch", "HeadYaw", "HeadRoll")
 LEAST_FPS, MOST_FPS = 10.0, 240.0
 MOST_GAP_S = 0.5
 COUNTED_RATES = (24, 25, 30, 50, 60, 120)  # frames in a second of timecode
-SIGNS = np.array([-1.0, -1.0, 1.0])  # the app's pitch is up, its yaw towards the right of the person
+SIGNS = np.array([1.0, -1.0, 1.0])  # as of its eyes: pitch down (EyePitch follows EyeLookDown), yaw to the right
 
 
 @dataclass(frozen=True, slots=True, eq=False)

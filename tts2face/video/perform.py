@@ -1,6 +1,6 @@
 """A take: what a performer's face and head do in a video, frame by frame, ready to drive any face."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.grid import on_grid
 from tts2face.video.media import media_facts, read_pictures
 from tts2face.video.pose import head_angles, remove_pose
-from tts2face.video.track import FaceTracker
+from tts2face.video.steady import FilmReader, Sight
 
 LEAST_SEEN = 0.5  # of the frames must show a face
 PROFILE_RAD = 0.8  # median turn beyond which landmarks of the far side are guessed
@@ -48,15 +48,13 @@ class Take:
         return self.head.fps
 
 
-def read_take(
-    video: Path, tracker: FaceTracker, reader: BlendshapeReader, *, on_progress: Progress | None = None
-) -> Take:
+def read_take(video: Path, film: FilmReader, reader: BlendshapeReader, *, on_progress: Progress | None = None) -> Take:
     """The take in a video.
 
     Parameters
     ----------
     on_progress
-        Called with frames read and of all; the tracker reads every frame twice.
+        Called with frames read and of all.
 
     Raises
     ------
@@ -65,25 +63,21 @@ def read_take(
     DataError
         It cannot be read as video, or shows no face, several faces, or one in profile.
     """
-    fps = media_facts(video).fps
-    times = np.array([picture.time for picture in read_pictures(video)])
-    _require_one_face(video, tracker, len(times))
-    n_read = 0
-
-    def pictures() -> Iterator[NDArray[np.uint8]]:
-        nonlocal n_read
-        for picture in read_pictures(video):
-            yield picture.pixels
-            n_read += 1
-            if on_progress:
-                on_progress(n_read, 2 * len(times))
-
-    tracking = tracker.track(pictures, fps)
-    seen = ~tracking.is_missing
+    facts = media_facts(video)
+    fps, of = facts.fps, max(1, round(facts.duration * facts.fps))
+    found: list[Sight] = []
+    for sight in film.sights(read_pictures(video), fps):
+        found.append(sight)
+        if on_progress:
+            on_progress(min(len(found), of), of)
+    times, pixels = np.array([sight.time for sight in found]), np.array([sight.points for sight in found])
+    seen = np.isfinite(pixels[:, 0, 0])
+    if not seen.any():
+        raise DataError(f"{video} shows no face; film one from the front, in the light")
     if seen.mean() < LEAST_SEEN:
         raise DataError(f"{video} shows a face in {seen.sum()} of {len(seen)} frames; film it from the front")
-    scores = np.array([reader.blendshape_scores(points) for points in tracking.points[seen]])
-    points, first = on_grid(_bridged(tracking.points[seen], times[seen], times), times, fps)
+    scores = np.array([reader.blendshape_scores(points) for points in pixels[seen]])
+    points, first = on_grid(_bridged(pixels[seen], times[seen], times), times, fps)
     read, _ = on_grid(_bridged(scores, times[seen], times), times, fps)
     points, read = _from_the_start(points, first), _from_the_start(read, first)
     posed = remove_pose(points, fps)
@@ -94,16 +88,6 @@ def read_take(
     head -= np.median(head, axis=0)
     n_guessed = int((~seen).sum())
     return Take(posed.landmarks, Trajectory(HEAD_CHANNELS, head, fps), Trajectory(BLENDSHAPES, read, fps), n_guessed)
-
-
-def _require_one_face(video: Path, tracker: FaceTracker, n_frames: int) -> None:
-    """Refuse a video whose first, middle or last picture shows several faces; a passer-by in one of them is none."""
-    looked_at = {0, n_frames // 2, n_frames - 1}
-    counts = [tracker.count(picture.pixels) for at, picture in enumerate(read_pictures(video)) if at in looked_at]
-    if not counts or max(counts) == 0:
-        raise DataError(f"{video} shows no face; film one from the front, in the light")
-    if sum(count > 1 for count in counts) * 2 > len(counts):
-        raise DataError(f"{video} shows {max(counts)} faces; film or cut it so that one is seen")
 
 
 def _bridged(
