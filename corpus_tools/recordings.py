@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from corpus_tools.subtitles import read_cues, subtitles_beside
+from corpus_tools.transcripts.beside import said_in, transcript_of
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import DataError, InputError
 from lexicon.normalize import normalize
@@ -31,13 +32,13 @@ Ways = tuple[tuple[str, ...], ...]  # pronunciations of one word, each a row of 
 class Recording:
     """One video and what is said in it; `is_spelling` marks words of one letter as names of letters.
 
-    ``transcript`` is None where the folder does not say what is spoken. ``span`` are the seconds of the video that the
-    recording takes, None where it takes all.
+    ``transcript`` is its text, or the file that holds it; None where the folder does not say what is spoken.
+    ``span`` are the seconds of the video that the recording takes, None where it takes all.
     """
 
     name: str
     video: Path
-    transcript: str | None
+    transcript: str | Path | None
     is_spelling: bool = False
     span: tuple[float, float] | None = None
 
@@ -47,7 +48,7 @@ def find_recordings(folder: Path) -> tuple[Recording, ...]:
 
     Two layouts are read: ``manifest.csv`` (columns clip, transcript) beside a folder ``clips``, as the GRID corpus is
     kept here, where single letters are names of letters; and videos with subtitles (.srt, .vtt; every cue is a
-    recording) or a text file (.txt) of the same name beside each.
+    recording) or a transcript (.txt, .TextGrid, .align) of the same name beside each.
 
     Raises
     ------
@@ -73,11 +74,12 @@ def spoken_words(recording: Recording) -> tuple[tuple[str, Ways], ...]:
     Raises
     ------
     DataError
-        There is no transcript, no word in it, or a word that nobody can say.
+        There is no transcript, it cannot be read, holds no word, or one that nobody can say.
     """
     if recording.transcript is None:
         raise DataError(f"{recording.name} has no transcript; put its words into {recording.video.stem}.txt beside it")
-    text = recording.transcript if recording.is_spelling else normalize(recording.transcript)
+    said = said_in(recording.transcript) if isinstance(recording.transcript, Path) else recording.transcript
+    text = said if recording.is_spelling else normalize(said)
     words = re.findall(r"[^\W_]+(?:['’][^\W_]+)*", text)
     if not words:
         raise DataError(f"the transcript of {recording.name} holds no word; write what is said")
@@ -135,21 +137,17 @@ def _plain(folder: Path) -> tuple[Recording, ...]:
 
 
 def _said_in(video: Path) -> Iterator[Recording]:
-    """The recordings in a video: one for each cue of its subtitles, or the whole."""
+    """The recordings in a video: one for each cue of its subtitles, or the whole; damage is told when it is read."""
     subtitles = subtitles_beside(video)
-    if subtitles is None:
-        yield Recording(video.stem, video, _text_beside(video))
-        return
-    for number, cue in enumerate(read_cues(subtitles), start=1):
+    try:
+        cues = read_cues(subtitles) if subtitles else ()
+    except DataError:
+        cues = ()
+    for number, cue in enumerate(cues, start=1):
         yield Recording(f"{video.stem}-{number:04d}", video, cue.text, span=(cue.begin, cue.end))
+    if not cues:
+        yield Recording(video.stem, video, subtitles or transcript_of(video))
 
 
 def _videos(folder: Path) -> list[Path]:
     return sorted(path for path in folder.iterdir() if path.suffix.lower() in VIDEO_SUFFIXES)
-
-
-def _text_beside(video: Path) -> str | None:
-    try:
-        return video.with_suffix(".txt").read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError):
-        return None

@@ -1,11 +1,15 @@
 """Subtitles beside a video: what is said, and about when."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from lexicon.errors import DataError
+from corpus_tools.transcripts.text import read_text
+from lexicon.errors import BackendError, DataError
 
 FORMATS = {".srt": "srt", ".vtt": "vtt"}  # stated to the reader: it guesses wrongly for files without a header
+# Blocks for people and for styling; the reader would take them for words of the cue before (W3C WebVTT, 4.1).
+_UNSPOKEN = re.compile(r"(?:(?<=\n\n)|^)(?:NOTE|STYLE|REGION)\b(?:.+\n?)*")
 MARGIN_S = 0.3  # before and behind a cue; subtitles are rarely nearer to the speech
 
 
@@ -33,11 +37,16 @@ def read_cues(path: Path) -> tuple[Cue, ...]:
     BackendError
         The package pysubs2 is missing.
     """
-    import pysubs2
-
     try:
-        read = pysubs2.SSAFile.from_string(_decoded(path), format_=FORMATS[path.suffix.lower()])
-    except (pysubs2.exceptions.Pysubs2Error, ValueError) as broken:
+        import pysubs2
+    except ImportError as missing:
+        raise BackendError("subtitles need the package pysubs2; pip install 'tts2face[capture]'") from missing
+    text = read_text(path).replace("\r\n", "\n").replace("\r", "\n")
+    if path.suffix.lower() == ".vtt":
+        text = _UNSPOKEN.sub("", text)
+    try:
+        read = pysubs2.SSAFile.from_string(text, format_=FORMATS[path.suffix.lower()])
+    except (pysubs2.exceptions.Pysubs2Error, ValueError, OverflowError) as broken:
         raise DataError(f"{path} cannot be read as subtitles ({broken}); export them again") from broken
     spoken = sorted((event.start / 1000, event.end / 1000, event.plaintext.strip()) for event in read)
     spoken = [(begin, end, text) for begin, end, text in spoken if text and end > begin]
@@ -50,12 +59,3 @@ def read_cues(path: Path) -> tuple[Cue, ...]:
         earliest, latest = min((before + begin) / 2, begin), max((end + behind) / 2, end)
         cues.append(Cue(max(begin - MARGIN_S, earliest, 0.0), min(end + MARGIN_S, latest), " ".join(text.split())))
     return tuple(cues)
-
-
-def _decoded(path: Path) -> str:
-    """Text of a file in UTF-8, or in the code page that old tools write."""
-    content = path.read_bytes()
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return content.decode("cp1252", "replace")

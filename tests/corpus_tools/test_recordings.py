@@ -20,7 +20,8 @@ def test_plain_videos_have_their_text_beside_them(tmp_path):
     (tmp_path / "x.txt").write_text("A word.", encoding="utf-8-sig")
     (tmp_path / "notes.doc").touch()
     (found,) = find_recordings(tmp_path)
-    assert (found.name, found.transcript, found.is_spelling) == ("x", "A word.", False)
+    assert (found.name, found.transcript, found.is_spelling) == ("x", tmp_path / "x.txt", False)
+    assert [word for word, _ in spoken_words(found)] == ["A", "word"]
 
 
 def test_single_letters_are_letter_names_where_the_corpus_spells(tmp_path):

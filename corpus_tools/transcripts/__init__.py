@@ -1,0 +1,1 @@
+"""Readers of what is said in a recording, one file format each."""

@@ -1,0 +1,178 @@
+"""Transcripts of every kind, whole and damaged."""
+
+import contextlib
+
+import numpy as np
+import pytest
+
+from corpus_tools.recordings import find_recordings, spoken_words
+from corpus_tools.subtitles import Cue, read_cues
+from corpus_tools.transcripts.beside import READERS, said_in, transcript_of
+from corpus_tools.transcripts.text import LARGEST_BYTES, read_text
+from lexicon.errors import DataError
+
+SRT = """1
+00:00:01,000 --> 00:00:02,500
+<i>Place blue</i>
+at F two
+
+2
+00:01:00,250 --> 00:01:01,000
+[door slams]
+
+3
+00:01:02,000 --> 00:01:03,000
+ANNA: now – café
+"""
+VTT = """WEBVTT
+
+00:01.000 --> 00:02.500
+Place blue
+
+NOTE nothing
+
+01:02:03.000 --> 01:02:04.000
+again
+"""
+LONG_GRID = """File type = "ooTextFile"
+Object class = "TextGrid"
+
+xmin = 0
+xmax = 2.5
+tiers? <exists>
+size = 2
+item []:
+    item [1]:
+        class = "IntervalTier"
+        name = "phones"
+        xmin = 0
+        xmax = 2.5
+        intervals: size = 1
+        intervals [1]:
+            xmin = 0
+            xmax = 2.5
+            text = "b"
+    item [2]:
+        class = "IntervalTier"
+        name = "words"
+        xmin = 0
+        xmax = 2.5
+        intervals: size = 3
+        intervals [1]:
+            xmin = 0
+            xmax = 0.5
+            text = ""
+        intervals [2]:
+            xmin = 0.5
+            xmax = 1.25
+            text = "say ""hi"" [2]"
+        intervals [3]:
+            xmin = 1.25
+            xmax = 2.5
+            text = "sp"
+"""
+SHORT_GRID = 'File type = "ooTextFile"\n"TextGrid"\n\n0\n2.5\n<exists>\n2\n"TextTier"\n"beeps"\n0\n2.5\n1\n0.5\n"x"\n'
+SHORT_GRID += '"IntervalTier"\n"said"\n0\n2.5\n1\n0.5\n2\n"blue"\n'
+ALIGN = "0 23750 sil\n23750 29500 bin\n29500 34000 blue\n34000 70000 sil\n"
+WHOLE = {".srt": SRT, ".vtt": VTT, ".TextGrid": LONG_GRID, ".align": ALIGN}
+
+
+@pytest.fixture
+def write(tmp_path):
+    def written(suffix, content, encoding="utf-8"):
+        path = tmp_path / f"take{suffix}"
+        path.write_bytes(content if isinstance(content, bytes) else content.encode(encoding))
+        return path
+
+    return written
+
+
+def cues_of(path):
+    return READERS[path.suffix.lower()](path)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-32", "cp1252"])
+def test_every_encoding_says_the_same(write, encoding):
+    assert [cue.text for cue in read_cues(write(".srt", SRT, encoding))][-1] == "ANNA: now – café"
+
+
+@pytest.mark.parametrize("header", ["WEBVTT\n\n", "\ufeffWEBVTT\n\n", ""])
+def test_vtt_keeps_its_first_cue_with_and_without_header(write, header):
+    cues = cues_of(write(".vtt", VTT.replace("WEBVTT\n\n", header)))
+    assert [cue.text for cue in cues] == ["Place blue", "again"]
+    assert cues[1].begin < 3723.0 < cues[1].end
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_a_long_textgrid_gives_its_tier_of_words(write, encoding):
+    assert cues_of(write(".TextGrid", LONG_GRID, encoding)) == (Cue(0.5, 1.25, 'say "hi" [2]'),)
+
+
+def test_a_short_textgrid_without_a_tier_of_words_gives_its_first_intervals(write):
+    assert cues_of(write(".TextGrid", SHORT_GRID)) == (Cue(0.5, 2.0, "blue"),)
+
+
+def test_word_times_are_samples_of_25_khz(write):
+    assert cues_of(write(".align", ALIGN)) == (Cue(0.95, 1.18, "bin"), Cue(1.18, 1.36, "blue"))
+
+
+def test_all_grid_alignments_say_what_the_manifest_says(shared_recordings):
+    folder = shared_recordings / "grid_s1"
+    listed = {one.name: one.transcript for one in find_recordings(folder)}
+    aligned = {path.stem: said_in(path) for path in sorted((folder / "align").glob("*.align"))}
+    assert aligned
+    assert aligned == {name: listed[name] for name in aligned}
+
+
+def test_text_goes_before_the_others(write, tmp_path):
+    write(".align", ALIGN)
+    assert transcript_of(tmp_path / "take.mp4") == tmp_path / "take.align"
+    write(".TXT", "words")
+    assert transcript_of(tmp_path / "take.mp4") == tmp_path / "take.TXT"
+
+
+def test_damaged_subtitles_refuse_their_video_alone(write, tmp_path):
+    write(".srt", "Nothing here")
+    (tmp_path / "take.mp4").touch()
+    (tmp_path / "whole.mp4").touch()
+    (tmp_path / "whole.TextGrid").write_text(LONG_GRID)
+    broken, whole = find_recordings(tmp_path)
+    assert [word for word, _ in spoken_words(whole)] == ["say", "hi", "two"]
+    with pytest.raises(DataError, match="holds no subtitles"):
+        spoken_words(broken)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "content", "reason"),
+    [
+        (".txt", b"\x00\x01\x02" * 9, "holds zero bytes"),
+        (".txt", b"\x81\xfe", "is no text in UTF-8"),
+        (".txt", b"a" * (LARGEST_BYTES + 1), "is larger than 8 MiB"),
+        (".srt", "Nothing here", "holds no subtitles"),
+        (".TextGrid", "hello", "is no TextGrid"),
+        (".TextGrid", LONG_GRID[:-30], "is a damaged TextGrid"),
+        (".TextGrid", LONG_GRID.replace('say ""hi"" [2]', ""), "holds no interval with a word"),
+        (".align", "0 x bin", "line 1: '0 x bin' is not start, end and word"),
+        (".align", "0 100 sil", "holds no word"),
+    ],
+)
+def test_what_cannot_be_read_is_refused(write, suffix, content, reason):
+    with pytest.raises(DataError, match=reason):
+        said_in(write(suffix, content))
+
+
+def test_a_file_that_vanished(tmp_path):
+    with pytest.raises(DataError, match="cannot be read"):
+        read_text(tmp_path / "none.txt")
+
+
+@pytest.mark.parametrize("suffix", WHOLE)
+def test_damage_is_read_or_refused(write, suffix):
+    generator = np.random.default_rng(5)
+    whole = np.frombuffer(WHOLE[suffix].encode(), np.uint8)
+    for _ in range(150):
+        damaged = whole[: generator.integers(1, len(whole) + 1)].copy()
+        for at in generator.integers(0, len(damaged), generator.integers(0, 6)):
+            damaged[at] = generator.integers(0, 256)
+        with contextlib.suppress(DataError):
+            assert cues_of(write(suffix, damaged.tobytes()))
