@@ -37,15 +37,6 @@ def ring(points: NDArray[np.floating]) -> NDArray[np.float64]:
     return np.asarray(middle + RING_SCALE * (oval - middle))
 
 
-def ring_triangles() -> NDArray[np.int32]:
-    """(72, 3) triangles between the oval and the ring, whose points follow the landmarks."""
-    n, rows = len(FACE_OVAL), []
-    for k, here in enumerate(FACE_OVAL):
-        after, outer, outer_after = FACE_OVAL[(k + 1) % n], N_MESH + k, N_MESH + (k + 1) % n
-        rows += [(here, after, outer), (after, outer_after, outer)]
-    return np.array(rows, np.int32)
-
-
 def inside(places: NDArray[np.floating], polygon: NDArray[np.floating]) -> NDArray[np.bool_]:
     """(P,) whether each of (P, 2) places lies within a polygon (N, 2), by counting the edges to its right."""
     x, y = places[:, 0, None], places[:, 1, None]

@@ -9,10 +9,11 @@ from corpus_tools.aam.filmed import Filmed
 from corpus_tools.aam.frame import barycentric, framed
 from corpus_tools.aam.learn import changed_by_speech, picture_axes
 from corpus_tools.aam.light import light_of
-from corpus_tools.aam.mesh import MOUTH_POINTS, face_triangles, inside, mouth_triangles, ring, ring_triangles
+from corpus_tools.aam.mesh import MOUTH_POINTS, face_triangles, inside, mouth_triangles, ring
 from corpus_tools.consent import consent_of
 from lexicon.errors import InputError
 from tts2face.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.render.plate import ring_triangles
 
 
 def turned(shape, angle, size, shift):
@@ -100,7 +101,7 @@ def test_the_ring_lies_around_the_oval():
     angles = np.linspace(0, 2 * np.pi, len(FACE_OVAL), endpoint=False)
     shape[list(FACE_OVAL)] = 40 * np.stack([np.sin(angles), -np.cos(angles)], axis=1)
     assert not inside(ring(shape), shape[list(FACE_OVAL)]).any()
-    assert len(np.unique(ring_triangles())) == 2 * len(FACE_OVAL)
+    assert len(np.unique(ring_triangles(468))) == 2 * len(FACE_OVAL)
     triangles = face_triangles(shape)
     assert inside(shape[triangles].mean(axis=1), shape[list(FACE_OVAL)]).all()
 

@@ -87,7 +87,7 @@ def plate_staged(talker: Talker, picture: Picture) -> PlateStage:
         plate=plate,
         points=points,
         scale=scale,
-        triangles=np.concatenate([_ring_triangles(len(appearance.face.reference)), appearance.face.triangles]),
+        triangles=np.concatenate([ring_triangles(len(appearance.face.reference)), appearance.face.triangles]),
         face_fill=_fill(appearance.face),
         mouth_fill=_fill(appearance.mouth),
     )
@@ -200,7 +200,7 @@ def _decoded(film: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
         raise DataError(f"the talker's plate cannot be decoded ({broken.strerror}); build the talker again") from broken
 
 
-def _ring_triangles(n_mesh: int) -> NDArray[np.int32]:
+def ring_triangles(n_mesh: int) -> NDArray[np.int32]:
     """(72, 3) triangles between the oval and the ring, whose points follow the mesh's."""
     n, rows = len(FACE_OVAL), []
     for k, here in enumerate(FACE_OVAL):
