@@ -1,5 +1,6 @@
 """An encoder at work in a thread of its own, behind a short queue."""
 
+import contextlib
 import queue
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Protocol
@@ -69,8 +70,10 @@ class Lane:
     def abandon(self) -> None:
         """Stop the encoder where it is and let go of the file."""
         self._stopped = True
-        while not self._work.done() and self._queue.full():
-            self._queue.get_nowait()
-        self._queue.put(None)
+        while not self._work.done():  # it may end by an error of its own with a full queue that nobody empties
+            with contextlib.suppress(queue.Full):
+                self._queue.put(None, timeout=PATIENCE_S)
+            with contextlib.suppress(queue.Empty):
+                self._queue.get_nowait()
         self._pool.shutdown()
         self._sink.abandon()
