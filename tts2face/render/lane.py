@@ -2,7 +2,7 @@
 
 import contextlib
 import queue
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import Protocol
 
 import numpy as np
@@ -72,8 +72,7 @@ class Lane:
         self._stopped = True
         while not self._work.done():  # it may end by an error of its own with a full queue that nobody empties
             with contextlib.suppress(queue.Full):
-                self._queue.put(None, timeout=PATIENCE_S)
-            with contextlib.suppress(queue.Empty):
-                self._queue.get_nowait()
+                self._queue.put_nowait(None)
+            wait([self._work], PATIENCE_S)
         self._pool.shutdown()
         self._sink.abandon()
