@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from cli.files import write_beside
 from cli.progress import progress_bar, say
 from lexicon.errors import InputError
+from tts2face.files import write_whole
 
 if TYPE_CHECKING:
     from corpus_tools.observation import Observation
@@ -32,7 +32,7 @@ def setup() -> None:
 
 @corpus.command
 def build(  # noqa: PLR0913 - one parameter a flag
-    recordings: Annotated[Path, Parameter(help="Folder of recordings with transcripts.")],
+    recordings: Annotated[Path, Parameter(help="Folder of videos, or one; transcripts beside them.")],
     /,
     *,
     out: Annotated[Path, Parameter(help="The talker to write (.talker).", alias="-o")],
@@ -47,6 +47,9 @@ def build(  # noqa: PLR0913 - one parameter a flag
     consent: Annotated[
         str | None, Parameter(help="With --appearance: the consent of the person shown, kept with name and date.")
     ] = None,
+    report: Annotated[
+        Path | None, Parameter(help="Write an HTML page: pictures, curves, measures, what was refused and why.")
+    ] = None,
     jobs: Jobs = None,
     cache: Cache = None,
     model: Model = None,
@@ -55,7 +58,7 @@ def build(  # noqa: PLR0913 - one parameter a flag
     if out.suffix != ".talker":
         raise InputError(f"a talker is written as .talker, not {out.name}")
     from corpus_tools.build import build_talker
-    from corpus_tools.observe import Effort
+    from corpus_tools.effort import Effort
 
     agreed = _consent(name or recordings.resolve().name, consent) if appearance else None
     with progress_bar("learning from recordings") as on_progress:
@@ -66,6 +69,7 @@ def build(  # noqa: PLR0913 - one parameter a flag
             provenance=provenance,
             effort=Effort(cache, jobs, model),
             consent=agreed,
+            report=report,
             on_progress=on_progress,
         )
     for refusal in built.refused:
@@ -99,7 +103,7 @@ def face(
     if out.suffix != ".face":
         raise InputError(f"a face is written as .face, not {out.name}")
     from corpus_tools.dense.build import build_face
-    from corpus_tools.observe import Effort
+    from corpus_tools.effort import Effort
 
     agreed = _consent(name or recordings.resolve().stem, consent)
     with progress_bar("looking at videos") as on_progress:
@@ -156,9 +160,10 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
     """Measure synthesised lips against real ones that were not learnt from."""
     if (recordings is None) == (train is None) or (train is None) != (test is None):
         raise InputError("give --recordings to split, or both --train and --test")
+    from corpus_tools.effort import Effort
     from corpus_tools.evaluate import evaluate as evaluated
     from corpus_tools.evaluate import split
-    from corpus_tools.observe import Effort, observe
+    from corpus_tools.observe import observe
 
     def observations_of(folder: Path) -> "tuple[Observation, ...]":
         with progress_bar(f"reading {folder.name}") as on_progress:
@@ -176,4 +181,4 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
     print(f"{result.n_train} utterances learnt from, {result.n_test} held out\n")  # noqa: T201 - the answer
     print(result.table())  # noqa: T201
     if json is not None:
-        write_beside(json, dumps(result.to_json(), indent=1))
+        write_whole(json, dumps(result.to_json(), indent=1).encode())

@@ -6,9 +6,9 @@ from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.files import write_beside
 from cli.progress import progress_bar, say
 from lexicon.errors import InputError
+from tts2face.files import write_whole
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 
@@ -139,4 +139,5 @@ class _Explanation:
 
         shown = tuple(self._shown)
         is_json = path.suffix == ".json"
-        write_beside(path, dumps(explanation_json(shown), ensure_ascii=False) if is_json else explanation_text(shown))
+        text = dumps(explanation_json(shown), ensure_ascii=False) if is_json else explanation_text(shown)
+        write_whole(path, text.encode())

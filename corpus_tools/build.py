@@ -2,20 +2,26 @@
 
 import json
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from corpus_tools.effort import Effort, Progress
 from corpus_tools.learn import learn_talker
-from corpus_tools.observe import Effort, Progress, Refusal, observe
+from corpus_tools.observation import Observation
+from corpus_tools.observe import Refusal, observe
+from corpus_tools.report.recordings import recordings_page
 from lexicon.errors import DataError
+from tts2face.files import write_whole
 from tts2face.talker import write_talker
 
 PROVENANCE = "provenance.json"  # in the folder of recordings: where they come from and how they may be used
 PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
 UNSTATED = "not stated"
+SHARES = 1000  # steps of the whole work
+WATCHING = 0.4  # of the work where an appearance is learnt, too
 CONTENT_WITH_PICTURES = (
     "landmark shapes, head pose, phones, loudness, and with the stated consent pictures of the person's face; no sound"
 )
@@ -40,6 +46,7 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
     effort: Effort | None = None,
     created: str | None = None,
     consent: Mapping[str, str] | None = None,
+    report: Path | None = None,
     on_progress: Progress | None = None,
 ) -> Built:
     """Observe recordings, learn their talker, and write it; the same recordings give the same bytes but for `created`.
@@ -54,8 +61,10 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
         Date for the metadata; today when None.
     consent
         Of the person shown, from `corpus_tools.consent.consent_of`; with it the talker gets an appearance.
+    report
+        HTML page about the recordings to write; it is written even where none could be used.
     on_progress
-        Called with steps done and of all; with an appearance every recording is three steps.
+        Called with steps done and of all.
 
     Raises
     ------
@@ -67,36 +76,48 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
         A package or the landmark models are missing, or a file cannot be written.
     """
     stated = read_provenance(provenance or recordings / PROVENANCE, must_exist=provenance is not None)
-    observing = on_progress if consent is None else _first_third(on_progress)
-    observations = observe(recordings, effort=effort, on_progress=observing)
+    watched = 1.0 if consent is None else WATCHING
+    observations = observe(recordings, effort=effort, on_progress=_part(on_progress, 0.0, watched))
+    called = name or stated.get("name") or recordings.resolve().stem
+    if report is not None:
+        write_whole(report, recordings_page(called, observations).encode())
     metadata = {
         **dict.fromkeys(PROVENANCE_FIELDS, UNSTATED),
-        "name": recordings.resolve().name,
         **stated,
-        **({"name": name} if name else {}),
+        "name": called,
         "command": _command(recordings, out, name, provenance),
         "created": created or datetime.now(UTC).date().isoformat(),
         "content": CONTENT if consent is None else CONTENT_WITH_PICTURES,
         **({} if consent is None else {"consent": dict(consent)}),
         "refused": [[refusal.name, refusal.reason] for refusal in observations.refused],
+        **_marks(observations.kept),
     }
     talker = learn_talker(observations.kept, metadata=metadata)
     if consent is not None:
         from corpus_tools.aam.attach import with_appearance
 
-        learning = _shifted(on_progress, len(observations.kept))
+        learning = _part(on_progress, watched, 1.0)
         talker = with_appearance(talker, observations.kept, effort=effort or Effort(), on_progress=learning)
     write_talker(out, talker)
     seconds = sum(len(utterance.shape) for utterance in talker.utterances) / talker.fps
     return Built(len(talker.utterances), seconds / 60.0, observations.refused)
 
 
-def _first_third(on_progress: Progress | None) -> Progress | None:
-    return on_progress and (lambda done, of: on_progress(done, 3 * of))
+def _marks(kept: Sequence[Observation]) -> dict[str, Any]:
+    """What users of the talker must know of how its recordings were read."""
+    recognised = [seen.name for seen in kept if seen.is_recognised]
+    lags = {seen.video.name: seen.quality.lag for seen in kept if seen.quality.lag}
+    return {
+        **({"phones_recognised": recognised} if recognised else {}),
+        **({"sound_late_s": lags} if lags else {}),
+    }
 
 
-def _shifted(on_progress: Progress | None, before: int) -> Progress | None:
-    return on_progress and (lambda done, of: on_progress(before + done, before + of))
+def _part(on_progress: Progress | None, begin: float, end: float) -> Progress | None:
+    """Progress of a part of the work, from share `begin` of the whole to share `end`."""
+    if on_progress is None:
+        return None
+    return lambda done, of: on_progress(round(SHARES * (begin + (end - begin) * done / max(of, 1))), SHARES)
 
 
 def read_provenance(path: Path, *, must_exist: bool) -> Mapping[str, Any]:

@@ -2,27 +2,30 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.listen import Heard, heard, intensity
+from corpus_tools.checks import picture_measures, refuse, sound_measures, turn_deg
+from corpus_tools.listen import Ears, Heard, intensity
 from corpus_tools.recordings import Recording, spoken_words
-from corpus_tools.watch import Watched, watched
+from corpus_tools.watch import Eyes, Watched
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.video.grid import face_span, filled_gaps, on_grid
-from tts2face.video.media import media_facts
 from tts2face.video.pose import Posed, head_angles, remove_pose
 
-if TYPE_CHECKING:
-    from tts2face.speech.align import Aligner
-    from tts2face.video.track import FaceTracker
+ROUNDING = 1e-6  # seconds
+NEIGHBOURS = 2.0  # frames about a span, from which those in it are read
+LEAST_FRAMES = 2
 
-# Log likelihood per second of speech below which the words are not those of the sound. Of 804 GRID recordings the worst
-# reached -6020; other sentences of its small grammar lie at -7300 (median), unrelated text at -10500 or is not found.
-LEAST_CONFIDENCE = -6500.0
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """The common frame rate, a video's own when None, and seconds by which a video's sound comes late."""
+
+    fps: float | None = None
+    lag: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,13 +33,21 @@ class Quality:
     """How well a recording could be read.
 
     ``confidence`` of the alignment (0 is perfect, log likelihood per second), lowest face ``score``, ``n_filled``
-    frames filled in, seconds ``cut`` from the beginning because they show no face.
+    frames filled in, seconds ``cut`` from the video's beginning, seconds of ``lag`` taken out, share of ``clipped``
+    speech, ``snr_db`` of speech over noise, share of ``crowded`` pictures, ``turn_deg`` away from the camera,
+    ``frozen_s`` without a change.
     """
 
     confidence: float
     score: float
     n_filled: int
     cut: float
+    lag: float = 0.0
+    clipped: float = 0.0
+    snr_db: float = np.inf
+    crowded: float = 0.0
+    turn_deg: float = 0.0
+    frozen_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,6 +62,8 @@ class Observation:
         `HEAD_CHANNELS`: angles against the camera, place against the recording's middle.
     intensity : (T,)
         Level of the sound in dB.
+    is_recognised
+        Nobody wrote what is said: the phones were heard, and some are wrong.
     """
 
     name: str
@@ -62,9 +75,10 @@ class Observation:
     intensity: NDArray[np.float32]
     quality: Quality
     video: Path
+    is_recognised: bool = False
 
 
-def observed(recording: Recording, cache: Path, tracker: "FaceTracker", aligner: "Aligner") -> Observation:
+def observed(recording: Recording, eyes: Eyes, ears: Ears, timing: Timing) -> Observation:
     """One recording, read and measured.
 
     Raises
@@ -72,49 +86,65 @@ def observed(recording: Recording, cache: Path, tracker: "FaceTracker", aligner:
     DataError
         The recording cannot serve; the message says why.
     """
-    words = spoken_words(recording)
-    span = _on_frames(recording)
-    sound = heard(recording.video, words, cache, aligner, span)
-    if sound.confidence < LEAST_CONFIDENCE:
-        raise DataError(f"the sound does not fit the transcript (confidence {sound.confidence:.0f}); correct the words")
-    seen = watched(recording.video, cache, tracker)
-    points, first = on_grid(seen.tracking.points, seen.times, seen.fps)
-    if span is not None:
-        points, first = _within(points, first, seen.fps, span)
-    origin = span[0] if span is not None else 0.0
-    if np.isnan(points).all():
-        raise DataError("no frame shows a face")
-    start, end = face_span(points)
-    filled, n_filled = filled_gaps(points[start:end], seen.fps)
-    begin, stop = (first + start) / seen.fps, (first + end) / seen.fps
-    phones, spans = trimmed(sound, begin, stop)
-    posed = remove_pose(filled, seen.fps)
-    times = begin + np.arange(end - start) / seen.fps
-    quality = Quality(sound.confidence, _lowest_score(seen), n_filled, origin + begin)
-    loudness = intensity(sound.sound, times)
+    sound = ears.heard(recording.video, spoken_words(recording), recording.span)
+    refuse({"recognised" if sound.is_recognised else "confidence": sound.confidence})
+    measures = sound_measures(sound.sound, sound.phones)
+    refuse(measures)
+    seen = eyes.watched(recording.video)
+    filled, first, n_filled = _frames(seen, recording.span, timing)
+    fps = timing.fps or seen.fps
+    begin = first / fps
+    start = begin + timing.lag - (recording.span[0] if recording.span else 0.0)  # on the clock of the sound
+    phones, spans = trimmed(sound, start, start + len(filled) / fps)
+    posed = remove_pose(filled, fps)
+    here = (seen.times > begin - ROUNDING) & (seen.times < begin + len(filled) / fps - ROUNDING)
+    measures |= picture_measures(seen.n_faces[here], seen.changes[here], seen.times[here])
+    measures["turn_deg"] = turn_deg(head_angles(posed.rotations))
+    refuse(measures)
     return Observation(
-        recording.name, seen.fps, posed.landmarks, _head(posed), phones, spans, loudness, quality, recording.video
+        name=recording.name,
+        fps=fps,
+        landmarks=posed.landmarks,
+        head=_head(posed),
+        phones=phones,
+        words=spans,
+        intensity=intensity(sound.sound, start + np.arange(len(filled)) / fps),
+        quality=Quality(
+            confidence=sound.confidence,
+            score=_lowest_score(seen, here),
+            n_filled=n_filled,
+            cut=begin,
+            lag=timing.lag,
+            **measures,
+        ),
+        video=recording.video,
+        is_recognised=sound.is_recognised,
     )
 
 
-def _on_frames(recording: Recording) -> tuple[float, float] | None:
-    """The span of a recording from the instant of a frame to that of another."""
-    if recording.span is None:
-        return None
-    fps = media_facts(recording.video).fps
-    begin, end = int(np.ceil(recording.span[0] * fps)), int(np.floor(recording.span[1] * fps))
-    return begin / fps, max(end, begin) / fps
+def _frames(seen: Watched, span: tuple[float, float] | None, timing: Timing) -> tuple[NDArray[np.float32], int, int]:
+    """Landmarks of the frames that belong to a span of the sound, the number of the first, and how many were filled.
 
-
-def _within(
-    points: NDArray[np.float32], first: int, fps: float, span: tuple[float, float]
-) -> tuple[NDArray[np.float32], int]:
-    """The frames of a span of the video, and the number of the first of them counted from the span's beginning."""
-    begin, end = (round(second * fps) for second in span)
-    here = points[max(begin - first, 0) : max(end - first, 0)]
-    if not len(here):
-        raise DataError(f"the video shows nothing from {span[0]:.2f} s to {span[1]:.2f} s; check the subtitles' times")
-    return here, max(first - begin, 0)
+    Raises
+    ------
+    DataError
+        The video shows nothing there, no face, or a face that is out of sight too long.
+    """
+    fps = timing.fps or seen.fps
+    begin, end = (0.0, np.inf) if span is None else (span[0] - timing.lag, span[1] - timing.lag)
+    near = (seen.times > begin - NEIGHBOURS / fps) & (seen.times < end + NEIGHBOURS / fps)
+    if near.sum() < LEAST_FRAMES:
+        where = "" if span is None else f" from {span[0]:.2f} s to {span[1]:.2f} s"
+        raise DataError(f"the video shows nothing{where}; check its length and the times")
+    points, first = on_grid(seen.tracking.points[near], seen.times[near], fps)
+    instants = (first + np.arange(len(points))) / fps
+    inside = (instants > begin - ROUNDING) & (instants < end + ROUNDING)
+    points, first = points[inside], first + int(inside.argmax())
+    if np.isnan(points).all():
+        raise DataError("no frame shows a face")
+    start, end = face_span(points)
+    filled, n_filled = filled_gaps(points[start:end], fps)
+    return filled, first + start, n_filled
 
 
 def trimmed(sound: Heard, begin: float, stop: float) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
@@ -133,7 +163,10 @@ def trimmed(sound: Heard, begin: float, stop: float) -> tuple[PhoneSequence, tup
     spoken = [i for i, phone in enumerate(phones) if phone != SILENCE]
     if edges[spoken[0]] < begin or sound.phones.edges[lead + spoken[-1] + 1] > stop:
         raise DataError(f"words are spoken while no face is seen (it is seen from {begin:.2f} s to {stop:.2f} s)")
-    edges[0] = max(edges[0], begin)
+    if phones[0] == SILENCE:
+        edges[0] = begin
+    elif edges[0] > begin:  # the sound begins after the picture
+        phones, edges, lead = [SILENCE, *phones], np.concatenate([[begin], edges]), lead - 1
     words = tuple(WordSpan(word.text, word.first - lead, word.last - lead) for word in sound.words)
     return PhoneSequence(phones, edges - begin), words
 
@@ -143,5 +176,5 @@ def _head(posed: Posed) -> NDArray[np.float32]:
     return np.column_stack([head_angles(posed.rotations), place]).astype(np.float32)
 
 
-def _lowest_score(seen: Watched) -> float:
-    return float(seen.tracking.scores[~seen.tracking.is_missing].min())
+def _lowest_score(seen: Watched, here: NDArray[np.bool_]) -> float:
+    return float(seen.tracking.scores[here & ~seen.tracking.is_missing].min(initial=1.0))

@@ -1,28 +1,34 @@
 """A folder of recordings, observed in parallel; what was done stays in a cache, so that a second run goes on."""
 
-import os
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 
-from corpus_tools.observation import Observation, observed
-from corpus_tools.recordings import Recording, find_recordings
-from lexicon.errors import BackendError, DataError, InputError
-from tts2face.video.model import find_bundle, user_cache
+from corpus_tools.effort import Effort, Progress
+from corpus_tools.listen import LONGEST_UTTERANCE_S, Ears
+from corpus_tools.observation import Observation, Timing, observed
+from corpus_tools.recordings import Recording, find_recordings, spoken_words
+from corpus_tools.sync import agreements, timings
+from corpus_tools.watch import Eyes
+from lexicon.errors import BackendError, DataError
+from tts2face.video.model import find_bundle
 
-Progress = Callable[[int, int], None]
+STEPS = 100  # of progress for each video
+WATCHING = 0.8  # of a video's work
 
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A recording that cannot serve, and why."""
+    """A recording that cannot serve, and why; ``at`` are seconds of its ``video`` in which it lies."""
 
     name: str
     reason: str
+    video: Path
+    at: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,28 +39,32 @@ class Observations:
     refused: tuple[Refusal, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Effort:
-    """How the work is done, which changes nothing in its result.
+@dataclass(frozen=True, slots=True, eq=False)
+class Task:
+    """The recordings of one video, read together so that it is watched once."""
 
-    ``cache`` is the folder for finished parts (the user's cache when None), ``jobs`` the number of processes (one per
-    core when None), ``model`` the bundle of landmark models (found when None).
-    """
+    recordings: tuple[Recording, ...]
+    timing: Timing = Timing()  # noqa: RUF009 - frozen
 
-    cache: Path | None = None
-    jobs: int | None = None
-    model: Path | None = None
+    @property
+    def video(self) -> Path:
+        """The video."""
+        return self.recordings[0].video
+
+
+Outcomes = list[Observation | Refusal]
+Tell = Callable[[float], None]  # told the share of a task that is done
 
 
 def observe(recordings: Path, *, effort: Effort | None = None, on_progress: Progress | None = None) -> Observations:
-    """Every recording of a folder, or the reason why not.
+    """Every recording of a folder, or the reason why not; all at one frame rate, sound and picture together.
 
     Parameters
     ----------
     recordings
-        A folder as `corpus_tools.recordings.find_recordings` reads it.
+        A folder, or a video, as `corpus_tools.recordings.find_recordings` reads it.
     on_progress
-        Called with the number of recordings done and of all.
+        Called with steps done and of all, `STEPS` for each video.
 
     Raises
     ------
@@ -64,38 +74,67 @@ def observe(recordings: Path, *, effort: Effort | None = None, on_progress: Prog
         A package or the landmark models are missing, the cache cannot be written, or a process died.
     """
     effort = effort or Effort()
-    jobs = effort.jobs or os.cpu_count() or 1
-    if jobs < 1:
-        raise InputError(f"jobs must be 1 or more, not {jobs}")
-    found = find_recordings(recordings)
-    cache = effort.cache or user_cache() / "recordings"
-    try:
-        cache.mkdir(parents=True, exist_ok=True)
-    except OSError as refused:
-        raise BackendError(f"cannot write {cache}: {refused.strerror}; choose another cache folder") from refused
+    processes, cache = effort.processes(), effort.folder()
+    tasks = by_video(find_recordings(recordings))
     model = find_bundle(effort.model)
-    outcomes: list[Observation | Refusal] = []
-    for outcome in _outcomes(found, cache, model, min(jobs, len(found))):
-        outcomes.append(outcome)
-        if on_progress:
-            on_progress(len(outcomes), len(found))
-    kept = [outcome for outcome in outcomes if isinstance(outcome, Observation)]
-    refused_ones = [outcome for outcome in outcomes if isinstance(outcome, Refusal)]
+    found: dict[Path, Outcomes] = {}
+    for task, outcomes in _done(tasks, cache, model, min(processes, len(tasks)), on_progress):
+        found[task.video] = outcomes
+    kept = _kept(found)
+    agreed = agreements(kept)
+    timing = timings(kept, agreed)
+    again = [replace(task, timing=timing[task.video]) for task in tasks if task.video in timing]
+    for task, outcomes in _done(again, cache, model, min(processes, len(again)), None):
+        found[task.video] = outcomes
+    for video, agreement in agreed.items():
+        if agreement.fault:
+            found[video] = [_out_of_step(outcome, agreement.fault) for outcome in found[video]]
+    every = [outcome for outcomes in found.values() for outcome in outcomes]
     return Observations(
-        tuple(sorted(kept, key=lambda outcome: outcome.name)), tuple(sorted(refused_ones, key=lambda one: one.name))
+        tuple(sorted((one for one in every if isinstance(one, Observation)), key=lambda one: one.name)),
+        tuple(sorted((one for one in every if isinstance(one, Refusal)), key=lambda one: one.name)),
     )
 
 
-def _outcomes(found: tuple[Recording, ...], cache: Path, model: Path, jobs: int) -> Iterator[Observation | Refusal]:
-    """Outcomes as they come, in no order."""
-    if jobs == 1:
+def _kept(found: Mapping[Path, Outcomes]) -> list[Observation]:
+    return [one for outcomes in found.values() for one in outcomes if isinstance(one, Observation)]
+
+
+def _refusal(recording: Recording, reason: DataError) -> Refusal:
+    return Refusal(recording.name, str(reason), recording.video, sum(recording.span or (0.0, 0.0)) / 2)
+
+
+def _out_of_step(outcome: Observation | Refusal, fault: str) -> Refusal:
+    if isinstance(outcome, Refusal):
+        return outcome
+    return Refusal(outcome.name, fault, outcome.video, outcome.quality.cut)
+
+
+def by_video(recordings: Sequence[Recording]) -> list[Task]:
+    """Recordings of one video together."""
+    together: dict[Path, list[Recording]] = {}
+    for recording in recordings:
+        together.setdefault(recording.video, []).append(recording)
+    return [Task(tuple(group)) for group in together.values()]
+
+
+def _done(
+    tasks: Sequence[Task], cache: Path, model: Path, jobs: int, on_progress: Progress | None
+) -> Iterator[tuple[Task, Outcomes]]:
+    """Tasks with their outcomes as they come, in no order."""
+    tell = on_progress or (lambda done, of: None)
+    of = STEPS * len(tasks)
+    if jobs <= 1:
         worker = _Worker(cache, model)
-        yield from map(worker.outcome, found)
+        for number, task in enumerate(tasks):
+            yield task, worker.outcomes(task, _share_of(tell, number, of))
         return
     pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_start, initargs=(cache, model))
     try:
-        for future in as_completed([pool.submit(_work, together) for together in by_video(found)]):
-            yield from future.result()
+        waiting = {pool.submit(_work, task): task for task in tasks}
+        for number, future in enumerate(as_completed(waiting), start=1):
+            yield waiting[future], future.result()
+            tell(STEPS * number, of)
     except BrokenProcessPool as died:
         raise BackendError(
             "a process that read recordings died; run the command again (it goes on), with fewer jobs"
@@ -104,23 +143,44 @@ def _outcomes(found: tuple[Recording, ...], cache: Path, model: Path, jobs: int)
         pool.shutdown(cancel_futures=True)
 
 
+def _share_of(tell: Progress, number: int, of: int) -> Tell:
+    return lambda share: tell(int(STEPS * (number + share)), of)
+
+
 class _Worker:
-    """Reads recordings one after the other; the networks and the acoustic model are loaded once."""
+    """Reads videos one after the other; the networks and the acoustic models are loaded once."""
 
     def __init__(self, cache: Path, model: Path) -> None:
-        from tts2face.speech.align import Aligner
-        from tts2face.video.track import FaceTracker
+        self._eyes, self._ears = Eyes(cache, model), Ears(cache)
 
-        self._cache = cache
-        self._tracker = FaceTracker(model)
-        self._aligner = Aligner()
-
-    def outcome(self, recording: Recording) -> Observation | Refusal:
-        """The observation, or why there is none."""
+    def outcomes(self, task: Task, tell: Tell) -> Outcomes:
+        """An observation, or why there is none, for each utterance of a video."""
+        found: Outcomes = []
         try:
-            return observed(recording, self._cache, self._tracker, self._aligner)
+            recordings = self._utterances(task.recordings)
+            self._eyes.watched(task.video, lambda share: tell(WATCHING * share))
         except DataError as reason:
-            return Refusal(recording.name, str(reason))
+            recordings = ()
+            found = [_refusal(recording, reason) for recording in task.recordings]
+        for number, recording in enumerate(recordings, start=1):
+            try:
+                found.append(observed(recording, self._eyes, self._ears, task.timing))
+            except DataError as reason:
+                found.append(_refusal(recording, reason))
+            tell(WATCHING + (1 - WATCHING) * number / len(recordings))
+        tell(1.0)
+        return found
+
+    def _utterances(self, recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:
+        """The recordings; where one takes the whole of a long video, its utterances, cut at pauses."""
+        whole = recordings[0]
+        if whole.span is not None or self._ears.sound(whole.video).duration <= LONGEST_UTTERANCE_S:
+            return recordings
+        said = self._ears.utterances(whole.video, spoken_words(whole))
+        return tuple(
+            replace(whole, name=f"{whole.name}-{number:04d}", span=span, words=words)
+            for number, (span, words) in enumerate(said, start=1)
+        )
 
 
 _worker: list[_Worker] = []  # of this process; filled once by the pool
@@ -131,13 +191,5 @@ def _start(cache: Path, model: Path) -> None:
     _worker.append(_Worker(cache, model))
 
 
-def _work(recordings: tuple[Recording, ...]) -> list[Observation | Refusal]:
-    return [_worker[0].outcome(recording) for recording in recordings]
-
-
-def by_video(recordings: Sequence[Recording]) -> list[tuple[Recording, ...]]:
-    """Recordings of one video together, so that one process tracks it once."""
-    together: dict[Path, list[Recording]] = {}
-    for recording in recordings:
-        together.setdefault(recording.video, []).append(recording)
-    return [tuple(group) for group in together.values()]
+def _work(task: Task) -> Outcomes:
+    return _worker[0].outcomes(task, lambda share: None)

@@ -26,6 +26,7 @@ LETTER_NAMES = {
 BREATHED_W = ("h", "w")
 
 Ways = tuple[tuple[str, ...], ...]  # pronunciations of one word, each a row of phones
+Spoken = tuple[tuple[str, Ways], ...]  # words with their pronunciations
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +34,8 @@ class Recording:
     """One video and what is said in it; `is_spelling` marks words of one letter as names of letters.
 
     ``transcript`` is its text, or the file that holds it; None where the folder does not say what is spoken.
-    ``span`` are the seconds of the video that the recording takes, None where it takes all.
+    ``span`` are the seconds of the video that the recording takes, None where it takes all. ``words`` are what is said
+    in it where that is known already.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Recording:
     transcript: str | Path | None
     is_spelling: bool = False
     span: tuple[float, float] | None = None
+    words: Spoken | None = None
 
 
 def find_recordings(folder: Path) -> tuple[Recording, ...]:
@@ -68,16 +71,16 @@ def find_recordings(folder: Path) -> tuple[Recording, ...]:
     return found
 
 
-def spoken_words(recording: Recording) -> tuple[tuple[str, Ways], ...]:
-    """Each word of a transcript with its pronunciations.
+def spoken_words(recording: Recording) -> Spoken | None:
+    """Each word of a transcript with its pronunciations; None without a transcript.
 
     Raises
     ------
     DataError
-        There is no transcript, it cannot be read, holds no word, or one that nobody can say.
+        It cannot be read, holds no word, or one that nobody can say.
     """
-    if recording.transcript is None:
-        raise DataError(f"{recording.name} has no transcript; put its words into {recording.video.stem}.txt beside it")
+    if recording.words is not None or recording.transcript is None:
+        return recording.words
     said = said_in(recording.transcript) if isinstance(recording.transcript, Path) else recording.transcript
     text = said if recording.is_spelling else normalize(said)
     words = re.findall(r"[^\W_]+(?:['’][^\W_]+)*", text)

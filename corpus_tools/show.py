@@ -11,6 +11,7 @@ from lexicon.sequence import SILENCE
 from tts2face.talker import Talker
 
 COLUMNS = 10  # phones on a line
+LISTED = frozenset({"refused", "phones_recognised"})  # in the metadata; shown as counts
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +33,8 @@ class Description:
 
     def text(self) -> str:
         """Lines for people to read."""
-        about = [f"{key + ':':<13}{self.metadata[key]}" for key in self.metadata if key != "refused"]
+        about = [f"{key + ':':<13}{self.metadata[key]}" for key in self.metadata if key not in LISTED]
+        recognised = self.metadata.get("phones_recognised", [])
         counts = [f"{phone} {count}" for phone, count in self.phones]
         rows = ["  " + "  ".join(counts[at : at + COLUMNS]) for at in range(0, len(counts), COLUMNS)]
         refused = self.metadata.get("refused", [])
@@ -40,6 +42,7 @@ class Description:
             [
                 *about,
                 f"utterances:  {self.n_utterances} ({self.minutes:.1f} minutes at {self.fps:g} frames/s)",
+                *([f"recognised:  {len(recognised)} utterances without a transcript"] if recognised else []),
                 f"refused:     {len(refused)}",
                 *(f"  {name}: {reason}" for name, reason in refused),
                 f"triphones:   {self.n_triphones}",

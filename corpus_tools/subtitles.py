@@ -10,6 +10,9 @@ from lexicon.errors import BackendError, DataError
 FORMATS = {".srt": "srt", ".vtt": "vtt"}  # stated to the reader: it guesses wrongly for files without a header
 # Blocks for people and for styling; the reader would take them for words of the cue before (W3C WebVTT, 4.1).
 _UNSPOKEN = re.compile(r"(?:(?<=\n\n)|^)(?:NOTE|STYLE|REGION)\b(?:.+\n?)*")
+# What subtitles for the deaf add: noises in brackets, sung lines between notes, who speaks, dashes between speakers.
+_NOISE = re.compile(r"\[[^\]]*\]|\([^)]*\)|\{[^}]*\}|♪[^♪]*(?:♪|$)")
+_SPEAKER = re.compile(r"(?m)^\s*(?:[-–—]\s*|>>\s*)?(?:[A-Z][A-Z0-9 .'’#-]*:(?=\s))?")
 MARGIN_S = 0.3  # before and behind a cue; subtitles are rarely nearer to the speech
 
 
@@ -48,7 +51,7 @@ def read_cues(path: Path) -> tuple[Cue, ...]:
         read = pysubs2.SSAFile.from_string(text, format_=FORMATS[path.suffix.lower()])
     except (pysubs2.exceptions.Pysubs2Error, ValueError, OverflowError) as broken:
         raise DataError(f"{path} cannot be read as subtitles ({broken}); export them again") from broken
-    spoken = sorted((event.start / 1000, event.end / 1000, event.plaintext.strip()) for event in read)
+    spoken = sorted((event.start / 1000, event.end / 1000, _spoken(event.plaintext)) for event in read)
     spoken = [(begin, end, text) for begin, end, text in spoken if text and end > begin]
     if not spoken:
         raise DataError(f"{path} holds no subtitles; export them again")
@@ -57,5 +60,10 @@ def read_cues(path: Path) -> tuple[Cue, ...]:
         before = spoken[number - 1][1] if number else 0.0
         behind = spoken[number + 1][0] if number + 1 < len(spoken) else end + 2 * MARGIN_S
         earliest, latest = min((before + begin) / 2, begin), max((end + behind) / 2, end)
-        cues.append(Cue(max(begin - MARGIN_S, earliest, 0.0), min(end + MARGIN_S, latest), " ".join(text.split())))
+        cues.append(Cue(max(begin - MARGIN_S, earliest, 0.0), min(end + MARGIN_S, latest), text))
     return tuple(cues)
+
+
+def _spoken(text: str) -> str:
+    """What is said in a cue, on one line; nothing where it shows noises only."""
+    return " ".join(_SPEAKER.sub(" ", _NOISE.sub(" ", text)).split())

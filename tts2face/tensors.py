@@ -1,8 +1,6 @@
 """Arrays and JSON metadata in one safetensors file: how a talker and a face are kept, without pickle."""
 
 import json
-import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -10,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import BackendError, DataError, InputError
+from lexicon.errors import DataError, InputError
+from tts2face.files import write_whole
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -27,20 +26,7 @@ def write_tensors(path: Path, kind: str, version: int, arrays: Arrays, metadata:
 
     header = {"kind": kind, "version": str(version), "metadata": json.dumps(metadata, ensure_ascii=False)}
     content = _ordered(save({name: np.ascontiguousarray(array) for name, array in arrays.items()}, header))
-    try:
-        handle, beside = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    except OSError as refused:
-        raise BackendError(f"cannot write {path}: {refused.strerror}; choose another folder") from refused
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.chmod(beside, 0o644)
-        os.replace(beside, path)
-    except OSError as refused:
-        Path(beside).unlink(missing_ok=True)
-        raise BackendError(
-            f"cannot write {path}: {refused.strerror}; free some space or choose another folder"
-        ) from refused
+    write_whole(path, content)
 
 
 def _ordered(content: bytes) -> bytes:

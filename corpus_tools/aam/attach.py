@@ -1,17 +1,15 @@
 """A talker given an appearance: learnt from the recordings that the talker was learnt from."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from corpus_tools.aam.filmed import filmed
 from corpus_tools.aam.learn import TextureOptions, learn_appearance
+from corpus_tools.effort import Effort, Progress
 from corpus_tools.observation import Observation
-from corpus_tools.observe import Effort
+from corpus_tools.watch import Eyes
 from tts2face.talker import Talker
-from tts2face.video.model import user_cache
-from tts2face.video.track import FaceTracker
-
-Progress = Callable[[int, int], None]
+from tts2face.video.model import find_bundle
 
 
 def with_appearance(
@@ -36,10 +34,9 @@ def with_appearance(
     BackendError
         A package or the landmark models are missing.
     """
-    cache = effort.cache or user_cache() / "recordings"
-    tracker = FaceTracker(effort.model)
+    eyes = Eyes(effort.folder(), find_bundle(effort.model))
     recordings = [
-        filmed(observation, spoken.shape, cache, tracker)
+        filmed(observation, spoken.shape, eyes)
         for observation, spoken in zip(observations, talker.utterances, strict=True)
     ]
     learnt = learn_appearance(recordings, options, on_progress=on_progress)

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.observation import Observation
-from corpus_tools.watch import watched
+from corpus_tools.watch import Eyes
 from tts2face.video.grid import filled_gaps, on_grid
 from tts2face.video.media import read_pictures
-from tts2face.video.track import FaceTracker
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,7 +46,7 @@ class Filmed:
         return self.begin + frame / self.fps
 
 
-def filmed(observation: Observation, shape: NDArray[np.float32], cache: Path, tracker: FaceTracker) -> Filmed:
+def filmed(observation: Observation, shape: NDArray[np.float32], eyes: Eyes) -> Filmed:
     """A recording that was observed, with its landmarks in the picture; tracking comes from the cache.
 
     Parameters
@@ -60,7 +59,7 @@ def filmed(observation: Observation, shape: NDArray[np.float32], cache: Path, tr
     DataError
         The video cannot be read any more.
     """
-    seen = watched(observation.video, cache, tracker)
+    seen = eyes.watched(observation.video)
     points, first = on_grid(seen.tracking.points, seen.times, seen.fps)
     begin = observation.quality.cut
     start = round(begin * seen.fps) - first

@@ -1,6 +1,6 @@
 """An appearance model learnt from tracked recordings (T07 section 2, eqs 1 and 2), in memory that does not grow."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -14,6 +14,7 @@ from corpus_tools.aam.frame import Frame, framed
 from corpus_tools.aam.light import Light, light_of
 from corpus_tools.aam.mesh import MOUTH_POINTS, N_MESH, face_triangles, mouth_triangles, ring
 from corpus_tools.aam.plates import chosen_stretch, film_of
+from corpus_tools.effort import Progress
 from lexicon.errors import InputError
 from tts2face.appearance import Appearance, Plate, TextureModel
 from tts2face.landmarks import (
@@ -34,8 +35,6 @@ SPARE = 20  # components carried beyond those that are kept
 STILL = 0.02  # pixels that speech changes by less show the light
 LIGHT_FRAMES = 25  # from which a recording's light is read
 N_SMOOTHINGS = 4  # rounds by which the edge of what speech changes is softened over the mesh
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,13 +13,13 @@ from corpus_tools.aam.learn import Learnt
 from corpus_tools.aam.mesh import MOUTH_POINTS, N_MESH
 from corpus_tools.learn import CLOSED
 from corpus_tools.observation import Observation
+from corpus_tools.sync import LEAD_S, agreement
 from tts2face.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 
 SHAPE_MODES = 20
 TEXTURES_READ = 1000  # frames from which the number of texture modes is read
 BILABIALS = frozenset({"p", "b", "m"})
 REACH_S = 0.03  # either side of a phone in which its closure may lie
-LAGS = np.arange(-6, 7)  # frames by which the sound may follow the lips
 INNER_LIPS = (*INNER_LIP_UPPER, *INNER_LIP_LOWER)
 
 
@@ -64,7 +64,7 @@ def figures(
         held_out_texture_db=texture,
         held_out_mouth_db=mouth,
         closed=closed_share(observations),
-        lag_ms=lag_ms(observations),
+        lag_ms=1000 * (agreement(observations).lag + LEAD_S),
     )
 
 
@@ -142,25 +142,6 @@ def closed_share(observations: Sequence[Observation]) -> float:
             if phone in BILABIALS and here.any():
                 least.append(relative[here].min())
     return float(np.mean(np.array(least) < CLOSED)) if least else float("nan")
-
-
-def lag_ms(observations: Sequence[Observation]) -> float:
-    """Milliseconds by which the loudness follows the opening of the lips: the peak of their correlation."""
-    totals = np.zeros(len(LAGS))
-    for seen in observations:
-        opening = np.linalg.norm(
-            seen.landmarks[:, UPPER_LIP_INNER_MID] - seen.landmarks[:, LOWER_LIP_INNER_MID], axis=1
-        )
-        reach = LAGS.max()
-        here = opening[reach:-reach]
-        for at, lag in enumerate(LAGS):
-            loud = seen.intensity[reach + lag : len(opening) - reach + lag]
-            totals[at] += np.corrcoef(here, loud)[0, 1] if min(here.std(), loud.std()) > 0 else 0.0
-    at = int(np.clip(totals.argmax(), 1, len(LAGS) - 2))
-    before, peak, behind = totals[at - 1 : at + 2]
-    bend = before - 2 * peak + behind
-    offset = 0.5 * (before - behind) / bend if bend else 0.0
-    return float((LAGS[at] + offset) / observations[0].fps * 1000)
 
 
 def modes_for(explained: NDArray[np.float64]) -> tuple[int, int]:

@@ -13,13 +13,12 @@ from corpus_tools.dense.adapt import adapted
 from corpus_tools.dense.gather import fitter, gathered
 from corpus_tools.dense.paint import painted_like
 from corpus_tools.dense.region import canvas_of
-from corpus_tools.dense.seen import Progress, resting_landmarks, seen_in, videos_of
+from corpus_tools.dense.seen import resting_landmarks, seen_in, videos_of
 from corpus_tools.dense.warp import N_MESH, aligned, fitting, landmarks_of, settled
-from corpus_tools.observe import Effort
-from lexicon.errors import BackendError
+from corpus_tools.effort import Effort, Progress
+from corpus_tools.watch import Eyes
 from tts2face.face.file import face_path, read_face, write_face
-from tts2face.video.model import find_bundle, user_cache
-from tts2face.video.track import FaceTracker
+from tts2face.video.model import find_bundle
 
 HEAD = "head"  # the shipped face that is adapted
 CONTENT = "a head with the shape and, with the stated consent, the skin of a real person"
@@ -68,14 +67,9 @@ def build_face(
     effort = effort or Effort()
     videos = videos_of(recordings)
     stated = read_provenance(recordings / PROVENANCE, must_exist=False)
-    tracker = FaceTracker(find_bundle(effort.model))
-    cache = effort.cache or user_cache() / "recordings"
-    try:
-        cache.mkdir(parents=True, exist_ok=True)
-    except OSError as refused:
-        raise BackendError(f"cannot write {cache}: {refused.strerror}; choose another cache folder") from refused
+    eyes = Eyes(effort.folder(), find_bundle(effort.model))
     report = on_progress or (lambda done, of: None)
-    seen = seen_in(videos, cache, tracker, lambda done, of: report(done, 2 * of))
+    seen = seen_in(videos, eyes, lambda done, of: report(done, 2 * of))
     head = read_face(face_path(HEAD))
     talker = resting_landmarks(seen)
     rest = landmarks_of(head, head.vertices)[:N_MESH]

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.dense.region import Canvas, ramp
-from corpus_tools.dense.seen import Progress, Seen, eyes_open
+from corpus_tools.dense.seen import Seen, eyes_open
 from corpus_tools.dense.warp import N_MESH, face_width, landmarks_of
+from corpus_tools.effort import Progress
 from lexicon.errors import DataError
 from tts2face.face.model import Face
 from tts2face.face.rbf import FACE_WIDTH, REACH, basis

@@ -1,14 +1,15 @@
 """What videos show of a talker: landmarks in the picture and without head pose."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.effort import Progress
 from corpus_tools.recordings import VIDEO_SUFFIXES, find_recordings
-from corpus_tools.watch import watched
+from corpus_tools.watch import Eyes
 from lexicon.errors import DataError, InputError
 from tts2face.landmarks import (
     EYE_OUTER_LEFT,
@@ -17,10 +18,8 @@ from tts2face.landmarks import (
     UPPER_LIP_INNER_MID,
 )
 from tts2face.video.pose import remove_pose
-from tts2face.video.track import FaceTracker
 
 Floats = NDArray[np.float64]
-Progress = Callable[[int, int], None]
 
 MOST_VIDEOS = 40  # evenly out of more; of GRID's s1, the mean of 201 lies 0.05 mm from that of 40
 CLOSED = 0.02  # gap of the inner lips over the distance of the eyes up to which lips are closed at rest
@@ -58,7 +57,7 @@ def videos_of(recordings: Path) -> tuple[Path, ...]:
     return tuple(found[row] for row in rows)
 
 
-def seen_in(videos: Sequence[Path], cache: Path, tracker: FaceTracker, on_progress: Progress) -> tuple[Seen, ...]:
+def seen_in(videos: Sequence[Path], eyes: Eyes, on_progress: Progress) -> tuple[Seen, ...]:
     """The videos that can be read and show a face.
 
     Raises
@@ -69,7 +68,7 @@ def seen_in(videos: Sequence[Path], cache: Path, tracker: FaceTracker, on_progre
     kept, reason = [], ""
     for number, video in enumerate(videos):
         try:
-            found = watched(video, cache, tracker)
+            found = eyes.watched(video)
             posed = remove_pose(found.tracking.points, found.fps)
             kept.append(Seen(video, found.tracking.points, posed.landmarks))
         except DataError as refused:

@@ -13,13 +13,14 @@ import numpy as np
 from corpus_tools.aam.filmed import filmed
 from corpus_tools.aam.learn import learn_appearance
 from corpus_tools.aam.measure import figures
+from corpus_tools.effort import Effort
 from corpus_tools.learn import learn_talker
-from corpus_tools.observe import Effort, observe
+from corpus_tools.observe import observe
+from corpus_tools.watch import Eyes
 from tts2face.render.picture import Picture
 from tts2face.render.plate import plate_drawn, plate_staged
 from tts2face.talker import write_talker
-from tts2face.video.model import user_cache
-from tts2face.video.track import FaceTracker
+from tts2face.video.model import find_bundle
 
 
 def main() -> None:
@@ -45,11 +46,11 @@ def main() -> None:
     about = dict.fromkeys(("name", "language", "sources", "licence", "attribution", "command", "created"), "")
     talker = learn_talker(learn, metadata=about)
     stage("shape model")
-    tracker, cache = FaceTracker(), options.cache or user_cache() / "recordings"
-    films = [filmed(seen, spoken.shape, cache, tracker) for seen, spoken in zip(learn, talker.utterances, strict=True)]
+    eyes = Eyes(Effort(options.cache).folder(), find_bundle())
+    films = [filmed(seen, spoken.shape, eyes) for seen, spoken in zip(learn, talker.utterances, strict=True)]
     learnt = learn_appearance(films)
     stage(f"appearance of {len(films)} recordings")
-    unseen = [filmed(seen, talker.model.parameters(seen.landmarks), cache, tracker) for seen in held_out]
+    unseen = [filmed(seen, talker.model.parameters(seen.landmarks), eyes) for seen in held_out]
     for name, value in figures(films, learnt, unseen, kept).as_dict().items():
         print(f"{name}: {value}")
     stage("measuring")

@@ -16,9 +16,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.effort import Effort
 from corpus_tools.learn import CLOSED, learn_shapes, lip_gap
 from corpus_tools.observation import Observation, Quality
-from corpus_tools.observe import Effort, observe
+from corpus_tools.observe import observe
 from tests.bench.bench_retarget import bilabial_frames, landmarks_of, opening
 from tts2face.face.clone import Cloning, append_missing, cloning
 from tts2face.face.file import load_face

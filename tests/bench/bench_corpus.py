@@ -44,7 +44,7 @@ def main(folder: Path, n_recordings: int) -> None:
         marks.append(time.perf_counter())
         for stage, took in zip(("read", "track", "align", "pose"), np.diff(marks), strict=True):
             seconds[stage] += float(took) / len(pictures)
-        once = np.array([found[0] for found, _ in tracker._follow(pictures)])
+        once = np.array([found[0] for found, _ in tracker.follow(pictures)])
         jitter["one pass"].append(noise(once))
         jitter["two passes"].append(noise(tracked))
     for stage, took in seconds.items():

@@ -15,7 +15,7 @@ from corpus_tools.dense.gather import fitter, vertex_normals
 from corpus_tools.dense.region import canvas_of, depth_inside
 from corpus_tools.dense.seen import videos_of
 from corpus_tools.dense.warp import N_MESH, OPEN_JAW, aligned, landmarks_of, part_vertices
-from corpus_tools.observe import Effort
+from corpus_tools.effort import Effort
 from lexicon.errors import DataError, InputError
 from tts2face.face.file import face_path, read_face
 from tts2face.face.linear import posed_vertices

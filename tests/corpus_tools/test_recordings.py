@@ -64,9 +64,13 @@ def test_a_manifest_with_other_columns(tmp_path):
         find_recordings(tmp_path)
 
 
-def test_a_recording_without_words(tmp_path):
-    with pytest.raises(DataError, match="has no transcript"):
-        spoken_words(Recording("r", tmp_path / "r.mkv", None))
+def test_a_recording_without_a_transcript_has_no_words(tmp_path):
+    assert spoken_words(Recording("r", tmp_path / "r.mkv", None)) is None
+
+
+def test_words_that_are_known_already_are_not_read_again(tmp_path):
+    words = (("bob", (("b", "ɑ", "b"),)),)
+    assert spoken_words(Recording("r", tmp_path / "r.mkv", "other words", words=words)) == words
 
 
 def test_a_transcript_of_nothing_but_signs(tmp_path):

@@ -1,18 +1,16 @@
 """Subtitles beside videos: cues become recordings of parts of a video."""
 
 import csv
-from fractions import Fraction
 from pathlib import Path
 
-import av
-import numpy as np
 import pytest
 
-from corpus_tools.observe import Effort, by_video, observe
+from corpus_tools.effort import Effort
+from corpus_tools.observe import by_video, observe
 from corpus_tools.recordings import Recording, find_recordings
 from corpus_tools.subtitles import read_cues
 from lexicon.errors import DataError
-from tts2face.video.media import read_pictures, read_sound
+from tests.corpus_tools.films import joined
 
 SRT = "1\n00:00:01,000 --> 00:00:02,000\n<i>Hello</i>\nthere.\n\n2\n00:00:02,100 --> 00:00:03,500\nIt is £5.\n"
 
@@ -36,6 +34,31 @@ def test_cues_are_read_and_widened_up_to_their_neighbours(name: str, content: by
     assert (second.begin, second.end) == pytest.approx((2.05, 3.8))
 
 
+@pytest.mark.parametrize(
+    ("shown", "spoken"),
+    [
+        ("[door slams] Come in.", "Come in."),
+        ("(sighs) No.", "No."),
+        ("MRS. O'NEIL: Good evening.", "Good evening."),
+        ("- Who is it?\n- Me.", "Who is it? Me."),
+        ("♪ La la la ♪\nStop it.", "Stop it."),
+        ("At 10:30, they said: go.", "At 10:30, they said: go."),
+        ("{\\an8}Up here.", "Up here."),
+    ],
+)
+def test_only_what_is_spoken_counts(shown: str, spoken: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.srt"
+    path.write_text(f"1\n00:00:01,000 --> 00:00:03,000\n{shown}\n", encoding="utf-8")
+    assert [cue.text for cue in read_cues(path)] == [spoken]
+
+
+def test_subtitles_of_nothing_but_noises(tmp_path: Path) -> None:
+    path = tmp_path / "a.srt"
+    path.write_text("1\n00:00:01,000 --> 00:00:03,000\n[music]\n", encoding="utf-8")
+    with pytest.raises(DataError, match="holds no subtitles"):
+        read_cues(path)
+
+
 @pytest.mark.parametrize("content", [b"", b"no subtitles at all", b"\x00\xff\xfe\x01" * 50])
 def test_a_file_without_subtitles_is_refused(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "a.srt"
@@ -51,39 +74,7 @@ def test_a_video_with_subtitles_is_a_recording_for_each_cue(tmp_path: Path) -> N
     assert [one.name for one in found] == ["talk-0001", "talk-0002"]
     assert found[0].span == pytest.approx((0.7, 2.05))
     assert find_recordings(tmp_path / "talk.mp4") == found
-    assert by_video([*found, Recording("x", tmp_path / "x.mp4", "A.")])[0] == found
-
-
-def joined(sources: list[Path], out: Path) -> list[tuple[float, float]]:
-    """Clips one behind the other in one MP4 with 44.1 kHz stereo sound; returns when each begins and ends."""
-    import soxr
-
-    spans, sounds, n_frames = [], [], 0
-    with av.open(str(out), "w") as container:
-        video = container.add_stream("libx264", rate=25, options={"crf": "15"})
-        audio = container.add_stream("aac", rate=44_100, layout="stereo")
-        for source in sources:
-            pictures = list(read_pictures(source))
-            if not n_frames:
-                video.height, video.width = pictures[0].pixels.shape[:2]
-                video.pix_fmt = "yuv420p"
-            for picture in pictures:
-                frame = av.VideoFrame.from_ndarray(picture.pixels, format="rgb24")
-                frame.pts, frame.time_base = n_frames, Fraction(1, 25)
-                container.mux(video.encode(frame))
-                n_frames += 1
-            sound = read_sound(source, 16_000).samples
-            whole = np.zeros(len(pictures) * 640, np.float32)
-            whole[: len(sound)] = sound[: len(whole)]
-            sounds.append(whole)
-            spans.append(((n_frames - len(pictures)) / 25, n_frames / 25))
-        samples = soxr.resample(np.concatenate(sounds), 16_000, 44_100)
-        frame = av.AudioFrame.from_ndarray(np.stack([samples, samples]).astype(np.float32), "fltp", "stereo")
-        frame.sample_rate = 44_100
-        container.mux(audio.encode(frame))
-        container.mux(audio.encode(None))
-        container.mux(video.encode(None))
-    return spans
+    assert by_video([*found, Recording("x", tmp_path / "x.mp4", "A.")])[0].recordings == found
 
 
 def test_one_long_video_with_subtitles_gives_what_its_parts_gave(

@@ -1,10 +1,16 @@
+import os
+import subprocess
+import sys
+from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
 
+import av
 import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
+from tests.corpus_tools.films import joined
 from tts2face.video.media import _placed, _upright, media_facts, read_pictures, read_sound
 
 
@@ -79,3 +85,33 @@ def test_no_pictures(make_video):
 def test_no_sound(make_video):
     with pytest.raises(DataError, match="holds no sound"):
         read_sound(make_video("silent.mkv"), 16000)
+
+
+def test_a_rate_that_counts_ticks_is_read_from_the_frames(tmp_path):
+    path = tmp_path / "ticks.mkv"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=1000)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for number in range(10):
+            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), 20 * number, np.uint8), format="rgb24")
+            frame.pts, frame.time_base = 40 * number, Fraction(1, 1000)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    assert media_facts(path).fps == pytest.approx(25.0, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["bbaf2n.mkv", "copy.mp4"])
+def test_damaged_films_are_read_or_refused_in_bounded_memory_and_time(name, shared_recordings, tmp_path):
+    """A crash, another exception than a refusal, or more memory than the child may have ends the child."""
+    film = shared_recordings / "grid_s1" / "clips" / "bbaf2n.mkv"
+    if name != film.name:
+        joined([film], tmp_path / name)
+        film = tmp_path / name
+    command = [sys.executable, "tests/video/damage.py", str(film), str(tmp_path), "40", "7"]
+    root = Path(__file__).parents[2]
+    done = subprocess.run(  # noqa: PLW1510 - its answer is looked at
+        command, cwd=root, env={**os.environ, "PYTHONPATH": str(root)}, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    assert len(done.stdout.splitlines()) == 40
+    assert "refused" in done.stdout

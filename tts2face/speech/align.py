@@ -38,12 +38,14 @@ class Alignment:
     """Phones from 0 s to the end of the sound, one span for each word, and how well they fit.
 
     ``confidence`` is the mean log likelihood per second of speech, relative to the best fitting state of the acoustic
-    model at each instant: 0 is perfect; a wrong text lies far below a right one.
+    model at each instant: 0 is perfect; a wrong text lies far below a right one. ``fits`` (W,) is the same for each
+    word.
     """
 
     phones: PhoneSequence
     words: tuple[WordSpan, ...]
     confidence: float
+    fits: NDArray[np.float64]
 
 
 class Aligner:
@@ -175,8 +177,9 @@ def _alignment(
     labels: list[str] = []
     starts: list[float] = []
     spans: list[WordSpan] = []
-    end, score, n_frames = 0.0, 0.0, 0
-    for entry, (text, ways) in zip(entries, words, strict=True):
+    end = 0.0
+    scores, n_frames = np.zeros(len(words)), np.zeros(len(words))
+    for number, (entry, (text, ways)) in enumerate(zip(entries, words, strict=True)):
         onset = begin + _seconds(entry.phones[0][1])
         if onset - end >= SHORTEST_S:  # silence, at the beginning too
             labels.append(SILENCE)
@@ -185,13 +188,17 @@ def _alignment(
         for phone, (_, first, count, fit) in zip(ways[entry.way], entry.phones, strict=True):
             labels.append(phone)
             starts.append(begin + _seconds(first))
-            end, score, n_frames = begin + _seconds(first + count), score + fit, n_frames + count
+            end = begin + _seconds(first + count)
+            scores[number] += fit
+            n_frames[number] += count
     if duration - end >= SHORTEST_S:
         labels.append(SILENCE)
         starts.append(end)
     edges = np.array([*starts, duration])
     edges[0] = 0.0
-    return Alignment(PhoneSequence(labels, increasing(edges)), tuple(spans), score / max(n_frames, 1) * FRAME_RATE)
+    confidence = float(scores.sum() / max(n_frames.sum(), 1.0)) * FRAME_RATE
+    fits = scores / np.maximum(n_frames, 1.0) * FRAME_RATE
+    return Alignment(PhoneSequence(labels, increasing(edges)), tuple(spans), confidence, fits)
 
 
 def _seconds(frame: int) -> float:

@@ -3,11 +3,11 @@
 Time 0 is the beginning of the file's clock, for pictures and for sound, so that both stay in step.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,16 @@ from tts2face.types import Waveform
 
 if TYPE_CHECKING:
     from av.audio.frame import AudioFrame
+    from av.audio.stream import AudioStream
     from av.container import InputContainer
     from av.video.frame import VideoFrame
     from av.video.stream import VideoStream
 
+Stream = TypeVar("Stream", "AudioStream", "VideoStream")
+
 LONGEST_SHORTFALL_S = 0.25  # a file that ends this much before its stated end is truncated; codecs pad by less
+LONGEST_DELAY_S = 60.0  # of the sound against the file's clock; more of it is damage
+MOST_FPS = 240.0  # fast cameras have no more; a higher rate counts the ticks of the file's clock
 QUARTER_TURN_DEG = 90
 
 
@@ -56,13 +61,14 @@ def media_facts(path: Path) -> Facts:
     """
     with _opened(path) as container:
         stream = _video(container, path)
-        audio = container.streams.audio
-        rate = stream.average_rate or stream.guessed_rate
-        if not rate:
-            raise DataError(f"{path} does not say how many frames it shows per second; convert it with ffmpeg -r")
         context = stream.codec_context
+        sound = _decodable(container.streams.audio)
         return Facts(
-            (container.duration or 0) / 1e6, float(rate), context.width, context.height, audio[0].rate if audio else 0
+            (container.duration or 0) / 1e6,
+            _rate(container, stream, path),
+            context.width,
+            context.height,
+            sound.rate if sound else 0,
         )
 
 
@@ -99,15 +105,17 @@ def read_sound(path: Path, rate: int) -> Waveform:
 
     blocks: list[NDArray[np.float32]] = []
     with _opened(path) as container:
-        if not container.streams.audio:
+        stream = _decodable(container.streams.audio)
+        if stream is None:
             raise DataError(f"{path} holds no sound; give a recording with its sound track")
-        stream = container.streams.audio[0]
         start = 0.0
         for frame in _decoded(container, stream, path):
             if not blocks:
                 start = float(frame.time or 0.0)
             blocks.append(_mono(frame))
         source_rate = stream.rate
+    if abs(start) > LONGEST_DELAY_S:
+        raise DataError(f"{path} says that its sound begins at {start:.0f} s; it is damaged: copy or convert it")
     sound = _placed(np.concatenate(blocks), round(start * source_rate))
     return Waveform(np.clip(soxr.resample(sound, source_rate, rate), -1.0, 1.0), rate)
 
@@ -121,7 +129,7 @@ def _opened(path: Path) -> Iterator["InputContainer"]:
     if path.stat().st_size == 0:
         raise DataError(f"{path} is empty (0 bytes); copy or record it again")
     try:
-        with av.open(str(path)) as container:
+        with av.open(str(path), metadata_errors="replace") as container:
             yield container
     except (av.FFmpegError, OSError) as broken:
         reason = getattr(broken, "strerror", None) or broken
@@ -129,9 +137,27 @@ def _opened(path: Path) -> Iterator["InputContainer"]:
 
 
 def _video(container: "InputContainer", path: Path) -> "VideoStream":
-    if not container.streams.video:
+    stream = _decodable(container.streams.video)
+    if stream is None:
         raise DataError(f"{path} holds no video; give a recording with pictures")
-    return container.streams.video[0]
+    return stream
+
+
+def _decodable(streams: Sequence[Stream]) -> Stream | None:
+    """The first stream that can be decoded; damage may leave streams of unknown kinds."""
+    return next((stream for stream in streams if stream.codec_context is not None), None)
+
+
+def _rate(container: "InputContainer", stream: "VideoStream", path: Path) -> float:
+    """Frames per second as the file states them; counted where it states none, or the ticks of its clock."""
+    stated = float(stream.average_rate or stream.guessed_rate or 0)
+    if 0 < stated <= MOST_FPS:
+        return stated
+    times = [packet.pts * packet.time_base for packet in container.demux(stream) if packet.pts and packet.time_base]
+    counted = float((len(times) - 1) / (max(times) - min(times))) if len(set(times)) > 1 else 0.0
+    if not 0 < counted <= MOST_FPS:
+        raise DataError(f"{path} does not tell how many frames it shows per second; convert it with ffmpeg -r")
+    return counted
 
 
 def _instant(frame: "VideoFrame", path: Path) -> float:

@@ -15,6 +15,7 @@ from tts2face.video.media import media_facts, read_pictures
 from tts2face.video.pose import head_angles, remove_pose
 from tts2face.video.steady import FilmReader, Sight
 
+MOST_LOOKS_WITH_TWO = 1  # a picture on the wall may be taken for a face once
 LEAST_SEEN = 0.5  # of the frames must show a face
 PROFILE_RAD = 0.8  # median turn beyond which landmarks of the far side are guessed
 
@@ -66,8 +67,12 @@ def read_take(video: Path, film: FilmReader, reader: BlendshapeReader, *, on_pro
     facts = media_facts(video)
     fps, of = facts.fps, max(1, round(facts.duration * facts.fps))
     found: list[Sight] = []
+    n_crowded = 0
     for sight in film.sights(read_pictures(video), fps):
         found.append(sight)
+        n_crowded += sight.n_faces is not None and sight.n_faces > 1
+        if n_crowded > MOST_LOOKS_WITH_TWO:
+            raise DataError(f"{video} shows two faces at {sight.time:.1f} s; crop it so that it shows one person")
         if on_progress:
             on_progress(min(len(found), of), of)
     times, pixels = np.array([sight.time for sight in found]), np.array([sight.points for sight in found])

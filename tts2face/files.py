@@ -1,4 +1,4 @@
-"""Text files that appear whole or not at all."""
+"""Files that appear whole or not at all."""
 
 import os
 import tempfile
@@ -7,8 +7,8 @@ from pathlib import Path
 from lexicon.errors import BackendError
 
 
-def write_beside(path: Path, text: str) -> None:
-    """Write a text beside `path`, then rename it.
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file beside `path`, then rename it, so that no half file is ever seen.
 
     Raises
     ------
@@ -18,11 +18,13 @@ def write_beside(path: Path, text: str) -> None:
     beside = None
     try:
         handle, beside = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
         os.chmod(beside, 0o644)
         os.replace(beside, path)
     except OSError as refused:
         if beside is not None:
             Path(beside).unlink(missing_ok=True)
-        raise BackendError(f"cannot write {path}: {refused.strerror}; choose another folder") from refused
+        raise BackendError(
+            f"cannot write {path}: {refused.strerror}; free some space or choose another folder"
+        ) from refused

@@ -1,0 +1,1 @@
+"""Pages for people to look at: one HTML file each, with nothing outside it."""

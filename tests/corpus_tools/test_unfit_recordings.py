@@ -1,0 +1,70 @@
+"""Real recordings made unfit in one way each are refused for that; the others go on, at one frame rate."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from corpus_tools.effort import Effort
+from corpus_tools.observe import Observations, observe
+from tests.corpus_tools.films import doubled, film
+from tts2face.video.media import read_pictures, read_sound
+
+REASONS = {
+    "crowd": "show more than one face",
+    "frozen": "the picture stands still for",
+    "clipped": "of the speech is clipped",
+    "noisy": "dB above the noise",
+    "away": "out of sight",
+    "wrong": "check the transcript",
+    "dark": "no frame shows a face",
+}
+
+
+@pytest.fixture(scope="module")
+def found(shared_recordings: Path, face_model: Path, tmp_path_factory: pytest.TempPathFactory) -> Observations:
+    source = shared_recordings / "grid_s1"
+    with (source / "manifest.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))[:2]
+    clip = source / "clips" / f"{rows[0]['clip']}.mkv"
+    pictures = [picture.pixels for picture in read_pictures(clip)]
+    sound = read_sound(clip, 16_000).samples
+    grey = np.full_like(pictures[0], 90)
+    loud = np.abs(sound).max()
+    noise = np.random.default_rng(0).normal(0, sound.std(), len(sound))
+    folder = tmp_path_factory.mktemp("unfit")
+    film([doubled(pixels) for pixels in pictures], sound, folder / "crowd.mp4")
+    film([*pictures[:30], *[pictures[30]] * 12, *pictures[42:]], sound, folder / "frozen.mp4")
+    film(pictures, np.clip(8 * sound / loud, -1, 1), folder / "clipped.mp4")
+    film(pictures, sound + noise, folder / "noisy.mp4")
+    film([*pictures[:35], *[grey] * 8, *pictures[43:]], sound, folder / "away.mp4")
+    film([grey] * len(pictures), sound, folder / "dark.mp4")
+    film(pictures, sound, folder / "good.mp4")
+    film(pictures, sound, folder / "wrong.mp4")
+    faster = [pictures[min(round(number * 25 / 30), len(pictures) - 1)] for number in range(len(pictures) * 30 // 25)]
+    film(faster, sound, folder / "faster.mp4", fps=30)
+    for path in folder.glob("*.mp4"):
+        path.with_suffix(".txt").write_text(rows[0]["transcript"])
+    (folder / "wrong.txt").write_text("yesterday seventeen elephants remembered nothing")
+    film(pictures, sound, folder / "second.mp4")
+    (folder / "second.txt").write_text(rows[0]["transcript"])
+    return observe(folder, effort=Effort(folder / "cache", 2, face_model))
+
+
+def test_what_is_wrong_is_said(found: Observations) -> None:
+    reasons = {refusal.name: refusal.reason for refusal in found.refused}
+    assert set(reasons) == set(REASONS)
+    assert [name for name, reason in REASONS.items() if reason not in reasons[name]] == []
+
+
+def test_the_rest_goes_on_at_the_rate_of_most(found: Observations) -> None:
+    assert [seen.name for seen in found.kept] == ["faster", "good", "second"]
+    assert {seen.fps for seen in found.kept} == {25.0}
+    faster, good, _ = found.kept
+    n_frames = min(len(faster.landmarks), len(good.landmarks))
+    gaps = [
+        np.linalg.norm(one.landmarks[:n_frames, 13] - one.landmarks[:n_frames, 14], axis=1) for one in found.kept[:2]
+    ]
+    assert np.corrcoef(gaps[0], gaps[1])[0, 1] > 0.98
+    np.testing.assert_allclose(faster.phones.edges[1:-1], good.phones.edges[1:-1], atol=0.02)

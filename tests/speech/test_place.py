@@ -1,0 +1,85 @@
+"""Words placed into stretches of sound."""
+
+import numpy as np
+import pytest
+
+from lexicon.errors import InputError
+from tts2face.speech import place
+from tts2face.speech.place import stretch_of_words
+
+PHONES = "pbtdkgfvszmnlrwiuaeo"
+
+
+def edit_cost(written: str, sounded: str) -> float:
+    """Cost of the cheapest edits: the whole table, in plain Python."""
+    row = [place.MISSED * number for number in range(len(sounded) + 1)]
+    for phone in written:
+        before, row = row, [row[0] + place.MISSED]
+        for number, other in enumerate(sounded):
+            said = before[number] + (0.0 if phone == other else place.OTHER)
+            row.append(min(said, before[number + 1] + place.MISSED, row[-1] + place.MISSED))
+    return row[-1]
+
+
+def cost_of(partners: np.ndarray, written: str, sounded: str, steps: list[int]) -> float:
+    """Cost of the edits that a row of partners stands for."""
+    missed = len(sounded) - sum(step == place.SAID for step in steps)
+    said = sum(
+        place.OTHER * (written[number] != sounded[partner])
+        for number, (partner, step) in enumerate(zip(partners, steps, strict=True))
+        if step == place.SAID
+    )
+    return said + place.MISSED * (missed + sum(step == place.SKIPPED for step in steps))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_path_is_the_cheapest(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    written, sounded = ("".join(generator.choice(list("pba"), generator.integers(1, 9))) for _ in range(2))
+    numbers = {phone: number for number, phone in enumerate("pba")}
+    partners = place._partners(
+        np.array([numbers[one] for one in written]), np.array([numbers[one] for one in sounded]), 20
+    )
+    assert (np.diff(partners) >= 0).all()
+    costs = []
+    for flags in np.ndindex(*[2] * len(written)):  # which phones count as said: some choice gives the cheapest cost
+        steps = [place.SAID if flag else place.SKIPPED for flag in flags]
+        used = [int(partner) for partner, flag in zip(partners, flags, strict=True) if flag]
+        if len(set(used)) == len(used):
+            costs.append(cost_of(partners, written, sounded, steps))
+    assert min(costs) == pytest.approx(edit_cost(written, sounded), abs=1e-5)
+
+
+def test_words_go_where_their_phones_were_heard() -> None:
+    generator = np.random.default_rng(1)
+    words = [tuple(generator.choice(list(PHONES), generator.integers(2, 6))) for _ in range(300)]
+    truth = np.sort(generator.integers(0, 12, len(words)))
+    heard: list[list[str]] = [[] for _ in range(12)]
+    for word, at in zip(words, truth, strict=True):
+        for phone in word:
+            luck = generator.random()
+            if luck < 0.1:
+                continue  # not heard
+            heard[at].append(phone if luck < 0.8 else str(generator.choice(list(PHONES))))
+            if luck > 0.95:
+                heard[at].append(str(generator.choice(list(PHONES))))
+    found = stretch_of_words(words, heard)
+    assert (np.diff(found) >= 0).all()
+    assert (found == truth).mean() > 0.99
+
+
+def test_text_far_longer_than_the_sound_has_its_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(place, "BAND", 4)
+    words = [tuple("pa")] * 40 + [tuple("si")] * 5
+    found = stretch_of_words(words, [list("papa"), list("sisisisisi")])
+    assert found[0] == 0
+    assert found[-5:].tolist() == [1] * 5
+
+
+def test_silence_holds_all_words() -> None:
+    assert stretch_of_words([("p",), ("a",)], [[], []]).tolist() == [0, 0]
+
+
+def test_nothing_to_place() -> None:
+    with pytest.raises(InputError, match="needs words, and stretches"):
+        stretch_of_words([], [["p"]])

@@ -1,0 +1,56 @@
+"""Phones heard without a transcript, in real speech."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from corpus_tools.recordings import Recording, spoken_words
+from lexicon.errors import InputError
+from tts2face.speech.align import acoustic_phones
+from tts2face.speech.recognize import LONGEST_S, PhoneRecogniser
+from tts2face.types import Waveform
+from tts2face.video.media import read_sound
+
+EDITED = 0.4  # of the phones: 0.285 over 100 sentences of this talker (docs/decisions.md)
+
+
+@pytest.fixture(scope="module")
+def recogniser() -> PhoneRecogniser:
+    pytest.importorskip("hama", reason="needs `pip install 'tts2face[capture]'`")
+    return PhoneRecogniser()
+
+
+def edits(written: list[str], heard: list[str]) -> int:
+    """Levenshtein distance."""
+    row = list(range(len(heard) + 1))
+    for phone in written:
+        before, row = row, [row[0] + 1]
+        for number, other in enumerate(heard):
+            row.append(min(before[number] + (phone != other), before[number + 1] + 1, row[-1] + 1))
+    return row[-1]
+
+
+def test_most_phones_of_real_sentences_are_heard(recogniser: PhoneRecogniser, shared_recordings: Path) -> None:
+    folder = shared_recordings / "grid_s1"
+    with (folder / "manifest.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))[::80]
+    wrong = total = 0
+    for row in rows:
+        video = folder / "clips" / f"{row['clip']}.mkv"
+        words = spoken_words(Recording(row["clip"], video, row["transcript"], is_spelling=True))
+        assert words is not None
+        written = acoustic_phones([phone for _, ways in words for phone in ways[0]])
+        heard = acoustic_phones([phone for word in recogniser.words(read_sound(video, 16_000)) for phone in word])
+        wrong, total = wrong + edits(written, heard), total + len(written)
+    assert wrong / total < EDITED
+
+
+def test_silence_holds_no_word(recogniser: PhoneRecogniser) -> None:
+    assert recogniser.words(Waveform(np.zeros(0), 16_000)) == ()
+
+
+def test_a_sound_that_is_too_long(recogniser: PhoneRecogniser) -> None:
+    with pytest.raises(InputError, match="is heard in parts of at most 30 s"):
+        recogniser.words(Waveform(np.zeros(round((LONGEST_S + 1) * 16_000)), 16_000))
