@@ -38,7 +38,8 @@ def readme_commands() -> list[str]:
 @pytest.mark.parametrize("line", readme_commands())
 def test_every_command_of_the_readme_works(line: str, here: Path, shared_recordings: Path) -> None:
     (here / "chapter.txt").write_text("Chapter one. It was late.", encoding="utf-8")
-    (here / "take.mp4").symlink_to(shared_recordings / "grid_s1" / "clips" / "bbaf2n.mkv")
+    for film in ("take.mp4", "me.mp4"):
+        (here / film).symlink_to(shared_recordings / "grid_s1" / "clips" / "bbaf2n.mkv")
     few = here / "recordings"
     (few / "clips").mkdir(parents=True)
     (few / "align").mkdir()
@@ -65,7 +66,7 @@ def test_every_command_of_the_readme_works(line: str, here: Path, shared_recordi
         words += SMALL
     done = subprocess.run([*COMMAND, *words], input=given, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    for flag in ("--out", "--explain"):
+    for flag in ("--out", "--explain", "--report"):
         if flag in words:
             assert (here / words[words.index(flag) + 1]).exists()
 
