@@ -37,7 +37,9 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     gain: Annotated[float, Parameter(help="Factor on the motion of lips and brows.")] = 1.0,
     fps: Annotated[float | None, Parameter(help="Frames per second; the take's own, at most 30 of a capture.")] = None,
     audio: Annotated[Path | None, Parameter(help="The sound that belongs to a capture.")] = None,
-    size: Annotated[str, Parameter(help="Width x height in pixels.")] = "512x512",
+    size: Annotated[
+        str, Parameter(help="Width x height in pixels; auto: 512x512, or the talker's own video.")
+    ] = "auto",
     background: Annotated[str, Parameter(help="studio, transparent, a colour, or an image file.")] = "studio",
     model: Annotated[Path | None, Parameter(help="face_landmarker.task; found or set up without it.")] = None,
     quiet: Annotated[bool, Parameter(help="No progress bar and no last line.", negative="")] = False,

@@ -224,7 +224,7 @@ def _plate(
     recording, here = recordings[number], slice(first, last)
     points = recording.points[here, :N_MESH]
     return Plate(
-        video=film_of(list(islice(recording.pictures(), first, last))),
+        video=film_of(islice(recording.pictures(), first, last)),
         points=np.concatenate([points, ring(points)], axis=1).astype(np.float32),
         axes=picture_axes(recording.points[here], recording.landmarks[here]),
         shape=recording.shape[here],

@@ -1,8 +1,9 @@
 """The plate: which stretch of the talker's video is drawn on, and the stretch as a small film."""
 
 import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,16 +28,17 @@ def chosen_stretch(points: Sequence[NDArray[np.float32]]) -> tuple[int, int, int
     return number, 0, min(len(points[number]), LONGEST)
 
 
-def film_of(pictures: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+def film_of(pictures: Iterator[NDArray[np.uint8]]) -> NDArray[np.uint8]:
     """The bytes of an MP4 film of (H, W, 3) pictures; odd sides lose their last row or column."""
     import av
 
-    height, width = (side - side % 2 for side in pictures[0].shape[:2])
+    first = next(pictures)
+    height, width = (side - side % 2 for side in first.shape[:2])
     store = io.BytesIO()
     with av.open(store, "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=Fraction(25), options=dict(NEAR_LOSSLESS))
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv444p"
-        for picture in pictures:
+        for picture in chain([first], pictures):
             frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture[:height, :width]), format="rgb24")
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))

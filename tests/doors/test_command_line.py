@@ -35,21 +35,25 @@ def readme_commands() -> list[str]:
     return [line.split(" #")[0].strip() for line in block if not line.startswith("pip")]
 
 
-@pytest.mark.parametrize("line", readme_commands())
-def test_every_command_of_the_readme_works(line: str, here: Path, shared_recordings: Path) -> None:
+def lay_out(here: Path, source: Path) -> None:
+    """The files that the README's commands read."""
     (here / "chapter.txt").write_text("Chapter one. It was late.", encoding="utf-8")
     for film in ("take.mp4", "me.mp4"):
-        (here / film).symlink_to(shared_recordings / "grid_s1" / "clips" / "bbaf2n.mkv")
+        (here / film).symlink_to(source / "clips" / "bbaf2n.mkv")
     few = here / "recordings"
     (few / "clips").mkdir(parents=True)
     (few / "align").mkdir()
-    source = shared_recordings / "grid_s1"
     rows = (source / "manifest.csv").read_text().splitlines()[:7]
     (few / "manifest.csv").write_text("\n".join(rows))
     for row in rows[1:]:
         name = row.split(",")[0]
         (few / "clips" / f"{name}.mkv").symlink_to(source / "clips" / f"{name}.mkv")
         (few / "align" / f"{name}.align").symlink_to(source / "align" / f"{name}.align")
+
+
+@pytest.mark.parametrize("line", readme_commands())
+def test_every_command_of_the_readme_works(line: str, here: Path, shared_recordings: Path) -> None:
+    lay_out(here, shared_recordings / "grid_s1")
     if "corpus" in line or "mimic" in line:
         pytest.importorskip("ai_edge_litert", reason="needs the extra [capture]")
         line = line.replace("--hold-out 100", "--hold-out 2")

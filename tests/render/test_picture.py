@@ -24,6 +24,7 @@ def test_sizes_are_read():
     assert sides_of("640x480") == (640, 480)
     assert sides_of(" 1280 X 720 ") == (1280, 720)
     assert sides_of("256") == (256, 256)
+    assert sides_of("auto") == (512, 512)
 
 
 @pytest.mark.parametrize("camera", ["top", "", "1", "1,2,3,4", "nan,0", "inf,0,900", "a,b"])

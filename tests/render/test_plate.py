@@ -10,6 +10,7 @@ from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.appearance import Appearance, Plate, TextureModel
 from tts2face.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.render import plate
 from tts2face.render.draw import frames
 from tts2face.render.picture import Picture
 from tts2face.render.plate import plate_drawn, plate_frame, plate_staged
@@ -64,7 +65,7 @@ def own_talker(*, has_face: bool = True) -> Talker:
     y, x = np.mgrid[:SIZE, :SIZE]
     pictures = [np.stack([2 * x + k, 2 * y, x + y], axis=2).clip(0, 255).astype(np.uint8) for k in range(4)]
     plate = Plate(
-        video=film_of(pictures),
+        video=film_of(iter(pictures)),
         points=np.repeat(points[None], 4, axis=0).astype(np.float32),
         axes=np.tile(np.array([[1.0, 0, 0], [0, -1.0, 0]], np.float32), (4, 1, 1)),
         shape=generator.normal(0, 1, (4, 3)).astype(np.float32),
@@ -156,6 +157,23 @@ def test_looks_change_the_texture_by_their_basis():
 @pytest.mark.parametrize(("instant", "number"), [(0.0, 0), (0.08, 2), (0.12, 3), (0.16, 2), (0.24, 0), (0.28, 1)])
 def test_the_plate_goes_to_its_end_and_back(instant, number):
     assert plate_frame(plate_staged(own_talker(), Picture(size="96x96")), instant) == number
+
+
+def test_without_a_size_the_picture_is_as_large_as_the_video():
+    stage = plate_staged(own_talker(), Picture())
+    assert (stage.picture.width, stage.picture.height) == (SIZE, SIZE)
+    assert stage.scale == 1.0
+    assert stage.plate[0].shape == (SIZE, SIZE, 3)
+
+
+def test_many_large_frames_are_packed_and_look_the_same(monkeypatch):
+    raw = plate_staged(own_talker(), Picture()).plate
+    monkeypatch.setattr(plate, "MOST_RAW_BYTES", raw[0].size)
+    packed = plate_staged(own_talker(), Picture()).plate
+    assert len(packed) == len(raw)
+    assert np.array_equal(packed[0], raw[0])
+    for number in range(1, len(raw)):
+        assert np.abs(packed[number].astype(int) - raw[number]).mean() <= 2  # of 255
 
 
 def test_a_clip_goes_on_where_the_one_before_it_ended():

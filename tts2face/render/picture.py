@@ -9,6 +9,7 @@ from tts2face.render.views import Camera, camera_named
 from tts2face.request import option
 
 SIDES = (16, 4096)  # px
+AUTO, USUAL = "auto", (512, 512)
 SUPERSAMPLING = (1, 2, 3)
 NUMBA, PYVISTA = RENDERERS = ("numba", "pyvista")
 STUDIO, TRANSPARENT = "studio", "transparent"
@@ -30,7 +31,10 @@ class Picture:
         An option is out of range or unknown.
     """
 
-    size: str = option("512x512", "Width x height in pixels, even numbers from 16 to 4096.")
+    size: str = option(
+        "auto",
+        "Width x height in pixels, even numbers from 16 to 4096; auto: 512x512, or those of a talker's own video.",
+    )
     camera: str = option("front", "front, three-quarter, profile, close, or yaw,pitch[,distance] in degrees and mm.")
     background: str = option("studio", "studio, transparent, a colour (name or #rrggbb), or an image file.")
     supersampling: int = option(2, "Samples along each side of a pixel: 1, 2 or 3.")
@@ -73,13 +77,15 @@ class Picture:
 
 
 def sides_of(size: str) -> tuple[int, int]:
-    """Width and height of a size such as ``640x480`` or ``512``.
+    """Width and height of a size such as ``640x480`` or ``512``; those of ``auto`` are `USUAL`.
 
     Raises
     ------
     InputError
         It is not a size, or a side is odd or out of range.
     """
+    if size.strip() == AUTO:
+        return USUAL
     match = re.fullmatch(r"\s*(\d{1,9})\s*(?:[xX×,]\s*(\d{1,9})\s*)?", size)
     if match is None:
         raise InputError(f"size must be width x height such as 640x480, not {size!r}")
