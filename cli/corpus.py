@@ -132,7 +132,7 @@ def clone(
     added = f", {made.n_appended} modes added" if append_missing else ""
     say(f"wrote {out}: {len(made.talker.utterances)} utterances{added}, {made.at_limits:.1%} of frames at limits")
     if made.left_pictures:
-        say("it carries motion only: pictures show other frames than these and were left behind")
+        say("it carries motion only: the source's pictures show another face and were left behind")
 
 
 @corpus.command

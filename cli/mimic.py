@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from tts2face.render.draw import AnyStage
     from tts2face.render.picture import Picture
     from tts2face.types import Waveform
+    from tts2face.video.perform import Take
 
 OWN, CAPTURE = "self", ".csv"
 SOUND_RATE = 48000  # Hz
@@ -35,6 +36,9 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     identity: Annotated[str | None, Parameter(help="A preset of the face's age, sex and ancestry.")] = None,
     talker: Annotated[Path | None, Parameter(help="With --face self: the talker whose own face is shown.")] = None,
     gain: Annotated[float, Parameter(help="Factor on the motion of lips and brows.")] = 1.0,
+    append_missing: Annotated[
+        bool, Parameter(help="With --face self: add the motion that she never made.", negative="")
+    ] = False,
     fps: Annotated[float | None, Parameter(help="Frames per second; the take's own, at most 30 of a capture.")] = None,
     audio: Annotated[Path | None, Parameter(help="The sound that belongs to a capture.")] = None,
     size: Annotated[
@@ -56,7 +60,9 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
         raise InputError("--face self shows a talker's own face: give both --face self and --talker FILE")
     if audio is not None and take.suffix.lower() != CAPTURE:
         raise InputError("--audio belongs to a capture; a film brings its own sound")
-    wanted = Wanted(take, face, identity, talker, gain, Picture(size=size, background=background))
+    if append_missing and talker is None:
+        raise InputError("--append-missing belongs to --face self: a face file has the shapes that it has")
+    wanted = Wanted(take, face, identity, talker, gain, append_missing, Picture(size=size, background=background))
     with progress_bar("watching", quiet) as on_progress:
         motion, stage = _capture(wanted) if take.suffix.lower() == CAPTURE else _film(wanted, model, on_progress)
     if fps is not None or take.suffix.lower() == CAPTURE:
@@ -79,6 +85,7 @@ class Wanted:
     identity: str | None
     talker: Path | None
     gain: float
+    append_missing: bool
     picture: "Picture"
 
 
@@ -96,23 +103,31 @@ def _capture(wanted: Wanted) -> "tuple[Motion, AnyStage]":
 
 def _film(wanted: Wanted, model: Path | None, on_progress: "Progress | None") -> "tuple[Motion, AnyStage]":
     from tts2face.face.file import load_face
-    from tts2face.mimic import motion_of_own, motion_of_take
+    from tts2face.mimic import able_to_follow, motion_of_own, motion_of_take
     from tts2face.render.draw import staged
     from tts2face.render.plate import plate_staged
     from tts2face.talker import read_talker
+
+    if wanted.talker is None:
+        shown = load_face(wanted.face, wanted.identity)
+        return motion_of_take(_watched(wanted, model, on_progress), shown, gain=wanted.gain), staged(
+            shown, wanted.picture
+        )
+    hers = read_talker(wanted.talker)
+    stage = plate_staged(hers, wanted.picture)  # before the take is watched: it refuses what cannot be shown
+    seen = _watched(wanted, model, on_progress)
+    if wanted.append_missing:
+        hers = able_to_follow(seen, hers)
+        stage = plate_staged(hers, wanted.picture)
+    return motion_of_own(seen, hers, gain=wanted.gain), stage
+
+
+def _watched(wanted: Wanted, model: Path | None, on_progress: "Progress | None") -> "Take":
     from tts2face.video.blendshapes import BlendshapeReader
     from tts2face.video.perform import read_take
     from tts2face.video.steady import FilmReader
 
-    shown = None if wanted.talker is not None else load_face(wanted.face, wanted.identity)
-    hers = None if wanted.talker is None else read_talker(wanted.talker)
-    stage = plate_staged(hers, wanted.picture) if hers is not None else None
-    seen = read_take(wanted.take, FilmReader(model), BlendshapeReader(model), on_progress=on_progress)
-    if hers is not None and stage is not None:
-        return motion_of_own(seen, hers, gain=wanted.gain), stage
-    if shown is None:
-        raise InputError("there is no face to drive; choose --face head")
-    return motion_of_take(seen, shown, gain=wanted.gain), staged(shown, wanted.picture)
+    return read_take(wanted.take, FilmReader(model), BlendshapeReader(model), on_progress=on_progress)
 
 
 def _sound(take: Path, audio: Path | None, quiet: bool) -> "Waveform":

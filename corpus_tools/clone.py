@@ -1,19 +1,26 @@
 """A talker with one person's face model and another's recorded speech."""
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from corpus_tools.aam.carry import looks_map
 from lexicon.errors import InputError
-from tts2face.face.clone import Cloning, append_missing, cloning
-from tts2face.talker import Talker, Utterance, load_talker, write_talker
+from tts2face.face.clone import Cloning, cloning, with_missing
+from tts2face.face.own import own_face
+from tts2face.talker import Talker, Utterance, load_talker, speech_channels, write_talker
+from tts2face.types import Trajectory
 
 CONTENT = "motion only: one talker's recorded motion carried to the shape model of another's face; no image, no sound"
+CONTENT_WITH_PICTURES = (
+    "one talker's recorded motion carried to another's face, with pictures of that face, agreed to; no sound"
+)
 STATED = ("sources", "licence", "attribution")  # these bind whoever uses the clone, for both talkers
 UNSTATED = "not stated"
 
@@ -23,7 +30,7 @@ class Cloned:
     """A cloned talker and what happened on the way.
 
     ``n_appended`` modes were added to the target's; ``at_limits`` is the share of frames with a parameter at the
-    target's limits; ``left_pictures`` tells that a talker had pictures, which are not carried over.
+    target's limits; ``left_pictures`` tells that the source had pictures, for which the target has no place.
     """
 
     talker: Talker
@@ -67,10 +74,10 @@ def clone_talker(
 
 
 def cloned_talker(source: Talker, target: Talker, *, gain: float = 1.0, append: bool = False) -> Cloned:
-    """The talker with the target's shape model whose utterances are the source's, carried over.
+    """The talker with the target's face whose utterances are the source's, carried over.
 
-    Sizes of the head's motion follow the faces' sizes, its angles stay. Pictures are left behind: the source's belong
-    to another face, and the target's show no frame of these utterances.
+    Sizes of the head's motion follow the faces' sizes, its angles stay. Where the target has pictures, so has the
+    clone: their looks are the source's by eq. 5 where it has pictures too, else those that go with the target's lips.
 
     Raises
     ------
@@ -81,25 +88,49 @@ def cloned_talker(source: Talker, target: Talker, *, gain: float = 1.0, append: 
     """
     if not source.utterances:
         raise InputError("the source talker has no utterance to clone; give one that was built from recordings")
-    model = append_missing(source.model, target.model) if append else target.model
-    ready = cloning(source.model, model, gain=gain)
-    utterances = tuple(_carried(utterance, ready) for utterance in source.utterances)
+    n_before = len(target.model.spread)
+    target = with_missing(source.model, target) if append else target
+    ready = cloning(source.model, target.model, gain=gain)
+    looks = _looks(source, target, gain)
+    utterances = tuple(_carried(utterance, ready, looks) for utterance in source.utterances)
     shapes = np.concatenate([utterance.shape for utterance in utterances])
-    n_appended = len(model.spread) - len(target.model.spread)
+    n_appended = len(target.model.spread) - n_before
     about = {"gain": gain, "size": round(ready.size, 4), "appended_modes": n_appended}
-    metadata = _metadata(source.metadata, target.metadata, about)
+    metadata = _metadata(source.metadata, target.metadata, about, has_pictures=target.appearance is not None)
     at_limits = float((np.abs(shapes) >= ready.limits).any(axis=1).mean())
-    left = source.appearance is not None or target.appearance is not None
-    return Cloned(Talker(source.fps, model, utterances, metadata), n_appended, at_limits, left)
+    talker = Talker(source.fps, target.model, utterances, metadata, target.appearance)
+    return Cloned(talker, n_appended, at_limits, source.appearance is not None and target.appearance is None)
 
 
-def _carried(utterance: Utterance, ready: Cloning) -> Utterance:
+Looks = Callable[[Utterance, NDArray[np.float32]], NDArray[np.float32] | None]
+
+
+def _looks(source: Talker, target: Talker, gain: float) -> Looks:
+    """The looks of an utterance of the source on the target, given its shape there; none without pictures."""
+    if target.appearance is None:
+        return lambda spoken, shape: None
+    if source.appearance is not None:
+        carry = looks_map(source.appearance, target.appearance)
+        return lambda spoken, shape: None if spoken.looks is None else carry.carried(spoken.looks, gain=gain)
+    own, channels = own_face(target), speech_channels(target.model)
+
+    def with_lips(_spoken: Utterance, shape: NDArray[np.float32]) -> NDArray[np.float32]:
+        lips = Trajectory(channels, shape[:, : len(channels)], source.fps)
+        return np.asarray(own.motion(lips).values[:, len(channels) :], np.float32)
+
+    return with_lips
+
+
+def _carried(utterance: Utterance, ready: Cloning, looks: Looks) -> Utterance:
     head = utterance.head.copy()
     head[:, 3:] *= ready.size
-    return replace(utterance, shape=ready.parameters(utterance.shape), head=head, looks=None)
+    shape = ready.parameters(utterance.shape)
+    return replace(utterance, shape=shape, head=head, looks=looks(utterance, shape))
 
 
-def _metadata(source: Mapping[str, Any], target: Mapping[str, Any], about: Mapping[str, Any]) -> dict[str, Any]:
+def _metadata(
+    source: Mapping[str, Any], target: Mapping[str, Any], about: Mapping[str, Any], *, has_pictures: bool
+) -> dict[str, Any]:
     """Provenance of both, and in full under ``cloning``."""
     origins = {
         role: {key: value for key, value in stated.items() if key != "refused"}
@@ -109,7 +140,8 @@ def _metadata(source: Mapping[str, Any], target: Mapping[str, Any], about: Mappi
         "name": f"{target.get('name', UNSTATED)} with the speech of {source.get('name', UNSTATED)}",
         "language": source.get("language", UNSTATED),
         **{key: _both(source.get(key, UNSTATED), target.get(key, UNSTATED)) for key in STATED},
-        "content": CONTENT,
+        "content": CONTENT_WITH_PICTURES if has_pictures else CONTENT,
+        **({"consent": target["consent"]} if has_pictures and "consent" in target else {}),
         "cloning": {**about, **origins},
     }
 

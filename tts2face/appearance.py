@@ -131,6 +131,20 @@ class Appearance:
         return np.concatenate([self.face.spread, self.mouth.spread])
 
 
+def nearest_pixels(model: TextureModel) -> NDArray[np.int64]:
+    """(h w,) for each pixel of a texture the nearest one of its mesh, as a place in `model.pixels`."""
+    from scipy.ndimage import distance_transform_edt
+
+    width, height = model.size
+    empty = np.ones(width * height, bool)
+    empty[model.pixels] = False
+    y, x = distance_transform_edt(empty.reshape(height, width), return_distances=False, return_indices=True)
+    place = np.zeros(width * height, np.int64)
+    place[model.pixels] = np.arange(len(model.pixels))
+    nearest: NDArray[np.int64] = place[(y * width + x).ravel()]
+    return nearest
+
+
 def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
     """The appearance as arrays of a talker's file; `appearance_of` reads them."""
     arrays: dict[str, NDArray[Any]] = {

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.face.clone import cloning
+from tts2face.face.clone import cloning, with_missing
 from tts2face.face.model import Face
 from tts2face.face.own import own_face
 from tts2face.face.performer import lip_model, performer
@@ -37,6 +37,11 @@ def motion_of_take(take: Take, face: Face, *, gain: float = 1.0) -> Motion:
     """
     ready = performer(take.landmarks, take.scores, face)
     return Motion(ready.weights(take.landmarks, take.scores, gain=gain), take.head)
+
+
+def able_to_follow(take: Take, talker: Talker) -> Talker:
+    """The talker with the motion of lips that the take shows and she never made (T07, section 3.1)."""
+    return with_missing(lip_model(take.landmarks), talker)
 
 
 def motion_of_own(take: Take, talker: Talker, *, gain: float = 1.0) -> Motion:

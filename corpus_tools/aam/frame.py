@@ -40,7 +40,7 @@ def framed(shape: NDArray[np.floating], triangles: NDArray[np.int32], side: int)
     scale = (side - 1 - 2 * MARGIN_PX) / (high - low).max()
     points = (np.asarray(shape, np.float64) - low) * scale + MARGIN_PX
     width, height = (int(np.ceil(length)) for length in (high - low) * scale + 2 * MARGIN_PX + 1)
-    owner, weights = _covered(points, triangles, (width, height))
+    owner, weights = covered(points, triangles, (width, height))
     pixels = np.flatnonzero(owner >= 0)
     return Frame(
         points.astype(np.float32),
@@ -52,7 +52,7 @@ def framed(shape: NDArray[np.floating], triangles: NDArray[np.int32], side: int)
     )
 
 
-def _covered(
+def covered(
     points: Floats, triangles: NDArray[np.int32], size: tuple[int, int]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Triangle over each pixel (-1: none) and the pixel's barycentric coordinates in it."""

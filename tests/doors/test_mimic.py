@@ -132,6 +132,7 @@ def test_films_that_cannot_drive_a_face_are_refused(
         (["--out", "m.mp4", "--face", "self"], "give both --face self and --talker"),
         (["--out", "m.mp4", "--audio", "x.wav"], "a film brings its own sound"),
         (["--out", "m.mp4", "--face", "nobody"], "nobody"),
+        (["--out", "m.mp4", "--append-missing"], "belongs to --face self"),
     ],
 )
 def test_orders_that_make_no_sense_are_refused(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from cli.main import run
+from corpus_tools.aam.carry import looks_map
 from lexicon.errors import BackendError
 from tts2face.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.talker import read_talker
@@ -109,3 +110,37 @@ def test_pictures_without_consent_are_refused(
     assert run(["corpus", "build", str(recordings), "--out", str(tmp_path / "me.talker"), "--appearance"]) != 0
     assert "state the consent" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("source", ["grid_s1", "me"])
+def test_another_s_speech_on_her_own_face(source: str, talker: Path, tmp_path: Path) -> None:
+    """From a talker without pictures, and from one with them: the clone has hers, and the consent to show them."""
+    cloned, clip = tmp_path / "cloned.talker", tmp_path / "clip.mp4"
+    given = str(talker) if source == "me" else source
+    assert run(["corpus", "clone", given, str(talker), "--append-missing", "--out", str(cloned)]) == 0
+    assert run(["Bob may.", "--talker", str(cloned), "--face", "self", "--out", str(clip), "--quiet"]) == 0
+    made, hers = read_talker(cloned), read_talker(talker)
+    assert made.metadata["consent"] == hers.metadata["consent"]
+    assert all(spoken.looks is not None for spoken in made.utterances)
+    with av.open(str(clip)) as container:
+        assert "Synthetic" in container.metadata["comment"]
+        pictures = np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)])
+    assert np.abs(np.diff(pictures.astype(int), axis=0)).mean() > 0.1
+
+
+def test_her_looks_carried_to_herself_stay(talker: Path) -> None:
+    """The basis is kept in 16-bit floating point, with three digits."""
+    hers = read_talker(talker)
+    carry = looks_map(hers.appearance, hers.appearance)
+    np.testing.assert_allclose(carry.relation, np.eye(len(carry.relation)), atol=0.01)
+
+
+def test_a_take_moves_her_lips_as_she_never_did(talker: Path, recordings: Path, bundle: Path, tmp_path: Path) -> None:
+    take = next((recordings / "clips").iterdir())
+    made = {}
+    for flags in ((), ("--append-missing",)):
+        out = tmp_path / f"m{len(flags)}.mp4"
+        words = ["mimic", str(take), "--talker", str(talker), "--face", "self", "--out", str(out), *flags]
+        assert run([*words, "--quiet", "--model", str(bundle)]) == 0
+        made[flags] = out.read_bytes()
+    assert made[()] != made[("--append-missing",)]

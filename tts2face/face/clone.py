@@ -5,7 +5,7 @@ both faces have one size. Motion is counted from rest to rest: closed lips stay 
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from tts2face.face.lips import (
 )
 from tts2face.face.retarget import inner_product_map, product
 from tts2face.landmarks import N_LANDMARKS
-from tts2face.talker import ShapeModel
+from tts2face.talker import ShapeModel, Talker
 from tts2face.types import Trajectory
 
 FloatArray = NDArray[np.float64]
@@ -193,6 +193,29 @@ def append_missing(source: ShapeModel, target: ShapeModel, n: int | None = None)
     basis = joined(own.astype(np.float32), added).reshape(-1, *target.mean.shape)
     rest = joined(target.rest, np.zeros(len(found)))
     return ShapeModel(target.mean, basis, joined(target.spread, found), target.n_speech + len(of_mouth), rest)
+
+
+def with_missing(source: ShapeModel, target: Talker) -> Talker:
+    """The target with the components that the source moves and it cannot; its own utterances and plate leave them at 0.
+
+    Raises
+    ------
+    DataError
+        A model does not have the 478 landmarks.
+    """
+    model, before = append_missing(source, target.model), target.model
+    n_mouth = model.n_speech - before.n_speech
+    n_other = len(model.spread) - len(before.spread) - n_mouth
+
+    def widened(shape: NDArray[np.float32]) -> NDArray[np.float32]:
+        mouth, other = (np.zeros((len(shape), n), np.float32) for n in (n_mouth, n_other))
+        return np.concatenate([shape[:, : before.n_speech], mouth, shape[:, before.n_speech :], other], axis=1)
+
+    utterances = tuple(replace(spoken, shape=widened(spoken.shape)) for spoken in target.utterances)
+    appearance = target.appearance
+    if appearance is not None:
+        appearance = replace(appearance, plate=replace(appearance.plate, shape=widened(appearance.plate.shape)))
+    return replace(target, model=model, utterances=utterances, appearance=appearance)
 
 
 def face_size(model: ShapeModel) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.appearance import Appearance, TextureModel
+from tts2face.appearance import Appearance, nearest_pixels
 from tts2face.landmarks import FACE_OVAL
 from tts2face.render.ahead import drawn_ahead
 from tts2face.render.picture import AUTO, SIDES, Picture
@@ -96,8 +96,8 @@ def plate_staged(talker: Talker, picture: Picture) -> PlateStage:
         points=points,
         scale=scale,
         triangles=np.concatenate([ring_triangles(len(appearance.face.reference)), appearance.face.triangles]),
-        face_fill=_fill(appearance.face),
-        mouth_fill=_fill(appearance.mouth),
+        face_fill=nearest_pixels(appearance.face),
+        mouth_fill=nearest_pixels(appearance.mouth),
     )
 
 
@@ -249,20 +249,6 @@ def ring_triangles(n_mesh: int) -> NDArray[np.int32]:
         after, outer, outer_after = FACE_OVAL[(k + 1) % n], n_mesh + k, n_mesh + (k + 1) % n
         rows += [(here, after, outer), (after, outer_after, outer)]
     return np.array(rows, np.int32)
-
-
-def _fill(model: TextureModel) -> NDArray[np.int64]:
-    """(h w,) for each pixel of a texture the nearest one of its mesh, as a place in `model.pixels`."""
-    from scipy.ndimage import distance_transform_edt
-
-    width, height = model.size
-    empty = np.ones(width * height, bool)
-    empty[model.pixels] = False
-    y, x = distance_transform_edt(empty.reshape(height, width), return_distances=False, return_indices=True)
-    place = np.zeros(width * height, np.int64)
-    place[model.pixels] = np.arange(len(model.pixels))
-    nearest: NDArray[np.int64] = place[(y * width + x).ravel()]
-    return nearest
 
 
 def _filled(texture: Floats, fill: NDArray[np.int64], size: tuple[int, int]) -> Floats:
