@@ -26,10 +26,16 @@ Progress = Callable[[int, int], None]
 
 
 def mimic(  # noqa: PLR0913 - one parameter a flag
-    take: Annotated[Path, Parameter(help="A video of one person, or a .csv file of Live Link Face.")],
+    take: Annotated[Path | None, Parameter(help="A video of one person, or a .csv file of Live Link Face.")] = None,
     /,
     *,
-    out: Annotated[Path, Parameter(help="The clip: .mp4, .webm, .gif, or a folder for .png files.", alias="-o")],
+    out: Annotated[
+        Path | None, Parameter(help="The clip: .mp4, .webm, .gif, or a folder for .png files.", alias="-o")
+    ] = None,
+    camera: Annotated[
+        str | None,
+        Parameter(help="Instead of a take: a camera's number (0 is the first) or address, live in a window."),
+    ] = None,
     face: Annotated[
         str, Parameter(help="What is shown: head, cartoon, a .face file, or self (with --talker).")
     ] = "head",
@@ -50,19 +56,18 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
 ) -> None:
     """Let a recorded person drive a face: lips, eyes, brows and head; her sound is kept."""
     began = time.perf_counter()
-    from tts2face.render.output import checked_output
     from tts2face.render.picture import Picture
 
-    checked_output(out)
-    if not 0.0 <= gain <= 4.0:
-        raise InputError(f"the gain must lie from 0 to 4, not {gain:g}; 1 leaves the motion as it is")
-    if (face == OWN) != (talker is not None):
-        raise InputError("--face self shows a talker's own face: give both --face self and --talker FILE")
-    if audio is not None and take.suffix.lower() != CAPTURE:
-        raise InputError("--audio belongs to a capture; a film brings its own sound")
-    if append_missing and talker is None:
-        raise InputError("--append-missing belongs to --face self: a face file has the shapes that it has")
+    if camera is not None:
+        if take is not None or out is not None or face == OWN:
+            raise InputError("--camera is shown live in a window: give neither a take nor --out, and a head as --face")
+        from cli.live import live
+
+        return live(camera, face, identity, Picture(size=size, background=background), model)
+    if take is None or out is None:
+        raise InputError("give a take and --out, or --camera to be seen live")
     wanted = Wanted(take, face, identity, talker, gain, append_missing, Picture(size=size, background=background))
+    _check(wanted, out, audio)
     with progress_bar("watching", quiet) as on_progress:
         motion, stage = _capture(wanted) if take.suffix.lower() == CAPTURE else _film(wanted, model, on_progress)
     if fps is not None or take.suffix.lower() == CAPTURE:
@@ -87,6 +92,21 @@ class Wanted:
     gain: float
     append_missing: bool
     picture: "Picture"
+
+
+def _check(wanted: Wanted, out: Path, audio: Path | None) -> None:
+    """Refuse what makes no sense before anything is watched."""
+    from tts2face.render.output import checked_output
+
+    checked_output(out)
+    if not 0.0 <= wanted.gain <= 4.0:
+        raise InputError(f"the gain must lie from 0 to 4, not {wanted.gain:g}; 1 leaves the motion as it is")
+    if (wanted.face == OWN) != (wanted.talker is not None):
+        raise InputError("--face self shows a talker's own face: give both --face self and --talker FILE")
+    if audio is not None and wanted.take.suffix.lower() != CAPTURE:
+        raise InputError("--audio belongs to a capture; a film brings its own sound")
+    if wanted.append_missing and wanted.talker is None:
+        raise InputError("--append-missing belongs to --face self: a face file has the shapes that it has")
 
 
 def _capture(wanted: Wanted) -> "tuple[Motion, AnyStage]":

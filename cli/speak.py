@@ -47,7 +47,7 @@ def run(request: Request, picture: Picture, errand: Errand) -> None:
     if errand.view:
         from tts2face.render.view import require_display
 
-        require_display()
+        require_display("--view")
     if errand.out is not None:
         _make(request, picture, errand, errand.out)
     else:

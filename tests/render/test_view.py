@@ -57,7 +57,7 @@ def test_the_windows_camera_stands_where_the_pictures_camera_stands(name):
 
 def test_a_clip_plays_its_last_frame_stays_and_turning_lights_it_anew():
     try:
-        view.require_display()
+        view.require_display("--view")
     except BackendError as missing:
         pytest.skip(f"needs a display and pyvista: {missing}")
     face = tiny_face()
@@ -77,3 +77,24 @@ def test_a_clip_plays_its_last_frame_stays_and_turning_lights_it_anew():
         assert not player.show_at(0.0)
     finally:
         player.close()
+
+
+def test_a_mirror_shows_what_came_last():
+    try:
+        view.require_display("--camera")
+    except BackendError as missing:
+        pytest.skip(f"needs a display and pyvista: {missing}")
+    face = tiny_face()
+    came = [None, (np.array([1.0, 0, 0, 0], np.float32), np.zeros(6, np.float32)), None]
+    mirror = view.Mirror(face, Picture(size="128x128"), lambda: came.pop(0))
+    try:
+        mirror.plotter.show(auto_close=False, interactive=False)
+        seen = []
+        for moved in (False, True, False):
+            assert mirror.tick() == moved
+            mirror.plotter.render()
+            seen.append(np.asarray(mirror.plotter.screenshot(return_img=True)).astype(int))
+        assert np.abs(seen[0] - seen[1]).max() > 20
+        np.testing.assert_array_equal(seen[1], seen[2])
+    finally:
+        mirror.close()

@@ -3,6 +3,7 @@
 import os
 import sys
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from tts2face.render.light import lamps, light_table
 from tts2face.render.picture import Picture, background_kind
 from tts2face.render.surface import surfaced
 from tts2face.render.vtk import ON_SCREEN, Puppet, aim, probe, require_pyvista, windows_of
-from tts2face.types import Clip
+from tts2face.types import HEAD_CHANNELS, Clip
 
 WALL, WALL_TOP = "#3a4049", "#7d8793"  # behind the head, unless the picture names a colour
 TICK_MS = 10  # between looks at the clock
@@ -31,7 +32,7 @@ def view(clip: Clip, face: Face, picture: Picture) -> None:
     BackendError
         pyvista is not installed, or there is no display or no GL for it.
     """
-    require_display()
+    require_display("--view")
     player = Player(clip, face, picture)
     try:
         player.run()
@@ -39,18 +40,20 @@ def view(clip: Clip, face: Face, picture: Picture) -> None:
         player.close()
 
 
-def require_display() -> None:
-    """Make sure that a window can be opened here.
+def require_display(purpose: str) -> None:
+    """Make sure that a window can be opened here for an option.
 
     Raises
     ------
     BackendError
         It cannot.
     """
-    require_pyvista("--view")
+    require_pyvista(purpose)
     is_linux = sys.platform.startswith("linux")
     if is_linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise BackendError("--view opens a window, and this machine has no display; write a file with --out clip.mp4")
+        raise BackendError(
+            f"{purpose} opens a window, and this machine has no display; write a file with --out clip.mp4"
+        )
     if not probe(ON_SCREEN):
         raise BackendError(
             "VTK cannot open a window on this display (it needs X11 or XWayland, and OpenGL 3.2); "
@@ -65,13 +68,13 @@ def camera_matrix(camera: Any) -> NDArray[np.float64]:
     return rows * [[1.0], [-1.0], [-1.0]]
 
 
-class Player:
-    """The window, the head in it and the clock that moves both."""
+class Window:
+    """The window and the head in it."""
 
-    def __init__(self, clip: Clip, face: Face, picture: Picture) -> None:
+    def __init__(self, face: Face, picture: Picture) -> None:
         import pyvista
 
-        self._clip, self._surface, self._towards = clip, surfaced(face), lamps(picture.view)
+        self._surface, self._towards = surfaced(face), lamps(picture.view)
         self._exposure = exposed(face, self._surface, self._towards, available_cores())
         self._optics = optics(picture.view, face, (picture.width, picture.height))
         with windows_of(ON_SCREEN):
@@ -81,41 +84,28 @@ class Player:
         self._paint_wall(picture)
         self._puppet = Puppet(self._surface, self.plotter)
         aim(self.plotter, self._optics, picture.height)
-        self.plotter.add_key_event("space", self.restart)
-        self._shown: tuple[int, int] | None = None
-        self.restart()
 
     def run(self) -> None:
-        """Play until the window is closed; the last picture stays."""
+        """Show what `tick` moves until the window is closed; the last picture stays."""
         self.plotter.add_timer_event(max_steps=2**31 - 1, duration=TICK_MS, callback=self._tick)
-        self.restart()
         self.plotter.show(auto_close=False)
 
-    def restart(self) -> None:
-        """Begin with the first frame again."""
-        self._began = time.perf_counter()
-        self.show_at(0.0)
+    def tick(self) -> bool:
+        """Move the head to now; False where nothing has changed."""
+        raise NotImplementedError
 
-    def show_at(self, seconds: float) -> bool:
-        """Move the head to a moment of the clip, lit for where the camera is now; False where nothing has changed."""
-        frame = min(int(seconds * self._clip.fps), len(self._clip.motion) - 1)
-        now = frame, int(self.plotter.camera.GetMTime())
-        if now == self._shown:
-            return False
-        self._shown = now
-        weights = self._clip.motion.values[frame]
+    def pose(self, weights: NDArray[np.floating], head: NDArray[np.floating]) -> None:
+        """Move the head, lit for where the camera is now."""
         view = camera_matrix(self.plotter.camera)
         lights = light_table(self._towards, Optics(view, self._optics.lens))
-        points = self._surface.rig.posed(weights, self._clip.head.values[frame])
-        self._puppet.show(points, view, (lights, self._exposure.at(weights)))
-        return True
+        self._puppet.show(self._surface.rig.posed(weights, head), view, (lights, self._exposure.at(weights)))
 
     def close(self) -> None:
         """Close the window."""
         self.plotter.close()
 
     def _tick(self, _step: int) -> None:
-        if self.show_at(time.perf_counter() - self._began):
+        if self.tick():
             self.plotter.render()
 
     def _paint_wall(self, picture: Picture) -> None:
@@ -125,3 +115,62 @@ class Player:
             self.plotter.set_background(tuple(value / 255 for value in kind))
         else:
             self.plotter.set_background(WALL, top=WALL_TOP)
+
+
+class Player(Window):
+    """The clock that plays a clip."""
+
+    def __init__(self, clip: Clip, face: Face, picture: Picture) -> None:
+        super().__init__(face, picture)
+        self._clip = clip
+        self.plotter.add_key_event("space", self.restart)
+        self._shown: tuple[int, int] | None = None
+        self.restart()
+
+    def run(self) -> None:
+        """Play until the window is closed; the last picture stays."""
+        self.restart()
+        super().run()
+
+    def restart(self) -> None:
+        """Begin with the first frame again."""
+        self._began = time.perf_counter()
+        self.show_at(0.0)
+
+    def tick(self) -> bool:
+        """Move the head to the moment that the clock shows."""
+        return self.show_at(time.perf_counter() - self._began)
+
+    def show_at(self, seconds: float) -> bool:
+        """Move the head to a moment of the clip; False where nothing has changed."""
+        frame = min(int(seconds * self._clip.fps), len(self._clip.motion) - 1)
+        now = frame, int(self.plotter.camera.GetMTime())
+        if now == self._shown:
+            return False
+        self._shown = now
+        self.pose(self._clip.motion.values[frame], self._clip.head.values[frame])
+        return True
+
+
+class Mirror(Window):
+    """A head that shows what somebody does now.
+
+    Parameters
+    ----------
+    newest
+        Gives the weights and the head's pose to show, None where nothing new has come.
+    """
+
+    def __init__(
+        self, face: Face, picture: Picture, newest: Callable[[], tuple[NDArray[Any], NDArray[Any]] | None]
+    ) -> None:
+        super().__init__(face, picture)
+        self._newest = newest
+        self.pose(np.zeros(len(face.shape_names), np.float32), np.zeros(len(HEAD_CHANNELS), np.float32))
+
+    def tick(self) -> bool:
+        """Move the head to what came last."""
+        now = self._newest()
+        if now is not None:
+            self.pose(*now)
+        return now is not None

@@ -1,0 +1,99 @@
+"""A person before a camera: what the head does now is what the whole take, read afterwards, makes of it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cli.main import run
+from lexicon.errors import BackendError
+from tests.corpus_tools.films import joined
+from tts2face.face.file import load_face
+from tts2face.live import LEARNING_S, Actor, Pose, poses
+from tts2face.mimic import motion_of_take
+from tts2face.video.blendshapes import BlendshapeReader
+from tts2face.video.media import Picture, read_pictures
+from tts2face.video.model import find_bundle
+from tts2face.video.perform import read_take
+from tts2face.video.steady import FilmReader
+from tts2face.video.track import FaceTracker
+
+FPS = 25.0
+
+
+@pytest.fixture(scope="module")
+def bundle() -> Path:
+    pytest.importorskip("ai_edge_litert", reason="needs `pip install 'tts2face[capture]'`")
+    try:
+        return find_bundle(None)
+    except BackendError as missing:
+        pytest.skip(str(missing))
+
+
+@pytest.fixture(scope="module")
+def film(shared_recordings: Path, bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    clips = sorted((shared_recordings / "grid_s1" / "clips").iterdir())[:4]
+    out = tmp_path_factory.mktemp("film") / "person.mp4"
+    joined(clips, out)
+    return out
+
+
+@pytest.fixture(scope="module")
+def live(film: Path, bundle: Path) -> list[Pose | None]:
+    return list(poses(read_pictures(film), load_face("head"), FaceTracker(bundle), BlendshapeReader(bundle), FPS))
+
+
+def test_a_person_is_learnt_and_then_followed(live: list[Pose | None], film: Path, bundle: Path) -> None:
+    """Against the take read as a whole, which knows the future and more of her."""
+    head = load_face("head")
+    learnt = round(LEARNING_S * FPS)
+    assert all(pose is None for pose in live[:learnt])
+    followed = live[learnt + 1 :]
+    assert all(pose is not None for pose in followed)
+    motion = motion_of_take(read_take(film, FilmReader(bundle), BlendshapeReader(bundle)), head)
+    weights = np.array([pose.weights for pose in followed if pose is not None])
+    whole = motion.face.values[learnt + 1 : learnt + 1 + len(weights)]
+    for shape, least in (("jawOpen", 0.9), ("eyeBlinkLeft", 0.9), ("mouthPucker", 0.7)):
+        column = head.shape_names.index(shape)
+        assert np.corrcoef(weights[:, column], whole[:, column])[0, 1] > least, shape
+    assert (weights >= head.limits[:, 0] - 1e-6).all()
+    assert (weights <= head.limits[:, 1] + 1e-6).all()
+
+
+def test_without_a_face_the_head_waits(bundle: Path) -> None:
+    blank = [Picture(number / FPS, np.full((64, 64, 3), 90, np.uint8)) for number in range(5)]
+    found = list(poses(blank, load_face("head"), FaceTracker(bundle), BlendshapeReader(bundle), FPS))
+    assert found == [None] * 5
+
+
+def test_an_actor_gives_each_pose_once(film: Path, bundle: Path) -> None:
+    with Actor(read_pictures(film), load_face("head"), FPS, bundle) as actor:
+        actor._watching.join()
+        now = actor.newest()
+        assert now is not None
+        assert now[0].shape == (len(load_face("head").shape_names),)
+        assert now[1].shape == (6,)
+        assert actor.newest() is None
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["take.mp4", "--camera", "0"], "give neither a take nor --out"),
+        (["--camera", "0", "--out", "m.mp4"], "give neither a take nor --out"),
+        (["--camera", "0", "--face", "self"], "and a head as --face"),
+        ([], "give a take and --out, or --camera"),
+        (["take.mp4"], "give a take and --out, or --camera"),
+    ],
+)
+def test_orders_that_make_no_sense(words: list[str], reason: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["mimic", *words]) == 2
+    assert reason in capsys.readouterr().err
+
+
+def test_without_a_display_it_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr("tts2face.render.view.sys.platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    assert run(["mimic", "--camera", "0"]) == 4
+    assert "--camera opens a window, and this machine has no display" in capsys.readouterr().err

@@ -1,0 +1,83 @@
+"""A camera as it films: its pictures as they come, the ones that came too late left out."""
+
+import threading
+import time
+from collections.abc import Iterator
+from types import TracebackType
+from typing import Any
+
+from lexicon.errors import BackendError, InputError
+from tts2face.video.media import Picture
+
+PATIENCE_S = 10.0  # without a picture the camera is gone
+
+
+class Camera:
+    """Pictures of a camera by number, of an address that sends video, or of a file at its own pace.
+
+    Raises
+    ------
+    InputError
+        Nothing films there.
+    BackendError
+        OpenCV is missing.
+    """
+
+    def __init__(self, source: str) -> None:
+        try:
+            import cv2
+        except ImportError as missing:
+            raise BackendError("a camera needs opencv-python-headless: pip install 'tts2face[capture]'") from missing
+        cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # its warnings would hide our sentence
+        self._device: Any = cv2.VideoCapture(int(source) if source.isdecimal() else source)
+        if not self._device.isOpened():
+            raise InputError(f"nothing films at {source!r}; give a camera's number (0 is the first) or its address")
+        stated = float(self._device.get(cv2.CAP_PROP_FPS) or 0.0)
+        self.fps = stated if 0 < stated <= 120 else 30.0
+        self._pace = 0.0 if source.isdecimal() or "://" in source else 1.0 / self.fps
+        self._newest: Picture | None = None
+        self._came = threading.Condition()
+        self._ended = False
+        self._filming = threading.Thread(target=self._film, name="camera", daemon=True)
+
+    def __enter__(self) -> "Camera":
+        """Begin to film."""
+        self._began = time.monotonic()
+        self._filming.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop and let the camera go."""
+        self._ended = True
+        self._filming.join()
+        self._device.release()
+
+    def pictures(self) -> Iterator[Picture]:
+        """The newest picture each time one is asked for, with the seconds since the beginning; until filming ends."""
+        while True:
+            with self._came:
+                self._came.wait_for(lambda: self._newest is not None or self._ended, PATIENCE_S)
+                picture, self._newest = self._newest, None
+            if picture is None:
+                return
+            yield picture
+
+    def _film(self) -> None:
+        import cv2
+
+        n_read = 0
+        while not self._ended:
+            worked, pixels = self._device.read()
+            if not worked:
+                break
+            n_read += 1
+            time.sleep(max(0.0, self._began + n_read * self._pace - time.monotonic()) if self._pace else 0.0)
+            upright = cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB)
+            with self._came:
+                self._newest = Picture(time.monotonic() - self._began, upright)
+                self._came.notify()
+        with self._came:
+            self._ended = True
+            self._came.notify()
