@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from corpus_tools.effort import Effort, Progress
+from corpus_tools.leak import without_leak
 from corpus_tools.learn import learn_talker
 from corpus_tools.observation import Observation
 from corpus_tools.observe import Refusal, observe
@@ -92,7 +93,7 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
         "refused": [[refusal.name, refusal.reason] for refusal in observations.refused],
         **_marks(observations.kept),
     }
-    talker = learn_talker(observations.kept, metadata=metadata)
+    talker = learn_talker(without_leak(observations.kept), metadata=metadata)
     if consent is not None:
         from corpus_tools.aam.attach import with_appearance
 

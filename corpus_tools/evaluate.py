@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools import measures
+from corpus_tools.leak import pose_leak
 from corpus_tools.learn import learn_talker
 from corpus_tools.observation import Observation
 from lexicon.errors import InputError
@@ -125,6 +126,8 @@ def evaluate(
     """
     if not test:
         raise InputError("there is no utterance to test")
+    leak = pose_leak(train)
+    train, test = ([leak.removed(seen) for seen in part] for part in (train, test))
     talker = learn_talker(train, metadata=LEARNT_FOR_EVALUATION)
     voice = visual_voice(talker)
     methods: dict[str, Method] = {

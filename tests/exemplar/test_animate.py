@@ -132,7 +132,7 @@ def test_a_recorded_sentence_finds_itself_first(voice: VisualVoice, talker: Talk
 
 def test_one_exemplar_of_a_recorded_sentence_gives_the_recording_back(voice: VisualVoice, talker: Talker):
     spoken = talker.utterances[7]
-    options = SynthesisOptions(context=4, k=1, smoothing_s=0.0, contacts=False)
+    options = SynthesisOptions(context=4, k=1, smoothing_s=0.0, contacts=False, articulation=1.0)
     made = speech_trajectory(spoken.phones, voice, fps=25.0, n_frames=len(spoken.shape), options=options).values
     inner = slice(int(spoken.phones.edges[1] * 25) + 1, int(spoken.phones.edges[-2] * 25))
     # mm; straight lines between knots cut the corners of a curve with 25 frames a second
@@ -143,7 +143,7 @@ def test_one_exemplar_of_a_recorded_sentence_gives_the_recording_back(voice: Vis
 def test_every_option_matters(voice: VisualVoice, name):
     changed = {
         "context": 1, "k": 1, "duration": 0.0, "sharpness": 0.0, "overlap": False, "precision": 0.0, "align": False,
-        "smoothing_s": 0.04, "contacts": False,
+        "articulation": 1.2, "smoothing_s": 0.04, "contacts": False,
     }  # fmt: skip
     assert (moved(voice, SENTENCE).values != moved(voice, SENTENCE, **{name: changed[name]}).values).any()
 
@@ -190,3 +190,16 @@ def test_explains_which_tokens_were_used(voice: VisualVoice):
     assert "ɔɪ (shown by" in text
     assert f"{first.utterance} {first.start:.2f}" in text
     assert json.loads(json.dumps(explanation_json(shown)))[1]["tokens"][0]["utterance"] == first.utterance
+
+
+def test_articulation_is_counted_from_the_mean_speaking_pose(voice: VisualVoice, talker: Talker):
+    plain = SynthesisOptions(contacts=False, articulation=1.0)
+    more = replace(plain, articulation=1.5)
+    phones = sequence([SILENCE, "b", "i", "p", "ɑ", "b", SILENCE], [0.4, *[0.1] * 5, 0.4])
+    one, other = (
+        speech_trajectory(phones, voice, fps=100.0, n_frames=130, options=options).values for options in (plain, more)
+    )
+    inner = slice(50, 80)  # no silence is near: nothing is drawn to rest
+    np.testing.assert_allclose(
+        other[inner] - voice.speaking, 1.5 * (one[inner] - voice.speaking), atol=1e-3 * voice.spread.max()
+    )

@@ -118,12 +118,12 @@ def test_a_closed_contact_is_left_alone():
 
 
 def test_poses_are_taken_where_each_token_is_closest(voice: VisualVoice):
-    """Two p tokens, and one that never closes: the closer half by weight tells the pose."""
+    """Two p tokens, and one that never closes: the closer ones by weight tell the pose."""
     label = voice.tokens.inventory.index("p")
     p = np.flatnonzero(voice.tokens.phone == label)[:2]
     open_one = np.flatnonzero(voice.tokens.phone == voice.tokens.inventory.index("ɑ"))[0]
     chosen = np.array([[open_one, *p]], np.int32)
-    pose = contact_poses(voice.tokens, chosen, np.array([[0.4, 0.3, 0.3]]), voice.lip_gap)
+    pose = contact_poses(voice.tokens, chosen, np.array([[0.2, 0.4, 0.4]]), voice.lip_gap)
     least = []
     for token in p:
         first, last = voice.tokens.first_frame[voice.tokens.utterance[token] :][:2]

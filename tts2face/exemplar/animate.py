@@ -28,7 +28,8 @@ DEFAULT_OPTIONS = SynthesisOptions()
 class VisualVoice:
     """A talker made ready for synthesis: tokens, their index, the similarity of phones, the pose at rest.
 
-    ``spread`` and ``rest`` are (D,), of the speech parameters; ``names`` are the utterances'.
+    ``spread``, ``rest`` and ``speaking``, the mean pose while speaking, are (D,), of the speech parameters; ``names``
+    are the utterances'.
     """
 
     tokens: Tokens
@@ -36,6 +37,7 @@ class VisualVoice:
     similarity: Similarity
     spread: NDArray[np.float32]
     rest: NDArray[np.float32]
+    speaking: NDArray[np.float32]
     lip_gap: Gap
     channels: tuple[str, ...]
     names: tuple[str, ...]
@@ -54,6 +56,7 @@ def visual_voice(talker: Talker) -> VisualVoice:
         similarity,
         spread,
         model.rest[:n_speech].astype(np.float32),
+        mean_speaking_pose(talker),
         Gap(
             np.ascontiguousarray(model.mean[upper] - model.mean[lower]),
             np.ascontiguousarray(model.basis[:n_speech, upper] - model.basis[:n_speech, lower]),
@@ -61,6 +64,19 @@ def visual_voice(talker: Talker) -> VisualVoice:
         speech_channels(model),
         tuple(spoken.name for spoken in talker.utterances),
     )
+
+
+def mean_speaking_pose(talker: Talker) -> NDArray[np.float32]:
+    """(D,) mean speech parameters of the frames between the first phone and the last of every utterance."""
+    n_speech, parts = talker.model.n_speech, []
+    for spoken in talker.utterances:
+        sounding = [at for at, label in enumerate(spoken.phones.phones) if label != SILENCE]
+        if sounding:
+            edges = spoken.phones.edges
+            begin, end = (int(edges[at] * talker.fps) for at in (sounding[0], sounding[-1] + 1))
+            parts.append(spoken.shape[begin : end + 1, :n_speech])
+    frames = np.concatenate(parts) if parts else np.zeros((1, n_speech))
+    return np.asarray(frames.mean(axis=0, dtype=np.float64), np.float32)
 
 
 def chosen_tokens(phones: PhoneSequence, voice: VisualVoice, options: SynthesisOptions) -> tuple[Targets, Found]:
@@ -130,7 +146,8 @@ def _motion(
     weights = blend.exemplar_weights(found.scores, options.sharpness)
     pieces = blend.averaged_pieces(voice.tokens, found.tokens, weights, voice.spread, options)
     joined, told = blend.joined_pieces(pieces, targets, n_instants, options)
-    motion = np.where(told[:, None], joined * voice.spread, voice.rest)
+    said = voice.speaking + options.articulation * (joined * voice.spread - voice.speaking)
+    motion = np.where(told[:, None], said, voice.rest).astype(np.float32)
     motion = blend.smoothed(motion, options.smoothing_s, blend.CLOCK_HZ)
     if not options.contacts:
         return motion

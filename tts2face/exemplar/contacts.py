@@ -12,6 +12,7 @@ from tts2face.exemplar.tokens import Tokens
 LIP_PLACES = frozenset({"bilabial", "labiodental"})
 NON_CONTACTS = frozenset({"approximant"})  # narrowed, not closed
 WINDOW_S = 0.03  # a closure may lie this far outside its phone's edges (video frames are 40 ms, edges +- 10 ms)
+CLOSER = 0.7  # of the exemplars, by weight; with it as many bilabials close as in recordings (docs/decisions.md)
 HOLD_S = 0.03  # lips stay together at least this long: shorter, and the touch falls between two frames at 30 fps
 EASE_S = 0.05  # way into and out of it; longer eats into the vowels (0.06: r of opening falls by .001)
 
@@ -47,15 +48,15 @@ def contact_poses(
 ) -> NDArray[np.float32]:
     """(N, D) average pose of the chosen tokens (N, k), each at the frame where its own lips are closest.
 
-    Only the closer half by weight (N, k) counts: a tenth of the recorded contacts is missed between two frames or by
-    the alignment, and would hold the lips open.
+    Only the closer ones count, `CLOSER` by weight (N, k): a tenth of the recorded contacts is missed between two frames
+    or by the alignment, and would hold the lips open.
     """
     rows, gaps = np.zeros(chosen.shape, np.int64), np.full(chosen.shape, np.inf)
     corpus = (tokens.frames, tokens.first_frame, tokens.utterance, tokens.spans, tokens.fps)
     _closest_rows(corpus, chosen, (gap.rest, gap.basis), rows, gaps)
     order = np.argsort(gaps, axis=1, kind="stable")
     sorted_weights = np.take_along_axis(weights, order, axis=1)
-    closer = np.cumsum(sorted_weights, axis=1) - sorted_weights < 0.5
+    closer = np.cumsum(sorted_weights, axis=1) - sorted_weights < CLOSER
     kept = np.zeros_like(weights)
     np.put_along_axis(kept, order, np.where(closer, sorted_weights, 0.0), axis=1)
     kept /= kept.sum(axis=1, keepdims=True)

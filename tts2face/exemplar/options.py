@@ -26,6 +26,8 @@ class SynthesisOptions:
         Where exemplars overlap, each counts by its inverse variance to this power; 0 = all alike.
     align
         Exemplars are warped onto the best one so that events coincide before they are averaged.
+    articulation
+        Factor on the motion about the talker's mean speaking pose; averaging shrinks what it averages.
     smoothing_s
         Standard deviation of the Gaussian that smooths the whole, seconds; 0 = none.
     contacts
@@ -44,19 +46,20 @@ class SynthesisOptions:
     overlap: bool = True
     precision: float = 1.5
     align: bool = True
+    articulation: float = 1.1
     smoothing_s: float = 0.01
     contacts: bool = True
 
     def __post_init__(self) -> None:
         """Refuse numbers outside their range; `context` and `k` are checked by the search."""
-        for name in ("duration", "sharpness", "precision", "smoothing_s"):
+        for name in ("duration", "sharpness", "precision", "articulation", "smoothing_s"):
             value = getattr(self, name)
             if not 0 <= value < 100:
                 raise InputError(f"{name} must be 0 or more and below 100, not {value}")
 
 
 THEOBALD_2007 = SynthesisOptions(
-    context=4, k=10, duration=0.0, sharpness=0.0, overlap=False, precision=0.0, align=True, smoothing_s=0.02,
-    contacts=False,
+    context=4, k=10, duration=0.0, sharpness=0.0, overlap=False, precision=0.0, align=True, articulation=1.0,
+    smoothing_s=0.02, contacts=False,
 )  # fmt: skip
 METHODS = {"exemplar": SynthesisOptions(), "theobald2007": THEOBALD_2007}
