@@ -2,18 +2,13 @@
 
 import sys
 from collections.abc import Mapping
-from json import dumps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import App, Parameter
 
 from cli.progress import progress_bar, say
 from lexicon.errors import InputError
-from tts2face.files import write_whole
-
-if TYPE_CHECKING:
-    from corpus_tools.observation import Observation
 
 corpus = App(name="corpus", help="Build, show and measure talkers.")
 
@@ -150,35 +145,26 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
     recordings: Annotated[Path | None, Parameter(help="Folder to split into training and held-out utterances.")] = None,
     hold_out: Annotated[int, Parameter(help="Utterances held out of --recordings.")] = 100,
     seed: Annotated[int, Parameter(help="Which utterances are held out.")] = 0,
+    folds: Annotated[
+        int | None, Parameter(help="Instead of --hold-out: hold out each utterance once, in folds.")
+    ] = None,
+    hold_out_words: Annotated[
+        str | None, Parameter(help="Instead of --hold-out: utterances with one of these words, such as please,seven.")
+    ] = None,
     train: Annotated[Path | None, Parameter(help="Folder to learn from, instead of --recordings.")] = None,
     test: Annotated[Path | None, Parameter(help="Folder to test on, with --train.")] = None,
-    json: Annotated[Path | None, Parameter(help="Write all figures, utterance by utterance.")] = None,
+    network: Annotated[
+        bool, Parameter(help="Compare with a sliding-window network, too (extra [study]).", negative="")
+    ] = False,
+    out: Annotated[
+        Path | None, Parameter(help="Write figures and plots (.html) or figures (.json, .csv).", alias="-o")
+    ] = None,
     jobs: Jobs = None,
     cache: Cache = None,
     model: Model = None,
 ) -> None:
     """Measure synthesised lips against real ones that were not learnt from."""
-    if (recordings is None) == (train is None) or (train is None) != (test is None):
-        raise InputError("give --recordings to split, or both --train and --test")
-    from corpus_tools.effort import Effort
-    from corpus_tools.evaluate import evaluate as evaluated
-    from corpus_tools.evaluate import split
-    from corpus_tools.observe import observe
+    from cli.evaluation import Asked, evaluated
 
-    def observations_of(folder: Path) -> "tuple[Observation, ...]":
-        with progress_bar(f"reading {folder.name}") as on_progress:
-            found = observe(folder, effort=Effort(cache, jobs, model), on_progress=on_progress)
-        for refusal in found.refused:
-            say(f"refused {refusal.name}: {refusal.reason}")
-        return found.kept
-
-    if recordings is not None:
-        learnt, held = split(observations_of(recordings), hold_out=hold_out, seed=seed)
-    elif train is not None and test is not None:
-        learnt, held = observations_of(train), observations_of(test)
-    with progress_bar("measuring") as on_progress:
-        result = evaluated(learnt, held, on_progress=on_progress)
-    print(f"{result.n_train} utterances learnt from, {result.n_test} held out\n")  # noqa: T201 - the answer
-    print(result.table())  # noqa: T201
-    if json is not None:
-        write_whole(json, dumps(result.to_json(), indent=1).encode())
+    asked = Asked(recordings, hold_out, seed, folds, hold_out_words, train, test)
+    evaluated(asked, out, network=network, effort=(cache, jobs, model))

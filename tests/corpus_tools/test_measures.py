@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from corpus_tools import measures
+from corpus_tools.evaluation import measures
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 
@@ -87,3 +87,15 @@ def test_nine_of_ten_real_closures_lie_below_the_threshold():
     assert measures.share_below(real, threshold) == pytest.approx(10 / 11)
     assert measures.share_below(np.array([9.0, 10.5]), threshold) == 0.5
     assert measures.closure_threshold(np.array([])) == measures.share_below(np.array([]), 1.0) == 0.0
+
+
+def test_peaks_are_read_between_frames():
+    times = np.arange(60) / 50.0
+    for peak in (0.58, 0.613, 0.66):
+        curve = 10 - 100 * (times - peak) ** 2
+        assert measures.peak_times(curve, SPEECH, 50.0) == pytest.approx([peak], abs=1e-6)
+
+
+def test_a_curve_without_a_peak_in_the_vowel_has_none():
+    rising = np.arange(60) / 60.0
+    assert np.isnan(measures.peak_times(rising, SPEECH, 50.0)).all()

@@ -28,6 +28,7 @@ CLOSURE_SHARE = 0.9  # of the real closures count as closed: the threshold is th
 DTW_BAND_S = 0.12  # of time by which synthesis may lead or lag unpunished by the warping cost
 DTW_PARAMETERS = 6  # shape parameters that the warping cost compares: 95 % of the motion
 ROUNDING_S = 1e-6  # a frame that falls on an edge counts, whatever the sum of floats says
+PEAK_MARGIN_S = 0.06  # the widest opening of a vowel may lie this far outside its edges
 BILABIALS = ("p", "b", "m")
 OPEN_HEIGHTS = ("open", "near-open", "open-mid")
 
@@ -129,3 +130,25 @@ def closure_threshold(real_least: Values) -> float:
 def share_below(openings: Values, threshold: float) -> float:
     """Share of openings at or below a threshold; 0 where there are none."""
     return float(np.mean(openings <= threshold)) if len(openings) else 0.0
+
+
+def peak_times(opening: Values, phones: PhoneSequence, fps: float) -> NDArray[np.float64]:
+    """Seconds at which the lips are widest apart in each open vowel, `PEAK_MARGIN_S` either side; between frames.
+
+    The top of the parabola through the highest frame and its neighbours; NaN where the curve peaks at the border.
+    """
+    wanted, peaks = open_vowels(), []
+    for at, label in enumerate(phones.phones):
+        if label in wanted:
+            low = max(1, int(np.ceil((phones.edges[at] - PEAK_MARGIN_S) * fps)))
+            high = min(len(opening) - 2, int(np.floor((phones.edges[at + 1] + PEAK_MARGIN_S) * fps)))
+            peaks.append(_peak(opening, low, high) / fps if low < high else np.nan)
+    return np.array(peaks, np.float64)
+
+
+def _peak(curve: Values, low: int, high: int) -> float:
+    top = low + int(np.argmax(curve[low : high + 1]))
+    before, here, behind = (float(value) for value in curve[top - 1 : top + 2])
+    if not (here >= before and here >= behind and here > min(before, behind)):
+        return np.nan
+    return top + 0.5 * (before - behind) / (before - 2 * here + behind)

@@ -1,0 +1,68 @@
+"""Ways to make lips move that are compared: from what the training part taught, for phones in time."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.sequence import PhoneSequence
+from tts2face.exemplar.animate import VisualVoice, speech_trajectory, visual_voice
+from tts2face.exemplar.options import METHODS, SynthesisOptions
+from tts2face.exemplar.targets import targets_of
+from tts2face.talker import Talker
+
+# Speech parameters (T, D) for phones at T frames, from what the training part taught.
+Method = Callable[[PhoneSequence, int, float], NDArray[np.float32]]
+
+
+def methods_of(
+    talker: Talker, options: Mapping[str, SynthesisOptions] | None = None, *, network: bool = False
+) -> dict[str, Method]:
+    """Baselines and exemplar methods by name; `METHODS` without options.
+
+    Raises
+    ------
+    BackendError
+        The network is wanted, and scikit-learn is missing.
+    """
+    from corpus_tools.evaluation.network import window_network
+
+    voice = visual_voice(talker)
+    n_speech = talker.model.n_speech
+    return {
+        "mean face": lambda _, n_frames, __: np.zeros((n_frames, n_speech), np.float32),
+        "mean phone pose": mean_phone_pose(talker, voice),
+        **({"sliding-window network": window_network(talker)} if network else {}),
+        **{name: exemplar_method(voice, chosen) for name, chosen in (options or METHODS).items()},
+    }
+
+
+def exemplar_method(voice: VisualVoice, options: SynthesisOptions) -> Method:
+    """Synthesis from exemplars."""
+
+    def made(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
+        return speech_trajectory(phones, voice, fps=fps, n_frames=n_frames, options=options).values
+
+    return made
+
+
+def mean_phone_pose(talker: Talker, voice: VisualVoice) -> Method:
+    """The simplest synthesis that knows phones: their mean poses, joined by straight lines from middle to middle."""
+    n_speech, inventory = talker.model.n_speech, voice.tokens.inventory
+    poses: dict[str, list[NDArray[np.float64]]] = {label: [] for label in inventory}
+    for spoken in talker.utterances:
+        frame_times = np.arange(len(spoken.shape)) / talker.fps
+        middles = (spoken.phones.edges[:-1] + spoken.phones.edges[1:]) / 2
+        read = np.stack([np.interp(middles, frame_times, spoken.shape[:, d]) for d in range(n_speech)], axis=1)
+        for label, pose in zip(spoken.phones.phones, read, strict=True):
+            poses[label].append(pose)
+    mean = {label: np.mean(seen, axis=0) for label, seen in poses.items() if seen}
+
+    def made(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
+        targets = targets_of(phones, inventory)
+        middles = targets.spans[:, 1:3].mean(axis=1)
+        keys = np.stack([mean[label] for label in targets.labels])
+        times = np.arange(n_frames) / fps
+        return np.stack([np.interp(times, middles, keys[:, d]) for d in range(n_speech)], axis=1).astype(np.float32)
+
+    return made

@@ -1,0 +1,232 @@
+"""Figures of one method over held-out utterances, with intervals from drawing utterances again."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.evaluation import measures
+from corpus_tools.evaluation.real import CLASSES, OTHER, Curves, Real, Thresholds
+from tts2face.talker import ShapeModel
+
+N_DRAWS = 1000  # of utterances, with replacement (Efron 1979)
+CONFIDENCE = 0.95
+# In the order of tables: name, its head, digits.
+FIGURES = (
+    ("r_opening", "r opening", 3), ("r_width", "r width", 3), ("rmse_z", "RMSE z", 3), ("dtw_cost", "DTW cost", 3),
+    ("range_ratio", "range ratio", 2), ("closure", "closure", 2), ("false_closure", "false closure", 2),
+    ("labiodental", "labiodental", 2), ("rounding", "rounding", 2), ("peak_offset_ms", "peak offset (ms)", 0),
+)  # fmt: skip
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A value and the interval in which it lies with `CONFIDENCE`."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class UtteranceScore:
+    """One held-out utterance: RMSE and warping cost in units of spread, r and range of opening and width."""
+
+    name: str
+    r_opening: float
+    r_width: float
+    rmse_z: float
+    dtw_cost: float
+    range_ratio: float
+    n_frames: int
+
+
+@dataclass(frozen=True, slots=True)
+class ClassScore:
+    """Frames of one class of phones: how many, their RMSE in units of spread, error and bias of the opening.
+
+    Error and bias are in parts of the eye distance; a negative bias is a mouth too closed.
+    """
+
+    phones: str
+    n_frames: int
+    rmse_z: float
+    opening_error: float
+    opening_bias: float
+
+
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """One method over all held-out utterances: frames pooled for r and range, the other figures means or shares.
+
+    ``figures`` are those of `FIGURES` by name; ``real_time_factor`` is the time spent over the utterances' duration.
+    """
+
+    method: str
+    figures: Mapping[str, Figure]
+    classes: tuple[ClassScore, ...]
+    real_time_factor: float
+    utterances: tuple[UtteranceScore, ...]
+
+    def __getitem__(self, figure: str) -> float:
+        """The value of a figure."""
+        return self.figures[figure].value
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tally:
+    """What one utterance adds to the figures of a method.
+
+    ``opening`` and ``width`` (6,) are moments of real and made curves; ``counts`` (4, 2) are events that happened, and
+    that could: closures, false closures, labiodental contacts, roundings; ``offsets`` are seconds between peaks.
+    """
+
+    opening: Floats
+    width: Floats
+    rmse_z: float
+    dtw_cost: float
+    counts: Floats
+    offsets: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """One utterance as it was and as it was made: parameters (T, S) and curves of the lips."""
+
+    real: Real
+    made: NDArray[np.float32]
+    curves: Curves
+    spread: NDArray[np.float32]
+
+
+Made = tuple[ShapeModel, Sequence[Real], Sequence[NDArray[np.float32]]]  # of one split: (T, S) for each utterance
+
+
+def scored(method: str, splits: Sequence[Made], limits: Thresholds, spent: float = 0.0) -> Scores:
+    """Figures of a method over the utterances of all splits; making them took `spent` seconds."""
+    judged = []
+    for model, real, made in splits:
+        spread = model.spread[: min(measures.DTW_PARAMETERS, model.n_speech)]
+        judged += [
+            Judged(one, values, Curves.of(model.shapes(values)), spread) for one, values in zip(real, made, strict=True)
+        ]
+    tallies = [_tally(one, limits) for one in judged]
+    return Scores(
+        method,
+        _figures(tallies),
+        tuple(_class_scores(judged)),
+        spent / sum(one.real.seconds for one in judged),
+        tuple(_utterance(tally, one) for tally, one in zip(tallies, judged, strict=True)),
+    )
+
+
+def _tally(judged: Judged, limits: Thresholds) -> Tally:
+    one, seen, n, here = judged.real, judged.curves, len(judged.spread), judged.real.judged
+    phones, fps = one.observation.phones, one.observation.fps
+    real, made = one.parameters[here, :n], judged.made[here, :n]
+
+    def events(curve: NDArray[np.floating], labels: str, limit: float) -> tuple[float, float]:
+        least = measures.least_openings(curve, phones, fps, CLASSES[labels])
+        return float((least <= limit).sum()), float(len(least))
+
+    middles = measures.midpoint_openings(seen.opening, phones, fps)
+    counts = [
+        events(seen.opening, "bilabial", limits.closed),
+        (float((middles <= limits.closed).sum()), float(len(middles))),
+        events(seen.opening, "labiodental", limits.labiodental),
+        events(seen.width, "rounded", limits.rounded),
+    ]
+    peaks = [measures.peak_times(curve, phones, fps) for curve in (one.curves.opening, seen.opening)]
+    offsets = peaks[1] - peaks[0]
+    return Tally(
+        _moments(one.curves.opening[here], seen.opening[here]),
+        _moments(one.curves.width[here], seen.width[here]),
+        measures.rmse_z(real, made, judged.spread),
+        measures.warping_cost(real, made, judged.spread, fps),
+        np.array(counts),
+        np.abs(offsets[np.isfinite(offsets)]),
+    )
+
+
+def _moments(real: Floats, made: Floats) -> Floats:
+    return np.array([len(real), real.sum(), made.sum(), real @ real, made @ made, real @ made])
+
+
+def _figures(tallies: Sequence[Tally]) -> dict[str, Figure]:
+    draws = np.random.default_rng(0).multinomial(len(tallies), np.full(len(tallies), 1 / len(tallies)), N_DRAWS)
+    weights = np.concatenate([np.ones((1, len(tallies))), draws])  # the first row: each utterance once
+    rows = {
+        **dict(
+            zip(("r_opening", "range_ratio"), _curve_figures(weights, [one.opening for one in tallies]), strict=True)
+        ),
+        "r_width": _curve_figures(weights, [one.width for one in tallies])[0],
+        "rmse_z": weights @ [one.rmse_z for one in tallies] / weights.sum(axis=1),
+        "dtw_cost": weights @ [one.dtw_cost for one in tallies] / weights.sum(axis=1),
+        "peak_offset_ms": 1000 * _medians(weights, [one.offsets for one in tallies]),
+    }
+    counts = np.tensordot(weights, np.array([one.counts for one in tallies]), axes=1)
+    for at, name in enumerate(("closure", "false_closure", "labiodental", "rounding")):
+        rows[name] = counts[:, at, 0] / np.maximum(counts[:, at, 1], 1.0)
+    edges = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
+    return {
+        name: Figure(float(rows[name][0]), *(float(value) for value in np.quantile(rows[name][1:], edges)))
+        for name, _, _ in FIGURES
+    }
+
+
+def _curve_figures(weights: Floats, moments: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """Pearson's r and the ratio of spreads for each row of weights (W, U)."""
+    n, a, b, aa, bb, ab = (weights @ np.array(moments)).T
+    real, made = np.maximum(aa - a * a / n, 0.0), np.maximum(bb - b * b / n, 0.0)
+    moves = np.sqrt(real * made) > 1e-9 * n
+    r = np.where(moves, (ab - a * b / n) / np.where(moves, np.sqrt(real * made), 1.0), 0.0)
+    return r, np.sqrt(made / np.maximum(real, 1e-12))
+
+
+def _medians(weights: Floats, offsets: Sequence[Floats]) -> Floats:
+    """Weighted median of all offsets for each row of weights (W, U); 0 where there is none."""
+    values = np.concatenate(offsets)
+    if not len(values):
+        return np.zeros(len(weights))
+    order = np.argsort(values)
+    owner = np.repeat(np.arange(len(offsets)), [len(some) for some in offsets])[order]
+    total = np.cumsum(weights[:, owner], axis=1)
+    at = (total < total[:, -1:] / 2).sum(axis=1)
+    return np.asarray(values[order][np.minimum(at, len(values) - 1)])
+
+
+def _class_scores(judged: Sequence[Judged]) -> list[ClassScore]:
+    classes, away, opening = [], [], []
+    for each in judged:
+        one, here, n = each.real, each.real.judged, len(each.spread)
+        classes.append(one.classes[here])
+        away.append((each.made - one.parameters)[here, :n] / each.spread)
+        opening.append((each.curves.opening - one.curves.opening)[here])
+    return _by_class(np.concatenate(classes), np.concatenate(away), np.concatenate(opening))
+
+
+def _by_class(classes: NDArray[np.str_], away: NDArray[np.float32], opening: Floats) -> list[ClassScore]:
+    found = []
+    for name in (*CLASSES, OTHER):
+        here = classes == name
+        if here.any():
+            rmse = float(np.sqrt(np.square(away[here]).mean()))
+            error, bias = float(np.abs(opening[here]).mean()), float(opening[here].mean())
+            found.append(ClassScore(name, int(here.sum()), rmse, error, bias))
+    return found
+
+
+def _utterance(tally: Tally, judged: Judged) -> UtteranceScore:
+    one, seen, here, curves = judged.real, judged.curves, judged.real.judged, judged.real.curves
+    return UtteranceScore(
+        one.observation.name,
+        measures.correlation(curves.opening[here], seen.opening[here]),
+        measures.correlation(curves.width[here], seen.width[here]),
+        tally.rmse_z,
+        tally.dtw_cost,
+        measures.range_ratio(curves.opening[here], seen.opening[here]),
+        int(tally.opening[0]),
+    )

@@ -1,0 +1,92 @@
+"""Which utterances are learnt from and which are held out: always whole utterances."""
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from corpus_tools.observation import Observation
+from lexicon.errors import InputError
+
+Parts = tuple[tuple[Observation, ...], tuple[Observation, ...]]  # learnt from, held out
+
+
+def split(observations: Sequence[Observation], *, hold_out: int, seed: int) -> Parts:
+    """Training and held-out utterances, drawn by a seed from the sorted names.
+
+    Raises
+    ------
+    InputError
+        `hold_out` leaves nothing to learn from or nothing to test.
+    """
+    if not 0 < hold_out < len(observations):
+        raise InputError(
+            f"of {len(observations)} utterances, 1 to {len(observations) - 1} can be held out, not {hold_out}"
+        )
+    ordered = _ordered(observations)
+    held = set(np.random.default_rng(seed).permutation(len(ordered))[:hold_out].tolist())
+    return _parted(ordered, held)
+
+
+def folds(observations: Sequence[Observation], *, n_folds: int, seed: int) -> tuple[Parts, ...]:
+    """As many splits as folds; every utterance is held out once.
+
+    Raises
+    ------
+    InputError
+        There are fewer than two folds, or more than utterances.
+    """
+    if not 2 <= n_folds <= len(observations):
+        raise InputError(f"{len(observations)} utterances make 2 to {len(observations)} folds, not {n_folds}")
+    ordered = _ordered(observations)
+    order = np.random.default_rng(seed).permutation(len(ordered))
+    return tuple(_parted(ordered, set(held.tolist())) for held in np.array_split(order, n_folds))
+
+
+def without_words(observations: Sequence[Observation], words: Collection[str]) -> Parts:
+    """Utterances without any of the words, and those with one: their contexts are never seen in training.
+
+    Raises
+    ------
+    InputError
+        A word is not spoken, or every utterance has one of them.
+    """
+    wanted = {word.lower() for word in words}
+    said = {word.text.lower() for seen in observations for word in seen.words}
+    if missing := sorted(wanted - said):
+        raise InputError(f"nobody says {', '.join(missing)}; words that are said: {', '.join(sorted(said)[:60])}")
+    ordered = _ordered(observations)
+    held = {at for at, seen in enumerate(ordered) if wanted & {word.text.lower() for word in seen.words}}
+    if len(held) == len(ordered):
+        raise InputError(f"every utterance has one of {', '.join(sorted(wanted))}; nothing is left to learn from")
+    return _parted(ordered, held)
+
+
+def require_parted(train: Sequence[Observation], test: Sequence[Observation]) -> None:
+    """Refuse a split in which an utterance is on both sides.
+
+    Raises
+    ------
+    InputError
+        There is such an utterance, nothing to test, or nothing to learn from.
+    """
+    if not test:
+        raise InputError("there is no utterance to test")
+    if not train:
+        raise InputError("there is no utterance to learn from")
+    known = {_identity(seen) for seen in train}
+    if both := sorted(seen.name for seen in test if _identity(seen) in known):
+        raise InputError(f"{both[0]} is learnt from and tested on ({len(both)} such); take it out of one part")
+
+
+def _identity(seen: Observation) -> tuple[int, bytes]:
+    """What is the same in copies of one recording, whatever they are called."""
+    return len(seen.landmarks), seen.landmarks[:: max(1, len(seen.landmarks) // 4), :20].tobytes()
+
+
+def _ordered(observations: Sequence[Observation]) -> list[Observation]:
+    return sorted(observations, key=lambda one: one.name)
+
+
+def _parted(ordered: Sequence[Observation], held: Collection[int]) -> Parts:
+    train = tuple(one for at, one in enumerate(ordered) if at not in held)
+    return train, tuple(one for at, one in enumerate(ordered) if at in held)
