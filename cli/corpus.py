@@ -153,9 +153,6 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
     ] = None,
     train: Annotated[Path | None, Parameter(help="Folder to learn from, instead of --recordings.")] = None,
     test: Annotated[Path | None, Parameter(help="Folder to test on, with --train.")] = None,
-    network: Annotated[
-        bool, Parameter(help="Compare with a sliding-window network, too (extra [study]).", negative="")
-    ] = False,
     out: Annotated[
         Path | None, Parameter(help="Write figures and plots (.html) or figures (.json, .csv).", alias="-o")
     ] = None,
@@ -167,4 +164,4 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
     from cli.evaluation import Asked, evaluated
 
     asked = Asked(recordings, hold_out, seed, folds, hold_out_words, train, test)
-    evaluated(asked, out, network=network, effort=(cache, jobs, model))
+    evaluated(asked, out, (cache, jobs, model))

@@ -41,9 +41,7 @@ class Asked:
             raise InputError("--folds and --hold-out-words split --recordings; --train and --test are split already")
 
 
-def evaluated(
-    asked: Asked, out: Path | None, *, network: bool, effort: tuple[Path | None, int | None, Path | None]
-) -> None:
+def evaluated(asked: Asked, out: Path | None, effort: tuple[Path | None, int | None, Path | None]) -> None:
     """Read recordings, measure every method on what is held out, and tell or write the figures."""
     asked.check()
     if out is not None and out.suffix not in SUFFIXES:
@@ -53,7 +51,7 @@ def evaluated(
 
     parts = _parts(asked, Effort(*effort))
     with progress_bar("measuring") as on_progress:
-        result, runs = evaluate(parts, network=network, on_progress=on_progress)
+        result, runs = evaluate(parts, on_progress=on_progress)
     print(result.table())  # noqa: T201 - the answer
     if out is not None:
         _write(out, result, runs)

@@ -11,6 +11,7 @@ from typing import Any
 from corpus_tools.effort import Effort, Progress
 from corpus_tools.leak import without_leak
 from corpus_tools.learn import learn_talker
+from corpus_tools.lips import with_network
 from corpus_tools.observation import Observation
 from corpus_tools.observe import Refusal, observe
 from corpus_tools.report.recordings import recordings_page
@@ -93,7 +94,7 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
         "refused": [[refusal.name, refusal.reason] for refusal in observations.refused],
         **_marks(observations.kept),
     }
-    talker = learn_talker(without_leak(observations.kept), metadata=metadata)
+    talker = with_network(learn_talker(without_leak(observations.kept), metadata=metadata))
     if consent is not None:
         from corpus_tools.aam.attach import with_appearance
 

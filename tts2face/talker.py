@@ -13,6 +13,7 @@ from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.appearance import STEPS_PER_LOOK, Appearance, appearance_arrays, appearance_of
 from tts2face.tensors import read_tensors, write_tensors
 from tts2face.types import HEAD_CHANNELS, Trajectory
+from tts2face.window_network import WindowNetwork, network_arrays, network_of
 
 KIND = "talker"
 FORMAT_VERSION = 1
@@ -89,7 +90,8 @@ class Utterance:
 class Talker:
     """A person's visual speech: shape model, utterances, where they come from, and with consent how she looks.
 
-    ``metadata`` holds at least name, language, sources, licence, attribution, command, created.
+    ``metadata`` holds at least name, language, sources, licence, attribution, command, created; ``network`` tells the
+    lips' parameters from phones alone, None where there was too little to learn from.
     """
 
     fps: float
@@ -97,6 +99,7 @@ class Talker:
     utterances: tuple[Utterance, ...]
     metadata: Mapping[str, Any]
     appearance: Appearance | None = None
+    network: WindowNetwork | None = None
 
     def speech_trajectory(self, utterance: Utterance) -> Trajectory:
         """Speech parameters of a recorded utterance."""
@@ -137,11 +140,14 @@ def write_talker(path: Path, talker: Talker) -> None:
         steps = looks / (talker.appearance.spread / STEPS_PER_LOOK)
         arrays["looks"] = np.clip(np.rint(steps), -32768, 32767).astype(np.int16)
         arrays |= appearance_arrays(talker.appearance)
+    if talker.network is not None:
+        arrays |= network_arrays(talker.network)
     header = {
         **talker.metadata,
         "fps": talker.fps,
         "n_speech": talker.model.n_speech,
         "inventory": inventory,
+        **({"network_inventory": talker.network.inventory} if talker.network is not None else {}),
         "head_channels": HEAD_CHANNELS,
         "utterances": [
             [utterance.name, [[word.text, word.first, word.last] for word in utterance.words]]
@@ -189,6 +195,7 @@ def _assembled(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> Talke
     shape = arrays["shape"].astype(np.float32) * (model.spread / STEPS_PER_SPREAD)
     head, intensity = arrays["head"].astype(np.float32), arrays["intensity"].astype(np.float32)
     appearance = appearance_of(arrays)
+    network = network_of(arrays, header.pop("network_inventory", ()))
     looks = arrays["looks"] * (appearance.spread / STEPS_PER_LOOK) if appearance is not None else None
     utterances = []
     for i, (name, words) in enumerate(header.pop("utterances")):
@@ -198,4 +205,4 @@ def _assembled(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> Talke
         here = slice(frames[i], frames[i + 1])
         seen = None if looks is None else looks[here]
         utterances.append(Utterance(name, sequence, spans, shape[here], head[here], intensity[here], seen))
-    return Talker(fps, model, tuple(utterances), header, appearance)
+    return Talker(fps, model, tuple(utterances), header, appearance, network)

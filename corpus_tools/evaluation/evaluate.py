@@ -15,6 +15,7 @@ from corpus_tools.evaluation.scores import FIGURES, Scores, scored
 from corpus_tools.evaluation.splits import Parts, require_parted
 from corpus_tools.leak import pose_leak
 from corpus_tools.learn import learn_talker
+from corpus_tools.lips import with_network
 from corpus_tools.observation import Observation
 from tts2face.exemplar.options import SynthesisOptions
 from tts2face.talker import ShapeModel
@@ -88,7 +89,6 @@ def evaluate(
     parts: Sequence[Parts],
     *,
     options: Mapping[str, SynthesisOptions] | None = None,
-    network: bool = False,
     on_progress: Progress | None = None,
 ) -> tuple[Evaluation, tuple[Run, ...]]:
     """Every method on held-out utterances, with their true phone edges; all is learnt from the training parts.
@@ -100,21 +100,19 @@ def evaluate(
         units of spread refer to each split's own model.
     options
         Exemplar methods by name; by default `METHODS`.
-    network
-        Train the sliding-window network, too.
 
     Raises
     ------
     InputError
         There is nothing to learn from or nothing to test, or an utterance is on both sides.
     BackendError
-        The network is wanted, and scikit-learn is missing.
+        scikit-learn is missing.
     """
     runs = []
     for number, (train, test) in enumerate(parts):
         require_parted(train, test)
         tell = _stage(on_progress, number, len(parts))
-        runs.append(run(train, test, options=options, network=network, on_progress=tell))
+        runs.append(run(train, test, options=options, on_progress=tell))
     n_train = len(parts[0][0]) if len(parts) == 1 else min(len(train) for train, _ in parts)
     return Evaluation(n_train, sum(len(one.real) for one in runs), _together(runs)), tuple(runs)
 
@@ -124,14 +122,13 @@ def run(
     test: Sequence[Observation],
     *,
     options: Mapping[str, SynthesisOptions] | None = None,
-    network: bool = False,
     on_progress: Progress | None = None,
 ) -> Run:
     """One split: learn a talker from `train`, and make the motion of `test` by every method."""
     leak = pose_leak(train)
     train, test = ([leak.removed(seen) for seen in part] for part in (train, test))
-    talker = learn_talker(train, metadata=LEARNT_FOR_EVALUATION)
-    methods = methods_of(talker, options, network=network)
+    talker = with_network(learn_talker(train, metadata=LEARNT_FOR_EVALUATION))
+    methods = methods_of(talker, options)
     real = tuple(Real.of(seen, talker.model) for seen in test)
     made, spent = {}, {}
     for number, (name, method) in enumerate(methods.items()):

@@ -10,31 +10,33 @@ from tts2face.exemplar.animate import VisualVoice, speech_trajectory, visual_voi
 from tts2face.exemplar.options import METHODS, SynthesisOptions
 from tts2face.exemplar.targets import targets_of
 from tts2face.talker import Talker
+from tts2face.window_network import WindowNetwork
+
+NETWORK = "sliding-window network"
 
 # Speech parameters (T, D) for phones at T frames, from what the training part taught.
 Method = Callable[[PhoneSequence, int, float], NDArray[np.float32]]
 
 
-def methods_of(
-    talker: Talker, options: Mapping[str, SynthesisOptions] | None = None, *, network: bool = False
-) -> dict[str, Method]:
-    """Baselines and exemplar methods by name; `METHODS` without options.
-
-    Raises
-    ------
-    BackendError
-        The network is wanted, and scikit-learn is missing.
-    """
-    from corpus_tools.evaluation.network import window_network
-
+def methods_of(talker: Talker, options: Mapping[str, SynthesisOptions] | None = None) -> dict[str, Method]:
+    """Baselines and exemplar methods by name; `METHODS` without options."""
     voice = visual_voice(talker)
     n_speech = talker.model.n_speech
     return {
         "mean face": lambda _, n_frames, __: np.zeros((n_frames, n_speech), np.float32),
         "mean phone pose": mean_phone_pose(talker, voice),
-        **({"sliding-window network": window_network(talker)} if network else {}),
+        **({NETWORK: one_network(talker.network)} if talker.network is not None else {}),
         **{name: exemplar_method(voice, chosen) for name, chosen in (options or METHODS).items()},
     }
+
+
+def one_network(network: WindowNetwork) -> Method:
+    """The first of a talker's networks alone: what a plain sliding-window network makes of phones."""
+
+    def made(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
+        return network.parameters(phones, np.arange(n_frames) / fps, slice(1))
+
+    return made
 
 
 def exemplar_method(voice: VisualVoice, options: SynthesisOptions) -> Method:

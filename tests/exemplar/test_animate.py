@@ -143,7 +143,7 @@ def test_one_exemplar_of_a_recorded_sentence_gives_the_recording_back(voice: Vis
 def test_every_option_matters(voice: VisualVoice, name):
     changed = {
         "context": 1, "k": 1, "duration": 0.0, "sharpness": 0.0, "overlap": False, "precision": 0.0, "align": False,
-        "articulation": 1.2, "smoothing_s": 0.04, "contacts": False,
+        "network": 0.8, "articulation": 1.2, "smoothing_s": 0.04, "contacts": False,
     }  # fmt: skip
     assert (moved(voice, SENTENCE).values != moved(voice, SENTENCE, **{name: changed[name]}).values).any()
 

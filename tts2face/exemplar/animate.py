@@ -12,11 +12,12 @@ from tts2face.exemplar.contacts import Contacts, Gap, contact_poses, makes_lip_c
 from tts2face.exemplar.options import SynthesisOptions
 from tts2face.exemplar.select import ContextIndex, Found, Wanted, best_tokens, context_index, log_durations
 from tts2face.exemplar.similarity import Similarity, phone_similarity, token_samples
-from tts2face.exemplar.targets import Targets, targets_of
+from tts2face.exemplar.targets import Targets, shown_phones, targets_of
 from tts2face.exemplar.tokens import Tokens, contexts, tokens_of
 from tts2face.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.talker import Talker, speech_channels
 from tts2face.types import Trajectory
+from tts2face.window_network import WindowNetwork
 
 RELEASE_FROM_S = 0.08  # this far from speech the face begins to leave what the exemplars did ...
 REST_FROM_S = 0.20  # ... and this far it is at rest; recorded lips settle within 0.2 s
@@ -41,6 +42,7 @@ class VisualVoice:
     lip_gap: Gap
     channels: tuple[str, ...]
     names: tuple[str, ...]
+    network: WindowNetwork | None
 
 
 def visual_voice(talker: Talker) -> VisualVoice:
@@ -63,6 +65,7 @@ def visual_voice(talker: Talker) -> VisualVoice:
         ),
         speech_channels(model),
         tuple(spoken.name for spoken in talker.utterances),
+        talker.network,
     )
 
 
@@ -146,7 +149,12 @@ def _motion(
     weights = blend.exemplar_weights(found.scores, options.sharpness)
     pieces = blend.averaged_pieces(voice.tokens, found.tokens, weights, voice.spread, options)
     joined, told = blend.joined_pieces(pieces, targets, n_instants, options)
-    said = voice.speaking + options.articulation * (joined * voice.spread - voice.speaking)
+    said = joined * voice.spread
+    if voice.network is not None and options.network > 0:
+        instants = np.arange(n_instants) / blend.CLOCK_HZ
+        told_by_network = voice.network.parameters(shown_phones(targets), instants)
+        said = (1 - options.network) * said + options.network * told_by_network
+    said = voice.speaking + options.articulation * (said - voice.speaking)
     motion = np.where(told[:, None], said, voice.rest).astype(np.float32)
     motion = blend.smoothed(motion, options.smoothing_s, blend.CLOCK_HZ)
     if not options.contacts:

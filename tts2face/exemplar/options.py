@@ -26,6 +26,8 @@ class SynthesisOptions:
         Where exemplars overlap, each counts by its inverse variance to this power; 0 = all alike.
     align
         Exemplars are warped onto the best one so that events coincide before they are averaged.
+    network
+        Share of the talker's networks, where it has some, in what the exemplars tell; 0 leaves them out.
     articulation
         Factor on the motion about the talker's mean speaking pose; averaging shrinks what it averages.
     smoothing_s
@@ -46,6 +48,7 @@ class SynthesisOptions:
     overlap: bool = True
     precision: float = 1.5
     align: bool = True
+    network: float = 0.4
     articulation: float = 1.1
     smoothing_s: float = 0.01
     contacts: bool = True
@@ -56,10 +59,12 @@ class SynthesisOptions:
             value = getattr(self, name)
             if not 0 <= value < 100:
                 raise InputError(f"{name} must be 0 or more and below 100, not {value}")
+        if not 0 <= self.network <= 1:
+            raise InputError(f"the share of the networks must lie from 0 to 1, not {self.network}")
 
 
 THEOBALD_2007 = SynthesisOptions(
-    context=4, k=10, duration=0.0, sharpness=0.0, overlap=False, precision=0.0, align=True, articulation=1.0,
-    smoothing_s=0.02, contacts=False,
+    context=4, k=10, duration=0.0, sharpness=0.0, overlap=False, precision=0.0, align=True, network=0.0,
+    articulation=1.0, smoothing_s=0.02, contacts=False,
 )  # fmt: skip
 METHODS = {"exemplar": SynthesisOptions(), "theobald2007": THEOBALD_2007}

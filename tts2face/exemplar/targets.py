@@ -14,6 +14,9 @@ from tts2face.exemplar.tokens import PAUSE_REACH_S, reaching_spans
 TRANSPARENT = frozenset({"h", "ɦ", "ʔ"})
 
 
+LEAST_GAP_S = 1e-6  # between targets: less is rounding
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Targets:
     """N phones that the talker said, in order.
@@ -63,6 +66,19 @@ def targets_of(phones: PhoneSequence, inventory: tuple[str, ...]) -> Targets:
     return Targets(
         tuple(row[0] for row in rows), reaching_spans(starts, ends), np.array([row[3] for row in rows], np.int64)
     )
+
+
+def shown_phones(targets: Targets) -> PhoneSequence:
+    """The targets as phones in time from 0 s on, with silence where there is none."""
+    labels: list[str] = []
+    edges = [0.0]
+    for label, (start, end) in zip(targets.labels, targets.spans[:, 1:3], strict=True):
+        if start - edges[-1] > LEAST_GAP_S:
+            labels.append(SILENCE)
+            edges.append(float(start))
+        labels.append(label)
+        edges.append(float(end))
+    return PhoneSequence(labels, edges)
 
 
 Row = tuple[str, float, float, int]  # label, start, end, index of the wanted phone
