@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from lexicon.phones import phone_of
 from tts2face.exemplar.tokens import Tokens
 
-LIP_PLACES = frozenset({"bilabial", "labiodental"})
+# Labiodentals keep what averaging leaves: drawn to their closest, all touch where a tenth of the real do not.
+LIP_PLACES = frozenset({"bilabial"})
 NON_CONTACTS = frozenset({"approximant"})  # narrowed, not closed
 WINDOW_S = 0.03  # a closure may lie this far outside its phone's edges (video frames are 40 ms, edges +- 10 ms)
 CLOSER = 0.7  # of the exemplars, by weight; with it as many bilabials close as in recordings (docs/decisions.md)
@@ -30,7 +31,7 @@ class Gap:
 
 
 def makes_lip_contact(label: str) -> bool:
-    """The phone closes the lips, or lays the lower lip to the teeth."""
+    """The phone closes the lips."""
     phone = phone_of(label)
     return phone.place in LIP_PLACES and phone.manner not in NON_CONTACTS
 
