@@ -8,7 +8,7 @@ import numpy as np
 
 LEFT, RIGHT, TOP, BOTTOM = 56, 14, 12, 44  # px around the plot
 BAR, NAME = 20, 150  # px: height of a bar with its gap, width of its name
-N_TICKS = 6
+N_TICKS = 8
 
 
 @dataclass(frozen=True, slots=True)

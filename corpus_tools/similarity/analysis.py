@@ -19,8 +19,9 @@ from corpus_tools.similarity.compare import Comparison, compare_tables
 from corpus_tools.similarity.consistency import Consistency, mode_consistency, movement_consistency
 from corpus_tools.similarity.mantel import Agreement, articulatory_distances, mantel
 from corpus_tools.similarity.reliability import Reliability, split_half
-from corpus_tools.similarity.spoken import SimilarityTable, similarity_table, spoken_tokens
+from corpus_tools.similarity.spoken import LEAST_PHONES, SimilarityTable, similarity_table, spoken_tokens
 from lexicon.errors import InputError
+from lexicon.phones import phone_of
 from tts2face.exemplar.similarity import Similarity
 from tts2face.talker import Talker
 
@@ -52,7 +53,8 @@ class Analysis:
 
     ``curve`` holds classes for every number from 2 to P - 1, ``chosen`` those asked for, ``best`` the one with the
     highest silhouette. ``by_words`` is None where the corpus has too few different words. ``articulation`` (P, P) are
-    distances of the phones by their features.
+    distances of the phones by their features, ``articulatory`` how they agree with the
+    table, for all phones first, then for consonants and for vowels.
     """
 
     name: str
@@ -67,7 +69,7 @@ class Analysis:
     by_utterances: Reliability
     by_words: Reliability | None
     articulation: NDArray[np.float64]
-    articulatory: Agreement
+    articulatory: tuple[tuple[str, Agreement], ...]
     movements: Consistency
     modes: Consistency
     comparison: Comparison | None
@@ -111,7 +113,7 @@ def analyse(asked: Named, options: Options, other: Named | None = None) -> Analy
         by_utterances,
         split_half(spoken, spoken.word, options.halves, _stream(options, "words")),
         articulation,
-        mantel(apart, articulation, _stream(options, "articulation")),
+        _articulatory(table.phones, apart, articulation, options),
         movement_consistency(spoken, table.phones, asked.talker.model),
         mode_consistency(spoken, table.phones, asked.talker.model),
         _compared(table, against, other, options),
@@ -124,6 +126,20 @@ def _numbers(options: Options, n_phones: int) -> tuple[int, ...]:
     for n in options.classes:
         check_classes(n, n_phones)
     return tuple(sorted(set(options.classes)))
+
+
+def _articulatory(
+    phones: tuple[str, ...], apart: NDArray[np.float64], articulation: NDArray[np.float64], options: Options
+) -> tuple[tuple[str, Agreement], ...]:
+    """Agreement over all phones, and within consonants and vowels where `LEAST_PHONES` of them were said."""
+    vowel = np.array([phone_of(phone).is_vowel for phone in phones])
+    stream = _stream(options, "articulation")
+    made = []
+    for name, kept in (("all phones", vowel | True), ("consonants", ~vowel), ("vowels", vowel)):
+        at = np.flatnonzero(kept)
+        if len(at) >= LEAST_PHONES:
+            made.append((name, mantel(apart[np.ix_(at, at)], articulation[np.ix_(at, at)], stream)))
+    return tuple(made)
 
 
 def _compared(

@@ -14,7 +14,7 @@ from corpus_tools.similarity.compare import Comparison
 from corpus_tools.similarity.figure import difference_figure, similarity_figure
 from corpus_tools.similarity.heatmap import grid, heatmap
 from corpus_tools.similarity.labels import label
-from corpus_tools.similarity.mantel import upper
+from corpus_tools.similarity.mantel import N_PERMUTATIONS, upper
 from corpus_tools.similarity.reliability import Reliability
 from corpus_tools.similarity.spoken import LEAST_TOKENS
 from lexicon.phones import phone_of
@@ -54,7 +54,7 @@ def _summary(found: Analysis) -> str:
         f"{len(found.table.phones)} phones, {n_tokens} tokens, {found.n_utterances} utterances. Silence is left out.",
         f"Best number of viseme classes: {found.best.n_classes} (silhouette {found.best.silhouette:.2f}).",
         f"Reliability: halves of the utterances correlate by {agree.mean:.3f}, the whole by {agree.corrected:.3f}.",
-        f"Articulatory features: r = {found.articulatory.r:.2f}, p = {found.articulatory.p:.4f}.",
+        f"Articulatory features: r = {found.articulatory[0][1].r:.2f}, p = {found.articulatory[0][1].p:.4f}.",
     )
 
 
@@ -113,7 +113,8 @@ def members(found: Analysis, classes: VisemeClasses, labels: str) -> str:
     """The phones of each class, in the dendrogram's order."""
     grouped: list[list[str]] = [[] for _ in range(classes.n_classes)]
     for at in found.tree.order:
-        grouped[classes.labels[at]].append(label(found.table.phones[at], labels))
+        unbroken = label(found.table.phones[at], labels).replace(" ", "\N{NO-BREAK SPACE}")
+        grouped[classes.labels[at]].append(unbroken)
     return "  |  ".join((", " if labels == "both" else " ").join(group) for group in grouped)
 
 
@@ -162,13 +163,17 @@ def _articulation(found: Analysis, labels: str) -> list[str]:
     ]
     slope, intercept = np.polyfit(apart, alike, 1)
     axes = Axes("distance by articulatory features", "similarity", (0.0, float(apart.max()) * 1.03), (0.0, 1.0))
-    found_r = found.articulatory
+    agreements = [
+        (name, str(agreement.n_pairs), f"{agreement.r:.3f}", f"{agreement.p:.4f}")
+        for name, agreement in found.articulatory
+    ]
     return [
         _soft(
-            f"Mantel test over {found_r.n_pairs} pairs: distances on the face and by features correlate by "
-            f"r = {found_r.r:.3f}; p = {found_r.p:.4f} by {found_r.n_permutations} permutations, one-sided. "
-            "Blue: two consonants; ochre: two vowels; grey: one of each."
+            "Mantel test: correlation r of the distances on the face with those by articulatory features, and the "
+            f"share p of {N_PERMUTATIONS} permutations with at least this r."
         ),
+        table(("phones", "pairs", "r", "p"), agreements, numbers=(1, 2, 3)),
+        _soft("Blue: two consonants; ochre: two vowels; grey: one of each."),
         scatter(axes, points, (float(intercept), float(slope))),
     ]
 
@@ -194,7 +199,8 @@ def _consistency(found: Analysis, labels: str) -> list[str]:
         bars(list(zip(movements.names, movements.free_share.tolist(), strict=True))),
         _soft(
             "Phone by phone: spread within the phone over the spread in all speech. Blue: held, whatever stands beside "
-            "it; ochre: as free as any speech, or freer."
+            "it; ochre: as free as any speech, or freer. A phone of few words seems held: its neighbours are "
+            "always the same."
         ),
         _wide(grid(names, movements.names, movements.free[order], Ramp(0.3, 1.2, FREEDOM))),
         _soft(
@@ -223,6 +229,7 @@ def _comparison(found: Analysis, labels: str) -> list[str]:
         _wide(heatmap(difference_figure(found, compared, labels))),
         "<h2>Phones and pairs that differ most</h2>",
         table(("phone", "mean difference"), phones, numbers=(1,)),
+        _soft("Pairs, with the sign of the difference:"),
         _pairs(compared, labels),
     ]
 

@@ -2,6 +2,7 @@
 
 from functools import cache
 from io import BytesIO
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from corpus_tools.report.plots import ticks
@@ -16,7 +17,6 @@ CELL, LETTER = 24, 14  # px
 TREE, LABEL, HEAD, FOOT, MARGIN = 200, 74, 40, 62, 12  # px
 LEGEND = (280, 14)
 INK, SOFT, CUT = (29, 35, 41), (102, 112, 122), (184, 134, 11)
-N_COLOURS = 96  # of the palette: the ramp and the letters' edges
 # Fonts of Linux, Windows and macOS that have the IPA letters; Pillow's own has not.
 IPA_FONTS = ("DejaVuSans.ttf", "segoeui.ttf", "arial.ttf", "LucidaGrande.ttc", "Arial Unicode.ttf")
 
@@ -55,7 +55,7 @@ def table_png(figure: TableFigure) -> bytes:
     _draw_tree(pen, figure, top)
     _draw_legend(pen, figure, left, top + n * CELL + 16)
     file = BytesIO()
-    image.quantize(N_COLOURS, dither=Image.Dither.NONE).save(file, "PNG", optimize=True)
+    image.save(file, "PNG", optimize=True)
     return file.getvalue()
 
 
@@ -83,7 +83,7 @@ def _draw_cells(pen: "ImageDraw", figure: TableFigure, left: int, top: int) -> N
         for j in range(len(figure.names)):
             x, y = left + j * CELL, top + i * CELL
             pen.rectangle((x, y, x + CELL - 1, y + CELL - 1), fill=figure.ramp.colour(figure.values[i, j]))
-    for first, last in zip(figure.blocks, figure.blocks[1:], strict=False):
+    for first, last in pairwise(figure.blocks):
         a, b = first * CELL, last * CELL - 1
         pen.rectangle((left + a, top + a, left + b, top + b), outline="white", width=2)
 

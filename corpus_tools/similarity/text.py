@@ -14,6 +14,7 @@ from corpus_tools.similarity.classes import VisemeClasses
 from corpus_tools.similarity.compare import Comparison
 from corpus_tools.similarity.consistency import Consistency
 from corpus_tools.similarity.labels import label
+from corpus_tools.similarity.mantel import Agreement
 from corpus_tools.similarity.reliability import Reliability
 from corpus_tools.similarity.spoken import LEAST_TOKENS, SimilarityTable
 from lexicon.phones import phone_of
@@ -72,9 +73,7 @@ def analysis_json(found: Analysis) -> str:
             "words": None if found.by_words is None else _reliability(found.by_words),
         },
         "articulation": {
-            "r": round(found.articulatory.r, 4),
-            "p": found.articulatory.p,
-            "permutations": found.articulatory.n_permutations,
+            "agreement": {name: _agreement(agreement) for name, agreement in found.articulatory},
             "distance": _rounded(found.articulation),
         },
         "movements": _consistency(found, found.movements),
@@ -117,6 +116,15 @@ def _reliability(split: Reliability) -> dict[str, Any]:
     }
 
 
+def _agreement(agreement: Agreement) -> dict[str, Any]:
+    return {
+        "r": round(agreement.r, 4),
+        "p": agreement.p,
+        "permutations": agreement.n_permutations,
+        "pairs": agreement.n_pairs,
+    }
+
+
 def _consistency(found: Analysis, held: Consistency) -> dict[str, Any]:
     return {
         "names": list(held.names),
@@ -131,9 +139,7 @@ def _comparison(compared: Comparison) -> dict[str, Any]:
         "other": compared.other,
         "phones": list(compared.phones),
         "left_out": list(compared.left_out),
-        "r": round(compared.agreement.r, 4),
-        "p": compared.agreement.p,
-        "permutations": compared.agreement.n_permutations,
+        "agreement": _agreement(compared.agreement),
         "difference": _rounded(compared.difference),
         "mean_difference": dict(zip(compared.phones, _rounded(compared.per_phone), strict=True)),
     }
