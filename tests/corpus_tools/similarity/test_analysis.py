@@ -11,7 +11,7 @@ from corpus_tools.similarity.consistency import MOVEMENTS, mode_names, movement_
 from corpus_tools.similarity.reliability import spearman_brown, split_half
 from corpus_tools.similarity.spoken import NO_WORD, SimilarityTable, similarity_table, spoken_tokens
 from lexicon.errors import InputError
-from tests.corpus_tools.similarity.conftest import BLOCKS, POSES, made_model, made_talker
+from tests.corpus_tools.similarity.steady_talker import BLOCKS, POSES, made_model, made_talker
 from tts2face.exemplar.animate import visual_voice
 
 
