@@ -19,14 +19,16 @@ from corpus_tools.similarity.compare import Comparison, compare_tables
 from corpus_tools.similarity.consistency import Consistency, mode_consistency, movement_consistency
 from corpus_tools.similarity.mantel import Agreement, articulatory_distances, mantel
 from corpus_tools.similarity.reliability import Reliability, split_half
-from corpus_tools.similarity.spoken import LEAST_PHONES, SimilarityTable, similarity_table, spoken_tokens
+from corpus_tools.similarity.spoken import LEAST_PHONES, SimilarityTable, Spoken, similarity_table, spoken_tokens
 from lexicon.errors import InputError
 from lexicon.phones import phone_of
 from tts2face.exemplar.similarity import Similarity
 from tts2face.talker import Talker
 
 USUAL_CLASSES = (4, 6, 8, 10, 12)
-STREAMS = MappingProxyType({"utterances": 0, "words": 1, "articulation": 2, "comparison": 3})  # each draws its own
+STREAMS = MappingProxyType(
+    {"utterances": 0, "words": 1, "articulation": 2, "comparison": 3, "same phones": 4}
+)  # each draws its own
 N_NEIGHBOURS = 3  # as in T07 Table 1
 
 
@@ -52,9 +54,9 @@ class Analysis:
     """All that is known about one talker's similarity table.
 
     ``curve`` holds classes for every number from 2 to P - 1, ``chosen`` those asked for, ``best`` the one with the
-    highest silhouette. ``by_words`` is None where the corpus has too few different words. ``articulation`` (P, P) are
-    distances of the phones by their features, ``articulatory`` how they agree with the
-    table, for all phones first, then for consonants and for vowels.
+    highest silhouette. ``by_words`` is None where the corpus has too few different words; ``by_utterances_alike``
+    compares the phones of ``by_words`` between halves of the utterances. ``articulation`` (P, P) are distances of the
+    phones by their features, ``articulatory`` how they agree with the table: all phones first, then consonants, vowels.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Analysis:
     best: VisemeClasses
     by_utterances: Reliability
     by_words: Reliability | None
+    by_utterances_alike: Reliability | None
     articulation: NDArray[np.float64]
     articulatory: tuple[tuple[str, Agreement], ...]
     movements: Consistency
@@ -98,6 +101,7 @@ def analyse(asked: Named, options: Options, other: Named | None = None) -> Analy
     by_utterances = split_half(spoken, spoken.utterance, options.halves, _stream(options, "utterances"))
     if by_utterances is None:
         raise InputError(f"halves of {asked.name}'s utterances share too few phones; record more")
+    by_words = split_half(spoken, spoken.word, options.halves, _stream(options, "words"))
     similarity = Similarity(table.phones, table.matrix)
     articulation = articulatory_distances(table.phones)
     return Analysis(
@@ -111,7 +115,8 @@ def analyse(asked: Named, options: Options, other: Named | None = None) -> Analy
         tuple(viseme_classes(apart, tree, n) for n in numbers),
         best_classes(curve),
         by_utterances,
-        split_half(spoken, spoken.word, options.halves, _stream(options, "words")),
+        by_words,
+        None if by_words is None else _alike(spoken, by_words, options),
         articulation,
         _articulatory(table.phones, apart, articulation, options),
         movement_consistency(spoken, table.phones, asked.talker.model),
@@ -126,6 +131,12 @@ def _numbers(options: Options, n_phones: int) -> tuple[int, ...]:
     for n in options.classes:
         check_classes(n, n_phones)
     return tuple(sorted(set(options.classes)))
+
+
+def _alike(spoken: Spoken, by_words: Reliability, options: Options) -> Reliability | None:
+    """Halves of the utterances over the phones that halves of the words could compare."""
+    among = set(by_words.phones) - set(by_words.left_out)
+    return split_half(spoken, spoken.utterance, options.halves, _stream(options, "same phones"), among)
 
 
 def _articulatory(

@@ -26,13 +26,14 @@ class TableFigure:
     """A heat map of P rows in the order in which they are drawn.
 
     ``values`` (P, P); ``blocks`` the first row of each class and P; ``brackets`` the dendrogram, none without one;
-    ``cut`` its height between the classes.
+    ``cut`` its height between the classes; ``scale`` what the colours mean.
     """
 
     title: str
     names: tuple[str, ...]
     values: NDArray[np.float64]
     ramp: Ramp
+    scale: str
     blocks: tuple[int, ...] = ()
     brackets: tuple[Bracket, ...] = ()
     cut: float | None = None
@@ -64,6 +65,7 @@ def similarity_figure(found: Analysis, labels: str) -> TableFigure:
         tuple(label(found.table.phones[at], labels) for at in order),
         found.table.matrix[np.ix_(order, order)],
         likeness_ramp(),
+        f"similarity; dashed and framed: {n_classes} classes",
         tuple(starts),
         brackets_of(found.tree),
         cut,
@@ -80,4 +82,5 @@ def difference_figure(found: Analysis, compared: Comparison, labels: str) -> Tab
         tuple(label(compared.phones[at], labels) for at in order),
         compared.difference[np.ix_(order, order)],
         difference_ramp(largest),
+        "difference of similarity",
     )

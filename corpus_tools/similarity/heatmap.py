@@ -27,8 +27,8 @@ def heatmap(figure: TableFigure) -> str:
     parts = [*_cells(figure, left, top), *_blocks(figure.blocks, left, top), *_names(figure, left, top)]
     if figure.brackets:
         parts += _tree(figure, top)
-    parts.append(f'<g transform="translate({left} {top + n * CELL + 14})">{legend(figure.ramp)}</g>')
-    width = max(left + n * CELL, left + LEGEND[0] + 20) + 4
+    parts.append(f'<g transform="translate({left} {top + n * CELL + 14})">{legend(figure.ramp, figure.scale)}</g>')
+    width = left + max(n * CELL, LEGEND[0] + 280) + 4
     return picture(width, top + n * CELL + FOOT, parts, size=LETTER, name=figure.title)
 
 
@@ -51,11 +51,11 @@ def grid(rows: Sequence[str], columns: Sequence[str], values: NDArray[np.floatin
     return picture(LABEL + len(columns) * field + 70, head + len(rows) * high, parts, size=LETTER, name="table")
 
 
-def legend(ramp: Ramp) -> str:
-    """The colour scale with its numbers."""
+def legend(ramp: Ramp, scale: str) -> str:
+    """The colour scale with its numbers, and what they mean."""
     width, high = LEGEND
     shade = width / N_SHADES
-    parts = []
+    parts = [text(width + 14, high - 1, scale, anchor="start")]
     for k in range(N_SHADES):
         value = ramp.low + (k + 0.5) / N_SHADES * (ramp.high - ramp.low)
         colour = ramp.hexadecimal(value)

@@ -28,7 +28,7 @@ def similarity_page(found: Analysis, labels: str) -> str:
     parts = [
         _summary(found),
         "<h2>Phone by phone</h2>",
-        _soft("Colour: similarity, 1 for the same. White frames and dashed line: the best classes. Point at a field."),
+        _soft("Silence is left out. Point at a field for its number."),
         _wide(heatmap(similarity_figure(found, labels))),
         "<h2>Most similar phones</h2>",
         _soft("As Table 1 of Theobald et al. 2007. Agreement: of the phone's similarities between random halves."),
@@ -49,11 +49,12 @@ def similarity_page(found: Analysis, labels: str) -> str:
 
 def _summary(found: Analysis) -> str:
     n_tokens = int(found.table.counts.sum())
-    agree = found.by_utterances
+    agree, words = found.by_utterances, found.by_words
+    other_words = "" if words is None else f"; halves of the words, that share no word, by {words.mean:.3f}"
     return _said(
-        f"{len(found.table.phones)} phones, {n_tokens} tokens, {found.n_utterances} utterances. Silence is left out.",
+        f"{len(found.table.phones)} phones, {n_tokens} tokens, {found.n_utterances} utterances.",
         f"Best number of viseme classes: {found.best.n_classes} (silhouette {found.best.silhouette:.2f}).",
-        f"Reliability: halves of the utterances correlate by {agree.mean:.3f}, the whole by {agree.corrected:.3f}.",
+        f"Reliability: halves of the utterances correlate by {agree.mean:.3f}{other_words}.",
         f"Articulatory features: r = {found.articulatory[0][1].r:.2f}, p = {found.articulatory[0][1].p:.4f}.",
     )
 
@@ -119,13 +120,17 @@ def members(found: Analysis, classes: VisemeClasses, labels: str) -> str:
 
 
 def _reliability(found: Analysis, labels: str) -> list[str]:
-    splits: list[tuple[str, Reliability | None]] = [("utterances", found.by_utterances), ("words", found.by_words)]
+    splits: list[tuple[str, Reliability | None]] = [
+        ("utterances", found.by_utterances),
+        ("words", found.by_words),
+        ("utterances, phones of the words", found.by_utterances_alike),
+    ]
     rows = [_reliability_row(name, split) for name, split in splits]
     left = [
         f"Left out of the halves of {name}, with fewer than {LEAST_TOKENS} tokens in a half: "
         f"{', '.join(label(phone, labels) for phone in split.left_out)}."
         for name, split in splits
-        if split is not None and split.left_out
+        if split is not None and split.left_out and split is not found.by_utterances_alike
     ]
     head = ("halves of", "halves", "phones", "correlation", "lowest", "highest", "whole (Spearman-Brown)")
     return [

@@ -42,7 +42,7 @@ def table_png(figure: TableFigure) -> bytes:
     n = len(figure.names)
     left = MARGIN + (TREE if figure.brackets else 0) + LABEL
     top = MARGIN + HEAD + LABEL
-    width = max(left + n * CELL, left + LEGEND[0] + 20) + MARGIN
+    width = left + max(n * CELL, LEGEND[0] + 300) + MARGIN
     image = Image.new("RGB", (width, top + n * CELL + FOOT), "white")
     pen = ImageDraw.Draw(image)
     font = _font(LETTER)
@@ -114,6 +114,7 @@ def _draw_tree(pen: "ImageDraw", figure: TableFigure, top: int) -> None:
 def _draw_legend(pen: "ImageDraw", figure: TableFigure, left: int, top: int) -> None:
     width, high = LEGEND
     ramp = figure.ramp
+    pen.text((left + width + 14, top + high / 2), figure.scale, INK, font=_font(LETTER), anchor="lm")
     for at in range(width):
         pen.line(
             [(left + at, top), (left + at, top + high)],

@@ -1,5 +1,6 @@
 """Whether another corpus of the same talker would give the same table: random halves of this one are compared."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,12 +53,17 @@ def spearman_brown(r: float) -> float:
 
 
 def split_half(
-    spoken: Spoken, units: NDArray[np.integer], n_halves: int, stream: np.random.Generator
+    spoken: Spoken,
+    units: NDArray[np.integer],
+    n_halves: int,
+    stream: np.random.Generator,
+    among: Collection[str] | None = None,
 ) -> Reliability | None:
     """Tables from random halves of the `units` (N,), those of utterances or of words, compared.
 
     A unit's tokens all go into one half; tokens of a unit below 0 into none. A phone is compared when each half has
-    `LEAST_TOKENS` of it; halves with fewer than `LEAST_PHONES` such phones are dropped. None when all are.
+    `LEAST_TOKENS` of it, and `among` those given, if any are; halves with fewer than `LEAST_PHONES` such phones are
+    dropped. None when all are.
 
     Raises
     ------
@@ -67,13 +73,14 @@ def split_half(
     if n_halves < 2:
         raise InputError(f"a reliability needs at least 2 random halves, not {n_halves}")
     phones = similarity_table(spoken).phones
+    asked = np.array([among is None or phone in among for phone in phones])
     numbers = np.unique(units[units >= 0])
     rows, correlations, sizes = [], [], []
     for _ in range(n_halves):
         chosen = stream.permutation(numbers)[: len(numbers) // 2]
         first = np.isin(units, chosen)
         tables = similarity_table(spoken, first), similarity_table(spoken, ~first & (units >= 0))
-        enough = np.minimum(tables[0].counts, tables[1].counts) >= LEAST_TOKENS
+        enough = asked & (np.minimum(tables[0].counts, tables[1].counts) >= LEAST_TOKENS)
         if enough.sum() < LEAST_PHONES:
             continue
         row, r = _agreement(tables, enough)

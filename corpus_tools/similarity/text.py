@@ -70,7 +70,8 @@ def analysis_json(found: Analysis) -> str:
         "reliability": {
             "least_tokens": LEAST_TOKENS,
             "utterances": _reliability(found.by_utterances),
-            "words": None if found.by_words is None else _reliability(found.by_words),
+            "words": _reliability(found.by_words),
+            "utterances_phones_of_words": _reliability(found.by_utterances_alike),
         },
         "articulation": {
             "agreement": {name: _agreement(agreement) for name, agreement in found.articulatory},
@@ -104,7 +105,9 @@ def _classes(found: Analysis, classes: VisemeClasses) -> dict[str, Any]:
     }
 
 
-def _reliability(split: Reliability) -> dict[str, Any]:
+def _reliability(split: Reliability | None) -> dict[str, Any] | None:
+    if split is None:
+        return None
     return {
         "mean": round(split.mean, 4),
         "spearman_brown": round(split.corrected, 4),

@@ -8,8 +8,10 @@ import pytest
 from corpus_tools.similarity.analysis import Named, Options, analyse
 from corpus_tools.similarity.compare import compare_tables
 from corpus_tools.similarity.consistency import MOVEMENTS, mode_names, movement_consistency, movement_weights
+from corpus_tools.similarity.page import similarity_page
 from corpus_tools.similarity.reliability import spearman_brown, split_half
 from corpus_tools.similarity.spoken import NO_WORD, SimilarityTable, similarity_table, spoken_tokens
+from corpus_tools.similarity.text import analysis_json
 from lexicon.errors import InputError
 from tests.corpus_tools.similarity.steady_talker import BLOCKS, POSES, made_model, made_talker
 from tts2face.exemplar.animate import visual_voice
@@ -75,6 +77,23 @@ def test_halves_by_words_share_no_word(spoken):
     split = split_half(spoken, units, 3, np.random.default_rng(0))
     assert split is not None
     assert split.mean > 0.9
+
+
+def test_halves_compare_only_the_phones_among_those_given(spoken):
+    among = {"p", "b", "u", "w", "a"}
+    split = split_half(spoken, spoken.utterance, 3, np.random.default_rng(0), among)
+    assert split is not None
+    assert set(split.phones) - set(split.left_out) == among
+    assert (split.n_phones == 5).all()
+
+
+def test_a_talker_without_words_has_no_halves_of_words(talker):
+    wordless = replace(talker, utterances=tuple(replace(spoken, words=()) for spoken in talker.utterances))
+    found = analyse(Named("made", wordless), Options(halves=2))
+    assert found.by_words is None
+    assert found.by_utterances_alike is None
+    assert "too few phones with tokens in both halves" in similarity_page(found, "both")
+    assert '"words": null' in analysis_json(found)
 
 
 def test_random_looks_do_not_agree(spoken):
