@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from cli.progress import say
+from cli.progress import progress_bar, say
 from lexicon.errors import InputError
 
 report = App(name="report", help="Study what a talker's recordings tell about visual speech.")
@@ -32,7 +32,8 @@ def similarity(  # noqa: PLR0913 - one parameter a flag
     from corpus_tools.similarity.write import write_similarity
 
     options = Options(_numbers(classes), halves, seed)
-    found = write_similarity(talker, out, options, other=compare, labels=labels)
+    with progress_bar("comparing halves") as on_progress:
+        found = write_similarity(talker, out, options, other=compare, labels=labels, on_progress=on_progress)
     say(
         f"wrote {out}: {len(found.table.phones)} phones, best in {found.best.n_classes} classes, "
         f"reliability {found.by_utterances.corrected:.3f}"

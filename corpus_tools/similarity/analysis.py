@@ -1,5 +1,6 @@
 """The whole analysis of one talker's similarity table, in one record."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -25,6 +26,7 @@ from lexicon.phones import phone_of
 from tts2face.exemplar.similarity import Similarity
 from tts2face.talker import Talker
 
+Progress = Callable[[int, int], None]
 USUAL_CLASSES = (4, 6, 8, 10, 12)
 STREAMS = MappingProxyType(
     {"utterances": 0, "words": 1, "articulation": 2, "comparison": 3, "same phones": 4}
@@ -78,7 +80,9 @@ class Analysis:
     comparison: Comparison | None
 
 
-def analyse(asked: Named, options: Options, other: Named | None = None) -> Analysis:
+def analyse(
+    asked: Named, options: Options, other: Named | None = None, on_progress: Progress | None = None
+) -> Analysis:
     """Analyse a talker's similarity table, and compare it with another's.
 
     Raises
@@ -98,10 +102,9 @@ def analyse(asked: Named, options: Options, other: Named | None = None) -> Analy
     apart = distances(table.matrix)
     tree = cluster_tree(apart)
     curve = tuple(viseme_classes(apart, tree, n) for n in range(2, len(table.phones)))
-    by_utterances = split_half(spoken, spoken.utterance, options.halves, _stream(options, "utterances"))
+    by_utterances, by_words, alike = _halves(spoken, options, on_progress)
     if by_utterances is None:
         raise InputError(f"halves of {asked.name}'s utterances share too few phones; record more")
-    by_words = split_half(spoken, spoken.word, options.halves, _stream(options, "words"))
     similarity = Similarity(table.phones, table.matrix)
     articulation = articulatory_distances(table.phones)
     return Analysis(
@@ -116,7 +119,7 @@ def analyse(asked: Named, options: Options, other: Named | None = None) -> Analy
         best_classes(curve),
         by_utterances,
         by_words,
-        None if by_words is None else _alike(spoken, by_words, options),
+        alike,
         articulation,
         _articulatory(table.phones, apart, articulation, options),
         movement_consistency(spoken, table.phones, asked.talker.model),
@@ -133,10 +136,25 @@ def _numbers(options: Options, n_phones: int) -> tuple[int, ...]:
     return tuple(sorted(set(options.classes)))
 
 
-def _alike(spoken: Spoken, by_words: Reliability, options: Options) -> Reliability | None:
-    """Halves of the utterances over the phones that halves of the words could compare."""
+def _halves(
+    spoken: Spoken, options: Options, on_progress: Progress | None
+) -> tuple[Reliability | None, Reliability | None, Reliability | None]:
+    """Halves of the utterances, of the words, and of the utterances over the phones that the second could compare."""
+    n, done = options.halves, 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        if on_progress is not None:
+            on_progress(done, 3 * n)
+
+    by_utterances = split_half(spoken, spoken.utterance, n, _stream(options, "utterances"), on_half=step)
+    by_words = split_half(spoken, spoken.word, n, _stream(options, "words"), on_half=step)
+    if by_words is None:
+        return by_utterances, None, None
     among = set(by_words.phones) - set(by_words.left_out)
-    return split_half(spoken, spoken.utterance, options.halves, _stream(options, "same phones"), among)
+    stream = _stream(options, "same phones")
+    return by_utterances, by_words, split_half(spoken, spoken.utterance, n, stream, among=among, on_half=step)
 
 
 def _articulatory(

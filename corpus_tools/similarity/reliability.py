@@ -1,6 +1,6 @@
 """Whether another corpus of the same talker would give the same table: random halves of this one are compared."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,13 +57,15 @@ def split_half(
     units: NDArray[np.integer],
     n_halves: int,
     stream: np.random.Generator,
+    *,
     among: Collection[str] | None = None,
+    on_half: Callable[[], None] | None = None,
 ) -> Reliability | None:
     """Tables from random halves of the `units` (N,), those of utterances or of words, compared.
 
     A unit's tokens all go into one half; tokens of a unit below 0 into none. A phone is compared when each half has
     `LEAST_TOKENS` of it, and `among` those given, if any are; halves with fewer than `LEAST_PHONES` such phones are
-    dropped. None when all are.
+    dropped. None when all are. `on_half` is called after each half.
 
     Raises
     ------
@@ -80,6 +82,8 @@ def split_half(
         chosen = stream.permutation(numbers)[: len(numbers) // 2]
         first = np.isin(units, chosen)
         tables = similarity_table(spoken, first), similarity_table(spoken, ~first & (units >= 0))
+        if on_half is not None:
+            on_half()
         enough = asked & (np.minimum(tables[0].counts, tables[1].counts) >= LEAST_TOKENS)
         if enough.sum() < LEAST_PHONES:
             continue

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from corpus_tools.similarity.analysis import Analysis, Named, Options, analyse
+from corpus_tools.similarity.analysis import Analysis, Named, Options, Progress, analyse
 from corpus_tools.similarity.figure import difference_figure, similarity_figure
 from corpus_tools.similarity.labels import check_labels
 from corpus_tools.similarity.page import similarity_page
@@ -16,7 +16,13 @@ from tts2face.talker import load_talker
 
 
 def write_similarity(
-    talker: str, out: Path, options: Options, *, other: str | None = None, labels: str = "both"
+    talker: str,
+    out: Path,
+    options: Options,
+    *,
+    other: str | None = None,
+    labels: str = "both",
+    on_progress: Progress | None = None,
 ) -> Analysis:
     """Analyse a talker (by name or path), write the file, and give the analysis.
 
@@ -38,7 +44,7 @@ def write_similarity(
     if not out.parent.is_dir():
         raise InputError(f"there is no folder {out.parent}; make it or choose another")
     against = None if other is None else Named(other, load_talker(other))
-    found = analyse(Named(talker, load_talker(talker)), options, against)
+    found = analyse(Named(talker, load_talker(talker)), options, against, on_progress)
     write_whole(out, WRITERS[suffix](found, labels))
     return found
 

@@ -81,7 +81,7 @@ def test_halves_by_words_share_no_word(spoken):
 
 def test_halves_compare_only_the_phones_among_those_given(spoken):
     among = {"p", "b", "u", "w", "a"}
-    split = split_half(spoken, spoken.utterance, 3, np.random.default_rng(0), among)
+    split = split_half(spoken, spoken.utterance, 3, np.random.default_rng(0), among=among)
     assert split is not None
     assert set(split.phones) - set(split.left_out) == among
     assert (split.n_phones == 5).all()
@@ -94,6 +94,12 @@ def test_a_talker_without_words_has_no_halves_of_words(talker):
     assert found.by_utterances_alike is None
     assert "too few phones with tokens in both halves" in similarity_page(found, "both")
     assert '"words": null' in analysis_json(found)
+
+
+def test_progress_runs_to_its_end(talker):
+    told = []
+    analyse(Named("made", talker), Options(halves=2), on_progress=lambda done, of: told.append((done, of)))
+    assert told == [(done, 6) for done in range(1, 7)]
 
 
 def test_random_looks_do_not_agree(spoken):
