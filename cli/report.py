@@ -18,10 +18,11 @@ def similarity(  # noqa: PLR0913 - one parameter a flag
     *,
     out: Annotated[Path, Parameter(help="What to write: .html, .csv, .json or .png.", alias="-o")],
     classes: Annotated[
-        str | None, Parameter(help="Numbers of viseme classes; those of 4,6,8,10,12 that the phones allow.")
+        str | None,
+        Parameter(help="Numbers of viseme classes to list; without it those of 4,6,8,10,12 that the phones allow."),
     ] = None,
-    halves: Annotated[int, Parameter(help="Random halves of the corpus for the reliability.")] = 20,
-    seed: Annotated[int, Parameter(help="Which halves and permutations are drawn.")] = 0,
+    halves: Annotated[int, Parameter(help="Random halves of the corpus to compare (.html, .json).")] = 20,
+    seed: Annotated[int, Parameter(help="Which halves and permutations are drawn (.html, .json).")] = 0,
     compare: Annotated[
         str | None, Parameter(help="Another talker to compare with; .csv and .png then hold the difference.")
     ] = None,
