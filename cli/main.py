@@ -12,6 +12,7 @@ from cli.exits import exit_code, sentence
 from cli.flags import chosen, flags_from
 from cli.mimic import mimic
 from cli.phones import phones
+from cli.report import report
 from lexicon.errors import InputError, Tts2faceError
 from tts2face import __version__
 from tts2face.render.picture import Picture
@@ -27,6 +28,7 @@ app = App(
 app.command(phones)
 app.command(mimic)
 app.command(corpus)
+app.command(report)
 
 
 @app.default

@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from corpus_tools.similarity.analysis import Options
+from corpus_tools.similarity.write import write_similarity
 from lexicon.phones import ipa_to_arpabet
 from lexicon.sequence import SILENCE
 from tts2face.api import cast, stream
@@ -95,6 +97,7 @@ def main() -> None:
     HERE.mkdir(exist_ok=True)
     if talker is not None:
         own_face_sheet(talker).save(HERE / "own_face.jpg", quality=85)
+    write_similarity("grid_s1", HERE / "similarity.png", Options())
     clip_sheet().save(HERE / "clip.png", optimize=True)
     faces_sheet().save(HERE / "faces.png", optimize=True)
 

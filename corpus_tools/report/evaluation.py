@@ -9,7 +9,7 @@ from corpus_tools.evaluation.evaluate import CEILING, Evaluation, Run
 from corpus_tools.evaluation.real import Curves, Real
 from corpus_tools.evaluation.scores import CONFIDENCE, FIGURES, Scores
 from corpus_tools.report.page import page, picture_tag, table
-from corpus_tools.report.plots import Series, histogram, line_plot
+from corpus_tools.report.trajectories import Series, histogram, line_plot
 from lexicon.errors import DataError, InputError
 from tts2face.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.video.media import read_pictures

@@ -22,6 +22,8 @@ section.item { display: flex; gap: 1rem; padding: .6rem 0; border-top: 1px solid
 section.item > div { overflow-x: auto; } section.item > div:first-child { flex: none; }
 p { margin: .2rem 0; } .soft { color: var(--soft); } .bad { color: var(--bad); }
 img { border-radius: 4px; } svg text { fill: var(--soft); font: 10px system-ui, sans-serif; }
+svg.figure text { fill: var(--ink); font-size: var(--letters); } .wide { overflow-x: auto; }
+svg .cell:hover { stroke: #fff; stroke-width: 2px; }
 """.strip()
 
 

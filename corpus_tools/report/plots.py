@@ -1,114 +1,126 @@
-"""Plots inside a page (SVG): curves over phones, and histograms."""
+"""Plots as pictures inside a page (SVG): lines, points and bars over two axes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lexicon.sequence import SILENCE, PhoneSequence
-
-WIDTH, HEIGHT = 1100, 190
-LEFT, RIGHT, TOP, BOTTOM = 56, 8, 22, 24  # margins
-COLOURS = ("var(--ink)", "var(--first)", "var(--second)", "#2e8b57", "#a0522d", "#8a63d2", "#c2185b")
-DASHES = ("", "", "5 3", "2 3", "8 3 2 3", "1 2", "")
-N_BINS = 30
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Series:
-    """A named curve: values (T,) at times (T,) in seconds."""
-
-    name: str
-    times: NDArray[np.floating]
-    values: NDArray[np.floating]
-
-
-def line_plot(series: Sequence[Series], label: str, phones: PhoneSequence | None = None) -> str:
-    """Curves over time, with the phones below."""
-    low = min(float(one.values.min()) for one in series)
-    high = max(float(one.values.max()) for one in series)
-    room = 0.05 * (high - low) or 1.0
-    frame = _Frame((0.0, float(series[0].times[-1])), (low - room, high + room))
-    parts = [frame.axes(label), *(_phones(frame, phones) if phones is not None else ())]
-    for number, one in enumerate(series):
-        points = " ".join(f"{frame.x(t):.1f},{frame.y(v):.1f}" for t, v in zip(one.times, one.values, strict=True))
-        parts.append(f'<polyline points="{points}" {_stroke(number)}/>')
-    parts.append(_legend([one.name for one in series]))
-    return _svg(parts)
-
-
-def histogram(samples: Mapping[str, Sequence[float]]) -> str:
-    """How often values occur, one outline for each name."""
-    every = np.concatenate([np.asarray(values, np.float64) for values in samples.values()])
-    edges = np.linspace(float(every.min()), float(every.max()) + 1e-9, N_BINS + 1)
-    counts = {name: np.histogram(values, edges)[0] for name, values in samples.items()}
-    top = max(int(count.max()) for count in counts.values())
-    frame = _Frame((float(edges[0]), float(edges[-1])), (0.0, 1.05 * top))
-    parts = [frame.axes("utterances")]
-    for tick in np.linspace(edges[0], edges[-1], 6):
-        parts.append(f'<text x="{frame.x(tick):.0f}" y="{HEIGHT - 8}" text-anchor="middle">{tick:.2f}</text>')
-    for number, count in enumerate(counts.values()):
-        steps = [(x, c) for bin_, c in enumerate(count) for x in (edges[bin_], edges[bin_ + 1])]
-        points = " ".join(f"{frame.x(x):.1f},{frame.y(c):.1f}" for x, c in steps)
-        parts.append(f'<polyline points="{points}" {_stroke(number)}/>')
-    parts.append(_legend(list(counts)))
-    return _svg(parts)
+LEFT, RIGHT, TOP, BOTTOM = 56, 14, 12, 44  # px around the plot
+BAR, NAME = 20, 150  # px: height of a bar with its gap, width of its name
+N_TICKS = 8
 
 
 @dataclass(frozen=True, slots=True)
-class _Frame:
-    """From values to places in the picture."""
+class Point:
+    """Where it lies, its text under the mouse, and its colour (CSS)."""
 
-    across: tuple[float, float]
-    along: tuple[float, float]
+    x: float
+    y: float
+    title: str
+    colour: str = "var(--first)"
 
-    def x(self, value: float) -> float:
-        low, high = self.across
-        return LEFT + (WIDTH - LEFT - RIGHT) * (value - low) / ((high - low) or 1.0)
 
-    def y(self, value: float) -> float:
-        low, high = self.along
-        return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * (value - low) / ((high - low) or 1.0)
+@dataclass(frozen=True, slots=True)
+class Axes:
+    """What the axes say, how far they go, and the size of the picture in px."""
 
-    def axes(self, label: str) -> str:
-        """The frame, three values on the left, and what they are."""
-        low, high = self.along
-        ticks = [low, (low + high) / 2, high]
-        texts = [f'<text x="{LEFT - 6}" y="{self.y(v) + 4:.0f}" text-anchor="end">{v:.3g}</text>' for v in ticks]
-        box = f'x="{LEFT}" y="{TOP}" width="{WIDTH - LEFT - RIGHT}" height="{HEIGHT - TOP - BOTTOM}"'
-        return (
-            f'<rect {box} fill="none" stroke="var(--line)"/>{"".join(texts)}'
-            f'<text x="{LEFT}" y="{TOP - 8}">{escape(label)}</text>'
+    x_label: str
+    y_label: str
+    x_range: tuple[float, float]
+    y_range: tuple[float, float]
+    width: int = 560
+    height: int = 300
+
+
+def text(x: float, y: float, content: str, *, anchor: str = "middle", more: str = "") -> str:
+    """A word at a place; `more` are further attributes."""
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" {more}>{escape(content)}</text>'
+
+
+def picture(width: float, height: float, parts: Sequence[str], *, size: int = 11, name: str = "") -> str:
+    """An SVG with letters of `size` px, and a name for those who cannot see it."""
+    return (
+        f'<svg role="img" aria-label="{escape(name)}" width="{width:.0f}" height="{height:.0f}" '
+        f'viewBox="0 0 {width:.0f} {height:.0f}" class="figure" style="--letters:{size}px">{"".join(parts)}</svg>'
+    )
+
+
+def ticks(low: float, high: float) -> list[float]:
+    """Round numbers within a range, about `N_TICKS` of them."""
+    raw = (high - low) / N_TICKS
+    size = 10.0 ** np.floor(np.log10(raw))
+    step = next(size * factor for factor in (1, 2, 5, 10) if size * factor >= raw * 0.999)
+    return [float(k * step) for k in range(int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9)) + 1)]
+
+
+def scatter(axes: Axes, points: Sequence[Point], line: tuple[float, float] | None = None) -> str:
+    """Points; `line` is the intercept and slope of a straight line through them."""
+    x, y = _scales(axes)
+    parts = _frame(axes)
+    for point in points:
+        parts.append(
+            f'<circle cx="{x(point.x):.1f}" cy="{y(point.y):.1f}" r="3" fill="{point.colour}" fill-opacity=".65">'
+            f"<title>{escape(point.title)}</title></circle>"
         )
+    if line is not None:
+        low, high = axes.x_range
+        ends = [(at, float(np.clip(line[0] + line[1] * at, *axes.y_range))) for at in (low, high)]
+        path = "L".join(f"{x(a):.1f} {y(b):.1f}" for a, b in ends)
+        parts.append(f'<path d="M{path}" stroke="var(--ink)" stroke-width="1.5" fill="none"/>')
+    return picture(axes.width, axes.height, parts, name=f"{axes.y_label} over {axes.x_label}")
 
 
-def _phones(frame: _Frame, phones: PhoneSequence) -> list[str]:
+def line_plot(axes: Axes, points: Sequence[Point], marked: int) -> str:
+    """Points joined by a line; the one at index `marked` is larger."""
+    x, y = _scales(axes)
+    places = " ".join(f"{x(point.x):.1f},{y(point.y):.1f}" for point in points)
+    parts = [*_frame(axes), f'<polyline points="{places}" fill="none" stroke="var(--first)" stroke-width="1.5"/>']
+    for at, point in enumerate(points):
+        radius, colour = (6, "var(--second)") if at == marked else (3.5, point.colour)
+        parts.append(
+            f'<circle cx="{x(point.x):.1f}" cy="{y(point.y):.1f}" r="{radius}" fill="{colour}">'
+            f"<title>{escape(point.title)}</title></circle>"
+        )
+    return picture(axes.width, axes.height, parts, name=f"{axes.y_label} over {axes.x_label}")
+
+
+def bars(values: Sequence[tuple[str, float]], *, width: int = 560) -> str:
+    """Bars from 0 to 1, one a line: its name, the bar, the number."""
+    room = width - NAME - 46
     parts = []
-    for label, begin, end in zip(phones.phones, phones.edges, phones.edges[1:], strict=False):
-        if begin > frame.across[1]:
-            break
-        parts.append(f'<path d="M{frame.x(begin):.1f} {TOP}V{HEIGHT - BOTTOM}" stroke="var(--line)"/>')
-        if label != SILENCE:
-            middle = frame.x((begin + min(end, frame.across[1])) / 2)
-            parts.append(f'<text x="{middle:.0f}" y="{HEIGHT - 8}" text-anchor="middle">{escape(label)}</text>')
+    for row, (name, value) in enumerate(values):
+        top = row * BAR
+        parts += [
+            text(NAME - 8, top + 14, name, anchor="end"),
+            f'<rect x="{NAME}" y="{top + 3}" width="{room}" height="14" fill="var(--line)" fill-opacity=".5"/>',
+            f'<rect x="{NAME}" y="{top + 3}" width="{room * min(value, 1.0):.1f}" height="14" fill="var(--first)"/>',
+            text(NAME + room + 8, top + 14, f"{value:.2f}", anchor="start"),
+        ]
+    return picture(width, len(values) * BAR, parts, size=12, name="bars")
+
+
+def _scales(axes: Axes) -> tuple[Callable[[float], float], Callable[[float], float]]:
+    (x_low, x_high), (y_low, y_high) = axes.x_range, axes.y_range
+    room, tall = axes.width - LEFT - RIGHT, axes.height - TOP - BOTTOM
+    return (
+        lambda value: LEFT + (value - x_low) / (x_high - x_low) * room,
+        lambda value: TOP + (y_high - value) / (y_high - y_low) * tall,
+    )
+
+
+def _frame(axes: Axes) -> list[str]:
+    x, y = _scales(axes)
+    right, bottom = axes.width - RIGHT, axes.height - BOTTOM
+    parts = []
+    for value in ticks(*axes.y_range):
+        parts.append(f'<path d="M{LEFT} {y(value):.1f}H{right}" stroke="var(--line)"/>')
+        parts.append(text(LEFT - 6, y(value) + 4, f"{value:g}", anchor="end"))
+    for value in ticks(*axes.x_range):
+        parts.append(f'<path d="M{x(value):.1f} {bottom}v4" stroke="var(--soft)"/>')
+        parts.append(text(x(value), bottom + 17, f"{value:g}"))
+    middle = (TOP + bottom) / 2
+    parts.append(f'<path d="M{LEFT} {bottom}H{right}" stroke="var(--soft)"/>')
+    parts.append(text((LEFT + right) / 2, axes.height - 8, axes.x_label))
+    parts.append(text(14, middle, axes.y_label, more=f'transform="rotate(-90 14 {middle:.1f})"'))
     return parts
-
-
-def _stroke(number: int) -> str:
-    colour, dash = COLOURS[number % len(COLOURS)], DASHES[number % len(DASHES)]
-    return f'fill="none" stroke="{colour}" stroke-width="1.6" stroke-dasharray="{dash}"'
-
-
-def _legend(names: Sequence[str]) -> str:
-    parts, x = [], WIDTH - RIGHT - sum(44 + 7 * len(name) for name in names)
-    for number, name in enumerate(names):
-        parts.append(f'<path d="M{x} {TOP - 12}h24" {_stroke(number)}/>')
-        parts.append(f'<text x="{x + 28}" y="{TOP - 8}">{escape(name)}</text>')
-        x += 44 + 7 * len(name)
-    return "".join(parts)
-
-
-def _svg(parts: Sequence[str]) -> str:
-    return f'<svg width="100%" viewBox="0 0 {WIDTH} {HEIGHT}">{"".join(parts)}</svg>'

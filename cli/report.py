@@ -1,0 +1,50 @@
+"""``tts2face report``: what recordings tell about visual speech, as pages, tables and pictures."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, Parameter
+
+from cli.progress import progress_bar, say
+from lexicon.errors import InputError
+
+report = App(name="report", help="Study what a talker's recordings tell about visual speech.")
+
+
+@report.command
+def similarity(  # noqa: PLR0913 - one parameter a flag
+    talker: Annotated[str, Parameter(help="A shipped talker or a .talker file.")],
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="What to write: .html, .csv, .json or .png.", alias="-o")],
+    classes: Annotated[
+        str | None,
+        Parameter(help="Numbers of viseme classes to list; without it those of 4,6,8,10,12 that the phones allow."),
+    ] = None,
+    halves: Annotated[int, Parameter(help="Random halves of the corpus to compare (.html, .json).")] = 20,
+    seed: Annotated[int, Parameter(help="Which halves and permutations are drawn (.html, .json).")] = 0,
+    compare: Annotated[
+        str | None, Parameter(help="Another talker to compare with; .csv and .png then hold the difference.")
+    ] = None,
+    labels: Annotated[str, Parameter(help="How phones are labelled: both, ipa or arpabet (.json has both).")] = "both",
+) -> None:
+    """Analyse which phones look alike: matrix, neighbours, viseme classes, reliability, articulation."""
+    from corpus_tools.similarity.analysis import Options
+    from corpus_tools.similarity.write import write_similarity
+
+    options = Options(_numbers(classes), halves, seed)
+    with progress_bar("comparing halves") as on_progress:
+        found = write_similarity(talker, out, options, other=compare, labels=labels, on_progress=on_progress)
+    say(
+        f"wrote {out}: {len(found.table.phones)} phones, best in {found.best.n_classes} classes, "
+        f"reliability {found.by_utterances.corrected:.3f}"
+    )
+
+
+def _numbers(classes: str | None) -> tuple[int, ...] | None:
+    if classes is None:
+        return None
+    try:
+        return tuple(int(number) for number in classes.split(","))
+    except ValueError as wrong:
+        raise InputError(f"--classes takes whole numbers with commas between, like 4,8,12, not {classes!r}") from wrong

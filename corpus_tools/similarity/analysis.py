@@ -1,0 +1,183 @@
+"""The whole analysis of one talker's similarity table, in one record."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.similarity.classes import (
+    Tree,
+    VisemeClasses,
+    best_classes,
+    check_classes,
+    cluster_tree,
+    distances,
+    viseme_classes,
+)
+from corpus_tools.similarity.compare import Comparison, compare_tables
+from corpus_tools.similarity.consistency import Consistency, mode_consistency, movement_consistency
+from corpus_tools.similarity.mantel import Agreement, articulatory_distances, mantel
+from corpus_tools.similarity.reliability import Reliability, split_half
+from corpus_tools.similarity.spoken import LEAST_PHONES, SimilarityTable, Spoken, similarity_table, spoken_tokens
+from lexicon.errors import InputError
+from lexicon.phones import phone_of
+from tts2face.exemplar.similarity import Similarity
+from tts2face.talker import Talker
+
+Progress = Callable[[int, int], None]
+USUAL_CLASSES = (4, 6, 8, 10, 12)
+STREAMS = MappingProxyType(
+    {"utterances": 0, "words": 1, "articulation": 2, "comparison": 3, "same phones": 4}
+)  # each draws its own
+N_NEIGHBOURS = 3  # as in T07 Table 1
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What is asked: numbers of `classes` (the usual ones that the phones allow without), random halves, seed."""
+
+    classes: tuple[int, ...] | None = None
+    halves: int = 20
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Named:
+    """A talker and the name by which it was asked for."""
+
+    name: str
+    talker: Talker
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Analysis:
+    """All that is known about one talker's similarity table.
+
+    ``curve`` holds classes for every number from 2 to P - 1, ``chosen`` those asked for, ``best`` the one with the
+    highest silhouette. ``by_words`` is None where the corpus has too few different words; ``by_utterances_alike``
+    compares the phones of ``by_words`` between halves of the utterances. ``articulation`` (P, P) are distances of the
+    phones by their features, ``articulatory`` how they agree with the table: all phones first, then consonants, vowels.
+    """
+
+    name: str
+    n_utterances: int
+    options: Options
+    table: SimilarityTable
+    neighbours: tuple[tuple[tuple[str, float], ...], ...]
+    tree: Tree
+    curve: tuple[VisemeClasses, ...]
+    chosen: tuple[VisemeClasses, ...]
+    best: VisemeClasses
+    by_utterances: Reliability
+    by_words: Reliability | None
+    by_utterances_alike: Reliability | None
+    articulation: NDArray[np.float64]
+    articulatory: tuple[tuple[str, Agreement], ...]
+    movements: Consistency
+    modes: Consistency
+    comparison: Comparison | None
+
+
+def analyse(
+    asked: Named, options: Options, other: Named | None = None, on_progress: Progress | None = None
+) -> Analysis:
+    """Analyse a talker's similarity table, and compare it with another's.
+
+    Raises
+    ------
+    InputError
+        A talker has too few phones, tokens or utterances; numbers of classes or halves that cannot be; too few common
+        phones.
+    """
+    if options.halves < 2:
+        raise InputError(f"a reliability needs at least 2 random halves, not {options.halves}")
+    if options.seed < 0:
+        raise InputError(f"a seed is a whole number from 0, not {options.seed}")
+    spoken = spoken_tokens(asked.talker, asked.name)
+    table = similarity_table(spoken)
+    numbers = _numbers(options, len(table.phones))
+    against = None if other is None else similarity_table(spoken_tokens(other.talker, other.name))
+    apart = distances(table.matrix)
+    tree = cluster_tree(apart)
+    curve = tuple(viseme_classes(apart, tree, n) for n in range(2, len(table.phones)))
+    by_utterances, by_words, alike = _halves(spoken, options, on_progress)
+    if by_utterances is None:
+        raise InputError(f"halves of {asked.name}'s utterances share too few phones; record more")
+    similarity = Similarity(table.phones, table.matrix)
+    articulation = articulatory_distances(table.phones)
+    return Analysis(
+        asked.name,
+        len(asked.talker.utterances),
+        options,
+        table,
+        tuple(tuple(similarity.nearest(phone, N_NEIGHBOURS)) for phone in table.phones),
+        tree,
+        curve,
+        tuple(viseme_classes(apart, tree, n) for n in numbers),
+        best_classes(curve),
+        by_utterances,
+        by_words,
+        alike,
+        articulation,
+        _articulatory(table.phones, apart, articulation, options),
+        movement_consistency(spoken, table.phones, asked.talker.model),
+        mode_consistency(spoken, table.phones, asked.talker.model),
+        _compared(table, against, other, options),
+    )
+
+
+def _numbers(options: Options, n_phones: int) -> tuple[int, ...]:
+    if options.classes is None:
+        return tuple(n for n in USUAL_CLASSES if n < n_phones)
+    for n in options.classes:
+        check_classes(n, n_phones)
+    return tuple(sorted(set(options.classes)))
+
+
+def _halves(
+    spoken: Spoken, options: Options, on_progress: Progress | None
+) -> tuple[Reliability | None, Reliability | None, Reliability | None]:
+    """Halves of the utterances, of the words, and of the utterances over the phones that the second could compare."""
+    n, done = options.halves, 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        if on_progress is not None:
+            on_progress(done, 3 * n)
+
+    by_utterances = split_half(spoken, spoken.utterance, n, _stream(options, "utterances"), on_half=step)
+    by_words = split_half(spoken, spoken.word, n, _stream(options, "words"), on_half=step)
+    if by_words is None:
+        return by_utterances, None, None
+    among = set(by_words.phones) - set(by_words.left_out)
+    stream = _stream(options, "same phones")
+    return by_utterances, by_words, split_half(spoken, spoken.utterance, n, stream, among=among, on_half=step)
+
+
+def _articulatory(
+    phones: tuple[str, ...], apart: NDArray[np.float64], articulation: NDArray[np.float64], options: Options
+) -> tuple[tuple[str, Agreement], ...]:
+    """Agreement over all phones, and within consonants and vowels where `LEAST_PHONES` of them were said."""
+    vowel = np.array([phone_of(phone).is_vowel for phone in phones])
+    stream = _stream(options, "articulation")
+    made = []
+    for name, kept in (("all phones", vowel | True), ("consonants", ~vowel), ("vowels", vowel)):
+        at = np.flatnonzero(kept)
+        if len(at) >= LEAST_PHONES:
+            made.append((name, mantel(apart[np.ix_(at, at)], articulation[np.ix_(at, at)], stream)))
+    return tuple(made)
+
+
+def _compared(
+    table: SimilarityTable, against: SimilarityTable | None, other: Named | None, options: Options
+) -> Comparison | None:
+    if against is None or other is None:
+        return None
+    return compare_tables(table, against, other.name, _stream(options, "comparison"))
+
+
+def _stream(options: Options, name: str) -> np.random.Generator:
+    return np.random.default_rng([options.seed, STREAMS[name]])

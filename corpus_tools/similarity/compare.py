@@ -1,0 +1,58 @@
+"""Two talkers: whether the same phones look alike on both."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.similarity.mantel import Agreement, mantel
+from corpus_tools.similarity.spoken import LEAST_PHONES, SimilarityTable
+from lexicon.errors import InputError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """Two tables over the P phones that both have.
+
+    ``difference`` (P, P) is the first talker's similarity minus the other's; ``per_phone`` (P,) the mean size of a
+    phone's differences; ``left_out`` are phones of one talker only.
+    """
+
+    other: str
+    phones: tuple[str, ...]
+    difference: NDArray[np.float64]
+    per_phone: NDArray[np.float64]
+    agreement: Agreement
+    left_out: tuple[str, ...]
+
+    def largest(self, n: int = 10) -> list[tuple[str, str, float]]:
+        """The n pairs that differ most: phone, phone, difference."""
+        rows, columns = np.triu_indices(len(self.phones), 1)
+        sizes = self.difference[rows, columns]
+        order = np.argsort(-np.abs(sizes), kind="stable")[:n]
+        return [(self.phones[rows[at]], self.phones[columns[at]], float(sizes[at])) for at in order]
+
+
+def compare_tables(one: SimilarityTable, two: SimilarityTable, other: str, stream: np.random.Generator) -> Comparison:
+    """Compare two talkers' tables; `other` is the second one's name.
+
+    Raises
+    ------
+    InputError
+        They share fewer than `LEAST_PHONES` phones.
+    """
+    common = tuple(phone for phone in one.phones if phone in two.phones)
+    if len(common) < LEAST_PHONES:
+        raise InputError(
+            f"the talkers share {len(common)} phones, and a comparison needs {LEAST_PHONES}; compare others"
+        )
+    a, b = _among(one, common), _among(two, common)
+    difference = a - b
+    per_phone = np.abs(difference).sum(axis=1) / (len(common) - 1)
+    apart = sorted({*one.phones, *two.phones} - set(common))
+    return Comparison(other, common, difference, per_phone, mantel(a, b, stream), tuple(apart))
+
+
+def _among(table: SimilarityTable, phones: tuple[str, ...]) -> NDArray[np.float64]:
+    at = [table.phones.index(phone) for phone in phones]
+    return table.matrix[np.ix_(at, at)]

@@ -1,0 +1,26 @@
+"""What a phone is called in figures and tables."""
+
+from lexicon.errors import InputError
+from lexicon.phones import phone_of
+
+LABELS = ("both", "ipa", "arpabet")
+
+
+def check_labels(labels: str) -> None:
+    """Refuse a way to label phones that there is not.
+
+    Raises
+    ------
+    InputError
+        It is none of `LABELS`.
+    """
+    if labels not in LABELS:
+        raise InputError(f"phones are labelled in {', '.join(LABELS[1:])} or {LABELS[0]}, not {labels!r}")
+
+
+def label(phone: str, labels: str) -> str:
+    """A phone in IPA, in ARPABET, or in both: ``tʃ CH``; IPA where ARPABET has no name."""
+    name = phone_of(phone).arpabet
+    if not name or labels == "ipa":
+        return phone
+    return name if labels == "arpabet" else f"{phone} {name}"

@@ -1,0 +1,84 @@
+"""Whether two tables over the same items agree: the Mantel test."""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from lexicon.phones import phone_distance
+
+N_PERMUTATIONS = 9999
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """Correlation `r` of two tables over their pairs, and the share `p` of shuffled tables that agree as well."""
+
+    r: float
+    p: float
+    n_permutations: int
+    n_pairs: int
+
+
+def upper(matrix: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(P (P - 1) / 2,) values above the diagonal, row by row."""
+    return np.asarray(matrix[np.triu_indices(len(matrix), 1)], np.float64)
+
+
+def mantel(
+    first: NDArray[np.floating],
+    second: NDArray[np.floating],
+    stream: np.random.Generator,
+    n_permutations: int = N_PERMUTATIONS,
+) -> Agreement:
+    """Correlation of two symmetric (P, P) tables, one-sided against shuffles of the second's items.
+
+    Raises
+    ------
+    InputError
+        The tables differ in shape, have fewer than 3 items, or all pairs of one are alike.
+
+    Notes
+    -----
+    Pearson over the upper triangles; ``p = (1 + shuffles with at least this r) / (1 + shuffles)`` (Mantel 1967).
+    """
+    if first.shape != second.shape or len(first) < 3:
+        raise InputError(f"two tables over the same 3 items or more are needed, not {first.shape} and {second.shape}")
+    orders = np.array([stream.permutation(len(first)) for _ in range(n_permutations)])
+    found = correlation(upper(first), upper(second))
+    if np.isnan(found):
+        raise InputError("all pairs of a table are equally alike: nothing can be correlated with it")
+    as_high = shuffled_correlations(first, second, orders) >= found - 1e-12
+    return Agreement(found, (1 + int(as_high.sum())) / (1 + n_permutations), n_permutations, len(upper(first)))
+
+
+def shuffled_correlations(
+    first: NDArray[np.floating], second: NDArray[np.floating], orders: NDArray[np.integer]
+) -> NDArray[np.float64]:
+    """(K,) correlation of the tables' upper triangles for K orders (K, P) of the second's items."""
+    rows, columns = np.triu_indices(len(first), 1)
+    fixed = _standard(upper(first))
+    moved = np.stack([second[order[rows], order[columns]] for order in orders])
+    return np.asarray(_standard(moved) @ fixed / len(rows))
+
+
+def correlation(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:
+    """Pearson's r; NaN where one of them does not vary."""
+    if np.ptp(a) == 0 or np.ptp(b) == 0:
+        return float("nan")
+    return float(_standard(a) @ _standard(b) / len(a))
+
+
+def _standard(values: NDArray[np.floating]) -> NDArray[np.float64]:
+    offsets = values - values.mean(axis=-1, keepdims=True)
+    return np.asarray(offsets / np.sqrt(np.square(offsets).mean(axis=-1, keepdims=True)))
+
+
+def articulatory_distances(phones: tuple[str, ...]) -> NDArray[np.float64]:
+    """(P, P) distance of the phones by their articulatory features (`lexicon.phones.phone_distance`)."""
+    made = np.zeros((len(phones), len(phones)))
+    for a, b in combinations(range(len(phones)), 2):
+        made[a, b] = made[b, a] = phone_distance(phones[a], phones[b])
+    return made

@@ -1,0 +1,257 @@
+"""The analysis as a page for people who study visual speech."""
+
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+
+from corpus_tools.report.page import page, table
+from corpus_tools.report.plots import Axes, Point, bars, line_plot, scatter
+from corpus_tools.report.ramps import Ramp
+from corpus_tools.similarity.analysis import Analysis
+from corpus_tools.similarity.classes import VisemeClasses
+from corpus_tools.similarity.compare import Comparison
+from corpus_tools.similarity.figure import difference_figure, similarity_figure
+from corpus_tools.similarity.heatmap import grid, heatmap
+from corpus_tools.similarity.labels import label
+from corpus_tools.similarity.mantel import N_PERMUTATIONS, upper
+from corpus_tools.similarity.reliability import Reliability
+from corpus_tools.similarity.spoken import LEAST_TOKENS
+from lexicon.phones import phone_of
+
+FREEDOM = ((33, 102, 172), (146, 197, 222), (243, 240, 232), (230, 170, 80))  # held blue, free ochre
+N_DIFFERENT = 10
+
+
+def similarity_page(found: Analysis, labels: str) -> str:
+    """The page (HTML), phones labelled in ``ipa``, ``arpabet`` or ``both``."""
+    parts = [
+        _summary(found),
+        "<h2>Phone by phone</h2>",
+        _soft("Silence is left out. Point at a field for its number."),
+        _wide(heatmap(similarity_figure(found, labels))),
+        "<h2>Most similar phones</h2>",
+        _soft("As Table 1 of Theobald et al. 2007. Agreement: of the phone's similarities between random halves."),
+        _neighbours(found, labels),
+        "<h2>Viseme classes</h2>",
+        *_classes(found, labels),
+        "<h2>Reliability</h2>",
+        *_reliability(found, labels),
+        "<h2>Look and articulation</h2>",
+        *_articulation(found, labels),
+        "<h2>What phones hold and what they leave free</h2>",
+        *_consistency(found, labels),
+    ]
+    if found.comparison is not None:
+        parts += [f"<h2>Compared with {escape(found.comparison.other)}</h2>", *_comparison(found, labels)]
+    return page(f"Similarity of phones: {found.name}", parts)
+
+
+def _summary(found: Analysis) -> str:
+    n_tokens = int(found.table.counts.sum())
+    agree, words = found.by_utterances, found.by_words
+    other_words = "" if words is None else f"; halves of the words, that share no word, by {words.mean:.3f}"
+    return _said(
+        f"{len(found.table.phones)} phones, {n_tokens} tokens, {found.n_utterances} utterances.",
+        f"Best number of viseme classes: {found.best.n_classes} (silhouette {found.best.silhouette:.2f}).",
+        f"Reliability: halves of the utterances correlate by {agree.mean:.3f}{other_words}.",
+        f"Articulatory features: r = {found.articulatory[0][1].r:.2f}, p = {found.articulatory[0][1].p:.4f}.",
+    )
+
+
+def _neighbours(found: Analysis, labels: str) -> str:
+    rows = [
+        (
+            label(phone, labels),
+            str(count),
+            *(f"{label(near, labels)} {value:.3f}" for near, value in ranked),
+            f"{silence:.2f}",
+            f"{agreement:.2f}" if np.isfinite(agreement) else f"under {LEAST_TOKENS} tokens a half",
+        )
+        for phone, count, ranked, silence, agreement in zip(
+            found.table.phones,
+            found.table.counts,
+            found.neighbours,
+            found.table.silence,
+            found.by_utterances.per_phone,
+            strict=True,
+        )
+    ]
+    ranks = [f"rank {place}" for place in range(1, len(found.neighbours[0]) + 1)]
+    last = 2 + len(ranks)
+    return table(("phone", "tokens", *ranks, "to silence", "agreement"), rows, numbers=(1, last, last + 1))
+
+
+def _classes(found: Analysis, labels: str) -> list[str]:
+    points = [Point(c.n_classes, c.silhouette, f"{c.n_classes} classes: {c.silhouette:.3f}") for c in found.curve]
+    heights = [point.y for point in points]
+    axes = Axes(
+        "number of classes",
+        "mean silhouette",
+        (1.0, points[-1].x + 1),
+        (min(0.0, *heights), max(0.05, *heights) * 1.1),
+    )
+    shown = {classes.n_classes: classes for classes in (found.best, *found.chosen)}
+    rows = [
+        (
+            f"{n} (best)" if n == found.best.n_classes else str(n),
+            f"{classes.silhouette:.3f}",
+            members(found, classes, labels),
+        )
+        for n, classes in sorted(shown.items())
+    ]
+    return [
+        _soft(
+            "Average linkage on 1 - similarity, cut into so many classes. A phone's silhouette is near 1 where it "
+            "looks like its own class and unlike the next; 0 for a phone alone."
+        ),
+        line_plot(axes, points, found.curve.index(found.best)),
+        table(("classes", "silhouette", "phones"), rows, numbers=(1,)),
+    ]
+
+
+def members(found: Analysis, classes: VisemeClasses, labels: str) -> str:
+    """The phones of each class, in the dendrogram's order."""
+    grouped: list[list[str]] = [[] for _ in range(classes.n_classes)]
+    for at in found.tree.order:
+        unbroken = label(found.table.phones[at], labels).replace(" ", "\N{NO-BREAK SPACE}")
+        grouped[classes.labels[at]].append(unbroken)
+    return "  |  ".join((", " if labels == "both" else " ").join(group) for group in grouped)
+
+
+def _reliability(found: Analysis, labels: str) -> list[str]:
+    splits: list[tuple[str, Reliability | None]] = [
+        ("utterances", found.by_utterances),
+        ("words", found.by_words),
+        ("utterances, phones of the words", found.by_utterances_alike),
+    ]
+    rows = [_reliability_row(name, split) for name, split in splits]
+    left = [
+        f"Left out of the halves of {name}, with fewer than {LEAST_TOKENS} tokens in a half: "
+        f"{', '.join(label(phone, labels) for phone in split.left_out)}."
+        for name, split in splits
+        if split is not None and split.left_out and split is not found.by_utterances_alike
+    ]
+    head = ("halves of", "halves", "phones", "correlation", "lowest", "highest", "whole (Spearman-Brown)")
+    return [
+        _soft(
+            f"The corpus is dealt in two at random, {found.options.halves} times, a table made of each half, and the "
+            "tables' pairs correlated. Halves of the utterances hold the same words: they tell what more recordings of "
+            "the same kind would change. Halves of the words share no word: they tell what other words would change."
+        ),
+        table(head, rows, numbers=range(1, 7)),
+        _said(*left),
+    ]
+
+
+def _reliability_row(name: str, split: Reliability | None) -> Sequence[str]:
+    if split is None:
+        return (name, "0", "too few phones with tokens in both halves", "", "", "", "")
+    r = split.correlations
+    few, many = int(split.n_phones.min()), int(split.n_phones.max())
+    figures = (f"{value:.3f}" for value in (split.mean, r.min(), r.max(), split.corrected))
+    return (name, str(len(r)), str(few) if few == many else f"{few} to {many}", *figures)
+
+
+def _articulation(found: Analysis, labels: str) -> list[str]:
+    phones = found.table.phones
+    rows, columns = np.triu_indices(len(phones), 1)
+    apart, alike = found.articulation[rows, columns], upper(found.table.matrix)
+    points = [
+        Point(
+            float(x),
+            float(y),
+            f"{label(phones[a], labels)} – {label(phones[b], labels)}: {y:.3f}",
+            _pair_colour(phones[a], phones[b]),
+        )
+        for a, b, x, y in zip(rows, columns, apart, alike, strict=True)
+    ]
+    slope, intercept = np.polyfit(apart, alike, 1)
+    axes = Axes("distance by articulatory features", "similarity", (0.0, float(apart.max()) * 1.03), (0.0, 1.0))
+    agreements = [
+        (name, str(agreement.n_pairs), f"{agreement.r:.3f}", f"{agreement.p:.4f}")
+        for name, agreement in found.articulatory
+    ]
+    return [
+        _soft(
+            "Mantel test: correlation r of the distances on the face with those by articulatory features, and the "
+            f"share p of {N_PERMUTATIONS} permutations with at least this r."
+        ),
+        table(("phones", "pairs", "r", "p"), agreements, numbers=(1, 2, 3)),
+        _soft("Blue: two consonants; ochre: two vowels; grey: one of each."),
+        scatter(axes, points, (float(intercept), float(slope))),
+    ]
+
+
+def _pair_colour(a: str, b: str) -> str:
+    n_vowels = phone_of(a).is_vowel + phone_of(b).is_vowel
+    return ("var(--first)", "var(--soft)", "var(--second)")[n_vowels]
+
+
+def _consistency(found: Analysis, labels: str) -> list[str]:
+    movements, modes = found.movements, found.modes
+    order = found.tree.order
+    names = [label(found.table.phones[at], labels) for at in order]
+    rows = [
+        (str(number), name, f"{spread:.2f}", f"{share:.2f}")
+        for number, (name, spread, share) in enumerate(zip(modes.names, modes.spread, modes.free_share, strict=True))
+    ]
+    return [
+        _soft(
+            "Share of each movement's variance that the phones do not explain: what the neighbours and chance move. "
+            "0: each phone holds it; 1: no phone does."
+        ),
+        bars(list(zip(movements.names, movements.free_share.tolist(), strict=True))),
+        _soft(
+            "Phone by phone: spread within the phone over the spread in all speech. Blue: held, whatever stands beside "
+            "it; ochre: as free as any speech, or freer. A phone of few words seems held: its neighbours are "
+            "always the same."
+        ),
+        _wide(grid(names, movements.names, movements.free[order], Ramp(0.3, 1.2, FREEDOM))),
+        _soft(
+            "The talker's own parameters, named by what one spread of each moves (mm), with their spread (mm over all "
+            "landmarks together) and the share that the phones do not explain:"
+        ),
+        table(("mode", "moves", "spread", "share"), rows, numbers=(0, 2, 3)),
+    ]
+
+
+def _comparison(found: Analysis, labels: str) -> list[str]:
+    compared = found.comparison
+    if compared is None:
+        return []
+    agreement = compared.agreement
+    apart = ", ".join(label(phone, labels) for phone in compared.left_out) or "none"
+    order = np.argsort(-compared.per_phone, kind="stable")[:N_DIFFERENT]
+    phones = [(label(compared.phones[at], labels), f"{compared.per_phone[at]:.3f}") for at in order]
+    return [
+        _said(
+            f"{len(compared.phones)} phones in common; of one talker only: {apart}.",
+            f"The tables correlate by r = {agreement.r:.3f} over {agreement.n_pairs} pairs; p = {agreement.p:.4f} "
+            f"by {agreement.n_permutations} permutations, one-sided.",
+        ),
+        _soft(f"Similarity on {found.name} minus that on {compared.other}: orange where it is higher on {found.name}."),
+        _wide(heatmap(difference_figure(found, compared, labels))),
+        "<h2>Phones and pairs that differ most</h2>",
+        table(("phone", "mean difference"), phones, numbers=(1,)),
+        _soft("Pairs, with the sign of the difference:"),
+        _pairs(compared, labels),
+    ]
+
+
+def _pairs(compared: Comparison, labels: str) -> str:
+    pairs = compared.largest(N_DIFFERENT)
+    rows = [(f"{label(a, labels)} – {label(b, labels)}", f"{value:+.3f}") for a, b, value in pairs]
+    return table(("pair", "difference"), rows, numbers=(1,))
+
+
+def _said(*lines: str) -> str:
+    return "\n".join(f"<p>{escape(line)}</p>" for line in lines)
+
+
+def _soft(line: str) -> str:
+    return f'<p class="soft">{escape(line)}</p>'
+
+
+def _wide(svg: str) -> str:
+    return f'<div class="wide">{svg}</div>'

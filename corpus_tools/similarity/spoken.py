@@ -1,0 +1,113 @@
+"""What a talker said, as the similarity analysis needs it: sampled tokens, and the table of phone by phone."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from lexicon.phones import PHONES, phone_of
+from lexicon.sequence import SILENCE
+from tts2face.exemplar.similarity import phone_similarity, token_samples
+from tts2face.exemplar.tokens import tokens_of
+from tts2face.talker import Talker
+
+LEAST_PHONES = 4  # fewer have no two classes to tell apart
+LEAST_TOKENS = 10  # of a phone, in each half: a mean of fewer shows their neighbours as much as the phone
+NO_WORD = -1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spoken:
+    """N phone tokens of a talker, silence among them, and their motion.
+
+    Parameters
+    ----------
+    inventory : Q labels
+        Silence is one of them.
+    samples : (N, S, D)
+        Speech parameters of each token at S instants, as `phone_similarity` takes them.
+    phone, utterance, word : (N,)
+        Index into `inventory`; of the talker's utterance; of the different words, `NO_WORD` outside them.
+    spread : (D,)
+        Standard deviation of each parameter over the recordings.
+    """
+
+    inventory: tuple[str, ...]
+    samples: NDArray[np.float32]
+    phone: NDArray[np.int32]
+    utterance: NDArray[np.int32]
+    word: NDArray[np.int64]
+    spread: NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimilarityTable:
+    """Similarity of P phones: `matrix` (P, P) in [0, 1], `counts` (P,) tokens, `silence` (P,) similarity to silence."""
+
+    phones: tuple[str, ...]
+    counts: NDArray[np.int64]
+    matrix: NDArray[np.float64]
+    silence: NDArray[np.float64]
+
+
+def spoken_tokens(talker: Talker, name: str) -> Spoken:
+    """Tokens of a talker.
+
+    Raises
+    ------
+    InputError
+        Fewer than `LEAST_PHONES` phones have the tokens for two halves, or there is one utterance only.
+    """
+    tokens = tokens_of(talker)
+    n_speech = talker.model.n_speech
+    spread = np.maximum(talker.model.spread[:n_speech], 1e-6).astype(np.float32)
+    counts = np.bincount(tokens.phone, minlength=len(tokens.inventory))
+    sounding = [label for label in tokens.inventory if label != SILENCE]
+    n_enough = sum(
+        count >= 2 * LEAST_TOKENS for label, count in zip(tokens.inventory, counts, strict=True) if label != SILENCE
+    )
+    if n_enough < LEAST_PHONES or len(talker.utterances) < 2:
+        raise InputError(
+            f"the talker {name} has {len(talker.utterances)} utterances, {len(sounding)} phones and {n_enough} of them "
+            f"{2 * LEAST_TOKENS} times or more; the analysis needs 2 utterances and {LEAST_PHONES} such phones: "
+            "record more"
+        )
+    return Spoken(tokens.inventory, token_samples(tokens), tokens.phone, tokens.utterance, _words(talker), spread)
+
+
+def _words(talker: Talker) -> NDArray[np.int64]:
+    """(N,) number of the word, by its text, in which each token stands."""
+    numbers: dict[str, int] = {}
+    made = []
+    for spoken in talker.utterances:
+        here = np.full(len(spoken.phones), NO_WORD, np.int64)
+        for word in spoken.words:
+            here[word.first : word.last] = numbers.setdefault(word.text.lower(), len(numbers))
+        made.append(here)
+    return np.concatenate(made)
+
+
+def similarity_table(spoken: Spoken, chosen: NDArray[np.bool_] | None = None) -> SimilarityTable:
+    """Similarity of the sounding phones, in the phone table's order, from all tokens or the `chosen` (N,) ones.
+
+    The figures are those that synthesis uses: silence is measured with the phones and then left out.
+
+    Raises
+    ------
+    InputError
+        A label of the talker is not in the phone table.
+    """
+    take = np.ones(len(spoken.phone), bool) if chosen is None else chosen
+    found = phone_similarity(spoken.samples[take], spoken.phone[take], spoken.inventory, spoken.spread)
+    counts = np.bincount(spoken.phone[take], minlength=len(spoken.inventory))
+    place = {label: at for at, label in enumerate(PHONES)}
+    sounding = [at for at, label in enumerate(spoken.inventory) if label != SILENCE]
+    order = sorted(sounding, key=lambda at: place[phone_of(spoken.inventory[at]).symbol])
+    silence = spoken.inventory.index(SILENCE)
+    return SimilarityTable(
+        tuple(spoken.inventory[at] for at in order),
+        counts[order].astype(np.int64),
+        found.matrix[np.ix_(order, order)],
+        found.matrix[order, silence],
+    )

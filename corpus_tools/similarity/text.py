@@ -1,0 +1,148 @@
+"""The analysis as numbers for other programs: the matrix as CSV, everything as JSON."""
+
+import csv
+import json
+from collections.abc import Sequence
+from io import StringIO
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.similarity.analysis import Analysis
+from corpus_tools.similarity.classes import VisemeClasses
+from corpus_tools.similarity.compare import Comparison
+from corpus_tools.similarity.consistency import Consistency
+from corpus_tools.similarity.labels import label
+from corpus_tools.similarity.mantel import Agreement
+from corpus_tools.similarity.reliability import Reliability
+from corpus_tools.similarity.spoken import LEAST_TOKENS, SimilarityTable
+from lexicon.phones import phone_of
+
+
+def table_csv(found: SimilarityTable, labels: str) -> str:
+    """One line a phone: its label, its tokens, its similarity to each phone."""
+    counts = [[str(count)] for count in found.counts]
+    return _csv([label(phone, labels) for phone in found.phones], ["tokens"], counts, found.matrix)
+
+
+def difference_csv(compared: Comparison, labels: str) -> str:
+    """One line a phone: its label, its similarity to each phone on the first talker minus that on the other."""
+    names = [label(phone, labels) for phone in compared.phones]
+    return _csv(names, [], [[] for _ in names], compared.difference)
+
+
+def _csv(
+    names: Sequence[str], more: Sequence[str], cells: Sequence[Sequence[str]], values: NDArray[np.floating]
+) -> str:
+    file = StringIO()
+    rows = csv.writer(file, lineterminator="\n")
+    rows.writerow(["phone", *more, *names])
+    for name, own, row in zip(names, cells, values, strict=True):
+        rows.writerow([name, *own, *(f"{value:.4f}" for value in row)])
+    return file.getvalue()
+
+
+def analysis_json(found: Analysis) -> str:
+    """Everything; similarities in the order of ``phones``."""
+    content = {
+        "talker": found.name,
+        "utterances": found.n_utterances,
+        "seed": found.options.seed,
+        "phones": [{"ipa": phone, "arpabet": phone_of(phone).arpabet or None} for phone in found.table.phones],
+        "tokens": found.table.counts.tolist(),
+        "similarity": _rounded(found.table.matrix),
+        "similarity_to_silence": _rounded(found.table.silence),
+        "neighbours": {
+            phone: [{"phone": near, "similarity": round(value, 4)} for near, value in ranked]
+            for phone, ranked in zip(found.table.phones, found.neighbours, strict=True)
+        },
+        "dendrogram": {
+            "order": [found.table.phones[at] for at in found.tree.order],
+            "links": _rounded(found.tree.links),
+        },
+        "classes": {
+            "best": found.best.n_classes,
+            "chosen": [_classes(found, classes) for classes in found.chosen],
+            "silhouettes": {str(classes.n_classes): round(classes.silhouette, 4) for classes in found.curve},
+            "best_classes": _classes(found, found.best),
+        },
+        "reliability": {
+            "least_tokens": LEAST_TOKENS,
+            "utterances": _reliability(found.by_utterances),
+            "words": _reliability(found.by_words),
+            "utterances_phones_of_words": _reliability(found.by_utterances_alike),
+        },
+        "articulation": {
+            "agreement": {name: _agreement(agreement) for name, agreement in found.articulatory},
+            "distance": _rounded(found.articulation),
+        },
+        "movements": _consistency(found, found.movements),
+        "modes": _consistency(found, found.modes),
+        "comparison": None if found.comparison is None else _comparison(found.comparison),
+    }
+    return json.dumps(content, ensure_ascii=False, indent=1, allow_nan=False) + "\n"
+
+
+def _rounded(values: NDArray[np.floating]) -> Any:
+    """Lists with four digits behind the point, None for what is not known."""
+    if values.ndim > 1:
+        return [_rounded(row) for row in values]
+    return [round(float(value), 4) if np.isfinite(value) else None for value in values]
+
+
+def _classes(found: Analysis, classes: VisemeClasses) -> dict[str, Any]:
+    groups = [
+        [found.table.phones[at] for at in found.tree.order if classes.labels[at] == number]
+        for number in range(classes.n_classes)
+    ]
+    silhouettes = dict(zip(found.table.phones, _rounded(classes.silhouettes), strict=True))
+    return {
+        "n": classes.n_classes,
+        "silhouette": round(classes.silhouette, 4),
+        "classes": groups,
+        "silhouettes": silhouettes,
+    }
+
+
+def _reliability(split: Reliability | None) -> dict[str, Any] | None:
+    if split is None:
+        return None
+    return {
+        "mean": round(split.mean, 4),
+        "spearman_brown": round(split.corrected, 4),
+        "halves": _rounded(split.correlations),
+        "halves_asked": split.n_asked,
+        "phones_compared": split.n_phones.tolist(),
+        "phones": dict(zip(split.phones, _rounded(split.per_phone), strict=True)),
+        "left_out": list(split.left_out),
+    }
+
+
+def _agreement(agreement: Agreement) -> dict[str, Any]:
+    return {
+        "r": round(agreement.r, 4),
+        "p": agreement.p,
+        "permutations": agreement.n_permutations,
+        "pairs": agreement.n_pairs,
+    }
+
+
+def _consistency(found: Analysis, held: Consistency) -> dict[str, Any]:
+    return {
+        "names": list(held.names),
+        "spread_mm": _rounded(held.spread),
+        "free_share": _rounded(held.free_share),
+        "free": dict(zip(found.table.phones, _rounded(held.free), strict=True)),
+    }
+
+
+def _comparison(compared: Comparison) -> dict[str, Any]:
+    return {
+        "other": compared.other,
+        "phones": list(compared.phones),
+        "left_out": list(compared.left_out),
+        "agreement": _agreement(compared.agreement),
+        "difference": _rounded(compared.difference),
+        "mean_difference": dict(zip(compared.phones, _rounded(compared.per_phone), strict=True)),
+    }

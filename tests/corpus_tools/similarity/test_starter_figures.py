@@ -1,0 +1,70 @@
+"""What docs/accuracy.md says about the similarity of the starter talker's phones is what the report finds."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from corpus_tools.similarity.analysis import Analysis, Named, Options, analyse
+from tts2face.talker import load_talker
+
+DOC = Path(__file__).resolve().parents[3] / "docs" / "accuracy.md"
+
+
+@pytest.fixture(scope="module")
+def found() -> Analysis:
+    return analyse(Named("grid_s1", load_talker("grid_s1")), Options())
+
+
+@pytest.fixture(scope="module")
+def said() -> str:
+    return " ".join(DOC.read_text(encoding="utf-8").split("## Similarity of phones")[1].split())
+
+
+def short(value: float, digits: int = 3) -> str:
+    return f"{value:.{digits}f}".lstrip("0")
+
+
+def test_reliability(found: Analysis, said: str) -> None:
+    for split in (found.by_utterances, found.by_words, found.by_utterances_alike):
+        assert split is not None
+        low, high = short(split.correlations.min()), short(split.correlations.max())
+        assert f"| {short(split.mean)} | {low} - {high} | {short(split.corrected)} |" in said
+
+
+def test_classes(found: Analysis, said: str) -> None:
+    assert found.best.n_classes == 6
+    assert f"**{short(found.best.silhouette, 2)} for 6**" in said
+    for classes in (found.curve[0], *found.chosen):
+        assert f"{short(classes.silhouette, 2)} for {classes.n_classes}" in said
+    for number in range(6):
+        group = [found.table.phones[at] for at in found.tree.order if found.best.labels[at] == number]
+        assert f"| {' '.join(group)} |" in said
+
+
+def test_articulation(found: Analysis, said: str) -> None:
+    for name, agreement in found.articulatory:
+        assert f"{name} r = {short(agreement.r)} (p = {short(agreement.p, 4)})" in said
+
+
+def test_what_is_held(found: Analysis, said: str) -> None:
+    movements = found.movements
+    share = dict(zip(movements.names, movements.free_share, strict=True))
+    for name, word in (
+        ("jaw lowering", "jaw"),
+        ("opening", "opening"),
+        ("protrusion", "protrusion"),
+        ("width", "width"),
+    ):
+        assert f"{word} {short(share[name], 2)}" in said
+    opening = movements.free[:, movements.names.index("opening")]
+    assert found.table.phones[int(np.argmin(opening))] == "m"
+    assert found.table.phones[int(np.argmax(opening))] == "t"
+    assert (found.modes.free_share[3:] >= 0.795).all()
+
+
+def test_neighbours(found: Analysis, said: str) -> None:
+    ranked = dict(zip(found.table.phones, found.neighbours, strict=True))
+    for phone in "pfvtd":
+        cells = " | ".join(f"{near} {short(value, 2)}" for near, value in ranked[phone])
+        assert f"| {phone} | {cells} |" in said
