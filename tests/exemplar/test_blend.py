@@ -92,8 +92,8 @@ def test_smoothing_is_a_gaussian_in_seconds():
 
 
 def test_knows_the_phones_that_bring_the_lips_together():
-    assert all(makes_lip_contact(label) for label in ("p", "b", "m", "f", "v"))
-    assert not any(makes_lip_contact(label) for label in ("w", "t", "u", "ɹ", "sil"))
+    assert all(makes_lip_contact(label) for label in ("p", "b", "m"))
+    assert not any(makes_lip_contact(label) for label in ("w", "f", "t", "u", "ɹ", "sil"))
 
 
 def test_a_contact_closes_what_averaging_left_open():

@@ -1,0 +1,107 @@
+"""Networks from phones to lips: their answer, their file, and their share in the motion."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lexicon.errors import InputError
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.exemplar.animate import VisualVoice, speech_trajectory
+from tts2face.exemplar.options import SynthesisOptions
+from tts2face.exemplar.targets import Targets, shown_phones
+from tts2face.talker import Talker, read_talker, write_talker
+from tts2face.window_network import WindowNetwork, window_features
+
+PHONES = PhoneSequence([SILENCE, "b", "i", "p", SILENCE], [0.0, 0.3, 0.4, 0.6, 0.7, 1.0])
+KNOWN = ("b", "i", "p", SILENCE)
+TIMES = np.arange(25) / 25
+
+
+def random_network(n_outputs: int, n_networks: int = 2) -> WindowNetwork:
+    generator = np.random.default_rng(0)
+    n_features = window_features(PHONES, TIMES, KNOWN).shape[1]
+    shapes = [(n_features, 7), (7, 5), (5, n_outputs)]
+    weights = tuple(generator.normal(0, 1, (n_networks, *shape)).astype(np.float32) for shape in shapes)
+    biases = tuple(generator.normal(0, 1, (n_networks, shape[1])).astype(np.float32) for shape in shapes)
+    return WindowNetwork(KNOWN, weights, biases)
+
+
+def test_the_answer_is_the_mean_of_the_networks_neuron_by_neuron() -> None:
+    network = random_network(2)
+    features = window_features(PHONES, TIMES, KNOWN)
+    wanted = np.zeros((len(TIMES), 2))
+    for member in range(2):
+        for frame, row in enumerate(features):
+            seen = [float(value) for value in row]
+            for layer in range(3):
+                weights, biases = network.weights[layer][member], network.biases[layer][member]
+                seen = [
+                    sum(value * weights[at, unit] for at, value in enumerate(seen)) + biases[unit]
+                    for unit in range(weights.shape[1])
+                ]
+                if layer < 2:
+                    seen = [max(value, 0.0) for value in seen]
+            wanted[frame] += np.array(seen) / 2
+    np.testing.assert_allclose(network.parameters(PHONES, TIMES), wanted, rtol=1e-4, atol=1e-4)
+
+
+def test_one_member_can_answer_alone() -> None:
+    network = random_network(2)
+    alone = [network.parameters(PHONES, TIMES, slice(at, at + 1)) for at in (0, 1)]
+    np.testing.assert_allclose(np.mean(alone, axis=0), network.parameters(PHONES, TIMES), atol=1e-4)
+
+
+def test_features_say_what_sounds_when() -> None:
+    features = window_features(PHONES, np.array([0.45]), KNOWN)[0]
+    columns = features[: 21 * 4].reshape(21, 4)
+    assert (columns.sum(axis=1) == 1).all()
+    sounding = [KNOWN[at] for at in columns.argmax(axis=1)]
+    assert sounding[7] == "i"  # now
+    assert sounding[7 - 2] == "b"  # 80 ms before
+    assert sounding[7 + 4] == "p"  # 160 ms behind
+    assert sounding[15:] == [SILENCE, SILENCE, "b", "p", SILENCE, SILENCE]  # neighbours; beyond the end the end goes on
+    np.testing.assert_allclose(features[-4:], [0.25, 0.05, 0.15, 0.2], atol=1e-6)
+
+
+def test_an_unknown_phone_is_seen_as_its_nearest() -> None:
+    other = PhoneSequence([SILENCE, "m", "i", "p", SILENCE], PHONES.edges)
+    features = window_features(other, np.array([0.35]), KNOWN)[0][:84].reshape(21, 4)
+    assert KNOWN[int(features[7].argmax())] in {"b", "p"}
+    with pytest.raises(InputError, match="§"):
+        window_features(PhoneSequence(["§"], [0.0, 1.0]), TIMES, KNOWN)
+
+
+def test_a_talker_keeps_its_networks(talker: Talker, tmp_path) -> None:
+    with_one = replace(talker, network=random_network(talker.model.n_speech))
+    write_talker(tmp_path / "a.talker", with_one)
+    read = read_talker(tmp_path / "a.talker").network
+    assert read is not None
+    assert read.inventory == KNOWN
+    np.testing.assert_allclose(  # weights are kept in 16 bits
+        read.parameters(PHONES, TIMES), with_one.network.parameters(PHONES, TIMES), rtol=0.02, atol=0.1
+    )
+    write_talker(tmp_path / "b.talker", talker)
+    assert read_talker(tmp_path / "b.talker").network is None
+
+
+def test_the_share_of_the_networks_is_what_it_says(voice: VisualVoice) -> None:
+    knowing = replace(voice, network=random_network(len(voice.spread)))
+    plain = SynthesisOptions(network=0.0, articulation=1.0, smoothing_s=0.0, contacts=False)
+
+    def moved(which: VisualVoice, share: float) -> np.ndarray:
+        options = replace(plain, network=share)
+        return speech_trajectory(PHONES, which, fps=100.0, n_frames=100, options=options).values[35:65]
+
+    none, half, whole = (moved(knowing, share) for share in (0.0, 0.5, 1.0))
+    np.testing.assert_array_equal(none, moved(voice, 0.5))
+    np.testing.assert_allclose(half, (none + whole) / 2, atol=1e-4)
+    with pytest.raises(InputError, match="from 0 to 1"):
+        SynthesisOptions(network=1.5)
+
+
+def test_time_that_belongs_to_no_target_is_silence() -> None:
+    spans = np.array([[0.0, 0.2, 0.4, 0.5], [0.2, 0.4, 0.5, 0.5], [0.8, 0.9, 1.0, 1.1]])
+    shown = shown_phones(Targets(("b", "i", "p"), spans, np.arange(3)))
+    assert shown.phones == (SILENCE, "b", "i", SILENCE, "p")
+    np.testing.assert_allclose(shown.edges, [0.0, 0.2, 0.4, 0.5, 0.9, 1.0])
