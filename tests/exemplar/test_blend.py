@@ -3,7 +3,7 @@ import pytest
 
 from tts2face.exemplar.animate import VisualVoice
 from tts2face.exemplar.blend import Pieces, averaged_pieces, exemplar_weights, joined_pieces, smoothed
-from tts2face.exemplar.contacts import Contacts, Gap, contact_poses, makes_lip_contact, with_contacts
+from tts2face.exemplar.contacts import Contacts, Gap, contact_poses, contact_share, with_contacts
 from tts2face.exemplar.options import THEOBALD_2007, SynthesisOptions
 from tts2face.exemplar.targets import Targets
 from tts2face.exemplar.tokens import reaching_spans
@@ -92,8 +92,8 @@ def test_smoothing_is_a_gaussian_in_seconds():
 
 
 def test_knows_the_phones_that_bring_the_lips_together():
-    assert all(makes_lip_contact(label) for label in ("p", "b", "m"))
-    assert not any(makes_lip_contact(label) for label in ("w", "f", "t", "u", "ɹ", "sil"))
+    assert all(contact_share(label) > 0 for label in ("p", "b", "m", "f", "v"))
+    assert not any(contact_share(label) for label in ("w", "t", "u", "ɹ", "sil"))
 
 
 def test_a_contact_closes_what_averaging_left_open():
@@ -123,7 +123,7 @@ def test_poses_are_taken_where_each_token_is_closest(voice: VisualVoice):
     p = np.flatnonzero(voice.tokens.phone == label)[:2]
     open_one = np.flatnonzero(voice.tokens.phone == voice.tokens.inventory.index("ɑ"))[0]
     chosen = np.array([[open_one, *p]], np.int32)
-    pose = contact_poses(voice.tokens, chosen, np.array([[0.2, 0.4, 0.4]]), voice.lip_gap)
+    pose = contact_poses(voice.tokens, chosen, np.array([[0.2, 0.4, 0.4]]), voice.lip_gap, np.array([0.7]))
     least = []
     for token in p:
         first, last = voice.tokens.first_frame[voice.tokens.utterance[token] :][:2]

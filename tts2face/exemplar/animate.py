@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar import blend
-from tts2face.exemplar.contacts import Contacts, Gap, contact_poses, makes_lip_contact, with_contacts
+from tts2face.exemplar.contacts import Contacts, Gap, contact_poses, contact_share, with_contacts
 from tts2face.exemplar.options import SynthesisOptions
 from tts2face.exemplar.select import ContextIndex, Found, Wanted, best_tokens, context_index, log_durations
 from tts2face.exemplar.similarity import Similarity, phone_similarity, token_samples
@@ -159,8 +159,9 @@ def _motion(
     motion = blend.smoothed(motion, options.smoothing_s, blend.CLOCK_HZ)
     if not options.contacts:
         return motion
-    touching = np.array([makes_lip_contact(label) for label in targets.labels])
-    poses = contact_poses(voice.tokens, found.tokens[touching], weights[touching], voice.lip_gap)
+    shares = np.array([contact_share(label) for label in targets.labels])
+    touching = shares > 0
+    poses = contact_poses(voice.tokens, found.tokens[touching], weights[touching], voice.lip_gap, shares[touching])
     contacts = Contacts(targets.spans[touching, 1:3], poses)
     return with_contacts(motion, contacts, voice.lip_gap, blend.CLOCK_HZ)
 

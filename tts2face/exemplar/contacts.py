@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from lexicon.phones import phone_of
 from tts2face.exemplar.tokens import Tokens
 
-# Labiodentals keep what averaging leaves: drawn to their closest, all touch where a tenth of the real do not.
-LIP_PLACES = frozenset({"bilabial"})
+# Of the exemplars, by weight, the closest that tell a contact: with these as many lips touch as in recordings
+# (docs/decisions.md). Half the bilabials are seen between two frames; the gap of labiodentals is open, and hides little.
+CLOSER = {"bilabial": 0.7, "labiodental": 1.0}
 NON_CONTACTS = frozenset({"approximant"})  # narrowed, not closed
 WINDOW_S = 0.03  # a closure may lie this far outside its phone's edges (video frames are 40 ms, edges +- 10 ms)
-CLOSER = 0.7  # of the exemplars, by weight; with it as many bilabials close as in recordings (docs/decisions.md)
 HOLD_S = 0.03  # lips stay together at least this long: shorter, and the touch falls between two frames at 30 fps
 EASE_S = 0.05  # way into and out of it; longer eats into the vowels (0.06: r of opening falls by .001)
 
@@ -30,10 +30,10 @@ class Gap:
         return np.asarray(np.linalg.norm(self.rest + parameters.astype(np.float32) @ self.basis, axis=1))
 
 
-def makes_lip_contact(label: str) -> bool:
-    """The phone closes the lips."""
+def contact_share(label: str) -> float:
+    """The share of exemplars that tells a phone's contact; 0 for a phone without one."""
     phone = phone_of(label)
-    return phone.place in LIP_PLACES and phone.manner not in NON_CONTACTS
+    return 0.0 if phone.manner in NON_CONTACTS else CLOSER.get(phone.place, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,19 +45,19 @@ class Contacts:
 
 
 def contact_poses(
-    tokens: Tokens, chosen: NDArray[np.int32], weights: NDArray[np.float64], gap: Gap
+    tokens: Tokens, chosen: NDArray[np.int32], weights: NDArray[np.float64], gap: Gap, shares: NDArray[np.float64]
 ) -> NDArray[np.float32]:
     """(N, D) average pose of the chosen tokens (N, k), each at the frame where its own lips are closest.
 
-    Only the closer ones count, `CLOSER` by weight (N, k): a tenth of the recorded contacts is missed between two frames
-    or by the alignment, and would hold the lips open.
+    Only the closer ones count, of each target a share (N,) of its weights (N, k): a tenth of the recorded contacts is
+    missed between two frames or by the alignment, and would hold the lips open.
     """
     rows, gaps = np.zeros(chosen.shape, np.int64), np.full(chosen.shape, np.inf)
     corpus = (tokens.frames, tokens.first_frame, tokens.utterance, tokens.spans, tokens.fps)
     _closest_rows(corpus, chosen, (gap.rest, gap.basis), rows, gaps)
     order = np.argsort(gaps, axis=1, kind="stable")
     sorted_weights = np.take_along_axis(weights, order, axis=1)
-    closer = np.cumsum(sorted_weights, axis=1) - sorted_weights < CLOSER
+    closer = np.cumsum(sorted_weights, axis=1) - sorted_weights < shares[:, None]
     kept = np.zeros_like(weights)
     np.put_along_axis(kept, order, np.where(closer, sorted_weights, 0.0), axis=1)
     kept /= kept.sum(axis=1, keepdims=True)

@@ -49,7 +49,7 @@ class SynthesisOptions:
     precision: float = 1.5
     align: bool = True
     network: float = 0.4
-    articulation: float = 1.1
+    articulation: float = 1.12
     smoothing_s: float = 0.01
     contacts: bool = True
 

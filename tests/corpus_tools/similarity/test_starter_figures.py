@@ -60,7 +60,7 @@ def test_what_is_held(found: Analysis, said: str) -> None:
     opening = movements.free[:, movements.names.index("opening")]
     assert found.table.phones[int(np.argmin(opening))] == "m"
     assert found.table.phones[int(np.argmax(opening))] == "t"
-    assert (found.modes.free_share[3:] >= 0.795).all()
+    assert (found.modes.free_share[4:] >= 0.795).all()
 
 
 def test_neighbours(found: Analysis, said: str) -> None:
