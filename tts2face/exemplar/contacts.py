@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from lexicon.phones import phone_of
 from tts2face.exemplar.tokens import Tokens
 
-# Of the exemplars, by weight, the closest that tell a contact: with these as many lips touch as in recordings
-# (docs/decisions.md). Half the bilabials are seen between two frames; the gap of labiodentals is open, and hides little.
+# Share of the exemplars, the closest by weight, that tell a contact: as many lips touch as in recordings with it
+# (docs/decisions.md). Some bilabials close between two frames; labiodentals leave a gap, which hides nothing.
 CLOSER = {"bilabial": 0.7, "labiodental": 1.0}
 NON_CONTACTS = frozenset({"approximant"})  # narrowed, not closed
 WINDOW_S = 0.03  # a closure may lie this far outside its phone's edges (video frames are 40 ms, edges +- 10 ms)
