@@ -1,7 +1,7 @@
 """The Talker: everything learnt from the recordings of one person, and the file that keeps it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.appearance import STEPS_PER_LOOK, Appearance, appearance_arrays, appearance_of
+from tts2face.drives import Drive, drive_arrays, drives_of
 from tts2face.tensors import read_tensors, write_tensors
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
@@ -89,7 +90,8 @@ class Utterance:
 class Talker:
     """A person's visual speech: shape model, utterances, where they come from, and with consent how she looks.
 
-    ``metadata`` holds at least name, language, sources, licence, attribution, command, created.
+    ``metadata`` holds at least name, language, sources, licence, attribution, command, created. ``drives`` are learnt
+    maps from sound to the speech parameters, by name; none where the talker was learnt without sound.
     """
 
     fps: float
@@ -97,6 +99,7 @@ class Talker:
     utterances: tuple[Utterance, ...]
     metadata: Mapping[str, Any]
     appearance: Appearance | None = None
+    drives: Mapping[str, Drive] = field(default_factory=dict)
 
     def speech_trajectory(self, utterance: Utterance) -> Trajectory:
         """Speech parameters of a recorded utterance."""
@@ -137,6 +140,7 @@ def write_talker(path: Path, talker: Talker) -> None:
         steps = looks / (talker.appearance.spread / STEPS_PER_LOOK)
         arrays["looks"] = np.clip(np.rint(steps), -32768, 32767).astype(np.int16)
         arrays |= appearance_arrays(talker.appearance)
+    arrays |= drive_arrays(talker.drives)
     header = {
         **talker.metadata,
         "fps": talker.fps,
@@ -198,4 +202,4 @@ def _assembled(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> Talke
         here = slice(frames[i], frames[i + 1])
         seen = None if looks is None else looks[here]
         utterances.append(Utterance(name, sequence, spans, shape[here], head[here], intensity[here], seen))
-    return Talker(fps, model, tuple(utterances), header, appearance)
+    return Talker(fps, model, tuple(utterances), header, appearance, drives_of(arrays))
