@@ -77,13 +77,15 @@ def measures_of(kind: str) -> tuple[Measure, ...]:
 
 def measured(windows: Cells, measures: tuple[Measure, ...]) -> NDArray[np.float32]:
     """(T, D) features of cells, one kind beside the other."""
+    if not len(windows):  # Praat knows no sound without samples
+        return measured(np.zeros((1, CELL)) + NOISE, measures)[:0]
     return np.concatenate([measure(windows) for measure in measures], axis=1).astype(np.float32)
 
 
 def cells(samples: NDArray[np.float32], centres: NDArray[np.int64]) -> Cells:
     """(T, `CELL`) samples about each of T places, zeros beyond the ends, with the same faint noise in each cell."""
-    first = max(int(centres.min()) - HALF_CELL, 0)
-    last = max(int(centres.max()) + HALF_CELL + 1, first)
+    first = max(int(centres.min(initial=len(samples))) - HALF_CELL, 0)
+    last = max(int(centres.max(initial=0)) + HALF_CELL + 1, first)
     part = np.zeros(last - first + 2 * CELL)
     heard = samples[first:last]
     part[CELL : CELL + len(heard)] = heard
