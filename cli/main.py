@@ -61,9 +61,10 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     """Turn text into a talking face."""
     from cli.speak import Errand, run
 
-    request = chosen(
-        Request, options, text=_text(text if said is None else said, file, is_heard=options.get("audio") is not None)
-    )
+    if text is not None and said is not None:
+        raise InputError("give the text once, with or without --text")
+    is_heard = options.get("audio") is not None
+    request = chosen(Request, options, text=_text(text if said is None else said, file, is_heard=is_heard))
     errand = Errand(out, talker, face, identity, explain, view, quiet)
     run(request, chosen(Picture, options), errand)
 

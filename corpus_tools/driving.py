@@ -1,7 +1,7 @@
 """Drives learnt from observations and their sound: which features, how much context, how many hidden units."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,15 +9,14 @@ from numpy.typing import NDArray
 from corpus_tools.observation import Observation
 from tts2face.drives import Drive
 from tts2face.speech.drive import Lesson, learn_linear
-from tts2face.speech.features import FEATURE_RATE, speech_features
+from tts2face.speech.features import FEATURE_RATE, speech_features, speech_level
 from tts2face.speech.network import NetworkOptions, learn_network
 from tts2face.talker import ShapeModel, Talker
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 
 # Chosen by inner cross-validation on the training utterances of GRID s1 (docs/accuracy.md, "Speech-driven").
-LINEAR_FEATURE = "lsf+level"
-NETWORK_FEATURE = "mfcc+lsf"
+FEATURE = "mfcc+lsf"
 NETWORK = NetworkOptions(n_hidden=40)
 LEAST_UTTERANCES = 20  # a network sets a tenth of them aside
 LEAST_FRAMES = 1000  # below, canonical correlation feigns ties (docs/accuracy.md)
@@ -72,12 +71,12 @@ def learn_drives(
     """
     if len(observations) < LEAST_UTTERANCES or sum(len(one.landmarks) for one in observations) < LEAST_FRAMES:
         return {}
-    heard = heard_features(observations, (LINEAR_FEATURE, NETWORK_FEATURE), on_progress=on_progress)
-    plain = lessons_of(observations, talker.model, heard[LINEAR_FEATURE])
-    rich = lessons_of(observations, talker.model, heard[NETWORK_FEATURE])
+    heard = heard_features(observations, (FEATURE, "level"), on_progress=on_progress)
+    lessons = lessons_of(observations, talker.model, heard[FEATURE])
+    loudness = speech_level(np.concatenate(list(heard["level"].values())))
     return {
-        "linear": learn_linear(plain, feature=LINEAR_FEATURE),
-        "network": learn_network(rich, feature=NETWORK_FEATURE, options=network),
+        "linear": replace(learn_linear(lessons, feature=FEATURE), loudness=loudness),
+        "network": replace(learn_network(lessons, feature=FEATURE, options=network), loudness=loudness),
     }
 
 

@@ -3,6 +3,7 @@
 How they are learnt stands in `tts2face.speech.drive` (linear) and `tts2face.speech.network`.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError, InputError
 
 PREFIX = "drive."
+MOST_GAIN_DB = 40.0  # a recording that is fainter holds more noise than speech
 Values = NDArray[np.floating]
 
 
@@ -36,6 +38,8 @@ class Drive:
     offset : (S,)
     bends
         Whether the hidden units bend (tanh); without it the map is linear.
+    loudness
+        Level of the speech that it was learnt from, dB of full scale; NaN where nobody measured it.
     """
 
     feature: str
@@ -48,6 +52,7 @@ class Drive:
     outer: NDArray[np.float32]
     offset: NDArray[np.float32]
     bends: bool
+    loudness: float = math.nan
 
     def __post_init__(self) -> None:
         """Refuse parts that do not fit each other."""
@@ -56,6 +61,11 @@ class Drive:
         fits = self.inner.shape == (n_hidden, n_inputs) and self.outer.shape == (n_outputs, n_hidden)
         if not fits or self.spread.shape != self.mean.shape or min(self.before, self.after) < 0:
             raise DataError(f"the parts of the drive by {self.feature} do not fit each other; learn it again")
+
+    def gain_for(self, loudness: float) -> float:
+        """Factor on the samples of a recording whose speech has a level in dB, so that it is as loud as the learnt."""
+        missing = self.loudness - loudness
+        return 1.0 if math.isnan(missing) else float(10.0 ** (min(max(missing, -MOST_GAIN_DB), MOST_GAIN_DB) / 20.0))
 
     def parameters(self, features: Values) -> NDArray[np.float32]:
         """(T, S) shape parameters of (T, D) features; beyond the ends the first and the last frame go on.
@@ -102,6 +112,7 @@ def drive_arrays(drives: Mapping[str, Drive]) -> dict[str, NDArray[Any]]:
         for part in ("mean", "spread", "inner", "bias", "outer", "offset"):
             arrays[f"{PREFIX}{name}.{part}"] = getattr(drive, part)
         arrays[f"{PREFIX}{name}.context"] = np.array([drive.before, drive.after, drive.bends], np.int32)
+        arrays[f"{PREFIX}{name}.loudness"] = np.array([drive.loudness], np.float32)
         arrays[f"{PREFIX}{name}.feature"] = np.frombuffer(drive.feature.encode(), np.uint8)
     return arrays
 
@@ -122,5 +133,6 @@ def drives_of(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Drive]:
             part: arrays[f"{PREFIX}{name}.{part}"] for part in ("mean", "spread", "inner", "bias", "outer", "offset")
         }
         feature = arrays[f"{PREFIX}{name}.feature"].tobytes().decode()
-        found[name] = Drive(feature, before, after, **parts, bends=bool(bends))
+        loudness = float(arrays[f"{PREFIX}{name}.loudness"][0])
+        found[name] = Drive(feature, before, after, **parts, bends=bool(bends), loudness=loudness)
     return found

@@ -1,7 +1,7 @@
 """A recording of a voice drives the lips: by its words where they are known, else by its sound alone.
 
-A long recording is read twice in blocks, first for its features or phones, then for the sound of the clips, so that
-memory stays small.
+Long recordings are read in blocks, once for their loudness, once for their features and once for the sound of the
+clips, so that memory stays small.
 """
 
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.drives import Drive
 from tts2face.render.clock import exact_rate, first_sample
 from tts2face.request import Request
-from tts2face.speech.features import FEATURE_RATE
+from tts2face.speech.features import FEATURE_RATE, speech_level
 from tts2face.speech.listener import Ear
 from tts2face.speech.script import phones_in, script
 from tts2face.talker import Talker, speech_channels
@@ -86,12 +86,19 @@ def driven(path: Path, drive: Drive, talker: Talker, fps: float) -> tuple[Heard,
     InputError, DataError
         The recording cannot be read, is silent or too short.
     """
-    ear = Ear(drive.feature, talker.fps)
-    features = np.concatenate([*(ear.hear(block) for block in _audible(path)), ear.finish()])
-    duration = ear.n_samples / FEATURE_RATE
+    levels, _ = _features(path, "level", talker.fps, 1.0)
+    gain = drive.gain_for(speech_level(levels))
+    features, duration = _features(path, drive.feature, talker.fps, gain)
     lips = between(drive.parameters(features), talker.fps, fps, frame_count(duration, fps))
     phones = PhoneSequence([SILENCE], [0.0, duration])
     return Heard(phones, ()), Trajectory(speech_channels(talker.model), lips, fps)
+
+
+def _features(path: Path, kind: str, fps: float, gain: float) -> tuple[NDArray[np.float32], float]:
+    """(T, D) features of a recording made louder by a factor, and its seconds."""
+    ear = Ear(kind, fps)
+    found = [ear.hear(np.clip(gain * block, -1.0, 1.0)) for block in _audible(path)]
+    return np.concatenate([*found, ear.finish()]), ear.n_samples / FEATURE_RATE
 
 
 def between(values: NDArray[np.float32], rate: float, fps: float, n_frames: int) -> NDArray[np.float32]:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from corpus_tools import measures
-from corpus_tools.driving import LINEAR_FEATURE, NETWORK, NETWORK_FEATURE, Fold, folds, heard_features, lessons_of
+from corpus_tools.driving import FEATURE, NETWORK, Fold, folds, heard_features, heard_in, lessons_of
 from corpus_tools.evaluate import LEARNT_FOR_EVALUATION, Scores, split
 from corpus_tools.evaluate import _Real as Real
 from corpus_tools.evaluate import _scores as scored
@@ -22,7 +22,10 @@ from corpus_tools.observe import observe
 from tts2face.drives import Drive
 from tts2face.speech.correlate import tie_strength
 from tts2face.speech.drive import learn_linear
+from tts2face.speech.features import FEATURE_RATE, speech_level
 from tts2face.speech.network import NetworkOptions, learn_network
+from tts2face.types import Waveform
+from tts2face.video.media import read_sound
 
 PLAIN = ("formants", "lpc", "lsf", "mfcc")
 FRAMES = (50, 100, 200, 300, 500, 700, 1000, 1500, 2000, 3000)
@@ -133,14 +136,32 @@ class Bench:
         talker = learn_talker(self.train, metadata=LEARNT_FOR_EVALUATION)
         head()
         chosen = (
-            ("linear, mfcc (eqs 6-8)", "mfcc", None),
-            (f"linear, {LINEAR_FEATURE} (default linear)", LINEAR_FEATURE, None),
-            ("network, mfcc, 10 units, 5 frames", "mfcc", NetworkOptions(articulation=0.0)),
-            ("network, mfcc, 10 units, 5 frames, articulation 0.5", "mfcc", NetworkOptions()),
-            (f"network, {NETWORK_FEATURE}, {NETWORK.n_hidden} units (default network)", NETWORK_FEATURE, NETWORK),
+            ("linear, mfcc (T07)", "mfcc", None, 0),
+            (f"linear, {FEATURE} (default `linear`)", FEATURE, None, 0),
+            (f"linear, {FEATURE}, 5 frames either side", FEATURE, None, 5),
+            ("network, mfcc, 10 units, 5 frames (T07)", "mfcc", replace(NETWORK, n_hidden=10, articulation=0.0), 0),
+            ("the same, articulation 0.5", "mfcc", replace(NETWORK, n_hidden=10), 0),
+            (f"network, {FEATURE}, 40 units, 5 frames", FEATURE, replace(NETWORK, articulation=0.0), 0),
+            ("the same, articulation 0.5 (default `network`)", FEATURE, NETWORK, 0),
         )
-        for name, kind, network in chosen:
-            self.score(name, kind, self.learnt(kind, network, 0, self.train, talker), self.test, talker)
+        for name, kind, network, context in chosen:
+            drive = self.learnt(kind, network, context, self.train, talker)
+            self.score(name, kind, drive, self.test, talker)
+        self.made_as_loud(drive, talker)
+
+    def made_as_loud(self, drive: Drive, talker: object) -> None:
+        """Every utterance made as loud as all together, as recordings of others are."""
+        learnt = np.concatenate([self.of("level")[one.name] for one in self.train])
+        drive = replace(drive, loudness=speech_level(learnt))
+        kept = self.heard[FEATURE]
+        louder = {}
+        for one in self.test:
+            sound = read_sound(one.video, FEATURE_RATE)
+            gain = drive.gain_for(speech_level(self.of("level")[one.name]))
+            louder[one.name] = heard_in(one, Waveform(np.clip(gain * sound.samples, -1, 1), FEATURE_RATE), FEATURE)
+        self.heard[FEATURE] = louder
+        self.score("the same, each utterance made as loud as the talker", FEATURE, drive, self.test, talker)
+        self.heard[FEATURE] = kept
 
     def choose(self) -> None:
         """Every method by three-fold cross-validation on the training utterances; means of the folds."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.speech.lsf import line_spectral_frequencies
+from tts2face.speech.pauses import NOISE_QUANTILE, SPEECH_QUANTILE
 from tts2face.types import Trajectory, Waveform
 
 FEATURE_RATE = 16_000  # Hz; sound is read at this rate
@@ -136,6 +137,12 @@ def level(windows: Cells) -> NDArray[np.float64]:
     taper = np.hanning(windows.shape[1])
     power = np.square(windows) @ taper / taper.sum()
     return np.asarray(10.0 * np.log10(power)[:, None], np.float64)
+
+
+def speech_level(levels: NDArray[np.floating]) -> float:
+    """Mean level in dB of the frames with speech, of (T, 1) levels: those above the middle of noise and speech."""
+    noise, speech = np.quantile(levels, NOISE_QUANTILE), np.quantile(levels, SPEECH_QUANTILE)
+    return float(levels[levels >= (noise + speech) / 2].mean())
 
 
 MEASURES: Mapping[str, Measure] = MappingProxyType(dict(zip(FEATURES, (formants, mfcc, lpc, lsf, level), strict=True)))
