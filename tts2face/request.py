@@ -38,7 +38,9 @@ class Request:
         None, "A recording of a voice (any sound or video file) that the lips follow; best with its words as text."
     )
     drive: str | None = option(
-        None, "How lips follow a recording without its words: network (default), or linear, which moves them less."
+        None,
+        "How lips follow a recording without its words: network (default, best for the talker's own voice) or linear "
+        "(moves them less, steadier with other voices).",
     )
     language: str = option("en-us", "Language of the text: an espeak-ng code such as en-us, de, fr-fr, ja.")
     voice: str | None = option(None, "heart (English), espeak (every language), or a Piper voice by path (x.onnx).")
