@@ -7,10 +7,15 @@ import av
 import numpy as np
 import pytest
 
+from cli.main import run
+from corpus_tools.build import add_drives
 from corpus_tools.driving import FEATURE, folds, heard_features, heard_in, learn_drives
 from corpus_tools.learn import learn_talker
+from corpus_tools.observe import Observations
+from lexicon.errors import DataError, InputError
 from tts2face.speech.features import FEATURE_RATE
 from tts2face.speech.network import NetworkOptions
+from tts2face.talker import read_talker, write_talker
 from tts2face.types import Waveform
 
 ABOUT = dict.fromkeys(("name", "language", "sources", "licence", "attribution", "command", "created"), "")
@@ -66,6 +71,35 @@ def test_drives_follow_the_sound_that_they_were_taught(corpus: list) -> None:
         assert made.shape == (60, 2)
         real = talker.utterances[1].shape[:, :2]
         assert np.corrcoef((real - real.mean(0)).ravel(), (made - made.mean(0)).ravel())[0, 1] > 0.3  # measured: .5
+
+
+def test_a_talker_without_drives_is_given_them(
+    corpus: list, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    talker = learn_talker(corpus, n_speech=2, n_other=1, metadata=ABOUT)
+    write_talker(tmp_path / "bare.talker", talker)
+    monkeypatch.setattr("corpus_tools.build.observe", lambda *_, **__: Observations(tuple(corpus), ()))
+    command = ["corpus", "drives", str(tmp_path), "--talker", str(tmp_path / "bare.talker"), "--out"]
+    assert run([*command, str(tmp_path / "full.talker")]) == 0
+    assert "linear (hears mfcc+lsf), network (hears mfcc+lsf)" in capsys.readouterr().err
+    full = read_talker(tmp_path / "full.talker")
+    assert set(full.drives) == {"linear", "network"}
+    assert len(full.utterances) == len(talker.utterances)
+
+
+@pytest.mark.parametrize(
+    ("n", "fps", "refusal"),
+    [(5, 25.0, (InputError, "too little speech")), (22, 30.0, (DataError, "talker's 30 frames per second"))],
+)
+def test_recordings_that_teach_no_drive_are_refused(
+    n: int, fps: float, refusal: tuple, corpus: list, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    talker = replace(learn_talker(corpus, n_speech=2, n_other=1, metadata=ABOUT), fps=fps)
+    monkeypatch.setattr("corpus_tools.build.observe", lambda *_, **__: Observations(tuple(corpus[:n]), ()))
+    kind, reason = refusal
+    with pytest.raises(kind, match=reason):
+        add_drives(tmp_path, talker, tmp_path / "full.talker")
+    assert not (tmp_path / "full.talker").exists()
 
 
 def test_few_utterances_teach_no_drive(corpus: list) -> None:
