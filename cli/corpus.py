@@ -131,6 +131,31 @@ def clone(
 
 
 @corpus.command
+def drives(
+    recordings: Annotated[Path, Parameter(help="The folder that the talker was built from.")],
+    /,
+    *,
+    talker: Annotated[str, Parameter(help="A shipped talker or a .talker file.")],
+    out: Annotated[Path, Parameter(help="The talker to write (.talker).", alias="-o")],
+    jobs: Jobs = None,
+    cache: Cache = None,
+    model: Model = None,
+) -> None:
+    """Learn how a talker's lips follow sound alone (`--audio`), for talkers that were built without it."""
+    if out.suffix != ".talker":
+        raise InputError(f"a talker is written as .talker, not {out.name}")
+    from corpus_tools.build import add_drives
+    from corpus_tools.effort import Effort
+    from tts2face.talker import load_talker
+
+    with progress_bar("listening to recordings") as on_progress:
+        effort = Effort(cache, jobs, model)
+        made = add_drives(recordings, load_talker(talker), out, effort=effort, on_progress=on_progress)
+    told = ", ".join(f"{name} (hears {drive.feature})" for name, drive in made.drives.items())
+    say(f"wrote {out} with the drives {told}")
+
+
+@corpus.command
 def show(talker: Annotated[str, Parameter(help="A shipped talker or a .talker file.")], /) -> None:
     """Print what a talker holds: utterances, phones, modes, provenance."""
     from corpus_tools.show import describe

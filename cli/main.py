@@ -44,7 +44,10 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     out: Annotated[
         Path | None, Parameter(help="The clip: .mp4, .webm, .gif, or a folder for .png files.", alias="-o")
     ] = None,
-    file: Annotated[Path | None, Parameter(help="Read the text from a UTF-8 file.")] = None,
+    file: Annotated[
+        Path | None, Parameter(help="Read the text from a UTF-8 file.", name=["--file", "--transcript"])
+    ] = None,
+    said: Annotated[str | None, Parameter(help="The text as an option: what --audio says.", name="--text")] = None,
     talker: Annotated[str, Parameter(help="Whose lips move: a shipped talker or a .talker file.")] = "grid_s1",
     face: Annotated[
         str, Parameter(help="What is shown: head, cartoon, a .face file, or self (the talker's own).")
@@ -60,12 +63,17 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     """Turn text into a talking face."""
     from cli.speak import Errand, run
 
-    request = chosen(Request, options, text=_text(text, file))
+    if text is not None and said is not None:
+        raise InputError("give the text once, with or without --text")
+    is_heard = options.get("audio") is not None
+    request = chosen(Request, options, text=_text(text if said is None else said, file, is_heard=is_heard))
     errand = Errand(out, talker, face, identity, explain, view, quiet)
     run(request, chosen(Picture, options), errand)
 
 
-def _text(text: str | None, file: Path | None) -> str:
+def _text(text: str | None, file: Path | None, *, is_heard: bool) -> str:
+    if text is None and file is None and is_heard:
+        return ""
     if text is not None and file is not None:
         raise InputError("give the text itself or --file, not both")
     if text is not None and text != "-":

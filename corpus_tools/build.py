@@ -3,11 +3,12 @@
 import json
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from corpus_tools.driving import learn_drives
 from corpus_tools.effort import Effort, Progress
 from corpus_tools.leak import without_leak
 from corpus_tools.learn import learn_talker
@@ -15,9 +16,9 @@ from corpus_tools.lips import with_network
 from corpus_tools.observation import Observation
 from corpus_tools.observe import Refusal, observe
 from corpus_tools.report.recordings import recordings_page
-from lexicon.errors import DataError
+from lexicon.errors import DataError, InputError
 from tts2face.files import write_whole
-from tts2face.talker import write_talker
+from tts2face.talker import Talker, write_talker
 
 PROVENANCE = "provenance.json"  # in the folder of recordings: where they come from and how they may be used
 PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
@@ -94,7 +95,9 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
         "refused": [[refusal.name, refusal.reason] for refusal in observations.refused],
         **_marks(observations.kept),
     }
-    talker = with_network(learn_talker(without_leak(observations.kept), metadata=metadata))
+    steady = without_leak(observations.kept)
+    talker = with_network(learn_talker(steady, metadata=metadata))
+    talker = replace(talker, drives=learn_drives(steady, talker))
     if consent is not None:
         from corpus_tools.aam.attach import with_appearance
 
@@ -103,6 +106,29 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
     write_talker(out, talker)
     seconds = sum(len(utterance.shape) for utterance in talker.utterances) / talker.fps
     return Built(len(talker.utterances), seconds / 60.0, observations.refused)
+
+
+def add_drives(
+    recordings: Path, talker: Talker, out: Path, *, effort: Effort | None = None, on_progress: Progress | None = None
+) -> Talker:
+    """Learn the drives of a talker from the recordings that she was learnt from, and write her with them.
+
+    Raises
+    ------
+    InputError
+        The folder is missing or holds no video, or too little sound to learn from.
+    DataError
+        A recording holds no sound, or its frame rate is not the talker's.
+    """
+    kept = observe(recordings, effort=effort, on_progress=on_progress).kept
+    if any(one.fps != talker.fps for one in kept):
+        raise DataError(f"the recordings do not have the talker's {talker.fps:g} frames per second; convert them")
+    drives = learn_drives(kept, talker)
+    if not drives:
+        raise InputError(f"{recordings} holds too little speech to learn drives from; give 20 utterances or more")
+    made = replace(talker, drives=drives)
+    write_talker(out, made)
+    return made
 
 
 def _marks(kept: Sequence[Observation]) -> dict[str, Any]:

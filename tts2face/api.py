@@ -4,7 +4,6 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -15,15 +14,17 @@ from lexicon.errors import InputError
 from lexicon.g2p import check_language
 from lexicon.normalize import normalize
 from lexicon.scripts import check_script
-from lexicon.sequence import SILENCE, PhoneSequence
+from lexicon.sequence import PhoneSequence
 from tts2face.ahead import Ahead
 from tts2face.exemplar.animate import VisualVoice, speech_trajectory, visual_voice
 from tts2face.exemplar.explain import ShownPhone, explained
 from tts2face.exemplar.looks import Looks, looks_of, looks_trajectory
 from tts2face.exemplar.options import METHODS, SynthesisOptions
 from tts2face.face.model import Face
+from tts2face.face.own import own_face
 from tts2face.face.retarget import Retargeter, retargeter
-from tts2face.render.clock import exact_rate, first_sample
+from tts2face.listen import Heard, clips_in, drive_of, driven, heard
+from tts2face.render.clock import exact_rate, on_frames
 from tts2face.render.draw import AnyStage, staged
 from tts2face.render.encode import ClipWriter
 from tts2face.render.output import checked_output
@@ -31,11 +32,12 @@ from tts2face.render.picture import Picture
 from tts2face.render.plate import plate_staged
 from tts2face.request import Request
 from tts2face.talker import Talker
-from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, frame_count, joined_clips
+from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, frame_count, joined_clips
 from tts2face.voice.engine import Voice, load_voice
 
 VOICES_KEPT = 2  # kinds of voice; each keeps some 100 MB
 STAGES_KEPT = 2  # kinds of picture; each keeps some 30 MB
+RECORDED_STEPS = 1000  # of progress through a recording
 CLIPS_AHEAD = 2  # pieces that may wait to be drawn while the next is spoken
 PIECE_CHARACTERS = 300  # a sentence that is longer is cut at a clause mark or a space
 
@@ -111,19 +113,22 @@ def synthesize(request: Request, talker: Talker, face: Face | None) -> Clip:
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A sentence's clip, and how many characters of the request's text are spoken with it."""
+    """A part's clip, and how many steps of the whole go with it: characters of a text, or parts of a recording."""
 
     clip: Clip
-    n_characters: int
+    n_steps: int
 
 
 def stream(request: Request, ready: Cast) -> Iterator[Piece]:
     """A request sentence by sentence; the clips put together are what `synthesize` gives.
 
-    Each clip begins and ends at rest, and ends on a frame, so that a text of any length stays in step in bounded
-    memory.
+    Each clip ends on a frame, so that a text or recording of any length stays in step in bounded memory. Those of a
+    text begin and end at rest.
     """
     check(request)
+    if request.audio is not None:
+        yield from _recorded(request, request.audio, ready)
+        return
     first_frame = 0
     with ready.voice(request) as voice:
         for text in pieces(request):
@@ -138,8 +143,12 @@ def check(request: Request) -> None:
     Raises
     ------
     InputError
-        As `pieces`; or there is no word in the text.
+        As `pieces`; there is no word in the text, or no such recording.
     """
+    if request.audio is not None and not request.audio.is_file():
+        raise InputError(f"there is no recording {request.audio}; check the path")
+    if request.audio is not None and not request.text.strip():
+        return
     if next(pieces(request), None) is None:
         raise InputError(f"there is nothing to say in {request.text[:40]!r}; give at least one word")
 
@@ -174,36 +183,44 @@ def _spoken(voice: Voice, text: str, request: Request, first_frame: int) -> Spee
     return on_frames(speech, first_frame, exact_rate(request.fps))
 
 
-def on_frames(speech: Speech, first_frame: int, fps: Fraction) -> Speech:
-    """Speech lengthened by silence to the last sample of a frame, counted from the start of the whole sound."""
-    rate, samples = speech.waveform.rate, speech.waveform.samples
-    n_frames = frame_count(speech.waveform.duration, float(fps))
-    wanted = first_sample(first_frame + n_frames, rate, fps) - first_sample(first_frame, rate, fps)
-    padded = np.zeros(max(wanted, len(samples)), np.float32)
-    padded[: len(samples)] = samples
-    phones, edges = list(speech.phones.phones), list(speech.phones.edges)
-    if phones[-1] != SILENCE and len(padded) > len(samples):
-        phones.append(SILENCE)
-        edges.append(edges[-1])
-    edges[-1] = len(padded) / rate
-    return Speech(Waveform(padded, rate), PhoneSequence(phones, edges), speech.words)
-
-
 def _animated(speech: Speech, ready: Cast, request: Request) -> Clip:
     fps = float(exact_rate(request.fps))
     n_frames = frame_count(speech.waveform.duration, fps)
     lips = speech_trajectory(speech.phones, ready.visual_voice, fps=fps, n_frames=n_frames, options=_options(request))
     head = Trajectory(HEAD_CHANNELS, np.zeros((n_frames, len(HEAD_CHANNELS)), np.float32), fps)
-    return Clip(_shown(lips, speech, ready, request), head, speech)
+    return Clip(_shown(lips, speech.phones, ready, request), head, speech)
 
 
-def _shown(lips: Trajectory, speech: Speech, ready: Cast, request: Request) -> Trajectory:
+def _recorded(request: Request, audio: Path, ready: Cast) -> Iterator[Piece]:
+    """A recording in pieces: with its words by exemplars, without them by a drive."""
+    fps = float(exact_rate(request.fps))
+    said, motion = _followed(request, audio, ready, fps)
+    before = 0
+    for clip in clips_in(audio, said, motion, volume=request.volume):
+        after = before + len(clip.motion)
+        yield Piece(clip, RECORDED_STEPS * after // len(motion) - RECORDED_STEPS * before // len(motion))
+        before = after
+
+
+def _followed(request: Request, audio: Path, ready: Cast, fps: float) -> tuple[Heard, Trajectory]:
+    if not request.text.strip():
+        said, lips = driven(audio, drive_of(request, ready.talker), ready.talker, fps)
+        if ready.retargeter is None:
+            return said, own_face(ready.talker).motion(lips)
+        return said, ready.retargeter.retarget(lips)
+    said = heard(request, audio)
+    n_frames = frame_count(said.duration, fps)
+    lips = speech_trajectory(said.phones, ready.visual_voice, fps=fps, n_frames=n_frames, options=_options(request))
+    return said, _shown(lips, said.phones, ready, request)
+
+
+def _shown(lips: Trajectory, phones: PhoneSequence, ready: Cast, request: Request) -> Trajectory:
     if ready.retargeter is not None:
         return ready.retargeter.retarget(lips)
     if ready.looks is None:
         raise InputError("a cast without a face needs the talker's looks; make it with `cast`")
     looks = looks_trajectory(
-        speech.phones, ready.visual_voice, ready.looks, fps=lips.fps, n_frames=len(lips), options=_options(request)
+        phones, ready.visual_voice, ready.looks, fps=lips.fps, n_frames=len(lips), options=_options(request)
     )
     return Trajectory(lips.channels + looks.channels, np.concatenate([lips.values, looks.values], axis=1), lips.fps)
 
@@ -239,7 +256,7 @@ def write_clip(
     out
         .mp4, .webm, .gif, or a folder of .png. It appears when all is done; after an error nothing is left.
     on_progress
-        Called with characters of the text drawn, and characters in all.
+        Called with steps drawn, and steps in all: characters of a text, or parts of a recording.
     on_clip
         Called with each piece before it is drawn.
 
@@ -249,7 +266,8 @@ def write_clip(
         As `synthesize`; or the file cannot be written.
     """
     checked_output(out)
-    of, before, seconds, n_frames = max(len(request.text), 1), 0, 0.0, 0
+    of = RECORDED_STEPS if request.audio is not None else max(len(request.text), 1)
+    before, seconds, n_frames = 0, 0.0, 0
     piece_length, given_before = 0, 0
 
     def tell(done: int, given: int) -> None:
@@ -264,7 +282,7 @@ def write_clip(
         for piece in spoken:
             if on_clip:
                 on_clip(piece.clip)
-            piece_length, given_before = piece.n_characters, n_frames
+            piece_length, given_before = piece.n_steps, n_frames
             writer.add(piece.clip)
             before += piece_length
             seconds += piece.clip.speech.waveform.duration

@@ -12,6 +12,7 @@ from lexicon.errors import InputError
 RATES = (0.5, 2.0)
 VOLUMES = (0.0, 2.0)
 FRAMES_PER_SECOND = (1.0, 120.0)
+DRIVES = ("linear", "network")
 SYNTHESES = ("exemplar", "theobald2007")
 
 
@@ -24,13 +25,23 @@ def option(default: Any, help_text: str) -> Any:
 class Request:
     """What is said, by which voice, and how the face moves with it.
 
+    With ``audio`` a recording is heard in place of a voice; ``text`` then is what is said in it, or empty.
+
     Raises
     ------
     InputError
-        A number lies outside its range.
+        A number lies outside its range, or an option belongs to a voice where there is a recording.
     """
 
-    text: str = field(metadata={"help": "What to say."})
+    text: str = option("", "What to say.")
+    audio: Path | None = option(
+        None, "A recording of a voice (any sound or video file) that the lips follow; best with its words as text."
+    )
+    drive: str | None = option(
+        None,
+        "How lips follow a recording without its words: network (default, best for the talker's own voice) or linear "
+        "(moves them less, steadier with other voices).",
+    )
     language: str = option("en-us", "Language of the text: an espeak-ng code such as en-us, de, fr-fr, ja.")
     voice: str | None = option(None, "heart (English), espeak (every language), or a Piper voice by path (x.onnx).")
     rate: float = option(1.0, "Speed of speech, 0.5 to 2.")
@@ -51,6 +62,19 @@ class Request:
             raise InputError(f"there is no synthesis {self.synthesis!r}; choose {' or '.join(SYNTHESES)}")
         if self.seed < 0:
             raise InputError(f"seed must be 0 or more, not {self.seed}")
+        if self.drive is not None:
+            _check_drive(self)
+        if self.audio is not None and (self.voice is not None or self.rate != 1.0):
+            raise InputError("a recording keeps its own voice and speed; leave --voice and --rate away")
+
+
+def _check_drive(request: Request) -> None:
+    if request.drive not in DRIVES:
+        raise InputError(f"there is no drive {request.drive!r}; choose {' or '.join(DRIVES)}")
+    if request.audio is None:
+        raise InputError("a drive follows a recording; give one with --audio, or leave --drive away")
+    if request.text.strip():
+        raise InputError("where the words are known the lips follow them; leave --drive or the text away")
 
 
 def _check(name: str, value: float, limits: tuple[float, float]) -> None:

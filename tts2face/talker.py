@@ -1,7 +1,7 @@
 """The Talker: everything learnt from the recordings of one person, and the file that keeps it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.appearance import STEPS_PER_LOOK, Appearance, appearance_arrays, appearance_of
+from tts2face.drives import Drive, drive_arrays, drives_of
 from tts2face.tensors import read_tensors, write_tensors
 from tts2face.types import HEAD_CHANNELS, Trajectory
 from tts2face.window_network import WindowNetwork, network_arrays, network_of
@@ -90,8 +91,9 @@ class Utterance:
 class Talker:
     """A person's visual speech: shape model, utterances, where they come from, and with consent how she looks.
 
-    ``metadata`` holds at least name, language, sources, licence, attribution, command, created; ``network`` tells the
-    lips' parameters from phones alone, None where there was too little to learn from.
+    ``metadata`` holds at least name, language, sources, licence, attribution, command, created. ``network`` tells the
+    lips' parameters from phones alone, None where there was too little to learn from; ``drives`` are learnt maps from
+    sound to them, by name, none where the talker was learnt without sound.
     """
 
     fps: float
@@ -100,6 +102,7 @@ class Talker:
     metadata: Mapping[str, Any]
     appearance: Appearance | None = None
     network: WindowNetwork | None = None
+    drives: Mapping[str, Drive] = field(default_factory=dict)
 
     def speech_trajectory(self, utterance: Utterance) -> Trajectory:
         """Speech parameters of a recorded utterance."""
@@ -142,6 +145,7 @@ def write_talker(path: Path, talker: Talker) -> None:
         arrays |= appearance_arrays(talker.appearance)
     if talker.network is not None:
         arrays |= network_arrays(talker.network)
+    arrays |= drive_arrays(talker.drives)
     header = {
         **talker.metadata,
         "fps": talker.fps,
@@ -205,4 +209,4 @@ def _assembled(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> Talke
         here = slice(frames[i], frames[i + 1])
         seen = None if looks is None else looks[here]
         utterances.append(Utterance(name, sequence, spans, shape[here], head[here], intensity[here], seen))
-    return Talker(fps, model, tuple(utterances), header, appearance, network)
+    return Talker(fps, model, tuple(utterances), header, appearance, network, drives_of(arrays))

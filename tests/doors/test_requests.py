@@ -52,7 +52,10 @@ def digest(clip: Clip) -> str:
     return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()
 
 
-@pytest.mark.parametrize("name", [option.name for option in fields(Request)])
+OF_RECORDINGS = {"audio", "drive"}  # tests/doors/test_audio.py changes them
+
+
+@pytest.mark.parametrize("name", [option.name for option in fields(Request) if option.name not in OF_RECORDINGS])
 def test_every_option_changes_the_clip(name: str, clip: Clip, talker: Talker, face: Face, tmp_path: Path) -> None:
     own = tmp_path / "own.txt"
     own.write_text("bob  B IY1 M\n")

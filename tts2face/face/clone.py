@@ -215,7 +215,7 @@ def with_missing(source: ShapeModel, target: Talker) -> Talker:
     appearance = target.appearance
     if appearance is not None:
         appearance = replace(appearance, plate=replace(appearance.plate, shape=widened(appearance.plate.shape)))
-    return replace(target, model=model, utterances=utterances, appearance=appearance, network=None)
+    return replace(target, model=model, utterances=utterances, appearance=appearance, network=None, drives={})
 
 
 def face_size(model: ShapeModel) -> float:

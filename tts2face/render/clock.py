@@ -2,8 +2,12 @@
 
 from fractions import Fraction
 
+import numpy as np
+
 from lexicon.errors import InputError
+from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.request import FRAMES_PER_SECOND
+from tts2face.types import Speech, Waveform, frame_count
 
 BROADCAST = (24, 30, 48, 60, 120)  # nominal rates whose broadcast form is 1000/1001 of them (SMPTE 12M)
 
@@ -28,3 +32,18 @@ def exact_rate(fps: float) -> Fraction:
 def first_sample(frame: int, rate: int, fps: Fraction) -> int:
     """The sample that sounds when a frame appears."""
     return round(Fraction(frame) * rate / fps)
+
+
+def on_frames(speech: Speech, first_frame: int, fps: Fraction) -> Speech:
+    """Speech lengthened by silence to the last sample of a frame, counted from the start of the whole sound."""
+    rate, samples = speech.waveform.rate, speech.waveform.samples
+    n_frames = frame_count(speech.waveform.duration, float(fps))
+    wanted = first_sample(first_frame + n_frames, rate, fps) - first_sample(first_frame, rate, fps)
+    padded = np.zeros(max(wanted, len(samples)), np.float32)
+    padded[: len(samples)] = samples
+    phones, edges = list(speech.phones.phones), list(speech.phones.edges)
+    if phones[-1] != SILENCE and len(padded) > len(samples):
+        phones.append(SILENCE)
+        edges.append(edges[-1])
+    edges[-1] = len(padded) / rate
+    return Speech(Waveform(padded, rate), PhoneSequence(phones, edges), speech.words)

@@ -111,13 +111,45 @@ def read_sound(path: Path, rate: int) -> Waveform:
         start = 0.0
         for frame in _decoded(container, stream, path):
             if not blocks:
-                start = float(frame.time or 0.0)
+                start = _sound_start(frame, path)
             blocks.append(_mono(frame))
         source_rate = stream.rate
-    if abs(start) > LONGEST_DELAY_S:
-        raise DataError(f"{path} says that its sound begins at {start:.0f} s; it is damaged: copy or convert it")
     sound = _placed(np.concatenate(blocks), round(start * source_rate))
     return Waveform(np.clip(soxr.resample(sound, source_rate, rate), -1.0, 1.0), rate)
+
+
+def sound_blocks(path: Path, rate: int) -> Iterator[NDArray[np.float32]]:
+    """Sound of a file as `read_sound` gives it, block by block, so that long recordings need little memory.
+
+    Raises
+    ------
+    InputError, DataError
+        As `read_sound`, where the block would come.
+    """
+    import soxr
+
+    with _opened(path) as container:
+        stream = _decodable(container.streams.audio)
+        if stream is None:
+            raise DataError(f"{path} holds no sound; give a recording with its sound track")
+        resampler = soxr.ResampleStream(stream.rate, rate, 1, dtype="float32")
+        n_early: int | None = None  # samples before the file's time 0 that are still to be left out
+        for frame in _decoded(container, stream, path):
+            samples = _mono(frame)
+            if n_early is None:
+                offset = round(_sound_start(frame, path) * stream.rate)
+                samples, n_early = _placed(samples, max(offset, 0)), max(-offset, 0)
+            cut = min(n_early, len(samples))
+            n_early -= cut
+            yield np.clip(resampler.resample_chunk(samples[cut:]), -1.0, 1.0)
+        yield np.clip(resampler.resample_chunk(np.zeros(0, np.float32), last=True), -1.0, 1.0)
+
+
+def _sound_start(frame: "AudioFrame", path: Path) -> float:
+    start = float(frame.time or 0.0)
+    if abs(start) > LONGEST_DELAY_S:
+        raise DataError(f"{path} says that its sound begins at {start:.0f} s; it is damaged: copy or convert it")
+    return start
 
 
 @contextmanager

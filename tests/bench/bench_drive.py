@@ -1,0 +1,230 @@
+"""Speech-driven lips: ties of features to the face, and the drives on utterances held out.
+
+Run: ``python tests/bench/bench_drive.py ../shared/recordings/grid_s1`` (``--quick`` for a look; ``--choose`` for the
+inner cross-validation; ``--picture docs/pictures/cca_strength.svg`` draws the ties as Fig. 5 of Theobald et al. 2007).
+"""
+
+import argparse
+import pickle
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from corpus_tools import measures
+from corpus_tools.driving import FEATURE, NETWORK, Fold, folds, heard_features, heard_in, lessons_of
+from corpus_tools.evaluate import LEARNT_FOR_EVALUATION, Scores, split
+from corpus_tools.evaluate import _Real as Real
+from corpus_tools.evaluate import _scores as scored
+from corpus_tools.learn import learn_talker
+from corpus_tools.observation import Observation
+from corpus_tools.observe import observe
+from tts2face.drives import Drive
+from tts2face.speech.correlate import tie_strength
+from tts2face.speech.drive import learn_linear
+from tts2face.speech.features import FEATURE_RATE, speech_level
+from tts2face.speech.network import NetworkOptions, learn_network
+from tts2face.types import Waveform
+from tts2face.video.media import read_sound
+
+PLAIN = ("formants", "lpc", "lsf", "mfcc")
+FRAMES = (50, 100, 200, 300, 500, 700, 1000, 1500, 2000, 3000)
+COLOURS = {"formants": "#2a8c3c", "lpc": "#2457c5", "lsf": "#111111", "mfcc": "#c8281e"}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("recordings", type=Path)
+    parser.add_argument("--observations", type=Path, help="a pickle of `corpus_tools.observe.Observations`")
+    parser.add_argument("--hold-out", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--trials", type=int, default=100)
+    parser.add_argument("--choose", action="store_true")
+    parser.add_argument("--picture", type=Path)
+    parser.add_argument("--quick", action="store_true")
+    options = parser.parse_args()
+    kept = (
+        pickle.loads(options.observations.read_bytes()).kept
+        if options.observations
+        else observe(options.recordings).kept
+    )
+    if options.quick:
+        kept, options.hold_out, options.trials = kept[:120], 30, 10
+    train, test = split(kept, hold_out=options.hold_out, seed=options.seed)
+    bench = Bench(train, test)
+    if options.choose:
+        bench.choose()
+        return
+    ties = bench.ties(options.trials, options.seed)
+    if options.picture:
+        options.picture.write_text(drawn(ties))
+    bench.compare()
+
+
+class Bench:
+    def __init__(self, train: tuple[Observation, ...], test: tuple[Observation, ...]) -> None:
+        self.train, self.test = train, test
+        self.heard: dict[str, dict] = {}
+        self.kept = (*train, *test)
+
+    def of(self, kind: str) -> dict:
+        if kind not in self.heard:
+            parts = kind.split("+")
+            missing = [part for part in parts if part not in self.heard]
+            self.heard |= heard_features(self.kept, missing) if missing else {}
+            names = self.heard[parts[0]]
+            self.heard[kind] = {
+                name: np.concatenate([self.heard[part][name] for part in parts], axis=1) for name in names
+            }
+        return self.heard[kind]
+
+    def ties(self, trials: int, seed: int) -> dict[str, np.ndarray]:
+        """First canonical correlation of randomly selected frames, mean over trials."""
+        model = learn_talker(self.train, metadata=LEARNT_FOR_EVALUATION).model
+        speech = [measures.judged_frames(one.phones, len(one.landmarks), one.fps) for one in self.train]
+        seen = np.concatenate(
+            [model.parameters(one.landmarks[here])[:, :20] for one, here in zip(self.train, speech, strict=True)]
+        )
+        found = {}
+        print("| feature | " + " | ".join(str(n) for n in FRAMES) + " |\n| --- |" + " --- |" * len(FRAMES))
+        for kind in (*PLAIN, "lsf+level", "mfcc+lsf"):
+            heard = self.of(kind)
+            table = np.concatenate([heard[one.name][here] for one, here in zip(self.train, speech, strict=True)])
+            ns = [n for n in FRAMES if n <= len(table)]
+            strengths = tie_strength(table, seen, ns, trials=trials, rng=np.random.default_rng(seed))
+            found[kind] = strengths.mean(axis=1)
+            print(f"| {kind} | " + " | ".join(f"{value:.3f}" for value in found[kind]) + " |", flush=True)
+        return found
+
+    def learnt(self, kind: str, network: NetworkOptions | None, context: int, learn: tuple, talker: object) -> Drive:
+        lessons = lessons_of(learn, talker.model, self.of(kind))
+        if network is None:
+            return learn_linear(lessons, feature=kind, before=context, after=context)
+        return learn_network(lessons, feature=kind, options=network)
+
+    def score(self, name: str, kind: str, drive: Drive, test: tuple, talker: object) -> Scores:
+        real = [Real.of(one, talker.model) for one in test]
+        threshold = measures.closure_threshold(np.concatenate([one.least for one in real]))
+        made = [drive.parameters(self.of(kind)[one.name]) for one in test]
+        one = scored(name, made, real, talker.model, threshold, 0.0)
+        print(
+            f"| {one.method} | {one.r_opening:.3f} | {one.r_width:.3f} | {one.rmse_z:.3f} | {one.dtw_cost:.3f} "
+            f"| {one.range_ratio:.2f} | {one.closure:.2f} | {one.false_closure:.2f} |",
+            flush=True,
+        )
+        return one
+
+    def methods(self) -> list[tuple[str, str, NetworkOptions | None, int]]:
+        found: list = [(f"linear, {kind}", kind, None, 0) for kind in (*PLAIN, "mfcc+level", "lsf+level", "mfcc+lsf")]
+        found += [(f"linear, {kind}, 5 frames either side", kind, None, 5) for kind in ("mfcc", "mfcc+lsf")]
+        plain = replace(NETWORK, n_hidden=10, articulation=0.0)
+        for kind in (*PLAIN, "lsf+level", "mfcc+lsf"):
+            found.append((f"network, {kind}, 10 units, 5 frames", kind, plain, 0))
+        for frames in (0, 1, 3, 4, 7):
+            found.append(
+                (f"network, mfcc, 10 units, {frames} frames", "mfcc", replace(plain, before=frames, after=frames), 0)
+            )
+        for units in (5, 20, 40, 80):
+            found.append((f"network, mfcc+lsf, {units} units, 5 frames", "mfcc+lsf", replace(plain, n_hidden=units), 0))
+        for share in (0.5, 1.0):
+            name = f"network, mfcc+lsf, 40 units, 5 frames, articulation {share:g}"
+            found.append((name, "mfcc+lsf", replace(plain, n_hidden=40, articulation=share), 0))
+        return found
+
+    def compare(self) -> None:
+        """The chosen drives and those of the paper on the utterances held out."""
+        talker = learn_talker(self.train, metadata=LEARNT_FOR_EVALUATION)
+        head()
+        chosen = (
+            ("linear, mfcc (T07)", "mfcc", None, 0),
+            (f"linear, {FEATURE} (default `linear`)", FEATURE, None, 0),
+            (f"linear, {FEATURE}, 5 frames either side", FEATURE, None, 5),
+            ("network, mfcc, 10 units, 5 frames (T07)", "mfcc", replace(NETWORK, n_hidden=10, articulation=0.0), 0),
+            ("the same, articulation 0.5", "mfcc", replace(NETWORK, n_hidden=10), 0),
+            (f"network, {FEATURE}, 40 units, 5 frames", FEATURE, replace(NETWORK, articulation=0.0), 0),
+            ("the same, articulation 0.5 (default `network`)", FEATURE, NETWORK, 0),
+        )
+        for name, kind, network, context in chosen:
+            drive = self.learnt(kind, network, context, self.train, talker)
+            self.score(name, kind, drive, self.test, talker)
+        self.made_as_loud(drive, talker)
+
+    def made_as_loud(self, drive: Drive, talker: object) -> None:
+        """Every utterance made as loud as all together, as recordings of others are."""
+        learnt = np.concatenate([self.of("level")[one.name] for one in self.train])
+        drive = replace(drive, loudness=speech_level(learnt))
+        kept = self.heard[FEATURE]
+        louder = {}
+        for one in self.test:
+            sound = read_sound(one.video, FEATURE_RATE)
+            gain = drive.gain_for(speech_level(self.of("level")[one.name]))
+            louder[one.name] = heard_in(one, Waveform(np.clip(gain * sound.samples, -1, 1), FEATURE_RATE), FEATURE)
+        self.heard[FEATURE] = louder
+        self.score("the same, each utterance made as loud as the talker", FEATURE, drive, self.test, talker)
+        self.heard[FEATURE] = kept
+
+    def choose(self) -> None:
+        """Every method by three-fold cross-validation on the training utterances; means of the folds."""
+        parts: list[Fold] = list(folds(len(self.train), 3, 0))
+        talkers = [learn_talker([self.train[i] for i in f.learn], metadata=LEARNT_FOR_EVALUATION) for f in parts]
+        rows = []
+        for name, kind, network, context in self.methods():
+            every = []
+            for fold, talker in zip(parts, talkers, strict=True):
+                learn, check = ([self.train[i] for i in part] for part in (fold.learn, fold.check))
+                drive = self.learnt(kind, network, context, learn, talker)
+                every.append(self.score(f"{name} (fold)", kind, drive, check, talker))
+            means = [np.mean([getattr(one, what) for one in every]) for what in COLUMNS]
+            rows.append(f"| {name} | " + " | ".join(f"{value:.3f}" for value in means) + " |")
+        head()
+        print("\n".join(rows))
+
+
+COLUMNS = ("r_opening", "r_width", "rmse_z", "dtw_cost", "range_ratio", "closure", "false_closure")
+
+
+def head() -> None:
+    print("\n| drive | " + " | ".join(COLUMNS).replace("_", " ") + " |\n| --- |" + " --- |" * len(COLUMNS))
+
+
+def drawn(ties: dict[str, np.ndarray]) -> str:
+    """The ties as a picture in SVG: one line a feature, frames across, correlation up."""
+    low, width, height, left, top = 0.4, 620, 340, 70, 30
+
+    def place(n: float, value: float) -> tuple[float, float]:
+        across = (np.log10(n) - np.log10(FRAMES[0])) / np.log10(FRAMES[-1] / FRAMES[0])
+        return left + width * across, top + height * (1.0 - (value - low) / (1.0 - low))
+
+    text = 'font-family="sans-serif" font-size="14"'
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {left + width + 130} {top + height + 60}">',
+        '<rect width="100%" height="100%" fill="white"/>',
+    ]
+    for value in np.arange(low, 1.01, 0.1):
+        _, y = place(FRAMES[0], value)
+        lines.append(f'<path d="M{left} {y:.1f}h{width}" stroke="#ddd"/>')
+        lines.append(f'<text x="{left - 10}" y="{y + 5:.1f}" text-anchor="end" {text}>{value:.1f}</text>')
+    for n in (50, 100, 200, 500, 1000, 3000):
+        x, _ = place(n, low)
+        lines.append(f'<text x="{x:.1f}" y="{top + height + 22}" text-anchor="middle" {text}>{n}</text>')
+    middle = left + width / 2
+    lines.append(f'<text x="{middle}" y="{top + height + 48}" text-anchor="middle" {text}>frames of 40 ms</text>')
+    turned = f'transform="rotate(-90 20 {top + height / 2})"'
+    lines.append(
+        f'<text x="20" y="{top + height / 2}" text-anchor="middle" {turned} {text}>first canonical correlation</text>'
+    )
+    ends = sorted((place(FRAMES[-1], ties[kind][-1])[1], kind) for kind in PLAIN)
+    last = -np.inf
+    for y, kind in ends:
+        points = [place(n, value) for n, value in zip(FRAMES, ties[kind], strict=False)]
+        path = "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
+        lines.append(f'<path d="M{path}" fill="none" stroke="{COLOURS[kind]}" stroke-width="2"/>')
+        lines += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{COLOURS[kind]}"/>' for x, y in points]
+        last = max(y, last + 18)
+        shown = kind if kind == "formants" else kind.upper()
+        lines.append(f'<text x="{left + width + 14}" y="{last + 5:.1f}" fill="{COLOURS[kind]}" {text}>{shown}</text>')
+    return "\n".join([*lines, "</svg>"])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,70 @@
+"""Drives on voices that they did not learn from, against the lips that exemplars give for the known phones.
+
+Run: ``python tests/bench/bench_drive_voices.py me.talker`` with a talker that carries drives.
+"""
+
+import argparse
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from sentences import sentences
+
+from corpus_tools import measures
+from tts2face.exemplar.animate import speech_trajectory, visual_voice
+from tts2face.listen import driven
+from tts2face.talker import Talker, load_talker
+from tts2face.types import Speech, frame_count
+from tts2face.voice.engine import load_voice
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("talker")
+    parser.add_argument("--sentences", type=int, default=20)
+    options = parser.parse_args()
+    talker = load_talker(options.talker)
+    print("| voice | drive | loudness | r opening | r width | range ratio |\n| --- | --- | --- | --- | --- | --- |")
+    for name in ("heart", "espeak"):
+        voice = load_voice(name, "en-us", {})
+        said = [voice.speak(text, rate=1.0, volume=1.0, seed=0) for text in sentences(options.sentences)]
+        for drive in ("linear", "network"):
+            for is_matched in (False, True):
+                kept = talker.drives[drive]
+                used = kept if is_matched else replace(kept, loudness=float("nan"))
+                figures = " | ".join(f"{value:.3f}" for value in compared(said, talker, used))
+                print(f"| {name} | {drive} | {'matched' if is_matched else 'as it is'} | {figures} |", flush=True)
+
+
+def compared(said: list[Speech], talker: Talker, drive: object) -> tuple[float, float, float]:
+    known = visual_voice(talker)
+    exemplars, heard = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for speech in said:
+            path = written(Path(folder) / "said.wav", speech)
+            n_frames = frame_count(speech.waveform.duration, talker.fps)
+            exemplars.append(speech_trajectory(speech.phones, known, fps=talker.fps, n_frames=n_frames).values)
+            heard.append(driven(path, drive, talker, talker.fps)[1].values[:n_frames])
+    n = [min(len(a), len(b)) for a, b in zip(exemplars, heard, strict=True)]
+    shapes = [
+        talker.model.shapes(np.concatenate([one[:k] for one, k in zip(ways, n, strict=True)]))
+        for ways in (exemplars, heard)
+    ]
+    openings, widths = ([measure(one) for one in shapes] for measure in (measures.lip_opening, measures.lip_width))
+    return measures.correlation(*openings), measures.correlation(*widths), measures.range_ratio(*openings)
+
+
+def written(path: Path, speech: Speech) -> Path:
+    import wave
+
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(speech.waveform.rate)
+        file.writeframes((speech.waveform.samples * 32767).astype(np.int16).tobytes())
+    return path
+
+
+if __name__ == "__main__":
+    main()

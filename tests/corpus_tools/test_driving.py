@@ -1,0 +1,115 @@
+"""Drives learnt from recordings: what is heard stands on the frames of what is seen."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from cli.main import run
+from corpus_tools.build import add_drives
+from corpus_tools.driving import FEATURE, folds, heard_features, heard_in, learn_drives
+from corpus_tools.learn import learn_talker
+from corpus_tools.observe import Observations
+from lexicon.errors import DataError, InputError
+from tts2face.speech.features import FEATURE_RATE
+from tts2face.speech.network import NetworkOptions
+from tts2face.talker import read_talker, write_talker
+from tts2face.types import Waveform
+
+ABOUT = dict.fromkeys(("name", "language", "sources", "licence", "attribution", "command", "created"), "")
+
+
+def test_features_stand_on_the_clock_of_the_landmarks(make_observation) -> None:
+    """An utterance that begins 0.4 s into its video, whose sound comes 0.2 s late: a click is heard in its place."""
+    seen = make_observation("a", 1)
+    seen = replace(seen, quality=replace(seen.quality, cut=0.4, lag=0.2))
+    samples = np.zeros(4 * FEATURE_RATE)
+    samples[round((0.4 + 0.2 + 10 / 25) * FEATURE_RATE)] = 1.0
+    levels = heard_in(seen, Waveform(samples, FEATURE_RATE), "level")
+    assert levels.shape == (60, 1)
+    assert levels.argmax() == 10
+
+
+def talking_film(path: Path, opening: np.ndarray) -> Path:
+    """A sound file whose loudness follows an opening (T,) at 25 frames a second."""
+    generator = np.random.default_rng(0)
+    times = np.arange(round(len(opening) / 25 * FEATURE_RATE)) / FEATURE_RATE
+    loud = 10 ** (np.clip(np.interp(times, np.arange(len(opening)) / 25, opening), -20, 20) / 20)
+    samples = np.clip(0.02 * loud * generator.normal(size=len(times)), -1, 1)
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("pcm_s16le", rate=FEATURE_RATE)
+        stream.layout = "mono"
+        frame = av.AudioFrame.from_ndarray((samples * 32767).astype(np.int16)[None], format="s16", layout="mono")
+        frame.rate, frame.pts = FEATURE_RATE, 0
+        for part in (frame, None):
+            container.mux(stream.encode(part))
+    return path
+
+
+@pytest.fixture
+def corpus(make_observation, tmp_path: Path) -> list:
+    found = []
+    for number in range(22):
+        seen = make_observation(f"u{number:02d}", number)
+        gap = seen.landmarks[:, 13] - seen.landmarks[:, 14]
+        signed = gap @ np.linalg.svd(gap)[2][0]
+        found.append(replace(seen, video=talking_film(tmp_path / f"u{number:02d}.wav", 10 * signed / signed.std())))
+    return found
+
+
+def test_drives_follow_the_sound_that_they_were_taught(corpus: list) -> None:
+    talker = learn_talker(corpus, n_speech=2, n_other=1, metadata=ABOUT)
+    drives = learn_drives(corpus, talker, network=NetworkOptions(n_hidden=4, before=1, after=1))
+    assert set(drives) == {"linear", "network"}
+    heard = heard_features(corpus[:3], (FEATURE,))[FEATURE]
+    for drive in drives.values():
+        assert drive.feature == FEATURE
+        assert np.isfinite(drive.loudness)
+        made = drive.parameters(heard["u01"])
+        assert made.shape == (60, 2)
+        real = talker.utterances[1].shape[:, :2]
+        assert np.corrcoef((real - real.mean(0)).ravel(), (made - made.mean(0)).ravel())[0, 1] > 0.3  # measured: .5
+
+
+def test_a_talker_without_drives_is_given_them(
+    corpus: list, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    talker = learn_talker(corpus, n_speech=2, n_other=1, metadata=ABOUT)
+    write_talker(tmp_path / "bare.talker", talker)
+    monkeypatch.setattr("corpus_tools.build.observe", lambda *_, **__: Observations(tuple(corpus), ()))
+    command = ["corpus", "drives", str(tmp_path), "--talker", str(tmp_path / "bare.talker"), "--out"]
+    assert run([*command, str(tmp_path / "full.talker")]) == 0
+    assert "linear (hears mfcc+lsf), network (hears mfcc+lsf)" in capsys.readouterr().err
+    full = read_talker(tmp_path / "full.talker")
+    assert set(full.drives) == {"linear", "network"}
+    assert len(full.utterances) == len(talker.utterances)
+
+
+@pytest.mark.parametrize(
+    ("n", "fps", "refusal"),
+    [(5, 25.0, (InputError, "too little speech")), (22, 30.0, (DataError, "talker's 30 frames per second"))],
+)
+def test_recordings_that_teach_no_drive_are_refused(
+    n: int, fps: float, refusal: tuple, corpus: list, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    talker = replace(learn_talker(corpus, n_speech=2, n_other=1, metadata=ABOUT), fps=fps)
+    monkeypatch.setattr("corpus_tools.build.observe", lambda *_, **__: Observations(tuple(corpus[:n]), ()))
+    kind, reason = refusal
+    with pytest.raises(kind, match=reason):
+        add_drives(tmp_path, talker, tmp_path / "full.talker")
+    assert not (tmp_path / "full.talker").exists()
+
+
+def test_few_utterances_teach_no_drive(corpus: list) -> None:
+    talker = learn_talker(corpus[:5], n_speech=2, n_other=1, metadata=ABOUT)
+    assert learn_drives(corpus[:5], talker) == {}
+
+
+def test_folds_check_every_utterance_once_and_learn_from_the_others() -> None:
+    made = folds(10, 3, seed=1)
+    assert sorted(i for fold in made for i in fold.check) == list(range(10))
+    for fold in made:
+        assert sorted((*fold.learn, *fold.check)) == list(range(10))
+    assert folds(10, 3, seed=1)[0].check == made[0].check

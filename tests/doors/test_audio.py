@@ -1,0 +1,241 @@
+"""A recording of a voice drives a head: with its words, by its sound alone; what cannot be heard is refused."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from cli.main import run
+from lexicon.errors import DataError, InputError
+from tts2face.api import cast, stream, synthesize
+from tts2face.face.file import load_face
+from tts2face.face.model import Face
+from tts2face.listen import PIECE_FRAMES, between, driven
+from tts2face.request import Request
+from tts2face.speech.drive import Lesson, learn_linear
+from tts2face.speech.features import FEATURE_RATE, speech_features
+from tts2face.speech.network import NetworkOptions, learn_network
+from tts2face.talker import Talker, load_talker, write_talker
+from tts2face.types import Trajectory, frame_count, joined_clips
+from tts2face.video.media import media_facts, read_sound, sound_blocks
+
+TEXT = "bin blue at F two now"
+LEARNT_FROM = 60  # utterances: enough to be far better than nothing
+SUFFIXES = {".wav": "pcm_s16le", ".flac": "flac", ".mp3": "libmp3lame", ".m4a": "aac", ".ogg": "libopus"}
+
+
+@pytest.fixture(scope="module")
+def clips(shared_recordings: Path) -> Path:
+    return shared_recordings / "grid_s1" / "clips"
+
+
+@pytest.fixture(scope="module")
+def film(clips: Path) -> Path:
+    return clips / "bbaf2n.mkv"
+
+
+@pytest.fixture(scope="module")
+def talker(clips: Path) -> Talker:
+    """The shipped talker with drives learnt from some of her recordings, the one above left out."""
+    shipped = load_talker("grid_s1")
+    spoken = [one for one in shipped.utterances if one.name != "bbaf2n"][:: len(shipped.utterances) // LEARNT_FROM]
+    lessons = []
+    for one in spoken:
+        sound = read_sound(clips / f"{one.name}.mkv", FEATURE_RATE)
+        features = speech_features(sound, "mfcc", fps=shipped.fps, n_frames=len(one.shape)).values
+        lessons.append(Lesson(features, one.shape[:, : shipped.model.n_speech]))
+    network = learn_network(lessons, feature="mfcc", options=NetworkOptions())
+    return replace(shipped, drives={"linear": learn_linear(lessons, feature="mfcc"), "network": network})
+
+
+@pytest.fixture(scope="module")
+def face() -> Face:
+    return load_face("head")
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def written(path: Path, samples: np.ndarray, rate: int = 16000) -> Path:
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream(SUFFIXES[path.suffix], rate=rate)
+        stream.layout = "mono"
+        frame = av.AudioFrame.from_ndarray((samples * 32767).astype(np.int16)[None], format="s16", layout="mono")
+        frame.rate, frame.pts = rate, 0
+        resampled = av.AudioResampler(stream.format, "mono", rate).resample(frame)
+        for part in [*resampled, None]:
+            container.mux(stream.encode(part))
+    return path
+
+
+def opening(motion: np.ndarray, talker: Talker) -> np.ndarray:
+    shapes = talker.model.shapes(motion)
+    return np.linalg.norm(shapes[:, 13] - shapes[:, 14], axis=1)
+
+
+@pytest.mark.parametrize(("drive", "least"), [("linear", 0.5), ("network", 0.65)])
+def test_lips_that_hear_a_new_sentence_move_as_the_speaker_s(
+    drive: str, least: float, film: Path, talker: Talker
+) -> None:
+    _, lips = driven(film, talker.drives[drive], talker, talker.fps)
+    (real,) = (one.shape for one in talker.utterances if one.name == "bbaf2n")
+    n = min(len(real), len(lips))
+    assert np.corrcoef(opening(real[:n], talker), opening(lips.values[:n], talker))[0, 1] > least
+
+
+def test_with_the_words_lips_close_where_they_are_said(film: Path, talker: Talker, face: Face) -> None:
+    clip = synthesize(Request(audio=film, text=TEXT, fps=25.0), talker, face)
+    assert [word.text for word in clip.speech.words] == TEXT.split()
+    (real,) = (one for one in talker.utterances if one.name == "bbaf2n")
+    said = [phone for phone in clip.speech.phones.phones if phone != "sil"]
+    assert said[:3] == ["b", "ɪ", "n"]
+    starts = clip.speech.phones.edges[clip.speech.phones.phones.index("b")]
+    assert abs(starts - real.phones.edges[real.phones.phones.index("b")]) < 0.02
+
+
+def test_drives_and_words_give_different_lips(film: Path, talker: Talker, face: Face) -> None:
+    requests = (
+        Request(audio=film),
+        Request(audio=film, drive="network"),
+        Request(audio=film, drive="linear"),
+        Request(audio=film, text=TEXT),
+        Request(audio=film, volume=0.5),
+    )
+    default, network, linear, words, quiet = (synthesize(one, talker, face) for one in requests)
+    np.testing.assert_array_equal(default.motion.values, network.motion.values)
+    assert not np.array_equal(network.motion.values, linear.motion.values)
+    assert not np.array_equal(network.motion.values, words.motion.values)
+    np.testing.assert_allclose(quiet.speech.waveform.samples, 0.5 * default.speech.waveform.samples, atol=1e-6)
+
+
+@pytest.mark.parametrize("fps", [23.976, 25.0, 60.0])
+def test_sound_and_picture_are_equally_long(fps: float, film: Path, talker: Talker, face: Face) -> None:
+    clip = synthesize(Request(audio=film, fps=fps), talker, face)
+    sound = read_sound(film, 48000)
+    assert len(clip.motion) == frame_count(sound.duration, clip.fps)
+    n = min(len(sound.samples), len(clip.speech.waveform.samples))
+    np.testing.assert_allclose(clip.speech.waveform.samples[:n], sound.samples[:n], atol=1e-4)
+
+
+@pytest.mark.parametrize("text", ["", f"{TEXT} {TEXT} {TEXT} {TEXT} {TEXT}"])
+def test_a_long_recording_comes_in_pieces(text: str, film: Path, talker: Talker, face: Face, here: Path) -> None:
+    sound = written(here / "long.wav", np.tile(read_sound(film, 16000).samples, 5))
+    pieces = list(stream(Request(audio=sound, text=text, fps=60.0), cast(talker, face)))
+    assert [len(piece.clip.motion) for piece in pieces[:-1]] == [PIECE_FRAMES] * (len(pieces) - 1)
+    assert sum(piece.n_steps for piece in pieces) == 1000
+    whole = joined_clips([piece.clip for piece in pieces])
+    assert whole.speech.waveform.duration == pytest.approx(len(whole.motion) / 60.0, abs=1e-3)
+    if text:
+        assert len(whole.speech.words) == len(text.split())
+
+
+@pytest.mark.parametrize("suffix", sorted(SUFFIXES))
+def test_files_of_sound_alone_are_read(suffix: str, here: Path) -> None:
+    tone = 0.3 * np.sin(2 * np.pi * 440 * np.arange(16000) / 16000)
+    path = written(here / f"tone{suffix}", tone)
+    blocks = np.concatenate(list(sound_blocks(path, 48000)))
+    assert len(blocks) == pytest.approx(48000, abs=4000)  # codecs pad
+    spectrum = np.abs(np.fft.rfft(blocks))
+    assert np.argmax(spectrum) * 48000 / len(blocks) == pytest.approx(440, abs=2)
+    np.testing.assert_allclose(blocks, read_sound(path, 48000).samples, atol=1e-4)
+
+
+def test_a_faint_recording_moves_the_lips_as_a_loud_one(film: Path, talker: Talker, here: Path) -> None:
+    sound = read_sound(film, 16000).samples
+    drive = replace(talker.drives["network"], loudness=-18.0)
+    loud, faint = (
+        driven(written(here / f"{gain}.wav", gain * sound), drive, talker, 25.0)[1].values for gain in (1.0, 0.1)
+    )
+    spread = talker.model.spread[: talker.model.n_speech]
+    assert np.median(np.abs(loud - faint) / spread) < 0.1  # 16-bit noise is left
+
+
+def test_motion_between_frames_goes_through_them() -> None:
+    values = np.random.default_rng(0).normal(size=(20, 3)).astype(np.float32)
+    np.testing.assert_allclose(between(values, 25.0, 50.0, 39)[::2], values, atol=1e-5)
+    line = np.arange(20, dtype=np.float32)[:, None]
+    np.testing.assert_allclose(between(line, 25.0, 30.0, 22)[2:-2, 0], np.arange(22)[2:-2] / 30 * 25, atol=1e-4)
+
+
+def test_the_command_writes_clips(film: Path, talker: Talker, here: Path) -> None:
+    write_talker(here / "me.talker", talker)
+    (here / "said.txt").write_text(TEXT)
+    common = ["--audio", str(film), "--talker", "me.talker", "--size", "64x64", "--fps", "5", "--quiet"]
+    for out, more in (
+        ("sound.mp4", []),
+        ("linear.mp4", ["--drive", "linear"]),
+        ("text.mp4", ["--text", TEXT]),
+        ("words.mp4", [TEXT]),
+        ("script.mp4", ["--transcript", "said.txt", "--explain", "why.json"]),
+    ):
+        assert run([*common, *more, "--out", out]) == 0
+        facts = media_facts(here / out)
+        assert facts.rate == 48000
+        assert facts.duration == pytest.approx(3.0, abs=0.25)
+    assert (here / "why.json").stat().st_size > 100
+
+
+@pytest.mark.parametrize(
+    ("samples", "reason"), [(np.zeros(16000), "is silent"), (0.1 * np.ones(800), r"lasts 0\.050 s; give a recording")]
+)
+@pytest.mark.parametrize("text", ["", TEXT])
+def test_what_cannot_be_heard_is_refused(
+    samples: np.ndarray, reason: str, text: str, talker: Talker, here: Path
+) -> None:
+    path = written(here / "a.wav", samples)
+    with pytest.raises(DataError, match=reason):
+        synthesize(Request(audio=path, text=text), talker, load_face("head"))
+
+
+def test_files_without_sound_are_refused(talker: Talker, face: Face, here: Path) -> None:
+    (here / "empty.wav").touch()
+    (here / "text.wav").write_text("hello " * 100)
+    for path, reason in (("empty.wav", "is empty"), ("text.wav", "cannot be read as video or sound")):
+        with pytest.raises(DataError, match=reason):
+            synthesize(Request(audio=here / path), talker, face)
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"drive": "magic"}, "no drive 'magic'; choose linear or network"),
+        ({"drive": "linear", "audio": None, "text": "Hi."}, "a drive follows a recording"),
+        ({"drive": "linear", "text": "Hi."}, "leave --drive or the text away"),
+        ({"voice": "espeak"}, "leave --voice and --rate away"),
+        ({"rate": 1.5}, "leave --voice and --rate away"),
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(options: dict, reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        Request(**{"audio": Path("a.wav"), **options})
+
+
+def test_a_recording_that_is_not_there_and_a_talker_without_drives_are_refused(
+    film: Path, talker: Talker, face: Face
+) -> None:
+    with pytest.raises(InputError, match=r"there is no recording none\.wav"):
+        synthesize(Request(audio=Path("none.wav")), talker, face)
+    with pytest.raises(InputError, match="has no network drive"):
+        synthesize(Request(audio=film), replace(talker, drives={}), face)
+
+
+def test_the_text_is_given_once(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["Hi.", "--text", "Hi.", "--out", "a.mp4"]) == 2
+    assert "give the text once" in capsys.readouterr().err
+
+
+def test_an_explanation_needs_words(film: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["--audio", str(film), "--explain", "why.json"]) == 2
+    assert "or what --audio says" in capsys.readouterr().err
+
+
+def test_lips_are_in_the_talker_s_channels(film: Path, talker: Talker) -> None:
+    said, lips = driven(film, talker.drives["linear"], talker, 30.0)
+    assert isinstance(lips, Trajectory)
+    assert said.phones.phones == ("sil",)
+    assert lips.channels == tuple(f"shape{i}" for i in range(talker.model.n_speech))

@@ -1,0 +1,108 @@
+"""How strongly two sets of measurements are tied: canonical correlation analysis (Hotelling 1936)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+
+Values = NDArray[np.floating]
+RANK = 1e-10  # singular values below this part of the largest belong to measurements that say nothing new
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Canonical:
+    """Canonical factor pairs, strongest first.
+
+    Parameters
+    ----------
+    correlations : (K,)
+        Of the factors of a pair, falling, in [0, 1].
+    weights_a : (D, K)
+        ``(a - mean_a) @ weights_a`` are factors of unit variance.
+    weights_b : (E, K)
+    mean_a, mean_b : (D,), (E,)
+    loadings_a : (D, K)
+        Correlation of each measurement with each factor of its own set.
+    loadings_b : (E, K)
+    """
+
+    correlations: NDArray[np.float64]
+    weights_a: NDArray[np.float64]
+    weights_b: NDArray[np.float64]
+    mean_a: NDArray[np.float64]
+    mean_b: NDArray[np.float64]
+    loadings_a: NDArray[np.float64]
+    loadings_b: NDArray[np.float64]
+
+
+def canonical_correlation(a: Values, b: Values) -> Canonical:
+    """Canonical correlations of (T, D) and (T, E) measurements taken together.
+
+    Raises
+    ------
+    InputError
+        Lengths differ, there are not more frames than measurements, or one set does not move.
+
+    Notes
+    -----
+    QR of each centred set, SVD of the product of their orthonormal parts (Bjorck and Golub 1973).
+    """
+    if len(a) != len(b):
+        raise InputError(f"canonical correlation needs measurements taken together, not {len(a)} and {len(b)}")
+    if len(a) <= max(a.shape[1], b.shape[1]) + 1:
+        raise InputError(f"{len(a)} frames are too few for {a.shape[1]} and {b.shape[1]} measurements; give more")
+    centred_a, centred_b = (np.asarray(one - one.mean(axis=0), np.float64) for one in (a, b))
+    basis_a, back_a = _orthonormal(centred_a)
+    basis_b, back_b = _orthonormal(centred_b)
+    left, correlations, right = np.linalg.svd(basis_a.T @ basis_b, full_matrices=False)
+    scale = np.sqrt(len(a))
+    weights_a, weights_b = back_a @ left * scale, back_b @ right.T * scale
+    return Canonical(
+        np.clip(correlations, 0.0, 1.0),
+        weights_a,
+        weights_b,
+        a.mean(axis=0, dtype=np.float64),
+        b.mean(axis=0, dtype=np.float64),
+        _loadings(centred_a, centred_a @ weights_a),
+        _loadings(centred_b, centred_b @ weights_b),
+    )
+
+
+def tie_strength(
+    a: Values, b: Values, n_frames: Sequence[int], *, trials: int, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """(N, trials) first canonical correlation of as many randomly selected frames (T07 Fig. 5).
+
+    Raises
+    ------
+    InputError
+        More frames are asked for than there are, or too few.
+    """
+    if max(n_frames) > len(a):
+        raise InputError(f"there are {len(a)} frames, not {max(n_frames)}; ask for fewer")
+    strengths = np.zeros((len(n_frames), trials))
+    for row, n in enumerate(n_frames):
+        for trial in range(trials):
+            chosen = rng.choice(len(a), n, replace=False)
+            strengths[row, trial] = canonical_correlation(a[chosen], b[chosen]).correlations[0]
+    return strengths
+
+
+def _orthonormal(centred: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(T, R) orthonormal columns that span the measurements, and (D, R) what makes them from these."""
+    spread = centred.std(axis=0)
+    if not (spread > 0.0).any():
+        raise InputError("measurements that do not move have no correlation; give others")
+    scale = np.where(spread > 0.0, spread, 1.0)
+    q, r = np.linalg.qr(centred / scale)
+    left, sizes, right = np.linalg.svd(r)
+    kept = sizes > RANK * sizes[0]
+    return q @ left[:, kept], (right[kept].T / sizes[kept]) / scale[:, None]
+
+
+def _loadings(measured: NDArray[np.float64], factors: NDArray[np.float64]) -> NDArray[np.float64]:
+    sizes = np.linalg.norm(measured, axis=0)[:, None] * np.linalg.norm(factors, axis=0)
+    return np.asarray((measured.T @ factors) / np.where(sizes > 0.0, sizes, 1.0), np.float64)

@@ -1,0 +1,158 @@
+"""What a voice sounds like at each frame: formants, MFCC, LPC, LSF (Theobald et al. 2007, section 3.2).
+
+Every frame is measured in a cell of samples of its own, so that numbers do not depend on what else is measured with
+them: sound given in pieces gives the same bytes as the whole.
+"""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from tts2face.speech.lsf import line_spectral_frequencies
+from tts2face.speech.pauses import NOISE_QUANTILE, SPEECH_QUANTILE
+from tts2face.types import Trajectory, Waveform
+
+FEATURE_RATE = 16_000  # Hz; sound is read at this rate
+WINDOW_S = 0.04  # effective length of the Gaussian window (T07, section 3.2)
+CELL = 1361  # samples, odd: twice the window, which is where Praat cuts its Gaussian off, and 5 ms
+HALF_CELL = CELL // 2  # samples needed behind a frame's instant
+N_MFCC = 12
+LPC_ORDER = 16  # two for each kHz of the rate
+PRE_EMPHASIS_HZ = 50.0
+POLES = 8  # formants up to half the rate, one for each kHz; the first four are kept
+NEUTRAL_TUBE_HZ = (500.0, 1500.0, 2500.0, 3500.0)  # of a vocal tract at rest; stand where no formant is found
+NOISE = 3e-5  # of full scale; digital silence has neither logarithm nor formants
+CELLS_AT_ONCE = 1000  # 11 MB
+
+Cells = NDArray[np.float64]
+Measure = Callable[[Cells], NDArray[np.float64]]
+FEATURES = ("formants", "mfcc", "lpc", "lsf", "level")
+
+
+def speech_features(sound: Waveform, kind: str, *, fps: float, n_frames: int, start: float = 0.0) -> Trajectory:
+    """Features of a sound at the instants ``start + i / fps``, i = 0 ... n_frames - 1; silence beyond its ends.
+
+    Parameters
+    ----------
+    sound
+        At `FEATURE_RATE`.
+    kind
+        One of `FEATURES`, or several as ``mfcc+lsf``: ``formants`` (4, Hz), ``mfcc`` (13, the first is the level),
+        ``lpc`` (16 prediction coefficients), ``lsf`` (16, rad), ``level`` (1, dB of full scale).
+
+    Raises
+    ------
+    InputError
+        The kind does not exist, or the sound has another rate.
+    """
+    measures = measures_of(kind)
+    if sound.rate != FEATURE_RATE:
+        raise InputError(f"features are measured at {FEATURE_RATE} Hz, not {sound.rate}; resample the sound")
+    centres = np.rint((start + np.arange(n_frames) / fps) * FEATURE_RATE).astype(np.int64)
+    parts = [
+        measured(cells(sound.samples, centres[at : at + CELLS_AT_ONCE]), measures)
+        for at in range(0, n_frames, CELLS_AT_ONCE)
+    ]
+    values = np.concatenate(parts)
+    return Trajectory([f"{kind}.{i}" for i in range(values.shape[1])], values, fps)
+
+
+def measures_of(kind: str) -> tuple[Measure, ...]:
+    """What measures a kind of feature, or several joined by ``+``.
+
+    Raises
+    ------
+    InputError
+        One of them does not exist.
+    """
+    names = kind.split("+")
+    for name in names:
+        if name not in MEASURES:
+            raise InputError(f"there is no feature {name!r}; choose {', '.join(FEATURES)}")
+    return tuple(MEASURES[name] for name in names)
+
+
+def measured(windows: Cells, measures: tuple[Measure, ...]) -> NDArray[np.float32]:
+    """(T, D) features of cells, one kind beside the other."""
+    if not len(windows):  # Praat knows no sound without samples
+        return measured(np.zeros((1, CELL)) + NOISE, measures)[:0]
+    return np.concatenate([measure(windows) for measure in measures], axis=1).astype(np.float32)
+
+
+def cells(samples: NDArray[np.float32], centres: NDArray[np.int64]) -> Cells:
+    """(T, `CELL`) samples about each of T places, zeros beyond the ends, with the same faint noise in each cell."""
+    first = max(int(centres.min(initial=len(samples))) - HALF_CELL, 0)
+    last = max(int(centres.max(initial=0)) + HALF_CELL + 1, first)
+    part = np.zeros(last - first + 2 * CELL)
+    heard = samples[first:last]
+    part[CELL : CELL + len(heard)] = heard
+    starts = np.clip(centres - HALF_CELL - first + CELL, 0, len(part) - CELL)
+    noise = np.random.default_rng(0).normal(0.0, NOISE, CELL)
+    return np.asarray(part[starts[:, None] + np.arange(CELL)] + noise, np.float64)
+
+
+def mfcc(windows: Cells) -> NDArray[np.float64]:
+    """(T, 13) mel-frequency cepstral coefficients of cells; the first is the level."""
+    sound = _end_to_end(np.concatenate([windows, windows[-1:]]))  # of a single frame Praat gives the level alone
+    found = sound.to_mfcc(number_of_coefficients=N_MFCC, window_length=WINDOW_S, time_step=_step(windows))
+    return np.asarray(found.to_array().T[: len(windows)], np.float64)
+
+
+def lpc(windows: Cells) -> NDArray[np.float64]:
+    """(T, 16) linear prediction coefficients of cells, by autocorrelation."""
+    from parselmouth.praat import call
+
+    analysis = ("To LPC (autocorrelation)...", LPC_ORDER, WINDOW_S, _step(windows), PRE_EMPHASIS_HZ)
+    found = call(call(_end_to_end(windows), *analysis), "Down to Matrix (lpc)")
+    return np.asarray(found.values.T, np.float64)
+
+
+def lsf(windows: Cells) -> NDArray[np.float64]:
+    """(T, 16) line spectral frequencies of cells, radians."""
+    return line_spectral_frequencies(lpc(windows))
+
+
+def formants(windows: Cells) -> NDArray[np.float64]:
+    """(T, 4) first formants of cells, Hz; those of a neutral tube where none is found."""
+    even = windows[:, :-1]  # Praat takes the sample before the middle of a window: let none lie on the middle
+    found = _end_to_end(even).to_formant_burg(
+        time_step=_step(even),
+        max_number_of_formants=POLES,
+        maximum_formant=FEATURE_RATE / 2,
+        window_length=WINDOW_S,
+        pre_emphasis_from=PRE_EMPHASIS_HZ,
+    )
+    instants = found.x1 + np.arange(len(even)) * found.dx
+    numbers = range(1, len(NEUTRAL_TUBE_HZ) + 1)
+    values = np.array([[found.get_value_at_time(number, at) for number in numbers] for at in instants])
+    return np.where(np.isfinite(values), values, NEUTRAL_TUBE_HZ)
+
+
+def level(windows: Cells) -> NDArray[np.float64]:
+    """(T, 1) level of cells in dB of full scale, through a Hann window of twice `WINDOW_S`."""
+    taper = np.hanning(windows.shape[1])
+    power = np.square(windows) @ taper / taper.sum()
+    return np.asarray(10.0 * np.log10(power)[:, None], np.float64)
+
+
+def speech_level(levels: NDArray[np.floating]) -> float:
+    """Mean level in dB of the frames with speech, of (T, 1) levels: those above the middle of noise and speech."""
+    noise, speech = np.quantile(levels, NOISE_QUANTILE), np.quantile(levels, SPEECH_QUANTILE)
+    return float(levels[levels >= (noise + speech) / 2].mean())
+
+
+MEASURES: Mapping[str, Measure] = MappingProxyType(dict(zip(FEATURES, (formants, mfcc, lpc, lsf, level), strict=True)))
+
+
+def _step(windows: Cells) -> float:
+    return float(windows.shape[1] / FEATURE_RATE)
+
+
+def _end_to_end(windows: Cells) -> Any:
+    import parselmouth
+
+    return parselmouth.Sound(windows.ravel(), sampling_frequency=FEATURE_RATE)
