@@ -11,11 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools import measures
 from corpus_tools.driving import FEATURE, NETWORK, Fold, folds, heard_features, heard_in, lessons_of
-from corpus_tools.evaluate import LEARNT_FOR_EVALUATION, Scores, split
-from corpus_tools.evaluate import _Real as Real
-from corpus_tools.evaluate import _scores as scored
+from corpus_tools.evaluation import measures
+from corpus_tools.evaluation.evaluate import LEARNT_FOR_EVALUATION
+from corpus_tools.evaluation.real import Real, Thresholds
+from corpus_tools.evaluation.scores import Scores, scored
+from corpus_tools.evaluation.splits import split
+from corpus_tools.leak import pose_leak
 from corpus_tools.learn import learn_talker
 from corpus_tools.observation import Observation
 from corpus_tools.observe import observe
@@ -51,7 +53,8 @@ def main() -> None:
     if options.quick:
         kept, options.hold_out, options.trials = kept[:120], 30, 10
     train, test = split(kept, hold_out=options.hold_out, seed=options.seed)
-    bench = Bench(train, test)
+    leak = pose_leak(train)
+    bench = Bench(*(tuple(leak.removed(one) for one in part) for part in (train, test)))
     if options.choose:
         bench.choose()
         return
@@ -104,12 +107,11 @@ class Bench:
 
     def score(self, name: str, kind: str, drive: Drive, test: tuple, talker: object) -> Scores:
         real = [Real.of(one, talker.model) for one in test]
-        threshold = measures.closure_threshold(np.concatenate([one.least for one in real]))
         made = [drive.parameters(self.of(kind)[one.name]) for one in test]
-        one = scored(name, made, real, talker.model, threshold, 0.0)
+        one = scored(name, [(talker.model, real, made)], Thresholds.of(real))
         print(
-            f"| {one.method} | {one.r_opening:.3f} | {one.r_width:.3f} | {one.rmse_z:.3f} | {one.dtw_cost:.3f} "
-            f"| {one.range_ratio:.2f} | {one.closure:.2f} | {one.false_closure:.2f} |",
+            f"| {one.method} | {one['r_opening']:.3f} | {one['r_width']:.3f} | {one['rmse_z']:.3f} "
+            f"| {one['dtw_cost']:.3f} | {one['range_ratio']:.2f} | {one['closure']:.2f} | {one['false_closure']:.2f} |",
             flush=True,
         )
         return one

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from sentences import sentences
 
-from corpus_tools import measures
+from corpus_tools.evaluation import measures
 from tts2face.exemplar.animate import speech_trajectory, visual_voice
 from tts2face.listen import driven
 from tts2face.talker import Talker, load_talker

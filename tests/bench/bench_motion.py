@@ -15,7 +15,8 @@ import numpy as np
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar.animate import DEFAULT_OPTIONS, VisualVoice, chosen_tokens, speech_trajectory, visual_voice
 from tts2face.exemplar.options import THEOBALD_2007
-from tts2face.talker import Talker, read_talker
+from tts2face.speech.align import increasing
+from tts2face.talker import Talker, Utterance, read_talker
 from tts2face.types import frame_count
 
 FPS = 30.0
@@ -62,7 +63,7 @@ def main() -> None:
         )
     print("\n| corpus | tokens | search, each phone |\n| --- | --- | --- |")
     phones = text(talker, 60)
-    for copies in (0.125, 0.5, 1, 4):
+    for copies in (0.125, 0.5, 1, 4, 10, 100):
         larger = visual_voice(_of_size(talker, copies))
         spent = least_time(lambda larger=larger: chosen_tokens(phones, larger, DEFAULT_OPTIONS))
         print(f"| x {copies:g} | {len(larger.tokens)} | {spent / len(phones) * 1e6:.1f} us |")
@@ -74,9 +75,17 @@ def _motion_time(phones: PhoneSequence, voice: VisualVoice, options: object) -> 
 
 
 def _of_size(talker: Talker, copies: float) -> Talker:
-    """The talker with a part of its utterances, or with all of them several times."""
-    kept = talker.utterances[: max(1, round(len(talker.utterances) * min(copies, 1)))] * max(1, int(copies))
-    return replace(talker, utterances=kept)
+    """The talker with a part of its utterances, or with all of them several times, their edges moved by some 3 ms."""
+    kept = talker.utterances[: max(1, round(len(talker.utterances) * min(copies, 1)))]
+    generator = np.random.default_rng(0)
+    again = tuple(_jittered(spoken, generator) for _ in range(max(1, int(copies)) - 1) for spoken in kept)
+    return replace(talker, utterances=kept + again)
+
+
+def _jittered(spoken: Utterance, generator: np.random.Generator) -> Utterance:
+    edges = spoken.phones.edges.copy()
+    edges[1:-1] += generator.normal(0, 0.003, len(edges) - 2)
+    return replace(spoken, phones=PhoneSequence(spoken.phones.phones, increasing(edges)))
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+import wave
 from dataclasses import fields
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from cli.main import run
 from lexicon import errors
 from tts2face.render.picture import Picture
 from tts2face.request import Request
+from tts2face.video.media import read_sound
 
 README = Path(__file__).parents[2] / "README.md"
 COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
@@ -38,6 +40,11 @@ def readme_commands() -> list[str]:
 def lay_out(here: Path, source: Path) -> None:
     """The files that the README's commands read."""
     (here / "chapter.txt").write_text("Chapter one. It was late.", encoding="utf-8")
+    (here / "speech.txt").write_text("bin blue at f two now", encoding="utf-8")
+    sound = read_sound(source / "clips" / "bbaf2n.mkv", 16_000)
+    with wave.open(str(here / "speech.wav"), "wb") as file:
+        file.setparams((1, 2, sound.rate, 0, "NONE", ""))
+        file.writeframes((sound.samples * 32767).astype("<i2").tobytes())
     for film in ("take.mp4", "me.mp4"):
         (here / film).symlink_to(source / "clips" / "bbaf2n.mkv")
     few = here / "recordings"
