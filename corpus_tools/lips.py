@@ -9,7 +9,7 @@ import numpy as np
 from lexicon.errors import BackendError
 from lexicon.sequence import SILENCE
 from tts2face.talker import Talker
-from tts2face.window_network import WindowNetwork, window_features
+from tts2face.window_network import WindowNetwork, one_of_each, window_features
 
 MARGIN_S = 0.2  # of silence that is learnt from
 UNITS = (128, 128)
@@ -36,7 +36,7 @@ def with_network(talker: Talker, n_networks: int = N_NETWORKS) -> Talker:
     for spoken in talker.utterances:
         times = np.arange(len(spoken.shape)) / talker.fps
         near = (times >= spoken.phones.edges[1] - MARGIN_S) & (times <= spoken.phones.edges[-2] + MARGIN_S)
-        inputs.append(window_features(spoken.phones, times, inventory)[near])
+        inputs.append(one_of_each(*window_features(spoken.phones, times[near], inventory), len(inventory)))
         wanted.append(spoken.shape[near, :n_speech] / spread)
     fitted = [_fitted(np.concatenate(inputs), np.concatenate(wanted), seed) for seed in range(n_networks)]
     weights = [np.stack(layer).astype(np.float32) for layer in zip(*(one.coefs_ for one in fitted), strict=True)]

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
@@ -42,17 +43,60 @@ class WindowNetwork:
         self, phones: PhoneSequence, times: NDArray[np.floating], members: slice = slice(None)
     ) -> NDArray[np.float32]:
         """(T, D) speech parameters at instants in seconds (T,); of some of the networks where `members` says so."""
-        seen = window_features(phones, np.asarray(times, np.float64), self.inventory)[None]
-        layers = list(zip(self.weights, self.biases, strict=True))
-        for weights, biases in layers[:-1]:
-            seen = np.maximum(seen @ weights[members] + biases[members][:, None], 0.0)
-        last, bias = layers[-1]
-        told = seen @ last[members] + bias[members][:, None]
-        return np.asarray(told.mean(axis=0), np.float32)
+        shown, place = window_features(phones, np.asarray(times, np.float64), self.inventory)
+        rows = shown + len(self.inventory) * np.arange(shown.shape[1])
+        told = np.zeros((len(times), self.weights[-1].shape[2]), np.float32)
+        for member in range(len(self.weights[0]))[members]:
+            weights, biases = (tuple(layer[member] for layer in layers) for layers in (self.weights, self.biases))
+            hidden = np.maximum(_first_layer(rows, place, weights[0], biases[0]), np.float32(0.0))
+            for inner, bias in zip(weights[1:-1], biases[1:-1], strict=True):
+                hidden = np.maximum(_layer(hidden, inner, bias), np.float32(0.0))
+            told += _layer(hidden, weights[-1], biases[-1])
+        return told / np.float32(len(range(len(self.weights[0]))[members]))
 
 
-def window_features(phones: PhoneSequence, times: NDArray[np.float64], inventory: Sequence[str]) -> NDArray[np.float32]:
-    """(T, F) phones that sound about each instant and those about the present one (one of N each), and its times.
+@njit(cache=True)
+def _first_layer(rows, place, weights, biases):  # type: ignore[no-untyped-def]
+    """(T, H) of inputs that are ones in some rows of the weights (T, C), and numbers (T, 4) for the last rows.
+
+    Sums run in one order, so that every machine and number of threads gives the same bits.
+    """
+    first = len(weights) - place.shape[1]
+    told = np.zeros((len(rows), weights.shape[1]), np.float32)
+    for t in range(len(rows)):
+        told[t] = biases
+        for row in rows[t]:
+            told[t] += weights[row]
+        for k in range(place.shape[1]):
+            told[t] += place[t, k] * weights[first + k]
+    return told
+
+
+@njit(cache=True)
+def _layer(seen, weights, biases):  # type: ignore[no-untyped-def]
+    """(T, H') of inputs (T, H), summed in one order."""
+    told = np.zeros((len(seen), weights.shape[1]), np.float32)
+    for t in range(len(seen)):
+        told[t] = biases
+        for k in range(len(weights)):
+            if seen[t, k] != 0.0:
+                told[t] += seen[t, k] * weights[k]
+    return told
+
+
+def one_of_each(shown: NDArray[np.int64], place: NDArray[np.float32], n_phones: int) -> NDArray[np.float32]:
+    """(T, F) features as the networks are trained on them: each phone as one of N, then the numbers of its place."""
+    ones = np.zeros((*shown.shape, n_phones), np.float32)
+    np.put_along_axis(ones, shown[:, :, None], np.float32(1.0), axis=2)
+    return np.concatenate([ones.reshape(len(shown), -1), place], axis=1)
+
+
+def window_features(
+    phones: PhoneSequence, times: NDArray[np.float64], inventory: Sequence[str]
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """(T, C) numbers of the phones that sound about each instant and of those about the present one; its place (T, 4).
+
+    The place: part of the phone that has passed, seconds since it began, until it ends, and that it takes.
 
     Raises
     ------
@@ -61,7 +105,6 @@ def window_features(phones: PhoneSequence, times: NDArray[np.float64], inventory
     """
     if not len(phones):
         raise InputError("a window needs phones to look at")
-    n_phones, n_frames = len(inventory), len(times)
     number = {label: at for at, label in enumerate(inventory)}
     labels = np.array([number[nearest_phones(label, inventory)[0]] for label in phones.phones])
     offsets = np.arange(-round(WINDOW_S / STEP_S), round(WINDOW_S / STEP_S) + 1) * STEP_S
@@ -73,12 +116,9 @@ def window_features(phones: PhoneSequence, times: NDArray[np.float64], inventory
     now = sounding(times)
     shown = [labels[sounding(times + offset)] for offset in offsets]
     shown += [labels[np.clip(now + step, 0, len(labels) - 1)] for step in NEIGHBOURS]
-    one_of = np.zeros((n_frames, len(shown), n_phones), np.float32)
-    for column, numbers in enumerate(shown):
-        one_of[np.arange(n_frames), column, numbers] = 1.0
     since, until = times - starts[now], ends[now] - times
     place = np.column_stack([since / (ends - starts)[now], since, until, (ends - starts)[now]])
-    return np.concatenate([one_of.reshape(n_frames, -1), place], axis=1).astype(np.float32)
+    return np.stack(shown, axis=1), place.astype(np.float32)
 
 
 def network_arrays(network: WindowNetwork) -> dict[str, NDArray[Any]]:

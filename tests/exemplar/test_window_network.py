@@ -11,16 +11,20 @@ from tts2face.exemplar.animate import VisualVoice, speech_trajectory
 from tts2face.exemplar.options import SynthesisOptions
 from tts2face.exemplar.targets import Targets, shown_phones
 from tts2face.talker import Talker, read_talker, write_talker
-from tts2face.window_network import WindowNetwork, window_features
+from tts2face.window_network import WindowNetwork, one_of_each, window_features
 
 PHONES = PhoneSequence([SILENCE, "b", "i", "p", SILENCE], [0.0, 0.3, 0.4, 0.6, 0.7, 1.0])
 KNOWN = ("b", "i", "p", SILENCE)
 TIMES = np.arange(25) / 25
 
 
+def seen_as_ones(phones: PhoneSequence, times: np.ndarray) -> np.ndarray:
+    return one_of_each(*window_features(phones, times, KNOWN), len(KNOWN))
+
+
 def random_network(n_outputs: int, n_networks: int = 2) -> WindowNetwork:
     generator = np.random.default_rng(0)
-    n_features = window_features(PHONES, TIMES, KNOWN).shape[1]
+    n_features = seen_as_ones(PHONES, TIMES).shape[1]
     shapes = [(n_features, 7), (7, 5), (5, n_outputs)]
     weights = tuple(generator.normal(0, 1, (n_networks, *shape)).astype(np.float32) for shape in shapes)
     biases = tuple(generator.normal(0, 1, (n_networks, shape[1])).astype(np.float32) for shape in shapes)
@@ -29,7 +33,7 @@ def random_network(n_outputs: int, n_networks: int = 2) -> WindowNetwork:
 
 def test_the_answer_is_the_mean_of_the_networks_neuron_by_neuron() -> None:
     network = random_network(2)
-    features = window_features(PHONES, TIMES, KNOWN)
+    features = seen_as_ones(PHONES, TIMES)
     wanted = np.zeros((len(TIMES), 2))
     for member in range(2):
         for frame, row in enumerate(features):
@@ -53,7 +57,7 @@ def test_one_member_can_answer_alone() -> None:
 
 
 def test_features_say_what_sounds_when() -> None:
-    features = window_features(PHONES, np.array([0.45]), KNOWN)[0]
+    features = seen_as_ones(PHONES, np.array([0.45]))[0]
     columns = features[: 21 * 4].reshape(21, 4)
     assert (columns.sum(axis=1) == 1).all()
     sounding = [KNOWN[at] for at in columns.argmax(axis=1)]
@@ -66,7 +70,7 @@ def test_features_say_what_sounds_when() -> None:
 
 def test_an_unknown_phone_is_seen_as_its_nearest() -> None:
     other = PhoneSequence([SILENCE, "m", "i", "p", SILENCE], PHONES.edges)
-    features = window_features(other, np.array([0.35]), KNOWN)[0][:84].reshape(21, 4)
+    features = seen_as_ones(other, np.array([0.35]))[0][:84].reshape(21, 4)
     assert KNOWN[int(features[7].argmax())] in {"b", "p"}
     with pytest.raises(InputError, match="§"):
         window_features(PhoneSequence(["§"], [0.0, 1.0]), TIMES, KNOWN)

@@ -117,7 +117,7 @@ def test_a_talker_file_keeps_its_drives_and_old_files_have_none(tmp_path: Path) 
     drive = learn_network(lessons(), feature="lsf", options=NetworkOptions(n_hidden=3, before=1, after=2))
     for drives in ({}, {"network": drive, "linear": learn_linear(lessons(), feature="mfcc")}):
         path = tmp_path / "a.talker"
-        write_talker(path, Talker(25.0, model, (spoken,), {"name": "Ada"}, None, drives))
+        write_talker(path, Talker(25.0, model, (spoken,), {"name": "Ada"}, drives=drives))
         kept = read_talker(path).drives
         assert set(kept) == set(drives)
     heard = lessons(1)[0].features
