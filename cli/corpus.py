@@ -178,6 +178,9 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
     ] = None,
     train: Annotated[Path | None, Parameter(help="Folder to learn from, instead of --recordings.")] = None,
     test: Annotated[Path | None, Parameter(help="Folder to test on, with --train.")] = None,
+    tracks: Annotated[
+        Path | None, Parameter(help="Measure others' curves, too: CSV with utterance, time and a column a channel.")
+    ] = None,
     out: Annotated[
         Path | None, Parameter(help="Write figures and plots (.html) or figures (.json, .csv).", alias="-o")
     ] = None,
@@ -189,4 +192,4 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
     from cli.evaluation import Asked, evaluated
 
     asked = Asked(recordings, hold_out, seed, folds, hold_out_words, train, test)
-    evaluated(asked, out, (cache, jobs, model))
+    evaluated(asked, out, tracks, (cache, jobs, model))

@@ -41,17 +41,21 @@ class Asked:
             raise InputError("--folds and --hold-out-words split --recordings; --train and --test are split already")
 
 
-def evaluated(asked: Asked, out: Path | None, effort: tuple[Path | None, int | None, Path | None]) -> None:
+def evaluated(
+    asked: Asked, out: Path | None, tracks: Path | None, effort: tuple[Path | None, int | None, Path | None]
+) -> None:
     """Read recordings, measure every method on what is held out, and tell or write the figures."""
     asked.check()
     if out is not None and out.suffix not in SUFFIXES:
         raise InputError(f"an evaluation is written as {', '.join(SUFFIXES)}, not {out.name}")
     from corpus_tools.effort import Effort
     from corpus_tools.evaluation.evaluate import evaluate
+    from corpus_tools.evaluation.tracks import read_tracks
 
+    theirs = read_tracks(tracks) if tracks is not None else None
     parts = _parts(asked, Effort(*effort))
     with progress_bar("measuring") as on_progress:
-        result, runs = evaluate(parts, on_progress=on_progress)
+        result, runs = evaluate(parts, tracks=theirs, on_progress=on_progress)
     print(result.table())  # noqa: T201 - the answer
     if out is not None:
         _write(out, result, runs)

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.observation import Observation
+from corpus_tools.ridge import ridge
 from tts2face.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 
 CHUNK_S = 3.0  # a sentence: long enough for speech to average out
 LEAST_CHUNKS = 12  # with fewer nothing is taken out
-EFFORTS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # tried; the one that predicts chunks left out best is taken
 Floats = NDArray[np.float64]
 
 
@@ -45,10 +45,9 @@ def pose_leak(observations: Sequence[Observation]) -> PoseLeak:
     away = landmarks.reshape(len(landmarks), -1) - landmarks.reshape(len(landmarks), -1).mean(axis=0)
     offsets = np.zeros((terms.shape[1], away.shape[1]))
     if len(angles) >= LEAST_CHUNKS:
-        errors = [_left_out_error(terms, away, effort) for effort in EFFORTS]
-        best = int(np.argmin(errors))
-        if errors[best] < float(np.square(away).sum()):
-            offsets = _fitted(terms, away, EFFORTS[best])
+        fit = ridge(terms, away)
+        if fit.left_out_error < float(np.square(away).sum()):
+            offsets = fit.weights
     return PoseLeak(centre, scale, _keeping_contact(offsets.reshape(terms.shape[1], *landmarks.shape[1:])))
 
 
@@ -81,19 +80,3 @@ def _chunks(observations: Sequence[Observation]) -> tuple[Floats, Floats]:
             angles.append(seen.head[rows, :3].mean(axis=0, dtype=np.float64))
             landmarks.append(seen.landmarks[rows].mean(axis=0, dtype=np.float64))
     return np.array(angles), np.array(landmarks)
-
-
-def _fitted(terms: Floats, away: Floats, effort: float) -> Floats:
-    """(K, V) ridge regression through the mean."""
-    centred = terms - terms.mean(axis=0)
-    fitted: Floats = np.linalg.solve(centred.T @ centred + effort * np.eye(terms.shape[1]), centred.T @ away)
-    return fitted
-
-
-def _left_out_error(terms: Floats, away: Floats, effort: float) -> float:
-    """Sum of squares of each chunk's error when it is left out (Allen 1974, PRESS)."""
-    centred = terms - terms.mean(axis=0)
-    inverse = np.linalg.inv(centred.T @ centred + effort * np.eye(terms.shape[1]))
-    leverage = np.einsum("ck,kj,cj->c", centred, inverse, centred) + 1.0 / len(terms)
-    errors = away - centred @ (inverse @ (centred.T @ away))
-    return float(np.square(errors / (1.0 - leverage)[:, None]).sum())

@@ -13,6 +13,7 @@ from corpus_tools.evaluation.methods import Method, methods_of
 from corpus_tools.evaluation.real import Real, Thresholds
 from corpus_tools.evaluation.scores import FIGURES, Scores, scored
 from corpus_tools.evaluation.splits import Parts, require_parted
+from corpus_tools.evaluation.tracks import Track, mapped
 from corpus_tools.leak import pose_leak
 from corpus_tools.learn import learn_talker
 from corpus_tools.lips import with_network
@@ -23,7 +24,7 @@ from tts2face.talker import ShapeModel
 LEARNT_FOR_EVALUATION = {
     "name": "evaluation", "language": "", "sources": "", "licence": "", "attribution": "", "command": "", "created": "",
 }  # fmt: skip
-CEILING = "real, through the model"
+TRACKS, CEILING = "tracks", "real, through the model"
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +90,7 @@ def evaluate(
     parts: Sequence[Parts],
     *,
     options: Mapping[str, SynthesisOptions] | None = None,
+    tracks: Mapping[str, Track] | None = None,
     on_progress: Progress | None = None,
 ) -> tuple[Evaluation, tuple[Run, ...]]:
     """Every method on held-out utterances, with their true phone edges; all is learnt from the training parts.
@@ -100,6 +102,8 @@ def evaluate(
         units of spread refer to each split's own model.
     options
         Exemplar methods by name; by default `METHODS`.
+    tracks
+        Somebody's curves by utterance, to be measured beside them.
 
     Raises
     ------
@@ -112,7 +116,7 @@ def evaluate(
     for number, (train, test) in enumerate(parts):
         require_parted(train, test)
         tell = _stage(on_progress, number, len(parts))
-        runs.append(run(train, test, options=options, on_progress=tell))
+        runs.append(run(train, test, options=options, tracks=tracks, on_progress=tell))
     n_train = len(parts[0][0]) if len(parts) == 1 else min(len(train) for train, _ in parts)
     return Evaluation(n_train, sum(len(one.real) for one in runs), _together(runs)), tuple(runs)
 
@@ -122,6 +126,7 @@ def run(
     test: Sequence[Observation],
     *,
     options: Mapping[str, SynthesisOptions] | None = None,
+    tracks: Mapping[str, Track] | None = None,
     on_progress: Progress | None = None,
 ) -> Run:
     """One split: learn a talker from `train`, and make the motion of `test` by every method."""
@@ -135,6 +140,8 @@ def run(
         made[name], spent[name] = _made(method, real)
         if on_progress:
             on_progress(number + 1, len(methods))
+    if tracks is not None:
+        made[TRACKS], spent[TRACKS] = mapped(tracks, talker, real), 0.0
     made[CEILING], spent[CEILING] = tuple(one.parameters for one in real), 0.0
     return Run(talker.model, real, made, spent)
 

@@ -10,9 +10,10 @@ import pytest
 from corpus_tools.evaluation.evaluate import CEILING, Evaluation, Run, evaluate
 from corpus_tools.evaluation.scores import FIGURES
 from corpus_tools.evaluation.splits import folds, split, without_words
+from corpus_tools.evaluation.tracks import Track, read_tracks
 from corpus_tools.observation import Observation, Quality
 from corpus_tools.report.evaluation import evaluation_page
-from lexicon.errors import InputError
+from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 
 OPENINGS = {"p": 0.0, "b": 0.0, "m": 0.0, "s": 4.0, "t": 5.0, "i": 7.0, "ɑ": 15.0, SILENCE: 0.0}
@@ -167,3 +168,61 @@ def test_a_network_is_trained_and_compared_with_where_there_is_enough_to_learn(
     scores = {one.method: one for one in result.scores}
     assert scores["sliding-window network"]["r_opening"] > 0.8  # of some 700 frames it cannot learn more
     assert scores["exemplar"]["r_opening"] > 0.95
+
+
+def curves_of(observations: list[Observation], hidden: np.ndarray) -> dict[str, Track]:
+    """What another system might give: opening and width of the lips mixed, at 60 frames a second."""
+    found = {}
+    for one in observations:
+        opening, width = one.landmarks[:, 13, 1] - one.landmarks[:, 14, 1], one.landmarks[:, 291, 0]
+        times = np.arange(0, len(opening) / FPS, 1 / 60)
+        read = np.stack([np.interp(times, np.arange(len(opening)) / FPS, curve) for curve in (opening, width)], axis=1)
+        found[one.name] = Track(times, read @ hidden)
+    return found
+
+
+def test_good_curves_of_others_score_high_whatever_their_channels(observations: list[Observation]):
+    hidden = np.array([[0.3, -2.0, 1.0], [1.0, 0.5, 0.0]])
+    parts = split(observations, hold_out=8, seed=0)
+    result, _ = evaluate([parts], tracks=curves_of(observations, hidden))
+    scores = {one.method: one for one in result.scores}
+    assert scores["tracks"]["r_opening"] > 0.99
+    still = {name: Track(track.times, 0 * track.values) for name, track in curves_of(observations, hidden).items()}
+    assert {one.method: one for one in evaluate([parts], tracks=still)[0].scores}["tracks"]["r_opening"] < 0.1
+
+
+def test_curves_that_do_not_cover_the_split_are_refused(observations: list[Observation]):
+    train, test = split(observations, hold_out=8, seed=0)
+    curves = curves_of(observations, np.eye(2))
+    with pytest.raises(InputError, match=f"the tracks lack {test[0].name}"):
+        evaluate([(train, test)], tracks={one.name: curves[one.name] for one in train})
+    with pytest.raises(InputError, match="hold 3 training utterances"):
+        evaluate([(train, test)], tracks={one.name: curves[one.name] for one in (*train[:3], *test)})
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ("", "must begin with the columns"),
+        ("name,time,jaw\na,0,1\n", "must begin with the columns"),
+        ("utterance,time,jaw\na,0\n", "line 2: 2 columns, not 3"),
+        ("utterance,time,jaw\na,0,x\n", "line 2: 'x' is no number"),
+        ("utterance,time,jaw\na,0,nan\n", "'nan' is no number"),
+        ("utterance,time,jaw\na,1,0\na,0.5,0\n", "times of a do not increase"),
+    ],
+)
+def test_tracks_that_cannot_be_read(content: str, reason: str, tmp_path: Path):
+    path = tmp_path / "peer.csv"
+    path.write_text(content)
+    with pytest.raises(DataError, match=reason):
+        read_tracks(path)
+
+
+def test_tracks_are_read_by_utterance(tmp_path: Path):
+    path = tmp_path / "peer.csv"
+    path.write_text("utterance,time,jaw,lips\na,0,1,2\nb,0,5,6\na,0.5,3,4\n")
+    found = read_tracks(path)
+    assert set(found) == {"a", "b"}
+    assert found["a"].at(np.array([0.25, 9.0])).tolist() == [[2.0, 3.0], [3.0, 4.0]]
+    with pytest.raises(InputError, match="there are no tracks"):
+        read_tracks(tmp_path / "none.csv")

@@ -1,0 +1,102 @@
+"""Anybody's face curves, measured like our own: through one linear map fitted on the training sentences."""
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.evaluation.real import Real
+from corpus_tools.ridge import ridge
+from lexicon.errors import DataError, InputError
+from tts2face.talker import Talker
+
+UTTERANCE, TIME = "utterance", "time"
+LEAST_TRAINING = 10  # sentences from which a map is fitted
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """Curves of one utterance: seconds (T,) on the clock of its first frame, and values (T, C)."""
+
+    times: NDArray[np.float64]
+    values: NDArray[np.float64]
+
+    def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(N, C) values at other instants, straight between, held at the ends."""
+        columns = [np.interp(times, self.times, column) for column in self.values.T]
+        return np.stack(columns, axis=1)
+
+
+def read_tracks(path: Path) -> Mapping[str, Track]:
+    """Curves by utterance from a CSV file with the columns utterance, time (seconds), and one for each channel.
+
+    Raises
+    ------
+    InputError
+        There is no such file.
+    DataError
+        Columns are missing, a value is no number, or times of an utterance do not increase.
+    """
+    if not path.is_file():
+        raise InputError(f"there are no tracks {path}; check the path")
+    rows: dict[str, list[list[float]]] = {}
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.reader(file)
+            head = next(reader, [])
+            if head[:2] != [UTTERANCE, TIME] or len(head) < 3:
+                raise DataError(f"{path} must begin with the columns utterance, time and a channel, not {head[:3]}")
+            for number, row in enumerate(reader, start=2):
+                if len(row) != len(head):
+                    raise DataError(f"{path}, line {number}: {len(row)} columns, not {len(head)}; mend it")
+                rows.setdefault(row[0], []).append([_number(value, path, number) for value in row[1:]])
+    except (OSError, UnicodeDecodeError, csv.Error) as broken:
+        raise DataError(f"{path} cannot be read as CSV in UTF-8 ({broken}); export it again") from broken
+    tracks = {name: np.array(values) for name, values in rows.items()}
+    for name, values in tracks.items():
+        if (np.diff(values[:, 0]) <= 0).any():
+            raise DataError(f"{path}: the times of {name} do not increase; sort them")
+    return {name: Track(values[:, 0], values[:, 1:]) for name, values in tracks.items()}
+
+
+def _number(text: str, path: Path, line: int) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise DataError(f"{path}, line {line}: {text!r} is no number; mend it")
+    return value
+
+
+def mapped(tracks: Mapping[str, Track], talker: Talker, real: Sequence[Real]) -> tuple[NDArray[np.float32], ...]:
+    """Speech parameters (T, S) of the held-out utterances, by a ridge regression fitted on the training ones.
+
+    Raises
+    ------
+    InputError
+        A held-out utterance has no track, or too few training ones have.
+    """
+    if missing := [one.observation.name for one in real if one.observation.name not in tracks]:
+        raise InputError(f"the tracks lack {missing[0]} ({len(missing)} of {len(real)} held-out utterances); add them")
+    known = [spoken for spoken in talker.utterances if spoken.name in tracks]
+    if len(known) < LEAST_TRAINING:
+        raise InputError(
+            f"the tracks hold {len(known)} training utterances; the map to our parameters needs {LEAST_TRAINING}"
+        )
+    n_speech = talker.model.n_speech
+    terms = np.concatenate([tracks[one.name].at(np.arange(len(one.shape)) / talker.fps) for one in known])
+    wanted = np.concatenate([one.shape[:, :n_speech] for one in known]).astype(np.float64)
+    spread = np.maximum(terms.std(axis=0), 1e-9)
+    middle = wanted.mean(axis=0)
+    fit = ridge(terms / spread, wanted - middle)
+
+    def made(one: Real) -> NDArray[np.float32]:
+        times = np.arange(len(one.parameters)) / one.observation.fps
+        seen = tracks[one.observation.name].at(times) / spread
+        return np.asarray(middle + (seen - fit.mean) @ fit.weights, np.float32)
+
+    return tuple(made(one) for one in real)

@@ -1,0 +1,40 @@
+"""Ridge regression whose effort is chosen by leaving rows out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+EFFORTS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # for terms of unit spread
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ridge:
+    """Weights (K, V) of terms about their ``mean`` (K,), and the sum of squares of the errors of rows left out."""
+
+    mean: Floats
+    weights: Floats
+    left_out_error: float
+
+
+def ridge(terms: Floats, wanted: Floats, efforts: Sequence[float] = EFFORTS) -> Ridge:
+    """The best regression of (R, V) values, whose mean is 0, on (R, K) terms.
+
+    Each row's error when it is left out follows from its leverage. Source: Allen 1974 (PRESS).
+    """
+    mean = terms.mean(axis=0)
+    centred = terms - mean
+    normal, right = centred.T @ centred, centred.T @ wanted
+    found = [_fitted(centred, wanted, normal + effort * np.eye(terms.shape[1]), right) for effort in efforts]
+    error, weights = min(found, key=lambda one: one[0])
+    return Ridge(mean, weights, error)
+
+
+def _fitted(centred: Floats, wanted: Floats, normal: Floats, right: Floats) -> tuple[float, Floats]:
+    inverse = np.linalg.inv(normal)
+    weights: Floats = inverse @ right
+    leverage = np.einsum("rk,kj,rj->r", centred, inverse, centred) + 1.0 / len(centred)
+    errors = (wanted - centred @ weights) / (1.0 - leverage)[:, None]
+    return float(np.square(errors).sum()), weights
