@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from tts2face.exemplar.tokens import MAX_CONTEXT, Tokens
 
+GROUPED = 3  # neighbours either side that are alike in a group; the default context
 _ROUNDING = 1e-9  # a bound may fall below the score it bounds by rounding; scores are of order 1
 
 
@@ -26,19 +27,18 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContextIndex:
-    """Tokens sorted into groups with the same phone and the same direct neighbours.
+    """Tokens sorted into groups with the same phone and the same `GROUPED` neighbours either side.
 
-    The tokens ``order[group_first[g]:group_first[g + 1]]`` form group g; the groups
+    The tokens ``order[group_first[g]:group_first[g + 1]]`` form group g, the shortest first; the groups
     ``phone_first[p]:phone_first[p + 1]`` belong to phone p. ``likeness[g, c, q]`` is the highest similarity of label q
-    to what any token of group g has in context column c; ``log_range[g]`` are the group's least and greatest log
-    durations: both bound a group's scores from above.
+    to what any token of group g has in context column c: it bounds a group's scores from above, and so do durations,
+    the farther from the wanted one.
     """
 
     order: NDArray[np.int32]
     group_first: NDArray[np.int32]
     phone_first: NDArray[np.int32]
     likeness: NDArray[np.float64]
-    log_range: NDArray[np.float64]
     context: NDArray[np.int32]
     log_durations: NDArray[np.float64]
     similarity: NDArray[np.float64]
@@ -59,19 +59,17 @@ def log_durations(spans: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def context_index(tokens: Tokens, similarity: NDArray[np.float64]) -> ContextIndex:
     """Index of a talker's tokens for the (P, P) similarity of its phones."""
-    left, right = tokens.context[:, 0], tokens.context[:, 1]
-    order = np.lexsort((right, left, tokens.phone)).astype(np.int32)
-    keys = np.stack([tokens.phone, left, right], axis=1)[order]
-    firsts = np.flatnonzero(np.concatenate([[True], (keys[1:] != keys[:-1]).any(1)]))
+    near = tokens.context[:, : 2 * GROUPED]
     durations = log_durations(tokens.spans)
-    own = durations[order, 1]
+    order = np.lexsort((durations[:, 1], *near.T[::-1], tokens.phone)).astype(np.int32)
+    keys = np.column_stack([tokens.phone, near])[order]
+    firsts = np.flatnonzero(np.concatenate([[True], (keys[1:] != keys[:-1]).any(1)]))
     likeness = [np.maximum.reduceat(similarity[column[order]], firsts, axis=0) for column in tokens.context.T]
     return ContextIndex(
         order,
         np.concatenate([firsts, [len(order)]]).astype(np.int32),
         np.searchsorted(keys[firsts, 0], np.arange(len(tokens.inventory) + 1)).astype(np.int32),
         np.stack(likeness, axis=1),
-        np.stack([np.minimum.reduceat(own, firsts), np.maximum.reduceat(own, firsts)], axis=1),
         tokens.context,
         durations,
         similarity,
@@ -98,7 +96,8 @@ def best_tokens(wanted: Wanted, index: ContextIndex, *, context: int, k: int, du
     Notes
     -----
     Exactly the answer of scoring every token. Groups of tokens with the same neighbours are visited from the highest
-    bound of their score downwards, until the bound falls below the k-th best: those that cannot win are not scored.
+    bound of their score downwards, until the bound falls below the k-th best, and within a group tokens from the wanted
+    duration outwards: those that cannot win are not scored. More recordings of the same contexts cost next to nothing.
     """
     if not 1 <= context <= MAX_CONTEXT:
         raise InputError(f"context must be 1 to {MAX_CONTEXT} phones, not {context}")
@@ -111,7 +110,7 @@ def best_tokens(wanted: Wanted, index: ContextIndex, *, context: int, k: int, du
     _search(
         (wanted.phone, wanted.context, wanted.log_durations),
         (index.order, index.group_first, index.phone_first, index.context, index.log_durations),
-        (index.likeness, index.log_range),
+        index.likeness,
         (index.similarity, context_weights(context), duration),
         tokens,
         scores,
@@ -147,35 +146,58 @@ def _insert(tokens, scores, token, score):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _bound(target, log_duration, likeness, log_range, rule):  # type: ignore[no-untyped-def]
+def _bound(target, likeness, rule):  # type: ignore[no-untyped-def]
     """Score that no token of a group exceeds."""
-    _, weights, duration = rule
+    _, weights, _ = rule
     total = _ROUNDING
     for d in range(len(weights)):
         left, right = 2 * d, 2 * d + 1
         total += weights[d] * (likeness[left, target[left]] + likeness[right, target[right]])
-    return total - duration * max(log_range[0] - log_duration, log_duration - log_range[1], 0.0)
+    return total
 
 
 @njit(cache=True)
-def _search(wanted, index, limits, rule, tokens, scores):  # type: ignore[no-untyped-def]
+def _search(wanted, index, likeness, rule, tokens, scores):  # type: ignore[no-untyped-def]
     phone, contexts, durations = wanted
     order, group_first, phone_first, token_contexts, token_durations = index
-    likeness, log_range = limits
     for n in range(len(phone)):
         first, last = phone_first[phone[n]], phone_first[phone[n] + 1]
         bounds = np.zeros(last - first)
         for g in range(first, last):
-            bounds[g - first] = _bound(contexts[n], durations[n, 1], likeness[g], log_range[g], rule)
+            bounds[g - first] = _bound(contexts[n], likeness[g], rule)
         for _ in range(last - first):
             g = _highest(bounds)
-            if bounds[g] < scores[n, -1]:
+            bound = bounds[g]
+            if bound < scores[n, -1]:
                 break
             bounds[g] = -np.inf
-            for at in range(group_first[first + g], group_first[first + g + 1]):
-                token = order[at]
-                score = _score(contexts[n], durations[n], token_contexts[token], token_durations[token], rule)
-                _insert(tokens[n], scores[n], token, score)
+            low, high = group_first[first + g], group_first[first + g + 1]
+            target = (contexts[n], durations[n], bound)
+            _search_group(target, order[low:high], (token_contexts, token_durations), rule, (tokens[n], scores[n]))
+
+
+@njit(cache=True)
+def _search_group(target, group, corpus, rule, found):  # type: ignore[no-untyped-def]
+    """Score the tokens of a group from the wanted duration to shorter and to longer ones, as long as they can win."""
+    context, durations, bound = target
+    token_contexts, token_durations = corpus
+    tokens, scores = found
+    low, high = 0, len(group)
+    while low < high:  # the first token that is not shorter than wanted
+        middle = (low + high) // 2
+        if token_durations[group[middle], 1] < durations[1]:
+            low = middle + 1
+        else:
+            high = middle
+    for step in (-1, 1):
+        at = low - 1 if step < 0 else low
+        while 0 <= at < len(group):
+            token = group[at]
+            if bound - rule[2] * abs(token_durations[token, 1] - durations[1]) < scores[-1]:
+                break
+            score = _score(context, durations, token_contexts[token], token_durations[token], rule)
+            _insert(tokens, scores, token, score)
+            at += step
 
 
 @njit(cache=True)
