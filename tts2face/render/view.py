@@ -3,6 +3,7 @@
 import os
 import sys
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 
@@ -68,7 +69,7 @@ def camera_matrix(camera: Any) -> NDArray[np.float64]:
     return rows * [[1.0], [-1.0], [-1.0]]
 
 
-class Window:
+class Window(ABC):
     """The window and the head in it."""
 
     def __init__(self, face: Face, picture: Picture) -> None:
@@ -90,9 +91,9 @@ class Window:
         self.plotter.add_timer_event(max_steps=2**31 - 1, duration=TICK_MS, callback=self._tick)
         self.plotter.show(auto_close=False)
 
+    @abstractmethod
     def tick(self) -> bool:
         """Move the head to now; False where nothing has changed."""
-        raise NotImplementedError
 
     def pose(self, weights: NDArray[np.floating], head: NDArray[np.floating]) -> None:
         """Move the head, lit for where the camera is now."""
