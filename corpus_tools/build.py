@@ -120,7 +120,7 @@ def add_drives(
     DataError
         A recording holds no sound, or its frame rate is not the talker's.
     """
-    kept = observe(recordings, effort=effort, on_progress=on_progress).kept
+    kept = without_leak(observe(recordings, effort=effort, on_progress=on_progress).kept)
     if any(one.fps != talker.fps for one in kept):
         raise DataError(f"the recordings do not have the talker's {talker.fps:g} frames per second; convert them")
     drives = learn_drives(kept, talker)
