@@ -50,8 +50,7 @@ def build(  # noqa: PLR0913 - one parameter a flag
     model: Model = None,
 ) -> None:
     """Learn a talker from recordings. After an interruption the same command goes on where it stopped."""
-    if out.suffix != ".talker":
-        raise InputError(f"a talker is written as .talker, not {out.name}")
+    _check_suffix(out, "talker")
     from corpus_tools.build import build_talker
     from corpus_tools.effort import Effort
 
@@ -70,6 +69,12 @@ def build(  # noqa: PLR0913 - one parameter a flag
     for refusal in built.refused:
         say(f"refused {refusal.name}: {refusal.reason}")
     say(f"wrote {out}: {built.n_kept} recordings, {built.minutes:.1f} minutes, {len(built.refused)} refused")
+
+
+def _check_suffix(out: Path, kind: str) -> None:
+    """Refuse a file whose name does not say what is in it."""
+    if out.suffix != f".{kind}":
+        raise InputError(f"a {kind} is written as .{kind}, not {out.name}")
 
 
 def _consent(name: str, statement: str | None) -> Mapping[str, str]:
@@ -95,8 +100,7 @@ def face(
     model: Model = None,
 ) -> None:
     """Make a head with the shape and skin of the person in videos, to be shown with `--face`."""
-    if out.suffix != ".face":
-        raise InputError(f"a face is written as .face, not {out.name}")
+    _check_suffix(out, "face")
     from corpus_tools.dense.build import build_face
     from corpus_tools.effort import Effort
 
@@ -119,8 +123,7 @@ def clone(
     ] = False,
 ) -> None:
     """Carry one talker's speech to another's face: write a talker with the target's face and the source's motion."""
-    if out.suffix != ".talker":
-        raise InputError(f"a talker is written as .talker, not {out.name}")
+    _check_suffix(out, "talker")
     from corpus_tools.clone import clone_talker
 
     made = clone_talker(source, target, out, gain=gain, append=append_missing)
@@ -142,8 +145,7 @@ def drives(
     model: Model = None,
 ) -> None:
     """Learn how a talker's lips follow sound alone (`--audio`), for talkers that were built without it."""
-    if out.suffix != ".talker":
-        raise InputError(f"a talker is written as .talker, not {out.name}")
+    _check_suffix(out, "talker")
     from corpus_tools.build import add_drives
     from corpus_tools.effort import Effort
     from tts2face.talker import load_talker

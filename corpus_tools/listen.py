@@ -35,14 +35,13 @@ LONGEST_UTTERANCE_S = 20.0  # longer recordings are cut at pauses
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Heard:
-    """Phones, words with the fit (W,) of each, the alignment's confidence, and the sound.
+    """Phones, words, the alignment's confidence, and the sound.
 
     ``is_recognised`` where nobody wrote what is said: the words then are the phones heard, between slashes.
     """
 
     phones: PhoneSequence
     words: tuple[WordSpan, ...]
-    fits: NDArray[np.float64]
     confidence: float
     sound: Waveform
     is_recognised: bool
@@ -130,8 +129,8 @@ class Ears:
             "words": [[word.text, word.first, word.last] for word in found.words],
             "confidence": found.confidence,
         }
-        write_tensors(kept, KIND, ALIGNMENT_VERSION, {"edges": found.phones.edges, "fits": found.fits}, header)
-        return Heard(found.phones, found.words, found.fits, found.confidence, sound, words is None)
+        write_tensors(kept, KIND, ALIGNMENT_VERSION, {"edges": found.phones.edges}, header)
+        return Heard(found.phones, found.words, found.confidence, sound, words is None)
 
     def _recognised(self, video: Path, spans: Sequence[Span]) -> list[list[tuple[str, ...]]]:
         """Phones of the words heard in each span, from the cache when they were recognised before."""
@@ -169,7 +168,7 @@ def _aligned_before(kept: Path, sound: Waveform, *, is_recognised: bool) -> Hear
         arrays, header = read_tensors(kept, KIND, ALIGNMENT_VERSION)
         words = tuple(WordSpan(text, first, last) for text, first, last in header["words"])
         phones = PhoneSequence(header["phones"], arrays["edges"])
-        return Heard(phones, words, arrays["fits"], float(header["confidence"]), sound, is_recognised)
+        return Heard(phones, words, float(header["confidence"]), sound, is_recognised)
     except (DataError, KeyError):
         return None
 

@@ -115,6 +115,19 @@ def speech_channels(model: ShapeModel) -> tuple[str, ...]:
     return tuple(f"shape{i}" for i in range(model.n_speech))
 
 
+def require_appearance(talker: Talker) -> Appearance:
+    """How a talker looks.
+
+    Raises
+    ------
+    InputError
+        The talker has motion only.
+    """
+    if talker.appearance is None:
+        raise InputError(f"the talker {talker.metadata.get('name', '')} has motion only; build one with --appearance")
+    return talker.appearance
+
+
 def write_talker(path: Path, talker: Talker) -> None:
     """Write a ``.talker`` file (docs/file-formats.md).
 

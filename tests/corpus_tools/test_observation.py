@@ -64,7 +64,7 @@ def test_a_long_gap():
 
 def _heard() -> Heard:
     phones = PhoneSequence([SILENCE, "b", "i", SILENCE], [0.0, 1.0, 1.1, 1.5, 3.0])
-    return Heard(phones, (WordSpan("b", 1, 3),), np.zeros(1), -3000.0, Waveform(np.zeros(100), 100), False)
+    return Heard(phones, (WordSpan("b", 1, 3),), -3000.0, Waveform(np.zeros(100), 100), False)
 
 
 def test_a_cut_moves_phones_and_pictures_together():

@@ -5,13 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar import blend
 from tts2face.exemplar.animate import VisualVoice, chosen_tokens, read_at_frames
 from tts2face.exemplar.options import SynthesisOptions
 from tts2face.exemplar.tokens import Tokens
-from tts2face.talker import Talker
+from tts2face.talker import Talker, require_appearance
 from tts2face.types import Trajectory
 
 LOOKS_BLENDED = 3  # exemplars; more of them blur teeth and tongue (docs/decisions.md)
@@ -38,9 +37,7 @@ def looks_of(talker: Talker, voice: VisualVoice) -> Looks:
     InputError
         The talker has motion only.
     """
-    appearance = talker.appearance
-    if appearance is None:
-        raise InputError(f"the talker {talker.metadata.get('name', '')} has motion only; build one with --appearance")
+    appearance = require_appearance(talker)
     frames = np.concatenate([spoken.looks for spoken in talker.utterances if spoken.looks is not None])
     spread = np.maximum(appearance.spread, 1e-6).astype(np.float32)
     silent = np.concatenate([_silent(spoken.phones, len(spoken.shape), talker.fps) for spoken in talker.utterances])

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.talker import Talker, speech_channels
+from tts2face.talker import Talker, require_appearance, speech_channels
 from tts2face.types import Trajectory
 
 RIDGE = 0.003  # of the mean variance of the terms
@@ -46,21 +46,17 @@ def own_face(talker: Talker) -> OwnFace:
     InputError
         The talker has motion only.
     """
-    appearance = talker.appearance
-    if appearance is None:
-        raise InputError(f"the talker {talker.metadata.get('name', '')} has motion only; build one with --appearance")
+    appearance = require_appearance(talker)
     n_speech = talker.model.n_speech
     scale = np.maximum(talker.model.spread[:n_speech], 1e-6).astype(np.float32)
     n_looks = len(appearance.channels)
     first = _terms(np.zeros((1, n_speech), np.float32)).shape[1]
     normal, right = np.zeros((first, first)), np.zeros((first, n_looks))
-    n_frames = 0
     for spoken in talker.utterances:
         if spoken.looks is not None:
             terms = _terms(spoken.shape[:, :n_speech] / scale).astype(np.float64)
             normal += terms.T @ terms
             right += terms.T @ spoken.looks
-            n_frames += len(terms)
     effort = RIDGE * np.trace(normal) / first
     weights = np.linalg.solve(normal + effort * np.eye(first), right)
     return OwnFace(scale, weights.astype(np.float32), speech_channels(talker.model), appearance.channels)

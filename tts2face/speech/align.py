@@ -38,14 +38,12 @@ class Alignment:
     """Phones from 0 s to the end of the sound, one span for each word, and how well they fit.
 
     ``confidence`` is the mean log likelihood per second of speech, relative to the best fitting state of the acoustic
-    model at each instant: 0 is perfect; a wrong text lies far below a right one. ``fits`` (W,) is the same for each
-    word.
+    model at each instant: 0 is perfect; a wrong text lies far below a right one.
     """
 
     phones: PhoneSequence
     words: tuple[WordSpan, ...]
     confidence: float
-    fits: NDArray[np.float64]
 
 
 class Aligner:
@@ -178,8 +176,8 @@ def _alignment(
     starts: list[float] = []
     spans: list[WordSpan] = []
     end = 0.0
-    scores, n_frames = np.zeros(len(words)), np.zeros(len(words))
-    for number, (entry, (text, ways)) in enumerate(zip(entries, words, strict=True)):
+    score, n_frames = 0.0, 0
+    for entry, (text, ways) in zip(entries, words, strict=True):
         onset = begin + _seconds(entry.phones[0][1])
         if onset - end >= SHORTEST_S:  # silence, at the beginning too
             labels.append(SILENCE)
@@ -189,16 +187,15 @@ def _alignment(
             labels.append(phone)
             starts.append(begin + _seconds(first))
             end = begin + _seconds(first + count)
-            scores[number] += fit
-            n_frames[number] += count
+            score += fit
+            n_frames += count
     if duration - end >= SHORTEST_S:
         labels.append(SILENCE)
         starts.append(end)
     edges = np.array([*starts, duration])
     edges[0] = 0.0
-    confidence = float(scores.sum() / max(n_frames.sum(), 1.0)) * FRAME_RATE
-    fits = scores / np.maximum(n_frames, 1.0) * FRAME_RATE
-    return Alignment(PhoneSequence(labels, increasing(edges)), tuple(spans), confidence, fits)
+    confidence = score / max(n_frames, 1) * FRAME_RATE
+    return Alignment(PhoneSequence(labels, increasing(edges)), tuple(spans), confidence)
 
 
 def _seconds(frame: int) -> float:
