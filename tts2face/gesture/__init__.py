@@ -1,1 +1,1 @@
-"""Gestures: expression, brows, lids, cheeks, gaze and head, as Markov random fields over recorded styles."""
+"""Expression, brows, blinks, cheeks, gaze and head: gestures that go with speech, or with silence."""

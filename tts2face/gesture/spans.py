@@ -1,0 +1,179 @@
+"""What a timeline holds: styles and expressions over spans of time, nods, and gains; and how spans are put together.
+
+Times are seconds; spans are half open.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from types import MappingProxyType
+from typing import TypeVar
+
+from lexicon.errors import InputError
+from tts2face.palette import EXPRESSIONS, FEATURES
+
+WEIGHTS = (-0.5, 1.5)  # -e to 1 + e with e = 0.5, the middle of what Ju and Lee 2008 (section 4) allow
+GAINS = (0.0, 3.0)  # beyond three times as far, lids and brows of any face are at their limits
+GAINED = (*FEATURES, "jaw", "lips")
+NOD_SIZES = (0.1, 2.0)  # above 12 degrees a nod is a bow
+
+
+def check_feature(feature: str, known: Sequence[str] = FEATURES) -> str:
+    """A feature's name.
+
+    Raises
+    ------
+    InputError
+        There is no such feature.
+    """
+    if feature not in known:
+        raise InputError(f"there is no feature {feature!r}; choose {', '.join(known)}")
+    return feature
+
+
+@dataclass(frozen=True, slots=True)
+class StyleSpan:
+    """One feature follows a style in [start, end); `end` may be infinite."""
+
+    feature: str
+    style: str
+    start: float
+    end: float
+
+    def __post_init__(self) -> None:
+        """Refuse unknown features and times that do not run forward."""
+        check_feature(self.feature)
+        check_style(self.style)
+        _check_span(f"the span of {self.feature}", self.start, self.end)
+
+    @property
+    def lane(self) -> str:
+        """What no other span may hold at the same time."""
+        return self.feature
+
+
+@dataclass(frozen=True, slots=True)
+class ExpressionSpan:
+    """A basis expression is added with a weight in [start, end), with eased edges; `end` may be infinite."""
+
+    expression: str
+    weight: float
+    start: float
+    end: float
+
+    def __post_init__(self) -> None:
+        """Refuse unknown expressions, weights out of range, and times that do not run forward."""
+        if self.expression == "neutral":
+            raise InputError("neutral is the face at rest, of which nothing can be added; leave it away")
+        if self.expression not in EXPRESSIONS:
+            raise InputError(f"there is no expression {self.expression!r}; choose {', '.join(EXPRESSIONS)}")
+        _check_range(f"the weight of {self.expression}", self.weight, WEIGHTS)
+        _check_span(f"the span of {self.expression}", self.start, self.end)
+
+    @property
+    def lane(self) -> str:
+        """What no other span may hold at the same time."""
+        return self.expression
+
+
+@dataclass(frozen=True, slots=True)
+class Nod:
+    """The head begins to nod at a time; size 1 goes 6 degrees down."""
+
+    time: float
+    size: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse times before the clip and sizes out of range."""
+        if not 0.0 <= self.time < math.inf:
+            raise InputError(f"a nod needs a time of 0 s or more, not {self.time:g}")
+        _check_range("the size of a nod", self.size, NOD_SIZES)
+
+
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """How far each feature moves, as a factor of its style's motion; jaw and lips: of the speech's."""
+
+    factors: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Refuse unknown features and factors out of range."""
+        for feature, factor in self.factors.items():
+            check_feature(feature, GAINED)
+            _check_range(f"the gain of {feature}", factor, GAINS)
+        object.__setattr__(self, "factors", MappingProxyType(dict(self.factors)))
+
+    def of(self, feature: str) -> float:
+        """The factor of a feature, 1 where none was chosen."""
+        return self.factors.get(check_feature(feature, GAINED), 1.0)
+
+
+AnySpan = TypeVar("AnySpan", StyleSpan, ExpressionSpan)
+
+
+def check_style(style: str) -> None:
+    """Refuse a style without a name."""
+    if not style.strip():
+        raise InputError("a style needs a name; give one of the palette's")
+
+
+def _check_range(what: str, value: float, limits: tuple[float, float]) -> None:
+    low, high = limits
+    if not low <= value <= high:
+        raise InputError(f"{what} must lie between {low:g} and {high:g}, not {value:g}")
+
+
+def _check_span(what: str, start: float, end: float) -> None:
+    if not 0.0 <= start < math.inf:
+        raise InputError(f"{what} must begin at 0 s or later, not at {start:g} s")
+    if not start < end:
+        raise InputError(f"{what} must end after it begins, not run from {start:g} to {end:g} s")
+
+
+def in_order(spans: Iterable[AnySpan]) -> tuple[AnySpan, ...]:
+    """Spans by time.
+
+    Raises
+    ------
+    InputError
+        Two of one feature or expression overlap.
+    """
+    ordered = tuple(sorted(spans, key=lambda span: (span.start, span.end)))
+    lanes: dict[str, list[AnySpan]] = {}
+    for span in ordered:
+        lanes.setdefault(span.lane, []).append(span)
+    for lane, mine in lanes.items():
+        for before, after in pairwise(mine):
+            if after.start < before.end:
+                raise InputError(
+                    f"two spans of {lane} overlap: {before.start:g}-{before.end:g} s and {after.start:g}-{after.end:g} "
+                    "s; let one end before the other begins"
+                )
+    return ordered
+
+
+def moved(span: AnySpan, seconds: float) -> AnySpan:
+    """The same span, so many seconds later."""
+    return replace(span, start=span.start + seconds, end=span.end + seconds)
+
+
+def cut(spans: Iterable[AnySpan], start: float, end: float) -> tuple[AnySpan, ...]:
+    """What of some spans lies in [start, end)."""
+    return tuple(
+        replace(span, start=max(span.start, start), end=min(span.end, end))
+        for span in spans
+        if span.start < end and span.end > start
+    )
+
+
+def painted(under: Sequence[AnySpan], over: Sequence[AnySpan]) -> tuple[AnySpan, ...]:
+    """Spans with others painted over them."""
+    left = list(under)
+    for top in over:
+        mine = [span for span in left if span.lane == top.lane]
+        left = [span for span in left if span.lane != top.lane]
+        left.extend(cut(mine, -1.0, top.start))
+        left.extend(cut(mine, top.end, math.inf))
+    left.extend(over)
+    return tuple(left)

@@ -1,0 +1,181 @@
+"""The Timeline: which style each feature of the face follows when, and what is done beside: expressions, nods, gains.
+
+Times are seconds on the clock of the whole clip; spans are half open.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lexicon.errors import InputError
+from tts2face.gesture.ease import Floats, between_keys, presence
+from tts2face.gesture.spans import (
+    ExpressionSpan,
+    Gains,
+    Nod,
+    StyleSpan,
+    check_feature,
+    check_style,
+    cut,
+    in_order,
+    moved,
+    painted,
+)
+from tts2face.palette import EXPRESSIONS, Palette
+
+BLEND_S = 0.3  # from one style to the next: as long as a blink, so that no seam is seen
+ONSET_S = 0.4  # of an expression; people take 0.3-0.7 s to a smile (Schmidt et al. 2003, J. Nonverbal Behavior 27)
+# A nod: down within 0.18 s, back, a little beyond, and to rest. About 2 Hz, the ordinary head movements of speakers
+# (1.8-3.7 Hz: Hadar et al. 1983, Human Movement Science 2); seconds, and shares of NOD_RAD.
+NOD_KEYS = ((0.0, 0.0), (0.18, 1.0), (0.42, -0.1), (0.55, 0.0))
+NOD_RAD = math.radians(6.0)  # of a nod of size 1; radians, as a head moves with a stressed word
+SLACK_S = 0.05  # a span may end this much behind the clip: people round to tenths of a second
+
+
+@dataclass(frozen=True, slots=True)
+class Timeline:
+    """How the face is to behave over a clip.
+
+    Parameters
+    ----------
+    style
+        Style of each feature outside its spans; a feature without one is left to whoever animates.
+    spans, expressions
+        In order of time; those of one feature or expression may touch but not overlap.
+    """
+
+    style: Mapping[str, str] = field(default_factory=dict)
+    spans: tuple[StyleSpan, ...] = ()
+    expressions: tuple[ExpressionSpan, ...] = ()
+    nods: tuple[Nod, ...] = ()
+    gains: Gains = field(default_factory=Gains)
+
+    def __post_init__(self) -> None:
+        """Refuse unknown features and overlapping spans; put the rest in order of time."""
+        for feature, style in self.style.items():
+            check_feature(feature)
+            check_style(style)
+        object.__setattr__(self, "style", MappingProxyType(dict(self.style)))
+        object.__setattr__(self, "spans", in_order(self.spans))
+        object.__setattr__(self, "expressions", in_order(self.expressions))
+        object.__setattr__(self, "nods", tuple(sorted(self.nods, key=lambda nod: nod.time)))
+
+    @property
+    def style_names(self) -> tuple[str, ...]:
+        """Every style that is asked for, once, in order of first use."""
+        return tuple(dict.fromkeys([*self.style.values(), *(span.style for span in self.spans)]))
+
+    @property
+    def end(self) -> float:
+        """Last second at which anything is asked for; infinite ends count from where they begin."""
+        ends = [span.start if math.isinf(span.end) else span.end for span in self._all_spans]
+        return max([0.0, *ends, *(nod.time for nod in self.nods)])
+
+    @property
+    def _all_spans(self) -> tuple[StyleSpan | ExpressionSpan, ...]:
+        return (*self.spans, *self.expressions)
+
+    def style_at(self, feature: str, times: ArrayLike, *, default: str) -> tuple[str, ...]:
+        """A feature's style at each of T times, without blending; `default` where none was chosen."""
+        seconds = np.atleast_1d(np.asarray(times, np.float64))
+        base = self.style.get(check_feature(feature), default)
+        mine = [span for span in self.spans if span.feature == feature]
+        at = np.searchsorted([span.start for span in mine], seconds, side="right") - 1
+        return tuple(
+            mine[k].style if k >= 0 and second < mine[k].end else base
+            for k, second in zip(at.tolist(), seconds.tolist(), strict=True)
+        )
+
+    def style_shares(self, feature: str, times: ArrayLike, *, default: str) -> dict[str, Floats]:
+        """Share (T,) of each style in a feature at T times; they add up to 1, and blend over `BLEND_S` at edges."""
+        seconds = np.atleast_1d(np.asarray(times, np.float64))
+        base = self.style.get(check_feature(feature), default)
+        shares = {base: np.ones(len(seconds))}
+        for span in self.spans:
+            if span.feature == feature:
+                share = presence(seconds, span.start, span.end, BLEND_S)
+                shares[base] = shares[base] - share
+                shares[span.style] = shares.get(span.style, np.zeros(len(seconds))) + share
+        return {style: np.clip(share, 0.0, 1.0) for style, share in shares.items()}
+
+    def expression_weights(self, times: ArrayLike) -> Floats:
+        """Weights (T, 5) added to `EXPRESSIONS` at T times; they rise and fall within `ONSET_S` around the edges."""
+        seconds = np.atleast_1d(np.asarray(times, np.float64))
+        weights = np.zeros((len(seconds), len(EXPRESSIONS)))
+        for span in self.expressions:
+            column = EXPRESSIONS.index(span.expression)
+            weights[:, column] += span.weight * presence(seconds, span.start, span.end, ONSET_S)
+        return weights
+
+    def nod_pitch(self, times: ArrayLike) -> Floats:
+        """Radians (T,) by which nods turn the head down at T times; of nods that meet the deeper one counts."""
+        seconds = np.atleast_1d(np.asarray(times, np.float64))
+        down, up = np.zeros(len(seconds)), np.zeros(len(seconds))
+        for nod in self.nods:
+            pitch = nod.size * NOD_RAD * between_keys(seconds - nod.time, NOD_KEYS)
+            down, up = np.maximum(down, pitch), np.minimum(up, pitch)
+        return down + up
+
+    def merged(self, other: "Timeline", shift: float = 0.0) -> "Timeline":
+        """Both, the other `shift` seconds later; where they name one thing twice the other wins."""
+        later = other.shifted(shift)
+        return Timeline(
+            {**self.style, **later.style},
+            painted(self.spans, later.spans),
+            painted(self.expressions, later.expressions),
+            self.nods + later.nods,
+            Gains({**self.gains.factors, **later.gains.factors}),
+        )
+
+    def shifted(self, seconds: float) -> "Timeline":
+        """The same, so many seconds later."""
+        return replace(
+            self,
+            spans=tuple(moved(span, seconds) for span in self.spans),
+            expressions=tuple(moved(span, seconds) for span in self.expressions),
+            nods=tuple(replace(nod, time=nod.time + seconds) for nod in self.nods),
+        )
+
+    def within(self, start: float, end: float) -> "Timeline":
+        """What is asked for in [start, end), spans cut to it; on the same clock."""
+        return replace(
+            self,
+            spans=cut(self.spans, start, end),
+            expressions=cut(self.expressions, start, end),
+            nods=tuple(nod for nod in self.nods if start <= nod.time < end),
+        )
+
+    def check(self, palette: Palette, duration: float) -> None:
+        """Refuse what a palette does not hold and what lies beyond a clip.
+
+        Raises
+        ------
+        InputError
+            A style is unknown, or a time lies behind the end.
+        """
+        self.check_styles(palette)
+        self.check_duration(duration)
+
+    def check_styles(self, palette: Palette) -> None:
+        """Refuse styles that a palette does not hold; as `check`."""
+        for name in self.style_names:
+            palette.require(name)
+
+    def check_duration(self, duration: float) -> None:
+        """Refuse times beyond a clip; as `check`."""
+        for span in self._all_spans:
+            last = span.start if math.isinf(span.end) else span.end - SLACK_S
+            if max(last, span.start) >= duration:
+                raise InputError(
+                    f"the span of {span.lane} from {span.start:g} to {span.end:g} s lies beyond the clip, which lasts "
+                    f"{duration:.2f} s; shorten it"
+                )
+        for nod in self.nods:
+            if nod.time >= duration:
+                raise InputError(
+                    f"the nod at {nod.time:g} s lies beyond the clip, which lasts {duration:.2f} s; move it"
+                )
