@@ -7,17 +7,36 @@ speech averages out, and taken out of every frame.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.observation import Observation
 from corpus_tools.ridge import ridge
 from tts2face.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 
 CHUNK_S = 3.0  # a sentence: long enough for speech to average out
 LEAST_CHUNKS = 12  # with fewer nothing is taken out
 Floats = NDArray[np.float64]
+
+
+class Seen(Protocol):
+    """A recording of which landmarks (T, L, 3) without head pose and the head's pose (T, 6) are known."""
+
+    @property
+    def fps(self) -> float:
+        """Frames per second."""
+
+    @property
+    def landmarks(self) -> NDArray[np.float32]:
+        """Millimetres."""
+
+    @property
+    def head(self) -> NDArray[np.float32]:
+        """As `tts2face.types.HEAD_CHANNELS`."""
+
+
+AnySeen = TypeVar("AnySeen", bound=Seen)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,7 +47,7 @@ class PoseLeak:
     scale: Floats
     offsets: Floats
 
-    def removed(self, observation: Observation) -> Observation:
+    def removed(self, observation: AnySeen) -> AnySeen:
         """The observation with landmarks as if the head stood at the centre."""
         if not self.offsets.any():
             return observation
@@ -37,7 +56,7 @@ class PoseLeak:
         return replace(observation, landmarks=(observation.landmarks - leak).astype(np.float32))
 
 
-def pose_leak(observations: Sequence[Observation]) -> PoseLeak:
+def pose_leak(observations: Sequence[Seen]) -> PoseLeak:
     """The leak in recordings of one person; none where they are too few or where taking it out predicts nothing."""
     angles, landmarks = _chunks(observations)
     centre, scale = angles.mean(axis=0), np.maximum(angles.std(axis=0), 1e-6)
@@ -59,7 +78,7 @@ def _keeping_contact(offsets: Floats) -> Floats:
     return kept
 
 
-def without_leak(observations: Sequence[Observation]) -> tuple[Observation, ...]:
+def without_leak(observations: Sequence[AnySeen]) -> tuple[AnySeen, ...]:
     """Observations of one person without the leak that they show."""
     leak = pose_leak(observations) if observations else None
     return tuple(leak.removed(seen) for seen in observations) if leak else ()
@@ -71,7 +90,7 @@ def angle_terms(angles: NDArray[np.floating]) -> Floats:
     return np.column_stack([pitch, yaw, roll, pitch**2, yaw**2, roll**2, pitch * yaw, pitch * roll, yaw * roll])
 
 
-def _chunks(observations: Sequence[Observation]) -> tuple[Floats, Floats]:
+def _chunks(observations: Sequence[Seen]) -> tuple[Floats, Floats]:
     """Mean angles (C, 3) and landmarks (C, L, 3) of every chunk."""
     angles, landmarks = [], []
     for seen in observations:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from corpus_tools.recordings import Spoken
 from corpus_tools.watch import content_key
@@ -28,8 +27,6 @@ ALIGNMENT_VERSION = 4  # rises when alignment gives other edges, so that cached 
 HEARING = "hearing"
 HEARING_VERSION = 1  # rises when other phones are recognised
 SOUND_RATE = 16_000  # Hz; what the aligner and the recogniser hear
-LOWEST_PITCH_HZ = 100.0  # of a voice: intensity is averaged over 3.2 periods of it, 32 ms (parselmouth's rule)
-QUIETEST_DB = 0.0  # digital silence has no level; it counts as the threshold of hearing
 LONGEST_UTTERANCE_S = 20.0  # longer recordings are cut at pauses
 
 
@@ -171,25 +168,3 @@ def _aligned_before(kept: Path, sound: Waveform, *, is_recognised: bool) -> Hear
         return Heard(phones, words, float(header["confidence"]), sound, is_recognised)
     except (DataError, KeyError):
         return None
-
-
-def intensity(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(T,) level of a sound in dB at instants (T,) in seconds.
-
-    Raises
-    ------
-    DataError
-        The sound is too short to have a level.
-    """
-    import parselmouth
-
-    praat = parselmouth.Sound(sound.samples.astype(np.float64), sampling_frequency=sound.rate)
-    try:
-        levels = praat.to_intensity(minimum_pitch=LOWEST_PITCH_HZ, subtract_mean=True)
-    except parselmouth.PraatError as refused:
-        raise DataError(
-            f"a sound of {sound.duration:.3f} s is too short to measure; give a longer recording"
-        ) from refused
-    values = np.maximum(np.nan_to_num(levels.values[0], nan=QUIETEST_DB, neginf=QUIETEST_DB), QUIETEST_DB)
-    at_times: NDArray[np.float64] = np.interp(times, levels.xs(), values)
-    return at_times.astype(np.float32)

@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.checks import picture_measures, refuse, sound_measures, turn_deg
-from corpus_tools.listen import Ears, Heard, intensity
+from corpus_tools.listen import Ears, Heard
 from corpus_tools.recordings import Recording, spoken_words
 from corpus_tools.watch import Eyes, Watched
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from tts2face.speech.loudness import intensity
 from tts2face.video.grid import face_span, filled_gaps, on_grid
 from tts2face.video.pose import Posed, head_angles, remove_pose
 

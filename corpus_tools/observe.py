@@ -1,20 +1,17 @@
 """A folder of recordings, observed in parallel; what was done stays in a cache, so that a second run goes on."""
 
-import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
 from pathlib import Path
 
 from corpus_tools.effort import Effort, Progress
 from corpus_tools.listen import LONGEST_UTTERANCE_S, Ears
 from corpus_tools.observation import Observation, Timing, observed
+from corpus_tools.pool import each_done
 from corpus_tools.recordings import Recording, find_recordings, spoken_words
 from corpus_tools.sync import agreements, timings
 from corpus_tools.watch import Eyes
-from lexicon.errors import BackendError, DataError
+from lexicon.errors import DataError
 from tts2face.video.model import find_bundle
 
 STEPS = 100  # of progress for each video
@@ -129,18 +126,9 @@ def _done(
         for number, task in enumerate(tasks):
             yield task, worker.outcomes(task, _share_of(tell, number, of))
         return
-    pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_start, initargs=(cache, model))
-    try:
-        waiting = {pool.submit(_work, task): task for task in tasks}
-        for number, future in enumerate(as_completed(waiting), start=1):
-            yield waiting[future], future.result()
-            tell(STEPS * number, of)
-    except BrokenProcessPool as died:
-        raise BackendError(
-            "a process that read recordings died; run the command again (it goes on), with fewer jobs"
-        ) from died
-    finally:
-        pool.shutdown(cancel_futures=True)
+    for number, done in enumerate(each_done(tasks, _work, _start, (cache, model), jobs), start=1):
+        yield done
+        tell(STEPS * number, of)
 
 
 def _share_of(tell: Progress, number: int, of: int) -> Tell:
@@ -187,7 +175,6 @@ _worker: list[_Worker] = []  # of this process; filled once by the pool
 
 
 def _start(cache: Path, model: Path) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent stops the pool
     _worker.append(_Worker(cache, model))
 
 

@@ -18,6 +18,7 @@ from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.drives import Drive
 from tts2face.render.clock import exact_rate, first_sample
 from tts2face.request import Request
+from tts2face.sampling import cubic_at
 from tts2face.speech.features import FEATURE_RATE, speech_level
 from tts2face.speech.listener import Ear
 from tts2face.speech.script import phones_in, script
@@ -102,14 +103,8 @@ def _features(path: Path, kind: str, fps: float, gain: float) -> tuple[NDArray[n
 
 
 def between(values: NDArray[np.float32], rate: float, fps: float, n_frames: int) -> NDArray[np.float32]:
-    """(n_frames, D) values at another rate than (T, D) ones, by cubics through them (Catmull and Rom 1974)."""
-    at = np.minimum(np.arange(n_frames) / fps * rate, len(values) - 1)
-    low = at.astype(int)
-    part = (at - low)[:, None].astype(np.float32)
-    before, here, after, beyond = (values[np.clip(low + k, 0, len(values) - 1)] for k in (-1, 0, 1, 2))
-    slope_here, slope_after = (after - before) / 2, (beyond - here) / 2
-    bend, twist = 3 * (after - here) - 2 * slope_here - slope_after, 2 * (here - after) + slope_here + slope_after
-    return np.asarray(here + part * (slope_here + part * (bend + part * twist)), np.float32)
+    """(n_frames, D) values at another rate than (T, D) ones."""
+    return cubic_at(values, np.minimum(np.arange(n_frames) / fps * rate, len(values) - 1))
 
 
 def clips_in(path: Path, said: Heard, motion: Trajectory, *, volume: float) -> Iterator[Clip]:

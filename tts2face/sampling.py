@@ -1,7 +1,8 @@
-"""Pictures read at places between their pixels."""
+"""Pictures read at places between their pixels, and motion at instants between its frames."""
 
 from typing import Any
 
+import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
@@ -35,3 +36,13 @@ def sampled(picture: Array, points: Array, corners: Array, weights: Array, out: 
             y += weights[i, k] * points[corners[i, k], 1]
         for c in range(out.shape[1]):
             out[i, c] = bilinear(picture, x, y, c)
+
+
+def cubic_at(values: NDArray[np.float32], at: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(N, D) of (T, D) values at rows between them, by cubics through them (Catmull and Rom 1974)."""
+    low = np.minimum(at, len(values) - 1).astype(int)
+    part = (at - low)[:, None].astype(np.float32)
+    before, here, after, beyond = (values[np.clip(low + k, 0, len(values) - 1)] for k in (-1, 0, 1, 2))
+    slope_here, slope_after = (after - before) / 2, (beyond - here) / 2
+    bend, twist = 3 * (after - here) - 2 * slope_here - slope_after, 2 * (here - after) + slope_here + slope_after
+    return np.asarray(here + part * (slope_here + part * (bend + part * twist)), np.float32)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from corpus_tools.listen import Heard, intensity
+from corpus_tools.listen import Heard
 from corpus_tools.observation import trimmed
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
@@ -85,19 +85,3 @@ def test_a_silence_that_is_cut_away_leaves_no_phone():
 def test_words_without_a_face(begin, stop):
     with pytest.raises(DataError, match="words are spoken while no face is seen"):
         trimmed(_heard(), begin, stop)
-
-
-def test_level_of_a_known_tone():
-    tone = np.sin(2 * np.pi * 200 * np.arange(16000) / 16000) * 0.1
-    level = intensity(Waveform(tone, 16000), np.array([0.3, 0.5]))
-    expected = 20 * np.log10(0.1 / np.sqrt(2) / 2e-5)  # dB against 20 micropascals, as Praat counts
-    np.testing.assert_allclose(level, expected, atol=0.1)
-
-
-def test_digital_silence_has_a_level():
-    assert intensity(Waveform(np.zeros(16000), 16000), np.array([0.5])).tolist() == [0.0]
-
-
-def test_a_sound_too_short_for_a_level():
-    with pytest.raises(DataError, match="too short to measure"):
-        intensity(Waveform(np.zeros(50), 16000), np.array([0.0]))

@@ -1,0 +1,173 @@
+"""Fields on made recordings: against brute force, and laws that any field must keep."""
+
+import numpy as np
+import pytest
+
+from lexicon.errors import DataError, InputError
+from tts2face.gesture import field as fields
+from tts2face.gesture.field import FieldOptions, continued, field_of, resting, taken_over
+from tts2face.gesture.tree import tree_of
+
+OPTIONS = FieldOptions(history=5, candidates=3, future=4, alpha=(1.0,))
+
+
+def _recordings(seed: int, n: int = 12, length: int = 60) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Smooth motion (T, 2), its sound (T, 1), and the lengths of n recordings."""
+    generator = np.random.default_rng(seed)
+    steps = generator.normal(size=(n, length, 3))
+    smooth = np.stack([np.convolve(row, np.hanning(9), "same") for row in steps.transpose(0, 2, 1).reshape(-1, length)])
+    whole = smooth.reshape(n, 3, length).transpose(0, 2, 1).reshape(-1, 3).astype(np.float32)
+    return whole[:, :2], whole[:, 2:], np.full(n, length, np.int32)
+
+
+def _brute_force(made, state, n_best: int) -> list[int]:
+    """The nearest moments, by comparing with all of them, none within `APART` frames of a nearer one."""
+    history, future = made.options.history, made.options.future
+    ends = np.append(np.unique(made.starts)[1:], len(made.values))
+    found = []
+    for moment in range(history, len(made.values)):
+        start = made.starts[moment]
+        end = ends[np.searchsorted(ends, moment, side="right")]
+        if moment - start < history or end - moment <= future:
+            continue
+        rows = slice(moment - history, moment)
+        away = np.square(made.values[rows] - state.shown).sum() + np.square(made.heard[rows] - state.heard).sum()
+        found.append((float(away) / history, moment))
+    best: list[int] = []
+    for _, moment in sorted(found):
+        if all(made.starts[other] != made.starts[moment] or abs(other - moment) >= fields.APART for other in best):
+            best.append(moment)
+    return best[:n_best]
+
+
+def test_a_tree_holds_every_place_once_and_on_its_side():
+    places = np.random.default_rng(0).normal(size=(777, 3)).astype(np.float32)
+    tree = tree_of(places)
+    assert sorted(tree.order.tolist()) == list(range(777))
+    np.testing.assert_array_equal(tree.places, places[tree.order])
+    for node in np.flatnonzero(tree.axes >= 0):
+        children = (2 * node + 1, 2 * node + 2)
+        left, right = (tree.places[slice(*tree.spans[child]), tree.axes[node]] for child in children)
+        assert left.max() <= tree.cuts[node] <= right.min()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_search_finds_what_brute_force_finds(seed, monkeypatch):
+    values, heard, lengths = _recordings(seed)
+    made = field_of(values, heard, lengths, FieldOptions(history=5, candidates=1, future=4, alpha=(1.0,)))
+    generator = np.random.default_rng(100 + seed)
+    state = resting(made, generator.normal(size=2).astype(np.float32), np.float32([0.3]))
+    (expected,) = _brute_force(made, state, 1)
+    _, behind = continued(made, state, np.zeros((1, 1), np.float32), np.array([0.5]))
+    found = np.square(made.values[behind.moment - 5 : behind.moment] - state.shown).sum()
+    found += np.square(made.heard[behind.moment - 5 : behind.moment] - state.heard).sum()
+    nearest = np.square(made.values[expected - 5 : expected] - state.shown).sum()
+    nearest += np.square(made.heard[expected - 5 : expected] - state.heard).sum()
+    assert found <= fields.SLACK**2 * nearest + 1e-6
+
+
+def test_candidates_are_drawn_by_their_distance():
+    values, heard, lengths = _recordings(1)
+    made = field_of(values, heard, lengths, FieldOptions(history=5, candidates=3, future=4, alpha=(1.0,), sigma=0.5))
+    state = resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32))
+    best = _brute_force(made, state, 3)
+    chances = (np.arange(3000) + 0.5) / 3000
+    drawn = [continued(made, state, np.zeros((1, 1), np.float32), np.array([chance]))[1].moment for chance in chances]
+    away = []
+    for moment in best:
+        rows = slice(moment - 5, moment)
+        squares = np.square(made.values[rows] - state.shown).sum() + np.square(made.heard[rows] - state.heard).sum()
+        away.append(squares / 5)
+    shares = np.exp((away[0] - np.array(away)) / (0.5 * made.nearness))
+    expected = shares / shares.sum()
+    got = [drawn.count(moment) / len(drawn) for moment in best]
+    np.testing.assert_allclose(got, expected, atol=2 / 3000)
+
+
+def test_in_parts_as_at_once():
+    values, heard, lengths = _recordings(2)
+    made = field_of(values, heard, lengths, OPTIONS)
+    generator = np.random.default_rng(3)
+    sound, chances = generator.normal(size=(200, 1)).astype(np.float32), generator.random(200)
+    start = resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32))
+    whole, _ = continued(made, start, sound, chances)
+    parts, state = [], start
+    for low, high in ((0, 1), (1, 50), (50, 50), (50, 200)):
+        part, state = continued(made, state, sound[low:high], chances[low:high])
+        parts.append(part)
+    np.testing.assert_array_equal(np.concatenate(parts), whole)
+
+
+def test_without_leaps_a_recording_is_repeated():
+    values, heard, lengths = _recordings(4, n=1, length=300)
+    options = FieldOptions(history=5, future=20, alpha=(1.0,), continuity=0.0, sigma=1e-6)
+    made = field_of(values, heard, lengths, options)
+    state = fields.FieldState(
+        made.values[20:25], made.heard[20:25], 24, np.zeros(2, np.float32), np.zeros(0, np.int64), 0
+    )
+    shown, behind = continued(made, state, heard[25:150], np.full(125, 0.5))
+    assert behind.moment == 149
+    np.testing.assert_allclose(shown, values[25:150], atol=1e-5)
+
+
+def test_after_a_leap_motion_goes_on_from_where_it_was():
+    values, heard, lengths = _recordings(5)
+    made = field_of(values, heard, lengths, FieldOptions(history=5, future=4, alpha=(5.0,), settle_s=0.2))
+    generator = np.random.default_rng(6)
+    sound = generator.normal(size=(600, 1)).astype(np.float32)
+    start = resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32))
+    shown, _ = continued(made, start, sound, generator.random(600))
+    recorded = np.abs(np.diff(values.reshape(12, 60, 2), axis=1)).max()
+    assert np.abs(np.diff(shown, axis=0)).max() < 1.5 * recorded
+
+
+def test_no_dead_end_and_no_loop_in_silence():
+    values, heard, lengths = _recordings(7)
+    made = field_of(values, heard, lengths, OPTIONS)
+    start = resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32))
+    moments, state = [], start
+    generator = np.random.default_rng(8)
+    for _ in range(1500):
+        _, state = continued(made, state, np.zeros((1, 1), np.float32), generator.random(1))
+        moments.append(state.moment)
+    assert len(set(moments[:500])) > 100
+    assert set(moments[1000:]) - set(moments[500:1000])
+
+
+def test_another_style_goes_on_where_the_first_stood():
+    values, heard, lengths = _recordings(9)
+    first = field_of(values, heard, lengths, OPTIONS)
+    second = field_of(2.0 * values[::-1].copy(), heard[::-1].copy(), lengths, OPTIONS)
+    state = resting(first, np.float32([1.0, 2.0]), np.float32([0.5]))
+    there = taken_over(state, first, second)
+    np.testing.assert_allclose(there.shown * second.scale, state.shown * first.scale, rtol=1e-6)
+    np.testing.assert_allclose(there.heard / second.weights, state.heard / first.weights, rtol=1e-6)
+
+
+def test_too_short_recordings():
+    values, heard, _ = _recordings(10, n=1, length=9)
+    with pytest.raises(DataError, match="no recording of the style has 10 frames"):
+        field_of(values, heard, np.array([9], np.int32), OPTIONS)
+
+
+def test_sound_without_weight():
+    values, heard, lengths = _recordings(11)
+    with pytest.raises(InputError, match="2 sound features need as many weights, not 1"):
+        field_of(values, np.repeat(heard, 2, axis=1), lengths, OPTIONS)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "reason"),
+    [
+        ({"history": 0}, "history and stride are 1 to 60"),
+        ({"stride": 61}, "history and stride are 1 to 60"),
+        ({"memory": -1}, "remembers 0 to 1000 leaps, not -1"),
+        ({"candidates": 17}, "1 to 16 candidates, not 17"),
+        ({"alpha": (-1.0,)}, "alpha must not be negative"),
+        ({"sigma": 0.0}, "sigma and settling time must be above 0"),
+        ({"continuity": 1.5}, "continuity must lie from 0 to 1, not 1.5"),
+    ],
+)
+def test_options_out_of_range(wrong, reason):
+    with pytest.raises(InputError, match=reason):
+        FieldOptions(**wrong)

@@ -1,0 +1,402 @@
+"""Markov random fields over recorded gestures: each frame is drawn from moments like the present one.
+
+Ju and Lee 2008, section 5.1: the next value is that of a recorded moment whose last frames, and the sound in them, are
+most like those just shown; one of the few best, drawn with a probability that falls with its distance.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError, InputError
+from tts2face.gesture.tree import Tree, tree_of
+from tts2face.palette import GESTURE_FPS
+
+DIMENSIONS = 8  # of the search: the windows' principal axes
+SAMPLED = 8  # every so many windows tell the axes; all of them tell the same
+SLACK = 1.1  # moments are found that are at most so much farther than the best; the paper's search has one, too
+ASKED = 200  # moments whose nearest ones are looked for
+APART = 10  # frames between two moments that count as different
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FieldOptions:
+    """How a field chooses; the defaults were chosen on recordings (docs/gestures.md).
+
+    Parameters
+    ----------
+    history
+        Frames that are compared; h of the paper.
+    candidates
+        Moments among which is drawn.
+    alpha
+        Weight of each sound feature against the motion, both in units of their variance.
+    sigma
+        A moment that is farther by sigma is e times less likely; in units of how far the recorded moment lies that is
+        most like another one (median).
+    stride
+        Frames from draw to draw; the paper draws every frame.
+    continuity
+        The moment that goes on from the last one counts as nearer by this factor: 1 as in the paper; less leaps less.
+    future
+        Frames that must follow a moment in its recording to be leapt to: at a recording's end there is no way on.
+    settle_s
+        Seconds in which what is left of a leap falls to 1 / e.
+    memory
+        Leaps after which the same moment may be leapt to again: without it silence ends in a loop.
+
+    Raises
+    ------
+    InputError
+        A number lies outside its range.
+    """
+
+    history: int = 10
+    candidates: int = 2
+    alpha: tuple[float, ...] = (3.0, 1.0)
+    sigma: float = 0.05
+    stride: int = 3
+    continuity: float = 0.05
+    future: int = 25
+    settle_s: float = 0.07
+    memory: int = 30
+
+    def __post_init__(self) -> None:
+        """Refuse numbers outside their range."""
+        if not 1 <= self.history <= 60 or not 1 <= self.stride <= 60 or not 0 <= self.future <= 600:
+            raise InputError("a field's history and stride are 1 to 60 frames, its future 0 to 600")
+        if not 0 <= self.memory <= 1000:
+            raise InputError(f"a field remembers 0 to 1000 leaps, not {self.memory}")
+        if not 1 <= self.candidates <= 16:
+            raise InputError(f"a field draws among 1 to 16 candidates, not {self.candidates}")
+        if min(self.alpha, default=0.0) < 0 or not self.sigma > 0 or not self.settle_s > 0:
+            raise InputError("a field's alpha must not be negative, its sigma and settling time must be above 0")
+        if not 0 <= self.continuity <= 1:
+            raise InputError(f"a field's continuity must lie from 0 to 1, not {self.continuity}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Field:
+    """A feature of a style, made ready to be continued.
+
+    Parameters
+    ----------
+    values : (T, D)
+        Recorded motion over `scale`.
+    heard : (T, E)
+        Recorded sound features times `weights`.
+    starts : (T,)
+        First frame of the recording that each frame belongs to.
+    axes : (p, h (E + D))
+        Directions of the search.
+    scale, weights : float, (E,)
+        What motion is divided by, and sound multiplied by.
+    nearness
+        Mean squared distance of a moment from the one most like it; median.
+    """
+
+    values: Floats
+    heard: Floats
+    starts: NDArray[np.int32]
+    axes: Floats
+    tree: Tree
+    scale: float
+    weights: Floats
+    nearness: float
+    options: FieldOptions
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FieldState:
+    """Where a field stands.
+
+    Parameters
+    ----------
+    shown, heard : (h, D), (h, E)
+        The last frames, scaled and weighted as the field's.
+    moment
+        The recorded frame that was shown last, -1 for none.
+    offset : (D,)
+        What is left of leaps.
+    recent : (m,)
+        Moments that were leapt to last, the oldest first.
+    n_frames
+        Frames shown so far.
+    """
+
+    shown: Floats
+    heard: Floats
+    moment: int
+    offset: Floats
+    recent: NDArray[np.int64]
+    n_frames: int
+
+
+def field_of(values: Floats, heard: Floats, lengths: NDArray[np.int32], options: FieldOptions) -> Field:
+    """Index recorded motion (T, D) with the sound (T, E) that went with it; recordings of `lengths` (R,) frames.
+
+    Raises
+    ------
+    InputError
+        There are fewer weights `alpha` than sound features.
+    DataError
+        No recording is long enough.
+    """
+    if len(options.alpha) < heard.shape[1]:
+        raise InputError(f"{heard.shape[1]} sound features need as many weights, not {len(options.alpha)}")
+    starts = np.repeat(np.cumsum(lengths) - lengths, lengths).astype(np.int32)
+    frames = np.arange(len(values))
+    left = starts + np.repeat(lengths, lengths) - frames
+    usable = np.flatnonzero((frames - starts >= options.history) & (left > options.future))
+    if not len(usable):
+        least = options.history + options.future + 1
+        raise DataError(
+            f"no recording of the style has {least} frames ({least / GESTURE_FPS:.1f} s); record longer ones"
+        )
+    scale = float(np.sqrt(np.square(values - values.mean(axis=0)).sum(axis=1).mean())) or 1.0
+    spread = np.maximum(heard.std(axis=0), 1e-6)
+    weights = (np.sqrt(np.array(options.alpha[: heard.shape[1]])) / spread).astype(np.float32)
+    scaled = np.ascontiguousarray(values / np.float32(scale), np.float32)
+    weighted = np.ascontiguousarray(heard * weights, np.float32)
+    axes = _principal_axes(_windows(scaled, weighted, usable[::SAMPLED], options.history))
+    tree = tree_of(_windows(scaled, weighted, usable, options.history) @ axes.T)
+    tree.order[:] = usable[tree.order]
+    made = Field(scaled, weighted, starts, axes, tree, scale, weights, 1.0, options)
+    return replace(made, nearness=_nearness(made, usable))
+
+
+def _nearness(made: Field, usable: NDArray[np.int64]) -> float:
+    moments = usable[np.linspace(0, len(usable) - 1, min(ASKED, len(usable))).astype(int)]
+    away = np.zeros(len(moments))
+    _nearest(_corpus(made), _walked(made.tree), made.axes, made.options.history, (moments, away))
+    return max(float(np.median(away[np.isfinite(away)])) if np.isfinite(away).any() else 1.0, 1e-9)
+
+
+def _corpus(made: Field) -> tuple[Floats, Floats, NDArray[np.int32]]:
+    return made.values, made.heard, made.starts
+
+
+def _walked(tree: Tree) -> tuple[NDArray[Any], ...]:
+    return tree.places, tree.order, tree.spans, tree.axes, tree.cuts
+
+
+def _windows(values: Floats, heard: Floats, frames: NDArray[np.int64], history: int) -> Floats:
+    """(N, h (E + D)) what was heard and shown before each of N frames."""
+    rows = frames[:, None] + np.arange(-history, 0)
+    return np.concatenate([heard[rows].reshape(len(rows), -1), values[rows].reshape(len(rows), -1)], axis=1)
+
+
+def _principal_axes(windows: Floats) -> Floats:
+    away = (windows - windows.mean(axis=0)).astype(np.float64)
+    _, vectors = np.linalg.eigh(np.asarray(away.T @ away))
+    return np.ascontiguousarray(vectors[:, ::-1][:, :DIMENSIONS].T, np.float32)
+
+
+def _none(made: Field) -> NDArray[np.int64]:
+    """No leaps to remember; of few recordings fewer, so that some moment is always left."""
+    return np.full(min(made.options.memory, len(made.tree.order) // (8 * APART)), -APART, np.int64)
+
+
+def resting(field: Field, rest: Floats, silence: Floats) -> FieldState:
+    """The state of a face that has been at rest (D,) in silence (E,), in the units of the recordings."""
+    history = field.options.history
+    shown = np.repeat((rest / np.float32(field.scale))[None], history, axis=0).astype(np.float32)
+    heard = np.repeat((silence * field.weights)[None], history, axis=0).astype(np.float32)
+    return FieldState(shown, heard, -1, np.zeros(len(rest), np.float32), _none(field), 0)
+
+
+def taken_over(state: FieldState, before: Field, after: Field) -> FieldState:
+    """The state of one style's field, from which another style's field of the same feature goes on."""
+    shown = state.shown * np.float32(before.scale / after.scale)
+    heard = state.heard / np.maximum(before.weights, np.float32(1e-9)) * after.weights
+    recent = _none(after)
+    return FieldState(shown, heard.astype(np.float32), -1, np.zeros_like(state.offset), recent, state.n_frames)
+
+
+def continued(
+    field: Field, state: FieldState, heard: Floats, chances: NDArray[np.float64]
+) -> tuple[Floats, FieldState]:
+    """The next n frames (n, D), in the units of the recordings, and the state behind them; in parts as at once.
+
+    Parameters
+    ----------
+    heard : (n, E)
+        Sound features of these frames; each frame is chosen by those before it.
+    chances : (n,)
+        Uniform in [0, 1), one for each frame.
+    """
+    if not len(chances):
+        return np.zeros((0, len(state.offset)), np.float32), state
+    options, history = field.options, field.options.history
+    shown = np.concatenate([state.shown, np.zeros((len(chances), len(state.offset)), np.float32)])
+    sound = np.concatenate([state.heard, (heard * field.weights).astype(np.float32)])
+    moments, offset, recent = np.zeros(len(chances), np.int64), state.offset.copy(), state.recent.copy()
+    fade = np.float32(np.exp(-1.0 / (options.settle_s * GESTURE_FPS)))
+    _continue(
+        _corpus(field),
+        _walked(field.tree),
+        field.axes,
+        (history, options.candidates, options.sigma * field.nearness, options.stride, options.continuity, fade),
+        (shown, sound, moments, offset, recent, state.moment, state.n_frames, chances),
+    )
+    behind = shown[-history:].copy(), sound[-history:].copy(), int(moments[-1]), offset, recent
+    return shown[history:] * np.float32(field.scale), FieldState(*behind, state.n_frames + len(chances))
+
+
+@njit(cache=True, nogil=True)
+def _nearest(corpus, tree, axes, history, asked):  # type: ignore[no-untyped-def]
+    """Write how far the nearest different moment lies from each of some."""
+    values, recorded, _ = corpus
+    moments, away = asked
+    best, distance = np.zeros(2, np.int64), np.zeros(2)
+    stack, bounds = np.zeros(128, np.int64), np.zeros(128)
+    query = np.zeros(len(axes), np.float32)
+    for n in range(len(moments)):
+        best[:], distance[:] = -1, np.inf
+        window = (values[moments[n] - history : moments[n]], recorded[moments[n] - history : moments[n]], 0, history)
+        _project(window, axes, query)
+        _search(corpus, tree, window, query, (best[:0], best, distance, stack, bounds))
+        away[n] = distance[1]
+
+
+@njit(cache=True, nogil=True)
+def _continue(corpus, tree, axes, options, track):  # type: ignore[no-untyped-def]
+    """Write the frames shown and the moments they come from."""
+    values, _, starts = corpus
+    history, n_candidates, sigma, stride, continuity, fade = options
+    shown, heard, moments, offset, recent, moment, n_before, chances = track
+    none = recent[:0]
+    best, distance = np.zeros(n_candidates, np.int64), np.zeros(n_candidates)
+    stack, bounds = np.zeros(128, np.int64), np.zeros(128)
+    query = np.zeros(len(axes), np.float32)
+    for i in range(len(chances)):
+        following = moment + 1
+        goes_on = moment >= 0 and following < len(values) and starts[following] == starts[moment]
+        chosen = following
+        if not goes_on or (n_before + i) % stride == 0:
+            best[:], distance[:] = -1, np.inf
+            if goes_on:
+                away = continuity * _apart(corpus, (shown, heard, i, history), following, np.inf)
+                _offer(following, away, (starts, none), (best, distance))
+            _project((shown, heard, i, history), axes, query)
+            _search(corpus, tree, (shown, heard, i, history), query, (recent, best, distance, stack, bounds))
+            chosen = _drawn(best, distance, sigma, chances[i])
+        for d in range(len(offset)):
+            if not goes_on or chosen != following:
+                offset[d] = shown[i + history - 1, d] - values[chosen - 1, d]
+            offset[d] *= fade
+            shown[i + history, d] = values[chosen, d] + offset[d]
+        if len(recent) and (not goes_on or chosen != following):
+            recent[:-1] = recent[1:].copy()
+            recent[-1] = chosen
+        moment = moments[i] = chosen
+
+
+@njit(cache=True, nogil=True)
+def _drawn(best, distance, sigma, chance):  # type: ignore[no-untyped-def]
+    """One of the moments found, by the chance."""
+    total = 0.0
+    for c in range(len(best)):
+        if best[c] >= 0:
+            total += np.exp((distance[0] - distance[c]) / sigma)
+    left, chosen = chance * total, best[0]
+    for c in range(len(best)):
+        if best[c] >= 0:
+            chosen = best[c]
+            left -= np.exp((distance[0] - distance[c]) / sigma)
+            if left < 0.0:
+                break
+    return chosen
+
+
+@njit(cache=True, nogil=True)
+def _offer(moment, away, known, found):  # type: ignore[no-untyped-def]
+    """Keep a moment among the best ones if it is nearer than those that it is hardly different from, and not recent."""
+    starts, recent = known
+    best, distance = found
+    at = len(best) - 1
+    if away >= distance[at]:
+        return
+    for r in range(len(recent)):
+        if abs(recent[r] - moment) < APART:
+            return
+    for c in range(len(best)):
+        if best[c] >= 0 and starts[best[c]] == starts[moment] and abs(best[c] - moment) < APART:
+            if away >= distance[c]:
+                return
+            at = c
+            break
+    while at > 0 and distance[at - 1] > away:
+        best[at], distance[at] = best[at - 1], distance[at - 1]
+        at -= 1
+    best[at], distance[at] = moment, away
+
+
+@njit(cache=True, nogil=True)
+def _apart(corpus, window, moment, limit):  # type: ignore[no-untyped-def]
+    """Mean squared distance of what was shown and heard from what came before a moment; any number above `limit`."""
+    values, recorded, _ = corpus
+    shown, heard, i, history = window
+    total, most = 0.0, limit * history
+    for j in range(history):
+        row, there = i + history - 1 - j, moment - 1 - j
+        for d in range(values.shape[1]):
+            gap = shown[row, d] - values[there, d]
+            total += gap * gap
+        for e in range(recorded.shape[1]):
+            gap = heard[row, e] - recorded[there, e]
+            total += gap * gap
+        if total > most:
+            break
+    return total / history
+
+
+@njit(cache=True, nogil=True)
+def _project(window, axes, query):  # type: ignore[no-untyped-def]
+    shown, heard, i, history = window
+    n_heard, n_shown = heard.shape[1], shown.shape[1]
+    for p in range(len(axes)):
+        total = 0.0
+        for j in range(history):
+            for e in range(n_heard):
+                total += axes[p, j * n_heard + e] * heard[i + j, e]
+            for d in range(n_shown):
+                total += axes[p, history * n_heard + j * n_shown + d] * shown[i + j, d]
+        query[p] = total
+
+
+@njit(cache=True, nogil=True)
+def _search(corpus, tree, window, query, found):  # type: ignore[no-untyped-def]
+    """Offer every moment that may be among the best ones; the nearer half of each node first.
+
+    A place's distance from the query is at most that of the windows: the axes are orthonormal.
+    """
+    places, order, spans, axes, cuts = tree
+    recent, best, distance, stack, bounds = found
+    history = window[3]
+    slack = SLACK * SLACK / history
+    height = 1
+    stack[0], bounds[0] = 0, 0.0
+    while height > 0:
+        height -= 1
+        node, bound = stack[height], bounds[height]
+        while bound * slack < distance[-1] and axes[node] >= 0:
+            side = query[axes[node]] - cuts[node]
+            near = 2 * node + 2 if side > 0 else 2 * node + 1
+            stack[height], bounds[height] = 4 * node + 3 - near, max(bound, side * side)
+            height += 1
+            node = near
+        if bound * slack >= distance[-1]:
+            continue
+        for at in range(spans[node, 0], spans[node, 1]):
+            squared = 0.0
+            for p in range(len(query)):
+                squared += (query[p] - places[at, p]) ** 2
+            if squared < distance[-1] * history:
+                moment = np.int64(order[at])
+                away = _apart(corpus, window, moment, distance[-1])
+                _offer(moment, away, (corpus[2], recent), (best, distance))

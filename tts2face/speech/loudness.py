@@ -1,0 +1,66 @@
+"""How loud and how high a voice is, frame by frame: what gestures follow."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+from tts2face.types import Waveform
+
+LOWEST_PITCH_HZ = 100.0  # of a voice: intensity is averaged over 3.2 periods of it, 32 ms (parselmouth's rule)
+QUIETEST_DB = 0.0  # digital silence has no level; it counts as the threshold of hearing
+PITCH_RANGE_HZ = (75.0, 600.0)  # Praat's own
+SEMITONES = 12.0  # in an octave
+
+
+def intensity(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(T,) level of a sound in dB at instants (T,) in seconds.
+
+    Raises
+    ------
+    DataError
+        The sound is too short to have a level.
+    """
+    import parselmouth
+
+    try:
+        levels = _praat(sound).to_intensity(minimum_pitch=LOWEST_PITCH_HZ, subtract_mean=True)
+    except parselmouth.PraatError as refused:
+        raise DataError(
+            f"a sound of {sound.duration:.3f} s is too short to measure; give a longer recording"
+        ) from refused
+    values = np.maximum(np.nan_to_num(levels.values[0], nan=QUIETEST_DB, neginf=QUIETEST_DB), QUIETEST_DB)
+    at_times: NDArray[np.float64] = np.interp(times, levels.xs(), values)
+    return at_times.astype(np.float32)
+
+
+def pitch(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(T,) semitones against the sound's median pitch at instants (T,) in seconds; 0 where nothing is voiced.
+
+    Raises
+    ------
+    DataError
+        The sound is too short to have a pitch.
+    """
+    import parselmouth
+
+    low, high = PITCH_RANGE_HZ
+    try:
+        found = _praat(sound).to_pitch_ac(pitch_floor=low, pitch_ceiling=high)
+    except parselmouth.PraatError as refused:
+        raise DataError(
+            f"a sound of {sound.duration:.3f} s is too short to have a pitch; give a longer one"
+        ) from refused
+    hertz = np.interp(times, found.xs(), found.selected_array["frequency"])
+    nearest = np.clip(np.rint((times - found.xs()[0]) / found.dx).astype(int), 0, found.n_frames - 1)
+    voiced = found.selected_array["frequency"][nearest] > low
+    if not voiced.any():
+        return np.zeros(len(times), np.float32)
+    median = float(np.median(hertz[voiced]))
+    semitones = SEMITONES * np.log2(np.maximum(hertz, low) / median)
+    return np.where(voiced, semitones, 0.0).astype(np.float32)
+
+
+def _praat(sound: Waveform):  # type: ignore[no-untyped-def] # parselmouth has no types
+    import parselmouth
+
+    return parselmouth.Sound(sound.samples.astype(np.float64), sampling_frequency=sound.rate)
