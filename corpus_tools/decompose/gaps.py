@@ -1,0 +1,73 @@
+"""Gaps in marker tracks: short ones filled and told, long ones refused."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+
+LONGEST_GAP_S = 0.2  # half a blink with its pause; what a face does in longer gaps nobody knows
+MOST_NAMED = 4  # markers in a sentence
+
+Floats = NDArray[np.float64]
+
+
+def filled(tracks: Floats, names: Sequence[str], fps: float) -> tuple[Floats, tuple[str, ...]]:
+    """Tracks without gaps, and a sentence that says what was filled.
+
+    Parameters
+    ----------
+    tracks : (T, M, 3)
+        NaN in gaps.
+
+    Raises
+    ------
+    DataError
+        A gap is longer than `LONGEST_GAP_S`; the sentence names the marker and the time.
+
+    Notes
+    -----
+    Inside, by a curve that does not overshoot (PCHIP, Fritsch and Carlson 1980); at the ends the nearest place stays.
+    """
+    whole, counts = tracks.copy(), {}
+    for marker, name in enumerate(names):
+        gone = np.asarray(np.isnan(tracks[:, marker]).any(axis=1))
+        if not gone.any():
+            continue
+        _check(name, gone, fps)
+        whole[gone, marker] = _bridged(tracks[:, marker], gone)
+        counts[name] = int(gone.sum())
+    if not counts:
+        return whole, ()
+    named = ", ".join(f"{name} ({count} frames)" for name, count in list(counts.items())[:MOST_NAMED])
+    more = f" and {len(counts) - MOST_NAMED} more" if len(counts) > MOST_NAMED else ""
+    return whole, (f"gaps were filled in {named}{more}",)
+
+
+def gaps_of(gone: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(G, 2) first frame and one past the last of each run of True in (T,)."""
+    borders = np.flatnonzero(np.diff(np.concatenate([[False], gone, [False]])))
+    return borders.reshape(-1, 2)
+
+
+def _check(name: str, gone: NDArray[np.bool_], fps: float) -> None:
+    begin, end = max(gaps_of(gone).tolist(), key=lambda gap: gap[1] - gap[0])
+    if gone.all():
+        raise DataError(f"the marker {name} is never seen; leave it out of the marker set, or capture it again")
+    if (end - begin) / fps > LONGEST_GAP_S:
+        raise DataError(
+            f"the marker {name} is out of sight for {(end - begin) / fps:.2f} s from {begin / fps:.2f} s on, and gaps "
+            f"up to {LONGEST_GAP_S:g} s can be filled; fill it where it was captured, or leave it out of the marker set"
+        )
+
+
+def _bridged(track: Floats, gone: NDArray[np.bool_]) -> Floats:
+    """(G, 3) places in the frames that are gone."""
+    from scipy.interpolate import PchipInterpolator
+
+    there = np.flatnonzero(~gone)
+    if len(there) == 1:
+        return np.repeat(track[there], gone.sum(), axis=0)
+    at = np.clip(np.flatnonzero(gone), there[0], there[-1])
+    return np.asarray(PchipInterpolator(there, track[there])(at))

@@ -1,0 +1,145 @@
+"""Recordings of every source on one clock: films, Live Link captures, and their resampling."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from corpus_tools.decompose.captured import Captured, at_gesture_rate, resampled, sound_of
+from corpus_tools.decompose.face_motion import moved_landmarks, rest_landmarks
+from corpus_tools.decompose.film import captured_film
+from corpus_tools.decompose.livelink import captured_livelink
+from corpus_tools.observation import Observation, Quality
+from lexicon.errors import DataError, InputError
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.face.linear import posed_vertices
+from tts2face.face.model import Face
+from tts2face.landmarks import N_LANDMARKS
+from tts2face.mimic import motion_of_capture
+from tts2face.types import Trajectory, Waveform
+from tts2face.video.livelink import read_livelink
+
+
+def still(n_frames: int, fps: float) -> Captured:
+    wave = np.sin(2 * np.pi * 2.0 * np.arange(n_frames) / fps)
+    landmarks = np.ones((n_frames, N_LANDMARKS, 3), np.float32) * wave[:, None, None]
+    return Captured("made", fps, landmarks.astype(np.float32), np.zeros((n_frames, 6), np.float32))
+
+
+@pytest.mark.parametrize("fps", [24.0, 25.0, 30.0, 60.0, 120.0])
+def test_a_movement_keeps_its_time_and_size_at_thirty_frames(fps: float) -> None:
+    read = at_gesture_rate(still(round(fps * 4), fps))
+    assert read.fps == 30.0
+    expected = np.sin(2 * np.pi * 2.0 * np.arange(len(read.landmarks)) / 30.0)
+    # A frame's mean of a 2 Hz movement is 0.7 % smaller than its middle; splines of 24 frames are nearer.
+    assert np.abs(read.landmarks[1:-1, 0, 0] - expected[1:-1]).max() < 0.01
+    assert abs(len(read.landmarks) / 30.0 - 4.0) <= 1 / 30.0
+
+
+def test_what_is_too_fast_does_not_come_back_as_something_slow() -> None:
+    fps = 120.0
+    fast = np.cos(2 * np.pi * 29.0 * np.arange(480) / fps)[:, None]  # every fourth frame of it: a movement at 1 Hz
+    assert np.abs(fast[::4]).max() == 1.0
+    assert np.abs(resampled(fast, fps, 30.0)[2:-2]).max() < 0.05
+
+
+def test_the_same_rate_changes_nothing_and_one_frame_stays_one() -> None:
+    values = np.random.default_rng(1).normal(size=(20, 2, 3))
+    np.testing.assert_allclose(resampled(values, 25.0, 25.0), values, atol=1e-12)
+    np.testing.assert_array_equal(resampled(values[:1], 25.0, 30.0), values[:1])
+
+
+def test_a_rate_of_nothing_is_refused() -> None:
+    with pytest.raises(InputError, match="above 0"):
+        resampled(np.zeros((3, 2)), 25.0, 0.0)
+
+
+def test_frames_without_a_face_are_refused() -> None:
+    good = still(5, 30.0)
+    gone = good.landmarks.copy()
+    gone[2] = np.nan
+    with pytest.raises(DataError, match="frames without a face"):
+        replace(good, landmarks=gone)
+
+
+def test_head_poses_of_another_length_are_refused() -> None:
+    with pytest.raises(DataError, match="head poses"):
+        replace(still(5, 30.0), head=np.zeros((4, 6), np.float32))
+
+
+def test_an_unknown_feature_is_refused() -> None:
+    with pytest.raises(InputError, match="no feature 'ears'"):
+        replace(still(5, 30.0), missing=frozenset({"ears"}))
+
+
+def test_landmarks_follow_the_face_s_own_posing(face: Face) -> None:
+    generator = np.random.default_rng(2)
+    weights = generator.uniform(0, 0.6, (4, len(face.shape_names)))
+    found = moved_landmarks(face, Trajectory(face.shape_names, weights, 30.0))
+    for row, places in zip(weights, found, strict=True):
+        vertices = posed_vertices(face, row.astype(np.float32)).astype(float)
+        expected = np.einsum("lk,lkd->ld", face.landmark_weights, vertices[face.landmark_vertices])
+        np.testing.assert_allclose(places[face.landmarks], expected, atol=0.001)  # float32 of 100 mm
+
+
+def test_weights_of_other_shapes_are_refused(face: Face) -> None:
+    with pytest.raises(DataError, match="not of this face's shapes"):
+        moved_landmarks(face, Trajectory(("jawOpen",), np.zeros((2, 1)), 30.0))
+
+
+def test_a_face_without_all_landmarks_is_refused(face: Face) -> None:
+    fewer = replace(
+        face,
+        landmarks=face.landmarks[:-1],
+        landmark_vertices=face.landmark_vertices[:-1],
+        landmark_weights=face.landmark_weights[:-1],
+    )
+    with pytest.raises(DataError, match="477 of 478 landmarks"):
+        rest_landmarks(fewer)
+
+
+def test_a_live_link_capture_moves_the_face_with_its_head_and_sound(shared_recordings: Path, face: Face) -> None:
+    folder = shared_recordings / "livelink"
+    path = folder / "testset_arkit61_60fps.csv"
+    found = captured_livelink(path, face, sound=folder / "testset_audio.flac")
+    assert found.fps == 60.0
+    assert found.missing == frozenset()
+    assert found.sound is not None
+    assert found.sound.duration == pytest.approx(len(found.landmarks) / found.fps, abs=0.3)
+    weights = motion_of_capture(read_livelink(path), face).face.values
+    jaw = weights[:, face.shape_names.index("jawOpen")]
+    assert np.corrcoef(jaw, -found.landmarks[:, 152, 1])[0, 1] > 0.95
+    read = at_gesture_rate(found)
+    assert len(read.landmarks) == (len(found.landmarks) + 1) // 2
+
+
+def test_sound_of_the_same_name_is_found(shared_recordings: Path, tmp_path: Path) -> None:
+    capture = tmp_path / "take.csv"
+    assert sound_of(capture) is None
+    (tmp_path / "take.flac").write_bytes((shared_recordings / "livelink" / "testset_audio.flac").read_bytes())
+    found = sound_of(capture)
+    assert found is not None
+    assert found.rate == 16_000
+
+
+@pytest.mark.parametrize(("cut", "first"), [(0.5, 8000), (-0.25, -4000)])
+def test_a_film_brings_its_sound_on_the_clock_of_its_frames(cut: float, first: int) -> None:
+    n_frames, fps = 50, 25.0
+    seen = Observation(
+        name="film",
+        fps=fps,
+        landmarks=np.zeros((n_frames, N_LANDMARKS, 3), np.float32),
+        head=np.zeros((n_frames, 6), np.float32),
+        phones=PhoneSequence([SILENCE], [0.0, 2.0]),
+        words=(),
+        intensity=np.zeros(n_frames, np.float32),
+        quality=Quality(confidence=0.0, score=1.0, n_filled=0, cut=0.4, lag=cut - 0.4),
+        video=Path("film.mp4"),
+    )
+    ramp = np.arange(64_000, dtype=np.float32) / 64_000
+    sound = captured_film(seen, Waveform(ramp, 16_000)).sound
+    assert sound is not None
+    assert sound.duration == pytest.approx(2.0, abs=1e-4)
+    at = np.arange(len(sound.samples)) + first
+    np.testing.assert_allclose(sound.samples, np.where(at < 0, 0.0, ramp[np.maximum(at, 0)]), atol=1e-6)

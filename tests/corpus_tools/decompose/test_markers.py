@@ -1,0 +1,280 @@
+"""Marker capture: what was made is found again, through real C3D files and tables; damage is told in a sentence."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from corpus_tools.decompose.gaps import LONGEST_GAP_S, filled, gaps_of
+from corpus_tools.decompose.marker_files import read_c3d, read_markers
+from corpus_tools.decompose.marker_set import MarkerSet, read_marker_set
+from corpus_tools.decompose.markers import captured_markers, marker_face, still_of_markers
+from lexicon.errors import DataError, InputError
+from tests.corpus_tools.decompose.made_markers import FPS, SIZE, Made, write_c3d, write_table
+from tts2face.face.model import Face
+from tts2face.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
+
+REST = slice(0, 60)  # the made performance's frames at rest
+
+
+@pytest.fixture
+def c3d() -> None:
+    pytest.importorskip("ezc3d", reason="needs `pip install 'tts2face[capture]'`")
+
+
+def at_rest(made: Made, path: Path) -> Path:
+    return write_table(path, made.names, made.points[REST])
+
+
+def gap(landmarks: np.ndarray) -> np.ndarray:
+    return landmarks[:, UPPER_LIP_INNER_MID, 1] - landmarks[:, LOWER_LIP_INNER_MID, 1]
+
+
+@pytest.mark.usefixtures("c3d")
+def test_a_c3d_file_gives_head_face_and_sound_again(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+    sound = np.sin(np.arange(len(made.points) * 100) * 0.1) * 3.0
+    path = write_c3d(tmp_path / "take.c3d", made.names, made.points / 1000, units="m", sound=sound)
+    found = captured_markers(path, face, worn, neutral=at_rest(made, tmp_path / "rest.csv"))
+    assert found.fps == FPS
+    assert found.missing == {"gaze"}
+    assert found.notes == ()
+    assert found.sound is not None
+    assert found.sound.duration == pytest.approx(len(made.points) / FPS, abs=0.001)
+    assert np.abs(found.sound.samples).max() == pytest.approx(1.0)
+    worn_at = list(worn.landmarks.values())
+    truth = made.landmarks - made.landmarks[0]
+    moved = found.landmarks - found.landmarks[0]
+    away = np.linalg.norm(moved - truth, axis=2)
+    # The person's axes are found from the markers: a turn of 0.3 degrees moves 10 mm of motion by 0.05 mm.
+    assert away[:, worn_at].max() < 0.1
+    # Between markers: a quarter of what moves at all.
+    assert np.sqrt(np.square(away[:, :468]).mean()) < 0.25 * np.sqrt(np.square(truth[:, :468]).sum(axis=2).mean())
+    turns = found.head[:, :3] - found.head[:, :3].mean(axis=0)
+    assert np.degrees(np.abs(turns - (made.head[:, :3] - made.head[:, :3].mean(axis=0)))).max() < 2.0
+    shifts = found.head[:, 3:] - np.median(found.head[:, 3:], axis=0)
+    assert np.abs(shifts - (made.head[:, 3:] - np.median(made.head[:, 3:], axis=0))).max() < 3.0
+
+
+def test_rest_is_the_person_s_own_size(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+    rest = marker_face(at_rest(made, tmp_path / "rest.csv"), face, worn)
+    eyes = np.linalg.norm(rest.spread.rest[33] - rest.spread.rest[263])
+    assert eyes == pytest.approx(np.linalg.norm(made.landmarks[0, 33] - made.landmarks[0, 263]), abs=0.1)
+    assert rest.spread.size == pytest.approx(1 / SIZE, rel=0.01)
+    still = still_of_markers(write_table(tmp_path / "still.csv", made.names, made.points[200:201].repeat(5, 0)), rest)
+    np.testing.assert_allclose(
+        still[70] - rest.spread.rest[70], made.landmarks[200, 70] - made.landmarks[0, 70], atol=0.1
+    )
+
+
+def test_lips_open_and_lids_close_although_no_marker_lies_inside_them(
+    made: Made, face: Face, worn: MarkerSet, tmp_path: Path
+) -> None:
+    path = write_table(tmp_path / "take.csv", made.names, made.points)
+    found = captured_markers(path, face, worn)
+    assert np.corrcoef(gap(found.landmarks), gap(made.landmarks))[0, 1] > 0.95
+    lids = [take[:, 159, 1] - take[:, 145, 1] for take in (found.landmarks, made.landmarks)]
+    assert np.corrcoef(lids)[0, 1] > 0.95
+    np.testing.assert_allclose(found.landmarks[:, 468:], found.landmarks[:1, 468:].repeat(len(found.landmarks), 0))
+    assert found.notes == ("the recording's median stands for the face at rest",)
+
+
+def test_gaps_are_filled_and_told(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+    whole = captured_markers(write_table(tmp_path / "whole.csv", made.names, made.points), face, worn)
+    points = made.points.copy()
+    points[100:115, made.names.index("LBRO2")] = np.nan
+    points[:5, made.names.index("JAW1")] = np.nan
+    points[200:230, made.names.index("HED3")] = np.nan  # four others show the pose
+    found = captured_markers(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+    assert "gaps were filled in LBRO2 (15 frames), JAW1 (5 frames)" in found.notes
+    assert np.abs(found.landmarks - whole.landmarks).max() < 0.5
+    np.testing.assert_allclose(found.head, whole.head, atol=1e-3)
+
+
+def test_a_long_gap_is_refused_with_its_time(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+    points = made.points.copy()
+    points[120:150, made.names.index("LBRO2")] = np.nan
+    with pytest.raises(DataError, match=r"take\.csv: the marker LBRO2 is out of sight for 0\.25 s from 1\.00 s on"):
+        captured_markers(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+
+
+def test_a_marker_never_seen_is_refused(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+    points = made.points.copy()
+    points[:, made.names.index("LBRO2")] = np.nan
+    with pytest.raises(DataError, match="LBRO2 is never seen"):
+        captured_markers(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+
+
+def test_a_missing_marker_is_told_and_a_missing_region_refused(
+    made: Made, face: Face, worn: MarkerSet, tmp_path: Path
+) -> None:
+    one = [number for number, name in enumerate(made.names) if name != "LIP3"]
+    found = captured_markers(
+        write_table(tmp_path / "one.csv", tuple(made.names[k] for k in one), made.points[:, one]), face, worn
+    )
+    assert "the file has no marker LIP3; its region goes by the others" in found.notes
+    none = [number for number, name in enumerate(made.names) if not name.startswith("LBRO")]
+    path = write_table(tmp_path / "none.csv", tuple(made.names[k] for k in none), made.points[:, none])
+    with pytest.raises(DataError, match=r"no marker of the region brow_left \(LBRO1, LBRO2"):
+        captured_markers(path, face, worn)
+
+
+def test_a_set_without_brows_tells_nothing_of_them(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+    table = tmp_path / "set.tsv"
+    lines = Path("corpus_tools/decompose/markers_68.tsv").read_text().splitlines()
+    table.write_text("# no brows\n" + "\n".join(line for line in lines if "brow" not in line) + "\n")
+    fewer = read_marker_set(table)
+    path = write_table(tmp_path / "take.csv", made.names, made.points)
+    assert captured_markers(path, face, fewer).missing == {"gaze", "brows", "expression"}
+
+
+def test_a_file_of_other_markers_is_refused(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+    path = write_table(tmp_path / "take.csv", tuple(f"m{k}" for k in range(len(made.names))), made.points)
+    with pytest.raises(DataError, match="none of the set's markers; it has m0, m1"):
+        captured_markers(path, face, worn)
+
+
+def test_a_wrong_unit_is_refused(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+    path = write_table(tmp_path / "take.csv", made.names, made.points / 10)
+    with pytest.raises(DataError, match=r"0\.09\d+ times as far apart as on a face"):
+        captured_markers(path, face, worn)
+
+
+def test_a_head_that_is_not_rigid_is_refused(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+    points = made.points.copy()
+    points[:, made.names.index("HED2")] += 80 * np.sin(np.arange(len(points)) / 20)[:, None]
+    with pytest.raises(DataError, match="do not move as one"):
+        captured_markers(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+
+
+def test_head_markers_on_a_line_are_refused(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+    points = made.points.copy()
+    head = [made.names.index(name) for name in worn.head]
+    points[:, head] = points[:, head[:1]] + np.arange(len(head))[:, None] * [10.0, 0.0, 0.0]
+    with pytest.raises(DataError, match="on a line"):
+        captured_markers(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+
+
+@pytest.mark.usefixtures("c3d")
+@pytest.mark.parametrize(("units", "factor"), [("mm", 1.0), ("cm", 0.1), ("m", 0.001)])
+def test_units_of_a_c3d_file(made: Made, tmp_path: Path, units: str, factor: float) -> None:
+    take = read_c3d(write_c3d(tmp_path / "take.c3d", made.names, made.points[:5] * factor, units=units))
+    np.testing.assert_allclose(take.points, made.points[:5], rtol=1e-5)
+    assert take.names == made.names
+
+
+@pytest.mark.usefixtures("c3d")
+def test_gaps_of_a_c3d_file_are_nan_and_nothing_is_sound(made: Made, tmp_path: Path) -> None:
+    points = made.points[:5].copy()
+    points[2, 7] = np.nan
+    points[3, 8] = 0.0
+    take = read_c3d(write_c3d(tmp_path / "take.c3d", made.names, points))
+    gone = np.isnan(take.points).any(axis=2)
+    assert np.argwhere(gone).tolist() == [[2, 7], [3, 8]]
+    assert take.sound is None
+
+
+@pytest.mark.usefixtures("c3d")
+def test_an_unknown_unit_is_refused(made: Made, tmp_path: Path) -> None:
+    path = write_c3d(tmp_path / "take.c3d", made.names, made.points[:5], units="px")
+    with pytest.raises(DataError, match="'px'; POINT:UNITS must be mm"):
+        read_markers(path)
+
+
+@pytest.mark.usefixtures("c3d")
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.5])
+def test_a_c3d_file_that_breaks_off_is_refused(made: Made, tmp_path: Path, share: float) -> None:
+    path = write_c3d(tmp_path / "take.c3d", made.names, made.points)
+    content = path.read_bytes()
+    path.write_bytes(content[: int(share * len(content))])
+    with pytest.raises(DataError, match="damaged, or no C3D file"):
+        read_markers(path)
+
+
+def test_a_table_that_counts_frames_needs_a_rate(made: Made, tmp_path: Path) -> None:
+    path = write_table(tmp_path / "take.csv", made.names, made.points[:9], first="frame")
+    with pytest.raises(InputError, match="give its frames a second"):
+        read_markers(path)
+    take = read_markers(path, 120.0)
+    np.testing.assert_allclose(take.points, made.points[:9], atol=1e-5)
+    assert take.fps == 120.0
+
+
+def test_frames_that_a_table_leaves_out_are_gaps_and_rounded_times_do_no_harm(made: Made, tmp_path: Path) -> None:
+    path = write_table(tmp_path / "take.csv", made.names, made.points)
+    header, *rows = path.read_text().splitlines()
+    rounded = [f"{float(row.split(',')[0]):.3f},{row.partition(',')[2]}" for row in rows]
+    path.write_text("\n".join([header, *rounded[:50], *rounded[55:]]) + "\n")
+    take = read_markers(path)
+    assert take.fps == pytest.approx(FPS, abs=0.05)
+    assert len(take.points) == len(made.points)
+    assert np.flatnonzero(np.isnan(take.points[:, 0, 0])).tolist() == [50, 51, 52, 53, 54]
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (lambda lines: ["clock" + lines[0][4:], *lines[1:]], "needs the columns time or frame"),
+        (lambda lines: [lines[0].replace("RBRO2_y", "RBRO2_w"), *lines[1:]], "look at RBRO2"),
+        (lambda lines: [lines[0], lines[1] + ",1", *lines[2:]], "line 2 of .* has 227 columns, not 226"),
+        (lambda lines: [lines[0], lines[1], "x" + lines[2][1:], *lines[3:]], "line 3 of .* cannot be read"),
+        (lambda lines: [lines[0], lines[2], lines[1], *lines[3:]], "must rise from row to row"),
+        (lambda lines: [lines[0], *("0.004" + line[6:] if line[:6] == "0.0083" else line for line in lines[1:])],
+         "does not run evenly"),
+    ],
+)  # fmt: skip
+def test_a_damaged_table_is_refused(made: Made, tmp_path: Path, change: object, reason: str) -> None:
+    path = write_table(tmp_path / "take.csv", made.names, made.points[:20])
+    path.write_text("\n".join(change(path.read_text().splitlines())) + "\n")
+    with pytest.raises(DataError, match=reason):
+        read_markers(path)
+
+
+def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no file of markers"):
+        read_markers(tmp_path / "take.bvh")
+    with pytest.raises(InputError, match="there is no capture"):
+        read_markers(tmp_path / "take.csv")
+
+
+def test_the_shipped_set_is_the_paper_s_number_of_markers(worn: MarkerSet) -> None:
+    assert len(worn.face) == 68
+    assert len(worn.head) == 7
+    assert worn.untold == {"gaze"}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ("marker\t", "name\t", "not a marker set"),
+        ("RBRO1\tbrow_right\t70", "RBRO1\tbrow_right", "it needs marker, region, landmark"),
+        ("RBRO1\t", "RBRO2\t", "RBRO2 twice"),
+        ("RBRO1\tbrow_right", "RBRO1\teyebrow", "region 'eyebrow'"),
+        ("RBRO1\tbrow_right\t70", "RBRO1\tbrow_right\t478", "landmark '478'"),
+        ("RBRO1\tbrow_right\t70", "RBRO1\tbrow_right\t63", "two markers at the landmark 63"),
+    ],
+)
+def test_a_damaged_set_is_refused(tmp_path: Path, old: str, new: str, reason: str) -> None:
+    path = tmp_path / "set.tsv"
+    path.write_text(Path("corpus_tools/decompose/markers_68.tsv").read_text().replace(old, new, 1))
+    with pytest.raises(DataError, match=reason):
+        read_marker_set(path)
+
+
+def test_a_set_without_a_head_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "set.tsv"
+    lines = Path("corpus_tools/decompose/markers_68.tsv").read_text().splitlines()
+    path.write_text("\n".join(line for line in lines if "\thead\t" not in line) + "\n")
+    with pytest.raises(DataError, match="0 markers of the region head; a head's pose takes at least 3"):
+        read_marker_set(path)
+
+
+def test_a_gap_is_bridged_without_overshoot() -> None:
+    track = np.zeros((40, 1, 3))
+    track[20:] = 1.0
+    track[15:25] = np.nan
+    whole, notes = filled(track, ("A",), 100.0)
+    assert whole.min() >= 0.0
+    assert whole.max() <= 1.0
+    assert notes == ("gaps were filled in A (10 frames)",)
+    assert gaps_of(np.isnan(track[:, 0, 0])).tolist() == [[15, 25]]
+    assert LONGEST_GAP_S * 100.0 > 10
