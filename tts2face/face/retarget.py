@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence
 from tts2face.face.bounded import bounded_least_squares
+from tts2face.face.fit import landmark_motion, landmark_places, turn_onto
 from tts2face.face.model import Face
 from tts2face.landmarks import (
     INNER_LIP_LOWER,
@@ -107,27 +108,21 @@ def retargeter(talker: Talker, face: Face, *, contact: FloatArray | None = None)
         The face lacks the lips' landmarks, or has no shape that speech could move.
     """
     moving = np.array([i for i, name in enumerate(face.shape_names) if name.startswith(SPEECH_SHAPES)])
-    _check_lips(face, moving)
+    require_lips(face, moving)
     common = [landmark for landmark in MOUTH_REGION if landmark in set(face.landmarks.tolist())]
     at = {landmark: row for row, landmark in enumerate(common)}
-    rest, per_weight = _landmarks(face, moving)
+    rest, per_weight = landmark_places(face), landmark_motion(face, moving)
     turn, scale = _onto_face(talker, face, rest)
     moved = per_weight[[int(np.flatnonzero(face.landmarks == landmark)[0]) for landmark in common]]
     wanted = _displacements(talker, common, scale * turn)
-    weights = _row_weights(common)
-    weighted = moved * weights[..., None]
-    curvature = np.einsum("ldk,ldj->kj", weighted, moved)
-    effort = EFFORT * np.trace(curvature) / len(moving)
+    weighted = moved * _row_weights(common)[..., None]
     pull = np.einsum("ldk,lds->ks", weighted, wanted)
     left, right = ([at[corner] for corner in corners] for corners in (CORNERS_LEFT, CORNERS_RIGHT))
     upper, lower = ([at[lip] for lip in lips] for lips in (INNER_LIP_UPPER, INNER_LIP_LOWER))
     widened, opened = moved[left, 0] - moved[right, 0], moved[upper, 1] - moved[lower, 1]
-    curvature += WIDTH_WEIGHT * product(widened.T, widened) + GAP_WEIGHT * product(opened.T, opened)
-    curvature += effort * np.eye(len(moving))
     pull += WIDTH_WEIGHT * product(widened.T, wanted[left, 0] - wanted[right, 0])
     chin = [at[landmark] for landmark in CHIN_POINTS if landmark in at]
     dropped = moved[chin, 1].mean(axis=0)
-    curvature += CHIN_WEIGHT * np.outer(dropped, dropped)
     pull += CHIN_WEIGHT * np.outer(dropped, wanted[chin, 1].mean(axis=0))
     contact = scale * (contact_gaps(talker) if contact is None else contact)
     gaps = _talker_gaps(talker, scale * turn[1], contact)
@@ -135,7 +130,7 @@ def retargeter(talker: Talker, face: Face, *, contact: FloatArray | None = None)
         shape_names=face.shape_names,
         moving=moving,
         limits=face.limits[moving].astype(np.float64),
-        curvature=curvature,
+        curvature=mouth_curvature(moved, common) + GAP_WEIGHT * product(opened.T, opened),
         pull=pull,
         gaps=gaps,
         contact=contact,
@@ -143,6 +138,25 @@ def retargeter(talker: Talker, face: Face, *, contact: FloatArray | None = None)
         gap_pull=GAP_WEIGHT * opened.T,
         lip_pull=(weighted[upper, 1] - weighted[lower, 1]).T / 2,
     )
+
+
+def mouth_curvature(moved: FloatArray, common: list[int]) -> FloatArray:
+    """(k, k) normal matrix of what is seen of a mouth, its lip gaps excepted, and of the effort.
+
+    Parameters
+    ----------
+    moved : (L, 3, k)
+        Motion of the landmarks `common` per weight, mm.
+    """
+    at = {landmark: row for row, landmark in enumerate(common)}
+    curvature: FloatArray = np.einsum("ldk,ldj->kj", moved * _row_weights(common)[..., None], moved)
+    effort = EFFORT * np.trace(curvature) / moved.shape[-1]
+    left, right = ([at[corner] for corner in corners] for corners in (CORNERS_LEFT, CORNERS_RIGHT))
+    widened = moved[left, 0] - moved[right, 0]
+    curvature += WIDTH_WEIGHT * product(widened.T, widened) + effort * np.eye(moved.shape[-1])
+    dropped = moved[[at[landmark] for landmark in CHIN_POINTS if landmark in at], 1].mean(axis=0)
+    curvature += CHIN_WEIGHT * np.outer(dropped, dropped)
+    return curvature
 
 
 def product(a: NDArray[np.floating], b: NDArray[np.floating]) -> FloatArray:
@@ -161,21 +175,14 @@ def inner_product_map(source: NDArray[np.floating], target: NDArray[np.floating]
     return np.asarray(target, np.float64) @ np.asarray(source, np.float64).T
 
 
-def _check_lips(face: Face, moving: NDArray[np.int64]) -> None:
+def require_lips(face: Face, moving: NDArray[np.int64]) -> None:
+    """Refuse a face that lacks lips' landmarks, or has no shapes that move them (DataError)."""
     known = set(face.landmarks.tolist())
     lips = (*INNER_LIP_UPPER, *INNER_LIP_LOWER, *OUTER_LIP_UPPER, *OUTER_LIP_LOWER)
     missing = [landmark for landmark in lips if landmark not in known]
     if missing or not len(moving):
         what = f"landmark {missing[0]} of the lips" if missing else "shapes named jaw... or mouth..."
         raise DataError(f"the face lacks {what}, so no speech can move it; build it with its landmark table")
-
-
-def _landmarks(face: Face, moving: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
-    """(L, 3) landmarks of the face at rest, and (L, 3, k) their motion per weight, mm."""
-    mixed = face.landmark_weights.astype(np.float64)[..., None]
-    rest = (face.vertices[face.landmark_vertices] * mixed).sum(axis=1)
-    per_weight = [(face.shapes[k][face.landmark_vertices] * mixed).sum(axis=1) for k in moving]
-    return rest, np.stack(per_weight, axis=-1)
 
 
 def _displacements(talker: Talker, common: list[int], onto_face: FloatArray) -> FloatArray:
@@ -200,13 +207,9 @@ def _onto_face(talker: Talker, face: Face, rest: FloatArray) -> tuple[FloatArray
     model = talker.model
     own = (model.mean + np.einsum("m,mld->ld", model.rest, model.basis)).astype(np.float64)
     rows = {int(landmark): row for row, landmark in enumerate(face.landmarks)}
-    of_talker, of_face = own[face.landmarks], rest
-    inertia = product((of_talker - of_talker.mean(axis=0)).T, of_face - of_face.mean(axis=0))
-    left, _, right = np.linalg.svd(inertia)
-    mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
     width = np.linalg.norm(rest[rows[MOUTH_CORNER_LEFT]] - rest[rows[MOUTH_CORNER_RIGHT]])
-    turn = np.round((left @ mirror @ right).T, 9)  # the last bits of an SVD depend on the threads of LAPACK
-    return turn, float(width / np.linalg.norm(own[MOUTH_CORNER_LEFT] - own[MOUTH_CORNER_RIGHT]))
+    own_width = np.linalg.norm(own[MOUTH_CORNER_LEFT] - own[MOUTH_CORNER_RIGHT])
+    return turn_onto(own[face.landmarks], rest), float(width / own_width)
 
 
 def _talker_gaps(talker: Talker, up: FloatArray, contact: FloatArray) -> FloatArray:

@@ -1,0 +1,303 @@
+"""Gestures on real faces: lips stay in charge, lids meet, regions stay local."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from lexicon.errors import DataError, InputError
+from tests.face.gestures import BROWS, CHEEKS, palette, posed_landmarks
+from tts2face.api import synthesize
+from tts2face.face.carry import eye_distance
+from tts2face.face.expressions import expression_landmarks, expression_table, expressive
+from tts2face.face.file import load_face
+from tts2face.face.fit import landmark_places
+from tts2face.face.gestures import LID_RIMS, LIPS, GestureFace, gesture_face
+from tts2face.face.linear import rigged
+from tts2face.face.model import Face
+from tts2face.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT
+from tts2face.palette import EXPRESSIONS
+from tts2face.request import Request
+from tts2face.talker import load_talker
+from tts2face.types import HEAD_CHANNELS, Trajectory
+
+FACES = ("head", "cartoon")
+BILABIALS = "Bob may bump my pump; Pam probably maps a big bamboo bomb to Mum. You choose two blue shoes."
+CONTACT_MM = 0.3  # gaps up to this are closed lips: half a pixel of a face that fills 512 of them
+KEPT_MM = 0.05  # a contact may open, or lips sink into each other, by no more: nobody sees a tenth of a pixel
+UPPER_LIDS, LOWER_LIDS = (386, 159), (374, 145)
+MASK = {name: i for i, name in enumerate(EXPRESSIONS)}
+
+
+@cache
+def ready(name: str) -> GestureFace:
+    return gesture_face(load_face(name), palette())
+
+
+@cache
+def spoken(name: str) -> Trajectory:
+    return synthesize(Request(text=BILABIALS), load_talker("grid_s1"), load_face(name)).motion
+
+
+def silence(face: Face, n_frames: int = 1) -> Trajectory:
+    return Trajectory(face.shape_names, np.zeros((n_frames, len(face.shape_names))), 25.0)
+
+
+def felt(n_frames: int, **weights: float) -> dict[str, np.ndarray]:
+    """Basis expressions held for all frames."""
+    values = np.zeros((n_frames, len(EXPRESSIONS)), np.float32)
+    for name, weight in weights.items():
+        values[:, MASK[name]] = weight
+    return {"expression": values}
+
+
+def at(face: Face, landmarks: tuple[int, ...]) -> list[int]:
+    rows = {int(landmark): row for row, landmark in enumerate(face.landmarks)}
+    return [rows[landmark] for landmark in landmarks]
+
+
+def gaps(face: Face, weights: np.ndarray) -> np.ndarray:
+    """(T, P) heights of facing inner lip points over each other, beyond those of the face at rest, mm."""
+    posed = posed_landmarks(face, weights)[:, :, 1] - landmark_places(face)[:, 1]
+    return posed[:, at(face, INNER_LIP_UPPER)] - posed[:, at(face, INNER_LIP_LOWER)]
+
+
+def width(face: Face, weights: np.ndarray) -> np.ndarray:
+    left, right = at(face, (MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT))
+    posed = posed_landmarks(face, weights)
+    return posed[:, left, 0] - posed[:, right, 0]
+
+
+def lid_openings(face: Face, weights: np.ndarray) -> np.ndarray:
+    posed = posed_landmarks(face, weights)[:, :, 1]
+    return posed[:, at(face, UPPER_LIDS)] - posed[:, at(face, LOWER_LIDS)]
+
+
+@pytest.mark.parametrize("name", FACES)
+@pytest.mark.parametrize(
+    ("weights", "gains"),
+    [
+        ({"happy": 1, "surprised": 1}, {"jaw": 1.5}),
+        ({"sad": 1}, {}),
+        ({"afraid": 1}, {"lips": 1.5}),
+        ({"angry": 1.2}, {}),
+        ({}, {"jaw": 2.0}),
+    ],
+)
+def test_an_expression_never_opens_closed_lips(name: str, weights: dict[str, float], gains: dict[str, float]) -> None:
+    """The paper's own warning (section 7). Real speech full of /p b m/."""
+    face, speech = ready(name), spoken(name)
+    plain = gaps(face.face, face.perform(speech, {}).motion.values)
+    moved = gaps(face.face, face.perform(speech, felt(len(speech), **weights), gains).motion.values)
+    closed = plain <= CONTACT_MM
+    assert closed[:, 5].sum() > 20
+    assert (moved - plain)[closed].max() < KEPT_MM
+    assert (moved - np.minimum(plain, 0)).min() > -KEPT_MM
+
+
+@pytest.mark.parametrize("name", FACES)
+def test_neutral_gestures_leave_speech_as_it_is(name: str) -> None:
+    face, speech = ready(name), spoken(name)
+    calm = felt(len(speech), sad=0.05, happy=0.15, afraid=0.02, angry=0.05, surprised=0.1)
+    calm |= {"blink": np.zeros((len(speech), 2), np.float32), "cheeks": np.full((len(speech), 2), 0.5, np.float32)}
+    plain, moved = (face.perform(speech, gestures).motion.values for gestures in ({}, calm))
+    for measured in (lambda weights: gaps(face.face, weights)[:, 5], lambda weights: width(face.face, weights)):
+        assert np.corrcoef(measured(plain), measured(moved))[0, 1] > 0.99
+
+
+def test_a_smile_leaves_rounded_lips_round() -> None:
+    face, speech = ready("head"), spoken("head")
+    plain, smiling = (
+        width(face.face, face.perform(speech, gestures).motion.values) for gestures in ({}, felt(len(speech), happy=1))
+    )
+    roundest = plain.argmin()
+    rest = width(face.face, np.zeros((1, len(face.face.shape_names))))[0]
+    smile = width(face.face, face.perform(silence(load_face("head")), felt(1, happy=1)).motion.values)[0]
+    assert plain[roundest] < rest - 3
+    assert smiling[roundest] < smile - 6
+
+
+@pytest.mark.parametrize("name", FACES)
+def test_without_gestures_speech_passes_unchanged(name: str) -> None:
+    face, speech = ready(name), spoken(name)
+    performed = face.perform(speech, {})
+    assert np.array_equal(performed.motion.values[:, : face.n_own], speech.values)
+    assert not performed.motion.values[:, face.n_own :].any()
+    assert performed.head.channels == HEAD_CHANNELS
+    assert not performed.head.values.any()
+
+
+def test_a_louder_jaw_opens_wider() -> None:
+    face, speech = ready("head"), spoken("head")
+    plain, loud, low = (gaps(face.face, face.perform(speech, {}, {"jaw": g}).motion.values)[:, 5] for g in (1, 1.5, 0))
+    assert loud.max() > 1.2 * plain.max()
+    assert low.max() < 0.7 * plain.max()
+
+
+@pytest.mark.parametrize("name", FACES)
+@pytest.mark.parametrize("down", [-0.15, 0.0, 0.17, 0.3])
+@pytest.mark.parametrize("mood", [{}, {"happy": 1}, {"surprised": 1}, {"sad": 1}])
+def test_lids_shut_by_their_share_wherever_the_eyes_look(name: str, down: float, mood: dict[str, float]) -> None:
+    face = ready(name)
+    shares = np.array([0, 0.25, 0.5, 0.75, 1], np.float32)
+    gestures = felt(5, **mood) | {
+        "blink": np.column_stack([shares, shares]),
+        "gaze": np.tile(np.array([down, 0], np.float32), (5, 1)),
+    }
+    performed = face.perform(silence(load_face(name), 5), gestures)
+    opening = lid_openings(face.face, performed.motion.values)
+    assert (opening[0] > 3).all()  # mm
+    assert np.abs(opening[-1]).max() < 0.8  # lids meet within a lash's width
+    assert (np.diff(opening, axis=0) < 0).all()
+
+
+def test_one_eye_winks_and_a_negative_share_opens_wider() -> None:
+    face = ready("head")
+    weights = face.perform(silence(load_face("head")), {"blink": np.array([[1, -0.3]], np.float32)}).motion.values
+    rest = lid_openings(face.face, np.zeros_like(weights))[0]
+    left, right = lid_openings(face.face, weights)[0]
+    assert abs(left) < 0.8
+    assert right == pytest.approx(1.3 * rest[1], rel=0.1)
+
+
+@pytest.mark.parametrize("name", FACES)
+@pytest.mark.parametrize("gaze", [(0.17, 0.0), (-0.17, 0.0), (0.0, 0.17), (0.0, -0.17), (0.1, 0.12)])
+def test_eyes_look_where_they_are_told(name: str, gaze: tuple[float, float]) -> None:
+    face = ready(name)
+    weights = face.perform(silence(load_face(name)), {"gaze": np.array([gaze], np.float32)}).motion.values[0]
+    turns = rigged(face.face).eye_turns
+    for turn in np.einsum("ekc,k->ec", turns, weights):
+        assert turn == pytest.approx([*gaze, 0], abs=1e-5)
+
+
+@pytest.mark.parametrize("name", FACES)
+@pytest.mark.parametrize(("feature", "landmarks"), [("brows", BROWS), ("cheeks", CHEEKS)])
+def test_regions_move_their_landmarks_and_leave_lips_and_lids(
+    name: str, feature: str, landmarks: tuple[int, ...]
+) -> None:
+    """Landmarks rise 4 mm on the talker; a face moves in proportion to its size, and nothing far away does."""
+    face = ready(name)
+    raised = np.array([[4 * np.sqrt(len(landmarks)), 0]], np.float32)
+    weights = face.perform(silence(load_face(name)), {feature: raised}).motion.values
+    moved = (posed_landmarks(face.face, weights) - landmark_places(face.face))[0]
+    assert 2 < moved[at(face.face, landmarks), 1].mean() < 8
+    assert np.abs(moved[at(face.face, tuple({*LIPS, *LID_RIMS}))]).max() < 0.3  # mm; they lie inside triangles
+    shape = face.face.shapes[face.face.shape_names.index(f"{feature}0")]
+    still = {
+        "sclera",
+        "iris",
+        "teeth_upper",
+        "teeth_lower",
+        "gums_upper",
+        "gums_lower",
+        "tongue",
+        "hair_locks",
+        "shirt",
+    }
+    for part in face.face.parts:
+        used = face.face.triangles[part.first : part.first + part.count]
+        assert part.name not in still or not shape[used].any()
+    support = 0.31 * eye_distance(face.face)
+    moving, kept = (
+        KDTree(landmark_places(face.face)[at(face.face, some)]).query(face.face.vertices, p=np.inf)[0] > support
+        for some in (landmarks, (*landmarks, *LIPS, *LID_RIMS))
+    )
+    assert not shape[kept].any()
+    assert np.abs(shape[moving]).max() < 0.05 * np.abs(shape).max()
+
+
+def test_the_head_moves_and_gains_multiply() -> None:
+    face = ready("head")
+    gestures = felt(2, happy=0.4) | {"head": np.full((2, 6), 0.1, np.float32)}
+    gestures |= {"brows": np.ones((2, 2), np.float32), "gaze": np.full((2, 2), 0.1, np.float32)}
+    still = silence(load_face("head"), 2)
+    doubled = face.perform(still, gestures, dict.fromkeys(("expression", "head", "brows", "gaze"), 2.0))
+    same = face.perform(still, {name: 2 * values for name, values in gestures.items()})
+    assert np.array_equal(doubled.motion.values, same.motion.values)
+    assert np.array_equal(doubled.head.values, np.full((2, 6), 0.2, np.float32))
+
+
+def test_frames_do_not_know_each_other() -> None:
+    face, speech = ready("head"), spoken("head")
+    values = np.random.default_rng(1).uniform(-0.1, 1.1, (len(speech), 5)).astype(np.float32)
+    whole = face.perform(speech, {"expression": values}).motion.values
+    part = face.perform(Trajectory(speech.channels, speech.values[40:50], speech.fps), {"expression": values[40:50]})
+    assert np.array_equal(whole[40:50], part.motion.values)
+    low, high = face.face.limits.T
+    assert (whole >= low - 1e-6).all()
+    assert (whole <= high + 1e-6).all()
+
+
+def renamed(face: Face, kept: tuple[str, ...]) -> Face:
+    """A rig with other names, but for shapes whose names begin so; its eyes do not turn."""
+    names = tuple(name if name.startswith(kept) else f"rig_{i}" for i, name in enumerate(face.shape_names))
+    return replace(face, shape_names=names, eyes=tuple(replace(eye, turns={}) for eye in face.eyes))
+
+
+@pytest.mark.parametrize("kept", [("jaw", "mouth"), ("jaw", "mouthClose", "mouthF", "mouthPucker", "eyeBlink")])
+def test_a_rig_with_other_names_gestures_as_the_one_it_is_made_of(kept: tuple[str, ...]) -> None:
+    """The default head with its shapes renamed: what is carried by landmarks does what its own shapes did."""
+    head = load_face("head")
+    face, known = gesture_face(renamed(head, kept), palette()), ready("head")
+    for name in EXPRESSIONS:
+        there, here = (
+            posed_landmarks(one.face, one.perform(silence(own), felt(1, **{name: 1})).motion.values)[0, :468]
+            for one, own in ((known, head), (face, renamed(head, kept)))
+        )
+        rest = landmark_places(head)[:468]
+        assert np.corrcoef((there - rest).ravel(), (here - rest).ravel())[0, 1] > 0.9
+    shut = face.perform(silence(renamed(head, kept)), {"blink": np.ones((1, 2), np.float32)}).motion.values
+    assert np.abs(lid_openings(face.face, shut)).max() < 0.8
+    looking = face.perform(silence(renamed(head, kept)), {"gaze": np.array([[0.1, 0.1]], np.float32)}).motion.values[0]
+    for turn in np.einsum("ekc,k->ec", rigged(face.face).eye_turns, looking):
+        assert turn == pytest.approx([0.1, 0.1, 0], abs=1e-5)
+
+
+def test_basis_expressions_have_closed_lips_and_open_eyes() -> None:
+    for name in FACES:
+        face = load_face(name)
+        moved = expression_landmarks(face)
+        assert moved.shape == (len(EXPRESSIONS), 478, 3)
+        lips = moved[:, INNER_LIP_UPPER, 1] - moved[:, INNER_LIP_LOWER, 1]
+        assert np.abs(lips).max() < KEPT_MM
+        lids = moved[:, UPPER_LIDS, 1] - moved[:, LOWER_LIDS, 1]
+        assert (
+            landmark_places(face)[list(UPPER_LIDS), 1] - landmark_places(face)[list(LOWER_LIDS), 1] + lids > 3
+        ).all()
+        corners = moved[MASK["happy"], [MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT]]
+        assert (corners[:, 1] > 3).all()
+        assert corners[0, 0] > 2 > -2 > corners[1, 0]
+        assert (moved[MASK["surprised"], BROWS, 1] > 3).all()
+        assert (moved[MASK["angry"], [55, 285], 1] < -2).all()
+
+
+def test_the_table_names_shapes_of_the_default_head() -> None:
+    assert set(expression_table()) <= set(load_face("head").shape_names)
+    assert expressive(load_face("head")).shape_names == load_face("head").shape_names
+
+
+def test_refuses_what_does_not_fit() -> None:
+    face = ready("head")
+    still = silence(load_face("head"))
+    with pytest.raises(InputError, match="no feature 'ears'"):
+        face.perform(still, {"ears": np.zeros((1, 2), np.float32)})
+    with pytest.raises(InputError, match=r"blink must be finite values \(1, 2\), not \(2, 2\)"):
+        face.perform(still, {"blink": np.zeros((2, 2), np.float32)})
+    with pytest.raises(InputError, match="no gain for 'ears'"):
+        face.perform(still, {}, {"ears": 1.0})
+    with pytest.raises(InputError, match="gain of jaw must be 0 or more, not -1"):
+        face.perform(still, {}, {"jaw": -1.0})
+    with pytest.raises(InputError, match="not in the shapes of this face"):
+        face.perform(Trajectory(("a",), np.zeros((1, 1)), 25.0), {})
+    head = load_face("head")
+    kept = np.flatnonzero(head.landmarks != 386)
+    lidless = replace(
+        head,
+        landmarks=head.landmarks[kept],
+        landmark_vertices=head.landmark_vertices[kept],
+        landmark_weights=head.landmark_weights[kept],
+    )
+    with pytest.raises(DataError, match="lacks landmarks of its lids"):
+        gesture_face(lidless, palette())

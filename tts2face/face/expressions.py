@@ -1,0 +1,80 @@
+"""The basis expressions B_i of a face, from a table that an animator can correct (expressions.tsv).
+
+Ju and Lee 2008, sections 5 and 7: expressions are designed on each synthetic face, over the whole of it and with closed
+lips; weights are what faces share.
+"""
+
+import csv
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+from tts2face.face.carry import completed
+from tts2face.face.fit import N_SKIN, all_landmarks, landmark_motion
+from tts2face.face.lids import BLINK, WIDE, lids_of
+from tts2face.face.model import Face
+from tts2face.face.mouth import Mouth, mouth_of
+from tts2face.palette import EXPRESSIONS
+
+TABLE = "expressions.tsv"
+BOTH_SIDES = "*"  # at the end of a name: this shape of the left and of the right
+GAZE = tuple(f"eyeLook{way}{side}" for way in ("Up", "Down", "In", "Out") for side in ("Left", "Right"))
+
+FloatArray = NDArray[np.float64]
+
+
+@cache
+def expression_table() -> Mapping[str, tuple[float, ...]]:
+    """Weight of each ARKit shape in each of `EXPRESSIONS`.
+
+    Raises
+    ------
+    DataError
+        The table is not as it should be.
+    """
+    rows = list(csv.reader(files("tts2face.face").joinpath(TABLE).read_text("utf-8").splitlines(), delimiter="\t"))
+    if tuple(rows[0][1:]) != EXPRESSIONS:
+        raise DataError(f"{TABLE} must have the columns {', '.join(EXPRESSIONS)}, not {', '.join(rows[0][1:])}")
+    table: dict[str, tuple[float, ...]] = {}
+    for name, *cells in rows[1:]:
+        try:
+            weights = tuple(float(cell or 0.0) for cell in cells)
+        except ValueError as broken:
+            raise DataError(f"{TABLE} holds something that is no weight in the row {name}: {broken}") from broken
+        sides = ("Left", "Right") if name.endswith(BOTH_SIDES) else ("",)
+        table |= {name.removesuffix(BOTH_SIDES) + side: weights for side in sides}
+    return table
+
+
+def expressive(face: Face) -> Face:
+    """A face with every shape of expressions, lids and gaze: those that it lacks are carried from the default head."""
+    return completed(face, (*expression_table(), *BLINK, *WIDE, *GAZE))
+
+
+def expression_weights(face: Face, mouth: Mouth) -> FloatArray:
+    """(5, K) weights of `EXPRESSIONS` on an `expressive` face; lips that rest closed stay so, lids stay apart."""
+    table = expression_table()
+    none = (0.0,) * len(EXPRESSIONS)
+    drawn = np.array([table.get(name, none) for name in face.shape_names]).T
+    held = mouth.held(np.zeros_like(drawn), drawn)
+    return lids_of(face).shut(held, np.zeros((len(held), 2)))
+
+
+def expression_landmarks(face: Face) -> FloatArray:
+    """(5, 478, 3) motion of the landmarks in each of `EXPRESSIONS`, mm; 0 for the irises and landmarks that it lacks.
+
+    Raises
+    ------
+    DataError
+        The face lacks the landmarks of lips or lids.
+    """
+    whole = expressive(face)
+    weights = expression_weights(whole, mouth_of(whole))
+    motion = all_landmarks(whole, landmark_motion(whole, np.arange(len(whole.shape_names))))
+    moved: FloatArray = np.nan_to_num(np.einsum("lck,ek->elc", motion, weights))
+    moved[:, N_SKIN:] = 0.0
+    return moved
