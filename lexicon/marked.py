@@ -1,0 +1,201 @@
+"""A text and what is marked in it: styles, speed and loudness run by run, and pauses, nods and names at places.
+
+Places are characters of the text that is said, in which the marks themselves are missing.
+"""
+
+from dataclasses import dataclass
+
+from lexicon.errors import InputError
+
+RATES = (0.5, 2.0)  # speed of marked words, as of a whole request
+VOLUMES = (0.0, 2.0)
+NOD_SIZES = (0.1, 2.0)
+LONGEST_PAUSE_S = 10.0  # at one place; speech services allow 10 to 20
+DEEPEST = 16  # marks within marks; nobody reads more
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """From a character on, to the next run: styles in force, outermost first, and factors of speed and loudness."""
+
+    start: int
+    styles: tuple[str, ...] = ()
+    rate: float = 1.0
+    volume: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class PauseMark:
+    """Silence before a character."""
+
+    at: int
+    seconds: float
+
+    def __post_init__(self) -> None:
+        """Refuse lengths out of range."""
+        _check_range("a pause", self.seconds, (0.0, LONGEST_PAUSE_S), " s")
+
+
+@dataclass(frozen=True, slots=True)
+class NodMark:
+    """The head nods with the word at or behind a character."""
+
+    at: int
+    size: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse sizes out of range."""
+        _check_range("the size of a nod", self.size, NOD_SIZES)
+
+
+@dataclass(frozen=True, slots=True)
+class NameMark:
+    """A place whose time is told."""
+
+    at: int
+    name: str
+
+
+Mark = PauseMark | NodMark | NameMark
+
+
+@dataclass(frozen=True, slots=True)
+class MarkedText:
+    """What is said, and how.
+
+    Parameters
+    ----------
+    text
+        Without any mark.
+    runs
+        At least one; the first begins at 0, the others each behind the one before.
+    marks
+        In order of place; of one place in the order in which they were written.
+    language
+        That the text itself names (SSML), or nothing.
+    """
+
+    text: str
+    runs: tuple[Run, ...] = (Run(0),)
+    marks: tuple[Mark, ...] = ()
+    language: str | None = None
+
+    @property
+    def is_plain(self) -> bool:
+        """Nothing is marked."""
+        return self.runs == (Run(0),) and not self.marks and self.language is None
+
+    @property
+    def changes_voice(self) -> bool:
+        """A pause, speed or loudness is marked: what only a voice that has not spoken yet can do."""
+        spoken_alike = all(run.rate == run.volume == 1.0 for run in self.runs)
+        return not spoken_alike or any(isinstance(mark, PauseMark) for mark in self.marks)
+
+
+@dataclass(slots=True)
+class _Open:
+    """A mark that is not closed yet."""
+
+    kind: str
+    shown: str
+    start: int
+    before: Run
+
+
+class Gathering:
+    """Takes text and marks in order, and becomes a `MarkedText`."""
+
+    def __init__(self) -> None:
+        self._pieces: list[str] = []
+        self._length = 0
+        self._runs = [Run(0)]
+        self._marks: list[Mark] = []
+        self._open: list[_Open] = []
+        self._last_pause: tuple[int, PauseMark | None] = (0, None)
+
+    @property
+    def at(self) -> int:
+        """Characters so far."""
+        return self._length
+
+    def say(self, text: str) -> None:
+        """Add words."""
+        self._pieces.append(text)
+        self._length += len(text)
+
+    def mark(self, mark: Mark) -> None:
+        """Add a mark at the present place; pauses at one place add up.
+
+        Raises
+        ------
+        InputError
+            They last too long.
+        """
+        if isinstance(mark, PauseMark):
+            place, earlier = self._last_pause
+            if earlier is not None and earlier.at == mark.at:
+                mark = PauseMark(mark.at, earlier.seconds + mark.seconds)
+                self._marks[place] = mark
+                self._last_pause = (place, mark)
+                return
+            self._last_pause = (len(self._marks), mark)
+        self._marks.append(mark)
+
+    def open(self, kind: str, shown: str, *, style: str | None = None, rate: float = 1.0, volume: float = 1.0) -> None:
+        """Begin a span that `close` ends; within another, factors multiply and styles add up.
+
+        Raises
+        ------
+        InputError
+            Spans are nested too deep, or together too fast, slow or loud.
+        """
+        if len(self._open) >= DEEPEST:
+            raise InputError(f"{shown} stands within {DEEPEST} other marks; nest them less deep")
+        before = self._runs[-1]
+        self._open.append(_Open(kind, shown, self._length, before))
+        _check_range(f"the speed within {shown}", before.rate * rate, RATES)
+        _check_range(f"the loudness within {shown}", before.volume * volume, VOLUMES)
+        styles = (*before.styles, style) if style is not None else before.styles
+        self._turn(Run(self._length, styles, before.rate * rate, before.volume * volume))
+
+    def close(self, kind: str, shown: str) -> None:
+        """End the span that was opened last.
+
+        Raises
+        ------
+        InputError
+            None of this kind is open, another one is, or a style holds nothing that is said.
+        """
+        if not self._open:
+            raise InputError(f"{shown} closes nothing; open it before, or leave it away")
+        last = self._open.pop()
+        if last.kind != kind:
+            raise InputError(f"{shown} stands where {last.shown} must be closed first")
+        if self._length == last.start and self._runs[-1].styles != last.before.styles:
+            raise InputError(f"{last.shown} holds no word; put what is said between it and its end")
+        self._turn(Run(self._length, last.before.styles, last.before.rate, last.before.volume))
+
+    def done(self, language: str | None = None) -> MarkedText:
+        """All that was given.
+
+        Raises
+        ------
+        InputError
+            A span is still open.
+        """
+        if self._open:
+            raise InputError(f"{self._open[-1].shown} is never closed; say where it ends")
+        return MarkedText("".join(self._pieces), tuple(self._runs), tuple(self._marks), language)
+
+    def _turn(self, run: Run) -> None:
+        if self._runs[-1].start == run.start:
+            self._runs.pop()
+        last = self._runs[-1] if self._runs else None
+        if last is None or (last.styles, last.rate, last.volume) != (run.styles, run.rate, run.volume):
+            self._runs.append(run)
+
+
+def _check_range(what: str, value: float, limits: tuple[float, float], unit: str = "") -> None:
+    low, high = limits
+    if not low <= value <= high:
+        raise InputError(f"{what} must lie between {low:g} and {high:g}{unit}, not {value:g}{unit}")

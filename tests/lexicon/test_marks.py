@@ -1,0 +1,202 @@
+"""Marks and SSML in a text: what they mean, and what is no mark."""
+
+import time
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lexicon.errors import InputError
+from lexicon.marked import DEEPEST, MarkedText, NameMark, NodMark, PauseMark, Run
+from lexicon.marks import marked
+
+PLAIN = st.text(st.characters(blacklist_characters="[]<"))
+
+
+@given(st.text(st.characters(blacklist_characters="[<")))
+def test_text_without_marks_is_itself(text: str) -> None:
+    assert marked(text) == MarkedText(text)
+    assert marked(text).is_plain
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a < b",
+        "<b>bold</b>",
+        "see [1]",
+        "[laughs]",
+        "[nodding]",
+        "[styles]",
+        "[pauses]",
+        "[ pause 1]",
+        "x[0",
+        "<speaker>",
+    ],
+)
+def test_other_brackets_are_text(text: str) -> None:
+    assert marked(text) == MarkedText(text)
+
+
+@given(st.lists(st.tuples(PLAIN, st.sampled_from([0.1, 0.4, 2.0])), max_size=6), PLAIN)
+def test_marks_stand_where_they_were_written(parts: list, last: str) -> None:
+    found = marked("".join(f"{text}[nod {size:g}]" for text, size in parts) + last)
+    assert found.text == "".join(text for text, _ in parts) + last
+    places = [sum(len(text) for text, _ in parts[: k + 1]) for k in range(len(parts))]
+    assert found.marks == tuple(NodMark(at, size) for at, (_, size) in zip(places, parts, strict=True))
+
+
+def test_every_mark() -> None:
+    found = marked(
+        "Well, [pause 0.4]yes [nod 0.5][pause .5s][style:head=calm]one [style: cross ]two[/style][/style].[nod]"
+    )
+    assert found.text == "Well, yes one two."
+    assert found.marks == (PauseMark(6, 0.4), NodMark(10, 0.5), PauseMark(10, 0.5), NodMark(18))
+    assert found.runs == (Run(0), Run(10, ("head=calm",)), Run(14, ("head=calm", "cross")), Run(17))
+    assert found.changes_voice
+    assert not marked("[style:a]b[/style]").changes_voice
+
+
+def test_pauses_at_one_place_add_up() -> None:
+    assert marked("a[pause 1][nod][pause 2]b[pause 3]").marks == (PauseMark(1, 3.0), NodMark(1), PauseMark(2, 3.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("[pause x]", r"cannot read the mark \[pause x\]; write \[pause 0\.4\]"),
+        ("[pause]", r"cannot read the mark \[pause\]"),
+        ("[pause nan]", r"cannot read the mark \[pause nan\]"),
+        ("[pause 1e3]", "cannot read"),
+        ("[pause 60]", "a pause must lie between 0 and 10 s, not 60 s"),
+        ("[pause -1]", "a pause must lie between 0 and 10 s, not -1 s"),
+        ("[pause 6][pause 6]", "a pause must lie between 0 and 10 s, not 12 s"),
+        ("[pause 1", "lacks its closing bracket"),
+        ("[nod", "lacks its closing bracket; write .nod., or"),
+        ("[nod often]", r"cannot read the mark \[nod often\]; write \[nod\]"),
+        ("[nod 9]", "size of a nod must lie between 0.1 and 2, not 9"),
+        ("[/nod]", r"cannot read the mark \[/nod\]"),
+        ("[style]a[/style]", r"cannot read the mark \[style\]; write \[style:NAME\]"),
+        ("[style delighted]", "cannot read the mark"),
+        ("[style:]a[/style]", "cannot read the mark"),
+        ("[style:a]b", r"\[style:a\] is never closed"),
+        ("b[/style]", r"\[/style\] closes nothing"),
+        ("[style:a][/style]", r"\[style:a\] holds no word"),
+        ("[style:a]" * (DEEPEST + 1), "stands within 16 other marks"),
+    ],
+)
+def test_marks_written_wrongly_are_refused(text: str, reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        marked(f"Hello {text}")
+
+
+def ssml(inside: str, more: str = "") -> MarkedText:
+    return marked(f"<speak{more}>{inside}</speak>")
+
+
+def test_ssml_says_the_same_as_marks() -> None:
+    assert ssml('Hi <break time="400ms"/>there <express-as style="cross">you</express-as>') == marked(
+        "Hi [pause 0.4]there [style:cross]you[/style]"
+    )
+
+
+def test_every_element() -> None:
+    found = marked(
+        '\ufeff <?xml version="1.0" encoding="UTF-16"?>\n<speak version="1.1" '
+        'xmlns="http://www.w3.org/2001/10/synthesis" xml:lang="en-US"><p><s>One &amp; <sub alias="two">2</sub></s></p>'
+        "<!-- no --><![CDATA[<3]]>"
+        '<prosody rate="slow" volume="+6dB"><prosody rate="120%">four</prosody></prosody>'
+        '<emphasis level="strong">five</emphasis><mark name="here"/><break strength="strong"/><break time="1s"/>'
+        '<mstts:express-as style="sad">six</mstts:express-as></speak>'
+    )
+    assert found.text.split() == ["One", "&", "two", "<3fourfivesix"]
+    at = {word: found.text.index(word) for word in ("four", "five", "six")}
+    assert found.marks == (NodMark(at["five"], 1.0), NameMark(at["six"], "here"), PauseMark(at["six"], 1.7))
+    assert [run.start for run in found.runs] == [0, at["four"], at["five"], at["six"], len(found.text)]
+    assert found.runs[1].rate == pytest.approx(0.75 * 1.2)
+    assert found.runs[1].volume == pytest.approx(1.995, abs=0.01)
+    assert (found.runs[2].volume, found.runs[3].styles) == (1.6, ("sad",))
+    assert found.language == "en-US"
+
+
+@pytest.mark.parametrize(
+    ("written", "rate"),
+    [("80%", 0.8), ("+20%", 1.2), ("-20%", 0.8), ("1.5", 1.5), ("x-slow", 0.5), ("medium", 1.0)],
+)
+def test_speeds(written: str, rate: float) -> None:
+    assert ssml(f'<prosody rate="{written}">a</prosody>').runs[0].rate == pytest.approx(rate)
+
+
+@pytest.mark.parametrize(
+    ("inside", "reason"),
+    [
+        ("<audio src='x'/>", "there is no <audio> here; choose speak, p, s, break"),
+        ("<b>a</b>", "there is no <b> here"),
+        ("<speak>a</speak>", "<speak> holds all the rest, once"),
+        ("a\n\n<p>", "not well-formed: mismatched tag in line 3"),
+        ("a & b", "not well-formed"),
+        ("&lol;", "not well-formed: undefined entity"),
+        ("<?php a?>", r"the instruction <\?php\?> is not read"),
+        ("[nod]", "square brackets do not go with SSML"),
+        ("\ud800", "half character"),
+        ("<break time='soon'/>", "cannot read the time 'soon' of a <break>"),
+        ("<break time='60s'/>", "a pause must lie between 0 and 10 s, not 60 s"),
+        ("<break strength='long'/>", "no strength 'long'; choose none, x-weak"),
+        ("<break size='1'/>", "<break> has no attribute 'size' here; choose time, strength"),
+        ("<break>a</break>", "<break> holds no words"),
+        ("<break><p/></break>", "<break> holds no elements"),
+        ("<emphasis level='loud'>a</emphasis>", "no level 'loud' of <emphasis>; choose strong"),
+        ("<prosody pitch='high'>a</prosody>", "no voice here can change its pitch"),
+        ("<prosody contour='(0%,+20Hz)'>a</prosody>", "change its contour"),
+        ("<prosody rate='warp'>a</prosody>", "no rate 'warp'; choose x-slow"),
+        ("<prosody rate='300%'>a</prosody>", "speed within <prosody> must lie between 0.5 and 2, not 3"),
+        ("<prosody rate='0.6'><prosody rate='0.6'>a</prosody></prosody>", "must lie between 0.5 and 2, not 0.36"),
+        ("<prosody volume='11'>a</prosody>", r"cannot read the volume '11'; write \+6dB"),
+        ("<prosody volume='+20dB'>a</prosody>", "loudness within <prosody> must lie between 0 and 2, not 10"),
+        ("<mark/>", "a <mark> needs a name"),
+        ("<sub>a</sub>", "a <sub> needs what is said instead"),
+        ("<express-as>a</express-as>", "<express-as> needs a style"),
+        ("<express-as style='a' styledegree='2'>a</express-as>", "no attribute 'styledegree'"),
+        ("<express-as style='a'/>", "holds no word"),
+        ("<p xml:lang='de'>a</p><p xml:lang='fr'>b</p>", "one voice speaks one language, de or fr"),
+        ("<p>" * 40 + "</p>" * 40, "stands within 33 others"),
+    ],
+)
+def test_ssml_outside_the_subset_is_refused(inside: str, reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        ssml(inside)
+
+
+def test_a_refusal_names_the_line() -> None:
+    with pytest.raises(InputError, match=r"^SSML, line 3: there is no <audio>"):
+        ssml("a\nb\n<audio/>")
+
+
+BILLION = "".join(f'<!ENTITY l{n} "{f"&l{n - 1};" * 10}">' for n in range(1, 10))
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        f'<!DOCTYPE speak [<!ENTITY l0 "lol">{BILLION}]>',
+        '<!DOCTYPE speak [<!ENTITY l9 SYSTEM "file:///etc/passwd">]>',
+        '<?xml version="1.0"?><!DOCTYPE speak SYSTEM "http://example.org/x.dtd">',
+    ],
+)
+def test_nothing_is_expanded_or_fetched(head: str) -> None:
+    with pytest.raises(InputError, match="a document type declaration is not read"):
+        marked(f"{head}<speak>&l9;</speak>")
+
+
+@pytest.mark.parametrize("piece", ["[", "[nod]", "[pause 0]", "[style:a]b[/style]", "[pause 1]c", "a [b ", "word "])
+def test_a_megabyte_of_marks_is_read_at_once(piece: str) -> None:
+    begin = time.perf_counter()
+    marked(piece * (1_000_000 // len(piece)))
+    assert time.perf_counter() - begin < 10
+
+
+def test_a_megabyte_of_ssml_is_read_at_once() -> None:
+    begin = time.perf_counter()
+    found = ssml('<p>Hello <break time="1s"/> there.</p>' * 25_000)
+    assert len(found.marks) == 25_000
+    assert time.perf_counter() - begin < 10
