@@ -83,6 +83,8 @@ def _make(request: Request, picture: Picture, errand: Errand, out: Path) -> None
             f"wrote {written.path}: {written.seconds:.1f} s, {written.n_frames} frames, "
             f"made in {took:.1f} s ({written.seconds / took:.1f} x real time)"
         )
+        for mark in written.marks:
+            say(f"{mark.seconds:.2f} s: {mark.name}")
 
 
 def _only_told(request: Request, errand: Errand) -> None:

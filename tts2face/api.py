@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from lexicon.chunks import chunks
 from lexicon.dictionary import read_dictionary
 from lexicon.errors import InputError
 from lexicon.g2p import check_language
-from lexicon.normalize import normalize
+from lexicon.marks import marked
 from lexicon.scripts import check_script
+from lexicon.sentences import sentences
 from lexicon.sequence import PhoneSequence
 from tts2face.ahead import Ahead
 from tts2face.exemplar.animate import VisualVoice, speech_trajectory, visual_voice
@@ -23,6 +23,7 @@ from tts2face.exemplar.options import METHODS, SynthesisOptions
 from tts2face.face.model import Face
 from tts2face.face.own import own_face
 from tts2face.face.retarget import Retargeter, retargeter
+from tts2face.gesture.timeline import Timeline
 from tts2face.listen import Heard, clips_in, drive_of, driven, heard
 from tts2face.render.clock import exact_rate, on_frames
 from tts2face.render.draw import AnyStage, staged
@@ -31,6 +32,7 @@ from tts2face.render.output import checked_output
 from tts2face.render.picture import Picture
 from tts2face.render.plate import plate_staged
 from tts2face.request import Request
+from tts2face.spoken import Reached, check_marks, reached_in, say
 from tts2face.talker import Talker
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, frame_count, joined_clips
 from tts2face.voice.engine import Voice, load_voice
@@ -39,7 +41,6 @@ VOICES_KEPT = 2  # kinds of voice; each keeps some 100 MB
 STAGES_KEPT = 2  # kinds of picture; each keeps some 30 MB
 RECORDED_STEPS = 1000  # of progress through a recording
 CLIPS_AHEAD = 2  # pieces that may wait to be drawn while the next is spoken
-PIECE_CHARACTERS = 300  # a sentence that is longer is cut at a clause mark or a space
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,10 +114,20 @@ def synthesize(request: Request, talker: Talker, face: Face | None) -> Clip:
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A part's clip, and how many steps of the whole go with it: characters of a text, or parts of a recording."""
+    """A part of a clip, and what is marked in it.
+
+    Parameters
+    ----------
+    n_steps
+        How much of the whole goes with it: characters of a text, or parts of a recording.
+    timeline, marks
+        What the text's marks ask for in this part, and its named marks; on the clock of the whole clip.
+    """
 
     clip: Clip
     n_steps: int
+    timeline: Timeline = field(default_factory=Timeline)
+    marks: tuple[Reached, ...] = ()
 
 
 def stream(request: Request, ready: Cast) -> Iterator[Piece]:
@@ -129,12 +140,17 @@ def stream(request: Request, ready: Cast) -> Iterator[Piece]:
     if request.audio is not None:
         yield from _recorded(request, request.audio, ready)
         return
+    fps = exact_rate(request.fps)
     first_frame = 0
     with ready.voice(request) as voice:
-        for text in pieces(request):
-            clip = _animated(_spoken(voice, text, request, first_frame), ready, request)
+        for sentence in sentences(marked(request.text), request.language):
+            said = say(voice, sentence, request)
+            clip = _animated(on_frames(said.speech, first_frame, fps), ready, request)
+            begins = float(first_frame / fps)
             first_frame += len(clip.motion)
-            yield Piece(clip, len(text))
+            timeline = said.timeline.within(0.0, clip.speech.waveform.duration).shifted(begins)
+            marks = tuple(replace(mark, seconds=mark.seconds + begins) for mark in said.marks)
+            yield Piece(clip, sentence.n_characters, timeline, marks)
 
 
 def check(request: Request) -> None:
@@ -143,30 +159,19 @@ def check(request: Request) -> None:
     Raises
     ------
     InputError
-        As `pieces`; there is no word in the text, or no such recording.
+        There is no word in the text, the language does not exist or cannot read it, a mark in it is wrong, or there is
+        no such recording.
     """
     if request.audio is not None and not request.audio.is_file():
         raise InputError(f"there is no recording {request.audio}; check the path")
     if request.audio is not None and not request.text.strip():
         return
-    if next(pieces(request), None) is None:
-        raise InputError(f"there is nothing to say in {request.text[:40]!r}; give at least one word")
-
-
-def pieces(request: Request) -> Iterator[str]:
-    """Sentences of a request's text that hold something to say; English ones as they are said.
-
-    Raises
-    ------
-    InputError
-        The language does not exist or cannot read the text.
-    """
+    text = marked(request.text)
     check_language(request.language)
-    check_script(request.text, request.language)
-    for chunk in chunks(request.text, PIECE_CHARACTERS):
-        text = normalize(chunk) if request.language.startswith("en") else chunk
-        if any(character.isalnum() for character in text):
-            yield text
+    check_script(text.text, request.language)
+    check_marks(text, request)
+    if next(sentences(text, request.language), None) is None:
+        raise InputError(f"there is nothing to say in {request.text[:40]!r}; give at least one word")
 
 
 def _options(request: Request) -> SynthesisOptions:
@@ -176,11 +181,6 @@ def _options(request: Request) -> SynthesisOptions:
     if request.exemplars is not None:
         options = replace(options, k=request.exemplars)
     return options
-
-
-def _spoken(voice: Voice, text: str, request: Request, first_frame: int) -> Speech:
-    speech = voice.speak(text, rate=request.rate, volume=request.volume, seed=request.seed)
-    return on_frames(speech, first_frame, exact_rate(request.fps))
 
 
 def _animated(speech: Speech, ready: Cast, request: Request) -> Clip:
@@ -194,11 +194,16 @@ def _animated(speech: Speech, ready: Cast, request: Request) -> Clip:
 def _recorded(request: Request, audio: Path, ready: Cast) -> Iterator[Piece]:
     """A recording in pieces: with its words by exemplars, without them by a drive."""
     fps = float(exact_rate(request.fps))
-    said, motion = _followed(request, audio, ready, fps)
+    text = marked(request.text)
+    said, motion = _followed(replace(request, text=text.text), audio, ready, fps)
+    timeline, marks = reached_in(text, said.phones, said.words, request.language)
     before = 0
     for clip in clips_in(audio, said, motion, volume=request.volume):
         after = before + len(clip.motion)
-        yield Piece(clip, RECORDED_STEPS * after // len(motion) - RECORDED_STEPS * before // len(motion))
+        n_steps = RECORDED_STEPS * after // len(motion) - RECORDED_STEPS * before // len(motion)
+        begin, end = before / fps, after / fps
+        here = tuple(mark for mark in marks if begin <= mark.seconds < end)
+        yield Piece(clip, n_steps, timeline.within(begin, end), here)
         before = after
 
 
@@ -233,11 +238,12 @@ def explain(clip: Clip, ready: Cast, request: Request, *, begins: float = 0.0) -
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What a file holds: seconds of sound, and frames."""
+    """What a file holds: seconds of sound, frames, and when the text's named marks are reached."""
 
     path: Path
     seconds: float
     n_frames: int
+    marks: tuple[Reached, ...] = ()
 
 
 def write_clip(
@@ -266,7 +272,8 @@ def write_clip(
         As `synthesize`; or the file cannot be written.
     """
     checked_output(out)
-    of = RECORDED_STEPS if request.audio is not None else max(len(request.text), 1)
+    of = RECORDED_STEPS if request.audio is not None else max(len(marked(request.text).text), 1)
+    marks: list[Reached] = []
     before, seconds, n_frames = 0, 0.0, 0
     piece_length, given_before = 0, 0
 
@@ -285,8 +292,9 @@ def write_clip(
             piece_length, given_before = piece.n_steps, n_frames
             writer.add(piece.clip)
             before += piece_length
+            marks += piece.marks
             seconds += piece.clip.speech.waveform.duration
             n_frames += len(piece.clip.motion)
     if on_progress:
         on_progress(of, of)
-    return Written(out, seconds, n_frames)
+    return Written(out, seconds, n_frames, tuple(marks))

@@ -1,0 +1,192 @@
+"""A marked text in sentences, and each sentence in utterances: what a voice speaks in one go.
+
+Places in the text are counted in letters here, that is in characters that are no space: cutting a text into sentences
+changes its spaces and nothing else.
+"""
+
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from lexicon.chunks import chunks
+from lexicon.marked import Mark, MarkedText, NodMark, PauseMark, Run
+from lexicon.normalize import normalize
+
+LONGEST = 300  # characters; a sentence that is longer is cut at a clause mark or a space
+
+
+@dataclass(frozen=True, slots=True)
+class Utterance:
+    """What is spoken in one go, at one speed.
+
+    Parameters
+    ----------
+    written, text
+        As it stands in the text, and as it is said.
+    first, last
+        Its letters in the whole text, half open.
+    pause
+        Seconds of silence that are marked behind it; None where nothing is.
+    """
+
+    written: str
+    text: str
+    first: int
+    last: int
+    rate: float = 1.0
+    pause: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Sentence:
+    """What becomes one piece of a clip.
+
+    Parameters
+    ----------
+    utterances
+        At least one.
+    runs, marks
+        What is marked in it, by letters of the whole text: runs begin with the one in force at its first letter; marks
+        are all but pauses.
+    lead
+        Seconds of silence marked before the first sentence.
+    n_characters
+        Its share of the text.
+    """
+
+    utterances: tuple[Utterance, ...]
+    runs: tuple[Run, ...]
+    marks: tuple[Mark, ...]
+    lead: float
+    n_characters: int
+
+    @property
+    def first(self) -> int:
+        """Its first letter in the whole text."""
+        return self.utterances[0].first
+
+    @property
+    def last(self) -> int:
+        """The letter behind it."""
+        return self.utterances[-1].last
+
+
+def sentences(text: MarkedText, language: str) -> Iterator[Sentence]:
+    """Sentences that hold something to say; English ones as they are said. Linear, and lazy but for one sentence.
+
+    Sentences are those of the text without marks. A pause or a change of speed within one begins a new utterance.
+    """
+    placed = by_letters(text)
+    starts = [run.start for run in placed.runs]
+    pauses = [mark for mark in placed.marks if isinstance(mark, PauseMark)]
+    silent = [mark.at for mark in pauses]
+    others = [mark for mark in placed.marks if not isinstance(mark, PauseMark)]
+    held: Sentence | None = None
+    lead, done, told = sum(mark.seconds for mark in pauses[:1] if mark.at == 0), 0, 0
+    for chunk in chunks(text.text, LONGEST):
+        begin, done = done, done + n_letters(chunk)
+        runs = _runs_within(placed.runs, starts, begin, done)
+        inside = pauses[bisect_right(silent, begin) : bisect_right(silent, done)]
+        utterances, silence = _utterances(chunk, begin, runs, inside, language)
+        if held is not None:
+            held = _longer(held, silence)
+        else:
+            lead += silence
+        if not utterances:
+            continue
+        if held is not None:
+            yield held
+        behind = told
+        while told < len(others) and others[told].at < done:
+            told += 1
+        held = Sentence(tuple(utterances), runs, tuple(others[behind:told]), lead, len(chunk))
+        lead = 0.0
+    if held is not None:
+        yield replace(held, marks=(*held.marks, *others[told:]))
+
+
+def n_letters(text: str) -> int:
+    """Characters that are no space."""
+    return len("".join(text.split()))
+
+
+def up_to(written: str, n: int) -> str:
+    """The beginning of a text with so many letters."""
+    for at, character in enumerate(written):
+        if n == 0 and not character.isspace():
+            return written[:at]
+        n -= not character.isspace()
+    return written
+
+
+def by_letters(text: MarkedText) -> MarkedText:
+    """The same with places counted in letters; what meets at one place is one: last run, one pause, largest nod.
+
+    Raises
+    ------
+    InputError
+        The pauses at one place are too long together.
+    """
+    places = sorted({0, *(run.start for run in text.runs), *(mark.at for mark in text.marks)})
+    letters = {0: 0}
+    for before, place in pairwise(places):
+        letters[place] = letters[before] + n_letters(text.text[before:place])
+    runs = {letters[run.start]: replace(run, start=letters[run.start]) for run in text.runs}
+    pauses: dict[int, PauseMark] = {}
+    nods: dict[int, NodMark] = {}
+    names: list[Mark] = []
+    for mark in text.marks:
+        at = letters[mark.at]
+        if isinstance(mark, PauseMark):
+            pauses[at] = PauseMark(at, mark.seconds + (pauses[at].seconds if at in pauses else 0.0))
+        elif isinstance(mark, NodMark):
+            nods[at] = NodMark(at, max(mark.size, nods[at].size if at in nods else 0.0))
+        else:
+            names.append(replace(mark, at=at))
+    marks = sorted([*nods.values(), *names, *pauses.values()], key=lambda mark: mark.at)
+    return replace(text, runs=tuple(runs.values()), marks=tuple(marks))
+
+
+def _runs_within(runs: tuple[Run, ...], starts: list[int], begin: int, end: int) -> tuple[Run, ...]:
+    return runs[bisect_right(starts, begin) - 1 : bisect_right(starts, end - 1)]
+
+
+def _utterances(
+    chunk: str, begin: int, runs: tuple[Run, ...], pauses: Sequence[PauseMark], language: str
+) -> tuple[list[Utterance], float]:
+    """Utterances of a chunk of text, and the silence that is marked before the first of them."""
+    places = [at for at, character in enumerate(chunk) if not character.isspace()]
+    end = begin + len(places)
+    silences = {mark.at: mark.seconds for mark in pauses}
+    faster = [run.start for before, run in pairwise(runs) if run.rate != before.rate]
+    bounds = sorted({begin, end, *faster, *silences})
+    found: list[Utterance] = []
+    before = 0.0
+    for first, last in pairwise(bounds):
+        written = chunk[places[first - begin] : places[last - begin - 1] + 1]
+        text = normalize(written) if language.startswith("en") else written
+        rate = next(run.rate for run in reversed(runs) if run.start <= first)
+        pause = silences.get(last)
+        if any(character.isalnum() for character in text):
+            found.append(Utterance(written, text, first, last, rate, pause))
+        elif found:  # punctuation by itself belongs to the words before it
+            found[-1] = _with_more(found[-1], written, last, pause, language)
+        else:
+            before += pause or 0.0
+    return found, before
+
+
+def _with_more(utterance: Utterance, written: str, last: int, pause: float | None, language: str) -> Utterance:
+    whole = utterance.written + written
+    text = normalize(whole) if language.startswith("en") else whole
+    seconds = [silence for silence in (utterance.pause, pause) if silence is not None]
+    return replace(utterance, written=whole, text=text, last=last, pause=sum(seconds) if seconds else None)
+
+
+def _longer(sentence: Sentence, seconds: float) -> Sentence:
+    """A sentence with more silence behind it."""
+    if seconds == 0.0:
+        return sentence
+    *others, last = sentence.utterances
+    return replace(sentence, utterances=(*others, replace(last, pause=(last.pause or 0.0) + seconds)))

@@ -1,0 +1,105 @@
+"""Marked texts through every door: clips with pauses, times of marks on the clock of the whole clip."""
+
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lexicon.sequence import SILENCE
+from tts2face.api import Cast, Piece, cast, stream, write_clip
+from tts2face.face.file import load_face
+from tts2face.gesture.spans import StyleSpan
+from tts2face.render.picture import Picture
+from tts2face.request import Request
+from tts2face.talker import load_talker
+from tts2face.types import joined_clips
+from tts2face.video.media import media_facts
+
+COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
+SMALL = Picture(size="64x64")
+
+
+@pytest.fixture(scope="module")
+def ready() -> Cast:
+    return cast(load_talker("grid_s1"), load_face("head"))
+
+
+def pieces(text: str, ready: Cast, **options: object) -> list[Piece]:
+    return list(stream(Request(text=text, voice="espeak", **options), ready))
+
+
+def words(found: list[Piece]) -> dict[str, float]:
+    """Onset of each word on the whole clip's clock."""
+    speech = joined_clips([piece.clip for piece in found]).speech
+    return {word.text.strip("."): float(speech.phones.edges[word.first]) for word in speech.words}
+
+
+@pytest.mark.parametrize("fps", [29.97, 60.0, 7.0])
+def test_marks_come_with_their_words_on_the_whole_clip_s_clock(fps: float, ready: Cast) -> None:
+    text = "One two. [style:head=calm]Three [nod]four. Five. Six [pause 0.7]seven[/style] eight. [nod]Nine."
+    found = pieces(text, ready, fps=fps)
+    at = words(found)
+    nods = [nod.time for piece in found for nod in piece.timeline.nods]
+    np.testing.assert_allclose(nods, [at["four"], at["Nine"]], atol=1e-3)
+    spans = [span for piece in found for span in piece.timeline.spans]
+    assert all(isinstance(span, StyleSpan) and span.feature == "head" for span in spans)
+    for before, after in pairwise(spans):
+        assert after.start == pytest.approx(before.end, abs=1 / 22050)
+    assert spans[0].start == pytest.approx(len(found[0].clip.motion) / found[0].clip.fps)
+    assert at["seven"] < spans[-1].end <= at["eight"] + 1e-6
+
+
+def test_a_pause_is_silent_and_the_lips_rest_in_it(ready: Cast) -> None:
+    (plain,), (paused,) = (pieces(text, ready) for text in ("Bob may go away.", "Bob may [pause 1.5] go away."))
+    phones = paused.clip.speech.phones
+    assert phones.phones.count(SILENCE) == 3
+    middle = phones.phones.index(SILENCE, 1)
+    assert phones.durations[middle] == pytest.approx(1.5, abs=1e-3)
+    frame = round(float(phones.edges[middle : middle + 2].mean()) * paused.clip.fps)
+    assert np.abs(paused.clip.motion.values[frame] - paused.clip.motion.values[0]).max() < 1e-3
+    assert len(paused.clip.motion) > len(plain.clip.motion) + 30
+
+
+def test_a_file_with_marks_counts_characters_and_tells_the_times_of_names(ready: Cast, tmp_path: Path) -> None:
+    text = '<speak>Hello <mark name="here"/>there. <break time="1s"/>Bye.</speak>'
+    told: list[tuple[int, int]] = []
+    request = Request(text=text, fps=5.0)
+    written = write_clip(request, SMALL, ready, tmp_path / "a.mp4", on_progress=lambda *step: told.append(step))
+    (here,) = written.marks
+    assert here.name == "here"
+    assert 0.3 < here.seconds < 1.2
+    assert told[-1] == (len("Hello there. Bye."),) * 2
+    assert [done for done, _ in told] == sorted(done for done, _ in told)
+    assert media_facts(tmp_path / "a.mp4").duration == pytest.approx(written.seconds, abs=0.2)
+
+
+def test_the_command_makes_the_pause(tmp_path: Path) -> None:
+    lengths = []
+    for number, text in enumerate(("Hello there.", "Hello [pause 2] there.")):
+        out = tmp_path / f"{number}.mp4"
+        arguments = [text, "--out", str(out), "--size", "64x64", "--voice", "espeak"]
+        subprocess.run([*COMMAND, *arguments], check=True, capture_output=True)
+        lengths.append(media_facts(out).duration)
+    assert 1.7 < lengths[1] - lengths[0] < 2.5
+
+
+def test_the_command_tells_when_names_are_reached(tmp_path: Path) -> None:
+    text = '<speak>Hello <mark name="the place"/>there.</speak>'
+    arguments = [text, "--out", str(tmp_path / "a.gif"), "--size", "64x64", "--fps", "5"]
+    done = subprocess.run([*COMMAND, *arguments], check=True, capture_output=True, text=True)
+    assert done.stderr.rstrip().endswith("s: the place")
+
+
+def test_a_recording_s_words_carry_marks(ready: Cast, shared_recordings: Path) -> None:
+    film = shared_recordings / "grid_s1" / "clips" / "bbaf2n.mkv"
+    found = list(
+        stream(Request(audio=film, text="bin [style:head=calm]blue at F[/style] two [nod]now", fps=60.0), ready)
+    )
+    at = words(found)
+    assert [nod.time for piece in found for nod in piece.timeline.nods] == pytest.approx([at["now"]])
+    spans = [span for piece in found for span in piece.timeline.spans]
+    assert spans[0].start == pytest.approx(at["blue"])
+    assert at["F"] < spans[-1].end <= at["two"] + 1e-6

@@ -1,0 +1,37 @@
+"""A voice with a known answer: every letter lasts 0.1 s, a loud one; silences of 0.2 s before and 0.3 s behind."""
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from tts2face.types import Speech, Waveform
+
+RATE = 1000
+LEAD, TRAIL, LETTER, LEVEL = 0.2, 0.3, 0.1, 0.25
+
+
+class FakeVoice:
+    """Splits words at hyphens where ``splits`` says so, as voices may."""
+
+    def __init__(self, splits: bool = False) -> None:
+        self.said: list[tuple[str, float]] = []
+        self._splits = splits
+
+    @property
+    def sample_rate(self) -> int:
+        return RATE
+
+    def speak(self, spoken: str | Sequence, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
+        self.said.append((str(spoken), rate))
+        words = re.findall(r"\w+" if self._splits else r"[\w'-]+", str(spoken))
+        n = sum(map(len, words))
+        edges = np.concatenate([[0.0], LEAD + np.arange(n + 1) * LETTER / rate, [0.0]])
+        edges[-1] = edges[-2] + TRAIL
+        samples = np.zeros(round(edges[-1] * RATE), np.float32)
+        samples[round(edges[1] * RATE) : round(edges[-2] * RATE)] = LEVEL * volume
+        edges[-1] = len(samples) / RATE
+        firsts = 1 + np.concatenate([[0], np.cumsum([len(word) for word in words])])
+        spans = tuple(WordSpan(word, int(firsts[k]), int(firsts[k + 1])) for k, word in enumerate(words))
+        return Speech(Waveform(samples, RATE), PhoneSequence([SILENCE, *["a"] * n, SILENCE], edges), spans)
