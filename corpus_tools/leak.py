@@ -53,7 +53,8 @@ class PoseLeak:
             return observation
         terms = angle_terms((observation.head[:, :3] - self.centre) / self.scale)
         leak = np.tensordot(terms, self.offsets, axes=1)
-        return replace(observation, landmarks=(observation.landmarks - leak).astype(np.float32))
+        landmarks = (observation.landmarks - leak).astype(np.float32)
+        return replace(observation, landmarks=landmarks)  # type: ignore[type-var] # protocols cannot ask for a dataclass
 
 
 def pose_leak(observations: Sequence[Seen]) -> PoseLeak:
