@@ -7,12 +7,13 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
+from cli.flags import whole_number
 from cli.progress import progress_bar, say
 from lexicon.errors import InputError
 
 corpus = App(name="corpus", help="Build, show and measure talkers.")
 
-Jobs = Annotated[int | None, Parameter(help="Processes; one a core without it.")]
+Jobs = Annotated[int | None, Parameter(help="Processes; one a core without it.", converter=whole_number)]
 Cache = Annotated[Path | None, Parameter(help="Folder for finished parts; your cache folder without it.")]
 Model = Annotated[Path | None, Parameter(help="face_landmarker.task; found or set up without it.")]
 
@@ -170,10 +171,11 @@ def show(talker: Annotated[str, Parameter(help="A shipped talker or a .talker fi
 def evaluate(  # noqa: PLR0913 - one parameter a flag
     *,
     recordings: Annotated[Path | None, Parameter(help="Folder to split into training and held-out utterances.")] = None,
-    hold_out: Annotated[int, Parameter(help="Utterances held out of --recordings.")] = 100,
-    seed: Annotated[int, Parameter(help="Which utterances are held out.")] = 0,
+    hold_out: Annotated[int, Parameter(help="Utterances held out of --recordings.", converter=whole_number)] = 100,
+    seed: Annotated[int, Parameter(help="Which utterances are held out.", converter=whole_number)] = 0,
     folds: Annotated[
-        int | None, Parameter(help="Instead of --hold-out: hold out each utterance once, in folds.")
+        int | None,
+        Parameter(help="Instead of --hold-out: hold out each utterance once, in folds.", converter=whole_number),
     ] = None,
     hold_out_words: Annotated[
         str | None, Parameter(help="Instead of --hold-out: utterances with one of these words, such as please,seven.")

@@ -1,11 +1,22 @@
 """Flags made from the fields of option dataclasses, so that every option is named and explained once."""
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import MISSING, Field, fields
-from typing import Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 from cyclopts import Group, Parameter
+
+if TYPE_CHECKING:
+    from cyclopts import Token
+
+
+def whole_number(_: Any, tokens: "Sequence[Token]") -> int:
+    """The number of a flag that counts; cyclopts itself rounds 2.5 to 2."""
+    try:
+        return int(tokens[0].value)
+    except ValueError as wrong:
+        raise ValueError(f'"{tokens[0].value}" is no whole number') from wrong
 
 
 def flags_from(*groups: tuple[str, type], without: frozenset[str] = frozenset()) -> Callable[..., Any]:
@@ -36,7 +47,8 @@ def flags_from(*groups: tuple[str, type], without: frozenset[str] = frozenset())
 
 def _parameter(option: "Field[Any]", kind: Any, group: Group) -> inspect.Parameter:
     default = inspect.Parameter.empty if option.default is MISSING else option.default
-    annotation = Annotated[kind, Parameter(help=option.metadata["help"], group=group, negative="")]
+    converter = whole_number if kind in (int, int | None) else None
+    annotation = Annotated[kind, Parameter(help=option.metadata["help"], group=group, negative="", converter=converter)]
     return inspect.Parameter(option.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 

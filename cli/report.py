@@ -5,6 +5,7 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
+from cli.flags import whole_number
 from cli.progress import progress_bar, say
 from lexicon.errors import InputError
 
@@ -21,8 +22,12 @@ def similarity(  # noqa: PLR0913 - one parameter a flag
         str | None,
         Parameter(help="Numbers of viseme classes to list; without it those of 4,6,8,10,12 that the phones allow."),
     ] = None,
-    halves: Annotated[int, Parameter(help="Random halves of the corpus to compare (.html, .json).")] = 20,
-    seed: Annotated[int, Parameter(help="Which halves and permutations are drawn (.html, .json).")] = 0,
+    halves: Annotated[
+        int, Parameter(help="Random halves of the corpus to compare (.html, .json).", converter=whole_number)
+    ] = 20,
+    seed: Annotated[
+        int, Parameter(help="Which halves and permutations are drawn (.html, .json).", converter=whole_number)
+    ] = 0,
     compare: Annotated[
         str | None, Parameter(help="Another talker to compare with; .csv and .png then hold the difference.")
     ] = None,

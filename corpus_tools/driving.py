@@ -1,7 +1,7 @@
 """Drives learnt from observations and their sound: which features, how much context, how many hidden units."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,23 +78,6 @@ def learn_drives(
         "linear": replace(learn_linear(lessons, feature=FEATURE), loudness=loudness),
         "network": replace(learn_network(lessons, feature=FEATURE, options=network), loudness=loudness),
     }
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Fold:
-    """Utterances to learn from and others to check by."""
-
-    learn: tuple[int, ...]
-    check: tuple[int, ...]
-
-
-def folds(n_utterances: int, n_folds: int, seed: int) -> tuple[Fold, ...]:
-    """Every utterance is checked by once; drawn by the seed."""
-    parts = np.array_split(np.random.default_rng(seed).permutation(n_utterances), n_folds)
-    return tuple(
-        Fold(tuple(int(i) for k, other in enumerate(parts) if k != at for i in other), tuple(int(i) for i in part))
-        for at, part in enumerate(parts)
-    )
 
 
 def _with_sound(observations: Sequence[Observation]) -> Iterator[tuple[Observation, Waveform]]:

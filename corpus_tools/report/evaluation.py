@@ -9,7 +9,7 @@ from corpus_tools.evaluation.evaluate import CEILING, Evaluation, Run
 from corpus_tools.evaluation.real import Curves, Real
 from corpus_tools.evaluation.scores import CONFIDENCE, FIGURES, Scores
 from corpus_tools.report.page import page, picture_tag, table
-from corpus_tools.report.trajectories import Series, histogram, line_plot
+from corpus_tools.report.trajectories import Series, curves_plot, histogram
 from lexicon.errors import DataError, InputError
 from tts2face.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.video.media import read_pictures
@@ -34,7 +34,8 @@ def evaluation_page(result: Evaluation, runs: Sequence[Run]) -> str:
             _classes(result.scores),
             "<h2>DTW cost of the sentences</h2>",
             histogram(
-                {one.method: [u.dtw_cost for u in one.utterances] for one in result.scores if one.method != CEILING}
+                {one.method: [u.dtw_cost for u in one.utterances] for one in result.scores if one.method != CEILING},
+                "DTW cost",
             ),
             *_sentences(result, runs, shown, PLAIN if PLAIN in compared and shown != PLAIN else None),
         ],
@@ -93,7 +94,7 @@ def _curves(run: Run, at: int, names: Sequence[str]) -> str:
     for label, curve in (("gap of the lips / eye distance", "opening"), ("width of the mouth / eye distance", "width")):
         series = [Series("real", times, getattr(one.curves, curve))]
         series += [Series(name, times, getattr(curves, curve)) for name, curves in made.items()]
-        plots.append(line_plot(series, label, one.observation.phones))
+        plots.append(curves_plot(series, label, one.observation.phones))
     return "\n".join(plots)
 
 

@@ -56,8 +56,8 @@ def ticks(low: float, high: float) -> list[float]:
 
 def scatter(axes: Axes, points: Sequence[Point], line: tuple[float, float] | None = None) -> str:
     """Points; `line` is the intercept and slope of a straight line through them."""
-    x, y = _scales(axes)
-    parts = _frame(axes)
+    x, y = scales(axes)
+    parts = [*y_axis(axes), *x_axis(axes)]
     for point in points:
         parts.append(
             f'<circle cx="{x(point.x):.1f}" cy="{y(point.y):.1f}" r="3" fill="{point.colour}" fill-opacity=".65">'
@@ -73,9 +73,10 @@ def scatter(axes: Axes, points: Sequence[Point], line: tuple[float, float] | Non
 
 def line_plot(axes: Axes, points: Sequence[Point], marked: int) -> str:
     """Points joined by a line; the one at index `marked` is larger."""
-    x, y = _scales(axes)
+    x, y = scales(axes)
     places = " ".join(f"{x(point.x):.1f},{y(point.y):.1f}" for point in points)
-    parts = [*_frame(axes), f'<polyline points="{places}" fill="none" stroke="var(--first)" stroke-width="1.5"/>']
+    line = f'<polyline points="{places}" fill="none" stroke="var(--first)" stroke-width="1.5"/>'
+    parts = [*y_axis(axes), *x_axis(axes), line]
     for at, point in enumerate(points):
         radius, colour = (6, "var(--second)") if at == marked else (3.5, point.colour)
         parts.append(
@@ -100,7 +101,8 @@ def bars(values: Sequence[tuple[str, float]], *, width: int = 560) -> str:
     return picture(width, len(values) * BAR, parts, size=12, name="bars")
 
 
-def _scales(axes: Axes) -> tuple[Callable[[float], float], Callable[[float], float]]:
+def scales(axes: Axes) -> tuple[Callable[[float], float], Callable[[float], float]]:
+    """From values to places in the picture, across and down."""
     (x_low, x_high), (y_low, y_high) = axes.x_range, axes.y_range
     room, tall = axes.width - LEFT - RIGHT, axes.height - TOP - BOTTOM
     return (
@@ -109,18 +111,27 @@ def _scales(axes: Axes) -> tuple[Callable[[float], float], Callable[[float], flo
     )
 
 
-def _frame(axes: Axes) -> list[str]:
-    x, y = _scales(axes)
+def y_axis(axes: Axes) -> list[str]:
+    """The axis on the left, its lines across the plot, and its name."""
+    _, y = scales(axes)
     right, bottom = axes.width - RIGHT, axes.height - BOTTOM
     parts = []
     for value in ticks(*axes.y_range):
         parts.append(f'<path d="M{LEFT} {y(value):.1f}H{right}" stroke="var(--line)"/>')
         parts.append(text(LEFT - 6, y(value) + 4, f"{value:g}", anchor="end"))
-    for value in ticks(*axes.x_range):
-        parts.append(f'<path d="M{x(value):.1f} {bottom}v4" stroke="var(--soft)"/>')
-        parts.append(text(x(value), bottom + 17, f"{value:g}"))
     middle = (TOP + bottom) / 2
-    parts.append(f'<path d="M{LEFT} {bottom}H{right}" stroke="var(--soft)"/>')
-    parts.append(text((LEFT + right) / 2, axes.height - 8, axes.x_label))
     parts.append(text(14, middle, axes.y_label, more=f'transform="rotate(-90 14 {middle:.1f})"'))
+    return parts
+
+
+def x_axis(axes: Axes, marks: Sequence[tuple[float, str]] | None = None) -> list[str]:
+    """The axis below with its name, and what stands at which values: round numbers without `marks`."""
+    x, _ = scales(axes)
+    right, bottom = axes.width - RIGHT, axes.height - BOTTOM
+    parts = [f'<path d="M{LEFT} {bottom}H{right}" stroke="var(--soft)"/>']
+    if marks is None:
+        marks = [(value, f"{value:g}") for value in ticks(*axes.x_range)]
+        parts += [f'<path d="M{x(value):.1f} {bottom}v4" stroke="var(--soft)"/>' for value, _ in marks]
+    parts += [text(x(value), bottom + 17, name) for value, name in marks]
+    parts.append(text((LEFT + right) / 2, axes.height - 8, axes.x_label))
     return parts

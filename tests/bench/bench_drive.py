@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.driving import FEATURE, NETWORK, Fold, folds, heard_features, heard_in, lessons_of
+from corpus_tools.driving import FEATURE, NETWORK, heard_features, heard_in, lessons_of
 from corpus_tools.evaluation import measures
 from corpus_tools.evaluation.evaluate import LEARNT_FOR_EVALUATION
 from corpus_tools.evaluation.real import Real, Thresholds
 from corpus_tools.evaluation.scores import Scores, scored
-from corpus_tools.evaluation.splits import split
+from corpus_tools.evaluation.splits import folds, split
 from corpus_tools.leak import pose_leak
 from corpus_tools.learn import learn_talker
 from corpus_tools.observation import Observation
@@ -167,13 +167,12 @@ class Bench:
 
     def choose(self) -> None:
         """Every method by three-fold cross-validation on the training utterances; means of the folds."""
-        parts: list[Fold] = list(folds(len(self.train), 3, 0))
-        talkers = [learn_talker([self.train[i] for i in f.learn], metadata=LEARNT_FOR_EVALUATION) for f in parts]
+        parts = folds(self.train, n_folds=3, seed=0)
+        talkers = [learn_talker(learn, metadata=LEARNT_FOR_EVALUATION) for learn, _ in parts]
         rows = []
         for name, kind, network, context in self.methods():
             every = []
-            for fold, talker in zip(parts, talkers, strict=True):
-                learn, check = ([self.train[i] for i in part] for part in (fold.learn, fold.check))
+            for (learn, check), talker in zip(parts, talkers, strict=True):
                 drive = self.learnt(kind, network, context, learn, talker)
                 every.append(self.score(f"{name} (fold)", kind, drive, check, talker))
             means = [np.mean([getattr(one, what) for one in every]) for what in COLUMNS]

@@ -9,7 +9,7 @@ import pytest
 
 from cli.main import run
 from corpus_tools.build import add_drives
-from corpus_tools.driving import FEATURE, folds, heard_features, heard_in, learn_drives
+from corpus_tools.driving import FEATURE, heard_features, heard_in, learn_drives
 from corpus_tools.learn import learn_talker
 from corpus_tools.observe import Observations
 from lexicon.errors import DataError, InputError
@@ -105,11 +105,3 @@ def test_recordings_that_teach_no_drive_are_refused(
 def test_few_utterances_teach_no_drive(corpus: list) -> None:
     talker = learn_talker(corpus[:5], n_speech=2, n_other=1, metadata=ABOUT)
     assert learn_drives(corpus[:5], talker) == {}
-
-
-def test_folds_check_every_utterance_once_and_learn_from_the_others() -> None:
-    made = folds(10, 3, seed=1)
-    assert sorted(i for fold in made for i in fold.check) == list(range(10))
-    for fold in made:
-        assert sorted((*fold.learn, *fold.check)) == list(range(10))
-    assert folds(10, 3, seed=1)[0].check == made[0].check
