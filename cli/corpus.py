@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from cli.flags import whole_number
-from cli.progress import progress_bar, say
+from cli.progress import progress_bar, say, stage_bar
 from lexicon.errors import InputError
 
 corpus = App(name="corpus", help="Build, show and measure talkers.")
@@ -53,10 +53,10 @@ def build(  # noqa: PLR0913 - one parameter a flag
     """Learn a talker from recordings. After an interruption the same command goes on where it stopped."""
     _check_suffix(out, "talker")
     from corpus_tools.build import build_talker
-    from corpus_tools.effort import Effort
+    from corpus_tools.effort import Effort, no_stages
 
     agreed = _consent(name or recordings.resolve().name, consent) if appearance else None
-    with progress_bar("learning from recordings") as on_progress:
+    with stage_bar() as stages:
         built = build_talker(
             recordings,
             out,
@@ -65,7 +65,7 @@ def build(  # noqa: PLR0913 - one parameter a flag
             effort=Effort(cache, jobs, model),
             consent=agreed,
             report=report,
-            on_progress=on_progress,
+            stages=stages or no_stages,
         )
     for refusal in built.refused:
         say(f"refused {refusal.name}: {refusal.reason}")
@@ -148,12 +148,12 @@ def drives(
     """Learn how a talker's lips follow sound alone (`--audio`), for talkers that were built without it."""
     _check_suffix(out, "talker")
     from corpus_tools.build import add_drives
-    from corpus_tools.effort import Effort
+    from corpus_tools.effort import Effort, no_stages
     from tts2face.talker import load_talker
 
-    with progress_bar("listening to recordings") as on_progress:
+    with stage_bar() as stages:
         effort = Effort(cache, jobs, model)
-        made = add_drives(recordings, load_talker(talker), out, effort=effort, on_progress=on_progress)
+        made = add_drives(recordings, load_talker(talker), out, effort=effort, stages=stages or no_stages)
     told = ", ".join(f"{name} (hears {drive.feature})" for name, drive in made.drives.items())
     say(f"wrote {out} with the drives {told}")
 
@@ -182,6 +182,13 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
     ] = None,
     train: Annotated[Path | None, Parameter(help="Folder to learn from, instead of --recordings.")] = None,
     test: Annotated[Path | None, Parameter(help="Folder to test on, with --train.")] = None,
+    cross_talker: Annotated[
+        Path | None,
+        Parameter(help="Test on recordings of somebody else, or a Live Link Face .csv beside its sound; z-scored."),
+    ] = None,
+    own_durations: Annotated[
+        bool, Parameter(help="Measure text alone, too: words in the default English voice's own time.", negative="")
+    ] = False,
     tracks: Annotated[
         Path | None, Parameter(help="Measure others' curves, too: CSV with utterance, time and a column a channel.")
     ] = None,
@@ -193,7 +200,7 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
     model: Model = None,
 ) -> None:
     """Measure synthesised lips against real ones that were not learnt from."""
-    from cli.evaluation import Asked, evaluated
+    from cli.evaluation import Asked, Beside, evaluated
 
-    asked = Asked(recordings, hold_out, seed, folds, hold_out_words, train, test)
-    evaluated(asked, out, tracks, (cache, jobs, model))
+    asked = Asked(recordings, hold_out, seed, folds, hold_out_words, train, test, cross_talker)
+    evaluated(asked, Beside(tracks, own_durations), out, (cache, jobs, model))

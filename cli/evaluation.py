@@ -12,9 +12,11 @@ from lexicon.errors import InputError
 
 if TYPE_CHECKING:
     from corpus_tools.effort import Effort
-    from corpus_tools.evaluation.evaluate import Evaluation, Run
+    from corpus_tools.evaluation.evaluate import Run
     from corpus_tools.evaluation.splits import Parts
+    from corpus_tools.evaluation.tables import Evaluation
     from corpus_tools.observation import Observation
+    from tts2face.voice.engine import Voice
 
 SUFFIXES = (".html", ".json", ".csv")
 
@@ -30,36 +32,80 @@ class Asked:
     words: str | None
     train: Path | None
     test: Path | None
+    cross_talker: Path | None
 
     def check(self) -> None:
         """Refuse flags that contradict each other."""
-        if (self.recordings is None) == (self.train is None) or (self.train is None) != (self.test is None):
+        if self.cross_talker is not None:
+            self._check_across()
+        elif (self.recordings is None) == (self.train is None) or (self.train is None) != (self.test is None):
             raise InputError("give --recordings to split, or both --train and --test")
-        if self.folds is not None and self.words is not None:
+        elif self.folds is not None and self.words is not None:
             raise InputError("give either --folds or --hold-out-words")
-        if self.train is not None and (self.folds is not None or self.words is not None):
+        elif self.train is not None and (self.folds is not None or self.words is not None):
             raise InputError("--folds and --hold-out-words split --recordings; --train and --test are split already")
+
+    def _check_across(self) -> None:
+        if (self.recordings is None) == (self.train is None):
+            raise InputError("with --cross-talker give either --recordings or --train: all of it is learnt from")
+        if self.test is not None or self.folds is not None or self.words is not None:
+            raise InputError("--cross-talker tests on somebody else; leave out --test, --folds and --hold-out-words")
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """The flags that say what is measured beside the methods."""
+
+    tracks: Path | None
+    own_durations: bool
 
 
 def evaluated(
-    asked: Asked, out: Path | None, tracks: Path | None, effort: tuple[Path | None, int | None, Path | None]
+    asked: Asked, beside: Beside, out: Path | None, effort: tuple[Path | None, int | None, Path | None]
 ) -> None:
     """Read recordings, measure every method on what is held out, and tell or write the figures."""
     asked.check()
+    if asked.cross_talker is not None and (beside.tracks is not None or beside.own_durations):
+        raise InputError("--cross-talker takes no --tracks and no --own-durations; measure them on the talker's own")
     if out is not None and out.suffix not in SUFFIXES:
         raise InputError(f"an evaluation is written as {', '.join(SUFFIXES)}, not {out.name}")
     from corpus_tools.effort import Effort
-    from corpus_tools.evaluation.evaluate import evaluate
-    from corpus_tools.evaluation.tracks import read_tracks
 
-    theirs = read_tracks(tracks) if tracks is not None else None
-    parts = _parts(asked, Effort(*effort))
-    with progress_bar("measuring") as on_progress:
-        result, runs = evaluate(parts, tracks=theirs, on_progress=on_progress)
+    result, runs = _measured(asked, beside, Effort(*effort))
     print(result.table())  # noqa: T201 - the answer
     if out is not None:
         _write(out, result, runs)
-        say(f"wrote {out}: {result.n_test} utterances held out, {result.n_train} learnt from")
+        kind = "of somebody else" if result.is_across else "held out"
+        say(f"wrote {out}: {result.n_test} utterances {kind}, {result.n_train} learnt from")
+
+
+def _measured(asked: Asked, beside: Beside, effort: "Effort") -> "tuple[Evaluation, tuple[Run, ...]]":
+    from corpus_tools.evaluation.evaluate import evaluate, evaluate_across
+    from corpus_tools.evaluation.tracks import read_tracks
+
+    learnt_from = asked.recordings or asked.train
+    if asked.cross_talker is not None and learnt_from is not None:
+        train, others = _observations(learnt_from, effort), _somebody_else(asked.cross_talker, effort)
+        with progress_bar("measuring") as on_progress:
+            return evaluate_across(train, others, on_progress=on_progress)
+    tracks = read_tracks(beside.tracks) if beside.tracks is not None else None
+    voice = _voice() if beside.own_durations else None
+    parts = _parts(asked, effort)
+    with progress_bar("measuring") as on_progress:
+        return evaluate(parts, tracks=tracks, voice=voice, on_progress=on_progress)
+
+
+def _voice() -> "Voice":
+    from tts2face.request import Request
+    from tts2face.voice.engine import load_voice
+
+    return load_voice(None, Request(text="").language)
+
+
+def _somebody_else(recordings: Path, effort: "Effort") -> "tuple[Observation, ...]":
+    from corpus_tools.evaluation.capture import SUFFIX, captured
+
+    return captured(recordings, effort) if recordings.suffix == SUFFIX else _observations(recordings, effort)
 
 
 def _parts(asked: Asked, effort: "Effort") -> "tuple[Parts, ...]":

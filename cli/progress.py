@@ -15,6 +15,13 @@ def say(line: str) -> None:
 @contextmanager
 def progress_bar(what: str, quiet: bool = False) -> Iterator[Progress | None]:
     """A bar that follows ``on_progress(done, of)``; nothing when quiet or when no person is looking."""
+    with stage_bar(quiet) as stages:
+        yield stages(what) if stages else None
+
+
+@contextmanager
+def stage_bar(quiet: bool = False) -> Iterator[Callable[[str], Progress] | None]:
+    """A bar that starts again with each stage, under its name; nothing when quiet or when no person is looking."""
     if quiet or not sys.stderr.isatty():
         yield None
         return
@@ -24,5 +31,11 @@ def progress_bar(what: str, quiet: bool = False) -> Iterator[Progress | None]:
 
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=None)
-        yield lambda done, of: bar.update(task, completed=done, total=of)
+
+        def begin(what: str) -> Progress:
+            for task in bar.task_ids:
+                bar.remove_task(task)
+            task = bar.add_task(what, total=None)
+            return lambda done, of: bar.update(task, completed=done, total=of)
+
+        yield begin

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from corpus_tools.driving import learn_drives
-from corpus_tools.effort import Effort, Progress
+from corpus_tools.effort import Effort, Stages, no_stages
 from corpus_tools.leak import without_leak
 from corpus_tools.learn import learn_talker
 from corpus_tools.lips import with_network
@@ -23,8 +23,7 @@ from tts2face.talker import Talker, write_talker
 PROVENANCE = "provenance.json"  # in the folder of recordings: where they come from and how they may be used
 PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
 UNSTATED = "not stated"
-SHARES = 1000  # steps of the whole work
-WATCHING = 0.4  # of the work where an appearance is learnt, too
+READING = "reading recordings"  # the first stage
 CONTENT_WITH_PICTURES = (
     "landmark shapes, head pose, phones, loudness, and with the stated consent pictures of the person's face; no sound"
 )
@@ -50,7 +49,7 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
     created: str | None = None,
     consent: Mapping[str, str] | None = None,
     report: Path | None = None,
-    on_progress: Progress | None = None,
+    stages: Stages = no_stages,
 ) -> Built:
     """Observe recordings, learn their talker, and write it; the same recordings give the same bytes but for `created`.
 
@@ -66,8 +65,8 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
         Of the person shown, from `corpus_tools.consent.consent_of`; with it the talker gets an appearance.
     report
         HTML page about the recordings to write; it is written even where none could be used.
-    on_progress
-        Called with steps done and of all.
+    stages
+        Called with the name of each stage as it begins.
 
     Raises
     ------
@@ -79,8 +78,7 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
         A package or the landmark models are missing, or a file cannot be written.
     """
     stated = read_provenance(provenance or recordings / PROVENANCE, must_exist=provenance is not None)
-    watched = 1.0 if consent is None else WATCHING
-    observations = observe(recordings, effort=effort, on_progress=_part(on_progress, 0.0, watched))
+    observations = observe(recordings, effort=effort, on_progress=stages(READING))
     called = name or stated.get("name") or recordings.resolve().stem
     if report is not None:
         write_whole(report, recordings_page(called, observations).encode())
@@ -96,20 +94,20 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
         **_marks(observations.kept),
     }
     steady = without_leak(observations.kept)
-    talker = with_network(learn_talker(steady, metadata=metadata))
-    talker = replace(talker, drives=learn_drives(steady, talker))
+    talker = with_network(learn_talker(steady, metadata=metadata), on_progress=stages("learning lips"))
+    talker = replace(talker, drives=learn_drives(steady, talker, stages=stages))
     if consent is not None:
         from corpus_tools.aam.attach import with_appearance
 
-        learning = _part(on_progress, watched, 1.0)
-        talker = with_appearance(talker, observations.kept, effort=effort or Effort(), on_progress=learning)
+        looks = stages("learning looks")
+        talker = with_appearance(talker, observations.kept, effort=effort or Effort(), on_progress=looks)
     write_talker(out, talker)
     seconds = sum(len(utterance.shape) for utterance in talker.utterances) / talker.fps
     return Built(len(talker.utterances), seconds / 60.0, observations.refused)
 
 
 def add_drives(
-    recordings: Path, talker: Talker, out: Path, *, effort: Effort | None = None, on_progress: Progress | None = None
+    recordings: Path, talker: Talker, out: Path, *, effort: Effort | None = None, stages: Stages = no_stages
 ) -> Talker:
     """Learn the drives of a talker from the recordings that she was learnt from, and write her with them.
 
@@ -120,10 +118,10 @@ def add_drives(
     DataError
         A recording holds no sound, or its frame rate is not the talker's.
     """
-    kept = without_leak(observe(recordings, effort=effort, on_progress=on_progress).kept)
+    kept = without_leak(observe(recordings, effort=effort, on_progress=stages(READING)).kept)
     if any(one.fps != talker.fps for one in kept):
         raise DataError(f"the recordings do not have the talker's {talker.fps:g} frames per second; convert them")
-    drives = learn_drives(kept, talker)
+    drives = learn_drives(kept, talker, stages=stages)
     if not drives:
         raise InputError(f"{recordings} holds too little speech to learn drives from; give 20 utterances or more")
     made = replace(talker, drives=drives)
@@ -139,13 +137,6 @@ def _marks(kept: Sequence[Observation]) -> dict[str, Any]:
         **({"phones_recognised": recognised} if recognised else {}),
         **({"sound_late_s": lags} if lags else {}),
     }
-
-
-def _part(on_progress: Progress | None, begin: float, end: float) -> Progress | None:
-    """Progress of a part of the work, from share `begin` of the whole to share `end`."""
-    if on_progress is None:
-        return None
-    return lambda done, of: on_progress(round(SHARES * (begin + (end - begin) * done / max(of, 1))), SHARES)
 
 
 def read_provenance(path: Path, *, must_exist: bool) -> Mapping[str, Any]:

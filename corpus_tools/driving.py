@@ -1,11 +1,12 @@
 """Drives learnt from observations and their sound: which features, how much context, how many hidden units."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.effort import Progress, Stages, no_stages
 from corpus_tools.observation import Observation
 from tts2face.drives import Drive
 from tts2face.speech.drive import Lesson, learn_linear
@@ -25,7 +26,7 @@ Heard = Mapping[str, NDArray[np.float32]]  # features of each utterance by its n
 
 
 def heard_features(
-    observations: Sequence[Observation], kinds: Sequence[str], *, on_progress: Callable[[int, int], None] | None = None
+    observations: Sequence[Observation], kinds: Sequence[str], *, on_progress: Progress | None = None
 ) -> dict[str, Heard]:
     """For each kind of feature, the (T, D) features of every utterance on the frames of its landmarks.
 
@@ -60,7 +61,7 @@ def learn_drives(
     talker: Talker,
     *,
     network: NetworkOptions = NETWORK,
-    on_progress: Callable[[int, int], None] | None = None,
+    stages: Stages = no_stages,
 ) -> dict[str, Drive]:
     """The linear and the network drive of a talker; none where the recordings are too few to learn them.
 
@@ -71,13 +72,15 @@ def learn_drives(
     """
     if len(observations) < LEAST_UTTERANCES or sum(len(one.landmarks) for one in observations) < LEAST_FRAMES:
         return {}
-    heard = heard_features(observations, (FEATURE, "level"), on_progress=on_progress)
+    heard = heard_features(observations, (FEATURE, "level"), on_progress=stages("listening"))
     lessons = lessons_of(observations, talker.model, heard[FEATURE])
     loudness = speech_level(np.concatenate(list(heard["level"].values())))
-    return {
-        "linear": replace(learn_linear(lessons, feature=FEATURE), loudness=loudness),
-        "network": replace(learn_network(lessons, feature=FEATURE, options=network), loudness=loudness),
-    }
+    told = stages("learning drives")
+    linear = learn_linear(lessons, feature=FEATURE)
+    told(1, 2)
+    bent = learn_network(lessons, feature=FEATURE, options=network)
+    told(2, 2)
+    return {"linear": replace(linear, loudness=loudness), "network": replace(bent, loudness=loudness)}
 
 
 def _with_sound(observations: Sequence[Observation]) -> Iterator[tuple[Observation, Waveform]]:

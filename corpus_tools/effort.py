@@ -9,6 +9,7 @@ from lexicon.errors import BackendError, InputError
 from tts2face.video.model import user_cache
 
 Progress = Callable[[int, int], None]  # steps done, and of all
+Stages = Callable[[str], Progress]  # begins a stage of a long piece of work by its name, and gives its progress
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,3 +51,8 @@ class Effort:
         if jobs < 1:
             raise InputError(f"jobs must be 1 or more, not {jobs}")
         return jobs
+
+
+def no_stages(_: str) -> Progress:
+    """Stages that nobody watches."""
+    return lambda done, of: None

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from corpus_tools.effort import Progress
 from lexicon.errors import BackendError
 from lexicon.sequence import SILENCE
 from tts2face.talker import Talker
@@ -19,7 +20,7 @@ N_NETWORKS = 3  # averaged: r of opening .877 with one, .886 with three (docs/de
 LEAST_FRAMES = 3000  # two minutes; from less a network learns nothing that examples do not show
 
 
-def with_network(talker: Talker, n_networks: int = N_NETWORKS) -> Talker:
+def with_network(talker: Talker, n_networks: int = N_NETWORKS, *, on_progress: Progress | None = None) -> Talker:
     """The talker with networks trained on what it holds; as it is where that is too little.
 
     Raises
@@ -38,7 +39,11 @@ def with_network(talker: Talker, n_networks: int = N_NETWORKS) -> Talker:
         near = (times >= spoken.phones.edges[1] - MARGIN_S) & (times <= spoken.phones.edges[-2] + MARGIN_S)
         inputs.append(one_of_each(*window_features(spoken.phones, times[near], inventory), len(inventory)))
         wanted.append(spoken.shape[near, :n_speech] / spread)
-    fitted = [_fitted(np.concatenate(inputs), np.concatenate(wanted), seed) for seed in range(n_networks)]
+    fitted = []
+    for seed in range(n_networks):
+        fitted.append(_fitted(np.concatenate(inputs), np.concatenate(wanted), seed))
+        if on_progress:
+            on_progress(seed + 1, n_networks)
     weights = [np.stack(layer).astype(np.float32) for layer in zip(*(one.coefs_ for one in fitted), strict=True)]
     biases = [np.stack(layer).astype(np.float32) for layer in zip(*(one.intercepts_ for one in fitted), strict=True)]
     weights[-1], biases[-1] = weights[-1] * spread, biases[-1] * spread

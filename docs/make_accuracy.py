@@ -1,50 +1,61 @@
 """Measure the default synthesis on held-out recordings and write the tables of accuracy.md.
 
-Run: python docs/make_accuracy.py ../shared/recordings/grid_s1 [--cache FOLDER]
+Run: python docs/make_accuracy.py ../shared/recordings/grid_s1 ../shared/recordings/livelink/testset_arkit61_60fps.csv
 """
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from corpus_tools.effort import Effort
-from corpus_tools.evaluation.evaluate import Evaluation, evaluate
-from corpus_tools.evaluation.scores import FIGURES
+from corpus_tools.evaluation.capture import captured
+from corpus_tools.evaluation.evaluate import evaluate, evaluate_across
+from corpus_tools.evaluation.scores import FIGURES, Scores
 from corpus_tools.evaluation.splits import split, without_words
+from corpus_tools.evaluation.tables import Evaluation
 from corpus_tools.observe import observe
 from tts2face.exemplar.options import METHODS
+from tts2face.voice.engine import load_voice
 
 HERE = Path(__file__).parent
 PAGE, FIGURES_FILE = HERE / "accuracy.md", HERE / "accuracy.json"
 HELD_OUT, SEED, WORDS = 100, 0, ("please", "seven", "m")
+LANGUAGE = "en-us"
+TABLES = ("utterances", "own durations", "words", "another talker")
 
 
-def measured(recordings: Path, effort: Effort) -> dict[str, Any]:
-    """The figures of both splits, and the options that were measured."""
+def measured(recordings: Path, other: Path, effort: Effort) -> dict[str, Any]:
+    """The figures of both splits and of another talker, and the options that were measured."""
     kept = observe(recordings, effort=effort).kept
-    splits = {"utterances": split(kept, hold_out=HELD_OUT, seed=SEED), "words": without_words(kept, WORDS)}
+    utterances, _ = evaluate([split(kept, hold_out=HELD_OUT, seed=SEED)], voice=load_voice(None, LANGUAGE))
+    words, _ = evaluate([without_words(kept, WORDS)])
+    across, _ = evaluate_across(kept, captured(other, effort))
     return {
         "options": {name: asdict(options) for name, options in METHODS.items()},
-        **{name: _plain(evaluate([parts])[0]) for name, parts in splits.items()},
+        "utterances": _plain(utterances.scores, utterances),
+        "own durations": _plain(utterances.own, utterances),
+        "words": _plain(words.scores, words),
+        "another talker": _plain(across.scores, across),
     }
 
 
-def _plain(found: Evaluation) -> dict[str, Any]:
-    told = found.to_json()
-    for scores in told["scores"]:
-        del scores["utterances"], scores["real_time_factor"]  # one is long, the other the machine's
-    return told
+def _plain(scores: Sequence[Scores], found: Evaluation) -> dict[str, Any]:
+    told = [asdict(one) for one in scores]
+    for one in told:
+        del one["utterances"], one["real_time_factor"]  # one is long, the other the machine's
+    return {"n_train": found.n_train, "n_test": found.n_test, "scores": told}
 
 
 def table(split_figures: Mapping[str, Any]) -> str:
     """Markdown table of one split, with intervals for the headline."""
-    lines = [f"| method | {' | '.join(head for _, head, _ in FIGURES)} |", "| --- |" + " --- |" * len(FIGURES)]
+    heads = [figure for figure in FIGURES if figure[0] in split_figures["scores"][0]["figures"]]
+    lines = [f"| method | {' | '.join(head for _, head, _ in heads)} |", "| --- |" + " --- |" * len(heads)]
     for scores in split_figures["scores"]:
         cells = []
-        for name, _, digits in FIGURES:
+        for name, _, digits in heads:
             figure = scores["figures"][name]
             text = f"{figure['value']:.{digits}f}"
             if name == "dtw_cost":
@@ -56,7 +67,7 @@ def table(split_figures: Mapping[str, Any]) -> str:
 
 def with_tables(page: str, figures: Mapping[str, Any]) -> str:
     """The page with the tables of the figures between its marks."""
-    for name in ("utterances", "words"):
+    for name in TABLES:
         begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
         before, _, rest = page.partition(begin)
         _, _, behind = rest.partition(end)
@@ -68,9 +79,10 @@ def main() -> None:
     """Measure and write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("recordings", type=Path)
+    parser.add_argument("other", type=Path)
     parser.add_argument("--cache", type=Path)
     arguments = parser.parse_args()
-    figures = measured(arguments.recordings, Effort(arguments.cache))
+    figures = measured(arguments.recordings, arguments.other, Effort(arguments.cache))
     FIGURES_FILE.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
     PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8"), figures), encoding="utf-8")
 

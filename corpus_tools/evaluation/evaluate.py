@@ -2,24 +2,27 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.effort import Progress
+from corpus_tools.evaluation.across import Scale, in_own_units, judged_across
 from corpus_tools.evaluation.methods import Method, methods_of
-from corpus_tools.evaluation.real import Real, Thresholds
-from corpus_tools.evaluation.scores import FIGURES, Scores, scored
+from corpus_tools.evaluation.own_durations import Said, judged_own, said_by
+from corpus_tools.evaluation.real import Curves, Real, Thresholds
+from corpus_tools.evaluation.scores import Judged, Scores, scored, scores_of
 from corpus_tools.evaluation.splits import Parts, require_parted
+from corpus_tools.evaluation.tables import Evaluation, Fold
 from corpus_tools.evaluation.tracks import Track, mapped
-from corpus_tools.leak import pose_leak
+from corpus_tools.leak import pose_leak, without_leak
 from corpus_tools.learn import learn_talker
 from corpus_tools.lips import with_network
 from corpus_tools.observation import Observation
 from tts2face.exemplar.options import SynthesisOptions
-from tts2face.talker import ShapeModel
+from tts2face.talker import ShapeModel, Talker
+from tts2face.voice.engine import Voice
 
 LEARNT_FOR_EVALUATION = {
     "name": "evaluation", "language": "", "sources": "", "licence": "", "attribution": "", "command": "", "created": "",
@@ -27,63 +30,29 @@ LEARNT_FOR_EVALUATION = {
 TRACKS, CEILING = "tracks", "real, through the model"
 
 
-@dataclass(frozen=True, slots=True)
-class Evaluation:
-    """All methods on held-out utterances."""
-
-    n_train: int
-    n_test: int
-    scores: tuple[Scores, ...]
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain dictionary, utterances included."""
-        return asdict(self)
-
-    def table(self, *, intervals: bool = False) -> str:
-        """Markdown table, one method a line."""
-        lines = [f"| method | {' | '.join(head for _, head, _ in FIGURES)} |", "| --- |" + " --- |" * len(FIGURES)]
-        for one in self.scores:
-            cells = [_cell(one, name, digits, intervals=intervals) for name, _, digits in FIGURES]
-            lines.append(f"| {one.method} | {' | '.join(cells)} |")
-        return "\n".join(lines)
-
-    def class_table(self) -> str:
-        """Markdown table of the classes of phones, one method and class a line."""
-        lines = ["| method | phones | frames | RMSE z | error of opening | bias |", "| --- |" + " --- |" * 5]
-        lines += [
-            f"| {one.method} | {some.phones} | {some.n_frames} | {some.rmse_z:.3f} | {some.opening_error:.4f} | "
-            f"{some.opening_bias:+.4f} |"
-            for one in self.scores
-            for some in one.classes
-        ]
-        return "\n".join(lines)
-
-    def rows(self) -> tuple[tuple[str, ...], ...]:
-        """All figures with their intervals, for a CSV file; the first row names the columns."""
-        head = ("method", *(part for name, _, _ in FIGURES for part in (name, f"{name}_low", f"{name}_high")))
-        rows = []
-        for one in self.scores:
-            figures = [one.figures[name] for name, _, _ in FIGURES]
-            rows.append(
-                (one.method, *(f"{x:.6g}" for figure in figures for x in (figure.value, figure.low, figure.high)))
-            )
-        return (head, *rows)
-
-
-def _cell(scores: Scores, name: str, digits: int, *, intervals: bool) -> str:
-    figure = scores.figures[name]
-    text = f"{figure.value:.{digits}f}"
-    return f"{text} ({figure.low:.{digits}f}-{figure.high:.{digits}f})" if intervals else text
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """One split, made: the model, the real utterances, and what each method made of them (T, S), by name."""
+    """One split, made: the talker, the real utterances, and what each method made of them (T, S), by name.
 
-    model: ShapeModel
+    ``own`` is what methods made of a voice's own durations. ``scale`` is the talker's where curves are z-scored.
+    """
+
+    talker: Talker
     real: tuple[Real, ...]
     made: Mapping[str, tuple[NDArray[np.float32], ...]]
     spent: Mapping[str, float]
+    own: Mapping[str, tuple[Judged, ...]] = field(default_factory=dict)
+    scale: Scale | None = None
+
+    @property
+    def model(self) -> ShapeModel:
+        """The talker's shape model."""
+        return self.talker.model
+
+    def curves(self, method: str, at: int) -> Curves:
+        """Curves of the lips as a method made them, in the units of the real ones."""
+        curves = Curves.of(self.model.shapes(self.made[method][at]))
+        return curves if self.scale is None else self.scale.scored(curves)
 
 
 def evaluate(
@@ -91,6 +60,7 @@ def evaluate(
     *,
     options: Mapping[str, SynthesisOptions] | None = None,
     tracks: Mapping[str, Track] | None = None,
+    voice: Voice | None = None,
     on_progress: Progress | None = None,
 ) -> tuple[Evaluation, tuple[Run, ...]]:
     """Every method on held-out utterances, with their true phone edges; all is learnt from the training parts.
@@ -104,11 +74,14 @@ def evaluate(
         Exemplar methods by name; by default `METHODS`.
     tracks
         Somebody's curves by utterance, to be measured beside them.
+    voice
+        Says the words of the held-out utterances with its own durations, for a second table.
 
     Raises
     ------
     InputError
-        There is nothing to learn from or nothing to test, or an utterance is on both sides.
+        There is nothing to learn from or nothing to test, an utterance is on both sides, or no words are known for the
+        voice.
     BackendError
         scikit-learn is missing.
     """
@@ -116,9 +89,17 @@ def evaluate(
     for number, (train, test) in enumerate(parts):
         require_parted(train, test)
         tell = _stage(on_progress, number, len(parts))
-        runs.append(run(train, test, options=options, tracks=tracks, on_progress=tell))
+        runs.append(run(train, test, options=options, tracks=tracks, voice=voice, on_progress=tell))
+    limits = Thresholds.of([one for each in runs for one in each.real])
     n_train = len(parts[0][0]) if len(parts) == 1 else min(len(train) for train, _ in parts)
-    return Evaluation(n_train, sum(len(one.real) for one in runs), _together(runs)), tuple(runs)
+    result = Evaluation(
+        n_train,
+        sum(len(one.real) for one in runs),
+        _together(runs, limits),
+        own=_own_together(runs, limits),
+        folds=_folds(parts, runs, limits) if len(runs) > 1 else (),
+    )
+    return result, tuple(runs)
 
 
 def run(
@@ -127,23 +108,74 @@ def run(
     *,
     options: Mapping[str, SynthesisOptions] | None = None,
     tracks: Mapping[str, Track] | None = None,
+    voice: Voice | None = None,
     on_progress: Progress | None = None,
 ) -> Run:
     """One split: learn a talker from `train`, and make the motion of `test` by every method."""
     leak = pose_leak(train)
     train, test = ([leak.removed(seen) for seen in part] for part in (train, test))
-    talker = with_network(learn_talker(train, metadata=LEARNT_FOR_EVALUATION))
+    talker = _learnt(train)
     methods = methods_of(talker, options)
     real = tuple(Real.of(seen, talker.model) for seen in test)
-    made, spent = {}, {}
+    said = said_by(voice, real) if voice is not None else ()
+    made, spent, own = {}, {}, {}
     for number, (name, method) in enumerate(methods.items()):
         made[name], spent[name] = _made(method, real)
+        if said:
+            own[name] = _made_own(method, real, said, talker.model)
         if on_progress:
             on_progress(number + 1, len(methods))
     if tracks is not None:
         made[TRACKS], spent[TRACKS] = mapped(tracks, talker, real), 0.0
     made[CEILING], spent[CEILING] = tuple(one.parameters for one in real), 0.0
-    return Run(talker.model, real, made, spent)
+    return Run(talker, real, made, spent, own)
+
+
+def evaluate_across(
+    train: Sequence[Observation],
+    others: Sequence[Observation],
+    *,
+    options: Mapping[str, SynthesisOptions] | None = None,
+    on_progress: Progress | None = None,
+) -> tuple[Evaluation, tuple[Run, ...]]:
+    """Every method, learnt from one person, on what somebody else said, with that person's phone edges.
+
+    Opening and width are z-scored by the spread of each one's speech, and all figures are those of these two curves.
+
+    Raises
+    ------
+    InputError
+        There is nothing to learn from or nothing to test, or an utterance is on both sides.
+    BackendError
+        scikit-learn is missing.
+    """
+    require_parted(train, others)
+    train, others = without_leak(train), without_leak(others)
+    talker = _learnt(train)
+    hers, theirs = Scale.of(train), Scale.of(others)
+    real = tuple(in_own_units(Real.of(seen, talker.model), theirs) for seen in others)
+    made, spent = {}, {}
+    methods = methods_of(talker, options)
+    for number, (name, method) in enumerate(methods.items()):
+        made[name], spent[name] = _made(method, real)
+        if on_progress:
+            on_progress(number + 1, len(methods))
+    limits = Thresholds.of(real)
+    scores = tuple(
+        scores_of(
+            name,
+            [judged_across(one, values, talker.model, hers) for one, values in zip(real, made[name], strict=True)],
+            limits,
+            spent[name],
+        )
+        for name in methods
+    )
+    result = Evaluation(len(train), len(others), scores, is_across=True)
+    return result, (Run(talker, real, made, spent, scale=hers),)
+
+
+def _learnt(train: Sequence[Observation]) -> Talker:
+    return with_network(learn_talker(train, metadata=LEARNT_FOR_EVALUATION))
 
 
 def _made(method: Method, real: Sequence[Real]) -> tuple[tuple[NDArray[np.float32], ...], float]:
@@ -152,14 +184,34 @@ def _made(method: Method, real: Sequence[Real]) -> tuple[tuple[NDArray[np.float3
     return made, time.perf_counter() - began
 
 
-def _together(runs: Sequence[Run]) -> tuple[Scores, ...]:
-    """Scores of each method over all runs; thresholds come from all real utterances."""
-    limits = Thresholds.of([one for each in runs for one in each.real])
+def _made_own(
+    method: Method, real: Sequence[Real], said: Sequence[Said | None], model: ShapeModel
+) -> tuple[Judged, ...]:
+    pairs = zip(real, said, strict=True)
+    return tuple(judged_own(method, one, spoken, model) for one, spoken in pairs if spoken is not None)
+
+
+def _together(runs: Sequence[Run], limits: Thresholds) -> tuple[Scores, ...]:
+    """Scores of each method over runs."""
     return tuple(
         scored(
             name, [(each.model, each.real, each.made[name]) for each in runs], limits, sum(r.spent[name] for r in runs)
         )
         for name in runs[0].made
+    )
+
+
+def _own_together(runs: Sequence[Run], limits: Thresholds) -> tuple[Scores, ...]:
+    return tuple(
+        scores_of(name, [judged for each in runs for judged in each.own[name]], limits) for name in runs[0].own
+    )
+
+
+def _folds(parts: Sequence[Parts], runs: Sequence[Run], limits: Thresholds) -> tuple[Fold, ...]:
+    """Figures of every run alone; thresholds are those of all."""
+    return tuple(
+        Fold(len(train), len(test), {one.method: one.values() for one in _together([each], limits)})
+        for (train, test), each in zip(parts, runs, strict=True)
     )
 
 

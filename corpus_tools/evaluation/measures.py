@@ -84,10 +84,10 @@ def rmse_z(real: Values, made: Values, spread: Values) -> float:
     return float(np.sqrt(np.mean(np.square((real - made) / spread))))
 
 
-def warping_cost(real: Values, made: Values, spread: Values, fps: float) -> float:
-    """Mean distance of two (T, D) motions in units of `spread` (D,), along the cheapest warp within `DTW_BAND_S`."""
+def warping_cost(real: Values, made: Values, spread: Values, band: int | None) -> float:
+    """Mean distance of motions (T, D) and (U, D) in units of `spread` (D,), along the cheapest warp within a band."""
     cost = distances(real / spread, made / spread)
-    path = warp_path(cost, band=round(DTW_BAND_S * fps))
+    path = warp_path(cost, band=band)
     return path_cost(cost, path) / len(path)
 
 

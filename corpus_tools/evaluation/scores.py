@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.evaluation import measures
 from corpus_tools.evaluation.real import CLASSES, OTHER, Curves, Real, Thresholds
+from lexicon.sequence import PhoneSequence
 from tts2face.talker import ShapeModel
 
 N_DRAWS = 1000  # of utterances, with replacement (Efron 1979)
@@ -15,7 +16,8 @@ CONFIDENCE = 0.95
 # In the order of tables: name, its head, digits.
 FIGURES = (
     ("r_opening", "r opening", 3), ("r_width", "r width", 3), ("rmse_z", "RMSE z", 3), ("dtw_cost", "DTW cost", 3),
-    ("range_ratio", "range ratio", 2), ("closure", "closure", 2), ("false_closure", "false closure", 2),
+    ("free_cost", "DTW cost, free", 3), ("range_ratio", "range ratio", 2), ("closure", "closure", 2),
+    ("false_closure", "false closure", 2),
     ("labiodental", "labiodental", 2), ("rounding", "rounding", 2), ("peak_offset_ms", "peak offset (ms)", 0),
 )  # fmt: skip
 
@@ -62,7 +64,8 @@ class ClassScore:
 class Scores:
     """One method over all held-out utterances: frames pooled for r and range, the other figures means or shares.
 
-    ``figures`` are those of `FIGURES` by name; ``real_time_factor`` is the time spent over the utterances' duration.
+    ``figures`` are those of `FIGURES` by name, ``free_cost`` only for speech on a clock of its own;
+    ``real_time_factor`` is the time spent over the utterances' duration.
     """
 
     method: str
@@ -74,6 +77,10 @@ class Scores:
     def __getitem__(self, figure: str) -> float:
         """The value of a figure."""
         return self.figures[figure].value
+
+    def values(self) -> dict[str, float]:
+        """The figures without their intervals."""
+        return {name: figure.value for name, figure in self.figures.items()}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,31 +95,64 @@ class Tally:
     width: Floats
     rmse_z: float
     dtw_cost: float
+    free_cost: float | None
     counts: Floats
     offsets: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class OwnClock:
+    """The same words as a voice says them, on its own clock: its phones, and parameters (U, S) and curves made of them.
+
+    ``judged`` are the frames about its speech.
+    """
+
+    phones: PhoneSequence
+    judged: slice
+    values: NDArray[np.floating]
+    curves: Curves
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Judged:
-    """One utterance as it was and as it was made: parameters (T, S) and curves of the lips."""
+    """One utterance as it was and as it was made: parameters (T, S) and curves of the lips on the real clock.
+
+    Of the parameters the first ``len(spread)`` are compared. Where the motion was made on an ``own`` clock, what the
+    lips do in its phones is looked at there.
+    """
 
     real: Real
-    made: NDArray[np.float32]
+    made: NDArray[np.floating]
     curves: Curves
-    spread: NDArray[np.float32]
+    spread: NDArray[np.floating]
+    own: OwnClock | None = None
 
 
 Made = tuple[ShapeModel, Sequence[Real], Sequence[NDArray[np.float32]]]  # of one split: (T, S) for each utterance
 
 
+def shown(scores: Sequence[Scores]) -> tuple[tuple[str, str, int], ...]:
+    """Those of `FIGURES` that the scores have."""
+    return tuple(figure for figure in FIGURES if all(figure[0] in one.figures for one in scores))
+
+
 def scored(method: str, splits: Sequence[Made], limits: Thresholds, spent: float = 0.0) -> Scores:
     """Figures of a method over the utterances of all splits; making them took `spent` seconds."""
-    judged = []
-    for model, real, made in splits:
-        spread = model.spread[: min(measures.DTW_PARAMETERS, model.n_speech)]
-        judged += [
-            Judged(one, values, Curves.of(model.shapes(values)), spread) for one, values in zip(real, made, strict=True)
-        ]
+    judged = [
+        Judged(one, values, Curves.of(model.shapes(values)), compared_spread(model))
+        for model, real, made in splits
+        for one, values in zip(real, made, strict=True)
+    ]
+    return scores_of(method, judged, limits, spent)
+
+
+def compared_spread(model: ShapeModel) -> NDArray[np.float32]:
+    """(D,) spread of the parameters that are compared."""
+    return model.spread[: min(measures.DTW_PARAMETERS, model.n_speech)]
+
+
+def scores_of(method: str, judged: Sequence[Judged], limits: Thresholds, spent: float = 0.0) -> Scores:
+    """Figures of a method over judged utterances; making them took `spent` seconds."""
     tallies = [_tally(one, limits) for one in judged]
     return Scores(
         method,
@@ -127,27 +167,45 @@ def _tally(judged: Judged, limits: Thresholds) -> Tally:
     one, seen, n, here = judged.real, judged.curves, len(judged.spread), judged.real.judged
     phones, fps = one.observation.phones, one.observation.fps
     real, made = one.parameters[here, :n], judged.made[here, :n]
-
-    def events(curve: NDArray[np.floating], labels: str, limit: float) -> tuple[float, float]:
-        least = measures.least_openings(curve, phones, fps, CLASSES[labels])
-        return float((least <= limit).sum()), float(len(least))
-
-    middles = measures.midpoint_openings(seen.opening, phones, fps)
-    counts = [
-        events(seen.opening, "bilabial", limits.closed),
-        (float((middles <= limits.closed).sum()), float(len(middles))),
-        events(seen.opening, "labiodental", limits.labiodental),
-        events(seen.width, "rounded", limits.rounded),
-    ]
     peaks = [measures.peak_times(curve, phones, fps) for curve in (one.curves.opening, seen.opening)]
     offsets = peaks[1] - peaks[0]
     return Tally(
         _moments(one.curves.opening[here], seen.opening[here]),
         _moments(one.curves.width[here], seen.width[here]),
         measures.rmse_z(real, made, judged.spread),
-        measures.warping_cost(real, made, judged.spread, fps),
-        np.array(counts),
+        measures.warping_cost(real, made, judged.spread, round(measures.DTW_BAND_S * fps)),
+        _free_cost(judged),
+        _counts(judged, limits),
         np.abs(offsets[np.isfinite(offsets)]),
+    )
+
+
+def _free_cost(judged: Judged) -> float | None:
+    """Warping cost of what was made on its own clock, without a band."""
+    if judged.own is None:
+        return None
+    n = len(judged.spread)
+    real = judged.real.parameters[judged.real.judged, :n]
+    return measures.warping_cost(real, judged.own.values[judged.own.judged, :n], judged.spread, None)
+
+
+def _counts(judged: Judged, limits: Thresholds) -> Floats:
+    """(4, 2) events that happened and that could, in the phones of the clock on which the motion was made."""
+    own, fps = judged.own, judged.real.observation.fps
+    phones, seen = (own.phones, own.curves) if own else (judged.real.observation.phones, judged.curves)
+
+    def events(curve: NDArray[np.floating], labels: str, limit: float) -> tuple[float, float]:
+        least = measures.least_openings(curve, phones, fps, CLASSES[labels])
+        return float((least <= limit).sum()), float(len(least))
+
+    middles = measures.midpoint_openings(seen.opening, phones, fps)
+    return np.array(
+        [
+            events(seen.opening, "bilabial", limits.closed),
+            (float((middles <= limits.closed).sum()), float(len(middles))),
+            events(seen.opening, "labiodental", limits.labiodental),
+            events(seen.width, "rounded", limits.rounded),
+        ]
     )
 
 
@@ -167,6 +225,9 @@ def _figures(tallies: Sequence[Tally]) -> dict[str, Figure]:
         "dtw_cost": weights @ [one.dtw_cost for one in tallies] / weights.sum(axis=1),
         "peak_offset_ms": 1000 * _medians(weights, [one.offsets for one in tallies]),
     }
+    free = [one.free_cost for one in tallies if one.free_cost is not None]
+    if len(free) == len(tallies):
+        rows["free_cost"] = weights @ free / weights.sum(axis=1)
     counts = np.tensordot(weights, np.array([one.counts for one in tallies]), axes=1)
     for at, name in enumerate(("closure", "false_closure", "labiodental", "rounding")):
         rows[name] = counts[:, at, 0] / np.maximum(counts[:, at, 1], 1.0)
@@ -174,6 +235,7 @@ def _figures(tallies: Sequence[Tally]) -> dict[str, Figure]:
     return {
         name: Figure(float(rows[name][0]), *(float(value) for value in np.quantile(rows[name][1:], edges)))
         for name, _, _ in FIGURES
+        if name in rows
     }
 
 

@@ -36,13 +36,13 @@ def curves_plot(series: Sequence[Series], label: str, phones: PhoneSequence) -> 
     return _drawn(axes, [*_borders(axes, phones), *x_axis(axes, _middles(phones, end))], curves)
 
 
-def histogram(samples: Mapping[str, Sequence[float]], label: str) -> str:
+def histogram(samples: Mapping[str, Sequence[float]]) -> str:
     """How often values occur, one outline for each name."""
     every = np.concatenate([np.asarray(values, np.float64) for values in samples.values()])
     edges = np.linspace(float(every.min()), float(every.max()) + 1e-9, N_BINS + 1)
     counts = {name: np.histogram(values, edges)[0] for name, values in samples.items()}
     top = max(int(count.max()) for count in counts.values())
-    axes = Axes(label, "utterances", (float(edges[0]), float(edges[-1])), (0.0, 1.05 * top), WIDTH, HEIGHT)
+    axes = Axes("", "utterances", (float(edges[0]), float(edges[-1])), (0.0, 1.05 * top), WIDTH, HEIGHT)
     steps = np.repeat(edges, 2)[1:-1]
     return _drawn(axes, x_axis(axes), {name: (steps, np.repeat(count, 2)) for name, count in counts.items()})
 

@@ -61,7 +61,17 @@ def corpus(make_observation, tmp_path: Path) -> list:
 
 def test_drives_follow_the_sound_that_they_were_taught(corpus: list) -> None:
     talker = learn_talker(corpus, n_speech=2, n_other=1, metadata=ABOUT)
-    drives = learn_drives(corpus, talker, network=NetworkOptions(n_hidden=4, before=1, after=1))
+    told = []
+
+    def stages(name: str):
+        told.append((name, []))
+        return lambda done, of: told[-1][1].append((done, of))
+
+    drives = learn_drives(corpus, talker, network=NetworkOptions(n_hidden=4, before=1, after=1), stages=stages)
+    assert told == [
+        ("listening", [(n, 22) for n in range(1, 23)]),
+        ("learning drives", [(1, 2), (2, 2)]),
+    ]
     assert set(drives) == {"linear", "network"}
     heard = heard_features(corpus[:3], (FEATURE,))[FEATURE]
     for drive in drives.values():

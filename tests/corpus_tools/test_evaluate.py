@@ -7,38 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.evaluation.evaluate import CEILING, Evaluation, Run, evaluate
+from corpus_tools.evaluation.evaluate import CEILING, Run, evaluate
 from corpus_tools.evaluation.scores import FIGURES
 from corpus_tools.evaluation.splits import folds, split, without_words
+from corpus_tools.evaluation.tables import Evaluation
 from corpus_tools.evaluation.tracks import Track, read_tracks
-from corpus_tools.observation import Observation, Quality
+from corpus_tools.observation import Observation
 from corpus_tools.report.evaluation import evaluation_page
 from lexicon.errors import DataError, InputError
-from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-
-OPENINGS = {"p": 0.0, "b": 0.0, "m": 0.0, "s": 4.0, "t": 5.0, "i": 7.0, "ɑ": 15.0, SILENCE: 0.0}
-FPS = 25.0
-
-
-def observation(number: int) -> Observation:
-    stream = np.random.default_rng(number)
-    names = [label for label in OPENINGS if label != SILENCE]
-    labels = [SILENCE, *(names[at] for at in stream.integers(0, len(names), 8)), SILENCE]
-    edges = np.concatenate([[0.0], np.cumsum([0.5, *stream.uniform(0.1, 0.2, 8), 0.5])])
-    phones = PhoneSequence(labels, edges)
-    times = np.arange(int(edges[-1] * FPS)) / FPS
-    opening = np.interp(times, (edges[:-1] + edges[1:]) / 2, [OPENINGS[label] for label in labels])
-    points = np.tile(np.random.default_rng(0).normal(0, 30, (478, 3)), (len(times), 1, 1))
-    points += stream.normal(0, 0.01, points.shape)
-    points[:, 13] = (0.0, -40.0, 0.0)
-    points[:, 14] = np.stack([np.zeros_like(times), -40.0 - opening, np.zeros_like(times)], axis=1)
-    points[:, 291, 0] = 25.0 - 0.3 * opening
-    points[:, [33, 263]] = ((-45.0, 0.0, 0.0), (45.0, 0.0, 0.0))
-    head = np.zeros((len(times), 6), np.float32)
-    quality = Quality(0.0, 1.0, 0, 0.0)
-    return Observation(
-        f"u{number:02d}", FPS, points.astype(np.float32), head, phones, (), head[:, 0], quality, Path("u.mkv")
-    )
+from lexicon.sequence import WordSpan
+from tests.corpus_tools.speaking import FPS, observation
 
 
 @pytest.fixture(scope="module")
@@ -65,8 +43,8 @@ def test_a_face_that_follows_its_phones_is_predicted(measured: tuple[Evaluation,
 
 def test_intervals_hold_their_value(measured: tuple[Evaluation, tuple[Run, ...]]):
     for one in measured[0].scores:
-        for name, _, _ in FIGURES:
-            figure = one.figures[name]
+        assert set(one.figures) == {name for name, _, _ in FIGURES} - {"free_cost"}
+        for name, figure in one.figures.items():
             assert figure.low - 1e-9 <= figure.value <= figure.high + 1e-9, (one.method, name)
     exact = measured[0].scores[-1].figures["dtw_cost"]
     assert (exact.low, exact.high) == (0.0, 0.0)
@@ -93,8 +71,9 @@ def test_tells_itself_as_tables_json_and_rows(measured: tuple[Evaluation, tuple[
     assert (told["n_train"], told["n_test"]) == (32, 8)
     assert told["scores"][2]["utterances"][0]["name"].startswith("u")
     head, *rows = result.rows()
-    assert len(head) == 1 + 3 * len(FIGURES)
-    assert [row[0] for row in rows] == [one.method for one in result.scores]
+    assert len(head) == 2 + 3 * len(FIGURES)
+    assert [row[:2] for row in rows] == [("true durations", one.method) for one in result.scores]
+    assert all(len(row) == len(head) for row in rows)
 
 
 def test_the_page_shows_all_figures_and_nothing_from_outside(measured: tuple[Evaluation, tuple[Run, ...]]):
@@ -113,6 +92,18 @@ def test_folds_hold_out_every_utterance_once(observations: list[Observation]):
     result, runs = evaluate(parts[:2])
     assert (result.n_test, len(runs)) == (20, 2)
     assert len(result.scores[0].utterances) == 20
+    assert [(fold.n_train, fold.n_test) for fold in result.folds] == [(30, 10), (30, 10)]
+    for one in result.scores:  # a mean over utterances is the mean of the folds' means where these are alike in size
+        mean, spread = result.over_folds(one.method, "dtw_cost")
+        assert mean == pytest.approx(one["dtw_cost"], rel=1e-12)
+        each = [fold.figures[one.method]["dtw_cost"] for fold in result.folds]
+        assert spread == pytest.approx(abs(each[0] - each[1]) / np.sqrt(2), rel=1e-12)
+    assert [row[0] for row in result.rows()[-5:]] == ["fold 2"] * 5
+    assert "spread over 2 folds" in result.table()
+    html = evaluation_page(result, runs)
+    assert "<h2>2 folds</h2>" in html
+    assert html.count("<td>mean ± spread</td>") == 5
+    assert html.count("<td>2 (10 held out, 30 learnt from)</td>") == 5
 
 
 @pytest.mark.parametrize("n_folds", [1, 41])

@@ -1,0 +1,118 @@
+"""What was measured, as tables for the terminal and for files."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from corpus_tools.evaluation.scores import FIGURES, Scores, shown
+
+TRUE, OWN, ACROSS = "true durations", "own durations", "another talker"
+
+
+@dataclass(frozen=True, slots=True)
+class Fold:
+    """One of several splits: how many utterances were learnt from and held out, and figures by method and name."""
+
+    n_train: int
+    n_test: int
+    figures: Mapping[str, Mapping[str, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """All methods on held-out utterances.
+
+    ``own`` are the scores with a voice's own durations, none where no voice spoke; ``folds`` those of each split where
+    there are several. Where the evaluation ``is_across`` talkers, all figures are those of z-scored curves.
+    """
+
+    n_train: int
+    n_test: int
+    scores: tuple[Scores, ...]
+    own: tuple[Scores, ...] = ()
+    folds: tuple[Fold, ...] = ()
+    is_across: bool = False
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain dictionary, utterances included."""
+        return asdict(self)
+
+    def tables(self) -> Iterator[tuple[str, tuple[Scores, ...]]]:
+        """The tables there are, by name."""
+        yield ACROSS if self.is_across else TRUE, self.scores
+        if self.own:
+            yield OWN, self.own
+
+    def table(self, *, intervals: bool = False) -> str:
+        """Markdown tables, one method a line."""
+        every = [(name, figures_table(scores, intervals=intervals)) for name, scores in self.tables()]
+        if self.folds:
+            every.append((f"spread over {len(self.folds)} folds", self.fold_table()))
+        return every[0][1] if len(every) == 1 else "\n\n".join(f"{name}\n\n{lines}" for name, lines in every)
+
+    def class_table(self) -> str:
+        """Markdown table of the classes of phones, one method and class a line."""
+        lines = ["| method | phones | frames | RMSE z | error of opening | bias |", "| --- |" + " --- |" * 5]
+        lines += [
+            f"| {one.method} | {some.phones} | {some.n_frames} | {some.rmse_z:.3f} | {some.opening_error:.4f} | "
+            f"{some.opening_bias:+.4f} |"
+            for one in self.scores
+            for some in one.classes
+        ]
+        return "\n".join(lines)
+
+    def fold_table(self) -> str:
+        """Markdown table of the standard deviation of each figure over the folds, one method a line."""
+        heads = shown(self.scores)
+        lines = [f"| method | {' | '.join(head for _, head, _ in heads)} |", "| --- |" + " --- |" * len(heads)]
+        for one in self.scores:
+            cells = [f"{self.over_folds(one.method, name)[1]:.{digits}f}" for name, _, digits in heads]
+            lines.append(f"| {one.method} | {' | '.join(cells)} |")
+        return "\n".join(lines)
+
+    def over_folds(self, method: str, figure: str) -> tuple[float, float]:
+        """Mean and standard deviation (of a sample) of a figure over the folds."""
+        values = [fold.figures[method][figure] for fold in self.folds]
+        return float(np.mean(values)), float(np.std(values, ddof=1))
+
+    def rows(self) -> tuple[tuple[str, ...], ...]:
+        """All figures with their intervals, for a CSV file; the first row names the columns.
+
+        Folds have no interval of their own: those cells are empty, and so is what a table does not have.
+        """
+        head = ("table", "method", *(part for name, _, _ in FIGURES for part in (name, f"{name}_low", f"{name}_high")))
+        rows = [(name, one.method, *_cells(one)) for name, scores in self.tables() for one in scores]
+        for number, fold in enumerate(self.folds, start=1):
+            rows += [(f"fold {number}", name, *_plain(values)) for name, values in fold.figures.items()]
+        return (head, *rows)
+
+
+def figures_table(scores: Sequence[Scores], *, intervals: bool = False) -> str:
+    """Markdown table of figures, one method a line."""
+    heads = shown(scores)
+    lines = [f"| method | {' | '.join(head for _, head, _ in heads)} |", "| --- |" + " --- |" * len(heads)]
+    for one in scores:
+        cells = [figure_text(one, name, digits, intervals=intervals) for name, _, digits in heads]
+        lines.append(f"| {one.method} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def figure_text(scores: Scores, name: str, digits: int, *, intervals: bool) -> str:
+    """A figure, with its interval in brackets."""
+    figure = scores.figures[name]
+    text = f"{figure.value:.{digits}f}"
+    return f"{text} ({figure.low:.{digits}f}-{figure.high:.{digits}f})" if intervals else text
+
+
+def _cells(scores: Scores) -> Iterator[str]:
+    for name, _, _ in FIGURES:
+        figure = scores.figures.get(name)
+        values = (figure.value, figure.low, figure.high) if figure else ()
+        yield from (f"{x:.6g}" for x in values) if values else ("", "", "")
+
+
+def _plain(values: Mapping[str, float]) -> Iterator[str]:
+    for name, _, _ in FIGURES:
+        yield from (f"{values[name]:.6g}" if name in values else "", "", "")

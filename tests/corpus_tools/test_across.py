@@ -1,0 +1,110 @@
+"""A talker speaks what somebody else said: faces of another size and lips that go further change nothing."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from corpus_tools.effort import Effort
+from corpus_tools.evaluation.across import Scale
+from corpus_tools.evaluation.capture import captured, landmarks_of
+from corpus_tools.evaluation.evaluate import Run, evaluate_across
+from corpus_tools.evaluation.measures import least_openings, midpoint_openings
+from corpus_tools.evaluation.real import Curves
+from corpus_tools.evaluation.tables import Evaluation
+from corpus_tools.observation import Observation
+from corpus_tools.report.evaluation import evaluation_page
+from lexicon.errors import InputError
+from tests.corpus_tools.speaking import observation
+from tts2face.face.file import load_face
+
+
+@pytest.fixture(scope="module")
+def train() -> list[Observation]:
+    return [observation(number) for number in range(30)]
+
+
+def others(gain: float) -> list[Observation]:
+    return [observation(100 + number, gain, "other") for number in range(8)]
+
+
+@pytest.fixture(scope="module")
+def measured(train: list[Observation]) -> tuple[Evaluation, tuple[Run, ...]]:
+    return evaluate_across(train, others(2.0))
+
+
+def test_somebody_who_opens_the_mouth_twice_as_far_is_predicted(measured: tuple[Evaluation, tuple[Run, ...]]) -> None:
+    scores = {one.method: one for one in measured[0].scores}
+    assert list(scores) == ["mean face", "mean phone pose", "exemplar", "theobald2007"]
+    assert scores["exemplar"]["r_opening"] > 0.97
+    assert scores["exemplar"]["range_ratio"] == pytest.approx(1.0, abs=0.1)
+    assert scores["exemplar"]["closure"] > 0.8
+    assert scores["mean face"]["range_ratio"] < 1e-6
+    assert scores["mean face"]["dtw_cost"] > 2 * scores["exemplar"]["dtw_cost"]
+
+
+def test_figures_do_not_depend_on_how_far_the_other_one_moves(
+    train: list[Observation], measured: tuple[Evaluation, tuple[Run, ...]]
+) -> None:
+    alike, _ = evaluate_across(train, others(1.0))
+    for one, other in zip(alike.scores, measured[0].scores, strict=True):
+        for name in ("r_opening", "rmse_z", "dtw_cost", "range_ratio", "closure"):
+            assert one[name] == pytest.approx(other[name], abs=0.01), name
+
+
+def test_a_scale_makes_the_mean_0_and_the_spread_1(train: list[Observation]) -> None:
+    scale = Scale.of(train)
+    scored = scale.scored(Curves(scale.mean[:1] + 2 * scale.spread[:1], scale.mean[1:] - scale.spread[1:]))
+    np.testing.assert_allclose((scored.opening[0], scored.width[0]), (2.0, -1.0), rtol=1e-12)
+
+
+def test_the_answer_says_what_it_is(measured: tuple[Evaluation, tuple[Run, ...]]) -> None:
+    result, runs = measured
+    assert result.to_json()["is_across"]
+    assert result.rows()[1][:2] == ("another talker", "mean face")
+    html = evaluation_page(result, runs)
+    assert "8 utterances of somebody else, 30 learnt from" in html
+    assert "gap of the lips (z)" in html
+
+
+def test_the_talker_herself_is_refused(train: list[Observation]) -> None:
+    with pytest.raises(InputError, match="u03 is learnt from and tested on"):
+        evaluate_across(train, train[3:5])
+
+
+def test_landmarks_of_a_face_are_its_own_at_rest_and_follow_its_shapes() -> None:
+    face = load_face("head")
+    jaw = face.shape_names.index("jawOpen")
+    weights = np.zeros((3, len(face.shape_names)))
+    weights[1:, jaw] = (0.5, 1.0)
+    opening = Curves.of(landmarks_of(face, weights)).opening
+    np.testing.assert_allclose(opening[1] - opening[0], opening[2] - opening[1], rtol=0.2)  # eyes hold, the jaw drops
+    assert opening[2] > opening[0] + 0.1
+
+
+@pytest.fixture(scope="module")
+def livelink(shared_recordings: Path) -> Path:
+    return shared_recordings / "livelink" / "testset_arkit61_60fps.csv"
+
+
+def test_a_real_capture_closes_its_lips_where_bilabials_are_heard(livelink: Path, tmp_path: Path) -> None:
+    pytest.importorskip("hama", reason="needs the extra [capture]")
+    found = captured(livelink, Effort(tmp_path))
+    assert len(found) >= 4
+    assert all(one.fps == 60.0 and one.is_recognised for one in found)
+    curves = [Curves.of(one.landmarks).opening for one in found]
+    closed = [least_openings(curve, one.phones, 60.0) for curve, one in zip(curves, found, strict=True)]
+    opened = [midpoint_openings(curve, one.phones, 60.0) for curve, one in zip(curves, found, strict=True)]
+    assert 2 * np.median(np.concatenate(closed)) < np.median(np.concatenate(opened))
+
+
+@pytest.mark.parametrize(("sounds", "count"), [((), 0), (("a.wav", "b.flac"), 2)])
+def test_a_capture_needs_one_sound(sounds: tuple[str, ...], count: int, tmp_path: Path) -> None:
+    rows = [["Timecode", "BlendshapeCount", "JawOpen"], *([f"00:00:00:{at:02d}", "1", "0.1"] for at in range(20))]
+    with (tmp_path / "take.csv").open("w", newline="") as file:
+        csv.writer(file).writerows(rows)
+    for sound in sounds:
+        (tmp_path / sound).touch()
+    with pytest.raises(InputError, match=f"beside take.csv lie {count} sound files"):
+        captured(tmp_path / "take.csv", Effort(tmp_path / "cache"))

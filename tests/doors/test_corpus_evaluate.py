@@ -1,0 +1,158 @@
+"""``tts2face corpus evaluate``: every option matters, every kind of file, every refusal."""
+
+import csv
+import json
+import re
+from base64 import b64decode
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from cli.main import run
+from corpus_tools.observe import Observations
+from tests.corpus_tools.speaking import OwnVoice, observation, worded
+
+HERS = [worded(observation(number)) for number in range(24)]
+OTHERS = [observation(100 + number, 2.0, "other") for number in range(4)]
+FOLDERS = {"all": HERS, "some": HERS[:18], "rest": HERS[18:], "other": OTHERS}
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Folders whose recordings need not be watched, and a voice that needs no network."""
+    monkeypatch.chdir(tmp_path)
+    found = {name: Observations(tuple(some), ()) for name, some in FOLDERS.items()}
+    monkeypatch.setattr("corpus_tools.observe.observe", lambda folder, **_: found[folder.name])
+    monkeypatch.setattr("cli.evaluation._voice", lambda: OwnVoice(HERS, lambda durations: 1.2 * durations))
+    with (tmp_path / "curves.csv").open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(("utterance", "time", "opening"))
+        for one in HERS:
+            gaps = one.landmarks[:, 13, 1] - one.landmarks[:, 14, 1]
+            rows.writerows((one.name, f"{at / one.fps:.3f}", f"{gap:.4f}") for at, gap in enumerate(gaps))
+    return tmp_path
+
+
+def evaluate(*more: str) -> int:
+    return run(["corpus", "evaluate", *more])
+
+
+def measured(out: str, *more: str) -> bytes:
+    assert evaluate(*more, "--out", out) == 0
+    return Path(out).read_bytes()
+
+
+PLAIN = ("--recordings", "all", "--hold-out", "4")
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        ("--seed", "3"),
+        ("--folds", "2"),
+        ("--hold-out-words", "aaum,abum"),
+        ("--tracks", "curves.csv"),
+        ("--own-durations",),
+        ("--cross-talker", "other"),
+    ],
+)
+def test_each_option_changes_the_figures(option: tuple[str, ...], here: Path) -> None:
+    plain = measured("plain.csv", *PLAIN)
+    assert measured("plain.csv", *PLAIN) == plain
+    assert measured("more.csv", "--recordings", "all", "--hold-out", "5") != plain
+    assert measured("option.csv", *PLAIN, *option) != plain
+
+
+def test_folders_that_are_split_already(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert len(json.loads(measured("split.json", "--train", "some", "--test", "rest"))["scores"][0]["utterances"]) == 6
+    assert "wrote split.json: 6 utterances held out, 18 learnt from" in capsys.readouterr().err
+
+
+def test_another_talker_is_told_apart(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    told = json.loads(measured("across.json", "--train", "all", "--cross-talker", "other"))
+    assert (told["is_across"], told["n_train"], told["n_test"]) == (True, 24, 4)
+    assert "4 utterances of somebody else, 24 learnt from" in capsys.readouterr().err
+
+
+def test_own_durations_are_told_at_the_terminal_and_in_every_file(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = (*PLAIN, "--own-durations")
+    assert b"<h2>With own durations</h2>" in measured("own.html", *own)
+    assert capsys.readouterr().out.count("| exemplar |") == 2
+    assert b"\nown durations,exemplar," in measured("own.csv", *own)
+    assert len(json.loads(measured("own.json", *own))["own"]) == 4
+
+
+def test_folds_are_told_at_the_terminal_and_in_every_file(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folds = ("--recordings", "all", "--folds", "3")
+    assert b"<h2>3 folds</h2>" in measured("folds.html", *folds)
+    assert "spread over 3 folds" in capsys.readouterr().out
+    assert b"\nfold 3,exemplar," in measured("folds.csv", *folds)
+    assert len(json.loads(measured("folds.json", *folds))["folds"]) == 3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        ((), "give --recordings to split, or both --train and --test"),
+        (("--train", "some"), "give --recordings to split, or both --train and --test"),
+        (("--recordings", "all", "--folds", "2", "--hold-out-words", "alpha"), "either --folds or --hold-out-words"),
+        (("--train", "some", "--test", "rest", "--folds", "2"), "--train and --test are split already"),
+        (("--recordings", "all", "--hold-out", "24"), "1 to 23 can be held out, not 24"),
+        (("--recordings", "all", "--folds", "1"), "24 utterances make 2 to 24 folds, not 1"),
+        (("--recordings", "all", "--hold-out-words", "zebra"), "nobody says zebra"),
+        (("--recordings", "all", "--tracks", "none.csv"), "there are no tracks none.csv"),
+        (("--recordings", "all", "--out", "x.pdf"), "written as .html, .json, .csv, not x.pdf"),
+        (("--cross-talker", "other"), "with --cross-talker give either --recordings or --train"),
+        (("--cross-talker", "other", "--recordings", "all", "--folds", "2"), "leave out --test, --folds"),
+        (("--cross-talker", "other", "--train", "some", "--test", "rest"), "leave out --test, --folds"),
+        (("--cross-talker", "other", "--recordings", "all", "--own-durations"), "no --tracks and no --own-durations"),
+        (("--cross-talker", "other", "--recordings", "all", "--tracks", "curves.csv"), "no --tracks and no"),
+        (("--cross-talker", "none.csv", "--recordings", "all"), "there is no capture none.csv"),
+        (("--cross-talker", "rest", "--recordings", "all"), "u18 is learnt from and tested on"),
+    ],
+)
+def test_refusals_are_one_sentence(
+    arguments: tuple[str, ...], reason: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert evaluate(*arguments) == 2
+    said = capsys.readouterr().err
+    assert re.search(re.escape(reason), said)
+    assert said.count("\n") == 1
+
+
+def test_own_durations_need_words(here: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    mute = [replace(one, words=()) for one in HERS]
+    monkeypatch.setattr("corpus_tools.observe.observe", lambda *_, **__: Observations(tuple(mute), ()))
+    assert evaluate(*PLAIN, "--own-durations") == 2
+    assert "own durations need recordings whose words are known" in capsys.readouterr().err
+
+
+def test_real_recordings_are_shown_beside_the_head(
+    shared_recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Six recordings, one held out, with the real voice: the page holds a film of it, and stays small."""
+    pytest.importorskip("ai_edge_litert", reason="needs the extra [capture]")
+    monkeypatch.chdir(tmp_path)
+    source, few = shared_recordings / "grid_s1", tmp_path / "few"
+    (few / "clips").mkdir(parents=True)
+    rows = (source / "manifest.csv").read_text().splitlines()[:7]
+    (few / "manifest.csv").write_text("\n".join(rows))
+    for row in rows[1:]:
+        name = f"{row.split(',')[0]}.mkv"
+        (few / "clips" / name).symlink_to(source / "clips" / name)
+    page = measured("few.html", "--recordings", "few", "--hold-out", "1", "--own-durations", "--jobs", "1").decode()
+    assert len(page) < 1_000_000
+    (film,) = re.findall(r'src="data:video/mp4;base64,([^"]*)"', page)
+    with av.open(BytesIO(b64decode(film))) as container:
+        assert not container.streams.audio
+        pictures = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    assert len(pictures) > 25
+    assert pictures[0].shape == (240, 480, 3)
+    moved = np.abs(np.diff([one.astype(float) for one in pictures], axis=0)).mean(axis=(1, 2, 3))
+    assert moved.max() > 0.5
