@@ -16,7 +16,7 @@ PLAIN = "theobald2007"
 N_SHOWN = 3  # sentences of each kind
 ABOUT = {
     False: "{n_test} utterances held out, {n_train} learnt from; true phone edges.",
-    True: "{n_test} utterances of somebody else, {n_train} learnt from; true phone edges, opening and width z-scored "
+    True: "{n_test} utterances of somebody else with their own phone edges, {n_train} learnt from; curves z-scored "
     "by each one's own speech.",
 }
 ABOUT_OWN = (
