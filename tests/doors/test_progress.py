@@ -1,0 +1,29 @@
+"""Bars: one at a time, under the name of the stage, and none where nobody looks."""
+
+import sys
+
+import pytest
+
+from cli.progress import progress_bar, stage_bar
+
+
+def test_a_bar_starts_again_with_each_stage(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    with stage_bar() as stages:
+        assert stages is not None
+        stages("reading recordings")(3, 4)
+        stages("learning lips")(1, 2)
+    told = capsys.readouterr().err
+    assert "learning lips" in told
+    assert "50%" in told
+
+
+@pytest.mark.parametrize("quiet", [True, False])
+def test_nobody_is_told_who_does_not_look(quiet: bool, capsys: pytest.CaptureFixture[str]) -> None:
+    with progress_bar("reading", quiet) as tell, stage_bar(quiet) as stages:
+        assert tell is None
+        assert stages is None
+    assert capsys.readouterr().err == ""
