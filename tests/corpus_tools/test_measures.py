@@ -51,11 +51,13 @@ def test_warping_cost_forgives_a_small_delay_and_divides_by_the_path():
     pulse = np.zeros((10, 1))
     pulse[4] = 1.0
     late = np.roll(pulse, 2, axis=0)
-    assert measures.warping_cost(pulse, late, np.ones(1), 25.0) == 0.0
-    # 4 frames (160 ms) lie beyond the band of 3: one pulse must be matched to stillness on either side.
-    assert measures.warping_cost(pulse, np.roll(pulse, 4, axis=0), np.ones(1), 25.0) == pytest.approx(2 / 10)
+    assert measures.warping_cost(pulse, late, np.ones(1), 3) == 0.0
+    # 4 frames lie beyond the band of 3: one pulse must be matched to stillness on either side.
+    assert measures.warping_cost(pulse, np.roll(pulse, 4, axis=0), np.ones(1), 3) == pytest.approx(2 / 10)
+    # Without a band neither the delay nor the length matters.
+    assert measures.warping_cost(pulse, np.concatenate([np.zeros((4, 1)), pulse]), np.ones(1), None) == 0.0
     # Two still motions one spread apart: 10 pairs of distance 2 / 2.
-    assert measures.warping_cost(np.zeros((10, 1)), np.full((10, 1), 2.0), np.full(1, 2.0), 25.0) == pytest.approx(1.0)
+    assert measures.warping_cost(np.zeros((10, 1)), np.full((10, 1), 2.0), np.full(1, 2.0), 3) == pytest.approx(1.0)
 
 
 def test_least_opening_looks_a_little_beyond_the_phone():
