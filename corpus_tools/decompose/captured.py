@@ -30,6 +30,8 @@ class Captured:
         Millimetres of the person's own size, head pose removed; axes as in `tts2face.landmarks`.
     head : (T, 6)
         `HEAD_CHANNELS`.
+    rest : (478, 3)
+        The face at rest, mm, where the source tells.
     missing
         Features of `tts2face.palette.FEATURES` of which this source tells nothing.
     notes
@@ -41,6 +43,7 @@ class Captured:
     landmarks: NDArray[np.float32]
     head: NDArray[np.float32]
     sound: Waveform | None = None
+    rest: NDArray[np.float32] | None = None
     missing: frozenset[str] = frozenset()
     notes: tuple[str, ...] = ()
 

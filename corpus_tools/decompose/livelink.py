@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from corpus_tools.decompose.captured import Captured, sound_of
-from corpus_tools.decompose.face_motion import moved_landmarks
+from corpus_tools.decompose.face_motion import moved_landmarks, rest_landmarks
 from tts2face.face.model import Face
 from tts2face.mimic import motion_of_capture
 from tts2face.video.livelink import Capture, read_livelink
@@ -32,6 +32,7 @@ def captured_livelink(path: Path, face: Face, *, sound: Path | None = None) -> C
         landmarks=moved_landmarks(face, motion.face),
         head=np.asarray(capture.head.values, np.float32),
         sound=sound_of(path, sound),
+        rest=rest_landmarks(face).astype(np.float32),
         missing=_untold(capture),
     )
 

@@ -82,6 +82,7 @@ def captured_markers(
         landmarks=landmarks.astype(np.float32),
         head=_head_motion(poses, rest.spread, face).astype(np.float32),
         sound=take.sound or sound_of(path, sound),
+        rest=rest.spread.rest.astype(np.float32),
         missing=worn.untold,
         notes=(*_absent(take, worn), *notes),
     )

@@ -108,6 +108,7 @@ def test_a_live_link_capture_moves_the_face_with_its_head_and_sound(shared_recor
     assert found.sound is not None
     assert found.sound.duration == pytest.approx(len(found.landmarks) / found.fps, abs=0.3)
     weights = motion_of_capture(read_livelink(path), face).face.values
+    np.testing.assert_allclose(found.rest, rest_landmarks(face), atol=1e-4)
     jaw = weights[:, face.shape_names.index("jawOpen")]
     assert np.corrcoef(jaw, -found.landmarks[:, 152, 1])[0, 1] > 0.95
     read = at_gesture_rate(found)
