@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 
 LONGEST_GAP_S = 0.2  # half a blink with its pause; what a face does in longer gaps nobody knows
+OTHERWISE = "give a marker set that does without it"
 MOST_NAMED = 4  # markers in a sentence
 
 Floats = NDArray[np.float64]
@@ -35,7 +36,7 @@ def filled(tracks: Floats, names: Sequence[str], fps: float) -> tuple[Floats, tu
         gone = np.asarray(np.isnan(tracks[:, marker]).any(axis=1))
         if not gone.any():
             continue
-        _check(name, gone, fps)
+        check_gap(f"marker {name}", gone, fps)
         whole[gone, marker] = _bridged(tracks[:, marker], gone)
         counts[name] = int(gone.sum())
     if not counts:
@@ -51,14 +52,15 @@ def gaps_of(gone: NDArray[np.bool_]) -> NDArray[np.int64]:
     return borders.reshape(-1, 2)
 
 
-def _check(name: str, gone: NDArray[np.bool_], fps: float) -> None:
-    begin, end = max(gaps_of(gone).tolist(), key=lambda gap: gap[1] - gap[0])
+def check_gap(what: str, gone: NDArray[np.bool_], fps: float) -> None:
+    """Refuse gaps, True in (T,), that are too long to be filled; errors as `filled`."""
     if gone.all():
-        raise DataError(f"the marker {name} is never seen; leave it out of the marker set, or capture it again")
+        raise DataError(f"the {what} is never seen; {OTHERWISE}, or capture it again")
+    begin, end = max(gaps_of(gone).tolist(), key=lambda gap: gap[1] - gap[0], default=(0, 0))
     if (end - begin) / fps > LONGEST_GAP_S:
         raise DataError(
-            f"the marker {name} is out of sight for {(end - begin) / fps:.2f} s from {begin / fps:.2f} s on, and gaps "
-            f"up to {LONGEST_GAP_S:g} s can be filled; fill it where it was captured, or leave it out of the marker set"
+            f"the {what} is out of sight for {(end - begin) / fps:.2f} s from {begin / fps:.2f} s on, and gaps up to "
+            f"{LONGEST_GAP_S:g} s can be filled; fill it where it was captured, or {OTHERWISE}"
         )
 
 

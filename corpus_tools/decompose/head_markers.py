@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.decompose.gaps import filled
+from corpus_tools.decompose.gaps import check_gap
 from lexicon.errors import DataError
 from tts2face.video.pose import similarity
 
@@ -58,34 +58,50 @@ def head_poses(
     Raises
     ------
     DataError
-        They are too few, on a line, out of sight too long, or do not move as one.
+        They are fewer than three, on a line, out of sight too long, or do not move as one.
 
     Notes
     -----
-    Kabsch 1976 on the markers that are seen; reference and poses are found in turn.
+    Kabsch 1976 on the markers that are seen; reference and poses are found in turn. Poses between frames that show
+    them are filled in.
     """
+    if len(names) < LEAST_SEEN:
+        raise DataError(f"{len(names)} markers of the head are there; its pose takes at least {LEAST_SEEN}")
     seen = np.asarray(np.isfinite(points).all(axis=2))
-    notes: tuple[str, ...] = ()
-    if (seen.sum(axis=1) < LEAST_SEEN).any():
-        points, notes = filled(points, names, fps)
-        seen = np.ones(points.shape[:2], bool)
+    posed = np.asarray(seen.sum(axis=1) >= LEAST_SEEN)
+    check_gap("head's pose", ~posed, fps)
     head = _first_reference(points, seen) if reference is None else reference
     spreads = np.linalg.svd(head - head.mean(axis=0), compute_uv=False)
     if spreads[1] <= LINE * spreads[0]:
         raise DataError("the head's markers lie on a line, so that its pose is not known; wear them apart")
-    rotations, places = _fitted(points, seen, head)
+    shown, seen = points[posed], seen[posed]
+    rotations, places = _fitted(shown, seen, head)
     for _ in range(N_ROUNDS if reference is None else 0):
-        local = np.einsum("tij,tmi->tmj", rotations, np.nan_to_num(points) - places[:, None])
+        local = np.einsum("tij,tmi->tmj", rotations, np.nan_to_num(shown) - places[:, None])
         head = np.einsum("tm,tmi->mi", seen, local) / seen.sum(axis=0)[:, None]
         head = head - head.mean(axis=0)
-        rotations, places = _fitted(points, seen, head)
-    off = np.einsum("tij,mj->tmi", rotations, head) + places[:, None] - points
+        rotations, places = _fitted(shown, seen, head)
+    off = np.einsum("tij,mj->tmi", rotations, head) + places[:, None] - shown
     misfit = float(np.sqrt(np.square(off[seen]).sum(axis=1).mean()))
     if misfit > MOST_MISFIT_MM:
         raise DataError(
             f"the head's markers do not move as one ({misfit:.1f} mm apart); name only those on the skull as head"
         )
-    return HeadPoses(head, rotations, places, misfit), notes
+    notes = () if posed.all() else (f"the head's pose was filled in in {int((~posed).sum())} frames",)
+    return HeadPoses(head, *_between(rotations, places, posed), misfit), notes
+
+
+def _between(rotations: Floats, places: Floats, posed: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """Poses of all frames from those of the frames that have one: evenly turned and straight between them."""
+    from scipy.spatial.transform import Rotation, Slerp
+
+    there = np.flatnonzero(posed)
+    if len(there) == 1:
+        return rotations.repeat(len(posed), axis=0), places.repeat(len(posed), axis=0)
+    frames = np.arange(len(posed))
+    turned = Slerp(there, Rotation.from_matrix(rotations))(np.clip(frames, there[0], there[-1])).as_matrix()
+    turned[there] = rotations
+    return turned, np.stack([np.interp(frames, there, axis) for axis in places.T], axis=1)
 
 
 def _first_reference(points: Floats, seen: NDArray[np.bool_]) -> Floats:

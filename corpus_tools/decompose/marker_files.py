@@ -2,6 +2,7 @@
 
 import csv
 import struct
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.listen import SOUND_RATE
 from lexicon.errors import BackendError, DataError, InputError
+from tts2face.palette import GESTURE_FPS
 from tts2face.types import Waveform
 
 MM_PER_UNIT = {"": 1.0, "mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "in": 25.4, "inch": 25.4, "ft": 304.8}
@@ -60,6 +62,9 @@ def read_markers(path: Path, fps: float | None = None) -> MarkerTake:
     take = readers[path.suffix.lower()]()
     if not len(take.points) or not np.isfinite(take.points).any():
         raise DataError(f"{path} holds no marker in any frame; export it again")
+    twice = [name for name, count in Counter(take.names).items() if count > 1]
+    if twice:
+        raise DataError(f"{path} holds the marker {twice[0]} twice; export one person alone")
     if not LEAST_FPS <= take.fps <= MOST_FPS:
         raise DataError(f"{path} has {take.fps:g} frames a second; {LEAST_FPS:g} to {MOST_FPS:g} can be read")
     return take
@@ -132,7 +137,7 @@ def read_marker_table(path: Path, fps: float | None = None) -> MarkerTake:
     except (UnicodeDecodeError, csv.Error) as broken:
         raise DataError(f"{path} is not a CSV table of markers ({broken})") from broken
     first = rows[0][0].lower() if rows else ""
-    if first not in ("time", "frame") or len(rows) < 3:
+    if first not in ("time", "frame") or len(rows) < 2:
         raise DataError(f"{path} is not a CSV table of markers: it needs the columns time or frame, then NAME_x, ...")
     names = _named(path, rows[0])
     values = np.array([_numbers(path, number, row, len(rows[0])) for number, row in enumerate(rows[1:], start=2)])
@@ -165,8 +170,10 @@ def _even(
 ) -> MarkerTake:
     """Frames at an even rate; those that a table leaves out are gaps."""
     what, at = counted
-    if what == "frame" and fps is None:
+    if what == "frame" and fps is None and len(at) > 1:
         raise InputError(f"{path.name} counts frames; give its frames a second, or a column time")
+    if len(at) == 1:  # a still
+        return MarkerTake(names, points, fps or GESTURE_FPS)
     steps = np.diff(at)
     if not np.isfinite(at).all() or (steps <= 0).any():
         raise DataError(f"the column {what} of {path} must rise from row to row; export it again")

@@ -11,7 +11,7 @@ from corpus_tools.decompose.face_motion import rest_landmarks
 from corpus_tools.decompose.gaps import filled
 from corpus_tools.decompose.head_markers import HeadPoses, head_poses
 from corpus_tools.decompose.marker_files import MarkerTake, read_markers
-from corpus_tools.decompose.marker_set import MarkerSet
+from corpus_tools.decompose.marker_set import LEAST_FACE, MarkerSet
 from corpus_tools.decompose.spread import Spread, spread_to_landmarks
 from lexicon.errors import DataError
 from tts2face.face.model import Face
@@ -94,6 +94,8 @@ def marker_face(path: Path, face: Face, worn: MarkerSet, *, fps: float | None = 
     check_regions(path, take, worn)
     there = set(take.names)
     names = tuple(name for name in worn.face if name in there)
+    if len(names) < LEAST_FACE:
+        raise DataError(f"{path} has {len(names)} of the set's markers of the face; it takes at least {LEAST_FACE}")
     head_names = tuple(name for name in worn.head if name in there)
     points, poses, _ = _in_head(path, take, names, head_names, None)
     rest = np.median(points, axis=0)

@@ -36,6 +36,7 @@ DISTANCES = {
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("capture", type=Path)
+    parser.add_argument("--noise", type=float, default=0.0, help="mm, standard deviation of each coordinate")
     options = parser.parse_args()
     face, worn = load_face("head"), read_marker_set()
     take = captured_livelink(options.capture, face)
@@ -43,14 +44,17 @@ def main() -> None:
     made = made_take(landmarks, head, face, worn)
     own = rest_landmarks(face)
     with tempfile.TemporaryDirectory() as folder:
-        path = write_c3d(Path(folder) / "take.c3d", made.names, made.points)
+        noise = options.noise * np.random.default_rng(0).normal(size=made.points.shape)
+        path = write_c3d(Path(folder) / "take.c3d", made.names, made.points + noise)
         still = made_take(np.repeat(own[None], 5, axis=0), np.zeros((5, 6)), face, worn)
         rest = write_c3d(Path(folder) / "rest.c3d", still.names, still.points)
         found = at_gesture_rate(captured_markers(path, face, worn, neutral=rest))
     truth = resampled(made.landmarks, FPS, 30.0)
     moved, wanted = found.landmarks[:, :N_MESH] - found.landmarks.mean(axis=0)[:N_MESH], truth - truth.mean(axis=0)
-    off = np.sqrt(np.square(moved - wanted[:, :N_MESH]).sum(axis=2).mean())
-    print(f"motion {np.sqrt(np.square(wanted[:, :N_MESH]).sum(axis=2).mean()):.2f} mm, error {off:.2f} mm")
+    away = np.square(moved - wanted[:, :N_MESH]).sum(axis=2)
+    off, worn_off = np.sqrt(away.mean()), np.sqrt(away[:, list(worn.landmarks.values())].mean())
+    size = np.sqrt(np.square(wanted[:, :N_MESH]).sum(axis=2).mean())
+    print(f"motion {size:.2f} mm, error {off:.2f} mm, {worn_off:.3f} mm at markers")
     for name, (a, b) in DISTANCES.items():
         far = [np.linalg.norm(places[:, a] - places[:, b], axis=1) for places in (found.landmarks, truth)]
         slope = np.polyfit(far[1], far[0], 1)[0]

@@ -7,7 +7,7 @@ import pytest
 
 from corpus_tools.decompose.gaps import LONGEST_GAP_S, filled, gaps_of
 from corpus_tools.decompose.marker_files import read_c3d, read_markers
-from corpus_tools.decompose.marker_set import MarkerSet, read_marker_set
+from corpus_tools.decompose.marker_set import SHIPPED, MarkerSet, read_marker_set
 from corpus_tools.decompose.markers import captured_markers, marker_face, still_of_markers
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.decompose.made_markers import FPS, SIZE, Made, write_c3d, write_table
@@ -120,7 +120,7 @@ def test_a_missing_marker_is_told_and_a_missing_region_refused(
 
 def test_a_set_without_brows_tells_nothing_of_them(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
     table = tmp_path / "set.tsv"
-    lines = Path("corpus_tools/decompose/markers_68.tsv").read_text().splitlines()
+    lines = SHIPPED.read_text().splitlines()
     table.write_text("# no brows\n" + "\n".join(line for line in lines if "brow" not in line) + "\n")
     fewer = read_marker_set(table)
     path = write_table(tmp_path / "take.csv", made.names, made.points)
@@ -144,6 +144,53 @@ def test_a_head_that_is_not_rigid_is_refused(made: Made, face: Face, worn: Marke
     points[:, made.names.index("HED2")] += 80 * np.sin(np.arange(len(points)) / 20)[:, None]
     with pytest.raises(DataError, match="do not move as one"):
         captured_markers(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+
+
+def test_a_pose_that_no_three_markers_show_is_filled_in_and_told(
+    made: Made, face: Face, worn: MarkerSet, tmp_path: Path
+) -> None:
+    whole = captured_markers(write_table(tmp_path / "whole.csv", made.names, made.points), face, worn)
+    points = made.points.copy()
+    head = [made.names.index(name) for name in worn.head]
+    points[200:210, head[:5]] = np.nan
+    points[300:, head[6]] = np.nan
+    found = captured_markers(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+    assert "the head's pose was filled in in 10 frames" in found.notes
+    assert np.degrees(np.abs(found.head - whole.head)[:, :3]).max() < 0.2  # over 0.08 s
+    points[200:240, head[:5]] = np.nan
+    with pytest.raises(DataError, match=r"the head's pose is out of sight for 0\.33 s from 1\.67 s on"):
+        captured_markers(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+
+
+def test_two_markers_show_no_head(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+    kept = [k for k, name in enumerate(made.names) if name not in worn.head[2:]]
+    path = write_table(tmp_path / "take.csv", tuple(made.names[k] for k in kept), made.points[:, kept])
+    with pytest.raises(DataError, match="2 markers of the head are there"):
+        captured_markers(path, face, worn)
+
+
+def test_three_markers_show_no_face(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+    table = tmp_path / "set.tsv"
+    brows = [line for line in SHIPPED.read_text().splitlines() if "BRO" in line or "\thead\t" in line]
+    table.write_text("\n".join(["marker\tregion\tlandmark", *brows]) + "\n")
+    names = ("RBRO1", "RBRO2", "LBRO1", *worn.head)
+    kept = [made.names.index(name) for name in names]
+    path = write_table(tmp_path / "take.csv", names, made.points[:, kept])
+    with pytest.raises(DataError, match="3 of the set's markers of the face; it takes at least 4"):
+        captured_markers(path, face, read_marker_set(table))
+
+
+@pytest.mark.usefixtures("c3d")
+def test_two_persons_in_a_file_are_refused(made: Made, tmp_path: Path) -> None:
+    path = write_c3d(tmp_path / "take.c3d", (*made.names, "FHD1"), made.points[:5, [*range(len(made.names)), 0]])
+    with pytest.raises(DataError, match="the marker FHD1 twice"):
+        read_markers(path)
+
+
+def test_a_table_of_one_frame_is_a_still(made: Made, tmp_path: Path) -> None:
+    for first in ("time", "frame"):
+        take = read_markers(write_table(tmp_path / "still.csv", made.names, made.points[:1], first))
+        np.testing.assert_allclose(take.points, made.points[:1], atol=1e-5)
 
 
 def test_head_markers_on_a_line_are_refused(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
@@ -255,14 +302,14 @@ def test_the_shipped_set_is_the_paper_s_number_of_markers(worn: MarkerSet) -> No
 )
 def test_a_damaged_set_is_refused(tmp_path: Path, old: str, new: str, reason: str) -> None:
     path = tmp_path / "set.tsv"
-    path.write_text(Path("corpus_tools/decompose/markers_68.tsv").read_text().replace(old, new, 1))
+    path.write_text(SHIPPED.read_text().replace(old, new, 1))
     with pytest.raises(DataError, match=reason):
         read_marker_set(path)
 
 
 def test_a_set_without_a_head_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "set.tsv"
-    lines = Path("corpus_tools/decompose/markers_68.tsv").read_text().splitlines()
+    lines = SHIPPED.read_text().splitlines()
     path.write_text("\n".join(line for line in lines if "\thead\t" not in line) + "\n")
     with pytest.raises(DataError, match="0 markers of the region head; a head's pose takes at least 3"):
         read_marker_set(path)
