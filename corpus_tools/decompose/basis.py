@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from corpus_tools.decompose.stills import NEUTRAL, Still, required
 from lexicon.errors import DataError, InputError
+from tts2face.face.fit import N_SKIN
 from tts2face.landmarks import N_LANDMARKS
 from tts2face.palette import EXPRESSIONS
 
-N_MESH = 468  # the iris points behind them are gaze, no expression
 LEAST_MOTION_MM = 0.3  # root mean square over landmarks; trackers differ by half of it from still to still
 
 Floats = NDArray[np.float64]
@@ -59,9 +59,9 @@ def carried_basis(
     if shapes != ((len(EXPRESSIONS), N_LANDMARKS, 3), (N_LANDMARKS, 3), (N_LANDMARKS, 3)):
         raise InputError(f"expressions and faces at rest have the shapes {shapes}; all need {N_LANDMARKS} landmarks")
     own = np.asarray(rest, np.float64)
-    there = np.asarray(face_rest, np.float64)[:N_MESH]
+    there = np.asarray(face_rest, np.float64)[:N_SKIN]
     centred = there - there.mean(axis=0)
-    affine, *_ = np.linalg.lstsq(centred, own[:N_MESH] - own[:N_MESH].mean(axis=0), rcond=None)
+    affine, *_ = np.linalg.lstsq(centred, own[:N_SKIN] - own[:N_SKIN].mean(axis=0), rcond=None)
     return Basis(own, np.asarray(expressions, np.float64) @ affine)
 
 
@@ -89,8 +89,8 @@ def captured_basis(
     needed = required(stills, is_rest_known=rest is not None)
     own = np.asarray(read(stills[NEUTRAL]) if rest is None else rest, np.float64)
     expressions = np.stack([read(stills[name]) - own for name in needed if name != NEUTRAL])
-    expressions[:, N_MESH:] = 0.0
-    sizes = np.sqrt(np.square(expressions[:, :N_MESH]).sum(axis=2).mean(axis=1))
+    expressions[:, N_SKIN:] = 0.0
+    sizes = np.sqrt(np.square(expressions[:, :N_SKIN]).sum(axis=2).mean(axis=1))
     for name, size in zip(EXPRESSIONS, sizes, strict=True):
         if size < LEAST_MOTION_MM:
             raise DataError(f"{stills[name]} shows {name} as the face at rest; capture it stronger")

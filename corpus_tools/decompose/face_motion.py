@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
+from tts2face.face.fit import all_landmarks, landmark_motion, landmark_places
 from tts2face.face.model import Face
 from tts2face.landmarks import N_LANDMARKS
 from tts2face.types import Trajectory
@@ -21,9 +22,7 @@ def rest_landmarks(face: Face) -> Floats:
     """
     if sorted(face.landmarks.tolist()) != list(range(N_LANDMARKS)):
         raise DataError(f"the face has {len(face.landmarks)} of {N_LANDMARKS} landmarks; build it with all of them")
-    found = np.zeros((N_LANDMARKS, 3))
-    found[face.landmarks] = _at_landmarks(face, face.vertices)
-    return found
+    return all_landmarks(face, landmark_places(face))
 
 
 def moved_landmarks(face: Face, motion: Trajectory) -> NDArray[np.float32]:
@@ -37,18 +36,10 @@ def moved_landmarks(face: Face, motion: Trajectory) -> NDArray[np.float32]:
     if motion.channels != face.shape_names:
         raise DataError("the weights are not of this face's shapes; carry them to it first")
     weights = motion.values.astype(np.float64)
-    moves = np.zeros((len(face.shapes), N_LANDMARKS, 3))
-    for shape, places in zip(face.shapes, moves, strict=True):
-        places[face.landmarks] = _at_landmarks(face, shape)
-    found = rest_landmarks(face) + np.tensordot(weights, moves, axes=1)
+    moves = all_landmarks(face, landmark_motion(face, np.arange(len(face.shapes))))
+    found = rest_landmarks(face) + np.tensordot(weights, moves, axes=(1, 2))
     _turn_eyes(face, weights, found)
     return found.astype(np.float32)
-
-
-def _at_landmarks(face: Face, values: NDArray[np.floating]) -> Floats:
-    """(L, 3) values of vertices (V, 3), mixed as the landmarks lie."""
-    mixed: Floats = np.einsum("lk,lkd->ld", face.landmark_weights.astype(np.float64), values[face.landmark_vertices])
-    return mixed
 
 
 def _turn_eyes(face: Face, weights: Floats, landmarks: Floats) -> None:

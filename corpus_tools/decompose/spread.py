@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
+from tts2face.face.fit import N_SKIN
 from tts2face.face.rbf import interpolant
 from tts2face.landmarks import (
     INNER_LIP_LOWER,
@@ -17,7 +18,6 @@ from tts2face.landmarks import (
 )
 from tts2face.video.pose import similarity
 
-N_MESH = 468  # the iris points behind them lie on the eyeballs, which no marker moves
 FACE_SIDES = (234, 454)  # landmarks as far apart as the face is wide
 LEAST_SIZE, MOST_SIZE = 0.6, 1.7  # of the common face over the person's; beyond it the unit is wrong
 # Lines of each lip between the outer and the inner one, from the right corner to the left: entry k of each lies behind
@@ -134,5 +134,5 @@ def _sides(common: Floats) -> list[tuple[list[int], set[int]]]:
     pairs = [(upper, lower), *((set(up), set(down)) for up, down in zip(UPPER_LIDS, LOWER_LIDS, strict=True))]
     sides = [*pairs, *((down, up) for up, down in pairs)]
     apart = set().union(*(side for side, _ in sides))
-    others = [landmark for landmark in range(N_MESH) if landmark not in apart]
+    others = [landmark for landmark in range(N_SKIN) if landmark not in apart]
     return [(sorted(side), opposite) for side, opposite in sides] + [(others, set())]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.decompose.basis import N_MESH, carried_basis
+from corpus_tools.decompose.basis import carried_basis
 from corpus_tools.decompose.captured import at_gesture_rate, resampled
 from corpus_tools.decompose.face_motion import rest_landmarks
 from corpus_tools.decompose.livelink import captured_livelink
@@ -20,6 +20,7 @@ from corpus_tools.decompose.weights import averaged, least_squares
 from tests.corpus_tools.decompose.made_markers import FPS, SIZE, made_take, write_c3d
 from tts2face.face.expressions import expression_landmarks
 from tts2face.face.file import load_face
+from tts2face.face.fit import N_SKIN
 from tts2face.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.palette import EXPRESSIONS
 
@@ -50,10 +51,10 @@ def main() -> None:
         rest = write_c3d(Path(folder) / "rest.c3d", still.names, still.points)
         found = at_gesture_rate(captured_markers(path, face, worn, neutral=rest))
     truth = resampled(made.landmarks, FPS, 30.0)
-    moved, wanted = found.landmarks[:, :N_MESH] - found.landmarks.mean(axis=0)[:N_MESH], truth - truth.mean(axis=0)
-    away = np.square(moved - wanted[:, :N_MESH]).sum(axis=2)
+    moved, wanted = found.landmarks[:, :N_SKIN] - found.landmarks.mean(axis=0)[:N_SKIN], truth - truth.mean(axis=0)
+    away = np.square(moved - wanted[:, :N_SKIN]).sum(axis=2)
     off, worn_off = np.sqrt(away.mean()), np.sqrt(away[:, list(worn.landmarks.values())].mean())
-    size = np.sqrt(np.square(wanted[:, :N_MESH]).sum(axis=2).mean())
+    size = np.sqrt(np.square(wanted[:, :N_SKIN]).sum(axis=2).mean())
     print(f"motion {size:.2f} mm, error {off:.2f} mm, {worn_off:.3f} mm at markers")
     for name, (a, b) in DISTANCES.items():
         far = [np.linalg.norm(places[:, a] - places[:, b], axis=1) for places in (found.landmarks, truth)]
@@ -63,9 +64,9 @@ def main() -> None:
     angles = found.head[:, :3] - found.head[:, :3].mean(axis=0) - turned + turned.mean(axis=0)
     print(f"head: {np.degrees(np.abs(angles)).mean():.2f} degrees, at most {np.degrees(np.abs(angles)).max():.2f}")
     basis = carried_basis(expression_landmarks(face), own, own * SIZE)
-    fitted = least_squares(basis.expressions[:, :N_MESH], 0.25)
-    seen = fitted.weights(averaged((found.landmarks - found.rest)[:, :N_MESH]))
-    real = fitted.weights(averaged((truth - own * SIZE)[:, :N_MESH]))
+    fitted = least_squares(basis.expressions[:, :N_SKIN], 0.25)
+    seen = fitted.weights(averaged((found.landmarks - found.rest)[:, :N_SKIN]))
+    real = fitted.weights(averaged((truth - own * SIZE)[:, :N_SKIN]))
     for at, name in enumerate(EXPRESSIONS):
         both = seen[:, at], real[:, at]
         print(f"{name}: r {np.corrcoef(*both)[0, 1]:.3f}, mean {both[0].mean():.2f} for {both[1].mean():.2f}")

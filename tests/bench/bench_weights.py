@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.decompose.basis import N_MESH, carried_basis
+from corpus_tools.decompose.basis import carried_basis
 from corpus_tools.decompose.captured import at_gesture_rate, resampled
 from corpus_tools.decompose.face_motion import rest_landmarks
 from corpus_tools.decompose.livelink import captured_livelink
@@ -30,6 +30,7 @@ from corpus_tools.leak import without_leak
 from corpus_tools.observe import observe
 from tts2face.face.expressions import expression_landmarks
 from tts2face.face.file import load_face
+from tts2face.face.fit import N_SKIN
 from tts2face.palette import EXPRESSIONS, GESTURE_FPS
 
 SAMPLES = (50, 100, 200, 500, 1000, 2000, 5000)
@@ -45,9 +46,9 @@ class Faces:
     """Averaged displacements (T, L, 3) of a source, and the basis (5, L, 3) on it."""
 
     def __init__(self, name: str, seen: list[np.ndarray], basis: np.ndarray) -> None:
-        self.name, self.basis = name, basis[:, :N_MESH]
-        self.raw = np.concatenate([one[::EVERY, :N_MESH] for one in seen])
-        self.slow = np.concatenate([averaged(one[:, :N_MESH])[::EVERY] for one in seen])
+        self.name, self.basis = name, basis[:, :N_SKIN]
+        self.raw = np.concatenate([one[::EVERY, :N_SKIN] for one in seen])
+        self.slow = np.concatenate([averaged(one[:, :N_SKIN])[::EVERY] for one in seen])
 
     def error(self, estimator: Estimator) -> float:
         return float(approximation_error(self.slow, self.basis, estimator.weights(self.slow)).mean())
@@ -168,7 +169,7 @@ def sources(recordings: Path, observations: Path | None) -> tuple[Faces, Faces, 
     """GRID s1 and Live Link, and the latter's displacements at every frame."""
     face = load_face("head")
     own, expressions = rest_landmarks(face), expression_landmarks(face)
-    sizes = np.sqrt(np.square(expressions[:, :N_MESH]).sum(axis=2).mean(axis=1))
+    sizes = np.sqrt(np.square(expressions[:, :N_SKIN]).sum(axis=2).mean(axis=1))
     print("expressions, mm: " + ", ".join(f"{name} {size:.2f}" for name, size in zip(EXPRESSIONS, sizes, strict=True)))
     kept = pickle.loads(observations.read_bytes()).kept if observations else observe(recordings / "grid_s1").kept
     kept = without_leak(kept)
@@ -176,7 +177,7 @@ def sources(recordings: Path, observations: Path | None) -> tuple[Faces, Faces, 
     seen = [resampled(one.landmarks - rest, one.fps, GESTURE_FPS) for one in kept]
     grid = Faces("GRID s1, neutral sentences", seen, carried_basis(expressions, own, rest).expressions)
     take = at_gesture_rate(captured_livelink(recordings / "livelink" / "testset_arkit61_60fps.csv", face))
-    moved = take.landmarks[:, :N_MESH] - own[:N_MESH]
+    moved = take.landmarks[:, :N_SKIN] - own[:N_SKIN]
     return grid, Faces("Live Link Face, 20 s of speech", [moved], expressions), moved
 
 
