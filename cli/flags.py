@@ -48,7 +48,10 @@ def flags_from(*groups: tuple[str, type], without: frozenset[str] = frozenset())
 def _parameter(option: "Field[Any]", kind: Any, group: Group) -> inspect.Parameter:
     default = inspect.Parameter.empty if option.default is MISSING else option.default
     converter = whole_number if kind in (int, int | None) else None
-    annotation = Annotated[kind, Parameter(help=option.metadata["help"], group=group, negative="", converter=converter)]
+    negative = f"--no-{option.name}" if default is True else ""
+    annotation = Annotated[
+        kind, Parameter(help=option.metadata["help"], group=group, negative=negative, converter=converter)
+    ]
     return inspect.Parameter(option.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 

@@ -65,14 +65,14 @@ def speak(  # noqa: PLR0913 - one parameter a flag
 
     if text is not None and said is not None:
         raise InputError("give the text once, with or without --text")
-    is_heard = options.get("audio") is not None
-    request = chosen(Request, options, text=_text(text if said is None else said, file, is_heard=is_heard))
+    needs_text = options.get("audio") is None and options.get("idle") is None
+    request = chosen(Request, options, text=_text(text if said is None else said, file, is_needed=needs_text))
     errand = Errand(out, talker, face, identity, explain, view, quiet)
     run(request, chosen(Picture, options), errand)
 
 
-def _text(text: str | None, file: Path | None, *, is_heard: bool) -> str:
-    if text is None and file is None and is_heard:
+def _text(text: str | None, file: Path | None, *, is_needed: bool) -> str:
+    if text is None and file is None and not is_needed:
         return ""
     if text is not None and file is not None:
         raise InputError("give the text itself or --file, not both")

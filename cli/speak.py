@@ -40,7 +40,8 @@ def run(request: Request, picture: Picture, errand: Errand) -> None:
         raise InputError("say where the clip goes: --out clip.mp4 (or .webm, .gif, a folder for .png files)")
     if errand.explain is not None and errand.explain.suffix not in EXPLANATIONS:
         raise InputError(f"an explanation is written as .json or .txt, not {errand.explain.name}")
-    if not request.text.strip() and (request.audio is None or errand.explain is not None):
+    is_silent = request.audio is not None or request.idle is not None
+    if not request.text.strip() and (not is_silent or errand.explain is not None):
         raise InputError("the text is empty; give something to say, or what --audio says")
     if errand.view and errand.face == OWN:
         raise InputError("a window shows heads that can be turned; leave --view away, or choose --face head")

@@ -23,6 +23,7 @@ from tts2face.exemplar.options import METHODS, SynthesisOptions
 from tts2face.face.model import Face
 from tts2face.face.own import own_face
 from tts2face.face.retarget import Retargeter, retargeter
+from tts2face.gesture.asked import asked
 from tts2face.gesture.timeline import Timeline
 from tts2face.listen import Heard, clips_in, drive_of, driven, heard
 from tts2face.render.clock import exact_rate, on_frames
@@ -32,7 +33,7 @@ from tts2face.render.output import checked_output
 from tts2face.render.picture import Picture
 from tts2face.render.plate import plate_staged
 from tts2face.request import Request
-from tts2face.spoken import Reached, check_marks, reached_in, say
+from tts2face.spoken import Reached, Said, check_marks, reached_in, say, silent
 from tts2face.talker import Talker
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, frame_count, joined_clips
 from tts2face.voice.engine import Voice, load_voice
@@ -40,6 +41,7 @@ from tts2face.voice.engine import Voice, load_voice
 VOICES_KEPT = 2  # kinds of voice; each keeps some 100 MB
 STAGES_KEPT = 2  # kinds of picture; each keeps some 30 MB
 RECORDED_STEPS = 1000  # of progress through a recording
+IDLE_STEPS = 1000  # through a silent clip
 CLIPS_AHEAD = 2  # pieces that may wait to be drawn while the next is spoken
 
 
@@ -142,15 +144,21 @@ def stream(request: Request, ready: Cast) -> Iterator[Piece]:
         return
     fps = exact_rate(request.fps)
     first_frame = 0
+    source = _said(request, ready) if request.idle is None else silent(request.idle, fps, IDLE_STEPS)
+    for said, n_steps in source:
+        clip = _animated(on_frames(said.speech, first_frame, fps), ready, request)
+        begins = float(first_frame / fps)
+        first_frame += len(clip.motion)
+        timeline = said.timeline.within(0.0, clip.speech.waveform.duration).shifted(begins)
+        marks = tuple(replace(mark, seconds=mark.seconds + begins) for mark in said.marks)
+        yield Piece(clip, n_steps, timeline, marks)
+
+
+def _said(request: Request, ready: Cast) -> Iterator[tuple[Said, int]]:
+    """Sentences of a text, and the characters of each."""
     with ready.voice(request) as voice:
         for sentence in sentences(marked(request.text), request.language):
-            said = say(voice, sentence, request)
-            clip = _animated(on_frames(said.speech, first_frame, fps), ready, request)
-            begins = float(first_frame / fps)
-            first_frame += len(clip.motion)
-            timeline = said.timeline.within(0.0, clip.speech.waveform.duration).shifted(begins)
-            marks = tuple(replace(mark, seconds=mark.seconds + begins) for mark in said.marks)
-            yield Piece(clip, sentence.n_characters, timeline, marks)
+            yield say(voice, sentence, request), sentence.n_characters
 
 
 def check(request: Request) -> None:
@@ -159,12 +167,15 @@ def check(request: Request) -> None:
     Raises
     ------
     InputError
-        There is no word in the text, the language does not exist or cannot read it, a mark in it is wrong, or there is
-        no such recording.
+        There is no word in the text, the language does not exist or cannot read it, a mark in it is wrong, there is no
+        such recording, or what is asked of the gestures cannot be read.
+    DataError
+        The timeline's file is wrong.
     """
     if request.audio is not None and not request.audio.is_file():
         raise InputError(f"there is no recording {request.audio}; check the path")
-    if request.audio is not None and not request.text.strip():
+    asked(request)
+    if not request.text.strip() and (request.audio is not None or request.idle is not None):
         return
     text = marked(request.text)
     check_language(request.language)
@@ -172,6 +183,12 @@ def check(request: Request) -> None:
     check_marks(text, request)
     if next(sentences(text, request.language), None) is None:
         raise InputError(f"there is nothing to say in {request.text[:40]!r}; give at least one word")
+
+
+def _steps(request: Request) -> int:
+    if request.audio is not None:
+        return RECORDED_STEPS
+    return IDLE_STEPS if request.idle is not None else max(len(marked(request.text).text), 1)
 
 
 def _options(request: Request) -> SynthesisOptions:
@@ -272,7 +289,7 @@ def write_clip(
         As `synthesize`; or the file cannot be written.
     """
     checked_output(out)
-    of = RECORDED_STEPS if request.audio is not None else max(len(marked(request.text).text), 1)
+    of = _steps(request)
     marks: list[Reached] = []
     before, seconds, n_frames = 0, 0.0, 0
     piece_length, given_before = 0, 0

@@ -14,6 +14,7 @@ VOLUMES = (0.0, 2.0)
 FRAMES_PER_SECOND = (1.0, 120.0)
 DRIVES = ("linear", "network")
 SYNTHESES = ("exemplar", "theobald2007")
+IDLE_S = (0.1, 3600.0)
 
 
 def option(default: Any, help_text: str) -> Any:
@@ -52,6 +53,20 @@ class Request:
     context: int | None = option(None, "Phones either side by which exemplars are chosen; the method's own without it.")
     exemplars: int | None = option(None, "Exemplars averaged for each phone; the method's own without it.")
     fps: float = option(30.0, "Frames per second, 1 to 120.")
+    gestures: bool = option(True, "Whether face and head move with the speech, or only the lips.")
+    palette: str = option("starter", "Where the styles come from: a shipped palette, or a .palette file.")
+    style: str | None = option(
+        None, "Style of the gestures: a name, or names by feature (brows=annoyed,head=delighted)."
+    )
+    gain: str | None = option(
+        None, "How far features move, 0 to 3: head=1.5,blink=0.8; jaw and lips too; all for every gesture."
+    )
+    expression: str | None = option(
+        None,
+        "Expressions added (sad, happy, afraid, angry, surprised), with weight and seconds: happy=0.6@1.2-3.4,sad=0.3.",
+    )
+    timeline: Path | None = option(None, "A JSON file with styles, expressions, nods and gains over time.")
+    idle: float | None = option(None, "Seconds of a living, silent face, in place of a text.")
 
     def __post_init__(self) -> None:
         """Refuse numbers outside their range."""
@@ -66,6 +81,14 @@ class Request:
             _check_drive(self)
         if self.audio is not None and (self.voice is not None or self.rate != 1.0):
             raise InputError("a recording keeps its own voice and speed; leave --voice and --rate away")
+        if self.idle is not None:
+            _check("idle", self.idle, IDLE_S)
+            _check_idle(self)
+        if not self.gestures and (self.style, self.gain, self.expression, self.timeline) != (None, None, None, None):
+            raise InputError(
+                "without gestures there is nothing to style; leave --style, --gain, --expression and "
+                "--timeline away, or --no-gestures"
+            )
 
 
 def _check_drive(request: Request) -> None:
@@ -75,6 +98,13 @@ def _check_drive(request: Request) -> None:
         raise InputError("a drive follows a recording; give one with --audio, or leave --drive away")
     if request.text.strip():
         raise InputError("where the words are known the lips follow them; leave --drive or the text away")
+
+
+def _check_idle(request: Request) -> None:
+    if request.text.strip() or request.audio is not None:
+        raise InputError("an idle face is silent; leave the text and --audio away, or --idle")
+    if (request.voice, request.rate, request.volume) != (None, 1.0, 1.0):
+        raise InputError("an idle face says nothing; leave --voice, --rate and --volume away")
 
 
 def _check(name: str, value: float, limits: tuple[float, float]) -> None:

@@ -2,9 +2,11 @@
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import lru_cache
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -21,12 +23,15 @@ from tts2face.gesture.spans import Nod, StyleSpan
 from tts2face.gesture.timeline import Timeline
 from tts2face.gesture.written import style_of
 from tts2face.joints import joined, silence
+from tts2face.render.clock import first_sample
 from tts2face.request import RATES, VOLUMES, Request
-from tts2face.types import Speech, Waveform, joined_speech
+from tts2face.types import Speech, Waveform, frame_count, joined_speech
 from tts2face.voice.engine import Voice, at_volume
 
 LEAST_GAP_S = 0.02  # between utterances of a sentence: less cuts into their sounds (edges are good to 16 ms)
 JOINT_S = 0.06  # where only the speed changes
+IDLE_PART_S = 10.0  # of a silent clip, as a long sentence
+IDLE_RATE = 48_000  # Hz, of its silence
 RAMP_S = 0.03  # from one loudness to another
 
 
@@ -148,6 +153,16 @@ def say(voice: Voice, sentence: Sentence, request: Request) -> Said:
         speech = joined_speech([speech, silence(pause, voice.sample_rate)])
     times = _SentenceTimes(tuple(part.first for part in sentence.utterances), tuple(clocks), tuple(begins))
     return Said(speech, *reached(sentence.runs, sentence.marks, times, (sentence.first, sentence.last)))
+
+
+def silent(seconds: float, fps: Fraction, n_steps: int) -> Iterator[tuple[Said, int]]:
+    """Seconds in which nothing is said, in parts that end on frames, and the share of each in so many steps."""
+    n_frames = frame_count(seconds, float(fps))
+    bounds = [*range(0, n_frames, max(round(IDLE_PART_S * fps), 1)), n_frames]
+    for first, last in pairwise(bounds):
+        n_samples = first_sample(last, IDLE_RATE, fps) - first_sample(first, IDLE_RATE, fps)
+        steps = n_steps * last // n_frames - n_steps * first // n_frames
+        yield Said(silence(n_samples / IDLE_RATE, IDLE_RATE), Timeline(), ()), steps
 
 
 def reached(

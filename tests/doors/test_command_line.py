@@ -112,6 +112,14 @@ def test_every_kind_of_error_has_an_exit_code() -> None:
         (["<speak><voice>Hi.</voice></speak>", "--out", "x.mp4"], 2, "SSML, line 1: there is no <voice> here"),
         (["<speak xml:lang='fr'>Salut.</speak>", "--out", "x.mp4"], 2, "the text names the language fr, not en-us"),
         (["Hi [pause 1] you.", "--audio", "latin.txt", "--out", "x.mp4"], 2, "a recording keeps its own pauses"),
+        (["Hi.", "--style", "ears=a", "--out", "x.mp4"], 2, "no feature 'ears'"),
+        (["Hi.", "--gain", "head=9", "--out", "x.mp4"], 2, "the gain of head must lie between 0 and 3, not 9"),
+        (["Hi.", "--expression", "sad=1@3-1", "--out", "x.mp4"], 2, "must end after it begins"),
+        (["Hi.", "--timeline", "none.json", "--out", "x.mp4"], 2, "cannot read the timeline none.json"),
+        (["Hi.", "--timeline", "plan.json", "--out", "x.mp4"], 3, "plan.json: two spans of head overlap"),
+        (["Hi.", "--idle", "5", "--out", "x.mp4"], 2, "an idle face is silent"),
+        (["--idle", "5", "--explain", "x.json"], 2, "the text is empty"),
+        (["Hi.", "--no-gestures", "--style", "calm", "--out", "x.mp4"], 2, "without gestures there is nothing"),
         (["Hi.", "--out", "x.avi"], 2, "unknown suffix .avi"),
         (["Hi.", "--out", "none/x.mp4"], 2, "no folder none"),
         (["Hi.", "--out", "x.mp4", "--talker", "none.talker"], 2, "no talker file none.talker"),
@@ -143,6 +151,8 @@ def test_bad_input_gets_one_sentence_and_leaves_nothing(
     (here / "face.talker").write_bytes((SHIPPED / "head.face").read_bytes())
     (here / "half.face").write_bytes((SHIPPED / "head.face").read_bytes()[:100_000])
     (here / "latin.txt").write_bytes(b"h\xe9llo")
+    spans = [{"feature": "head", "style": "calm", "start": start} for start in (0, 1)]
+    (here / "plan.json").write_text(json.dumps({"spans": spans}))
     write_tensors(here / "old.talker", "talker", 0, {}, {})
     before = set(here.iterdir())
     assert run(arguments) == code

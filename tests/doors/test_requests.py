@@ -29,6 +29,10 @@ CHANGES = {
     "context": 1,
     "exemplars": 3,
     "fps": 25.0,
+    "gestures": False,
+    "style": "delighted",
+    "gain": "head=2,blink=0",
+    "expression": "happy=0.6@0.2-0.9",
 }
 
 
@@ -52,14 +56,17 @@ def digest(clip: Clip) -> str:
     return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()
 
 
-OF_RECORDINGS = {"audio", "drive"}  # tests/doors/test_audio.py changes them
+# tests/doors/test_audio.py changes these; an idle face below; palettes in tests/doors/test_gestures.py
+ELSEWHERE = {"audio", "drive", "idle", "palette"}
 
 
-@pytest.mark.parametrize("name", [option.name for option in fields(Request) if option.name not in OF_RECORDINGS])
+@pytest.mark.parametrize("name", [option.name for option in fields(Request) if option.name not in ELSEWHERE])
 def test_every_option_changes_the_clip(name: str, clip: Clip, talker: Talker, face: Face, tmp_path: Path) -> None:
     own = tmp_path / "own.txt"
     own.write_text("bob  B IY1 M\n")
-    value = own if name == "dictionary" else CHANGES[name]
+    plan = tmp_path / "plan.json"
+    plan.write_text('{"nods": [{"time": 0.4}]}')
+    value = {"dictionary": own, "timeline": plan}.get(name) or CHANGES[name]
     changed = synthesize(replace(Request(text=TEXT), **{name: value}), talker, face)
     assert digest(changed) != digest(clip)
 
@@ -87,6 +94,17 @@ def test_a_stream_is_the_whole_in_pieces(clip: Clip, talker: Talker, face: Face)
     pieces = list(stream(Request(text=TEXT), cast(talker, face)))
     assert len(pieces) == 2
     assert digest(joined_clips([piece.clip for piece in pieces])) == digest(clip)
+
+
+@pytest.mark.parametrize(("seconds", "fps"), [(0.1, 30.0), (25.0, 29.97), (12.3, 7.0)])
+def test_an_idle_face_is_silent_for_as_long_as_it_says(seconds: float, fps: float, talker: Talker, face: Face) -> None:
+    pieces = list(stream(Request(idle=seconds, fps=fps), cast(talker, face)))
+    clip = joined_clips([piece.clip for piece in pieces])
+    assert clip.speech.waveform.duration == pytest.approx(seconds, abs=1.01 / fps)
+    assert not clip.speech.waveform.samples.any()
+    assert clip.speech.phones.phones == ("sil",)
+    assert len(pieces) == -(-seconds // 10)
+    assert sum(piece.n_steps for piece in pieces) == 1000
 
 
 @pytest.mark.parametrize("fps", [23.976, 24.0, 25.0, 29.97, 50.0, 59.94])
@@ -131,8 +149,12 @@ def test_what_cannot_be_said_is_refused(change: dict, reason: str, talker: Talke
         ({"fps": float("nan")}, "fps must lie between"),
         ({"seed": -1}, "seed must be 0 or more, not -1"),
         ({"synthesis": "magic"}, "no synthesis 'magic'"),
+        ({"idle": 5.0}, "an idle face is silent; leave the text and --audio away"),
+        ({"idle": 5.0, "text": "", "voice": "espeak"}, "says nothing; leave --voice, --rate and --volume away"),
+        ({"idle": 0.0, "text": ""}, "idle must lie between 0.1 and 3600, not 0"),
+        ({"gestures": False, "style": "calm"}, "without gestures there is nothing to style"),
     ],
 )
 def test_options_out_of_range_are_refused(change: dict, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
-        Request(text="Hi.", **change)
+        Request(**{"text": "Hi.", **change})
