@@ -16,8 +16,9 @@ def phones(
 ) -> None:
     """Print the words of a text and their phones, in ARPABET and IPA, with stress and syllables."""
     from lexicon.dictionary import read_dictionary
+    from lexicon.marks import marked
     from lexicon.pronounce import pronounce
     from tts2face.export.text import FORMATS
 
-    spoken = pronounce(text, language, read_dictionary(dictionary) if dictionary else None)
+    spoken = pronounce(marked(text).text, language, read_dictionary(dictionary) if dictionary else None)
     print(FORMATS[format](spoken), end="")  # noqa: T201 - the answer

@@ -13,7 +13,7 @@ from tts2face.render.picture import Picture
 from tts2face.request import Request
 
 if TYPE_CHECKING:
-    from tts2face.api import Cast
+    from tts2face.cast import Cast
     from tts2face.exemplar.explain import ShownPhone
     from tts2face.types import Clip
 
@@ -54,13 +54,19 @@ def run(request: Request, picture: Picture, errand: Errand) -> None:
     else:
         _only_told(request, errand)
     if errand.view:
-        from tts2face.api import synthesize
-        from tts2face.face.file import load_face
-        from tts2face.render.view import view
-        from tts2face.talker import load_talker
+        _view(request, picture, errand)
 
-        face = load_face(errand.face, errand.identity)
-        view(synthesize(request, load_talker(errand.talker), face), face, picture)
+
+def _view(request: Request, picture: Picture, errand: Errand) -> None:
+    from tts2face.api import stream
+    from tts2face.render.view import view
+    from tts2face.types import joined_clips
+
+    ready = _ready(errand)
+    face = ready.shown(request)
+    if face is None:
+        raise InputError("a window shows heads that can be turned; leave --view away, or choose --face head")
+    view(joined_clips([piece.clip for piece in stream(request, ready)]), face, picture)
 
 
 def _make(request: Request, picture: Picture, errand: Errand, out: Path) -> None:
@@ -101,7 +107,7 @@ def _only_told(request: Request, errand: Errand) -> None:
 
 
 def _ready(errand: Errand) -> "Cast":
-    from tts2face.api import cast
+    from tts2face.cast import cast
     from tts2face.face.file import load_face
     from tts2face.render.compiled import kernels_are_compiled
     from tts2face.talker import load_talker

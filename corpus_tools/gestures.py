@@ -2,7 +2,7 @@
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from corpus_tools.build import PROVENANCE, PROVENANCE_FIELDS, UNSTATED, read_pro
 from corpus_tools.decompose.basis import Basis, captured_basis, carried_basis
 from corpus_tools.decompose.captured import Captured
 from corpus_tools.decompose.decompose import as_counted, taken_apart
+from corpus_tools.decompose.derived import derived_styles
 from corpus_tools.decompose.face_motion import rest_landmarks
 from corpus_tools.decompose.palette import Learnt, with_style
 from corpus_tools.decompose.sources import CAPTURE_SUFFIXES, Worn, captured_file
@@ -85,7 +86,7 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
     effort: Effort | None = None,
     on_progress: Progress | None = None,
 ) -> Made:
-    """Learn a style from recordings and write a palette: `base` with it, or it alone.
+    """Learn a style from recordings and write a palette: `base` with it, or it alone with the styles derived from it.
 
     Raises
     ------
@@ -111,7 +112,10 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
     learnt = learn_style(
         captured, basis, estimator_of(estimator, basis), style, base, _metadata(recorded, stated, style, out)
     )
-    write_palette(out, learnt.palette)
+    palette = learnt.palette
+    if base is None:
+        palette = replace(palette, derivations=derived_styles(style))
+    write_palette(out, palette)
     seconds = learnt.palette.styles[style].seconds
     notes = tuple(f"{one.name}: {note}" for one in captured for note in one.notes)
     return Made(len(captured), seconds / 60, tuple(refused), notes, learnt.kept)
@@ -153,7 +157,10 @@ def basis_of(recorded: Recorded, captured: Sequence[Captured], face: Face) -> Ba
 
 
 def rest_of(captured: Sequence[Captured]) -> NDArray[np.float64]:
-    """(478, 3) landmarks of the person at rest: the median of frames with closed lips and open lids."""
+    """(478, 3) landmarks of the person at rest: as captured, or the median of frames with closed lips and open lids."""
+    known = next((one.rest for one in captured if one.rest is not None), None)
+    if known is not None:
+        return np.asarray(known, np.float64)
     frames = np.concatenate([one.landmarks for one in captured])
     frames = frames[:: max(1, len(frames) // RESTING_FRAMES)]
     opened = np.minimum(aperture(frames, "Left"), aperture(frames, "Right"))

@@ -11,7 +11,8 @@ from corpus_tools.similarity.analysis import Options
 from corpus_tools.similarity.write import write_similarity
 from lexicon.phones import ipa_to_arpabet
 from lexicon.sequence import SILENCE
-from tts2face.api import cast, stream
+from tts2face.api import stream
+from tts2face.cast import cast
 from tts2face.face.file import face_path, identities_of, load_face
 from tts2face.render.draw import draw, staged, still
 from tts2face.render.picture import Picture

@@ -1,14 +1,11 @@
 """The one core call: a request, a talker and a face become a clip, whole, piece by piece, or as a file."""
 
-from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from lexicon.dictionary import read_dictionary
 from lexicon.errors import InputError
 from lexicon.g2p import check_language
 from lexicon.marks import marked
@@ -16,87 +13,31 @@ from lexicon.scripts import check_script
 from lexicon.sentences import sentences
 from lexicon.sequence import PhoneSequence
 from tts2face.ahead import Ahead
-from tts2face.exemplar.animate import VisualVoice, speech_trajectory, visual_voice
+from tts2face.cast import Cast, cast
+from tts2face.exemplar.animate import speech_trajectory
 from tts2face.exemplar.explain import ShownPhone, explained
-from tts2face.exemplar.looks import Looks, looks_of, looks_trajectory
+from tts2face.exemplar.looks import looks_trajectory
 from tts2face.exemplar.options import METHODS, SynthesisOptions
 from tts2face.face.model import Face
 from tts2face.face.own import own_face
-from tts2face.face.retarget import Retargeter, retargeter
 from tts2face.gesture.asked import asked
 from tts2face.gesture.timeline import Timeline
 from tts2face.listen import Heard, clips_in, drive_of, driven, heard
+from tts2face.living import Life
 from tts2face.render.clock import exact_rate, on_frames
-from tts2face.render.draw import AnyStage, staged
 from tts2face.render.encode import ClipWriter
 from tts2face.render.output import checked_output
 from tts2face.render.picture import Picture
-from tts2face.render.plate import plate_staged
 from tts2face.request import Request
 from tts2face.spoken import Reached, Said, check_marks, reached_in, say, silent
 from tts2face.talker import Talker
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, frame_count, joined_clips
-from tts2face.voice.engine import Voice, load_voice
 
 VOICES_KEPT = 2  # kinds of voice; each keeps some 100 MB
 STAGES_KEPT = 2  # kinds of picture; each keeps some 30 MB
 RECORDED_STEPS = 1000  # of progress through a recording
 IDLE_STEPS = 1000  # through a silent clip
 CLIPS_AHEAD = 2  # pieces that may wait to be drawn while the next is spoken
-
-
-@dataclass(frozen=True, slots=True)
-class Cast:
-    """A talker and a face made ready for each other; serves any number of requests.
-
-    With ``face`` None the talker shows her own face: there is nothing to retarget to, and her ``looks`` are spoken too.
-    ``stages`` keeps what was made ready to draw the face into the last few kinds of picture; ``voices`` the voices that
-    wait to speak again, by name, language and the user's own words.
-    """
-
-    talker: Talker
-    face: Face | None
-    visual_voice: VisualVoice
-    retargeter: Retargeter | None
-    looks: Looks | None = None
-    stages: dict[Picture, AnyStage] = field(default_factory=dict)
-    voices: "OrderedDict[Hashable, Voice]" = field(default_factory=OrderedDict)
-
-    def stage(self, picture: Picture) -> AnyStage:
-        """The face made ready to be drawn into a kind of picture; its soft shadows take most of a second."""
-        if picture not in self.stages:
-            while len(self.stages) >= STAGES_KEPT:
-                self.stages.pop(next(iter(self.stages)))
-            made = staged(self.face, picture) if self.face is not None else plate_staged(self.talker, picture)
-            self.stages[picture] = made
-        return self.stages[picture]
-
-    @contextmanager
-    def voice(self, request: Request) -> Iterator[Voice]:
-        """A voice for the time of a request, used by nobody else; loading one takes half a second."""
-        own = read_dictionary(request.dictionary).entries if request.dictionary else {}
-        key = (request.voice, request.language, frozenset(own.items()))
-        voice = self.voices.pop(key, None) or load_voice(request.voice, request.language, own)
-        try:
-            yield voice
-        finally:
-            self.voices[key] = voice
-            while len(self.voices) > VOICES_KEPT:
-                self.voices.popitem(last=False)
-
-
-def cast(talker: Talker, face: Face | None) -> Cast:
-    """Index the talker's exemplars and prepare the way of their motion onto the face, or onto her own without one.
-
-    Raises
-    ------
-    InputError
-        There is no face, and the talker has motion only.
-    """
-    voice = visual_voice(talker)
-    if face is None:
-        return Cast(talker, None, voice, None, looks_of(talker, voice))
-    return Cast(talker, face, voice, retargeter(talker, face))
 
 
 def synthesize(request: Request, talker: Talker, face: Face | None) -> Clip:
@@ -143,15 +84,18 @@ def stream(request: Request, ready: Cast) -> Iterator[Piece]:
         yield from _recorded(request, request.audio, ready)
         return
     fps = exact_rate(request.fps)
+    life = _life(request, ready)
     first_frame = 0
     source = _said(request, ready) if request.idle is None else silent(request.idle, fps, IDLE_STEPS)
     for said, n_steps in source:
-        clip = _animated(on_frames(said.speech, first_frame, fps), ready, request)
-        begins = float(first_frame / fps)
+        speech, begins = on_frames(said.speech, first_frame, fps), float(first_frame / fps)
+        timeline = said.timeline.within(0.0, speech.waveform.duration).shifted(begins)
+        clip = _alive(speech, _lips(speech, ready, request), timeline, life)
         first_frame += len(clip.motion)
-        timeline = said.timeline.within(0.0, clip.speech.waveform.duration).shifted(begins)
         marks = tuple(replace(mark, seconds=mark.seconds + begins) for mark in said.marks)
         yield Piece(clip, n_steps, timeline, marks)
+    if life is not None:
+        life.finish()
 
 
 def _said(request: Request, ready: Cast) -> Iterator[tuple[Said, int]]:
@@ -200,12 +144,24 @@ def _options(request: Request) -> SynthesisOptions:
     return options
 
 
-def _animated(speech: Speech, ready: Cast, request: Request) -> Clip:
+def _life(request: Request, ready: Cast) -> Life | None:
+    living = ready.living(request)
+    return None if living is None else Life(request, living, float(exact_rate(request.fps)))
+
+
+def _alive(speech: Speech, lips: Trajectory, timeline: Timeline, life: Life | None) -> Clip:
+    """A clip with its gestures; the head stands still where there are none."""
+    if life is not None:
+        return life.added(speech, lips, timeline)
+    head = np.zeros((len(lips), len(HEAD_CHANNELS)), np.float32)
+    return Clip(lips, Trajectory(HEAD_CHANNELS, head, lips.fps), speech)
+
+
+def _lips(speech: Speech, ready: Cast, request: Request) -> Trajectory:
     fps = float(exact_rate(request.fps))
     n_frames = frame_count(speech.waveform.duration, fps)
     lips = speech_trajectory(speech.phones, ready.visual_voice, fps=fps, n_frames=n_frames, options=_options(request))
-    head = Trajectory(HEAD_CHANNELS, np.zeros((n_frames, len(HEAD_CHANNELS)), np.float32), fps)
-    return Clip(_shown(lips, speech.phones, ready, request), head, speech)
+    return _shown(lips, speech.phones, ready, request)
 
 
 def _recorded(request: Request, audio: Path, ready: Cast) -> Iterator[Piece]:
@@ -214,14 +170,18 @@ def _recorded(request: Request, audio: Path, ready: Cast) -> Iterator[Piece]:
     text = marked(request.text)
     said, motion = _followed(replace(request, text=text.text), audio, ready, fps)
     timeline, marks = reached_in(text, said.phones, said.words, request.language)
+    life = _life(request, ready)
     before = 0
     for clip in clips_in(audio, said, motion, volume=request.volume):
         after = before + len(clip.motion)
         n_steps = RECORDED_STEPS * after // len(motion) - RECORDED_STEPS * before // len(motion)
         begin, end = before / fps, after / fps
         here = tuple(mark for mark in marks if begin <= mark.seconds < end)
-        yield Piece(clip, n_steps, timeline.within(begin, end), here)
+        asked_here = timeline.within(begin, end)
+        yield Piece(_alive(clip.speech, clip.motion, asked_here, life), n_steps, asked_here, here)
         before = after
+    if life is not None:
+        life.finish()
 
 
 def _followed(request: Request, audio: Path, ready: Cast, fps: float) -> tuple[Heard, Trajectory]:
@@ -301,7 +261,7 @@ def write_clip(
 
     with (
         Ahead(stream(request, ready), CLIPS_AHEAD) as spoken,
-        ClipWriter(out, ready.stage(picture), on_progress=tell) as writer,
+        ClipWriter(out, ready.stage(picture, request), on_progress=tell) as writer,
     ):
         for piece in spoken:
             if on_clip:

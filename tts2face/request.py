@@ -66,6 +66,8 @@ class Request:
         "Expressions added (sad, happy, afraid, angry, surprised), with weight and seconds: happy=0.6@1.2-3.4,sad=0.3.",
     )
     timeline: Path | None = option(None, "A JSON file with styles, expressions, nods and gains over time.")
+    pitch: bool = option(False, "Gestures follow the pitch of the voice, not only its loudness.")
+    noise: bool = option(False, "Gestures from Perlin noise, to compare with.")
     idle: float | None = option(None, "Seconds of a living, silent face, in place of a text.")
 
     def __post_init__(self) -> None:

@@ -13,7 +13,7 @@ from lexicon.errors import InputError
 from tts2face.palette import FEATURES, REGION_FEATURES, Palette, Region, Style
 
 VARIANCE = 0.95  # of a region's motion that its modes keep: the rest is the tracker's
-MOST_MODES = 8
+MOST_MODES = 10
 
 Floats = NDArray[np.float32]
 

@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.effort import Effort
-from corpus_tools.listen import Ears, intensity
+from corpus_tools.listen import Ears
 from corpus_tools.observation import Observation, Quality, trimmed
 from lexicon.errors import DataError, InputError
 from tts2face.face.file import load_face
 from tts2face.face.model import Face
 from tts2face.landmarks import N_LANDMARKS
 from tts2face.mimic import motion_of_capture
+from tts2face.speech.loudness import intensity
 from tts2face.speech.pauses import stretches
 from tts2face.video.livelink import read_livelink
 

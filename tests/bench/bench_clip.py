@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 from sentences import sentences
 
-from tts2face.api import cast, stream, write_clip
+from tts2face.api import stream, write_clip
+from tts2face.cast import cast
 from tts2face.face.file import load_face
 from tts2face.render.encode import ClipWriter
 from tts2face.render.picture import Picture
@@ -48,9 +49,10 @@ def whole_clip(folder: Path, n_runs: int = 3) -> None:
     print(
         f"whole clip of {written.seconds:.1f} s: {np.median(rates):.2f} x real time ({min(rates):.2f}-{max(rates):.2f})"
     )
-    clips = [piece.clip for piece in stream(Request(text=TEN_SECONDS), ready)]
+    request = Request(text=TEN_SECONDS)
+    clips = [piece.clip for piece in stream(request, ready)]
     began = time.perf_counter()
-    with ClipWriter(folder / "drawn.mp4", ready.stage(Picture())) as writer:
+    with ClipWriter(folder / "drawn.mp4", ready.stage(Picture(), request)) as writer:
         for clip in clips:
             writer.add(clip)
     frames = sum(len(clip.motion) for clip in clips)

@@ -9,7 +9,8 @@ import pytest
 
 from cli.main import run
 from lexicon.errors import DataError, InputError
-from tts2face.api import cast, stream, synthesize
+from tts2face.api import stream, synthesize
+from tts2face.cast import cast
 from tts2face.face.file import load_face
 from tts2face.face.model import Face
 from tts2face.listen import PIECE_FRAMES, between, driven

@@ -8,7 +8,8 @@ import pytest
 import soxr
 
 from lexicon.sequence import SILENCE
-from tts2face.api import Cast, cast, write_clip
+from tts2face.api import write_clip
+from tts2face.cast import Cast, cast
 from tts2face.face.file import load_face
 from tts2face.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.render.picture import Picture

@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cli.main import run
 from lexicon.sequence import SILENCE
-from tts2face.api import Cast, Piece, cast, stream, write_clip
+from tts2face.api import Piece, stream, write_clip
+from tts2face.cast import Cast, cast
 from tts2face.face.file import load_face
 from tts2face.gesture.spans import StyleSpan
 from tts2face.render.picture import Picture
@@ -84,6 +86,14 @@ def test_the_command_makes_the_pause(tmp_path: Path) -> None:
         subprocess.run([*COMMAND, *arguments], check=True, capture_output=True)
         lengths.append(media_facts(out).duration)
     assert 1.7 < lengths[1] - lengths[0] < 2.5
+
+
+def test_phones_are_those_of_the_words(capsys: pytest.CaptureFixture[str]) -> None:
+    told = []
+    for text in ("Hello there.", "Hello [pause 2] there."):
+        assert run(["phones", text]) == 0
+        told.append(capsys.readouterr().out)
+    assert told[0] == told[1]
 
 
 def test_the_command_tells_when_names_are_reached(tmp_path: Path) -> None:

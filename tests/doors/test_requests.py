@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.api import cast, stream, synthesize
+from tts2face.api import stream, synthesize
+from tts2face.cast import cast
 from tts2face.face.file import load_face
 from tts2face.face.model import Face
 from tts2face.request import Request

@@ -1,5 +1,6 @@
 """Marks in speech: a voice with a known answer, and real ones."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lexicon.errors import InputError
+from lexicon.marked import NodMark
 from lexicon.marks import marked
-from lexicon.sentences import Sentence, sentences
+from lexicon.sentences import Sentence, by_letters, sentences
 from lexicon.sequence import SILENCE
 from tests.spoken.fake_voice import LEAD, LETTER, LEVEL, RATE, TRAIL, FakeVoice
 from tts2face.gesture.spans import Nod, StyleSpan
@@ -182,6 +184,23 @@ def test_sentences_hold_the_same_words_with_pauses(texts: list, data: st.DataObj
     parts = list(sentences(marked(text), "en-us"))
     spoken = "".join("".join(part.written.split()) for sentence in parts for part in sentence.utterances)
     assert spoken == "".join("".join(texts).split())
+
+
+BITS = st.one_of(st.text(max_size=8), st.sampled_from(["[nod]", "[pause 0.5]", ". ", "Ab", "\n\n"]))
+
+
+@given(st.lists(BITS, max_size=12))
+def test_any_text_is_cut_without_loss(bits: list) -> None:
+    text = marked("".join(bit if bit in {"[nod]", "[pause 0.5]"} else bit.replace("[", "") for bit in bits))
+    parts = list(sentences(text, "de"))
+    written = "".join(part.written for sentence in parts for part in sentence.utterances)
+    assert [letter for letter in written if letter.isalnum()] == [letter for letter in text.text if letter.isalnum()]
+    nods = {mark.at for mark in by_letters(text).marks if isinstance(mark, NodMark)}
+    assert sum(len(sentence.marks) for sentence in parts) == (len(nods) if parts else 0)
+    for sentence in parts:
+        bounds = [(part.first, part.last) for part in sentence.utterances]
+        assert all(first < last for first, last in bounds)
+        assert all(before[1] <= after[0] for before, after in pairwise(bounds))
 
 
 def test_silences_are_taken_away_and_put_in_exactly() -> None:

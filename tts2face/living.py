@@ -1,0 +1,83 @@
+"""Gestures laid over speech: what a request asks for, over the whole of its clip."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tts2face.face.gestures import SPEECH_GAINS, GestureFace
+from tts2face.gesture.animate import Fields, Gestures, GestureStream
+from tts2face.gesture.asked import asked
+from tts2face.gesture.noise import NoiseStream
+from tts2face.gesture.timeline import Timeline
+from tts2face.palette import Palette
+from tts2face.request import Request
+from tts2face.types import Clip, Speech, Trajectory
+
+USUAL_STYLE = "neutral"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Living:
+    """A palette and a face made ready for each other; serves any number of clips."""
+
+    fields: Fields
+    face: GestureFace
+
+
+def usual_style(palette: Palette) -> str:
+    """The style of a clip for which none was chosen."""
+    return USUAL_STYLE if USUAL_STYLE in palette.names else next(iter(palette.styles))
+
+
+class Life:
+    """The gestures of one clip, added piece by piece.
+
+    Raises
+    ------
+    InputError, DataError
+        The request's style, gains, expressions or timeline cannot be read, or the palette lacks a style.
+    """
+
+    def __init__(self, request: Request, living: Living, fps: float) -> None:
+        self._asked, self._living = asked(request), living
+        palette = living.fields.palette
+        self._asked.check_styles(palette)
+        kind = NoiseStream if request.noise else GestureStream
+        self._stream = kind(living.fields, style=usual_style(palette), seed=request.seed, fps=fps)
+        self._marked = Timeline()
+        self._seconds = 0.0
+
+    def added(self, speech: Speech, lips: Trajectory, marks: Timeline) -> Clip:
+        """The next piece of the clip.
+
+        Parameters
+        ----------
+        lips : (T, n_own)
+            Weights of the face's own shapes, T frames of them.
+        marks
+            What the piece's text asks for, on the clock of the whole clip.
+        """
+        self._marked = self._marked.within(self._seconds - 1.0, np.inf).merged(marks)  # a nod runs on for half a second
+        timeline = self._asked.merged(self._marked)
+        self._seconds += len(lips) / lips.fps
+        gestures = _seen_from_the_head(self._stream.next(speech.waveform, len(lips), timeline))
+        gains = {name: timeline.gains.of(name) for name in SPEECH_GAINS}
+        shown = self._living.face.perform(lips, gestures, gains)
+        return Clip(shown.motion, shown.head, speech)
+
+    def finish(self) -> None:
+        """Refuse what was asked for beyond the clip's end.
+
+        Raises
+        ------
+        InputError
+            There is such a thing.
+        """
+        self._asked.check_duration(self._seconds)
+
+
+def _seen_from_the_head(gestures: Gestures) -> Gestures:
+    """Gestures with the line of sight as the eyes must turn: they hold what they look at while the head moves."""
+    if "gaze" not in gestures or "head" not in gestures:
+        return gestures
+    return {**gestures, "gaze": gestures["gaze"] - gestures["head"][:, :2]}
