@@ -31,6 +31,8 @@ CHANGES = {
     "exemplars": 3,
     "fps": 25.0,
     "gestures": False,
+    "pitch": True,
+    "noise": True,
     "style": "delighted",
     "gain": "head=2,blink=0",
     "expression": "happy=0.6@0.2-0.9",
