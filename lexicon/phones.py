@@ -5,6 +5,7 @@ The knowledge stands in `phones.tsv`, one phone a line, for a phonetician to rea
 
 import functools
 import math
+import operator
 from collections.abc import Collection, Mapping
 from importlib import resources
 from types import MappingProxyType
@@ -125,12 +126,25 @@ def _features(phone: Phone) -> dict[str, float]:
 
 
 @functools.cache
-def _halves(label: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Weighted features of a phone's first and last half; those of a simple phone are equal."""
+def phone_features(label: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Articulatory features (`WEIGHTS` names them) of a phone's first and last half; those of a simple phone are equal.
+
+    Raises
+    ------
+    InputError
+        The label is not in the table.
+    """
     phone = phone_of(label)
     parts = phone.parts or (label,)
     first, last = (_features(PHONES[part]) for part in (parts[0], parts[-1]))
-    return tuple(first[name] * w for name, w in WEIGHTS.items()), tuple(last[name] * w for name, w in WEIGHTS.items())
+    return tuple(first[name] for name in WEIGHTS), tuple(last[name] for name in WEIGHTS)
+
+
+@functools.cache
+def _halves(label: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Weighted features of a phone's first and last half."""
+    first, last = (tuple(map(operator.mul, half, WEIGHTS.values())) for half in phone_features(label))
+    return first, last
 
 
 def phone_distance(a: str, b: str) -> float:

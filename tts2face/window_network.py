@@ -84,13 +84,6 @@ def _layer(seen, weights, biases):  # type: ignore[no-untyped-def]
     return told
 
 
-def one_of_each(shown: NDArray[np.int64], place: NDArray[np.float32], n_phones: int) -> NDArray[np.float32]:
-    """(T, F) features as the networks are trained on them: each phone as one of N, then the numbers of its place."""
-    ones = np.zeros((*shown.shape, n_phones), np.float32)
-    np.put_along_axis(ones, shown[:, :, None], np.float32(1.0), axis=2)
-    return np.concatenate([ones.reshape(len(shown), -1), place], axis=1)
-
-
 def window_features(
     phones: PhoneSequence, times: NDArray[np.float64], inventory: Sequence[str]
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:

@@ -1,9 +1,20 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tts2face.exemplar.animate import VisualVoice
 from tts2face.exemplar.blend import Pieces, averaged_pieces, exemplar_weights, joined_pieces, smoothed
-from tts2face.exemplar.contacts import Contacts, Gap, contact_poses, contact_share, with_contacts
+from tts2face.exemplar.contacts import (
+    RULES,
+    ContactRule,
+    Contacts,
+    Exemplars,
+    Gap,
+    contact_rule,
+    contacts_told,
+    with_contacts,
+)
 from tts2face.exemplar.options import THEOBALD_2007, SynthesisOptions
 from tts2face.exemplar.targets import Targets
 from tts2face.exemplar.tokens import reaching_spans
@@ -92,14 +103,15 @@ def test_smoothing_is_a_gaussian_in_seconds():
 
 
 def test_knows_the_phones_that_bring_the_lips_together():
-    assert all(contact_share(label) > 0 for label in ("p", "b", "m", "f", "v"))
-    assert not any(contact_share(label) for label in ("w", "t", "u", "ɹ", "sil"))
+    assert [contact_rule(label) for label in ("p", "b", "m")] == [RULES["bilabial"]] * 3
+    assert [contact_rule(label) for label in ("f", "v")] == [RULES["labiodental"]] * 2
+    assert not any(contact_rule(label) for label in ("w", "t", "u", "ɹ", "sil"))
 
 
 def test_a_contact_closes_what_averaging_left_open():
     values = np.full((100, 1), 4.0, np.float32)
     values[45:56, 0] = 2.0
-    contact = Contacts(np.array([[0.46, 0.54]]), np.array([[0.1]], np.float32))
+    contact = Contacts(np.array([[0.46, 0.54]]), np.array([[0.1]], np.float32), np.array([0.1], np.float32))
     kept = with_contacts(values, contact, GAP, 100.0)
     low = int(kept[:, 0].argmin())
     assert 43 <= low <= 57
@@ -111,10 +123,12 @@ def test_a_contact_closes_what_averaging_left_open():
 
 def test_a_closed_contact_is_left_alone():
     values = np.full((100, 1), 0.05, np.float32)
-    contact = Contacts(np.array([[0.46, 0.54]]), np.array([[0.1]], np.float32))
+    contact = Contacts(np.array([[0.46, 0.54]]), np.array([[0.1]], np.float32), np.array([0.1], np.float32))
     assert (with_contacts(values, contact, GAP, 100.0) == values).all()
-    beyond = Contacts(np.array([[5.0, 5.1]]), np.array([[0.0]], np.float32))
+    beyond = replace(contact, spans=np.array([[5.0, 5.1]]), enough=np.zeros(1, np.float32))
     assert (with_contacts(values + 1, beyond, GAP, 100.0) == values + 1).all()
+    lenient = replace(contact, enough=np.array([1.1], np.float32))
+    assert (with_contacts(values + 1, lenient, GAP, 100.0) == values + 1).all()
 
 
 def test_poses_are_taken_where_each_token_is_closest(voice: VisualVoice):
@@ -123,11 +137,17 @@ def test_poses_are_taken_where_each_token_is_closest(voice: VisualVoice):
     p = np.flatnonzero(voice.tokens.phone == label)[:2]
     open_one = np.flatnonzero(voice.tokens.phone == voice.tokens.inventory.index("ɑ"))[0]
     chosen = np.array([[open_one, *p]], np.int32)
-    pose = contact_poses(voice.tokens, chosen, np.array([[0.2, 0.4, 0.4]]), voice.lip_gap, np.array([0.7]))
-    least = []
-    for token in p:
+    exemplars = Exemplars(voice.tokens, chosen, np.array([[0.2, 0.4, 0.4]]))
+
+    def told(enough: float) -> Contacts:
+        return contacts_told(exemplars, voice.lip_gap, np.array([[0.0, 0.1]]), [ContactRule(0.7, enough)])
+
+    least, frames = [], voice.tokens.frames
+    for token in (*p, open_one):
         first, last = voice.tokens.first_frame[voice.tokens.utterance[token] :][:2]
         times = np.arange(last - first) / voice.tokens.fps
         near = (times >= voice.tokens.spans[token, 1] - 0.03) & (times <= voice.tokens.spans[token, 2] + 0.03)
-        least.append(np.abs(voice.tokens.frames[first:last][near, 0]).min())
-    assert pose[0, 0] == pytest.approx(np.mean(least), abs=1e-5)
+        least.append(np.abs(frames[first:last][near, 0]).min())
+    assert told(0.0).poses[0, 0] == pytest.approx(np.mean(least[:2]), abs=1e-5)
+    assert told(0.7).enough[0] == pytest.approx(max(least[:2]), abs=1e-5)
+    assert told(0.9).enough[0] == pytest.approx(least[2], abs=1e-5)

@@ -11,7 +11,7 @@ from tts2face.exemplar.animate import VisualVoice, speech_trajectory
 from tts2face.exemplar.options import SynthesisOptions
 from tts2face.exemplar.targets import Targets, shown_phones
 from tts2face.talker import Talker, read_talker, write_talker
-from tts2face.window_network import WindowNetwork, one_of_each, window_features
+from tts2face.window_network import WindowNetwork, window_features
 
 PHONES = PhoneSequence([SILENCE, "b", "i", "p", SILENCE], [0.0, 0.3, 0.4, 0.6, 0.7, 1.0])
 KNOWN = ("b", "i", "p", SILENCE)
@@ -19,7 +19,8 @@ TIMES = np.arange(25) / 25
 
 
 def seen_as_ones(phones: PhoneSequence, times: np.ndarray) -> np.ndarray:
-    return one_of_each(*window_features(phones, times, KNOWN), len(KNOWN))
+    shown, place = window_features(phones, times, KNOWN)
+    return np.array([[*np.eye(len(KNOWN))[row].ravel(), *where] for row, where in zip(shown, place, strict=True)])
 
 
 def random_network(n_outputs: int, n_networks: int = 2) -> WindowNetwork:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar import blend
-from tts2face.exemplar.contacts import Contacts, Gap, contact_poses, contact_share, with_contacts
+from tts2face.exemplar.contacts import Exemplars, Gap, contact_rule, contacts_told, with_contacts
 from tts2face.exemplar.options import SynthesisOptions
 from tts2face.exemplar.select import ContextIndex, Found, Wanted, best_tokens, context_index, log_durations
 from tts2face.exemplar.similarity import Similarity, phone_similarity, token_samples
@@ -159,10 +159,11 @@ def _motion(
     motion = blend.smoothed(motion, options.smoothing_s, blend.CLOCK_HZ)
     if not options.contacts:
         return motion
-    shares = np.array([contact_share(label) for label in targets.labels])
-    touching = shares > 0
-    poses = contact_poses(voice.tokens, found.tokens[touching], weights[touching], voice.lip_gap, shares[touching])
-    contacts = Contacts(targets.spans[touching, 1:3], poses)
+    rules = [contact_rule(label) for label in targets.labels]
+    touching = np.array([rule is not None for rule in rules])
+    exemplars = Exemplars(voice.tokens, found.tokens[touching], weights[touching])
+    kept = [rule for rule in rules if rule is not None]
+    contacts = contacts_told(exemplars, voice.lip_gap, targets.spans[touching, 1:3], kept)
     return with_contacts(motion, contacts, voice.lip_gap, blend.CLOCK_HZ)
 
 

@@ -1,5 +1,6 @@
 """Lips that meet in the recordings meet in the result: averaging opens closures, this closes them again."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,9 +10,22 @@ from numpy.typing import NDArray
 from lexicon.phones import phone_of
 from tts2face.exemplar.tokens import Tokens
 
-# Share of the exemplars, the closest by weight, that tell a contact: as many lips touch as in recordings with it
-# (docs/decisions.md). Some bilabials close between two frames; labiodentals leave a gap, which hides nothing.
-CLOSER = {"bilabial": 0.7, "labiodental": 1.0}
+
+@dataclass(frozen=True, slots=True)
+class ContactRule:
+    """What counts as a contact of the lips.
+
+    ``closer`` is the share of the exemplars, the closest by weight, that tell its pose; ``enough`` the share whose gap
+    is gap enough: only a motion that stays farther apart is drawn to the pose.
+    """
+
+    closer: float
+    enough: float
+
+
+# As many lips touch as in recordings (docs/decisions.md). Some bilabials close between two frames, so not all exemplars
+# tell the pose. Labiodentals leave a gap that varies: drawing each to the mean closes those that were recorded open.
+RULES = {"bilabial": ContactRule(closer=0.7, enough=0.0), "labiodental": ContactRule(closer=1.0, enough=0.75)}
 NON_CONTACTS = frozenset({"approximant"})  # narrowed, not closed
 WINDOW_S = 0.03  # a closure may lie this far outside its phone's edges (video frames are 40 ms, edges +- 10 ms)
 HOLD_S = 0.03  # lips stay together at least this long: shorter, and the touch falls between two frames at 30 fps
@@ -30,38 +44,55 @@ class Gap:
         return np.asarray(np.linalg.norm(self.rest + parameters.astype(np.float32) @ self.basis, axis=1))
 
 
-def contact_share(label: str) -> float:
-    """The share of exemplars that tells a phone's contact; 0 for a phone without one."""
+def contact_rule(label: str) -> ContactRule | None:
+    """What counts as a phone's contact; None for a phone without one."""
     phone = phone_of(label)
-    return 0.0 if phone.manner in NON_CONTACTS else CLOSER.get(phone.place, 0.0)
+    return None if phone.manner in NON_CONTACTS else RULES.get(phone.place)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contacts:
-    """Lip contacts to be kept: spans (C, 2) in seconds of the phones that make them, poses (C, D) of the exemplars."""
+    """Lip contacts to be kept.
+
+    Spans (C, 2) in seconds of the phones that make them, poses (C, D), and gaps (C,) in mm that are enough.
+    """
 
     spans: NDArray[np.float64]
     poses: NDArray[np.float32]
+    enough: NDArray[np.float32]
 
 
-def contact_poses(
-    tokens: Tokens, chosen: NDArray[np.int32], weights: NDArray[np.float64], gap: Gap, shares: NDArray[np.float64]
-) -> NDArray[np.float32]:
-    """(N, D) average pose of the chosen tokens (N, k), each at the frame where its own lips are closest.
+@dataclass(frozen=True, slots=True, eq=False)
+class Exemplars:
+    """The tokens (N, k) of a talker that were chosen for N phones, and their weights (N, k)."""
 
-    Only the closer ones count, of each target a share (N,) of its weights (N, k): a tenth of the recorded contacts is
-    missed between two frames or by the alignment, and would hold the lips open.
+    tokens: Tokens
+    chosen: NDArray[np.int32]
+    weights: NDArray[np.float64]
+
+
+def contacts_told(exemplars: Exemplars, gap: Gap, spans: NDArray[np.float64], rules: Sequence[ContactRule]) -> Contacts:
+    """The contacts of N phones with spans (N, 2) in seconds, by a rule for each.
+
+    A pose is the average of the closer exemplars, each at the frame where its own lips are closest: a tenth of the
+    recorded contacts is missed between two frames or by the alignment, and would hold the lips open.
     """
-    rows, gaps = np.zeros(chosen.shape, np.int64), np.full(chosen.shape, np.inf)
+    tokens, chosen, weights = exemplars.tokens, exemplars.chosen, exemplars.weights
+    rows, squared = np.zeros(chosen.shape, np.int64), np.full(chosen.shape, np.inf)
     corpus = (tokens.frames, tokens.first_frame, tokens.utterance, tokens.spans, tokens.fps)
-    _closest_rows(corpus, chosen, (gap.rest, gap.basis), rows, gaps)
-    order = np.argsort(gaps, axis=1, kind="stable")
+    _closest_rows(corpus, chosen, (gap.rest, gap.basis), rows, squared)
+    order = np.argsort(squared, axis=1, kind="stable")
     sorted_weights = np.take_along_axis(weights, order, axis=1)
-    closer = np.cumsum(sorted_weights, axis=1) - sorted_weights < shares[:, None]
+    closer_than = np.cumsum(sorted_weights, axis=1) - sorted_weights
     kept = np.zeros_like(weights)
-    np.put_along_axis(kept, order, np.where(closer, sorted_weights, 0.0), axis=1)
+    tells = closer_than < np.array([rule.closer for rule in rules])[:, None]
+    np.put_along_axis(kept, order, np.where(tells, sorted_weights, 0.0), axis=1)
     kept /= kept.sum(axis=1, keepdims=True)
-    return np.asarray(np.einsum("nk,nkd->nd", kept, tokens.frames[rows]), np.float32)
+    poses = np.asarray(np.einsum("nk,nkd->nd", kept, tokens.frames[rows]), np.float32)
+    present = (closer_than <= np.array([rule.enough for rule in rules])[:, None]) & (sorted_weights > 0)
+    gaps = np.sqrt(np.take_along_axis(squared, order, axis=1))
+    enough = np.where(present, gaps, 0.0).max(axis=1).astype(np.float32)
+    return Contacts(spans, poses, np.maximum(enough, gap.of(poses)))
 
 
 @njit(cache=True)
@@ -98,21 +129,20 @@ def _closest_row(frames, low, high, gap):  # type: ignore[no-untyped-def]
 
 
 def with_contacts(values: NDArray[np.float32], contacts: Contacts, gap: Gap, rate_hz: float) -> NDArray[np.float32]:
-    """(T, D) values at `rate_hz` whose lips come as close in every contact as the exemplars' did.
+    """(T, D) values at `rate_hz` whose lips come close enough in every contact.
 
     Where the lips are closest already, the motion is drawn to the exemplars' pose: fully for `HOLD_S`, easing in and
     out over `EASE_S`. A contact that is closed enough is left alone.
     """
     kept = values.copy()
-    wanted = gap.of(contacts.poses)
     times = np.arange(len(values)) / rate_hz
-    for (start, end), pose, want in zip(contacts.spans, contacts.poses, wanted, strict=True):
+    for (start, end), pose, enough in zip(contacts.spans, contacts.poses, contacts.enough, strict=True):
         low, high = np.searchsorted(times, (start - WINDOW_S, end + WINDOW_S))
         if low >= high:
             continue
         gaps = gap.of(kept[low:high])
         at = low + int(np.argmin(gaps))
-        if gaps[at - low] <= want:
+        if gaps[at - low] <= enough:
             continue
         reach = int((HOLD_S / 2 + EASE_S) * rate_hz)
         here = slice(max(0, at - reach), min(len(kept), at + reach + 1))

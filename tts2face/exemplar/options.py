@@ -48,7 +48,7 @@ class SynthesisOptions:
     overlap: bool = True
     precision: float = 1.5
     align: bool = True
-    network: float = 0.4
+    network: float = 0.5
     articulation: float = 1.12
     smoothing_s: float = 0.01
     contacts: bool = True

@@ -1,0 +1,55 @@
+"""Networks from phones to lips: what they are told of phones, and that multiplying it out by phone changes nothing."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from corpus_tools.evaluation.evaluate import LEARNT_FOR_EVALUATION
+from corpus_tools.learn import learn_talker
+from corpus_tools.lips import by_phone, described, feature_table, with_network
+from corpus_tools.observation import Observation
+from lexicon.phones import PHONES, WEIGHTS
+from lexicon.sequence import SILENCE
+
+KNOWN = ("b", "aɪ", "p", SILENCE)
+N_SHOWN = 3
+
+
+@pytest.fixture
+def stream() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
+def test_phones_are_told_by_what_the_mouth_does_first_and_last() -> None:
+    b, diphthong, p, _ = feature_table(KNOWN)
+    names = [f"{name} {half}" for half in ("first", "last") for name in WEIGHTS]
+    assert [name for name, one, other in zip(names, b, p, strict=True) if one != other] == [
+        "voicing first",
+        "voicing last",
+    ]
+    told = dict(zip(names, diphthong, strict=True))
+    assert told["opening first"] > told["opening last"] > 0
+    assert feature_table(PHONES).shape == (len(PHONES), 2 * len(WEIGHTS))
+
+
+def test_inputs_are_the_lines_of_the_table_beside_each_other(stream: np.random.Generator) -> None:
+    shown, place = stream.integers(0, 4, (5, N_SHOWN)), stream.normal(size=(5, 4)).astype(np.float32)
+    table = feature_table(KNOWN)
+    dense = described(shown, place, table).toarray()
+    for row, labels, where in zip(dense, shown, place, strict=True):
+        np.testing.assert_array_equal(row, [*(value for label in labels for value in table[label]), *where])
+
+
+def test_weights_by_phone_tell_what_weights_by_feature_do(stream: np.random.Generator) -> None:
+    shown, place = stream.integers(0, 4, (5, N_SHOWN)), stream.normal(size=(5, 4)).astype(np.float32)
+    table, ones = feature_table(KNOWN), np.eye(4, dtype=np.float32)
+    weights = stream.normal(size=(N_SHOWN * table.shape[1] + 4, 6)).astype(np.float32)
+    told = described(shown, place, ones) @ by_phone(weights, table, N_SHOWN)
+    np.testing.assert_allclose(told, described(shown, place, table) @ weights, rtol=1e-4, atol=1e-4)
+    np.testing.assert_array_equal(by_phone(weights[: 4 * N_SHOWN + 4], ones, N_SHOWN), weights[: 4 * N_SHOWN + 4])
+
+
+def test_too_little_is_not_learnt_from(make_observation: Callable[..., Observation]) -> None:
+    talker = learn_talker([make_observation("u0", 0, 75)], n_speech=5, n_other=3, metadata=LEARNT_FOR_EVALUATION)
+    assert with_network(talker) is talker
