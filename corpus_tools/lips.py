@@ -25,7 +25,7 @@ MARGIN_S = 0.2  # of silence that is learnt from
 UNITS = (128, 128)
 DECAY = 1e-3
 ROUNDS = 60
-N_BY_LABEL, N_BY_FEATURES = 1, 3  # networks; where words were never heard, features halve what is lost (accuracy.md)
+N_BY_LABEL, N_BY_FEATURES = 1, 3  # networks; features tell unheard words better, labels heard ones (accuracy.md)
 LEAST_FRAMES = 3000  # two minutes; from less a network learns nothing that examples do not show
 Floats = NDArray[np.float32]
 
