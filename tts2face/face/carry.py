@@ -94,7 +94,7 @@ def completed(face: Face, names: Sequence[str]) -> Face:
     missing = [name for name in dict.fromkeys(names) if name not in face.shape_names]
     if not missing:
         return face
-    head = _default_head()
+    head = default_head()
     common = np.intersect1d(face.landmarks[face.landmarks < N_SKIN], head.landmarks)
     here, there = (all_landmarks(one, landmark_places(one)) for one in (face, head))
     sizes = axis_scales(there[common], here[common], SIZES)
@@ -125,7 +125,7 @@ def _merged(places: FloatArray, values: FloatArray, apart: float) -> tuple[Float
 
 def _eyes_drawn_in(eye: Eye, names: Sequence[str]) -> FloatArray:
     """(k, 3) how far the default head's shapes shift the eyeball of this side, mm: lids that shut slide over it."""
-    head, model = _default_head(), _model_eye(eye)
+    head, model = default_head(), _model_eye(eye)
     shifts = [head.shapes[head.shape_names.index(name), model.first : model.first + model.count] for name in names]
     return DRAWN_IN * np.stack([shift.mean(axis=0, dtype=np.float64) for shift in shifts])
 
@@ -136,9 +136,10 @@ def _turning(eye: Eye, missing: Sequence[str]) -> Eye:
 
 
 def _model_eye(eye: Eye) -> Eye:
-    return min(_default_head().eyes, key=lambda other: abs(float(other.centre[0] - eye.centre[0])))
+    return min(default_head().eyes, key=lambda other: abs(float(other.centre[0] - eye.centre[0])))
 
 
 @cache
-def _default_head() -> Face:
+def default_head() -> Face:
+    """The head from which motion is carried."""
     return load_face(DEFAULT)

@@ -199,14 +199,19 @@ def region_shapes(face: Face, neutral: FloatArray, region: Region) -> Floats:
     its frame of eye corners and nose, and spread by compact cubic B-splines.
     """
     places = all_landmarks(face, landmark_places(face))
+    own = {*region.landmarks.tolist()}
+    still = [number for number in (*LID_RIMS, *LIPS) if number not in own]
+    return spread(face, region.landmarks, fitted_modes(places, neutral, region), still)
+
+
+def fitted_modes(places: FloatArray, neutral: FloatArray, region: Region) -> FloatArray:
+    """(k, L, 3) a region's modes in the size of landmarks (478, 3), of which some may be NaN."""
     seen: NDArray[np.bool_] = np.isfinite(places[:, 0])
     skin = np.flatnonzero(seen[:N_SKIN])
     turn = turn_onto(neutral[skin], places[skin])
     fitted = np.array([number for number in (*region.landmarks, *FRAME) if seen[number]])
     sizes = axis_scales(product(neutral[fitted], turn.T), places[fitted], SIZES)
-    modes = product(region.modes.astype(np.float64), turn.T) * sizes
-    own = {*region.landmarks.tolist()}
-    return spread(face, region.landmarks, modes, [number for number in (*LID_RIMS, *LIPS) if number not in own])
+    return product(region.modes.astype(np.float64), turn.T) * sizes
 
 
 def gaze_weights(face: Face) -> FloatArray:

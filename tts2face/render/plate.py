@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.appearance import Appearance, nearest_pixels
+from tts2face.face.own_gestures import OwnGestures
 from tts2face.landmarks import FACE_OVAL
 from tts2face.render.ahead import drawn_ahead
 from tts2face.render.picture import AUTO, SIDES, Picture
@@ -52,6 +53,7 @@ class PlateStage:
     triangles: NDArray[np.int32]
     face_fill: NDArray[np.int64]
     mouth_fill: NDArray[np.int64]
+    gestures: OwnGestures | None = None
 
     @property
     def notice(self) -> str:
@@ -60,12 +62,13 @@ class PlateStage:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Channels of the motion that it draws: the talker's speech parameters, then her looks."""
-        return tuple(f"shape{i}" for i in range(self.shapes.n_speech)) + self.appearance.channels
+        """Channels of the motion that it draws: the talker's speech parameters, her looks, and gestures if any."""
+        spoken = tuple(f"shape{i}" for i in range(self.shapes.n_speech)) + self.appearance.channels
+        return spoken if self.gestures is None else spoken + self.gestures.channels
 
 
-def plate_staged(talker: Talker, picture: Picture) -> PlateStage:
-    """The stage of a talker's own face.
+def plate_staged(talker: Talker, picture: Picture, gestures: OwnGestures | None = None) -> PlateStage:
+    """The stage of a talker's own face; with `gestures` it draws theirs too.
 
     Raises
     ------
@@ -98,6 +101,7 @@ def plate_staged(talker: Talker, picture: Picture) -> PlateStage:
         triangles=np.concatenate([ring_triangles(len(appearance.face.reference)), appearance.face.triangles]),
         face_fill=nearest_pixels(appearance.face),
         mouth_fill=nearest_pixels(appearance.mouth),
+        gestures=gestures,
     )
 
 
@@ -127,20 +131,24 @@ def plate_frame(stage: PlateStage, instant: float) -> int:
 
 
 def plate_drawn(stage: PlateStage, motion: NDArray[np.floating], number: int) -> NDArray[np.uint8]:
-    """One picture (H, W, 3): speech parameters and looks (D,) on a frame of the plate."""
+    """One picture (H, W, 3): speech parameters, looks and gestures (D,) on a frame of the plate."""
     appearance, n_speech = stage.appearance, stage.shapes.n_speech
-    n_face = appearance.face.n_modes
+    n_face, n_spoken = appearance.face.n_modes, n_speech + len(appearance.channels)
     plate = appearance.plate
     n_mesh = len(appearance.face.reference)
     offset = (motion[:n_speech] - plate.shape[number, :n_speech]).astype(np.float32)
     moved = np.tensordot(offset, stage.shapes.basis[:n_speech, :n_mesh], axes=1)
-    target = stage.points[number].astype(np.float64)
-    target[:n_mesh] += stage.scale * (moved @ plate.axes[number].T)
     change = np.tensordot(
         (motion[n_speech : n_speech + n_face] - plate.looks[number]).astype(np.float32), appearance.face.basis, axes=1
     )
     change *= appearance.moved_by_speech[:, None]
-    mouth = appearance.mouth.textures(motion[None, n_speech + n_face :])[0]
+    if stage.gestures is not None:
+        felt, looks = stage.gestures.moved(motion[n_spoken:], number)
+        moved += felt
+        change += stage.gestures.lid_pixels[:, None] * np.tensordot(looks, appearance.face.basis, axes=1)
+    target = stage.points[number].astype(np.float64)
+    target[:n_mesh] += stage.scale * (moved @ plate.axes[number].T)
+    mouth = appearance.mouth.textures(motion[None, n_speech + n_face : n_spoken])[0]
     textures = (
         _filled(change, stage.face_fill, appearance.face.size),
         _filled(mouth, stage.mouth_fill, appearance.mouth.size),
