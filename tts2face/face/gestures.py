@@ -104,9 +104,8 @@ class GestureFace:
         felt = {name: gains.get(name, 1.0) * values.astype(np.float64) for name, values in gestures.items()}
         spoken = self._louder(spoken, gains)
         added = self._added(spoken, felt)
-        if "blink" in felt or added.any():
-            shares = felt.get("blink", np.zeros((len(speech), 2)))
-            added = self.lids.shut(spoken + added, shares) - spoken
+        shares = felt.get("blink", np.zeros((len(speech), 2)))
+        added = self.lids.shut(spoken + added, shares) - spoken
         weights = self.mouth.held(spoken, added)
         head = felt.get("head", np.zeros((len(speech), len(HEAD_CHANNELS))))
         return Performance(

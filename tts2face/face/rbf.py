@@ -75,11 +75,7 @@ def interpolant(centres: NDArray[np.floating], displacements: NDArray[np.floatin
     from scipy.linalg import solve
     from scipy.spatial.distance import pdist
 
-    places, wanted = np.asarray(centres, np.float64), np.asarray(displacements, np.float64)
-    if places.ndim != 2 or wanted.ndim != 2 or len(places) != len(wanted) or not len(places):
-        raise InputError(f"centres {places.shape} and displacements {wanted.shape} must have the same rows, at least 1")
-    if not (np.isfinite(places).all() and np.isfinite(wanted).all()):
-        raise InputError("centres and displacements must be finite; leave out places that were not seen")
+    places, wanted = checked_centres(centres, displacements)
     if not face_width > 0:
         raise InputError(f"the face's width must be above 0, not {face_width}")
     reach = REACH / FACE_WIDTH * face_width
@@ -87,6 +83,18 @@ def interpolant(centres: NDArray[np.floating], displacements: NDArray[np.floatin
         raise DataError("two centres lie in one place; give each place one displacement")
     coefficients = solve(basis(places, places, reach), wanted, assume_a="pos")
     return Interpolant(places, coefficients, reach)
+
+
+def checked_centres(
+    centres: NDArray[np.floating], displacements: NDArray[np.floating]
+) -> tuple[FloatArray, FloatArray]:
+    """Places (N, D) and what is known there (N, E), if they are finite and as many, and at least one; InputError."""
+    places, wanted = np.asarray(centres, np.float64), np.asarray(displacements, np.float64)
+    if places.ndim != 2 or wanted.ndim != 2 or len(places) != len(wanted) or not len(places):
+        raise InputError(f"centres {places.shape} and displacements {wanted.shape} must have the same rows, at least 1")
+    if not (np.isfinite(places).all() and np.isfinite(wanted).all()):
+        raise InputError("centres and displacements must be finite; leave out places that were not seen")
+    return places, wanted
 
 
 def basis(places: NDArray[np.floating], centres: NDArray[np.floating], reach: float) -> FloatArray:

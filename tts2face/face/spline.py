@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from tts2face.face.rbf import checked_centres
 
 FloatArray = NDArray[np.float64]
 
@@ -72,11 +73,7 @@ def local_interpolant(
     >>> moved(np.array([[0.0], [5.0], [25.0]])).round(9).ravel().tolist()
     [1.0, 2.0, 0.0]
     """
-    places, wanted = np.asarray(centres, np.float64), np.asarray(displacements, np.float64)
-    if places.ndim != 2 or wanted.ndim != 2 or len(places) != len(wanted) or not len(places):
-        raise InputError(f"centres {places.shape} and displacements {wanted.shape} must have the same rows, at least 1")
-    if not (np.isfinite(places).all() and np.isfinite(wanted).all()):
-        raise InputError("centres and displacements must be finite; leave out places that were not seen")
+    places, wanted = checked_centres(centres, displacements)
     if not support > 0:
         raise InputError(f"the support must be above 0, not {support}")
     matrix = _bells(places, places, support)
