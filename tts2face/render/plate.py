@@ -19,6 +19,7 @@ from tts2face.face.own_gestures import OwnGestures
 from tts2face.landmarks import FACE_OVAL
 from tts2face.render.ahead import drawn_ahead
 from tts2face.render.picture import AUTO, SIDES, Picture
+from tts2face.render.sample import Samples, samples
 from tts2face.render.warp import bend, lay
 from tts2face.talker import ShapeModel, Talker
 from tts2face.types import Clip
@@ -54,6 +55,7 @@ class PlateStage:
     face_fill: NDArray[np.int64]
     mouth_fill: NDArray[np.int64]
     gestures: OwnGestures | None = None
+    eyes: Samples | None = None
 
     @property
     def notice(self) -> str:
@@ -102,6 +104,7 @@ def plate_staged(talker: Talker, picture: Picture, gestures: OwnGestures | None 
         face_fill=nearest_pixels(appearance.face),
         mouth_fill=nearest_pixels(appearance.mouth),
         gestures=gestures,
+        eyes=None if gestures is None else samples(appearance.face, gestures.lid_pixels > 0),
     )
 
 
@@ -145,7 +148,7 @@ def plate_drawn(stage: PlateStage, motion: NDArray[np.floating], number: int) ->
     if stage.gestures is not None:
         felt, looks = stage.gestures.moved(motion[n_spoken:], number)
         moved += felt
-        change += stage.gestures.lid_pixels[:, None] * np.tensordot(looks, appearance.face.basis, axes=1)
+        change += _lids(stage, number, looks, float(motion[-1]))
     target = stage.points[number].astype(np.float64)
     target[:n_mesh] += stage.scale * (moved @ plate.axes[number].T)
     mouth = appearance.mouth.textures(motion[None, n_speech + n_face : n_spoken])[0]
@@ -158,6 +161,20 @@ def plate_drawn(stage: PlateStage, motion: NDArray[np.floating], number: int) ->
     _draw_mouth_finely(stage, number, target, textures, frame)
     drawn: NDArray[np.uint8] = np.clip(frame + 0.5, 0, 255).astype(np.uint8)
     return drawn
+
+
+def _lids(stage: PlateStage, number: int, looks: Floats, share: float) -> Floats:
+    """(P, 3) change of the face's texture by lids shut by a share: what the model does not know of the eye fades."""
+    face = stage.appearance.face
+    change = np.zeros((len(face.pixels), 3), np.float32)
+    if stage.gestures is None or stage.eyes is None or share <= 0:
+        return change
+    here = stage.eyes.pixels
+    known = face.mean[here] + np.tensordot(stage.appearance.plate.looks[number], face.basis[:, here], axes=1)
+    own = stage.eyes.of(stage.plate[number], stage.points[number]) - known
+    shut = np.tensordot(looks, face.basis[:, here], axes=1) - share * own
+    change[here] = stage.gestures.lid_pixels[here, None] * shut
+    return change
 
 
 def _draw(
