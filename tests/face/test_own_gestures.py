@@ -126,7 +126,7 @@ def test_who_never_blinks_on_video_has_no_blinks_to_show() -> None:
 
 
 def test_refuses_what_does_not_fit() -> None:
-    with pytest.raises(InputError, match=r"brows must be values \(1, 2\), not \(1, 3\)"):
+    with pytest.raises(InputError, match=r"brows must be finite values \(1, 2\), not \(1, 3\)"):
         ready().motion(spoken(), {"brows": np.zeros((1, 3), np.float32)})
     with pytest.raises(InputError, match="motion only"):
         own_gestures(own_talker(has_face=False), palette())

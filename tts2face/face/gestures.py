@@ -139,21 +139,32 @@ class GestureFace:
     def _check(self, speech: Trajectory, gestures: Mapping[str, Floats], gains: Mapping[str, float]) -> None:
         if speech.channels != self.face.shape_names[: self.n_own]:
             raise InputError("the speech is not in the shapes of this face; retarget it to the face first")
-        for name, values in gestures.items():
-            if name not in FEATURES:
-                raise InputError(f"there is no feature {name!r}; give {', '.join(FEATURES)}")
-            wanted = (len(speech), self._n_channels(name))
-            if values.shape != wanted or not np.isfinite(values).all():
-                raise InputError(f"{name} must be finite values {wanted}, not {values.shape}")
-        for name, gain in gains.items():
-            if name not in GAINS:
-                raise InputError(f"there is no gain for {name!r}; give {', '.join(GAINS)}")
-            if not (np.isfinite(gain) and gain >= 0):
-                raise InputError(f"the gain of {name} must be 0 or more, not {gain}")
+        widths = {name: columns.stop - columns.start for name, columns in self.regions.items()}
+        check_gestures(gestures, gains, len(speech), widths)
 
-    def _n_channels(self, feature: str) -> int:
-        columns = self.regions.get(feature)
-        return len(FIXED_CHANNELS[feature]) if columns is None else columns.stop - columns.start
+
+def check_gestures(
+    gestures: Mapping[str, Floats], gains: Mapping[str, float], n_frames: int, regions: Mapping[str, int]
+) -> None:
+    """Refuse gestures that are none, or do not fit the frames or the palette; `regions` are numbers of modes.
+
+    Raises
+    ------
+    InputError
+        A feature or gain does not exist, is not finite, or has other sizes.
+    """
+    widths = {name: len(channels) for name, channels in FIXED_CHANNELS.items()} | dict(regions)
+    for name, values in gestures.items():
+        if name not in widths:
+            raise InputError(f"there is no feature {name!r}; give {', '.join(FEATURES)}")
+        wanted = (n_frames, widths[name])
+        if values.shape != wanted or not np.isfinite(values).all():
+            raise InputError(f"{name} must be finite values {wanted}, not {values.shape}")
+    for name, gain in gains.items():
+        if name not in GAINS:
+            raise InputError(f"there is no gain for {name!r}; give {', '.join(GAINS)}")
+        if not (np.isfinite(gain) and gain >= 0):
+            raise InputError(f"the gain of {name} must be 0 or more, not {gain}")
 
 
 def gesture_face(face: Face, palette: Palette) -> GestureFace:

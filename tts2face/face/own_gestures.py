@@ -9,12 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import InputError
 from tts2face.appearance import Appearance
 from tts2face.face.carry import SIZES, SUPPORT, default_head
 from tts2face.face.expressions import expression_landmarks
 from tts2face.face.fit import all_landmarks, axis_scales, landmark_places, turn_onto
-from tts2face.face.gestures import LID_RIMS, LIPS, NO_GAINS, fitted_modes
+from tts2face.face.gestures import LID_RIMS, LIPS, NO_GAINS, check_gestures, fitted_modes
 from tts2face.face.performer import LIDS, aperture
 from tts2face.face.retarget import product
 from tts2face.face.spline import local_interpolant
@@ -72,19 +71,20 @@ class OwnGestures:
         ----------
         gestures
             (T, k) values of features of the palette; gaze and head have no effect, and both eyes blink together.
+        gains
+            Factors on the motion of features; those of jaw and lips have no effect.
 
         Raises
         ------
         InputError
-            A feature does not fit the frames or the palette.
+            As `tts2face.face.gestures.check_gestures`.
         """
+        check_gestures(gestures, gains, len(own), self.regions)
         felt = np.zeros((len(own), len(self.channels)))
         widths = {"expression": len(EXPRESSIONS), **self.regions}
         first = 0
         for name, width in widths.items():
             if name in gestures:
-                if gestures[name].shape != (len(own), width):
-                    raise InputError(f"{name} must be values {(len(own), width)}, not {gestures[name].shape}")
                 felt[:, first : first + width] = gains.get(name, 1.0) * gestures[name]
             first += width
         felt[:, : len(EXPRESSIONS)] *= LIVELY
