@@ -114,10 +114,11 @@ class GestureFace:
 
     def _louder(self, spoken: FloatArray, gains: Mapping[str, float]) -> FloatArray:
         """Speech with its jaw and lips multiplied."""
-        factors = np.ones(spoken.shape[1])
-        for name, prefix in zip(SPEECH_GAINS, SPEECH_SHAPES, strict=True):
-            factors[[shape.startswith(prefix) for shape in self.face.shape_names]] = gains.get(name, 1.0)
-        return self.mouth.held(spoken, spoken * (factors - 1.0), least_share=0.0)
+        jaw, lips = (
+            np.where([shape.startswith(prefix) for shape in self.face.shape_names], gains.get(name, 1.0), 1.0)
+            for name, prefix in zip(SPEECH_GAINS, SPEECH_SHAPES, strict=True)
+        )
+        return self.mouth.louder(spoken, jaw, lips)
 
     def _added(self, spoken: FloatArray, felt: Mapping[str, FloatArray]) -> FloatArray:
         """(T, K) what gestures add to speech, but for blinks; apart from the mouth within the shapes' limits."""

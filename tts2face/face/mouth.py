@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tts2face.face.bounded import bounded_least_squares
 from tts2face.face.fit import all_landmarks, landmark_motion
 from tts2face.face.model import Face
-from tts2face.face.retarget import SPEECH_SHAPES, mouth_curvature, product, require_lips
+from tts2face.face.retarget import MIDDLE_PAIR, SPEECH_SHAPES, mouth_curvature, product, require_lips
 from tts2face.landmarks import (
     INNER_LIP_LOWER,
     INNER_LIP_UPPER,
@@ -24,6 +24,8 @@ from tts2face.landmarks import (
 FREE_MM = 4.0  # lips so far apart follow an expression in full; nearer ones less, touching ones not at all
 LEAST_SHARE = 0.5  # of the gap of speech that an expression leaves open
 FIRM = 1e5  # weight of a gap against a landmark of the cheek: 300 in speech, where gaps may give way a little
+PARTED_MM = 1.5  # lips nearer than this grow apart by less than their share
+LEAST_MM = 0.01  # a gap that is none
 ROUND_MM = 8.0  # a mouth narrower by this than at rest is rounded in full ...
 ROUND_KEPT = 0.6  # ... and takes this share less of what an expression does to it, so that /u w/ stay round
 
@@ -53,16 +55,19 @@ class Mouth:
     width: FloatArray
     limits: FloatArray
 
-    def held(self, spoken: FloatArray, added: FloatArray, *, least_share: float = LEAST_SHARE) -> FloatArray:
+    def held(self, spoken: FloatArray, added: FloatArray) -> FloatArray:
         """(T, K) weights for those of speech and what is laid over them, (T, K) each.
 
         A gap is that of speech where the lips touch, and follows what is added the more the further they are apart;
-        `least_share` of it stays. Frames to which nothing is added are as they were.
+        half of it stays. Frames to which nothing is added are as they were.
         """
-        total = spoken + added
         gaps, widened = product(spoken, self.gaps.T), product(added, self.gaps.T)
         wanted = gaps + _eased(gaps / FREE_MM) * widened
-        wanted = np.maximum(wanted, np.where(gaps > 0, least_share * gaps, gaps))
+        return self._solved(spoken, added, np.maximum(wanted, np.where(gaps > 0, LEAST_SHARE * gaps, gaps)))
+
+    def _solved(self, spoken: FloatArray, added: FloatArray, wanted: FloatArray) -> FloatArray:
+        """(T, K) weights nearest to the sum with gaps (T, P) as wanted, beyond those at rest."""
+        total = spoken + added
         moving = np.isin(np.arange(total.shape[1]), self.moving)
         left = wanted - product(np.where(moving, 0.0, total), self.gaps.T)
         opened = self.gaps[:, self.moving]
@@ -71,6 +76,20 @@ class Mouth:
         changed = added.any(axis=1)
         total[np.ix_(changed, moving)] = bounded_least_squares(curvature, linear[changed], self.limits)
         return np.asarray(total, np.float64)
+
+    def louder(self, spoken: FloatArray, jaw: FloatArray, lips: FloatArray) -> FloatArray:
+        """(T, K) weights of speech with the motion of jaw and lips multiplied by factors (K,), 1 for other shapes.
+
+        All gaps grow by one share, so that those that are closed stay closed. Behind lips that hold together what the
+        jaw opens, it drops no further than they part, or the upper lip must come after it.
+        """
+        gap = np.maximum(product(spoken, self.gaps[MIDDLE_PAIR]), 0.0)
+        by_jaw = np.maximum(product(np.where(jaw == 1.0, 0.0, spoken), self.gaps[MIDDLE_PAIR]), LEAST_MM)
+        added = spoken * (jaw - 1.0) * np.minimum(gap / by_jaw, 1.0)[:, None] + spoken * (lips - 1.0)
+        most = max(float(jaw.max()), float(lips.max()))
+        grown = np.clip(product(added, self.gaps[MIDDLE_PAIR]) / np.maximum(gap, LEAST_MM), -1.0, most - 1.0)
+        gaps = product(spoken, self.gaps.T)
+        return self._solved(spoken, added, gaps + grown[:, None] * _eased(gaps / PARTED_MM) * np.maximum(gaps, 0.0))
 
     def rounded(self, spoken: FloatArray) -> FloatArray:
         """(T,) how far the mouth is rounded: 0 as wide as at rest, 1 by `ROUND_MM` narrower."""
