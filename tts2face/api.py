@@ -23,7 +23,7 @@ from tts2face.face.own import own_face
 from tts2face.gesture.asked import asked
 from tts2face.gesture.timeline import Timeline
 from tts2face.listen import Heard, clips_in, drive_of, driven, heard
-from tts2face.living import Life
+from tts2face.living import Life, still
 from tts2face.render.clock import exact_rate, on_frames
 from tts2face.render.encode import ClipWriter
 from tts2face.render.output import checked_output
@@ -31,7 +31,7 @@ from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.spoken import Reached, Said, check_marks, reached_in, say, silent
 from tts2face.talker import Talker
-from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, frame_count, joined_clips
+from tts2face.types import Clip, Speech, Trajectory, frame_count, joined_clips
 
 VOICES_KEPT = 2  # kinds of voice; each keeps some 100 MB
 STAGES_KEPT = 2  # kinds of picture; each keeps some 30 MB
@@ -153,8 +153,7 @@ def _alive(speech: Speech, lips: Trajectory, timeline: Timeline, life: Life | No
     """A clip with its gestures; the head stands still where there are none."""
     if life is not None:
         return life.added(speech, lips, timeline)
-    head = np.zeros((len(lips), len(HEAD_CHANNELS)), np.float32)
-    return Clip(lips, Trajectory(HEAD_CHANNELS, head, lips.fps), speech)
+    return still(speech, lips)
 
 
 def _lips(speech: Speech, ready: Cast, request: Request) -> Trajectory:

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from lexicon.dictionary import read_dictionary
 from tts2face.exemplar.animate import VisualVoice, visual_voice
 from tts2face.exemplar.looks import Looks, looks_of
-from tts2face.face.gestures import gesture_face
+from tts2face.face.gestures import GestureFace, gesture_face
 from tts2face.face.model import Face
+from tts2face.face.own_gestures import OwnGestures, own_gestures
 from tts2face.face.retarget import Retargeter, retargeter
 from tts2face.gesture.animate import Fields
 from tts2face.living import Living
@@ -52,29 +53,35 @@ class Cast:
         InputError, DataError
             There is no such palette, or it is damaged; or the face cannot show gestures.
         """
-        if not request.gestures or self.face is None:
+        if not request.gestures:
             return None
         key = (request.palette, request.pitch)
         if key not in self.lives:
             palette = load_palette(request.palette)
-            self.lives[key] = Living(Fields(palette, with_pitch=request.pitch), gesture_face(self.face, palette))
+            face = own_gestures(self.talker, palette) if self.face is None else gesture_face(self.face, palette)
+            self.lives[key] = Living(Fields(palette, with_pitch=request.pitch), face)
             while len(self.lives) > PALETTES_KEPT:
                 self.lives.popitem(last=False)
         return self.lives[key]
 
     def shown(self, request: Request) -> Face | None:
-        """The face in whose shapes a request's clip moves."""
+        """The face in whose shapes a request's clip moves; None where the talker shows her own."""
         living = self.living(request)
-        return self.face if living is None else living.face.face
+        return living.face.face if living is not None and isinstance(living.face, GestureFace) else self.face
 
     def stage(self, picture: Picture, request: Request) -> AnyStage:
         """The face made ready to be drawn into a kind of picture; its soft shadows take most of a second."""
-        face = self.shown(request)
-        key = (picture, None if face is self.face else request.palette)
+        living = self.living(request)
+        key = (picture, None if living is None else request.palette)
         if key not in self.stages:
             while len(self.stages) >= STAGES_KEPT:
                 self.stages.popitem(last=False)
-            self.stages[key] = staged(face, picture) if face is not None else plate_staged(self.talker, picture)
+            face, own = self.shown(request), None if living is None else living.face
+            if face is not None:
+                self.stages[key] = staged(face, picture)
+            else:
+                gestures = own if isinstance(own, OwnGestures) else None
+                self.stages[key] = plate_staged(self.talker, picture, gestures=gestures)
         return self.stages[key]
 
     @contextmanager

@@ -5,23 +5,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from tts2face.face.gestures import SPEECH_GAINS, GestureFace
+from tts2face.face.own_gestures import OwnGestures
 from tts2face.gesture.animate import Fields, Gestures, GestureStream
 from tts2face.gesture.asked import asked
 from tts2face.gesture.noise import NoiseStream
 from tts2face.gesture.timeline import Timeline
 from tts2face.palette import Palette
 from tts2face.request import Request
-from tts2face.types import Clip, Speech, Trajectory
+from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory
 
 USUAL_STYLE = "neutral"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Living:
-    """A palette and a face made ready for each other; serves any number of clips."""
+    """A palette and a face, or a talker's own one, made ready for each other; serves any number of clips."""
 
     fields: Fields
-    face: GestureFace
+    face: GestureFace | OwnGestures
 
 
 def usual_style(palette: Palette) -> str:
@@ -52,8 +53,8 @@ class Life:
 
         Parameters
         ----------
-        lips : (T, n_own)
-            Weights of the face's own shapes, T frames of them.
+        lips : (T, K)
+            Motion of the face without gestures, T frames of it.
         marks
             What the piece's text asks for, on the clock of the whole clip.
         """
@@ -62,7 +63,10 @@ class Life:
         self._seconds += len(lips) / lips.fps
         gestures = _seen_from_the_head(self._stream.next(speech.waveform, len(lips), timeline))
         gains = {name: timeline.gains.of(name) for name in SPEECH_GAINS}
-        shown = self._living.face.perform(lips, gestures, gains)
+        face = self._living.face
+        if isinstance(face, OwnGestures):
+            return still(speech, face.motion(lips, gestures, gains))
+        shown = face.perform(lips, gestures, gains)
         return Clip(shown.motion, shown.head, speech)
 
     def finish(self) -> None:
@@ -74,6 +78,12 @@ class Life:
             There is such a thing.
         """
         self._asked.check_duration(self._seconds)
+
+
+def still(speech: Speech, motion: Trajectory) -> Clip:
+    """A clip whose head does not move."""
+    head = np.zeros((len(motion), len(HEAD_CHANNELS)), np.float32)
+    return Clip(motion, Trajectory(HEAD_CHANNELS, head, motion.fps), speech)
 
 
 def _seen_from_the_head(gestures: Gestures) -> Gestures:
