@@ -51,7 +51,7 @@ def build(  # noqa: PLR0913 - one parameter a flag
     model: Model = None,
 ) -> None:
     """Learn a talker from recordings. After an interruption the same command goes on where it stopped."""
-    _check_suffix(out, "talker")
+    check_suffix(out, "talker")
     from corpus_tools.build import build_talker
     from corpus_tools.effort import Effort, no_stages
 
@@ -72,7 +72,7 @@ def build(  # noqa: PLR0913 - one parameter a flag
     say(f"wrote {out}: {built.n_kept} recordings, {built.minutes:.1f} minutes, {len(built.refused)} refused")
 
 
-def _check_suffix(out: Path, kind: str) -> None:
+def check_suffix(out: Path, kind: str) -> None:
     """Refuse a file whose name does not say what is in it."""
     if out.suffix != f".{kind}":
         raise InputError(f"a {kind} is written as .{kind}, not {out.name}")
@@ -101,7 +101,7 @@ def face(
     model: Model = None,
 ) -> None:
     """Make a head with the shape and skin of the person in videos, to be shown with `--face`."""
-    _check_suffix(out, "face")
+    check_suffix(out, "face")
     from corpus_tools.dense.build import build_face
     from corpus_tools.effort import Effort
 
@@ -124,7 +124,7 @@ def clone(
     ] = False,
 ) -> None:
     """Carry one talker's speech to another's face: write a talker with the target's face and the source's motion."""
-    _check_suffix(out, "talker")
+    check_suffix(out, "talker")
     from corpus_tools.clone import clone_talker
 
     made = clone_talker(source, target, out, gain=gain, append=append_missing)
@@ -146,7 +146,7 @@ def drives(
     model: Model = None,
 ) -> None:
     """Learn how a talker's lips follow sound alone (`--audio`), for talkers that were built without it."""
-    _check_suffix(out, "talker")
+    check_suffix(out, "talker")
     from corpus_tools.build import add_drives
     from corpus_tools.effort import Effort, no_stages
     from tts2face.talker import load_talker

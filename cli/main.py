@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from cyclopts import App, CycloptsError, Parameter
 
+import cli.gestures  # noqa: F401 - adds its command to `corpus`
 from cli.corpus import corpus
 from cli.exits import exit_code, sentence
 from cli.flags import chosen, flags_from

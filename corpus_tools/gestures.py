@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from corpus_tools.build import PROVENANCE, PROVENANCE_FIELDS, UNSTATED, read_provenance
 from corpus_tools.decompose.basis import Basis, captured_basis, carried_basis
 from corpus_tools.decompose.captured import Captured
-from corpus_tools.decompose.decompose import as_counted, taken_apart
+from corpus_tools.decompose.decompose import Parts, as_counted, taken_apart
 from corpus_tools.decompose.derived import derived_styles
 from corpus_tools.decompose.face_motion import rest_landmarks
-from corpus_tools.decompose.palette import Learnt, with_style
+from corpus_tools.decompose.palette import with_style
 from corpus_tools.decompose.sources import CAPTURE_SUFFIXES, Worn, captured_file
 from corpus_tools.decompose.stills import NEUTRAL, PictureReader, Still
 from corpus_tools.decompose.video import captured_video
 from corpus_tools.decompose.weights import Estimator, least_squares, nearest_samples
-from corpus_tools.effort import Effort, Progress
+from corpus_tools.effort import Effort, Progress, Stages, no_stages
 from corpus_tools.leak import pose_leak
 from corpus_tools.observe import Refusal
 from corpus_tools.pool import each_done
@@ -84,7 +84,7 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
     base: Palette | None,
     estimator: str = ESTIMATORS[0],
     effort: Effort | None = None,
-    on_progress: Progress | None = None,
+    stages: Stages = no_stages,
 ) -> Made:
     """Learn a style from recordings and write a palette: `base` with it, or it alone with the styles derived from it.
 
@@ -105,13 +105,13 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
         recorded.provenance or recorded.recordings / PROVENANCE, must_exist=recorded.provenance is not None
     )
     face = load_face("head")
-    captured, refused = captured_all(recorded, face, effort or Effort(), on_progress)
+    captured, refused = captured_all(recorded, face, effort or Effort(), stages("watching recordings"))
     if not captured:
         raise DataError(f"no recording could be used; the first: {refused[0].name}: {refused[0].reason}")
     basis = basis_of(recorded, captured, face)
-    learnt = learn_style(
-        captured, basis, estimator_of(estimator, basis), style, base, _metadata(recorded, stated, style, out)
-    )
+    told = estimator_of(estimator, basis)
+    parts = parts_of(captured, basis, told, stages("taking them apart"))
+    learnt = with_style(base, style, parts, basis.rest, _metadata(recorded, stated, style, out))
     palette = learnt.palette
     if base is None:
         palette = replace(palette, derivations=derived_styles(style))
@@ -121,18 +121,17 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
     return Made(len(captured), seconds / 60, tuple(refused), notes, learnt.kept)
 
 
-def learn_style(
-    captured: Sequence[Captured],
-    basis: Basis,
-    estimator: Estimator,
-    style: str,
-    base: Palette | None,
-    metadata: Mapping[str, Any],
-) -> Learnt:
-    """The style of recordings of one person, in a palette."""
+def parts_of(
+    captured: Sequence[Captured], basis: Basis, estimator: Estimator, on_progress: Progress | None = None
+) -> list[Parts]:
+    """Recordings of one person taken apart, without what turning the head does to landmarks."""
     leak = pose_leak(captured)
-    parts = [taken_apart(leak.removed(one), basis, estimator) for one in captured]
-    return with_style(base, style, parts, basis.rest, metadata)
+    parts = []
+    for number, one in enumerate(captured, start=1):
+        parts.append(taken_apart(leak.removed(one), basis, estimator))
+        if on_progress:
+            on_progress(number, len(captured))
+    return parts
 
 
 def estimator_of(name: str, basis: Basis) -> Estimator:

@@ -29,7 +29,7 @@ from tts2face.render.encode import ClipWriter
 from tts2face.render.output import checked_output
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.spoken import Reached, Said, check_marks, reached_in, say, silent
+from tts2face.spoken import Reached, Said, check_marks, marked_styles, reached_in, say, silent
 from tts2face.talker import Talker
 from tts2face.types import Clip, Speech, Trajectory, frame_count, joined_clips
 
@@ -146,7 +146,11 @@ def _options(request: Request) -> SynthesisOptions:
 
 def _life(request: Request, ready: Cast) -> Life | None:
     living = ready.living(request)
-    return None if living is None else Life(request, living, float(exact_rate(request.fps)))
+    if living is None:
+        return None
+    for style in marked_styles(marked(request.text)):
+        living.fields.palette.require(style)
+    return Life(request, living, float(exact_rate(request.fps)))
 
 
 def _alive(speech: Speech, lips: Trajectory, timeline: Timeline, life: Life | None) -> Clip:

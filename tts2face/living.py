@@ -1,9 +1,11 @@
 """Gestures laid over speech: what a request asks for, over the whole of its clip."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from lexicon.errors import InputError
 from tts2face.face.gestures import SPEECH_GAINS, GestureFace
 from tts2face.face.own_gestures import OwnGestures
 from tts2face.gesture.animate import Fields, Gestures, GestureStream
@@ -15,6 +17,7 @@ from tts2face.request import Request
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory
 
 USUAL_STYLE = "neutral"
+STILL = ("gaze", "head", *SPEECH_GAINS)  # of a talker's own face
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,6 +46,8 @@ class Life:
         self._asked, self._living = asked(request), living
         palette = living.fields.palette
         self._asked.check_styles(palette)
+        if isinstance(living.face, OwnGestures):
+            _refuse_still(self._asked.gains.factors)
         kind = NoiseStream if request.noise else GestureStream
         self._stream = kind(living.fields, style=usual_style(palette), seed=request.seed, fps=fps)
         self._marked = Timeline()
@@ -78,6 +83,12 @@ class Life:
             There is such a thing.
         """
         self._asked.check_duration(self._seconds)
+
+
+def _refuse_still(gains: Mapping[str, float]) -> None:
+    for name in gains:
+        if name in STILL:
+            raise InputError(f"her own face is shown on her video, whose {name} cannot be moved; leave its gain away")
 
 
 def still(speech: Speech, motion: Trajectory) -> Clip:

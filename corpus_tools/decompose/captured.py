@@ -13,7 +13,7 @@ from tts2face.palette import FEATURES, GESTURE_FPS
 from tts2face.types import HEAD_CHANNELS, Waveform
 from tts2face.video.media import read_sound
 
-SOUND_SUFFIXES = (".wav", ".flac", ".m4a", ".mp3", ".ogg", ".mov", ".mp4")  # looked for beside a capture, in turn
+SOUND_SUFFIXES = (".wav", ".flac", ".m4a", ".mp3", ".ogg", ".opus", ".mov", ".mp4")  # looked for beside a capture
 AT_ONCE = 128  # coordinates resampled at once, to bound memory
 SAME_RATE = 1e-6  # frames a second
 
@@ -32,6 +32,9 @@ class Captured:
         `HEAD_CHANNELS`.
     rest : (478, 3)
         The face at rest, mm, where the source tells.
+    eyes : (T, 4)
+        Shares by which the left and the right lids are shut, pitch and yaw of the eyes in the head in radians; where
+        the source itself tells them, and they need not be read from landmarks.
     missing
         Features of `tts2face.palette.FEATURES` of which this source tells nothing.
     notes
@@ -44,6 +47,7 @@ class Captured:
     head: NDArray[np.float32]
     sound: Waveform | None = None
     rest: NDArray[np.float32] | None = None
+    eyes: NDArray[np.float32] | None = None
     missing: frozenset[str] = frozenset()
     notes: tuple[str, ...] = ()
 
@@ -70,6 +74,7 @@ def at_gesture_rate(captured: Captured) -> Captured:
         fps=GESTURE_FPS,
         landmarks=resampled(captured.landmarks, captured.fps, GESTURE_FPS).astype(np.float32),
         head=resampled(captured.head, captured.fps, GESTURE_FPS).astype(np.float32),
+        eyes=None if captured.eyes is None else resampled(captured.eyes, captured.fps, GESTURE_FPS).astype(np.float32),
     )
 
 
@@ -113,13 +118,27 @@ def _read(values: Floats, fps: float, wanted: float, n_frames: int) -> Floats:
 
 
 def sound_of(capture: Path, given: Path | None = None) -> Waveform | None:
-    """The sound that belongs to a capture: the file that is given, or one of the same name beside it.
+    """The sound that belongs to a capture: the file that is given, or `sound_beside` it.
 
     Raises
     ------
     InputError, DataError
-        As `tts2face.video.media.read_sound`.
+        As `sound_beside` and `tts2face.video.media.read_sound`.
     """
-    beside = [capture.with_suffix(suffix) for suffix in SOUND_SUFFIXES]
-    found = given or next((path for path in beside if path != capture and path.is_file()), None)
+    found = given or sound_beside(capture)
     return None if found is None else read_sound(found, SOUND_RATE)
+
+
+def sound_beside(capture: Path) -> Path | None:
+    """The sound file of the same name beside a capture, or the only one there; None where there is none.
+
+    Raises
+    ------
+    InputError
+        There are several.
+    """
+    beside = sorted(file for file in capture.parent.iterdir() if file.suffix.lower() in SOUND_SUFFIXES)
+    found = [file for file in beside if file.stem == capture.stem and file != capture] or beside
+    if len(found) > 1:
+        raise InputError(f"beside {capture.name} lie {len(found)} sound files; name one as the capture")
+    return found[0] if found else None

@@ -68,13 +68,17 @@ def taken_apart(captured: Captured, basis: Basis, estimator: Estimator) -> Parts
     moved = recorded.landmarks - basis.rest
     weights = estimator.weights(as_counted(averaged(moved)))
     left = moved - np.tensordot(weights, basis.expressions, axes=1)
-    shut = lids_shut(basis.rest + left, basis.rest)
+    if recorded.eyes is None:
+        shut = lids_shut(basis.rest + left, basis.rest)
+        turned = eyes_turned(recorded.landmarks)
+    else:
+        shut, turned = recorded.eyes[:, :2], recorded.eyes[:, 2:].astype(np.float64)
     head = _steady(recorded.head - np.median(recorded.head, axis=0))
     motion = {
         "expression": weights.astype(np.float32),
         **{name: _steady(left[:, feature_landmarks(name)]) for name in REGION_FEATURES},
         "blink": shut,
-        "gaze": line_of_sight(recorded.landmarks, recorded.head, shut),
+        "gaze": line_of_sight(turned, recorded.head, shut),
         "head": head,
     }
     times = np.arange(len(moved)) / GESTURE_FPS
@@ -106,11 +110,8 @@ def lids_shut(landmarks: NDArray[np.floating], rest: NDArray[np.floating]) -> Fl
     return np.stack(columns, axis=1).astype(np.float32)
 
 
-def line_of_sight(landmarks: NDArray[np.floating], head: NDArray[np.floating], shut: Floats) -> Floats:
-    """(T, 2) pitch and yaw at which the eyes look, against the recording's median, whatever the head does.
-
-    Where lids hide the irises the line goes straight from before to behind.
-    """
+def eyes_turned(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(T, 2) pitch and yaw of the eyes in the head, of tracked landmarks (T, 478, 3): from where the irises stand."""
     turned = []
     for side, iris in IRIS.items():
         _, _, outer, inner = LIDS[side]
@@ -118,7 +119,15 @@ def line_of_sight(landmarks: NDArray[np.floating], head: NDArray[np.floating], s
         width = np.linalg.norm(corners[:, 0] - corners[:, 1], axis=1)
         away = landmarks[:, iris] - corners.mean(axis=1)
         turned.append(np.stack([away[:, 1], away[:, 0]], axis=1) / width[:, None] / IRIS_PER_RAD)
-    sight = np.mean(turned, axis=0) + head[:, :2]
+    return np.asarray(np.mean(turned, axis=0), np.float64)
+
+
+def line_of_sight(turned: NDArray[np.float64], head: NDArray[np.floating], shut: Floats) -> Floats:
+    """(T, 2) pitch and yaw at which eyes look that are turned (T, 2) in the head, against the recording's median.
+
+    Where lids hide the irises the line goes straight from before to behind.
+    """
+    sight = turned + head[:, :2]
     seen = np.flatnonzero(shut.max(axis=1) < SEEN_SHUT)
     if len(seen):
         frames = np.arange(len(sight))

@@ -3,11 +3,13 @@
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from corpus_tools.decompose.captured import Captured, sound_of
 from corpus_tools.decompose.face_motion import moved_landmarks, rest_landmarks
 from tts2face.face.model import Face
 from tts2face.mimic import motion_of_capture
+from tts2face.types import Trajectory
 from tts2face.video.livelink import Capture, read_livelink
 
 # Channels without which a feature is not told.
@@ -33,8 +35,23 @@ def captured_livelink(path: Path, face: Face, *, sound: Path | None = None) -> C
         head=np.asarray(capture.head.values, np.float32),
         sound=sound_of(path, sound),
         rest=rest_landmarks(face).astype(np.float32),
+        eyes=eyes_of(face, motion.face),
         missing=_untold(capture),
     )
+
+
+def eyes_of(face: Face, motion: Trajectory) -> NDArray[np.float32]:
+    """(T, 4) shares by which both lids are shut, and pitch and yaw of the eyes, of weights (T, K) of a face's shapes.
+
+    The capture's own measure: its lids are shut at 1, wherever those of the face meet.
+    """
+    at = {name: number for number, name in enumerate(face.shape_names)}
+    lids = [motion.values[:, at[f"eyeBlink{side}"]] for side in ("Left", "Right")]
+    turned = np.zeros((len(motion), 2))
+    for eye in face.eyes:
+        for name, turn in eye.turns.items():
+            turned += motion.values[:, at[name], None] * turn[:2] / len(face.eyes)
+    return np.column_stack([*lids, turned]).astype(np.float32)
 
 
 def _untold(capture: Capture) -> frozenset[str]:

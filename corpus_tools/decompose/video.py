@@ -39,12 +39,12 @@ def captured_video(video: Path, eyes: Eyes) -> Captured:
         fps=seen.fps,
         landmarks=posed.landmarks,
         head=np.column_stack([angles, place]).astype(np.float32),
-        sound=_sound(video, begin, len(filled) / seen.fps),
+        sound=sound_from(video, begin, len(filled) / seen.fps),
         notes=(f"{n_filled} frames without a face were filled in",) if n_filled else (),
     )
 
 
-def _sound(video: Path, begin: float, seconds: float) -> Waveform:
+def sound_from(video: Path, begin: float, seconds: float) -> Waveform:
     """Sound of a video from `begin`, which may lie before it."""
     heard = read_sound(video, SOUND_RATE)
     samples = np.zeros(round(seconds * heard.rate), np.float32)

@@ -5,20 +5,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.decompose.captured import sound_beside
+from corpus_tools.decompose.face_motion import moved_landmarks
 from corpus_tools.effort import Effort
 from corpus_tools.listen import Ears
 from corpus_tools.observation import Observation, Quality, trimmed
-from lexicon.errors import DataError, InputError
+from lexicon.errors import InputError
 from tts2face.face.file import load_face
-from tts2face.face.model import Face
-from tts2face.landmarks import N_LANDMARKS
 from tts2face.mimic import motion_of_capture
 from tts2face.speech.loudness import intensity
 from tts2face.speech.pauses import stretches
+from tts2face.types import Trajectory
 from tts2face.video.livelink import read_livelink
 
 SUFFIX = ".csv"
-SOUNDS = (".flac", ".wav", ".mp3", ".m4a", ".ogg", ".opus", ".mov", ".mp4")
 LONGEST_S = 6.0  # cut at pauses into utterances of about a sentence: intervals come from drawing utterances again
 
 
@@ -35,14 +35,17 @@ def captured(path: Path, effort: Effort) -> tuple[Observation, ...]:
         Nothing on this machine recognises phones.
     """
     capture = read_livelink(path)
-    sound = _sound_of(path)
+    sound = sound_beside(path)
+    if sound is None:
+        raise InputError(f"no sound lies beside {path.name}; put its sound file there")
     face = load_face("head")
     motion = motion_of_capture(capture, face).face
     ears = Ears(effort.folder())
     found = []
     for number, span in enumerate(stretches(ears.sound(sound), LONGEST_S), start=1):
         begin, end = (round(second * motion.fps) for second in span)
-        landmarks = landmarks_of(face, motion.values[begin:end])
+        part = Trajectory(motion.channels, motion.values[begin:end], motion.fps)
+        landmarks = moved_landmarks(face, part)
         found.append(_observed(f"{path.stem}-{number:02d}", (ears, sound), span, landmarks, motion.fps))
     return tuple(found)
 
@@ -65,30 +68,3 @@ def _observed(
         sound,
         is_recognised=True,
     )
-
-
-def landmarks_of(face: Face, weights: NDArray[np.floating]) -> NDArray[np.float32]:
-    """(T, L, 3) landmarks of a face for (T, K) weights of its shapes, the head at rest.
-
-    Raises
-    ------
-    DataError
-        The face lacks landmarks.
-    """
-    if len(face.landmarks) != N_LANDMARKS:
-        raise DataError(f"the face has {len(face.landmarks)} of {N_LANDMARKS} landmarks; build it again")
-    mixed = face.landmark_weights[..., None]
-    rest = (face.vertices[face.landmark_vertices] * mixed).sum(axis=1)
-    moved = (face.shapes[:, face.landmark_vertices] * mixed).sum(axis=2)
-    points = np.zeros((len(weights), N_LANDMARKS, 3), np.float32)
-    points[:, face.landmarks] = rest + np.tensordot(weights, moved, axes=1)
-    return points
-
-
-def _sound_of(path: Path) -> Path:
-    beside = sorted(one for one in path.parent.iterdir() if one.suffix.lower() in SOUNDS)
-    same = [one for one in beside if one.stem == path.stem]
-    found = same or beside
-    if len(found) != 1:
-        raise InputError(f"beside {path.name} lie {len(found)} sound files; put one there, or one of its name")
-    return found[0]

@@ -41,7 +41,7 @@ def words(found: list[Piece]) -> dict[str, float]:
 
 @pytest.mark.parametrize("fps", [29.97, 60.0, 7.0])
 def test_marks_come_with_their_words_on_the_whole_clip_s_clock(fps: float, ready: Cast) -> None:
-    text = "One two. [style:head=calm]Three [nod]four. Five. Six [pause 0.7]seven[/style] eight. [nod]Nine."
+    text = "One two. [style:head=annoyed]Three [nod]four. Five. Six [pause 0.7]seven[/style] eight. [nod]Nine."
     found = pieces(text, ready, fps=fps)
     at = words(found)
     nods = [nod.time for piece in found for nod in piece.timeline.nods]
@@ -55,7 +55,8 @@ def test_marks_come_with_their_words_on_the_whole_clip_s_clock(fps: float, ready
 
 
 def test_a_pause_is_silent_and_the_lips_rest_in_it(ready: Cast) -> None:
-    (plain,), (paused,) = (pieces(text, ready) for text in ("Bob may go away.", "Bob may [pause 1.5] go away."))
+    texts = ("Bob may go away.", "Bob may [pause 1.5] go away.")
+    (plain,), (paused,) = (list(stream(Request(text=text, gestures=False), ready)) for text in texts)
     phones = paused.clip.speech.phones
     assert phones.phones.count(SILENCE) == 3
     middle = phones.phones.index(SILENCE, 1)
@@ -106,7 +107,7 @@ def test_the_command_tells_when_names_are_reached(tmp_path: Path) -> None:
 def test_a_recording_s_words_carry_marks(ready: Cast, shared_recordings: Path) -> None:
     film = shared_recordings / "grid_s1" / "clips" / "bbaf2n.mkv"
     found = list(
-        stream(Request(audio=film, text="bin [style:head=calm]blue at F[/style] two [nod]now", fps=60.0), ready)
+        stream(Request(audio=film, text="bin [style:head=annoyed]blue at F[/style] two [nod]now", fps=60.0), ready)
     )
     at = words(found)
     assert [nod.time for piece in found for nod in piece.timeline.nods] == pytest.approx([at["now"]])

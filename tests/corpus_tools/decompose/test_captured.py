@@ -6,13 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.decompose.captured import Captured, at_gesture_rate, resampled, sound_of
+from corpus_tools.decompose.captured import Captured, at_gesture_rate, resampled, sound_beside, sound_of
 from corpus_tools.decompose.face_motion import moved_landmarks, rest_landmarks
-from corpus_tools.decompose.film import captured_film
 from corpus_tools.decompose.livelink import captured_livelink
-from corpus_tools.observation import Observation, Quality
+from corpus_tools.decompose.video import sound_from
 from lexicon.errors import DataError, InputError
-from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.face.linear import posed_vertices
 from tts2face.face.model import Face
 from tts2face.landmarks import N_LANDMARKS
@@ -124,23 +122,22 @@ def test_sound_of_the_same_name_is_found(shared_recordings: Path, tmp_path: Path
     assert found.rate == 16_000
 
 
-@pytest.mark.parametrize(("cut", "first"), [(0.5, 8000), (-0.25, -4000)])
-def test_a_film_brings_its_sound_on_the_clock_of_its_frames(cut: float, first: int) -> None:
-    n_frames, fps = 50, 25.0
-    seen = Observation(
-        name="film",
-        fps=fps,
-        landmarks=np.zeros((n_frames, N_LANDMARKS, 3), np.float32),
-        head=np.zeros((n_frames, 6), np.float32),
-        phones=PhoneSequence([SILENCE], [0.0, 2.0]),
-        words=(),
-        intensity=np.zeros(n_frames, np.float32),
-        quality=Quality(confidence=0.0, score=1.0, n_filled=0, cut=0.4, lag=cut - 0.4),
-        video=Path("film.mp4"),
-    )
+@pytest.mark.parametrize("begin", [0.5, -0.25])
+def test_a_film_brings_its_sound_on_the_clock_of_its_frames(begin: float, monkeypatch: pytest.MonkeyPatch) -> None:
     ramp = np.arange(64_000, dtype=np.float32) / 64_000
-    sound = captured_film(seen, Waveform(ramp, 16_000)).sound
-    assert sound is not None
-    assert sound.duration == pytest.approx(2.0, abs=1e-4)
-    at = np.arange(len(sound.samples)) + first
-    np.testing.assert_allclose(sound.samples, np.where(at < 0, 0.0, ramp[np.maximum(at, 0)]), atol=1e-6)
+    monkeypatch.setattr("corpus_tools.decompose.video.read_sound", lambda path, rate: Waveform(ramp, rate))
+    sound = sound_from(Path("film.mp4"), begin, 2.0)
+    assert sound.duration == 2.0
+    at = np.arange(len(sound.samples)) + round(begin * 16_000)
+    np.testing.assert_array_equal(sound.samples, np.where(at < 0, 0.0, ramp[np.maximum(at, 0)]))
+
+
+def test_one_sound_of_another_name_is_the_capture_s(tmp_path: Path) -> None:
+    capture = tmp_path / "take.csv"
+    (tmp_path / "room.wav").write_bytes(b"")
+    assert sound_beside(capture) == tmp_path / "room.wav"
+    (tmp_path / "lapel.wav").write_bytes(b"")
+    with pytest.raises(InputError, match=r"beside take\.csv lie 2 sound files; name one as the capture"):
+        sound_beside(capture)
+    (tmp_path / "take.wav").write_bytes(b"")
+    assert sound_beside(capture) == tmp_path / "take.wav"

@@ -1,0 +1,71 @@
+"""``tts2face corpus gestures``: recordings become a style of a palette."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from cli.corpus import Cache, Jobs, Model, check_suffix, corpus
+from cli.progress import say, stage_bar
+
+
+@corpus.command
+def gestures(  # noqa: PLR0913 - one parameter a flag
+    recordings: Annotated[Path, Parameter(help="Videos, Live Link tables or marker captures; a folder or one file.")],
+    /,
+    *,
+    style: Annotated[str, Parameter(help="Name of the new style.")],
+    out: Annotated[Path, Parameter(help="The palette to write (.palette).", alias="-o")],
+    palette: Annotated[str, Parameter(help="The palette that the style is added to: shipped, or a file.")] = "starter",
+    alone: Annotated[
+        bool, Parameter(help="Write this style alone, with the six moods derived from it.", negative="")
+    ] = False,
+    stills: Annotated[
+        Path | None, Parameter(help="Folder with stills of the person: neutral.png, sad.png, happy.png, ...")
+    ] = None,
+    still: Annotated[
+        list[str] | None, Parameter(help="One still, as sad=FILE or sad=VIDEO@SECONDS; give it for each expression.")
+    ] = None,
+    markers: Annotated[Path | None, Parameter(help="Table of a marker set (.tsv); 68 + 7 markers without it.")] = None,
+    neutral: Annotated[Path | None, Parameter(help="A marker capture of the person at rest.")] = None,
+    marker_rate: Annotated[float | None, Parameter(help="Frames a second of marker tables without times.")] = None,
+    estimator: Annotated[
+        str, Parameter(help="Of expressions: least-squares, or samples as published.")
+    ] = "least-squares",
+    provenance: Annotated[
+        Path | None,
+        Parameter(help="JSON with name, language, sources, licence, attribution; provenance.json of the folder."),
+    ] = None,
+    jobs: Jobs = None,
+    cache: Cache = None,
+    model: Model = None,
+) -> None:
+    """Learn how a person moves beside the lips, from recordings without transcripts: a style for `--palette`."""
+    check_suffix(out, "palette")
+    from corpus_tools.decompose.marker_set import SHIPPED
+    from corpus_tools.decompose.sources import Worn
+    from corpus_tools.decompose.stills import named_stills, stills_in
+    from corpus_tools.effort import Effort, no_stages
+    from corpus_tools.gestures import Recorded, build_style
+    from tts2face.palette import load_palette
+
+    shown = (stills_in(stills) if stills is not None else {}) | named_stills(still or [])
+    worn = Worn(markers or SHIPPED, neutral, marker_rate)
+    recorded = Recorded(recordings=recordings, stills=shown, worn=worn, provenance=provenance)
+    base = None if alone else load_palette(palette)
+    with stage_bar() as stages:
+        made = build_style(
+            recorded,
+            style,
+            out,
+            base=base,
+            estimator=estimator,
+            effort=Effort(cache, jobs, model),
+            stages=stages or no_stages,
+        )
+    for refusal in made.refused:
+        say(f"refused {refusal.name}: {refusal.reason}")
+    for note in made.notes:
+        say(note)
+    kept = ", ".join(f"{share:.0%} of the {feature}'s motion" for feature, share in made.kept.items())
+    say(f"wrote {out}: the style {style} of {made.n_kept} recordings, {made.minutes:.1f} minutes; kept {kept}")
