@@ -111,7 +111,7 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
     basis = basis_of(recorded, captured, face)
     told = estimator_of(estimator, basis)
     parts = parts_of(captured, basis, told, stages("taking them apart"))
-    learnt = with_style(base, style, parts, basis.rest, _metadata(recorded, stated, style, out))
+    learnt = with_style(base, style, parts, basis.rest, _metadata(recorded, stated, style, out, base is None))
     palette = learnt.palette
     if base is None:
         palette = replace(palette, derivations=derived_styles(style))
@@ -256,12 +256,14 @@ def _work(file: Path) -> Outcome:
     return _worker[0].outcome(file)
 
 
-def _metadata(recorded: Recorded, stated: Mapping[str, Any], style: str, out: Path) -> dict[str, Any]:
-    words = ["tts2face", "corpus", "gestures", recorded.recordings.name, "--style", style, "--out", out.name]
+def _metadata(recorded: Recorded, stated: Mapping[str, Any], style: str, out: Path, is_alone: bool) -> dict[str, Any]:
+    words = ["tts2face", "corpus", "gestures", recorded.recordings.name, "--style", style]
+    words += ["--alone"] if is_alone else []
+    words += ["--provenance", recorded.provenance.name] if recorded.provenance else []
     return {
         **dict.fromkeys(PROVENANCE_FIELDS, UNSTATED),
         **stated,
-        "command": shlex.join(words),
+        "command": shlex.join([*words, "--out", out.name]),
         "created": datetime.now(UTC).date().isoformat(),
         "content": CONTENT,
     }

@@ -38,7 +38,7 @@ def ready(name: str) -> GestureFace:
 
 @cache
 def spoken(name: str) -> Trajectory:
-    return synthesize(Request(text=BILABIALS), load_talker("grid_s1"), load_face(name)).motion
+    return synthesize(Request(text=BILABIALS, gestures=False), load_talker("grid_s1"), load_face(name)).motion
 
 
 def silence(face: Face, n_frames: int = 1) -> Trajectory:

@@ -23,6 +23,9 @@ from tts2face.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, OUTER_LIP_LOWER
 from tts2face.palette import FEATURES, FIXED_CHANNELS, REGION_FEATURES, Palette, Region
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
+# Weights of an expression from which the mouth begins to answer, and answers in full: a neutral speaker reads as up to
+# .1 sad or angry (99th percentile of 40 minutes), and the mouth's part of that is in the recorded lips already.
+ANSWERED = (0.05, 0.2)
 SPEECH_GAINS = ("jaw", "lips")
 GAINS = (*FEATURES, *SPEECH_GAINS)  # whose motion may be multiplied
 MOST_MOVED_MM = 10.0  # of a landmark by one mode: brows rise 10 mm at most
@@ -107,6 +110,12 @@ class GestureFace:
         shares = felt.get("blink", np.zeros((len(speech), 2)))
         added = self.lids.shut(spoken + added, shares) - spoken
         weights = self.mouth.held(spoken, added)
+        for (
+            name,
+            columns,
+        ) in self.regions.items():  # they leave lids and lips alone, and lids and lips know nothing of them
+            if name in felt:
+                weights[:, columns] = np.clip(felt[name], *self.face.limits[columns].T.astype(np.float64))
         head = felt.get("head", np.zeros((len(speech), len(HEAD_CHANNELS))))
         return Performance(
             Trajectory(self.face.shape_names, weights, speech.fps), Trajectory(HEAD_CHANNELS, head, speech.fps)
@@ -121,13 +130,13 @@ class GestureFace:
         return self.mouth.louder(spoken, jaw, lips)
 
     def _added(self, spoken: FloatArray, felt: Mapping[str, FloatArray]) -> FloatArray:
-        """(T, K) what gestures add to speech, but for blinks; apart from the mouth within the shapes' limits."""
+        """(T, K) what expression and gaze add to speech; apart from the mouth within the shapes' limits."""
         added = np.zeros_like(spoken)
         if "expression" in felt:
-            added += self.mouth.softened(spoken, product(felt["expression"], self.expressions))
-        for name, columns in self.regions.items():
-            if name in felt:
-                added[:, columns] += felt[name]
+            added += product(felt["expression"], self.expressions)
+            lips = self.mouth.moving
+            added[:, lips] = product(answered(felt["expression"]), self.expressions[:, lips])
+            added = self.mouth.softened(spoken, added)
         if "gaze" in felt:
             down, left = felt["gaze"].T
             turned = np.stack([np.maximum(down, 0), np.maximum(-down, 0), np.maximum(left, 0), np.maximum(-left, 0)])
@@ -142,6 +151,13 @@ class GestureFace:
             raise InputError("the speech is not in the shapes of this face; retarget it to the face first")
         widths = {name: columns.stop - columns.start for name, columns in self.regions.items()}
         check_gestures(gestures, gains, len(speech), widths)
+
+
+def answered(expression: FloatArray) -> FloatArray:
+    """Weights of expressions (T, 5) as the mouth answers them, whose motion in a neutral face is speech already."""
+    low, high = ANSWERED
+    share = np.clip((np.abs(expression) - low) / (high - low), 0.0, 1.0)
+    return np.asarray(expression * share * share * (3.0 - 2.0 * share))
 
 
 def check_gestures(

@@ -1,0 +1,213 @@
+"""Faces that live, through the doors: styles, timelines, palettes, and what gestures may never do."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cli.main import run
+from corpus_tools.decompose.face_motion import moved_landmarks
+from lexicon.errors import InputError
+from tts2face.api import synthesize
+from tts2face.face.file import load_face
+from tts2face.face.gestures import gesture_face
+from tts2face.face.model import Face
+from tts2face.palette import FEATURES, load_palette, write_palette
+from tts2face.request import Request
+from tts2face.talker import Talker, load_talker
+from tts2face.types import Clip
+
+TEXT = "Bob may move five big maps, but we keep two."
+SMALL = ["--size", "64x64", "--fps", "5", "--quiet"]
+SHAPES = {"brows": ("brows",), "cheeks": ("cheeks",), "blink": ("eyeBlink",), "gaze": ("eyeLook",)}
+
+
+@pytest.fixture(scope="module")
+def talker() -> Talker:
+    return load_talker("grid_s1")
+
+
+@pytest.fixture(scope="module")
+def face() -> Face:
+    return load_face("head")
+
+
+@pytest.fixture(scope="module")
+def alive(talker: Talker, face: Face) -> Clip:
+    return synthesize(Request(text=TEXT), talker, face)
+
+
+def channels_of(clip: Clip, begins: tuple[str, ...]) -> np.ndarray:
+    return clip.motion.values[:, [name.startswith(begins) for name in clip.motion.channels]]
+
+
+def test_everything_moves(alive: Clip) -> None:
+    for feature, begins in SHAPES.items():
+        assert np.ptp(channels_of(alive, begins), axis=0).max() > 0.05, feature
+    assert np.degrees(np.ptp(alive.head.values[:, :3], axis=0)).max() > 0.5
+
+
+def test_a_layer_of_its_own_changes_no_other(alive: Clip, talker: Talker, face: Face) -> None:
+    still = synthesize(Request(text=TEXT, gain="brows=0"), talker, face)
+    assert not channels_of(still, ("brows",)).any()
+    others = [not name.startswith("brows") for name in alive.motion.channels]
+    np.testing.assert_array_equal(still.motion.values[:, others], alive.motion.values[:, others])
+    np.testing.assert_array_equal(still.head.values, alive.head.values)
+
+
+def test_the_starter_palette_holds_the_paper_s_moods_and_says_where_it_is_from() -> None:
+    palette = load_palette("starter")
+    moods = ("neutral", "depressed", "delighted", "annoyed", "exaggerated", "exasperated")
+    assert palette.names == (*moods, "grid_s1")
+    measured = palette.styles["grid_s1"]
+    assert measured.seconds == pytest.approx(40 * 60, rel=0.02)
+    assert set(measured.motion) == set(FEATURES)
+    assert "CC BY 4.0" in measured.metadata["licence"] or "Attribution 4.0" in measured.metadata["licence"]
+    assert all(palette.derivations[mood].summary.startswith("derived from grid_s1") for mood in moods)
+
+
+@pytest.mark.parametrize("style", ["depressed", "delighted", "annoyed", "exaggerated", "exasperated"])
+def test_lips_that_meet_still_meet_in_every_mood(style: str, talker: Talker, face: Face) -> None:
+    plain = synthesize(Request(text=TEXT, gestures=False), talker, face)
+    made = synthesize(Request(text=TEXT, style=style), talker, face)
+    shown = gesture_face(face, load_palette("starter")).face
+    before, after = lip_gap(face, plain), lip_gap(shown, made)
+    touching = before < 0.3
+    assert touching.sum() > 5
+    assert (after[touching] - before[touching]).max() < 0.1  # mm
+    assert after.min() > -0.1
+
+
+def test_neutral_gestures_leave_lips_as_they_are(alive: Clip, talker: Talker, face: Face) -> None:
+    plain = synthesize(Request(text=TEXT, gestures=False), talker, face)
+    shown = gesture_face(face, load_palette("starter")).face
+    assert np.corrcoef(lip_gap(face, plain), lip_gap(shown, alive))[0, 1] > 0.995
+    assert np.corrcoef(lip_width(face, plain), lip_width(shown, alive))[0, 1] > 0.99
+
+
+def lip_gap(face: Face, clip: Clip) -> np.ndarray:
+    points = moved_landmarks(face, clip.motion)
+    return points[:, 13, 1] - points[:, 14, 1]
+
+
+def lip_width(face: Face, clip: Clip) -> np.ndarray:
+    points = moved_landmarks(face, clip.motion)
+    return points[:, 291, 0] - points[:, 61, 0]
+
+
+def test_eyes_hold_the_viewer_while_the_head_nods(talker: Talker, face: Face) -> None:
+    quiet = "gaze=0,head=0"
+    nods = {"nods": [{"time": 0.5, "size": 1.5}]}
+    clip = synthesize(Request(text="[nod]Yes.", gain=quiet), talker, face)
+    assert np.degrees(clip.head.values[:, 0].max()) > 4
+    up = channels_of(clip, ("eyeLookUp",)).mean(axis=1)
+    turned = np.corrcoef(up, clip.head.values[:, 0])[0, 1]
+    assert turned > 0.95, nods
+
+
+def test_marks_and_flags_paint_styles(alive: Clip, talker: Talker, face: Face) -> None:
+    by_flag = synthesize(Request(text=TEXT, style="head=exaggerated"), talker, face)
+    by_mark = synthesize(Request(text=f"[style:head=exaggerated]{TEXT}[/style]"), talker, face)
+    np.testing.assert_allclose(by_mark.head.values[30:-30], by_flag.head.values[30:-30], atol=1e-4)
+    assert not np.array_equal(by_flag.head.values, alive.head.values)
+    np.testing.assert_array_equal(channels_of(by_flag, ("brows",)), channels_of(alive, ("brows",)))
+
+
+def test_another_palette_is_another_person(alive: Clip, talker: Talker, face: Face, tmp_path: Path) -> None:
+    starter = load_palette("starter")
+    style = starter.styles["grid_s1"]
+    few = {name: values[: int(style.lengths[:40].sum())] for name, values in style.motion.items()}
+    n_frames = int(style.lengths[:40].sum())
+    part = replace(
+        style,
+        lengths=style.lengths[:40],
+        intensity=style.intensity[:n_frames],
+        pitch=style.pitch[:n_frames],
+        motion=few,
+    )
+    write_palette(tmp_path / "few.palette", replace(starter, styles={"few": part}, derivations={}))
+    clip = synthesize(Request(text=TEXT, palette=str(tmp_path / "few.palette")), talker, face)
+    assert not np.array_equal(clip.head.values, alive.head.values)
+    with pytest.raises(InputError, match="no style 'delighted' in the palette; it has few"):
+        synthesize(Request(text=TEXT, palette=str(tmp_path / "few.palette"), style="delighted"), talker, face)
+
+
+def test_an_idle_face_lives(talker: Talker, face: Face) -> None:
+    clip = synthesize(Request(idle=12.0), talker, face)
+    assert not clip.speech.waveform.samples.any()
+    assert channels_of(clip, ("eyeBlink",)).max() > 0.6
+    assert np.degrees(np.ptp(clip.head.values[:, :3], axis=0)).max() > 0.5
+    gap = lip_gap(gesture_face(face, load_palette("starter")).face, clip)
+    assert np.ptp(gap) < 0.5  # mm: lips stay closed
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "reason"),
+    [
+        (["--style", "cross"], 2, "no style 'cross' in the palette; it has neutral, depressed"),
+        (["--palette", "none"], 2, "no palette 'none'; give starter"),
+        (["--palette", "half.palette"], 3, "half.palette is damaged"),
+        (["--expression", "happy=1@90-91"], 2, "lies beyond the clip, which lasts"),
+        (["--timeline", "late.json"], 2, "the nod at 90 s lies beyond the clip"),
+        (["--gain", "head=4"], 2, "the gain of head must lie between 0 and 3, not 4"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence_and_nothing_is_written(
+    arguments: list[str], code: int, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "late.json").write_text(json.dumps({"nods": [{"time": 90}]}))
+    shipped = Path(load_palette.__globals__["SHIPPED"]) / "starter.palette"
+    (tmp_path / "half.palette").write_bytes(shipped.read_bytes()[:100_000])
+    before = set(tmp_path.iterdir())
+    assert run(["Hi there.", *arguments, "--out", "x.mp4", *SMALL]) == code
+    assert reason in capsys.readouterr().err
+    assert set(tmp_path.iterdir()) == before
+
+
+def test_a_style_in_the_text_that_nobody_has(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert run(["[style:cross]Hi.[/style]", "--out", str(tmp_path / "x.mp4"), *SMALL]) == 2
+    assert "no style 'cross'" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_capture_becomes_a_style_of_the_starter_palette(
+    shared_recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    capture = shared_recordings / "livelink" / "testset_arkit61_60fps.csv"
+    cache = ["--cache", "cache", "--jobs", "1"]
+    assert run(["corpus", "gestures", str(capture), "--style", "live", "--out", "live.palette", *cache]) == 0
+    assert "wrote live.palette: the style live of 1 recordings, 0.3 minutes; kept" in capsys.readouterr().err
+    palette = load_palette("live.palette")
+    assert palette.names[-2:] == ("grid_s1", "live")
+    assert palette.styles["live"].intensity.max() > 0  # its sound lies beside it
+    assert run(["Hello.", "--palette", "live.palette", "--style", "live", "--out", "x.mp4", *SMALL]) == 0
+    alone = ["--alone", "--estimator", "samples"]
+    assert run(["corpus", "gestures", str(capture), "--style", "live", "--out", "a.palette", *alone, *cache]) == 0
+    made = load_palette("a.palette")
+    assert made.names[-1] == "live"
+    assert "exasperated" in made.derivations
+    assert not np.array_equal(made.styles["live"].motion["expression"], palette.styles["live"].motion["expression"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "reason"),
+    [
+        (["none", "--out", "a.palette"], 2, "none holds no video and no capture"),
+        (["take.csv", "--out", "a.talker"], 2, "a palette is written as .palette"),
+        (["take.csv", "--out", "a.palette", "--estimator", "guess"], 2, "no estimator 'guess'"),
+        (["take.csv", "--out", "a.palette"], 3, "no recording could be used; the first: take"),
+        (["take.csv", "--out", "a.palette", "--still", "sad=none.png"], 2, "none.png"),
+    ],
+)
+def test_what_cannot_become_a_style(
+    arguments: list[str], code: int, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "take.csv").write_text("a,b\n1,2\n")
+    assert run(["corpus", "gestures", *arguments, "--style", "mine", "--cache", "cache", "--jobs", "1"]) == code
+    assert reason in capsys.readouterr().err
+    assert not list(tmp_path.glob("*.palette"))
