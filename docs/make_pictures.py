@@ -14,7 +14,7 @@ from lexicon.sequence import SILENCE
 from tts2face.api import stream
 from tts2face.cast import cast
 from tts2face.face.file import face_path, identities_of, load_face
-from tts2face.render.draw import draw, staged, still
+from tts2face.render.draw import draw, still
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.talker import load_talker
@@ -50,16 +50,16 @@ def sheet(pictures: list[Image.Image], columns: int) -> Image.Image:
 
 def clip_sheet() -> Image.Image:
     """Frames of one clip at the middle of twelve of its phones."""
-    face = load_face("head")
-    stage = staged(face, Picture(size=f"{SIDE}x{SIDE}", camera="close"))
-    (piece,) = stream(Request(text=SENTENCE), cast(load_talker("grid_s1"), face))
+    ready, request = cast(load_talker("grid_s1"), load_face("head")), Request(text=SENTENCE)
+    stage = ready.stage(Picture(size=f"{SIDE}x{SIDE}", camera="close"), request)
+    (piece,) = stream(request, ready)
     phones, pictures, after = piece.clip.speech.phones, [], 0
     for wanted in SPOKEN:
         at = phones.phones.index(wanted, after)
         after = at + 1
         middle = round((phones.edges[at] + phones.edges[at + 1]) / 2 * piece.clip.fps)
         word = next((word.text for word in piece.clip.speech.words if word.first <= at < word.last), SILENCE)
-        pictures.append(labelled(draw(stage, piece.clip.motion.values[middle]), f"{ipa_to_arpabet(wanted)}  {word}"))
+        pictures.append(labelled(still(piece.clip, stage, middle), f"{ipa_to_arpabet(wanted)}  {word}"))
     return sheet(pictures, 6)
 
 
@@ -79,10 +79,11 @@ def faces_sheet() -> Image.Image:
 def own_face_sheet(talker: Path) -> Image.Image:
     """Frames of new sentences on the talker's own face, in the order of speech."""
     ready = cast(load_talker(str(talker)), None)
-    stage = ready.stage(Picture(size=f"{SIDE}x{SIDE}"))
     pictures = []
     for text in NEW_SENTENCES:
-        (piece,) = stream(Request(text=text, fps=25.0), ready)
+        request = Request(text=text, fps=25.0)
+        stage = ready.stage(Picture(size=f"{SIDE}x{SIDE}"), request)
+        (piece,) = stream(request, ready)
         phones = piece.clip.speech.phones
         for instant in np.linspace(phones.edges[1], phones.edges[-2], 6, endpoint=False):
             label = ipa_to_arpabet(phones.phones[phones.index_at(instant)])

@@ -1,0 +1,65 @@
+"""Make the clips and the contact sheet of the starter palette's styles in docs/pictures.
+
+Run: python docs/make_styles.py
+"""
+
+from pathlib import Path
+
+import av
+import numpy as np
+from PIL import Image, ImageDraw
+
+from tts2face.api import write_clip
+from tts2face.cast import cast
+from tts2face.face.file import load_face
+from tts2face.palette import load_palette
+from tts2face.render.picture import Picture
+from tts2face.request import Request
+from tts2face.talker import load_talker
+
+PICTURES = Path(__file__).parent / "pictures"
+# Ten seconds each; the second one with a pause, in which a face must go on living.
+TEXTS = (
+    "We were away a year ago, but Bob may move five big maps. I have a lot to tell you, so please sit down and listen "
+    "while I explain what happened yesterday.",
+    "Do you know what they told me this morning? [pause 0.8] They said that nobody would come before half past seven, "
+    "and that we should [nod] wait for them outside.",
+)
+FACES = ("head", "cartoon")
+SIDE, FPS, N_SHOWN = 240, 25.0, 10
+
+
+def main() -> None:
+    """Two clips for each style, and one sheet with frames of them all."""
+    rows = []
+    for style in load_palette("starter").derivations:
+        for number, (text, face) in enumerate(zip(TEXTS, FACES, strict=True), start=1):
+            ready = cast(load_talker("grid_s1"), load_face(face))
+            out = PICTURES / f"style_{style}_{number}.mp4"
+            request = Request(text=text, style=style, seed=number, fps=FPS)
+            write_clip(request, Picture(size=f"{SIDE}x{SIDE}"), ready, out)
+            rows.append((f"{style}, {face}", _frames(out)))
+    _sheet(rows).save(PICTURES / "styles.jpg", quality=80)
+
+
+def _frames(clip: Path) -> list[Image.Image]:
+    with av.open(str(clip)) as container:
+        frames = [frame.to_image() for frame in container.decode(video=0)]
+    wanted = np.linspace(FPS / 2, len(frames) - FPS / 2, N_SHOWN).astype(int)
+    box = (40, 20, 200, 200)
+    return [frames[number].crop(box) for number in wanted]
+
+
+def _sheet(rows: list[tuple[str, list[Image.Image]]]) -> Image.Image:
+    width, height = rows[0][1][0].size
+    sheet = Image.new("RGB", (N_SHOWN * width // 2, len(rows) * height // 2))
+    pen = ImageDraw.Draw(sheet)
+    for row, (name, frames) in enumerate(rows):
+        for column, frame in enumerate(frames):
+            sheet.paste(frame.resize((width // 2, height // 2)), (column * width // 2, row * height // 2))
+        pen.text((3, row * height // 2 + 2), name, fill="white")
+    return sheet
+
+
+if __name__ == "__main__":
+    main()
