@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture import field as fields
-from tts2face.gesture.field import FieldOptions, continued, field_of, resting, taken_over
+from tts2face.gesture.field import FieldOptions, FieldState, continued, field_of, resting, taken_over, walked
 from tts2face.gesture.tree import tree_of
+from tts2face.gesture.walk import APART, SLACK
 
 OPTIONS = FieldOptions(history=5, candidates=3, future=4, alpha=(1.0,))
 
@@ -35,7 +35,7 @@ def _brute_force(made, state, n_best: int) -> list[int]:
         found.append((float(away) / history, moment))
     best: list[int] = []
     for _, moment in sorted(found):
-        if all(made.starts[other] != made.starts[moment] or abs(other - moment) >= fields.APART for other in best):
+        if all(made.starts[other] != made.starts[moment] or abs(other - moment) >= APART for other in best):
             best.append(moment)
     return best[:n_best]
 
@@ -63,7 +63,7 @@ def test_the_search_finds_what_brute_force_finds(seed, monkeypatch):
     found += np.square(made.heard[behind.moment - 5 : behind.moment] - state.heard).sum()
     nearest = np.square(made.values[expected - 5 : expected] - state.shown).sum()
     nearest += np.square(made.heard[expected - 5 : expected] - state.heard).sum()
-    assert found <= fields.SLACK**2 * nearest + 1e-6
+    assert found <= SLACK**2 * nearest + 1e-6
 
 
 def test_candidates_are_drawn_by_their_distance():
@@ -102,7 +102,7 @@ def test_without_leaps_a_recording_is_repeated():
     values, heard, lengths = _recordings(4, n=1, length=300)
     options = FieldOptions(history=5, future=20, alpha=(1.0,), continuity=0.0, sigma=1e-6)
     made = field_of(values, heard, lengths, options)
-    state = fields.FieldState(
+    state = FieldState(
         made.values[20:25], made.heard[20:25], 24, np.zeros(2, np.float32), np.zeros(0, np.int64), 0
     )
     shown, behind = continued(made, state, heard[25:150], np.full(125, 0.5))
@@ -171,3 +171,21 @@ def test_sound_without_weight():
 def test_options_out_of_range(wrong, reason):
     with pytest.raises(InputError, match=reason):
         FieldOptions(**wrong)
+
+
+def test_a_walk_tells_which_moments_it_shows():
+    values, heard, lengths = _recordings(4)
+    made = field_of(values, heard, lengths, OPTIONS)
+    generator = np.random.default_rng(5)
+    sound, chances = generator.normal(size=(300, 1)).astype(np.float32), generator.random(300)
+    start = resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32))
+    walk = walked(made, start, sound, chances)
+    np.testing.assert_array_equal(walk.values, continued(made, start, sound, chances)[0])
+    assert walk.moments[-1] == walk.state.moment
+    leaps = np.flatnonzero(np.diff(walk.moments) != 1) + 1
+    ended = (walk.moments[leaps - 1] + 1) % lengths[0] == 0
+    assert len(leaps) > 5
+    assert not (leaps[~ended] % OPTIONS.stride).any()
+    faded = walk.values - values[walk.moments]  # what is left of leaps; it only fades while a recording goes on
+    goes_on = np.setdiff1d(np.arange(1, 300), leaps)
+    assert (np.abs(faded[goes_on]) <= np.abs(faded[goes_on - 1]) + 1e-5).all()

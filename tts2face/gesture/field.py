@@ -8,18 +8,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.gesture.tree import Tree, tree_of
+from tts2face.gesture.walk import APART, nearest, walk
 from tts2face.palette import GESTURE_FPS
 
 DIMENSIONS = 8  # of the search: the windows' principal axes
 SAMPLED = 8  # every so many windows tell the axes; all of them tell the same
-SLACK = 1.1  # moments are found that are at most so much farther than the best; the paper's search has one, too
 ASKED = 200  # moments whose nearest ones are looked for
-APART = 10  # frames between two moments that count as different
 Floats = NDArray[np.float32]
 
 
@@ -136,6 +134,15 @@ class FieldState:
     n_frames: int
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Walk:
+    """Frames (n, D) in the units of the recordings, the recorded moment (n,) of each, and the state behind them."""
+
+    values: Floats
+    moments: NDArray[np.int64]
+    state: FieldState
+
+
 def field_of(values: Floats, heard: Floats, lengths: NDArray[np.int32], options: FieldOptions) -> Field:
     """Index recorded motion (T, D) with the sound (T, E) that went with it; recordings of `lengths` (R,) frames.
 
@@ -172,7 +179,7 @@ def field_of(values: Floats, heard: Floats, lengths: NDArray[np.int32], options:
 def _nearness(made: Field, usable: NDArray[np.int64]) -> float:
     moments = usable[np.linspace(0, len(usable) - 1, min(ASKED, len(usable))).astype(int)]
     away = np.zeros(len(moments))
-    _nearest(_corpus(made), _walked(made.tree), made.axes, made.options.history, (moments, away))
+    nearest(_corpus(made), _flat(made.tree), made.axes, made.options.history, (moments, away))
     return max(float(np.median(away[np.isfinite(away)])) if np.isfinite(away).any() else 1.0, 1e-9)
 
 
@@ -180,7 +187,7 @@ def _corpus(made: Field) -> tuple[Floats, Floats, NDArray[np.int32]]:
     return made.values, made.heard, made.starts
 
 
-def _walked(tree: Tree) -> tuple[NDArray[Any], ...]:
+def _flat(tree: Tree) -> tuple[NDArray[Any], ...]:
     return tree.places, tree.order, tree.spans, tree.axes, tree.cuts
 
 
@@ -229,174 +236,26 @@ def continued(
     chances : (n,)
         Uniform in [0, 1), one for each frame.
     """
+    made = walked(field, state, heard, chances)
+    return made.values, made.state
+
+
+def walked(field: Field, state: FieldState, heard: Floats, chances: NDArray[np.float64]) -> Walk:
+    """As `continued`, with the recorded moments that were shown."""
     if not len(chances):
-        return np.zeros((0, len(state.offset)), np.float32), state
+        return Walk(np.zeros((0, len(state.offset)), np.float32), np.zeros(0, np.int64), state)
     options, history = field.options, field.options.history
     shown = np.concatenate([state.shown, np.zeros((len(chances), len(state.offset)), np.float32)])
     sound = np.concatenate([state.heard, (heard * field.weights).astype(np.float32)])
     moments, offset, recent = np.zeros(len(chances), np.int64), state.offset.copy(), state.recent.copy()
     fade = np.float32(np.exp(-1.0 / (options.settle_s * GESTURE_FPS)))
-    _continue(
+    walk(
         _corpus(field),
-        _walked(field.tree),
+        _flat(field.tree),
         field.axes,
         (history, options.candidates, options.sigma * field.nearness, options.stride, options.continuity, fade),
         (shown, sound, moments, offset, recent, state.moment, state.n_frames, chances),
     )
     behind = shown[-history:].copy(), sound[-history:].copy(), int(moments[-1]), offset, recent
-    return shown[history:] * np.float32(field.scale), FieldState(*behind, state.n_frames + len(chances))
-
-
-@njit(cache=True, nogil=True)
-def _nearest(corpus, tree, axes, history, asked):  # type: ignore[no-untyped-def]
-    """Write how far the nearest different moment lies from each of some."""
-    values, recorded, _ = corpus
-    moments, away = asked
-    best, distance = np.zeros(2, np.int64), np.zeros(2)
-    stack, bounds = np.zeros(128, np.int64), np.zeros(128)
-    query = np.zeros(len(axes), np.float32)
-    for n in range(len(moments)):
-        best[:], distance[:] = -1, np.inf
-        window = (values[moments[n] - history : moments[n]], recorded[moments[n] - history : moments[n]], 0, history)
-        _project(window, axes, query)
-        _search(corpus, tree, window, query, (best[:0], best, distance, stack, bounds))
-        away[n] = distance[1]
-
-
-@njit(cache=True, nogil=True)
-def _continue(corpus, tree, axes, options, track):  # type: ignore[no-untyped-def]
-    """Write the frames shown and the moments they come from."""
-    values, _, starts = corpus
-    history, n_candidates, sigma, stride, continuity, fade = options
-    shown, heard, moments, offset, recent, moment, n_before, chances = track
-    none = recent[:0]
-    best, distance = np.zeros(n_candidates, np.int64), np.zeros(n_candidates)
-    stack, bounds = np.zeros(128, np.int64), np.zeros(128)
-    query = np.zeros(len(axes), np.float32)
-    for i in range(len(chances)):
-        following = moment + 1
-        goes_on = moment >= 0 and following < len(values) and starts[following] == starts[moment]
-        chosen = following
-        if not goes_on or (n_before + i) % stride == 0:
-            best[:], distance[:] = -1, np.inf
-            if goes_on:
-                away = continuity * _apart(corpus, (shown, heard, i, history), following, np.inf)
-                _offer(following, away, (starts, none), (best, distance))
-            _project((shown, heard, i, history), axes, query)
-            _search(corpus, tree, (shown, heard, i, history), query, (recent, best, distance, stack, bounds))
-            chosen = _drawn(best, distance, sigma, chances[i])
-        for d in range(len(offset)):
-            if not goes_on or chosen != following:
-                offset[d] = shown[i + history - 1, d] - values[chosen - 1, d]
-            offset[d] *= fade
-            shown[i + history, d] = values[chosen, d] + offset[d]
-        if len(recent) and (not goes_on or chosen != following):
-            recent[:-1] = recent[1:].copy()
-            recent[-1] = chosen
-        moment = moments[i] = chosen
-
-
-@njit(cache=True, nogil=True)
-def _drawn(best, distance, sigma, chance):  # type: ignore[no-untyped-def]
-    """One of the moments found, by the chance."""
-    total = 0.0
-    for c in range(len(best)):
-        if best[c] >= 0:
-            total += np.exp((distance[0] - distance[c]) / sigma)
-    left, chosen = chance * total, best[0]
-    for c in range(len(best)):
-        if best[c] >= 0:
-            chosen = best[c]
-            left -= np.exp((distance[0] - distance[c]) / sigma)
-            if left < 0.0:
-                break
-    return chosen
-
-
-@njit(cache=True, nogil=True)
-def _offer(moment, away, known, found):  # type: ignore[no-untyped-def]
-    """Keep a moment among the best ones if it is nearer than those that it is hardly different from, and not recent."""
-    starts, recent = known
-    best, distance = found
-    at = len(best) - 1
-    if away >= distance[at]:
-        return
-    for r in range(len(recent)):
-        if abs(recent[r] - moment) < APART:
-            return
-    for c in range(len(best)):
-        if best[c] >= 0 and starts[best[c]] == starts[moment] and abs(best[c] - moment) < APART:
-            if away >= distance[c]:
-                return
-            at = c
-            break
-    while at > 0 and distance[at - 1] > away:
-        best[at], distance[at] = best[at - 1], distance[at - 1]
-        at -= 1
-    best[at], distance[at] = moment, away
-
-
-@njit(cache=True, nogil=True)
-def _apart(corpus, window, moment, limit):  # type: ignore[no-untyped-def]
-    """Mean squared distance of what was shown and heard from what came before a moment; any number above `limit`."""
-    values, recorded, _ = corpus
-    shown, heard, i, history = window
-    total, most = 0.0, limit * history
-    for j in range(history):
-        row, there = i + history - 1 - j, moment - 1 - j
-        for d in range(values.shape[1]):
-            gap = shown[row, d] - values[there, d]
-            total += gap * gap
-        for e in range(recorded.shape[1]):
-            gap = heard[row, e] - recorded[there, e]
-            total += gap * gap
-        if total > most:
-            break
-    return total / history
-
-
-@njit(cache=True, nogil=True)
-def _project(window, axes, query):  # type: ignore[no-untyped-def]
-    shown, heard, i, history = window
-    n_heard, n_shown = heard.shape[1], shown.shape[1]
-    for p in range(len(axes)):
-        total = 0.0
-        for j in range(history):
-            for e in range(n_heard):
-                total += axes[p, j * n_heard + e] * heard[i + j, e]
-            for d in range(n_shown):
-                total += axes[p, history * n_heard + j * n_shown + d] * shown[i + j, d]
-        query[p] = total
-
-
-@njit(cache=True, nogil=True)
-def _search(corpus, tree, window, query, found):  # type: ignore[no-untyped-def]
-    """Offer every moment that may be among the best ones; the nearer half of each node first.
-
-    A place's distance from the query is at most that of the windows: the axes are orthonormal.
-    """
-    places, order, spans, axes, cuts = tree
-    recent, best, distance, stack, bounds = found
-    history = window[3]
-    slack = SLACK * SLACK / history
-    height = 1
-    stack[0], bounds[0] = 0, 0.0
-    while height > 0:
-        height -= 1
-        node, bound = stack[height], bounds[height]
-        while bound * slack < distance[-1] and axes[node] >= 0:
-            side = query[axes[node]] - cuts[node]
-            near = 2 * node + 2 if side > 0 else 2 * node + 1
-            stack[height], bounds[height] = 4 * node + 3 - near, max(bound, side * side)
-            height += 1
-            node = near
-        if bound * slack >= distance[-1]:
-            continue
-        for at in range(spans[node, 0], spans[node, 1]):
-            squared = 0.0
-            for p in range(len(query)):
-                squared += (query[p] - places[at, p]) ** 2
-            if squared < distance[-1] * history:
-                moment = np.int64(order[at])
-                away = _apart(corpus, window, moment, distance[-1])
-                _offer(moment, away, (corpus[2], recent), (best, distance))
+    after = FieldState(*behind, state.n_frames + len(chances))
+    return Walk(shown[history:] * np.float32(field.scale), moments, after)

@@ -1,0 +1,1 @@
+"""What recorded gestures are like, and how near made ones come to them."""

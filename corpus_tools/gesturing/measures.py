@@ -1,0 +1,124 @@
+"""Measures of gestures: speeds, spectra, distances of distributions, correlation, diversity, coverage, repetition.
+
+Motion is (T, k); recordings stand one behind the other, `lengths` (R,) frames each, and nothing is measured across
+their borders.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+from scipy.spatial.distance import cdist
+from scipy.stats import wasserstein_distance
+
+FAST_HZ = 6.0  # from here on a head or a brow that moves is seen to tremble
+SEGMENT = 64  # frames of a spectrum's window: 2.1 s, which a recording of 3 s holds
+
+Doubles = NDArray[np.float64]
+Motion = NDArray[np.floating]
+Lengths = NDArray[np.int32]
+
+
+def recordings(values: Motion, lengths: Lengths) -> list[Motion]:
+    """Each recording's part."""
+    return np.split(values, np.cumsum(lengths)[:-1])
+
+
+def speeds(values: Motion, lengths: Lengths, fps: float) -> Doubles:
+    """(T - R,) length of the change a second, over all channels."""
+    changes = [np.linalg.norm(np.diff(part.astype(np.float64), axis=0), axis=1) for part in recordings(values, lengths)]
+    return np.concatenate(changes) * fps
+
+
+def distance(one: Motion, other: Motion) -> float:
+    """Wasserstein distance of two sets of numbers, in their unit; NaN where one is empty."""
+    return float(wasserstein_distance(one, other)) if len(one) and len(other) else float("nan")
+
+
+def halves(n: int, n_times: int, generator: np.random.Generator) -> Iterator[tuple[NDArray[np.int64], ...]]:
+    """Two random halves of n things, so many times."""
+    for _ in range(n_times):
+        order = generator.permutation(n)
+        yield order[: n // 2], order[n // 2 :]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spectrum:
+    """Power (F,) of frequencies (F,) in Hz: squared units a Hz, all channels together."""
+
+    hz: Doubles
+    power: Doubles
+
+    @property
+    def fast(self) -> float:
+        """Power above `FAST_HZ`."""
+        return float(self.power[self.hz >= FAST_HZ].sum() * (self.hz[1] - self.hz[0]))
+
+
+def spectrum(values: Motion, lengths: Lengths, fps: float) -> Spectrum:
+    """Mean power spectrum of the recordings (Welch 1967; Hann windows of `SEGMENT` frames, no trend)."""
+    total: Doubles | None = None
+    hz = np.zeros(0)
+    used = 0
+    for part in recordings(values, lengths):
+        if len(part) < SEGMENT:
+            continue
+        hz, power = welch(part.astype(np.float64), fps, nperseg=SEGMENT, axis=0, detrend="linear")
+        whole = power.sum(axis=1) * len(part)
+        total = whole if total is None else total + whole
+        used += len(part)
+    if total is None:
+        return Spectrum(np.fft.rfftfreq(SEGMENT, 1 / fps), np.full(SEGMENT // 2 + 1, np.nan))
+    return Spectrum(hz, total / used)
+
+
+def correlation(one: Motion, other: Motion) -> float:
+    """Pearson's r; NaN where one of them stands still."""
+    if not (np.ptp(one) > 0 and np.ptp(other) > 0):
+        return float("nan")
+    return float(np.corrcoef(one, other)[0, 1])
+
+
+def between_frames(values: Motion, lengths: Lengths) -> Doubles:
+    """(T - R,) means of neighbours (T,): what is heard when a speed of `speeds` is seen."""
+    return np.concatenate([(part[1:] + part[:-1]) / 2.0 for part in recordings(values, lengths)])
+
+
+def diversity(clips: Sequence[Motion], takes: Sequence[Motion]) -> float:
+    """Mean distance between clips of different seeds, over that between different takes of the same length.
+
+    Distance: square root of the mean square over frames. 0: every seed gives the same; 1: as unlike as recordings.
+    """
+    return _mean_distance(clips) / _mean_distance(takes)
+
+
+def _mean_distance(clips: Sequence[Motion]) -> float:
+    flat = np.stack([clip.astype(np.float64).ravel() for clip in clips])
+    away = cdist(flat, flat)
+    return float(away[np.triu_indices(len(flat), 1)].mean() / np.sqrt(len(clips[0])))
+
+
+def coverage(shown: NDArray[np.int64], lengths: Lengths, within: int) -> float:
+    """Share of recorded moments within so many frames of one that was shown, in the same recording."""
+    edges = np.concatenate([[0], np.cumsum(lengths)])
+    visited = np.zeros(edges[-1], bool)
+    moments = np.unique(shown)
+    at = np.searchsorted(edges, moments, side="right") - 1
+    for moment, low, high in zip(moments, edges[at], edges[at + 1], strict=True):
+        visited[max(low, moment - within) : min(high, moment + within + 1)] = True
+    return float(visited.mean())
+
+
+def autocorrelation(values: Motion, most: int) -> Doubles:
+    """(most + 1,) correlation of a clip with itself so many frames later, all channels together; 1 at lag 0.
+
+    About 1 at a lag with which it repeats itself. Each lag is weighed by the frames that it has.
+    """
+    away = values.astype(np.float64) - values.mean(axis=0, dtype=np.float64)
+    size = 1 << int(np.ceil(np.log2(2 * len(away))))
+    power = np.abs(np.fft.rfft(away, size, axis=0)) ** 2
+    sums = np.fft.irfft(power.sum(axis=1), size)[: most + 1]
+    means = sums / (len(away) - np.arange(most + 1))
+    return np.asarray(means / means[0])
