@@ -1,4 +1,4 @@
-"""``tts2face report``: what recordings tell about visual speech, as pages, tables and pictures."""
+"""``tts2face report``: what recordings tell about visual speech and gestures, as pages, tables and pictures."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +9,7 @@ from cli.flags import whole_number
 from cli.progress import progress_bar, say
 from lexicon.errors import InputError
 
-report = App(name="report", help="Study what a talker's recordings tell about visual speech.")
+report = App(name="report", help="Study what recordings tell: which phones look alike, how a person gestures.")
 
 
 @report.command
@@ -44,6 +44,34 @@ def similarity(  # noqa: PLR0913 - one parameter a flag
         f"wrote {out}: {len(found.table.phones)} phones, best in {found.best.n_classes} classes, "
         f"reliability {found.by_utterances.corrected:.3f}"
     )
+
+
+@report.command
+def gestures(
+    palette: Annotated[str, Parameter(help="A shipped palette or a .palette file.")] = "starter",
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="What to write: .html, .csv, .json or .png.", alias="-o")],
+    held_out: Annotated[
+        int, Parameter(help="One in so many recordings is held out, to compare with.", converter=whole_number)
+    ] = 5,
+    halves: Annotated[
+        int, Parameter(help="Random halves of the held-out recordings to compare.", converter=whole_number)
+    ] = 50,
+    clips: Annotated[
+        int, Parameter(help="Clips of different seeds that fields and noise make.", converter=whole_number)
+    ] = 3,
+    seed: Annotated[int, Parameter(help="Which recordings, halves and clips are drawn.", converter=whole_number)] = 0,
+) -> None:
+    """Compare each style's gestures with those that its fields, and noise, make of the same sound."""
+    from corpus_tools.gesturing.analysis import Options
+    from corpus_tools.gesturing.write import write_gestures
+
+    options = Options(held_out, halves, clips, seed)
+    with progress_bar("studying styles") as on_progress:
+        found = write_gestures(palette, out, options, on_progress=on_progress)
+    n_met, n_targets = found.targets
+    say(f"wrote {out}: {len(found.styles)} styles, {n_met} of {n_targets} targets met")
 
 
 def _numbers(classes: str | None) -> tuple[int, ...] | None:

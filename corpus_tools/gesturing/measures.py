@@ -58,20 +58,21 @@ class Spectrum:
 
 
 def spectrum(values: Motion, lengths: Lengths, fps: float) -> Spectrum:
-    """Mean power spectrum of the recordings (Welch 1967; Hann windows of `SEGMENT` frames, no trend)."""
+    """Mean power spectrum of the recordings (Welch 1967; Hann windows of `SEGMENT` frames, no mean)."""
     total: Doubles | None = None
     hz = np.zeros(0)
     used = 0
     for part in recordings(values, lengths):
         if len(part) < SEGMENT:
             continue
-        hz, power = welch(part.astype(np.float64), fps, nperseg=SEGMENT, axis=0, detrend="linear")
-        whole = power.sum(axis=1) * len(part)
+        level = part.astype(np.float64) - part.mean(axis=0, dtype=np.float64)
+        hz, power = welch(level, fps, nperseg=SEGMENT, axis=0)
+        whole = np.asarray(power.sum(axis=1), np.float64) * len(part)
         total = whole if total is None else total + whole
         used += len(part)
     if total is None:
         return Spectrum(np.fft.rfftfreq(SEGMENT, 1 / fps), np.full(SEGMENT // 2 + 1, np.nan))
-    return Spectrum(hz, total / used)
+    return Spectrum(hz, np.asarray(total / used, np.float64))
 
 
 def correlation(one: Motion, other: Motion) -> float:

@@ -102,9 +102,7 @@ def test_without_leaps_a_recording_is_repeated():
     values, heard, lengths = _recordings(4, n=1, length=300)
     options = FieldOptions(history=5, future=20, alpha=(1.0,), continuity=0.0, sigma=1e-6)
     made = field_of(values, heard, lengths, options)
-    state = FieldState(
-        made.values[20:25], made.heard[20:25], 24, np.zeros(2, np.float32), np.zeros(0, np.int64), 0
-    )
+    state = FieldState(made.values[20:25], made.heard[20:25], 24, np.zeros(2, np.float32), np.zeros(0, np.int64), 0)
     shown, behind = continued(made, state, heard[25:150], np.full(125, 0.5))
     assert behind.moment == 149
     np.testing.assert_allclose(shown, values[25:150], atol=1e-5)

@@ -61,6 +61,13 @@ class Fields:
         derived = self.palette.derivations.get(style)
         return UNCHANGED if derived is None else derived.changes.get(feature, UNCHANGED)
 
+    def changed(self, style: str, feature: str, values: Floats) -> Floats:
+        """Values (T, k) of a feature's source with the gain and offset of a style."""
+        change = self.change(style, feature)
+        middle = middle_of(self.palette.styles[self.source(style, feature)], feature)
+        offset = np.array([change.offset.get(channel, 0.0) for channel in self.palette.channels(feature)], np.float32)
+        return np.asarray(middle + np.float32(change.gain) * (values - middle) + offset, np.float32)
+
     @property
     def features(self) -> tuple[str, ...]:
         """Features that any style of the palette shows."""
@@ -156,17 +163,10 @@ class _Track:
         shares = timeline.style_shares(self._feature, times, default=self._style)
         changed = np.zeros_like(values)
         for style, share in shares.items():
-            changed += share.astype(np.float32)[:, None] * self._changed(values, style)
+            changed += share.astype(np.float32)[:, None] * self._fields.changed(style, self._feature, values)
         passed = max(0, bisect_right(self._times, times[-1]) - 1 - BEYOND)
         self._times, self._values = self._times[passed:], self._values[passed:]
         return changed
-
-    def _changed(self, values: Floats, style: str) -> Floats:
-        change = self._fields.change(style, self._feature)
-        middle = middle_of(self._fields.palette.styles[self._fields.source(style, self._feature)], self._feature)
-        channels = self._fields.palette.channels(self._feature)
-        offset = np.array([change.offset.get(channel, 0.0) for channel in channels], np.float32)
-        return np.asarray(middle + np.float32(change.gain) * (values - middle) + offset, np.float32)
 
 
 def middle_of(style: Style, feature: str) -> Floats:
