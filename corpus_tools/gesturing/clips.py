@@ -76,11 +76,9 @@ def from_field(fields: Fields, style: str, feature: str, intensity: Floats, seed
     chances = np.random.default_rng([seed, crc32(feature.encode())]).random(len(heard))
     start = resting(made, middle_of(fields.palette.styles[source], feature), SILENCE[: made.heard.shape[1]])
     walk = walked(made, start, heard, chances)
-    values = (
-        walk.values[: len(intensity)]
-        if tempo == 1.0
-        else cubic_at(walk.values, tempo * np.arange(len(intensity), dtype=np.float64))
-    )
+    values = walk.values[: len(intensity)]
+    if tempo != 1.0:
+        values = cubic_at(walk.values, tempo * np.arange(len(intensity), dtype=np.float64))
     return Clip(fields.changed(style, feature, values), walk.moments[: round(len(intensity) * tempo)])
 
 

@@ -60,7 +60,7 @@ class Spectrum:
 def spectrum(values: Motion, lengths: Lengths, fps: float) -> Spectrum:
     """Mean power spectrum of the recordings (Welch 1967; Hann windows of `SEGMENT` frames, no mean)."""
     total: Doubles | None = None
-    hz = np.zeros(0)
+    hz: Motion = np.zeros(0)
     used = 0
     for part in recordings(values, lengths):
         if len(part) < SEGMENT:
@@ -71,8 +71,8 @@ def spectrum(values: Motion, lengths: Lengths, fps: float) -> Spectrum:
         total = whole if total is None else total + whole
         used += len(part)
     if total is None:
-        return Spectrum(np.fft.rfftfreq(SEGMENT, 1 / fps), np.full(SEGMENT // 2 + 1, np.nan))
-    return Spectrum(hz, np.asarray(total / used, np.float64))
+        return Spectrum(np.fft.rfftfreq(SEGMENT, 1 / fps).astype(np.float64), np.full(SEGMENT // 2 + 1, np.nan))
+    return Spectrum(np.asarray(hz, np.float64), total / used)
 
 
 def correlation(one: Motion, other: Motion) -> float:

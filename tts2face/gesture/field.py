@@ -43,7 +43,7 @@ class FieldOptions:
     future
         Frames that must follow a moment in its recording to be leapt to: at a recording's end there is no way on.
     settle_s
-        Seconds in which what is left of a leap falls to 1 / e.
+        Time constant of the spring that takes what is left of a leap away: after three of it a fifth is left.
     memory
         Leaps after which the same moment may be leapt to again: without it silence ends in a loop.
 
@@ -65,8 +65,8 @@ class FieldOptions:
 
     def __post_init__(self) -> None:
         """Refuse numbers outside their range."""
-        if not 1 <= self.history <= 60 or not 1 <= self.stride <= 60 or not 0 <= self.future <= 600:
-            raise InputError("a field's history and stride are 1 to 60 frames, its future 0 to 600")
+        if not 2 <= self.history <= 60 or not 1 <= self.stride <= 60 or not 0 <= self.future <= 600:
+            raise InputError("a field's history is 2 to 60 frames, its stride 1 to 60, its future 0 to 600")
         if not 0 <= self.memory <= 1000:
             raise InputError(f"a field remembers 0 to 1000 leaps, not {self.memory}")
         if not 1 <= self.candidates <= 16:
@@ -118,8 +118,8 @@ class FieldState:
         The last frames, scaled and weighted as the field's.
     moment
         The recorded frame that was shown last, -1 for none.
-    offset : (D,)
-        What is left of leaps.
+    offset : (2, D)
+        What is left of leaps, and its change a frame.
     recent : (m,)
         Moments that were leapt to last, the oldest first.
     n_frames
@@ -213,7 +213,7 @@ def resting(field: Field, rest: Floats, silence: Floats) -> FieldState:
     history = field.options.history
     shown = np.repeat((rest / np.float32(field.scale))[None], history, axis=0).astype(np.float32)
     heard = np.repeat((silence * field.weights)[None], history, axis=0).astype(np.float32)
-    return FieldState(shown, heard, -1, np.zeros(len(rest), np.float32), _none(field), 0)
+    return FieldState(shown, heard, -1, np.zeros((2, len(rest)), np.float32), _none(field), 0)
 
 
 def taken_over(state: FieldState, before: Field, after: Field) -> FieldState:
@@ -243,17 +243,17 @@ def continued(
 def walked(field: Field, state: FieldState, heard: Floats, chances: NDArray[np.float64]) -> Walk:
     """As `continued`, with the recorded moments that were shown."""
     if not len(chances):
-        return Walk(np.zeros((0, len(state.offset)), np.float32), np.zeros(0, np.int64), state)
+        return Walk(np.zeros((0, state.offset.shape[1]), np.float32), np.zeros(0, np.int64), state)
     options, history = field.options, field.options.history
-    shown = np.concatenate([state.shown, np.zeros((len(chances), len(state.offset)), np.float32)])
+    shown = np.concatenate([state.shown, np.zeros((len(chances), state.offset.shape[1]), np.float32)])
     sound = np.concatenate([state.heard, (heard * field.weights).astype(np.float32)])
     moments, offset, recent = np.zeros(len(chances), np.int64), state.offset.copy(), state.recent.copy()
-    fade = np.float32(np.exp(-1.0 / (options.settle_s * GESTURE_FPS)))
+    stiffness = np.float32(1.0 / (options.settle_s * GESTURE_FPS))
     walk(
         _corpus(field),
         _flat(field.tree),
         field.axes,
-        (history, options.candidates, options.sigma * field.nearness, options.stride, options.continuity, fade),
+        (history, options.candidates, options.sigma * field.nearness, options.stride, options.continuity, stiffness, np.exp(-stiffness)),
         (shown, sound, moments, offset, recent, state.moment, state.n_frames, chances),
     )
     behind = shown[-history:].copy(), sound[-history:].copy(), int(moments[-1]), offset, recent

@@ -25,9 +25,12 @@ def nearest(corpus, tree, axes, history, asked):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def walk(corpus, tree, axes, options, track):  # type: ignore[no-untyped-def]
-    """Write the frames shown and the moments they come from."""
+    """Write the frames shown and the moments they come from.
+
+    What is left of a leap goes as a critically damped spring, so that neither place nor speed jumps (Bollo 2018).
+    """
     values, _, starts = corpus
-    history, n_candidates, sigma, stride, continuity, fade = options
+    history, n_candidates, sigma, stride, continuity, stiffness, fade = options
     shown, heard, moments, offset, recent, moment, n_before, chances = track
     none = recent[:0]
     best, distance = np.zeros(n_candidates, np.int64), np.zeros(n_candidates)
@@ -45,11 +48,15 @@ def walk(corpus, tree, axes, options, track):  # type: ignore[no-untyped-def]
             _project((shown, heard, i, history), axes, query)
             _search(corpus, tree, (shown, heard, i, history), query, (recent, best, distance, stack, bounds))
             chosen = _drawn(best, distance, sigma, chances[i])
-        for d in range(len(offset)):
+        last = i + history - 1
+        for d in range(values.shape[1]):
             if not goes_on or chosen != following:
-                offset[d] = shown[i + history - 1, d] - values[chosen - 1, d]
-            offset[d] *= fade
-            shown[i + history, d] = values[chosen, d] + offset[d]
+                offset[0, d] = shown[last, d] - values[chosen - 1, d]
+                offset[1, d] = shown[last, d] - shown[last - 1, d] - values[chosen - 1, d] + values[chosen - 2, d]
+            pull = offset[1, d] + offset[0, d] * stiffness
+            offset[0, d] = (offset[0, d] + pull) * fade
+            offset[1, d] = (offset[1, d] - pull * stiffness) * fade
+            shown[i + history, d] = values[chosen, d] + offset[0, d]
         if len(recent) and (not goes_on or chosen != following):
             recent[:-1] = recent[1:].copy()
             recent[-1] = chosen
