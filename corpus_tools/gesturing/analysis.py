@@ -16,6 +16,7 @@ from corpus_tools.gesturing.measures import (
     distance,
     diversity,
     halves,
+    ratio,
     recordings,
     spectrum,
 )
@@ -101,7 +102,7 @@ class Moving:
     def fast(self) -> tuple[float, float]:
         """Power above `measures.FAST_HZ` of field and noise, over that of the recordings."""
         real, field, noise = (one.fast for one in self.spectra)
-        return field / real, noise / real
+        return ratio(field, real), ratio(noise, real)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

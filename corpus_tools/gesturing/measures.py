@@ -75,6 +75,11 @@ def spectrum(values: Motion, lengths: Lengths, fps: float) -> Spectrum:
     return Spectrum(np.asarray(hz, np.float64), total / used)
 
 
+def ratio(one: float, other: float) -> float:
+    """One over the other; NaN over 0."""
+    return one / other if other else float("nan")
+
+
 def correlation(one: Motion, other: Motion) -> float:
     """Pearson's r; NaN where one of them stands still."""
     if not (np.ptp(one) > 0 and np.ptp(other) > 0):
@@ -92,7 +97,7 @@ def diversity(clips: Sequence[Motion], takes: Sequence[Motion]) -> float:
 
     Distance: square root of the mean square over frames. 0: every seed gives the same; 1: as unlike as recordings.
     """
-    return _mean_distance(clips) / _mean_distance(takes)
+    return ratio(_mean_distance(clips), _mean_distance(takes))
 
 
 def _mean_distance(clips: Sequence[Motion]) -> float:

@@ -15,7 +15,7 @@ from corpus_tools.gesturing.analysis import (
 )
 from corpus_tools.gesturing.figure import distribution, names_of, power, repetition
 from corpus_tools.gesturing.longrun import FROM_S, MINUTES, VISITED_AFTER
-from corpus_tools.gesturing.measures import FAST_HZ
+from corpus_tools.gesturing.measures import FAST_HZ, ratio
 from corpus_tools.report.page import page, table
 from corpus_tools.report.panels import panel_svg
 
@@ -101,8 +101,8 @@ def _distances(found: StyleFound) -> str:
             number(one.halves, 3),
             number(one.to_field, 3),
             number(one.to_noise, 3),
-            number(one.to_field / one.halves),
-            number(one.to_field / one.to_noise),
+            number(ratio(one.to_field, one.halves)),
+            number(ratio(one.to_field, one.to_noise)),
             verdict(found, one),
         )
         for one in found.compared

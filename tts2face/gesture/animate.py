@@ -19,11 +19,20 @@ from tts2face.types import Waveform
 
 BEYOND = 2  # frames of a field behind an instant, which its cubic needs
 UNCHANGED = Change()
-# Chosen on two parts of the recordings of GRID s1 (docs/gestures.md); the others take the options of brows.
+# Chosen within three quarters of the recordings of GRID s1 (docs/gestures.md); the others take the options of brows.
 OPTIONS: Mapping[str, FieldOptions] = MappingProxyType(
     {
-        "head": FieldOptions(alpha=(8.0, 1.0), sigma=0.05, stride=2, continuity=0.2),
-        "blink": FieldOptions(alpha=(0.5, 0.1), sigma=0.4, stride=6, continuity=1.0, future=4, settle_s=0.05),
+        "head": FieldOptions(alpha=(20.0, 1.0), stride=3, continuity=0.08, settle_s=0.08, candidates=4),
+        "blink": FieldOptions(
+            alpha=(1.0, 0.1),
+            sigma=0.3,
+            stride=3,
+            continuity=1.0,
+            future=6,
+            settle_s=0.015,
+            candidates=2,
+            memory=150,
+        ),
     }
 )
 Floats = NDArray[np.float32]

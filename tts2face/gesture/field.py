@@ -54,14 +54,14 @@ class FieldOptions:
     """
 
     history: int = 10
-    candidates: int = 2
-    alpha: tuple[float, ...] = (3.0, 1.0)
-    sigma: float = 0.05
-    stride: int = 3
+    candidates: int = 3
+    alpha: tuple[float, ...] = (10.0, 1.0)
+    sigma: float = 0.1
+    stride: int = 6
     continuity: float = 0.05
-    future: int = 25
-    settle_s: float = 0.07
-    memory: int = 30
+    future: int = 20
+    settle_s: float = 0.06
+    memory: int = 400
 
     def __post_init__(self) -> None:
         """Refuse numbers outside their range."""
@@ -253,7 +253,15 @@ def walked(field: Field, state: FieldState, heard: Floats, chances: NDArray[np.f
         _corpus(field),
         _flat(field.tree),
         field.axes,
-        (history, options.candidates, options.sigma * field.nearness, options.stride, options.continuity, stiffness, np.exp(-stiffness)),
+        (
+            history,
+            options.candidates,
+            options.sigma * field.nearness,
+            options.stride,
+            options.continuity,
+            stiffness,
+            np.exp(-stiffness),
+        ),
         (shown, sound, moments, offset, recent, state.moment, state.n_frames, chances),
     )
     behind = shown[-history:].copy(), sound[-history:].copy(), int(moments[-1]), offset, recent

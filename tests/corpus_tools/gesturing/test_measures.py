@@ -12,6 +12,7 @@ from corpus_tools.gesturing.measures import (
     distance,
     diversity,
     halves,
+    ratio,
     recordings,
     spectrum,
     speeds,
@@ -103,6 +104,11 @@ def test_a_spectrum_finds_a_wave_and_its_power():
 
 def test_recordings_too_short_for_a_spectrum_have_none():
     assert np.isnan(spectrum(np.zeros((20, 1)), lengths(20), FPS).power).all()
+
+
+def test_ratio():
+    assert ratio(1.0, 4.0) == 0.25
+    assert np.isnan(ratio(1.0, 0.0))
 
 
 def test_correlation():

@@ -1,0 +1,11 @@
+"""One study for all tests of the room."""
+
+import pytest
+
+from corpus_tools.gesturing.analysis import GesturesFound, Options, study
+from tests.corpus_tools.gesturing.made_palette import made_palette
+
+
+@pytest.fixture(scope="session")
+def found() -> GesturesFound:
+    return study("made", made_palette(), Options(one_in=4, halves=10, clips=2))

@@ -1,0 +1,62 @@
+"""What fields make of the shipped palette's recordings that they have not seen: near the real, far from noise."""
+
+import pytest
+
+from corpus_tools.gesturing.analysis import Compared, Moving, Options, StyleFound, study
+from lexicon.errors import InputError
+from tts2face.palette import Palette, load_palette
+
+NO_JITTER = 1.3  # times the recorded power above 6 Hz
+
+
+@pytest.fixture(scope="module")
+def style() -> StyleFound:
+    try:
+        palette: Palette = load_palette("starter")
+    except InputError:
+        pytest.skip("no starter palette is installed")
+    return study("starter", palette, Options()).styles[0]
+
+
+def compared(style: StyleFound, name: str) -> Compared:
+    return next(one for one in style.compared if one.trait.name == name)
+
+
+def moving(style: StyleFound, feature: str) -> Moving:
+    return next(one for one in style.moving if one.feature == feature)
+
+
+def test_hundreds_of_recordings_are_studied(style: StyleFound) -> None:
+    assert style.is_held_out
+    assert style.n_held > 100
+    assert len(compared(style, "blink interval").real) > 100
+
+
+@pytest.mark.parametrize("name", ["head speed", "brow height", "blink interval"])
+def test_fields_are_as_near_as_other_recordings_of_the_same_person(name: str, style: StyleFound) -> None:
+    found = compared(style, name)
+    assert found.to_field <= 1.5 * found.halves
+    assert found.to_field < 0.5 * found.to_noise
+
+
+def test_heads_move_with_the_sound_as_real_ones_do(style: StyleFound) -> None:
+    real, field, noise = moving(style, "head").with_intensity
+    assert real > 0.3
+    assert abs(field - real) <= 0.1
+    assert abs(noise) < 0.1
+
+
+@pytest.mark.parametrize("feature", ["head", "brows"])
+def test_nothing_trembles(feature: str, style: StyleFound) -> None:
+    assert 0.7 < moving(style, feature).fast[0] < NO_JITTER
+
+
+def test_clips_of_ten_minutes_do_not_repeat_themselves(style: StyleFound) -> None:
+    for found in style.long.repeating.values():
+        _, speech, silence = found.highest
+        assert max(speech, silence) < 0.5
+
+
+def test_another_seed_is_another_clip(style: StyleFound) -> None:
+    for found in style.moving:
+        assert found.diversity[0] > 0.4
