@@ -141,23 +141,41 @@ class GesturesFound:
 
 def study(name: str, palette: Palette, options: Options, on_progress: Progress | None = None) -> GesturesFound:
     """Measure every style of a palette."""
-    found = []
+    found: list[StyleFound] = []
+    ready: dict[str, _Ready] = {}
     for done, style in enumerate(names := (*palette.styles, *palette.derivations)):
         if on_progress:
             on_progress(done, len(names))
-        found.append(_style_found(palette, style, options))
+        source = palette.derivations[style].source if style in palette.derivations else style
+        if source not in ready:
+            ready[source] = _ready(palette, source, options)
+        found.append(_style_found(palette, style, ready[source], options))
     if on_progress:
         on_progress(len(names), len(names))
     return GesturesFound(name, options, tuple(found))
 
 
-def _style_found(palette: Palette, name: str, options: Options) -> StyleFound:
-    derived = palette.derivations.get(name)
-    source = name if derived is None else derived.source
+@dataclass(frozen=True, slots=True, eq=False)
+class _Ready:
+    """A measured style: what its fields are made of, what they have not seen, and the fields."""
+
+    learnt: Style
+    held: Style
+    is_held_out: bool
+    fields: Fields
+
+
+def _ready(palette: Palette, source: str, options: Options) -> _Ready:
     whole = palette.styles[source]
     is_held_out = len(whole.lengths) >= FEWEST
     learnt, held = dealt(whole, options.one_in, options.seed) if is_held_out else (whole, whole)
-    fields = Fields(with_source(palette, source, learnt))
+    return _Ready(learnt, held, is_held_out, Fields(with_source(palette, source, learnt)))
+
+
+def _style_found(palette: Palette, name: str, ready: _Ready, options: Options) -> StyleFound:
+    derived = palette.derivations.get(name)
+    source = name if derived is None else derived.source
+    learnt, held, fields = ready.learnt, ready.held, ready.fields
     clips = [_from_fields(fields, name, held, options.seed + k) for k in range(options.clips)]
     noises = [from_noise(fields, name, len(held.intensity), options.seed + k) for k in range(options.clips)]
     real: Motion = held.motion if derived is None else _from_fields(fields, source, held, options.seed + options.clips)
@@ -168,8 +186,8 @@ def _style_found(palette: Palette, name: str, options: Options) -> StyleFound:
         summary="" if derived is None else derived.summary,
         n_learnt=len(learnt.lengths),
         n_held=len(held.lengths),
-        is_held_out=is_held_out,
-        minutes=whole.seconds / 60,
+        is_held_out=ready.is_held_out,
+        minutes=palette.styles[source].seconds / 60,
         blinks_per_minute=(rates[0], rates[1], rates[2]),
         compared=tuple(_compared(trait, held, (real, clips, noises), options) for trait in traits_of(palette, learnt)),
         moving=_moving(palette, held, real, clips, noises),

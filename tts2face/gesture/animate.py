@@ -22,6 +22,7 @@ UNCHANGED = Change()
 # Chosen within three quarters of the recordings of GRID s1 (docs/gestures.md); the others take the options of brows.
 OPTIONS: Mapping[str, FieldOptions] = MappingProxyType(
     {
+        "expression": FieldOptions(alpha=(3.0, 1.0), sigma=0.05, stride=4),
         "head": FieldOptions(alpha=(16.0, 1.0), stride=2, continuity=0.07, settle_s=0.09, candidates=4),
         "blink": FieldOptions(
             alpha=(1.0, 0.1),
