@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from corpus_tools.gesturing.analysis import Options as GestureOptions
+from corpus_tools.gesturing.write import write_gestures
 from corpus_tools.similarity.analysis import Options
 from corpus_tools.similarity.write import write_similarity
 from lexicon.phones import ipa_to_arpabet
@@ -100,6 +102,7 @@ def main() -> None:
     if talker is not None:
         own_face_sheet(talker).save(HERE / "own_face.jpg", quality=85)
     write_similarity("grid_s1", HERE / "similarity.png", Options())
+    write_gestures("starter", HERE / "gestures.png", GestureOptions())
     clip_sheet().save(HERE / "clip.png", optimize=True)
     faces_sheet().save(HERE / "faces.png", optimize=True)
 

@@ -48,7 +48,7 @@ def power(found: StyleFound, moving: Moving) -> Panel:
         lines.append(Line(name, colour, one.hz[1:], np.log10(np.maximum(one.power[1:], 1e-30))))
     highest = max(float(np.nanmax(line.y)) if np.isfinite(line.y).any() else 0.0 for line in lines[:2])
     top = np.ceil(highest)
-    unit = f"{moving.unit}²/Hz" if moving.unit else "1/Hz"
+    unit = f"{moving.unit}^2/Hz" if moving.unit else "1/Hz"
     return Panel(
         f"{moving.feature}: power",
         Axes("Hz", unit, (0.0, 15.0), (top - DECADES, top), WIDTH, HEIGHT),

@@ -17,6 +17,7 @@ COLOURS = {
     "second": ("var(--second)", (184, 134, 11)),
 }
 HEAD = 26  # px above a panel of a picture
+DOWN = 14  # px from there to the panel: room for its title
 LETTER = 12  # px
 SCALE = 2  # pictures are drawn larger and then made smaller: smooth lines
 
@@ -82,7 +83,7 @@ def panels_png(title: str, panels: Sequence[Panel], columns: int) -> bytes:
     pen = _Pen(ImageDraw.Draw(image))
     pen.text(width * columns / 2, HEAD / 2, title, INK, "mm", LETTER + 3)
     for at, panel in enumerate(panels):
-        pen.move(at % columns * width, HEAD + at // columns * height)
+        pen.move(at % columns * width, HEAD + DOWN + at // columns * height)
         _draw(pen, panel)
     file = BytesIO()
     image.resize(size, Image.Resampling.LANCZOS).quantize(64).save(file, "PNG", optimize=True)
@@ -98,7 +99,9 @@ def _inside(panel: Panel, line: Line) -> list[tuple[float, float]]:
 def _marks(panel: Panel) -> list[tuple[float, str]]:
     values = ticks(*panel.axes.y_range)
     if panel.is_logarithmic:
-        return [(value, f"{10.0**value:g}") for value in values if value == round(value)]
+        return [
+            (value, f"1e{value:.0f}" if value < -2 else f"{10.0**value:g}") for value in values if value == round(value)
+        ]
     return [(value, f"{value:g}") for value in values]
 
 

@@ -6,7 +6,7 @@ from io import BytesIO
 import numpy as np
 from PIL import Image
 
-from corpus_tools.report.panels import HEAD, Line, Panel, histogram, panel_svg, panels_png
+from corpus_tools.report.panels import DOWN, HEAD, Line, Panel, histogram, panel_svg, panels_png
 from corpus_tools.report.plots import BOTTOM, TOP, Axes
 
 AXES = Axes("x", "y", (0.0, 10.0), (0.0, 1.0), 300, 200)
@@ -41,7 +41,7 @@ def test_the_picture_shows_the_line_in_its_colour():
     flat = Line("flat", "first", np.array([0.0, 10.0]), np.array([0.5, 0.5]))
     image = Image.open(BytesIO(panels_png("title", [panel(flat)] * 3, 2))).convert("RGB")
     assert image.size == (600, 2 * (200 + HEAD) + HEAD)
-    middle = HEAD + (TOP + 200 - BOTTOM) / 2
+    middle = HEAD + DOWN + (TOP + 200 - BOTTOM) / 2
     for left, top in ((0, 0), (300, 0), (0, 200 + HEAD)):
         column = [image.getpixel((left + 150, round(top + middle) + k)) for k in (-2, -1, 0, 1, 2)]
         assert any(blue > 150 > red for red, _, blue in column)
