@@ -107,7 +107,10 @@ class Moving:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StyleFound:
-    """What one style is like: `real` is its recordings, or for a derived style what the field of its source makes."""
+    """What one style is like: `real` is its recordings, or for a derived style what the field of its source makes.
+
+    Long clips are of measured styles alone: derived ones are theirs, changed.
+    """
 
     name: str
     source: str | None
@@ -157,19 +160,25 @@ def study(name: str, palette: Palette, options: Options, on_progress: Progress |
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Ready:
-    """A measured style: what its fields are made of, what they have not seen, and the fields."""
+    """A measured style: what its fields are made of, what they have not seen, the fields, and a clip of theirs.
+
+    The clip is what derived styles are compared with.
+    """
 
     learnt: Style
     held: Style
     is_held_out: bool
     fields: Fields
+    again: Motion
 
 
 def _ready(palette: Palette, source: str, options: Options) -> _Ready:
     whole = palette.styles[source]
     is_held_out = len(whole.lengths) >= FEWEST
     learnt, held = dealt(whole, options.one_in, options.seed) if is_held_out else (whole, whole)
-    return _Ready(learnt, held, is_held_out, Fields(with_source(palette, source, learnt)))
+    fields = Fields(with_source(palette, source, learnt))
+    again = _from_fields(fields, source, held, options.seed + options.clips) if palette.derivations else {}
+    return _Ready(learnt, held, is_held_out, fields, again)
 
 
 def _style_found(palette: Palette, name: str, ready: _Ready, options: Options) -> StyleFound:
@@ -178,7 +187,7 @@ def _style_found(palette: Palette, name: str, ready: _Ready, options: Options) -
     learnt, held, fields = ready.learnt, ready.held, ready.fields
     clips = [_from_fields(fields, name, held, options.seed + k) for k in range(options.clips)]
     noises = [from_noise(fields, name, len(held.intensity), options.seed + k) for k in range(options.clips)]
-    real: Motion = held.motion if derived is None else _from_fields(fields, source, held, options.seed + options.clips)
+    real = held.motion if derived is None else ready.again
     rates = [_rate(real, held), _rate(clips[0], held), _rate(noises[0], held)]
     return StyleFound(
         name=name,
@@ -191,7 +200,7 @@ def _style_found(palette: Palette, name: str, ready: _Ready, options: Options) -
         blinks_per_minute=(rates[0], rates[1], rates[2]),
         compared=tuple(_compared(trait, held, (real, clips, noises), options) for trait in traits_of(palette, learnt)),
         moving=_moving(palette, held, real, clips, noises),
-        long=long_run(fields, name, learnt, held, options.seed),
+        long=long_run(fields, name, learnt, held, options.seed) if derived is None else LongRun({}, {}),
     )
 
 

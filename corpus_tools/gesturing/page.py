@@ -66,9 +66,7 @@ def _style(found: StyleFound) -> list[str]:
         "<h3>Spectra, sound, seeds</h3>",
         _moving(found),
         _panels([panel_svg(power(found, one)) for one in found.moving]),
-        f"<h3>Clips of {MINUTES} minutes</h3>",
-        _long(found),
-        _panels([panel_svg(repetition(found, feature)) for feature in found.long.repeating]),
+        *_long(found),
     ]
 
 
@@ -143,7 +141,9 @@ def _near(found: StyleFound, one: Moving) -> str:
     return "met" if one.goes_with_sound else "missed"
 
 
-def _long(found: StyleFound) -> str:
+def _long(found: StyleFound) -> list[str]:
+    if not found.long.visited:
+        return []
     rows = [
         (
             feature,
@@ -154,9 +154,12 @@ def _long(found: StyleFound) -> str:
     ]
     after = [f"moments visited after {minutes} min" for minutes in VISITED_AFTER]
     likeness = [f"highest r from {FROM_S} s: {kind}" for kind in ("recordings", "speech", "silence")]
-    return table(("feature", *after, *likeness), rows, numbers=range(1, 7)) + _soft(
-        "A clip that runs in a loop is like itself (r = 1) at the loop's lag."
-    )
+    return [
+        f"<h3>Clips of {MINUTES} minutes</h3>",
+        table(("feature", *after, *likeness), rows, numbers=range(1, 7)),
+        _soft("A clip that runs in a loop is like itself (r = 1) at the loop's lag."),
+        _panels([panel_svg(repetition(found, feature)) for feature in found.long.repeating]),
+    ]
 
 
 def _panels(parts: Sequence[str]) -> str:

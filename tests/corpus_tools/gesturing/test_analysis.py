@@ -109,10 +109,12 @@ def test_a_field_is_nearer_than_noise(found):
 
 
 def test_long_clips_visit_more_and_more_and_do_not_repeat(found):
-    for style in found.styles:
-        for shares in style.long.visited.values():
-            assert 0 < shares[0] <= shares[1] <= shares[2] <= 1
-        assert all(len(one.speech) == 300 for one in style.long.repeating.values())
+    calm, quick = found.styles
+    assert len(calm.long.visited) == 3
+    for shares in calm.long.visited.values():
+        assert 0 < shares[0] <= shares[1] <= shares[2] <= 1
+    assert all(len(one.speech) == 300 for one in calm.long.repeating.values())
+    assert not quick.long.visited
 
 
 def test_targets_are_those_of_measured_styles(found):
