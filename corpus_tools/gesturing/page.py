@@ -74,7 +74,7 @@ def _origin(found: StyleFound) -> str:
     rates = " / ".join(number(rate, 1) for rate in found.blinks_per_minute)
     if found.source is not None:
         return _said(
-            f"Derived from {found.source}: {found.summary}.",
+            f"{found.summary[:1].upper()}{found.summary[1:]}.",
             f"Nobody recorded it: it is compared with what the field of {found.source} makes; no targets.",
             f"Blinks a minute, {found.source} / field / noise: {rates}.",
         )
