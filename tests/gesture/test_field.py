@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture.field import FieldOptions, FieldState, continued, field_of, resting, taken_over, walked
+from tts2face.gesture.field import FieldOptions, FieldState, begun, continued, field_of, resting, taken_over, walked
 from tts2face.gesture.tree import tree_of
 from tts2face.gesture.walk import APART, SLACK
 
@@ -202,3 +202,13 @@ def test_what_is_left_of_a_leap_is_a_critically_damped_spring():
         speed = np.diff(walk.values[leap - 2 : leap], axis=0) - np.diff(values[moment - 2 : moment], axis=0)
         left = walk.values[leap:following] - values[walk.moments[leap:following]]
         np.testing.assert_allclose(left, (place + (speed + omega * place) * k) * np.exp(-omega * k), atol=1e-4)
+
+
+@pytest.mark.parametrize("chance", [0.0, 0.5, 0.999])
+def test_a_clip_begins_as_a_recording_did(chance: float):
+    values, heard, lengths = _recordings(12)
+    made = field_of(values, heard, lengths, OPTIONS)
+    state = begun(made, chance)
+    start = 60 * int(chance * 12)
+    np.testing.assert_array_equal(state.shown, made.values[start : start + OPTIONS.history])
+    assert state.moment == start + OPTIONS.history - 1

@@ -10,8 +10,8 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.gesture.field import Field, FieldOptions, continued, field_of, resting, taken_over
-from tts2face.gesture.sound import SILENCE, drivers
+from tts2face.gesture.field import Field, FieldOptions, begun, continued, field_of, taken_over
+from tts2face.gesture.sound import drivers
 from tts2face.gesture.timeline import Timeline
 from tts2face.palette import FEATURES, GESTURE_FPS, Change, Palette, Style
 from tts2face.sampling import cubic_at
@@ -130,8 +130,7 @@ class _Track:
         self._chances = np.random.default_rng([seed, crc32(feature.encode())])
         self._source = fields.source(style, feature)
         made = fields.of(self._source, feature)
-        silence = SILENCE[: made.heard.shape[1]]
-        self._state = resting(made, middle_of(fields.palette.styles[self._source], feature), silence)
+        self._state = begun(made, self._chances.random())
         self._times: list[float] = []
         self._values = np.zeros((0, made.values.shape[1]), np.float32)
 

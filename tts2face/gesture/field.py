@@ -216,6 +216,16 @@ def resting(field: Field, rest: Floats, silence: Floats) -> FieldState:
     return FieldState(shown, heard, -1, np.zeros((2, len(rest)), np.float32), _none(field), 0)
 
 
+def begun(field: Field, chance: float) -> FieldState:
+    """The state after the first frames of one of the recordings; `chance` in [0, 1) tells which."""
+    history = field.options.history
+    first = np.sort(field.tree.order[field.tree.order - field.starts[field.tree.order] == history])
+    moment = int(first[int(chance * len(first))])
+    rows = slice(moment - history, moment)
+    nothing = np.zeros((2, field.values.shape[1]), np.float32)
+    return FieldState(field.values[rows].copy(), field.heard[rows].copy(), moment - 1, nothing, _none(field), 0)
+
+
 def taken_over(state: FieldState, before: Field, after: Field) -> FieldState:
     """The state of one style's field, from which another style's field of the same feature goes on."""
     shown = state.shown * np.float32(before.scale / after.scale)
