@@ -26,7 +26,8 @@ TEXTS = (
     "and that we should [nod] wait for them outside.",
 )
 FACES = ("head", "cartoon")
-SIDE, FPS, N_SHOWN = 240, 25.0, 10
+SIDE, FPS = 192, 25.0
+N_SHOWN, SHOWN = 10, 80  # frames of each clip on the sheet, pixels of each
 
 
 def main() -> None:
@@ -46,18 +47,17 @@ def _frames(clip: Path) -> list[Image.Image]:
     with av.open(str(clip)) as container:
         frames = [frame.to_image() for frame in container.decode(video=0)]
     wanted = np.linspace(FPS / 2, len(frames) - FPS / 2, N_SHOWN).astype(int)
-    box = (40, 20, 200, 200)
+    box = (32, 16, 160, 144)
     return [frames[number].crop(box) for number in wanted]
 
 
 def _sheet(rows: list[tuple[str, list[Image.Image]]]) -> Image.Image:
-    width, height = rows[0][1][0].size
-    sheet = Image.new("RGB", (N_SHOWN * width // 2, len(rows) * height // 2))
+    sheet = Image.new("RGB", (N_SHOWN * SHOWN, len(rows) * SHOWN))
     pen = ImageDraw.Draw(sheet)
     for row, (name, frames) in enumerate(rows):
         for column, frame in enumerate(frames):
-            sheet.paste(frame.resize((width // 2, height // 2)), (column * width // 2, row * height // 2))
-        pen.text((3, row * height // 2 + 2), name, fill="white")
+            sheet.paste(frame.resize((SHOWN, SHOWN)), (column * SHOWN, row * SHOWN))
+        pen.text((3, row * SHOWN + 2), name, fill="white")
     return sheet
 
 
