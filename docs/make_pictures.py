@@ -15,7 +15,8 @@ from lexicon.phones import ipa_to_arpabet
 from lexicon.sequence import SILENCE
 from tts2face.api import stream
 from tts2face.cast import cast
-from tts2face.face.file import face_path, identities_of, load_face
+from tts2face.face.file import identities_of, load_face
+from tts2face.files import named_file
 from tts2face.render.draw import draw, still
 from tts2face.render.picture import Picture
 from tts2face.request import Request
@@ -68,7 +69,7 @@ def clip_sheet() -> Image.Image:
 def faces_sheet() -> Image.Image:
     """The shipped faces and the identities of the head, at rest."""
     chosen: list[tuple[str, str | None]] = [("head", None), ("cartoon", None)]
-    chosen += [("head", name) for name in identities_of(face_path("head"))]
+    chosen += [("head", name) for name in identities_of(named_file("head", "face"))]
     pictures = []
     for name, identity in chosen:
         face = load_face(name, identity)

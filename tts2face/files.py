@@ -1,10 +1,12 @@
-"""Files that appear whole or not at all."""
+"""Files that appear whole or not at all, and those that are shipped."""
 
 import os
 import tempfile
 from pathlib import Path
 
-from lexicon.errors import BackendError
+from lexicon.errors import BackendError, InputError
+
+SHIPPED = Path(__file__).parent / "data"
 
 
 def write_whole(path: Path, content: bytes) -> None:
@@ -28,3 +30,20 @@ def write_whole(path: Path, content: bytes) -> None:
         raise BackendError(
             f"cannot write {path}: {refused.strerror}; free some space or choose another folder"
         ) from refused
+
+
+def named_file(name: str, kind: str) -> Path:
+    """Where a talker, face or palette lies: a shipped one by name, or a path.
+
+    Raises
+    ------
+    InputError
+        There is neither.
+    """
+    shipped = SHIPPED / f"{name}.{kind}"
+    if shipped.parent == SHIPPED and shipped.is_file():
+        return shipped
+    if Path(name).suffix or Path(name).exists():
+        return Path(name)
+    known = ", ".join(sorted(file.stem for file in SHIPPED.glob(f"*.{kind}")))
+    raise InputError(f"there is no {kind} {name!r}; give {known}, or the path of a .{kind} file")

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from tts2face.files import named_file
 from tts2face.tensors import read_tensors, write_tensors
 from tts2face.types import HEAD_CHANNELS
 
 KIND = "palette"
 FORMAT_VERSION = 1
 GESTURE_FPS = 30.0  # Ju and Lee 2008, section 3; every style is kept at this rate
-SHIPPED = Path(__file__).parent / "data"
 STEPS_PER_SPREAD = 2000.0  # of 16-bit integers: finer than any tracker's noise
 
 EXPRESSIONS = ("sad", "happy", "afraid", "angry", "surprised")  # neutral, the sixth, is the face at rest
@@ -226,14 +226,8 @@ def read_palette(path: Path) -> Palette:
 
 
 def load_palette(name: str) -> Palette:
-    """A shipped palette by name, or one from a ``.palette`` file; errors as `read_palette`."""
-    shipped = SHIPPED / f"{name}.palette"
-    if shipped.parent == SHIPPED and shipped.is_file():
-        return read_palette(shipped)
-    if Path(name).suffix or Path(name).exists():
-        return read_palette(Path(name))
-    known = ", ".join(sorted(file.stem for file in SHIPPED.glob("*.palette")))
-    raise InputError(f"there is no palette {name!r}; give {known}, or the path of a .palette file")
+    """A shipped palette by name, or one from a ``.palette`` file; errors as `named_file` and `read_palette`."""
+    return read_palette(named_file(name, KIND))
 
 
 def _assembled(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> Palette:

@@ -12,6 +12,7 @@ from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.appearance import STEPS_PER_LOOK, Appearance, appearance_arrays, appearance_of
 from tts2face.drives import Drive, drive_arrays, drives_of
+from tts2face.files import named_file
 from tts2face.tensors import read_tensors, write_tensors
 from tts2face.types import HEAD_CHANNELS, Trajectory
 from tts2face.window_network import WindowNetwork, network_arrays, network_of
@@ -19,7 +20,6 @@ from tts2face.window_network import WindowNetwork, network_arrays, network_of
 KIND = "talker"
 FORMAT_VERSION = 1
 STEPS_PER_SPREAD = 2000.0
-SHIPPED = Path(__file__).parent / "data"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -192,14 +192,8 @@ def read_talker(path: Path) -> Talker:
 
 
 def load_talker(name: str) -> Talker:
-    """A shipped talker by name, or one from a ``.talker`` file; errors as `read_talker`."""
-    shipped = SHIPPED / f"{name}.talker"
-    if shipped.parent == SHIPPED and shipped.is_file():
-        return read_talker(shipped)
-    if Path(name).suffix or Path(name).exists():
-        return read_talker(Path(name))
-    known = ", ".join(sorted(file.stem for file in SHIPPED.glob("*.talker")))
-    raise InputError(f"there is no talker {name!r}; give {known}, or the path of a .talker file")
+    """A shipped talker by name, or one from a ``.talker`` file; errors as `named_file` and `read_talker`."""
+    return read_talker(named_file(name, KIND))
 
 
 def _assembled(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> Talker:

@@ -17,7 +17,8 @@ from corpus_tools.dense.seen import resting_landmarks, seen_in, videos_of
 from corpus_tools.dense.warp import N_MESH, aligned, fitting, landmarks_of, settled
 from corpus_tools.effort import Effort, Progress
 from corpus_tools.watch import Eyes
-from tts2face.face.file import face_path, read_face, write_face
+from tts2face.face.file import read_face, write_face
+from tts2face.files import named_file
 from tts2face.video.model import find_bundle
 
 HEAD = "head"  # the shipped face that is adapted
@@ -70,7 +71,7 @@ def build_face(
     eyes = Eyes(effort.folder(), find_bundle(effort.model))
     report = on_progress or (lambda done, of: None)
     seen = seen_in(videos, eyes, lambda done, of: report(done, 2 * of))
-    head = read_face(face_path(HEAD))
+    head = read_face(named_file(HEAD, "face"))
     talker = resting_landmarks(seen)
     rest = landmarks_of(head, head.vertices)[:N_MESH]
     target = aligned(talker, rest)

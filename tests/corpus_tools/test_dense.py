@@ -17,9 +17,10 @@ from corpus_tools.dense.seen import videos_of
 from corpus_tools.dense.warp import N_MESH, OPEN_JAW, aligned, landmarks_of, part_vertices
 from corpus_tools.effort import Effort
 from lexicon.errors import DataError, InputError
-from tts2face.face.file import face_path, read_face
+from tts2face.face.file import read_face
 from tts2face.face.linear import posed_vertices
 from tts2face.face.model import Face
+from tts2face.files import named_file
 from tts2face.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
 
 LIPS_MM = 0.5  # facing lips that are nearer touch
@@ -27,7 +28,7 @@ LIPS_MM = 0.5  # facing lips that are nearer touch
 
 @pytest.fixture(scope="module")
 def head() -> Face:
-    return read_face(face_path("head"))
+    return read_face(named_file("head", "face"))
 
 
 @pytest.fixture(scope="module")

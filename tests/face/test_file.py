@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.file import Identity, face_path, identities_of, load_face, read_face, write_face
+from tts2face.face.file import Identity, identities_of, load_face, read_face, write_face
 from tts2face.face.linear import posed_vertices
 from tts2face.face.model import Eye, Face, Part
+from tts2face.files import named_file
 from tts2face.tensors import write_tensors
 
 N = 40
@@ -105,7 +106,7 @@ def test_an_unknown_identity_is_refused_with_those_there_are(written: tuple[Face
 
 def test_an_unknown_name_is_refused() -> None:
     with pytest.raises(InputError, match="there is no face 'nobody'"):
-        face_path("nobody")
+        named_file("nobody", "face")
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:

@@ -49,7 +49,7 @@ class SynthesisOptions:
     precision: float = 1.5
     align: bool = True
     network: float = 0.5
-    articulation: float = 1.12
+    articulation: float = 1.14
     smoothing_s: float = 0.01
     contacts: bool = True
 

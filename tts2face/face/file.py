@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.face.model import Eye, Face, Part
+from tts2face.files import named_file
 from tts2face.tensors import read_tensors, write_tensors
 
 KIND = "face"
@@ -18,7 +19,6 @@ FORMAT_VERSION = 1
 STEPS_PER_SHAPE = 32000.0  # a shape's largest displacement in 16-bit steps: below 0.002 mm for 60 mm
 JPEG_QUALITY = 92
 LIGHTENED = 150  # a tint lightens texels up to this and no further: skin at the edge of dark hair stays skin
-SHIPPED = Path(__file__).parents[1] / "data"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,26 +109,9 @@ def identities_of(path: Path) -> dict[str, str]:
     return {name: summary for name, _, summary in header["identities"]}
 
 
-def face_path(name: str) -> Path:
-    """Where a face lies: a shipped one by name, or a path.
-
-    Raises
-    ------
-    InputError
-        There is neither.
-    """
-    shipped = SHIPPED / f"{name}.face"
-    if shipped.parent == SHIPPED and shipped.is_file():
-        return shipped
-    if Path(name).suffix or Path(name).exists():
-        return Path(name)
-    known = ", ".join(sorted(file.stem for file in SHIPPED.glob("*.face")))
-    raise InputError(f"there is no face {name!r}; give {known}, or the path of a .face file")
-
-
 def load_face(name: str, identity: str | None = None) -> Face:
-    """A shipped face by name (head, cartoon), or one from a file; errors as `face_path` and `read_face`."""
-    return read_face(face_path(name), identity)
+    """A shipped face by name (head, cartoon), or one from a file; errors as `named_file` and `read_face`."""
+    return read_face(named_file(name, KIND), identity)
 
 
 def _steps(values: NDArray[np.floating]) -> tuple[NDArray[np.int16], float]:
