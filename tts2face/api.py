@@ -253,6 +253,7 @@ def write_clip(
     """
     checked_output(out)
     of = _steps(request)
+    ready.living(request)  # before two threads want it
     marks: list[Reached] = []
     before, seconds, n_frames = 0, 0.0, 0
     piece_length, given_before = 0, 0

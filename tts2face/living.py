@@ -1,6 +1,7 @@
 """Gestures laid over speech: what a request asks for, over the whole of its clip."""
 
 from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,8 +49,12 @@ class Life:
         self._asked.check_styles(palette)
         if isinstance(living.face, OwnGestures):
             _refuse_still(self._asked.gains.factors)
-        kind = NoiseStream if request.noise else GestureStream
-        self._stream = kind(living.fields, style=usual_style(palette), seed=request.seed, fps=fps)
+        kind: type[NoiseStream] | type[GestureStream] = NoiseStream if request.noise else GestureStream
+        starter = ThreadPoolExecutor(1)  # fields take half a second to make, in which a voice can be loaded and speak
+        self._stream: Future[GestureStream | NoiseStream] = starter.submit(
+            kind, living.fields, style=usual_style(palette), seed=request.seed, fps=fps
+        )
+        starter.shutdown(wait=False)
         self._marked = Timeline()
         self._seconds = 0.0
 
@@ -66,7 +71,7 @@ class Life:
         self._marked = self._marked.within(self._seconds - 1.0, np.inf).merged(marks)  # a nod runs on for half a second
         timeline = self._asked.merged(self._marked)
         self._seconds += len(lips) / lips.fps
-        gestures = _seen_from_the_head(self._stream.next(speech.waveform, len(lips), timeline))
+        gestures = _seen_from_the_head(self._stream.result().next(speech.waveform, len(lips), timeline))
         gains = {name: timeline.gains.of(name) for name in SPEECH_GAINS}
         face = self._living.face
         if isinstance(face, OwnGestures):

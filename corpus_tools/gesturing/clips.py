@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from corpus_tools.gesturing.measures import recordings
 from lexicon.errors import InputError
-from tts2face.gesture.animate import Fields, middle_of
-from tts2face.gesture.field import resting, walked
+from tts2face.gesture.animate import Fields
+from tts2face.gesture.field import begun, walked
 from tts2face.gesture.noise import NoiseStream
-from tts2face.gesture.sound import SILENCE
 from tts2face.gesture.timeline import Timeline
 from tts2face.palette import GESTURE_FPS, Palette, Style
 from tts2face.sampling import cubic_at
@@ -73,9 +72,9 @@ def from_field(fields: Fields, style: str, feature: str, intensity: Floats, seed
     made = fields.of(source, feature)
     times = np.arange(0.0, len(intensity) * tempo + 2)  # in frames of the field; two more for the cubic
     heard = np.interp(times / tempo, np.arange(len(intensity)), intensity).astype(np.float32)[:, None]
-    chances = np.random.default_rng([seed, crc32(feature.encode())]).random(len(heard))
-    start = resting(made, middle_of(fields.palette.styles[source], feature), SILENCE[: made.heard.shape[1]])
-    walk = walked(made, start, heard, chances)
+    generator = np.random.default_rng([seed, crc32(feature.encode())])  # as `tts2face.gesture.animate` draws
+    start = begun(made, generator.random())
+    walk = walked(made, start, heard, generator.random(len(heard)))
     values = walk.values[: len(intensity)]
     if tempo != 1.0:
         values = cubic_at(walk.values, tempo * np.arange(len(intensity), dtype=np.float64))

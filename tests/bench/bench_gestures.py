@@ -13,9 +13,8 @@ import numpy as np
 
 from corpus_tools.gesturing.clips import some_of, with_source
 from corpus_tools.gesturing.measures import recordings
-from tts2face.gesture.animate import Fields, middle_of
-from tts2face.gesture.field import Field, FieldState, continued, resting
-from tts2face.gesture.sound import SILENCE
+from tts2face.gesture.animate import Fields
+from tts2face.gesture.field import Field, FieldState, begun, continued
 from tts2face.palette import GESTURE_FPS, Palette, Style, load_palette
 
 SECONDS = 120
@@ -66,8 +65,7 @@ def timed(palette: Palette, name: str, heard: np.ndarray) -> Timed:
         began = time.process_time()
         made = fields.of(name, feature)
         made_s[feature] = time.process_time() - began
-        start = resting(made, middle_of(palette.styles[name], feature), SILENCE[:1])
-        frames[feature] = frame_us(made, start, heard)
+        frames[feature] = frame_us(made, begun(made, 0.5), heard)
     return Timed(frames, made_s)
 
 

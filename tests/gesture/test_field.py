@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture.field import FieldOptions, FieldState, begun, continued, field_of, resting, taken_over, walked
+from tts2face.gesture.field import Field, FieldOptions, FieldState, begun, continued, field_of, taken_over, walked
 from tts2face.gesture.tree import tree_of
 from tts2face.gesture.walk import APART, SLACK
 
@@ -18,6 +18,16 @@ def _recordings(seed: int, n: int = 12, length: int = 60) -> tuple[np.ndarray, n
     smooth = np.stack([np.convolve(row, np.hanning(9), "same") for row in steps.transpose(0, 2, 1).reshape(-1, length)])
     whole = smooth.reshape(n, 3, length).transpose(0, 2, 1).reshape(-1, 3).astype(np.float32)
     return whole[:, :2], whole[:, 2:], np.full(n, length, np.int32)
+
+
+def resting(made: Field, rest: np.ndarray, silence: np.ndarray) -> FieldState:
+    """The state of a face that has been at rest (D,) in silence (E,)."""
+    history = made.options.history
+    shown = np.repeat((rest / np.float32(made.scale))[None], history, axis=0).astype(np.float32)
+    heard = np.repeat((silence * made.weights)[None], history, axis=0).astype(np.float32)
+    n_leaps = min(made.options.memory, len(made.tree.order) // (8 * APART))
+    recent = np.full(n_leaps, -APART, np.int64)
+    return FieldState(shown, heard, -1, np.zeros((2, len(rest)), np.float32), recent, 0)
 
 
 def _brute_force(made, state, n_best: int) -> list[int]:

@@ -208,14 +208,6 @@ def _none(made: Field) -> NDArray[np.int64]:
     return np.full(min(made.options.memory, len(made.tree.order) // (8 * APART)), -APART, np.int64)
 
 
-def resting(field: Field, rest: Floats, silence: Floats) -> FieldState:
-    """The state of a face that has been at rest (D,) in silence (E,), in the units of the recordings."""
-    history = field.options.history
-    shown = np.repeat((rest / np.float32(field.scale))[None], history, axis=0).astype(np.float32)
-    heard = np.repeat((silence * field.weights)[None], history, axis=0).astype(np.float32)
-    return FieldState(shown, heard, -1, np.zeros((2, len(rest)), np.float32), _none(field), 0)
-
-
 def begun(field: Field, chance: float) -> FieldState:
     """The state after the first frames of one of the recordings; `chance` in [0, 1) tells which."""
     history = field.options.history
