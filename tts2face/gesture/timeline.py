@@ -28,7 +28,9 @@ from tts2face.gesture.spans import (
 from tts2face.palette import EXPRESSIONS, Palette
 
 BLEND_S = 0.3  # from one style to the next: as long as a blink, so that no seam is seen
-ONSET_S = 0.4  # of an expression; people take 0.3-0.7 s to a smile (Schmidt et al. 2003, J. Nonverbal Behavior 27)
+# Of an expression: a smile's onset takes about as long whatever the occasion (Schmidt, Cohn and Tian 2003, Biological
+# Psychology 65); faster than this, moods that change within speech begin to look like pops.
+ONSET_S = 0.6
 # A nod: down within 0.18 s, back, a little beyond, and to rest. About 2 Hz, the ordinary head movements of speakers
 # (1.8-3.7 Hz: Hadar et al. 1983, Human Movement Science 2); seconds, and shares of NOD_RAD.
 NOD_KEYS = ((0.0, 0.0), (0.18, 1.0), (0.42, -0.1), (0.55, 0.0))
@@ -91,13 +93,16 @@ class Timeline:
         )
 
     def style_shares(self, feature: str, times: ArrayLike, *, default: str) -> dict[str, Floats]:
-        """Share (T,) of each style in a feature at T times; they add up to 1, and blend over `BLEND_S` at edges."""
+        """Share (T,) of each style in a feature at T times; they add up to 1, and blend at edges.
+
+        Over `BLEND_S`; expressions, which are slow, over `ONSET_S`.
+        """
         seconds = np.atleast_1d(np.asarray(times, np.float64))
         base = self.style.get(check_feature(feature), default)
         shares = {base: np.ones(len(seconds))}
         for span in self.spans:
             if span.feature == feature:
-                share = presence(seconds, span.start, span.end, BLEND_S)
+                share = presence(seconds, span.start, span.end, ONSET_S if feature == "expression" else BLEND_S)
                 shares[base] = shares[base] - share
                 shares[span.style] = shares.get(span.style, np.zeros(len(seconds))) + share
         return {style: np.clip(share, 0.0, 1.0) for style, share in shares.items()}
