@@ -72,7 +72,7 @@ def evaluated(
     from corpus_tools.effort import Effort
 
     result, runs = _measured(asked, beside, Effort(*effort))
-    print(result.table())  # noqa: T201 - the answer
+    print(f"{result.table()}\n\n{result.class_table()}")  # noqa: T201 - the answer
     if out is not None:
         _write(out, result, runs)
         kind = "of somebody else" if result.is_across else "held out"

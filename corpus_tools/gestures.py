@@ -1,7 +1,7 @@
 """Recordings of one person in one mood become a style of a palette."""
 
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,9 +16,11 @@ from corpus_tools.decompose.captured import Captured
 from corpus_tools.decompose.decompose import Parts, as_counted, taken_apart
 from corpus_tools.decompose.derived import derived_styles
 from corpus_tools.decompose.face_motion import rest_landmarks
+from corpus_tools.decompose.marker_set import read_marker_set
+from corpus_tools.decompose.markers import marker_face
 from corpus_tools.decompose.palette import with_style
 from corpus_tools.decompose.sources import CAPTURE_SUFFIXES, Worn, captured_file
-from corpus_tools.decompose.stills import NEUTRAL, PictureReader, Still
+from corpus_tools.decompose.stills import NEUTRAL, PictureReader, Still, marker_reader
 from corpus_tools.decompose.video import captured_video
 from corpus_tools.decompose.weights import Estimator, least_squares, nearest_samples
 from corpus_tools.effort import Effort, Progress, Stages, no_stages
@@ -151,8 +153,27 @@ def basis_of(recorded: Recorded, captured: Sequence[Captured], face: Face) -> Ba
     """
     rest = rest_of(captured)
     if recorded.stills:
-        return captured_basis(recorded.stills, PictureReader(), rest=None if NEUTRAL in recorded.stills else rest)
+        known = None if NEUTRAL in recorded.stills else rest
+        return captured_basis(recorded.stills, reader_of(recorded, face), rest=known)
     return carried_basis(expression_landmarks(face), rest_landmarks(face), rest)
+
+
+def reader_of(recorded: Recorded, face: Face) -> Callable[[Still], NDArray[np.float64]]:
+    """What reads the stills: the tracker, or for markers the person's markers at rest.
+
+    Raises
+    ------
+    InputError
+        Some stills are markers and some are not, or no markers at rest are known.
+    """
+    are_markers = {still.is_markers for still in recorded.stills.values()}
+    if are_markers == {False}:
+        return PictureReader()
+    at_rest = recorded.worn.neutral or (recorded.stills[NEUTRAL].path if NEUTRAL in recorded.stills else None)
+    if are_markers != {True} or at_rest is None:
+        raise InputError("stills of markers need each other and the person at rest; give all as markers, with neutral")
+    worn = read_marker_set(recorded.worn.markers)
+    return marker_reader(marker_face(at_rest, face, worn, fps=recorded.worn.fps))
 
 
 def rest_of(captured: Sequence[Captured]) -> NDArray[np.float64]:

@@ -81,11 +81,6 @@ class MarkedText:
     language: str | None = None
 
     @property
-    def is_plain(self) -> bool:
-        """Nothing is marked."""
-        return self.runs == (Run(0),) and not self.marks and self.language is None
-
-    @property
     def changes_voice(self) -> bool:
         """A pause, speed or loudness is marked: what only a voice that has not spoken yet can do."""
         spoken_alike = all(run.rate == run.volume == 1.0 for run in self.runs)

@@ -127,11 +127,6 @@ def closure_threshold(real_least: Values) -> float:
     return float(np.quantile(real_least, CLOSURE_SHARE)) if len(real_least) else 0.0
 
 
-def share_below(openings: Values, threshold: float) -> float:
-    """Share of openings at or below a threshold; 0 where there are none."""
-    return float(np.mean(openings <= threshold)) if len(openings) else 0.0
-
-
 def peak_times(opening: Values, phones: PhoneSequence, fps: float) -> NDArray[np.float64]:
     """Seconds at which the lips are widest apart in each open vowel, `PEAK_MARGIN_S` either side; between frames.
 

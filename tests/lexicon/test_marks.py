@@ -16,7 +16,6 @@ PLAIN = st.text(st.characters(blacklist_characters="[]<"))
 @given(st.text(st.characters(blacklist_characters="[<")))
 def test_text_without_marks_is_itself(text: str) -> None:
     assert marked(text) == MarkedText(text)
-    assert marked(text).is_plain
 
 
 @pytest.mark.parametrize(

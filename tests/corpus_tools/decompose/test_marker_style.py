@@ -1,0 +1,61 @@
+"""A marker recording with marker stills becomes a style, from end to end."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from corpus_tools.decompose.face_motion import moved_landmarks
+from corpus_tools.decompose.marker_set import MarkerSet
+from corpus_tools.decompose.sources import Worn
+from corpus_tools.decompose.stills import Still, stills_in
+from corpus_tools.effort import Effort
+from corpus_tools.gestures import Recorded, build_style
+from lexicon.errors import InputError
+from tests.corpus_tools.decompose.made_markers import Made, made_take, write_c3d, write_table
+from tts2face.face.expressions import expression_weights, expressive
+from tts2face.face.model import Face
+from tts2face.face.mouth import mouth_of
+from tts2face.palette import EXPRESSIONS, load_palette, read_palette
+from tts2face.types import Trajectory
+
+
+@pytest.fixture
+def recorded(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> Recorded:
+    """Four seconds of markers at 120 frames a second with sound, and a folder of static captures."""
+    whole = expressive(face)
+    shown = expression_weights(whole, mouth_of(whole))[:, : len(face.shape_names)]
+    weights = np.concatenate([np.zeros((1, shown.shape[1])), shown])
+    stills = made_take(moved_landmarks(face, Trajectory(face.shape_names, weights, 30.0)), np.zeros((6, 6)), face, worn)
+    folder = tmp_path / "stills"
+    folder.mkdir()
+    for row, name in enumerate(("neutral", *EXPRESSIONS)):
+        write_table(folder / f"{name}.csv", stills.names, stills.points[row : row + 1].repeat(3, axis=0))
+    pytest.importorskip("ezc3d", reason="needs the extra [capture]")
+    sound = 0.2 * np.sin(np.arange(len(made.points) * 100) / 8.0)
+    write_c3d(tmp_path / "take.c3d", made.names, made.points, sound=sound)
+    worn_how = Worn(neutral=folder / "neutral.csv")
+    return Recorded(recordings=tmp_path / "take.c3d", stills=stills_in(folder), worn=worn_how)
+
+
+def test_markers_and_their_stills_become_a_style(recorded: Recorded, made: Made, tmp_path: Path) -> None:
+    out = tmp_path / "worn.palette"
+    built = build_style(recorded, "worn", out, base=load_palette("starter"), effort=Effort(tmp_path / "cache", 1))
+    style = read_palette(out).styles["worn"]
+    assert (built.n_kept, int(style.lengths.sum())) == (1, 120)
+    assert "gaze" not in style.motion
+    assert style.intensity.max() > -5
+    true = made.head[::4, 1] - np.median(made.head[::4, 1])
+    np.testing.assert_allclose(style.motion["head"][5:-5, 1], true[5:-5], atol=0.015)  # radians; smoothed at the ends
+    raised = made.landmarks[::4, [105, 334], 1].mean(axis=1)
+    modes = read_palette(out).regions["brows"]
+    moved = np.einsum("tk,klc->tlc", style.motion["brows"], modes.modes)[..., 1].mean(axis=1)
+    assert np.corrcoef(moved[10:-10], raised[10:-10])[0, 1] > 0.6  # the rest is in the expressions
+
+
+def test_stills_of_two_kinds(recorded: Recorded, tmp_path: Path) -> None:
+    mixed = {**recorded.stills, "sad": Still(tmp_path / "sad.png")}
+    with pytest.raises(InputError, match="stills of markers need each other and the person at rest"):
+        build_style(replace(recorded, stills=mixed), "x", tmp_path / "x.palette", base=None, effort=Effort(tmp_path, 1))
+    assert not (tmp_path / "x.palette").exists()
