@@ -1,0 +1,90 @@
+"""Measure the starter palette's measured style on held-out recordings and write the tables of gestures.md.
+
+Run: python docs/make_gestures.py
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+from corpus_tools.gesturing.analysis import Compared, Options, StyleFound, study
+from tts2face.palette import load_palette
+
+PAGE = Path(__file__).with_name("gestures.md")
+
+
+def distances(found: StyleFound) -> str:
+    """Markdown table of all traits, those with a target first and in bold."""
+    heads = ("trait", "unit", "n", "recorded, mean", "field", "noise", "W halves", "W field", "W noise")
+    lines = _headed((*heads, "field / halves", "field / noise"))
+    for one in sorted(found.compared, key=lambda one: not one.trait.has_target):
+        lines.append(_line(one))
+    return "\n".join(lines)
+
+
+def _line(one: Compared) -> str:
+    means = (float(values.mean()) for values in (one.real, one.field, one.noise))
+    near = [f"{one.to_field / one.halves:.2f}", f"{one.to_field / one.to_noise:.2f}"]
+    mark = "**" if one.trait.has_target else ""
+    cells = (
+        f"{mark}{one.trait.name}{mark}",
+        one.trait.unit,
+        str(len(one.real)),
+        *(f"{mean:.3g}" for mean in means),
+        *(f"{away:.3f}" for away in (one.halves, one.to_field, one.to_noise)),
+        *(f"{mark}{share}{mark}" for share in near),
+    )
+    return f"| {' | '.join(cells)} |"
+
+
+def movements(found: StyleFound) -> str:
+    """Markdown table of sound, spectra, seeds and long clips, by feature."""
+    lines = _headed(
+        (
+            "feature",
+            "r of speed with intensity: recorded",
+            "field",
+            "noise",
+            "power above 6 Hz, of recorded",
+            "diversity",
+            "visited in 1 / 3 / 10 min",
+            "highest autocorrelation, speech / silence",
+        )
+    )
+    moving = {one.feature: one for one in found.moving}
+    for feature, visited in found.long.visited.items():
+        cells = [""] * 5
+        if feature in moving:
+            one = moving[feature]
+            cells = [*(f"{r:.2f}" for r in one.with_intensity), f"{one.fast[0]:.2f}", f"{one.diversity[0]:.2f}"]
+        shares = " / ".join(f"{100 * share:.0f}" for share in visited)
+        _, speech, silence = found.long.repeating[feature].highest
+        lines.append(f"| {feature} | {' | '.join(cells)} | {shares} % | {speech:.2f} / {silence:.2f} |")
+    return "\n".join(lines)
+
+
+def blinks(found: StyleFound) -> str:
+    """A line on how often lids shut."""
+    real, field, noise = found.blinks_per_minute
+    return f"Blinks a minute: {real:.1f} recorded, {field:.1f} by the field, {noise:.1f} by noise."
+
+
+def _headed(names: tuple[str, ...]) -> list[str]:
+    return [f"| {' | '.join(names)} |", "| --- |" + " --- |" * (len(names) - 1)]
+
+
+def main() -> None:
+    """Measure and write."""
+    palette = replace(load_palette("starter"), derivations={})
+    (found,) = study("starter", palette, Options()).styles
+    page = PAGE.read_text(encoding="utf-8")
+    tables = {"distances": distances(found), "blinks": blinks(found), "movements": movements(found)}
+    for name, table in tables.items():
+        begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
+        before, _, rest = page.partition(begin)
+        _, _, behind = rest.partition(end)
+        page = f"{before}{begin}{table}\n{end}{behind}"
+    PAGE.write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
