@@ -86,11 +86,7 @@ class Request:
         if self.idle is not None:
             _check("idle", self.idle, IDLE_S)
             _check_idle(self)
-        if not self.gestures and (self.style, self.gain, self.expression, self.timeline) != (None, None, None, None):
-            raise InputError(
-                "without gestures there is nothing to style; leave --style, --gain, --expression and "
-                "--timeline away, or --no-gestures"
-            )
+        _check_gestures(self)
 
 
 def _check_drive(request: Request) -> None:
@@ -100,6 +96,17 @@ def _check_drive(request: Request) -> None:
         raise InputError("a drive follows a recording; give one with --audio, or leave --drive away")
     if request.text.strip():
         raise InputError("where the words are known the lips follow them; leave --drive or the text away")
+
+
+def _check_gestures(request: Request) -> None:
+    if request.noise and request.pitch:
+        raise InputError("noise hears no voice; leave --pitch or --noise away")
+    asked = (request.style, request.gain, request.expression, request.timeline, request.noise, request.pitch)
+    if not request.gestures and asked != (None, None, None, None, False, False):
+        raise InputError(
+            "without gestures there is nothing to style; leave --style, --gain, --expression, --timeline, --noise and "
+            "--pitch away, or --no-gestures"
+        )
 
 
 def _check_idle(request: Request) -> None:

@@ -156,6 +156,8 @@ def test_what_cannot_be_said_is_refused(change: dict, reason: str, talker: Talke
         ({"idle": 5.0, "text": "", "voice": "espeak"}, "says nothing; leave --voice, --rate and --volume away"),
         ({"idle": 0.0, "text": ""}, "idle must lie between 0.1 and 3600, not 0"),
         ({"gestures": False, "style": "calm"}, "without gestures there is nothing to style"),
+        ({"gestures": False, "pitch": True}, "without gestures there is nothing to style"),
+        ({"noise": True, "pitch": True}, "noise hears no voice; leave --pitch or --noise away"),
     ],
 )
 def test_options_out_of_range_are_refused(change: dict, reason: str) -> None:
