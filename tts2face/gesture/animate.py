@@ -105,9 +105,9 @@ class GestureStream:
         begin = self._n_frames / self._fps
         times = (self._n_frames + np.arange(n_frames)) / self._fps
         self._n_frames += n_frames
-        made = {}
+        made, heard = {}, _Heard(sound, begin, with_pitch=self._fields.with_pitch)
         for name, track in self._tracks.items():
-            track.go_on(sound, begin, float(times[-1]), timeline)
+            track.go_on(heard, float(times[-1]), timeline)
             made[name] = painted(name, track.at(times, timeline), times, timeline)
         return made
 
@@ -122,6 +122,21 @@ def painted(feature: str, values: Floats, times: NDArray[np.float64], timeline: 
     return values
 
 
+class _Heard:
+    """What a sound that begins at an instant tells; features on the same clock measure it once."""
+
+    def __init__(self, sound: Waveform, begin: float, *, with_pitch: bool) -> None:
+        self._sound, self._begin, self._with_pitch = sound, begin, with_pitch
+        self._found: dict[bytes, Floats] = {}
+
+    def at(self, times: NDArray[np.float64]) -> Floats:
+        """(T, 1 or 2) as `drivers`."""
+        key = times.tobytes()
+        if key not in self._found:
+            self._found[key] = drivers(self._sound, times - self._begin, with_pitch=self._with_pitch)
+        return self._found[key]
+
+
 class _Track:
     """One feature of a clip: frames of its fields on a clock that runs at the style's tempo."""
 
@@ -134,10 +149,9 @@ class _Track:
         self._times: list[float] = []
         self._values = np.zeros((0, made.values.shape[1]), np.float32)
 
-    def go_on(self, sound: Waveform, begin: float, end: float, timeline: Timeline) -> None:
-        """Add frames up to `BEYOND` an instant; the sound begins at `begin`."""
+    def go_on(self, sound: "_Heard", end: float, timeline: Timeline) -> None:
+        """Add frames up to `BEYOND` an instant."""
         first = len(self._times)
-        styles = []
         while len(self._times) <= BEYOND or self._times[-1 - BEYOND] <= end:
             tempo = 1.0
             if self._times:
@@ -151,7 +165,7 @@ class _Track:
             self._fields.source(style, self._feature)
             for style in timeline.style_at(self._feature, new, default=self._style)
         ]
-        heard = drivers(sound, new - begin, with_pitch=self._fields.with_pitch)
+        heard = sound.at(new)
         chances = self._chances.random(len(new))
         borders = [0, *(i for i in range(1, len(new)) if styles[i] != styles[i - 1]), len(new)]
         parts = [self._drawn(styles[low], heard[low:high], chances[low:high]) for low, high in pairwise(borders)]
