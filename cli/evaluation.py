@@ -11,11 +11,11 @@ from cli.progress import progress_bar, say
 from lexicon.errors import InputError
 
 if TYPE_CHECKING:
-    from corpus_tools.effort import Effort
     from corpus_tools.evaluation.evaluate import Run
     from corpus_tools.evaluation.splits import Parts
     from corpus_tools.evaluation.tables import Evaluation
-    from corpus_tools.observation import Observation
+    from corpus_tools.recordings.observation import Observation
+    from corpus_tools.run_options import Effort
     from tts2face.voice.engine import Voice
 
 SUFFIXES = (".html", ".json", ".csv")
@@ -69,7 +69,7 @@ def evaluated(
         raise InputError("--cross-talker takes no --tracks and no --own-durations; measure them on the talker's own")
     if out is not None and out.suffix not in SUFFIXES:
         raise InputError(f"an evaluation is written as {', '.join(SUFFIXES)}, not {out.name}")
-    from corpus_tools.effort import Effort
+    from corpus_tools.run_options import Effort
 
     result, runs = _measured(asked, beside, Effort(*effort))
     print(f"{result.table()}\n\n{result.class_table()}")  # noqa: T201 - the answer
@@ -103,7 +103,7 @@ def _voice() -> "Voice":
 
 
 def _somebody_else(recordings: Path, effort: "Effort") -> "tuple[Observation, ...]":
-    from corpus_tools.evaluation.capture import SUFFIX, captured
+    from corpus_tools.evaluation.livelink_reference import SUFFIX, captured
 
     return captured(recordings, effort) if recordings.suffix == SUFFIX else _observations(recordings, effort)
 
@@ -124,7 +124,7 @@ def _parts(asked: Asked, effort: "Effort") -> "tuple[Parts, ...]":
 
 
 def _observations(folder: Path, effort: "Effort") -> "tuple[Observation, ...]":
-    from corpus_tools.observe import observe
+    from corpus_tools.recordings.observe import observe
 
     with progress_bar(f"reading {folder.name}") as on_progress:
         found = observe(folder, effort=effort, on_progress=on_progress)
@@ -134,7 +134,7 @@ def _observations(folder: Path, effort: "Effort") -> "tuple[Observation, ...]":
 
 
 def _write(out: Path, result: "Evaluation", runs: "tuple[Run, ...]") -> None:
-    from tts2face.files import write_whole
+    from tts2face.models.files import write_whole
 
     if out.suffix == ".json":
         write_whole(out, json.dumps(result.to_json(), indent=1).encode())

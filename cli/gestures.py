@@ -42,12 +42,12 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
 ) -> None:
     """Learn how a person moves beside the lips, from recordings without transcripts: a style for `--palette`."""
     check_suffix(out, "palette")
-    from corpus_tools.decompose.marker_set import SHIPPED
-    from corpus_tools.decompose.sources import Worn
-    from corpus_tools.decompose.stills import named_stills, stills_in
-    from corpus_tools.effort import Effort, no_stages
-    from corpus_tools.gestures import Recorded, build_style
-    from tts2face.palette import load_palette
+    from corpus_tools.build_palette import Recorded, build_style
+    from corpus_tools.decomposition.capture_files import Worn
+    from corpus_tools.decomposition.marker_set import SHIPPED
+    from corpus_tools.decomposition.stills import named_stills, stills_in
+    from corpus_tools.run_options import Effort, no_stages
+    from tts2face.models.palette import load_palette
 
     shown = (stills_in(stills) if stills is not None else {}) | named_stills(still or [])
     worn = Worn(markers or SHIPPED, neutral, marker_rate)

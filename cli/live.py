@@ -11,9 +11,9 @@ if TYPE_CHECKING:
 
 def live(source: str, face: str, identity: str | None, picture: "Picture", model: Path | None) -> None:
     """Show a head that does what the person before the camera does, until the window is closed."""
-    from tts2face.face.file import load_face
-    from tts2face.live import LEARNING_S, Actor
-    from tts2face.render.view import Mirror, require_display
+    from tts2face.models.face_file import load_face
+    from tts2face.render.window import Mirror, require_display
+    from tts2face.synthesis.live_capture import LEARNING_S, Actor
     from tts2face.video.camera import Camera
 
     require_display("--camera")

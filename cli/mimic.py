@@ -12,11 +12,11 @@ from cli.progress import progress_bar, say
 from lexicon.errors import InputError
 
 if TYPE_CHECKING:
-    from tts2face.mimic import Motion
     from tts2face.render.draw import AnyStage
     from tts2face.render.picture import Picture
+    from tts2face.synthesis.performance import Motion
     from tts2face.types import Waveform
-    from tts2face.video.perform import Take
+    from tts2face.video.take import Take
 
 OWN, CAPTURE = "self", ".csv"
 SOUND_RATE = 48000  # Hz
@@ -71,7 +71,7 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     with progress_bar("watching", quiet) as on_progress:
         motion, stage = _capture(wanted) if take.suffix.lower() == CAPTURE else _film(wanted, model, on_progress)
     if fps is not None or take.suffix.lower() == CAPTURE:
-        from tts2face.mimic import at_rate
+        from tts2face.synthesis.performance import at_rate
 
         motion = at_rate(motion, fps or min(motion.face.fps, MOST_FPS))
     seconds = len(motion.face) / motion.face.fps
@@ -96,7 +96,7 @@ class Wanted:
 
 def _check(wanted: Wanted, out: Path, audio: Path | None) -> None:
     """Refuse what makes no sense before anything is watched."""
-    from tts2face.render.output import checked_output
+    from tts2face.render.output_path import checked_output
 
     checked_output(out)
     if not 0.0 <= wanted.gain <= 4.0:
@@ -110,9 +110,9 @@ def _check(wanted: Wanted, out: Path, audio: Path | None) -> None:
 
 
 def _capture(wanted: Wanted) -> "tuple[Motion, AnyStage]":
-    from tts2face.face.file import load_face
-    from tts2face.mimic import motion_of_capture
+    from tts2face.models.face_file import load_face
     from tts2face.render.draw import staged
+    from tts2face.synthesis.performance import motion_of_capture
     from tts2face.video.livelink import read_livelink
 
     if wanted.talker is not None:
@@ -122,11 +122,11 @@ def _capture(wanted: Wanted) -> "tuple[Motion, AnyStage]":
 
 
 def _film(wanted: Wanted, model: Path | None, on_progress: "Progress | None") -> "tuple[Motion, AnyStage]":
-    from tts2face.face.file import load_face
-    from tts2face.mimic import able_to_follow, motion_of_own, motion_of_take
+    from tts2face.models.face_file import load_face
+    from tts2face.models.talker import read_talker
     from tts2face.render.draw import staged
-    from tts2face.render.plate import plate_staged
-    from tts2face.talker import read_talker
+    from tts2face.render.own_face import plate_staged
+    from tts2face.synthesis.performance import able_to_follow, motion_of_own, motion_of_take
 
     if wanted.talker is None:
         shown = load_face(wanted.face, wanted.identity)
@@ -144,8 +144,8 @@ def _film(wanted: Wanted, model: Path | None, on_progress: "Progress | None") ->
 
 def _watched(wanted: Wanted, model: Path | None, on_progress: "Progress | None") -> "Take":
     from tts2face.video.blendshapes import BlendshapeReader
-    from tts2face.video.perform import read_take
-    from tts2face.video.steady import FilmReader
+    from tts2face.video.streaming_tracker import FilmReader
+    from tts2face.video.take import read_take
 
     return read_take(wanted.take, FilmReader(model), BlendshapeReader(model), on_progress=on_progress)
 
@@ -167,8 +167,8 @@ def _sound(take: Path, audio: Path | None, quiet: bool) -> "Waveform":
 
 
 def _write(motion: "Motion", sound: "Waveform", stage: "AnyStage", out: Path, quiet: bool) -> None:
-    from tts2face.mimic import clips_of
     from tts2face.render.encode import ClipWriter
+    from tts2face.synthesis.performance import clips_of
 
     n_frames = len(motion.face)
     with progress_bar("drawing", quiet) as on_progress:

@@ -16,7 +16,7 @@ def phones(
 ) -> None:
     """Print the words of a text and their phones, in ARPABET and IPA, with stress and syllables."""
     from lexicon.dictionary import read_dictionary
-    from lexicon.marks import marked
+    from lexicon.mark_parser import marked
     from lexicon.pronounce import pronounce
     from tts2face.export.text import FORMATS
 

@@ -64,8 +64,8 @@ def gestures(
     seed: Annotated[int, Parameter(help="Which recordings, halves and clips are drawn.", converter=whole_number)] = 0,
 ) -> None:
     """Compare each style's gestures with those that its fields, and noise, make of the same sound."""
-    from corpus_tools.gesturing.analysis import Options
-    from corpus_tools.gesturing.write import write_gestures
+    from corpus_tools.gesture_study.analysis import Options
+    from corpus_tools.gesture_study.write import write_gestures
 
     options = Options(held_out, halves, clips, seed)
     with progress_bar("studying styles") as on_progress:

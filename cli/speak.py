@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from cli.progress import progress_bar, say
 from lexicon.errors import InputError
-from tts2face.files import write_whole
+from tts2face.models.files import write_whole
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 
 if TYPE_CHECKING:
-    from tts2face.cast import Cast
-    from tts2face.exemplar.explain import ShownPhone
+    from tts2face.exemplar.explanation import ShownPhone
+    from tts2face.session import Cast
     from tts2face.types import Clip
 
 OWN = "self"  # the face that the talker herself shows
@@ -46,7 +46,7 @@ def run(request: Request, picture: Picture, errand: Errand) -> None:
     if errand.view and errand.face == OWN:
         raise InputError("a window shows heads that can be turned; leave --view away, or choose --face head")
     if errand.view:
-        from tts2face.render.view import require_display
+        from tts2face.render.window import require_display
 
         require_display("--view")
     if errand.out is not None:
@@ -59,7 +59,7 @@ def run(request: Request, picture: Picture, errand: Errand) -> None:
 
 def _view(request: Request, picture: Picture, errand: Errand) -> None:
     from tts2face.api import stream
-    from tts2face.render.view import view
+    from tts2face.render.window import view
     from tts2face.types import joined_clips
 
     ready = _ready(errand)
@@ -71,7 +71,7 @@ def _view(request: Request, picture: Picture, errand: Errand) -> None:
 
 def _make(request: Request, picture: Picture, errand: Errand, out: Path) -> None:
     began = time.perf_counter()
-    from tts2face.render.output import checked_output
+    from tts2face.render.output_path import checked_output
 
     checked_output(out)
     from tts2face.api import check, write_clip
@@ -107,10 +107,10 @@ def _only_told(request: Request, errand: Errand) -> None:
 
 
 def _ready(errand: Errand) -> "Cast":
-    from tts2face.cast import cast
-    from tts2face.face.file import load_face
-    from tts2face.render.compiled import kernels_are_compiled
-    from tts2face.talker import load_talker
+    from tts2face.models.face_file import load_face
+    from tts2face.models.talker import load_talker
+    from tts2face.session import cast
+    from tts2face.synthesis.warm_up import compile_kernels, kernels_are_compiled
 
     talker = load_talker(errand.talker)
     if errand.face == OWN:
@@ -119,8 +119,6 @@ def _ready(errand: Errand) -> "Cast":
         return cast(talker, None)
     face = load_face(errand.face, errand.identity)
     if not kernels_are_compiled():
-        from tts2face.first_run import compile_kernels
-
         if not errand.quiet:
             say("first run on this machine: compiling the kernels, which takes some ten seconds once")
         compile_kernels(face)
@@ -144,7 +142,7 @@ class _Explanation:
 
     def write(self, path: Path) -> None:
         """Write all as JSON or text, by suffix."""
-        from tts2face.exemplar.explain import explanation_json, explanation_text
+        from tts2face.exemplar.explanation import explanation_json, explanation_text
 
         shown = tuple(self._shown)
         is_json = path.suffix == ".json"

@@ -10,13 +10,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from corpus_tools.effort import Effort
-from corpus_tools.evaluation.capture import captured
 from corpus_tools.evaluation.evaluate import evaluate, evaluate_across
+from corpus_tools.evaluation.livelink_reference import captured
 from corpus_tools.evaluation.scores import FIGURES, Scores
 from corpus_tools.evaluation.splits import split, without_words
 from corpus_tools.evaluation.tables import Evaluation
-from corpus_tools.observe import observe
+from corpus_tools.recordings.observe import observe
+from corpus_tools.run_options import Effort
 from tts2face.exemplar.options import METHODS
 from tts2face.voice.engine import load_voice
 

@@ -6,8 +6,8 @@ Run: python docs/make_gestures.py
 from dataclasses import replace
 from pathlib import Path
 
-from corpus_tools.gesturing.analysis import Compared, Options, StyleFound, study
-from tts2face.palette import load_palette
+from corpus_tools.gesture_study.analysis import Compared, Options, StyleFound, study
+from tts2face.models.palette import load_palette
 
 PAGE = Path(__file__).with_name("gestures.md")
 

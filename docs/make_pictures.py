@@ -7,20 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from corpus_tools.gesturing.analysis import Options as GestureOptions
-from corpus_tools.gesturing.write import write_gestures
+from corpus_tools.gesture_study.analysis import Options as GestureOptions
+from corpus_tools.gesture_study.write import write_gestures
 from corpus_tools.similarity.analysis import Options
 from corpus_tools.similarity.write import write_similarity
 from lexicon.phones import ipa_to_arpabet
 from lexicon.sequence import SILENCE
 from tts2face.api import stream
-from tts2face.cast import cast
-from tts2face.face.file import identities_of, load_face
-from tts2face.files import named_file
+from tts2face.models.face_file import identities_of, load_face
+from tts2face.models.files import named_file
+from tts2face.models.talker import load_talker
 from tts2face.render.draw import draw, still
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.talker import load_talker
+from tts2face.session import cast
 
 HERE = Path(__file__).parent / "pictures"
 SENTENCE = "We were away a year ago, but Bob may move five big maps."

@@ -10,12 +10,12 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from tts2face.api import write_clip
-from tts2face.cast import cast
-from tts2face.face.file import load_face
-from tts2face.palette import load_palette
+from tts2face.models.face_file import load_face
+from tts2face.models.palette import load_palette
+from tts2face.models.talker import load_talker
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.talker import load_talker
+from tts2face.session import cast
 
 PICTURES = Path(__file__).parent / "pictures"
 # Ten seconds each; the second one with a pause, in which a face must go on living.

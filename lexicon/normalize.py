@@ -9,7 +9,8 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from lexicon import forms, readings
+from lexicon import form_readers as forms
+from lexicon import written_forms as readings
 from lexicon.cleaning import plain
 
 MARKS = frozenset(".,;:!?")

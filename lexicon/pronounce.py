@@ -14,8 +14,8 @@ from lexicon.g2p import DEFAULT_LANGUAGE, check_language, phonemize, segments_of
 from lexicon.ipa import Segment
 from lexicon.normalize import MARKS, tokens
 from lexicon.phones import ipa_to_arpabet
-from lexicon.scripts import check_script
 from lexicon.syllables import syllables
+from lexicon.writing_systems import check_script
 
 PAUSES_S = MappingProxyType({"": 0.0, ",": 0.2, ";": 0.3, ":": 0.3, ".": 0.5, "!": 0.5, "?": 0.5})  # nominal
 _STRENGTH = tuple(PAUSES_S)  # of two marks that meet, the later one here stays

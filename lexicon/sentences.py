@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from lexicon.chunks import chunks
-from lexicon.marked import Mark, MarkedText, NodMark, PauseMark, Run
+from lexicon.marked_text import Mark, MarkedText, NodMark, PauseMark, Run
 from lexicon.normalize import normalize
 
 LONGEST = 300  # characters; a sentence that is longer is cut at a clause mark or a space

@@ -19,7 +19,7 @@ from types import MappingProxyType
 from xml.parsers import expat
 
 from lexicon.errors import InputError
-from lexicon.marked import DEEPEST, Gathering, MarkedText, NameMark, NodMark, PauseMark
+from lexicon.marked_text import DEEPEST, Gathering, MarkedText, NameMark, NodMark, PauseMark
 
 _BEGINS = re.compile(r"\ufeff?\s*<(?:speak[\s>/]|\?xml\s|!DOCTYPE\s)")
 _MARK = re.compile(r"\[/?(?:style|nod|pause)\b")

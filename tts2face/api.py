@@ -8,29 +8,29 @@ import numpy as np
 
 from lexicon.errors import InputError
 from lexicon.g2p import check_language
-from lexicon.marks import marked
-from lexicon.scripts import check_script
+from lexicon.mark_parser import marked
 from lexicon.sentences import sentences
 from lexicon.sequence import PhoneSequence
-from tts2face.ahead import Ahead
-from tts2face.cast import Cast, cast
-from tts2face.exemplar.animate import speech_trajectory
-from tts2face.exemplar.explain import ShownPhone, explained
-from tts2face.exemplar.looks import looks_trajectory
+from lexicon.writing_systems import check_script
+from tts2face.clock import exact_rate, on_frames
+from tts2face.exemplar.appearance_trajectory import looks_trajectory
+from tts2face.exemplar.explanation import ShownPhone, explained
 from tts2face.exemplar.options import METHODS, SynthesisOptions
-from tts2face.face.model import Face
-from tts2face.face.own import own_face
-from tts2face.gesture.asked import asked
+from tts2face.exemplar.synthesis import speech_trajectory
+from tts2face.gesture.request_timeline import asked
 from tts2face.gesture.timeline import Timeline
-from tts2face.listen import Heard, clips_in, drive_of, driven, heard
-from tts2face.living import Life, still
-from tts2face.render.clock import exact_rate, on_frames
+from tts2face.models.face import Face
+from tts2face.models.talker import Talker
+from tts2face.own_face.appearance_regression import own_face
+from tts2face.prefetch import Ahead
 from tts2face.render.encode import ClipWriter
-from tts2face.render.output import checked_output
+from tts2face.render.output_path import checked_output
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.spoken import Reached, Said, check_marks, marked_styles, reached_in, say, silent
-from tts2face.talker import Talker
+from tts2face.session import Cast, cast
+from tts2face.synthesis.audio_input import Heard, clips_in, drive_of, driven, heard
+from tts2face.synthesis.gesture_layer import Life, still
+from tts2face.synthesis.marked_speech import Reached, Said, check_marks, marked_styles, reached_in, say, silent
 from tts2face.types import Clip, Speech, Trajectory, frame_count, joined_clips
 
 VOICES_KEPT = 2  # kinds of voice; each keeps some 100 MB

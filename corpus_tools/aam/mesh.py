@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
 
 N_MESH = 468  # the iris points behind them lie on the eyeballs
 RING_SCALE = 1.35  # the ring around the face, of the oval about its middle: the skin that gives way to the chin

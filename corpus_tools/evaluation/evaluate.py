@@ -7,21 +7,21 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.effort import Progress
-from corpus_tools.evaluation.across import Scale, in_own_units, judged_across
+from corpus_tools.evaluation.cross_talker import Scale, in_own_units, judged_across
 from corpus_tools.evaluation.methods import Method, methods_of
 from corpus_tools.evaluation.own_durations import Said, judged_own, said_by
-from corpus_tools.evaluation.real import Curves, Real, Thresholds
+from corpus_tools.evaluation.reference import Curves, Real, Thresholds
 from corpus_tools.evaluation.scores import Judged, Scores, scored, scores_of
 from corpus_tools.evaluation.splits import Parts, require_parted
 from corpus_tools.evaluation.tables import Evaluation, Fold
 from corpus_tools.evaluation.tracks import Track, mapped
-from corpus_tools.leak import pose_leak, without_leak
-from corpus_tools.learn import learn_talker
-from corpus_tools.lips import with_network
-from corpus_tools.observation import Observation
+from corpus_tools.recordings.observation import Observation
+from corpus_tools.run_options import Progress
+from corpus_tools.training.pose_correction import pose_leak, without_leak
+from corpus_tools.training.train_phone_network import with_network
+from corpus_tools.training.train_talker import learn_talker
 from tts2face.exemplar.options import SynthesisOptions
-from tts2face.talker import ShapeModel, Talker
+from tts2face.models.talker import ShapeModel, Talker
 from tts2face.voice.engine import Voice
 
 LEARNT_FOR_EVALUATION = {

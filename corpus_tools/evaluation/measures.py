@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from lexicon.phones import phone_of, vowels
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.exemplar.warp import distances, path_cost, warp_path
-from tts2face.landmarks import (
+from tts2face.exemplar.time_warping import distances, path_cost, warp_path
+from tts2face.models.landmarks import (
     EYE_OUTER_LEFT,
     EYE_OUTER_RIGHT,
     LOWER_LIP_INNER_MID,

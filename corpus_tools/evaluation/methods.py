@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.sequence import PhoneSequence
-from tts2face.exemplar.animate import VisualVoice, speech_trajectory, visual_voice
 from tts2face.exemplar.options import METHODS, SynthesisOptions
-from tts2face.exemplar.targets import targets_of
-from tts2face.talker import Talker
-from tts2face.window_network import WindowNetwork
+from tts2face.exemplar.phone_substitution import targets_of
+from tts2face.exemplar.synthesis import VisualVoice, speech_trajectory, visual_voice
+from tts2face.models.phone_network import WindowNetwork
+from tts2face.models.talker import Talker
 
 NETWORK = "sliding-window network"
 

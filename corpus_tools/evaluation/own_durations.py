@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from corpus_tools.evaluation.measures import judged_frames
 from corpus_tools.evaluation.methods import Method
-from corpus_tools.evaluation.real import Curves, Real
+from corpus_tools.evaluation.reference import Curves, Real
 from corpus_tools.evaluation.scores import Judged, OwnClock, compared_spread
 from lexicon.errors import InputError
 from lexicon.normalize import normalize
 from lexicon.sequence import PhoneSequence, WordSpan
-from tts2face.talker import ShapeModel
+from tts2face.models.talker import ShapeModel
 from tts2face.types import Speech, frame_count
 from tts2face.voice.engine import Voice
 

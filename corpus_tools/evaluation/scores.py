@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.evaluation import measures
-from corpus_tools.evaluation.real import CLASSES, OTHER, Curves, Real, Thresholds
+from corpus_tools.evaluation.reference import CLASSES, OTHER, Curves, Real, Thresholds
 from lexicon.sequence import PhoneSequence
-from tts2face.talker import ShapeModel
+from tts2face.models.talker import ShapeModel
 
 N_DRAWS = 1000  # of utterances, with replacement (Efron 1979)
 CONFIDENCE = 0.95

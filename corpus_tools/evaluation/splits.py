@@ -4,7 +4,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from corpus_tools.observation import Observation
+from corpus_tools.recordings.observation import Observation
 from lexicon.errors import InputError
 
 Parts = tuple[tuple[Observation, ...], tuple[Observation, ...]]  # learnt from, held out

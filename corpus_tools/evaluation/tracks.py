@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.real import Real
-from corpus_tools.ridge import ridge
+from corpus_tools.evaluation.reference import Real
+from corpus_tools.training.ridge import ridge
 from lexicon.errors import DataError, InputError
-from tts2face.talker import Talker
+from tts2face.models.talker import Talker
 
 UTTERANCE, TIME = "utterance", "time"
 LEAST_TRAINING = 10  # sentences from which a map is fitted

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.face.model import Eye, Face
+from tts2face.models.face import Eye, Face
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -9,7 +9,7 @@ from corpus_tools.head.cage import caged
 from corpus_tools.head.head import Ground, Look, built_head
 from corpus_tools.head.piece import Built, stacked_vertices
 from corpus_tools.head.source import Source
-from tts2face.face.file import Identity
+from tts2face.models.face_file import Identity
 
 Tint = tuple[float, float, float]
 PLAIN: Tint = (1.0, 1.0, 1.0)

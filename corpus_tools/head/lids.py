@@ -10,7 +10,7 @@ from corpus_tools.head.eyes import RECEDE_MM, ball_radius
 from corpus_tools.head.piece import Ball
 from corpus_tools.head.shapes import neighbours
 from corpus_tools.head.skin import Skin
-from tts2face.face.linear import rotation_matrix
+from tts2face.face.deformation import rotation_matrix
 
 Floats = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from corpus_tools.head.build import head_face
+from corpus_tools.head.build_head import head_face
 from corpus_tools.head.cage import Cage, caged
 from corpus_tools.head.correspondence import nearest_on_surface, write_places
 from corpus_tools.head.eyes import balls_of
@@ -22,8 +22,8 @@ from corpus_tools.head.skin import Skin, skinned
 from corpus_tools.head.source import fetched, read_source
 from corpus_tools.head.subdivide import triangulated
 from lexicon.errors import DataError
-from tts2face.face.model import Face
-from tts2face.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.models.face import Face
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.render.camera import optics
 from tts2face.render.draw import draw, staged
 from tts2face.render.picture import Picture

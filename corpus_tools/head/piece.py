@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.face.model import Eye, Face, Part
+from tts2face.models.face import Eye, Face, Part
 
 Floats = NDArray[np.float64]
 

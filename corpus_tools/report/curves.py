@@ -6,8 +6,8 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.learn import lip_gap
-from corpus_tools.observation import Observation
+from corpus_tools.recordings.observation import Observation
+from corpus_tools.training.train_talker import lip_gap
 from lexicon.sequence import SILENCE
 
 PX_PER_S = 260

@@ -7,9 +7,9 @@ import numpy as np
 from corpus_tools.evaluation.evaluate import CEILING, Run
 from corpus_tools.evaluation.scores import CONFIDENCE, Scores, shown
 from corpus_tools.evaluation.tables import Evaluation, figure_text
-from corpus_tools.report.film import Films
 from corpus_tools.report.page import page, table
 from corpus_tools.report.trajectories import Series, curves_plot, histogram
+from corpus_tools.report.videos import Films
 
 SHOWN = "exemplar"  # whose best, usual and worst sentences are shown, if it was compared; else the last but one
 PLAIN = "theobald2007"

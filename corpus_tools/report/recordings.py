@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.checks import LIMITS
-from corpus_tools.observation import Observation
-from corpus_tools.observe import Observations, Refusal
+from corpus_tools.recordings.limits import LIMITS
+from corpus_tools.recordings.observation import Observation
+from corpus_tools.recordings.observe import Observations, Refusal
 from corpus_tools.report.curves import utterance_curves
 from corpus_tools.report.page import page, picture_tag, table
 from lexicon.errors import DataError, InputError

@@ -24,7 +24,7 @@ from corpus_tools.similarity.spoken import LEAST_PHONES, SimilarityTable, Spoken
 from lexicon.errors import InputError
 from lexicon.phones import phone_of
 from tts2face.exemplar.similarity import Similarity
-from tts2face.talker import Talker
+from tts2face.models.talker import Talker
 
 Progress = Callable[[int, int], None]
 USUAL_CLASSES = (4, 6, 8, 10, 12)

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from corpus_tools.similarity.spoken import Spoken
 from lexicon.sequence import SILENCE
-from tts2face.landmarks import (
+from tts2face.models.landmarks import (
     CHIN,
     LOWER_LIP_INNER_MID,
     MOUTH_CORNER_LEFT,
     MOUTH_CORNER_RIGHT,
     UPPER_LIP_INNER_MID,
 )
-from tts2face.talker import ShapeModel
+from tts2face.models.talker import ShapeModel
 
 UPPER_LIP, LOWER_LIP = 0, 17  # middle of the outer lip lines
 X, Y, Z = range(3)

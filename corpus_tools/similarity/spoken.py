@@ -10,7 +10,7 @@ from lexicon.phones import PHONES, phone_of
 from lexicon.sequence import SILENCE
 from tts2face.exemplar.similarity import phone_similarity, token_samples
 from tts2face.exemplar.tokens import tokens_of
-from tts2face.talker import Talker
+from tts2face.models.talker import Talker
 
 LEAST_PHONES = 4  # fewer have no two classes to tell apart
 LEAST_TOKENS = 10  # of a phone, in each half: a mean of fewer shows their neighbours as much as the phone

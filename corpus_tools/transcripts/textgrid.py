@@ -4,8 +4,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from corpus_tools.subtitles import Cue
-from corpus_tools.transcripts.text import read_text
+from corpus_tools.recordings.subtitles import Cue
+from corpus_tools.transcripts.decoding import read_text
 from lexicon.errors import DataError
 
 SILENT_LABELS = frozenset({"", "sil", "sp", "spn", "<p:>", "<sil>", "pau", "#"})

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tts2face.ahead import Ahead
+from tts2face.prefetch import Ahead
 
 
 def test_same_items_in_the_same_order() -> None:

@@ -10,17 +10,17 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.aam.filmed import filmed
-from corpus_tools.aam.learn import learn_appearance
-from corpus_tools.aam.measure import figures
-from corpus_tools.effort import Effort
-from corpus_tools.learn import learn_talker
-from corpus_tools.observe import observe
-from corpus_tools.watch import Eyes
+from corpus_tools.aam.evaluation import figures
+from corpus_tools.aam.source_videos import filmed
+from corpus_tools.aam.train_appearance import learn_appearance
+from corpus_tools.recordings.corpus_video import Eyes
+from corpus_tools.recordings.observe import observe
+from corpus_tools.run_options import Effort
+from corpus_tools.training.train_talker import learn_talker
+from tts2face.models.talker import write_talker
+from tts2face.render.own_face import plate_drawn, plate_staged
 from tts2face.render.picture import Picture
-from tts2face.render.plate import plate_drawn, plate_staged
-from tts2face.talker import write_talker
-from tts2face.video.model import find_bundle
+from tts2face.video.landmark_models import find_bundle
 
 
 def main() -> None:

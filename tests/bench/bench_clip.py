@@ -16,12 +16,12 @@ import numpy as np
 from sentences import sentences
 
 from tts2face.api import stream, write_clip
-from tts2face.cast import cast
-from tts2face.face.file import load_face
+from tts2face.models.face_file import load_face
+from tts2face.models.talker import load_talker
 from tts2face.render.encode import ClipWriter
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.talker import load_talker
+from tts2face.session import cast
 
 COMMAND = "from cli.main import main; main()"
 SHORT = "We were away a year ago, but Bob may move five big maps."

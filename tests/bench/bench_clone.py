@@ -4,8 +4,8 @@ Run: ``PYTHONPATH=. python tests/bench/bench_clone.py RECORDINGS [--cache FOLDER
 grid_s1. There is one recorded person, so second talkers are learnt from the two halves of RECORDINGS, with other
 numbers of modes, and from the landmarks of the shipped faces while they speak the source's utterances with brows and
 eyelids that move by themselves. Closed: at the frame of a bilabial where the middle lip points are nearest, they are
-less than 1 % of the distance of the outer eye corners apart, as in `corpus_tools.learn`. The rule for lips that touch
-has the same threshold, so that closures are also counted before it.
+less than 1 % of the distance of the outer eye corners apart, as in `corpus_tools.training.train_talker`. The rule for
+lips that touch has the same threshold, so that closures are also counted before it.
 """
 
 import argparse
@@ -16,17 +16,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.effort import Effort
-from corpus_tools.learn import CLOSED, learn_shapes, lip_gap
-from corpus_tools.observation import Observation, Quality
-from corpus_tools.observe import observe
+from corpus_tools.recordings.observation import Observation, Quality
+from corpus_tools.recordings.observe import observe
+from corpus_tools.run_options import Effort
+from corpus_tools.training.train_talker import CLOSED, learn_shapes, lip_gap
 from tests.bench.bench_retarget import bilabial_frames, landmarks_of, opening
-from tts2face.face.clone import Cloning, append_missing, cloning
-from tts2face.face.file import load_face
-from tts2face.face.lips import facing_gaps
-from tts2face.face.retarget import retargeter
-from tts2face.landmarks import MOUTH_REGION
-from tts2face.talker import ShapeModel, Talker, load_talker
+from tts2face.cloning.lip_gaps import facing_gaps
+from tts2face.cloning.parameter_transfer import Cloning, append_missing, cloning
+from tts2face.models.face_file import load_face
+from tts2face.models.landmarks import MOUTH_REGION
+from tts2face.models.talker import ShapeModel, Talker, load_talker
+from tts2face.retargeting.to_face import retargeter
 
 Floats = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.recordings import find_recordings, spoken_words
-from tts2face.speech.align import Aligner
+from corpus_tools.recordings.folder import find_recordings, spoken_words
+from tts2face.speech.forced_alignment import Aligner
 from tts2face.video.media import read_pictures, read_sound
 from tts2face.video.pose import remove_pose
 from tts2face.video.track import FaceTracker

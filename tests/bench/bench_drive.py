@@ -11,21 +11,21 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.driving import FEATURE, NETWORK, heard_features, heard_in, lessons_of
 from corpus_tools.evaluation import measures
 from corpus_tools.evaluation.evaluate import LEARNT_FOR_EVALUATION
-from corpus_tools.evaluation.real import Real, Thresholds
+from corpus_tools.evaluation.reference import Real, Thresholds
 from corpus_tools.evaluation.scores import Scores, scored
 from corpus_tools.evaluation.splits import folds, split
-from corpus_tools.leak import pose_leak
-from corpus_tools.learn import learn_talker
-from corpus_tools.observation import Observation
-from corpus_tools.observe import observe
-from tts2face.drives import Drive
-from tts2face.speech.correlate import tie_strength
-from tts2face.speech.drive import learn_linear
+from corpus_tools.recordings.observation import Observation
+from corpus_tools.recordings.observe import observe
+from corpus_tools.training.canonical_correlation import tie_strength
+from corpus_tools.training.linear_audio_map import learn_linear
+from corpus_tools.training.network_audio_map import NetworkOptions, learn_network
+from corpus_tools.training.pose_correction import pose_leak
+from corpus_tools.training.train_audio_map import FEATURE, NETWORK, heard_features, heard_in, lessons_of
+from corpus_tools.training.train_talker import learn_talker
+from tts2face.models.audio_map import Drive
 from tts2face.speech.features import FEATURE_RATE, speech_level
-from tts2face.speech.network import NetworkOptions, learn_network
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 
@@ -37,7 +37,7 @@ COLOURS = {"formants": "#2a8c3c", "lpc": "#2457c5", "lsf": "#111111", "mfcc": "#
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("recordings", type=Path)
-    parser.add_argument("--observations", type=Path, help="a pickle of `corpus_tools.observe.Observations`")
+    parser.add_argument("--observations", type=Path, help="a pickle of `corpus_tools.recordings.observe.Observations`")
     parser.add_argument("--hold-out", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--trials", type=int, default=100)

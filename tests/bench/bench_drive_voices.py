@@ -12,9 +12,9 @@ import numpy as np
 from sentences import sentences
 
 from corpus_tools.evaluation import measures
-from tts2face.exemplar.animate import speech_trajectory, visual_voice
-from tts2face.listen import driven
-from tts2face.talker import Talker, load_talker
+from tts2face.exemplar.synthesis import speech_trajectory, visual_voice
+from tts2face.models.talker import Talker, load_talker
+from tts2face.synthesis.audio_input import driven
 from tts2face.types import Speech, frame_count
 from tts2face.voice.engine import load_voice
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from corpus_tools.gesturing.clips import some_of, with_source
-from corpus_tools.gesturing.measures import recordings
-from tts2face.gesture.animate import Fields
+from corpus_tools.gesture_study.clips import some_of, with_source
+from corpus_tools.gesture_study.measures import recordings
 from tts2face.gesture.field import Field, FieldState, begun, continued
-from tts2face.palette import GESTURE_FPS, Palette, Style, load_palette
+from tts2face.gesture.gesture_stream import Fields
+from tts2face.models.palette import GESTURE_FPS, Palette, Style, load_palette
 
 SECONDS = 120
 PARTS = (0.1, 1 / 3, 1.0)

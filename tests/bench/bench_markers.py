@@ -10,19 +10,19 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.decompose.basis import carried_basis
-from corpus_tools.decompose.captured import at_gesture_rate, resampled
-from corpus_tools.decompose.face_motion import rest_landmarks
-from corpus_tools.decompose.livelink import captured_livelink
-from corpus_tools.decompose.marker_set import read_marker_set
-from corpus_tools.decompose.markers import captured_markers
-from corpus_tools.decompose.weights import averaged, least_squares
+from corpus_tools.decomposition.basis_expressions import carried_basis
+from corpus_tools.decomposition.blend_weights import averaged, least_squares
+from corpus_tools.decomposition.capture import at_gesture_rate, resampled
+from corpus_tools.decomposition.face_motion import rest_landmarks
+from corpus_tools.decomposition.livelink import captured_livelink
+from corpus_tools.decomposition.marker_set import read_marker_set
+from corpus_tools.decomposition.markers import captured_markers
 from tests.corpus_tools.decompose.made_markers import FPS, SIZE, made_take, write_c3d
 from tts2face.face.expressions import expression_landmarks
-from tts2face.face.file import load_face
-from tts2face.face.fit import N_SKIN
-from tts2face.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
-from tts2face.palette import EXPRESSIONS
+from tts2face.face.landmark_fit import N_SKIN
+from tts2face.models.face_file import load_face
+from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
+from tts2face.models.palette import EXPRESSIONS
 
 DISTANCES = {
     "lips open": (UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID),

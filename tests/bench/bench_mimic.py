@@ -10,18 +10,18 @@ from pathlib import Path
 
 import numpy as np
 
-from tts2face.face.file import load_face
-from tts2face.face.performer import aperture, lip_gaps
-from tts2face.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT
-from tts2face.mimic import clips_of, motion_of_take
+from tts2face.models.face_file import load_face
+from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT
 from tts2face.render.draw import staged
 from tts2face.render.encode import ClipWriter
 from tts2face.render.picture import Picture
+from tts2face.retargeting.performer import aperture, lip_gaps
+from tts2face.synthesis.performance import clips_of, motion_of_take
 from tts2face.video.blendshapes import BlendshapeReader
 from tts2face.video.media import media_facts, read_pictures, read_sound
-from tts2face.video.perform import Take, read_take
 from tts2face.video.pose import head_angles, remove_pose
-from tts2face.video.steady import FilmReader
+from tts2face.video.streaming_tracker import FilmReader
+from tts2face.video.take import Take, read_take
 from tts2face.video.track import FaceTracker
 
 

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.exemplar.animate import DEFAULT_OPTIONS, VisualVoice, chosen_tokens, speech_trajectory, visual_voice
 from tts2face.exemplar.options import THEOBALD_2007
-from tts2face.speech.align import increasing
-from tts2face.talker import Talker, Utterance, read_talker
+from tts2face.exemplar.synthesis import DEFAULT_OPTIONS, VisualVoice, chosen_tokens, speech_trajectory, visual_voice
+from tts2face.models.talker import Talker, Utterance, read_talker
+from tts2face.speech.forced_alignment import increasing
 from tts2face.types import frame_count
 
 FPS = 30.0

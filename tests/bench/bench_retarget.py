@@ -13,10 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.face.file import load_face
-from tts2face.face.model import Face
-from tts2face.face.retarget import BILABIALS, retargeter
-from tts2face.landmarks import (
+from tts2face.models.face import Face
+from tts2face.models.face_file import load_face
+from tts2face.models.landmarks import (
     INNER_LIP_LOWER,
     INNER_LIP_UPPER,
     LOWER_LIP_INNER_MID,
@@ -24,7 +23,8 @@ from tts2face.landmarks import (
     MOUTH_CORNER_RIGHT,
     UPPER_LIP_INNER_MID,
 )
-from tts2face.talker import Talker, Utterance, read_talker
+from tts2face.models.talker import Talker, Utterance, read_talker
+from tts2face.retargeting.to_face import BILABIALS, retargeter
 from tts2face.types import Trajectory
 
 Floats = NDArray[np.float64]

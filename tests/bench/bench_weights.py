@@ -12,11 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.decompose.basis import carried_basis
-from corpus_tools.decompose.captured import at_gesture_rate, resampled
-from corpus_tools.decompose.face_motion import rest_landmarks
-from corpus_tools.decompose.livelink import captured_livelink
-from corpus_tools.decompose.weights import (
+from corpus_tools.decomposition.basis_expressions import carried_basis
+from corpus_tools.decomposition.blend_weights import (
     N_AVERAGED,
     N_NEAREST,
     N_SAMPLES,
@@ -26,12 +23,15 @@ from corpus_tools.decompose.weights import (
     least_squares,
     nearest_samples,
 )
-from corpus_tools.leak import without_leak
-from corpus_tools.observe import observe
+from corpus_tools.decomposition.capture import at_gesture_rate, resampled
+from corpus_tools.decomposition.face_motion import rest_landmarks
+from corpus_tools.decomposition.livelink import captured_livelink
+from corpus_tools.recordings.observe import observe
+from corpus_tools.training.pose_correction import without_leak
 from tts2face.face.expressions import expression_landmarks
-from tts2face.face.file import load_face
-from tts2face.face.fit import N_SKIN
-from tts2face.palette import EXPRESSIONS, GESTURE_FPS
+from tts2face.face.landmark_fit import N_SKIN
+from tts2face.models.face_file import load_face
+from tts2face.models.palette import EXPRESSIONS, GESTURE_FPS
 
 SAMPLES = (50, 100, 200, 500, 1000, 2000, 5000)
 NEAREST = (5, 20, N_NEAREST, 150)
@@ -184,7 +184,7 @@ def sources(recordings: Path, observations: Path | None) -> tuple[Faces, Faces, 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("recordings", type=Path)
-    parser.add_argument("--observations", type=Path, help="a pickle of `corpus_tools.observe.Observations`")
+    parser.add_argument("--observations", type=Path, help="a pickle of `corpus_tools.recordings.observe.Observations`")
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--picture", type=Path)
     options = parser.parse_args()

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.observation import Observation, Quality
+from corpus_tools.recordings.observation import Observation, Quality
 from lexicon.errors import BackendError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tts2face.landmarks import MOUTH_REGION, N_LANDMARKS
-from tts2face.video.model import find_bundle
+from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS
+from tts2face.video.landmark_models import find_bundle
 
 CLIPS = ("bbaf2n", "bbaf3s", "bbaf5a")
 FPS = 25.0

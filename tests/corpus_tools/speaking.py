@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.observation import Observation, Quality
+from corpus_tools.recordings.observation import Observation, Quality
 from lexicon.normalize import normalize
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.types import Speech, Waveform

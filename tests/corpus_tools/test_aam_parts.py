@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from corpus_tools.aam.align import aligned, fitted, moved
-from corpus_tools.aam.components import GrowingComponents
-from corpus_tools.aam.filmed import Filmed
-from corpus_tools.aam.frame import barycentric, framed
-from corpus_tools.aam.learn import changed_by_speech, picture_axes
-from corpus_tools.aam.light import light_of
+from corpus_tools.aam.block_pca import GrowingComponents
+from corpus_tools.aam.lighting import light_of
 from corpus_tools.aam.mesh import MOUTH_POINTS, face_triangles, inside, mouth_triangles, ring
+from corpus_tools.aam.procrustes import aligned, fitted, moved
+from corpus_tools.aam.reference_frame import barycentric, framed
+from corpus_tools.aam.source_videos import Filmed
+from corpus_tools.aam.train_appearance import changed_by_speech, picture_axes
 from corpus_tools.consent import consent_of
 from lexicon.errors import InputError
-from tts2face.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
-from tts2face.render.plate import ring_triangles
+from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.render.own_face import ring_triangles
 
 
 def turned(shape, angle, size, shift):
@@ -145,7 +145,7 @@ def test_picture_axes_are_those_of_the_camera():
 def test_pictures_come_at_the_instants_of_the_frames(tmp_path, monkeypatch):
     shown = [type("Picture", (), {"time": t, "pixels": np.full((2, 2, 3), k, np.uint8)}) for k, t in
              enumerate([0.0, 0.04, 0.08, 0.2, 0.24])]  # fmt: skip
-    monkeypatch.setattr("corpus_tools.aam.filmed.read_pictures", lambda path: iter(shown))
+    monkeypatch.setattr("corpus_tools.aam.source_videos.read_pictures", lambda path: iter(shown))
     nothing = np.zeros((5, 478, 3), np.float32)
     film = Filmed(tmp_path / "x.mkv", 0.04, 25.0, nothing[:, :, :2], nothing, nothing[:, 0])
     assert [int(pixels[0, 0, 0]) for pixels in film.pictures()] == [1, 2, 2, 2, 3]

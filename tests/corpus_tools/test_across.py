@@ -6,19 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.decompose.face_motion import moved_landmarks
-from corpus_tools.effort import Effort
-from corpus_tools.evaluation.across import Scale
-from corpus_tools.evaluation.capture import captured
+from corpus_tools.decomposition.face_motion import moved_landmarks
+from corpus_tools.evaluation.cross_talker import Scale
 from corpus_tools.evaluation.evaluate import Run, evaluate_across
+from corpus_tools.evaluation.livelink_reference import captured
 from corpus_tools.evaluation.measures import least_openings, midpoint_openings
-from corpus_tools.evaluation.real import Curves
+from corpus_tools.evaluation.reference import Curves
 from corpus_tools.evaluation.tables import Evaluation
-from corpus_tools.observation import Observation
+from corpus_tools.recordings.observation import Observation
 from corpus_tools.report.evaluation import evaluation_page
+from corpus_tools.run_options import Effort
 from lexicon.errors import InputError
 from tests.corpus_tools.speaking import observation
-from tts2face.face.file import load_face
+from tts2face.models.face_file import load_face
 from tts2face.types import Trajectory
 
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from corpus_tools.aam.carry import looks_map
-from corpus_tools.aam.frame import framed
+from corpus_tools.aam.appearance_transfer import looks_map
 from corpus_tools.aam.mesh import face_triangles
+from corpus_tools.aam.reference_frame import framed
 from tests.render.tiny_talker import face_points, own_talker
-from tts2face.appearance import Appearance, TextureModel
+from tts2face.models.appearance import Appearance, TextureModel
 
 
 def painted(stretch: float, side: int, across: float) -> TextureModel:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from corpus_tools.checks import LIMITS, picture_measures, refuse, sound_measures, turn_deg
-from corpus_tools.watch import NOT_COUNTED
+from corpus_tools.recordings.corpus_video import NOT_COUNTED
+from corpus_tools.recordings.limits import LIMITS, picture_measures, refuse, sound_measures, turn_deg
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.types import Waveform

@@ -9,8 +9,8 @@ from corpus_tools.head.correspondence import nearest_on_surface, read_places, wr
 from corpus_tools.head.locate import alike, first_hit
 from corpus_tools.head.rings import Strips, narrowest_ring
 from lexicon.errors import DataError
-from tts2face.face.file import load_face
-from tts2face.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
+from tts2face.models.face_file import load_face
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
 
 N_AROUND, N_RINGS = 12, 5
 

@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 
 from corpus_tools.consent import consent_of
-from corpus_tools.dense.adapt import MOUTH_PARTS, adapted
-from corpus_tools.dense.build import build_face
-from corpus_tools.dense.gather import fitter, vertex_normals
-from corpus_tools.dense.region import canvas_of, depth_inside
-from corpus_tools.dense.seen import videos_of
-from corpus_tools.dense.warp import N_MESH, OPEN_JAW, aligned, landmarks_of, part_vertices
-from corpus_tools.effort import Effort
+from corpus_tools.dense.adapt_head import MOUTH_PARTS, adapted
+from corpus_tools.dense.build_face import build_face
+from corpus_tools.dense.mesh_fit import N_MESH, OPEN_JAW, aligned, landmarks_of, part_vertices
+from corpus_tools.dense.skin_colour import fitter, vertex_normals
+from corpus_tools.dense.video_landmarks import videos_of
+from corpus_tools.dense.visible_texels import canvas_of, depth_inside
+from corpus_tools.run_options import Effort
 from lexicon.errors import DataError, InputError
-from tts2face.face.file import read_face
-from tts2face.face.linear import posed_vertices
-from tts2face.face.model import Face
-from tts2face.files import named_file
-from tts2face.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
+from tts2face.face.deformation import posed_vertices
+from tts2face.models.face import Face
+from tts2face.models.face_file import read_face
+from tts2face.models.files import named_file
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
 
 LIPS_MM = 0.5  # facing lips that are nearer touch
 

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from corpus_tools.build import add_drives
-from corpus_tools.driving import FEATURE, heard_features, heard_in, learn_drives
-from corpus_tools.learn import learn_talker
-from corpus_tools.observe import Observations
+from corpus_tools.build_talker import add_drives
+from corpus_tools.recordings.observe import Observations
+from corpus_tools.training.network_audio_map import NetworkOptions
+from corpus_tools.training.train_audio_map import FEATURE, heard_features, heard_in, learn_drives
+from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
+from tts2face.models.talker import read_talker, write_talker
 from tts2face.speech.features import FEATURE_RATE
-from tts2face.speech.network import NetworkOptions
-from tts2face.talker import read_talker, write_talker
 from tts2face.types import Waveform
 
 ABOUT = dict.fromkeys(("name", "language", "sources", "licence", "attribution", "command", "created"), "")
@@ -88,7 +88,7 @@ def test_a_talker_without_drives_is_given_them(
 ) -> None:
     talker = learn_talker(corpus, n_speech=2, n_other=1, metadata=ABOUT)
     write_talker(tmp_path / "bare.talker", talker)
-    monkeypatch.setattr("corpus_tools.build.observe", lambda *_, **__: Observations(tuple(corpus), ()))
+    monkeypatch.setattr("corpus_tools.build_talker.observe", lambda *_, **__: Observations(tuple(corpus), ()))
     command = ["corpus", "drives", str(tmp_path), "--talker", str(tmp_path / "bare.talker"), "--out"]
     assert run([*command, str(tmp_path / "full.talker")]) == 0
     assert "linear (hears mfcc+lsf), network (hears mfcc+lsf)" in capsys.readouterr().err
@@ -105,7 +105,7 @@ def test_recordings_that_teach_no_drive_are_refused(
     n: int, fps: float, refusal: tuple, corpus: list, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     talker = replace(learn_talker(corpus, n_speech=2, n_other=1, metadata=ABOUT), fps=fps)
-    monkeypatch.setattr("corpus_tools.build.observe", lambda *_, **__: Observations(tuple(corpus[:n]), ()))
+    monkeypatch.setattr("corpus_tools.build_talker.observe", lambda *_, **__: Observations(tuple(corpus[:n]), ()))
     kind, reason = refusal
     with pytest.raises(kind, match=reason):
         add_drives(tmp_path, talker, tmp_path / "full.talker")

@@ -12,7 +12,7 @@ from corpus_tools.evaluation.scores import FIGURES
 from corpus_tools.evaluation.splits import folds, split, without_words
 from corpus_tools.evaluation.tables import Evaluation
 from corpus_tools.evaluation.tracks import Track, read_tracks
-from corpus_tools.observation import Observation
+from corpus_tools.recordings.observation import Observation
 from corpus_tools.report.evaluation import evaluation_page
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import WordSpan
@@ -154,7 +154,7 @@ def test_a_network_is_trained_and_compared_with_where_there_is_enough_to_learn(
     observations: list[Observation], monkeypatch: pytest.MonkeyPatch
 ):
     pytest.importorskip("sklearn", reason="needs `pip install 'tts2face[capture]'`")
-    monkeypatch.setattr("corpus_tools.lips.LEAST_FRAMES", 100)
+    monkeypatch.setattr("corpus_tools.training.train_phone_network.LEAST_FRAMES", 100)
     result, _ = evaluate([split(observations, hold_out=8, seed=0)])
     scores = {one.method: one for one in result.scores}
     assert scores["sliding-window network"]["r_opening"] > 0.8  # of some 700 frames it cannot learn more

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.leak import LEAST_CHUNKS, angle_terms, pose_leak, without_leak
-from corpus_tools.observation import Observation
-from tts2face.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
+from corpus_tools.recordings.observation import Observation
+from corpus_tools.training.pose_correction import LEAST_CHUNKS, angle_terms, pose_leak, without_leak
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
 
 N = 40
 

@@ -3,12 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.learn import learn_talker, lip_gap, mean_rotation, resting_frames
-from corpus_tools.show import describe
+from corpus_tools.show_talker import describe
+from corpus_tools.training.train_talker import learn_talker, lip_gap, mean_rotation, resting_frames
 from lexicon.errors import DataError, InputError
-from tts2face.face.linear import head_rotation
-from tts2face.landmarks import MOUTH_REGION, N_LANDMARKS
-from tts2face.talker import read_talker, write_talker
+from tts2face.face.deformation import head_rotation
+from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS
+from tts2face.models.talker import read_talker, write_talker
 
 from .conftest import known_directions  # noqa: TID252 - a test's own data
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from corpus_tools.evaluation.evaluate import LEARNT_FOR_EVALUATION
-from corpus_tools.learn import learn_talker
-from corpus_tools.lips import by_phone, described, feature_table, with_network
-from corpus_tools.observation import Observation
+from corpus_tools.recordings.observation import Observation
+from corpus_tools.training.train_phone_network import by_phone, described, feature_table, with_network
+from corpus_tools.training.train_talker import learn_talker
 from lexicon.phones import PHONES, WEIGHTS
 from lexicon.sequence import SILENCE
 

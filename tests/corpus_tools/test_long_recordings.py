@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.build import build_talker
-from corpus_tools.effort import Effort
-from corpus_tools.listen import LONGEST_UTTERANCE_S
-from corpus_tools.observe import Observations, observe
+from corpus_tools.build_talker import build_talker
+from corpus_tools.recordings.corpus_audio import LONGEST_UTTERANCE_S
+from corpus_tools.recordings.observe import Observations, observe
 from corpus_tools.report.recordings import recordings_page
+from corpus_tools.run_options import Effort
 from lexicon.sequence import SILENCE
 from tests.corpus_tools.films import joined
-from tts2face.talker import read_talker
+from tts2face.models.talker import read_talker
 
 N_CLIPS = 17
 LATE_S = 0.2

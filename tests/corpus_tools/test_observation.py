@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from corpus_tools.listen import Heard
-from corpus_tools.observation import trimmed
+from corpus_tools.recordings.corpus_audio import Heard
+from corpus_tools.recordings.observation import trimmed
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.types import Waveform
-from tts2face.video.grid import face_span, filled_gaps, on_grid
+from tts2face.video.frame_grid import face_span, filled_gaps, on_grid
 
 FPS = 25.0
 

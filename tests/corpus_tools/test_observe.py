@@ -11,18 +11,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.build import build_talker, read_provenance
-from corpus_tools.effort import Effort
-from corpus_tools.observe import STEPS, observe
+from corpus_tools.build_talker import build_talker, read_provenance
+from corpus_tools.recordings.observe import STEPS, observe
+from corpus_tools.run_options import Effort
 from lexicon.errors import DataError, InputError
-from tts2face.talker import read_talker
-from tts2face.video.steady import FilmReader
+from tts2face.models.talker import read_talker
+from tts2face.video.streaming_tracker import FilmReader
 
 CHILD = """
 import sys
 from pathlib import Path
-from corpus_tools.effort import Effort
-from corpus_tools.observe import observe
+from corpus_tools.run_options import Effort
+from corpus_tools.recordings.observe import observe
 observe(Path(sys.argv[1]), effort=Effort(Path(sys.argv[2]), 1, Path(sys.argv[3])))
 """
 

@@ -9,7 +9,7 @@ from corpus_tools.evaluation.evaluate import Run, evaluate
 from corpus_tools.evaluation.own_durations import Said, judged_own, on_one_clock
 from corpus_tools.evaluation.splits import split
 from corpus_tools.evaluation.tables import Evaluation
-from corpus_tools.observation import Observation
+from corpus_tools.recordings.observation import Observation
 from corpus_tools.report.evaluation import evaluation_page
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan

@@ -1,6 +1,6 @@
 import pytest
 
-from corpus_tools.recordings import LETTER_NAMES, Recording, find_recordings, pronunciations, spoken_words
+from corpus_tools.recordings.folder import LETTER_NAMES, Recording, find_recordings, pronunciations, spoken_words
 from lexicon.dictionary import arpabet_segments
 from lexicon.errors import DataError, InputError
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from corpus_tools.ridge import ridge
+from corpus_tools.training.ridge import ridge
 
 
 def test_errors_left_out_are_those_of_leaving_each_row_out() -> None:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from corpus_tools import setup
-from corpus_tools.setup import fetch_bundle
+from corpus_tools import setup_models as setup
+from corpus_tools.setup_models import fetch_bundle
 from lexicon.errors import BackendError
-from tts2face.video import model
+from tts2face.video import landmark_models as model
 
 CONTENT = b"a bundle"
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 
 import tts2face
-from corpus_tools.learn import CLOSED, lip_gap
-from corpus_tools.show import describe
-from tts2face.talker import load_talker
+from corpus_tools.show_talker import describe
+from corpus_tools.training.train_talker import CLOSED, lip_gap
+from tts2face.models.talker import load_talker
 
 PATH = Path(tts2face.__file__).parent / "data" / "grid_s1.talker"
 

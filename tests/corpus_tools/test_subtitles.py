@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from corpus_tools.effort import Effort
-from corpus_tools.observe import by_video, observe
-from corpus_tools.recordings import Recording, find_recordings
-from corpus_tools.subtitles import read_cues
+from corpus_tools.recordings.folder import Recording, find_recordings
+from corpus_tools.recordings.observe import by_video, observe
+from corpus_tools.recordings.subtitles import read_cues
+from corpus_tools.run_options import Effort
 from lexicon.errors import DataError
 from tests.corpus_tools.films import joined
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.observation import Observation, Timing
-from corpus_tools.sync import LEAD_S, REACH_S, agreement, agreements, timings
+from corpus_tools.recordings.audio_video_sync import LEAD_S, REACH_S, agreement, agreements, timings
+from corpus_tools.recordings.observation import Observation, Timing
 
 FPS = 25.0
 

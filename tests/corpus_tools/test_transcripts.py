@@ -5,10 +5,10 @@ import contextlib
 import numpy as np
 import pytest
 
-from corpus_tools.recordings import find_recordings, spoken_words
-from corpus_tools.subtitles import Cue, read_cues
-from corpus_tools.transcripts.beside import READERS, said_in, transcript_of
-from corpus_tools.transcripts.text import LARGEST_BYTES, read_text
+from corpus_tools.recordings.folder import find_recordings, spoken_words
+from corpus_tools.recordings.subtitles import Cue, read_cues
+from corpus_tools.transcripts.decoding import LARGEST_BYTES, read_text
+from corpus_tools.transcripts.find import READERS, said_in, transcript_of
 from lexicon.errors import DataError
 
 SRT = """1

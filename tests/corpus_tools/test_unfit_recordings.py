@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.effort import Effort
-from corpus_tools.observe import Observations, observe
+from corpus_tools.recordings.observe import Observations, observe
+from corpus_tools.run_options import Effort
 from tests.corpus_tools.films import doubled, film
 from tts2face.video.media import read_pictures, read_sound
 

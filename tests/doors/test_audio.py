@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from cli.main import run
+from corpus_tools.training.linear_audio_map import Lesson, learn_linear
+from corpus_tools.training.network_audio_map import NetworkOptions, learn_network
 from lexicon.errors import DataError, InputError
 from tts2face.api import stream, synthesize
-from tts2face.cast import cast
-from tts2face.face.file import load_face
-from tts2face.face.model import Face
-from tts2face.listen import PIECE_FRAMES, between, driven
+from tts2face.models.face import Face
+from tts2face.models.face_file import load_face
+from tts2face.models.talker import Talker, load_talker, write_talker
 from tts2face.request import Request
-from tts2face.speech.drive import Lesson, learn_linear
+from tts2face.session import cast
 from tts2face.speech.features import FEATURE_RATE, speech_features
-from tts2face.speech.network import NetworkOptions, learn_network
-from tts2face.talker import Talker, load_talker, write_talker
+from tts2face.synthesis.audio_input import PIECE_FRAMES, between, driven
 from tts2face.types import Trajectory, frame_count, joined_clips
 from tts2face.video.media import media_facts, read_sound, sound_blocks
 

@@ -9,12 +9,12 @@ import soxr
 
 from lexicon.sequence import SILENCE
 from tts2face.api import write_clip
-from tts2face.cast import Cast, cast
-from tts2face.face.file import load_face
-from tts2face.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.models.face_file import load_face
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.models.talker import load_talker
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.talker import load_talker
+from tts2face.session import Cast, cast
 from tts2face.types import Clip
 
 TEXT = "Bob may move five big maps, but we were away."

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from cli.main import run
-from corpus_tools.clone import clone_talker
-from tts2face.talker import load_talker, read_talker, write_talker
+from corpus_tools.clone_talker import clone_talker
+from tts2face.models.talker import load_talker, read_talker, write_talker
 
 
 @pytest.fixture

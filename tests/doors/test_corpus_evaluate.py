@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from corpus_tools.observe import Observations
+from corpus_tools.recordings.observe import Observations
 from tests.corpus_tools.speaking import OwnVoice, observation, worded
 
 HERS = [worded(observation(number)) for number in range(24)]
@@ -26,7 +26,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Folders whose recordings need not be watched, and a voice that needs no network."""
     monkeypatch.chdir(tmp_path)
     found = {name: Observations(tuple(some), ()) for name, some in FOLDERS.items()}
-    monkeypatch.setattr("corpus_tools.observe.observe", lambda folder, **_: found[folder.name])
+    monkeypatch.setattr("corpus_tools.recordings.observe.observe", lambda folder, **_: found[folder.name])
     monkeypatch.setattr("cli.evaluation._voice", lambda: OwnVoice(HERS, lambda durations: 1.2 * durations))
     with (tmp_path / "curves.csv").open("w", newline="") as file:
         rows = csv.writer(file)
@@ -128,7 +128,7 @@ def test_refusals_are_one_sentence(
 
 def test_own_durations_need_words(here: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     mute = [replace(one, words=()) for one in HERS]
-    monkeypatch.setattr("corpus_tools.observe.observe", lambda *_, **__: Observations(tuple(mute), ()))
+    monkeypatch.setattr("corpus_tools.recordings.observe.observe", lambda *_, **__: Observations(tuple(mute), ()))
     assert evaluate(*PLAIN, "--own-durations") == 2
     assert "own durations need recordings whose words are known" in capsys.readouterr().err
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from corpus_tools.decompose.face_motion import moved_landmarks
+from corpus_tools.decomposition.face_motion import moved_landmarks
 from lexicon.errors import InputError
 from tts2face.api import synthesize
-from tts2face.face.file import load_face
-from tts2face.face.gestures import gesture_face
-from tts2face.face.model import Face
-from tts2face.files import SHIPPED
-from tts2face.palette import FEATURES, load_palette, write_palette
+from tts2face.face.gesture_transfer import gesture_face
+from tts2face.models.face import Face
+from tts2face.models.face_file import load_face
+from tts2face.models.files import SHIPPED
+from tts2face.models.palette import FEATURES, load_palette, write_palette
+from tts2face.models.talker import Talker, load_talker
 from tts2face.request import Request
-from tts2face.talker import Talker, load_talker
 from tts2face.types import Clip
 
 TEXT = "Bob may move five big maps, but we keep two."

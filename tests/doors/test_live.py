@@ -8,14 +8,14 @@ import pytest
 from cli.main import run
 from lexicon.errors import BackendError
 from tests.corpus_tools.films import joined
-from tts2face.face.file import load_face
-from tts2face.live import LEARNING_S, Actor, Pose, poses
-from tts2face.mimic import motion_of_take
+from tts2face.models.face_file import load_face
+from tts2face.synthesis.live_capture import LEARNING_S, Actor, Pose, poses
+from tts2face.synthesis.performance import motion_of_take
 from tts2face.video.blendshapes import BlendshapeReader
+from tts2face.video.landmark_models import find_bundle
 from tts2face.video.media import Picture, read_pictures
-from tts2face.video.model import find_bundle
-from tts2face.video.perform import read_take
-from tts2face.video.steady import FilmReader
+from tts2face.video.streaming_tracker import FilmReader
+from tts2face.video.take import read_take
 from tts2face.video.track import FaceTracker
 
 FPS = 25.0
@@ -92,7 +92,7 @@ def test_orders_that_make_no_sense(words: list[str], reason: str, capsys: pytest
 
 
 def test_without_a_display_it_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr("tts2face.render.view.sys.platform", "linux")
+    monkeypatch.setattr("tts2face.render.window.sys.platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     assert run(["mimic", "--camera", "0"]) == 4

@@ -11,12 +11,12 @@ import pytest
 from cli.main import run
 from lexicon.sequence import SILENCE
 from tts2face.api import Piece, stream, write_clip
-from tts2face.cast import Cast, cast
-from tts2face.face.file import load_face
 from tts2face.gesture.spans import StyleSpan
+from tts2face.models.face_file import load_face
+from tts2face.models.talker import load_talker
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.talker import load_talker
+from tts2face.session import Cast, cast
 from tts2face.types import joined_clips
 from tts2face.video.media import media_facts
 

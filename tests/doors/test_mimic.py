@@ -11,9 +11,9 @@ import pytest
 
 from cli.main import run
 from lexicon.errors import BackendError
-from tts2face.face.performer import aperture
+from tts2face.retargeting.performer import aperture
+from tts2face.video.landmark_models import find_bundle
 from tts2face.video.media import media_facts, read_pictures
-from tts2face.video.model import find_bundle
 from tts2face.video.pose import head_angles, remove_pose
 from tts2face.video.track import FaceTracker
 

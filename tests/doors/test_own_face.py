@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from corpus_tools.aam.carry import looks_map
+from corpus_tools.aam.appearance_transfer import looks_map
 from lexicon.errors import BackendError
-from tts2face.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
-from tts2face.talker import read_talker
-from tts2face.video.model import find_bundle
+from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
+from tts2face.models.talker import read_talker
+from tts2face.video.landmark_models import find_bundle
 from tts2face.video.track import FaceTracker
 
 N_RECORDINGS = 10

@@ -10,7 +10,7 @@ from PIL import Image
 
 from cli.main import run
 from tests.corpus_tools.gesturing.made_palette import made_palette
-from tts2face.palette import write_palette
+from tts2face.models.palette import write_palette
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from PIL import Image
 from cli.main import run
 from corpus_tools.similarity import picture
 from tests.corpus_tools.similarity.steady_talker import made_talker
-from tts2face.talker import write_talker
+from tts2face.models.talker import write_talker
 
 
 @pytest.fixture(scope="module")

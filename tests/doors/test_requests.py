@@ -11,11 +11,11 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from tts2face.api import stream, synthesize
-from tts2face.cast import cast
-from tts2face.face.file import load_face
-from tts2face.face.model import Face
+from tts2face.models.face import Face
+from tts2face.models.face_file import load_face
+from tts2face.models.talker import Talker, load_talker
 from tts2face.request import Request
-from tts2face.talker import Talker, load_talker
+from tts2face.session import cast
 from tts2face.types import Clip, joined_clips
 
 TEXT = "Bob may move. We were away."

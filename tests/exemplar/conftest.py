@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.exemplar.animate import VisualVoice, visual_voice
-from tts2face.landmarks import LOWER_LIP_INNER_MID, N_LANDMARKS, UPPER_LIP_INNER_MID
-from tts2face.talker import ShapeModel, Talker, Utterance
+from tts2face.exemplar.synthesis import VisualVoice, visual_voice
+from tts2face.models.landmarks import LOWER_LIP_INNER_MID, N_LANDMARKS, UPPER_LIP_INNER_MID
+from tts2face.models.talker import ShapeModel, Talker, Utterance
 
 FPS = 25.0
 OPENINGS = {"p": 0.0, "b": 0.0, "m": 0.5, "f": 2.0, "s": 4.0, "t": 4.5, "i": 8.0, "ɑ": 16.0, "u": 6.0, SILENCE: 1.0}

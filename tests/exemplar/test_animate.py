@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.exemplar.animate import (
+from tts2face.exemplar.explanation import explained, explanation_json, explanation_text
+from tts2face.exemplar.options import METHODS, THEOBALD_2007, SynthesisOptions
+from tts2face.exemplar.synthesis import (
     REST_FROM_S,
     VisualVoice,
     chosen_tokens,
@@ -16,10 +18,8 @@ from tts2face.exemplar.animate import (
     stillness,
     visual_voice,
 )
-from tts2face.exemplar.explain import explained, explanation_json, explanation_text
-from tts2face.exemplar.options import METHODS, THEOBALD_2007, SynthesisOptions
 from tts2face.exemplar.tokens import MAX_CONTEXT
-from tts2face.talker import Talker
+from tts2face.models.talker import Talker
 from tts2face.types import frame_count
 
 LABELS = [SILENCE, "p", "b", "m", "f", "s", "t", "i", "ɑ", "u", "h", "ɔɪ", "ʃ"]

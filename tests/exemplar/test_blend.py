@@ -3,8 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tts2face.exemplar.animate import VisualVoice
-from tts2face.exemplar.blend import Pieces, averaged_pieces, exemplar_weights, joined_pieces, smoothed
+from tts2face.exemplar.blending import Pieces, averaged_pieces, exemplar_weights, joined_pieces, smoothed
 from tts2face.exemplar.contacts import (
     RULES,
     ContactRule,
@@ -16,7 +15,8 @@ from tts2face.exemplar.contacts import (
     with_contacts,
 )
 from tts2face.exemplar.options import THEOBALD_2007, SynthesisOptions
-from tts2face.exemplar.targets import Targets
+from tts2face.exemplar.phone_substitution import Targets
+from tts2face.exemplar.synthesis import VisualVoice
 from tts2face.exemplar.tokens import reaching_spans
 
 GAP = Gap(np.zeros(3, np.float32), np.array([[0.0, 1.0, 0.0]], np.float32))

@@ -1,12 +1,12 @@
 import numpy as np
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.exemplar.animate import VisualVoice
-from tts2face.exemplar.motion import sampled_tokens
+from tts2face.exemplar.phone_substitution import stand_ins, targets_of
+from tts2face.exemplar.recorded_motion import sampled_tokens
 from tts2face.exemplar.similarity import token_samples
-from tts2face.exemplar.targets import stand_ins, targets_of
+from tts2face.exemplar.synthesis import VisualVoice
 from tts2face.exemplar.tokens import PAUSE_REACH_S, contexts, spoken_spans, tokens_of
-from tts2face.talker import Talker
+from tts2face.models.talker import Talker
 
 INVENTORY = tuple(sorted({"p", "b", "s", "t", "i", "ɪ", "ɔ", "u", SILENCE}))
 

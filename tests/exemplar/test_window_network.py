@@ -7,11 +7,11 @@ import pytest
 
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.exemplar.animate import VisualVoice, speech_trajectory
 from tts2face.exemplar.options import SynthesisOptions
-from tts2face.exemplar.targets import Targets, shown_phones
-from tts2face.talker import Talker, read_talker, write_talker
-from tts2face.window_network import WindowNetwork, window_features
+from tts2face.exemplar.phone_substitution import Targets, shown_phones
+from tts2face.exemplar.synthesis import VisualVoice, speech_trajectory
+from tts2face.models.phone_network import WindowNetwork, window_features
+from tts2face.models.talker import Talker, read_talker, write_talker
 
 PHONES = PhoneSequence([SILENCE, "b", "i", "p", SILENCE], [0.0, 0.3, 0.4, 0.6, 0.7, 1.0])
 KNOWN = ("b", "i", "p", SILENCE)

@@ -10,7 +10,7 @@ import pytest
 from parselmouth.praat import call
 
 from lexicon.errors import InputError
-from lexicon.nominal import nominal_sequence
+from lexicon.nominal_durations import nominal_sequence
 from lexicon.pronounce import pronounce
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.export.text import FORMATS, NOMINAL_NOTE, textgrid, timed_json, timed_table

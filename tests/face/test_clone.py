@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.clone import append_missing, cloning, face_size, largest_parameters
-from tts2face.face.lips import LOWER, UPPER
-from tts2face.face.retarget import inner_product_map
-from tts2face.landmarks import (
+from tts2face.cloning.lip_gaps import LOWER, UPPER
+from tts2face.cloning.parameter_transfer import append_missing, cloning, face_size, largest_parameters
+from tts2face.models.landmarks import (
     EYE_OUTER_LEFT,
     EYE_OUTER_RIGHT,
     LOWER_LIP_INNER_MID,
@@ -20,7 +19,8 @@ from tts2face.landmarks import (
     N_LANDMARKS,
     UPPER_LIP_INNER_MID,
 )
-from tts2face.talker import ShapeModel, load_talker
+from tts2face.models.talker import ShapeModel, load_talker
+from tts2face.retargeting.to_face import inner_product_map
 from tts2face.types import Trajectory
 
 seeds = st.integers(0, 100_000)

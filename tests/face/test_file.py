@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.file import Identity, identities_of, load_face, read_face, write_face
-from tts2face.face.linear import posed_vertices
-from tts2face.face.model import Eye, Face, Part
-from tts2face.files import named_file
-from tts2face.tensors import write_tensors
+from tts2face.face.deformation import posed_vertices
+from tts2face.models.face import Eye, Face, Part
+from tts2face.models.face_file import Identity, identities_of, load_face, read_face, write_face
+from tts2face.models.files import named_file
+from tts2face.models.tensors import write_tensors
 
 N = 40
 TINT = (0.5, 0.75, 1.0)

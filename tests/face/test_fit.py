@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tts2face.face.file import load_face
-from tts2face.face.fit import all_landmarks, axis_scales, landmark_motion, landmark_places, turn_onto
-from tts2face.face.linear import posed_vertices
+from tts2face.face.deformation import posed_vertices
+from tts2face.face.landmark_fit import all_landmarks, axis_scales, landmark_motion, landmark_places, turn_onto
+from tts2face.models.face_file import load_face
 
 
 @pytest.mark.parametrize("seed", range(5))

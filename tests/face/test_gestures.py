@@ -10,17 +10,17 @@ from scipy.spatial import KDTree
 from lexicon.errors import DataError, InputError
 from tests.face.gestures import BROWS, CHEEKS, palette, posed_landmarks
 from tts2face.api import synthesize
-from tts2face.face.carry import eye_distance
+from tts2face.face.deformation import rigged
 from tts2face.face.expressions import expression_landmarks, expression_table, expressive
-from tts2face.face.file import load_face
-from tts2face.face.fit import landmark_places
-from tts2face.face.gestures import LID_RIMS, LIPS, GestureFace, gesture_face
-from tts2face.face.linear import rigged
-from tts2face.face.model import Face
-from tts2face.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT
-from tts2face.palette import EXPRESSIONS
+from tts2face.face.gesture_transfer import LID_RIMS, LIPS, GestureFace, gesture_face
+from tts2face.face.landmark_fit import landmark_places
+from tts2face.face.shape_transfer import eye_distance
+from tts2face.models.face import Face
+from tts2face.models.face_file import load_face
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT
+from tts2face.models.palette import EXPRESSIONS
+from tts2face.models.talker import load_talker
 from tts2face.request import Request
-from tts2face.talker import load_talker
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
 FACES = ("head", "cartoon")

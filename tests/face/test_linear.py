@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from lexicon.errors import InputError
 from tests.render.tiny_face import tiny_face
-from tts2face.face.linear import head_rotation, posed_vertices, rigged, rotation_matrix
-from tts2face.landmarks import CHIN
+from tts2face.face.deformation import head_rotation, posed_vertices, rigged, rotation_matrix
+from tts2face.models.landmarks import CHIN
 
 WEIGHTS = np.array([0.4, -0.3, 1.0, 0.6])
 

@@ -9,9 +9,9 @@ from scipy.optimize import minimize
 
 from lexicon.errors import DataError
 from tests.face.test_clone import gaps_of, opening_model, seeds, some
-from tts2face.face.bounded import bounded_least_squares
-from tts2face.face.clone import cloning
-from tts2face.face.lips import LEAST_GAP_MM, LOWER, nearest_allowed
+from tts2face.cloning.lip_gaps import LEAST_GAP_MM, LOWER, nearest_allowed
+from tts2face.cloning.parameter_transfer import cloning
+from tts2face.face.bounded_least_squares import bounded_least_squares
 
 
 def test_crossing_lips_are_parted_and_no_more() -> None:

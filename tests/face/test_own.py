@@ -8,8 +8,8 @@ import pytest
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.test_plate import own_talker
-from tts2face.face.own import own_face
-from tts2face.talker import Utterance
+from tts2face.models.talker import Utterance
+from tts2face.own_face.appearance_regression import own_face
 from tts2face.types import Trajectory
 
 

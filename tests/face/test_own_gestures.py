@@ -10,14 +10,14 @@ from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.face.gestures import BROWS, neutral, palette
 from tests.render.test_plate import own_talker
-from tts2face.face.gestures import LID_RIMS
-from tts2face.face.own_gestures import OwnGestures, own_gestures
-from tts2face.face.performer import LIDS
-from tts2face.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
-from tts2face.palette import EXPRESSIONS
+from tts2face.face.gesture_transfer import LID_RIMS
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.models.palette import EXPRESSIONS
+from tts2face.models.talker import ShapeModel, Talker, Utterance
+from tts2face.own_face.gestures import OwnGestures, own_gestures
+from tts2face.render.own_face import plate_drawn, plate_staged
 from tts2face.render.picture import Picture
-from tts2face.render.plate import plate_drawn, plate_staged
-from tts2face.talker import ShapeModel, Talker, Utterance
+from tts2face.retargeting.performer import LIDS
 from tts2face.types import Trajectory
 
 N_FRAMES = 400

@@ -10,10 +10,9 @@ from scipy.optimize import lsq_linear
 
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.face.bounded import bounded_least_squares
-from tts2face.face.model import Face, Part
-from tts2face.face.retarget import contact_gaps, inner_product_map, retargeter
-from tts2face.landmarks import (
+from tts2face.face.bounded_least_squares import bounded_least_squares
+from tts2face.models.face import Face, Part
+from tts2face.models.landmarks import (
     INNER_LIP_LOWER,
     INNER_LIP_UPPER,
     LOWER_LIP_INNER_MID,
@@ -23,7 +22,8 @@ from tts2face.landmarks import (
     N_LANDMARKS,
     UPPER_LIP_INNER_MID,
 )
-from tts2face.talker import ShapeModel, Talker, Utterance, speech_channels
+from tts2face.models.talker import ShapeModel, Talker, Utterance, speech_channels
+from tts2face.retargeting.to_face import contact_gaps, inner_product_map, retargeter
 from tts2face.types import Trajectory
 
 N_MODES = 3

@@ -5,9 +5,9 @@ import pytest
 from scipy.interpolate import BSpline
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.file import load_face
-from tts2face.face.fit import landmark_motion, landmark_places
-from tts2face.face.spline import AT_ONCE, bell, local_interpolant
+from tts2face.face.compact_spline import AT_ONCE, bell, local_interpolant
+from tts2face.face.landmark_fit import landmark_motion, landmark_places
+from tts2face.models.face_file import load_face
 
 SUPPORT = 30.0  # mm
 

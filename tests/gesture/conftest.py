@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tts2face.palette import (
+from tts2face.models.palette import (
     FIXED_CHANNELS,
     REGION_FEATURES,
     Change,

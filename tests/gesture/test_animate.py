@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.gesture.animate import Fields, GestureStream, middle_of
 from tts2face.gesture.field import FieldOptions
-from tts2face.gesture.noise import NoiseStream, blinks, blinks_per_second, perlin
+from tts2face.gesture.gesture_stream import Fields, GestureStream, middle_of
+from tts2face.gesture.perlin_noise import NoiseStream, blinks, blinks_per_second, perlin
 from tts2face.gesture.spans import ExpressionSpan, Gains, Nod, StyleSpan
 from tts2face.gesture.timeline import Timeline
-from tts2face.palette import EXPRESSIONS, FEATURES
+from tts2face.models.palette import EXPRESSIONS, FEATURES
 from tts2face.types import Waveform
 
 FPS = 30.0

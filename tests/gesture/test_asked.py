@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture.asked import asked
+from tts2face.gesture.request_timeline import asked
 from tts2face.gesture.spans import ExpressionSpan, Nod
-from tts2face.palette import FEATURES
+from tts2face.models.palette import FEATURES
 from tts2face.request import Request
 
 PLAN = """{"style": {"all": "calm", "head": "cross"}, "nods": [{"time": 1}], "gains": {"head": 2, "jaw": 0.5},

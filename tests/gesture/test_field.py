@@ -5,8 +5,8 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from tts2face.gesture.field import Field, FieldOptions, FieldState, begun, continued, field_of, taken_over, walked
-from tts2face.gesture.tree import tree_of
-from tts2face.gesture.walk import APART, SLACK
+from tts2face.gesture.field_kernels import APART, SLACK
+from tts2face.gesture.kd_tree import tree_of
 
 OPTIONS = FieldOptions(history=5, candidates=3, future=4, alpha=(1.0,))
 

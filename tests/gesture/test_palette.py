@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.palette import KIND, Derivation, Palette, Style, load_palette, read_palette, write_palette
-from tts2face.tensors import read_tensors, write_tensors
+from tts2face.models.palette import KIND, Derivation, Palette, Style, load_palette, read_palette, write_palette
+from tts2face.models.tensors import read_tensors, write_tensors
 
 
 def test_what_is_written_is_read(palette, tmp_path):

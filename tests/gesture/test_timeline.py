@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lexicon.errors import DataError, InputError
+from tts2face.gesture.notation import expressions_of, gains_of, style_of
 from tts2face.gesture.spans import GAINED, ExpressionSpan, Gains, Nod, StyleSpan
 from tts2face.gesture.timeline import BLEND_S, ONSET_S, Timeline
 from tts2face.gesture.timeline_file import parse_timeline, read_timeline
-from tts2face.gesture.written import expressions_of, gains_of, style_of
-from tts2face.palette import EXPRESSIONS, FEATURES, Palette, Style
+from tts2face.models.palette import EXPRESSIONS, FEATURES, Palette, Style
 
 TIMES = np.linspace(0, 12, 1201)
 

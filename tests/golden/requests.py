@@ -20,11 +20,11 @@ import numpy as np
 
 from tests.render.tiny_talker import own_talker
 from tts2face.api import write_clip
-from tts2face.cast import cast
-from tts2face.face.file import load_face
+from tts2face.models.face_file import load_face
+from tts2face.models.talker import Talker, load_talker
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.talker import Talker, load_talker
+from tts2face.session import cast
 from tts2face.types import Clip
 
 KEPT = Path(__file__).with_name("requests.json")

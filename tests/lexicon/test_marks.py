@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lexicon.errors import InputError
-from lexicon.marked import DEEPEST, MarkedText, NameMark, NodMark, PauseMark, Run
-from lexicon.marks import marked
+from lexicon.mark_parser import marked
+from lexicon.marked_text import DEEPEST, MarkedText, NameMark, NodMark, PauseMark, Run
 
 PLAIN = st.text(st.characters(blacklist_characters="[]<"))
 

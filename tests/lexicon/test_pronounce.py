@@ -5,7 +5,7 @@ import pytest
 from lexicon.dictionary import parse_dictionary
 from lexicon.errors import InputError
 from lexicon.ipa import parse_ipa
-from lexicon.nominal import nominal_sequence
+from lexicon.nominal_durations import nominal_sequence
 from lexicon.phones import ARPABET, PHONES
 from lexicon.pronounce import pronounce
 from lexicon.sequence import SILENCE

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from corpus_tools.training.canonical_correlation import canonical_correlation, tie_strength
 from lexicon.errors import InputError
-from tts2face.speech.correlate import canonical_correlation, tie_strength
 
 KNOWN = (0.9, 0.5, 0.2)
 

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from corpus_tools.training.linear_audio_map import Lesson, learn_linear
+from corpus_tools.training.network_audio_map import NetworkOptions, error_and_slope, learn_network
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.drives import Drive, drive_arrays, drives_of
-from tts2face.speech.drive import Lesson, learn_linear
-from tts2face.speech.network import NetworkOptions, error_and_slope, learn_network
-from tts2face.talker import ShapeModel, Talker, Utterance, read_talker, write_talker
+from tts2face.models.audio_map import Drive, drive_arrays, drives_of
+from tts2face.models.talker import ShapeModel, Talker, Utterance, read_talker, write_talker
 
 
 def lessons(n: int = 12, seed: int = 0, bend: float = 0.0) -> list[Lesson]:

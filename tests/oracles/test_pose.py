@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.linear import head_rotation
-from tts2face.landmarks import CHIN, MOUTH_REGION, N_LANDMARKS
+from tts2face.face.deformation import head_rotation
+from tts2face.models.landmarks import CHIN, MOUTH_REGION, N_LANDMARKS
 from tts2face.video.pose import PIVOT, head_angles, remove_pose, rigid_points, similarity
 
 FPS = 25.0

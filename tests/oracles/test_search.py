@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tts2face.exemplar import select
+from tts2face.exemplar import token_search as select
 from tts2face.exemplar.tokens import Tokens, contexts
 
 PHONES = 9

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.exemplar.warp import distances, lay_over, path_cost, warp_path, warped_times
+from tts2face.exemplar.time_warping import distances, lay_over, path_cost, warp_path, warped_times
 
 
 def every_path(n, m):

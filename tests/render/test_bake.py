@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.render.tiny_face import ball, tiny_face
-from tts2face.face.model import Part
-from tts2face.render.bake import cone, exposed, sphere
+from tts2face.models.face import Part
+from tts2face.render.soft_shadows import cone, exposed, sphere
 from tts2face.render.surface import surfaced
 
 LAMPS = np.array([[0, 0, 1.0], [1.0, 0, 0], [0, 1.0, 0]])

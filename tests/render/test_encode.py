@@ -13,11 +13,11 @@ from PIL import Image
 from lexicon.errors import BackendError, InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_face import tiny_face
+from tts2face.clock import exact_rate
 from tts2face.render import encode
-from tts2face.render.clock import exact_rate
 from tts2face.render.draw import draw, staged
 from tts2face.render.encode import ClipWriter, write_clip
-from tts2face.render.output import checked_output
+from tts2face.render.output_path import checked_output
 from tts2face.render.picture import Picture
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, frame_count
 

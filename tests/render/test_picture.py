@@ -3,9 +3,9 @@
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.render.clock import exact_rate, first_sample
+from tts2face.clock import exact_rate, first_sample
+from tts2face.render.camera_views import NAMED, camera_named
 from tts2face.render.picture import Picture, background_kind, sides_of
-from tts2face.render.views import NAMED, camera_named
 
 
 @pytest.mark.parametrize("size", ["15x16", "16x15", "4098x16", "17x32", "0x0", "14"])

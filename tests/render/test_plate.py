@@ -7,12 +7,12 @@ from corpus_tools.aam.mesh import MOUTH_POINTS
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_talker import SIZE, face_points, own_talker
-from tts2face.render import plate
+from tts2face.models.talker import Talker
+from tts2face.render import own_face as plate
 from tts2face.render.draw import frames
+from tts2face.render.image_warp import bend, lay
+from tts2face.render.own_face import plate_drawn, plate_frame, plate_staged
 from tts2face.render.picture import Picture
-from tts2face.render.plate import plate_drawn, plate_frame, plate_staged
-from tts2face.render.warp import bend, lay
-from tts2face.talker import Talker
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 

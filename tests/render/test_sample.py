@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.render.test_plate import own_talker
-from tts2face.render.sample import samples
+from tts2face.render.plate_sampling import samples
 
 
 def test_a_linear_picture_is_read_exactly_through_any_affine_mesh() -> None:

@@ -8,10 +8,11 @@ import pytest
 from lexicon.errors import BackendError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_face import tiny_face
-from tts2face.render import view, vtk
+from tts2face.render import vtk_renderer as vtk
+from tts2face.render import window as view
 from tts2face.render.camera import optics
+from tts2face.render.camera_views import camera_named
 from tts2face.render.picture import Picture
-from tts2face.render.views import camera_named
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 

@@ -9,8 +9,8 @@ import pytest
 from lexicon.errors import BackendError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_face import tiny_face
-from tts2face.face.file import load_face
-from tts2face.render import vtk
+from tts2face.models.face_file import load_face
+from tts2face.render import vtk_renderer as vtk
 from tts2face.render.draw import draw, frames, staged
 from tts2face.render.picture import NUMBA, PYVISTA, Picture
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tts2face.face.model import Eye, Face, Part
+from tts2face.models.face import Eye, Face, Part
 
 SKIN, EYE, TONGUE, LASH = (206, 150, 124), (240, 240, 240), (190, 70, 80), (30, 20, 15)
 RADIUS = 90.0  # mm

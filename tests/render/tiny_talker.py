@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from corpus_tools.aam.frame import framed
 from corpus_tools.aam.mesh import MOUTH_POINTS, N_MESH, face_triangles, mouth_triangles, ring
-from corpus_tools.aam.plates import film_of
-from tts2face.appearance import Appearance, Plate, TextureModel
-from tts2face.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
-from tts2face.talker import ShapeModel, Talker
+from corpus_tools.aam.plate import film_of
+from corpus_tools.aam.reference_frame import framed
+from tts2face.models.appearance import Appearance, Plate, TextureModel
+from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.models.talker import ShapeModel, Talker
 
 SIZE = 96
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError
-from tts2face.speech.align import Aligner, acoustic_phones, increasing
+from tts2face.speech.forced_alignment import Aligner, acoustic_phones, increasing
 from tts2face.types import Waveform
 from tts2face.voice.engine import load_voice
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from corpus_tools.training.linear_audio_map import Lesson, learn_linear
+from corpus_tools.training.network_audio_map import NetworkOptions, learn_network
 from lexicon.errors import InputError
 from tests.oracles.test_features import babble
-from tts2face.drives import Drive
-from tts2face.speech.drive import Lesson, learn_linear
+from tts2face.models.audio_map import Drive
 from tts2face.speech.features import FEATURE_RATE, FEATURES, speech_features
-from tts2face.speech.listener import Ear, Listener
-from tts2face.speech.network import NetworkOptions, learn_network
+from tts2face.speech.streaming_listener import Ear, Listener
 from tts2face.types import frame_count
 
 SOUND = babble(2.3)

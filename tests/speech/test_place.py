@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.speech import place
-from tts2face.speech.place import stretch_of_words
+from tts2face.speech import transcript_placement as place
+from tts2face.speech.transcript_placement import stretch_of_words
 
 PHONES = "pbtdkgfvszmnlrwiuaeo"
 

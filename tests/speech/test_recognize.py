@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.recordings import Recording, spoken_words
+from corpus_tools.recordings.folder import Recording, spoken_words
 from lexicon.errors import InputError
-from tts2face.speech.align import acoustic_phones
-from tts2face.speech.recognize import LONGEST_S, PhoneRecogniser
+from tts2face.speech.forced_alignment import acoustic_phones
+from tts2face.speech.phone_recognition import LONGEST_S, PhoneRecogniser
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 

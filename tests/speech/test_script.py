@@ -7,8 +7,8 @@ import pytest
 
 from lexicon.dictionary import parse_dictionary
 from lexicon.errors import DataError, InputError
-from tts2face.speech import script as scripts
-from tts2face.speech.script import phones_in, script
+from tts2face.speech import transcript_alignment as scripts
+from tts2face.speech.transcript_alignment import phones_in, script
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 

@@ -9,15 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lexicon.errors import InputError
-from lexicon.marked import NodMark
-from lexicon.marks import marked
+from lexicon.mark_parser import marked
+from lexicon.marked_text import NodMark
 from lexicon.sentences import Sentence, by_letters, sentences
 from lexicon.sequence import SILENCE
 from tests.spoken.fake_voice import LEAD, LETTER, LEVEL, RATE, TRAIL, FakeVoice
 from tts2face.gesture.spans import Nod, StyleSpan
-from tts2face.joints import joined, shortened, silence
 from tts2face.request import Request
-from tts2face.spoken import LEAST_GAP_S, Reached, Said, check_marks, marked_styles, reached_in, say
+from tts2face.synthesis.marked_speech import LEAST_GAP_S, Reached, Said, check_marks, marked_styles, reached_in, say
+from tts2face.synthesis.speech_joining import joined, shortened, silence
 from tts2face.voice.engine import load_voice
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import BackendError
-from tts2face.video.model import find_bundle
+from tts2face.video.landmark_models import find_bundle
 
 MakeVideo = Callable[..., Path]
 

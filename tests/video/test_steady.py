@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 
 from tts2face.video.media import Picture, media_facts, read_pictures
-from tts2face.video.steady import FilmReader
+from tts2face.video.streaming_tracker import FilmReader
 from tts2face.video.track import FaceTracker
 
 CLIP = "grid_s1/clips/bbaf2n.mkv"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import BackendError, DataError, InputError
-from tts2face.video import model
+from tts2face.video import landmark_models as model
 from tts2face.video.blendshapes import BLENDSHAPES, READ_LANDMARKS, BlendshapeReader
 from tts2face.video.media import read_pictures
 from tts2face.video.track import Crop, FaceTracker, crop_around, smoothed_crops

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from lexicon.phones import phone_of
+from tts2face.compilation import kernel
 from tts2face.exemplar.tokens import Tokens
 
 
@@ -95,7 +95,7 @@ def contacts_told(exemplars: Exemplars, gap: Gap, spans: NDArray[np.float64], ru
     return Contacts(spans, poses, np.maximum(enough, gap.of(poses)))
 
 
-@njit(cache=True)
+@kernel
 def _closest_rows(corpus, chosen, gap, rows, gaps):  # type: ignore[no-untyped-def]
     """Write, for each chosen token, the frame where its lips are closest, and their distance squared."""
     frames, first_frame, utterance, spans, fps = corpus
@@ -111,7 +111,7 @@ def _closest_rows(corpus, chosen, gap, rows, gaps):  # type: ignore[no-untyped-d
             rows[n, e], gaps[n, e] = _closest_row(frames, low, max(low, min(high, last)), gap)
 
 
-@njit(cache=True)
+@kernel
 def _closest_row(frames, low, high, gap):  # type: ignore[no-untyped-def]
     """Row of [low, high] where the gap is least, and the gap squared."""
     rest, basis = gap

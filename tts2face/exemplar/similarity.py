@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.exemplar.motion import sampled_tokens
+from tts2face.exemplar.recorded_motion import sampled_tokens
 from tts2face.exemplar.tokens import Tokens
 
 N_SAMPLES = 5  # per token

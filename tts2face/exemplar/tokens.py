@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.sequence import SILENCE
-from tts2face.talker import Talker
+from tts2face.models.talker import Talker
 
 MAX_CONTEXT = 6  # phones either side that a token remembers
 PAUSE_REACH_S = 0.25  # how far from speech a silence belongs to it: lips open and come to rest within this time

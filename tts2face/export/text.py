@@ -47,7 +47,7 @@ def pronunciation_json(spoken: "Pronunciation") -> str:
 
 def pronunciation_textgrid(spoken: "Pronunciation") -> str:
     """A TextGrid of a text that no voice has spoken: nominal durations, and a tier that says so."""
-    from lexicon.nominal import nominal_sequence
+    from lexicon.nominal_durations import nominal_sequence
 
     phones, words = nominal_sequence(spoken)
     return textgrid(phones, words, note=NOMINAL_NOTE)

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.face.carry import completed
-from tts2face.face.fit import N_SKIN, all_landmarks, landmark_motion
-from tts2face.face.lids import BLINK, WIDE, lids_of
-from tts2face.face.model import Face
-from tts2face.face.mouth import Mouth, mouth_of
-from tts2face.palette import EXPRESSIONS
+from tts2face.face.eyelids import BLINK, WIDE, lids_of
+from tts2face.face.landmark_fit import N_SKIN, all_landmarks, landmark_motion
+from tts2face.face.lip_constraints import Mouth, mouth_of
+from tts2face.face.shape_transfer import completed
+from tts2face.models.face import Face
+from tts2face.models.palette import EXPRESSIONS
 
 TABLE = "expressions.tsv"
 BOTH_SIDES = "*"  # at the end of a name: this shape of the left and of the right

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture.tree import Tree, tree_of
-from tts2face.gesture.walk import APART, nearest, walk
-from tts2face.palette import GESTURE_FPS
+from tts2face.gesture.field_kernels import APART, nearest, walk
+from tts2face.gesture.kd_tree import Tree, tree_of
+from tts2face.models.palette import GESTURE_FPS
 
 DIMENSIONS = 8  # of the search: the windows' principal axes
 SAMPLED = 8  # every so many windows tell the axes; all of them tell the same

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import TypeVar
 
 from lexicon.errors import InputError
-from tts2face.palette import EXPRESSIONS, FEATURES
+from tts2face.models.palette import EXPRESSIONS, FEATURES
 
 WEIGHTS = (-0.5, 1.5)  # -e to 1 + e with e = 0.5, the middle of what Ju and Lee 2008 (section 4) allow
 GAINS = (0.0, 3.0)  # beyond three times as far, lids and brows of any face are at their limits

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lexicon.errors import InputError
-from tts2face.gesture.ease import Floats, between_keys, presence
+from tts2face.gesture.easing import Floats, between_keys, presence
 from tts2face.gesture.spans import (
     ExpressionSpan,
     Gains,
@@ -25,7 +25,7 @@ from tts2face.gesture.spans import (
     moved,
     painted,
 )
-from tts2face.palette import EXPRESSIONS, Palette
+from tts2face.models.palette import EXPRESSIONS, Palette
 
 BLEND_S = 0.3  # from one style to the next: as long as a blink, so that no seam is seen
 # Of an expression: a smile's onset takes about as long whatever the occasion (Schmidt, Cohn and Tian 2003, Biological

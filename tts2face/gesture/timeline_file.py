@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from lexicon.errors import DataError, InputError
+from tts2face.gesture.notation import ALL, features_of, style_of
 from tts2face.gesture.spans import ExpressionSpan, Gains, Nod, StyleSpan, check_feature
 from tts2face.gesture.timeline import Timeline
-from tts2face.gesture.written import ALL, features_of, style_of
-from tts2face.palette import FEATURES
+from tts2face.models.palette import FEATURES
 
 KEYS = ("style", "spans", "expressions", "nods", "gains")
 LARGEST_BYTES = 10_000_000  # an hour of spans, one a second in each feature, takes 2 MB

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.face.model import Face
-from tts2face.landmarks import CHIN
-from tts2face.render.views import Camera
+from tts2face.models.face import Face
+from tts2face.models.landmarks import CHIN
+from tts2face.render.camera_views import Camera
 
 FIELD_RAD = math.radians(22.0)  # opening angle across the frame: a portrait lens, which keeps the nose small
 AIR = 0.06  # free space on each side, of the head's size

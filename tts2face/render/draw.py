@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.face.linear import REST_HEAD
-from tts2face.face.model import Face
-from tts2face.render import vtk
-from tts2face.render.ahead import drawn_ahead
+from tts2face.face.deformation import REST_HEAD
+from tts2face.models.face import Face
+from tts2face.render import vtk_renderer
 from tts2face.render.background import background
-from tts2face.render.bake import Exposure, exposed
 from tts2face.render.camera import Optics, optics
-from tts2face.render.light import lamps, light_table
-from tts2face.render.paint import Room, paint, room_for
+from tts2face.render.drawing_pool import drawn_ahead
+from tts2face.render.own_face import SYNTHETIC, PlateStage, plate_drawn, plate_frame, plate_frames
 from tts2face.render.picture import PYVISTA, Picture
-from tts2face.render.plate import SYNTHETIC, PlateStage, plate_drawn, plate_frame, plate_frames
+from tts2face.render.picture_kernels import Room, paint, room_for
+from tts2face.render.soft_shadows import Exposure, exposed
+from tts2face.render.studio_light import lamps, light_table
 from tts2face.render.surface import Surface, surfaced
 from tts2face.types import Clip
 
@@ -56,7 +56,7 @@ def staged(face: Face, picture: Picture) -> Stage:
         The picture wants a renderer that this machine lacks.
     """
     if picture.renderer == PYVISTA:
-        vtk.require_gl()
+        vtk_renderer.require_gl()
     side = picture.supersampling
     surface, towards = surfaced(face), lamps(picture.view)
     camera = optics(picture.view, face, (picture.width * side, picture.height * side))
@@ -99,7 +99,7 @@ def draw(
         raise InputError(f"the face has {n_shapes} shapes, not weights of shape {np.shape(weights)}")
     pose = np.asarray(weights, np.float32), np.asarray(head, np.float32)
     if stage.picture.renderer == PYVISTA:
-        (drawn,) = vtk.frames(stage, [pose])
+        (drawn,) = vtk_renderer.frames(stage, [pose])
         return drawn
     return _drawn(stage, *pose, _room(stage))
 
@@ -130,7 +130,7 @@ def frames(
     if clip.motion.channels != stage.face.shape_names:
         raise InputError("the clip's motion is not in the shapes of this face; retarget it to the face first")
     if stage.picture.renderer == PYVISTA:
-        yield from vtk.frames(stage, zip(clip.motion.values, clip.head.values, strict=True))
+        yield from vtk_renderer.frames(stage, zip(clip.motion.values, clip.head.values, strict=True))
         return
     rooms = deque(_room(stage) for _ in range(n_threads))
 

@@ -8,13 +8,13 @@ from types import TracebackType
 import numpy as np
 
 from lexicon.errors import InputError
-from tts2face.face.model import Face
-from tts2face.render.clock import exact_rate, first_sample
+from tts2face.clock import exact_rate, first_sample
+from tts2face.models.face import Face
 from tts2face.render.draw import AnyStage, frames, staged, still
+from tts2face.render.encoder_thread import Lane, Sink
 from tts2face.render.gif import Gif
-from tts2face.render.lane import Lane, Sink
 from tts2face.render.movie import MP4_MOVIE, WEBM_MOVIE, Movie
-from tts2face.render.output import (
+from tts2face.render.output_path import (
     FOLDER,
     GIF,
     WEBM,
@@ -26,7 +26,7 @@ from tts2face.render.output import (
     remove,
 )
 from tts2face.render.picture import Picture
-from tts2face.render.stills import Stills
+from tts2face.render.png_folder import Stills
 from tts2face.types import Clip
 
 N_SWATCHES = 6  # frames of the first clip from which a GIF's palette is made

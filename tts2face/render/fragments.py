@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.render.compiled import kernel
+from tts2face.compilation import kernel
 from tts2face.render.raster import NOTHING
 
 Array = NDArray[Any]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lexicon.errors import InputError
-from tts2face.render.views import Camera, camera_named
+from tts2face.render.camera_views import Camera, camera_named
 from tts2face.request import option
 
 SIDES = (16, 4096)  # px

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.render.compiled import inlined, kernel
+from tts2face.compilation import inlined_kernel, kernel
 
 Array = NDArray[Any]
 
@@ -68,7 +68,7 @@ def near_cut(camera: Array, grid: Array, triangle: Array, lens: Array, polygon: 
     return n_corners
 
 
-@inlined
+@inlined_kernel
 def may_be_seen(low: int, high: int, n_samples: int) -> bool:
     """Whether a sample's middle lies within a range of the grid and of the picture."""
     return bool(max((low + HALF - 1) >> SHIFT, 0) <= min((high - HALF) >> SHIFT, n_samples - 1))
@@ -145,14 +145,14 @@ def sort_into_bands(corners: Array, count: int, band_rows: int, starts: Array, m
     starts[0] = 0
 
 
-@inlined
+@inlined_kernel
 def edge(ax: int, ay: int, bx: int, by: int, px: int, py: int) -> int:
     """Edge function of a directed edge at a point, lowered by one where the edge does not own its samples."""
     owns = (by < ay) | ((by == ay) & (bx > ax))  # left edges and top edges
     return (bx - ax) * (py - ay) - (by - ay) * (px - ax) - (0 if owns else 1)
 
 
-@inlined
+@inlined_kernel
 def depth_plane(camera: Array, triangles: Array, t: int, lens: Array) -> tuple[float, float, float, float, float]:
     """1/z of a triangle as a linear function of the sample's place: (per column, per row, at 0, least, most)."""
     a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.render.compiled import kernel
+from tts2face.compilation import kernel
 from tts2face.render.fragments import AT_OPACITY, AT_SHARE, PIXEL_ENDS, PIXEL_X, PIXEL_Y, is_alike
 from tts2face.render.raster import NOTHING
 

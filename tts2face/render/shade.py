@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.render.compiled import streaming
+from tts2face.compilation import vectorized_kernel
 from tts2face.render.fragments import (
     AT_ALBEDO,
     AT_EXPOSURE,
@@ -27,7 +27,7 @@ N_SCRATCH_ROWS = 9
 SKY, FLOOR, UP, LIGHTS = 0, 1, 2, 3  # rows of the table of lights; a light has a direction and a colour
 
 
-@streaming
+@vectorized_kernel
 def light(table: Array, n: int, lights: Array, scratch: Array, colour: Array) -> None:
     """Write the light of n fragments.
 

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.face.linear import FaceRig, rigged
-from tts2face.face.model import Face
+from tts2face.face.deformation import FaceRig, rigged
+from tts2face.models.face import Face
 
 OPEN_SHARE = 0.05  # parts with more than this share of free edges are sheets that both sides of are lit
 

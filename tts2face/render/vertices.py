@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.render.compiled import kernel
+from tts2face.compilation import kernel
 from tts2face.render.fragments import (
     AT_ALBEDO,
     AT_EXPOSURE,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.speech.lsf import line_spectral_frequencies
+from tts2face.speech.line_spectral_frequencies import line_spectral_frequencies
 from tts2face.speech.pauses import NOISE_QUANTILE, SPEECH_QUANTILE
 from tts2face.types import Trajectory, Waveform
 

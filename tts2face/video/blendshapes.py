@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.landmarks import N_LANDMARKS
-from tts2face.video.model import find_bundle, load_network
+from tts2face.models.landmarks import N_LANDMARKS
+from tts2face.video.landmark_models import find_bundle, load_network
 
 # Outputs of the network in order. Source: MediaPipe's blendshape model card; ARKit names without tongueOut.
 BLENDSHAPES = (
@@ -39,7 +39,7 @@ class BlendshapeReader:
     Parameters
     ----------
     model
-        Bundle of the networks; found as `tts2face.video.model.find_bundle` says when None.
+        Bundle of the networks; found as `tts2face.video.landmark_models.find_bundle` says when None.
 
     Raises
     ------

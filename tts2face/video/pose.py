@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.landmarks import N_LANDMARKS
+from tts2face.models.landmarks import N_LANDMARKS
 
 # Points that hardly move against the skull: right landmark, its left twin (itself on the midline), place of the right
 # one on the canonical face in mm (x to the person's left, y up, z out), weight. Source: MediaPipe's face geometry
@@ -46,7 +46,7 @@ class Posed:
     Parameters
     ----------
     landmarks : (T, 478, 3)
-        Millimetres on the canonical face; axes as in `tts2face.landmarks`; NaN where there was no face.
+        Millimetres on the canonical face; axes as in `tts2face.models.landmarks`; NaN where there was no face.
     rotations : (T, 3, 3)
         Turn canonical axes into the camera's (x to the person's left in front of it, y up, z towards it).
     shifts : (T, 3)

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError
-from tts2face.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS
-from tts2face.video.model import find_bundle, load_network
+from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS
+from tts2face.video.landmark_models import find_bundle, load_network
 
 N_MESH = 468  # landmarks of the face mesh; the iris points follow
 LEAST_SCORE = 0.5  # the mesh network's own face probability; below it the landmarks are noise
@@ -69,7 +69,7 @@ class FaceTracker:
     Parameters
     ----------
     model
-        Bundle of the networks; found as `tts2face.video.model.find_bundle` says when None.
+        Bundle of the networks; found as `tts2face.video.landmark_models.find_bundle` says when None.
 
     Raises
     ------

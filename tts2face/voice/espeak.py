@@ -17,9 +17,9 @@ from lexicon.errors import BackendError, InputError
 from lexicon.g2p import check_language, segments_of
 from lexicon.ipa import Segment
 from lexicon.phones import PHONES, nearest_phones
-from lexicon.scripts import check_script
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tts2face.speech.align import increasing
+from lexicon.writing_systems import check_script
+from tts2face.speech.forced_alignment import increasing
 from tts2face.types import Speech, Waveform
 from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, at_volume
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError, InputError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tts2face.speech.align import Aligner, increasing
+from tts2face.speech.forced_alignment import Aligner, increasing
 from tts2face.types import Speech, Waveform, joined_speech
 from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, at_volume
-from tts2face.voice.symbols import letters_of, phones_of
+from tts2face.voice.heart_phonemes import letters_of, phones_of
 
 MOST_LETTERS = 400  # the model hears at most this many letters at once
 UNIT_S = 0.025  # length of one step of the model's durations

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError, InputError
 from lexicon.g2p import phonemize, segments_of
-from lexicon.scripts import check_script
-from tts2face.speech.align import Aligner
+from lexicon.writing_systems import check_script
+from tts2face.speech.forced_alignment import Aligner
 from tts2face.types import Speech, Waveform
 from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, at_volume
 

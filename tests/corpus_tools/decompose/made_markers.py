@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.decompose.marker_set import MarkerSet
-from tts2face.face.linear import head_transform
-from tts2face.face.model import Face
+from corpus_tools.decomposition.marker_set import MarkerSet
+from tts2face.face.deformation import head_transform
+from tts2face.models.face import Face
 
 FPS = 120.0
 SIZE = 0.94  # of the made person over the head

@@ -5,16 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.decompose.basis import captured_basis, carried_basis
-from corpus_tools.decompose.face_motion import moved_landmarks, rest_landmarks
-from corpus_tools.decompose.marker_set import MarkerSet
-from corpus_tools.decompose.markers import marker_face
-from corpus_tools.decompose.stills import PictureReader, Still, marker_reader, named_stills, stills_in
+from corpus_tools.decomposition.basis_expressions import captured_basis, carried_basis
+from corpus_tools.decomposition.face_motion import moved_landmarks, rest_landmarks
+from corpus_tools.decomposition.marker_set import MarkerSet
+from corpus_tools.decomposition.markers import marker_face
+from corpus_tools.decomposition.stills import PictureReader, Still, marker_reader, named_stills, stills_in
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.decompose.made_markers import SIZE, made_take, write_table
-from tts2face.face.model import Face
-from tts2face.landmarks import N_LANDMARKS
-from tts2face.palette import EXPRESSIONS
+from tts2face.models.face import Face
+from tts2face.models.landmarks import N_LANDMARKS
+from tts2face.models.palette import EXPRESSIONS
 from tts2face.types import Trajectory
 
 SHOWN = {"sad": "mouthFrownLeft", "happy": "mouthSmileLeft", "afraid": "browInnerUp", "angry": "browDownLeft",

@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.decompose.captured import Captured, at_gesture_rate, resampled, sound_beside, sound_of
-from corpus_tools.decompose.face_motion import moved_landmarks, rest_landmarks
-from corpus_tools.decompose.livelink import captured_livelink
-from corpus_tools.decompose.video import sound_from
+from corpus_tools.decomposition.capture import Captured, at_gesture_rate, resampled, sound_beside, sound_of
+from corpus_tools.decomposition.face_motion import moved_landmarks, rest_landmarks
+from corpus_tools.decomposition.livelink import captured_livelink
+from corpus_tools.decomposition.video import sound_from
 from lexicon.errors import DataError, InputError
-from tts2face.face.linear import posed_vertices
-from tts2face.face.model import Face
-from tts2face.landmarks import N_LANDMARKS
-from tts2face.mimic import motion_of_capture
+from tts2face.face.deformation import posed_vertices
+from tts2face.models.face import Face
+from tts2face.models.landmarks import N_LANDMARKS
+from tts2face.synthesis.performance import motion_of_capture
 from tts2face.types import Trajectory, Waveform
 from tts2face.video.livelink import read_livelink
 
@@ -125,7 +125,7 @@ def test_sound_of_the_same_name_is_found(shared_recordings: Path, tmp_path: Path
 @pytest.mark.parametrize("begin", [0.5, -0.25])
 def test_a_film_brings_its_sound_on_the_clock_of_its_frames(begin: float, monkeypatch: pytest.MonkeyPatch) -> None:
     ramp = np.arange(64_000, dtype=np.float32) / 64_000
-    monkeypatch.setattr("corpus_tools.decompose.video.read_sound", lambda path, rate: Waveform(ramp, rate))
+    monkeypatch.setattr("corpus_tools.decomposition.video.read_sound", lambda path, rate: Waveform(ramp, rate))
     sound = sound_from(Path("film.mp4"), begin, 2.0)
     assert sound.duration == 2.0
     at = np.arange(len(sound.samples)) + round(begin * 16_000)

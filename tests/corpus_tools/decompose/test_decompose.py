@@ -5,21 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.decompose.basis import Basis, carried_basis
-from corpus_tools.decompose.captured import Captured
-from corpus_tools.decompose.decompose import IRIS, IRIS_PER_RAD, Parts, as_counted, line_of_sight, taken_apart
-from corpus_tools.decompose.derived import derived_styles
-from corpus_tools.decompose.face_motion import moved_landmarks, rest_landmarks
-from corpus_tools.decompose.livelink import eyes_of
-from corpus_tools.decompose.palette import sizes_of, with_style
-from corpus_tools.decompose.regions import feature_landmarks, region_landmarks
-from corpus_tools.decompose.weights import least_squares
+from corpus_tools.decomposition.basis_expressions import Basis, carried_basis
+from corpus_tools.decomposition.blend_weights import least_squares
+from corpus_tools.decomposition.capture import Captured
+from corpus_tools.decomposition.decompose import IRIS, IRIS_PER_RAD, Parts, as_counted, line_of_sight, taken_apart
+from corpus_tools.decomposition.derived_styles import derived_styles
+from corpus_tools.decomposition.face_motion import moved_landmarks, rest_landmarks
+from corpus_tools.decomposition.livelink import eyes_of
+from corpus_tools.decomposition.regions import feature_landmarks, region_landmarks
+from corpus_tools.decomposition.style import sizes_of, with_style
 from lexicon.errors import DataError, InputError
 from tts2face.face.expressions import expression_landmarks
-from tts2face.face.model import Face
-from tts2face.face.performer import LIDS
-from tts2face.landmarks import MOUTH_REGION
-from tts2face.palette import EXPRESSIONS, REGION_FEATURES
+from tts2face.models.face import Face
+from tts2face.models.landmarks import MOUTH_REGION
+from tts2face.models.palette import EXPRESSIONS, REGION_FEATURES
+from tts2face.retargeting.performer import LIDS
 from tts2face.types import Trajectory, Waveform
 
 FPS, SECONDS = 30.0, 12.0

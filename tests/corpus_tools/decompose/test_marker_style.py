@@ -6,18 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.decompose.face_motion import moved_landmarks
-from corpus_tools.decompose.marker_set import MarkerSet
-from corpus_tools.decompose.sources import Worn
-from corpus_tools.decompose.stills import Still, stills_in
-from corpus_tools.effort import Effort
-from corpus_tools.gestures import Recorded, build_style
+from corpus_tools.build_palette import Recorded, build_style
+from corpus_tools.decomposition.capture_files import Worn
+from corpus_tools.decomposition.face_motion import moved_landmarks
+from corpus_tools.decomposition.marker_set import MarkerSet
+from corpus_tools.decomposition.stills import Still, stills_in
+from corpus_tools.run_options import Effort
 from lexicon.errors import InputError
 from tests.corpus_tools.decompose.made_markers import Made, made_take, write_c3d, write_table
 from tts2face.face.expressions import expression_weights, expressive
-from tts2face.face.model import Face
-from tts2face.face.mouth import mouth_of
-from tts2face.palette import EXPRESSIONS, load_palette, read_palette
+from tts2face.face.lip_constraints import mouth_of
+from tts2face.models.face import Face
+from tts2face.models.palette import EXPRESSIONS, load_palette, read_palette
 from tts2face.types import Trajectory
 
 

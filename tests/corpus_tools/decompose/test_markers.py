@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.decompose.gaps import LONGEST_GAP_S, filled, gaps_of
-from corpus_tools.decompose.marker_files import read_c3d, read_markers
-from corpus_tools.decompose.marker_set import SHIPPED, MarkerSet, read_marker_set
-from corpus_tools.decompose.markers import captured_markers, marker_face, still_of_markers
+from corpus_tools.decomposition.marker_files import read_c3d, read_markers
+from corpus_tools.decomposition.marker_gaps import LONGEST_GAP_S, filled, gaps_of
+from corpus_tools.decomposition.marker_set import SHIPPED, MarkerSet, read_marker_set
+from corpus_tools.decomposition.markers import captured_markers, marker_face, still_of_markers
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.decompose.made_markers import FPS, SIZE, Made, write_c3d, write_table
-from tts2face.face.model import Face
-from tts2face.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
+from tts2face.models.face import Face
+from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 
 REST = slice(0, 60)  # the made performance's frames at rest
 

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from corpus_tools.decompose.sources import Worn, captured_file
+from corpus_tools.decomposition.capture_files import Worn, captured_file
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.decompose.made_markers import Made, write_table
-from tts2face.face.model import Face
+from tts2face.models.face import Face
 
 
 def test_a_live_link_table_and_a_marker_table_are_told_apart(

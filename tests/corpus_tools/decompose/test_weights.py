@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from corpus_tools.decompose.weights import (
+from corpus_tools.decomposition.blend_weights import (
     N_AVERAGED,
     approximation_error,
     averaged,

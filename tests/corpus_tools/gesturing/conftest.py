@@ -2,7 +2,7 @@
 
 import pytest
 
-from corpus_tools.gesturing.analysis import GesturesFound, Options, study
+from corpus_tools.gesture_study.analysis import GesturesFound, Options, study
 from tests.corpus_tools.gesturing.made_palette import made_palette
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tts2face.palette import Change, Derivation, Palette, Region, Style
+from tts2face.models.palette import Change, Derivation, Palette, Region, Style
 
 N_RECORDINGS, N_FRAMES = 60, 90
 BLINK = np.array([0.25, 0.9, 1.0, 0.6, 0.25], np.float32)

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from corpus_tools.gesturing.analysis import Compared, Options, StyleFound, study
-from corpus_tools.gesturing.clips import dealt, from_field, from_noise, some_of, with_source
-from corpus_tools.gesturing.measures import recordings
-from corpus_tools.gesturing.traits import brow_lift, traits_of
+from corpus_tools.gesture_study.analysis import Compared, Options, StyleFound, study
+from corpus_tools.gesture_study.clips import dealt, from_field, from_noise, some_of, with_source
+from corpus_tools.gesture_study.measures import recordings
+from corpus_tools.gesture_study.traits import brow_lift, traits_of
 from lexicon.errors import InputError
 from tests.corpus_tools.gesturing.made_palette import BLINK, N_FRAMES, made_palette, made_style
-from tts2face.gesture.animate import Fields, GestureStream, middle_of
+from tts2face.gesture.gesture_stream import Fields, GestureStream, middle_of
 from tts2face.gesture.timeline import Timeline
-from tts2face.palette import GESTURE_FPS
+from tts2face.models.palette import GESTURE_FPS
 from tts2face.types import Waveform
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from corpus_tools.gesturing.blinks import blinks_of, onsets_of
-from corpus_tools.gesturing.measures import (
+from corpus_tools.gesture_study.blinks import blinks_of, onsets_of
+from corpus_tools.gesture_study.measures import (
     autocorrelation,
     between_frames,
     correlation,

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from corpus_tools.gesturing.analysis import Compared, Moving, Options, StyleFound, study
+from corpus_tools.gesture_study.analysis import Compared, Moving, Options, StyleFound, study
 from lexicon.errors import InputError
-from tts2face.palette import load_palette
+from tts2face.models.palette import load_palette
 
 NO_JITTER = 1.3  # times the recorded power above 6 Hz
 

@@ -3,7 +3,7 @@
 import pytest
 
 from tests.corpus_tools.similarity.steady_talker import made_talker
-from tts2face.talker import Talker
+from tts2face.models.talker import Talker
 
 
 @pytest.fixture(scope="session")

@@ -3,8 +3,8 @@
 import numpy as np
 
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tts2face.landmarks import LOWER_LIP_INNER_MID, MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT, N_LANDMARKS
-from tts2face.talker import ShapeModel, Talker, Utterance
+from tts2face.models.landmarks import LOWER_LIP_INNER_MID, MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT, N_LANDMARKS
+from tts2face.models.talker import ShapeModel, Talker, Utterance
 
 FPS = 50.0
 PHONE_S = 0.12

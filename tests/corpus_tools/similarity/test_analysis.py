@@ -14,7 +14,7 @@ from corpus_tools.similarity.spoken import NO_WORD, SimilarityTable, similarity_
 from corpus_tools.similarity.text import analysis_json
 from lexicon.errors import InputError
 from tests.corpus_tools.similarity.steady_talker import BLOCKS, POSES, made_model, made_talker
-from tts2face.exemplar.animate import visual_voice
+from tts2face.exemplar.synthesis import visual_voice
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from corpus_tools.similarity.analysis import Analysis, Named, Options, analyse
-from tts2face.talker import load_talker
+from tts2face.models.talker import load_talker
 
 DOC = Path(__file__).resolve().parents[3] / "docs" / "accuracy.md"
 

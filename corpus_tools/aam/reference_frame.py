@@ -1,0 +1,82 @@
+"""The reference frame of a texture: its points, triangles and pixels, and pictures warped to it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.interpolation import sampled
+
+MARGIN_PX = 2.0  # between the mesh and the edge of the texture
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """A reference shape of N points in a texture, and where its pixels lie in the triangles.
+
+    ``points`` (N, 2) pixels; ``triangles`` (F, 3); ``size`` (width, height); ``pixels`` (P,) as ``y * width + x``;
+    pixel i lies at ``sum_k weights[i, k] points[corners[i, k]]``.
+    """
+
+    points: NDArray[np.float32]
+    triangles: NDArray[np.int32]
+    size: tuple[int, int]
+    pixels: NDArray[np.int32]
+    corners: NDArray[np.int32]
+    weights: NDArray[np.float32]
+
+    def texture(self, picture: NDArray[np.uint8], points: NDArray[np.floating]) -> NDArray[np.float32]:
+        """(P, 3) texture of an (H, W, 3) picture whose (N, 2) points are these, warped piece by piece."""
+        texture = np.zeros((len(self.pixels), 3), np.float32)
+        sampled(picture, np.asarray(points, np.float64), self.corners, self.weights, texture)
+        return texture
+
+
+def framed(shape: NDArray[np.floating], triangles: NDArray[np.int32], side: int) -> Frame:
+    """The frame of a reference shape (N, 2), its longer side `side` pixels long."""
+    used = shape[np.unique(triangles)]
+    low, high = used.min(axis=0), used.max(axis=0)
+    scale = (side - 1 - 2 * MARGIN_PX) / (high - low).max()
+    points = (np.asarray(shape, np.float64) - low) * scale + MARGIN_PX
+    width, height = (int(np.ceil(length)) for length in (high - low) * scale + 2 * MARGIN_PX + 1)
+    owner, weights = covered(points, triangles, (width, height))
+    pixels = np.flatnonzero(owner >= 0)
+    return Frame(
+        points.astype(np.float32),
+        triangles.astype(np.int32),
+        (width, height),
+        pixels.astype(np.int32),
+        triangles[owner[pixels]].astype(np.int32),
+        weights[pixels].astype(np.float32),
+    )
+
+
+def covered(
+    points: Floats, triangles: NDArray[np.int32], size: tuple[int, int]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Triangle over each pixel (-1: none) and the pixel's barycentric coordinates in it."""
+    width, height = size
+    owner = np.full(width * height, -1, np.int64)
+    weights = np.zeros((width * height, 3))
+    for number, corners in enumerate(points[triangles]):
+        low = np.maximum(np.floor(corners.min(axis=0)).astype(int), 0)
+        high = np.minimum(np.ceil(corners.max(axis=0)).astype(int), (width - 1, height - 1))
+        x, y = np.meshgrid(np.arange(low[0], high[0] + 1), np.arange(low[1], high[1] + 1))
+        inside = barycentric(np.stack([x.ravel(), y.ravel()], axis=1), corners)
+        hit = (inside >= -1e-9).all(axis=1)
+        at = y.ravel()[hit] * width + x.ravel()[hit]
+        owner[at], weights[at] = number, np.clip(inside[hit], 0.0, 1.0)
+    return owner, weights
+
+
+def barycentric(places: NDArray[np.floating], corners: Floats) -> Floats:
+    """(P, 3) barycentric coordinates of (P, 2) places in a triangle (3, 2); a flat one holds nothing."""
+    a, b, c = corners
+    across, along, off = b - a, c - a, places - a
+    area = across[0] * along[1] - across[1] * along[0]
+    if area == 0.0:
+        return np.full((len(places), 3), -1.0)
+    second = (off[:, 0] * along[1] - off[:, 1] * along[0]) / area
+    third = (across[0] * off[:, 1] - across[1] * off[:, 0]) / area
+    return np.stack([1.0 - second - third, second, third], axis=1)

@@ -1,0 +1,67 @@
+"""What an appearance model is learnt from: recordings with their pictures, and where the landmarks lie in them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.recordings.corpus_video import Eyes
+from corpus_tools.recordings.observation import Observation
+from tts2face.video.frame_grid import filled_gaps, on_grid
+from tts2face.video.media import read_pictures
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Filmed:
+    """One recording as an appearance model needs it.
+
+    ``points`` (T, 478, 2) pixels and ``landmarks`` (T, 478, 3) mm; frame i is the instant ``begin + i / fps`` of the
+    video; ``shape`` (T, M) are parameters of the talker's shape model.
+    """
+
+    video: Path
+    begin: float
+    fps: float
+    points: NDArray[np.float32]
+    landmarks: NDArray[np.float32]
+    shape: NDArray[np.float32]
+
+    def pictures(self) -> Iterator[NDArray[np.uint8]]:
+        """The picture (H, W, 3) shown at each frame's instant; the file's own rate may change."""
+        n_given, n_frames, shown = 0, len(self.points), None
+        for picture in read_pictures(self.video):
+            while shown is not None and n_given < n_frames and picture.time > self._instant(n_given) + 0.5 / self.fps:
+                yield shown
+                n_given += 1
+            if n_given == n_frames:
+                return
+            shown = picture.pixels
+        while shown is not None and n_given < n_frames:
+            yield shown
+            n_given += 1
+
+    def _instant(self, frame: int) -> float:
+        return self.begin + frame / self.fps
+
+
+def filmed(observation: Observation, shape: NDArray[np.float32], eyes: Eyes) -> Filmed:
+    """A recording that was observed, with its landmarks in the picture; tracking comes from the cache.
+
+    Parameters
+    ----------
+    shape : (T, M)
+        Parameters of the talker's shape model.
+
+    Raises
+    ------
+    DataError
+        The video cannot be read any more.
+    """
+    seen = eyes.watched(observation.video)
+    points, first = on_grid(seen.tracking.points, seen.times, seen.fps)
+    begin = observation.quality.cut
+    start = round(begin * seen.fps) - first
+    here, _ = filled_gaps(points[start : start + len(observation.landmarks)], seen.fps)
+    return Filmed(observation.video, begin, seen.fps, here[:, :, :2].copy(), observation.landmarks, shape)

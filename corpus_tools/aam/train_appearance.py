@@ -1,0 +1,240 @@
+"""An appearance model learnt from tracked recordings (T07 section 2, eqs 1 and 2), in memory that does not grow."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.aam.block_pca import GrowingComponents
+from corpus_tools.aam.lighting import Light, light_of
+from corpus_tools.aam.mesh import MOUTH_POINTS, N_MESH, face_triangles, mouth_triangles, ring
+from corpus_tools.aam.plate import chosen_stretch, film_of
+from corpus_tools.aam.procrustes import aligned
+from corpus_tools.aam.reference_frame import Frame, framed
+from corpus_tools.aam.source_videos import Filmed
+from corpus_tools.run_options import Progress
+from lexicon.errors import InputError
+from tts2face.models.appearance import Appearance, Plate, TextureModel
+from tts2face.models.landmarks import (
+    EYE_OUTER_LEFT,
+    EYE_OUTER_RIGHT,
+    FACE_OVAL,
+    LOWER_LIP_INNER_MID,
+    MOUTH_REGION,
+    UPPER_LIP_INNER_MID,
+)
+
+SHAPES_READ = 4000  # frames from which the reference shape is made
+OPEN_SHARE = 0.9  # the reference is the mean of the frames whose lips stand further apart than in this share
+OPEN_GAP = 0.03  # of the eye distance: the inner mouth is seen from here on
+FRAMES_APART = 3  # of the frames from which textures are learnt; neighbours hardly differ
+BLOCK = 128  # frames that are learnt from at a time
+SPARE = 20  # components carried beyond those that are kept
+STILL = 0.02  # pixels that speech changes by less show the light
+LIGHT_FRAMES = 25  # from which a recording's light is read
+N_SMOOTHINGS = 4  # rounds by which the edge of what speech changes is softened over the mesh
+
+
+@dataclass(frozen=True, slots=True)
+class TextureOptions:
+    """How large the textures are, and how many components are kept."""
+
+    side: int = 128
+    modes: int = 40
+    mouth_side: int = 64
+    mouth_modes: int = 20
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Learnt:
+    """An appearance and how it was learnt.
+
+    ``frames`` and ``lights`` are those of the textures, ``looks`` (T, A + B) of every recording in turn, ``explained``
+    the share of the variance in the first 1, 2, ... modes of the face and of the mouth.
+    """
+
+    appearance: Appearance
+    frames: tuple[Frame, Frame]
+    lights: "Lights"
+    looks: tuple[NDArray[np.float32], ...]
+    explained: tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+def learn_appearance(
+    recordings: Sequence[Filmed], options: TextureOptions | None = None, *, on_progress: Progress | None = None
+) -> Learnt:
+    """Texture models of the face and of the inner mouth, the plate, and the looks of every frame.
+
+    Raises
+    ------
+    InputError
+        There is no recording, or too few frames for the modes.
+    """
+    if not recordings:
+        raise InputError("no recording could be used; see why each was refused")
+    options = options or TextureOptions()
+    frames = reference_frames(recordings, options)
+    moving = changed_by_speech(frames[0])
+    stretch = chosen_stretch([recording.points for recording in recordings])
+    lights = Lights(frames[0], mean_texture(recordings[stretch[0]], frames[0]), moving < STILL)
+    grown = GrowingComponents(options.modes + SPARE), GrowingComponents(options.mouth_modes + SPARE)
+    steps, found = 2 * len(recordings), []
+    for number, recording in enumerate(recordings):
+        found.append(lights.of(recording))
+        _learn_from(recording, frames, found[-1], grown)
+        if on_progress:
+            on_progress(number + 1, steps)
+    models = (
+        _model(frames[0], grown[0], options.modes, "the face"),
+        _model(frames[1], grown[1], options.mouth_modes, "the inside of the mouth"),
+    )
+    looks = []
+    for number, (recording, light) in enumerate(zip(recordings, found, strict=True)):
+        looks.append(looks_of(recording, frames, light, models))
+        if on_progress:
+            on_progress(len(recordings) + number + 1, steps)
+    plate = _plate(recordings, stretch, looks, models[0].n_modes)
+    appearance = Appearance(models[0], models[1], np.array(MOUTH_POINTS, np.int32), moving, plate)
+    return Learnt(appearance, frames, lights, tuple(looks), (grown[0].explained(), grown[1].explained()))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lights:
+    """The light that textures are brought to: that of the plate, whose mean ``texture`` (P, 3) this is.
+
+    ``still`` (P,) marks the pixels of the face's ``frame`` that speech leaves.
+    """
+
+    frame: Frame
+    texture: NDArray[np.float32]
+    still: NDArray[np.bool_]
+
+    def of(self, recording: Filmed) -> Light:
+        """The light of a recording."""
+        return light_of(mean_texture(recording, self.frame), self.texture, self.still)
+
+
+def mean_texture(recording: Filmed, frame: Frame) -> NDArray[np.float32]:
+    """(P, 3) mean of the first textures of a recording."""
+    pictures = islice(recording.pictures(), LIGHT_FRAMES)
+    textures = [frame.texture(picture, points) for picture, points in zip(pictures, recording.points, strict=False)]
+    return np.asarray(np.mean(textures, axis=0), np.float32)
+
+
+def reference_frames(recordings: Sequence[Filmed], options: TextureOptions) -> tuple[Frame, Frame]:
+    """Reference frames of the face and of the inner mouth: the mean of the frames with lips well apart."""
+    n_frames = sum(len(recording.points) for recording in recordings)
+    every = max(1, n_frames // SHAPES_READ)
+    points = np.concatenate([recording.points for recording in recordings])[::every]
+    shapes, _ = aligned(points[:, :N_MESH])
+    gaps = lip_gap(shapes)
+    opened = shapes[gaps >= np.quantile(gaps, OPEN_SHARE)].mean(axis=0)
+    face = framed(opened, face_triangles(opened), options.side)
+    return face, framed(opened[list(MOUTH_POINTS)], mouth_triangles(), options.mouth_side)
+
+
+def lip_gap(points: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(T,) distance of the inner lips over that of the outer eye corners, of (T, N, 2 or 3) points."""
+    lips = np.linalg.norm(points[:, UPPER_LIP_INNER_MID] - points[:, LOWER_LIP_INNER_MID], axis=1)
+    eyes = np.linalg.norm(points[:, EYE_OUTER_LEFT] - points[:, EYE_OUTER_RIGHT], axis=1)
+    return np.asarray(lips / eyes, np.float64)
+
+
+def _learn_from(
+    recording: Filmed,
+    frames: tuple[Frame, Frame],
+    light: Light,
+    grown: tuple[GrowingComponents, GrowingComponents],
+) -> None:
+    gaps = lip_gap(recording.points)
+    faces, mouths = [], []
+    for number, picture in enumerate(recording.pictures()):
+        points = recording.points[number]
+        if number % FRAMES_APART == 0:
+            faces.append(light.removed(frames[0].texture(picture, points)).ravel())
+        if gaps[number] >= OPEN_GAP:
+            mouths.append(light.removed(frames[1].texture(picture, points[list(MOUTH_POINTS)])).ravel())
+        for rows, components in ((faces, grown[0]), (mouths, grown[1])):
+            if len(rows) >= BLOCK:
+                components.add(np.array(rows))
+                rows.clear()
+    for rows, components in ((faces, grown[0]), (mouths, grown[1])):
+        if rows:
+            components.add(np.array(rows))
+
+
+def _model(frame: Frame, grown: GrowingComponents, n_modes: int, what: str) -> TextureModel:
+    if len(grown.basis) < n_modes:
+        raise InputError(f"{grown.n_rows} pictures of {what} have no {n_modes} modes; record more, or ask for fewer")
+    n_pixels = len(frame.pixels)
+    return TextureModel(
+        reference=frame.points,
+        triangles=frame.triangles,
+        size=frame.size,
+        pixels=frame.pixels,
+        mean=grown.mean.reshape(n_pixels, 3),
+        basis=grown.basis[:n_modes].reshape(n_modes, n_pixels, 3),
+        spread=grown.spread()[:n_modes].astype(np.float32),
+    )
+
+
+def looks_of(
+    recording: Filmed, frames: tuple[Frame, Frame], light: Light, models: tuple[TextureModel, TextureModel]
+) -> NDArray[np.float32]:
+    """(T, A + B) looks of a recording; where the lips hide the mouth, its looks go straight from before to behind."""
+    face, mouth = frames
+    n_frames, n_face = len(recording.points), models[0].n_modes
+    looks = np.zeros((n_frames, n_face + models[1].n_modes), np.float32)
+    seen = lip_gap(recording.points) >= OPEN_GAP
+    for number, picture in enumerate(recording.pictures()):
+        points = recording.points[number]
+        looks[number, :n_face] = models[0].parameters(light.removed(face.texture(picture, points))[None])[0]
+        if seen[number]:
+            inner = light.removed(mouth.texture(picture, points[list(MOUTH_POINTS)]))
+            looks[number, n_face:] = models[1].parameters(inner[None])[0]
+    if seen.any():
+        for column in range(n_face, looks.shape[1]):
+            looks[:, column] = np.interp(np.arange(n_frames), np.flatnonzero(seen), looks[seen, column])
+    return looks
+
+
+def changed_by_speech(face: Frame) -> NDArray[np.float32]:
+    """(P,) how far each pixel of the face's texture follows speech: 1 about the mouth, 0 on the oval and above."""
+    weight = np.isin(np.arange(N_MESH), MOUTH_REGION).astype(np.float64)
+    weight[list(FACE_OVAL)] = 0.0
+    ends = np.concatenate([face.triangles[:, [0, 1]], face.triangles[:, [1, 2]], face.triangles[:, [2, 0]]])
+    for _ in range(N_SMOOTHINGS):
+        total, count = weight.copy(), np.ones(N_MESH)
+        for here, there in (ends.T, ends.T[::-1]):
+            np.add.at(total, here, weight[there])
+            np.add.at(count, here, 1.0)
+        weight = total / count
+        weight[list(FACE_OVAL)] = 0.0
+    weight = np.minimum(weight / np.quantile(weight[list(MOUTH_POINTS)], 0.1), 1.0)
+    spread: NDArray[np.float32] = (weight[face.corners] * face.weights).sum(axis=1).astype(np.float32)
+    return spread
+
+
+def _plate(
+    recordings: Sequence[Filmed], stretch: tuple[int, int, int], looks: Sequence[NDArray[np.float32]], n_face: int
+) -> Plate:
+    number, first, last = stretch
+    recording, here = recordings[number], slice(first, last)
+    points = recording.points[here, :N_MESH]
+    return Plate(
+        video=film_of(islice(recording.pictures(), first, last)),
+        points=np.concatenate([points, ring(points)], axis=1).astype(np.float32),
+        axes=picture_axes(recording.points[here], recording.landmarks[here]),
+        shape=recording.shape[here],
+        looks=looks[number][here, :n_face],
+    )
+
+
+def picture_axes(points: NDArray[np.floating], landmarks: NDArray[np.floating]) -> NDArray[np.float32]:
+    """(T, 2, 3) pixels for each millimetre along the landmarks' axes: the camera without perspective, least squares."""
+    seen = points - points.mean(axis=1, keepdims=True)
+    local = landmarks - landmarks.mean(axis=1, keepdims=True)
+    axes = [np.linalg.lstsq(shape, picture, rcond=None)[0].T for shape, picture in zip(local, seen, strict=True)]
+    return np.array(axes, np.float32)

@@ -1,0 +1,165 @@
+"""From a folder of recordings to a talker file."""
+
+import json
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from corpus_tools.recordings.observation import Observation
+from corpus_tools.recordings.observe import Refusal, observe
+from corpus_tools.report.recordings import recordings_page
+from corpus_tools.run_options import Effort, Stages, no_stages
+from corpus_tools.training.pose_correction import without_leak
+from corpus_tools.training.train_audio_map import learn_drives
+from corpus_tools.training.train_phone_network import with_network
+from corpus_tools.training.train_talker import learn_talker
+from lexicon.errors import DataError, InputError
+from tts2face.models.files import write_whole
+from tts2face.models.talker import Talker, write_talker
+
+PROVENANCE = "provenance.json"  # in the folder of recordings: where they come from and how they may be used
+PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
+UNSTATED = "not stated"
+READING = "reading recordings"  # the first stage
+CONTENT_WITH_PICTURES = (
+    "landmark shapes, head pose, phones, loudness, and with the stated consent pictures of the person's face; no sound"
+)
+CONTENT = "motion only: landmark shapes, head pose, phones and loudness; no image and no sound"
+
+
+@dataclass(frozen=True, slots=True)
+class Built:
+    """What a build gave: recordings kept, minutes of them, and those refused."""
+
+    n_kept: int
+    minutes: float
+    refused: tuple[Refusal, ...]
+
+
+def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
+    recordings: Path,
+    out: Path,
+    *,
+    name: str | None = None,
+    provenance: Path | None = None,
+    effort: Effort | None = None,
+    created: str | None = None,
+    consent: Mapping[str, str] | None = None,
+    report: Path | None = None,
+    stages: Stages = no_stages,
+) -> Built:
+    """Observe recordings, learn their talker, and write it; the same recordings give the same bytes but for `created`.
+
+    Parameters
+    ----------
+    name
+        Whose talker it is; the provenance's name, or the folder's, when None.
+    provenance
+        JSON file as `read_provenance` reads it; ``provenance.json`` in the folder when None.
+    created
+        Date for the metadata; today when None.
+    consent
+        Of the person shown, from `corpus_tools.consent.consent_of`; with it the talker gets an appearance.
+    report
+        HTML page about the recordings to write; it is written even where none could be used.
+    stages
+        Called with the name of each stage as it begins.
+
+    Raises
+    ------
+    InputError
+        The folder is missing or holds no video, or no recording could be used.
+    DataError
+        The provenance cannot be read.
+    BackendError
+        A package or the landmark models are missing, or a file cannot be written.
+    """
+    stated = read_provenance(provenance or recordings / PROVENANCE, must_exist=provenance is not None)
+    observations = observe(recordings, effort=effort, on_progress=stages(READING))
+    called = name or stated.get("name") or recordings.resolve().stem
+    if report is not None:
+        write_whole(report, recordings_page(called, observations).encode())
+    metadata = {
+        **dict.fromkeys(PROVENANCE_FIELDS, UNSTATED),
+        **stated,
+        "name": called,
+        "command": _command(recordings, out, name, provenance),
+        "created": created or datetime.now(UTC).date().isoformat(),
+        "content": CONTENT if consent is None else CONTENT_WITH_PICTURES,
+        **({} if consent is None else {"consent": dict(consent)}),
+        "refused": [[refusal.name, refusal.reason] for refusal in observations.refused],
+        **_marks(observations.kept),
+    }
+    steady = without_leak(observations.kept)
+    talker = with_network(learn_talker(steady, metadata=metadata), on_progress=stages("learning lips"))
+    talker = replace(talker, drives=learn_drives(steady, talker, stages=stages))
+    if consent is not None:
+        from corpus_tools.aam.add_appearance import with_appearance
+
+        looks = stages("learning looks")
+        talker = with_appearance(talker, observations.kept, effort=effort or Effort(), on_progress=looks)
+    write_talker(out, talker)
+    seconds = sum(len(utterance.shape) for utterance in talker.utterances) / talker.fps
+    return Built(len(talker.utterances), seconds / 60.0, observations.refused)
+
+
+def add_drives(
+    recordings: Path, talker: Talker, out: Path, *, effort: Effort | None = None, stages: Stages = no_stages
+) -> Talker:
+    """Learn the drives of a talker from the recordings that she was learnt from, and write her with them.
+
+    Raises
+    ------
+    InputError
+        The folder is missing or holds no video, or too little sound to learn from.
+    DataError
+        A recording holds no sound, or its frame rate is not the talker's.
+    """
+    kept = without_leak(observe(recordings, effort=effort, on_progress=stages(READING)).kept)
+    if any(one.fps != talker.fps for one in kept):
+        raise DataError(f"the recordings do not have the talker's {talker.fps:g} frames per second; convert them")
+    drives = learn_drives(kept, talker, stages=stages)
+    if not drives:
+        raise InputError(f"{recordings} holds too little speech to learn drives from; give 20 utterances or more")
+    made = replace(talker, drives=drives)
+    write_talker(out, made)
+    return made
+
+
+def _marks(kept: Sequence[Observation]) -> dict[str, Any]:
+    """What users of the talker must know of how its recordings were read."""
+    recognised = [seen.name for seen in kept if seen.is_recognised]
+    lags = {seen.video.name: seen.quality.lag for seen in kept if seen.quality.lag}
+    return {
+        **({"phones_recognised": recognised} if recognised else {}),
+        **({"sound_late_s": lags} if lags else {}),
+    }
+
+
+def read_provenance(path: Path, *, must_exist: bool) -> Mapping[str, Any]:
+    """Where recordings come from: a JSON object with any of name, language, sources, licence and attribution.
+
+    Raises
+    ------
+    DataError
+        The file is missing though it must exist, is no JSON object, or has other fields.
+    """
+    if not must_exist and not path.is_file():
+        return {}
+    try:
+        stated = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as broken:
+        raise DataError(f"{path} cannot be read as JSON ({broken}); mend it") from broken
+    if not isinstance(stated, dict) or not set(stated) <= set(PROVENANCE_FIELDS):
+        raise DataError(f"{path} must be a JSON object with fields out of {', '.join(PROVENANCE_FIELDS)}")
+    return stated
+
+
+def _command(recordings: Path, out: Path, name: str | None, provenance: Path | None) -> str:
+    words = ["tts2face", "corpus", "build", recordings.name]
+    words += ["--name", name] if name else []
+    words += ["--provenance", provenance.name] if provenance else []
+    return shlex.join([*words, "--out", out.name])

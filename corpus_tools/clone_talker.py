@@ -1,0 +1,150 @@
+"""A talker with one person's face model and another's recorded speech."""
+
+import shlex
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.aam.appearance_transfer import looks_map
+from lexicon.errors import InputError
+from tts2face.cloning.parameter_transfer import Cloning, cloning, with_missing
+from tts2face.models.talker import Talker, Utterance, load_talker, speech_channels, write_talker
+from tts2face.own_face.appearance_regression import own_face
+from tts2face.types import Trajectory
+
+CONTENT = "motion only: one talker's recorded motion carried to the shape model of another's face; no image, no sound"
+CONTENT_WITH_PICTURES = (
+    "one talker's recorded motion carried to another's face, with pictures of that face, agreed to; no sound"
+)
+STATED = ("sources", "licence", "attribution")  # these bind whoever uses the clone, for both talkers
+UNSTATED = "not stated"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cloned:
+    """A cloned talker and what happened on the way.
+
+    ``n_appended`` modes were added to the target's; ``at_limits`` is the share of frames with a parameter at the
+    target's limits; ``left_pictures`` tells that the source had pictures, for which the target has no place.
+    """
+
+    talker: Talker
+    n_appended: int
+    at_limits: float
+    left_pictures: bool
+
+
+def clone_talker(
+    source: str, target: str, out: Path, *, gain: float = 1.0, append: bool = False, created: str | None = None
+) -> Cloned:
+    """Clone one talker's speech onto another's face and write it; equal talkers give equal bytes but for the date.
+
+    Parameters
+    ----------
+    source, target
+        Shipped talkers by name, or ``.talker`` files: who speaks, and whose face moves.
+    gain
+        Factor on the motion from rest, before the target's limits.
+    append
+        Give the target the components of the source's motion that its own modes lack.
+    created
+        Date for the metadata; today when None.
+
+    Raises
+    ------
+    InputError
+        There is no such talker, the source has no utterance, or the gain is no number from 0 up.
+    DataError
+        A talker is damaged or its model unfit.
+    BackendError
+        The file cannot be written.
+    """
+    made = cloned_talker(load_talker(source), load_talker(target), gain=gain, append=append)
+    flags = [*(["--gain", f"{gain:g}"] if gain != 1.0 else []), *(["--append-missing"] if append else [])]
+    words = ["tts2face", "corpus", "clone", Path(source).name, Path(target).name, "--out", out.name, *flags]
+    dated = {"command": shlex.join(words), "created": created or datetime.now(UTC).date().isoformat()}
+    made = replace(made, talker=replace(made.talker, metadata={**made.talker.metadata, **dated}))
+    write_talker(out, made.talker)
+    return made
+
+
+def cloned_talker(source: Talker, target: Talker, *, gain: float = 1.0, append: bool = False) -> Cloned:
+    """The talker with the target's face whose utterances are the source's, carried over.
+
+    Sizes of the head's motion follow the faces' sizes, its angles stay. Where the target has pictures, so has the
+    clone: their looks are the source's by eq. 5 where it has pictures too, else those that go with the target's lips.
+
+    Raises
+    ------
+    InputError
+        The source has no utterance, or the gain is no number from 0 up.
+    DataError
+        A shape model is unfit.
+    """
+    if not source.utterances:
+        raise InputError("the source talker has no utterance to clone; give one that was built from recordings")
+    n_before = len(target.model.spread)
+    target = with_missing(source.model, target) if append else target
+    ready = cloning(source.model, target.model, gain=gain)
+    looks = _looks(source, target, gain)
+    utterances = tuple(_carried(utterance, ready, looks) for utterance in source.utterances)
+    shapes = np.concatenate([utterance.shape for utterance in utterances])
+    n_appended = len(target.model.spread) - n_before
+    about = {"gain": gain, "size": round(ready.size, 4), "appended_modes": n_appended}
+    metadata = _metadata(source.metadata, target.metadata, about, has_pictures=target.appearance is not None)
+    at_limits = float((np.abs(shapes) >= ready.limits).any(axis=1).mean())
+    talker = Talker(source.fps, target.model, utterances, metadata, target.appearance)
+    return Cloned(talker, n_appended, at_limits, source.appearance is not None and target.appearance is None)
+
+
+Looks = Callable[[Utterance, NDArray[np.float32]], NDArray[np.float32] | None]
+
+
+def _looks(source: Talker, target: Talker, gain: float) -> Looks:
+    """The looks of an utterance of the source on the target, given its shape there; none without pictures."""
+    if target.appearance is None:
+        return lambda spoken, shape: None
+    if source.appearance is not None:
+        carry = looks_map(source.appearance, target.appearance)
+        return lambda spoken, shape: None if spoken.looks is None else carry.carried(spoken.looks, gain=gain)
+    own, channels = own_face(target), speech_channels(target.model)
+
+    def with_lips(_spoken: Utterance, shape: NDArray[np.float32]) -> NDArray[np.float32]:
+        lips = Trajectory(channels, shape[:, : len(channels)], source.fps)
+        return np.asarray(own.motion(lips).values[:, len(channels) :], np.float32)
+
+    return with_lips
+
+
+def _carried(utterance: Utterance, ready: Cloning, looks: Looks) -> Utterance:
+    head = utterance.head.copy()
+    head[:, 3:] *= ready.size
+    shape = ready.parameters(utterance.shape)
+    return replace(utterance, shape=shape, head=head, looks=looks(utterance, shape))
+
+
+def _metadata(
+    source: Mapping[str, Any], target: Mapping[str, Any], about: Mapping[str, Any], *, has_pictures: bool
+) -> dict[str, Any]:
+    """Provenance of both, and in full under ``cloning``."""
+    origins = {
+        role: {key: value for key, value in stated.items() if key != "refused"}
+        for role, stated in (("speech", source), ("face", target))
+    }
+    return {
+        "name": f"{target.get('name', UNSTATED)} with the speech of {source.get('name', UNSTATED)}",
+        "language": source.get("language", UNSTATED),
+        **{key: _both(source.get(key, UNSTATED), target.get(key, UNSTATED)) for key in STATED},
+        "content": CONTENT_WITH_PICTURES if has_pictures else CONTENT,
+        **({"consent": target["consent"]} if has_pictures and "consent" in target else {}),
+        "cloning": {**about, **origins},
+    }
+
+
+def _both(of_speech: str, of_face: str) -> str:
+    return of_speech if of_speech == of_face else f"speech: {of_speech}; face: {of_face}"

@@ -1,0 +1,97 @@
+"""Basis expressions B_i of a person (Ju and Lee 2008, Fig. 4): carried over from a face that has them, or captured."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.decomposition.stills import NEUTRAL, Still, required
+from lexicon.errors import DataError, InputError
+from tts2face.face.landmark_fit import N_SKIN
+from tts2face.models.landmarks import N_LANDMARKS
+from tts2face.models.palette import EXPRESSIONS
+
+LEAST_MOTION_MM = 0.3  # root mean square over landmarks; trackers differ by half of it from still to still
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Basis:
+    """A person's basis expressions.
+
+    Parameters
+    ----------
+    rest : (478, 3)
+        The person's landmarks at rest, mm.
+    expressions : (5, 478, 3)
+        Displacement of each of `tts2face.models.palette.EXPRESSIONS` from rest, mm.
+    """
+
+    rest: Floats
+    expressions: Floats
+
+
+def carried_basis(
+    expressions: NDArray[np.floating], face_rest: NDArray[np.floating], rest: NDArray[np.floating]
+) -> Basis:
+    """Expressions of one face as another person would show them.
+
+    Parameters
+    ----------
+    expressions : (5, 478, 3)
+        Displacements from `face_rest`, mm.
+    face_rest, rest : (478, 3)
+        Landmarks at rest of the face that has the expressions, and of the person.
+
+    Raises
+    ------
+    InputError
+        A shape is another.
+
+    Notes
+    -----
+    One affine map, of least squares between both faces at rest, carries displacements: it turns them into the person's
+    axes and scales width, height and depth each by itself.
+    """
+    shapes = (np.shape(expressions), np.shape(face_rest), np.shape(rest))
+    if shapes != ((len(EXPRESSIONS), N_LANDMARKS, 3), (N_LANDMARKS, 3), (N_LANDMARKS, 3)):
+        raise InputError(f"expressions and faces at rest have the shapes {shapes}; all need {N_LANDMARKS} landmarks")
+    own = np.asarray(rest, np.float64)
+    there = np.asarray(face_rest, np.float64)[:N_SKIN]
+    centred = there - there.mean(axis=0)
+    affine, *_ = np.linalg.lstsq(centred, own[:N_SKIN] - own[:N_SKIN].mean(axis=0), rcond=None)
+    return Basis(own, np.asarray(expressions, np.float64) @ affine)
+
+
+def captured_basis(
+    stills: Mapping[str, Still], read: Callable[[Still], Floats], *, rest: NDArray[np.floating] | None = None
+) -> Basis:
+    """Expressions that a person was captured with.
+
+    Parameters
+    ----------
+    stills
+        One for each of `tts2face.models.palette.EXPRESSIONS`, and neutral where `rest` is not given.
+    read
+        Landmarks (478, 3) of a still, mm, head pose removed: `PictureReader` or `marker_reader`.
+    rest : (478, 3)
+        The person's landmarks at rest as the recordings have them.
+
+    Raises
+    ------
+    InputError
+        A still is missing.
+    DataError
+        A still shows no face, or one as the face at rest; or as `read` says.
+    """
+    needed = required(stills, is_rest_known=rest is not None)
+    own = np.asarray(read(stills[NEUTRAL]) if rest is None else rest, np.float64)
+    expressions = np.stack([read(stills[name]) - own for name in needed if name != NEUTRAL])
+    expressions[:, N_SKIN:] = 0.0
+    sizes = np.sqrt(np.square(expressions[:, :N_SKIN]).sum(axis=2).mean(axis=1))
+    for name, size in zip(EXPRESSIONS, sizes, strict=True):
+        if size < LEAST_MOTION_MM:
+            raise DataError(f"{stills[name]} shows {name} as the face at rest; capture it stronger")
+    return Basis(own, expressions)

@@ -1,0 +1,210 @@
+"""Weights c_i of basis expressions in a face's slow displacement: Ju and Lee 2008, section 4.1, and least squares.
+
+Both estimators obey ``-slack <= c_i <= 1 + slack`` (the paper's epsilon). The paper draws random weights, keeps the
+faces they make in a k-d tree and averages those nearest to the face that is seen; least squares within the same limits
+is the best that any estimator can reach.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError, InputError
+from tts2face.face.bounded_least_squares import bounded_least_squares
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
+N_AVERAGED = 41  # frames at 30 a second, 1.36 s: speech and small gestures average out (Ju and Lee 2008, section 4.1)
+N_SAMPLES, N_NEAREST = 1000, 60  # Ju and Lee 2008, section 4.1
+MOST_SLACK = 1.0  # Ju and Lee 2008, section 4.1
+LEAST_CONDITION = 1e-9  # of the largest singular value: expressions nearer to dependent have no weights of their own
+AT_ONCE = 4096  # frames asked at once, to bound memory
+
+Floats = NDArray[np.float64]
+
+
+class Estimator(Protocol):
+    """What turns displacements (T, ...) into weights (T, B)."""
+
+    def weights(self, displacements: NDArray[np.floating]) -> Floats:
+        """Weights (T, B) of the basis expressions in displacements (T, ...) from the face at rest, in mm."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reduced:
+    """A basis in its own span: ``basis = rows @ axes.T``, so that distances within the span are kept exactly.
+
+    Parameters
+    ----------
+    axes : (n, B)
+        Orthonormal columns.
+    rows : (B, B)
+        Each expression in these axes.
+    slack
+        The paper's epsilon.
+    """
+
+    axes: Floats
+    rows: Floats
+    slack: float
+
+    def split(self, displacements: NDArray[np.floating]) -> tuple[Floats, Floats]:
+        """(T, B) displacements within the span, and (T,) their squared distance from it."""
+        flat = np.asarray(displacements, np.float64).reshape(len(displacements), -1)
+        if flat.shape[1] != len(self.axes):
+            raise InputError(f"displacements have {flat.shape[1]} coordinates, the expressions {len(self.axes)}")
+        within = flat @ self.axes
+        beyond = np.maximum(np.square(flat).sum(axis=1) - np.square(within).sum(axis=1), 0.0)
+        return within, beyond
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LeastSquares:
+    """The weights of least squared error within the limits."""
+
+    basis: Reduced
+
+    def weights(self, displacements: NDArray[np.floating]) -> Floats:
+        """As `Estimator`; exact up to rounding."""
+        within, _ = self.basis.split(displacements)
+        rows, slack = self.basis.rows, self.basis.slack
+        limits = np.tile([-slack, 1.0 + slack], (len(rows), 1))
+        solved: Floats = bounded_least_squares(rows @ rows.T, within @ rows.T, limits)
+        return solved
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NearestSamples:
+    """The paper's estimator.
+
+    Parameters
+    ----------
+    samples : (S, B)
+        Random weights c^k within the limits.
+    tree
+        Of the faces F_k that they make, in the span of the basis.
+    n_nearest
+        n_k of the paper.
+    """
+
+    basis: Reduced
+    samples: Floats
+    tree: "cKDTree[Any]"
+    n_nearest: int
+
+    def weights(self, displacements: NDArray[np.floating]) -> Floats:
+        """As `Estimator`.
+
+        Notes
+        -----
+        ``a_k`` is inversely proportional to the distance of F_k in all coordinates: what lies beyond the span is far
+        from every sample alike. The search is exact; the paper's is approximate within a small bound.
+        """
+        found = np.zeros((len(displacements), self.samples.shape[1]))
+        for first in range(0, len(displacements), AT_ONCE):
+            span = slice(first, first + AT_ONCE)
+            found[span] = self._mixed(*self.basis.split(displacements[span]))
+        return found
+
+    def _mixed(self, within: Floats, beyond: Floats) -> Floats:
+        near, at = self.tree.query(within, k=self.n_nearest)
+        shape = (len(within), self.n_nearest)
+        squares = np.reshape(near, shape) ** 2 + beyond[:, None]
+        least = np.maximum(squares.min(axis=1, keepdims=True), np.finfo(np.float64).tiny)
+        shares = np.sqrt(least / np.maximum(squares, least))  # relative to the nearest: no distance divides by 0
+        shares /= shares.sum(axis=1, keepdims=True)
+        mixed: Floats = np.einsum("tk,tkb->tb", shares, self.samples[np.reshape(at, shape)])
+        return mixed
+
+
+def averaged(motion: NDArray[np.floating], n_frames: int = N_AVERAGED) -> Floats:
+    """Centred mean of the `n_frames` frames about each; beyond a recording's ends its motion is mirrored.
+
+    Parameters
+    ----------
+    motion : (T, ...)
+        At least one frame.
+    n_frames
+        Odd.
+
+    Raises
+    ------
+    InputError
+        `n_frames` is even or below 1, or there is no frame.
+
+    Notes
+    -----
+    Mirrored, a window keeps its length: windows that shorten towards an end would leave the first frame as it is, lips
+    and all (measured: docs/gestures.md).
+    """
+    from scipy.ndimage import uniform_filter1d
+
+    if n_frames < 1 or n_frames % 2 == 0 or not len(motion):
+        raise InputError(f"an average needs frames and an odd number of them, not {n_frames} of {len(motion)}")
+    mean: Floats = uniform_filter1d(np.asarray(motion, np.float64), n_frames, axis=0, mode="reflect")
+    return mean
+
+
+def least_squares(basis: NDArray[np.floating], slack: float = 0.0) -> LeastSquares:
+    """Bounded least squares on a basis (B, ...) of displacements in mm; errors as `reduced`."""
+    return LeastSquares(reduced(basis, slack))
+
+
+def nearest_samples(
+    basis: NDArray[np.floating],
+    generator: np.random.Generator,
+    *,
+    slack: float = 0.0,
+    n_samples: int = N_SAMPLES,
+    n_nearest: int = N_NEAREST,
+) -> NearestSamples:
+    """The paper's estimator on a basis (B, ...) of displacements in mm.
+
+    Raises
+    ------
+    InputError
+        There are fewer samples than neighbours, no neighbour, or as `reduced`.
+    DataError
+        As `reduced`.
+    """
+    from scipy.spatial import cKDTree
+
+    if not 1 <= n_nearest <= n_samples:
+        raise InputError(f"{n_nearest} nearest of {n_samples} samples cannot be found; ask for 1 to {n_samples}")
+    within = reduced(basis, slack)
+    samples = generator.uniform(-slack, 1.0 + slack, (n_samples, len(within.rows)))
+    return NearestSamples(within, samples, cKDTree(samples @ within.rows), n_nearest)
+
+
+def reduced(basis: NDArray[np.floating], slack: float = 0.0) -> Reduced:
+    """A basis (B, ...) of displacements in the axes of its span.
+
+    Raises
+    ------
+    InputError
+        `slack` is not in [0, 1].
+    DataError
+        The expressions depend on each other, so that weights are not unique, or are not finite.
+    """
+    if not 0.0 <= slack <= MOST_SLACK:
+        raise InputError(f"weights may pass their limits by 0 to {MOST_SLACK:g}, not by {slack:g}")
+    flat = np.asarray(basis, np.float64).reshape(len(basis), -1)
+    if not np.isfinite(flat).all():
+        raise DataError("a basis expression holds values that are no numbers; capture it again")
+    strengths = np.linalg.svd(flat, compute_uv=False)
+    if len(flat) > flat.shape[1] or strengths[-1] <= LEAST_CONDITION * strengths[0]:
+        raise DataError("the basis expressions depend on each other; capture each as a face of its own")
+    axes, upper = np.linalg.qr(flat.T)
+    return Reduced(np.asarray(axes), np.asarray(upper).T, slack)
+
+
+def approximation_error(
+    displacements: NDArray[np.floating], basis: NDArray[np.floating], weights: NDArray[np.floating]
+) -> Floats:
+    """(T,) root mean square over landmarks, in mm, of what weights (T, B) leave of displacements (T, L, 3)."""
+    left = np.asarray(displacements, np.float64) - np.tensordot(weights, np.asarray(basis, np.float64), axes=1)
+    error: Floats = np.sqrt(np.square(left).sum(axis=-1).mean(axis=-1))
+    return error

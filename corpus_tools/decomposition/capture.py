@@ -1,0 +1,144 @@
+"""A recorded face from whichever source, as the decomposition needs it: pose-free landmarks, head pose and sound."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.recordings.corpus_audio import SOUND_RATE
+from lexicon.errors import DataError, InputError
+from tts2face.models.landmarks import N_LANDMARKS
+from tts2face.models.palette import FEATURES, GESTURE_FPS
+from tts2face.types import HEAD_CHANNELS, Waveform
+from tts2face.video.media import read_sound
+
+SOUND_SUFFIXES = (".wav", ".flac", ".m4a", ".mp3", ".ogg", ".opus", ".mov", ".mp4")  # looked for beside a capture
+AT_ONCE = 128  # coordinates resampled at once, to bound memory
+SAME_RATE = 1e-6  # frames a second
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Captured:
+    """One recording; frame i is the instant ``i / fps`` of its sound.
+
+    Parameters
+    ----------
+    landmarks : (T, 478, 3)
+        Millimetres of the person's own size, head pose removed; axes as in `tts2face.models.landmarks`.
+    head : (T, 6)
+        `HEAD_CHANNELS`.
+    rest : (478, 3)
+        The face at rest, mm, where the source tells.
+    eyes : (T, 4)
+        Shares by which the left and the right lids are shut, pitch and yaw of the eyes in the head in radians; where
+        the source itself tells them, and they need not be read from landmarks.
+    missing
+        Features of `tts2face.models.palette.FEATURES` of which this source tells nothing.
+    notes
+        What was filled in or supposed, a sentence each.
+    """
+
+    name: str
+    fps: float
+    landmarks: NDArray[np.float32]
+    head: NDArray[np.float32]
+    sound: Waveform | None = None
+    rest: NDArray[np.float32] | None = None
+    eyes: NDArray[np.float32] | None = None
+    missing: frozenset[str] = frozenset()
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse landmarks and head poses that do not fit each other, and unknown features."""
+        n_frames = len(self.landmarks)
+        if self.landmarks.shape != (n_frames, N_LANDMARKS, 3) or self.head.shape != (n_frames, len(HEAD_CHANNELS)):
+            raise DataError(
+                f"{self.name} has landmarks {self.landmarks.shape} and head poses {self.head.shape}; record it again"
+            )
+        if not n_frames or not np.isfinite(self.landmarks).all() or not np.isfinite(self.head).all():
+            raise DataError(f"{self.name} has no frame, or frames without a face; record it again")
+        unknown = self.missing - set(FEATURES)
+        if unknown:
+            raise InputError(f"there is no feature {sorted(unknown)[0]!r}; gestures consist of {', '.join(FEATURES)}")
+
+
+def at_gesture_rate(captured: Captured) -> Captured:
+    """The recording at `GESTURE_FPS` frames a second."""
+    if abs(captured.fps - GESTURE_FPS) < SAME_RATE:
+        return captured
+    return replace(
+        captured,
+        fps=GESTURE_FPS,
+        landmarks=resampled(captured.landmarks, captured.fps, GESTURE_FPS).astype(np.float32),
+        head=resampled(captured.head, captured.fps, GESTURE_FPS).astype(np.float32),
+        eyes=None if captured.eyes is None else resampled(captured.eyes, captured.fps, GESTURE_FPS).astype(np.float32),
+    )
+
+
+def resampled(values: NDArray[np.floating], fps: float, wanted: float) -> Floats:
+    """Values (T, ...) at another frame rate, the first frame staying where it is.
+
+    Raises
+    ------
+    InputError
+        There is no frame, or a rate is not above 0.
+
+    Notes
+    -----
+    Values of the cubic spline through the frames: straight lines between frames of 25 a second would blunt five frames
+    of six at 30. For a lower rate, its means over the time of a frame, so that what is too fast does not come back as
+    something slow.
+    """
+    if not len(values) or not (fps > 0 and wanted > 0):
+        raise InputError(f"frames at {fps:g} a second cannot be read at {wanted:g}; give rates above 0")
+    flat = np.asarray(values, np.float64).reshape(len(values), -1)
+    n_frames = int(np.floor((len(values) - 1) / fps * wanted + SAME_RATE)) + 1
+    read = np.zeros((n_frames, flat.shape[1]))
+    for first in range(0, flat.shape[1], AT_ONCE):
+        columns = slice(first, first + AT_ONCE)
+        read[:, columns] = _read(flat[:, columns], fps, wanted, n_frames)
+    return read.reshape(n_frames, *values.shape[1:])
+
+
+def _read(values: Floats, fps: float, wanted: float, n_frames: int) -> Floats:
+    from scipy.interpolate import make_interp_spline
+
+    instants, end = np.arange(n_frames) / wanted, (len(values) - 1) / fps
+    if len(values) == 1:
+        return values
+    curve = make_interp_spline(np.arange(len(values)) / fps, values, k=min(3, len(values) - 1))
+    if wanted >= fps:
+        return np.asarray(curve(np.minimum(instants, end)))
+    begin, stop = np.clip(instants - 0.5 / wanted, 0, end), np.clip(instants + 0.5 / wanted, 0, end)
+    area = curve.antiderivative()
+    return np.asarray((area(stop) - area(begin)) / (stop - begin)[:, None])
+
+
+def sound_of(capture: Path, given: Path | None = None) -> Waveform | None:
+    """The sound that belongs to a capture: the file that is given, or `sound_beside` it.
+
+    Raises
+    ------
+    InputError, DataError
+        As `sound_beside` and `tts2face.video.media.read_sound`.
+    """
+    found = given or sound_beside(capture)
+    return None if found is None else read_sound(found, SOUND_RATE)
+
+
+def sound_beside(capture: Path) -> Path | None:
+    """The sound file of the same name beside a capture, or the only one there; None where there is none.
+
+    Raises
+    ------
+    InputError
+        There are several.
+    """
+    beside = sorted(file for file in capture.parent.iterdir() if file.suffix.lower() in SOUND_SUFFIXES)
+    found = [file for file in beside if file.stem == capture.stem and file != capture] or beside
+    if len(found) > 1:
+        raise InputError(f"beside {capture.name} lie {len(found)} sound files; name one as the capture")
+    return found[0] if found else None

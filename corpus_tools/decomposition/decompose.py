@@ -1,0 +1,142 @@
+"""A recorded face taken apart (Ju and Lee 2008, section 4): F = R (N + sum c_i B_i + P + sum D_j) + T.
+
+N is the face at rest, B_i are basis expressions, c_i their slow weights, P what the lips do, D_j what every other
+region does besides, R and T the head's pose. Lids and gaze are read from what is left at the eyes.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.decomposition.basis_expressions import Basis
+from corpus_tools.decomposition.blend_weights import Estimator, averaged
+from corpus_tools.decomposition.capture import Captured, at_gesture_rate
+from corpus_tools.decomposition.regions import feature_landmarks
+from tts2face.gesture.prosody import SILENCE, drivers
+from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS
+from tts2face.models.palette import FEATURES, GESTURE_FPS, REGION_FEATURES
+from tts2face.retargeting.performer import LIDS, aperture
+
+STEADY_S = 0.03  # standard deviation of the Gaussian that takes the tracker's tremor from head, brows and cheeks
+SHUT_APERTURE = 0.055  # of tracked lids that touch; first percentile of 40 minutes of one person (docs/gestures.md)
+IRIS = {"Left": 473, "Right": 468}
+# A tracked iris moves so far, in widths of an eye, when the line of sight turns by a radian: down, to the left. From
+# one person who turns her head and looks into the camera (docs/gestures.md).
+IRIS_PER_RAD = (-0.23, 0.33)
+# Of a landmark's displacement that counts when expressions are told, in the region of the lips. At full weight the jaw
+# of a speaker reads as surprise (mean weight .20 in neutral speech) and the rest of the face is described three times
+# worse than by no expression; without lips a smile is hard to see (docs/gestures.md).
+LIPS_COUNT = 0.1
+SEEN_SHUT = 0.35  # a lid that covers more of the eye hides the iris
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Parts:
+    """One recording taken apart, at `GESTURE_FPS`.
+
+    Parameters
+    ----------
+    motion
+        (T, ...) of each feature that was seen: as `tts2face.models.palette.Style`, but "brows" and "cheeks" as
+        displacements (T, L, 3) of their landmarks, mm.
+    speech : (T, M, 3)
+        P: displacement of `MOUTH_REGION`, mm.
+    intensity, pitch : (T,)
+    """
+
+    name: str
+    motion: dict[str, Floats]
+    speech: Floats
+    intensity: Floats
+    pitch: Floats
+
+
+def taken_apart(captured: Captured, basis: Basis, estimator: Estimator) -> Parts:
+    """Head pose, expression, independent motion, lids, gaze, speech and sound of a recording.
+
+    Parameters
+    ----------
+    basis
+        Of the person, in the size of the landmarks.
+    estimator
+        Of weights in displacements `as_counted`.
+    """
+    recorded = at_gesture_rate(captured)
+    moved = recorded.landmarks - basis.rest
+    weights = estimator.weights(as_counted(averaged(moved)))
+    left = moved - np.tensordot(weights, basis.expressions, axes=1)
+    if recorded.eyes is None:
+        shut = lids_shut(basis.rest + left, basis.rest)
+        turned = eyes_turned(recorded.landmarks)
+    else:
+        shut, turned = recorded.eyes[:, :2], recorded.eyes[:, 2:].astype(np.float64)
+    head = _steady(recorded.head - np.median(recorded.head, axis=0))
+    motion = {
+        "expression": weights.astype(np.float32),
+        **{name: _steady(left[:, feature_landmarks(name)]) for name in REGION_FEATURES},
+        "blink": shut,
+        "gaze": line_of_sight(turned, recorded.head, shut),
+        "head": head,
+    }
+    times = np.arange(len(moved)) / GESTURE_FPS
+    heard = np.tile(SILENCE, (len(times), 1))
+    if recorded.sound is not None:
+        heard = drivers(recorded.sound, times, with_pitch=True)
+    return Parts(
+        recorded.name,
+        {name: motion[name] for name in FEATURES if name not in recorded.missing},
+        left[:, list(MOUTH_REGION)].astype(np.float32),
+        heard[:, 0],
+        heard[:, 1],
+    )
+
+
+def as_counted(displacements: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Displacements (N, 478, 3) as they count for expressions: lips move for speech most of the time."""
+    counts = np.ones((N_LANDMARKS, 1))
+    counts[list(MOUTH_REGION)] = LIPS_COUNT
+    return np.asarray(displacements, np.float64) * counts
+
+
+def lids_shut(landmarks: NDArray[np.floating], rest: NDArray[np.floating]) -> Floats:
+    """(T, 2) share by which the left and the right lids are shut, of (T, 478, 3): 0 as at rest (478, 3), 1 fully."""
+    columns = []
+    for side in ("Left", "Right"):
+        opened = float(aperture(rest[None], side)[0])
+        columns.append((opened - aperture(landmarks, side)) / (opened - SHUT_APERTURE))
+    return np.stack(columns, axis=1).astype(np.float32)
+
+
+def eyes_turned(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(T, 2) pitch and yaw of the eyes in the head, of tracked landmarks (T, 478, 3): from where the irises stand."""
+    turned = []
+    for side, iris in IRIS.items():
+        _, _, outer, inner = LIDS[side]
+        corners = landmarks[:, [outer, inner]]
+        width = np.linalg.norm(corners[:, 0] - corners[:, 1], axis=1)
+        away = landmarks[:, iris] - corners.mean(axis=1)
+        turned.append(np.stack([away[:, 1], away[:, 0]], axis=1) / width[:, None] / IRIS_PER_RAD)
+    return np.asarray(np.mean(turned, axis=0), np.float64)
+
+
+def line_of_sight(turned: NDArray[np.float64], head: NDArray[np.floating], shut: Floats) -> Floats:
+    """(T, 2) pitch and yaw at which eyes look that are turned (T, 2) in the head, against the recording's median.
+
+    Where lids hide the irises the line goes straight from before to behind.
+    """
+    sight = turned + head[:, :2]
+    seen = np.flatnonzero(shut.max(axis=1) < SEEN_SHUT)
+    if len(seen):
+        frames = np.arange(len(sight))
+        sight = np.stack([np.interp(frames, seen, sight[seen, axis]) for axis in range(2)], axis=1)
+    centred: Floats = (sight - np.median(sight, axis=0)).astype(np.float32)
+    return centred
+
+
+def _steady(values: NDArray[np.floating]) -> Floats:
+    from scipy.ndimage import gaussian_filter1d
+
+    return np.asarray(gaussian_filter1d(values, STEADY_S * GESTURE_FPS, axis=0), np.float32)

@@ -1,0 +1,47 @@
+"""Styles that nobody recorded: the table of how a measured style is changed into each."""
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+
+from lexicon.errors import DataError
+from tts2face.models.palette import FIXED_CHANNELS, REGION_FEATURES, Change, Derivation
+
+TABLE = Path(__file__).with_name("derived_styles.tsv")
+
+
+def derived_styles(source: str, table: Path = TABLE) -> dict[str, Derivation]:
+    """Derivations from a measured style, by name.
+
+    Raises
+    ------
+    DataError
+        A line of the table names no feature or channel, or holds no number.
+    """
+    changes: dict[str, dict[str, Change]] = {}
+    reasons: dict[str, list[str]] = {}
+    lines = [line for line in table.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    for row in csv.DictReader(lines, delimiter="\t"):
+        style, feature = row["style"], row["feature"]
+        if feature not in FIXED_CHANNELS and feature not in REGION_FEATURES:
+            raise DataError(f"{table.name}: {style} changes {feature!r}, which is no feature; correct the table")
+        try:
+            offset = _offsets(row["offsets"] or "", feature)
+            changes.setdefault(style, {})[feature] = Change(float(row["gain"]), offset, float(row["tempo"]))
+        except ValueError as broken:
+            raise DataError(f"{table.name}: {feature} of {style} cannot be read ({broken}); correct it") from broken
+        reasons.setdefault(style, []).extend([row["why"]] if row["why"] else [])
+    return {
+        style: Derivation(source, made, f"derived from {source}: {'; '.join(reasons[style])}")
+        for style, made in changes.items()
+    }
+
+
+def _offsets(written: str, feature: str) -> Mapping[str, float]:
+    found = {}
+    for part in written.split():
+        channel, _, value = part.partition("=")
+        if channel not in FIXED_CHANNELS.get(feature, ()):
+            raise ValueError(f"no channel {channel!r}")
+        found[channel] = float(value)
+    return found

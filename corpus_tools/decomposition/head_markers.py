@@ -1,0 +1,126 @@
+"""The head's pose from markers that the face does not move, and the face's markers without it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.decomposition.marker_gaps import check_gap
+from lexicon.errors import DataError
+from tts2face.video.pose import similarity
+
+LEAST_SEEN = 3  # markers that show a pose
+MOST_MISFIT_MM = 5.0  # of the head's markers against a rigid head, root mean square; caps slip by less
+N_ROUNDS = 3  # of reference and poses in turn; the reference moves by less than 0.01 mm from the second on
+LINE = 0.05  # second over first spread of markers that lie nearly on a line
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeadPoses:
+    """Poses of T frames.
+
+    Parameters
+    ----------
+    reference : (H, 3)
+        The head's markers about their middle, mm.
+    rotations, places : (T, 3, 3), (T, 3)
+        ``world = rotations @ head + places``.
+    misfit_mm
+        Root mean square distance of the markers from the rigid head.
+    """
+
+    reference: Floats
+    rotations: Floats
+    places: Floats
+    misfit_mm: float
+
+    def without(self, points: Floats) -> Floats:
+        """(T, M, 3) points in the head's own axes."""
+        local: Floats = np.einsum("tij,tmi->tmj", self.rotations, points - self.places[:, None])
+        return local
+
+
+def head_poses(
+    points: Floats, names: Sequence[str], fps: float, *, reference: Floats | None = None
+) -> tuple[HeadPoses, tuple[str, ...]]:
+    """Poses of the head, and a sentence that says what was filled.
+
+    Parameters
+    ----------
+    points : (T, H, 3)
+        The head's markers, NaN in gaps; three in a frame suffice.
+    reference : (H, 3)
+        The head as other recordings of the session have it; the recording's own by default.
+
+    Raises
+    ------
+    DataError
+        They are fewer than three, on a line, out of sight too long, or do not move as one.
+
+    Notes
+    -----
+    Kabsch 1976 on the markers that are seen; reference and poses are found in turn. Poses between frames that show
+    them are filled in.
+    """
+    if len(names) < LEAST_SEEN:
+        raise DataError(f"{len(names)} markers of the head are there; its pose takes at least {LEAST_SEEN}")
+    seen = np.asarray(np.isfinite(points).all(axis=2))
+    posed = np.asarray(seen.sum(axis=1) >= LEAST_SEEN)
+    check_gap("head's pose", ~posed, fps)
+    head = _first_reference(points, seen) if reference is None else reference
+    spreads = np.linalg.svd(head - head.mean(axis=0), compute_uv=False)
+    if spreads[1] <= LINE * spreads[0]:
+        raise DataError("the head's markers lie on a line, so that its pose is not known; wear them apart")
+    shown, seen = points[posed], seen[posed]
+    rotations, places = _fitted(shown, seen, head)
+    for _ in range(N_ROUNDS if reference is None else 0):
+        local = np.einsum("tij,tmi->tmj", rotations, np.nan_to_num(shown) - places[:, None])
+        head = np.einsum("tm,tmi->mi", seen, local) / seen.sum(axis=0)[:, None]
+        head = head - head.mean(axis=0)
+        rotations, places = _fitted(shown, seen, head)
+    off = np.einsum("tij,mj->tmi", rotations, head) + places[:, None] - shown
+    misfit = float(np.sqrt(np.square(off[seen]).sum(axis=1).mean()))
+    if misfit > MOST_MISFIT_MM:
+        raise DataError(
+            f"the head's markers do not move as one ({misfit:.1f} mm apart); name only those on the skull as head"
+        )
+    notes = () if posed.all() else (f"the head's pose was filled in in {int((~posed).sum())} frames",)
+    return HeadPoses(head, *_between(rotations, places, posed), misfit), notes
+
+
+def _between(rotations: Floats, places: Floats, posed: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """Poses of all frames from those of the frames that have one: evenly turned and straight between them."""
+    from scipy.spatial.transform import Rotation, Slerp
+
+    there = np.flatnonzero(posed)
+    if len(there) == 1:
+        return rotations.repeat(len(posed), axis=0), places.repeat(len(posed), axis=0)
+    frames = np.arange(len(posed))
+    turned = Slerp(there, Rotation.from_matrix(rotations))(np.clip(frames, there[0], there[-1])).as_matrix()
+    turned[there] = rotations
+    return turned, np.stack([np.interp(frames, there, axis) for axis in places.T], axis=1)
+
+
+def _first_reference(points: Floats, seen: NDArray[np.bool_]) -> Floats:
+    whole = np.flatnonzero(seen.all(axis=1))
+    if not len(whole):
+        raise DataError("no frame shows all markers of the head; leave those out that are rarely seen")
+    head: Floats = points[whole[0]] - points[whole[0]].mean(axis=0)
+    return head
+
+
+def _fitted(points: Floats, seen: NDArray[np.bool_], head: Floats) -> tuple[Floats, Floats]:
+    """Rotations (T, 3, 3) and places (T, 3) of the head; frames in which the same markers are seen go together."""
+    rotations, places = np.zeros((len(points), 3, 3)), np.zeros((len(points), 3))
+    patterns, which = np.unique(seen, axis=0, return_inverse=True)
+    for number, pattern in enumerate(patterns):
+        here = which.ravel() == number
+        weights = np.full(int(pattern.sum()), 1.0 / pattern.sum())
+        there, known = points[here][:, pattern], head[pattern]
+        into_head, _ = similarity(there, known, weights)
+        rotations[here] = into_head.swapaxes(1, 2)
+        places[here] = there.mean(axis=1) - rotations[here] @ known.mean(axis=0)
+    return rotations, places

@@ -1,0 +1,188 @@
+"""Files of facial marker capture: C3D (Vicon, OptiTrack, ...) and tables of comma-separated values."""
+
+import csv
+import struct
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.recordings.corpus_audio import SOUND_RATE
+from lexicon.errors import BackendError, DataError, InputError
+from tts2face.models.palette import GESTURE_FPS
+from tts2face.types import Waveform
+
+MM_PER_UNIT = {"": 1.0, "mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "in": 25.4, "inch": 25.4, "ft": 304.8}
+SOUND_LABELS = ("audio", "sound", "voice", "speech", "mic")  # how analogue channels that hold sound are named
+LEAST_SOUND_HZ = 8000.0  # an analogue channel of fewer samples a second is no sound
+LEAST_FPS, MOST_FPS = 10.0, 1000.0
+UNEVEN = 0.25  # of a frame: times in a file are rounded, often to milliseconds
+GAP = 1.5  # of the usual step: a longer one leaves frames out
+BLOCK_BYTES, MOST_BLOCKS, BIG_ENDIAN = 512, 256, 86  # of a C3D file; its first byte counts blocks
+AXES = ("x", "y", "z")
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MarkerTake:
+    """What a file holds: `points` (T, M, 3) in mm of the markers `names`, NaN in gaps, and sound where it has some."""
+
+    names: tuple[str, ...]
+    points: Floats
+    fps: float
+    sound: Waveform | None = None
+
+
+def read_markers(path: Path, fps: float | None = None) -> MarkerTake:
+    """The markers in a ``.c3d`` or ``.csv`` file.
+
+    Parameters
+    ----------
+    fps
+        Frames a second of a table that counts frames.
+
+    Raises
+    ------
+    InputError
+        There is no such file, it is of neither kind, or a table counts frames and `fps` is missing.
+    DataError
+        It is damaged.
+    BackendError
+        The package ezc3d is missing.
+    """
+    readers = {".c3d": lambda: read_c3d(path), ".csv": lambda: read_marker_table(path, fps)}
+    if path.suffix.lower() not in readers:
+        raise InputError(f"{path.name} is no file of markers; they are read from .c3d and .csv")
+    if not path.is_file():
+        raise InputError(f"there is no capture {path}; check the path")
+    take = readers[path.suffix.lower()]()
+    if not len(take.points) or not np.isfinite(take.points).any():
+        raise DataError(f"{path} holds no marker in any frame; export it again")
+    twice = [name for name, count in Counter(take.names).items() if count > 1]
+    if twice:
+        raise DataError(f"{path} holds the marker {twice[0]} twice; export one person alone")
+    if not LEAST_FPS <= take.fps <= MOST_FPS:
+        raise DataError(f"{path} has {take.fps:g} frames a second; {LEAST_FPS:g} to {MOST_FPS:g} can be read")
+    return take
+
+
+def read_c3d(path: Path) -> MarkerTake:
+    """The markers of a C3D file in mm, without the subject's name before a colon; errors as `read_markers`."""
+    try:
+        import ezc3d
+    except ImportError as missing:
+        raise BackendError(
+            "reading C3D needs the package ezc3d: run `pip install 'tts2face[capture]'`, or export the markers as CSV"
+        ) from missing
+    try:
+        file = ezc3d.c3d(str(path))
+        _check_length(path, file["data"]["points"].shape[2])
+        about = file["parameters"]["POINT"]
+        points = np.moveaxis(np.asarray(file["data"]["points"], np.float64)[:3], 0, -1).swapaxes(0, 1)
+        labels = [label for key in sorted(about) if key.startswith("LABELS") for label in about[key]["value"]]
+        units = "".join(about["UNITS"]["value"][:1]).strip().lower() if "UNITS" in about else ""
+        fps = float(about["RATE"]["value"][0])
+    except (OSError, ValueError, RuntimeError, KeyError, IndexError) as broken:
+        raise DataError(f"{path} is damaged, or no C3D file ({broken}); export it again") from broken
+    if units not in MM_PER_UNIT:
+        raise DataError(
+            f"{path} gives its markers in {units!r}; POINT:UNITS must be {', '.join(filter(None, MM_PER_UNIT))}"
+        )
+    names = [label.rpartition(":")[2].strip() for label in labels][: points.shape[1]]
+    points[(points == 0.0).all(axis=2)] = np.nan  # how old files mark a gap
+    return MarkerTake(tuple(names), points[:, : len(names)] * MM_PER_UNIT[units], fps, _analogue_sound(file))
+
+
+def _check_length(path: Path, n_frames: int) -> None:
+    """Refuse a file that ends before the last frame that its header states: ezc3d reads what is there in silence.
+
+    Source: the C3D file format, header words 4 and 5 (first and last frame, 16 bits) and the processor type.
+    """
+    with path.open("rb") as file:
+        content = file.read(BLOCK_BYTES * MOST_BLOCKS)
+    order = ">" if content[BLOCK_BYTES * (content[0] - 1) + 3] == BIG_ENDIAN else "<"
+    first, last = struct.unpack_from(f"{order}HH", content, 6)
+    if (last - first + 1 - n_frames) % 2**16:  # longer recordings count beyond 16 bits elsewhere
+        raise ValueError(f"it ends after {n_frames} of {last - first + 1} frames")
+
+
+def _analogue_sound(file: Any) -> Waveform | None:
+    """Sound among the analogue channels, its loudest sample being full scale."""
+    import soxr
+
+    about = file["parameters"]["ANALOG"]
+    labels, rates = about["LABELS"]["value"], about["RATE"]["value"]
+    named = [at for at, label in enumerate(labels) if any(word in label.lower() for word in SOUND_LABELS)]
+    if not named or not len(rates) or rates[0] < LEAST_SOUND_HZ:
+        return None
+    samples = np.asarray(file["data"]["analogs"], np.float64)[0, named[0]]
+    samples = np.nan_to_num(samples - np.nanmean(samples))
+    heard = soxr.resample(samples.astype(np.float32), rates[0], SOUND_RATE)
+    return Waveform(heard / max(float(np.abs(heard).max(initial=0.0)), 1e-9), SOUND_RATE)
+
+
+def read_marker_table(path: Path, fps: float | None = None) -> MarkerTake:
+    """The markers of a CSV table; errors as `read_markers`.
+
+    The first column is ``time`` in seconds or ``frame``, the others are ``NAME_x``, ``NAME_y``, ``NAME_z`` in mm, in
+    any order; empty cells are gaps.
+    """
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = [[cell.strip() for cell in row] for row in csv.reader(file) if row]
+    except (UnicodeDecodeError, csv.Error) as broken:
+        raise DataError(f"{path} is not a CSV table of markers ({broken})") from broken
+    first = rows[0][0].lower() if rows else ""
+    if first not in ("time", "frame") or len(rows) < 2:
+        raise DataError(f"{path} is not a CSV table of markers: it needs the columns time or frame, then NAME_x, ...")
+    names = _named(path, rows[0])
+    values = np.array([_numbers(path, number, row, len(rows[0])) for number, row in enumerate(rows[1:], start=2)])
+    columns = [[rows[0].index(f"{name}_{axis}") for axis in AXES] for name in names]
+    points = values[:, np.array(columns)]
+    points[np.isnan(points).any(axis=2)] = np.nan
+    return _even(path, names, points, (first, values[:, 0]), fps)
+
+
+def _named(path: Path, header: list[str]) -> tuple[str, ...]:
+    names = tuple(dict.fromkeys(column.rpartition("_")[0] for column in header[1:]))
+    wanted = sorted(f"{name}_{axis}" for name in names for axis in AXES)
+    if sorted(header[1:]) != wanted:
+        odd = next(iter(set(header[1:]) ^ set(wanted)), "one twice")
+        raise DataError(f"{path} needs the columns NAME_x, NAME_y and NAME_z once for every marker; look at {odd}")
+    return names
+
+
+def _numbers(path: Path, number: int, row: list[str], n_columns: int) -> list[float]:
+    if len(row) != n_columns:
+        raise DataError(f"line {number} of {path} has {len(row)} columns, not {n_columns}; export it again")
+    try:
+        return [float(cell) if cell else np.nan for cell in row]
+    except ValueError as broken:
+        raise DataError(f"line {number} of {path} cannot be read ({broken}); export it again") from broken
+
+
+def _even(
+    path: Path, names: tuple[str, ...], points: Floats, counted: tuple[str, Floats], fps: float | None
+) -> MarkerTake:
+    """Frames at an even rate; those that a table leaves out are gaps."""
+    what, at = counted
+    if what == "frame" and fps is None and len(at) > 1:
+        raise InputError(f"{path.name} counts frames; give its frames a second, or a column time")
+    if len(at) == 1:  # a still
+        return MarkerTake(names, points, fps or GESTURE_FPS)
+    steps = np.diff(at)
+    if not np.isfinite(at).all() or (steps <= 0).any():
+        raise DataError(f"the column {what} of {path} must rise from row to row; export it again")
+    usual = 1.0 if what == "frame" else float(steps[steps < GAP * np.median(steps)].mean())
+    away = steps / usual
+    if np.abs(away - np.rint(away)).max() > UNEVEN:
+        raise DataError(f"the column {what} of {path} does not run evenly from row to row; export it again")
+    rows = np.concatenate([[0], np.cumsum(np.rint(away).astype(int))])
+    found = np.full((rows[-1] + 1, len(names), 3), np.nan)
+    found[rows] = points
+    rate = fps if what == "frame" and fps else float(np.round(rows[-1] / (at[-1] - at[0]), 2))
+    return MarkerTake(names, found, rate)

@@ -1,0 +1,138 @@
+"""From a few markers to all landmarks: the person's face at rest, and what moves between its markers."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+from tts2face.face.landmark_fit import N_SKIN
+from tts2face.face.rbf import interpolant
+from tts2face.models.landmarks import (
+    INNER_LIP_LOWER,
+    INNER_LIP_UPPER,
+    MOUTH_REGION,
+    OUTER_LIP_LOWER,
+    OUTER_LIP_UPPER,
+)
+from tts2face.video.pose import similarity
+
+FACE_SIDES = (234, 454)  # landmarks as far apart as the face is wide
+LEAST_SIZE, MOST_SIZE = 0.6, 1.7  # of the common face over the person's; beyond it the unit is wrong
+# Lines of each lip between the outer and the inner one, from the right corner to the left: entry k of each lies behind
+# entry k of the outer line. Then the landmarks of upper lids and of lower lids.
+UPPER_LIP_LINES = (
+    (76, 184, 74, 73, 72, 11, 302, 303, 304, 408, 306),
+    (62, 183, 42, 41, 38, 12, 268, 271, 272, 407, 292),
+    INNER_LIP_UPPER,
+)
+LOWER_LIP_LINES = (
+    (76, 77, 90, 180, 85, 16, 315, 404, 320, 307, 306),
+    (62, 96, 89, 179, 86, 15, 316, 403, 319, 325, 292),
+    INNER_LIP_LOWER,
+)
+UPPER_LIDS = (
+    (246, 161, 160, 159, 158, 157, 173, 247, 30, 29, 27, 28, 56, 190),
+    (466, 388, 387, 386, 385, 384, 398, 467, 260, 259, 257, 258, 286, 414),
+)
+LOWER_LIDS = (
+    (7, 163, 144, 145, 153, 154, 155, 25, 110, 24, 23, 22, 26, 112),
+    (249, 390, 373, 374, 380, 381, 382, 255, 339, 254, 253, 252, 256, 341),
+)
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spread:
+    """A person's face in the axes of the common one.
+
+    Parameters
+    ----------
+    rest : (478, 3)
+        Landmarks at rest in the person's own size, mm.
+    shares : (478, M)
+        How far each landmark follows each marker.
+    turn, shift, size
+        ``common / size = turn @ head + shift``, from the head's axes: (3, 3), (3,), and common over own size.
+    """
+
+    rest: Floats
+    shares: Floats
+    turn: Floats
+    shift: Floats
+    size: float
+
+    def landmarks(self, displacements: Floats) -> Floats:
+        """(T, 478, 3) landmarks for displacements (T, M, 3) of the markers in the head's axes, mm."""
+        moved: Floats = np.einsum("lm,tmi->tli", self.shares, displacements @ self.turn.T, optimize=True)
+        return self.rest + moved
+
+
+def spread_to_landmarks(markers: Floats, at: Sequence[int], common: Floats) -> Spread:
+    """The way from a person's markers to landmarks.
+
+    Parameters
+    ----------
+    markers : (M, 3)
+        At rest, mm, in the head's axes.
+    at : (M,)
+        Landmark at which each lies.
+    common : (478, 3)
+        The common face at rest.
+
+    Raises
+    ------
+    DataError
+        They do not lie as on a face of plausible size.
+
+    Notes
+    -----
+    The common face is turned and scaled to the markers (Umeyama 1991) and bent to them by radial basis functions
+    (`tts2face.face.rbf`). Landmarks of an upper lip or lid do not follow the markers of the lower one, nor the other
+    way round: near each other at rest, they move apart. A lip moves as the line along its outer edge does, for few wear
+    markers further inside.
+    """
+    places = common[list(at)]
+    weights = np.full(len(at), 1.0 / len(at))
+    turns, sizes = similarity(markers[None], places, weights)
+    turn, size = turns[0], float(sizes[0])
+    if not LEAST_SIZE <= size <= MOST_SIZE:
+        raise DataError(f"the markers lie {1 / size:.3g} times as far apart as on a face; check the file's unit")
+    shift = weights @ places / size - turn @ (weights @ markers)
+    own = common / size
+    width = float(np.linalg.norm(own[FACE_SIDES[0]] - own[FACE_SIDES[1]]))
+    bent = interpolant(own[list(at)], markers @ turn.T + shift - own[list(at)], width)
+    rest = own + bent(own)
+    shares = np.zeros((len(common), len(at)))
+    asked = _asked(rest)
+    for side, opposite in _sides(common):
+        free = [marker for marker, landmark in enumerate(at) if landmark not in opposite]
+        if free:
+            follow = interpolant(rest[[at[marker] for marker in free]], np.eye(len(free)), width)
+            shares[np.ix_(side, free)] = follow(asked[side])
+    return Spread(rest, shares, turn, shift, size)
+
+
+def _asked(rest: Floats) -> Floats:
+    """(478, 3) places whose motion landmarks take: their own, but for those inside the lips."""
+    asked = rest.copy()
+    for outer, lines in ((OUTER_LIP_UPPER, UPPER_LIP_LINES), (OUTER_LIP_LOWER, LOWER_LIP_LINES)):
+        for line in lines:
+            asked[list(line)] = rest[list(outer)]
+    return asked
+
+
+def _sides(common: Floats) -> list[tuple[list[int], set[int]]]:
+    """Landmarks that follow the same markers, each with the landmarks whose markers they do not follow."""
+    corners = {landmark for line in (OUTER_LIP_UPPER, *UPPER_LIP_LINES) for landmark in (line[0], line[-1])}
+    upper = {*OUTER_LIP_UPPER, *(landmark for line in UPPER_LIP_LINES for landmark in line)} - corners
+    height = common[[OUTER_LIP_UPPER[0], OUTER_LIP_UPPER[-1]], 1].mean()
+    low = {landmark for landmark in MOUTH_REGION if common[landmark, 1] < height}
+    lower = (low | {landmark for line in LOWER_LIP_LINES for landmark in line}) - upper - corners
+    pairs = [(upper, lower), *((set(up), set(down)) for up, down in zip(UPPER_LIDS, LOWER_LIDS, strict=True))]
+    sides = [*pairs, *((down, up) for up, down in pairs)]
+    apart = set().union(*(side for side, _ in sides))
+    others = [landmark for landmark in range(N_SKIN) if landmark not in apart]
+    return [(sorted(side), opposite) for side, opposite in sides] + [(others, set())]

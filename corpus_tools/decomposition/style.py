@@ -1,0 +1,98 @@
+"""A style learnt from recordings that were taken apart, and the palette it is put into."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.decomposition.decompose import Parts
+from corpus_tools.decomposition.regions import feature_landmarks
+from lexicon.errors import InputError
+from tts2face.models.palette import FEATURES, REGION_FEATURES, Palette, Region, Style
+
+VARIANCE = 0.95  # of a region's motion that its modes keep: the rest is the tracker's
+MOST_MODES = 10
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Learnt:
+    """A palette with a new style, and the share of each region's motion (variance) that its modes keep."""
+
+    palette: Palette
+    kept: Mapping[str, float]
+
+
+def with_style(
+    base: Palette | None, name: str, parts: Sequence[Parts], neutral: NDArray[np.floating], metadata: Mapping[str, Any]
+) -> Learnt:
+    """The palette `base` and a style in it, in its modes; a palette of this style alone without a base.
+
+    Parameters
+    ----------
+    neutral : (478, 3)
+        The recorded person's landmarks at rest, mm: the common face, where there is no base.
+
+    Raises
+    ------
+    InputError
+        There is no recording, the style is there already, or a first style lacks a region that others need.
+    """
+    if not parts:
+        raise InputError("no recording could be used; see why each was refused")
+    if base is not None and name in base.names:
+        raise InputError(f"the palette has a style {name} already; choose another name with --style")
+    missing = [feature for feature in REGION_FEATURES if not all(feature in one.motion for one in parts)]
+    if base is None and missing:
+        raise InputError(f"the recordings do not show {missing[0]}; a palette begins with recordings that do")
+    common = base.neutral if base is not None else np.asarray(neutral, np.float32)
+    sizes = sizes_of(neutral, common)
+    moved = {
+        feature: np.concatenate([one.motion[feature] for one in parts]) * sizes
+        for feature in REGION_FEATURES
+        if feature not in missing
+    }
+    regions = dict(base.regions) if base is not None else {name: _region(name, moved[name]) for name in moved}
+    motion = {
+        feature: np.concatenate([one.motion[feature] for one in parts])
+        for feature in FEATURES
+        if feature not in REGION_FEATURES and all(feature in one.motion for one in parts)
+    }
+    kept = {}
+    for feature, displaced in moved.items():
+        region = regions[feature]
+        flat = displaced.reshape(len(displaced), -1)
+        motion[feature] = (flat @ region.modes.reshape(len(region.modes), -1).T).astype(np.float32)
+        kept[feature] = float(motion[feature].var(axis=0).sum() / max(flat.var(axis=0).sum(), 1e-12))
+    style = Style(
+        lengths=np.array([len(one.intensity) for one in parts], np.int32),
+        intensity=np.concatenate([one.intensity for one in parts]),
+        pitch=np.concatenate([one.pitch for one in parts]),
+        motion={feature: motion[feature] for feature in FEATURES if feature in motion},
+        metadata=dict(metadata),
+    )
+    if base is None:
+        return Learnt(Palette(common, regions, {name: style}, {}, {}), kept)
+    return Learnt(replace(base, styles={**base.styles, name: style}), kept)
+
+
+def sizes_of(person: NDArray[np.floating], common: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(3,) factors of width, height and depth by which one face at rest (478, 3) becomes as large as another."""
+    here, there = (np.asarray(face, np.float64) for face in (person, common))
+    here, there = here - here.mean(axis=0), there - there.mean(axis=0)
+    return np.asarray((here * there).sum(axis=0) / np.square(here).sum(axis=0))
+
+
+def _region(feature: str, displaced: NDArray[np.floating]) -> Region:
+    """Principal modes of a region's displacements (T, L, 3) about none; each one's largest entry is positive."""
+    flat = displaced.reshape(len(displaced), -1).astype(np.float64)
+    variances, vectors = np.linalg.eigh(np.einsum("ti,tj->ij", flat, flat))
+    variances, vectors = np.maximum(variances[::-1], 0.0), vectors[:, ::-1].T
+    share = np.cumsum(variances) / max(float(variances.sum()), 1e-12)
+    n_modes = min(int(np.searchsorted(share, VARIANCE)) + 1, MOST_MODES)
+    modes = vectors[:n_modes]
+    modes = modes * np.sign(modes[np.arange(n_modes), np.abs(modes).argmax(axis=1)])[:, None]
+    return Region(feature_landmarks(feature), modes.reshape(n_modes, -1, 3).astype(np.float32))

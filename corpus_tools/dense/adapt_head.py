@@ -1,0 +1,102 @@
+"""The default head adapted to a talker: its vertices, eyes, teeth and all its shapes."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.dense.mesh_fit import Warp, eyes_from_right, part_vertices, warp_onto
+from tts2face.models.face import Eye, Face
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.video.pose import similarity
+
+Floats = NDArray[np.float64]
+
+MOUTH_PARTS = ("teeth", "gums", "tongue")  # bone and what hangs on it: moved and scaled as one, never bent
+EYE_PARTS = ("sclera", "iris")
+MOVED_MM = 1e-4  # a shape that moves a vertex less does not move it
+
+
+def adapted(face: Face, talker: NDArray[np.floating]) -> Face:
+    """The face with the talker's shape.
+
+    Parameters
+    ----------
+    face
+        A head with jawOpen, all landmarks, and two eyes.
+    talker : (478, 3)
+        Mean landmarks of the talker at rest, lips closed, axes as in `tts2face.models.landmarks`; of any size.
+    """
+    warp = warp_onto(face, talker)
+    rest = face.vertices.astype(np.float64)
+    bone, balls = part_vertices(face, MOUTH_PARTS), part_vertices(face, EYE_PARTS)
+    soft = np.setdiff1d(np.arange(len(rest)), np.concatenate([bone, balls]))
+    moved = rest.copy()
+    moved[soft] = warp.carried(rest[soft], soft)
+    linear, shift = _as_one(rest[bone], rest[bone] + warp.field(rest[bone]))
+    shift[2] += _lips_forward(warp) - (rest[bone] @ linear.T + shift - rest[bone])[:, 2].max()
+    moved[bone] = rest[bone] @ linear.T + shift
+    eyes = _eyes(face, warp, rest, moved)
+    shapes = _carried_shapes(face, warp, soft, moved)
+    shapes[:, bone] = face.shapes[:, bone] @ linear.T
+    for eye, socket in zip(eyes_from_right(face), warp.sockets, strict=True):
+        span = slice(eye.first, eye.first + eye.count)
+        shapes[:, span] = socket.scale * face.shapes[:, span]  # an eyeball gives way to a lid that closes
+    origin = np.mean([eye.centre for eye in eyes], axis=0)
+    turning = _pivot(face, warp)
+    return replace(
+        face,
+        vertices=(moved - origin).astype(np.float32),
+        shapes=shapes.astype(np.float32),
+        eyes=tuple(replace(eye, centre=(eye.centre - origin).astype(np.float32)) for eye in eyes),
+        pivot=(turning - origin).astype(np.float32),
+    )
+
+
+def _as_one(before: Floats, after: Floats) -> tuple[Floats, Floats]:
+    """Scaled rotation (3, 3) and shift (3,) nearest to a motion of points (P, 3)."""
+    turns, scales = similarity(before[None], after, np.full(len(before), 1.0 / len(before)))
+    linear = scales[0] * turns[0]
+    return linear, after.mean(axis=0) - linear @ before.mean(axis=0)
+
+
+def _lips_forward(warp: Warp) -> float:
+    """How far the lips come forward, mm: teeth and tongue stay as far behind them as they were."""
+    lips = np.isin(warp.landmarks, (*INNER_LIP_UPPER, *INNER_LIP_LOWER))
+    centres = warp.field.centres[lips]
+    return float(warp.field(centres)[:, 2].mean())
+
+
+def _eyes(face: Face, warp: Warp, rest: Floats, moved: Floats) -> list[Eye]:
+    """The eyes in their new sockets; writes their vertices into `moved`."""
+    places = {}
+    for eye, socket in zip(eyes_from_right(face), warp.sockets, strict=True):
+        span = slice(eye.first, eye.first + eye.count)
+        moved[span] = socket.after + socket.scale * (rest[span] - socket.before)
+        places[eye.first] = socket.after
+    return [replace(eye, centre=places[eye.first].astype(np.float32)) for eye in face.eyes]
+
+
+def _carried_shapes(face: Face, warp: Warp, soft: NDArray[np.int64], moved: Floats) -> Floats:
+    """(K, V, 3) shapes: where the warp brings a vertex that the head's shape has moved, less where it was.
+
+    mouthClose is carried from the open jaw, which it closes.
+    """
+    shapes = np.zeros(face.shapes.shape)
+    rest = face.vertices.astype(np.float64)
+    jaw = face.shapes[face.shape_names.index("jawOpen")].astype(np.float64)
+    for number, name in enumerate(face.shape_names):
+        shape = face.shapes[number].astype(np.float64)
+        rows = soft[np.abs(shape[soft]).max(axis=1) > MOVED_MM]
+        if name == "mouthClose":
+            before = rest[rows] + jaw[rows]
+            shapes[number, rows] = warp.carried(before + shape[rows], rows) - warp.carried(before, rows)
+        else:
+            shapes[number, rows] = warp.carried(rest[rows] + shape[rows], rows) - moved[rows]
+    return shapes
+
+
+def _pivot(face: Face, warp: Warp) -> Floats:
+    place = face.pivot.astype(np.float64)[None]
+    turned: Floats = (place + warp.field(place))[0]
+    return turned

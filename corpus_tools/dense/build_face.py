@@ -1,0 +1,102 @@
+"""From videos of a talker to a textured head of the talker."""
+
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from corpus_tools.build_talker import PROVENANCE, UNSTATED, read_provenance
+from corpus_tools.dense.adapt_head import adapted
+from corpus_tools.dense.mesh_fit import N_MESH, aligned, fitting, landmarks_of, settled
+from corpus_tools.dense.skin_colour import fitter, gathered
+from corpus_tools.dense.texture_painting import painted_like
+from corpus_tools.dense.video_landmarks import resting_landmarks, seen_in, videos_of
+from corpus_tools.dense.visible_texels import canvas_of
+from corpus_tools.recordings.corpus_video import Eyes
+from corpus_tools.run_options import Effort, Progress
+from tts2face.models.face_file import read_face, write_face
+from tts2face.models.files import named_file
+from tts2face.video.landmark_models import find_bundle
+
+HEAD = "head"  # the shipped face that is adapted
+CONTENT = "a head with the shape and, with the stated consent, the skin of a real person"
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltFace:
+    """What was made: videos used of those found, and the mean distance of the head's landmarks from the talker's."""
+
+    n_videos: int
+    n_found: int
+    error_mm: float
+
+
+def build_face(
+    recordings: Path,
+    out: Path,
+    *,
+    consent: Mapping[str, str],
+    effort: Effort | None = None,
+    on_progress: Progress | None = None,
+) -> BuiltFace:
+    """Adapt the default head to the talker in videos, and write it as a face.
+
+    Parameters
+    ----------
+    recordings
+        A folder of recordings, or one video; transcripts are not needed. A ``provenance.json`` in the folder tells the
+        licence of the person's likeness; the mesh's own says nothing about it.
+    consent
+        Of the person shown, from `corpus_tools.consent.consent_of`; kept in the file.
+    effort
+        Its cache and landmark models; the work is done in one process.
+    on_progress
+        Called with steps done and of all, two for each video.
+
+    Raises
+    ------
+    InputError
+        There is no video.
+    DataError
+        No video shows a face, or the provenance cannot be read.
+    BackendError
+        A package or the landmark models are missing, or the file cannot be written.
+    """
+    effort = effort or Effort()
+    videos = videos_of(recordings)
+    stated = read_provenance(recordings / PROVENANCE, must_exist=False)
+    eyes = Eyes(effort.folder(), find_bundle(effort.model))
+    report = on_progress or (lambda done, of: None)
+    seen = seen_in(videos, eyes, lambda done, of: report(done, 2 * of))
+    head = read_face(named_file(HEAD, "face"))
+    talker = resting_landmarks(seen)
+    rest = landmarks_of(head, head.vertices)[:N_MESH]
+    target = aligned(talker, rest)
+    used = np.flatnonzero(fitting(rest, settled(rest, target)))
+    shaped = adapted(head, talker)
+    canvas = canvas_of(shaped)
+    painting = gathered(
+        shaped,
+        canvas,
+        fitter(shaped, canvas.opened, used),
+        seen,
+        lambda done, of: report(len(videos) + done * len(videos) // of, 2 * len(videos)),
+    )
+    face = painted_like(shaped, canvas, painting)
+    metadata = {
+        **head.metadata,
+        "name": consent["name"],
+        "licence": f"mesh: {head.metadata['licence']}; likeness of the person: {stated.get('licence', UNSTATED)}",
+        "attribution": "; ".join(filter(None, [head.metadata["attribution"], stated.get("attribution")])),
+        "content": CONTENT,
+        "consent": dict(consent),
+        "command": shlex.join(["tts2face", "corpus", "face", recordings.name, "--out", out.name]),
+        "created": datetime.now(UTC).date().isoformat(),
+    }
+    write_face(out, replace(face, metadata=metadata))
+    reached = landmarks_of(shaped, shaped.vertices)[:N_MESH]
+    again = aligned(talker, reached)
+    return BuiltFace(len(seen), len(videos), float(np.linalg.norm(again - reached, axis=1)[used].mean()))

@@ -1,0 +1,158 @@
+"""The way from the default head's skin to the talker's: eqs 3 and 4, with eyeballs that stay round under their lids."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.face.rbf import Interpolant, interpolant
+from tts2face.models.face import Eye, Face
+from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.video.pose import similarity
+
+Floats = NDArray[np.float64]
+
+N_MESH = 468  # the iris points behind them follow the gaze and say nothing about the shape of the face
+OPEN_JAW = 0.12  # weight of jawOpen in whose space the lips lie apart; a closed mouth would be torn, a wide one gape
+# The edge of the lids, once around, from the outer corner; the person's right eye, then the left.
+LIDS = (
+    (33, 246, 161, 160, 159, 158, 157, 173, 133, 155, 154, 153, 145, 144, 163, 7),
+    (263, 466, 388, 387, 386, 385, 384, 398, 362, 382, 381, 380, 374, 373, 390, 249),
+)
+CORNERS = ((33, 133), (263, 362))
+EYE_SCALE = (0.92, 1.08)  # eyeballs of adults differ in size by less than this
+ROUND_MM, LOOSE_MM = 2.0, 11.0  # off an eyeball: skin so near keeps its distance from it; beyond, it is free
+NEIGHBOURS = 10  # landmarks on the head whose motion tells what a landmark's own should be like
+STRAY_MM = 4.0  # off its neighbours' motion: its place on the head is another than the tracker's, along the face's rim
+ROUNDS = 3  # a landmark lies within a triangle whose corners move each by itself: the rest is removed again
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Socket:
+    """An eyeball's centre (3,) and radius before, centre (3,) and scale after."""
+
+    before: Floats
+    radius: float
+    after: Floats
+    scale: float
+
+    def kept_round(self, places: Floats, moved: Floats) -> Floats:
+        """(P, 3) moved places whose distance from the eyeball is as it was at places (P, 3) near it, but for scale."""
+        off = np.linalg.norm(places - self.before, axis=1)
+        share = np.clip((self.radius + LOOSE_MM - off) / (LOOSE_MM - ROUND_MM), 0.0, 1.0)
+        share = share * share * (3.0 - 2.0 * share)
+        towards = moved - self.after
+        length = np.maximum(np.linalg.norm(towards, axis=1), 1e-9)
+        wanted = self.scale * off / length
+        placed: Floats = self.after + towards * (1.0 + share * (wanted - 1.0))[:, None]
+        return placed
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Warp:
+    """Carries places of the default head to the talker.
+
+    ``opened`` (V, 3) is what a slightly open jaw adds to each vertex: the field is asked there. ``landmarks`` (N,) are
+    the numbers of the field's centres.
+    """
+
+    field: Interpolant
+    opened: Floats
+    sockets: tuple[Socket, ...]
+    landmarks: NDArray[np.int64]
+
+    def carried(self, places: Floats, rows: NDArray[np.int64]) -> Floats:
+        """(P, 3) new places of the vertices `rows` (P,), each at its place (P, 3) on the head with closed lips."""
+        moved = places + self.field(places + self.opened[rows])
+        for socket in self.sockets:
+            moved = socket.kept_round(places, moved)
+        return moved
+
+
+def warp_onto(face: Face, talker: NDArray[np.floating]) -> Warp:
+    """The warp onto resting landmarks (478, 3) of a talker with closed lips, in the place and size of the head."""
+    opened = OPEN_JAW * face.shapes[face.shape_names.index("jawOpen")].astype(np.float64)
+    rest = landmarks_of(face, face.vertices)[:N_MESH]
+    target = settled(rest, aligned(talker, rest))
+    used = np.flatnonzero(fitting(rest, target))
+    centres = (rest + landmarks_of(face, opened)[:N_MESH])[used]
+    width = face_width(rest)
+    missing = (target - rest)[used]
+    warp = Warp(interpolant(centres, missing, width), opened, sockets(face, rest, target), used)
+    for _ in range(ROUNDS - 1):
+        reached = face.vertices + warp.field(face.vertices + opened)
+        missing = missing + (target - landmarks_of(face, reached)[:N_MESH])[used]
+        warp = Warp(interpolant(centres, missing, width), opened, warp.sockets, used)
+    return warp
+
+
+def landmarks_of(face: Face, vertices: NDArray[np.floating]) -> Floats:
+    """(478, 3) landmarks, by number, of vertices (V, 3) in the face's topology."""
+    found = np.zeros((int(face.landmarks.max()) + 1, 3))
+    weights = face.landmark_weights.astype(np.float64)[..., None]
+    found[face.landmarks] = (vertices[face.landmark_vertices] * weights).sum(axis=1)
+    return found
+
+
+def face_width(landmarks: Floats) -> float:
+    """Width of a face's oval, in its own unit: what the paper's 200 picture elements are."""
+    return float(np.ptp(landmarks[list(FACE_OVAL), 0]))
+
+
+def aligned(talker: NDArray[np.floating], rest: Floats) -> Floats:
+    """(468, 3) landmarks of the talker brought to the head's by the nearest similarity: a camera shows no size."""
+    own = np.asarray(talker, np.float64)[:N_MESH]
+    weights = np.full(N_MESH, 1.0 / N_MESH)
+    turns, scales = similarity(own[None], rest, weights)
+    brought: Floats = scales[0] * (own - own.mean(axis=0)) @ turns[0].T + rest.mean(axis=0)
+    return brought
+
+
+def settled(rest: Floats, target: Floats) -> Floats:
+    """(468, 3) the talker's landmarks with lips that meet as the head's do, and lids as deep as their eye."""
+    placed = target.copy()
+    upper, lower = list(INNER_LIP_UPPER[1:-1]), list(INNER_LIP_LOWER[1:-1])
+    middle = (target[upper] + target[lower]) / 2
+    half = (rest[upper] - rest[lower]) / 2
+    placed[upper], placed[lower] = middle + half, middle - half
+    for lids in LIDS:
+        edge = list(lids)
+        placed[edge, 2] = rest[edge, 2] + (target[edge, 2] - rest[edge, 2]).mean()
+    return placed
+
+
+def fitting(rest: Floats, target: Floats) -> NDArray[np.bool_]:
+    """(468,) landmarks that move as their neighbours do."""
+    apart = np.linalg.norm(rest[:, None] - rest[None], axis=2)
+    nearest = np.argsort(apart, axis=1)[:, : NEIGHBOURS + 1]
+    moved = target - rest
+    usual = np.median(moved[nearest], axis=1)
+    fits: NDArray[np.bool_] = np.linalg.norm(moved - usual, axis=1) < STRAY_MM
+    return fits
+
+
+def sockets(face: Face, rest: Floats, target: Floats) -> tuple[Socket, ...]:
+    """Where the eyeballs go: with the middle of their lids, as much larger as the eye is longer."""
+    found = []
+    for eye, lids, (outer, inner) in zip(eyes_from_right(face), LIDS, CORNERS, strict=True):
+        edge = list(lids)
+        longer = np.linalg.norm(target[outer] - target[inner]) / np.linalg.norm(rest[outer] - rest[inner])
+        scale = float(np.clip(longer, *EYE_SCALE))
+        centre = np.asarray(eye.centre, np.float64)
+        after = target[edge].mean(axis=0) + scale * (centre - rest[edge].mean(axis=0))
+        around = face.vertices[eye.first : eye.first + eye.count].astype(np.float64) - centre
+        found.append(Socket(centre, float(np.median(np.linalg.norm(around, axis=1))), after, scale))
+    return tuple(found)
+
+
+def eyes_from_right(face: Face) -> list[Eye]:
+    """The person's right eye, then the left."""
+    return sorted(face.eyes, key=lambda eye: float(eye.centre[0]))
+
+
+def part_vertices(face: Face, starts: tuple[str, ...]) -> NDArray[np.int64]:
+    """Vertices of the parts whose names begin so."""
+    spans = [
+        face.triangles[part.first : part.first + part.count] for part in face.parts if part.name.startswith(starts)
+    ]
+    return np.unique(np.concatenate(spans)).astype(np.int64)

@@ -1,0 +1,155 @@
+"""The talker's skin colour, averaged over many frames: the dense mesh is fitted to each (eqs 3 and 4)."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.dense.mesh_fit import N_MESH, face_width, landmarks_of
+from corpus_tools.dense.video_landmarks import Seen, eyes_open
+from corpus_tools.dense.visible_texels import Canvas, ramp
+from corpus_tools.run_options import Progress
+from lexicon.errors import DataError
+from tts2face.face.rbf import FACE_WIDTH, REACH, basis
+from tts2face.models.face import Face
+from tts2face.video.media import read_pictures
+from tts2face.video.pose import similarity
+
+Floats = NDArray[np.float64]
+
+N_FRAMES = 160  # averaged; noise of the picture is gone after some dozens
+FACING = (0.15, 0.75)  # cosine to the camera: where a texel begins to count, and where it counts in full
+BLINKING = 0.8  # of the median opening of the eyes: frames with less show lids where the skin's lids are open
+REMAP_COLUMNS = 1024  # OpenCV maps pictures, not lists
+CROWN, HAIR_MM = 10, (10.0, 28.0, 32.0)  # landmark at the top of the forehead; hair above it: from, to, half width
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gathered:
+    """Colour (P, 3) and weight (P,) of each texel, sRGB 0..255, and the hair's colour (3,), NaN where none is seen."""
+
+    colour: Floats
+    weight: Floats
+    hair: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitter:
+    """Brings a head's vertices into pictures: similarity on the landmarks, then eqs 3 and 4 on what is left."""
+
+    vertices: Floats
+    marks: Floats
+    used: NDArray[np.int64]
+    spread: Floats
+
+    def placed(self, points: NDArray[np.floating]) -> tuple[Floats, Floats]:
+        """(V, 3) vertices, x right, y up, z towards the camera in pixels, and the (3, 3) rotation, for (478, 3)."""
+        wanted = points[self.used].astype(np.float64) * (1.0, -1.0, -1.0)
+        own = self.marks[self.used]
+        turns, scales = similarity(own[None], wanted, np.full(len(own), 1.0 / len(own)))
+        linear = scales[0] * turns[0]
+        shift = wanted.mean(axis=0) - linear @ own.mean(axis=0)
+        left = wanted - (own @ linear.T + shift)
+        placed: Floats = self.vertices @ linear.T + shift + self.spread @ left
+        return placed, turns[0]
+
+
+def fitter(face: Face, opened: Floats, used: NDArray[np.int64]) -> Fitter:
+    """The fitter of a face; `opened` (V, 3) is where the interpolation takes place, the lips apart."""
+    from scipy.linalg import solve
+
+    centres = landmarks_of(face, opened)[used]
+    marks = landmarks_of(face, face.vertices.astype(np.float64))[:N_MESH]
+    reach = REACH / FACE_WIDTH * face_width(marks)
+    matrix = basis(centres, centres, reach)
+    spread = solve(matrix, basis(opened, centres, reach).T, assume_a="pos").T
+    return Fitter(face.vertices.astype(np.float64), marks, used, spread)
+
+
+def gathered(face: Face, canvas: Canvas, fit: Fitter, seen: Sequence[Seen], on_progress: Progress) -> Gathered:
+    """Colours from the frames of all videos that show open eyes.
+
+    Raises
+    ------
+    DataError
+        No frame serves, or a video cannot be read any more.
+    """
+    rows = np.flatnonzero(canvas.share > 0)
+    corners, weights = canvas.texels.corners[rows], canvas.texels.weights[rows]
+    normals = vertex_normals(face)
+    own_normals = unit(np.einsum("pk,pkd->pd", weights, normals[corners]))
+    total, weight = np.zeros((len(rows), 3)), np.zeros(len(rows))
+    hair: list[Floats] = []
+    crown = hair_vertices(face, fit, normals)
+    for picture, points in chosen_frames(seen, on_progress):
+        placed, turn = fit.placed(points)
+        flat = placed[:, :2] * (1.0, -1.0)
+        colour, inside = sampled(picture, np.einsum("pk,pkd->pd", weights, flat[corners]))
+        facing = ramp(own_normals @ turn[2], *FACING) * inside
+        total += facing[:, None] * colour
+        weight += facing
+        found, is_inside = sampled(picture, flat[crown])
+        hair.append(found[is_inside])
+    if not weight.any():
+        raise DataError("no frame shows the face with open eyes; give a video of the person looking at the camera")
+    all_colours, all_weights = np.zeros((len(canvas.share), 3)), np.zeros(len(canvas.share))
+    all_colours[rows] = total / np.maximum(weight, 1e-9)[:, None]
+    all_weights[rows] = weight
+    strands = np.concatenate(hair)
+    return Gathered(all_colours, all_weights, np.median(strands, axis=0) if len(strands) else np.full(3, np.nan))
+
+
+def chosen_frames(
+    seen: Sequence[Seen], on_progress: Progress
+) -> Iterator[tuple[NDArray[np.uint8], NDArray[np.float32]]]:
+    """Yield picture (H, W, 3) and landmarks (478, 3) of `N_FRAMES` frames spread over the videos, eyes open."""
+    per_video = int(np.ceil(N_FRAMES / len(seen)))
+    usual = float(np.nanmedian(np.concatenate([eyes_open(one.landmarks) for one in seen])))
+    for number, one in enumerate(seen):
+        awake = np.flatnonzero(np.nan_to_num(eyes_open(one.landmarks)) > BLINKING * usual)
+        if len(awake):
+            wanted = set(awake[np.linspace(0, len(awake) - 1, per_video).round().astype(int)].tolist())
+            for at, picture in enumerate(read_pictures(one.video)):
+                if at in wanted:
+                    yield picture.pixels, one.points[at]
+        on_progress(number + 1, len(seen))
+
+
+def sampled(picture: NDArray[np.uint8], places: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Colours (P, 3) of a picture (H, W, 3) at places (P, 2), x and y, and which lie in it; cubic."""
+    import cv2
+
+    height, width = picture.shape[:2]
+    n = len(places)
+    grid = np.zeros((-(-n // REMAP_COLUMNS), REMAP_COLUMNS, 2), np.float32)
+    grid.reshape(-1, 2)[:n] = places
+    found = cv2.remap(picture, grid[..., 0], grid[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    inside = np.all((places >= 0) & (places <= (width - 1, height - 1)), axis=1)
+    return found.reshape(-1, 3)[:n].astype(np.float64), inside
+
+
+def hair_vertices(face: Face, fit: Fitter, normals: Floats) -> NDArray[np.int64]:
+    """Vertices in the hair above the forehead, in sight from the front."""
+    away = face.vertices - fit.marks[CROWN]
+    low, high, half = HAIR_MM
+    is_hair = (away[:, 1] > low) & (away[:, 1] < high) & (np.abs(away[:, 0]) < half) & (normals[:, 2] > FACING[0])
+    return np.flatnonzero(is_hair)
+
+
+def vertex_normals(face: Face) -> Floats:
+    """(V, 3) outward unit normals of the face at rest; vertices in one place have one normal."""
+    corners = face.vertices[face.triangles].astype(np.float64)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    _, place = np.unique(face.vertices, axis=0, return_inverse=True)
+    place = place.reshape(-1)
+    total = np.zeros((len(face.vertices), 3))
+    for corner in range(3):
+        np.add.at(total, place[face.triangles[:, corner]], across)
+    return unit(total[place])
+
+
+def unit(vectors: Floats) -> Floats:
+    """Vectors (N, 3) of length 1."""
+    scaled: Floats = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
+    return scaled

@@ -1,0 +1,141 @@
+"""The talker's skin painted over the head's own: where nothing was seen, the head's colours in the talker's tint."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.dense.mesh_fit import landmarks_of
+from corpus_tools.dense.skin_colour import Gathered, vertex_normals
+from corpus_tools.dense.visible_texels import Canvas, ramp, softened
+from corpus_tools.head.layout import Texels
+from tts2face.models.face import Face
+
+Floats = NDArray[np.float64]
+
+LUMA = np.array([0.299, 0.587, 0.114])  # ITU-R BT.601
+SKIN_LUMA = 0.72  # of the head's usual skin: darker texels are brows, lashes, nostrils, hair, and tell no tint
+HAIR_LUMA = (55.0, 115.0)  # of the head's texture: hair alone, and skin alone
+NEAR_MM = 14.0  # reach over which unseen skin takes the tint of the seen skin beside it
+TINT_BOUNDS = (0.35, 1.6)
+SHADE_BOUNDS = (0.75, 1.35)  # a lamp's shading that is taken out; more would amplify noise at the rim
+BROWS = (105, 66, 334, 296)  # upper edges
+FRINGE_MM = (2.0, 7.0)  # above the brows: where dark texels begin to be taken for hair, and where they surely are
+STRAND_TEXELS = 25  # about 4 mm of the forehead: around a strand its shadow is not skin either
+FRINGE_LUMA = (0.78, 0.95)  # of the usual skin: hair, and skin
+N_SAMPLES = 1500  # seen texels that stand for all of them
+SHARP_TEXELS, SHARP_GAIN = 4.0, 0.7  # unsharp masking, Gaussian of this deviation
+LEAST_WEIGHT = 0.02  # of the largest: texels seen less count less than in full
+
+
+def painted_like(face: Face, canvas: Canvas, seen: Gathered) -> Face:
+    """The face with the talker's texture and hair colour."""
+    texels = canvas.texels
+    base = canvas.texture[texels.rows, texels.columns].astype(np.float64)
+    share = canvas.share * ramp(seen.weight / seen.weight.max(), 0.0, LEAST_WEIGHT)
+    own = _unshaded(canvas.texels.carried(vertex_normals(face)), seen.colour, share)
+    share = softened(_without_fringe(face, canvas, own, share), texels, len(canvas.texture))
+    hair = 1.0 - ramp(base @ LUMA, *HAIR_LUMA)
+    tint = _tint(face, canvas, own / np.maximum(base, 1.0), (share, base @ LUMA))
+    usual = np.median(base[hair > 0.9], axis=0) if (hair > 0.9).any() else np.ones(3)
+    strands = np.clip(seen.hair / np.maximum(usual, 1.0), *TINT_BOUNDS) if np.isfinite(seen.hair).all() else np.ones(3)
+    tint = tint * (1 - hair)[:, None] + strands * hair[:, None]
+    tint[canvas.in_mouth] = 1.0
+    own = sharpened(own, share, texels, len(canvas.texture))
+    colour = share[:, None] * own + (1 - share)[:, None] * base * tint
+    colours = face.colours.astype(np.float64)
+    for part in face.parts:
+        if part.name.startswith("hair"):
+            rows = np.unique(face.triangles[part.first : part.first + part.count])
+            colours[rows] *= strands
+    return replace(
+        face,
+        texture=_filled(canvas.texture, texels, colour),
+        colours=np.rint(np.clip(colours, 0, 255)).astype(np.uint8),
+    )
+
+
+def _unshaded(normals: Floats, colour: Floats, share: Floats) -> Floats:
+    """Colours (P, 3) without the shading of the room's lamps, so far as it follows the surface's direction.
+
+    Source: the shading of a matt surface under distant light is nearly a quadratic function of its normal (Ramamoorthi
+    and Hanrahan 2001); each channel has its own, for lamps have colours.
+    """
+    told = np.flatnonzero(share > 0.5)
+    brightness = colour[told] @ LUMA
+    lit = told[brightness > SKIN_LUMA * np.median(brightness)]
+    terms = np.column_stack([_directions(normals), np.ones(len(normals))])
+    slopes = np.linalg.lstsq(terms[lit], np.log(np.maximum(colour[lit], 1.0)), rcond=None)[0]
+    shade = np.exp((terms - terms[lit].mean(axis=0)) @ slopes)
+    flat: Floats = colour / np.clip(shade, *SHADE_BOUNDS)
+    return flat
+
+
+def _directions(normals: Floats) -> Floats:
+    x, y, z = normals.T
+    return np.column_stack([x, y, z, x * y, x * z, y * z, x * x - y * y])
+
+
+def _without_fringe(face: Face, canvas: Canvas, own: Floats, share: Floats) -> Floats:
+    """Shares (P,) without the dark strands that hang over the forehead: hair is no skin."""
+    from scipy.ndimage import gaussian_filter, minimum_filter
+
+    marks = landmarks_of(face, face.vertices)
+    above = canvas.texels.carried(face.vertices.astype(np.float64))[:, 1] - float(marks[list(BROWS), 1].max())
+    luma = own @ LUMA
+    usual = float(np.median(luma[share > 0.5]))
+    clear = ramp(luma / usual, *FRINGE_LUMA)
+    near = 1.0 - ramp(above, *FRINGE_MM)
+    picture = np.ones(canvas.texture.shape[:2])
+    picture[canvas.texels.rows, canvas.texels.columns] = np.maximum(clear, near)
+    grown = gaussian_filter(minimum_filter(picture, STRAND_TEXELS), STRAND_TEXELS / 3)
+    kept: Floats = share * grown[canvas.texels.rows, canvas.texels.columns]
+    return kept
+
+
+def _tint(face: Face, canvas: Canvas, ratio: Floats, told: tuple[Floats, Floats]) -> Floats:
+    """(P, 3) factors for the head's own skin: those of the nearest seen skin, blending into the usual one."""
+    from scipy.spatial.distance import cdist
+
+    share, luma = told
+    skin = np.flatnonzero((share > 0.3) & (luma > SKIN_LUMA * np.median(luma[share > 0.3])))
+    chosen = skin[np.linspace(0, len(skin) - 1, min(N_SAMPLES, len(skin))).round().astype(int)]
+    logs = np.log(np.clip(ratio[chosen], *TINT_BOUNDS))
+    usual = np.median(logs, axis=0)
+    logs = np.clip(logs, usual - 0.35, usual + 0.35)
+    places = np.einsum("pk,pkd->pd", canvas.texels.weights[chosen], face.vertices[canvas.texels.corners[chosen]])
+    used = np.unique(canvas.texels.corners)
+    near = np.exp(-((cdist(face.vertices[used], places) / NEAR_MM) ** 2))
+    mixed = (near @ logs + 0.5 * usual) / (near.sum(axis=1, keepdims=True) + 0.5)
+    of_vertices = np.zeros((len(face.vertices), 3))
+    of_vertices[used] = mixed
+    factors: Floats = np.exp(canvas.texels.carried(of_vertices))
+    return factors
+
+
+def sharpened(colour: Floats, share: Floats, texels: Texels, side: int) -> Floats:
+    """Colours (P, 3) with edges as crisp as in one frame: an average over frames is blurred by the tracker's jitter."""
+    from scipy.ndimage import gaussian_filter
+
+    weight = np.zeros((side, side))
+    weight[texels.rows, texels.columns] = share
+    around = np.maximum(gaussian_filter(weight, SHARP_TEXELS), 1e-3)[texels.rows, texels.columns]
+    crisp = colour.copy()
+    for channel in range(3):
+        picture = np.zeros((side, side))
+        picture[texels.rows, texels.columns] = colour[:, channel] * share
+        smooth = gaussian_filter(picture, SHARP_TEXELS)[texels.rows, texels.columns] / around
+        crisp[:, channel] += SHARP_GAIN * share * (colour[:, channel] - smooth)
+    return crisp
+
+
+def _filled(texture: NDArray[np.uint8], texels: Texels, colour: Floats) -> NDArray[np.uint8]:
+    """The texture with new texels; those off the surface take the nearest colour on it."""
+    from scipy.ndimage import distance_transform_edt
+
+    picture = texture.astype(np.float64)
+    known = np.zeros(texture.shape[:2], bool)
+    picture[texels.rows, texels.columns], known[texels.rows, texels.columns] = colour, True
+    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    filled: NDArray[np.uint8] = np.rint(np.clip(picture[tuple(nearest)], 0, 255)).astype(np.uint8)
+    return filled

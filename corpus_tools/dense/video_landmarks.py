@@ -1,0 +1,99 @@
+"""What videos show of a talker: landmarks in the picture and without head pose."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.recordings.corpus_video import Eyes
+from corpus_tools.recordings.folder import VIDEO_SUFFIXES, find_recordings
+from corpus_tools.run_options import Progress
+from lexicon.errors import DataError, InputError
+from tts2face.models.landmarks import (
+    EYE_OUTER_LEFT,
+    EYE_OUTER_RIGHT,
+    LOWER_LIP_INNER_MID,
+    UPPER_LIP_INNER_MID,
+)
+from tts2face.video.pose import remove_pose
+
+Floats = NDArray[np.float64]
+
+MOST_VIDEOS = 40  # evenly out of more; of GRID's s1, the mean of 201 lies 0.05 mm from that of 40
+CLOSED = 0.02  # gap of the inner lips over the distance of the eyes up to which lips are closed at rest
+LEAST_CLOSED = 10  # frames; with fewer, the frames with the smallest gaps serve
+EYES_OPEN_PERCENTILE = 50  # lids at rest are those of the frames whose eyes are open at least so far
+RIGHT_LIDS, LEFT_LIDS = (159, 145), (386, 374)  # upper and lower, in the middle of each eye
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """One video: `points` (T, 478, 3) pixels as the tracker gives them, `landmarks` (T, 478, 3) mm without pose.
+
+    Both are NaN in frames without a face; frame i is the video's i-th.
+    """
+
+    video: Path
+    points: NDArray[np.float32]
+    landmarks: NDArray[np.float32]
+
+
+def videos_of(recordings: Path) -> tuple[Path, ...]:
+    """The videos of a folder of recordings, or the one video; not more than `MOST_VIDEOS`, evenly chosen.
+
+    Raises
+    ------
+    InputError
+        There is no such folder or file, or no video in it.
+    """
+    if recordings.is_file() and recordings.suffix.lower() not in VIDEO_SUFFIXES:
+        raise InputError(f"{recordings} is no video ({', '.join(sorted(VIDEO_SUFFIXES))}); give one, or a folder")
+    if recordings.is_file():
+        return (recordings,)
+    found = [recording.video for recording in find_recordings(recordings)]
+    rows = np.unique(np.linspace(0, len(found) - 1, min(MOST_VIDEOS, len(found))).round().astype(int))
+    return tuple(found[row] for row in rows)
+
+
+def seen_in(videos: Sequence[Path], eyes: Eyes, on_progress: Progress) -> tuple[Seen, ...]:
+    """The videos that can be read and show a face.
+
+    Raises
+    ------
+    DataError
+        None can.
+    """
+    kept, reason = [], ""
+    for number, video in enumerate(videos):
+        try:
+            found = eyes.watched(video)
+            posed = remove_pose(found.tracking.points, found.fps)
+            kept.append(Seen(video, found.tracking.points, posed.landmarks))
+        except DataError as refused:
+            reason = f" ({video.name}: {refused})"
+        on_progress(number + 1, len(videos))
+    if not kept:
+        raise DataError(f"no video shows a face{reason}; give videos of one person looking at the camera")
+    return tuple(kept)
+
+
+def resting_landmarks(seen: Sequence[Seen]) -> Floats:
+    """(478, 3) mean landmarks in mm of the frames with closed lips and open eyes."""
+    landmarks = np.concatenate([one.landmarks for one in seen])
+    landmarks = landmarks[np.isfinite(landmarks[:, 0, 0])].astype(np.float64)
+    eyes = np.linalg.norm(landmarks[:, EYE_OUTER_LEFT] - landmarks[:, EYE_OUTER_RIGHT], axis=1)
+    gaps = np.linalg.norm(landmarks[:, UPPER_LIP_INNER_MID] - landmarks[:, LOWER_LIP_INNER_MID], axis=1) / eyes
+    limit = max(CLOSED, float(np.sort(gaps)[min(LEAST_CLOSED, len(gaps)) - 1]))
+    open_eyes = eyes_open(landmarks)
+    still = gaps <= limit
+    wide = still & (open_eyes >= np.percentile(open_eyes[still], EYES_OPEN_PERCENTILE))
+    mean: Floats = landmarks[wide].mean(axis=0)
+    return mean
+
+
+def eyes_open(landmarks: NDArray[np.floating]) -> Floats:
+    """(T,) mean height of the two eye openings of (T, 478, 3) landmarks."""
+    heights = [np.linalg.norm(landmarks[:, up] - landmarks[:, low], axis=1) for up, low in (RIGHT_LIDS, LEFT_LIDS)]
+    return np.asarray(np.mean(heights, axis=0), np.float64)

@@ -1,0 +1,128 @@
+"""Which texels of the skin a camera in front sees: the face without the eyes, the mouth's inside and what hides."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.dense.mesh_fit import LIDS, N_MESH, OPEN_JAW, landmarks_of
+from corpus_tools.head.layout import BELOW, Texels, texels_of
+from lexicon.errors import DataError
+from tts2face.models.face import Face
+from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
+
+Floats = NDArray[np.float64]
+
+INNER_LIPS = (*INNER_LIP_UPPER, *INNER_LIP_LOWER[-2:0:-1])
+CELL_MM = 0.75  # of the grid in which the foremost surface is found
+HIDDEN_MM = 5.0  # this far behind the foremost surface is hidden; less is the slope of a nose within a cell
+RIM_MM = (3.0, 16.0)  # inside the face's oval: where the talker's colour begins, and where it is alone
+LID_MM = (0.8, 2.2)  # off the lids' edge, where lashes and the wet rim blur into the skin
+LIP_MM = (0.4, 1.4)  # off the inner lips' edge, where the dark between them does
+MASK_BLUR = 2.0  # texels
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Canvas:
+    """The skin as a picture.
+
+    Parameters
+    ----------
+    texture : (S, S, 3)
+        The head's own, sRGB.
+    texels
+        Those of the textured parts, P of them.
+    opened : (V, 3)
+        The face with its jaw slightly open.
+    share : (P,)
+        How much of the talker's own colour each texel takes, 0 to 1.
+    in_mouth : (P,)
+        Texels of the mouth's inside, which stay as they are.
+    """
+
+    texture: NDArray[np.uint8]
+    texels: Texels
+    opened: Floats
+    share: Floats
+    in_mouth: NDArray[np.bool_]
+
+
+def canvas_of(face: Face) -> Canvas:
+    """The canvas of an adapted head.
+
+    Raises
+    ------
+    DataError
+        It has no texture.
+    """
+    if face.uv is None or face.texture is None:
+        raise DataError("the head has no texture to paint a talker's skin on; build the shipped faces again")
+    spans = [face.triangles[part.first : part.first + part.count] for part in face.parts if part.textured]
+    triangles = np.concatenate(spans).astype(np.int64)
+    side = len(face.texture)
+    texels = texels_of(face.uv.astype(np.float64), triangles, side)
+    jaw = face.shapes[face.shape_names.index("jawOpen")]
+    opened = face.vertices.astype(np.float64) + OPEN_JAW * jaw
+    island = texels.rows > BELOW * side - 1
+    share = _front_share(face, texels, opened)
+    share[island] = 0.0
+    in_mouth = island & (texels.columns < 0.24 * side)
+    return Canvas(face.texture, texels, opened, softened(share, texels, side), in_mouth)
+
+
+def _front_share(face: Face, texels: Texels, opened: Floats) -> Floats:
+    place = texels.carried(opened)
+    marks = landmarks_of(face, opened)[:N_MESH]
+    share = ramp(depth_inside(place[:, :2], marks[list(FACE_OVAL), :2], RIM_MM[1] + 1), *RIM_MM)
+    share[place[:, 2] < float(marks[list(FACE_OVAL), 2].min())] = 0.0
+    share[_hidden(place)] = 0.0
+    share *= ramp(-depth_inside(place[:, :2], marks[list(INNER_LIPS), :2], LIP_MM[1] + 1), *LIP_MM)
+    for lids in LIDS:
+        share *= ramp(-depth_inside(place[:, :2], marks[list(lids), :2], LID_MM[1] + 1), *LID_MM)
+    return share
+
+
+def _hidden(place: Floats) -> NDArray[np.bool_]:
+    """(P,) whether another texel lies before one."""
+    cells = np.floor(place[:, :2] / CELL_MM).astype(np.int64)
+    cells -= cells.min(axis=0)
+    foremost = np.full(tuple(cells.max(axis=0) + 1), -np.inf)
+    np.maximum.at(foremost, (cells[:, 0], cells[:, 1]), place[:, 2])
+    hidden: NDArray[np.bool_] = place[:, 2] < foremost[cells[:, 0], cells[:, 1]] - HIDDEN_MM
+    return hidden
+
+
+def depth_inside(places: Floats, polygon: Floats, most: float) -> Floats:
+    """(P,) distance of places (P, 2) from a polygon's edge, above 0 inside; not looked for beyond `most`."""
+    low, high = polygon.min(axis=0) - most, polygon.max(axis=0) + most
+    near = np.flatnonzero(((places > low) & (places < high)).all(axis=1))
+    depth = np.full(len(places), -most)
+    here = places[near]
+    least, inside = np.full(len(near), np.inf), np.zeros(len(near), bool)
+    for start, end in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+        along = end - start
+        t = np.clip((here - start) @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
+        least = np.minimum(least, np.linalg.norm(here - start - t[:, None] * along, axis=1))
+        spans = (start[1] > here[:, 1]) != (end[1] > here[:, 1])
+        if along[1] != 0:
+            inside ^= spans & (here[:, 0] < start[0] + (here[:, 1] - start[1]) * along[0] / along[1])
+    depth[near] = np.where(inside, least, -least)
+    clipped: Floats = np.clip(depth, -most, most)
+    return clipped
+
+
+def ramp(values: Floats, low: float, high: float) -> Floats:
+    """0 up to `low`, 1 from `high`, smooth between."""
+    t = np.clip((values - low) / (high - low), 0.0, 1.0)
+    smooth: Floats = t * t * (3.0 - 2.0 * t)
+    return smooth
+
+
+def softened(share: Floats, texels: Texels, side: int) -> Floats:
+    """Shares without steps: blurred, and never above what they were."""
+    from scipy.ndimage import gaussian_filter
+
+    picture = np.zeros((side, side))
+    picture[texels.rows, texels.columns] = share
+    blurred = gaussian_filter(picture, MASK_BLUR)[texels.rows, texels.columns]
+    return np.minimum(share, blurred)

@@ -1,0 +1,70 @@
+"""An ARKit capture as recordings of somebody: lips as it shows them on the default head, phones from its sound."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.decomposition.capture import sound_beside
+from corpus_tools.decomposition.face_motion import moved_landmarks
+from corpus_tools.recordings.corpus_audio import Ears
+from corpus_tools.recordings.observation import Observation, Quality, trimmed
+from corpus_tools.run_options import Effort
+from lexicon.errors import InputError
+from tts2face.models.face_file import load_face
+from tts2face.speech.loudness import intensity
+from tts2face.speech.pauses import stretches
+from tts2face.synthesis.performance import motion_of_capture
+from tts2face.types import Trajectory
+from tts2face.video.livelink import read_livelink
+
+SUFFIX = ".csv"
+LONGEST_S = 6.0  # cut at pauses into utterances of about a sentence: intervals come from drawing utterances again
+
+
+def captured(path: Path, effort: Effort) -> tuple[Observation, ...]:
+    """Utterances of a Live Link Face capture and the one sound file that lies beside it, in sync with it.
+
+    Raises
+    ------
+    InputError
+        There is no such capture, or no sound beside it, or several.
+    DataError
+        The capture or its sound cannot be read, or nobody speaks.
+    BackendError
+        Nothing on this machine recognises phones.
+    """
+    capture = read_livelink(path)
+    sound = sound_beside(path)
+    if sound is None:
+        raise InputError(f"no sound lies beside {path.name}; put its sound file there")
+    face = load_face("head")
+    motion = motion_of_capture(capture, face).face
+    ears = Ears(effort.folder())
+    found = []
+    for number, span in enumerate(stretches(ears.sound(sound), LONGEST_S), start=1):
+        begin, end = (round(second * motion.fps) for second in span)
+        part = Trajectory(motion.channels, motion.values[begin:end], motion.fps)
+        landmarks = moved_landmarks(face, part)
+        found.append(_observed(f"{path.stem}-{number:02d}", (ears, sound), span, landmarks, motion.fps))
+    return tuple(found)
+
+
+def _observed(
+    name: str, heard_in: tuple[Ears, Path], span: tuple[float, float], landmarks: NDArray[np.float32], fps: float
+) -> Observation:
+    ears, sound = heard_in
+    heard = ears.heard(sound, None, span)
+    phones, words = trimmed(heard, 0.0, len(landmarks) / fps)
+    return Observation(
+        name,
+        fps,
+        landmarks,
+        np.zeros((len(landmarks), 6), np.float32),
+        phones,
+        words,
+        intensity(heard.sound, np.arange(len(landmarks)) / fps),
+        Quality(heard.confidence, 1.0, 0, cut=span[0]),
+        sound,
+        is_recognised=True,
+    )

@@ -1,0 +1,100 @@
+"""What the camera saw of held-out utterances, and the thresholds that it sets."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.evaluation import measures
+from corpus_tools.recordings.observation import Observation
+from lexicon.phones import PHONES
+from tts2face.models.talker import ShapeModel
+
+# Phones by what the lips do in them; a frame belongs to the phone that sounds, to one class only, the first that fits.
+CLASSES: dict[str, frozenset[str]] = {
+    "bilabial": frozenset(measures.BILABIALS),
+    "labiodental": frozenset({"f", "v"}),
+    "rounded": frozenset(label for label, phone in PHONES.items() if phone.rounding == "rounded"),
+    "open": measures.open_vowels(),
+}
+OTHER = "other"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curves:
+    """Opening and width (T,) of the lips over the eye distance."""
+
+    opening: NDArray[np.float64]
+    width: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, landmarks: NDArray[np.floating]) -> "Curves":
+        """Of (T, 478, 3) landmarks."""
+        return cls(measures.lip_opening(landmarks), measures.lip_width(landmarks))
+
+    def stacked(self) -> NDArray[np.float64]:
+        """(T, 2) opening and width."""
+        return np.stack([self.opening, self.width], axis=1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Real:
+    """One held-out utterance: its judged frames, speech parameters (T, S), curves, and the class of each frame (T,)."""
+
+    observation: Observation
+    judged: slice
+    parameters: NDArray[np.float32]
+    curves: Curves
+    classes: NDArray[np.str_]
+
+    @classmethod
+    def of(cls, seen: Observation, model: ShapeModel) -> "Real":
+        """The utterance in the parameters of a model."""
+        n_frames = len(seen.landmarks)
+        return cls(
+            seen,
+            measures.judged_frames(seen.phones, n_frames, seen.fps),
+            model.parameters(seen.landmarks)[:, : model.n_speech],
+            Curves.of(seen.landmarks),
+            frame_classes(seen.phones.phones, seen.phones.edges, np.arange(n_frames) / seen.fps),
+        )
+
+    @property
+    def seconds(self) -> float:
+        """Duration of the picture."""
+        return len(self.parameters) / self.observation.fps
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """Below these come nine tenths of real lips: openings in bilabials and labiodentals, widths in rounded phones."""
+
+    closed: float
+    labiodental: float
+    rounded: float
+
+    @classmethod
+    def of(cls, real: Sequence[Real]) -> "Thresholds":
+        """Of held-out utterances."""
+
+        def threshold(curve: str, labels: Collection[str]) -> float:
+            least = [
+                measures.least_openings(getattr(one.curves, curve), one.observation.phones, one.observation.fps, labels)
+                for one in real
+            ]
+            return measures.closure_threshold(np.concatenate(least))
+
+        return cls(
+            threshold("opening", CLASSES["bilabial"]),
+            threshold("opening", CLASSES["labiodental"]),
+            threshold("width", CLASSES["rounded"]),
+        )
+
+
+def frame_classes(labels: Sequence[str], edges: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.str_]:
+    """(T,) class of the phone that sounds at each instant."""
+    of_phone = np.array([next((name for name, some in CLASSES.items() if label in some), OTHER) for label in labels])
+    at = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(labels) - 1)
+    classes: NDArray[np.str_] = of_phone[at]
+    return classes

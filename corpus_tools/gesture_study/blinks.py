@@ -1,0 +1,92 @@
+"""Blinks: when lids shut, how long, how fast.
+
+Times between frames are those of straight lines through them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+SHUT = 0.5  # share from which lids count as shut (as in tts2face.gesture.perlin_noise)
+OPEN = 0.2  # share below which they count as open: trackers read a narrowed eye as a tenth
+
+Doubles = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Blinks:
+    """Blinks of some recordings.
+
+    Parameters
+    ----------
+    n, seconds
+        How many there are, and in how much time.
+    intervals : (I,)
+        Seconds from onset to onset within a recording; an onset is where the lids pass `SHUT`.
+    closing, opening : (B,)
+        Seconds from `OPEN` to the instant of the most shut lids, and from there to `OPEN`.
+    closing_speeds, opening_speeds : (B,)
+        Highest speed of each, shares a second.
+
+    Of blinks that begin or end outside their recording only the onsets count.
+    """
+
+    n: int
+    seconds: float
+    intervals: Doubles
+    closing: Doubles
+    opening: Doubles
+    closing_speeds: Doubles
+    opening_speeds: Doubles
+
+    @property
+    def durations(self) -> Doubles:
+        """(B,) seconds from open to open."""
+        return self.closing + self.opening
+
+    @property
+    def per_minute(self) -> float:
+        """How often the lids shut."""
+        return 60 * self.n / self.seconds
+
+
+def blinks_of(shut: NDArray[np.floating], lengths: NDArray[np.int32], fps: float) -> Blinks:
+    """Blinks of recordings of `lengths` (R,) frames, one behind the other; shut (T, 2) or (T,) shares of lids."""
+    lids = np.asarray(shut, np.float64).reshape(len(shut), -1).mean(axis=1)
+    n, intervals, found = 0, [np.zeros(0)], [np.zeros((0, 4))]
+    for part in np.split(lids, np.cumsum(lengths)[:-1]):
+        onsets = onsets_of(part) / fps
+        n += len(onsets)
+        intervals.append(np.diff(onsets))
+        found.append(_courses(part, fps))
+    closing, opening, closing_speeds, opening_speeds = np.concatenate(found).T
+    seconds = float(np.sum(lengths)) / fps
+    return Blinks(n, seconds, np.concatenate(intervals), closing, opening, closing_speeds, opening_speeds)
+
+
+def onsets_of(lids: Doubles) -> Doubles:
+    """(B,) frames, and parts of frames, at which lids (T,) pass `SHUT`."""
+    shut = lids > SHUT
+    last = np.flatnonzero(~shut[:-1] & shut[1:])
+    return np.asarray(last + (SHUT - lids[last]) / (lids[last + 1] - lids[last]))
+
+
+def _courses(lids: Doubles, fps: float) -> Doubles:
+    """(B, 4) closing and opening time and speed of the blinks that lie within a recording."""
+    rows = []
+    closed = lids > OPEN
+    begins = np.flatnonzero(~closed[:-1] & closed[1:])
+    for begin in begins:
+        after = np.flatnonzero(~closed[begin + 1 :])
+        if not len(after):
+            break
+        end = begin + 1 + int(after[0])  # the first open frame
+        top = begin + int(np.argmax(lids[begin : end + 1]))
+        if lids[top] <= SHUT:
+            continue
+        first = begin + (OPEN - lids[begin]) / (lids[begin + 1] - lids[begin])
+        last = end - (OPEN - lids[end]) / (lids[end - 1] - lids[end])
+        speeds = np.diff(lids[begin : end + 1]) * fps
+        rows.append(((top - first) / fps, (last - top) / fps, speeds.max(), -speeds.min()))
+    return np.array(rows, np.float64).reshape(-1, 4)

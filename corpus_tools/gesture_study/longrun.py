@@ -1,0 +1,81 @@
+"""Clips of ten minutes: how much of the palette they visit, and whether they repeat themselves."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.gesture_study.clips import from_field
+from corpus_tools.gesture_study.measures import autocorrelation, coverage, recordings
+from tts2face.gesture.field_kernels import APART
+from tts2face.gesture.gesture_stream import Fields
+from tts2face.gesture.prosody import SILENCE
+from tts2face.models.palette import GESTURE_FPS, Style
+
+MINUTES = 10
+VISITED_AFTER = (1, 3, MINUTES)  # minutes
+LAGS_S = 300  # half of the clip: every lag is seen for as long
+FROM_S = 5  # lags below are a gesture's own length
+
+Doubles = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Repeating:
+    """(L,) highest autocorrelation within each second of lag: recordings in random order, speech, silence."""
+
+    real: Doubles
+    speech: Doubles
+    silence: Doubles
+
+    @property
+    def highest(self) -> tuple[float, float, float]:
+        """From `FROM_S` on."""
+        return (
+            float(self.real[FROM_S:].max()),
+            float(self.speech[FROM_S:].max()),
+            float(self.silence[FROM_S:].max()),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LongRun:
+    """By feature: shares of recorded moments that speech visits after `VISITED_AFTER`, and repetition."""
+
+    visited: Mapping[str, tuple[float, ...]]
+    repeating: Mapping[str, Repeating]
+
+
+def long_run(fields: Fields, name: str, learnt: Style, held: Style, seed: int) -> LongRun:
+    """Make clips of `MINUTES` of a style, with speech of the recordings in random order and with silence."""
+    n_frames = round(MINUTES * 60 * GESTURE_FPS)
+    order = np.random.default_rng([seed, 3]).permutation(len(learnt.lengths))
+    heard = _shuffled(learnt.intensity, learnt.lengths, order, n_frames)
+    silence = np.full(n_frames, SILENCE[0], np.float32)
+    visited, repeating = {}, {}
+    for feature in held.motion:
+        speech = from_field(fields, name, feature, heard, seed)
+        quiet = from_field(fields, name, feature, silence, seed)
+        visited[feature] = tuple(
+            coverage(speech.moments[: round(minutes * 60 * GESTURE_FPS)], learnt.lengths, APART)
+            for minutes in VISITED_AFTER
+        )
+        taken = _shuffled(learnt.motion[feature], learnt.lengths, order, n_frames)
+        repeating[feature] = Repeating(*(_by_second(values) for values in (taken, speech.values, quiet.values)))
+    return LongRun(visited, repeating)
+
+
+def _shuffled(
+    values: NDArray[np.float32], lengths: NDArray[np.int32], order: NDArray[np.int64], n_frames: int
+) -> NDArray[np.float32]:
+    """Recordings one behind the other in some order, again from the first one where they do not suffice."""
+    parts = recordings(values, lengths)
+    whole = np.concatenate([parts[at] for at in order])
+    return np.resize(whole, (n_frames, *whole.shape[1:])) if len(whole) < n_frames else whole[:n_frames]
+
+
+def _by_second(values: NDArray[np.float32]) -> Doubles:
+    a_second = round(GESTURE_FPS)
+    found = autocorrelation(values, LAGS_S * a_second - 1)
+    return np.asarray(found.reshape(LAGS_S, a_second).max(axis=1))

@@ -1,0 +1,110 @@
+"""The study as numbers for other programs: one line a trait as CSV, everything as JSON."""
+
+import csv
+import json
+from io import StringIO
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.gesture_study.analysis import Compared, GesturesFound, Moving, StyleFound
+from corpus_tools.gesture_study.longrun import VISITED_AFTER
+from corpus_tools.gesture_study.page import verdict
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+HEAD = ("style", "source", "trait", "unit", "n", "w_halves", "w_field", "w_noise", "target")
+
+
+def gestures_csv(found: GesturesFound) -> str:
+    """Distances of every style's traits."""
+    file = StringIO()
+    rows = csv.writer(file, lineterminator="\n")
+    rows.writerow(HEAD)
+    for style in found.styles:
+        for one in style.compared:
+            told = [f"{value:.6g}" for value in (one.halves, one.to_field, one.to_noise)]
+            trait = one.trait
+            rows.writerow([style.name, style.source, trait.name, trait.unit, len(one.real), *told, verdict(style, one)])
+    return file.getvalue()
+
+
+def gestures_json(found: GesturesFound) -> str:
+    """Everything but the values themselves, of which there are quantiles."""
+    options = found.options
+    content = {
+        "palette": found.name,
+        "held_out_one_in": options.one_in,
+        "halves": options.halves,
+        "clips": options.clips,
+        "seed": options.seed,
+        "quantiles": list(QUANTILES),
+        "styles": [_style(style) for style in found.styles],
+    }
+    return json.dumps(content, ensure_ascii=False, indent=1) + "\n"
+
+
+def _style(found: StyleFound) -> dict[str, Any]:
+    return {
+        "name": found.name,
+        "derived_from": found.source,
+        "summary": found.summary,
+        "minutes": _number(found.minutes),
+        "recordings_learnt": found.n_learnt,
+        "recordings_held_out": found.n_held if found.is_held_out else 0,
+        "blinks_per_minute": _three(found.blinks_per_minute),
+        "traits": [_compared(found, one) for one in found.compared],
+        "features": [_moving(one) for one in found.moving],
+        "visited": {
+            feature: {f"{minutes} min": _number(share) for minutes, share in zip(VISITED_AFTER, shares, strict=True)}
+            for feature, shares in found.long.visited.items()
+        },
+        "repetition": {
+            feature: {
+                kind: _number(value) for kind, value in zip(("real", "speech", "silence"), one.highest, strict=True)
+            }
+            for feature, one in found.long.repeating.items()
+        },
+    }
+
+
+def _compared(found: StyleFound, one: Compared) -> dict[str, Any]:
+    kinds = {"real": one.real, "field": one.field, "noise": one.noise}
+    return {
+        "name": one.trait.name,
+        "unit": one.trait.unit,
+        "feature": one.trait.feature,
+        "n": len(one.real),
+        "halves": _number(one.halves),
+        "field": _number(one.to_field),
+        "noise": _number(one.to_noise),
+        "target": verdict(found, one) or None,
+        "means": {kind: _number(float(values.mean())) if len(values) else None for kind, values in kinds.items()},
+        "quantiles": {kind: _quantiles(values) for kind, values in kinds.items()},
+    }
+
+
+def _moving(one: Moving) -> dict[str, Any]:
+    return {
+        "name": one.feature,
+        "r_with_intensity": _three(one.with_intensity),
+        "fast_power": {kind: _number(share) for kind, share in zip(("field", "noise"), one.fast, strict=True)},
+        "diversity": {kind: _number(share) for kind, share in zip(("field", "noise"), one.diversity, strict=True)},
+        "hz": one.spectra[0].hz.round(4).tolist(),
+        "power": {
+            kind: [_number(float(value)) for value in spectrum.power]
+            for kind, spectrum in zip(("real", "field", "noise"), one.spectra, strict=True)
+        },
+    }
+
+
+def _three(values: tuple[float, float, float]) -> dict[str, float | None]:
+    return {kind: _number(value) for kind, value in zip(("real", "field", "noise"), values, strict=True)}
+
+
+def _quantiles(values: NDArray[np.float64]) -> list[float | None]:
+    return [_number(float(value)) for value in np.quantile(values, QUANTILES)] if len(values) else []
+
+
+def _number(value: float) -> float | None:
+    return float(f"{value:.6g}") if np.isfinite(value) else None

@@ -1,0 +1,105 @@
+"""What of gestures is compared: a number for each frame, or for each blink, of one recording."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.gesture_study.blinks import Blinks, blinks_of
+from tts2face.gesture.gesture_stream import middle_of
+from tts2face.models.palette import GESTURE_FPS, Palette, Style
+
+Doubles = NDArray[np.float64]
+Motion = NDArray[np.floating]
+IN_DEGREES = 180.0 / np.pi
+
+
+@dataclass(frozen=True, slots=True)
+class Trait:
+    """A name, its unit, the feature that shows it, and how it is read from a recording's motion (T, k).
+
+    The traits with a target are those that a field must keep near the recorded ones (docs/gestures.md).
+    """
+
+    name: str
+    unit: str
+    feature: str
+    of: Callable[[Motion], Doubles]
+    has_target: bool = False
+
+    def all_of(self, parts: Sequence[Motion]) -> Doubles:
+        """Of all recordings."""
+        return np.concatenate([self.of(part) for part in parts]) if len(parts) else np.zeros(0)
+
+
+def traits_of(palette: Palette, style: Style) -> tuple[Trait, ...]:
+    """The traits that a style's features show; amplitudes are distances from its medians."""
+    middle = {feature: middle_of(style, feature).astype(np.float64) for feature in style.motion}
+    found: list[Trait] = []
+    for feature in style.motion:
+        if feature == "blink":
+            found += [Trait(name, unit, feature, of, name == INTERVALS) for name, unit, of in BLINKS]
+        else:
+            found += _moved(palette, feature, middle[feature])
+    return tuple(found)
+
+
+INTERVALS = "blink interval"
+
+
+def _blinking(value: Callable[[Blinks], Doubles]) -> Callable[[Motion], Doubles]:
+    return lambda part: value(blinks_of(part, np.array([len(part)], np.int32), GESTURE_FPS))
+
+
+BLINKS: tuple[tuple[str, str, Callable[[Motion], Doubles]], ...] = (
+    (INTERVALS, "s", _blinking(lambda found: found.intervals)),
+    ("blink duration", "s", _blinking(lambda found: found.durations)),
+    ("closing time", "s", _blinking(lambda found: found.closing)),
+    ("opening time", "s", _blinking(lambda found: found.opening)),
+    ("closing speed", "1/s", _blinking(lambda found: found.closing_speeds)),
+    ("opening speed", "1/s", _blinking(lambda found: found.opening_speeds)),
+)
+
+
+def _moved(palette: Palette, feature: str, middle: Doubles) -> list[Trait]:
+    """Speed and amplitude of a feature that moves, in a unit that can be seen."""
+    see, unit = seen(palette, feature)
+    if feature == "brows":
+        lift = brow_lift(palette)
+        return [
+            Trait("brow height", "mm", feature, lambda part: part @ lift, has_target=True),
+            Trait("brow speed", "mm/s", feature, lambda part: np.abs(np.diff(part @ lift)) * GESTURE_FPS),
+        ]
+    return [
+        Trait(
+            f"{feature} speed",
+            f"{unit}/s" if unit else "1/s",
+            feature,
+            lambda part: np.linalg.norm(np.diff(see(part), axis=0), axis=1) * GESTURE_FPS,
+            has_target=feature == "head",
+        ),
+        Trait(f"{feature} amplitude", unit, feature, lambda part: np.linalg.norm(see(part - middle), axis=1)),
+    ]
+
+
+def seen(palette: Palette, feature: str) -> tuple[Callable[[Motion], Motion], str]:
+    """How channels become what is seen, and its unit: the head's three angles, landmarks' mean motion in mm."""
+    if feature == "head":
+        return lambda values: values[:, :3].astype(np.float64) * IN_DEGREES, "deg"
+    if feature == "gaze":
+        return lambda values: values.astype(np.float64) * IN_DEGREES, "deg"
+    if feature in palette.regions:
+        size = np.sqrt(len(palette.regions[feature].landmarks))
+        return lambda values: values.astype(np.float64) / size, "mm"
+    return lambda values: values.astype(np.float64), ""
+
+
+def brow_lift(palette: Palette) -> Doubles:
+    """(k,) mean height in mm of the brows' landmarks a unit of each mode."""
+    return np.asarray(palette.regions["brows"].modes[:, :, 1].mean(axis=1), np.float64)
+
+
+def visible(palette: Palette, motion: Mapping[str, Motion]) -> dict[str, Motion]:
+    """All features in the units that are seen."""
+    return {feature: seen(palette, feature)[0](values) for feature, values in motion.items()}

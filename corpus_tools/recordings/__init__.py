@@ -1,0 +1,1 @@
+"""Recordings of a person, observed: sound, phones, landmarks, on one clock."""

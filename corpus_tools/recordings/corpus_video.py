@@ -1,0 +1,132 @@
+"""What the camera saw in a recording: landmarks of every frame, tracked once and kept in a cache folder."""
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+from tts2face.models.tensors import read_tensors, write_tensors
+from tts2face.video.landmark_models import MODEL_SHA256
+from tts2face.video.media import media_facts, read_pictures
+from tts2face.video.track import Tracking
+
+if TYPE_CHECKING:
+    from tts2face.video.streaming_tracker import FilmReader
+
+KIND = "tracking"
+TRACKING_VERSION = 2  # rises when tracking gives other numbers, so that cached ones are made again
+NOT_COUNTED = -1
+
+Tell = Callable[[float], None]  # told the share of a video that is done
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Watched:
+    """What the camera saw in T frames.
+
+    Parameters
+    ----------
+    tracking
+        Landmarks and their scores.
+    times : (T,)
+        Seconds.
+    fps
+        As the file states it.
+    n_faces : (T,)
+        Faces in the picture, `NOT_COUNTED` where they were not counted.
+    changes : (T,)
+        Mean difference from the picture before, in steps of 8 bits; infinite for the first.
+    """
+
+    tracking: Tracking
+    times: NDArray[np.float64]
+    fps: float
+    n_faces: NDArray[np.int8]
+    changes: NDArray[np.float32]
+
+
+class Eyes:
+    """Watches videos; the networks are loaded for the first that is not in the cache, the last one seen is kept."""
+
+    def __init__(self, cache: Path, model: Path) -> None:
+        self._cache, self._model = cache, model
+        self._reader: FilmReader | None = None
+        self._last: tuple[Path, Watched] | None = None
+
+    def watched(self, video: Path, tell: Tell | None = None) -> Watched:
+        """What a video shows, from the cache when its content was tracked before.
+
+        Parameters
+        ----------
+        tell
+            Called with the share that is done.
+
+        Raises
+        ------
+        DataError
+            The video cannot be read or holds no picture.
+        """
+        kept = self._cache / f"{content_key(video)}-{MODEL_SHA256[:8]}-{TRACKING_VERSION}.{KIND}"
+        if self._last is None or self._last[0] != kept:
+            self._last = None  # two long videos need not lie in memory together
+            self._last = kept, _kept_in(kept) or self._tracked(video, kept, tell or (lambda share: None))
+        return self._last[1]
+
+    def _tracked(self, video: Path, kept: Path, tell: Tell) -> Watched:
+        from tts2face.video.streaming_tracker import FilmReader
+
+        self._reader = self._reader or FilmReader(self._model)
+        facts = media_facts(video)
+        sights = []
+        for sight in self._reader.sights(read_pictures(video), facts.fps):
+            sights.append(sight)
+            tell(min(sight.time / max(facts.duration, sight.time, 1e-3), 1.0))
+        if not sights:
+            raise DataError(f"{video} holds no picture; copy or record it again")
+        arrays = {
+            "points": np.array([sight.points for sight in sights]),
+            "scores": np.array([sight.score for sight in sights], np.float32),
+            "times": np.array([sight.time for sight in sights]),
+            "n_faces": np.array([_count(sight.n_faces) for sight in sights], np.int8),
+            "changes": np.array([sight.change for sight in sights], np.float32),
+        }
+        write_tensors(kept, KIND, TRACKING_VERSION, arrays, {"fps": facts.fps})
+        return _watched(arrays, facts.fps)
+
+
+def content_key(path: Path) -> str:
+    """Name for everything computed from a file's content alone."""
+    about = path.stat()
+    return _content_key(path, about.st_size, about.st_mtime_ns)
+
+
+@lru_cache(maxsize=1)
+def _content_key(path: Path, _size: int, _changed_ns: int) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:32]
+
+
+def _kept_in(path: Path) -> Watched | None:
+    """What the cache holds; None where it holds nothing or is damaged."""
+    if not path.is_file():
+        return None
+    try:
+        arrays, header = read_tensors(path, KIND, TRACKING_VERSION)
+        return _watched(arrays, float(header["fps"]))
+    except (DataError, KeyError):
+        return None
+
+
+def _watched(arrays: Mapping[str, NDArray[Any]], fps: float) -> Watched:
+    tracking = Tracking(arrays["points"], arrays["scores"])
+    return Watched(tracking, arrays["times"], fps, arrays["n_faces"], arrays["changes"])
+
+
+def _count(n_faces: int | None) -> int:
+    return NOT_COUNTED if n_faces is None else min(n_faces, np.iinfo(np.int8).max)

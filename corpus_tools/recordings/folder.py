@@ -1,0 +1,156 @@
+"""A folder of recordings: which videos there are and which words each one says."""
+
+import csv
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from corpus_tools.recordings.subtitles import read_cues, subtitles_beside
+from corpus_tools.transcripts.find import said_in, transcript_of
+from lexicon.dictionary import cmudict_lookup
+from lexicon.errors import DataError, InputError
+from lexicon.normalize import normalize
+
+VIDEO_SUFFIXES = frozenset({".mkv", ".mp4", ".mov", ".webm", ".avi", ".mpg", ".mpeg", ".m4v"})
+MANIFEST = "manifest.csv"
+# Names of letters in ARPABET, as speakers of southern British English and of American English say them.
+LETTER_NAMES = {
+    "a": ("EY1",), "b": ("B IY1",), "c": ("S IY1",), "d": ("D IY1",), "e": ("IY1",), "f": ("EH1 F",),
+    "g": ("JH IY1",), "h": ("EY1 CH",), "i": ("AY1",), "j": ("JH EY1",), "k": ("K EY1",), "l": ("EH1 L",),
+    "m": ("EH1 M",), "n": ("EH1 N",), "o": ("OW1",), "p": ("P IY1",), "q": ("K Y UW1",), "r": ("AA1", "AA1 R"),
+    "s": ("EH1 S",), "t": ("T IY1",), "u": ("Y UW1",), "v": ("V IY1",), "w": ("D AH1 B AH0 L Y UW0",),
+    "x": ("EH1 K S",), "y": ("W AY1",), "z": ("Z EH1 D", "Z IY1"),
+}  # fmt: skip
+# The older "hw" of "white" (Wells 1982, "glide cluster reduction"); aligned, it makes an h of the rounded lips of w.
+BREATHED_W = ("h", "w")
+
+Ways = tuple[tuple[str, ...], ...]  # pronunciations of one word, each a row of phones
+Spoken = tuple[tuple[str, Ways], ...]  # words with their pronunciations
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """One video and what is said in it; `is_spelling` marks words of one letter as names of letters.
+
+    ``transcript`` is its text, or the file that holds it; None where the folder does not say what is spoken.
+    ``span`` are the seconds of the video that the recording takes, None where it takes all. ``words`` are what is said
+    in it where that is known already.
+    """
+
+    name: str
+    video: Path
+    transcript: str | Path | None
+    is_spelling: bool = False
+    span: tuple[float, float] | None = None
+    words: Spoken | None = None
+
+
+def find_recordings(folder: Path) -> tuple[Recording, ...]:
+    """Every video of a folder with its transcript, by name; or one video.
+
+    Two layouts are read: ``manifest.csv`` (columns clip, transcript) beside a folder ``clips``, as the GRID corpus is
+    kept here, where single letters are names of letters; and videos with subtitles (.srt, .vtt; every cue is a
+    recording) or a transcript (.txt, .TextGrid, .align) of the same name beside each.
+
+    Raises
+    ------
+    InputError
+        There is no such folder, or no video in it.
+    DataError
+        The manifest cannot be read.
+    """
+    if folder.is_file() and folder.suffix.lower() in VIDEO_SUFFIXES:
+        return tuple(_said_in(folder))
+    if not folder.is_dir():
+        raise InputError(f"there is no folder {folder}; give the folder of recordings")
+    manifest = folder / MANIFEST
+    found = _listed(folder, manifest) if manifest.is_file() else _plain(folder)
+    if not found:
+        raise InputError(f"{folder} holds no video ({', '.join(sorted(VIDEO_SUFFIXES))}); give a folder of recordings")
+    return found
+
+
+def spoken_words(recording: Recording) -> Spoken | None:
+    """Each word of a transcript with its pronunciations; None without a transcript.
+
+    Raises
+    ------
+    DataError
+        It cannot be read, holds no word, or one that nobody can say.
+    """
+    if recording.words is not None or recording.transcript is None:
+        return recording.words
+    said = said_in(recording.transcript) if isinstance(recording.transcript, Path) else recording.transcript
+    text = said if recording.is_spelling else normalize(said)
+    words = re.findall(r"[^\W_]+(?:['’][^\W_]+)*", text)
+    if not words:
+        raise DataError(f"the transcript of {recording.name} holds no word; write what is said")
+    return tuple((word, pronunciations(word, is_letter=recording.is_spelling and len(word) == 1)) for word in words)
+
+
+def pronunciations(word: str, *, is_letter: bool) -> Ways:
+    """All ways to say a word, in phones of the table; the letter's names if it stands for one.
+
+    A word that the dictionary does not hold is said by rule.
+
+    Raises
+    ------
+    DataError
+        There is no way to say it.
+    """
+    from lexicon.dictionary import arpabet_segments
+
+    if is_letter and word.lower() in LETTER_NAMES:
+        found = [arpabet_segments(names) for names in LETTER_NAMES[word.lower()]]
+    else:
+        found = []
+        while variant := cmudict_lookup(word if not found else f"{word}({len(found) + 1})"):
+            found.append(variant)
+    if not found:
+        return (_by_rule(word),)
+    ways = dict.fromkeys(tuple(segment.phone for segment in segments) for segments in found)
+    plain = [way for way in ways if way[:2] != BREATHED_W]
+    return tuple(plain or ways)
+
+
+def _by_rule(word: str) -> tuple[str, ...]:
+    from lexicon.pronounce import pronounce
+
+    try:
+        spoken = pronounce(word)
+    except InputError as unsayable:
+        raise DataError(f"no pronunciation is known for {word!r}; check the transcript's spelling") from unsayable
+    return tuple(phone for said in spoken.words for phone in said.phones)
+
+
+def _listed(folder: Path, manifest: Path) -> tuple[Recording, ...]:
+    try:
+        with manifest.open(encoding="utf-8-sig", newline="") as file:
+            said = {row["clip"]: row["transcript"] for row in csv.DictReader(file)}
+    except (OSError, UnicodeDecodeError, KeyError, csv.Error) as broken:
+        raise DataError(f"{manifest} needs the columns clip and transcript in UTF-8; mend it") from broken
+    clips = folder / "clips"
+    videos = _videos(clips if clips.is_dir() else folder)
+    return tuple(Recording(video.stem, video, said.get(video.stem), is_spelling=True) for video in videos)
+
+
+def _plain(folder: Path) -> tuple[Recording, ...]:
+    return tuple(recording for video in _videos(folder) for recording in _said_in(video))
+
+
+def _said_in(video: Path) -> Iterator[Recording]:
+    """The recordings in a video: one for each cue of its subtitles, or the whole; damage is told when it is read."""
+    subtitles = subtitles_beside(video)
+    try:
+        cues = read_cues(subtitles) if subtitles else ()
+    except DataError:
+        cues = ()
+    for number, cue in enumerate(cues, start=1):
+        yield Recording(f"{video.stem}-{number:04d}", video, cue.text, span=(cue.begin, cue.end))
+    if not cues:
+        yield Recording(video.stem, video, subtitles or transcript_of(video))
+
+
+def _videos(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.iterdir() if path.suffix.lower() in VIDEO_SUFFIXES)

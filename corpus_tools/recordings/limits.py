@@ -1,0 +1,111 @@
+"""Whether a recording can serve: what is measured of it, and the limits.
+
+Every limit stands beside what 804 recordings of GRID s1 measure (median, worst), which all can serve.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.recordings.corpus_video import NOT_COUNTED
+from lexicon.errors import DataError
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.types import Waveform
+
+FULL_SCALE = 0.999  # a sample from here on is taken for clipped
+UNCHANGED = 0.02  # of an 8-bit step: pictures that differ by less are one picture; a camera's own noise is above
+LEVEL_WINDOW_S = 0.02
+NOISE_QUANTILE = 0.1  # of the windows without speech; steps and breaths are louder
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """A measure that must not lie beyond `bound`, and the sentence for when it does."""
+
+    measure: str
+    bound: float
+    is_least: bool
+    sentence: str
+
+    def is_broken_by(self, value: float) -> bool:
+        """Whether a value lies beyond."""
+        return value < self.bound if self.is_least else value > self.bound
+
+
+LIMITS = (
+    # Of other sentences of GRID's small grammar the median is -7300, of unrelated text -10500, or it is not found.
+    Limit(
+        "confidence", -6500.0, True, "the sound does not fit the transcript (confidence {value:.0f}); correct the words"
+    ),
+    Limit(
+        "recognised",
+        -6500.0,
+        True,
+        "its phones could not be recognised well (confidence {value:.0f}); write what is said into a .txt beside it",
+    ),
+    Limit("clipped", 0.005, False, "{value:.1%} of the speech is clipped; record it again with less gain"),
+    Limit("snr_db", 10.0, True, "speech is {value:.0f} dB above the noise; record where it is quiet"),
+    Limit("crowded", 0.25, False, "{value:.0%} of the pictures show more than one face; crop them to one person"),
+    Limit("turn_deg", 30.0, False, "the face is turned away by {value:.0f} degrees; film it from the front"),
+    Limit("frozen_s", 0.2, False, "the picture stands still for {value:.2f} s; record it again"),
+)
+
+
+def refuse(measured: Mapping[str, float]) -> None:
+    """Let good measures pass; those that are not among the limits are not looked at.
+
+    Raises
+    ------
+    DataError
+        A measure lies beyond its limit.
+    """
+    for limit in LIMITS:
+        value = measured.get(limit.measure)
+        if value is not None and limit.is_broken_by(value):
+            raise DataError(limit.sentence.format(value=value))
+
+
+def sound_measures(sound: Waveform, phones: PhoneSequence) -> dict[str, float]:
+    """Share of the speech that is ``clipped``, and ``snr_db``: level of the speech over that of the pauses in dB.
+
+    Without a pause nothing tells the noise; the ratio is infinite then.
+    """
+    window = max(1, round(LEVEL_WINDOW_S * sound.rate))
+    n_windows = len(sound.samples) // window
+    blocks = sound.samples[: n_windows * window].reshape(n_windows, window)
+    middles = (np.arange(n_windows) + 0.5) * LEVEL_WINDOW_S
+    at = np.clip(np.searchsorted(phones.edges, middles, side="right") - 1, 0, len(phones) - 1)
+    is_speech = np.array([phone != SILENCE for phone in phones.phones])[at] if n_windows else np.zeros(0, bool)
+    power = np.square(blocks, dtype=np.float64).mean(axis=1)
+    spoken, quiet = power[is_speech], power[~is_speech]
+    clipped = float((np.abs(blocks[is_speech]) >= FULL_SCALE).mean()) if is_speech.any() else 0.0
+    if not len(quiet) or not len(spoken):
+        return {"clipped": clipped, "snr_db": np.inf}
+    noise = max(float(np.quantile(quiet, NOISE_QUANTILE)), 1e-10)
+    return {"clipped": clipped, "snr_db": float(10 * np.log10(max(float(spoken.mean()), 1e-10) / noise))}
+
+
+def picture_measures(
+    n_faces: NDArray[np.int8], changes: NDArray[np.float32], times: NDArray[np.float64]
+) -> dict[str, float]:
+    """Share of the counted pictures that are ``crowded``, and ``frozen_s``: the longest time without change.
+
+    Parameters
+    ----------
+    n_faces, changes, times : (T,)
+        As `corpus_tools.recordings.corpus_video.Watched` has them.
+    """
+    counted = n_faces[n_faces != NOT_COUNTED]
+    crowded = float((counted > 1).mean()) if len(counted) else 0.0
+    still = np.concatenate([[False], changes < UNCHANGED, [False]])
+    borders = np.flatnonzero(np.diff(still.astype(np.int8))).reshape(-1, 2)
+    frozen = max((float(times[last - 1] - times[max(first - 1, 0)]) for first, last in borders), default=0.0)
+    return {"crowded": crowded, "frozen_s": frozen}
+
+
+def turn_deg(angles: NDArray[np.floating]) -> float:
+    """Degrees by which a face looks away from the camera, from (T, 3) pitch, yaw and roll: the median over time."""
+    away = np.arccos(np.clip(np.cos(angles[:, 0]) * np.cos(angles[:, 1]), -1.0, 1.0))
+    return float(np.degrees(np.median(away)))

@@ -1,0 +1,181 @@
+"""One recording as a corpus needs it: pose-free landmarks, head pose, phones and loudness on one clock."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.recordings.corpus_audio import Ears, Heard
+from corpus_tools.recordings.corpus_video import Eyes, Watched
+from corpus_tools.recordings.folder import Recording, spoken_words
+from corpus_tools.recordings.limits import picture_measures, refuse, sound_measures, turn_deg
+from lexicon.errors import DataError
+from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from tts2face.speech.loudness import intensity
+from tts2face.video.frame_grid import face_span, filled_gaps, on_grid
+from tts2face.video.pose import Posed, head_angles, remove_pose
+
+ROUNDING = 1e-6  # seconds
+NEIGHBOURS = 2.0  # frames about a span, from which those in it are read
+LEAST_FRAMES = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """The common frame rate, a video's own when None, and seconds by which a video's sound comes late."""
+
+    fps: float | None = None
+    lag: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """How well a recording could be read.
+
+    ``confidence`` of the alignment (0 is perfect, log likelihood per second), lowest face ``score``, ``n_filled``
+    frames filled in, seconds ``cut`` from the video's beginning, seconds of ``lag`` taken out, share of ``clipped``
+    speech, ``snr_db`` of speech over noise, share of ``crowded`` pictures, ``turn_deg`` away from the camera,
+    ``frozen_s`` without a change.
+    """
+
+    confidence: float
+    score: float
+    n_filled: int
+    cut: float
+    lag: float = 0.0
+    clipped: float = 0.0
+    snr_db: float = np.inf
+    crowded: float = 0.0
+    turn_deg: float = 0.0
+    frozen_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """One recording; frame i is the instant ``i / fps`` of the clock of ``phones``, ``quality.cut`` later in ``video``.
+
+    Parameters
+    ----------
+    landmarks : (T, 478, 3)
+        Millimetres, head pose removed; axes as in `tts2face.models.landmarks`.
+    head : (T, 6)
+        `HEAD_CHANNELS`: angles against the camera, place against the recording's middle.
+    intensity : (T,)
+        Level of the sound in dB.
+    is_recognised
+        Nobody wrote what is said: the phones were heard, and some are wrong.
+    """
+
+    name: str
+    fps: float
+    landmarks: NDArray[np.float32]
+    head: NDArray[np.float32]
+    phones: PhoneSequence
+    words: tuple[WordSpan, ...]
+    intensity: NDArray[np.float32]
+    quality: Quality
+    video: Path
+    is_recognised: bool = False
+
+
+def observed(recording: Recording, eyes: Eyes, ears: Ears, timing: Timing) -> Observation:
+    """One recording, read and measured.
+
+    Raises
+    ------
+    DataError
+        The recording cannot serve; the message says why.
+    """
+    sound = ears.heard(recording.video, spoken_words(recording), recording.span)
+    refuse({"recognised" if sound.is_recognised else "confidence": sound.confidence})
+    measures = sound_measures(sound.sound, sound.phones)
+    refuse(measures)
+    seen = eyes.watched(recording.video)
+    filled, first, n_filled = _frames(seen, recording.span, timing)
+    fps = timing.fps or seen.fps
+    begin = first / fps
+    start = begin + timing.lag - (recording.span[0] if recording.span else 0.0)  # on the clock of the sound
+    phones, spans = trimmed(sound, start, start + len(filled) / fps)
+    posed = remove_pose(filled, fps)
+    here = (seen.times > begin - ROUNDING) & (seen.times < begin + len(filled) / fps - ROUNDING)
+    measures |= picture_measures(seen.n_faces[here], seen.changes[here], seen.times[here])
+    measures["turn_deg"] = turn_deg(head_angles(posed.rotations))
+    refuse(measures)
+    return Observation(
+        name=recording.name,
+        fps=fps,
+        landmarks=posed.landmarks,
+        head=_head(posed),
+        phones=phones,
+        words=spans,
+        intensity=intensity(sound.sound, start + np.arange(len(filled)) / fps),
+        quality=Quality(
+            confidence=sound.confidence,
+            score=_lowest_score(seen, here),
+            n_filled=n_filled,
+            cut=begin,
+            lag=timing.lag,
+            **measures,
+        ),
+        video=recording.video,
+        is_recognised=sound.is_recognised,
+    )
+
+
+def _frames(seen: Watched, span: tuple[float, float] | None, timing: Timing) -> tuple[NDArray[np.float32], int, int]:
+    """Landmarks of the frames that belong to a span of the sound, the number of the first, and how many were filled.
+
+    Raises
+    ------
+    DataError
+        The video shows nothing there, no face, or a face that is out of sight too long.
+    """
+    fps = timing.fps or seen.fps
+    begin, end = (0.0, np.inf) if span is None else (span[0] - timing.lag, span[1] - timing.lag)
+    near = (seen.times > begin - NEIGHBOURS / fps) & (seen.times < end + NEIGHBOURS / fps)
+    if near.sum() < LEAST_FRAMES:
+        where = "" if span is None else f" from {span[0]:.2f} s to {span[1]:.2f} s"
+        raise DataError(f"the video shows nothing{where}; check its length and the times")
+    points, first = on_grid(seen.tracking.points[near], seen.times[near], fps)
+    instants = (first + np.arange(len(points))) / fps
+    inside = (instants > begin - ROUNDING) & (instants < end + ROUNDING)
+    points, first = points[inside], first + int(inside.argmax())
+    if np.isnan(points).all():
+        raise DataError("no frame shows a face")
+    start, end = face_span(points)
+    filled, n_filled = filled_gaps(points[start:end], fps)
+    return filled, first + start, n_filled
+
+
+def trimmed(sound: Heard, begin: float, stop: float) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+    """Phones and words on a clock that starts at `begin`, the silence outside [begin, stop] cut away.
+
+    Raises
+    ------
+    DataError
+        Speech lies outside.
+    """
+    phones = list(sound.phones.phones)
+    edges = sound.phones.edges.copy()
+    lead = 1 if phones[0] == SILENCE and edges[1] <= begin else 0
+    tail = len(phones) - (1 if phones[-1] == SILENCE and edges[-2] >= stop else 0)
+    phones, edges = phones[lead:tail], np.clip(edges[lead : tail + 1], None, stop)
+    spoken = [i for i, phone in enumerate(phones) if phone != SILENCE]
+    if edges[spoken[0]] < begin or sound.phones.edges[lead + spoken[-1] + 1] > stop:
+        raise DataError(f"words are spoken while no face is seen (it is seen from {begin:.2f} s to {stop:.2f} s)")
+    if phones[0] == SILENCE:
+        edges[0] = begin
+    elif edges[0] > begin:  # the sound begins after the picture
+        phones, edges, lead = [SILENCE, *phones], np.concatenate([[begin], edges]), lead - 1
+    words = tuple(WordSpan(word.text, word.first - lead, word.last - lead) for word in sound.words)
+    return PhoneSequence(phones, edges - begin), words
+
+
+def _head(posed: Posed) -> NDArray[np.float32]:
+    place = posed.shifts - np.median(posed.shifts, axis=0)
+    return np.column_stack([head_angles(posed.rotations), place]).astype(np.float32)
+
+
+def _lowest_score(seen: Watched, here: NDArray[np.bool_]) -> float:
+    return float(seen.tracking.scores[here & ~seen.tracking.is_missing].min(initial=1.0))

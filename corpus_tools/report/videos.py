@@ -1,0 +1,104 @@
+"""Small films inside a page: the recording, and beside it the default head with what was made of it."""
+
+from base64 import b64encode
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from functools import cached_property
+from html import escape
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.evaluation.evaluate import Run
+from corpus_tools.evaluation.reference import Real
+from lexicon.errors import DataError, InputError
+from tts2face.models.face import Face
+from tts2face.models.face_file import load_face
+from tts2face.models.talker import speech_channels
+from tts2face.render.draw import Stage, draw, staged
+from tts2face.render.picture import Picture
+from tts2face.retargeting.to_face import retargeter
+from tts2face.types import Trajectory
+from tts2face.video.media import read_pictures
+
+SIDE_PX = 240
+SETTINGS = {"crf": "26", "preset": "veryfast"}  # some 100 kB a sentence
+NOTE = "Left the recording, right {method} on the default head; without sound."
+
+
+class Films:
+    """Films of what one method made; the head is made ready when the first is asked for."""
+
+    def __init__(self, method: str) -> None:
+        """Show what `method` made."""
+        self._method = method
+
+    @cached_property
+    def _face(self) -> Face:
+        return load_face("head")
+
+    @cached_property
+    def _stage(self) -> Stage:
+        return staged(self._face, Picture(size=f"{SIDE_PX}x{SIDE_PX}", camera="close"))
+
+    def film(self, run: Run, at: int) -> str:
+        """A film of one utterance (HTML); nothing where its video has gone since or shows no picture."""
+        one = run.real[at]
+        seen = list(pictures_of(one))
+        if len(seen) < one.judged.stop - one.judged.start:
+            return ""
+        speech = Trajectory(speech_channels(run.model), run.made[self._method][at], one.observation.fps)
+        weights = retargeter(run.talker, self._face).retarget(speech).values
+        sides = [
+            np.concatenate([fitted(pixels), draw(self._stage, row)], axis=1)
+            for pixels, row in zip(seen, weights[one.judged], strict=False)
+        ]
+        return film_tag(sides, one.observation.fps, NOTE.format(method=self._method))
+
+
+def pictures_of(one: Real) -> Iterator[NDArray[np.uint8]]:
+    """The pictures of an utterance's judged frames; fewer where the video cannot be read."""
+    seen = one.observation
+    instants = seen.quality.cut + (np.arange(one.judged.start, one.judged.stop) - 0.5) / seen.fps
+    at = 0
+    try:
+        for picture in read_pictures(seen.video):
+            while at < len(instants) and picture.time >= instants[at]:
+                yield picture.pixels
+                at += 1
+            if at == len(instants):
+                return
+    except (DataError, InputError):
+        return  # the video has gone since; the curves stay
+
+
+def fitted(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """An (H, W, 3) picture in the middle of a black square of `SIDE_PX`."""
+    from PIL import Image
+
+    shown = Image.fromarray(pixels)
+    shown.thumbnail((SIDE_PX, SIDE_PX))
+    square = Image.new("RGB", (SIDE_PX, SIDE_PX))
+    square.paste(shown, ((SIDE_PX - shown.width) // 2, (SIDE_PX - shown.height) // 2))
+    return np.asarray(square)
+
+
+def film_tag(pictures: Sequence[NDArray[np.uint8]], fps: float, note: str) -> str:
+    """A silent film that runs round and round inside the page, and a line below it."""
+    import av
+
+    height, width = pictures[0].shape[:2]
+    content = BytesIO()
+    with av.open(content, "w", format="mp4") as container:
+        stream: Any = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001), options=SETTINGS)
+        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+        for pixels in pictures:
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")))
+        container.mux(stream.encode())
+    data = b64encode(content.getvalue()).decode()
+    return (
+        f'<video autoplay loop muted playsinline controls width="{width}" height="{height}" '
+        f'src="data:video/mp4;base64,{data}"></video>\n<p class="soft">{escape(note)}</p>'
+    )

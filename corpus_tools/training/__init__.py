@@ -1,0 +1,1 @@
+"""Observed recordings become models."""

@@ -1,0 +1,102 @@
+"""What turning the head does to landmarks from which the head's pose was taken out, and its removal.
+
+Trackers know heads of other shapes: as a face turns, its landmarks move a little although the face does not. Over the
+recordings of one person this is a smooth function of the head's angles; it is learnt from means over seconds, in which
+speech averages out, and taken out of every frame.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.training.ridge import ridge
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
+
+CHUNK_S = 3.0  # a sentence: long enough for speech to average out
+LEAST_CHUNKS = 12  # with fewer nothing is taken out
+Floats = NDArray[np.float64]
+
+
+class Seen(Protocol):
+    """A recording of which landmarks (T, L, 3) without head pose and the head's pose (T, 6) are known."""
+
+    @property
+    def fps(self) -> float:
+        """Frames per second."""
+
+    @property
+    def landmarks(self) -> NDArray[np.float32]:
+        """Millimetres."""
+
+    @property
+    def head(self) -> NDArray[np.float32]:
+        """As `tts2face.types.HEAD_CHANNELS`."""
+
+
+AnySeen = TypeVar("AnySeen", bound=Seen)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseLeak:
+    """Displacements (K, L, 3) of landmarks in mm for terms of the head's angles about ``centre`` over ``scale``."""
+
+    centre: Floats
+    scale: Floats
+    offsets: Floats
+
+    def removed(self, observation: AnySeen) -> AnySeen:
+        """The observation with landmarks as if the head stood at the centre."""
+        if not self.offsets.any():
+            return observation
+        terms = angle_terms((observation.head[:, :3] - self.centre) / self.scale)
+        leak = np.tensordot(terms, self.offsets, axes=1)
+        landmarks = (observation.landmarks - leak).astype(np.float32)
+        return replace(observation, landmarks=landmarks)  # type: ignore[type-var] # protocols cannot ask for a dataclass
+
+
+def pose_leak(observations: Sequence[Seen]) -> PoseLeak:
+    """The leak in recordings of one person; none where they are too few or where taking it out predicts nothing."""
+    angles, landmarks = _chunks(observations)
+    centre, scale = angles.mean(axis=0), np.maximum(angles.std(axis=0), 1e-6)
+    terms = angle_terms((angles - centre) / scale)
+    away = landmarks.reshape(len(landmarks), -1) - landmarks.reshape(len(landmarks), -1).mean(axis=0)
+    offsets = np.zeros((terms.shape[1], away.shape[1]))
+    if len(angles) >= LEAST_CHUNKS:
+        fit = ridge(terms, away)
+        if fit.left_out_error < float(np.square(away).sum()):
+            offsets = fit.weights
+    return PoseLeak(centre, scale, _keeping_contact(offsets.reshape(terms.shape[1], *landmarks.shape[1:])))
+
+
+def _keeping_contact(offsets: Floats) -> Floats:
+    """Offsets by which facing points of the inner lips move together: lips that touch at one angle touch at all."""
+    kept = offsets.copy()
+    upper, lower = list(INNER_LIP_UPPER), list(INNER_LIP_LOWER)
+    kept[:, upper] = kept[:, lower] = (offsets[:, upper] + offsets[:, lower]) / 2
+    return kept
+
+
+def without_leak(observations: Sequence[AnySeen]) -> tuple[AnySeen, ...]:
+    """Observations of one person without the leak that they show."""
+    leak = pose_leak(observations) if observations else None
+    return tuple(leak.removed(seen) for seen in observations) if leak else ()
+
+
+def angle_terms(angles: NDArray[np.floating]) -> Floats:
+    """(T, 9) angles (T, 3), their squares and their products."""
+    pitch, yaw, roll = np.asarray(angles, np.float64).T
+    return np.column_stack([pitch, yaw, roll, pitch**2, yaw**2, roll**2, pitch * yaw, pitch * roll, yaw * roll])
+
+
+def _chunks(observations: Sequence[Seen]) -> tuple[Floats, Floats]:
+    """Mean angles (C, 3) and landmarks (C, L, 3) of every chunk."""
+    angles, landmarks = [], []
+    for seen in observations:
+        n_chunks = max(1, round(len(seen.landmarks) / seen.fps / CHUNK_S))
+        for rows in np.array_split(np.arange(len(seen.landmarks)), n_chunks):
+            angles.append(seen.head[rows, :3].mean(axis=0, dtype=np.float64))
+            landmarks.append(seen.landmarks[rows].mean(axis=0, dtype=np.float64))
+    return np.array(angles), np.array(landmarks)

@@ -1,0 +1,107 @@
+"""Networks from phones to lips, trained on a talker's utterances with scikit-learn.
+
+The first is told phones as one of N. The others are told what the mouth does in them (`lexicon.phones.phone_features`),
+so that they know what to expect of neighbours that were never recorded together; their first layer is multiplied out
+by phone, and the talker's file holds them all alike.
+"""
+
+import warnings
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from corpus_tools.run_options import Progress
+from lexicon.errors import BackendError
+from lexicon.phones import phone_features
+from lexicon.sequence import SILENCE
+from tts2face.models.phone_network import WindowNetwork, window_features
+from tts2face.models.talker import Talker
+
+MARGIN_S = 0.2  # of silence that is learnt from
+UNITS = (128, 128)
+DECAY = 1e-3
+ROUNDS = 60
+N_BY_LABEL, N_BY_FEATURES = 1, 3  # networks; features tell unheard words better, labels heard ones (accuracy.md)
+LEAST_FRAMES = 3000  # two minutes; from less a network learns nothing that examples do not show
+Floats = NDArray[np.float32]
+
+
+def with_network(talker: Talker, *, on_progress: Progress | None = None) -> Talker:
+    """The talker with networks trained on what it holds; as it is where that is too little.
+
+    Raises
+    ------
+    BackendError
+        scikit-learn is missing.
+    """
+    if sum(len(spoken.shape) for spoken in talker.utterances) < LEAST_FRAMES:
+        return talker
+    inventory = tuple(sorted({label for spoken in talker.utterances for label in spoken.phones.phones} | {SILENCE}))
+    n_speech = talker.model.n_speech
+    spread = np.maximum(talker.model.spread[:n_speech], 1e-6)
+    shown, place, wanted = [], [], []
+    for spoken in talker.utterances:
+        times = np.arange(len(spoken.shape)) / talker.fps
+        near = (times >= spoken.phones.edges[1] - MARGIN_S) & (times <= spoken.phones.edges[-2] + MARGIN_S)
+        labels, where = window_features(spoken.phones, times[near], inventory)
+        shown.append(labels)
+        place.append(where)
+        wanted.append(spoken.shape[near, :n_speech] / spread)
+    seen = np.concatenate(shown), np.concatenate(place)
+    tables = [np.eye(len(inventory), dtype=np.float32)] * N_BY_LABEL + [feature_table(inventory)] * N_BY_FEATURES
+    networks = []
+    for seed, table in enumerate(tables):
+        networks.append(_network(*seen, np.concatenate(wanted), table, seed))
+        if on_progress:
+            on_progress(seed + 1, len(tables))
+    weights, biases = (_stacked(layers) for layers in zip(*networks, strict=True))
+    weights[-1], biases[-1] = weights[-1] * spread, biases[-1] * spread
+    return replace(talker, network=WindowNetwork(inventory, tuple(weights), tuple(biases)))
+
+
+def feature_table(inventory: Iterable[str]) -> Floats:
+    """(P, K) articulatory features of P phones, of the first half and of the last."""
+    return np.array([[*first, *last] for first, last in map(phone_features, inventory)], np.float32)
+
+
+def described(shown: NDArray[np.integer], place: Floats, table: Floats) -> Any:
+    """Sparse (T, C K + 4) inputs: for each of the phones (T, C) its line of the table (P, K), then its place (T, 4)."""
+    lines = sparse.csr_matrix(table)
+    return sparse.hstack([*(lines[column] for column in shown.T), sparse.csr_matrix(place)]).tocsr()
+
+
+def by_phone(weights: Floats, table: Floats, n_shown: int) -> Floats:
+    """(C P + 4, H) first weights for C phones as one of P that do what (C K + 4, H) do for `described` ones."""
+    n_features = table.shape[1]
+    told, place = weights[: n_shown * n_features], weights[n_shown * n_features :]
+    return np.concatenate([*(table @ each for each in np.split(told, n_shown)), place])
+
+
+def _stacked(members: Iterable[Iterable[Floats]]) -> list[Floats]:
+    return [np.stack(layer).astype(np.float32) for layer in zip(*members, strict=True)]
+
+
+def _network(
+    shown: NDArray[np.integer], place: Floats, wanted: Floats, table: Floats, seed: int
+) -> tuple[list[Floats], list[Floats]]:
+    """Weights and biases of one network for phones as one of N, learnt from phones as the table tells them."""
+    fitted = _fitted(described(shown, place, table), wanted, seed)
+    return [by_phone(fitted.coefs_[0], table, shown.shape[1]), *fitted.coefs_[1:]], fitted.intercepts_
+
+
+def _fitted(inputs: Any, wanted: Any, seed: int) -> Any:
+    try:
+        from sklearn.exceptions import ConvergenceWarning
+        from sklearn.neural_network import MLPRegressor
+    except ImportError as missing:
+        raise BackendError("learning from recordings needs scikit-learn: pip install 'tts2face[capture]'") from missing
+    network = MLPRegressor(
+        hidden_layer_sizes=UNITS, alpha=DECAY, early_stopping=True, max_iter=ROUNDS, batch_size=256, random_state=seed
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)  # it stops after `ROUNDS`, converged or not
+        return network.fit(inputs, wanted)

@@ -1,0 +1,161 @@
+"""A Talker learnt from observations: the shape model, and every utterance in its parameters."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.recordings.observation import Observation
+from lexicon.errors import DataError, InputError
+from lexicon.sequence import SILENCE
+from tts2face.models.landmarks import (
+    EYE_OUTER_LEFT,
+    EYE_OUTER_RIGHT,
+    LOWER_LIP_INNER_MID,
+    MOUTH_REGION,
+    N_LANDMARKS,
+    UPPER_LIP_INNER_MID,
+)
+from tts2face.models.talker import ShapeModel, Talker, Utterance
+from tts2face.video.pose import head_angles
+
+REST_MARGIN_S = 0.2  # lips begin to move this long before the first sound
+CLOSED = 0.01  # of the distance of the outer eye corners: the inner lips' gap below which the mouth counts as closed
+
+
+def learn_talker(
+    observations: Sequence[Observation], *, n_speech: int = 20, n_other: int = 10, metadata: Mapping[str, Any]
+) -> Talker:
+    """The talker whose recordings were observed.
+
+    Parameters
+    ----------
+    n_speech, n_other
+        Modes of the mouth region and of the rest of the face.
+    metadata
+        At least name, language, sources, licence, attribution, command, created.
+
+    Raises
+    ------
+    InputError
+        There is no observation, or a number of modes that the regions cannot have.
+    DataError
+        Recordings differ in frames per second.
+    """
+    if not observations:
+        raise InputError("no recording could be used; see why each was refused")
+    fps = observations[0].fps
+    for observation in observations:
+        if observation.fps != fps:
+            raise DataError(f"{observation.name} has {observation.fps:g} frames per second, others {fps:g}; convert it")
+    model = learn_shapes(observations, n_speech, n_other)
+    turn = mean_rotation(observations)
+    utterances = tuple(_utterance(observation, model, turn) for observation in observations)
+    return Talker(fps, model, utterances, dict(metadata))
+
+
+def learn_shapes(observations: Sequence[Observation], n_speech: int, n_other: int) -> ShapeModel:
+    """The talker's shape model: principal components of the mouth region, then of the rest of the face.
+
+    The two regions share no landmark, so that all modes together are orthonormal.
+
+    Raises
+    ------
+    InputError
+        A region has no such number of modes.
+    """
+    mouth = np.isin(np.arange(N_LANDMARKS), MOUTH_REGION)
+    n_frames = sum(len(observation.landmarks) for observation in observations)
+    mean = sum(observation.landmarks.sum(axis=0, dtype=np.float64) for observation in observations) / n_frames
+    rows, variances = [], []
+    for region, n_modes in ((mouth, n_speech), (~mouth, n_other)):
+        if not 0 < n_modes <= min(3 * int(region.sum()), n_frames):
+            raise InputError(
+                f"{n_frames} frames of {int(region.sum())} landmarks have no {n_modes} modes; ask for fewer"
+            )
+        components, variance = _principal(observations, mean, region, n_modes)
+        basis = np.zeros((n_modes, N_LANDMARKS, 3))
+        basis[:, region] = components
+        rows.append(basis)
+        variances.append(variance)
+    spread = np.sqrt(np.concatenate(variances)).astype(np.float32)
+    model = ShapeModel(
+        mean.astype(np.float32), np.concatenate(rows).astype(np.float32), spread, n_speech, np.zeros_like(spread)
+    )
+    rest = resting_parameters(observations, model)
+    return ShapeModel(model.mean, model.basis, model.spread, n_speech, rest)
+
+
+def resting_parameters(observations: Sequence[Observation], model: ShapeModel) -> NDArray[np.float32]:
+    """(M,) mean parameters of the silent frames before speech in which the lips are closed; zeros if there are none."""
+    total = np.zeros(len(model.spread))
+    n_frames = 0
+    for observation in observations:
+        still = resting_frames(observation)
+        parameters = model.parameters(observation.landmarks[still])
+        total += parameters.sum(axis=0)
+        n_frames += len(parameters)
+    return (total / max(n_frames, 1)).astype(np.float32)
+
+
+def resting_frames(observation: Observation) -> NDArray[np.bool_]:
+    """(T,) frames before speech that show closed lips."""
+    phones = observation.phones
+    speech = phones.edges[1] if phones.phones[0] == SILENCE else phones.edges[0]
+    times = np.arange(len(observation.landmarks)) / observation.fps
+    still: NDArray[np.bool_] = (times < speech - REST_MARGIN_S) & (lip_gap(observation.landmarks) < CLOSED)
+    return still
+
+
+def lip_gap(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(T,) distance of the inner lips at their middle over the distance of the outer eye corners."""
+    apart: NDArray[np.floating] = landmarks[:, UPPER_LIP_INNER_MID] - landmarks[:, LOWER_LIP_INNER_MID]
+    eyes: NDArray[np.floating] = landmarks[:, EYE_OUTER_LEFT] - landmarks[:, EYE_OUTER_RIGHT]
+    gap: NDArray[np.float64] = np.linalg.norm(apart, axis=1) / np.linalg.norm(eyes, axis=1)
+    return gap
+
+
+def mean_rotation(observations: Sequence[Observation]) -> NDArray[np.float64]:
+    """(3, 3) mean of the head's rotations: the rotation nearest to the mean of the matrices."""
+    total = sum(_rotations(observation.head[:, :3]).sum(axis=0) for observation in observations)
+    left, _, right = np.linalg.svd(np.asarray(total))
+    signs = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    mean: NDArray[np.float64] = left @ signs @ right
+    return mean
+
+
+def _principal(
+    observations: Sequence[Observation], mean: NDArray[np.float64], region: NDArray[np.bool_], n_modes: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(n_modes, R, 3) principal components of a region and the (n_modes,) variances along them, largest first.
+
+    Each component's largest entry is positive, so that the same recordings always give the same signs.
+    """
+    n_values = 3 * int(region.sum())
+    scatter = np.zeros((n_values, n_values))
+    n_frames = 0
+    for observation in observations:
+        offsets = (observation.landmarks - mean)[:, region].reshape(-1, n_values)
+        scatter += offsets.T @ offsets
+        n_frames += len(offsets)
+    variances, vectors = np.linalg.eigh(scatter / n_frames)
+    components = vectors[:, ::-1][:, :n_modes].T
+    largest = components[np.arange(n_modes), np.abs(components).argmax(axis=1)]
+    components = components * np.sign(largest)[:, None]
+    return components.reshape(n_modes, -1, 3), np.maximum(variances[::-1][:n_modes], 0.0)
+
+
+def _utterance(observation: Observation, model: ShapeModel, turn: NDArray[np.float64]) -> Utterance:
+    relative = turn.T @ _rotations(observation.head[:, :3])
+    head = np.column_stack([head_angles(relative), observation.head[:, 3:]]).astype(np.float32)
+    shape = model.parameters(observation.landmarks)
+    return Utterance(observation.name, observation.phones, observation.words, shape, head, observation.intensity)
+
+
+def _rotations(angles: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(T, 3, 3) rotations of (T, 3) pitch, yaw, roll; the inverse of `head_angles`."""
+    from scipy.spatial.transform import Rotation
+
+    rotations: NDArray[np.float64] = Rotation.from_euler("YXZ", angles[:, [1, 0, 2]]).as_matrix()
+    return rotations

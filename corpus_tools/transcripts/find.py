@@ -1,0 +1,33 @@
+"""The words in the transcript beside a video, whatever its format."""
+
+from pathlib import Path
+
+from corpus_tools.recordings.subtitles import FORMATS, read_cues
+from corpus_tools.transcripts.decoding import read_text
+from corpus_tools.transcripts.textgrid import read_textgrid
+from corpus_tools.transcripts.word_times import read_word_times
+
+TEXT = ".txt"
+READERS = {".textgrid": read_textgrid, ".align": read_word_times, **dict.fromkeys(FORMATS, read_cues)}
+
+
+def transcript_of(video: Path) -> Path | None:
+    """The transcript beside a video: text before TextGrid, word times and subtitles; None without one."""
+    beside = {path.suffix.lower(): path for path in sorted(video.parent.iterdir()) if path.stem == video.stem}
+    return next((beside[suffix] for suffix in (TEXT, *READERS) if suffix in beside), None)
+
+
+def said_in(transcript: Path) -> str:
+    """All words of a transcript, in order.
+
+    Raises
+    ------
+    DataError
+        It cannot be read or holds no word.
+    BackendError
+        A package that reads it is missing.
+    """
+    suffix = transcript.suffix.lower()
+    if suffix == TEXT:
+        return read_text(transcript)
+    return " ".join(cue.text for cue in READERS[suffix](transcript))

@@ -1,0 +1,66 @@
+"""Marks in a text: ``[pause 0.4]``, ``[nod]``, ``[style:delighted] ... [/style]``, or SSML.
+
+Only these are marks; any other bracket is text.
+"""
+
+import re
+
+from lexicon.errors import InputError
+from lexicon.marked_text import Gathering, MarkedText, NodMark, PauseMark
+from lexicon.ssml import is_ssml, spoken_by_ssml
+
+# A bracket, one of the three words, and what follows up to the closing bracket, which a mark must have. Each part ends
+# where the next begins, so that the scan is linear.
+MARK = re.compile(r"\[(?P<name>/?(?:style|nod|pause)\b)(?P<rest>[^\[\]]*)(?P<end>\]?)")
+SHOWN_CHARACTERS = 40
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
+
+
+def marked(text: str) -> MarkedText:
+    """A text and the marks in it; one that begins with ``<speak`` is read as SSML (`lexicon.ssml`).
+
+    Raises
+    ------
+    InputError
+        A mark is written wrongly, not closed, closes nothing, is nested too deep, or holds a number out of range; the
+        message names it and how it is written.
+    """
+    if is_ssml(text):
+        return spoken_by_ssml(text)
+    gathering = Gathering()
+    behind = 0
+    for match in MARK.finditer(text):
+        gathering.say(text[behind : match.start()])
+        behind = match.end()
+        _take(gathering, match)
+    gathering.say(text[behind:])
+    return gathering.done()
+
+
+def _take(gathering: Gathering, match: "re.Match[str]") -> None:
+    shown = " ".join(match.group()[:SHOWN_CHARACTERS].split())
+    name, rest = match["name"], match["rest"].strip()
+    if not match["end"]:
+        raise InputError(f"the mark {shown!r} lacks its closing bracket; write {_form(name)}")
+    if name == "pause":
+        gathering.mark(PauseMark(gathering.at, _number(rest.removesuffix("s").rstrip(), shown, name)))
+    elif name == "nod":
+        gathering.mark(NodMark(gathering.at, _number(rest, shown, name) if rest else 1.0))
+    elif name == "style" and rest[:1] == ":" and rest[1:].strip():
+        gathering.open("style", shown, style=rest[1:].strip())
+    elif name == "/style" and not rest:
+        gathering.close("style", shown)
+    else:
+        raise InputError(f"cannot read the mark {shown}; write {_form(name)}")
+
+
+def _number(written: str, shown: str, name: str) -> float:
+    if not _NUMBER.fullmatch(written):
+        raise InputError(f"cannot read the mark {shown}; write {_form(name)}")
+    return float(written)
+
+
+def _form(name: str) -> str:
+    forms = {"pause": "[pause 0.4] with seconds", "nod": "[nod], or [nod 0.5] for a small one"}
+    told = forms.get(name, "[style:NAME] ... [/style]")
+    return f"{told}, or round brackets around words that are to be spoken"

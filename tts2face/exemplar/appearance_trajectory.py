@@ -1,0 +1,69 @@
+"""Phones become looks: the textures of the recorded exemplars that move the lips, blended like their motion."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.exemplar import blending
+from tts2face.exemplar.options import SynthesisOptions
+from tts2face.exemplar.synthesis import VisualVoice, chosen_tokens, read_at_frames
+from tts2face.exemplar.tokens import Tokens
+from tts2face.models.talker import Talker, require_appearance
+from tts2face.types import Trajectory
+
+LOOKS_BLENDED = 3  # exemplars; more of them blur teeth and tongue (docs/decisions.md)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Looks:
+    """A talker's recorded looks, ready for synthesis.
+
+    The `frames` of ``tokens`` are looks (F, A); ``rest`` (A,) are those of silence, ``spread`` (A,) their deviations.
+    """
+
+    tokens: Tokens
+    spread: NDArray[np.float32]
+    rest: NDArray[np.float32]
+    channels: tuple[str, ...]
+
+
+def looks_of(talker: Talker, voice: VisualVoice) -> Looks:
+    """Index the looks of a talker who has an appearance.
+
+    Raises
+    ------
+    InputError
+        The talker has motion only.
+    """
+    appearance = require_appearance(talker)
+    frames = np.concatenate([spoken.looks for spoken in talker.utterances if spoken.looks is not None])
+    spread = np.maximum(appearance.spread, 1e-6).astype(np.float32)
+    silent = np.concatenate([_silent(spoken.phones, len(spoken.shape), talker.fps) for spoken in talker.utterances])
+    still = frames[silent] if silent.any() else frames
+    rest = np.median(still, axis=0).astype(np.float32)
+    return Looks(replace(voice.tokens, frames=frames.astype(np.float32)), spread, rest, appearance.channels)
+
+
+def looks_trajectory(
+    phones: PhoneSequence, voice: VisualVoice, looks: Looks, *, fps: float, n_frames: int, options: SynthesisOptions
+) -> Trajectory:
+    """Looks for phones in time, from the very tokens that move the lips; arguments as `speech_trajectory`."""
+    options = replace(options, k=min(options.k, LOOKS_BLENDED), contacts=False)
+    targets, found = chosen_tokens(phones, voice, options)
+    frame_times = np.arange(n_frames) / fps
+    n_instants = int(np.ceil(max(phones.end, frame_times[-1]) * blending.CLOCK_HZ)) + 2
+    weights = blending.exemplar_weights(found.scores, options.sharpness)
+    pieces = blending.averaged_pieces(looks.tokens, found.tokens, weights, looks.spread, options)
+    joined, told = blending.joined_pieces(pieces, targets, n_instants, options)
+    made = np.where(told[:, None], joined * looks.spread, looks.rest)
+    made = blending.smoothed(made, options.smoothing_s, blending.CLOCK_HZ)
+    return Trajectory(looks.channels, read_at_frames(made, phones, frame_times, looks.rest), fps)
+
+
+def _silent(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.bool_]:
+    """(T,) frames within silence."""
+    at = np.searchsorted(phones.edges, np.arange(n_frames) / fps, side="right") - 1
+    labels = np.array([label == SILENCE for label in phones.phones])
+    return np.asarray(labels[np.clip(at, 0, len(labels) - 1)])

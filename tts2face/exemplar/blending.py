@@ -1,0 +1,156 @@
+"""Exemplars become one motion: warped, averaged, joined, smoothed (T07 section 3.3)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.compilation import kernel
+from tts2face.exemplar.options import SynthesisOptions
+from tts2face.exemplar.phone_substitution import Targets
+from tts2face.exemplar.recorded_motion import read_motion
+from tts2face.exemplar.time_warping import lay_over
+from tts2face.exemplar.tokens import Tokens
+
+CLOCK_HZ = 100.0  # instants at which motion is made; lips move below 15 Hz, so nothing is lost
+KNOTS = 8  # samples a phone; 10 are no better (docs/decisions.md)
+ALIGN_BAND = 1  # knots by which an exemplar's event may lie off the best one's; 2 lose .002 of r opening
+LEAST_SPREAD = 0.15  # of a parameter's spread: exemplars that happen to agree are not surer than this
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pieces:
+    """Averaged exemplars of N targets at S knots: mean and variance (N, S, D), both in units of the spread."""
+
+    mean: NDArray[np.float32]
+    variance: NDArray[np.float32]
+
+
+def exemplar_weights(scores: NDArray[np.float64], sharpness: float) -> NDArray[np.float64]:
+    """(N, k) weights that sum to 1: ``exp(-sharpness (best - score))``, 0 where there is no exemplar."""
+    present = np.isfinite(scores)
+    behind = np.where(present, scores - scores[:, :1], 0.0)
+    weights = np.where(present, np.exp(sharpness * behind), 0.0)
+    return np.asarray(weights / weights.sum(1, keepdims=True))
+
+
+def averaged_pieces(
+    tokens: Tokens,
+    chosen: NDArray[np.int32],
+    weights: NDArray[np.float64],
+    spread: NDArray[np.float32],
+    options: SynthesisOptions,
+) -> Pieces:
+    """Average of the chosen tokens of each target, laid knot on knot.
+
+    Parameters
+    ----------
+    chosen, weights : (N, k)
+        Tokens of each target (-1 = none) and their weights.
+    spread : (D,)
+        Standard deviation of each parameter.
+
+    Notes
+    -----
+    Every token is sampled at the same parts of its phone (and of its neighbours, where pieces overlap), which warps it
+    to the target's duration; with `options.align`, it is first warped in time onto the best token.
+    """
+    parts = np.arange(3) if options.overlap else np.array([1])
+    knots = np.concatenate([part + np.arange(KNOTS) / KNOTS for part in parts] + [[parts[-1] + 1.0]])
+    shape = (len(chosen), len(knots), tokens.frames.shape[1])
+    mean, square = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
+    _average(
+        (tokens.frames, tokens.first_frame, tokens.utterance, tokens.spans, tokens.fps),
+        (chosen, weights, knots, 1.0 / spread, ALIGN_BAND if options.align else 0),
+        mean,
+        square,
+    )
+    return Pieces(mean, np.maximum(square - np.square(mean), np.float32(0.0)))
+
+
+@kernel
+def _average(corpus, plan, mean, square):  # type: ignore[no-untyped-def]
+    chosen, weights, knots, scale, band = plan
+    best, piece, laid = np.zeros_like(mean[0]), np.zeros_like(mean[0]), np.zeros_like(mean[0])
+    for n in range(len(chosen)):
+        for e in range(chosen.shape[1]):
+            if chosen[n, e] < 0 or weights[n, e] == 0.0:
+                continue
+            _read_piece(corpus, chosen[n, e], knots, scale, best if e == 0 else piece)
+            if e > 0 and band > 0:
+                lay_over(piece, best, scale, band, laid)
+            _add(best if e == 0 else (laid if band > 0 else piece), weights[n, e], mean[n], square[n])
+
+
+@kernel
+def _read_piece(corpus, token, knots, scale, piece):  # type: ignore[no-untyped-def]
+    """Write a token's motion at the knots, in units of the spread, into (S, D) `piece`."""
+    frames, first_frame, utterance, spans, fps = corpus
+    first, last = first_frame[utterance[token]], first_frame[utterance[token] + 1]
+    for s in range(len(knots)):
+        part = min(int(knots[s]), 2)
+        start, end = spans[token, part], spans[token, part + 1]
+        read_motion(frames, first, last, (start + (end - start) * (knots[s] - part)) * fps, piece[s])
+        for d in range(len(scale)):
+            piece[s, d] *= scale[d]
+
+
+@kernel
+def _add(piece, weight, mean, square):  # type: ignore[no-untyped-def]
+    for s in range(piece.shape[0]):
+        for d in range(piece.shape[1]):
+            mean[s, d] += weight * piece[s, d]
+            square[s, d] += weight * piece[s, d] * piece[s, d]
+
+
+def joined_pieces(
+    pieces: Pieces, targets: Targets, n_instants: int, options: SynthesisOptions
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """(n, D) motion at the instants ``i / CLOCK_HZ`` in units of the spread, and (n,) whether any piece tells it.
+
+    Overlapping pieces are averaged: each counts fully within its phone and falls to nothing towards the far edges of
+    the phone's neighbours, times the inverse variance of its exemplars to the power `options.precision`.
+    """
+    total = np.zeros((n_instants, pieces.mean.shape[2]), np.float32)
+    weight = np.zeros_like(total)
+    _join((pieces.mean, pieces.variance, targets.spans), options.overlap, options.precision, total, weight)
+    told = weight[:, 0] > 0
+    return np.where(told[:, None], total / np.where(told[:, None], weight, 1.0), 0.0).astype(np.float32), told
+
+
+@kernel
+def _join(pieces, overlap, precision, total, weight):  # type: ignore[no-untyped-def]
+    mean, variance, spans = pieces
+    n_knots, n_dims = mean.shape[1:]
+    n_parts = 3 if overlap else 1
+    for n in range(len(mean)):
+        span = spans[n]
+        low, high = (span[0], span[3]) if overlap else (span[1], span[2])
+        for i in range(max(0, int(np.ceil(low * CLOCK_HZ))), min(len(total), int(np.floor(high * CLOCK_HZ)) + 1)):
+            t = i / CLOCK_HZ
+            part = 0 if t < span[1] else (1 if t <= span[2] else 2)
+            within = (t - span[part]) / max(span[part + 1] - span[part], 1e-6)
+            share = 1.0
+            if part != 1:
+                share = max(within if part == 0 else 1.0 - within, 1e-3)
+            at = (part + within if overlap else within) * (n_knots - 1) / n_parts
+            low_knot = min(int(at), n_knots - 2)
+            u = at - low_knot
+            for d in range(n_dims):
+                value = (1.0 - u) * mean[n, low_knot, d] + u * mean[n, low_knot + 1, d]
+                spread = (1.0 - u) * variance[n, low_knot, d] + u * variance[n, low_knot + 1, d]
+                w = share / (spread + LEAST_SPREAD**2) ** precision
+                total[i, d] += w * value
+                weight[i, d] += w
+
+
+def smoothed(values: NDArray[np.floating], sigma_s: float, rate_hz: float) -> NDArray[np.float32]:
+    """(T, D) values at `rate_hz`, smoothed by a Gaussian of `sigma_s` seconds; beyond the ends they stand still.
+
+    The width is in seconds, so the same motion at another rate is smoothed alike.
+    """
+    if sigma_s == 0:
+        return np.array(values, np.float32)
+    from scipy.ndimage import gaussian_filter1d
+
+    return np.asarray(gaussian_filter1d(values.astype(np.float32), sigma_s * rate_hz, axis=0, mode="nearest"))

@@ -1,0 +1,100 @@
+"""Why the lips move as they do: for each phone, which recorded tokens were used."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.exemplar.blending import exemplar_weights
+from tts2face.exemplar.options import SynthesisOptions
+from tts2face.exemplar.synthesis import DEFAULT_OPTIONS, VisualVoice, chosen_tokens
+
+
+@dataclass(frozen=True, slots=True)
+class UsedToken:
+    """A recorded phone that served.
+
+    ``start`` and ``end`` in seconds of the utterance's clock; ``left`` and ``right`` are the phones around it, in order
+    of speech; ``score`` is its context score, ``weight`` its share of the average.
+    """
+
+    utterance: str
+    start: float
+    end: float
+    left: tuple[str, ...]
+    right: tuple[str, ...]
+    score: float
+    weight: float
+
+
+@dataclass(frozen=True, slots=True)
+class ShownPhone:
+    """A phone, what was shown for it, in which context, and the tokens used, best first.
+
+    ``shown`` differs from ``phone`` where the talker never said it. A phone without a shape of its own (h) and silence
+    far from speech are shown by no token and do not appear.
+    """
+
+    phone: str
+    start: float
+    end: float
+    shown: str
+    left: tuple[str, ...]
+    right: tuple[str, ...]
+    tokens: tuple[UsedToken, ...]
+
+
+def explained(
+    phones: PhoneSequence, voice: VisualVoice, *, options: SynthesisOptions = DEFAULT_OPTIONS
+) -> tuple[ShownPhone, ...]:
+    """What `speech_trajectory` uses for each phone, with the same arguments.
+
+    Raises
+    ------
+    InputError
+        As `speech_trajectory`.
+    """
+    targets, found = chosen_tokens(phones, voice, options)
+    weights = exemplar_weights(found.scores, options.sharpness)
+    padded = (SILENCE,) * options.context + targets.labels + (SILENCE,) * options.context
+    shown = []
+    for at, (label, source) in enumerate(zip(targets.labels, targets.source, strict=True)):
+        here = at + options.context
+        used = tuple(
+            _used(voice, int(token), float(score), float(weight), options.context)
+            for token, score, weight in zip(found.tokens[at], found.scores[at], weights[at], strict=True)
+            if token >= 0
+        )
+        start, end = float(targets.spans[at, 1]), float(targets.spans[at, 2])
+        left, right = padded[at:here], padded[here + 1 : here + 1 + options.context]
+        shown.append(ShownPhone(phones.phones[source], start, end, label, left, right, used))
+    return tuple(shown)
+
+
+def _used(voice: VisualVoice, token: int, score: float, weight: float, n_context: int) -> UsedToken:
+    tokens = voice.tokens
+    around = [tokens.inventory[number] for number in tokens.context[token, : 2 * n_context]]
+    _, start, end, _ = np.round(tokens.spans[token], 4).tolist()
+    name = voice.names[tokens.utterance[token]]
+    return UsedToken(name, start, end, tuple(around[0::2][::-1]), tuple(around[1::2]), score, weight)
+
+
+def explanation_json(shown: tuple[ShownPhone, ...]) -> list[dict[str, Any]]:
+    """Plain lists and dictionaries."""
+    return [asdict(phone) for phone in shown]
+
+
+def explanation_text(shown: tuple[ShownPhone, ...], *, n_tokens: int = 5) -> str:
+    """One paragraph a phone with its best tokens, for people."""
+    lines = []
+    for phone in shown:
+        name = phone.phone if phone.phone == phone.shown else f"{phone.phone} (shown by {phone.shown})"
+        around = f"{' '.join(phone.left)} [{phone.shown}] {' '.join(phone.right)}"
+        lines.append(f"{phone.start:8.3f}-{phone.end:.3f} s  {name}  in  {around}")
+        lines += [
+            f"    {used.score:6.3f} x {used.weight:.2f}  {used.utterance} {used.start:.2f}-{used.end:.2f} s  "
+            f"{' '.join(used.left)} [{phone.shown}] {' '.join(used.right)}"
+            for used in phone.tokens[:n_tokens]
+        ]
+    return "\n".join(lines) + "\n"

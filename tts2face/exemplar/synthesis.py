@@ -1,0 +1,194 @@
+"""Phones become lip motion: the talker's recorded exemplars, chosen, blended and brought to rest in silence."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.exemplar import blending
+from tts2face.exemplar.contacts import Exemplars, Gap, contact_rule, contacts_told, with_contacts
+from tts2face.exemplar.options import SynthesisOptions
+from tts2face.exemplar.phone_substitution import Targets, shown_phones, targets_of
+from tts2face.exemplar.similarity import Similarity, phone_similarity, token_samples
+from tts2face.exemplar.token_search import ContextIndex, Found, Wanted, best_tokens, context_index, log_durations
+from tts2face.exemplar.tokens import Tokens, contexts, tokens_of
+from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
+from tts2face.models.phone_network import WindowNetwork
+from tts2face.models.talker import Talker, speech_channels
+from tts2face.types import Trajectory
+
+RELEASE_FROM_S = 0.08  # this far from speech the face begins to leave what the exemplars did ...
+REST_FROM_S = 0.20  # ... and this far it is at rest; recorded lips settle within 0.2 s
+LEAST_EASE_S = 0.06  # a chunk that begins or ends within speech still eases from and to rest over this time
+DEFAULT_OPTIONS = SynthesisOptions()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VisualVoice:
+    """A talker made ready for synthesis: tokens, their index, the similarity of phones, the pose at rest.
+
+    ``spread``, ``rest`` and ``speaking``, the mean pose while speaking, are (D,), of the speech parameters; ``names``
+    are the utterances'.
+    """
+
+    tokens: Tokens
+    index: ContextIndex
+    similarity: Similarity
+    spread: NDArray[np.float32]
+    rest: NDArray[np.float32]
+    speaking: NDArray[np.float32]
+    lip_gap: Gap
+    channels: tuple[str, ...]
+    names: tuple[str, ...]
+    network: WindowNetwork | None
+
+
+def visual_voice(talker: Talker) -> VisualVoice:
+    """Index a talker's tokens and measure the similarity of the phones; once for any number of texts."""
+    model, n_speech = talker.model, talker.model.n_speech
+    tokens = tokens_of(talker)
+    spread = np.maximum(model.spread[:n_speech], 1e-6).astype(np.float32)
+    upper, lower = UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID
+    similarity = phone_similarity(token_samples(tokens), tokens.phone, tokens.inventory, spread)
+    return VisualVoice(
+        tokens,
+        context_index(tokens, similarity.matrix),
+        similarity,
+        spread,
+        model.rest[:n_speech].astype(np.float32),
+        mean_speaking_pose(talker),
+        Gap(
+            np.ascontiguousarray(model.mean[upper] - model.mean[lower]),
+            np.ascontiguousarray(model.basis[:n_speech, upper] - model.basis[:n_speech, lower]),
+        ),
+        speech_channels(model),
+        tuple(spoken.name for spoken in talker.utterances),
+        talker.network,
+    )
+
+
+def mean_speaking_pose(talker: Talker) -> NDArray[np.float32]:
+    """(D,) mean speech parameters of the frames between the first phone and the last of every utterance."""
+    n_speech, parts = talker.model.n_speech, []
+    for spoken in talker.utterances:
+        sounding = [at for at, label in enumerate(spoken.phones.phones) if label != SILENCE]
+        if sounding:
+            edges = spoken.phones.edges
+            begin, end = (int(edges[at] * talker.fps) for at in (sounding[0], sounding[-1] + 1))
+            parts.append(spoken.shape[begin : end + 1, :n_speech])
+    frames = np.concatenate(parts) if parts else np.zeros((1, n_speech))
+    return np.asarray(frames.mean(axis=0, dtype=np.float64), np.float32)
+
+
+def chosen_tokens(phones: PhoneSequence, voice: VisualVoice, options: SynthesisOptions) -> tuple[Targets, Found]:
+    """What is shown for each phone, and the recorded tokens that show it."""
+    tokens = voice.tokens
+    number = {label: at for at, label in enumerate(tokens.inventory)}
+    targets = targets_of(phones, tokens.inventory)
+    labels = np.array([number[label] for label in targets.labels], np.int32)
+    around = contexts(labels, np.zeros(len(labels), np.int32), number[SILENCE])
+    wanted = Wanted(labels, around, log_durations(targets.spans))
+    found = best_tokens(
+        wanted,
+        voice.index,
+        context=options.context,
+        k=options.k,
+        duration=options.duration,
+    )
+    return targets, found
+
+
+def speech_trajectory(
+    phones: PhoneSequence,
+    voice: VisualVoice,
+    *,
+    fps: float,
+    n_frames: int,
+    options: SynthesisOptions = DEFAULT_OPTIONS,
+) -> Trajectory:
+    """Motion of the talker's speech parameters for phones in time; the first and the last frame are at rest.
+
+    Raises
+    ------
+    InputError
+        A phone is not in the phone table, the sequence does not begin at 0 s, or an option is out of range.
+
+    Notes
+    -----
+    Time and memory grow linearly with the number of phones. The motion is made on a clock of its own and then read at
+    the frames, so that frame rates agree. In silence farther than `REST_FROM_S` from speech the face is at rest.
+    """
+    if phones.start != 0.0:
+        raise InputError(f"phones to be animated begin at 0 s, not at {phones.start} s; shift them first")
+    targets, found = chosen_tokens(phones, voice, options)
+    frame_times = np.arange(n_frames) / fps
+    n_instants = int(np.ceil(max(phones.end, frame_times[-1]) * blending.CLOCK_HZ)) + 2
+    made = _motion(targets, found, voice, n_instants, options)
+    return Trajectory(voice.channels, read_at_frames(made, phones, frame_times, voice.rest), fps)
+
+
+def read_at_frames(
+    made: NDArray[np.float32], phones: PhoneSequence, times: NDArray[np.float64], rest: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """(T, D) what was made at the instants of the clock (n, D), read at T times and drawn to rest in silence."""
+    at = times * blending.CLOCK_HZ
+    low = at.astype(np.int64)
+    part = (at - low)[:, None].astype(np.float32)
+    values = (1 - part) * made[low] + part * made[low + 1]
+    pull = stillness(phones, times)[:, None].astype(np.float32)
+    drawn: NDArray[np.float32] = (1 - pull) * values + pull * rest
+    return drawn
+
+
+def _motion(
+    targets: Targets, found: Found, voice: VisualVoice, n_instants: int, options: SynthesisOptions
+) -> NDArray[np.float32]:
+    """(n, D) motion at the instants of the clock."""
+    weights = blending.exemplar_weights(found.scores, options.sharpness)
+    pieces = blending.averaged_pieces(voice.tokens, found.tokens, weights, voice.spread, options)
+    joined, told = blending.joined_pieces(pieces, targets, n_instants, options)
+    said = joined * voice.spread
+    if voice.network is not None and options.network > 0:
+        instants = np.arange(n_instants) / blending.CLOCK_HZ
+        told_by_network = voice.network.parameters(shown_phones(targets), instants)
+        said = (1 - options.network) * said + options.network * told_by_network
+    said = voice.speaking + options.articulation * (said - voice.speaking)
+    motion = np.where(told[:, None], said, voice.rest).astype(np.float32)
+    motion = blending.smoothed(motion, options.smoothing_s, blending.CLOCK_HZ)
+    if not options.contacts:
+        return motion
+    rules = [contact_rule(label) for label in targets.labels]
+    touching = np.array([rule is not None for rule in rules])
+    exemplars = Exemplars(voice.tokens, found.tokens[touching], weights[touching])
+    kept = [rule for rule in rules if rule is not None]
+    contacts = contacts_told(exemplars, voice.lip_gap, targets.spans[touching, 1:3], kept)
+    return with_contacts(motion, contacts, voice.lip_gap, blending.CLOCK_HZ)
+
+
+def stillness(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(T,) how far the face is drawn to its rest at each of T instants: 0 in speech, 1 in silence, 1 at both ends."""
+    sounding = np.array([label != SILENCE for label in phones.phones])
+    if not sounding.any():
+        return np.ones(len(times))
+    starts, ends = phones.edges[:-1][sounding], phones.edges[1:][sounding]
+    next_start = np.searchsorted(starts, times, side="right")
+    ahead = np.append(starts, np.inf)[next_start] - times
+    behind = times - np.concatenate([[-np.inf], ends])[next_start]
+    away = np.minimum(ahead, np.maximum(behind, 0.0))
+    pull = _ease((away - RELEASE_FROM_S) / (REST_FROM_S - RELEASE_FROM_S))
+    last = times[-1]
+    onset = np.clip(starts[0], LEAST_EASE_S, REST_FROM_S)
+    offset = np.clip(last - ends[-1], LEAST_EASE_S, REST_FROM_S)
+    if onset < REST_FROM_S:
+        pull = np.maximum(pull, 1.0 - _ease(times / onset))
+    if offset < REST_FROM_S:
+        pull = np.maximum(pull, 1.0 - _ease((last - times) / offset))
+    return pull
+
+
+def _ease(part: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rise from 0 to 1 without a corner."""
+    part = np.clip(part, 0.0, 1.0)
+    return np.asarray(part * part * (3.0 - 2.0 * part))

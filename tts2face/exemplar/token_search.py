@@ -1,0 +1,210 @@
+"""Which recorded tokens fit a phone best, judged by the phones around it (T07 section 3.3)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from tts2face.compilation import kernel
+from tts2face.exemplar.tokens import MAX_CONTEXT, Tokens
+
+GROUPED = 3  # neighbours either side that are alike in a group; the default context
+_ROUNDING = 1e-9  # a bound may fall below the score it bounds by rounding; scores are of order 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Wanted:
+    """N phones to be found: labels (N,), contexts (N, 2 `MAX_CONTEXT`) and log durations (N, 3).
+
+    Columns of `log_durations`: the phone before, the phone itself, the phone behind, each as far as it is reached into.
+    """
+
+    phone: NDArray[np.int32]
+    context: NDArray[np.int32]
+    log_durations: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContextIndex:
+    """Tokens sorted into groups with the same phone and the same `GROUPED` neighbours either side.
+
+    The tokens ``order[group_first[g]:group_first[g + 1]]`` form group g, the shortest first; the groups
+    ``phone_first[p]:phone_first[p + 1]`` belong to phone p. ``likeness[g, c, q]`` is the highest similarity of label q
+    to what any token of group g has in context column c: it bounds a group's scores from above, and so do durations,
+    the farther from the wanted one.
+    """
+
+    order: NDArray[np.int32]
+    group_first: NDArray[np.int32]
+    phone_first: NDArray[np.int32]
+    likeness: NDArray[np.float64]
+    context: NDArray[np.int32]
+    log_durations: NDArray[np.float64]
+    similarity: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """Best tokens of N phones: `tokens` and `scores` (N, k), best first; -1 and -inf where there are fewer."""
+
+    tokens: NDArray[np.int32]
+    scores: NDArray[np.float64]
+
+
+def log_durations(spans: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 3) logarithms of the durations before, in and behind a token, from its (N, 4) span; at least 10 ms."""
+    return np.log(np.maximum(np.diff(spans, axis=1), 0.01))
+
+
+def context_index(tokens: Tokens, similarity: NDArray[np.float64]) -> ContextIndex:
+    """Index of a talker's tokens for the (P, P) similarity of its phones."""
+    near = tokens.context[:, : 2 * GROUPED]
+    durations = log_durations(tokens.spans)
+    order = np.lexsort((durations[:, 1], *near.T[::-1], tokens.phone)).astype(np.int32)
+    keys = np.column_stack([tokens.phone, near])[order]
+    firsts = np.flatnonzero(np.concatenate([[True], (keys[1:] != keys[:-1]).any(1)]))
+    likeness = [np.maximum.reduceat(similarity[column[order]], firsts, axis=0) for column in tokens.context.T]
+    return ContextIndex(
+        order,
+        np.concatenate([firsts, [len(order)]]).astype(np.int32),
+        np.searchsorted(keys[firsts, 0], np.arange(len(tokens.inventory) + 1)).astype(np.int32),
+        np.stack(likeness, axis=1),
+        tokens.context,
+        durations,
+        similarity,
+    )
+
+
+def context_weights(n_context: int) -> NDArray[np.float64]:
+    """(C,) weights 1 / (d + 1) of the phones at distance d = 1..C."""
+    return np.asarray(1.0 / (np.arange(1, n_context + 1) + 1.0))
+
+
+def best_tokens(wanted: Wanted, index: ContextIndex, *, context: int, k: int, duration: float) -> Found:
+    """The k tokens of each wanted phone that lie in the most similar surroundings.
+
+    Score = sum over d = 1..context of [S(left_d, its left_d) + S(right_d, its right_d)] / (d + 1), less, where
+    `duration` is above 0, ``duration`` x (|log ratio of durations| + half of the neighbours' ones). Equal scores go to
+    the token that comes first in the corpus.
+
+    Raises
+    ------
+    InputError
+        `context` is not 1 to `MAX_CONTEXT`, `k` is below 1, or `duration` below 0.
+
+    Notes
+    -----
+    Exactly the answer of scoring every token. Groups of tokens with the same neighbours are visited from the highest
+    bound of their score downwards, until the bound falls below the k-th best, and within a group tokens from the wanted
+    duration outwards: those that cannot win are not scored. More recordings of the same contexts cost next to nothing.
+    """
+    if not 1 <= context <= MAX_CONTEXT:
+        raise InputError(f"context must be 1 to {MAX_CONTEXT} phones, not {context}")
+    if k < 1:
+        raise InputError(f"the number of exemplars must be at least 1, not {k}")
+    if not duration >= 0:
+        raise InputError(f"the weight of durations must be 0 or more, not {duration}")
+    tokens = np.full((len(wanted.phone), k), -1, np.int32)
+    scores = np.full((len(wanted.phone), k), -np.inf)
+    _search(
+        (wanted.phone, wanted.context, wanted.log_durations),
+        (index.order, index.group_first, index.phone_first, index.context, index.log_durations),
+        index.likeness,
+        (index.similarity, context_weights(context), duration),
+        tokens,
+        scores,
+    )
+    return Found(tokens, scores)
+
+
+@kernel
+def _score(target, target_durations, token, token_durations, rule):  # type: ignore[no-untyped-def]
+    similarity, weights, duration = rule
+    total = 0.0
+    for d in range(len(weights)):
+        left, right = 2 * d, 2 * d + 1
+        total += weights[d] * (similarity[target[left], token[left]] + similarity[target[right], token[right]])
+    if duration > 0.0:
+        before, own, behind = target_durations[0], target_durations[1], target_durations[2]
+        neighbours = abs(before - token_durations[0]) + abs(behind - token_durations[2])
+        total -= duration * (abs(own - token_durations[1]) + 0.5 * neighbours)
+    return total
+
+
+@kernel
+def _insert(tokens, scores, token, score):  # type: ignore[no-untyped-def]
+    """Put a token into the ranking if it belongs there: higher score first, then lower token."""
+    k = len(tokens)
+    if score < scores[k - 1] or (score == scores[k - 1] and token > tokens[k - 1] >= 0):
+        return
+    at = k - 1
+    while at > 0 and (scores[at - 1] < score or (scores[at - 1] == score and tokens[at - 1] > token)):
+        scores[at], tokens[at] = scores[at - 1], tokens[at - 1]
+        at -= 1
+    scores[at], tokens[at] = score, token
+
+
+@kernel
+def _bound(target, likeness, rule):  # type: ignore[no-untyped-def]
+    """Score that no token of a group exceeds."""
+    _, weights, _ = rule
+    total = _ROUNDING
+    for d in range(len(weights)):
+        left, right = 2 * d, 2 * d + 1
+        total += weights[d] * (likeness[left, target[left]] + likeness[right, target[right]])
+    return total
+
+
+@kernel
+def _search(wanted, index, likeness, rule, tokens, scores):  # type: ignore[no-untyped-def]
+    phone, contexts, durations = wanted
+    order, group_first, phone_first, token_contexts, token_durations = index
+    for n in range(len(phone)):
+        first, last = phone_first[phone[n]], phone_first[phone[n] + 1]
+        bounds = np.zeros(last - first)
+        for g in range(first, last):
+            bounds[g - first] = _bound(contexts[n], likeness[g], rule)
+        for _ in range(last - first):
+            g = _highest(bounds)
+            bound = bounds[g]
+            if bound < scores[n, -1]:
+                break
+            bounds[g] = -np.inf
+            low, high = group_first[first + g], group_first[first + g + 1]
+            target = (contexts[n], durations[n], bound)
+            _search_group(target, order[low:high], (token_contexts, token_durations), rule, (tokens[n], scores[n]))
+
+
+@kernel
+def _search_group(target, group, corpus, rule, found):  # type: ignore[no-untyped-def]
+    """Score the tokens of a group from the wanted duration to shorter and to longer ones, as long as they can win."""
+    context, durations, bound = target
+    token_contexts, token_durations = corpus
+    tokens, scores = found
+    low, high = 0, len(group)
+    while low < high:  # the first token that is not shorter than wanted
+        middle = (low + high) // 2
+        if token_durations[group[middle], 1] < durations[1]:
+            low = middle + 1
+        else:
+            high = middle
+    for step in (-1, 1):
+        at = low - 1 if step < 0 else low
+        while 0 <= at < len(group):
+            token = group[at]
+            if bound - rule[2] * abs(token_durations[token, 1] - durations[1]) < scores[-1]:
+                break
+            score = _score(context, durations, token_contexts[token], token_durations[token], rule)
+            _insert(tokens, scores, token, score)
+            at += step
+
+
+@kernel
+def _highest(values):  # type: ignore[no-untyped-def]
+    """Index of the first highest value; `numpy.argmax` takes seconds to compile."""
+    at = 0
+    for i in range(1, len(values)):
+        if values[i] > values[at]:
+            at = i
+    return at

@@ -1,0 +1,181 @@
+"""A face posed: rest plus weighted shapes, eyeballs that turn, and the head that moves about its pivot."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from tts2face.compilation import kernel
+from tts2face.models.face import Face
+from tts2face.models.landmarks import CHIN
+from tts2face.types import HEAD_CHANNELS
+
+REST_HEAD = np.zeros(len(HEAD_CHANNELS), np.float32)  # the head pose of the face at rest
+CHIN_MARGIN_MM = 8.0  # flesh under the chin that still turns with the skull
+NECK_LEAST_MM = 20.0  # a mesh that ends nearer to the chin has no neck to bend and turns as a whole
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FaceRig:
+    """A face made ready to be posed many times.
+
+    Parameters
+    ----------
+    rest : (V, 3)
+        The face at rest, mm.
+    starts, indices, deltas : (K + 1,), (N,), (N, 3)
+        Shape k moves vertex ``indices[i]`` by ``deltas[i]`` mm per weight, i in [starts[k], starts[k + 1]).
+    eye_spans, eye_centres, eye_turns : (E, 2), (E, 3), (E, K, 3)
+        First vertex and one past the last, centre in mm, rotation vector per weight in radians of each eyeball.
+    pivot : (3,)
+        The point about which the head turns.
+    follow : (V,)
+        Share of the head's motion that each vertex takes: 1 down to the chin, falling to 0 at the end of the neck.
+    """
+
+    rest: NDArray[np.float32]
+    starts: NDArray[np.int64]
+    indices: NDArray[np.int32]
+    deltas: NDArray[np.float32]
+    eye_spans: NDArray[np.int64]
+    eye_centres: NDArray[np.float32]
+    eye_turns: NDArray[np.float32]
+    pivot: NDArray[np.float32]
+    follow: NDArray[np.float32]
+
+    def posed(self, weights: NDArray[np.floating], head: NDArray[np.floating] = REST_HEAD) -> NDArray[np.float32]:
+        """(V, 3) vertices for (K,) weights and a (6,) head pose of `HEAD_CHANNELS`."""
+        vertices = np.zeros_like(self.rest)
+        moved = head_transform(head, self.pivot)
+        eyes = eye_rotations(self.eye_turns, np.asarray(weights))
+        _pose(self.rest, self.starts, self.indices, self.deltas, np.asarray(weights, np.float32), vertices)
+        _turn_eyes(self.eye_spans, self.eye_centres, eyes, vertices)
+        if np.asarray(head).any():
+            _move_head(moved, self.follow, vertices)
+        return vertices
+
+
+def rigged(face: Face) -> FaceRig:
+    """The rig of a face; only the vertices that a shape moves are kept."""
+    moved = [np.flatnonzero(np.any(shape != 0, axis=1)).astype(np.int32) for shape in face.shapes]
+    starts = np.concatenate([[0], np.cumsum([len(indices) for indices in moved])]).astype(np.int64)
+    deltas = [shape[indices] for shape, indices in zip(face.shapes, moved, strict=True)]
+    turns = np.zeros((len(face.eyes), len(face.shape_names), 3), np.float32)
+    for number, eye in enumerate(face.eyes):
+        for name, turn in eye.turns.items():
+            turns[number, face.shape_names.index(name)] = turn
+    return FaceRig(
+        rest=np.array(face.vertices, np.float32),
+        starts=starts,
+        indices=np.concatenate([np.zeros(0, np.int32), *moved]),
+        deltas=np.concatenate([np.zeros((0, 3), np.float32), *deltas]).astype(np.float32),
+        eye_spans=np.array([(eye.first, eye.first + eye.count) for eye in face.eyes], np.int64).reshape(-1, 2),
+        eye_centres=np.array([eye.centre for eye in face.eyes], np.float32).reshape(-1, 3),
+        eye_turns=turns,
+        pivot=np.array(face.pivot, np.float32),
+        follow=head_share(face),
+    )
+
+
+def posed_vertices(face: Face, weights: NDArray[np.floating]) -> NDArray[np.float32]:
+    """(V, 3) vertices of a face for (K,) weights of its shapes, the head at rest.
+
+    Raises
+    ------
+    InputError
+        The number of weights is not the number of the face's shapes.
+    """
+    weights = np.asarray(weights, np.float64)
+    if weights.shape != (len(face.shape_names),):
+        raise InputError(f"the face has {len(face.shape_names)} shapes, not weights of shape {weights.shape}")
+    vertices = face.vertices + np.tensordot(weights, face.shapes, axes=1)
+    for eye in face.eyes:
+        turn = np.zeros(3)
+        for name, per_weight in eye.turns.items():
+            turn += weights[face.shape_names.index(name)] * per_weight
+        span = slice(eye.first, eye.first + eye.count)
+        vertices[span] = (vertices[span] - eye.centre) @ rotation_matrix(turn).T + eye.centre
+    return vertices.astype(np.float32)
+
+
+def head_share(face: Face) -> NDArray[np.float32]:
+    """(V,) share of the head's motion that each vertex takes, so that a neck bends and its end stays."""
+    height = face.vertices[:, 1]
+    chin = np.flatnonzero(face.landmarks == CHIN)
+    if not len(chin):
+        return np.ones(len(height), np.float32)
+    corners = face.vertices[face.landmark_vertices[chin[0]], 1]
+    top = float(corners @ face.landmark_weights[chin[0]]) - CHIN_MARGIN_MM
+    bottom = float(height.min())
+    if top - bottom < NECK_LEAST_MM:
+        return np.ones(len(height), np.float32)
+    share = np.clip((height - bottom) / (top - bottom), 0.0, 1.0)
+    smooth: NDArray[np.float32] = (share * share * (3.0 - 2.0 * share)).astype(np.float32)
+    return smooth
+
+
+def rotation_matrix(turn: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(3, 3) rotation for a rotation vector in radians (Rodrigues)."""
+    angle = float(np.linalg.norm(turn))
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = np.asarray(turn, np.float64) / angle
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    rotation: NDArray[np.float64] = np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross)
+    return rotation
+
+
+def head_rotation(pitch: float, yaw: float, roll: float) -> NDArray[np.float64]:
+    """(3, 3) rotation of the head: roll about z first, then pitch about x, then yaw about y; radians."""
+    about_x, about_y, about_z = np.eye(3) * [[pitch], [yaw], [roll]]
+    return rotation_matrix(about_y) @ rotation_matrix(about_x) @ rotation_matrix(about_z)
+
+
+def head_transform(head: NDArray[np.floating], pivot: NDArray[np.floating]) -> NDArray[np.float32]:
+    """(3, 4) rigid motion of a (6,) head pose about the pivot: rotation and shift in one matrix."""
+    pitch, yaw, roll, *shift = (float(value) for value in head)
+    rotation = head_rotation(pitch, yaw, roll)
+    moved = np.column_stack([rotation, pivot - rotation @ pivot + shift])
+    return moved.astype(np.float32)
+
+
+def eye_rotations(turns: NDArray[np.float32], weights: NDArray[np.floating]) -> NDArray[np.float32]:
+    """(E, 3, 3) rotations of the eyeballs."""
+    vectors = np.einsum("ekc,k->ec", turns, weights)
+    return np.array([rotation_matrix(vector) for vector in vectors], np.float32).reshape(-1, 3, 3)
+
+
+@kernel
+def _pose(rest, starts, indices, deltas, weights, vertices):  # type: ignore[no-untyped-def]
+    for v in range(len(rest)):
+        vertices[v, 0], vertices[v, 1], vertices[v, 2] = rest[v, 0], rest[v, 1], rest[v, 2]
+    for k in range(len(weights)):
+        weight = weights[k]
+        if weight == 0:
+            continue
+        for i in range(starts[k], starts[k + 1]):
+            v = indices[i]
+            vertices[v, 0] += weight * deltas[i, 0]
+            vertices[v, 1] += weight * deltas[i, 1]
+            vertices[v, 2] += weight * deltas[i, 2]
+
+
+@kernel
+def _turn_eyes(spans, centres, rotations, vertices):  # type: ignore[no-untyped-def]
+    for e in range(len(spans)):
+        turn, centre = rotations[e], centres[e]
+        for v in range(spans[e, 0], spans[e, 1]):
+            x, y, z = vertices[v, 0] - centre[0], vertices[v, 1] - centre[1], vertices[v, 2] - centre[2]
+            for c in range(3):
+                vertices[v, c] = centre[c] + turn[c, 0] * x + turn[c, 1] * y + turn[c, 2] * z
+
+
+@kernel
+def _move_head(moved, follow, vertices):  # type: ignore[no-untyped-def]
+    for v in range(len(vertices)):
+        x, y, z = vertices[v, 0], vertices[v, 1], vertices[v, 2]
+        for c in range(3):
+            there = moved[c, 0] * x + moved[c, 1] * y + moved[c, 2] * z + moved[c, 3]
+            vertices[v, c] += follow[v] * (there - vertices[v, c])

@@ -1,0 +1,101 @@
+"""Lids that shut on every face: fitted to where they are fully open and fully closed.
+
+Ju and Lee 2008, section 5.2: an affine transform between the lids of two faces, so that they match at wide opening and
+at closing. Shares of the opening are carried, so that lids meet whatever else moves them, and never cross.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+from tts2face.face.landmark_fit import all_landmarks, landmark_motion, landmark_places
+from tts2face.models.face import Face
+from tts2face.numeric import ordered_product
+
+SIDES = ("Left", "Right")  # the face's own, in the order of `tts2face.models.palette.EYES`
+# Upper and lower lid of each eye, at the middle and halfway to the nose: where they meet last.
+LIDS = (((386, 385), (374, 380)), ((159, 158), (145, 153)))
+BLINK, WIDE = ("eyeBlinkLeft", "eyeBlinkRight"), ("eyeWideLeft", "eyeWideRight")
+NARROWING = (("eyeSquintLeft", "cheekSquintLeft"), ("eyeSquintRight", "cheekSquintRight"))
+MOST_NARROWED = 0.6  # of the opening that squinting may take, so that lids that nobody shuts do not meet
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lids:
+    """What lids do for weights of a face's shapes.
+
+    Parameters
+    ----------
+    opening : (2,)
+        Of each eye at rest, mm.
+    per_weight : (2, K)
+        Widening per weight of each shape, mm.
+    blink, wide : (2,)
+        Numbers of the shapes that shut and widen each eye.
+    narrowing : (2, n)
+        Those that narrow it.
+    limits : (K, 2)
+    """
+
+    opening: FloatArray
+    per_weight: FloatArray
+    blink: NDArray[np.int64]
+    wide: NDArray[np.int64]
+    narrowing: NDArray[np.int64]
+    limits: FloatArray
+
+    def shut(self, weights: FloatArray, shares: FloatArray) -> FloatArray:
+        """(T, K) weights with the lids shut by (T, 2) shares of their opening: 0 as the weights leave them, 1 shut.
+
+        What squints or widens an eye gives way as it shuts.
+        """
+        lids = weights.copy()
+        for eye in range(len(SIDES)):
+            self._narrow(lids, eye)
+            lids[:, [self.wide[eye], *self.narrowing[eye]]] *= 1.0 - np.clip(shares[:, eye : eye + 1], 0.0, 1.0)
+            opening = np.maximum(self.opening[eye] + ordered_product(lids, self.per_weight[eye]), 0.0)
+            for column, share in ((self.blink[eye], shares[:, eye]), (self.wide[eye], shares[:, eye])):
+                per_weight = self.per_weight[eye, column]
+                moved = -opening * (np.maximum(share, 0.0) if per_weight < 0 else np.minimum(share, 0.0)) / per_weight
+                lids[:, column] = np.clip(lids[:, column] + moved, *self.limits[column])
+        return lids
+
+    def _narrow(self, lids: FloatArray, eye: int) -> None:
+        """Hold squinting within what is open, in place."""
+        columns = self.narrowing[eye]
+        taken = -ordered_product(lids[:, columns], self.per_weight[eye, columns])
+        others = self.opening[eye] + ordered_product(lids, self.per_weight[eye]) + taken
+        most = MOST_NARROWED * np.maximum(others, 0.0)
+        lids[:, columns] *= np.where(taken > most, most / np.maximum(taken, 1e-9), 1.0)[:, None]
+
+
+def lids_of(face: Face) -> Lids:
+    """The lids of a face that has the shapes `BLINK`, `WIDE` and `NARROWING`.
+
+    Raises
+    ------
+    DataError
+        It lacks their landmarks, or its shapes do not move them.
+    """
+    places = all_landmarks(face, landmark_places(face))[:, 1]
+    motion = all_landmarks(face, landmark_motion(face, np.arange(len(face.shape_names))))[:, 1]
+    opening = np.array([(places[list(upper)] - places[list(lower)]).mean() for upper, lower in LIDS])
+    per_weight = np.stack([(motion[list(upper)] - motion[list(lower)]).mean(axis=0) for upper, lower in LIDS])
+    number = {name: column for column, name in enumerate(face.shape_names)}
+    blink, wide = (np.array([number[name] for name in names], np.int64) for names in (BLINK, WIDE))
+    if not (np.isfinite(opening).all() and (opening > 0).all()):
+        raise DataError("the face lacks landmarks of its lids; build it with its landmark table")
+    if not all((per_weight[eye, blink[eye]] < 0) and (per_weight[eye, wide[eye]] > 0) for eye in range(len(SIDES))):
+        raise DataError(f"{BLINK[0]} does not shut the face's lids, or {WIDE[0]} does not open them; build it again")
+    return Lids(
+        opening=opening,
+        per_weight=per_weight,
+        blink=blink,
+        wide=wide,
+        narrowing=np.array([[number[name] for name in names] for names in NARROWING], np.int64),
+        limits=face.limits.astype(np.float64),
+    )

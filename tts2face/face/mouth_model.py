@@ -1,0 +1,63 @@
+"""How the shapes of a face move its mouth: the shapes that speech moves, and the normal matrix of visible changes."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+from tts2face.models.face import Face
+from tts2face.models.landmarks import (
+    INNER_LIP_LOWER,
+    INNER_LIP_UPPER,
+    OUTER_LIP_LOWER,
+    OUTER_LIP_UPPER,
+    UPPER_LIP_INNER_MID,
+)
+from tts2face.numeric import ordered_product
+
+FloatArray = NDArray[np.float64]
+SPEECH_SHAPES = ("jaw", "mouth")  # how the names of the shapes that speech moves begin
+CORNERS_LEFT, CORNERS_RIGHT = (OUTER_LIP_UPPER[-1], INNER_LIP_UPPER[-1]), (OUTER_LIP_UPPER[0], INNER_LIP_UPPER[0])
+CHIN_POINTS = (175, 199, 171, 396, 208, 428)  # where the skin lies on the bone of the jaw
+MIDDLE_PAIR = INNER_LIP_UPPER.index(UPPER_LIP_INNER_MID)
+LIP_WEIGHT = 10.0  # a lip landmark against one of the jaw or cheek
+DEPTH_WEIGHT = 0.1  # z against x and y: a single camera sees depth with some ten times their error
+WIDTH_WEIGHT = 60.0  # the mouth's width, likewise: rounding is the other thing that a viewer reads from lips
+CHIN_WEIGHT = 600.0  # the drop of the chin, likewise: it sets how far the teeth go apart
+EFFORT = 0.005  # share of the mean curvature that draws every weight to 0: makes the answer unique and calm
+
+
+def mouth_curvature(moved: FloatArray, common: list[int]) -> FloatArray:
+    """(k, k) normal matrix of what is seen of a mouth, its lip gaps excepted, and of the effort.
+
+    Parameters
+    ----------
+    moved : (L, 3, k)
+        Motion of the landmarks `common` per weight, mm.
+    """
+    at = {landmark: row for row, landmark in enumerate(common)}
+    curvature: FloatArray = np.einsum("ldk,ldj->kj", moved * landmark_weights(common)[..., None], moved)
+    effort = EFFORT * np.trace(curvature) / moved.shape[-1]
+    left, right = ([at[corner] for corner in corners] for corners in (CORNERS_LEFT, CORNERS_RIGHT))
+    widened = moved[left, 0] - moved[right, 0]
+    curvature += WIDTH_WEIGHT * ordered_product(widened.T, widened) + effort * np.eye(moved.shape[-1])
+    dropped = moved[[at[landmark] for landmark in CHIN_POINTS if landmark in at], 1].mean(axis=0)
+    curvature += CHIN_WEIGHT * np.outer(dropped, dropped)
+    return curvature
+
+
+def require_lips(face: Face, moving: NDArray[np.int64]) -> None:
+    """Refuse a face that lacks lips' landmarks, or has no shapes that move them (DataError)."""
+    known = set(face.landmarks.tolist())
+    lips = (*INNER_LIP_UPPER, *INNER_LIP_LOWER, *OUTER_LIP_UPPER, *OUTER_LIP_LOWER)
+    missing = [landmark for landmark in lips if landmark not in known]
+    if missing or not len(moving):
+        what = f"landmark {missing[0]} of the lips" if missing else "shapes named jaw... or mouth..."
+        raise DataError(f"the face lacks {what}, so no speech can move it; build it with its landmark table")
+
+
+def landmark_weights(common: list[int]) -> FloatArray:
+    """(L, 3) weight of each landmark coordinate."""
+    lips = {*INNER_LIP_UPPER, *INNER_LIP_LOWER, *OUTER_LIP_UPPER, *OUTER_LIP_LOWER}
+    per_landmark = np.array([LIP_WEIGHT if landmark in lips else 1.0 for landmark in common])
+    weights: FloatArray = per_landmark[:, None] * np.array([1.0, 1.0, DEPTH_WEIGHT])
+    return weights

@@ -1,0 +1,170 @@
+"""Compiled loops of `tts2face.gesture.field`: search, draw, show."""
+
+import numpy as np
+
+from tts2face.compilation import kernel
+
+SLACK = 1.1  # moments are found that are at most so much farther than the best; the paper's search has one, too
+APART = 10  # frames between two moments that count as different
+
+
+@kernel
+def nearest(corpus, tree, axes, history, asked):  # type: ignore[no-untyped-def]
+    """Write how far the nearest different moment lies from each of some."""
+    values, recorded, _ = corpus
+    moments, away = asked
+    best, distance = np.zeros(2, np.int64), np.zeros(2)
+    stack, bounds = np.zeros(128, np.int64), np.zeros(128)
+    query = np.zeros(len(axes), np.float32)
+    for n in range(len(moments)):
+        best[:], distance[:] = -1, np.inf
+        window = (values[moments[n] - history : moments[n]], recorded[moments[n] - history : moments[n]], 0, history)
+        _project(window, axes, query)
+        _search(corpus, tree, window, query, (best[:0], best, distance, stack, bounds))
+        away[n] = distance[1]
+
+
+@kernel
+def walk(corpus, tree, axes, options, track):  # type: ignore[no-untyped-def]
+    """Write the frames shown and the moments they come from.
+
+    What is left of a leap goes as a critically damped spring, so that neither place nor speed jumps (Bollo 2018).
+    """
+    values, _, starts = corpus
+    history, n_candidates, sigma, stride, continuity, stiffness, fade = options
+    shown, heard, moments, offset, recent, moment, n_before, chances = track
+    none = recent[:0]
+    best, distance = np.zeros(n_candidates, np.int64), np.zeros(n_candidates)
+    stack, bounds = np.zeros(128, np.int64), np.zeros(128)
+    query = np.zeros(len(axes), np.float32)
+    for i in range(len(chances)):
+        following = moment + 1
+        goes_on = moment >= 0 and following < len(values) and starts[following] == starts[moment]
+        chosen = following
+        if not goes_on or (n_before + i) % stride == 0:
+            best[:], distance[:] = -1, np.inf
+            if goes_on:
+                away = continuity * _apart(corpus, (shown, heard, i, history), following, np.inf)
+                _offer(following, away, (starts, none), (best, distance))
+            _project((shown, heard, i, history), axes, query)
+            _search(corpus, tree, (shown, heard, i, history), query, (recent, best, distance, stack, bounds))
+            chosen = _drawn(best, distance, sigma, chances[i])
+        last = i + history - 1
+        for d in range(values.shape[1]):
+            if not goes_on or chosen != following:
+                offset[0, d] = shown[last, d] - values[chosen - 1, d]
+                offset[1, d] = shown[last, d] - shown[last - 1, d] - values[chosen - 1, d] + values[chosen - 2, d]
+            pull = offset[1, d] + offset[0, d] * stiffness
+            offset[0, d] = (offset[0, d] + pull) * fade
+            offset[1, d] = (offset[1, d] - pull * stiffness) * fade
+            shown[i + history, d] = values[chosen, d] + offset[0, d]
+        if len(recent) and (not goes_on or chosen != following):
+            recent[:-1] = recent[1:].copy()
+            recent[-1] = chosen
+        moment = moments[i] = chosen
+
+
+@kernel
+def _drawn(best, distance, sigma, chance):  # type: ignore[no-untyped-def]
+    """One of the moments found, by the chance."""
+    total = 0.0
+    for c in range(len(best)):
+        if best[c] >= 0:
+            total += np.exp((distance[0] - distance[c]) / sigma)
+    left, chosen = chance * total, best[0]
+    for c in range(len(best)):
+        if best[c] >= 0:
+            chosen = best[c]
+            left -= np.exp((distance[0] - distance[c]) / sigma)
+            if left < 0.0:
+                break
+    return chosen
+
+
+@kernel
+def _offer(moment, away, known, found):  # type: ignore[no-untyped-def]
+    """Keep a moment among the best ones if it is nearer than those that it is hardly different from, and not recent."""
+    starts, recent = known
+    best, distance = found
+    at = len(best) - 1
+    if away >= distance[at]:
+        return
+    for r in range(len(recent)):
+        if abs(recent[r] - moment) < APART:
+            return
+    for c in range(len(best)):
+        if best[c] >= 0 and starts[best[c]] == starts[moment] and abs(best[c] - moment) < APART:
+            if away >= distance[c]:
+                return
+            at = c
+            break
+    while at > 0 and distance[at - 1] > away:
+        best[at], distance[at] = best[at - 1], distance[at - 1]
+        at -= 1
+    best[at], distance[at] = moment, away
+
+
+@kernel
+def _apart(corpus, window, moment, limit):  # type: ignore[no-untyped-def]
+    """Mean squared distance of what was shown and heard from what came before a moment; any number above `limit`."""
+    values, recorded, _ = corpus
+    shown, heard, i, history = window
+    total, most = 0.0, limit * history
+    for j in range(history):
+        row, there = i + history - 1 - j, moment - 1 - j
+        for d in range(values.shape[1]):
+            gap = shown[row, d] - values[there, d]
+            total += gap * gap
+        for e in range(recorded.shape[1]):
+            gap = heard[row, e] - recorded[there, e]
+            total += gap * gap
+        if total > most:
+            break
+    return total / history
+
+
+@kernel
+def _project(window, axes, query):  # type: ignore[no-untyped-def]
+    shown, heard, i, history = window
+    n_heard, n_shown = heard.shape[1], shown.shape[1]
+    for p in range(len(axes)):
+        total = 0.0
+        for j in range(history):
+            for e in range(n_heard):
+                total += axes[p, j * n_heard + e] * heard[i + j, e]
+            for d in range(n_shown):
+                total += axes[p, history * n_heard + j * n_shown + d] * shown[i + j, d]
+        query[p] = total
+
+
+@kernel
+def _search(corpus, tree, window, query, found):  # type: ignore[no-untyped-def]
+    """Offer every moment that may be among the best ones; the nearer half of each node first.
+
+    A place's distance from the query is at most that of the windows: the axes are orthonormal.
+    """
+    places, order, spans, axes, cuts = tree
+    recent, best, distance, stack, bounds = found
+    history = window[3]
+    slack = SLACK * SLACK / history
+    height = 1
+    stack[0], bounds[0] = 0, 0.0
+    while height > 0:
+        height -= 1
+        node, bound = stack[height], bounds[height]
+        while bound * slack < distance[-1] and axes[node] >= 0:
+            side = query[axes[node]] - cuts[node]
+            near = 2 * node + 2 if side > 0 else 2 * node + 1
+            stack[height], bounds[height] = 4 * node + 3 - near, max(bound, side * side)
+            height += 1
+            node = near
+        if bound * slack >= distance[-1]:
+            continue
+        for at in range(spans[node, 0], spans[node, 1]):
+            squared = 0.0
+            for p in range(len(query)):
+                squared += (query[p] - places[at, p]) ** 2
+            if squared < distance[-1] * history:
+                moment = np.int64(order[at])
+                away = _apart(corpus, window, moment, distance[-1])
+                _offer(moment, away, (corpus[2], recent), (best, distance))

@@ -1,0 +1,101 @@
+"""Styles, gains and expressions as people write them: ``brows=annoyed,head=delighted``, ``happy=0.6@1.2-3.4``."""
+
+import math
+from collections.abc import Iterator, Mapping
+
+from lexicon.errors import InputError
+from tts2face.gesture.spans import GAINED, ExpressionSpan, Gains, check_feature
+from tts2face.models.palette import FEATURES
+
+ALL = "all"  # every feature
+
+
+def features_of(name: str) -> tuple[str, ...]:
+    """The features that a name stands for: itself, or every one of them for ``all``."""
+    return FEATURES if name == ALL else (check_feature(name),)
+
+
+def style_of(written: str) -> Mapping[str, str]:
+    """Style of each feature from ``delighted``, ``brows=annoyed,head=delighted`` or ``delighted,brows=annoyed``.
+
+    A name without feature counts for all that have none of their own.
+
+    Raises
+    ------
+    InputError
+        A part is empty, names an unknown feature, or a feature stands twice.
+    """
+    chosen: dict[str, str] = {}
+    hint = "a style is a name, or features with styles such as brows=annoyed,head=delighted"
+    for name, style in _pairs(written, hint, is_named=False):
+        if (name or ALL) in chosen:
+            raise InputError(f"{written!r} chooses a style for {name or ALL} twice; keep one")
+        if name not in {"", ALL}:
+            check_feature(name)
+        chosen[name or ALL] = style
+    base = chosen.pop(ALL, None)
+    return (dict.fromkeys(FEATURES, base) if base is not None else {}) | chosen
+
+
+def gains_of(written: str) -> Gains:
+    """Gains from ``head=1.5,blink=0.8,jaw=1.2``; ``all=0.5`` counts for all gestures that have none of their own.
+
+    Raises
+    ------
+    InputError
+        A part is no feature with a number, or a feature stands twice, or a gain is out of range.
+    """
+    hint = "gains are written as head=1.5,blink=0.8"
+    chosen: dict[str, float] = {}
+    for name, number in _pairs(written, hint):
+        if name in chosen:
+            raise InputError(f"{written!r} chooses a gain for {name} twice; keep one")
+        if name != ALL:
+            check_feature(name, GAINED)
+        chosen[name] = _number(number, hint)
+    base = chosen.pop(ALL, None)
+    return Gains((dict.fromkeys(FEATURES, base) if base is not None else {}) | chosen)
+
+
+def expressions_of(written: str) -> tuple[ExpressionSpan, ...]:
+    """Expressions from ``happy=0.6@1.2-3.4,sad=0.3``: weight, and seconds from and to; without times the whole clip.
+
+    ``@1.2`` or ``@1.2-`` lasts to the end.
+
+    Raises
+    ------
+    InputError
+        A part is written in another way, or as `ExpressionSpan`.
+    """
+    hint = "an expression is written as happy=0.6, or with seconds as happy=0.6@1.2-3.4"
+    spans = []
+    for name, value in _pairs(written, hint):
+        weight, has_times, times = value.partition("@")
+        start, _, end = times.partition("-")
+        spans.append(
+            ExpressionSpan(
+                name,
+                _number(weight, hint),
+                _number(start, hint) if has_times else 0.0,
+                _number(end, hint) if end.strip() else math.inf,
+            )
+        )
+    return tuple(spans)
+
+
+def _pairs(written: str, hint: str, *, is_named: bool = True) -> Iterator[tuple[str, str]]:
+    for part in written.split(","):
+        name, is_pair, value = (piece.strip() for piece in part.rpartition("="))
+        if not value or "=" in name or bool(is_pair) != bool(name) or (is_named and not name):
+            raise InputError(f"cannot read {part.strip()!r} in {written[:80]!r}; {hint}")
+        yield name, value
+
+
+def _number(written: str, hint: str) -> float:
+    try:
+        number = float(written)
+    except ValueError as wrong:
+        raise InputError(f"{written.strip()!r} is no number; {hint}") from wrong
+    if not math.isfinite(number):
+        raise InputError(f"{written.strip()!r} is no finite number; {hint}")
+    return number

@@ -1,0 +1,1 @@
+"""Talker, face and palette, and the files that hold them."""

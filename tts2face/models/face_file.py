@@ -1,0 +1,236 @@
+"""The ``.face`` file: a face kept compactly, with presets of its identity."""
+
+import io
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError, InputError
+from tts2face.models.face import Eye, Face, Part
+from tts2face.models.files import named_file
+from tts2face.models.tensors import read_tensors, write_tensors
+
+KIND = "face"
+FORMAT_VERSION = 1
+STEPS_PER_SHAPE = 32000.0  # a shape's largest displacement in 16-bit steps: below 0.002 mm for 60 mm
+JPEG_QUALITY = 92
+LIGHTENED = 150  # a tint lightens texels up to this and no further: skin at the edge of dark hair stays skin
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Identity:
+    """A preset of age, sex and ancestry.
+
+    Parameters
+    ----------
+    displacement : (V, 3)
+        Millimetres, added to the face at rest.
+    tints
+        Part name -> three factors of its sRGB colours, vertex colours and texture alike.
+    summary
+        One line that says who it is.
+    """
+
+    displacement: NDArray[np.float32]
+    tints: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    summary: str = ""
+
+
+def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None = None) -> None:
+    """Write a ``.face`` file (docs/file-formats.md): shapes sparse in 16 bits, the texture as JPEG."""
+    arrays: dict[str, NDArray[Any]] = {
+        "vertices": face.vertices.astype(np.float32),
+        "triangles": face.triangles.astype(np.int32),
+        "limits": face.limits.astype(np.float32),
+        "colours": face.colours,
+        "landmarks": face.landmarks.astype(np.int32),
+        "landmark_vertices": face.landmark_vertices.astype(np.int32),
+        "landmark_weights": face.landmark_weights.astype(np.float32),
+        "pivot": face.pivot.astype(np.float32),
+    }
+    arrays |= _sparse(face.shapes)
+    if face.uv is not None and face.texture is not None:
+        arrays["uv"] = np.rint(np.clip(face.uv, 0, 1) * 65535).astype(np.uint16)
+        arrays["texture"] = _jpeg(face.texture)
+    presets = dict(identities or {})
+    for number, preset in enumerate(presets.values()):
+        steps, step = _steps(preset.displacement)
+        arrays[f"identity{number}"] = steps
+        arrays[f"identity{number}_step"] = np.array([step], np.float32)
+    header = {
+        "parts": [asdict(part) for part in face.parts],
+        "shape_names": list(face.shape_names),
+        "eyes": [
+            {
+                "first": eye.first,
+                "count": eye.count,
+                "centre": [float(x) for x in eye.centre],
+                "turns": {name: [float(x) for x in turn] for name, turn in eye.turns.items()},
+            }
+            for eye in face.eyes
+        ],
+        "identities": [[name, dict(preset.tints), preset.summary] for name, preset in presets.items()],
+        "metadata": dict(face.metadata),
+    }
+    write_tensors(path, KIND, FORMAT_VERSION, arrays, header)
+
+
+def read_face(path: Path, identity: str | None = None) -> Face:
+    """Read a ``.face`` file, as it is or with one of its identity presets.
+
+    Raises
+    ------
+    InputError
+        There is no such file, or it has no such identity.
+    DataError
+        It is damaged, not a face, or of another version.
+    """
+    arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
+    names = _identity_names(header, path)
+    if identity is not None and identity not in names:
+        offered = ", ".join(names) or "none"
+        raise InputError(f"the face {path.stem} has no identity {identity!r}; it has: {offered}")
+    try:
+        face = _assembled(arrays, header)
+        return face if identity is None else _identified(face, arrays, header, names.index(identity))
+    except (KeyError, IndexError, ValueError, TypeError, OSError) as broken:
+        if isinstance(broken, DataError):
+            raise
+        raise DataError(f"{path} lacks a part of a face ({broken}); build or copy it again") from broken
+
+
+def identities_of(path: Path) -> dict[str, str]:
+    """Names and summaries of a face file's identity presets."""
+    _, header = read_tensors(path, KIND, FORMAT_VERSION)
+    return {name: summary for name, _, summary in header["identities"]}
+
+
+def load_face(name: str, identity: str | None = None) -> Face:
+    """A shipped face by name (head, cartoon), or one from a file; errors as `named_file` and `read_face`."""
+    return read_face(named_file(name, KIND), identity)
+
+
+def _steps(values: NDArray[np.floating]) -> tuple[NDArray[np.int16], float]:
+    step = max(float(np.abs(values).max(initial=0.0)) / STEPS_PER_SHAPE, 1e-9)
+    return np.rint(values / step).astype(np.int16), step
+
+
+def _sparse(shapes: NDArray[np.floating]) -> dict[str, NDArray[Any]]:
+    steps, sizes, moved = [], [], []
+    for shape in shapes:
+        quantised, step = _steps(shape)
+        here = np.flatnonzero(quantised.any(axis=1))
+        steps.append(quantised[here])
+        sizes.append(step)
+        moved.append(here.astype(np.int32))
+    return {
+        "shape_deltas": np.concatenate([np.zeros((0, 3), np.int16), *steps]),
+        "shape_vertices": np.concatenate([np.zeros(0, np.int32), *moved]),
+        "shape_counts": np.array([len(here) for here in moved], np.int32),
+        "shape_steps": np.array(sizes, np.float32),
+    }
+
+
+def _dense(arrays: Mapping[str, NDArray[Any]], n_vertices: int) -> NDArray[np.float32]:
+    counts, steps = arrays["shape_counts"], arrays["shape_steps"]
+    shapes = np.zeros((len(counts), n_vertices, 3), np.float32)
+    bounds = np.concatenate([[0], np.cumsum(counts)])
+    for number, step in enumerate(steps):
+        here = slice(bounds[number], bounds[number + 1])
+        shapes[number, arrays["shape_vertices"][here]] = arrays["shape_deltas"][here] * step
+    return shapes
+
+
+def _jpeg(texture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    from PIL import Image
+
+    content = io.BytesIO()
+    Image.fromarray(texture).save(content, "JPEG", quality=JPEG_QUALITY, subsampling=0)
+    return np.frombuffer(content.getvalue(), np.uint8)
+
+
+def _pixels(content: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    from PIL import Image
+
+    with Image.open(io.BytesIO(content.tobytes())) as image:
+        return np.array(image.convert("RGB"))
+
+
+def _identity_names(header: Mapping[str, Any], path: Path) -> list[str]:
+    try:
+        return [name for name, _, _ in header["identities"]]
+    except (KeyError, TypeError, ValueError) as broken:
+        raise DataError(f"{path} lacks its list of identities; build or copy it again") from broken
+
+
+def _assembled(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> Face:
+    eyes = [
+        Eye(
+            eye["first"],
+            eye["count"],
+            np.array(eye["centre"], np.float32),
+            {name: np.array(turn, np.float32) for name, turn in eye["turns"].items()},
+        )
+        for eye in header["eyes"]
+    ]
+    return Face(
+        vertices=arrays["vertices"],
+        triangles=arrays["triangles"],
+        parts=tuple(Part(**part) for part in header["parts"]),
+        shape_names=tuple(header["shape_names"]),
+        shapes=_dense(arrays, len(arrays["vertices"])),
+        limits=arrays["limits"],
+        eyes=tuple(eyes),
+        colours=arrays["colours"],
+        uv=(arrays["uv"] / 65535).astype(np.float32) if "uv" in arrays else None,
+        texture=_pixels(arrays["texture"]) if "texture" in arrays else None,
+        landmarks=arrays["landmarks"],
+        landmark_vertices=arrays["landmark_vertices"],
+        landmark_weights=arrays["landmark_weights"],
+        pivot=arrays["pivot"],
+        metadata=header["metadata"],
+    )
+
+
+def _texel_share(face: Face, part: Part, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """(H, W) 1 on the texels of a part, a little less across its edge, 0 elsewhere."""
+    from PIL import Image, ImageDraw, ImageFilter
+
+    mask = Image.new("L", (shape[1], shape[0]))
+    pen = ImageDraw.Draw(mask)
+    places = np.asarray(face.uv, np.float64) * [shape[1], shape[0]] - 0.5
+    for corners in places[face.triangles[part.first : part.first + part.count]].tolist():
+        pen.polygon([tuple(corner) for corner in corners], fill=255, outline=255)
+    soft = mask.filter(ImageFilter.MaxFilter(3)).filter(ImageFilter.GaussianBlur(1.5))
+    share: NDArray[np.float32] = np.asarray(soft, np.float32) / np.float32(255)
+    return share
+
+
+def _identified(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], number: int) -> Face:
+    moved = arrays[f"identity{number}"] * arrays[f"identity{number}_step"][0]
+    name, tints, _ = header["identities"][number]
+    colours, texture = face.colours.copy(), None if face.texture is None else face.texture.copy()
+    for part in face.parts:
+        tint = np.array(tints.get(part.name, (1.0, 1.0, 1.0)), np.float32)
+        used = np.unique(face.triangles[part.first : part.first + part.count])
+        colours[used] = np.clip(face.colours[used] * tint, 0, 255).astype(np.uint8)
+        if part.textured and texture is not None and not np.all(tint == 1):
+            share = _texel_share(face, part, texture.shape)[:, :, None]
+            tinted = texture * (1 + share * (tint - 1))
+            texture = np.clip(tinted, 0, np.maximum(texture, LIGHTENED)).astype(np.uint8)
+    eyes = [
+        replace(eye, centre=eye.centre + moved[eye.first : eye.first + eye.count].mean(axis=0).astype(np.float32))
+        for eye in face.eyes
+    ]
+    return replace(
+        face,
+        vertices=(face.vertices + moved).astype(np.float32),
+        eyes=tuple(eyes),
+        colours=colours,
+        texture=texture,
+        metadata={**face.metadata, "identity": name},
+    )

@@ -1,0 +1,49 @@
+"""Files that appear whole or not at all, and those that are shipped."""
+
+import os
+import tempfile
+from pathlib import Path
+
+from lexicon.errors import BackendError, InputError
+
+SHIPPED = Path(__file__).parents[1] / "data"
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file beside `path`, then rename it, so that no half file is ever seen.
+
+    Raises
+    ------
+    BackendError
+        The folder cannot be written or the disk is full.
+    """
+    beside = None
+    try:
+        handle, beside = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        os.chmod(beside, 0o644)
+        os.replace(beside, path)
+    except OSError as refused:
+        if beside is not None:
+            Path(beside).unlink(missing_ok=True)
+        raise BackendError(
+            f"cannot write {path}: {refused.strerror}; free some space or choose another folder"
+        ) from refused
+
+
+def named_file(name: str, kind: str) -> Path:
+    """Where a talker, face or palette lies: a shipped one by name, or a path.
+
+    Raises
+    ------
+    InputError
+        There is neither.
+    """
+    shipped = SHIPPED / f"{name}.{kind}"
+    if shipped.parent == SHIPPED and shipped.is_file():
+        return shipped
+    if Path(name).suffix or Path(name).exists():
+        return Path(name)
+    known = ", ".join(sorted(file.stem for file in SHIPPED.glob(f"*.{kind}")))
+    raise InputError(f"there is no {kind} {name!r}; give {known}, or the path of a .{kind} file")

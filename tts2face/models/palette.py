@@ -1,0 +1,265 @@
+"""The Palette: how people move their faces while they speak, as styles by name, and the file that keeps it.
+
+After Ju and Lee 2008: a style is one person's recorded gestures, apart from lips and words. All is kept as motion of
+one common face, so that styles of different people can be mixed.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError, InputError
+from tts2face.models.files import named_file
+from tts2face.models.tensors import read_tensors, write_tensors
+from tts2face.types import HEAD_CHANNELS
+
+KIND = "palette"
+FORMAT_VERSION = 1
+GESTURE_FPS = 30.0  # Ju and Lee 2008, section 3; every style is kept at this rate
+STEPS_PER_SPREAD = 2000.0  # of 16-bit integers: finer than any tracker's noise
+
+EXPRESSIONS = ("sad", "happy", "afraid", "angry", "surprised")  # neutral, the sixth, is the face at rest
+EYES = ("left", "right")  # the person's own
+# What gestures consist of, and the channels that are the same in every palette; "brows" and "cheeks" have as many
+# modes as the palette's regions. Units: weights of basis expressions; shares by which lids are shut; radians (down, to
+# own left); radians and mm.
+FIXED_CHANNELS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {"expression": EXPRESSIONS, "blink": EYES, "gaze": ("pitch", "yaw"), "head": HEAD_CHANNELS}
+)
+REGION_FEATURES = ("brows", "cheeks")
+FEATURES = ("expression", "brows", "blink", "cheeks", "gaze", "head")
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Region:
+    """Independent motion D_j of a region of the face: ``displacement = sum_i d_i modes_i``.
+
+    Parameters
+    ----------
+    landmarks : (L,)
+        Numbers of `tts2face.models.landmarks`.
+    modes : (k, L, 3)
+        Orthonormal as rows of (k, 3 L); values d are in mm.
+    """
+
+    landmarks: NDArray[np.int32]
+    modes: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Style:
+    """Recorded gestures of one person in one mood; recordings one behind the other, at `GESTURE_FPS`.
+
+    Parameters
+    ----------
+    lengths : (R,)
+        Frames of each recording.
+    intensity : (T,)
+        dB of the sound against the mean level of its speech; silence is far below 0.
+    pitch : (T,)
+        Semitones against the recording's median; 0 where nothing is voiced.
+    motion
+        (T, k) values of each feature that was seen; of `FEATURES`.
+    metadata
+        At least sources, licence, attribution, command.
+    """
+
+    lengths: NDArray[np.int32]
+    intensity: Floats
+    pitch: Floats
+    motion: Mapping[str, Floats]
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Refuse parts that are not on one clock."""
+        n_frames = int(self.lengths.sum())
+        if n_frames == 0 or not len(self.intensity) == len(self.pitch) == n_frames:
+            raise DataError("a style's recordings, intensity and pitch differ in length; build the palette again")
+        for name, values in self.motion.items():
+            if name not in FEATURES or len(values) != n_frames:
+                raise DataError(f"a style's {name} does not fit its {n_frames} frames; build the palette again")
+
+    @property
+    def seconds(self) -> float:
+        """Duration of all recordings."""
+        return float(self.lengths.sum()) / GESTURE_FPS
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What is done to a feature of a measured style.
+
+    ``gain`` multiplies the motion about its mean, ``offset`` is added to channels by name, ``tempo`` above 1 plays
+    faster.
+    """
+
+    gain: float = 1.0
+    offset: Mapping[str, float] = field(default_factory=dict)
+    tempo: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Derivation:
+    """A style that nobody recorded: a measured one, changed as stated."""
+
+    source: str
+    changes: Mapping[str, Change]
+    summary: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Palette:
+    """Styles by name.
+
+    Parameters
+    ----------
+    neutral : (478, 3)
+        The face whose motion the values are: landmarks at rest, mm, axes as in `tts2face.models.landmarks`.
+    regions
+        Region of each of `REGION_FEATURES`.
+    styles, derivations
+        Measured styles, and those derived from them.
+    """
+
+    neutral: Floats
+    regions: Mapping[str, Region]
+    styles: Mapping[str, Style]
+    derivations: Mapping[str, Derivation]
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Refuse a palette without styles, styles of other sizes, and derivations from nothing."""
+        if not self.styles:
+            raise DataError("the palette holds no style; build it with `tts2face corpus gestures`")
+        for name, style in self.styles.items():
+            for feature, values in style.motion.items():
+                if values.shape[1] != len(self.channels(feature)):
+                    raise DataError(f"{feature} of the style {name} has {values.shape[1]} channels; build it again")
+        for name, derived in self.derivations.items():
+            if derived.source not in self.styles:
+                raise DataError(f"the style {name} is derived from {derived.source}, which is missing; build it again")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All styles, the derived ones first."""
+        return (*self.derivations, *self.styles)
+
+    def channels(self, feature: str) -> tuple[str, ...]:
+        """Names of a feature's channels."""
+        if feature in REGION_FEATURES:
+            return tuple(f"{feature}{i}" for i in range(len(self.regions[feature].modes)))
+        return FIXED_CHANNELS[feature]
+
+    def require(self, name: str) -> str:
+        """The name of a style.
+
+        Raises
+        ------
+        InputError
+            There is none of this name.
+        """
+        if name not in self.names:
+            raise InputError(f"there is no style {name!r} in the palette; it has {', '.join(self.names)}")
+        return name
+
+
+def write_palette(path: Path, palette: Palette) -> None:
+    """Write a ``.palette`` file (docs/file-formats.md); values in steps of 1/2000 of their spread."""
+    arrays: dict[str, NDArray[Any]] = {"neutral": palette.neutral}
+    for name, region in palette.regions.items():
+        arrays |= {f"region.{name}.landmarks": region.landmarks, f"region.{name}.modes": region.modes}
+    for name, style in palette.styles.items():
+        arrays |= {
+            f"style.{name}.lengths": style.lengths.astype(np.int32),
+            f"style.{name}.intensity": style.intensity.astype(np.float16),
+            f"style.{name}.pitch": style.pitch.astype(np.float16),
+        }
+        for feature, values in style.motion.items():
+            step = np.maximum(values.std(axis=0), 1e-6) / STEPS_PER_SPREAD
+            arrays[f"style.{name}.{feature}"] = np.clip(np.rint(values / step), -32768, 32767).astype(np.int16)
+            arrays[f"style.{name}.{feature}.step"] = step.astype(np.float32)
+    header = {
+        "metadata": dict(palette.metadata),
+        "fps": GESTURE_FPS,
+        "styles": {name: dict(style.metadata) for name, style in palette.styles.items()},
+        "derivations": {
+            name: {
+                "source": derived.source,
+                "summary": derived.summary,
+                "changes": {
+                    feature: {"gain": change.gain, "offset": dict(change.offset), "tempo": change.tempo}
+                    for feature, change in derived.changes.items()
+                },
+            }
+            for name, derived in palette.derivations.items()
+        },
+    }
+    write_tensors(path, KIND, FORMAT_VERSION, arrays, header)
+
+
+def read_palette(path: Path) -> Palette:
+    """Read a ``.palette`` file.
+
+    Raises
+    ------
+    InputError
+        There is no such file.
+    DataError
+        It is damaged, not a palette, of another version, or recorded at another rate.
+    """
+    arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
+    try:
+        if float(header["fps"]) != GESTURE_FPS:
+            raise DataError(f"{path} was recorded at {header['fps']:g} frames/s, not {GESTURE_FPS:g}; build it again")
+        return _assembled(arrays, header)
+    except (KeyError, IndexError, ValueError, TypeError, AttributeError) as broken:
+        if isinstance(broken, DataError):
+            raise
+        raise DataError(f"{path} lacks a part of a palette ({broken}); build it again") from broken
+
+
+def load_palette(name: str) -> Palette:
+    """A shipped palette by name, or one from a ``.palette`` file; errors as `named_file` and `read_palette`."""
+    return read_palette(named_file(name, KIND))
+
+
+def _assembled(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> Palette:
+    regions = {
+        name: Region(arrays[f"region.{name}.landmarks"], arrays[f"region.{name}.modes"]) for name in REGION_FEATURES
+    }
+    return Palette(
+        neutral=arrays["neutral"],
+        regions=regions,
+        styles={name: _style(name, arrays, metadata) for name, metadata in header["styles"].items()},
+        derivations={
+            name: Derivation(
+                told["source"],
+                {feature: Change(**change) for feature, change in told["changes"].items()},
+                told["summary"],
+            )
+            for name, told in header["derivations"].items()
+        },
+        metadata=header["metadata"],
+    )
+
+
+def _style(name: str, arrays: Mapping[str, NDArray[Any]], metadata: Mapping[str, Any]) -> Style:
+    motion = {
+        feature: arrays[f"style.{name}.{feature}"] * arrays[f"style.{name}.{feature}.step"]
+        for feature in FEATURES
+        if f"style.{name}.{feature}" in arrays
+    }
+    return Style(
+        lengths=arrays[f"style.{name}.lengths"],
+        intensity=arrays[f"style.{name}.intensity"].astype(np.float32),
+        pitch=arrays[f"style.{name}.pitch"].astype(np.float32),
+        motion=motion,
+        metadata=metadata,
+    )

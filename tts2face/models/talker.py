@@ -1,0 +1,219 @@
+"""The Talker: everything learnt from the recordings of one person, and the file that keeps it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError, InputError
+from lexicon.sequence import PhoneSequence, WordSpan
+from tts2face.models.appearance import STEPS_PER_LOOK, Appearance, appearance_arrays, appearance_of
+from tts2face.models.audio_map import Drive, drive_arrays, drives_of
+from tts2face.models.files import named_file
+from tts2face.models.phone_network import WindowNetwork, network_arrays, network_of
+from tts2face.models.tensors import read_tensors, write_tensors
+from tts2face.types import HEAD_CHANNELS, Trajectory
+
+KIND = "talker"
+FORMAT_VERSION = 1
+STEPS_PER_SPREAD = 2000.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShapeModel:
+    """Linear model of landmark shapes with head pose removed: ``shape = mean + sum_i p_i basis_i``.
+
+    Parameters
+    ----------
+    mean : (L, 3)
+        Millimetres; axes as in `tts2face.models.landmarks`.
+    basis : (M, L, 3)
+        Orthonormal as rows of (M, 3 L), so that inner products carry parameters between models (T07 eq. 5).
+        The first `n_speech` move only the mouth region; the others move only the rest of the face.
+    spread : (M,)
+        Standard deviation of each parameter over the training frames, millimetres.
+    n_speech
+        Number of leading modes that speech moves.
+    rest : (M,)
+        Parameters of the talker at rest: silent, lips closed.
+    """
+
+    mean: NDArray[np.float32]
+    basis: NDArray[np.float32]
+    spread: NDArray[np.float32]
+    n_speech: int
+    rest: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        """Refuse parts that do not fit each other."""
+        modes, landmarks = self.basis.shape[:2]
+        fits = self.mean.shape == (landmarks, 3) and self.basis.shape[2:] == (3,)
+        if not fits or not self.spread.shape == self.rest.shape == (modes,) or not 0 < self.n_speech <= modes:
+            raise DataError("the shape model's mean, basis, spread and rest do not fit each other; build it again")
+        for array in (self.mean, self.basis, self.spread, self.rest):
+            array.setflags(write=False)
+
+    def shapes(self, parameters: NDArray[np.floating]) -> NDArray[np.float32]:
+        """(T, L, 3) landmarks for (T, m) parameters of the first m modes."""
+        n_modes = parameters.shape[1]
+        flat = self.basis[:n_modes].reshape(n_modes, -1)
+        moved = parameters.astype(np.float32) @ flat
+        return self.mean + moved.reshape(len(parameters), *self.mean.shape)
+
+    def parameters(self, shapes: NDArray[np.floating]) -> NDArray[np.float32]:
+        """(T, M) parameters of (T, L, 3) landmarks."""
+        offsets = (shapes - self.mean).astype(np.float32).reshape(len(shapes), self.mean.size)
+        return offsets @ self.basis.reshape(len(self.basis), -1).T
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Utterance:
+    """One recording as the talker keeps it.
+
+    ``shape`` (T, M) are shape parameters, ``head`` (T, 6) the head pose (`HEAD_CHANNELS`, relative to the talker's
+    mean pose), ``intensity`` (T,) dB of the sound; all on the frames of the video, frame i at ``i / fps`` of the
+    clock of ``phones``. ``looks`` (T, A) are parameters of the talker's appearance, None without one.
+    """
+
+    name: str
+    phones: PhoneSequence
+    words: tuple[WordSpan, ...]
+    shape: NDArray[np.float32]
+    head: NDArray[np.float32]
+    intensity: NDArray[np.float32]
+    looks: NDArray[np.float32] | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Talker:
+    """A person's visual speech: shape model, utterances, where they come from, and with consent how she looks.
+
+    ``metadata`` holds at least name, language, sources, licence, attribution, command, created. ``network`` tells the
+    lips' parameters from phones alone, None where there was too little to learn from; ``drives`` are learnt maps from
+    sound to them, by name, none where the talker was learnt without sound.
+    """
+
+    fps: float
+    model: ShapeModel
+    utterances: tuple[Utterance, ...]
+    metadata: Mapping[str, Any]
+    appearance: Appearance | None = None
+    network: WindowNetwork | None = None
+    drives: Mapping[str, Drive] = field(default_factory=dict)
+
+    def speech_trajectory(self, utterance: Utterance) -> Trajectory:
+        """Speech parameters of a recorded utterance."""
+        n = self.model.n_speech
+        return Trajectory(speech_channels(self.model), utterance.shape[:, :n], self.fps)
+
+
+def speech_channels(model: ShapeModel) -> tuple[str, ...]:
+    """Names of the parameters that speech moves."""
+    return tuple(f"shape{i}" for i in range(model.n_speech))
+
+
+def require_appearance(talker: Talker) -> Appearance:
+    """How a talker looks.
+
+    Raises
+    ------
+    InputError
+        The talker has motion only.
+    """
+    if talker.appearance is None:
+        raise InputError(f"the talker {talker.metadata.get('name', '')} has motion only; build one with --appearance")
+    return talker.appearance
+
+
+def write_talker(path: Path, talker: Talker) -> None:
+    """Write a ``.talker`` file (docs/file-formats.md).
+
+    Shape parameters become 16-bit integers in steps of 1/2000 of their spread, finer than the tracker's noise.
+    """
+    utterances = talker.utterances
+    inventory = sorted({phone for utterance in utterances for phone in utterance.phones.phones})
+    numbers = {phone: number for number, phone in enumerate(inventory)}
+    step = talker.model.spread / STEPS_PER_SPREAD
+    shape = np.concatenate([utterance.shape for utterance in utterances]) / step
+    arrays = {
+        "mean": talker.model.mean,
+        "basis": talker.model.basis,
+        "spread": talker.model.spread,
+        "rest": talker.model.rest,
+        "shape": np.clip(np.rint(shape), -32768, 32767).astype(np.int16),
+        "head": np.concatenate([utterance.head for utterance in utterances]).astype(np.float16),
+        "intensity": np.concatenate([utterance.intensity for utterance in utterances]).astype(np.float16),
+        "n_frames": np.array([len(utterance.shape) for utterance in utterances], np.int32),
+        "phones": np.array([numbers[phone] for utterance in utterances for phone in utterance.phones.phones], np.int16),
+        "n_phones": np.array([len(utterance.phones) for utterance in utterances], np.int32),
+        "edges": np.concatenate([utterance.phones.edges for utterance in utterances]),
+    }
+    if talker.appearance is not None:
+        looks = np.concatenate([utterance.looks for utterance in utterances if utterance.looks is not None])
+        steps = looks / (talker.appearance.spread / STEPS_PER_LOOK)
+        arrays["looks"] = np.clip(np.rint(steps), -32768, 32767).astype(np.int16)
+        arrays |= appearance_arrays(talker.appearance)
+    if talker.network is not None:
+        arrays |= network_arrays(talker.network)
+    arrays |= drive_arrays(talker.drives)
+    header = {
+        **talker.metadata,
+        "fps": talker.fps,
+        "n_speech": talker.model.n_speech,
+        "inventory": inventory,
+        **({"network_inventory": talker.network.inventory} if talker.network is not None else {}),
+        "head_channels": HEAD_CHANNELS,
+        "utterances": [
+            [utterance.name, [[word.text, word.first, word.last] for word in utterance.words]]
+            for utterance in utterances
+        ],
+    }
+    write_tensors(path, KIND, FORMAT_VERSION, arrays, header)
+
+
+def read_talker(path: Path) -> Talker:
+    """Read a ``.talker`` file.
+
+    Raises
+    ------
+    InputError
+        There is no such file.
+    DataError
+        It is damaged, not a talker, or of another version.
+    """
+    arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
+    try:
+        return _assembled(arrays, header)
+    except (KeyError, IndexError, ValueError, TypeError) as broken:
+        raise DataError(f"{path} lacks a part of a talker ({broken}); build it again") from broken
+
+
+def load_talker(name: str) -> Talker:
+    """A shipped talker by name, or one from a ``.talker`` file; errors as `named_file` and `read_talker`."""
+    return read_talker(named_file(name, KIND))
+
+
+def _assembled(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> Talker:
+    n_speech = int(header.pop("n_speech"))
+    model = ShapeModel(arrays["mean"], arrays["basis"], arrays["spread"], n_speech, arrays["rest"])
+    inventory, fps = header.pop("inventory"), float(header.pop("fps"))
+    header.pop("head_channels")
+    frames = np.concatenate([[0], np.cumsum(arrays["n_frames"])])
+    phones = np.concatenate([[0], np.cumsum(arrays["n_phones"])])
+    shape = arrays["shape"].astype(np.float32) * (model.spread / STEPS_PER_SPREAD)
+    head, intensity = arrays["head"].astype(np.float32), arrays["intensity"].astype(np.float32)
+    appearance = appearance_of(arrays)
+    network = network_of(arrays, header.pop("network_inventory", ()))
+    looks = arrays["looks"] * (appearance.spread / STEPS_PER_LOOK) if appearance is not None else None
+    utterances = []
+    for i, (name, words) in enumerate(header.pop("utterances")):
+        labels = [inventory[number] for number in arrays["phones"][phones[i] : phones[i + 1]]]
+        sequence = PhoneSequence(labels, arrays["edges"][phones[i] + i : phones[i + 1] + i + 1])
+        spans = tuple(WordSpan(text, first, last) for text, first, last in words)
+        here = slice(frames[i], frames[i + 1])
+        seen = None if looks is None else looks[here]
+        utterances.append(Utterance(name, sequence, spans, shape[here], head[here], intensity[here], seen))
+    return Talker(fps, model, tuple(utterances), header, appearance, network, drives_of(arrays))

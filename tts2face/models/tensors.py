@@ -1,0 +1,70 @@
+"""Arrays and JSON metadata in one safetensors file: how a talker and a face are kept, without pickle."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError, InputError
+from tts2face.models.files import write_whole
+
+Arrays = Mapping[str, NDArray[Any]]
+
+
+def write_tensors(path: Path, kind: str, version: int, arrays: Arrays, metadata: Mapping[str, Any]) -> None:
+    """Write arrays and metadata beside `path`, then rename, so that no half file is ever seen.
+
+    Raises
+    ------
+    BackendError
+        The folder cannot be written or the disk is full.
+    """
+    from safetensors.numpy import save
+
+    header = {"kind": kind, "version": str(version), "metadata": json.dumps(metadata, ensure_ascii=False)}
+    content = _ordered(save({name: np.ascontiguousarray(array) for name, array in arrays.items()}, header))
+    write_whole(path, content)
+
+
+def _ordered(content: bytes) -> bytes:
+    """The same file with its header's keys in order: the library shuffles them, and equal talkers are equal bytes."""
+    start = 8 + int.from_bytes(content[:8], "little")
+    text = json.dumps(json.loads(content[8:start]), ensure_ascii=False, sort_keys=True, separators=(",", ":"))
+    header = text.encode()
+    header += b" " * (-len(header) % 8)
+    return len(header).to_bytes(8, "little") + header + content[start:]
+
+
+def read_tensors(path: Path, kind: str, version: int) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Memory-mapped arrays and the metadata of a file that `write_tensors` wrote.
+
+    Raises
+    ------
+    InputError
+        There is no such file.
+    DataError
+        The file is truncated, of another kind, or of another version.
+    """
+    from safetensors import SafetensorError, safe_open
+
+    if not path.is_file():
+        raise InputError(f"there is no {kind} file {path}; check the path")
+    try:
+        with safe_open(str(path), framework="numpy") as file:
+            header = file.metadata() or {}
+            if header.get("kind") != kind:
+                raise DataError(f"{path} is not a {kind} file; give one that tts2face wrote")
+            if header.get("version") != str(version):
+                raise DataError(
+                    f"{path} is a {kind} file of version {header.get('version')}, this one reads {version}; "
+                    "build it again"
+                )
+            arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
+            return arrays, json.loads(header["metadata"])
+    except (SafetensorError, KeyError, OSError, ValueError) as broken:
+        if isinstance(broken, DataError):
+            raise
+        raise DataError(f"{path} is damaged or not a {kind} file; build or copy it again") from broken

@@ -1,0 +1,1 @@
+"""A talker's own face, drawn on the talker's own video."""

@@ -1,0 +1,190 @@
+"""Gestures of a talker's own face, on her own video: landmarks that move, and lids whose looks go along.
+
+Her lids move, and look, as they did in the blinks of her recordings. Gaze and head stay those of her video.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.face.compact_spline import local_interpolant
+from tts2face.face.expressions import expression_landmarks
+from tts2face.face.gesture_transfer import LID_RIMS, LIPS, NO_GAINS, check_gestures, fitted_modes
+from tts2face.face.landmark_fit import all_landmarks, axis_scales, landmark_places, turn_onto
+from tts2face.face.shape_transfer import SIZES, SUPPORT, default_head
+from tts2face.models.appearance import Appearance
+from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
+from tts2face.models.palette import EXPRESSIONS, REGION_FEATURES, Palette
+from tts2face.models.talker import ShapeModel, Talker, require_appearance
+from tts2face.numeric import ordered_product
+from tts2face.retargeting.performer import LIDS, aperture
+from tts2face.types import Trajectory
+
+LIDS_CHANNEL = "lids"
+OPEN, SHUT = 0.7, 0.005  # quantiles of the opening of lids over all frames: open ones, and those in blinks
+LEAST_BLINK = 0.5  # share of the opening that must be lost in blinks; who never blinks on video has none to show
+WIDEST = -0.3  # share of lids opened wide
+RIDGE = 1e-5
+INNER, OUTER = 0.7, 1.1  # of an eye's width from its middle: how far lids change their looks in full, and at all
+LIVELY = 0.6  # of an expression is shown: folds and teeth that go with the rest are not known from speech
+
+Floats = NDArray[np.float32]
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OwnGestures:
+    """What gestures do to a talker's own face; N points of her mesh.
+
+    Parameters
+    ----------
+    channels
+        Of `motion`, behind those of speech and looks: expressions, modes of brows and cheeks, and the lids' share.
+    regions
+        Number of modes of each region.
+    modes : (G, N, 3)
+        Motion of the points for each channel but the last, mm.
+    lids, lid_looks : (2, N, 3), (2, A)
+        Motion and change of looks (the face texture's parameters) of lids shut by a share s: times s and s squared.
+    lid_pixels : (P,)
+        Of the face texture's pixels: 1 where lids change the picture, 0 where they do not.
+    plate_shares : (T,)
+        By how much her lids are shut on each frame of the plate; below 0 wider than usual.
+    """
+
+    channels: tuple[str, ...]
+    regions: Mapping[str, int]
+    modes: Floats
+    lids: Floats
+    lid_looks: Floats
+    lid_pixels: Floats
+    plate_shares: Floats
+
+    def motion(
+        self, own: Trajectory, gestures: Mapping[str, Floats], gains: Mapping[str, float] = NO_GAINS
+    ) -> Trajectory:
+        """Speech and looks (T, S + A) with gestures: more channels for `tts2face.render.own_face.PlateStage`.
+
+        Parameters
+        ----------
+        gestures
+            (T, k) values of features of the palette; gaze and head have no effect, and both eyes blink together.
+        gains
+            Factors on the motion of features; those of jaw and lips have no effect.
+
+        Raises
+        ------
+        InputError
+            As `tts2face.face.gesture_transfer.check_gestures`.
+        """
+        check_gestures(gestures, gains, len(own), self.regions)
+        felt = np.zeros((len(own), len(self.channels)))
+        widths = {"expression": len(EXPRESSIONS), **self.regions}
+        first = 0
+        for name, width in widths.items():
+            if name in gestures:
+                felt[:, first : first + width] = gains.get(name, 1.0) * gestures[name]
+            first += width
+        felt[:, : len(EXPRESSIONS)] *= LIVELY
+        if "blink" in gestures:
+            felt[:, -1] = np.clip(gains.get("blink", 1.0) * gestures["blink"].mean(axis=1), 0.0, 1.0)
+        return Trajectory(own.channels + self.channels, np.concatenate([own.values, felt], axis=1), own.fps)
+
+    def moved(self, felt: NDArray[np.floating], number: int) -> tuple[Floats, Floats]:
+        """Motion of the points (N, 3), mm, and change of the face's looks (A,), on a frame of the plate."""
+        before = float(self.plate_shares[number])
+        after = before + float(felt[-1]) * (1.0 - before)
+        powers = np.array([after - before, after**2 - before**2], np.float32)
+        points = np.tensordot(felt[:-1].astype(np.float32), self.modes, axes=1)
+        return points + np.tensordot(powers, self.lids, axes=1), powers @ self.lid_looks
+
+
+def own_gestures(talker: Talker, palette: Palette) -> OwnGestures:
+    """Prepare a talker's own face for the gestures of a palette.
+
+    Raises
+    ------
+    InputError
+        The talker has motion only.
+    """
+    appearance, model = require_appearance(talker), talker.model
+    rest = (model.mean + np.einsum("m,mld->ld", model.rest, model.basis)).astype(np.float64)
+    n_mesh = len(appearance.face.reference)
+    expressions = _expressions(rest)
+    regions = [_spread(rest, palette, name) for name in REGION_FEATURES]
+    lids, looks, plate_shares = _lids(talker, appearance)
+    return OwnGestures(
+        channels=(*EXPRESSIONS, *(c for name in REGION_FEATURES for c in palette.channels(name)), LIDS_CHANNEL),
+        regions={name: len(palette.regions[name].modes) for name in REGION_FEATURES},
+        modes=np.concatenate([expressions, *regions])[:, :n_mesh].astype(np.float32),
+        lids=lids[:, :n_mesh].astype(np.float32),
+        lid_looks=looks.astype(np.float32),
+        lid_pixels=_lid_pixels(appearance),
+        plate_shares=plate_shares.astype(np.float32),
+    )
+
+
+def _expressions(rest: FloatArray) -> FloatArray:
+    """(5, 478, 3) the default head's basis expressions in the size of a talker, who rests so."""
+    head = default_head()
+    places = all_landmarks(head, landmark_places(head))
+    turn = turn_onto(places, rest)
+    return ordered_product(expression_landmarks(head), turn.T) * axis_scales(
+        ordered_product(places, turn.T), rest, SIZES
+    )
+
+
+def _spread(rest: FloatArray, palette: Palette, name: str) -> FloatArray:
+    """(k, 478, 3) a region's modes on all landmarks; rims of the lids and lips stay."""
+    region = palette.regions[name]
+    modes = fitted_modes(rest, palette.neutral.astype(np.float64), region)
+    still = [number for number in sorted({*LID_RIMS, *LIPS}) if number not in region.landmarks]
+    moved = np.concatenate([modes, np.zeros((len(modes), len(still), 3))], axis=1)
+    size = float(np.linalg.norm(rest[EYE_OUTER_LEFT] - rest[EYE_OUTER_RIGHT]))
+    flat = moved.transpose(1, 0, 2).reshape(-1, 3 * len(modes))
+    field = local_interpolant(rest[[*region.landmarks, *still]], flat, SUPPORT * size)
+    return field(rest).reshape(len(rest), -1, 3).transpose(1, 0, 2)
+
+
+def _lids(talker: Talker, appearance: Appearance) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Lids' motion (2, 478, 3) and looks (2, A) by share and its square, and shares on the plate (T,)."""
+    model, n_face = talker.model, appearance.face.n_modes
+    seen = [spoken for spoken in talker.utterances if spoken.looks is not None]
+    shapes = np.concatenate([spoken.shape for spoken in seen])
+    looks = np.concatenate([spoken.looks[:, :n_face] for spoken in seen if spoken.looks is not None])
+    openings = _openings(model, shapes)
+    opened, shut = np.quantile(openings, [OPEN, SHUT])
+    still, plate = model.basis[model.n_speech :].astype(np.float64), _openings(model, appearance.plate.shape)
+    if shut > (1.0 - LEAST_BLINK) * opened:
+        return np.zeros((2, len(model.mean), 3)), np.zeros((2, n_face)), np.zeros(len(plate))
+    shares, on_plate = (np.clip((opened - values) / (opened - shut), WIDEST, 1.0) for values in (openings, plate))
+    terms = np.stack([np.ones_like(shares), shares, shares**2], axis=1)
+    normal = ordered_product(terms.T, terms) + RIDGE * len(terms) * np.diag([0.0, 1.0, 1.0])
+    motion, change = (
+        np.linalg.solve(normal, ordered_product(terms.T, values.astype(np.float64)))[1:]
+        for values in (shapes[:, model.n_speech :], looks)
+    )
+    return ordered_product(motion, still.reshape(len(still), -1)).reshape(2, -1, 3), change.astype(np.float64), on_plate
+
+
+def _openings(model: ShapeModel, shapes: Floats) -> FloatArray:
+    """(T,) mean opening of both eyes over their width."""
+    landmarks = model.shapes(shapes)
+    left, right = (aperture(landmarks, side) for side in LIDS)
+    return (left + right) / 2
+
+
+def _lid_pixels(appearance: Appearance) -> Floats:
+    """(P,) where lids change the picture of a face, fading outwards."""
+    width = appearance.face.size[0]
+    places = np.stack([appearance.face.pixels % width, appearance.face.pixels // width], axis=1)
+    share = np.zeros(len(places))
+    for rim in (LID_RIMS[:16], LID_RIMS[16:]):
+        around = appearance.face.reference[list(rim)]
+        size = float(around[:, 0].max() - around[:, 0].min())
+        distance = np.linalg.norm(places - around.mean(axis=0), axis=1) / size
+        share = np.maximum(share, np.clip((OUTER - distance) / (OUTER - INNER), 0.0, 1.0))
+    smooth: Floats = (share * share * (3.0 - 2.0 * share)).astype(np.float32)
+    return smooth

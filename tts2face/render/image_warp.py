@@ -1,0 +1,97 @@
+"""Pictures bent over triangles: a plate that gives way, with a change of its texture, and a texture on its own.
+
+Pixels are counted from the top left one's centre. Every kernel runs without the interpreter's lock on one thread.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.compilation import inlined_kernel, kernel
+from tts2face.interpolation import bilinear
+
+Array = NDArray[Any]
+
+EDGE = -1e-6  # barycentric coordinates down to here belong to a triangle, so that no pixel is left between two
+
+
+@inlined_kernel
+def corner(points: Array, triangle: Array, k: int) -> tuple[float, float]:
+    """Place of a triangle's corner."""
+    return points[triangle[k], 0], points[triangle[k], 1]
+
+
+@kernel
+def bend(triangles: Array, target: Array, source: Array, plate: Array, change: tuple[Any, Any], frame: Array) -> None:
+    """Draw the plate's triangles at new places.
+
+    Parameters
+    ----------
+    triangles : (F, 3)
+        Those drawn last lie on top.
+    target, source : (N, 2), (N, 2)
+        The points in the frame and in the plate, pixels.
+    plate : (H, W, 3)
+    change
+        A texture (h, w, 3) that is added, and the points' places in it (M, 2), M <= N; triangles of other points are
+        only bent.
+    frame : (H', W', 3) float32
+        Drawn into.
+    """
+    texture, places = change
+    height, width = frame.shape[0], frame.shape[1]
+    for f in range(len(triangles)):
+        triangle = triangles[f]
+        x0, y0 = corner(target, triangle, 0)
+        x1, y1 = corner(target, triangle, 1)
+        x2, y2 = corner(target, triangle, 2)
+        area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
+        if abs(area) < 1e-9:
+            continue
+        left, right = max(int(np.ceil(min(x0, x1, x2))), 0), min(int(max(x0, x1, x2)), width - 1)
+        top, bottom = max(int(np.ceil(min(y0, y1, y2))), 0), min(int(max(y0, y1, y2)), height - 1)
+        is_face = max(triangle[0], triangle[1], triangle[2]) < len(places)
+        for y in range(top, bottom + 1):
+            for x in range(left, right + 1):
+                b = ((x - x0) * (y2 - y0) - (x2 - x0) * (y - y0)) / area
+                c = ((x1 - x0) * (y - y0) - (x - x0) * (y1 - y0)) / area
+                a = 1.0 - b - c
+                if min(a, b, c) < EDGE:
+                    continue
+                u = a * source[triangle[0], 0] + b * source[triangle[1], 0] + c * source[triangle[2], 0]
+                v = a * source[triangle[0], 1] + b * source[triangle[1], 1] + c * source[triangle[2], 1]
+                for k in range(3):
+                    frame[y, x, k] = bilinear(plate, u, v, k)
+                if is_face:
+                    u = a * places[triangle[0], 0] + b * places[triangle[1], 0] + c * places[triangle[2], 0]
+                    v = a * places[triangle[0], 1] + b * places[triangle[1], 1] + c * places[triangle[2], 1]
+                    for k in range(3):
+                        frame[y, x, k] += bilinear(texture, u, v, k)
+
+
+@kernel
+def lay(triangles: Array, target: Array, texture: Array, places: Array, frame: Array) -> None:
+    """Draw a texture's triangles, at `places` in the texture and `target` in the frame; arguments as in `bend`."""
+    height, width = frame.shape[0], frame.shape[1]
+    for f in range(len(triangles)):
+        triangle = triangles[f]
+        x0, y0 = corner(target, triangle, 0)
+        x1, y1 = corner(target, triangle, 1)
+        x2, y2 = corner(target, triangle, 2)
+        area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
+        if abs(area) < 1e-9:
+            continue
+        left, right = max(int(np.ceil(min(x0, x1, x2))), 0), min(int(max(x0, x1, x2)), width - 1)
+        top, bottom = max(int(np.ceil(min(y0, y1, y2))), 0), min(int(max(y0, y1, y2)), height - 1)
+        for y in range(top, bottom + 1):
+            for x in range(left, right + 1):
+                b = ((x - x0) * (y2 - y0) - (x2 - x0) * (y - y0)) / area
+                c = ((x1 - x0) * (y - y0) - (x - x0) * (y1 - y0)) / area
+                a = 1.0 - b - c
+                if min(a, b, c) < EDGE:
+                    continue
+                u = a * places[triangle[0], 0] + b * places[triangle[1], 0] + c * places[triangle[2], 0]
+                v = a * places[triangle[0], 1] + b * places[triangle[1], 1] + c * places[triangle[2], 1]
+                for k in range(3):
+                    frame[y, x, k] = bilinear(texture, u, v, k)

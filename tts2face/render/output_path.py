@@ -1,0 +1,102 @@
+"""Where pictures go: a file or folder that appears under its name only when it is complete."""
+
+import contextlib
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from lexicon.errors import BackendError, InputError
+from tts2face.render.png_folder import is_stills_folder
+
+MP4, WEBM, GIF, FOLDER = ".mp4", ".webm", ".gif", ""
+KINDS = (MP4, WEBM, GIF)
+
+
+def kind_of(path: Path | str) -> str:
+    """What a path asks for: one of `KINDS`, or `FOLDER`.
+
+    Raises
+    ------
+    InputError
+        The suffix is unknown.
+    """
+    suffix = Path(path).suffix.lower()
+    if str(path).endswith(("/", os.sep)) or suffix == "" or (suffix not in KINDS and Path(path).is_dir()):
+        return FOLDER
+    if suffix not in KINDS:
+        raise InputError(
+            f"{path} has the unknown suffix {suffix}; give one of {', '.join(KINDS)}, "
+            "or a folder without a suffix for .png pictures"
+        )
+    return suffix
+
+
+def checked_output(path: Path | str) -> Path:
+    """The path of what shall be written.
+
+    Raises
+    ------
+    InputError
+        The suffix is unknown, the folder around it does not exist, or the name belongs to something else.
+    """
+    where, kind = Path(path), kind_of(path)
+    if not where.parent.is_dir():
+        raise InputError(f"there is no folder {where.parent} to write {where.name} to; make it first")
+    if kind == FOLDER and where.exists() and not (where.is_dir() and is_stills_folder(where)):
+        raise InputError(f"{where} holds other things than pictures of a clip; choose another folder")
+    if kind != FOLDER and where.is_dir():
+        raise InputError(f"{where} is a folder; choose another name")
+    return where
+
+
+def place_beside(path: Path, kind: str) -> Path:
+    """A new, empty, hidden file or folder beside a path.
+
+    Raises
+    ------
+    BackendError
+        The folder cannot be written.
+    """
+    with refusals(path):
+        if kind == FOLDER:
+            folder = tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent)
+            os.chmod(folder, 0o755)
+            return Path(folder)
+        handle, beside = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=kind, dir=path.parent)
+        os.close(handle)
+        os.chmod(beside, 0o644)
+        return Path(beside)
+
+
+def put_in_place(beside: Path, path: Path) -> None:
+    """Let what was written beside appear under its name, in place of what was there."""
+    with refusals(path):
+        if path.is_dir():
+            shutil.rmtree(path)
+        os.replace(beside, path)
+
+
+def remove(beside: Path) -> None:
+    """Leave nothing of what was written beside."""
+    if beside.is_dir():
+        shutil.rmtree(beside, ignore_errors=True)
+    else:
+        beside.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def refusals(path: Path) -> Iterator[None]:
+    """Say in one sentence why the disk refused.
+
+    Raises
+    ------
+    BackendError
+        It did.
+    """
+    try:
+        yield
+    except OSError as refused:
+        reason = os.strerror(refused.errno) if refused.errno else str(refused)
+        raise BackendError(f"cannot write {path}: {reason}; free some space or choose another folder") from refused

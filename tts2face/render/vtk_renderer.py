@@ -1,0 +1,253 @@
+"""The second renderer: VTK off screen, with a GPU or software GL, lit at the vertices by the project's own light.
+
+VTK ends the process when it finds no GL at all, so a child process tries first.
+"""
+
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import BackendError
+from tts2face.compilation import kernel
+from tts2face.render.camera import Optics
+from tts2face.render.fragments import OPACITY
+from tts2face.render.surface import Surface, encoding_table, linear_table
+from tts2face.render.vertices import VertexLight, brightened, shades, vertex_light
+
+if TYPE_CHECKING:
+    from tts2face.render.draw import Stage
+
+OFF_SCREEN, ON_SCREEN = "vtkEGLRenderWindow", "vtkXOpenGLRenderWindow"  # the first falls back to OSMesa by itself
+UNSEEN = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
+PROBE_SECONDS = 60.0
+PROBE = """
+import numpy, pyvista
+plotter = pyvista.Plotter(off_screen={off_screen}, window_size=(32, 32))
+plotter.add_mesh(pyvista.Sphere(), color="red", lighting=False)
+plotter.show(auto_close=False, interactive=False)
+seen = numpy.asarray(plotter.screenshot(return_img=True))
+opened = plotter.render_window.GetClassName()
+raise SystemExit(0 if int(seen[16, 16, 0]) > 200 and opened not in {refused} else 3)
+"""
+TONE = (linear_table(), encoding_table(8192))
+
+
+def require_gl() -> None:
+    """Make sure that VTK can draw off screen here.
+
+    Raises
+    ------
+    BackendError
+        pyvista is not installed, or neither a GPU nor software GL is there.
+    """
+    require_pyvista("--renderer pyvista")
+    if not probe(OFF_SCREEN):
+        raise BackendError(
+            "VTK finds neither a GPU nor software GL on this machine; draw with --renderer numba, or install one "
+            "(on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri)"
+        )
+
+
+def require_pyvista(purpose: str) -> None:
+    """Make sure that pyvista is installed.
+
+    Raises
+    ------
+    BackendError
+        It is not.
+    """
+    from importlib.util import find_spec
+
+    if find_spec("pyvista") is None:
+        raise BackendError(f"{purpose} needs pyvista, which is not installed; run: pip install 'tts2face[view]'")
+
+
+@cache
+def probe(window: str) -> bool:
+    """Whether a child process can draw with VTK in a window of a class; it is what crashes if VTK does."""
+    is_off_screen = window == OFF_SCREEN  # without a display VTK falls back to a window that nobody sees
+    code = PROBE.format(off_screen=is_off_screen, refused=() if is_off_screen else UNSEEN)
+    environment = os.environ | window_choice(window)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", code], env=environment, capture_output=True, timeout=PROBE_SECONDS, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return done.returncode == 0
+
+
+def window_choice(window: str) -> dict[str, str]:
+    """The environment by which VTK makes windows of a class; elsewhere than on Linux it has but one."""
+    return {"VTK_DEFAULT_OPENGL_WINDOW": window} if sys.platform.startswith("linux") else {}
+
+
+@contextmanager
+def windows_of(window: str) -> Iterator[None]:
+    """Make VTK's windows of a class within this context."""
+    choice = window_choice(window)
+    before = {name: os.environ.get(name) for name in choice}
+    os.environ.update(choice)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def frames(
+    stage: "Stage", poses: Iterable[tuple[NDArray[np.float32], NDArray[np.float32]]]
+) -> Iterator[NDArray[np.uint8]]:
+    """Pictures (H, W, 3 or 4) of a stage's face for weights (K,) and head poses (6,), one after the other.
+
+    One window is used for all of them, by the thread that takes the first.
+
+    Raises
+    ------
+    BackendError
+        As `require_gl`.
+    """
+    require_gl()
+    picture = stage.picture
+    side = picture.supersampling
+    plotter = _plotter((picture.width * side, picture.height * side), stage)
+    try:
+        actors = Puppet(stage.surface, plotter)
+        for weights, head in poses:
+            points = stage.surface.rig.posed(weights, head)
+            actors.show(points, stage.optics.view, (stage.lights, stage.exposure.at(weights)))
+            plotter.renderer.ResetCameraClippingRange()
+            plotter.render()
+            samples = np.asarray(plotter.screenshot(None, transparent_background=True, return_img=True))
+            drawn = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
+            drawn[:, :, :3] = stage.behind
+            average(samples, side, TONE, drawn)
+            yield drawn
+    finally:
+        plotter.close()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sheet:
+    """One mesh of a puppet: the vertices that it takes, the light that they show and how that is scaled."""
+
+    mesh: Any
+    used: NDArray[np.integer]
+    light_of: NDArray[np.float32]
+    scale: NDArray[np.float32]
+
+    def show(self, points: NDArray[np.float32]) -> None:
+        """Move the vertices and colour them."""
+        colours = np.minimum(self.light_of[self.used] * (self.scale * 255), 255) + np.float32(0.5)
+        self.mesh.points[:] = points[self.used]
+        self.mesh.point_data["light"][:] = colours.astype(np.uint8)
+        self.mesh.GetPoints().Modified()
+        self.mesh.point_data["light"].VTKObject.Modified()
+        self.mesh.Modified()
+
+
+class Puppet:
+    """A face's meshes in a plotter: textured, plain and translucent ones, each with an outer and an inner side."""
+
+    def __init__(self, surface: Surface, plotter: Any) -> None:
+        self._plotter, self._surface = plotter, surface
+        self._light: VertexLight = vertex_light(surface)
+        self._sheets: list[Sheet] = []
+        shade = shades(self._light)
+        opacity = surface.materials[surface.part_of, OPACITY]
+        for share in np.unique(opacity)[::-1]:
+            for number in np.unique(shade):
+                self._add((shade == number) & (opacity == share), float(share), number >= 0)
+
+    def show(
+        self, points: NDArray[np.float32], view: NDArray[np.floating], lights: tuple[NDArray[Any], NDArray[Any]]
+    ) -> None:
+        """Move the vertices and light them for a camera."""
+        self._light.lit(points, view, lights)
+        for sheet in self._sheets:
+            sheet.show(points)
+
+    def _add(self, chosen: NDArray[np.bool_], opacity: float, is_textured: bool) -> None:
+        import pyvista
+
+        if not chosen.any():
+            return
+        used, places = np.unique(self._surface.triangles[chosen], return_inverse=True)
+        scale, options = np.ones(3, np.float32), {"opacity": opacity}
+        if is_textured:
+            scale = self._light.albedo[used].max(axis=0)
+            options["texture"] = pyvista.Texture(brightened(self._surface.texture, scale))
+        for culling, light_of in (("front", self._light.back), ("back", self._light.front)):
+            mesh = pyvista.PolyData.from_regular_faces(self._surface.rig.rest[used].copy(), places.reshape(-1, 3))
+            mesh.point_data["light"] = np.zeros((len(used), 3), np.uint8)
+            if is_textured:
+                mesh.active_texture_coordinates = self._surface.uv[used] * [1, -1] + np.array([0, 1], np.float32)
+            self._plotter.add_mesh(
+                mesh, scalars="light", rgb=True, lighting=False, culling=culling, show_scalar_bar=False, **options
+            )
+            self._sheets.append(Sheet(mesh, used, light_of, scale))
+
+
+def aim(plotter: Any, optics: Optics, height: int) -> None:
+    """Set a plotter's camera up as a camera whose pictures are `height` samples high."""
+    view = optics.view
+    place = -view[:, :3].T @ view[:, 3]
+    camera = plotter.camera
+    camera.position = tuple(place)
+    camera.focal_point = tuple(place + max(float(view[2, 3]), 1.0) * view[2, :3])  # before the point between the eyes
+    camera.up = tuple(-view[1, :3])
+    camera.view_angle = math.degrees(2 * math.atan(height / 2 / float(optics.lens[0])))
+
+
+def _plotter(size: tuple[int, int], stage: "Stage") -> Any:
+    import pyvista
+
+    with windows_of(OFF_SCREEN):
+        plotter = pyvista.Plotter(off_screen=True, window_size=list(size), lighting="none")
+    plotter.disable_anti_aliasing()
+    plotter.set_background("black")
+    aim(plotter, stage.optics, size[1])
+    return plotter
+
+
+@kernel
+def pool(samples: Any, place: tuple[int, int], side: int, linear: Any, total: Any) -> None:
+    """Write the sums of linear light and coverage (4,) of the samples from a row and a column on."""
+    total[:] = np.float32(0)
+    for row in range(place[0], place[0] + side):
+        for column in range(place[1], place[1] + side):
+            for c in range(3):
+                total[c] += linear[samples[row, column, c]]
+            total[3] += np.float32(samples[row, column, 3]) / np.float32(255)
+
+
+@kernel
+def average(samples: Any, side: int, tables: Any, picture: Any) -> None:
+    """Lay the mean of side x side samples (premultiplied sRGB and coverage) over the background in the picture."""
+    one, half, share = np.float32(1), np.float32(0.5), np.float32(1.0 / (side * side))
+    total = np.zeros(4, np.float32)
+    for y in range(picture.shape[0]):
+        for x in range(picture.shape[1]):
+            pool(samples, (y * side, x * side), side, tables[0], total)
+            cover = total[3] * share
+            if cover <= np.float32(0):
+                continue
+            behind, scale = one - cover, share
+            if picture.shape[2] == 4:
+                picture[y, x, 3] = np.uint8(min(cover, one) * np.float32(255) + half)
+                behind, scale = np.float32(0), share / cover
+            for c in range(3):
+                value = min(total[c] * scale + behind * tables[0][picture[y, x, c]], one)
+                picture[y, x, c] = tables[1][int(value * np.float32(len(tables[1]) - 1) + half)]

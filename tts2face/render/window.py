@@ -1,0 +1,177 @@
+"""A window in which a clip's head plays in real time; the mouse turns it, space starts it again, q closes it."""
+
+import os
+import sys
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import BackendError
+from tts2face.models.face import Face
+from tts2face.render.camera import Optics, optics
+from tts2face.render.draw import available_cores
+from tts2face.render.picture import Picture, background_kind
+from tts2face.render.soft_shadows import exposed
+from tts2face.render.studio_light import lamps, light_table
+from tts2face.render.surface import surfaced
+from tts2face.render.vtk_renderer import ON_SCREEN, Puppet, aim, probe, require_pyvista, windows_of
+from tts2face.types import HEAD_CHANNELS, Clip
+
+WALL, WALL_TOP = "#3a4049", "#7d8793"  # behind the head, unless the picture names a colour
+TICK_MS = 10  # between looks at the clock
+
+
+def view(clip: Clip, face: Face, picture: Picture) -> None:
+    """Play a clip's head in a window, without sound, until the window is closed.
+
+    Raises
+    ------
+    BackendError
+        pyvista is not installed, or there is no display or no GL for it.
+    """
+    require_display("--view")
+    player = Player(clip, face, picture)
+    try:
+        player.run()
+    finally:
+        player.close()
+
+
+def require_display(purpose: str) -> None:
+    """Make sure that a window can be opened here for an option.
+
+    Raises
+    ------
+    BackendError
+        It cannot.
+    """
+    require_pyvista(purpose)
+    is_linux = sys.platform.startswith("linux")
+    if is_linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise BackendError(
+            f"{purpose} opens a window, and this machine has no display; write a file with --out clip.mp4"
+        )
+    if not probe(ON_SCREEN):
+        raise BackendError(
+            "VTK cannot open a window on this display (it needs X11 or XWayland, and OpenGL 3.2); "
+            "write a file with --out clip.mp4"
+        )
+
+
+def camera_matrix(camera: Any) -> NDArray[np.float64]:
+    """(3, 4) view of a pyvista camera as `tts2face.render.camera.Optics` has it: x right, y down, z ahead."""
+    matrix = camera.GetModelViewTransformMatrix()
+    rows = np.array([[matrix.GetElement(row, column) for column in range(4)] for row in range(3)])
+    return rows * [[1.0], [-1.0], [-1.0]]
+
+
+class Window(ABC):
+    """The window and the head in it."""
+
+    def __init__(self, face: Face, picture: Picture) -> None:
+        import pyvista
+
+        self._surface, self._towards = surfaced(face), lamps(picture.view)
+        self._exposure = exposed(face, self._surface, self._towards, available_cores())
+        self._optics = optics(picture.view, face, (picture.width, picture.height))
+        with windows_of(ON_SCREEN):
+            self.plotter: Any = pyvista.Plotter(
+                window_size=[picture.width, picture.height], lighting="none", title="tts2face"
+            )
+        self._paint_wall(picture)
+        self._puppet = Puppet(self._surface, self.plotter)
+        aim(self.plotter, self._optics, picture.height)
+
+    def run(self) -> None:
+        """Show what `tick` moves until the window is closed; the last picture stays."""
+        self.plotter.add_timer_event(max_steps=2**31 - 1, duration=TICK_MS, callback=self._tick)
+        self.plotter.show(auto_close=False)
+
+    @abstractmethod
+    def tick(self) -> bool:
+        """Move the head to now; False where nothing has changed."""
+
+    def pose(self, weights: NDArray[np.floating], head: NDArray[np.floating]) -> None:
+        """Move the head, lit for where the camera is now."""
+        view = camera_matrix(self.plotter.camera)
+        lights = light_table(self._towards, Optics(view, self._optics.lens))
+        self._puppet.show(self._surface.rig.posed(weights, head), view, (lights, self._exposure.at(weights)))
+
+    def close(self) -> None:
+        """Close the window."""
+        self.plotter.close()
+
+    def _tick(self, _step: int) -> None:
+        if self.tick():
+            self.plotter.render()
+
+    def _paint_wall(self, picture: Picture) -> None:
+        self.plotter.enable_anti_aliasing("msaa", multi_samples=4)
+        kind = background_kind(picture.background)
+        if isinstance(kind, tuple):
+            self.plotter.set_background(tuple(value / 255 for value in kind))
+        else:
+            self.plotter.set_background(WALL, top=WALL_TOP)
+
+
+class Player(Window):
+    """The clock that plays a clip."""
+
+    def __init__(self, clip: Clip, face: Face, picture: Picture) -> None:
+        super().__init__(face, picture)
+        self._clip = clip
+        self.plotter.add_key_event("space", self.restart)
+        self._shown: tuple[int, int] | None = None
+        self.restart()
+
+    def run(self) -> None:
+        """Play until the window is closed; the last picture stays."""
+        self.restart()
+        super().run()
+
+    def restart(self) -> None:
+        """Begin with the first frame again."""
+        self._began = time.perf_counter()
+        self.show_at(0.0)
+
+    def tick(self) -> bool:
+        """Move the head to the moment that the clock shows."""
+        return self.show_at(time.perf_counter() - self._began)
+
+    def show_at(self, seconds: float) -> bool:
+        """Move the head to a moment of the clip; False where nothing has changed."""
+        frame = min(int(seconds * self._clip.fps), len(self._clip.motion) - 1)
+        now = frame, int(self.plotter.camera.GetMTime())
+        if now == self._shown:
+            return False
+        self._shown = now
+        self.pose(self._clip.motion.values[frame], self._clip.head.values[frame])
+        return True
+
+
+class Mirror(Window):
+    """A head that shows what somebody does now.
+
+    Parameters
+    ----------
+    newest
+        Gives the weights and the head's pose to show, None where nothing new has come.
+    """
+
+    def __init__(
+        self, face: Face, picture: Picture, newest: Callable[[], tuple[NDArray[Any], NDArray[Any]] | None]
+    ) -> None:
+        super().__init__(face, picture)
+        self._newest = newest
+        self.pose(np.zeros(len(face.shape_names), np.float32), np.zeros(len(HEAD_CHANNELS), np.float32))
+
+    def tick(self) -> bool:
+        """Move the head to what came last."""
+        now = self._newest()
+        if now is not None:
+            self.pose(*now)
+        return now is not None

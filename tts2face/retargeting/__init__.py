@@ -1,0 +1,1 @@
+"""Motion of a talker or performer transferred to a face."""

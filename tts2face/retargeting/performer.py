@@ -1,0 +1,145 @@
+"""A performer's face carried to any face: lips by least squares on the landmarks, eyes and brows by their scores."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+from tts2face.face.mouth_model import MIDDLE_PAIR
+from tts2face.models.face import Face
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, MOUTH_REGION, N_LANDMARKS
+from tts2face.models.talker import ShapeModel, Talker, speech_channels
+from tts2face.retargeting.to_face import Retargeter, retargeter
+from tts2face.types import Trajectory
+
+MOUTH_MODES = 20
+CLOSED_SHARE = 0.15  # of the frames are taken for those with the lips closed
+MOST_CONTACT_MM = 1.5  # a gap that a tracker reads on touching lips is below this
+SCORED = ("eye", "brow", "nose", "cheek")  # how the names begin of shapes that follow scores
+CALM = 0.04  # scores rise by this much from noise alone
+LID_OPEN, LID_SHUT = 0.9, 0.25  # quantile of the apertures of an open eye; share of it that is left of a shut one
+# Upper and lower lid, outer and inner corner of each eye.
+LIDS = {"Left": ((386, 385, 387), (374, 380, 373), 263, 362), "Right": ((159, 158, 160), (145, 153, 144), 33, 133)}
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Performer:
+    """The prepared way from one performer to one face."""
+
+    model: ShapeModel
+    lips: Retargeter
+    face: Face
+    open_lids: dict[str, float]
+    calm_scores: NDArray[np.float32]
+
+    def weights(self, landmarks: NDArray[np.floating], scores: Trajectory, *, gain: float = 1.0) -> Trajectory:
+        """Weights of the face's shapes (T, K).
+
+        Parameters
+        ----------
+        landmarks : (T, 478, 3)
+            Millimetres, head pose removed.
+        scores
+            Blendshape scores by name.
+        gain
+            Factor on the motion of lips and brows; lids and gaze keep their size.
+        """
+        speech = self.lip_motion(landmarks, scores.fps, gain=gain)
+        weights = np.array(self.lips.retarget(speech).values)
+        lids = {side: self._shut(landmarks, side) for side in LIDS}
+        for column, name in enumerate(self.face.shape_names):
+            if not name.startswith(SCORED) or name not in scores.channels:
+                continue
+            at = scores.channels.index(name)
+            moved = np.maximum(scores.values[:, at] - self.calm_scores[at] - CALM, 0.0)
+            if name.startswith("eyeBlink"):
+                moved = lids[name.removeprefix("eyeBlink")]
+            elif not name.startswith("eye"):
+                moved = gain * moved
+            weights[:, column] = np.clip(moved, *self.face.limits[column])
+        return Trajectory(self.face.shape_names, weights, scores.fps)
+
+    def lip_motion(self, landmarks: NDArray[np.floating], fps: float, *, gain: float = 1.0) -> Trajectory:
+        """Speech parameters of the performer's own model (T, S)."""
+        rest = self.model.rest
+        values = rest + gain * (self.model.parameters(landmarks) - rest)
+        return Trajectory(speech_channels(self.model), values, fps)
+
+    def _shut(self, landmarks: NDArray[np.floating], side: str) -> Floats:
+        opened = self.open_lids[side]
+        return np.clip((opened - aperture(landmarks, side)) / (opened * (1.0 - LID_SHUT)), 0.0, 1.0)
+
+
+def performer(landmarks: NDArray[np.floating], scores: Trajectory, face: Face) -> Performer:
+    """Prepare the way from a performer, known from some seconds of her face, to a face.
+
+    Parameters
+    ----------
+    landmarks : (T, 478, 3)
+        Millimetres, head pose removed.
+
+    Raises
+    ------
+    DataError
+        There are too few frames, or the face lacks the lips' landmarks or shapes.
+    """
+    model = lip_model(landmarks)
+    gaps = lip_gaps(landmarks)
+    closed = gaps[np.argsort(gaps[:, MIDDLE_PAIR], kind="stable")[: max(1, int(CLOSED_SHARE * len(gaps)))]]
+    contact = np.clip(np.percentile(closed, 50, axis=0), 0.0, MOST_CONTACT_MM)
+    talker = Talker(scores.fps, model, (), {"name": "performer"})
+    return Performer(
+        model=model,
+        lips=retargeter(talker, face, contact=contact),
+        face=face,
+        open_lids={side: float(np.quantile(aperture(landmarks, side), LID_OPEN)) for side in LIDS},
+        calm_scores=np.median(scores.values, axis=0),
+    )
+
+
+def lip_model(landmarks: NDArray[np.floating]) -> ShapeModel:
+    """Principal components of the mouth region of (T, 478, 3) landmarks; at rest the lips are closed.
+
+    Raises
+    ------
+    DataError
+        There are too few frames.
+    """
+    n_modes = min(MOUTH_MODES, len(landmarks) - 1)
+    if n_modes < 1:
+        raise DataError("one frame tells nothing of how a face moves; give a longer take")
+    mean = landmarks.mean(axis=0, dtype=np.float64)
+    region = np.isin(np.arange(N_LANDMARKS), MOUTH_REGION)
+    offsets = (landmarks[:, region] - mean[region]).reshape(len(landmarks), -1)
+    variances, vectors = np.linalg.eigh(np.asarray(offsets.T @ offsets / len(offsets), np.float64))
+    order = np.argsort(variances)[::-1][:n_modes]
+    basis = np.zeros((n_modes, N_LANDMARKS, 3))
+    basis[:, region] = vectors[:, order].T.reshape(n_modes, -1, 3)
+    gap = lip_gaps(landmarks)[:, MIDDLE_PAIR]
+    closed = gap <= np.quantile(gap, CLOSED_SHARE)
+    flat = np.median(landmarks[closed], axis=0) - mean
+    rest = basis.reshape(n_modes, -1) @ flat.ravel()
+    spread = np.sqrt(np.maximum(variances[order], 1e-12))
+    return ShapeModel(
+        mean=mean.astype(np.float32),
+        basis=basis.astype(np.float32),
+        spread=spread.astype(np.float32),
+        n_speech=n_modes,
+        rest=rest.astype(np.float32),
+    )
+
+
+def lip_gaps(landmarks: NDArray[np.floating]) -> Floats:
+    """(T, P) height of each upper inner lip point above the one that faces it, mm."""
+    upper, lower = landmarks[:, list(INNER_LIP_UPPER), 1], landmarks[:, list(INNER_LIP_LOWER), 1]
+    return np.asarray(upper - lower, np.float64)
+
+
+def aperture(landmarks: NDArray[np.floating], side: str) -> Floats:
+    """(T,) distance of the lids over the width of an eye, ``Left`` or ``Right``."""
+    upper, lower, outer, inner = LIDS[side]
+    height = np.linalg.norm(landmarks[:, list(upper)] - landmarks[:, list(lower)], axis=2).mean(axis=1)
+    return np.asarray(height / np.linalg.norm(landmarks[:, outer] - landmarks[:, inner], axis=1), np.float64)

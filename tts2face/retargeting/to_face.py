@@ -1,0 +1,208 @@
+"""Motion of a talker carried to a face, on the landmarks that both have.
+
+Least squares within each shape's limits; Theobald et al. 2007, eq. 5 (inner products), is its case of an orthonormal
+target without limits.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.sequence import PhoneSequence
+from tts2face.face.bounded_least_squares import bounded_least_squares
+from tts2face.face.landmark_fit import landmark_motion, landmark_places, turn_onto
+from tts2face.face.mouth_model import (
+    CHIN_POINTS,
+    CHIN_WEIGHT,
+    CORNERS_LEFT,
+    CORNERS_RIGHT,
+    MIDDLE_PAIR,
+    SPEECH_SHAPES,
+    WIDTH_WEIGHT,
+    landmark_weights,
+    mouth_curvature,
+    require_lips,
+)
+from tts2face.models.face import Face
+from tts2face.models.landmarks import (
+    INNER_LIP_LOWER,
+    INNER_LIP_UPPER,
+    MOUTH_CORNER_LEFT,
+    MOUTH_CORNER_RIGHT,
+    MOUTH_REGION,
+)
+from tts2face.models.talker import Talker
+from tts2face.numeric import ordered_product
+from tts2face.types import Trajectory
+
+FloatArray = NDArray[np.float64]
+
+BILABIALS = frozenset({"p", "b", "m"})
+SURE_CONTACT = 90  # percentile of the least gaps in bilabials: up to this gap the talker's lips touch
+MOST_CONTACT_MM = 1.5  # a tracker that reads more than this on touching lips is not to be trusted
+CLEAR_MM = 3.0  # this far beyond contact a gap is shown in full
+GAP_WEIGHT = 300.0  # the gap between facing lip points against one of the cheek: whether lips touch is what is seen
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Retargeter:
+    """The prepared way from a talker's speech parameters to a face's weights.
+
+    Parameters
+    ----------
+    moving : (k,)
+        Numbers of the face's shapes that speech moves.
+    curvature : (k, k)
+        Normal matrix of the weighted least squares.
+    pull : (k, S + 1)
+        Linear term of landmarks and width: ``pull[:, :S] @ parameters + pull[:, S]``.
+    gaps : (P, S + 1)
+        The talker's lip gaps in the face's size less `contact`: ``gaps[:, :S] @ parameters + gaps[:, S]``, mm.
+    contact, gap_rest : (P,)
+        Gaps that the tracker reads on touching lips; `gaps` at the talker's rest.
+    gap_pull, lip_pull : (k, P)
+        What a gap that shall be seen adds to the linear term, and what the landmarks of its two lips do per mm that
+        they shall go apart further than the talker's.
+    """
+
+    shape_names: tuple[str, ...]
+    moving: NDArray[np.int64]
+    limits: FloatArray
+    curvature: FloatArray
+    pull: FloatArray
+    gaps: FloatArray
+    contact: FloatArray
+    gap_rest: FloatArray
+    gap_pull: FloatArray
+    lip_pull: FloatArray
+
+    def retarget(self, speech: Trajectory) -> Trajectory:
+        """Weights of all shapes of the face, (T, K), for a trajectory of speech parameters, (T, S).
+
+        Each frame is solved on its own: the answer does not depend on what came before.
+        """
+        parameters = speech.values.astype(np.float64)
+        read = ordered_product(parameters, self.gaps[:, :-1].T) + self.gaps[:, -1]
+        over = np.maximum(read, 0.0)  # a face rests with its lips closed: its gaps are counted from there
+        shown = over + self.contact * np.minimum(over / CLEAR_MM, 1.0)
+        linear = ordered_product(parameters, self.pull[:, :-1].T) + self.pull[:, -1]
+        linear += ordered_product(shown, self.gap_pull.T) + ordered_product(
+            shown - read + self.gap_rest, self.lip_pull.T
+        )
+        solved = bounded_least_squares(self.curvature, linear, self.limits)
+        weights = np.zeros((len(parameters), len(self.shape_names)), np.float32)
+        weights[:, self.moving] = solved
+        return Trajectory(self.shape_names, weights, speech.fps)
+
+
+def retargeter(talker: Talker, face: Face, *, contact: FloatArray | None = None) -> Retargeter:
+    """Prepare the way from a talker to a face.
+
+    Parameters
+    ----------
+    contact : (P,)
+        Gaps, in the talker's mm, up to which facing lip points touch; `contact_gaps` of the talker without it.
+
+    Raises
+    ------
+    DataError
+        The face lacks the lips' landmarks, or has no shape that speech could move.
+    """
+    moving = np.array([i for i, name in enumerate(face.shape_names) if name.startswith(SPEECH_SHAPES)])
+    require_lips(face, moving)
+    common = [landmark for landmark in MOUTH_REGION if landmark in set(face.landmarks.tolist())]
+    at = {landmark: row for row, landmark in enumerate(common)}
+    rest, per_weight = landmark_places(face), landmark_motion(face, moving)
+    turn, scale = _onto_face(talker, face, rest)
+    moved = per_weight[[int(np.flatnonzero(face.landmarks == landmark)[0]) for landmark in common]]
+    wanted = _displacements(talker, common, scale * turn)
+    weighted = moved * landmark_weights(common)[..., None]
+    pull = np.einsum("ldk,lds->ks", weighted, wanted)
+    left, right = ([at[corner] for corner in corners] for corners in (CORNERS_LEFT, CORNERS_RIGHT))
+    upper, lower = ([at[lip] for lip in lips] for lips in (INNER_LIP_UPPER, INNER_LIP_LOWER))
+    widened, opened = moved[left, 0] - moved[right, 0], moved[upper, 1] - moved[lower, 1]
+    pull += WIDTH_WEIGHT * ordered_product(widened.T, wanted[left, 0] - wanted[right, 0])
+    chin = [at[landmark] for landmark in CHIN_POINTS if landmark in at]
+    dropped = moved[chin, 1].mean(axis=0)
+    pull += CHIN_WEIGHT * np.outer(dropped, wanted[chin, 1].mean(axis=0))
+    contact = scale * (contact_gaps(talker) if contact is None else contact)
+    gaps = _talker_gaps(talker, scale * turn[1], contact)
+    return Retargeter(
+        shape_names=face.shape_names,
+        moving=moving,
+        limits=face.limits[moving].astype(np.float64),
+        curvature=mouth_curvature(moved, common) + GAP_WEIGHT * ordered_product(opened.T, opened),
+        pull=pull,
+        gaps=gaps,
+        contact=contact,
+        gap_rest=ordered_product(gaps[:, :-1], talker.model.rest[: talker.model.n_speech]) + gaps[:, -1],
+        gap_pull=GAP_WEIGHT * opened.T,
+        lip_pull=(weighted[upper, 1] - weighted[lower, 1]).T / 2,
+    )
+
+
+def inner_product_map(source: NDArray[np.floating], target: NDArray[np.floating]) -> FloatArray:
+    """R (q, r) that carries parameters of a source basis (r, D) to an orthonormal target basis (q, D).
+
+    Notes
+    -----
+    Theobald et al. 2007, eq. 5: the inner products of the basis vectors. Signs look after themselves.
+    """
+    return np.asarray(target, np.float64) @ np.asarray(source, np.float64).T
+
+
+def _displacements(talker: Talker, common: list[int], onto_face: FloatArray) -> FloatArray:
+    """(L, 3, S + 1) motion of the talker's landmarks per parameter, and from rest to the origin of parameters, mm."""
+    n_speech = talker.model.n_speech
+    basis = talker.model.basis[:n_speech, common].astype(np.float64)
+    wanted = np.einsum("slc,dc->lds", basis, onto_face)
+    at_rest = ordered_product(wanted, talker.model.rest[:n_speech].astype(np.float64))
+    return np.concatenate([wanted, -at_rest[..., None]], axis=2)
+
+
+def _onto_face(talker: Talker, face: Face, rest: FloatArray) -> tuple[FloatArray, float]:
+    """Rotation (3, 3) of the talker's axes into the face's, and the face's size over the talker's at the mouth."""
+    model = talker.model
+    own = (model.mean + np.einsum("m,mld->ld", model.rest, model.basis)).astype(np.float64)
+    rows = {int(landmark): row for row, landmark in enumerate(face.landmarks)}
+    width = np.linalg.norm(rest[rows[MOUTH_CORNER_LEFT]] - rest[rows[MOUTH_CORNER_RIGHT]])
+    own_width = np.linalg.norm(own[MOUTH_CORNER_LEFT] - own[MOUTH_CORNER_RIGHT])
+    return turn_onto(own[face.landmarks], rest), float(width / own_width)
+
+
+def _talker_gaps(talker: Talker, up: FloatArray, contact: FloatArray) -> FloatArray:
+    """(P, S + 1) gaps of facing inner lip points over `contact`, along `up`."""
+    model, n_speech = talker.model, talker.model.n_speech
+    upper, lower = list(INNER_LIP_UPPER), list(INNER_LIP_LOWER)
+    basis = ordered_product((model.basis[:n_speech, upper] - model.basis[:n_speech, lower]).astype(np.float64), up)
+    mean = ordered_product((model.mean[upper] - model.mean[lower]).astype(np.float64), up)
+    return np.column_stack([basis.T, mean - contact])
+
+
+def contact_gaps(talker: Talker) -> FloatArray:
+    """(P,) gaps, in the talker's mm, up to which its tracked facing lip points touch: most bilabials come so near.
+
+    Taken where each bilabial's middle pair is nearest; without bilabials in the corpus, 0.
+    """
+    model, n_speech = talker.model, talker.model.n_speech
+    apart = model.basis[:n_speech, INNER_LIP_UPPER, 1] - model.basis[:n_speech, INNER_LIP_LOWER, 1]
+    mean = (model.mean[list(INNER_LIP_UPPER), 1] - model.mean[list(INNER_LIP_LOWER), 1]).astype(np.float64)
+    least = [np.zeros((0, len(mean)))]
+    for utterance in talker.utterances:
+        gaps = ordered_product(utterance.shape[:, :n_speech].astype(np.float64), apart) + mean
+        least.append(_least_in_bilabials(gaps, utterance.phones, talker.fps))
+    found = np.concatenate(least)
+    return (
+        np.clip(np.percentile(found, SURE_CONTACT, axis=0), 0.0, MOST_CONTACT_MM) if len(found) else np.zeros(len(mean))
+    )
+
+
+def _least_in_bilabials(gaps: FloatArray, phones: PhoneSequence, fps: float) -> FloatArray:
+    """(B, P) gaps of (T, P) at the frame of each bilabial where the middle pair is nearest."""
+    rows = []
+    for phone, start, end in zip(phones.phones, phones.edges[:-1], phones.edges[1:], strict=True):
+        first, last = int(np.floor(start * fps)), int(np.ceil(end * fps)) + 1
+        if phone in BILABIALS and len(gaps[first:last]):
+            rows.append(first + int(gaps[first:last, MIDDLE_PAIR].argmin()))
+    return gaps[rows]

@@ -1,0 +1,89 @@
+"""What a transcript says, word by word, and where in a recording each phone of it sounds."""
+
+from collections.abc import Sequence
+from itertools import count
+
+from lexicon.dictionary import Dictionary, cmudict_lookup
+from lexicon.errors import DataError
+from lexicon.pronounce import Word, pronounce
+from lexicon.sequence import PhoneSequence, WordSpan, concatenated
+from tts2face.speech.forced_alignment import Aligner
+from tts2face.speech.pauses import stretches
+from tts2face.types import Waveform
+
+Ways = tuple[tuple[str, ...], ...]  # pronunciations of one word, each a row of phones
+Script = tuple[tuple[str, Ways], ...]
+
+LONGEST_AT_ONCE_S = 60.0  # alignment takes memory with the square of the length: 234 MB
+LONGEST_STRETCH_S = 20.0  # of the parts into which longer recordings are cut
+
+
+def script(text: str, language: str, own: Dictionary | None = None) -> Script:
+    """The words of a text with their pronunciations; English ones with all that the dictionary knows.
+
+    Raises
+    ------
+    InputError
+        The text holds no word, or the language cannot read it.
+    BackendError
+        A word needs espeak-ng, which is not installed.
+    """
+    said = pronounce(text, language, own).words
+    return tuple((word.text, _ways(word, language, own)) for word in said)
+
+
+def _ways(word: Word, language: str, own: Dictionary | None) -> Ways:
+    if not language.startswith("en") or (own is not None and own.lookup(word.text) is not None):
+        return (word.phones,)
+    ways = [word.phones]
+    for number in count(2):
+        found = cmudict_lookup(f"{word.text}({number})")
+        if found is None:
+            break
+        ways.append(tuple(segment.phone for segment in found))
+    return tuple(dict.fromkeys(ways))
+
+
+def phones_in(sound: Waveform, words: Script) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+    """Phones and words on the clock of a sound, from 0 s to its end.
+
+    Raises
+    ------
+    DataError
+        The sound does not hold these words.
+    BackendError
+        It is longer than a minute, and nothing on this machine recognises phones, by which the words are placed.
+    """
+    aligner = Aligner()
+    if sound.duration <= LONGEST_AT_ONCE_S:
+        found = aligner.align(sound, words)
+        return found.phones, found.words
+    parts = [_part(sound, span) for span in stretches(sound, LONGEST_STRETCH_S)]
+    phones, spans = [], []
+    for part, said in zip(parts, _placed(parts, words), strict=True):
+        if said:
+            found = aligner.align(part, said)
+            phones.append(found.phones)
+            spans.append(found.words)
+        else:
+            phones.append(PhoneSequence(["sil"], [0.0, part.duration]))
+            spans.append(())
+    return concatenated(phones, spans)
+
+
+def _placed(parts: Sequence[Waveform], words: Script) -> list[Script]:
+    """The words that are said in each part."""
+    from tts2face.speech.phone_recognition import PhoneRecogniser
+    from tts2face.speech.transcript_placement import stretch_of_words
+
+    recogniser = PhoneRecogniser()
+    heard = [[phone for word in recogniser.words(part) for phone in word] for part in parts]
+    if not any(heard):
+        raise DataError("no speech is heard; give a recording of somebody who speaks")
+    places = stretch_of_words([ways[0] for _, ways in words], heard)
+    return [tuple(word for word, place in zip(words, places, strict=True) if place == at) for at in range(len(parts))]
+
+
+def _part(sound: Waveform, span: tuple[float, float]) -> Waveform:
+    first, last = (round(second * sound.rate) for second in span)
+    return Waveform(sound.samples[first:last], sound.rate)

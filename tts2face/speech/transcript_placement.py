@@ -1,0 +1,111 @@
+"""Which words of a long text are said in which stretch of a long recording.
+
+Phones heard and phones written are matched by the cheapest edits (Wagner and Fischer 1974), within a band, so that an
+hour of speech takes seconds and little memory.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from tts2face.compilation import kernel
+
+BAND = 1500  # phones that the text may run ahead of or behind the sound: two minutes of speech
+OTHER = 1.0  # cost of a phone heard as another
+MISSED = 0.7  # of a phone that is not heard or not written; two of them cost more than one heard as another
+SAID, MISHEARD, SKIPPED = 0, 1, 2  # steps back: both sequences, the heard one, the written one
+
+Phones = Sequence[str]
+
+
+def stretch_of_words(words: Sequence[Phones], heard: Sequence[Phones]) -> NDArray[np.int64]:
+    """(W,) the stretch in which each word is said; they do not fall.
+
+    Parameters
+    ----------
+    words
+        Phones of each word as written.
+    heard
+        Phones heard in each stretch.
+
+    Raises
+    ------
+    InputError
+        There is no word, or no stretch.
+    """
+    if not words or not heard:
+        raise InputError("placing words needs words, and stretches of sound")
+    numbers: dict[str, int] = {}
+    written = np.array([numbers.setdefault(phone, len(numbers)) for word in words for phone in word], np.int64)
+    sounded = np.array([numbers.setdefault(phone, len(numbers)) for phones in heard for phone in phones], np.int64)
+    stretch_of_sounded = np.repeat(np.arange(len(heard)), [len(phones) for phones in heard])
+    if not len(sounded) or not len(written):
+        return np.zeros(len(words), np.int64)
+    partner = _partners(written, sounded, max(BAND, abs(len(written) - len(sounded)) + BAND // 4))
+    places = stretch_of_sounded[np.clip(partner, 0, len(sounded) - 1)]
+    ends = np.cumsum([len(word) for word in words])
+    found = [
+        int(np.median(places[max(end - len(word), 0) : end])) if len(word) else int(places[min(end, len(places) - 1)])
+        for word, end in zip(words, ends, strict=True)
+    ]
+    return np.maximum.accumulate(np.array(found, np.int64))
+
+
+@kernel
+def _partners(written: NDArray[np.int64], sounded: NDArray[np.int64], band: int) -> NDArray[np.int64]:
+    """(N,) index of the sounded phone that each written one is matched with, or of the one before it."""
+    n, m, width = len(written), len(sounded), 2 * band + 1
+    steps = np.full((n + 1, width), SKIPPED, np.uint8)
+    before = np.full(width, np.inf, np.float32)
+    for j in range(min(width - band, m + 1)):
+        before[j + band] = j * MISSED
+        steps[0, j + band] = MISHEARD
+    for i in range(1, n + 1):
+        low, low_before = i * m // n - band, (i - 1) * m // n - band
+        before = _row(written[i - 1], sounded, before, (low, low_before), steps[i])
+    partners: NDArray[np.int64] = _traced(steps, m, band)
+    return partners
+
+
+@kernel
+def _row(
+    phone: int,
+    sounded: NDArray[np.int64],
+    before: NDArray[np.float32],
+    lows: tuple[int, int],
+    steps: NDArray[np.uint8],
+) -> NDArray[np.float32]:
+    """Costs of one written phone's row of the band, from the row before; writes the steps that lead there."""
+    low, low_before = lows
+    width = len(before)
+    row = np.full(width, np.inf, np.float32)
+    for k in range(max(0, -low), min(width, len(sounded) + 1 - low)):
+        j = low + k
+        above = j - low_before
+        if above < width:
+            row[k] = before[above] + MISSED
+        if j > 0 and 0 < above <= width:
+            cost = before[above - 1] + (0.0 if phone == sounded[j - 1] else OTHER)
+            if cost <= row[k]:
+                row[k], steps[k] = cost, SAID
+        if j > 0 and k > 0 and row[k - 1] + MISSED < row[k]:
+            row[k], steps[k] = row[k - 1] + MISSED, MISHEARD
+    return row
+
+
+@kernel
+def _traced(steps: NDArray[np.uint8], m: int, band: int) -> NDArray[np.int64]:
+    n = len(steps) - 1
+    partner = np.zeros(n, np.int64)
+    i, j = n, m
+    while i > 0:
+        step = steps[i, j - (i * m // n - band)]
+        if step == MISHEARD:
+            j -= 1
+        else:
+            partner[i - 1] = max(j - 1, 0)
+            i -= 1
+            j -= step == SAID
+    return partner

@@ -1,0 +1,150 @@
+"""A person before a camera drives a face while she moves; her first seconds teach how she moves."""
+
+import threading
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.models.face import Face
+from tts2face.retargeting.performer import Performer, performer
+from tts2face.types import Trajectory
+from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
+from tts2face.video.media import Picture
+from tts2face.video.pose import head_angles, remove_pose
+from tts2face.video.track import FaceTracker
+
+LEARNING_S = 5.0  # in which lips close and open, and eyes blink
+LEAST_LEARNT = 40  # frames with a face
+SIZE_S = 2.0  # over which the size of the face is averaged
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose:
+    """What a face shows at one moment: ``weights`` (K,) of its shapes and ``head`` (6,) as `HEAD_CHANNELS`."""
+
+    weights: NDArray[np.float32]
+    head: NDArray[np.float32]
+
+
+def poses(
+    pictures: Iterable[Picture], face: Face, tracker: FaceTracker, reader: BlendshapeReader, fps: float
+) -> Iterator[Pose | None]:
+    """A pose for each picture as soon as it comes; None while the person is learnt, or cannot be seen.
+
+    Parameters
+    ----------
+    fps
+        About how many pictures come each second.
+
+    Raises
+    ------
+    DataError
+        The face lacks landmarks or shapes.
+    """
+    learning, ready = _Learning(), None
+    recent: deque[NDArray[np.float32]] = deque(maxlen=max(2, round(SIZE_S * fps)))
+    waiting: deque[Picture] = deque()
+    for (points, _), _ in tracker.follow(_passed(pictures, waiting)):
+        time = waiting.popleft().time
+        if not np.isfinite(points[0, 0]):
+            yield None
+            continue
+        recent.append(points)
+        scores = reader.blendshape_scores(points)
+        if ready is None:
+            learning.add(time, points, scores)
+            ready = learning.done(face, fps)
+            yield None
+        else:
+            yield ready.pose(np.array(recent), scores, fps)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Ready:
+    """A person who was learnt: the way from her to the face, and how her head stood."""
+
+    way: Performer
+    head: NDArray[np.float64]
+
+    def pose(self, recent: NDArray[np.float32], scores: NDArray[np.float32], fps: float) -> Pose:
+        """The pose of the last of the recent landmarks (T, 478, 3) in pixels."""
+        posed = remove_pose(recent, fps)
+        now = Trajectory(BLENDSHAPES, scores[None], fps)
+        weights = self.way.weights(posed.landmarks[-1:], now).values[0]
+        head = np.concatenate([head_angles(posed.rotations[-1:])[0], posed.shifts[-1]]) - self.head
+        head[5] = 0.0  # sizes of moments far apart are not compared
+        return Pose(weights, head.astype(np.float32))
+
+
+class _Learning:
+    """The first seconds of a person."""
+
+    def __init__(self) -> None:
+        self._times: list[float] = []
+        self._points: list[NDArray[np.float32]] = []
+        self._scores: list[NDArray[np.float32]] = []
+
+    def add(self, time: float, points: NDArray[np.float32], scores: NDArray[np.float32]) -> None:
+        """Take one more frame."""
+        self._times.append(time)
+        self._points.append(points)
+        self._scores.append(scores)
+
+    def done(self, face: Face, fps: float) -> _Ready | None:
+        """The person, as soon as enough of her was seen."""
+        if len(self._times) < LEAST_LEARNT or self._times[-1] - self._times[0] < LEARNING_S:
+            return None
+        posed = remove_pose(np.array(self._points), fps)
+        scores = Trajectory(BLENDSHAPES, np.array(self._scores), fps)
+        head = np.column_stack([head_angles(posed.rotations), posed.shifts])
+        return _Ready(performer(posed.landmarks, scores, face), np.median(head, axis=0))
+
+
+class Actor:
+    """A person who is watched in a thread of its own; a window asks for what she did last.
+
+    Raises
+    ------
+    BackendError
+        LiteRT, OpenCV or the landmark models are missing.
+    """
+
+    def __init__(self, pictures: Iterable[Picture], face: Face, fps: float, model: Path | None = None) -> None:
+        self._poses = poses(pictures, face, FaceTracker(model), BlendshapeReader(model), fps)
+        self._last: Pose | None = None
+        self._stopped = False
+        self._watching = threading.Thread(target=self._watch, name="actor", daemon=True)
+
+    def __enter__(self) -> "Actor":
+        """Begin to watch."""
+        self._watching.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop watching."""
+        self._stopped = True
+        self._watching.join()
+
+    def newest(self) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
+        """Weights and head of the last moment, once; None where nothing new has come."""
+        last, self._last = self._last, None
+        return None if last is None else (last.weights, last.head)
+
+    def _watch(self) -> None:
+        for pose in self._poses:
+            self._last = pose or self._last
+            if self._stopped:
+                return
+
+
+def _passed(pictures: Iterable[Picture], waiting: "deque[Picture]") -> Iterator[NDArray[np.uint8]]:
+    for picture in pictures:
+        waiting.append(picture)
+        yield picture.pixels

@@ -1,0 +1,273 @@
+"""A voice speaks a sentence with its marks: the sound with its pauses, and when each mark is reached."""
+
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from itertools import pairwise
+from typing import Protocol
+
+import numpy as np
+
+from lexicon.cleaning import plain
+from lexicon.errors import InputError
+from lexicon.marked_text import Mark, MarkedText, NameMark, NodMark, Run
+from lexicon.normalize import normalize
+from lexicon.pronounce import PAUSES_S
+from lexicon.sentences import Sentence, Utterance, by_letters, n_letters, up_to
+from lexicon.sequence import PhoneSequence, WordSpan
+from tts2face.clock import first_sample
+from tts2face.gesture.easing import presence
+from tts2face.gesture.notation import style_of
+from tts2face.gesture.spans import Nod, StyleSpan
+from tts2face.gesture.timeline import Timeline
+from tts2face.request import RATES, VOLUMES, Request
+from tts2face.synthesis.speech_joining import joined, silence
+from tts2face.types import Speech, Waveform, frame_count, joined_speech
+from tts2face.voice.engine import Voice, at_volume
+
+LEAST_GAP_S = 0.02  # between utterances of a sentence: less cuts into their sounds (edges are good to 16 ms)
+JOINT_S = 0.06  # where only the speed changes
+IDLE_PART_S = 10.0  # of a silent clip, as a long sentence
+IDLE_RATE = 48_000  # Hz, of its silence
+RAMP_S = 0.03  # from one loudness to another
+
+
+@dataclass(frozen=True, slots=True)
+class Reached:
+    """A named mark, and the second at which it is reached."""
+
+    name: str
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Said:
+    """A sentence's sound, and what its marks ask for, on its own clock."""
+
+    speech: Speech
+    timeline: Timeline
+    marks: tuple[Reached, ...]
+
+
+class WordTimes:
+    """When the letters of a text are spoken: each word at its onset, known from the words that a voice tells.
+
+    The words before a letter are counted in the text as it is said. Where a voice counts its words in another way the
+    letter is placed at the border of words that has the most nearly equal share of letters before it.
+
+    Parameters
+    ----------
+    first
+        Number of the text's first letter.
+    """
+
+    def __init__(
+        self, written: str, phones: PhoneSequence, words: Sequence[WordSpan], *, language: str, first: int = 0
+    ) -> None:
+        self._written, self._language, self._first = written, language, first
+        self._n_letters = max(n_letters(written), 1)
+        self._onsets = [float(phones.edges[word.first]) for word in words] or [phones.start]
+        self._ends = [float(phones.edges[word.last]) for word in words] or [phones.end]
+        self._are_counted = self._count(written) == len(self._onsets)
+        lengths = [max(n_letters(word.text), 1) for word in words] or [1]
+        self._found: dict[int, int] = {}
+        self._shares = np.concatenate([[0.0], np.cumsum(lengths) / sum(lengths)])
+
+    def onset(self, letter: int) -> float:
+        """Second at which the word at or behind a letter begins; behind the last word its end."""
+        word = self._words_before(letter)
+        return self._onsets[word] if word < len(self._onsets) else self._ends[-1]
+
+    def end(self, letter: int) -> float:
+        """Second at which the word before a letter ends; the first word's onset where there is none."""
+        word = self._words_before(letter)
+        return self._ends[word - 1] if word > 0 else self._onsets[0]
+
+    def _words_before(self, letter: int) -> int:
+        if letter not in self._found:
+            self._found[letter] = self._searched(min(max(letter - self._first, 0), self._n_letters))
+        return self._found[letter]
+
+    def _searched(self, at: int) -> int:
+        if not self._are_counted:
+            return int(np.abs(self._shares - at / self._n_letters).argmin())
+        before = up_to(self._written, at).rstrip()
+        rest = self._written[len(before) :]
+        is_inside = before[-1:].isalnum() and rest[:1].isalnum()
+        return min(self._count(before) - is_inside, len(self._onsets))
+
+    def _count(self, written: str) -> int:
+        is_english = self._language.startswith("en")
+        said = normalize(written) if is_english else plain(written, keep_marks=True)
+        return sum(any(letter.isalnum() for letter in word) for word in said.split())
+
+
+class _Clock(Protocol):
+    def onset(self, letter: int) -> float: ...
+
+    def end(self, letter: int) -> float: ...
+
+
+@dataclass(frozen=True, slots=True)
+class _SentenceTimes:
+    """When the letters of several utterances are spoken: the letters that each begins with, its clock, its seconds."""
+
+    firsts: tuple[int, ...]
+    clocks: tuple[WordTimes, ...]
+    begins: tuple[float, ...]
+
+    def onset(self, letter: int) -> float:
+        at = max(bisect_right(self.firsts, letter) - 1, 0)
+        return self.begins[at] + self.clocks[at].onset(letter)
+
+    def end(self, letter: int) -> float:
+        at = max(bisect_left(self.firsts, letter) - 1, 0)
+        return self.begins[at] + self.clocks[at].end(letter)
+
+
+def say(voice: Voice, sentence: Sentence, request: Request) -> Said:
+    """Speak a sentence with its pauses, speeds and loudness, and find when its marks are reached.
+
+    A sentence in which nothing is marked is what the voice makes of it, byte for byte.
+
+    Raises
+    ------
+    InputError
+        The voice cannot say it.
+    """
+    speeches, clocks = [], []
+    for part in sentence.utterances:
+        speech = voice.speak(part.text, rate=request.rate * part.rate, volume=request.volume, seed=request.seed)
+        clock = WordTimes(part.written, speech.phones, speech.words, language=request.language, first=part.first)
+        speeches.append(_louder(speech, sentence.runs, part, clock))
+        clocks.append(clock)
+    speech, begins = joined(speeches, [_gap(part) for part in sentence.utterances[:-1]])
+    if sentence.lead > 0:
+        before = silence(sentence.lead, voice.sample_rate)
+        speech, begins = joined_speech([before, speech]), [second + before.waveform.duration for second in begins]
+    pause = sentence.utterances[-1].pause
+    if pause:
+        speech = joined_speech([speech, silence(pause, voice.sample_rate)])
+    times = _SentenceTimes(tuple(part.first for part in sentence.utterances), tuple(clocks), tuple(begins))
+    return Said(speech, *reached(sentence.runs, sentence.marks, times, (sentence.first, sentence.last)))
+
+
+def silent(seconds: float, fps: Fraction, n_steps: int) -> Iterator[tuple[Said, int]]:
+    """Seconds in which nothing is said, in parts that end on frames, and the share of each in so many steps."""
+    n_frames = frame_count(seconds, float(fps))
+    bounds = [*range(0, n_frames, max(round(IDLE_PART_S * fps), 1)), n_frames]
+    for first, last in pairwise(bounds):
+        n_samples = first_sample(last, IDLE_RATE, fps) - first_sample(first, IDLE_RATE, fps)
+        steps = n_steps * last // n_frames - n_steps * first // n_frames
+        yield Said(silence(n_samples / IDLE_RATE, IDLE_RATE), Timeline(), ()), steps
+
+
+def reached(
+    runs: Sequence[Run], marks: Sequence[Mark], times: _Clock, letters: tuple[int, int]
+) -> tuple[Timeline, tuple[Reached, ...]]:
+    """What marks ask for in a stretch of letters, on the clock that tells when these are spoken.
+
+    A style from the first letter on holds from 0 s, one to the last letter without end; between them it begins with its
+    first word and ends with its last one, or where another style goes on.
+    """
+    first, last = letters
+    spans: list[StyleSpan] = []
+    behind = 0.0
+    for run, following in zip(runs, [*runs[1:], None], strict=True):
+        start = max(times.onset(run.start) if run.start > first else 0.0, behind)
+        if following is None or following.start >= last:
+            end = math.inf
+        else:
+            end = times.onset(following.start) if following.styles else times.end(following.start)
+        behind = max(end, behind)
+        if start < end:
+            spans += [StyleSpan(feature, style, start, end) for feature, style in styles_of(run.styles).items()]
+    nods = tuple(Nod(times.onset(mark.at), mark.size) for mark in marks if isinstance(mark, NodMark))
+    names = tuple(Reached(mark.name, times.onset(mark.at)) for mark in marks if isinstance(mark, NameMark))
+    return Timeline(spans=tuple(spans), nods=nods), names
+
+
+def reached_in(
+    text: MarkedText, phones: PhoneSequence, words: Sequence[WordSpan], language: str
+) -> tuple[Timeline, tuple[Reached, ...]]:
+    """What marks ask for in a recording whose words are known, as `reached`; nothing where there are no words."""
+    if not words:
+        return Timeline(), ()
+    placed = by_letters(text)
+    times = WordTimes(text.text, phones, words, language=language)
+    return reached(placed.runs, placed.marks, times, (0, n_letters(text.text)))
+
+
+@lru_cache(maxsize=1000)
+def styles_of(nested: tuple[str, ...]) -> Mapping[str, str]:
+    """Style of each feature under nested marks, the innermost of which counts."""
+    chosen: dict[str, str] = {}
+    for written in nested:
+        chosen |= style_of(written)
+    return chosen
+
+
+def marked_styles(text: MarkedText) -> tuple[str, ...]:
+    """Names of all styles that a text asks for, in order of first use; errors as `check_marks`."""
+    runs = dict.fromkeys(run.styles for run in text.runs)
+    return tuple(dict.fromkeys(style for styles in runs for style in styles_of(styles).values()))
+
+
+def check_marks(text: MarkedText, request: Request) -> None:
+    """Refuse marks that go with no request, or not with this one; cheap at any length.
+
+    Raises
+    ------
+    InputError
+        A style is written wrongly, speed or loudness are out of range together with the request's, the text names
+        another language, or a recording is to pause or to change its voice.
+    """
+    if request.audio is not None and text.changes_voice:
+        raise InputError(
+            "a recording keeps its own pauses, speed and loudness; "
+            "leave [pause], <break>, <prosody> and <emphasis> away"
+        )
+    if text.language is not None and text.language.lower().split("-")[0] != request.language.lower().split("-")[0]:
+        raise InputError(f"the text names the language {text.language}, not {request.language}; choose one of them")
+    marked_styles(text)
+    for what, marked, asked, (low, high) in (
+        ("speed", {run.rate for run in text.runs}, request.rate, RATES),
+        ("loudness", {run.volume for run in text.runs}, request.volume, VOLUMES),
+    ):
+        for factor in marked:
+            if not low <= factor * asked <= high:
+                raise InputError(
+                    f"a {what} of {factor:g} in the text times {asked:g} of the request lies outside "
+                    f"{low:g} to {high:g}; change one of them"
+                )
+
+
+def _gap(utterance: Utterance) -> float:
+    """Seconds of silence between an utterance and the next one of its sentence."""
+    if utterance.pause is not None:
+        return max(utterance.pause, LEAST_GAP_S)
+    return max(PAUSES_S.get(utterance.written[-1:], 0.0), JOINT_S)
+
+
+def _louder(speech: Speech, runs: Sequence[Run], part: Utterance, times: WordTimes) -> Speech:
+    """An utterance with the loudness of its runs; turned down as a whole where it would exceed full scale."""
+    mine = [
+        (run.volume, max(run.start, part.first), end)
+        for run, end in zip(runs, [*(run.start for run in runs[1:]), part.last], strict=True)
+        if run.start < part.last and end > part.first
+    ]
+    if all(volume == 1.0 for volume, _, _ in mine):
+        return speech
+    sound = speech.waveform
+    seconds = np.arange(len(sound.samples)) / sound.rate
+    gain = np.ones(len(seconds))
+    for volume, first, last in mine:
+        start = times.onset(first) if first > part.first else 0.0
+        end = times.end(last) if last < part.last else math.inf
+        if start < end:
+            gain += (volume - 1.0) * presence(seconds, start, end, RAMP_S)
+    louder = at_volume(sound.samples * np.maximum(gain, 0.0), 1.0)
+    return Speech(Waveform(louder, sound.rate), speech.phones, speech.words)

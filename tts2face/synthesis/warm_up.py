@@ -1,0 +1,63 @@
+"""The first run on a machine compiles the kernels; afterwards they lie on disk.
+
+What moves the lips is compiled in a process of its own while this one compiles what draws: numba compiles one kernel
+at a time in a process.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.models.face import Face
+from tts2face.models.talker import Talker
+from tts2face.render import raster
+from tts2face.render.draw import draw
+from tts2face.render.picture import Picture
+
+COMPILE_MOTION = "from tts2face.synthesis.warm_up import compile_motion; compile_motion()"
+PATIENCE_S = 120.0
+
+
+def kernels_are_compiled() -> bool:
+    """Whether the drawing kernels lie compiled on disk; without them the first picture takes some seconds longer."""
+    folder = Path(str(raster.draw_band.stats.cache_path))  # type: ignore[attr-defined]
+    source = Path(raster.__file__).stat().st_mtime
+    return any(index.stat().st_mtime >= source for index in folder.glob("raster.draw_band-*.nbi"))
+
+
+def compile_kernels(face: Face) -> None:
+    """Compile all kernels that a clip needs. Where the other process fails they are compiled at their first use."""
+    other = subprocess.Popen(
+        [sys.executable, "-c", COMPILE_MOTION], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    try:
+        draw(face, np.zeros(len(face.shape_names), np.float32), picture=Picture(size="64x64"))
+        other.wait(PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        other.kill()
+    finally:
+        if other.poll() is None:
+            other.kill()
+        other.wait()
+
+
+def compile_motion() -> None:
+    """Compile what turns phones into a face's weights and adds gestures, by moving the shipped faces a little."""
+    from tts2face.exemplar.synthesis import speech_trajectory, visual_voice
+    from tts2face.gesture.gesture_stream import Fields, GestureStream
+    from tts2face.gesture.timeline import Timeline
+    from tts2face.models.face_file import load_face
+    from tts2face.models.palette import load_palette
+    from tts2face.models.talker import load_talker
+    from tts2face.retargeting.to_face import retargeter
+    from tts2face.types import Waveform
+
+    talker: Talker = load_talker("grid_s1")
+    way = retargeter(talker, load_face("head"))
+    phones = PhoneSequence([SILENCE, "p", "f", "ɑ", SILENCE], [0.0, 0.3, 0.4, 0.5, 0.7, 1.0])
+    way.retarget(speech_trajectory(phones, visual_voice(talker), fps=30.0, n_frames=30))
+    gestures = GestureStream(Fields(load_palette("starter")), style="grid_s1", seed=0, fps=30.0)
+    gestures.next(Waveform(np.zeros(1600), 16_000), 3, Timeline())

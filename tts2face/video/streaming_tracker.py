@@ -1,0 +1,142 @@
+"""Landmarks of a film read as it runs: one pass over the pictures, the numbers of `FaceTracker.track`."""
+
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.models.landmarks import N_LANDMARKS
+from tts2face.prefetch import Ahead
+from tts2face.video.media import Picture
+from tts2face.video.track import CROP_SMOOTHING_S, LEAST_SCORE, Crop, FaceTracker, moved, smoothed_crops
+
+MOST_PIXELS = 1280  # along the longer side; a face in a larger picture is larger than the networks' input anyway
+REACH = 4.0  # standard deviations over which squares are smoothed
+LOOK_S = 0.5  # between looks for further faces
+CHANGE_STEP = 2  # every second pixel of every second row tells whether a picture differs from the one before
+ROOM = 4  # pictures that are decoded and followed ahead
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sight:
+    """What one picture shows, at `time` seconds.
+
+    Parameters
+    ----------
+    points : (478, 3)
+        Pixels of the picture as `Tracking` has them; NaN without a face.
+    score
+        Probability that the landmarks lie on a face.
+    n_faces
+        Faces in the picture, counted every `LOOK_S`; None where they were not counted.
+    change
+        Mean difference from the picture before, in steps of 8 bits; infinite for the first.
+    """
+
+    time: float
+    points: NDArray[np.float32]
+    score: float
+    n_faces: int | None
+    change: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Followed:
+    """A picture of at most `MOST_PIXELS`, `scale` of the one it was made from, and the face's square in it."""
+
+    picture: Picture
+    scale: float
+    n_faces: int | None
+    change: float
+    crop: Crop | None = None
+
+
+class FilmReader:
+    """Reads the landmarks of films; needs two sets of networks, for following and reading go side by side.
+
+    Raises
+    ------
+    BackendError
+        LiteRT, OpenCV or the bundle is missing.
+    """
+
+    def __init__(self, model: Path | None = None) -> None:
+        self._follower, self._reader = FaceTracker(model), FaceTracker(model)
+
+    def sights(self, pictures: Iterable[Picture], fps: float) -> Iterator[Sight]:
+        """What each picture shows in turn, some 0.6 s behind, in memory that does not grow."""
+        reach = int(REACH * CROP_SMOOTHING_S * fps + 0.5)
+        window: deque[_Followed] = deque()
+        at = 0  # place in the window of the picture to read next
+        with Ahead(self._followed(pictures, fps), ROOM) as followed:
+            for found in followed:
+                window.append(found)
+                if len(window) > at + reach:
+                    yield self._read(window, at, fps)
+                    at += 1
+                if at > reach:
+                    window.popleft()
+                    at -= 1
+            while at < len(window):
+                yield self._read(window, at, fps)
+                at += 1
+
+    def _followed(self, pictures: Iterable[Picture], fps: float) -> Iterator[_Followed]:
+        waiting: deque[_Followed] = deque()
+
+        def shrunk() -> Iterator[NDArray[np.uint8]]:
+            for found in self._glanced(pictures, max(1, round(LOOK_S * fps))):
+                waiting.append(found)
+                yield found.picture.pixels
+
+        for _, crop in self._follower.follow(shrunk()):
+            yield replace(waiting.popleft(), crop=crop)
+
+    def _glanced(self, pictures: Iterable[Picture], every: int) -> Iterator[_Followed]:
+        before = None
+        for number, picture in enumerate(pictures):
+            small, scale = _shrunk(picture.pixels)
+            n_faces = self._follower.count(small) if number % every == 0 else None
+            grey = small[::CHANGE_STEP, ::CHANGE_STEP, 1].astype(np.int16)
+            change = (
+                float(np.abs(grey - before).mean()) if before is not None and before.shape == grey.shape else np.inf
+            )
+            before = grey
+            yield _Followed(Picture(picture.time, small), scale, n_faces, change)
+
+    def _read(self, window: "deque[_Followed]", at: int, fps: float) -> Sight:
+        here = window[at]
+        crop = smoothed_crops([found.crop for found in window], fps)[at]
+        points, score = np.full((N_LANDMARKS, 3), np.nan, np.float32), 0.0
+        if crop is not None:
+            readings = [self._reader.read_crop(here.picture.pixels, near) for near in moved(crop)]
+            score = float(np.mean([score for _, score in readings]))
+            if score >= LEAST_SCORE:
+                points = np.mean([points for points, _ in readings], axis=0, dtype=np.float32)
+                points = _enlarged(points, here.scale)
+        return Sight(here.picture.time, points, score, here.n_faces, here.change)
+
+
+def _shrunk(pixels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float]:
+    """A picture of at most `MOST_PIXELS` along its longer side, and its size over that of the picture given."""
+    height, width = pixels.shape[:2]
+    if max(height, width) <= MOST_PIXELS:
+        return pixels, 1.0
+    import cv2
+
+    scale = MOST_PIXELS / max(height, width)
+    size = (round(width * scale), round(height * scale))
+    small: NDArray[Any] = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+    return small.astype(np.uint8, copy=False), scale
+
+
+def _enlarged(points: NDArray[np.float32], scale: float) -> NDArray[np.float32]:
+    """Points of a shrunk picture in the picture that it was made from; pixel centres lie at whole numbers."""
+    if scale == 1.0:
+        return points
+    centre = np.array([0.5, 0.5, 0.0], np.float32)
+    return np.asarray((points + centre) / np.float32(scale) - centre, np.float32)
