@@ -17,7 +17,7 @@ from corpus_tools.decomposition.face_motion import rest_landmarks
 from corpus_tools.decomposition.livelink import captured_livelink
 from corpus_tools.decomposition.marker_set import read_marker_set
 from corpus_tools.decomposition.markers import captured_markers
-from tests.corpus_tools.decompose.made_markers import FPS, SIZE, made_take, write_c3d
+from tests.corpus_tools.decomposition.made_markers import FPS, SIZE, made_take, write_c3d
 from tts2face.face.expressions import expression_landmarks
 from tts2face.face.landmark_fit import N_SKIN
 from tts2face.models.face_file import load_face

@@ -9,7 +9,7 @@ import pytest
 
 from corpus_tools.clone_talker import clone_talker, cloned_talker
 from lexicon.errors import InputError
-from tests.face.test_clone import gaps_of, model_of, opening_model
+from tests.cloning.test_clone import gaps_of, model_of, opening_model
 from tts2face.cloning.parameter_transfer import cloning, face_size
 from tts2face.models.talker import Talker, load_talker, read_talker
 

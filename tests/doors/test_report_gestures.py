@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from cli.main import run
-from tests.corpus_tools.gesturing.made_palette import made_palette
+from tests.corpus_tools.gesture_study.made_palette import made_palette
 from tts2face.models.palette import write_palette
 
 

@@ -13,7 +13,7 @@ from lexicon.mark_parser import marked
 from lexicon.marked_text import NodMark
 from lexicon.sentences import Sentence, by_letters, sentences
 from lexicon.sequence import SILENCE
-from tests.spoken.fake_voice import LEAD, LETTER, LEVEL, RATE, TRAIL, FakeVoice
+from tests.synthesis.fake_voice import LEAD, LETTER, LEVEL, RATE, TRAIL, FakeVoice
 from tts2face.gesture.spans import Nod, StyleSpan
 from tts2face.request import Request
 from tts2face.synthesis.marked_speech import LEAST_GAP_S, Reached, Said, check_marks, marked_styles, reached_in, say

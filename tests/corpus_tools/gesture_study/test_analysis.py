@@ -8,7 +8,7 @@ from corpus_tools.gesture_study.clips import dealt, from_field, from_noise, some
 from corpus_tools.gesture_study.measures import recordings
 from corpus_tools.gesture_study.traits import brow_lift, traits_of
 from lexicon.errors import InputError
-from tests.corpus_tools.gesturing.made_palette import BLINK, N_FRAMES, made_palette, made_style
+from tests.corpus_tools.gesture_study.made_palette import BLINK, N_FRAMES, made_palette, made_style
 from tts2face.gesture.gesture_stream import Fields, GestureStream, middle_of
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import GESTURE_FPS

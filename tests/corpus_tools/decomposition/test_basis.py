@@ -11,7 +11,7 @@ from corpus_tools.decomposition.marker_set import MarkerSet
 from corpus_tools.decomposition.markers import marker_face
 from corpus_tools.decomposition.stills import PictureReader, Still, marker_reader, named_stills, stills_in
 from lexicon.errors import DataError, InputError
-from tests.corpus_tools.decompose.made_markers import SIZE, made_take, write_table
+from tests.corpus_tools.decomposition.made_markers import SIZE, made_take, write_table
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.palette import EXPRESSIONS

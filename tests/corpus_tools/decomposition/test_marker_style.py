@@ -13,7 +13,7 @@ from corpus_tools.decomposition.marker_set import MarkerSet
 from corpus_tools.decomposition.stills import Still, stills_in
 from corpus_tools.run_options import Effort
 from lexicon.errors import InputError
-from tests.corpus_tools.decompose.made_markers import Made, made_take, write_c3d, write_table
+from tests.corpus_tools.decomposition.made_markers import Made, made_take, write_c3d, write_table
 from tts2face.face.expressions import expression_weights, expressive
 from tts2face.face.lip_constraints import mouth_of
 from tts2face.models.face import Face

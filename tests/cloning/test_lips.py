@@ -8,7 +8,7 @@ from hypothesis import given
 from scipy.optimize import minimize
 
 from lexicon.errors import DataError
-from tests.face.test_clone import gaps_of, opening_model, seeds, some
+from tests.cloning.test_clone import gaps_of, opening_model, seeds, some
 from tts2face.cloning.lip_gaps import LEAST_GAP_MM, LOWER, nearest_allowed
 from tts2face.cloning.parameter_transfer import cloning
 from tts2face.face.bounded_least_squares import bounded_least_squares

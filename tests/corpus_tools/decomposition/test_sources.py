@@ -6,7 +6,7 @@ import pytest
 
 from corpus_tools.decomposition.capture_files import Worn, captured_file
 from lexicon.errors import DataError, InputError
-from tests.corpus_tools.decompose.made_markers import Made, write_table
+from tests.corpus_tools.decomposition.made_markers import Made, write_table
 from tts2face.models.face import Face
 
 

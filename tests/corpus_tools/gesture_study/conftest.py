@@ -3,7 +3,7 @@
 import pytest
 
 from corpus_tools.gesture_study.analysis import GesturesFound, Options, study
-from tests.corpus_tools.gesturing.made_palette import made_palette
+from tests.corpus_tools.gesture_study.made_palette import made_palette
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ from corpus_tools.decomposition.marker_gaps import LONGEST_GAP_S, filled, gaps_o
 from corpus_tools.decomposition.marker_set import SHIPPED, MarkerSet, read_marker_set
 from corpus_tools.decomposition.markers import captured_markers, marker_face, still_of_markers
 from lexicon.errors import DataError, InputError
-from tests.corpus_tools.decompose.made_markers import FPS, SIZE, Made, write_c3d, write_table
+from tests.corpus_tools.decomposition.made_markers import FPS, SIZE, Made, write_c3d, write_table
 from tts2face.models.face import Face
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 
