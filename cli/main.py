@@ -54,6 +54,9 @@ def speak(  # noqa: PLR0913 - one parameter a flag
         str, Parameter(help="What is shown: head, cartoon, a .face file, or self (the talker's own).")
     ] = "head",
     identity: Annotated[str | None, Parameter(help="A preset of the face's age, sex and ancestry.")] = None,
+    palette: Annotated[
+        str, Parameter(help="The styles of the gestures: a shipped palette, or a .palette file.")
+    ] = "starter",
     explain: Annotated[
         Path | None, Parameter(help="Write, for each phone, which recorded phones were used (.json or .txt).")
     ] = None,
@@ -62,14 +65,14 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     **options: Any,
 ) -> None:
     """Turn text into a talking face."""
-    from cli.speak import Errand, run
+    from cli.speak import SpeakOptions, run
 
     if text is not None and said is not None:
         raise InputError("give the text once, with or without --text")
     needs_text = options.get("audio") is None and options.get("idle") is None
     request = chosen(Request, options, text=_text(text if said is None else said, file, is_needed=needs_text))
-    errand = Errand(out, talker, face, identity, explain, view, quiet)
-    run(request, chosen(Picture, options), errand)
+    speak_options = SpeakOptions(out, talker, face, identity, palette, explain, view, quiet)
+    run(request, chosen(Picture, options), speak_options)
 
 
 def _text(text: str | None, file: Path | None, *, is_needed: bool) -> str:

@@ -1,6 +1,7 @@
 """``tts2face "text"``: what the command does once its flags are read."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from json import dumps
 from pathlib import Path
@@ -14,137 +15,106 @@ from tts2face.request import Request
 
 if TYPE_CHECKING:
     from tts2face.exemplar.explanation import ShownPhone
-    from tts2face.session import Cast
-    from tts2face.types import Clip
+    from tts2face.session import Session
+    from tts2face.synthesis.clip_stream import Piece
 
-OWN = "self"  # the face that the talker herself shows
+OWN_FACE = "self"
 EXPLANATIONS = (".json", ".txt")
 
 
 @dataclass(frozen=True, slots=True)
-class Errand:
-    """What is wanted beside the request and the picture."""
+class SpeakOptions:
+    """The flags beside those of the request and the picture."""
 
     out: Path | None
     talker: str
     face: str
     identity: str | None
+    palette: str
     explain: Path | None
     view: bool
     quiet: bool
 
 
-def run(request: Request, picture: Picture, errand: Errand) -> None:
-    """Write, explain or show what was asked for."""
-    if errand.out is None and errand.explain is None and not errand.view:
-        raise InputError("say where the clip goes: --out clip.mp4 (or .webm, .gif, a folder for .png files)")
-    if errand.explain is not None and errand.explain.suffix not in EXPLANATIONS:
-        raise InputError(f"an explanation is written as .json or .txt, not {errand.explain.name}")
+def run(request: Request, picture: Picture, options: SpeakOptions) -> None:
+    """Write, explain or show a clip."""
+    _check(request, options)
+    from tts2face.synthesis.prepared_request import prepare
+
+    prepare(request)  # refuses a wrong request before anything is loaded
+    session = _session(options)
+    shown: list[ShownPhone] = []
+
+    def keep(piece: "Piece") -> None:
+        if options.explain is not None:
+            shown.extend(piece.shown())
+
+    if options.out is not None:
+        _write(session, (request, picture), options.out, (keep, options.quiet))
+    elif options.explain is not None:
+        for piece in session.stream(request):
+            keep(piece)
+    if options.explain is not None:
+        _write_explanation(tuple(shown), options.explain)
+    if options.view:
+        from tts2face.render.window import view
+
+        view(session.clip(request), session.mesh, picture)
+
+
+def _check(request: Request, options: SpeakOptions) -> None:
+    """Refuse flags that do not go together, before anything is loaded."""
+    if options.out is None and options.explain is None and not options.view:
+        raise InputError("there is no output; add --out clip.mp4 (or .webm, .gif, or a folder for .png files)")
+    if options.explain is not None and options.explain.suffix not in EXPLANATIONS:
+        raise InputError(f"an explanation is written as .json or .txt, not {options.explain.name}")
     is_silent = request.audio is not None or request.idle is not None
-    if not request.text.strip() and (not is_silent or errand.explain is not None):
-        raise InputError("the text is empty; give something to say, or what --audio says")
-    if errand.view and errand.face == OWN:
-        raise InputError("a window shows heads that can be turned; leave --view away, or choose --face head")
-    if errand.view:
+    if not request.text.strip() and (not is_silent or options.explain is not None):
+        raise InputError("the text is empty; give something to say, or the words of --audio")
+    if options.view:
+        if options.face == OWN_FACE:
+            raise InputError("--view shows mesh faces only; remove it, or choose --face head")
         from tts2face.render.window import require_display
 
         require_display("--view")
-    if errand.out is not None:
-        _make(request, picture, errand, errand.out)
-    else:
-        _only_told(request, errand)
-    if errand.view:
-        _view(request, picture, errand)
 
 
-def _view(request: Request, picture: Picture, errand: Errand) -> None:
-    from tts2face.api import stream
-    from tts2face.render.window import view
-    from tts2face.types import joined_clips
-
-    ready = _ready(errand)
-    face = ready.shown(request)
-    if face is None:
-        raise InputError("a window shows heads that can be turned; leave --view away, or choose --face head")
-    view(joined_clips([piece.clip for piece in stream(request, ready)]), face, picture)
-
-
-def _make(request: Request, picture: Picture, errand: Errand, out: Path) -> None:
+def _write(
+    session: "Session", what: tuple[Request, Picture], out: Path, how: tuple[Callable[["Piece"], None], bool]
+) -> None:
     began = time.perf_counter()
-    from tts2face.render.output_path import checked_output
-
-    checked_output(out)
-    from tts2face.api import check, write_clip
-
-    check(request)
-    ready = _ready(errand)
-    told = _Explanation(ready, request)
-    with progress_bar("speaking and drawing", errand.quiet) as on_progress:
-        keep = told.add if errand.explain else None
-        written = write_clip(request, picture, ready, out, on_progress=on_progress, on_clip=keep)
-    if errand.explain:
-        told.write(errand.explain)
-    if not errand.quiet:
-        took = time.perf_counter() - began
-        say(
-            f"wrote {written.path}: {written.seconds:.1f} s, {written.n_frames} frames, "
-            f"made in {took:.1f} s ({written.seconds / took:.1f} x real time)"
-        )
-        for mark in written.marks:
-            say(f"{mark.seconds:.2f} s: {mark.name}")
-
-
-def _only_told(request: Request, errand: Errand) -> None:
-    if errand.explain is None:
+    (request, picture), (keep, is_quiet) = what, how
+    with progress_bar("speaking and drawing", is_quiet) as on_progress:
+        written = session.write(request, out, picture=picture, on_progress=on_progress, on_piece=keep)
+    if is_quiet:
         return
-    from tts2face.api import stream
+    took = time.perf_counter() - began
+    say(
+        f"wrote {written.path}: {written.seconds:.1f} s, {written.n_frames} frames, "
+        f"made in {took:.1f} s ({written.seconds / took:.1f} x real time)"
+    )
+    for mark in written.marks:
+        say(f"{mark.seconds:.2f} s: {mark.name}")
 
-    ready = _ready(errand)
-    told = _Explanation(ready, request)
-    for piece in stream(request, ready):
-        told.add(piece.clip)
-    told.write(errand.explain)
 
-
-def _ready(errand: Errand) -> "Cast":
-    from tts2face.models.face_file import load_face
-    from tts2face.models.talker import load_talker
-    from tts2face.session import cast
+def _session(options: SpeakOptions) -> "Session":
+    from tts2face.render.output_path import checked_output
+    from tts2face.session import Session
     from tts2face.synthesis.warm_up import compile_kernels, kernels_are_compiled
 
-    talker = load_talker(errand.talker)
-    if errand.face == OWN:
-        if errand.identity is not None:
-            raise InputError("her own face has one identity; leave --identity away, or choose --face head")
-        return cast(talker, None)
-    face = load_face(errand.face, errand.identity)
+    if options.out is not None:
+        checked_output(options.out)
+    session = Session(options.talker, options.face, identity=options.identity, palette=options.palette)
     if not kernels_are_compiled():
-        if not errand.quiet:
+        if not options.quiet:
             say("first run on this machine: compiling the kernels, which takes some ten seconds once")
-        compile_kernels(face)
-    return cast(talker, face)
+        compile_kernels()
+    return session
 
 
-class _Explanation:
-    """Gathers which recorded phones moved the lips, clip by clip."""
+def _write_explanation(shown: "tuple[ShownPhone, ...]", path: Path) -> None:
+    from tts2face.exemplar.explanation import explanation_json, explanation_text
 
-    def __init__(self, ready: "Cast", request: Request) -> None:
-        self._ready, self._request = ready, request
-        self._seconds = 0.0
-        self._shown: list[ShownPhone] = []
-
-    def add(self, clip: "Clip") -> None:
-        """Explain one more clip."""
-        from tts2face.api import explain
-
-        self._shown += explain(clip, self._ready, self._request, begins=self._seconds)
-        self._seconds += clip.speech.waveform.duration
-
-    def write(self, path: Path) -> None:
-        """Write all as JSON or text, by suffix."""
-        from tts2face.exemplar.explanation import explanation_json, explanation_text
-
-        shown = tuple(self._shown)
-        is_json = path.suffix == ".json"
-        text = dumps(explanation_json(shown), ensure_ascii=False) if is_json else explanation_text(shown)
-        write_whole(path, text.encode())
+    is_json = path.suffix == ".json"
+    text = dumps(explanation_json(shown), ensure_ascii=False) if is_json else explanation_text(shown)
+    write_whole(path, text.encode())

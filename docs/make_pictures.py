@@ -13,14 +13,13 @@ from corpus_tools.similarity.analysis import Options
 from corpus_tools.similarity.write import write_similarity
 from lexicon.phones import ipa_to_arpabet
 from lexicon.sequence import SILENCE
-from tts2face.api import stream
 from tts2face.models.face_file import identities_of, load_face
 from tts2face.models.files import named_file
 from tts2face.models.talker import load_talker
-from tts2face.render.draw import draw, still
+from tts2face.render.draw import draw
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.session import cast
+from tts2face.session import Session
 
 HERE = Path(__file__).parent / "pictures"
 SENTENCE = "We were away a year ago, but Bob may move five big maps."
@@ -53,16 +52,16 @@ def sheet(pictures: list[Image.Image], columns: int) -> Image.Image:
 
 def clip_sheet() -> Image.Image:
     """Frames of one clip at the middle of twelve of its phones."""
-    ready, request = cast(load_talker("grid_s1"), load_face("head")), Request(text=SENTENCE)
-    stage = ready.stage(Picture(size=f"{SIDE}x{SIDE}", camera="close"), request)
-    (piece,) = stream(request, ready)
+    ready, request = Session(load_talker("grid_s1"), load_face("head")), Request(text=SENTENCE)
+    renderer = ready.renderer(Picture(size=f"{SIDE}x{SIDE}", camera="close"))
+    (piece,) = ready.stream(request)
     phones, pictures, after = piece.clip.speech.phones, [], 0
     for wanted in SPOKEN:
         at = phones.phones.index(wanted, after)
         after = at + 1
         middle = round((phones.edges[at] + phones.edges[at + 1]) / 2 * piece.clip.fps)
         word = next((word.text for word in piece.clip.speech.words if word.first <= at < word.last), SILENCE)
-        pictures.append(labelled(still(piece.clip, stage, middle), f"{ipa_to_arpabet(wanted)}  {word}"))
+        pictures.append(labelled(renderer.frame(piece.clip, middle), f"{ipa_to_arpabet(wanted)}  {word}"))
     return sheet(pictures, 6)
 
 
@@ -81,16 +80,16 @@ def faces_sheet() -> Image.Image:
 
 def own_face_sheet(talker: Path) -> Image.Image:
     """Frames of new sentences on the talker's own face, in the order of speech."""
-    ready = cast(load_talker(str(talker)), None)
+    ready = Session(load_talker(str(talker)), "self")
     pictures = []
     for text in NEW_SENTENCES:
         request = Request(text=text, fps=25.0)
-        stage = ready.stage(Picture(size=f"{SIDE}x{SIDE}"), request)
-        (piece,) = stream(request, ready)
+        renderer = ready.renderer(Picture(size=f"{SIDE}x{SIDE}"))
+        (piece,) = ready.stream(request)
         phones = piece.clip.speech.phones
         for instant in np.linspace(phones.edges[1], phones.edges[-2], 6, endpoint=False):
             label = ipa_to_arpabet(phones.phones[phones.index_at(instant)])
-            pictures.append(labelled(still(piece.clip, stage, round(instant * piece.clip.fps)), label))
+            pictures.append(labelled(renderer.frame(piece.clip, round(instant * piece.clip.fps)), label))
     return sheet(pictures, 6)
 
 

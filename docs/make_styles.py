@@ -9,13 +9,12 @@ import av
 import numpy as np
 from PIL import Image, ImageDraw
 
-from tts2face.api import write_clip
 from tts2face.models.face_file import load_face
 from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.session import cast
+from tts2face.session import Session
 
 PICTURES = Path(__file__).parent / "pictures"
 # Ten seconds each; the second one with a pause, in which a face must go on living.
@@ -35,10 +34,10 @@ def main() -> None:
     rows = []
     for style in load_palette("starter").derivations:
         for number, (text, face) in enumerate(zip(TEXTS, FACES, strict=True), start=1):
-            ready = cast(load_talker("grid_s1"), load_face(face))
+            ready = Session(load_talker("grid_s1"), load_face(face))
             out = PICTURES / f"style_{style}_{number}.mp4"
             request = Request(text=text, style=style, seed=number, fps=FPS)
-            write_clip(request, Picture(size=f"{SIDE}x{SIDE}"), ready, out)
+            ready.write(request, out, picture=Picture(size=f"{SIDE}x{SIDE}"))
             rows.append((f"{style}, {face}", _frames(out)))
     _sheet(rows).save(PICTURES / "styles.jpg", quality=80)
 

@@ -1,18 +1,21 @@
-"""Work done a little ahead of its use, in a thread of its own."""
+"""Work done before its result is needed: the items of a source in one thread, a function of items in several."""
 
 import contextlib
 import queue
 import threading
-from collections.abc import Iterable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import Any, Generic, TypeVar
 
 Item = TypeVar("Item")
+Result = TypeVar("Result")
 Offer = tuple[Any, BaseException | None]
 PATIENCE_S = 0.1  # how soon the maker notices that nobody wants its items any more
 
 
-class Ahead(Generic[Item]):
+class Prefetch(Generic[Item]):
     """The items of a source in their order; up to `room` of them are made before they are asked for.
 
     Making begins at once and ends with the ``with`` block. An error of the source is raised where its item would come.
@@ -22,10 +25,10 @@ class Ahead(Generic[Item]):
         self._source = source
         self._made: queue.Queue[Offer] = queue.Queue(room)
         self._stopped = threading.Event()
-        self._maker = threading.Thread(target=self._make, name="ahead", daemon=True)
+        self._maker = threading.Thread(target=self._make, name="prefetch", daemon=True)
         self._maker.start()
 
-    def __enter__(self) -> "Ahead[Item]":
+    def __enter__(self) -> "Prefetch[Item]":
         """Give the items."""
         return self
 
@@ -60,3 +63,19 @@ class Ahead(Generic[Item]):
         while not self._stopped.is_set():
             with contextlib.suppress(queue.Full):
                 return self._made.put(item, timeout=PATIENCE_S)
+
+
+def map_in_order(function: Callable[[Item], Result], items: Iterable[Item], threads: int) -> Iterator[Result]:
+    """`function` of each item, in order, computed in several threads, as many in advance as there are threads."""
+    with ThreadPoolExecutor(threads, "map") as pool:
+        ahead: deque[Future[Result]] = deque()
+        try:
+            for item in items:
+                ahead.append(pool.submit(function, item))
+                if len(ahead) > threads:
+                    yield ahead.popleft().result()
+            while ahead:
+                yield ahead.popleft().result()
+        finally:
+            for waiting in ahead:
+                waiting.cancel()

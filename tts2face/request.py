@@ -54,7 +54,6 @@ class Request:
     exemplars: int | None = option(None, "Exemplars averaged for each phone; the method's own without it.")
     fps: float = option(30.0, "Frames per second, 1 to 120.")
     gestures: bool = option(True, "Whether face and head move with the speech, or only the lips.")
-    palette: str = option("starter", "Where the styles come from: a shipped palette, or a .palette file.")
     style: str | None = option(
         None, "Style of the gestures: a name, or names by feature (brows=annoyed,head=delighted)."
     )

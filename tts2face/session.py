@@ -1,112 +1,351 @@
-"""A talker and a face made ready for each other, and what serves many requests: voices, pictures, gestures."""
+"""The Session: a talker, a face and a palette, loaded once, that turn any number of requests into clips and files."""
 
+import threading
 from collections import OrderedDict
-from collections.abc import Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, TypeVar
 
 from lexicon.dictionary import read_dictionary
-from tts2face.exemplar.appearance_trajectory import Looks, looks_of
+from lexicon.errors import InputError
 from tts2face.exemplar.synthesis import VisualVoice, visual_voice
-from tts2face.face.gesture_transfer import GestureFace, gesture_face
 from tts2face.gesture.gesture_stream import Fields
 from tts2face.models.face import Face
-from tts2face.models.palette import load_palette
-from tts2face.models.talker import Talker
-from tts2face.own_face.gestures import OwnGestures, own_gestures
-from tts2face.render.draw import AnyStage, staged
-from tts2face.render.own_face import plate_staged
+from tts2face.models.face_file import load_face
+from tts2face.models.palette import Palette, load_palette
+from tts2face.models.talker import Talker, load_talker
+from tts2face.prefetch import Prefetch
+from tts2face.render.encode import ClipWriter, write_clips
+from tts2face.render.output_path import checked_output
 from tts2face.render.picture import Picture
+from tts2face.render.renderer import FrameRenderer
 from tts2face.request import Request
-from tts2face.retargeting.to_face import Retargeter, retargeter
-from tts2face.synthesis.gesture_layer import Living
+from tts2face.synthesis.animated_face import AnimatedFace, mesh_face, own_appearance_face
+from tts2face.synthesis.clip_stream import Performers, Piece, pieces
+from tts2face.synthesis.gesture_layer import GestureLayer
+from tts2face.synthesis.marked_speech import Reached
+from tts2face.synthesis.performance import Performance, clips_of, perform
+from tts2face.synthesis.prepared_request import PreparedRequest, prepare
+from tts2face.types import Clip, joined_clips
 from tts2face.voice.engine import Voice, load_voice
 
-VOICES_KEPT = 2  # kinds of voice; each keeps some 100 MB
-STAGES_KEPT = 2  # kinds of picture; each keeps some 30 MB
-PALETTES_KEPT = 2  # each keeps some 60 MB
+OWN_FACE = "self"  # the face that the talker's own video shows
+VOICES_KEPT = 2  # idle voices by name and language; each keeps some 100 MB
+RENDERERS_KEPT = 2  # by picture; each keeps some 30 MB
+PIECES_AHEAD = 2  # pieces that may wait to be drawn while the next is spoken
+
+Progress = Callable[[int, int], None]
+Value = TypeVar("Value")
 
 
 @dataclass(frozen=True, slots=True)
-class Cast:
-    """A talker and a face made ready for each other; serves any number of requests.
+class Written:
+    """What a file holds: seconds of sound, frames, and when the named marks of the text are reached."""
 
-    With ``face`` None the talker shows her own face: there is nothing to retarget to, and her ``looks`` are spoken too.
-    ``stages`` keeps what was made ready to draw a face into the last few kinds of picture; ``voices`` the voices that
-    wait to speak again, by name, language and the user's own words; ``lives`` the palettes that the face is ready for.
-    """
-
-    talker: Talker
-    face: Face | None
-    visual_voice: VisualVoice
-    retargeter: Retargeter | None
-    looks: Looks | None = None
-    stages: "OrderedDict[Hashable, AnyStage]" = field(default_factory=OrderedDict)
-    voices: "OrderedDict[Hashable, Voice]" = field(default_factory=OrderedDict)
-    lives: "OrderedDict[Hashable, Living]" = field(default_factory=OrderedDict)
-
-    def living(self, request: Request) -> Living | None:
-        """The face with the gestures that a request is made with; None where it has none.
-
-        Raises
-        ------
-        InputError, DataError
-            There is no such palette, or it is damaged; or the face cannot show gestures.
-        """
-        if not request.gestures:
-            return None
-        key = (request.palette, request.pitch)
-        if key not in self.lives:
-            palette = load_palette(request.palette)
-            face = own_gestures(self.talker, palette) if self.face is None else gesture_face(self.face, palette)
-            self.lives[key] = Living(Fields(palette, with_pitch=request.pitch), face)
-            while len(self.lives) > PALETTES_KEPT:
-                self.lives.popitem(last=False)
-        return self.lives[key]
-
-    def shown(self, request: Request) -> Face | None:
-        """The face in whose shapes a request's clip moves; None where the talker shows her own."""
-        living = self.living(request)
-        return living.face.face if living is not None and isinstance(living.face, GestureFace) else self.face
-
-    def stage(self, picture: Picture, request: Request) -> AnyStage:
-        """The face made ready to be drawn into a kind of picture; its soft shadows take most of a second."""
-        living = self.living(request)
-        key = (picture, None if living is None else request.palette)
-        if key not in self.stages:
-            while len(self.stages) >= STAGES_KEPT:
-                self.stages.popitem(last=False)
-            face, own = self.shown(request), None if living is None else living.face
-            if face is not None:
-                self.stages[key] = staged(face, picture)
-            else:
-                gestures = own if isinstance(own, OwnGestures) else None
-                self.stages[key] = plate_staged(self.talker, picture, gestures=gestures)
-        return self.stages[key]
-
-    @contextmanager
-    def voice(self, request: Request) -> Iterator[Voice]:
-        """A voice for the time of a request, used by nobody else; loading one takes half a second."""
-        own = read_dictionary(request.dictionary).entries if request.dictionary else {}
-        key = (request.voice, request.language, frozenset(own.items()))
-        voice = self.voices.pop(key, None) or load_voice(request.voice, request.language, own)
-        try:
-            yield voice
-        finally:
-            self.voices[key] = voice
-            while len(self.voices) > VOICES_KEPT:
-                self.voices.popitem(last=False)
+    path: Path
+    seconds: float
+    n_frames: int
+    marks: tuple[Reached, ...] = ()
+    is_silent: bool = False
 
 
-def cast(talker: Talker, face: Face | None) -> Cast:
-    """Index the talker's exemplars and prepare the way of their motion onto the face, or onto her own without one.
+class Session:
+    """A talker, a face and a palette that serve many requests.
+
+    Models are loaded once, what a request needs beyond them when it is first needed. All methods may be called from
+    several threads at a time: voices are lent to one request each, everything else is only read. The same request,
+    talker, face, palette and version give the same clip, whatever ran before or runs beside it.
+
+    Parameters
+    ----------
+    talker
+        A shipped talker, a .talker file, or a talker.
+    face
+        A shipped face, a .face file, a face, or ``"self"`` for the talker's own face.
+    identity
+        A preset of the face's age, sex and ancestry.
+    palette
+        A shipped palette, a .palette file, or a palette; None for a face without gestures.
 
     Raises
     ------
     InputError
-        There is no face, and the talker has motion only.
+        There is no such model; the talker has no face of its own to show; the face has no such identity.
+    DataError
+        A file is damaged, or the face lacks what speech moves.
+
+    Examples
+    --------
+    >>> session = Session()  # doctest: +SKIP
+    >>> session.write("Hello there.", "hello.mp4", style="delighted")  # doctest: +SKIP
     """
-    voice = visual_voice(talker)
-    if face is None:
-        return Cast(talker, None, voice, None, looks_of(talker, voice))
-    return Cast(talker, face, voice, retargeter(talker, face))
+
+    def __init__(
+        self,
+        talker: str | Path | Talker = "grid_s1",
+        face: str | Path | Face = "head",
+        *,
+        identity: str | None = None,
+        palette: str | Path | Palette | None = "starter",
+    ) -> None:
+        self.talker: Talker = talker if isinstance(talker, Talker) else load_talker(str(talker))
+        if face == OWN_FACE and identity is not None:
+            raise InputError("a talker's own face has no identity presets; remove the identity, or choose another face")
+        self._mesh: Face | None = None
+        if face != OWN_FACE:
+            self._mesh = face if isinstance(face, Face) else load_face(str(face), identity)
+        self._palette = palette
+        self._lock = threading.RLock()
+        self._kept: dict[Hashable, Any] = {}
+        self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
+        self._voices: OrderedDict[Hashable, list[Voice]] = OrderedDict()
+        self._still_face: AnimatedFace = self._prepare_face(None)
+
+    @property
+    def palette(self) -> Palette | None:
+        """The styles of the gestures."""
+        given = self._palette
+        if given is None or isinstance(given, Palette):
+            return given
+        return self._once("palette", lambda: load_palette(str(given)))
+
+    @property
+    def mesh(self) -> Face:
+        """The mesh of the face, with the shapes of all channels.
+
+        Raises
+        ------
+        InputError
+            The face is a talker's own, which has no mesh.
+        """
+        return self.face.mesh
+
+    @property
+    def face(self) -> AnimatedFace:
+        """The face in whose channels clips move; `tts2face.write_clip` draws them on it."""
+        palette = self.palette
+        return self._still_face if palette is None else self._once("face", lambda: self._prepare_face(palette))
+
+    def clip(self, text: str | Request, **options: Any) -> Clip:
+        """The whole clip of a text or request.
+
+        Parameters
+        ----------
+        text
+            What to say, or a request with everything.
+        options
+            Fields of `Request`, such as ``style="delighted"``.
+
+        Raises
+        ------
+        InputError
+            The text is empty or holds something that the voice cannot say, or an option is wrong.
+        BackendError
+            The voice is not installed.
+        """
+        return joined_clips([piece.clip for piece in self.stream(text, **options)])
+
+    def stream(self, text: str | Request, **options: Any) -> Iterator[Piece]:
+        """The clip of a text or request piece by piece, in bounded memory; arguments as for `clip`.
+
+        The clips put together are what `clip` gives.
+        """
+        return self._pieces(prepare(request_of(text, options)))
+
+    def write(
+        self,
+        text: str | Request,
+        out: str | Path,
+        *,
+        picture: Picture | None = None,
+        on_progress: Progress | None = None,
+        on_piece: Callable[[Piece], None] | None = None,
+        **options: Any,
+    ) -> Written:
+        """Speak, animate, draw and encode a text or request into a file.
+
+        The next sentence is spoken while one is drawn.
+
+        Parameters
+        ----------
+        out
+            .mp4, .webm, .gif, or a folder of .png. It appears when all is done; after an error nothing is left.
+        picture
+            How the clip is drawn; without it, fields of `Picture` may stand among the options.
+        on_progress
+            Called with steps drawn, and steps in all: characters of a text, or parts of a recording.
+        on_piece
+            Called with each piece before it is drawn.
+        options
+            Fields of `Request` and `Picture`, such as ``style="delighted"`` or ``size="768x768"``.
+
+        Raises
+        ------
+        InputError, BackendError
+            As `clip`; or the file cannot be written.
+        """
+        of_picture = {name: options.pop(name) for name in _names(Picture) if name in options and picture is None}
+        prepared = prepare(request_of(text, options))
+        checked_output(out)
+        renderer = self.renderer(picture or Picture(**of_picture), has_gestures=prepared.request.gestures)
+        progress = _Steps(prepared.n_steps, on_progress)
+        marks: list[Reached] = []
+        seconds, n_frames = 0.0, 0
+        with (
+            Prefetch(self._pieces(prepared), PIECES_AHEAD) as spoken,
+            ClipWriter(out, renderer, on_progress=progress.drawn) as writer,
+        ):
+            for piece in spoken:
+                if on_piece:
+                    on_piece(piece)
+                progress.begin(piece.n_steps, n_frames)
+                writer.add(piece.clip)
+                marks += piece.marks
+                seconds += piece.clip.speech.waveform.duration
+                n_frames += len(piece.clip.motion)
+        progress.finish()
+        return Written(Path(out), seconds, n_frames, tuple(marks))
+
+    def write_performance(
+        self,
+        performance: Performance,
+        out: str | Path,
+        *,
+        picture: Picture | None = None,
+        stages: Callable[[str], Progress] | None = None,
+    ) -> Written:
+        """Let a recorded person drive the session's face, and write the clip into a file.
+
+        Parameters
+        ----------
+        stages
+            Called with the name of each stage of the work; gives what its progress is reported to.
+
+        Raises
+        ------
+        InputError, DataError, BackendError
+            As `tts2face.synthesis.performance.perform`; or the file cannot be written.
+        """
+        checked_output(out)
+        picture = picture or Picture()
+        self._still_face.renderer(picture)  # refuses what cannot be drawn before the take is watched
+        take = perform(performance, self._still_face, on_progress=stages("watching") if stages else None)
+        n_frames = len(take.motion.face)
+        draw = stages("drawing") if stages else None
+        clips = clips_of(take.motion, take.sound)
+        progress = (lambda done, _: draw(done, n_frames)) if draw else None
+        write_clips(out, clips, take.face.renderer(picture), on_progress=progress)
+        return Written(Path(out), take.seconds, n_frames, is_silent=not len(take.sound.samples))
+
+    def renderer(self, picture: Picture, *, has_gestures: bool = True) -> FrameRenderer:
+        """What draws the session's face into pictures of a kind; the last `RENDERERS_KEPT` of them are kept."""
+        face, key = self._face(has_gestures), (picture, has_gestures)
+        with self._lock:
+            if key not in self._renderers:
+                while len(self._renderers) >= RENDERERS_KEPT:
+                    self._renderers.popitem(last=False)
+                self._renderers[key] = face.renderer(picture)
+            return self._renderers[key]
+
+    def _pieces(self, prepared: PreparedRequest) -> Iterator[Piece]:
+        request = prepared.request
+        face = self._face(request.gestures)
+        palette = self.palette if request.gestures else None
+        layer = None if palette is None else GestureLayer(prepared, self._fields(palette, request.pitch), face)
+        performers = Performers(self.talker, self._exemplars, face, lambda: self._lent_voice(request))
+        return pieces(prepared, performers, layer)
+
+    def _face(self, has_gestures: bool) -> AnimatedFace:
+        return self.face if has_gestures else self._still_face
+
+    @property
+    def _exemplars(self) -> VisualVoice:
+        return self._once("exemplars", lambda: visual_voice(self.talker))
+
+    def _fields(self, palette: Palette, with_pitch: bool) -> Fields:
+        return self._once(("fields", with_pitch), lambda: Fields(palette, with_pitch=with_pitch))
+
+    def _prepare_face(self, palette: Palette | None) -> AnimatedFace:
+        if self._mesh is None:
+            return own_appearance_face(self.talker, self._exemplars, palette)
+        return mesh_face(self.talker, self._exemplars, self._mesh, palette)
+
+    def _once(self, key: Hashable, make: Callable[[], Value]) -> Value:
+        """What was made under a key, made now if it is the first time; by one thread only."""
+        with self._lock:
+            if key not in self._kept:
+                self._kept[key] = make()
+            kept: Value = self._kept[key]
+            return kept
+
+    @contextmanager
+    def _lent_voice(self, request: Request) -> Iterator[Voice]:
+        """A voice for the time of a request, used by nobody else; loading one takes half a second."""
+        own = read_dictionary(request.dictionary).entries if request.dictionary else {}
+        key = (request.voice, request.language, frozenset(own.items()))
+        with self._lock:
+            idle = self._voices.get(key)
+            voice = idle.pop() if idle else None
+        voice = voice or load_voice(request.voice, request.language, own)
+        try:
+            yield voice
+        finally:
+            with self._lock:
+                self._voices.setdefault(key, []).append(voice)
+                self._voices.move_to_end(key)
+                while sum(map(len, self._voices.values())) > VOICES_KEPT:
+                    oldest = next(iter(self._voices))
+                    self._voices[oldest].pop()
+                    if not self._voices[oldest]:
+                        del self._voices[oldest]
+
+
+def request_of(text: str | Request, options: dict[str, Any]) -> Request:
+    """The request of a text and options by name.
+
+    Raises
+    ------
+    InputError
+        There is no such option, or options stand beside a whole request.
+    """
+    known = _names(Request)
+    for name in options:
+        if name not in known:
+            raise InputError(f"there is no option {name!r}; the options are {', '.join(known)}")
+    if isinstance(text, Request):
+        if options:
+            raise InputError(
+                f"the option {next(iter(options))!r} stands beside a whole request; put it into the request"
+            )
+        return text
+    return Request(text=text, **options)
+
+
+def _names(options: type) -> tuple[str, ...]:
+    return tuple(option.name for option in fields(options) if option.name != "text")
+
+
+class _Steps:
+    """Progress in steps of a request, while the frames of its pieces are drawn."""
+
+    def __init__(self, of: int, on_progress: Progress | None) -> None:
+        self._of, self._on_progress = of, on_progress
+        self._before = self._length = self._frames_before = 0
+
+    def begin(self, n_steps: int, n_frames_before: int) -> None:
+        """The next piece begins, behind so many frames."""
+        self._before += self._length
+        self._length, self._frames_before = n_steps, n_frames_before
+
+    def drawn(self, done: int, given: int) -> None:
+        """So many frames are drawn, of those given to the writer so far."""
+        if self._on_progress:
+            share = (done - self._frames_before) / max(given - self._frames_before, 1)
+            self._on_progress(min(self._of, int(self._before + self._length * share)), self._of)
+
+    def finish(self) -> None:
+        """All is drawn."""
+        if self._on_progress:
+            self._on_progress(self._of, self._of)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from corpus_tools.decomposition.capture import Captured, sound_of
 from corpus_tools.decomposition.face_motion import moved_landmarks, rest_landmarks
 from tts2face.models.face import Face
-from tts2face.synthesis.performance import motion_of_capture
+from tts2face.retargeting.performer import match_shapes
 from tts2face.types import Trajectory
 from tts2face.video.livelink import Capture, read_livelink
 
@@ -27,15 +27,15 @@ def captured_livelink(path: Path, face: Face, *, sound: Path | None = None) -> C
         It is damaged, or the face lacks landmarks.
     """
     capture = read_livelink(path)
-    motion = motion_of_capture(capture, face)
+    motion = match_shapes(capture.weights, face)
     return Captured(
         name=path.stem,
         fps=capture.weights.fps,
-        landmarks=moved_landmarks(face, motion.face),
+        landmarks=moved_landmarks(face, motion),
         head=np.asarray(capture.head.values, np.float32),
         sound=sound_of(path, sound),
         rest=rest_landmarks(face).astype(np.float32),
-        eyes=eyes_of(face, motion.face),
+        eyes=eyes_of(face, motion),
         missing=_untold(capture),
     )
 

@@ -12,9 +12,9 @@ from corpus_tools.recordings.observation import Observation, Quality, trimmed
 from corpus_tools.run_options import Effort
 from lexicon.errors import InputError
 from tts2face.models.face_file import load_face
+from tts2face.retargeting.performer import match_shapes
 from tts2face.speech.loudness import intensity
 from tts2face.speech.pauses import stretches
-from tts2face.synthesis.performance import motion_of_capture
 from tts2face.types import Trajectory
 from tts2face.video.livelink import read_livelink
 
@@ -39,7 +39,7 @@ def captured(path: Path, effort: Effort) -> tuple[Observation, ...]:
     if sound is None:
         raise InputError(f"no sound lies beside {path.name}; put its sound file there")
     face = load_face("head")
-    motion = motion_of_capture(capture, face).face
+    motion = match_shapes(capture.weights, face)
     ears = Ears(effort.folder())
     found = []
     for number, span in enumerate(stretches(ears.sound(sound), LONGEST_S), start=1):

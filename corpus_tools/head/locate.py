@@ -25,7 +25,7 @@ from lexicon.errors import DataError
 from tts2face.models.face import Face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.render.camera import optics
-from tts2face.render.draw import draw, staged
+from tts2face.render.draw import mesh_renderer
 from tts2face.render.picture import Picture
 from tts2face.video.track import N_MESH, FaceTracker
 
@@ -78,7 +78,7 @@ def pictures() -> Iterator[Picture]:
 
 def cast(face: Face, picture: Picture, tracker: FaceTracker) -> tuple[Floats, NDArray[np.bool_]]:
     """Places on the head (468, 3), mm, at which its landmarks are seen in a picture, and which of them are sure."""
-    drawn = draw(face, np.zeros(len(face.shape_names), np.float32), picture=picture)
+    drawn = mesh_renderer(face, picture).draw(np.zeros(len(face.shape_names), np.float32))
     points = tracker.track(lambda: [drawn], 25.0).points[0, :N_MESH, :2].astype(np.float64)
     camera = optics(picture.view, face, (picture.width, picture.height))
     focal, middle_x, middle_y, _ = camera.lens
@@ -135,10 +135,10 @@ def twins_of(face: Face, tracker: FaceTracker) -> Ints:
         The pairs are not mutual: the tracker does not read the head as a face.
     """
     picture = Picture(size="900x900", camera="0,3")
-    stage, features = staged(face, picture), []
+    renderer, features = mesh_renderer(face, picture), []
     for shown in TELLING:
         weights = np.array([shown.get(name, 0.0) for name in face.shape_names], np.float32)
-        drawn = draw(stage, weights)
+        drawn = renderer.draw(weights)
         points = tracker.track(lambda drawn=drawn: [drawn], 25.0).points[0, :N_MESH].astype(np.float64)  # type: ignore[misc]
         features.append(points - [(picture.width - 1) / 2, 0, 0])
     read = np.concatenate(features, axis=1)

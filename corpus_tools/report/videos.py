@@ -17,7 +17,7 @@ from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
 from tts2face.models.talker import speech_channels
-from tts2face.render.draw import Stage, draw, staged
+from tts2face.render.draw import MeshRenderer, mesh_renderer
 from tts2face.render.picture import Picture
 from tts2face.retargeting.to_face import retargeter
 from tts2face.types import Trajectory
@@ -40,8 +40,8 @@ class Films:
         return load_face("head")
 
     @cached_property
-    def _stage(self) -> Stage:
-        return staged(self._face, Picture(size=f"{SIDE_PX}x{SIDE_PX}", camera="close"))
+    def _renderer(self) -> MeshRenderer:
+        return mesh_renderer(self._face, Picture(size=f"{SIDE_PX}x{SIDE_PX}", camera="close"))
 
     def film(self, run: Run, at: int) -> str:
         """A film of one utterance (HTML); nothing where its video has gone since or shows no picture."""
@@ -52,7 +52,7 @@ class Films:
         speech = Trajectory(speech_channels(run.model), run.made[self._method][at], one.observation.fps)
         weights = retargeter(run.talker, self._face).retarget(speech).values
         sides = [
-            np.concatenate([fitted(pixels), draw(self._stage, row)], axis=1)
+            np.concatenate([fitted(pixels), self._renderer.draw(row)], axis=1)
             for pixels, row in zip(seen, weights[one.judged], strict=False)
         ]
         return film_tag(sides, one.observation.fps, NOTE.format(method=self._method))

@@ -18,7 +18,7 @@ from corpus_tools.recordings.observe import observe
 from corpus_tools.run_options import Effort
 from corpus_tools.training.train_talker import learn_talker
 from tts2face.models.talker import write_talker
-from tts2face.render.own_face import plate_drawn, plate_staged
+from tts2face.render.own_face import own_face_renderer, plate_drawn
 from tts2face.render.picture import Picture
 from tts2face.video.landmark_models import find_bundle
 
@@ -61,7 +61,7 @@ def main() -> None:
     print(f"talker file: {path.stat().st_size / 1e6:.1f} MB")
     path.unlink()
     for size in ("360x288", "512x512"):
-        made = plate_staged(whole, Picture(size=size))
+        made = own_face_renderer(whole, Picture(size=size))
         motion = np.concatenate([spoken[0].shape[30, :20], spoken[0].looks[30]])
         plate_drawn(made, motion, 0)
         began = time.perf_counter()

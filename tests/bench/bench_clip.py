@@ -15,13 +15,12 @@ from pathlib import Path
 import numpy as np
 from sentences import sentences
 
-from tts2face.api import stream, write_clip
 from tts2face.models.face_file import load_face
 from tts2face.models.talker import load_talker
 from tts2face.render.encode import ClipWriter
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.session import cast
+from tts2face.session import Session
 
 COMMAND = "from cli.main import main; main()"
 SHORT = "We were away a year ago, but Bob may move five big maps."
@@ -39,20 +38,20 @@ def reference_s() -> float:
 
 def whole_clip(folder: Path, n_runs: int = 3) -> None:
     """Speak, animate, draw, encode: 512 x 512, 30 frames a second, 2 x 2 samples; after one warm-up."""
-    ready = cast(load_talker("grid_s1"), load_face("head"))
+    ready = Session(load_talker("grid_s1"), load_face("head"))
     rates, before = [], reference_s()
     for run in range(n_runs + 1):
         began = time.perf_counter()
-        written = write_clip(Request(text=TEN_SECONDS), Picture(), ready, folder / "clip.mp4")
+        written = ready.write(Request(text=TEN_SECONDS), folder / "clip.mp4", picture=Picture())
         if run:
             rates.append(written.seconds / (time.perf_counter() - began))
     print(
         f"whole clip of {written.seconds:.1f} s: {np.median(rates):.2f} x real time ({min(rates):.2f}-{max(rates):.2f})"
     )
     request = Request(text=TEN_SECONDS)
-    clips = [piece.clip for piece in stream(request, ready)]
+    clips = [piece.clip for piece in ready.stream(request)]
     began = time.perf_counter()
-    with ClipWriter(folder / "drawn.mp4", ready.stage(Picture(), request)) as writer:
+    with ClipWriter(folder / "drawn.mp4", ready.renderer(Picture())) as writer:
         for clip in clips:
             writer.add(clip)
     frames = sum(len(clip.motion) for clip in clips)

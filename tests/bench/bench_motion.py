@@ -14,7 +14,7 @@ import numpy as np
 
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar.options import THEOBALD_2007
-from tts2face.exemplar.synthesis import DEFAULT_OPTIONS, VisualVoice, chosen_tokens, speech_trajectory, visual_voice
+from tts2face.exemplar.synthesis import DEFAULT_OPTIONS, VisualVoice, select_tokens, speech_trajectory, visual_voice
 from tts2face.models.talker import Talker, Utterance, read_talker
 from tts2face.speech.forced_alignment import increasing
 from tts2face.types import frame_count
@@ -65,7 +65,7 @@ def main() -> None:
     phones = text(talker, 60)
     for copies in (0.125, 0.5, 1, 4, 10, 100):
         larger = visual_voice(_of_size(talker, copies))
-        spent = least_time(lambda larger=larger: chosen_tokens(phones, larger, DEFAULT_OPTIONS))
+        spent = least_time(lambda larger=larger: select_tokens(phones, larger, DEFAULT_OPTIONS))
         print(f"| x {copies:g} | {len(larger.tokens)} | {spent / len(phones) * 1e6:.1f} us |")
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from bench_renderers import clip_of
 
 from tts2face.models.face_file import load_face
-from tts2face.render.draw import available_cores, frames, staged
-from tts2face.render.encode import write_clip
+from tts2face.render.draw import available_cores, mesh_renderer
+from tts2face.render.encode import write_clips
 from tts2face.render.picture import Picture
 
 SIZES = ("256x256", "512x512", "1280x720", "1920x1080")
@@ -41,25 +41,25 @@ def main():
     face = load_face("head")
     clip = clip_of(face, n_frames)
     began = time.perf_counter()
-    stage = staged(face, Picture())
+    stage = mesh_renderer(face, Picture())
     print(f"stage with compiling or loading of kernels: {time.perf_counter() - began:.2f} s")
     began = time.perf_counter()
-    stage = staged(face, Picture())
+    stage = mesh_renderer(face, Picture())
     print(f"stage: {time.perf_counter() - began:.2f} s; {len(face.vertices)} vertices, {len(face.triangles)} triangles")
     for threads in range(1, available_cores() + 1):
         began = time.perf_counter()
-        for _ in frames(clip, stage, threads=threads):
+        for _ in stage.frames(clip, threads=threads):
             pass
         line(f"drawing 512x512, 2 x 2, {threads} thread(s)", n_frames, time.perf_counter() - began)
     with tempfile.TemporaryDirectory() as folder:
         for name in ("a.mp4", "a.webm", "a.gif", "pictures"):
             began = time.perf_counter()
-            write_clip(Path(folder) / name, clip, stage)
+            write_clips(Path(folder) / name, [clip], stage)
             line(f"drawing and writing {name}", n_frames, time.perf_counter() - began)
         for size in SIZES:
-            stage = staged(face, Picture(size=size))
+            stage = mesh_renderer(face, Picture(size=size))
             began = time.perf_counter()
-            write_clip(Path(folder) / "a.mp4", clip, stage)
+            write_clips(Path(folder) / "a.mp4", [clip], stage)
             line(f"drawing and writing {size} .mp4", n_frames, time.perf_counter() - began)
 
 

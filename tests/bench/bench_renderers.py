@@ -9,7 +9,7 @@ import numpy as np
 from lexicon.errors import BackendError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.face_file import load_face
-from tts2face.render.draw import frames, staged
+from tts2face.render.draw import mesh_renderer
 from tts2face.render.picture import RENDERERS, Picture
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
@@ -35,7 +35,7 @@ def main():
         for renderer in RENDERERS:
             picture = replace(Picture(), renderer=renderer, supersampling=supersampling)
             try:
-                drawn = frames(clip, staged(face, picture))
+                drawn = mesh_renderer(face, picture).frames(clip)
                 next(drawn)
             except BackendError as missing:
                 print(f"{renderer}: {missing}")

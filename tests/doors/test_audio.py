@@ -11,12 +11,11 @@ from cli.main import run
 from corpus_tools.training.linear_audio_map import Lesson, learn_linear
 from corpus_tools.training.network_audio_map import NetworkOptions, learn_network
 from lexicon.errors import DataError, InputError
-from tts2face.api import stream, synthesize
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
 from tts2face.models.talker import Talker, load_talker, write_talker
 from tts2face.request import Request
-from tts2face.session import cast
+from tts2face.session import Session
 from tts2face.speech.features import FEATURE_RATE, speech_features
 from tts2face.synthesis.audio_input import PIECE_FRAMES, between, driven
 from tts2face.types import Trajectory, frame_count, joined_clips
@@ -90,7 +89,7 @@ def test_lips_that_hear_a_new_sentence_move_as_the_speaker_s(
 
 
 def test_with_the_words_lips_close_where_they_are_said(film: Path, talker: Talker, face: Face) -> None:
-    clip = synthesize(Request(audio=film, text=TEXT, fps=25.0), talker, face)
+    clip = Session(talker, face).clip(Request(audio=film, text=TEXT, fps=25.0))
     assert [word.text for word in clip.speech.words] == TEXT.split()
     (real,) = (one for one in talker.utterances if one.name == "bbaf2n")
     said = [phone for phone in clip.speech.phones.phones if phone != "sil"]
@@ -107,7 +106,7 @@ def test_drives_and_words_give_different_lips(film: Path, talker: Talker, face: 
         Request(audio=film, text=TEXT),
         Request(audio=film, volume=0.5),
     )
-    default, network, linear, words, quiet = (synthesize(one, talker, face) for one in requests)
+    default, network, linear, words, quiet = (Session(talker, face).clip(one) for one in requests)
     np.testing.assert_array_equal(default.motion.values, network.motion.values)
     assert not np.array_equal(network.motion.values, linear.motion.values)
     assert not np.array_equal(network.motion.values, words.motion.values)
@@ -116,7 +115,7 @@ def test_drives_and_words_give_different_lips(film: Path, talker: Talker, face: 
 
 @pytest.mark.parametrize("fps", [23.976, 25.0, 60.0])
 def test_sound_and_picture_are_equally_long(fps: float, film: Path, talker: Talker, face: Face) -> None:
-    clip = synthesize(Request(audio=film, fps=fps), talker, face)
+    clip = Session(talker, face).clip(Request(audio=film, fps=fps))
     sound = read_sound(film, 48000)
     assert len(clip.motion) == frame_count(sound.duration, clip.fps)
     n = min(len(sound.samples), len(clip.speech.waveform.samples))
@@ -126,7 +125,7 @@ def test_sound_and_picture_are_equally_long(fps: float, film: Path, talker: Talk
 @pytest.mark.parametrize("text", ["", f"{TEXT} {TEXT} {TEXT} {TEXT} {TEXT}"])
 def test_a_long_recording_comes_in_pieces(text: str, film: Path, talker: Talker, face: Face, here: Path) -> None:
     sound = written(here / "long.wav", np.tile(read_sound(film, 16000).samples, 5))
-    pieces = list(stream(Request(audio=sound, text=text, fps=60.0), cast(talker, face)))
+    pieces = list(Session(talker, face).stream(Request(audio=sound, text=text, fps=60.0)))
     assert [len(piece.clip.motion) for piece in pieces[:-1]] == [PIECE_FRAMES] * (len(pieces) - 1)
     assert sum(piece.n_steps for piece in pieces) == 1000
     whole = joined_clips([piece.clip for piece in pieces])
@@ -190,7 +189,7 @@ def test_what_cannot_be_heard_is_refused(
 ) -> None:
     path = written(here / "a.wav", samples)
     with pytest.raises(DataError, match=reason):
-        synthesize(Request(audio=path, text=text), talker, load_face("head"))
+        Session(talker, load_face("head")).clip(Request(audio=path, text=text))
 
 
 def test_files_without_sound_are_refused(talker: Talker, face: Face, here: Path) -> None:
@@ -198,7 +197,7 @@ def test_files_without_sound_are_refused(talker: Talker, face: Face, here: Path)
     (here / "text.wav").write_text("hello " * 100)
     for path, reason in (("empty.wav", "is empty"), ("text.wav", "cannot be read as video or sound")):
         with pytest.raises(DataError, match=reason):
-            synthesize(Request(audio=here / path), talker, face)
+            Session(talker, face).clip(Request(audio=here / path))
 
 
 @pytest.mark.parametrize(
@@ -220,9 +219,9 @@ def test_a_recording_that_is_not_there_and_a_talker_without_drives_are_refused(
     film: Path, talker: Talker, face: Face
 ) -> None:
     with pytest.raises(InputError, match=r"there is no recording none\.wav"):
-        synthesize(Request(audio=Path("none.wav")), talker, face)
+        Session(talker, face).clip(Request(audio=Path("none.wav")))
     with pytest.raises(InputError, match="has no network drive"):
-        synthesize(Request(audio=film), replace(talker, drives={}), face)
+        Session(replace(talker, drives={}), face).clip(Request(audio=film))
 
 
 def test_the_text_is_given_once(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,13 +8,10 @@ import pytest
 import soxr
 
 from lexicon.sequence import SILENCE
-from tts2face.api import write_clip
 from tts2face.models.face_file import load_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.models.talker import load_talker
-from tts2face.render.picture import Picture
-from tts2face.request import Request
-from tts2face.session import Cast, cast
+from tts2face.session import Session
 from tts2face.types import Clip
 
 TEXT = "Bob may move five big maps, but we were away."
@@ -24,15 +21,15 @@ TOUCHING_MM = 0.6  # a third of a pixel at 512 px
 
 
 @pytest.fixture(scope="module")
-def ready() -> Cast:
-    return cast(load_talker("grid_s1"), load_face("head"))
+def ready() -> Session:
+    return Session(load_talker("grid_s1"), load_face("head"))
 
 
 @pytest.fixture(scope="module")
-def made(ready: Cast, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Clip]:
+def made(ready: Session, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Clip]:
     path = tmp_path_factory.mktemp("clip") / "clip.mp4"
     clips: list[Clip] = []
-    write_clip(Request(text=TEXT), Picture(size=f"{SIDE}x{SIDE}"), ready, path, on_clip=clips.append)
+    ready.write(TEXT, path, size=f"{SIDE}x{SIDE}", on_piece=lambda piece: clips.append(piece.clip))
     (clip,) = clips
     return path, clip
 
@@ -82,9 +79,9 @@ def test_the_mouth_moves_in_speech_and_rests_in_silence(made: tuple[Path, Clip],
     assert change[labels != SILENCE].mean() > 2 * still.mean()  # a living head moves the mouth's place in silence, too
 
 
-def test_lips_touch_at_bilabials_and_part_at_open_vowels(made: tuple[Path, Clip], ready: Cast) -> None:
+def test_lips_touch_at_bilabials_and_part_at_open_vowels(made: tuple[Path, Clip], ready: Session) -> None:
     """The gap of the inner lips on the mesh that is drawn, at the middle of the mouth, mm."""
-    clip, face = made[1], ready.shown(Request())
+    clip, face = made[1], ready.mesh
     assert face is not None
     rows = {int(number): row for row, number in enumerate(face.landmarks)}
     mixed = face.landmark_weights[..., None]

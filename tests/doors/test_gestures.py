@@ -10,7 +10,6 @@ import pytest
 from cli.main import run
 from corpus_tools.decomposition.face_motion import moved_landmarks
 from lexicon.errors import InputError
-from tts2face.api import synthesize
 from tts2face.face.gesture_transfer import gesture_face
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
@@ -18,6 +17,7 @@ from tts2face.models.files import SHIPPED
 from tts2face.models.palette import FEATURES, load_palette, write_palette
 from tts2face.models.talker import Talker, load_talker
 from tts2face.request import Request
+from tts2face.session import Session
 from tts2face.types import Clip
 
 TEXT = "Bob may move five big maps, but we keep two."
@@ -37,7 +37,7 @@ def face() -> Face:
 
 @pytest.fixture(scope="module")
 def alive(talker: Talker, face: Face) -> Clip:
-    return synthesize(Request(text=TEXT), talker, face)
+    return Session(talker, face).clip(Request(text=TEXT))
 
 
 def channels_of(clip: Clip, begins: tuple[str, ...]) -> np.ndarray:
@@ -51,7 +51,7 @@ def test_everything_moves(alive: Clip) -> None:
 
 
 def test_a_layer_of_its_own_changes_no_other(alive: Clip, talker: Talker, face: Face) -> None:
-    still = synthesize(Request(text=TEXT, gain="brows=0"), talker, face)
+    still = Session(talker, face).clip(Request(text=TEXT, gain="brows=0"))
     assert not channels_of(still, ("brows",)).any()
     others = [not name.startswith("brows") for name in alive.motion.channels]
     np.testing.assert_array_equal(still.motion.values[:, others], alive.motion.values[:, others])
@@ -71,8 +71,8 @@ def test_the_starter_palette_holds_the_paper_s_moods_and_says_where_it_is_from()
 
 @pytest.mark.parametrize("style", ["depressed", "delighted", "annoyed", "exaggerated", "exasperated"])
 def test_lips_that_meet_still_meet_in_every_mood(style: str, talker: Talker, face: Face) -> None:
-    plain = synthesize(Request(text=TEXT, gestures=False), talker, face)
-    made = synthesize(Request(text=TEXT, style=style), talker, face)
+    plain = Session(talker, face).clip(Request(text=TEXT, gestures=False))
+    made = Session(talker, face).clip(Request(text=TEXT, style=style))
     shown = gesture_face(face, load_palette("starter")).face
     before, after = lip_gap(face, plain), lip_gap(shown, made)
     touching = before < 0.3
@@ -82,7 +82,7 @@ def test_lips_that_meet_still_meet_in_every_mood(style: str, talker: Talker, fac
 
 
 def test_neutral_gestures_leave_lips_as_they_are(alive: Clip, talker: Talker, face: Face) -> None:
-    plain = synthesize(Request(text=TEXT, gestures=False), talker, face)
+    plain = Session(talker, face).clip(Request(text=TEXT, gestures=False))
     shown = gesture_face(face, load_palette("starter")).face
     assert np.corrcoef(lip_gap(face, plain), lip_gap(shown, alive))[0, 1] > 0.995
     assert np.corrcoef(lip_width(face, plain), lip_width(shown, alive))[0, 1] > 0.99
@@ -99,15 +99,15 @@ def lip_width(face: Face, clip: Clip) -> np.ndarray:
 
 
 def test_eyes_hold_the_viewer_while_the_head_nods(talker: Talker, face: Face) -> None:
-    clip = synthesize(Request(text="[nod]Yes.", gain="gaze=0,head=0"), talker, face)
+    clip = Session(talker, face).clip(Request(text="[nod]Yes.", gain="gaze=0,head=0"))
     assert np.degrees(clip.head.values[:, 0].max()) > 4
     up = channels_of(clip, ("eyeLookUp",)).mean(axis=1)
     assert np.corrcoef(up, clip.head.values[:, 0])[0, 1] > 0.95
 
 
 def test_marks_and_flags_paint_styles(alive: Clip, talker: Talker, face: Face) -> None:
-    by_flag = synthesize(Request(text=TEXT, style="head=exaggerated"), talker, face)
-    by_mark = synthesize(Request(text=f"[style:head=exaggerated]{TEXT}[/style]"), talker, face)
+    by_flag = Session(talker, face).clip(Request(text=TEXT, style="head=exaggerated"))
+    by_mark = Session(talker, face).clip(Request(text=f"[style:head=exaggerated]{TEXT}[/style]"))
     np.testing.assert_allclose(by_mark.head.values[30:-30], by_flag.head.values[30:-30], atol=1e-4)
     assert not np.array_equal(by_flag.head.values, alive.head.values)
     np.testing.assert_array_equal(channels_of(by_flag, ("brows",)), channels_of(alive, ("brows",)))
@@ -126,14 +126,14 @@ def test_another_palette_is_another_person(alive: Clip, talker: Talker, face: Fa
         motion=few,
     )
     write_palette(tmp_path / "few.palette", replace(starter, styles={"few": part}, derivations={}))
-    clip = synthesize(Request(text=TEXT, palette=str(tmp_path / "few.palette")), talker, face)
+    clip = Session(talker, face, palette=tmp_path / "few.palette").clip(Request(text=TEXT))
     assert not np.array_equal(clip.head.values, alive.head.values)
     with pytest.raises(InputError, match="no style 'delighted' in the palette; it has few"):
-        synthesize(Request(text=TEXT, palette=str(tmp_path / "few.palette"), style="delighted"), talker, face)
+        Session(talker, face, palette=tmp_path / "few.palette").clip(Request(text=TEXT, style="delighted"))
 
 
 def test_an_idle_face_lives(talker: Talker, face: Face) -> None:
-    clip = synthesize(Request(idle=12.0), talker, face)
+    clip = Session(talker, face).clip(Request(idle=12.0))
     assert not clip.speech.waveform.samples.any()
     assert channels_of(clip, ("eyeBlink",)).max() > 0.6
     assert np.degrees(np.ptp(clip.head.values[:, :3], axis=0)).max() > 0.5

@@ -10,13 +10,13 @@ import pytest
 
 from cli.main import run
 from lexicon.sequence import SILENCE
-from tts2face.api import Piece, stream, write_clip
 from tts2face.gesture.spans import StyleSpan
 from tts2face.models.face_file import load_face
 from tts2face.models.talker import load_talker
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.session import Cast, cast
+from tts2face.session import Session
+from tts2face.synthesis.clip_stream import Piece
 from tts2face.types import joined_clips
 from tts2face.video.media import media_facts
 
@@ -25,12 +25,12 @@ SMALL = Picture(size="64x64")
 
 
 @pytest.fixture(scope="module")
-def ready() -> Cast:
-    return cast(load_talker("grid_s1"), load_face("head"))
+def ready() -> Session:
+    return Session(load_talker("grid_s1"), load_face("head"))
 
 
-def pieces(text: str, ready: Cast, **options: object) -> list[Piece]:
-    return list(stream(Request(text=text, voice="espeak", **options), ready))
+def pieces(text: str, ready: Session, **options: object) -> list[Piece]:
+    return list(ready.stream(Request(text=text, voice="espeak", **options)))
 
 
 def words(found: list[Piece]) -> dict[str, float]:
@@ -40,7 +40,7 @@ def words(found: list[Piece]) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("fps", [29.97, 60.0, 7.0])
-def test_marks_come_with_their_words_on_the_whole_clip_s_clock(fps: float, ready: Cast) -> None:
+def test_marks_come_with_their_words_on_the_whole_clip_s_clock(fps: float, ready: Session) -> None:
     text = "One two. [style:head=annoyed]Three [nod]four. Five. Six [pause 0.7]seven[/style] eight. [nod]Nine."
     found = pieces(text, ready, fps=fps)
     at = words(found)
@@ -54,9 +54,9 @@ def test_marks_come_with_their_words_on_the_whole_clip_s_clock(fps: float, ready
     assert at["seven"] < spans[-1].end <= at["eight"] + 1e-6
 
 
-def test_a_pause_is_silent_and_the_lips_rest_in_it(ready: Cast) -> None:
+def test_a_pause_is_silent_and_the_lips_rest_in_it(ready: Session) -> None:
     texts = ("Bob may go away.", "Bob may [pause 1.5] go away.")
-    (plain,), (paused,) = (list(stream(Request(text=text, gestures=False), ready)) for text in texts)
+    (plain,), (paused,) = (list(ready.stream(Request(text=text, gestures=False))) for text in texts)
     phones = paused.clip.speech.phones
     assert phones.phones.count(SILENCE) == 3
     middle = phones.phones.index(SILENCE, 1)
@@ -66,11 +66,11 @@ def test_a_pause_is_silent_and_the_lips_rest_in_it(ready: Cast) -> None:
     assert len(paused.clip.motion) > len(plain.clip.motion) + 30
 
 
-def test_a_file_with_marks_counts_characters_and_tells_the_times_of_names(ready: Cast, tmp_path: Path) -> None:
+def test_a_file_with_marks_counts_characters_and_tells_the_times_of_names(ready: Session, tmp_path: Path) -> None:
     text = '<speak>Hello <mark name="here"/>there. <break time="1s"/>Bye.</speak>'
     told: list[tuple[int, int]] = []
     request = Request(text=text, fps=5.0)
-    written = write_clip(request, SMALL, ready, tmp_path / "a.mp4", on_progress=lambda *step: told.append(step))
+    written = ready.write(request, tmp_path / "a.mp4", picture=SMALL, on_progress=lambda *step: told.append(step))
     (here,) = written.marks
     assert here.name == "here"
     assert 0.3 < here.seconds < 1.2
@@ -104,10 +104,10 @@ def test_the_command_tells_when_names_are_reached(tmp_path: Path) -> None:
     assert done.stderr.rstrip().endswith("s: the place")
 
 
-def test_a_recording_s_words_carry_marks(ready: Cast, shared_recordings: Path) -> None:
+def test_a_recording_s_words_carry_marks(ready: Session, shared_recordings: Path) -> None:
     film = shared_recordings / "grid_s1" / "clips" / "bbaf2n.mkv"
     found = list(
-        stream(Request(audio=film, text="bin [style:head=annoyed]blue at F[/style] two [nod]now", fps=60.0), ready)
+        ready.stream(Request(audio=film, text="bin [style:head=annoyed]blue at F[/style] two [nod]now", fps=60.0))
     )
     at = words(found)
     assert [nod.time for piece in found for nod in piece.timeline.nods] == pytest.approx([at["now"]])

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.api import stream, synthesize
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
 from tts2face.models.talker import Talker, load_talker
 from tts2face.request import Request
-from tts2face.session import cast
+from tts2face.session import Session
 from tts2face.types import Clip, joined_clips
 
 TEXT = "Bob may move. We were away."
@@ -51,7 +50,7 @@ def face() -> Face:
 
 @pytest.fixture(scope="module")
 def clip(talker: Talker, face: Face) -> Clip:
-    return synthesize(Request(text=TEXT), talker, face)
+    return Session(talker, face).clip(Request(text=TEXT))
 
 
 def digest(clip: Clip) -> str:
@@ -59,8 +58,8 @@ def digest(clip: Clip) -> str:
     return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()
 
 
-# tests/doors/test_audio.py changes these; an idle face below; palettes in tests/doors/test_gestures.py
-ELSEWHERE = {"audio", "drive", "idle", "palette"}
+# tests/doors/test_audio.py changes these; an idle face below
+ELSEWHERE = {"audio", "drive", "idle"}
 
 
 @pytest.mark.parametrize("name", [option.name for option in fields(Request) if option.name not in ELSEWHERE])
@@ -70,7 +69,7 @@ def test_every_option_changes_the_clip(name: str, clip: Clip, talker: Talker, fa
     plan = tmp_path / "plan.json"
     plan.write_text('{"nods": [{"time": 0.4}]}')
     value = {"dictionary": own, "timeline": plan}.get(name) or CHANGES[name]
-    changed = synthesize(replace(Request(text=TEXT), **{name: value}), talker, face)
+    changed = Session(talker, face).clip(replace(Request(text=TEXT), **{name: value}))
     assert digest(changed) != digest(clip)
 
 
@@ -78,7 +77,7 @@ def test_the_same_request_gives_the_same_bytes_in_another_process(clip: Clip) ->
     code = (
         "import sys; sys.path.insert(0, 'tests/doors')\n"
         "from test_requests import *\n"
-        "print(digest(synthesize(Request(text=TEXT), load_talker('grid_s1'), load_face('head'))))"
+        "print(digest(Session(load_talker('grid_s1'), load_face('head')).clip(Request(text=TEXT))))"
     )
     environment = {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PATH": ""}
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
@@ -86,22 +85,21 @@ def test_the_same_request_gives_the_same_bytes_in_another_process(clip: Clip) ->
 
 
 def test_a_voice_that_has_spoken_before_gives_the_same_bytes(clip: Clip, talker: Talker, face: Face) -> None:
-    ready = cast(talker, face)
+    ready = Session(talker, face)
     for text in ("Something else was said. Bob may have been away.", TEXT):
-        said = joined_clips([piece.clip for piece in stream(Request(text=text), ready)])
+        said = joined_clips([piece.clip for piece in ready.stream(Request(text=text))])
     assert digest(said) == digest(clip)
-    assert len(ready.voices) == 1
 
 
 def test_a_stream_is_the_whole_in_pieces(clip: Clip, talker: Talker, face: Face) -> None:
-    pieces = list(stream(Request(text=TEXT), cast(talker, face)))
+    pieces = list(Session(talker, face).stream(Request(text=TEXT)))
     assert len(pieces) == 2
     assert digest(joined_clips([piece.clip for piece in pieces])) == digest(clip)
 
 
 @pytest.mark.parametrize(("seconds", "fps"), [(0.1, 30.0), (25.0, 29.97), (12.3, 7.0)])
 def test_an_idle_face_is_silent_for_as_long_as_it_says(seconds: float, fps: float, talker: Talker, face: Face) -> None:
-    pieces = list(stream(Request(idle=seconds, fps=fps), cast(talker, face)))
+    pieces = list(Session(talker, face).stream(Request(idle=seconds, fps=fps)))
     clip = joined_clips([piece.clip for piece in pieces])
     assert clip.speech.waveform.duration == pytest.approx(seconds, abs=1.01 / fps)
     assert not clip.speech.waveform.samples.any()
@@ -113,7 +111,7 @@ def test_an_idle_face_is_silent_for_as_long_as_it_says(seconds: float, fps: floa
 @pytest.mark.parametrize("fps", [23.976, 24.0, 25.0, 29.97, 50.0, 59.94])
 def test_pieces_end_on_frames_at_any_rate(fps: float, talker: Talker, face: Face) -> None:
     """Sound and picture of a long text stay together: each piece's sound is as long as its frames, to half a sample."""
-    pieces = list(stream(Request(text="One. Two. Three.", fps=fps), cast(talker, face)))
+    pieces = list(Session(talker, face).stream(Request(text="One. Two. Three.", fps=fps)))
     n_frames = sum(len(piece.clip.motion) for piece in pieces)
     n_samples = sum(len(piece.clip.speech.waveform.samples) for piece in pieces)
     rate = pieces[0].clip.speech.waveform.rate
@@ -121,7 +119,7 @@ def test_pieces_end_on_frames_at_any_rate(fps: float, talker: Talker, face: Face
 
 
 def test_lips_rest_in_silence_and_at_both_ends(talker: Talker, face: Face) -> None:
-    weights = synthesize(Request(text=TEXT, gestures=False), talker, face).motion.values
+    weights = Session(talker, face).clip(Request(text=TEXT, gestures=False)).motion.values
     for frame in (0, -1):
         assert np.abs(weights[frame] - weights[0]).max() < 1e-4
     assert np.abs(np.diff(weights[:5], axis=0)).max() < 0.02
@@ -140,7 +138,7 @@ def test_lips_rest_in_silence_and_at_both_ends(talker: Talker, face: Face) -> No
 )
 def test_what_cannot_be_said_is_refused(change: dict, reason: str, talker: Talker, face: Face) -> None:
     with pytest.raises((InputError, DataError), match=reason):
-        synthesize(replace(Request(text=TEXT), **change), talker, face)
+        Session(talker, face).clip(replace(Request(text=TEXT), **change))
 
 
 @pytest.mark.parametrize(

@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.exemplar.explanation import explained, explanation_json, explanation_text
+from tts2face.exemplar.explanation import explain_selection, explanation_json, explanation_text
 from tts2face.exemplar.options import METHODS, THEOBALD_2007, SynthesisOptions
 from tts2face.exemplar.synthesis import (
     REST_FROM_S,
     VisualVoice,
-    chosen_tokens,
+    select_tokens,
     speech_trajectory,
     stillness,
     visual_voice,
@@ -126,7 +126,7 @@ def test_a_throat_sound_takes_the_next_phone_s_shape(voice: VisualVoice):
 
 def test_a_recorded_sentence_finds_itself_first(voice: VisualVoice, talker: Talker):
     spoken = talker.utterances[7]
-    _, found = chosen_tokens(spoken.phones, voice, SynthesisOptions(context=4, k=1))
+    found = select_tokens(spoken.phones, voice, SynthesisOptions(context=4, k=1)).found
     assert (voice.tokens.utterance[found.tokens[:, 0]] == 7).all()
 
 
@@ -176,7 +176,7 @@ def test_refuses_impossible_requests(voice: VisualVoice):
 
 def test_explains_which_tokens_were_used(voice: VisualVoice):
     phones = sequence([SILENCE, "b", "ɔɪ", SILENCE], [0.3, 0.1, 0.2, 0.3])
-    shown = explained(phones, voice)
+    shown = explain_selection(select_tokens(phones, voice), voice)
     assert [phone.phone for phone in shown] == [SILENCE, "b", "ɔɪ", SILENCE] or len(shown) == 5
     b = shown[1]
     assert (b.phone, b.shown, b.left[-1], b.right[0]) == ("b", "b", SILENCE, shown[2].shown)

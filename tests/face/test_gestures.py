@@ -9,7 +9,6 @@ from scipy.spatial import KDTree
 
 from lexicon.errors import DataError, InputError
 from tests.face.gestures import BROWS, CHEEKS, palette, posed_landmarks
-from tts2face.api import synthesize
 from tts2face.face.deformation import rigged
 from tts2face.face.expressions import expression_landmarks, expression_table, expressive
 from tts2face.face.gesture_transfer import LID_RIMS, LIPS, GestureFace, gesture_face
@@ -21,6 +20,7 @@ from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, MOUTH_CO
 from tts2face.models.palette import EXPRESSIONS
 from tts2face.models.talker import load_talker
 from tts2face.request import Request
+from tts2face.session import Session
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
 FACES = ("head", "cartoon")
@@ -38,7 +38,7 @@ def ready(name: str) -> GestureFace:
 
 @cache
 def spoken(name: str) -> Trajectory:
-    return synthesize(Request(text=BILABIALS, gestures=False), load_talker("grid_s1"), load_face(name)).motion
+    return Session(load_talker("grid_s1"), load_face(name)).clip(Request(text=BILABIALS, gestures=False)).motion
 
 
 def silence(face: Face, n_frames: int = 1) -> Trajectory:

@@ -5,7 +5,7 @@ import pytest
 
 from lexicon.errors import Tts2faceError
 from tts2face.models.face_file import load_face
-from tts2face.render.draw import draw, staged
+from tts2face.render.draw import draw, mesh_renderer
 from tts2face.render.picture import Picture
 from tts2face.video.blendshapes import BLENDSHAPES
 
@@ -34,7 +34,7 @@ def scores(request, networks):
     """Function from shape weights to the network's scores by name."""
     tracker, reader = networks
     face = load_face(request.param)
-    stage = staged(face, Picture(size="640x640"))
+    stage = mesh_renderer(face, Picture(size="640x640"))
 
     def scored(weights):
         vector = np.array([weights.get(name, 0.0) for name in face.shape_names], np.float32)

@@ -19,12 +19,11 @@ from typing import Any
 import numpy as np
 
 from tests.render.tiny_talker import own_talker
-from tts2face.api import write_clip
 from tts2face.models.face_file import load_face
 from tts2face.models.talker import Talker, load_talker
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.session import cast
+from tts2face.session import Session
 from tts2face.types import Clip
 
 KEPT = Path(__file__).with_name("requests.json")
@@ -114,7 +113,8 @@ def fingerprint(golden: Golden) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "frames"
         picture = Picture(**{"size": "96x96", **golden.picture})
-        write_clip(Request(**options), picture, cast(talker, face), out, on_clip=clips.append)
+        session = Session(talker, face or "self")
+        session.write(Request(**options), out, picture=picture, on_piece=lambda piece: clips.append(piece.clip))
         pictures = hashed(*(path.read_bytes() for path in sorted(out.glob("*.png"))))
         n_pictures = len(list(out.glob("*.png")))
     motion = np.concatenate([clip.motion.values for clip in clips])

@@ -15,7 +15,7 @@ from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.models.palette import EXPRESSIONS
 from tts2face.models.talker import ShapeModel, Talker, Utterance
 from tts2face.own_face.gestures import OwnGestures, own_gestures
-from tts2face.render.own_face import plate_drawn, plate_staged
+from tts2face.render.own_face import own_face_renderer, plate_drawn
 from tts2face.render.picture import Picture
 from tts2face.retargeting.performer import LIDS
 from tts2face.types import Trajectory
@@ -101,7 +101,7 @@ def test_expressions_leave_the_gap_of_the_lips(mood: int) -> None:
 
 def test_without_gestures_the_picture_is_the_same_and_with_them_another() -> None:
     talker, picture = blinker(), Picture(size="96x96")
-    plain, stage = plate_staged(talker, picture), plate_staged(talker, picture, ready())
+    plain, stage = own_face_renderer(talker, picture), own_face_renderer(talker, picture, ready())
     own = spoken()
     assert stage.channels == plain.channels + ready().channels
     still, blink = (ready().motion(own, g).values[0] for g in ({}, {"blink": np.ones((1, 2), np.float32)}))

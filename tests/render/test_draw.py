@@ -10,7 +10,7 @@ from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_face import tiny_face
 from tts2face.models.face_file import load_face
-from tts2face.render.draw import draw, frames, staged
+from tts2face.render.draw import draw, mesh_renderer
 from tts2face.render.picture import Picture
 from tts2face.render.surface import linear_table
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
@@ -49,9 +49,9 @@ def test_no_option_was_forgotten():
 def test_bytes_do_not_depend_on_the_number_of_threads(threads):
     face = tiny_face()
     clip = clip_of(face, 7)
-    stage = staged(face, SMALL)
+    stage = mesh_renderer(face, SMALL)
     one_by_one = [draw(stage, *pose) for pose in zip(clip.motion.values, clip.head.values, strict=True)]
-    together = list(frames(clip, stage, threads=threads))
+    together = list(stage.frames(clip, threads=threads))
     assert len(together) == 7
     assert all(np.array_equal(a, b) for a, b in zip(one_by_one, together, strict=True))
 
@@ -160,6 +160,6 @@ def test_motion_of_another_face_is_refused():
     face = tiny_face()
     other = replace(clip_of(face, 2), motion=Trajectory(("a", "b"), np.zeros((2, 2)), 25.0))
     with pytest.raises(InputError, match="not in the shapes of this face"):
-        next(frames(other, face, SMALL))
+        next(mesh_renderer(face, SMALL).frames(other))
     with pytest.raises(InputError, match="4 shapes, not weights"):
         draw(face, np.zeros(3))

@@ -15,8 +15,8 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_face import tiny_face
 from tts2face.clock import exact_rate
 from tts2face.render import encode
-from tts2face.render.draw import draw, staged
-from tts2face.render.encode import ClipWriter, write_clip
+from tts2face.render.draw import draw, mesh_renderer
+from tts2face.render.encode import ClipWriter, write_clips
 from tts2face.render.output_path import checked_output
 from tts2face.render.picture import Picture
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, frame_count
@@ -28,12 +28,12 @@ CLEAR = Picture(size="64x48", background="transparent")
 
 @pytest.fixture(scope="module")
 def stage():
-    return staged(tiny_face(), SMALL)
+    return mesh_renderer(tiny_face(), SMALL)
 
 
 @pytest.fixture(scope="module")
 def clear():
-    return staged(tiny_face(), CLEAR)
+    return mesh_renderer(tiny_face(), CLEAR)
 
 
 def clip_of(seconds, fps=30.0, click=None, rate=RATE):
@@ -82,7 +82,7 @@ def loud_at(sound, rate, first, level=0.3):
 @pytest.mark.parametrize("fps", [30.0, 29.97, 23.976, 59.94, 25.0, 12.5])
 def test_an_mp4_has_every_frame_at_its_exact_time(tmp_path, stage, fps):
     clip = clip_of(1.3, fps)
-    write_clip(tmp_path / "a.mp4", clip, stage)
+    write_clips(tmp_path / "a.mp4", [clip], stage)
     pictures, times, sound, (rate, (first,)) = read(tmp_path / "a.mp4")
     assert len(pictures) == len(clip.motion)
     assert [time - times[0] for time in times] == [i / exact_rate(fps) for i in range(len(pictures))]
@@ -97,7 +97,7 @@ def test_an_mp4_has_every_frame_at_its_exact_time(tmp_path, stage, fps):
 @pytest.mark.parametrize("rate", [16_000, 22_050, 24_000])
 def test_a_click_is_heard_when_it_was_put(tmp_path, stage, suffix, rate):
     path = tmp_path / f"a{suffix}"
-    write_clip(path, clip_of(1.0, click=0.4, rate=rate), stage)
+    write_clips(path, [clip_of(1.0, click=0.4, rate=rate)], stage)
     _, _, sound, (heard_rate, (first,)) = read(path)
     assert heard_rate == 48_000
     assert loud_at(sound, heard_rate, first) == pytest.approx(0.4, abs=0.003)
@@ -118,8 +118,8 @@ def test_clips_follow_each_other_with_sound_and_picture_together(tmp_path, stage
 
 
 def test_pictures_look_as_drawn_and_say_their_colours(tmp_path):
-    stage, clip = staged(tiny_face(), Picture(size="256x256", background="#3050a0")), clip_of(0.2)
-    write_clip(tmp_path / "a.mp4", clip, stage)
+    stage, clip = mesh_renderer(tiny_face(), Picture(size="256x256", background="#3050a0")), clip_of(0.2)
+    write_clips(tmp_path / "a.mp4", [clip], stage)
     with av.open(str(tmp_path / "a.mp4")) as container:
         context = container.streams.video[0].codec_context
         tags = context.color_primaries, context.color_trc, context.colorspace, context.color_range
@@ -135,14 +135,14 @@ def test_pictures_look_as_drawn_and_say_their_colours(tmp_path):
 
 
 def test_an_mp4_can_be_played_while_it_loads(tmp_path, stage):
-    write_clip(tmp_path / "a.mp4", clip_of(0.3), stage)
+    write_clips(tmp_path / "a.mp4", [clip_of(0.3)], stage)
     content = (tmp_path / "a.mp4").read_bytes()
     assert 0 < content.find(b"moov") < content.find(b"mdat")
 
 
 def test_a_webm_keeps_the_coverage(tmp_path, clear):
     clip = clip_of(0.5)
-    write_clip(tmp_path / "a.webm", clip, clear)
+    write_clips(tmp_path / "a.webm", [clip], clear)
     decoder = av.CodecContext.create("libvpx-vp9", "r")
     with av.open(str(tmp_path / "a.webm")) as container:
         shown = [f for packet in container.demux(video=0) for f in decoder.decode(packet)]
@@ -156,7 +156,7 @@ def test_a_webm_keeps_the_coverage(tmp_path, clear):
 
 def test_a_gif_has_true_colours_and_times(tmp_path, stage):
     clip = clip_of(1.0)
-    write_clip(tmp_path / "a.gif", clip, stage)
+    write_clips(tmp_path / "a.gif", [clip], stage)
     with Image.open(tmp_path / "a.gif") as file:
         duration = 0
         for i in range(file.n_frames):
@@ -170,7 +170,7 @@ def test_a_gif_has_true_colours_and_times(tmp_path, stage):
 
 
 def test_a_fast_gif_leaves_frames_out_rather_than_slow_down(tmp_path, stage):
-    write_clip(tmp_path / "a.gif", clip_of(1.0, fps=120.0), stage)
+    write_clips(tmp_path / "a.gif", [clip_of(1.0, fps=120.0)], stage)
     with Image.open(tmp_path / "a.gif") as file:
         durations = []
         for i in range(file.n_frames):
@@ -181,7 +181,7 @@ def test_a_fast_gif_leaves_frames_out_rather_than_slow_down(tmp_path, stage):
 
 
 def test_a_transparent_gif_is_empty_around_the_head(tmp_path, clear):
-    write_clip(tmp_path / "a.gif", clip_of(0.3), clear)
+    write_clips(tmp_path / "a.gif", [clip_of(0.3)], clear)
     with Image.open(tmp_path / "a.gif") as file:
         coverage = np.array(file.convert("RGBA"))[:, :, 3]
     assert coverage[0, 0] == 0
@@ -192,7 +192,7 @@ def test_a_transparent_gif_is_empty_around_the_head(tmp_path, clear):
 def test_a_folder_holds_the_drawn_pictures_and_the_sound(tmp_path, clear, name):
     clip = clip_of(0.5, click=0.25)
     for _ in range(2):  # the second time, it replaces its own
-        write_clip(f"{tmp_path}/{name}", clip, clear)
+        write_clips(f"{tmp_path}/{name}", [clip], clear)
     folder = tmp_path / "pictures"
     assert sorted(path.name for path in folder.iterdir()) == [f"{i:06d}.png" for i in range(15)] + ["sound.wav"]
     for i in (0, 14):
@@ -205,7 +205,7 @@ def test_a_folder_holds_the_drawn_pictures_and_the_sound(tmp_path, clear, name):
 
 def test_progress_counts_every_frame(tmp_path, stage):
     heard = []
-    write_clip(tmp_path / "a.mp4", clip_of(0.5), stage, on_progress=lambda done, of: heard.append((done, of)))
+    write_clips(tmp_path / "a.mp4", [clip_of(0.5)], stage, on_progress=lambda done, of: heard.append((done, of)))
     assert heard == [(i + 1, 15) for i in range(15)]
 
 
@@ -266,7 +266,7 @@ def test_nothing_stays_of_an_interrupted_file(tmp_path, stage, name, error):
             raise error
 
     with pytest.raises(error):
-        write_clip(tmp_path / name, clip_of(0.5), stage, on_progress=stop)
+        write_clips(tmp_path / name, [clip_of(0.5)], stage, on_progress=stop)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -285,7 +285,7 @@ def test_a_full_disk_is_told_and_leaves_nothing(tmp_path, stage, name):
     resource.setrlimit(resource.RLIMIT_FSIZE, (3000, before[1]))  # no file beyond 3 kB, as if the disk were full
     try:
         with pytest.raises(BackendError, match=r"cannot write .*: .*; free some space or choose another folder"):
-            write_clip(tmp_path / name, clip_of(2.0, click=0.5), stage)
+            write_clips(tmp_path / name, [clip_of(2.0, click=0.5)], stage)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
         signal.signal(signal.SIGXFSZ, ignored)
@@ -298,5 +298,5 @@ def test_an_error_of_the_encoder_reaches_the_caller(tmp_path, stage, monkeypatch
 
     monkeypatch.setattr(encode.Movie, "picture", fail)
     with pytest.raises(BackendError, match="No space left on device; free some space"):
-        write_clip(tmp_path / "a.mp4", clip_of(2.0), stage)
+        write_clips(tmp_path / "a.mp4", [clip_of(2.0)], stage)
     assert list(tmp_path.iterdir()) == []

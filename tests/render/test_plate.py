@@ -9,9 +9,8 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_talker import SIZE, face_points, own_talker
 from tts2face.models.talker import Talker
 from tts2face.render import own_face as plate
-from tts2face.render.draw import frames
 from tts2face.render.image_warp import bend, lay
-from tts2face.render.own_face import plate_drawn, plate_frame, plate_staged
+from tts2face.render.own_face import own_face_renderer, plate_drawn
 from tts2face.render.picture import Picture
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
@@ -62,7 +61,7 @@ def test_a_texture_is_laid_where_its_points_are():
 
 def test_the_plate_s_own_parameters_leave_the_plate_alone_but_for_the_open_mouth():
     talker = own_talker()
-    stage = plate_staged(talker, Picture(size=f"{SIZE}x{SIZE}"))
+    stage = own_face_renderer(talker, Picture(size=f"{SIZE}x{SIZE}"))
     drawn = plate_drawn(stage, motion_of_plate(talker, 2), 2)
     changed = np.abs(drawn.astype(int) - stage.plate[2]).max(axis=2) > 1
     y, x = np.nonzero(changed)
@@ -75,7 +74,7 @@ def test_the_plate_s_own_parameters_leave_the_plate_alone_but_for_the_open_mouth
 
 def test_motion_moves_the_face_and_neither_corner_of_the_picture():
     talker = own_talker()
-    stage = plate_staged(talker, Picture(size=f"{SIZE}x{SIZE}"))
+    stage = own_face_renderer(talker, Picture(size=f"{SIZE}x{SIZE}"))
     motion = motion_of_plate(talker, 0)
     motion[0] += 40
     moved = plate_drawn(stage, motion, 0)
@@ -85,7 +84,7 @@ def test_motion_moves_the_face_and_neither_corner_of_the_picture():
 
 def test_looks_change_the_texture_by_their_basis():
     talker = own_talker()
-    stage = plate_staged(talker, Picture(size=f"{SIZE}x{SIZE}"))
+    stage = own_face_renderer(talker, Picture(size=f"{SIZE}x{SIZE}"))
     motion = motion_of_plate(talker, 1)
     motion[2] += 2000
     difference = plate_drawn(stage, motion, 1).astype(float) - stage.plate[1]
@@ -95,20 +94,20 @@ def test_looks_change_the_texture_by_their_basis():
 
 @pytest.mark.parametrize(("instant", "number"), [(0.0, 0), (0.08, 2), (0.12, 3), (0.16, 2), (0.24, 0), (0.28, 1)])
 def test_the_plate_goes_to_its_end_and_back(instant, number):
-    assert plate_frame(plate_staged(own_talker(), Picture(size="96x96")), instant) == number
+    assert own_face_renderer(own_talker(), Picture(size="96x96")).plate_frame(instant) == number
 
 
 def test_without_a_size_the_picture_is_as_large_as_the_video():
-    stage = plate_staged(own_talker(), Picture())
+    stage = own_face_renderer(own_talker(), Picture())
     assert (stage.picture.width, stage.picture.height) == (SIZE, SIZE)
     assert stage.scale == 1.0
     assert stage.plate[0].shape == (SIZE, SIZE, 3)
 
 
 def test_many_large_frames_are_packed_and_look_the_same(monkeypatch):
-    raw = plate_staged(own_talker(), Picture()).plate
+    raw = own_face_renderer(own_talker(), Picture()).plate
     monkeypatch.setattr(plate, "MOST_RAW_BYTES", raw[0].size)
-    packed = plate_staged(own_talker(), Picture()).plate
+    packed = own_face_renderer(own_talker(), Picture()).plate
     assert len(packed) == len(raw)
     assert np.array_equal(packed[0], raw[0])
     for number in range(1, len(raw)):
@@ -117,25 +116,25 @@ def test_many_large_frames_are_packed_and_look_the_same(monkeypatch):
 
 def test_a_clip_goes_on_where_the_one_before_it_ended():
     talker = own_talker()
-    stage = plate_staged(talker, Picture(size="96x96"))
+    stage = own_face_renderer(talker, Picture(size="96x96"))
     values = np.array([motion_of_plate(talker, 0)] * 4)
-    whole = list(frames(clip_of(stage.channels, values), stage, threads=2))
-    rest = list(frames(clip_of(stage.channels, values[2:]), stage, first=2))
+    whole = list(stage.frames(clip_of(stage.channels, values), threads=2))
+    rest = list(stage.frames(clip_of(stage.channels, values[2:]), first=2))
     assert np.array_equal(whole[2], rest[0])
     assert np.array_equal(whole[3], rest[1])
 
 
 def test_a_talker_without_pictures_is_refused():
     with pytest.raises(InputError, match="Ada has motion only"):
-        plate_staged(own_talker(has_face=False), Picture())
+        own_face_renderer(own_talker(has_face=False), Picture())
 
 
 def test_a_plate_is_not_transparent():
     with pytest.raises(InputError, match="her own video"):
-        plate_staged(own_talker(), Picture(background="transparent"))
+        own_face_renderer(own_talker(), Picture(background="transparent"))
 
 
 def test_a_clip_for_another_face_is_refused():
-    stage = plate_staged(own_talker(), Picture(size="96x96"))
+    stage = own_face_renderer(own_talker(), Picture(size="96x96"))
     with pytest.raises(InputError, match="not in the channels"):
-        list(frames(clip_of(("jawOpen",), np.zeros((1, 1))), stage))
+        list(stage.frames(clip_of(("jawOpen",), np.zeros((1, 1)))))

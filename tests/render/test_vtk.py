@@ -11,7 +11,7 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_face import tiny_face
 from tts2face.models.face_file import load_face
 from tts2face.render import vtk_renderer as vtk
-from tts2face.render.draw import draw, frames, staged
+from tts2face.render.draw import draw, mesh_renderer
 from tts2face.render.picture import NUMBA, PYVISTA, Picture
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
@@ -34,7 +34,7 @@ def _fresh_probe():
 
 
 def both(face, weights, head=TURNED * 0, **options):
-    pictures = [draw(staged(face, Picture(renderer=name, **options)), weights, head) for name in (NUMBA, PYVISTA)]
+    pictures = [mesh_renderer(face, Picture(renderer=name, **options)).draw(weights, head) for name in (NUMBA, PYVISTA)]
     return [picture.astype(int) for picture in pictures]
 
 
@@ -81,8 +81,8 @@ def test_a_clip_is_drawn_frame_by_frame_in_one_window():
     motion = np.linspace(0, 1, 3)[:, None] * [1, 0, 0, 0]
     speech = Speech(Waveform(np.zeros(2400), 24_000), PhoneSequence((SILENCE,), np.array([0.0, 0.1])), ())
     clip = Clip(Trajectory(face.shape_names, motion, 30), Trajectory(HEAD_CHANNELS, np.zeros((3, 6)), 30), speech)
-    stage = staged(face, Picture(size="64x64", renderer=PYVISTA))
-    drawn = list(frames(clip, stage))
+    stage = mesh_renderer(face, Picture(size="64x64", renderer=PYVISTA))
+    drawn = list(stage.frames(clip))
     assert len(drawn) == 3
     for weights, picture in zip(motion, drawn, strict=True):
         np.testing.assert_array_equal(picture, draw(stage, weights))
@@ -92,14 +92,14 @@ def test_a_clip_is_drawn_frame_by_frame_in_one_window():
 def test_without_pyvista_one_sentence_says_what_to_install(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(BackendError, match=r"--renderer pyvista needs pyvista.*pip install 'tts2face\[view\]'"):
-        staged(tiny_face(), Picture(renderer=PYVISTA))
+        mesh_renderer(tiny_face(), Picture(renderer=PYVISTA))
 
 
 def test_without_gl_one_sentence_says_what_to_install(monkeypatch):
     monkeypatch.setattr(vtk, "require_pyvista", lambda purpose: None)
     monkeypatch.setattr(vtk, "probe", lambda window: False)
     with pytest.raises(BackendError, match=r"neither a GPU nor software GL.*--renderer numba"):
-        staged(tiny_face(), Picture(renderer=PYVISTA))
+        mesh_renderer(tiny_face(), Picture(renderer=PYVISTA))
 
 
 @pytest.mark.usefixtures("_fresh_probe")

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from tts2face.prefetch import Ahead
+from tts2face.prefetch import Prefetch
 
 
 def test_same_items_in_the_same_order() -> None:
-    with Ahead(range(50), 3) as items:
+    with Prefetch(range(50), 3) as items:
         assert list(items) == list(range(50))
 
 
@@ -22,7 +22,7 @@ def test_no_more_than_the_room_is_made_ahead() -> None:
             made.append(number)
             yield number
 
-    with Ahead(source(), 2) as items:
+    with Prefetch(source(), 2) as items:
         assert next(iter(items)) == 0
         time.sleep(0.3)
         assert 3 <= len(made) <= 5
@@ -33,7 +33,7 @@ def test_an_error_comes_where_its_item_would() -> None:
         yield 1
         raise ValueError("broken")
 
-    with Ahead(source(), 2) as ahead:
+    with Prefetch(source(), 2) as ahead:
         items = iter(ahead)
         assert next(items) == 1
         with pytest.raises(ValueError, match="broken"):
@@ -42,7 +42,7 @@ def test_an_error_comes_where_its_item_would() -> None:
 
 def test_the_maker_ends_when_nobody_asks_any_more() -> None:
     before = threading.active_count()
-    with Ahead(iter(int, 1), 1) as items:  # endless
+    with Prefetch(iter(int, 1), 1) as items:  # endless
         next(iter(items))
     time.sleep(0.5)
     assert threading.active_count() <= before

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar import blending
-from tts2face.exemplar.options import SynthesisOptions
-from tts2face.exemplar.synthesis import VisualVoice, chosen_tokens, read_at_frames
+from tts2face.exemplar.synthesis import TokenSelection, VisualVoice, read_at_frames
+from tts2face.exemplar.token_search import Found
 from tts2face.exemplar.tokens import Tokens
 from tts2face.models.talker import Talker, require_appearance
 from tts2face.types import Trajectory
@@ -46,12 +46,11 @@ def looks_of(talker: Talker, voice: VisualVoice) -> Looks:
     return Looks(replace(voice.tokens, frames=frames.astype(np.float32)), spread, rest, appearance.channels)
 
 
-def looks_trajectory(
-    phones: PhoneSequence, voice: VisualVoice, looks: Looks, *, fps: float, n_frames: int, options: SynthesisOptions
-) -> Trajectory:
-    """Looks for phones in time, from the very tokens that move the lips; arguments as `speech_trajectory`."""
-    options = replace(options, k=min(options.k, LOOKS_BLENDED), contacts=False)
-    targets, found = chosen_tokens(phones, voice, options)
+def looks_trajectory(selection: TokenSelection, looks: Looks, *, fps: float, n_frames: int) -> Trajectory:
+    """Looks for phones in time, from the very tokens that move the lips; arguments as `blend_trajectory`."""
+    phones, targets = selection.phones, selection.targets
+    options = replace(selection.options, k=min(selection.options.k, LOOKS_BLENDED), contacts=False)
+    found = Found(selection.found.tokens[:, : options.k], selection.found.scores[:, : options.k])
     frame_times = np.arange(n_frames) / fps
     n_instants = int(np.ceil(max(phones.end, frame_times[-1]) * blending.CLOCK_HZ)) + 2
     weights = blending.exemplar_weights(found.scores, options.sharpness)

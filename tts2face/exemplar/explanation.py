@@ -5,10 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from lexicon.sequence import SILENCE, PhoneSequence
+from lexicon.sequence import SILENCE
 from tts2face.exemplar.blending import exemplar_weights
-from tts2face.exemplar.options import SynthesisOptions
-from tts2face.exemplar.synthesis import DEFAULT_OPTIONS, VisualVoice, chosen_tokens
+from tts2face.exemplar.synthesis import TokenSelection, VisualVoice
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,17 +44,9 @@ class ShownPhone:
     tokens: tuple[UsedToken, ...]
 
 
-def explained(
-    phones: PhoneSequence, voice: VisualVoice, *, options: SynthesisOptions = DEFAULT_OPTIONS
-) -> tuple[ShownPhone, ...]:
-    """What `speech_trajectory` uses for each phone, with the same arguments.
-
-    Raises
-    ------
-    InputError
-        As `speech_trajectory`.
-    """
-    targets, found = chosen_tokens(phones, voice, options)
+def explain_selection(selection: TokenSelection, voice: VisualVoice) -> tuple[ShownPhone, ...]:
+    """For each phone of a selection, the recorded tokens that move the lips."""
+    phones, targets, found, options = selection.phones, selection.targets, selection.found, selection.options
     weights = exemplar_weights(found.scores, options.sharpness)
     padded = (SILENCE,) * options.context + targets.labels + (SILENCE,) * options.context
     shown = []

@@ -82,8 +82,31 @@ def mean_speaking_pose(talker: Talker) -> NDArray[np.float32]:
     return np.asarray(frames.mean(axis=0, dtype=np.float64), np.float32)
 
 
-def chosen_tokens(phones: PhoneSequence, voice: VisualVoice, options: SynthesisOptions) -> tuple[Targets, Found]:
-    """What is shown for each phone, and the recorded tokens that show it."""
+@dataclass(frozen=True, slots=True, eq=False)
+class TokenSelection:
+    """The recorded tokens that show N phones in time: the answer of one search, from which every motion is made.
+
+    ``targets`` are the phones to be shown, ``found`` their best tokens, both for ``phones`` and ``options``.
+    """
+
+    phones: PhoneSequence
+    targets: Targets
+    found: Found
+    options: SynthesisOptions
+
+
+def select_tokens(
+    phones: PhoneSequence, voice: VisualVoice, options: SynthesisOptions = DEFAULT_OPTIONS
+) -> TokenSelection:
+    """Search the recorded tokens for each phone.
+
+    Raises
+    ------
+    InputError
+        A phone is not in the phone table, the sequence does not begin at 0 s, or an option is out of range.
+    """
+    if phones.start != 0.0:
+        raise InputError(f"phones to be animated begin at 0 s, not at {phones.start} s; shift them first")
     tokens = voice.tokens
     number = {label: at for at, label in enumerate(tokens.inventory)}
     targets = targets_of(phones, tokens.inventory)
@@ -97,7 +120,7 @@ def chosen_tokens(phones: PhoneSequence, voice: VisualVoice, options: SynthesisO
         k=options.k,
         duration=options.duration,
     )
-    return targets, found
+    return TokenSelection(phones, targets, found, options)
 
 
 def speech_trajectory(
@@ -108,25 +131,22 @@ def speech_trajectory(
     n_frames: int,
     options: SynthesisOptions = DEFAULT_OPTIONS,
 ) -> Trajectory:
-    """Motion of the talker's speech parameters for phones in time; the first and the last frame are at rest.
+    """Motion of the talker's speech parameters for phones in time: `select_tokens`, then `blend_trajectory`."""
+    return blend_trajectory(select_tokens(phones, voice, options), voice, fps=fps, n_frames=n_frames)
 
-    Raises
-    ------
-    InputError
-        A phone is not in the phone table, the sequence does not begin at 0 s, or an option is out of range.
+
+def blend_trajectory(selection: TokenSelection, voice: VisualVoice, *, fps: float, n_frames: int) -> Trajectory:
+    """Motion of the talker's speech parameters from selected tokens; the first and the last frame are at rest.
 
     Notes
     -----
     Time and memory grow linearly with the number of phones. The motion is made on a clock of its own and then read at
     the frames, so that frame rates agree. In silence farther than `REST_FROM_S` from speech the face is at rest.
     """
-    if phones.start != 0.0:
-        raise InputError(f"phones to be animated begin at 0 s, not at {phones.start} s; shift them first")
-    targets, found = chosen_tokens(phones, voice, options)
     frame_times = np.arange(n_frames) / fps
-    n_instants = int(np.ceil(max(phones.end, frame_times[-1]) * blending.CLOCK_HZ)) + 2
-    made = _motion(targets, found, voice, n_instants, options)
-    return Trajectory(voice.channels, read_at_frames(made, phones, frame_times, voice.rest), fps)
+    n_instants = int(np.ceil(max(selection.phones.end, frame_times[-1]) * blending.CLOCK_HZ)) + 2
+    made = _motion(selection.targets, selection.found, voice, n_instants, selection.options)
+    return Trajectory(voice.channels, read_at_frames(made, selection.phones, frame_times, voice.rest), fps)
 
 
 def read_at_frames(

@@ -1,6 +1,5 @@
-"""A clip's frames as pictures, drawn one after the other and never kept."""
+"""Frames of a mesh face as pictures, drawn one after the other and never kept."""
 
-import os
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,44 +10,93 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from tts2face.face.deformation import REST_HEAD
 from tts2face.models.face import Face
+from tts2face.prefetch import map_in_order
 from tts2face.render import vtk_renderer
-from tts2face.render.background import background
-from tts2face.render.camera import Optics, optics
-from tts2face.render.drawing_pool import drawn_ahead
-from tts2face.render.own_face import SYNTHETIC, PlateStage, plate_drawn, plate_frame, plate_frames
 from tts2face.render.picture import PYVISTA, Picture
 from tts2face.render.picture_kernels import Room, paint, room_for
-from tts2face.render.soft_shadows import Exposure, exposed
-from tts2face.render.studio_light import lamps, light_table
-from tts2face.render.surface import Surface, surfaced
+from tts2face.render.renderer import SYNTHETIC
+from tts2face.render.scene import Scene, available_cores, build_scene
 from tts2face.types import Clip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stage:
-    """Everything that stays the same while a face is drawn into pictures."""
+class MeshRenderer:
+    """Draws a mesh face; a `tts2face.render.renderer.FrameRenderer`."""
 
-    face: Face
-    picture: Picture
-    surface: Surface
-    optics: Optics
-    lights: NDArray[np.float32]
-    exposure: Exposure
-    behind: NDArray[np.uint8]
+    scene: Scene
+
+    @property
+    def picture(self) -> Picture:
+        """How the frames are drawn."""
+        return self.scene.picture
 
     @property
     def notice(self) -> str:
-        """What every file of it says about itself; a drawn head says nothing unless it is a real person's likeness."""
-        if "consent" not in self.face.metadata:
-            return ""
-        return SYNTHETIC.format(name=self.face.metadata.get("name", "a person"))
+        """What every file says about itself: nothing, unless the head is a real person's likeness."""
+        metadata = self.scene.face.metadata
+        return SYNTHETIC.format(name=metadata.get("name", "a person")) if "consent" in metadata else ""
+
+    def frames(self, clip: Clip, *, threads: int | None = None, first: int = 0) -> Iterator[NDArray[np.uint8]]:
+        """Pictures of a clip's frames; its motion is in the face's first shapes, and the others stay at rest."""
+        del first  # a head looks the same at any time
+        values = self._weights(clip)
+        poses = zip(values, clip.head.values, strict=True)
+        if self.picture.renderer == PYVISTA:
+            yield from vtk_renderer.frames(self.scene, poses)
+            return
+        n_threads = threads or available_cores()
+        rooms = deque(self._room() for _ in range(n_threads))
+
+        def draw_one(pose: tuple[NDArray[np.float32], NDArray[np.float32]]) -> NDArray[np.uint8]:
+            room = rooms.popleft()
+            try:
+                return self._draw(*pose, room)
+            finally:
+                rooms.append(room)
+
+        yield from map_in_order(draw_one, poses, n_threads)
+
+    def frame(self, clip: Clip, number: int) -> NDArray[np.uint8]:
+        """The picture of one frame of a clip."""
+        return self.draw(self._weights(clip)[number], clip.head.values[number])
+
+    def draw(self, weights: NDArray[np.floating], head: NDArray[np.floating] = REST_HEAD) -> NDArray[np.uint8]:
+        """One picture of the face for the weights (K,) of its shapes and a head pose (6,)."""
+        n_shapes = len(self.scene.face.shape_names)
+        if np.shape(weights) != (n_shapes,):
+            raise InputError(f"the face has {n_shapes} shapes, not weights of shape {np.shape(weights)}")
+        pose = np.asarray(weights, np.float32), np.asarray(head, np.float32)
+        if self.picture.renderer == PYVISTA:
+            (drawn,) = vtk_renderer.frames(self.scene, [pose])
+            return drawn
+        return self._draw(*pose, self._room())
+
+    def _weights(self, clip: Clip) -> NDArray[np.float32]:
+        names = self.scene.face.shape_names
+        n_moved = len(clip.motion.channels)
+        if clip.motion.channels != names[:n_moved]:
+            raise InputError(
+                "the clip's motion is not in the shapes of this face; make the clip with a session of this face"
+            )
+        if n_moved == len(names):
+            return clip.motion.values
+        return np.pad(clip.motion.values, ((0, 0), (0, len(names) - n_moved)))
+
+    def _room(self) -> Room:
+        picture = self.picture
+        return room_for(self.scene.surface, (picture.width, picture.height), picture.supersampling)
+
+    def _draw(self, weights: NDArray[np.float32], head: NDArray[np.float32], room: Room) -> NDArray[np.uint8]:
+        scene, picture = self.scene, self.picture
+        drawn = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
+        drawn[:, :, :3] = scene.behind
+        points = scene.surface.rig.posed(weights, head)
+        paint(points, scene.surface, scene.optics, (scene.lights, scene.exposure.at(weights)), room, drawn)
+        return drawn
 
 
-AnyStage = Stage | PlateStage
-
-
-def staged(face: Face, picture: Picture) -> Stage:
-    """The stage for a face and a picture; make it once, draw many times.
+def mesh_renderer(face: Face, picture: Picture) -> MeshRenderer:
+    """The renderer of a face; make it once, draw many times.
 
     Raises
     ------
@@ -57,15 +105,11 @@ def staged(face: Face, picture: Picture) -> Stage:
     """
     if picture.renderer == PYVISTA:
         vtk_renderer.require_gl()
-    side = picture.supersampling
-    surface, towards = surfaced(face), lamps(picture.view)
-    camera = optics(picture.view, face, (picture.width * side, picture.height * side))
-    exposure = exposed(face, surface, towards, available_cores())
-    return Stage(face, picture, surface, camera, light_table(towards, camera), exposure, background(picture))
+    return MeshRenderer(build_scene(face, picture))
 
 
 def draw(
-    face: Face | Stage,
+    face: Face,
     weights: NDArray[np.floating],
     head: NDArray[np.floating] = REST_HEAD,
     picture: Picture | None = None,
@@ -74,14 +118,12 @@ def draw(
 
     Parameters
     ----------
-    face
-        A face, or a stage when more pictures follow.
     weights : (K,)
         Of the face's shapes.
     head : (6,)
         Pose of `tts2face.types.HEAD_CHANNELS`.
     picture
-        How to draw; the default options without it. Not needed with a stage.
+        How to draw; the default options without it.
 
     Returns
     -------
@@ -93,78 +135,4 @@ def draw(
     InputError
         The number of weights is not the number of the face's shapes.
     """
-    stage = face if isinstance(face, Stage) else staged(face, picture or Picture())
-    n_shapes = len(stage.face.shape_names)
-    if np.shape(weights) != (n_shapes,):
-        raise InputError(f"the face has {n_shapes} shapes, not weights of shape {np.shape(weights)}")
-    pose = np.asarray(weights, np.float32), np.asarray(head, np.float32)
-    if stage.picture.renderer == PYVISTA:
-        (drawn,) = vtk_renderer.frames(stage, [pose])
-        return drawn
-    return _drawn(stage, *pose, _room(stage))
-
-
-def frames(
-    clip: Clip,
-    face: Face | AnyStage,
-    picture: Picture | None = None,
-    *,
-    threads: int | None = None,
-    first: int = 0,
-) -> Iterator[NDArray[np.uint8]]:
-    """Pictures of a clip's frames in order; as many are drawn ahead as there are threads, the rest not yet.
-
-    The bytes do not depend on the number of threads: one thread draws one picture. `first` is the number of the clip's
-    first frame in the whole, which a talker's own plate goes on from.
-
-    Raises
-    ------
-    InputError
-        The clip's motion is not in the face's shapes.
-    """
-    n_threads = threads or available_cores()
-    if isinstance(face, PlateStage):
-        yield from plate_frames(clip, face, n_threads, first)
-        return
-    stage = face if isinstance(face, Stage) else staged(face, picture or Picture())
-    if clip.motion.channels != stage.face.shape_names:
-        raise InputError("the clip's motion is not in the shapes of this face; retarget it to the face first")
-    if stage.picture.renderer == PYVISTA:
-        yield from vtk_renderer.frames(stage, zip(clip.motion.values, clip.head.values, strict=True))
-        return
-    rooms = deque(_room(stage) for _ in range(n_threads))
-
-    def one(pose: tuple[NDArray[np.float32], NDArray[np.float32]]) -> NDArray[np.uint8]:
-        room = rooms.popleft()
-        try:
-            return _drawn(stage, *pose, room)
-        finally:
-            rooms.append(room)
-
-    yield from drawn_ahead(one, zip(clip.motion.values, clip.head.values, strict=True), n_threads)
-
-
-def still(clip: Clip, stage: AnyStage, number: int) -> NDArray[np.uint8]:
-    """One frame of a clip."""
-    if isinstance(stage, PlateStage):
-        return plate_drawn(stage, clip.motion.values[number], plate_frame(stage, number / clip.fps))
-    return draw(stage, clip.motion.values[number], clip.head.values[number])
-
-
-def available_cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _room(stage: Stage) -> Room:
-    picture = stage.picture
-    return room_for(stage.surface, (picture.width, picture.height), picture.supersampling)
-
-
-def _drawn(stage: Stage, weights: NDArray[np.float32], head: NDArray[np.float32], room: Room) -> NDArray[np.uint8]:
-    picture = stage.picture
-    drawn = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
-    drawn[:, :, :3] = stage.behind
-    points = stage.surface.rig.posed(weights, head)
-    paint(points, stage.surface, stage.optics, (stage.lights, stage.exposure.at(weights)), room, drawn)
-    return drawn
+    return mesh_renderer(face, picture or Picture()).draw(weights, head)

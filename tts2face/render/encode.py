@@ -1,7 +1,7 @@
 """Clips into a file while they are drawn: .mp4, .webm, .gif, or a folder of .png."""
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import TracebackType
 
@@ -9,8 +9,6 @@ import numpy as np
 
 from lexicon.errors import InputError
 from tts2face.clock import exact_rate, first_sample
-from tts2face.models.face import Face
-from tts2face.render.draw import AnyStage, frames, staged, still
 from tts2face.render.encoder_thread import Lane, Sink
 from tts2face.render.gif import Gif
 from tts2face.render.movie import MP4_MOVIE, WEBM_MOVIE, Movie
@@ -25,8 +23,8 @@ from tts2face.render.output_path import (
     refusals,
     remove,
 )
-from tts2face.render.picture import Picture
 from tts2face.render.png_folder import Stills
+from tts2face.render.renderer import FrameRenderer
 from tts2face.types import Clip
 
 N_SWATCHES = 6  # frames of the first clip from which a GIF's palette is made
@@ -45,10 +43,8 @@ class ClipWriter:
     ----------
     path
         What is written, by suffix: .mp4, .webm, .gif; a folder of .png pictures with a slash at its end or no suffix.
-    face
-        The face, or a stage.
-    picture
-        How to draw; not needed with a stage.
+    renderer
+        What draws the clips' frames.
     on_progress
         Called with frames done and frames given so far.
     threads
@@ -63,7 +59,7 @@ class ClipWriter:
 
     Examples
     --------
-    >>> with ClipWriter("talk.mp4", face) as writer:  # doctest: +SKIP
+    >>> with ClipWriter("talk.mp4", renderer) as writer:  # doctest: +SKIP
     ...     for clip in clips:
     ...         writer.add(clip)
     """
@@ -71,14 +67,13 @@ class ClipWriter:
     def __init__(
         self,
         path: Path | str,
-        face: Face | AnyStage,
-        picture: Picture | None = None,
+        renderer: FrameRenderer,
         *,
         on_progress: Progress | None = None,
         threads: int | None = None,
     ) -> None:
         self.path, self._kind = checked_output(path), kind_of(path)
-        self._stage = staged(face, picture or Picture()) if isinstance(face, Face) else face
+        self._renderer = renderer
         self._on_progress, self._threads = on_progress, threads
         self._n_frames = self._n_given = self._n_samples = 0
         self._clock: tuple[float, int] | None = None
@@ -110,7 +105,7 @@ class ClipWriter:
             lane.put(samples=np.zeros(begin - self._n_samples, np.float32))  # the clip before ended within a frame
             self._n_given += len(clip.motion)
             at, samples = 0, clip.speech.waveform.samples
-            for pixels in frames(clip, self._stage, threads=self._threads, first=self._n_frames):
+            for pixels in self._renderer.frames(clip, threads=self._threads, first=self._n_frames):
                 self._n_frames += 1
                 until = min(self._sample_of(self._n_frames) - begin, len(samples))
                 lane.put(pixels, samples[at:until])
@@ -131,15 +126,15 @@ class ClipWriter:
     def _sink(self, clip: Clip) -> Sink:
         if self._beside is None:
             raise InputError("a clip writer is used in a with statement")
-        fps, rate, picture = exact_rate(clip.fps), clip.speech.waveform.rate, self._stage.picture
+        fps, rate, picture = exact_rate(clip.fps), clip.speech.waveform.rate, self._renderer.picture
         if self._kind == FOLDER:
-            return Stills(self._beside, rate, self._stage.notice)
+            return Stills(self._beside, rate, self._renderer.notice)
         if self._kind == GIF:
             chosen = np.linspace(0, len(clip.motion) - 1, N_SWATCHES).astype(int)
-            return Gif(self._beside, [still(clip, self._stage, int(i)) for i in chosen], fps, self._stage.notice)
+            return Gif(self._beside, [self._renderer.frame(clip, int(i)) for i in chosen], fps, self._renderer.notice)
         shape = (picture.height, picture.width, picture.channels)
         return Movie(
-            self._beside, WEBM_MOVIE if self._kind == WEBM else MP4_MOVIE, shape, (fps, rate), self._stage.notice
+            self._beside, WEBM_MOVIE if self._kind == WEBM else MP4_MOVIE, shape, (fps, rate), self._renderer.notice
         )
 
     def _complete(self) -> None:
@@ -161,14 +156,10 @@ class ClipWriter:
             self._beside = None
 
 
-def write_clip(
-    path: Path | str,
-    clip: Clip,
-    face: Face | AnyStage,
-    picture: Picture | None = None,
-    *,
-    on_progress: Progress | None = None,
+def write_clips(
+    path: Path | str, clips: Iterable[Clip], renderer: FrameRenderer, *, on_progress: Progress | None = None
 ) -> None:
-    """Write one clip; see `ClipWriter`."""
-    with ClipWriter(path, face, picture, on_progress=on_progress) as writer:
-        writer.add(clip)
+    """Write clips one behind the other; see `ClipWriter`."""
+    with ClipWriter(path, renderer, on_progress=on_progress) as writer:
+        for clip in clips:
+            writer.add(clip)

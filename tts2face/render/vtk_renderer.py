@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +20,9 @@ from lexicon.errors import BackendError
 from tts2face.compilation import kernel
 from tts2face.render.camera import Optics
 from tts2face.render.fragments import OPACITY
+from tts2face.render.scene import Scene
 from tts2face.render.surface import Surface, encoding_table, linear_table
 from tts2face.render.vertices import VertexLight, brightened, shades, vertex_light
-
-if TYPE_CHECKING:
-    from tts2face.render.draw import Stage
 
 OFF_SCREEN, ON_SCREEN = "vtkEGLRenderWindow", "vtkXOpenGLRenderWindow"  # the first falls back to OSMesa by itself
 UNSEEN = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
@@ -108,9 +106,9 @@ def windows_of(window: str) -> Iterator[None]:
 
 
 def frames(
-    stage: "Stage", poses: Iterable[tuple[NDArray[np.float32], NDArray[np.float32]]]
+    scene: Scene, poses: Iterable[tuple[NDArray[np.float32], NDArray[np.float32]]]
 ) -> Iterator[NDArray[np.uint8]]:
-    """Pictures (H, W, 3 or 4) of a stage's face for weights (K,) and head poses (6,), one after the other.
+    """Pictures (H, W, 3 or 4) of a scene's face for weights (K,) and head poses (6,), one after the other.
 
     One window is used for all of them, by the thread that takes the first.
 
@@ -120,19 +118,19 @@ def frames(
         As `require_gl`.
     """
     require_gl()
-    picture = stage.picture
+    picture = scene.picture
     side = picture.supersampling
-    plotter = _plotter((picture.width * side, picture.height * side), stage)
+    plotter = _plotter((picture.width * side, picture.height * side), scene)
     try:
-        actors = Puppet(stage.surface, plotter)
+        actors = Puppet(scene.surface, plotter)
         for weights, head in poses:
-            points = stage.surface.rig.posed(weights, head)
-            actors.show(points, stage.optics.view, (stage.lights, stage.exposure.at(weights)))
+            points = scene.surface.rig.posed(weights, head)
+            actors.show(points, scene.optics.view, (scene.lights, scene.exposure.at(weights)))
             plotter.renderer.ResetCameraClippingRange()
             plotter.render()
             samples = np.asarray(plotter.screenshot(None, transparent_background=True, return_img=True))
             drawn = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
-            drawn[:, :, :3] = stage.behind
+            drawn[:, :, :3] = scene.behind
             average(samples, side, TONE, drawn)
             yield drawn
     finally:
@@ -211,14 +209,14 @@ def aim(plotter: Any, optics: Optics, height: int) -> None:
     camera.view_angle = math.degrees(2 * math.atan(height / 2 / float(optics.lens[0])))
 
 
-def _plotter(size: tuple[int, int], stage: "Stage") -> Any:
+def _plotter(size: tuple[int, int], scene: Scene) -> Any:
     import pyvista
 
     with windows_of(OFF_SCREEN):
         plotter = pyvista.Plotter(off_screen=True, window_size=list(size), lighting="none")
     plotter.disable_anti_aliasing()
     plotter.set_background("black")
-    aim(plotter, stage.optics, size[1])
+    aim(plotter, scene.optics, size[1])
     return plotter
 
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from lexicon.errors import BackendError
 from tts2face.models.face import Face
 from tts2face.render.camera import Optics, optics
-from tts2face.render.draw import available_cores
 from tts2face.render.picture import Picture, background_kind
+from tts2face.render.scene import available_cores
 from tts2face.render.soft_shadows import exposed
 from tts2face.render.studio_light import lamps, light_table
 from tts2face.render.surface import surfaced

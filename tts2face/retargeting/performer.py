@@ -100,6 +100,20 @@ def performer(landmarks: NDArray[np.floating], scores: Trajectory, face: Face) -
     )
 
 
+def match_shapes(captured: Trajectory, face: Face, *, gain: float = 1.0) -> Trajectory:
+    """Weights (T, K) of a face's shapes from captured weights of the same names, within their limits.
+
+    Eyes turn as captured, whatever the gain; shapes that were not captured stay at 0.
+    """
+    weights = np.zeros((len(captured), len(face.shape_names)), np.float32)
+    for column, name in enumerate(face.shape_names):
+        if name in captured.channels:
+            size = 1.0 if name.startswith("eye") else gain
+            moved = captured.values[:, captured.channels.index(name)]
+            weights[:, column] = np.clip(size * moved, *face.limits[column])
+    return Trajectory(face.shape_names, weights, captured.fps)
+
+
 def lip_model(landmarks: NDArray[np.floating]) -> ShapeModel:
     """Principal components of the mouth region of (T, 478, 3) landmarks; at rest the lips are closed.
 

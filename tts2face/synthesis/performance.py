@@ -1,75 +1,155 @@
-"""A performer's take becomes a clip of any face, or of a talker's own; the original sound is kept."""
+"""A performer's take or an ARKit capture becomes clips of any face; the original sound is kept."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.clock import exact_rate, first_sample
-from tts2face.cloning.parameter_transfer import cloning, with_missing
-from tts2face.models.face import Face
-from tts2face.models.talker import Talker
-from tts2face.own_face.appearance_regression import own_face
-from tts2face.retargeting.performer import lip_model, performer
+from tts2face.synthesis.animated_face import AnimatedFace, FaceMotion
 from tts2face.types import Clip, Speech, Trajectory, Waveform
-from tts2face.video.livelink import Capture
-from tts2face.video.take import Take
+from tts2face.video.blendshapes import BlendshapeReader
+from tts2face.video.livelink import read_livelink
+from tts2face.video.media import media_facts, read_sound
+from tts2face.video.streaming_tracker import FilmReader
+from tts2face.video.take import Take, read_take
 
+CAPTURE_SUFFIX = ".csv"
+CAPTURE_FPS = 30.0  # captures run faster than videos need
+GAINS = (0.0, 4.0)
+SOUND_RATE = 48_000  # Hz
 PIECE_FRAMES = 300  # of the clips that a long take is given on in
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Motion:
-    """What a face and its head do, on one clock."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Performance:
+    """A recorded person whose face drives another one.
 
-    face: Trajectory
-    head: Trajectory
-
-
-def motion_of_take(take: Take, face: Face, *, gain: float = 1.0) -> Motion:
-    """A take carried to a face.
-
-    Raises
-    ------
-    DataError
-        The take is too short, or the face lacks landmarks or shapes.
-    """
-    ready = performer(take.landmarks, take.scores, face)
-    return Motion(ready.weights(take.landmarks, take.scores, gain=gain), take.head)
-
-
-def able_to_follow(take: Take, talker: Talker) -> Talker:
-    """The talker with the motion of lips that the take shows and she never made (T07, section 3.1)."""
-    return with_missing(lip_model(take.landmarks), talker)
-
-
-def motion_of_own(take: Take, talker: Talker, *, gain: float = 1.0) -> Motion:
-    """A take carried to a talker's own face: cloned by inner products (T07 eq. 5), with the looks of her lips.
+    Parameters
+    ----------
+    take
+        A video of one person, or a .csv table of Live Link Face.
+    gain
+        Factor on the motion of lips and brows, 0 to 4.
+    fps
+        Frames per second; without it the take's own, at most 30 of a capture.
+    audio
+        The sound that belongs to a capture.
+    append_missing
+        Whether motion that the talker never made is added to the talker's own face.
+    model
+        The face landmark models; found without it.
 
     Raises
     ------
     InputError
-        The talker has motion only.
+        The gain is out of range, or sound is given for a video, which has its own.
     """
-    model = lip_model(take.landmarks)
-    speech = Trajectory(tuple(f"shape{i}" for i in range(model.n_speech)), model.parameters(take.landmarks), take.fps)
-    hers = cloning(model, talker.model, gain=gain).clone(speech)
-    return Motion(own_face(talker).motion(hers), take.head)
+
+    take: Path
+    gain: float = 1.0
+    fps: float | None = None
+    audio: Path | None = None
+    append_missing: bool = False
+    model: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse options that do not go together."""
+        low, high = GAINS
+        if not low <= self.gain <= high:
+            raise InputError(f"the gain must lie between {low:g} and {high:g}, not {self.gain:g}")
+        if self.audio is not None and not is_capture(self.take):
+            raise InputError(f"{self.take} has its own sound; --audio belongs to a Live Link Face .csv file")
 
 
-def motion_of_capture(capture: Capture, face: Face, *, gain: float = 1.0) -> Motion:
-    """An ARKit capture on a face: shapes of the same name take its weights, within their limits."""
-    weights = np.zeros((len(capture.weights), len(face.shape_names)), np.float32)
-    for column, name in enumerate(face.shape_names):
-        if name in capture.weights.channels:
-            moved = capture.weights.values[:, capture.weights.channels.index(name)]
-            size = 1.0 if name.startswith("eye") else gain
-            weights[:, column] = np.clip(size * moved, *face.limits[column])
-    return Motion(Trajectory(face.shape_names, weights, capture.weights.fps), capture.head)
+@dataclass(frozen=True, slots=True, eq=False)
+class PerformedTake:
+    """A take on a face: the face that shows it, its motion, and the sound; of no samples where there is none."""
+
+    face: AnimatedFace
+    motion: FaceMotion
+    sound: Waveform
+
+    @property
+    def seconds(self) -> float:
+        """Duration of the motion."""
+        return len(self.motion.face) / self.motion.face.fps
 
 
-def at_rate(motion: Motion, fps: float) -> Motion:
+def perform(
+    performance: Performance, face: AnimatedFace, *, on_progress: Callable[[int, int], None] | None = None
+) -> PerformedTake:
+    """Carry a recorded person's performance to a face.
+
+    Parameters
+    ----------
+    on_progress
+        Called with frames read and of all, while a video is tracked.
+
+    Raises
+    ------
+    InputError
+        The face cannot show such a take.
+    DataError
+        The take cannot be read, is too short, or shows no face, or several.
+    BackendError
+        LiteRT, OpenCV or the landmark models are missing.
+    """
+    take = performance.take
+    sound = sound_of_take(take) if performance.audio is None else read_sound(performance.audio, SOUND_RATE)
+    if is_capture(take):
+        motion = motion_of_capture(take, face, gain=performance.gain)
+        fps = performance.fps or min(motion.face.fps, CAPTURE_FPS)
+        return PerformedTake(face, at_rate(motion, fps), sound)
+    seen = read_video_take(take, performance.model, on_progress=on_progress)
+    if performance.append_missing:
+        face = face.with_motion_of(seen)
+    motion = motion_of_take(seen, face, gain=performance.gain)
+    return PerformedTake(face, motion if performance.fps is None else at_rate(motion, performance.fps), sound)
+
+
+def is_capture(take: Path) -> bool:
+    """Whether a file is a table of a Live Link Face capture; anything else is read as a video."""
+    return take.suffix.lower() == CAPTURE_SUFFIX
+
+
+def read_video_take(
+    video: Path, model: Path | None = None, *, on_progress: Callable[[int, int], None] | None = None
+) -> Take:
+    """Landmarks, head pose and scores of a performer in a video.
+
+    Raises
+    ------
+    DataError
+        The video cannot be read, or shows no face, or several.
+    BackendError
+        LiteRT, OpenCV or the landmark models are missing.
+    """
+    return read_take(video, FilmReader(model), BlendshapeReader(model), on_progress=on_progress)
+
+
+def motion_of_take(take: Take, face: AnimatedFace, *, gain: float = 1.0) -> FaceMotion:
+    """The motion of a video take on a face."""
+    return FaceMotion(face.motion_of_take(take, gain=gain), take.head)
+
+
+def motion_of_capture(table: Path, face: AnimatedFace, *, gain: float = 1.0) -> FaceMotion:
+    """The motion of a Live Link Face capture on a face."""
+    capture = read_livelink(table)
+    return FaceMotion(face.motion_of_capture(capture, gain=gain), capture.head)
+
+
+def sound_of_take(take: Path) -> Waveform:
+    """The sound of a video; none where the file holds no sound."""
+    if not is_capture(take) and media_facts(take).rate:
+        return read_sound(take, SOUND_RATE)
+    return Waveform(np.zeros(0, np.float32), SOUND_RATE)
+
+
+def at_rate(motion: FaceMotion, fps: float) -> FaceMotion:
     """Motion read at another frame rate, straight between its frames."""
     old = motion.face.fps
     if exact_rate(fps) == exact_rate(old):
@@ -85,10 +165,10 @@ def at_rate(motion: Motion, fps: float) -> Motion:
             trajectory.channels, (1 - share) * trajectory.values[low] + share * trajectory.values[high], fps
         )
 
-    return Motion(read(motion.face), read(motion.head))
+    return FaceMotion(read(motion.face), read(motion.head))
 
 
-def clips_of(motion: Motion, sound: Waveform) -> Iterator[Clip]:
+def clips_of(motion: FaceMotion, sound: Waveform) -> Iterator[Clip]:
     """Motion and its sound as clips of at most `PIECE_FRAMES` frames; sound that is too short ends in silence."""
     fps = exact_rate(motion.face.fps)
     for first in range(0, len(motion.face), PIECE_FRAMES):

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.models.face import Face
+from tts2face.models.face_file import load_face
 from tts2face.models.talker import Talker
 from tts2face.render import raster
 from tts2face.render.draw import draw
@@ -28,8 +28,9 @@ def kernels_are_compiled() -> bool:
     return any(index.stat().st_mtime >= source for index in folder.glob("raster.draw_band-*.nbi"))
 
 
-def compile_kernels(face: Face) -> None:
+def compile_kernels() -> None:
     """Compile all kernels that a clip needs. Where the other process fails they are compiled at their first use."""
+    face = load_face("head")
     other = subprocess.Popen(
         [sys.executable, "-c", COMPILE_MOTION], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
@@ -49,7 +50,6 @@ def compile_motion() -> None:
     from tts2face.exemplar.synthesis import speech_trajectory, visual_voice
     from tts2face.gesture.gesture_stream import Fields, GestureStream
     from tts2face.gesture.timeline import Timeline
-    from tts2face.models.face_file import load_face
     from tts2face.models.palette import load_palette
     from tts2face.models.talker import load_talker
     from tts2face.retargeting.to_face import retargeter

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.landmarks import N_LANDMARKS
-from tts2face.prefetch import Ahead
+from tts2face.prefetch import Prefetch
 from tts2face.video.media import Picture
 from tts2face.video.track import CROP_SMOOTHING_S, LEAST_SCORE, Crop, FaceTracker, moved, smoothed_crops
 
@@ -72,7 +72,7 @@ class FilmReader:
         reach = int(REACH * CROP_SMOOTHING_S * fps + 0.5)
         window: deque[_Followed] = deque()
         at = 0  # place in the window of the picture to read next
-        with Ahead(self._followed(pictures, fps), ROOM) as followed:
+        with Prefetch(self._followed(pictures, fps), ROOM) as followed:
             for found in followed:
                 window.append(found)
                 if len(window) > at + reach:
