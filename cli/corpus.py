@@ -9,7 +9,7 @@ from cyclopts import App, Parameter
 
 from cli.flags import whole_number
 from cli.progress import progress_bar, say, stage_bar
-from lexicon.errors import InputError
+from tts2face.output_names import check_file_name
 
 corpus = App(name="corpus", help="Build, show and measure talkers.")
 
@@ -52,6 +52,8 @@ def build(  # noqa: PLR0913 - one parameter a flag
 ) -> None:
     """Learn a talker from recordings. After an interruption the same command goes on where it stopped."""
     check_suffix(out, "talker")
+    if report is not None:
+        check_file_name(report, "a report", (".html", ".htm"))
     from corpus_tools.build_talker import build_talker
     from corpus_tools.run_options import Effort, no_stages
 
@@ -73,9 +75,8 @@ def build(  # noqa: PLR0913 - one parameter a flag
 
 
 def check_suffix(out: Path, kind: str) -> None:
-    """Refuse a file whose name does not say what is in it."""
-    if out.suffix != f".{kind}":
-        raise InputError(f"a {kind} is written as .{kind}, not {out.name}")
+    """Refuse a file whose name does not say what is in it, or that cannot be written."""
+    check_file_name(out, f"a {kind}", (f".{kind}",))
 
 
 def _consent(name: str, statement: str | None) -> Mapping[str, str]:

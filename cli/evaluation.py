@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from cli.progress import progress_bar, say
 from lexicon.errors import InputError
+from tts2face.output_names import check_file_name
 
 if TYPE_CHECKING:
     from corpus_tools.evaluation.evaluate import Run
@@ -67,8 +68,8 @@ def evaluated(
     asked.check()
     if asked.cross_talker is not None and (beside.tracks is not None or beside.own_durations):
         raise InputError("--cross-talker takes no --tracks and no --own-durations; measure them on the talker's own")
-    if out is not None and out.suffix not in SUFFIXES:
-        raise InputError(f"an evaluation is written as {', '.join(SUFFIXES)}, not {out.name}")
+    if out is not None:
+        check_file_name(out, "an evaluation", SUFFIXES)
     from corpus_tools.run_options import Effort
 
     result, runs = _measured(asked, beside, Effort(*effort))

@@ -1,19 +1,31 @@
 """Exit codes: which kind of error ends a command with which number."""
 
+import errno
 from collections.abc import Mapping
 
 from cyclopts import CycloptsError
 
 from lexicon.errors import BackendError, DataError, InputError
 
-EXIT_CODES: Mapping[type[Exception], int] = {InputError: 2, CycloptsError: 2, DataError: 3, BackendError: 4}
+WRONG_PATHS = frozenset({errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP})
+LONGEST_SHOWN = 60  # characters of a path in a message
+EXIT_CODES: Mapping[type[Exception], int] = {InputError: 2, CycloptsError: 2, DataError: 3, BackendError: 4, OSError: 4}
 
 
 def exit_code(error: Exception) -> int:
     """The number with which a command ends after an error."""
+    if isinstance(error, OSError) and error.errno in WRONG_PATHS:
+        return EXIT_CODES[InputError]
     return next(code for kind, code in EXIT_CODES.items() if isinstance(error, kind))
 
 
 def sentence(error: Exception) -> str:
-    """What is wrong, on one line."""
+    """What is wrong, on one line; of an error of the system the path, or the stream to which an answer went."""
+    if isinstance(error, OSError):
+        reason = error.strerror or str(error)
+        if error.filename is None:
+            return f"cannot write the answer: {reason}; check where standard output goes"
+        shown = str(error.filename)
+        shown = shown if len(shown) <= LONGEST_SHOWN else f"{shown[:LONGEST_SHOWN]}..."
+        return f"cannot use {shown}: {reason}; check the path"
     return " ".join(str(error).split())

@@ -11,7 +11,9 @@ def phones(
     /,
     *,
     format: Annotated[Literal["text", "json", "textgrid"], Parameter(help="How to print it.")] = "text",
-    language: Annotated[str, Parameter(help="Language of the text: an espeak-ng code.")] = "en-us",
+    language: Annotated[
+        str, Parameter(help="Language of the text: a code, a BCP 47 tag or an English name.")
+    ] = "en-us",
     dictionary: Annotated[Path | None, Parameter(help="Your own pronunciations, which win.")] = None,
 ) -> None:
     """Print the words of a text and their phones, in ARPABET and IPA, with stress and syllables."""

@@ -4,12 +4,14 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from cli.streams import complain
+
 Progress = Callable[[int, int], None]
 
 
 def say(line: str) -> None:
     """One line for the person at the terminal."""
-    sys.stderr.write(f"{line}\n")
+    complain(line)
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from cli.progress import progress_bar, say
 from lexicon.errors import InputError
 from tts2face.models.files import write_whole
+from tts2face.output_names import check_file_name
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 
@@ -66,8 +67,8 @@ def _check(request: Request, options: SpeakOptions) -> None:
     """Refuse flags that do not go together, before anything is loaded."""
     if options.out is None and options.explain is None and not options.view:
         raise InputError("there is no output; add --out clip.mp4 (or .webm, .gif, or a folder for .png files)")
-    if options.explain is not None and options.explain.suffix not in EXPLANATIONS:
-        raise InputError(f"an explanation is written as .json or .txt, not {options.explain.name}")
+    if options.explain is not None:
+        check_file_name(options.explain, "an explanation", EXPLANATIONS)
     is_silent = request.audio is not None or request.idle is not None
     if not request.text.strip() and (not is_silent or options.explain is not None):
         raise InputError("the text is empty; give something to say, or the words of --audio")

@@ -30,6 +30,7 @@ from corpus_tools.recordings.observe import Refusal
 from corpus_tools.run_options import Effort, Progress, Stages, no_stages
 from corpus_tools.training.pose_correction import pose_leak
 from lexicon.errors import DataError, InputError
+from lexicon.inputs import check_regular_file
 from tts2face.face.expressions import expression_landmarks
 from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
@@ -259,6 +260,7 @@ class _Worker:
     def outcome(self, file: Path) -> Outcome:
         """A recording, or why it cannot serve."""
         try:
+            check_regular_file(file)
             if self._eyes is not None and file.suffix.lower() in VIDEO_SUFFIXES:
                 return captured_video(file, self._eyes)
             return captured_file(file, self._face, worn=self._worn)

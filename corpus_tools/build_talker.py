@@ -1,6 +1,5 @@
 """From a folder of recordings to a talker file."""
 
-import json
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.recordings.observe import Refusal, observe
+from corpus_tools.recordings.observe import Refusal, observe, require_kept
 from corpus_tools.report.recordings import recordings_page
 from corpus_tools.run_options import Effort, Stages, no_stages
 from corpus_tools.training.pose_correction import without_leak
@@ -17,6 +16,7 @@ from corpus_tools.training.train_audio_map import learn_drives
 from corpus_tools.training.train_phone_network import with_network
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
+from lexicon.inputs import read_json
 from tts2face.models.files import write_whole
 from tts2face.models.talker import Talker, write_talker
 
@@ -82,6 +82,7 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
     called = name or stated.get("name") or recordings.resolve().stem
     if report is not None:
         write_whole(report, recordings_page(called, observations).encode())
+    require_kept(observations)
     metadata = {
         **dict.fromkeys(PROVENANCE_FIELDS, UNSTATED),
         **stated,
@@ -118,7 +119,7 @@ def add_drives(
     DataError
         A recording holds no sound, or its frame rate is not the talker's.
     """
-    kept = without_leak(observe(recordings, effort=effort, on_progress=stages(READING)).kept)
+    kept = without_leak(require_kept(observe(recordings, effort=effort, on_progress=stages(READING))))
     if any(one.fps != talker.fps for one in kept):
         raise DataError(f"the recordings do not have the talker's {talker.fps:g} frames per second; convert them")
     drives = learn_drives(kept, talker, stages=stages)
@@ -150,9 +151,9 @@ def read_provenance(path: Path, *, must_exist: bool) -> Mapping[str, Any]:
     if not must_exist and not path.is_file():
         return {}
     try:
-        stated = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as broken:
-        raise DataError(f"{path} cannot be read as JSON ({broken}); mend it") from broken
+        stated = read_json(path)
+    except OSError as refused:
+        raise DataError(f"{path} cannot be read ({refused.strerror}); check the path") from refused
     if not isinstance(stated, dict) or not set(stated) <= set(PROVENANCE_FIELDS):
         raise DataError(f"{path} must be a JSON object with fields out of {', '.join(PROVENANCE_FIELDS)}")
     return stated

@@ -17,10 +17,14 @@ from pathlib import Path
 from types import MappingProxyType
 
 from lexicon.errors import DataError, InputError
+from lexicon.inputs import read_text
 from lexicon.ipa import Segment, parse_ipa
 from lexicon.phones import PHONES, arpabet_to_ipa
 
 SCANNED_WORDS = 40  # looked up by scanning the file (about 1 ms each) before all of it is split (about 100 ms)
+# Phones of a word. CMUdict's longest has 28. espeak-ng keeps a word in 200 bytes without a check of its length; a phone
+# takes up to five of them (two vowels with their lengths, and the stress).
+MOST_PHONES = 40
 _APOSTROPHES = str.maketrans({"’": "'", "ʼ": "'", "‘": "'"})
 
 
@@ -70,6 +74,11 @@ def _entry(line: str, where: str) -> tuple[str, tuple[Segment, ...]]:
         raise DataError(f"{where}: {wrong}") from wrong
     if not segments:
         raise DataError(f"{where}: the pronunciation of {word!r} holds no phone")
+    if len(segments) > MOST_PHONES:
+        raise DataError(
+            f"{where}: the pronunciation of {word[:40]!r} has {len(segments)} phones; "
+            f"a word has at most {MOST_PHONES}: divide it into several words"
+        )
     return word_key(word), segments
 
 
@@ -99,11 +108,9 @@ def read_dictionary(path: Path) -> Dictionary:
         The file cannot be read, is not UTF-8, or has a wrong line.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path)
     except OSError as missing:
         raise DataError(f"dictionary {path} cannot be read ({missing.strerror}); give a text file") from missing
-    except UnicodeDecodeError as wrong:
-        raise DataError(f"dictionary {path} is not UTF-8 (byte {wrong.start}); save it as UTF-8 text") from wrong
     return parse_dictionary(text, str(path))
 
 

@@ -3,7 +3,6 @@
 espeak-ng is a library with global state: one lock guards all calls.
 """
 
-import difflib
 import functools
 import logging
 import re
@@ -17,9 +16,6 @@ from lexicon.ipa import Segment, parse_ipa
 
 DEFAULT_LANGUAGE = "en-us"
 LONGEST_DATA_PATH = 150  # characters; espeak-ng cuts longer paths off (its buffer holds 160)
-_OTHER_CODES = MappingProxyType(
-    {"zh": "cmn yue hak", "zh-cn": "cmn", "zh-tw": "cmn", "no": "nb", "iw": "he", "jp": "ja"}
-)
 _LOCK = threading.RLock()
 _SWITCH = re.compile(r"\([a-z0-9-]+\)")  # espeak-ng marks a foreign word: (en)...(fr); its phones are read as well
 
@@ -79,25 +75,18 @@ def languages() -> Mapping[str, str]:
 
 
 def check_language(language: str) -> None:
-    """Refuse a language that espeak-ng does not have.
+    """Refuse what is no code of espeak-ng; `lexicon.languages.language_code` gives the code of other spellings.
 
     Raises
     ------
     InputError
-        There is no such code; the message names close ones.
+        There is no such code.
     """
-    if language == DEFAULT_LANGUAGE:
-        return
-    known = languages()
-    if language in known:
-        return
-    wanted = language.casefold()
-    start = _OTHER_CODES.get(wanted, wanted.partition("-")[0].partition("_")[0])
-    close = [code for code in known if code.partition("-")[0] in start.split()]
-    close += [code for code, name in known.items() if wanted and name.casefold().startswith(wanted)]
-    close = close or difflib.get_close_matches(wanted, list(known), n=4, cutoff=0.5)
-    hint = f"did you mean {', '.join(dict.fromkeys(close))}?" if close else "codes look like en-us, de, fr-fr, ja"
-    raise InputError(f"there is no language {language!r}; {hint}")
+    if language != DEFAULT_LANGUAGE and language not in languages():
+        raise InputError(
+            f"there is no language {language[:40]!r}; give a code such as en-us, de, fr-fr, ja "
+            "(`tts2face languages` lists all)"
+        )
 
 
 @functools.cache

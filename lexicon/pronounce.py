@@ -10,8 +10,9 @@ from lexicon.cleaning import plain
 from lexicon.dictionary import Dictionary
 from lexicon.english import SHOUTED, folded, known_word
 from lexicon.errors import InputError
-from lexicon.g2p import DEFAULT_LANGUAGE, check_language, phonemize, segments_of
+from lexicon.g2p import DEFAULT_LANGUAGE, phonemize, segments_of
 from lexicon.ipa import Segment
+from lexicon.languages import language_code
 from lexicon.normalize import MARKS, tokens
 from lexicon.phones import ipa_to_arpabet
 from lexicon.syllables import syllables
@@ -192,7 +193,7 @@ def pronounce(text: str, language: str = DEFAULT_LANGUAGE, dictionary: Dictionar
     BackendError
         A word needs espeak-ng, which is not installed.
     """
-    check_language(language)
+    language = language_code(language)
     own = dictionary or Dictionary(MappingProxyType({}))
     if language.partition("-")[0] == "en":
         words = _spoken_words((token.source, token.spoken) for token in tokens(text))

@@ -19,6 +19,7 @@ from types import MappingProxyType
 from xml.parsers import expat
 
 from lexicon.errors import InputError
+from lexicon.languages import language_code
 from lexicon.marked_text import DEEPEST, Gathering, MarkedText, NameMark, NodMark, PauseMark
 
 _BEGINS = re.compile(r"\ufeff?\s*<(?:speak[\s>/]|\?xml\s|!DOCTYPE\s)")
@@ -152,7 +153,7 @@ class _Reader:
         language = attributes.get(LANGUAGE)
         if language is None:
             return
-        if self._language is not None and language.lower() != self._language.lower():
+        if self._language is not None and language_code(language) != language_code(self._language):
             raise InputError(f"one voice speaks one language, {self._language} or {language}; give each its own clip")
         self._language = language
 

@@ -27,11 +27,13 @@ class Request:
     """What is said, by which voice, and how the face moves with it.
 
     With ``audio`` a recording is heard in place of a voice; ``text`` then is what is said in it, or empty.
+    ``language`` is kept as the espeak-ng code of what is given (`lexicon.languages.language_code`).
 
     Raises
     ------
     InputError
-        A number lies outside its range, or an option belongs to a voice where there is a recording.
+        There is no such language, a number lies outside its range, or an option belongs to a voice where there is a
+        recording.
     """
 
     text: str = option("", "What to say.")
@@ -43,7 +45,11 @@ class Request:
         "How lips follow a recording without its words: network (default, best for the talker's own voice) or linear "
         "(moves them less, steadier with other voices).",
     )
-    language: str = option("en-us", "Language of the text: an espeak-ng code such as en-us, de, fr-fr, ja.")
+    language: str = option(
+        "en-us",
+        "Language of the text: a code (en-us, de), a tag (pt-BR, zh-Hans) or a name (German); `tts2face languages` "
+        "lists all.",
+    )
     voice: str | None = option(None, "heart (English), espeak (every language), or a Piper voice by path (x.onnx).")
     rate: float = option(1.0, "Speed of speech, 0.5 to 2.")
     volume: float = option(1.0, "Loudness of the sound, 0 to 2.")
@@ -71,6 +77,9 @@ class Request:
 
     def __post_init__(self) -> None:
         """Refuse numbers outside their range."""
+        from lexicon.languages import language_code
+
+        object.__setattr__(self, "language", language_code(self.language))
         _check("rate", self.rate, RATES)
         _check("volume", self.volume, VOLUMES)
         _check("fps", self.fps, FRAMES_PER_SECOND)

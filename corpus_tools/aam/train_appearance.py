@@ -73,7 +73,7 @@ def learn_appearance(
         There is no recording, or too few frames for the modes.
     """
     if not recordings:
-        raise InputError("no recording could be used; see why each was refused")
+        raise InputError("no recording could be used; give at least one")
     options = options or TextureOptions()
     frames = reference_frames(recordings, options)
     moving = changed_by_speech(frames[0])

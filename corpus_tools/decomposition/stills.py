@@ -11,6 +11,7 @@ from corpus_tools.decomposition.markers import MarkerFace, still_of_markers
 from corpus_tools.recordings.folder import VIDEO_SUFFIXES
 from lexicon.errors import DataError, InputError
 from tts2face.models.palette import EXPRESSIONS
+from tts2face.picture_files import opened_picture
 from tts2face.video.media import Picture, read_pictures
 from tts2face.video.pose import remove_pose
 from tts2face.video.track import FaceTracker
@@ -140,13 +141,10 @@ def _still(place: str) -> Still:
 def _pixels(still: Still) -> NDArray[np.uint8]:
     if still.at is not None:
         return _frame(still, still.at)
-    from PIL import Image, ImageOps, UnidentifiedImageError
+    from PIL import ImageOps
 
-    try:
-        with Image.open(still.path) as image:
-            return np.array(ImageOps.exif_transpose(image).convert("RGB"))
-    except (OSError, UnidentifiedImageError) as broken:
-        raise DataError(f"{still} is no picture that can be read ({broken}); save it again") from broken
+    with opened_picture(still.path, "the still") as image:
+        return np.array(ImageOps.exif_transpose(image).convert("RGB"))
 
 
 def _frame(still: Still, at: float) -> NDArray[np.uint8]:

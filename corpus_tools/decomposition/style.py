@@ -42,7 +42,7 @@ def with_style(
         There is no recording, the style is there already, or a first style lacks a region that others need.
     """
     if not parts:
-        raise InputError("no recording could be used; see why each was refused")
+        raise InputError("no recording could be used; give at least one")
     if base is not None and name in base.names:
         raise InputError(f"the palette has a style {name} already; choose another name with --style")
     missing = [feature for feature in REGION_FEATURES if not all(feature in one.motion for one in parts)]

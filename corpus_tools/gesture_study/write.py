@@ -12,6 +12,7 @@ from corpus_tools.report.panels import panels_png
 from lexicon.errors import InputError
 from tts2face.models.files import write_whole
 from tts2face.models.palette import load_palette
+from tts2face.output_names import check_name
 
 COLUMNS = 3
 
@@ -31,8 +32,7 @@ def write_gestures(palette: str, out: Path, options: Options, *, on_progress: Pr
     suffix = out.suffix.lower()
     if suffix not in WRITERS:
         raise InputError(f"a report is written as {', '.join(WRITERS)}, not {out.name}")
-    if not out.parent.is_dir():
-        raise InputError(f"there is no folder {out.parent}; make it or choose another")
+    check_name(out)
     found = study(palette, load_palette(palette), options, on_progress)
     write_whole(out, WRITERS[suffix](found))
     return found

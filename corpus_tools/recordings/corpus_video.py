@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
+from lexicon.inputs import check_regular_file
 from tts2face.models.tensors import read_tensors, write_tensors
 from tts2face.video.landmark_models import MODEL_SHA256
 from tts2face.video.media import media_facts, read_pictures
@@ -101,7 +102,14 @@ class Eyes:
 
 
 def content_key(path: Path) -> str:
-    """Name for everything computed from a file's content alone."""
+    """Name for everything computed from a file's content alone.
+
+    Raises
+    ------
+    DataError
+        The path is no ordinary file.
+    """
+    check_regular_file(path)
     about = path.stat()
     return _content_key(path, about.st_size, about.st_mtime_ns)
 

@@ -11,11 +11,12 @@ from corpus_tools.recordings.corpus_video import Eyes
 from corpus_tools.recordings.folder import Recording, find_recordings, spoken_words
 from corpus_tools.recordings.observation import Observation, Timing, observed
 from corpus_tools.run_options import Effort, Progress
-from lexicon.errors import DataError
+from lexicon.errors import DataError, InputError
 from tts2face.video.landmark_models import find_bundle
 
 STEPS = 100  # of progress for each video
 WATCHING = 0.8  # of a video's work
+REASONS_SHOWN = 3  # of recordings, where none could be used
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +92,22 @@ def observe(recordings: Path, *, effort: Effort | None = None, on_progress: Prog
         tuple(sorted((one for one in every if isinstance(one, Observation)), key=lambda one: one.name)),
         tuple(sorted((one for one in every if isinstance(one, Refusal)), key=lambda one: one.name)),
     )
+
+
+def require_kept(observations: Observations) -> tuple[Observation, ...]:
+    """The recordings that were kept.
+
+    Raises
+    ------
+    InputError
+        None was; the message says why the first `REASONS_SHOWN` were refused.
+    """
+    refused = observations.refused
+    if observations.kept:
+        return observations.kept
+    reasons = "; ".join(f"{refusal.name}: {refusal.reason}" for refusal in refused[:REASONS_SHOWN])
+    more = f"; and {len(refused) - REASONS_SHOWN} more" if len(refused) > REASONS_SHOWN else ""
+    raise InputError(f"no recording could be used: {reasons}{more}")
 
 
 def _kept(found: Mapping[Path, Outcomes]) -> list[Observation]:

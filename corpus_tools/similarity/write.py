@@ -13,6 +13,7 @@ from corpus_tools.similarity.text import analysis_json, difference_csv, table_cs
 from lexicon.errors import InputError
 from tts2face.models.files import write_whole
 from tts2face.models.talker import load_talker
+from tts2face.output_names import check_name
 
 
 def write_similarity(
@@ -41,8 +42,7 @@ def write_similarity(
     if suffix not in WRITERS:
         raise InputError(f"a report is written as {', '.join(WRITERS)}, not {out.name}")
     check_labels(labels)
-    if not out.parent.is_dir():
-        raise InputError(f"there is no folder {out.parent}; make it or choose another")
+    check_name(out)
     against = None if other is None else Named(other, load_talker(other))
     found = analyse(Named(talker, load_talker(talker)), options, against, on_progress)
     write_whole(out, WRITERS[suffix](found, labels))

@@ -44,7 +44,7 @@ def learn_talker(
         Recordings differ in frames per second.
     """
     if not observations:
-        raise InputError("no recording could be used; see why each was refused")
+        raise InputError("no recording could be used; give at least one")
     fps = observations[0].fps
     for observation in observations:
         if observation.fps != fps:

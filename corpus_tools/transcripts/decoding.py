@@ -4,6 +4,7 @@ import codecs
 from pathlib import Path
 
 from lexicon.errors import DataError
+from lexicon.inputs import check_regular_file
 
 LARGEST_BYTES = 8 << 20  # 8 MiB; the words of a whole day of speech are below 1 MiB
 _MARKS = (
@@ -23,6 +24,7 @@ def read_text(path: Path) -> str:
     DataError
         It cannot be read, is too large, or is no text.
     """
+    check_regular_file(path)
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST_BYTES + 1)

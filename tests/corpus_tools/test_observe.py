@@ -172,7 +172,10 @@ def test_a_provenance_with_other_fields(tmp_path):
 
 def test_a_provenance_that_is_not_there(tmp_path):
     assert read_provenance(tmp_path / "p.json", must_exist=False) == {}
-    with pytest.raises(DataError, match="cannot be read as JSON"):
+    with pytest.raises(DataError, match=r"p\.json cannot be read \(No such file"):
+        read_provenance(tmp_path / "p.json", must_exist=True)
+    (tmp_path / "p.json").write_text('{"name": ' + "[" * 100_000)
+    with pytest.raises(DataError, match=r"p\.json is nested too deep"):
         read_provenance(tmp_path / "p.json", must_exist=True)
 
 

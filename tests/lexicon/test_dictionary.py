@@ -56,11 +56,18 @@ def test_user_entries() -> None:
         ("word /həˈloʊ", "line 2: IPA stands between two slashes"),
         ("word /hЖ/", "line 2: 'Ж' .* is no phone"),
         ("word //", "line 2: the pronunciation of 'word' holds no phone"),
+        ("word " + "AA1 " * 41, "line 2: the pronunciation of 'word' has 41 phones; a word has at most 40"),
+        ("word /" + "a" * 300 + "/", "line 2: the pronunciation of 'word' has 300 phones"),
     ],
 )
 def test_wrong_lines_are_named(line: str, reason: str) -> None:
     with pytest.raises(DataError, match=reason):
         parse_dictionary(f"good G UH1 D\n{line}\n")
+
+
+def test_a_dictionary_without_end_is_not_read() -> None:
+    with pytest.raises(DataError, match="/dev/zero holds more than 17 MB"):
+        read_dictionary(Path("/dev/zero"))
 
 
 def test_files(tmp_path: Path) -> None:
@@ -70,5 +77,5 @@ def test_files(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="cannot be read"):
         read_dictionary(tmp_path / "missing.txt")
     path.write_bytes(b"w\xff")
-    with pytest.raises(DataError, match=r"is not UTF-8 \(byte 1\)"):
+    with pytest.raises(DataError, match=r"is not UTF-8 text \(byte 1\)"):
         read_dictionary(path)

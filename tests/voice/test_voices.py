@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from lexicon.errors import DataError, InputError
-from lexicon.ipa import parse_ipa
+from lexicon.dictionary import MOST_PHONES, parse_dictionary
+from lexicon.errors import BackendError, DataError, InputError
+from lexicon.ipa import Segment, parse_ipa
 from lexicon.phones import PHONES
 from lexicon.sequence import SILENCE
 from tts2face.types import Speech
@@ -126,6 +127,22 @@ def test_what_the_neural_voice_cannot_say_is_refused() -> None:
 def test_letters_of_another_script_are_refused() -> None:
     with pytest.raises(InputError, match="cannot read"):
         load_voice("espeak", "de").speak("Привет")
+
+
+@pytest.mark.parametrize("language", ["en-us", "de", "ru"])
+def test_the_longest_words_of_a_dictionary_are_spoken(language: str) -> None:
+    longest = parse_dictionary(
+        "bob /" + "ˈɔu " * MOST_PHONES + "/"
+    ).entries  # ɔu takes the most bytes of a stressed phone
+    assert len(longest["bob"]) == MOST_PHONES
+    spoken = load_voice("espeak", language, longest).speak("bob bob")
+    assert len(spoken.words) == 2
+
+
+def test_a_crash_of_espeak_is_said_to_be_one() -> None:
+    words = [SpokenWord("bob", (Segment("b"),) * 300)]
+    with pytest.raises(BackendError, match=r"espeak-ng crashed \(signal 11\) on '\[\[bbb.*write it in another way"):
+        load_voice("espeak", "en-us").speak(words)
 
 
 @pytest.mark.parametrize(

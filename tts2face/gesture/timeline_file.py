@@ -2,20 +2,20 @@
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
 from lexicon.errors import DataError, InputError
+from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
 from tts2face.gesture.notation import ALL, features_of, style_of
 from tts2face.gesture.spans import ExpressionSpan, Gains, Nod, StyleSpan, check_feature
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import FEATURES
 
 KEYS = ("style", "spans", "expressions", "nods", "gains")
-LARGEST_BYTES = 10_000_000  # an hour of spans, one a second in each feature, takes 2 MB
 
 Made = TypeVar("Made")
 
@@ -31,26 +31,15 @@ def read_timeline(path: Path) -> Timeline:
         It is not JSON, or not a timeline; the message names the place and the value.
     """
     try:
-        if path.stat().st_size > LARGEST_BYTES:
-            raise DataError(f"{path} has more than {LARGEST_BYTES // 1_000_000} MB; that is no timeline")
-        content = path.read_bytes().decode("utf-8-sig")
+        content = read_text(path, LARGEST_JSON_BYTES)
     except OSError as refused:
         raise InputError(f"cannot read the timeline {path}: {refused.strerror}; check the path") from refused
-    except UnicodeDecodeError as broken:
-        raise DataError(f"{path} is not UTF-8 text (byte {broken.start}); save it as UTF-8") from broken
     return parse_timeline(content, str(path))
 
 
 def parse_timeline(content: str, name: str = "timeline") -> Timeline:
     """A timeline from the text of a JSON file; errors as `read_timeline`."""
-    try:
-        told = json.loads(content, object_pairs_hook=_once, parse_constant=_no_constant)
-    except json.JSONDecodeError as broken:
-        raise DataError(f"{name}, line {broken.lineno}: not JSON ({broken.msg}); mend it there") from broken
-    except RecursionError as deep:
-        raise DataError(f"{name} is nested too deep for a timeline") from deep
-    except InputError as wrong:
-        raise DataError(f"{name}: {wrong}") from wrong
+    told = parse_json(content, name)
     parts = _at(name, lambda: _object(told, {}, dict.fromkeys(KEYS)))
     spans = _each(f"{name}, spans", parts["spans"], _spans)
     expressions = _each(f"{name}, expressions", parts["expressions"], _expression)
@@ -143,16 +132,3 @@ def _finite(name: str, value: float) -> float:
 
 def _shown(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False)[:40]
-
-
-def _once(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for name, value in pairs:
-        if name in found:
-            raise InputError(f"{name!r} stands twice in one object; keep one")
-        found[name] = value
-    return found
-
-
-def _no_constant(written: str) -> Any:
-    raise InputError(f"{written} is no number of JSON; leave an end away where a span lasts to the end")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from lexicon.inputs import parse_json
 from tts2face.models.files import write_whole
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -63,7 +64,7 @@ def read_tensors(path: Path, kind: str, version: int) -> tuple[dict[str, NDArray
                     "build it again"
                 )
             arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
-            return arrays, json.loads(header["metadata"])
+            return arrays, parse_json(header["metadata"], f"the metadata of {path}")
     except (SafetensorError, KeyError, OSError, ValueError) as broken:
         if isinstance(broken, DataError):
             raise

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import DataError
+from tts2face.picture_files import opened_picture
 from tts2face.render.picture import STUDIO, Picture, background_kind
 
 STUDIO_BRIGHT, STUDIO_DARK = (128.0, 137.0, 148.0), (52.0, 58.0, 67.0)  # sRGB: the pool of light, and the corners
@@ -18,7 +18,7 @@ def background(picture: Picture) -> NDArray[np.uint8]:
     Raises
     ------
     DataError
-        The image cannot be read.
+        The image cannot be read, or is too large.
     """
     kind = background_kind(picture.background)
     if isinstance(kind, Path):
@@ -44,11 +44,7 @@ def _studio(width: int, height: int) -> NDArray[np.uint8]:
 
 def _image(path: Path, width: int, height: int) -> NDArray[np.uint8]:
     """An image scaled and cut so that it fills the picture."""
-    from PIL import Image, ImageOps, UnidentifiedImageError
+    from PIL import Image, ImageOps
 
-    try:
-        with Image.open(path) as file:
-            fitted = ImageOps.fit(file.convert("RGB"), (width, height), Image.Resampling.LANCZOS)
-    except (UnidentifiedImageError, OSError, Image.DecompressionBombError) as broken:
-        raise DataError(f"cannot read the background image {path}; give a PNG, JPEG or WebP picture") from broken
-    return np.array(fitted)
+    with opened_picture(path, "the background image") as file:
+        return np.array(ImageOps.fit(file.convert("RGB"), (width, height), Image.Resampling.LANCZOS))

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lexicon.errors import BackendError, InputError
+from tts2face.output_names import check_name
 from tts2face.render.png_folder import is_stills_folder
 
 MP4, WEBM, GIF, FOLDER = ".mp4", ".webm", ".gif", ""
@@ -39,11 +40,14 @@ def checked_output(path: Path | str) -> Path:
     Raises
     ------
     InputError
-        The suffix is unknown, the folder around it does not exist, or the name belongs to something else.
+        The suffix is unknown, the folder around it does not exist, the name is only a suffix or too long, or it belongs
+        to something else.
+    BackendError
+        The folder around it cannot be written.
     """
-    where, kind = Path(path), kind_of(path)
-    if not where.parent.is_dir():
-        raise InputError(f"there is no folder {where.parent} to write {where.name} to; make it first")
+    where = Path(path)
+    check_name(where)
+    kind = kind_of(path)
     if kind == FOLDER and where.exists() and not (where.is_dir() and is_stills_folder(where)):
         raise InputError(f"{where} holds other things than pictures of a clip; choose another folder")
     if kind != FOLDER and where.is_dir():

@@ -13,6 +13,7 @@ import numpy as np
 
 from lexicon.cleaning import plain
 from lexicon.errors import InputError
+from lexicon.languages import language_code
 from lexicon.marked_text import Mark, MarkedText, NameMark, NodMark, Run
 from lexicon.normalize import normalize
 from lexicon.pronounce import PAUSES_S
@@ -230,7 +231,7 @@ def check_marks(text: MarkedText, request: Request) -> None:
             "a recording keeps its own pauses, speed and loudness; "
             "leave [pause], <break>, <prosody> and <emphasis> away"
         )
-    if text.language is not None and text.language.lower().split("-")[0] != request.language.lower().split("-")[0]:
+    if text.language is not None and _primary(language_code(text.language)) != _primary(request.language):
         raise InputError(f"the text names the language {text.language}, not {request.language}; choose one of them")
     marked_styles(text)
     for what, marked, asked, (low, high) in (
@@ -243,6 +244,11 @@ def check_marks(text: MarkedText, request: Request) -> None:
                     f"a {what} of {factor:g} in the text times {asked:g} of the request lies outside "
                     f"{low:g} to {high:g}; change one of them"
                 )
+
+
+def _primary(language: str) -> str:
+    """The language of a code without its variety."""
+    return language.partition("-")[0]
 
 
 def _gap(utterance: Utterance) -> float:

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from lexicon.errors import InputError
-from lexicon.g2p import check_language
 from lexicon.mark_parser import marked
 from lexicon.marked_text import MarkedText
 from lexicon.sentences import Sentence, sentences
@@ -73,7 +72,6 @@ def prepare(request: Request) -> PreparedRequest:
     prepared = PreparedRequest(request, marked(request.text), asked(request), synthesis_options(request))
     if not request.text.strip() and (request.audio is not None or request.idle is not None):
         return prepared
-    check_language(request.language)
     check_script(prepared.text.text, request.language)
     check_marks(prepared.text, request)
     if next(prepared.sentences(), None) is None:

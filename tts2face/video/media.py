@@ -3,6 +3,7 @@
 Time 0 is the beginning of the file's clock, for pictures and for sound, so that both stay in step.
 """
 
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from lexicon.inputs import check_regular_file
 from tts2face.types import Waveform
 
 if TYPE_CHECKING:
@@ -156,8 +158,9 @@ def _sound_start(frame: "AudioFrame", path: Path) -> float:
 def _opened(path: Path) -> Iterator["InputContainer"]:
     import av
 
-    if not path.is_file():
+    if not os.path.lexists(path):
         raise InputError(f"there is no recording {path}; check the path")
+    check_regular_file(path)
     if path.stat().st_size == 0:
         raise DataError(f"{path} is empty (0 bytes); copy or record it again")
     try:

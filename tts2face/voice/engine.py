@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from lexicon.ipa import Segment
+from lexicon.languages import language_code
 from tts2face.types import Speech
 
 ENGLISH = ("en", "en-us", "en-gb")
@@ -58,6 +59,8 @@ def load_voice(name: str | None, language: str, own_words: Pronouncing | None = 
     ----------
     name
         One of `NAMES`, or the path of a Piper voice (``.onnx``).
+    language
+        As `lexicon.languages.language_code` reads it.
     own_words
         A user's pronunciations, which win over the voice's own.
 
@@ -68,6 +71,7 @@ def load_voice(name: str | None, language: str, own_words: Pronouncing | None = 
     BackendError
         What the voice needs is not installed.
     """
+    language = language_code(language)
     chosen = name or ("heart" if language in ENGLISH[:2] else "espeak")
     if chosen == "heart":
         if language not in ENGLISH:

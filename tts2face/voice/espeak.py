@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, InputError
-from lexicon.g2p import check_language, segments_of
+from lexicon.g2p import segments_of
 from lexicon.ipa import Segment
+from lexicon.languages import language_code
 from lexicon.phones import PHONES, nearest_phones
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from lexicon.writing_systems import check_script
@@ -57,8 +58,7 @@ class EspeakVoice:
     """A voice of espeak-ng, 22.05 kHz; every request runs in a process of its own."""
 
     def __init__(self, language: str, own_words: Pronouncing) -> None:
-        check_language(language)
-        self._language, self._own_words = language, own_words
+        self._language, self._own_words = language_code(language), own_words
         self._rate = 22050
 
     @property
@@ -148,6 +148,11 @@ def _ask(
         )
     except subprocess.TimeoutExpired as late:
         raise BackendError(f"espeak-ng did not answer within {PATIENCE_S:.0f} s; try a shorter text") from late
+    if answer.returncode < 0:
+        raise BackendError(
+            f"espeak-ng crashed (signal {-answer.returncode}) on {text[:40]!r}; "
+            "write it in another way, or choose another voice"
+        )
     if answer.returncode != 0:
         reason = answer.stderr.decode("utf-8", "replace").strip().splitlines()[-1:] or [f"exit {answer.returncode}"]
         raise BackendError(f"espeak-ng failed ({reason[0]}); reinstall espeakng-loader")

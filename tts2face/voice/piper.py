@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError, InputError
 from lexicon.g2p import phonemize, segments_of
+from lexicon.inputs import read_json
 from lexicon.writing_systems import check_script
 from tts2face.speech.forced_alignment import Aligner
 from tts2face.types import Speech, Waveform
@@ -28,6 +29,10 @@ class PiperVoice:
         settings = path.with_name(path.name + ".json")
         if not settings.is_file():
             raise DataError(f"the Piper voice {path} lacks its settings; put {settings.name} beside it")
+        try:
+            read_json(settings)  # piper itself reads it without limits
+        except OSError as refused:
+            raise DataError(f"{settings} cannot be read ({refused.strerror}); check the file") from refused
         try:
             from piper import PiperVoice as Loaded
         except ImportError as missing:

@@ -1,0 +1,108 @@
+"""``tts2face voices | languages | faces | identities | styles | talkers``: what there is to choose from."""
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+AsJson = Annotated[bool, Parameter(help="Print JSON instead of a table.", name="--json", negative="")]
+NONE = "-"
+
+
+def voices(*, as_json: AsJson = False) -> None:
+    """List the voices (`--voice`), the languages they speak, and whether they are installed."""
+    from tts2face.catalogue import voices
+
+    entries = voices()
+    rows = (
+        (one.name, one.engine, _languages(one.languages), "yes" if one.is_installed else "no", one.summary)
+        for one in entries
+    )
+    _print(entries, ("voice", "engine", "languages", "installed", "summary"), rows, as_json)
+
+
+def languages(*, as_json: AsJson = False) -> None:
+    """List the languages (`--language`): codes and English names, both of which are understood."""
+    from tts2face.catalogue import languages
+
+    entries = languages()
+    _print(entries, ("code", "name"), ((one.code, one.name) for one in entries), as_json)
+
+
+def faces(*, as_json: AsJson = False) -> None:
+    """List the faces (`--face`)."""
+    from tts2face.catalogue import faces
+
+    entries = faces()
+    rows = ((one.name, str(len(one.identities)), one.summary) for one in entries)
+    _print(entries, ("face", "identities", "summary"), rows, as_json)
+
+
+def identities(
+    *, face: Annotated[str, Parameter(help="A shipped face or a .face file.")] = "head", as_json: AsJson = False
+) -> None:
+    """List the identities (`--identity`) of a face: presets of age, sex and ancestry."""
+    from tts2face.catalogue import identities
+
+    entries = identities(face)
+    _print(entries, ("identity", "summary"), ((one.name, one.summary) for one in entries), as_json)
+
+
+def styles(
+    *,
+    palette: Annotated[str, Parameter(help="A shipped palette or a .palette file.")] = "starter",
+    as_json: AsJson = False,
+) -> None:
+    """List the styles (`--style`) of a palette."""
+    from tts2face.catalogue import styles
+
+    entries = styles(palette)
+    rows = ((one.name, one.source or NONE, one.summary) for one in entries)
+    _print(entries, ("style", "derived from", "summary"), rows, as_json)
+
+
+def talkers(*, as_json: AsJson = False) -> None:
+    """List the shipped talkers (`--talker`)."""
+    from tts2face.catalogue import talkers
+
+    entries = talkers()
+    rows = (
+        (
+            one.name,
+            one.language,
+            str(one.n_utterances),
+            f"{one.minutes:g}",
+            "yes" if one.has_own_face else "no",
+            one.licence,
+        )
+        for one in entries
+    )
+    _print(entries, ("talker", "language", "utterances", "minutes", "own face", "licence"), rows, as_json)
+
+
+LISTS = (voices, languages, faces, identities, styles, talkers)
+
+
+def _languages(codes: Sequence[str]) -> str:
+    if not codes:
+        return "its own"
+    return ", ".join(codes) if len(codes) < 6 else str(len(codes))
+
+
+def _print(
+    entries: "Sequence[DataclassInstance]", heading: Sequence[str], rows: Iterable[Sequence[str]], as_json: bool
+) -> None:
+    """Entries as JSON, or as a table with aligned columns."""
+    if as_json:
+        found: list[dict[str, Any]] = [asdict(entry) for entry in entries]
+        print(json.dumps(found, ensure_ascii=False, indent=2))  # noqa: T201 - the answer
+        return
+    table = [heading, *rows]
+    widths = [max(len(row[column]) for row in table) for column in range(len(heading))]
+    for row in table:
+        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())  # noqa: T201

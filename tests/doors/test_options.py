@@ -1,0 +1,154 @@
+"""Options that no command knows, names under which nothing can be written, and how soon help comes."""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from cli.main import app, run
+from cli.options import check_options
+from lexicon.errors import InputError
+from tts2face.output_names import check_name
+from tts2face.render.output_path import checked_output
+
+QUICK_S = 0.3  # of processor time, the interpreter's own start not counted
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("words", "option", "near"),
+    [
+        (["--quite", "--out", "x.mp4"], "--quite", "--quiet"),
+        (["--list-voices"], "--list-voices", "--voice"),
+        (["Hi.", "--out", "x.mp4", "--bakground=red"], "--bakground", "--background"),
+        (["Hi.", "--no-gesture", "--out", "x.mp4"], "--no-gesture", "--no-gestures"),
+        (["Hi.", "-O", "x.mp4"], "-O", None),
+        (["--help-me"], "--help-me", "--help"),
+        (["-- he said", "--out", "x.mp4"], "-- he said", None),
+        (["phones", "--formt", "json", "Hi."], "--formt", "--format"),
+        (["mimic", "take.mp4", "--quite"], "--quite", "--quiet"),
+        (["corpus", "build", "recordings", "--raport", "r.html"], "--raport", "--report"),
+        (["voices", "--jsn"], "--jsn", "--json"),
+    ],
+)
+def test_a_mistyped_option_is_not_spoken(
+    words: list[str], option: str, near: str | None, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(words) == 2
+    hint = f"did you mean {near}? " if near else ""
+    expected = f"tts2face: there is no option {option}; {hint}Text that begins with a dash goes after --\n"
+    assert capsys.readouterr().err == expected
+    assert not list(here.iterdir())
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--out", "x.mp4", "--", "--quite"],
+        ["-5 degrees", "--out", "x.mp4"],
+        ["- well", "--out=x.mp4", "-o", "y.mp4", "--no-gestures", "--transcript", "a.txt"],
+        ["Hi.", "--camera", "-30,10", "--text", "b"],
+        ["--help", "--quite"],
+        ["corpus", "--version"],
+    ],
+)
+def test_known_options_and_text_with_a_dash_pass(words: list[str]) -> None:
+    check_options(app, words)
+
+
+def test_text_behind_two_dashes_is_spoken(here: Path) -> None:
+    assert run(["--explain", "why.json", "--quiet", "--", "--bob"]) == 0
+    shown = json.loads((here / "why.json").read_text(encoding="utf-8"))
+    assert [phone["phone"] for phone in shown if phone["phone"] != "sil"] == ["b", "ɑ", "b"]
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "reason"),
+    [
+        (["Hi.", "--out", "x" * 300 + ".mp4"], 2, "has 304 bytes; use at most"),
+        (["Hi.", "--out", "ä" * 125 + ".mp4"], 2, "has 254 bytes; use at most"),
+        (["Hi.", "--out", "y" * 300 + "/x.mp4"], 2, "File name too long; choose another folder"),
+        (["Hi.", "--out", ".mp4"], 2, ".mp4 is only a suffix; put a name before it, such as clip.mp4"),
+        (["Hi.", "--out", ".webm"], 2, ".webm is only a suffix"),
+        (["Hi.", "--out", "x.mp4", "--explain", "no/e.json"], 2, "no folder no to write e.json to"),
+        (["Hi.", "--out", "x.mp4", "--explain", ".json"], 2, ".json is only a suffix"),
+        (["Hi.", "--out", "x.mp4", "--explain", "e.xml"], 2, "an explanation is written as .json, .txt, not e.xml"),
+        (["Hi.", "--explain", "folder.json"], 2, "folder.json is a folder"),
+        (["corpus", "build", "folder.json", "--out", "a.talker", "--report", "no/r.html"], 2, "no folder no"),
+        (["corpus", "build", "folder.json", "--out", "a.talker", "--report", "r.pdf"], 2, "a report is written as"),
+        (["corpus", "build", "folder.json", "--out", "no/a.talker"], 2, "no folder no"),
+        (["corpus", "evaluate", "--recordings", "folder.json", "--out", "no/a.html"], 2, "no folder no"),
+        (["Hi.", "--talker", "t" * 300, "--out", "x.mp4"], 2, "File name too long; check the path"),
+        (["--audio", "t" * 300, "--out", "x.mp4"], 2, "File name too long; check the path"),
+        (["Hi.", "--dictionary", "/dev/zero", "--out", "x.mp4"], 3, "/dev/zero holds more than"),
+        (["Hi.", "--timeline", "/dev/zero", "--out", "x.mp4"], 3, "/dev/zero holds more than"),
+        (["Hi.", "--timeline", "digits.json", "--out", "x.mp4"], 3, "a number of 5000 characters is too long"),
+        (
+            ["Hi.", "--background", "bomb.png", "--out", "x.mp4"],
+            3,
+            "image bomb.png is too large; at most 100 million",
+        ),
+        (["Hi.", "--background", "huge.png", "--out", "x.mp4"], 3, "huge.png has 11000 x 11000 pixels; at most 100"),
+        (["Hi.", "--language", "germn", "--out", "x.mp4"], 2, "there is no language 'germn'; did you mean de (German)"),
+        (["<speak xml:lang='xx'>Hi.</speak>", "--out", "x.mp4"], 2, "there is no language 'xx'"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_before_work_begins(
+    words: list[str], code: int, reason: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "folder.json").mkdir()
+    (here / "digits.json").write_text('{"gains": {"head": ' + "1" * 5000 + "}}")
+    if "bomb.png" in words:
+        Image.new("1", (20_000, 20_000)).save(here / "bomb.png")
+    if "huge.png" in words:
+        Image.new("1", (11_000, 11_000)).save(here / "huge.png")
+    before = set(here.iterdir())
+    assert run(words) == code
+    told = capsys.readouterr().err
+    assert reason in told
+    assert len(told.strip().splitlines()) == 1
+    assert set(here.iterdir()) == before
+
+
+def test_the_longest_name_can_be_written(here: Path) -> None:
+    longest = os.pathconf(here, "PC_NAME_MAX") - 16
+    assert checked_output(here / ("x" * (longest - 4) + ".mp4")).suffix == ".mp4"
+    with pytest.raises(InputError, match=f"has {longest + 1} bytes; use at most {longest}"):
+        check_name(here / ("x" * (longest + 1)))
+    assert checked_output(here / ".frames_of_mine").name == ".frames_of_mine"
+
+
+@pytest.mark.parametrize(
+    ("text", "language"),
+    [
+        ("<speak xml:lang='de-DE'><p xml:lang='de'>Hallo.</p></speak>", "German"),
+        ("<speak xml:lang='zh-CN'>你好</speak>", "Chinese"),
+        ("<speak xml:lang='en-GB'>Hello.</speak>", "EN"),
+        ("Hallo.", "de_DE.UTF-8"),
+    ],
+)
+def test_languages_in_any_spelling_are_spoken(text: str, language: str, here: Path) -> None:
+    assert run([text, "--language", language, "--voice", "espeak", "--explain", "why.txt", "--quiet"]) == 0
+    assert (here / "why.txt").stat().st_size > 0
+
+
+def test_help_comes_at_once() -> None:
+    def cpu_seconds(code: str) -> float:
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+    start = min(cpu_seconds("pass") for _ in range(3))
+    assert min(cpu_seconds("import cli.main") for _ in range(5)) - start < QUICK_S
+    assert min(cpu_seconds("from cli.main import run; run(['--help'])") for _ in range(5)) - start < QUICK_S

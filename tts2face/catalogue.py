@@ -1,0 +1,189 @@
+"""What there is to choose from: voices, languages, faces, their identities, styles and talkers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from lexicon.errors import DataError
+from tts2face.models.files import SHIPPED, named_file
+
+OWN_FACE = "self"
+
+
+@dataclass(frozen=True, slots=True)
+class VoiceEntry:
+    """A voice; ``languages`` are espeak-ng codes, empty where the voice's own file says which it speaks.
+
+    ``name`` is what ``Request.voice`` takes; for Piper voices the path of a file stands there.
+    """
+
+    name: str
+    engine: str
+    languages: tuple[str, ...]
+    is_installed: bool
+    summary: str
+
+
+@dataclass(frozen=True, slots=True)
+class LanguageEntry:
+    """A language of espeak-ng: its code and its English name."""
+
+    code: str
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class FaceEntry:
+    """A face, and the names of its identity presets."""
+
+    name: str
+    identities: tuple[str, ...]
+    summary: str
+
+
+@dataclass(frozen=True, slots=True)
+class IdentityEntry:
+    """A preset of a face's age, sex and ancestry."""
+
+    name: str
+    face: str
+    summary: str
+
+
+@dataclass(frozen=True, slots=True)
+class StyleEntry:
+    """A style of a palette; ``source`` is the recorded style that it is derived from, None where it was recorded."""
+
+    name: str
+    palette: str
+    source: str | None
+    summary: str
+
+
+@dataclass(frozen=True, slots=True)
+class TalkerEntry:
+    """A talker: how much was recorded, and whether the talker's own face can be shown (``--face self``)."""
+
+    name: str
+    language: str
+    licence: str
+    n_utterances: int
+    minutes: float
+    has_own_face: bool
+
+
+def voices() -> tuple[VoiceEntry, ...]:
+    """Every voice, whether what it needs is installed, and the languages that it speaks.
+
+    Raises
+    ------
+    BackendError
+        espeak-ng does not start.
+    """
+    from tts2face.voice.engine import ENGLISH, NAMES
+
+    codes = tuple(language.code for language in languages())
+    english = tuple(code for code in codes if code in ENGLISH)
+    return (
+        VoiceEntry("heart", "hibari", english, _is_installed("hibari"), NAMES["heart"]),
+        VoiceEntry("espeak", "espeak-ng", codes, _is_installed("espeakng_loader"), NAMES["espeak"]),
+        VoiceEntry("FILE.onnx", "piper", (), _is_installed("piper"), "any Piper voice by its path (extra [piper])"),
+    )
+
+
+def languages() -> tuple[LanguageEntry, ...]:
+    """Every language that espeak-ng speaks, by code.
+
+    Raises
+    ------
+    BackendError
+        espeak-ng is not installed or does not start.
+    """
+    from lexicon.g2p import languages as spoken
+
+    return tuple(LanguageEntry(code, name) for code, name in sorted(spoken().items()))
+
+
+def faces() -> tuple[FaceEntry, ...]:
+    """The shipped faces, and the talker's own."""
+    shipped = []
+    for path in _shipped("face"):
+        _, header = _read(path, "face")
+        names = tuple(name for name, _, _ in header["identities"])
+        shipped.append(FaceEntry(path.stem, names, f"mesh with {len(header['shape_names'])} shapes"))
+    own = FaceEntry(OWN_FACE, (), "the talker's own face, of talkers with pictures")
+    return (*shipped, own)
+
+
+def identities(face: str = "head") -> tuple[IdentityEntry, ...]:
+    """The identity presets of a face: a shipped one by name, or a ``.face`` file.
+
+    Raises
+    ------
+    InputError
+        There is no such face.
+    DataError
+        The file is damaged, or no face.
+    """
+    path = named_file(face, "face")
+    _, header = _read(path, "face")
+    try:
+        return tuple(IdentityEntry(name, face, summary) for name, _, summary in header["identities"])
+    except (KeyError, TypeError, ValueError) as broken:
+        raise DataError(f"{path} lacks its list of identities; build or copy it again") from broken
+
+
+def styles(palette: str = "starter") -> tuple[StyleEntry, ...]:
+    """The styles of a palette, a shipped one by name or a ``.palette`` file; errors as `load_palette`."""
+    from tts2face.models.palette import load_palette
+
+    found = load_palette(palette)
+    derived = (
+        StyleEntry(
+            name, palette, derivation.source, derivation.summary.removeprefix(f"derived from {derivation.source}: ")
+        )
+        for name, derivation in found.derivations.items()
+    )
+    recorded = (
+        StyleEntry(name, palette, None, f"recorded, {style.seconds / 60:.1f} minutes")
+        for name, style in found.styles.items()
+    )
+    return (*derived, *recorded)
+
+
+def talkers() -> tuple[TalkerEntry, ...]:
+    """The shipped talkers."""
+    from tts2face.models.talker import read_talker
+
+    found = []
+    for path in _shipped("talker"):
+        talker = read_talker(path)
+        seconds = sum(len(utterance.shape) for utterance in talker.utterances) / talker.fps
+        found.append(
+            TalkerEntry(
+                path.stem,
+                str(talker.metadata.get("language", "not stated")),
+                str(talker.metadata.get("licence", "not stated")),
+                len(talker.utterances),
+                round(seconds / 60, 1),
+                talker.appearance is not None,
+            )
+        )
+    return tuple(found)
+
+
+def _shipped(kind: str) -> list[Path]:
+    return sorted(SHIPPED.glob(f"*.{kind}"))
+
+
+def _read(path: Path, kind: str) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+    from tts2face.models.face_file import FORMAT_VERSION
+    from tts2face.models.tensors import read_tensors
+
+    return read_tensors(path, kind, FORMAT_VERSION)
+
+
+def _is_installed(module: str) -> bool:
+    return find_spec(module) is not None

@@ -1,0 +1,69 @@
+"""Names of files to write, checked before the work whose result they take."""
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from lexicon.errors import BackendError, InputError
+
+LONGEST_NAME = 255  # bytes, where the file system does not say
+HIDDEN_EXTRA = 16  # bytes that the hidden name adds under which a file is first written: dots and random letters
+_SUFFIX_ALONE = re.compile(r"\.\w{2,7}")
+
+
+def check_name(path: Path) -> None:
+    """Refuse a path at which no file or folder can be made.
+
+    Raises
+    ------
+    InputError
+        The name is only a suffix or too long, or the folder around it does not exist.
+    BackendError
+        The folder cannot be written.
+    """
+    _check_stem(path)
+    try:
+        is_folder = path.parent.is_dir()
+    except OSError as refused:
+        raise InputError(f"cannot write {shortened(path)}: {refused.strerror}; choose another folder") from refused
+    if not is_folder:
+        raise InputError(f"there is no folder {path.parent} to write {path.name} to; make it first")
+    longest = _longest_name(path.parent) - HIDDEN_EXTRA
+    if (length := len(os.fsencode(path.name))) > longest:
+        raise InputError(f"the name {shortened(path)} has {length} bytes; use at most {longest}")
+    if not os.access(path.parent, os.W_OK | os.X_OK):
+        raise BackendError(f"cannot write {path}: Permission denied; choose another folder")
+
+
+def check_file_name(path: Path, what: str, suffixes: Sequence[str]) -> None:
+    """Refuse a path at which no file of one of the suffixes can be written; errors as `check_name`.
+
+    Raises
+    ------
+    InputError
+        It has another suffix, or is a folder.
+    """
+    _check_stem(path)
+    if path.suffix not in suffixes:
+        raise InputError(f"{what} is written as {', '.join(suffixes)}, not {shortened(path)}")
+    check_name(path)
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; choose another name")
+
+
+def shortened(path: Path) -> str:
+    """A path's name for a message, cut where it is very long."""
+    return path.name if len(path.name) <= 60 else f"{path.name[:40]}...{path.name[-10:]}"
+
+
+def _check_stem(path: Path) -> None:
+    if _SUFFIX_ALONE.fullmatch(path.name):
+        raise InputError(f"{path} is only a suffix; put a name before it, such as clip{path.name}")
+
+
+def _longest_name(folder: Path) -> int:
+    try:
+        return os.pathconf(folder, "PC_NAME_MAX")
+    except (AttributeError, OSError, ValueError):  # no such question on Windows, or no answer
+        return LONGEST_NAME
