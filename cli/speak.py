@@ -1,7 +1,7 @@
 """``tts2face "text"``: what the command does once its flags are read."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from json import dumps
 from pathlib import Path
@@ -17,6 +17,7 @@ from tts2face.request import Request
 if TYPE_CHECKING:
     from tts2face.exemplar.explanation import ShownPhone
     from tts2face.session import Session
+    from tts2face.speech.text_fit import TextMismatch
     from tts2face.synthesis.clip_stream import Piece
 
 OWN_FACE = "self"
@@ -55,6 +56,7 @@ def run(request: Request, picture: Picture, options: SpeakOptions) -> None:
     elif options.explain is not None:
         for piece in session.stream(request):
             keep(piece)
+            _warn(piece.mismatches)
     if options.explain is not None:
         _write_explanation(tuple(shown), options.explain)
     if options.view:
@@ -87,6 +89,7 @@ def _write(
     (request, picture), (keep, is_quiet) = what, how
     with progress_bar("speaking and drawing", is_quiet) as on_progress:
         written = session.write(request, out, picture=picture, on_progress=on_progress, on_piece=keep)
+    _warn(written.mismatches)
     if is_quiet:
         return
     took = time.perf_counter() - began
@@ -96,6 +99,12 @@ def _write(
     )
     for mark in written.marks:
         say(f"{mark.seconds:.2f} s: {mark.name}")
+
+
+def _warn(mismatches: "Sequence[TextMismatch]") -> None:
+    """One line for each span of a recording that does not fit its text; in quiet runs too: the clip is wrong there."""
+    for mismatch in mismatches:
+        say(f"tts2face: warning: {mismatch.sentence}")
 
 
 def _session(options: SpeakOptions) -> "Session":

@@ -52,7 +52,7 @@ class Request:
     )
     voice: str | None = option(None, "heart (English), espeak (every language), or a Piper voice by path (x.onnx).")
     rate: float = option(1.0, "Speed of speech, 0.5 to 2.")
-    volume: float = option(1.0, "Loudness of the sound, 0 to 2.")
+    volume: float = option(1.0, "Loudness of the sound, 0 to 2; 1 is -16 LUFS, or a recording as it is.")
     seed: int = option(0, "The same seed gives the same sound and motion.")
     dictionary: Path | None = option(None, "Your own pronunciations, which win over the built-in ones.")
     synthesis: str = option("exemplar", "How lips are made from exemplars: exemplar, or theobald2007 as published.")

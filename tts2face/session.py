@@ -22,6 +22,7 @@ from tts2face.render.output_path import checked_output
 from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
 from tts2face.request import Request
+from tts2face.speech.text_fit import TextMismatch
 from tts2face.synthesis.animated_face import AnimatedFace, mesh_face, own_appearance_face
 from tts2face.synthesis.clip_stream import Performers, Piece, pieces
 from tts2face.synthesis.gesture_layer import GestureLayer
@@ -42,13 +43,17 @@ Value = TypeVar("Value")
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What a file holds: seconds of sound, frames, and when the named marks of the text are reached."""
+    """What a file holds: seconds of sound, frames, and when the named marks of the text are reached.
+
+    ``mismatches`` are words of the text that the recording probably does not say.
+    """
 
     path: Path
     seconds: float
     n_frames: int
     marks: tuple[Reached, ...] = ()
     is_silent: bool = False
+    mismatches: tuple[TextMismatch, ...] = ()
 
 
 class Session:
@@ -192,6 +197,7 @@ class Session:
         renderer = self.renderer(picture or Picture(**of_picture), has_gestures=prepared.request.gestures)
         progress = _Steps(prepared.n_steps, on_progress)
         marks: list[Reached] = []
+        mismatches: list[TextMismatch] = []
         seconds, n_frames = 0.0, 0
         with (
             Prefetch(self._pieces(prepared), PIECES_AHEAD) as spoken,
@@ -203,10 +209,11 @@ class Session:
                 progress.begin(piece.n_steps, n_frames)
                 writer.add(piece.clip)
                 marks += piece.marks
+                mismatches += piece.mismatches
                 seconds += piece.clip.speech.waveform.duration
                 n_frames += len(piece.clip.motion)
         progress.finish()
-        return Written(Path(out), seconds, n_frames, tuple(marks))
+        return Written(Path(out), seconds, n_frames, tuple(marks), mismatches=tuple(mismatches))
 
     def write_performance(
         self,

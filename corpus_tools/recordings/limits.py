@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from corpus_tools.recordings.corpus_video import NOT_COUNTED
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.speech.text_fit import LEAST_CONFIDENCE
 from tts2face.types import Waveform
 
 FULL_SCALE = 0.999  # a sample from here on is taken for clipped
@@ -37,11 +38,14 @@ class Limit:
 LIMITS = (
     # Of other sentences of GRID's small grammar the median is -7300, of unrelated text -10500, or it is not found.
     Limit(
-        "confidence", -6500.0, True, "the sound does not fit the transcript (confidence {value:.0f}); correct the words"
+        "confidence",
+        LEAST_CONFIDENCE,
+        True,
+        "the sound does not fit the transcript (confidence {value:.0f}); correct the words",
     ),
     Limit(
         "recognised",
-        -6500.0,
+        LEAST_CONFIDENCE,
         True,
         "its phones could not be recognised well (confidence {value:.0f}); write what is said into a .txt beside it",
     ),

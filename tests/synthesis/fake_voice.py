@@ -8,7 +8,7 @@ import numpy as np
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.types import Speech, Waveform
 
-RATE = 1000
+RATE = 8000  # Hz: the lowest at which loudness is measured
 LEAD, TRAIL, LETTER, LEVEL = 0.2, 0.3, 0.1, 0.25
 
 

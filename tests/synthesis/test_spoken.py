@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lexicon.errors import InputError
@@ -55,7 +55,7 @@ def test_a_pause_within_a_sentence_lasts_as_long_as_it_says(pause: float) -> Non
     assert answer.speech.phones.end == pytest.approx(LEAD + 10 * LETTER + pause + TRAIL, abs=2 / RATE)
     assert answer.speech.phones.phones.count(SILENCE) == 3
     silent = answer.speech.waveform.samples[round((words(answer)["hello"][1] + 0.001) * RATE) :][
-        : int(pause * RATE) - 3
+        : int((pause - 0.003) * RATE)
     ]
     assert np.abs(silent).max() == 0
 
@@ -166,6 +166,7 @@ WORDS = st.lists(
 )
 
 
+@settings(deadline=None)  # the first example imports scipy's filters
 @given(WORDS, st.data(), st.booleans())
 def test_times_of_marks_increase_and_lie_in_the_sound(texts: list, data: st.DataObject, splits: bool) -> None:
     kinds = [data.draw(st.sampled_from(["", "[nod]", "[pause 0.3]", "[pause 1][nod 0.5]"])) for _ in texts]

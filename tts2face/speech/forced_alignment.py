@@ -38,12 +38,14 @@ class Alignment:
     """Phones from 0 s to the end of the sound, one span for each word, and how well they fit.
 
     ``confidence`` is the mean log likelihood per second of speech, relative to the best fitting state of the acoustic
-    model at each instant: 0 is perfect; a wrong text lies far below a right one.
+    model at each instant: 0 is perfect; a wrong text lies far below a right one. ``scores`` (N,) are the log
+    likelihoods of the phones, 0 for silences.
     """
 
     phones: PhoneSequence
     words: tuple[WordSpan, ...]
     confidence: float
+    scores: NDArray[np.float64]
 
 
 class Aligner:
@@ -176,7 +178,8 @@ def _alignment(
     starts: list[float] = []
     spans: list[WordSpan] = []
     end = 0.0
-    score, n_frames = 0.0, 0
+    scores: dict[int, float] = {}  # by phone
+    n_frames = 0
     for entry, (text, ways) in zip(entries, words, strict=True):
         onset = begin + _seconds(entry.phones[0][1])
         if onset - end >= SHORTEST_S:  # silence, at the beginning too
@@ -184,18 +187,19 @@ def _alignment(
             starts.append(end)
         spans.append(WordSpan(text, len(labels), len(labels) + len(entry.phones)))
         for phone, (_, first, count, fit) in zip(ways[entry.way], entry.phones, strict=True):
+            scores[len(labels)] = float(fit)
             labels.append(phone)
             starts.append(begin + _seconds(first))
             end = begin + _seconds(first + count)
-            score += fit
             n_frames += count
     if duration - end >= SHORTEST_S:
         labels.append(SILENCE)
         starts.append(end)
     edges = np.array([*starts, duration])
     edges[0] = 0.0
-    confidence = score / max(n_frames, 1) * FRAME_RATE
-    return Alignment(PhoneSequence(labels, increasing(edges)), tuple(spans), confidence)
+    confidence = sum(scores.values()) / max(n_frames, 1) * FRAME_RATE
+    by_phone = np.array([scores.get(at, 0.0) for at in range(len(labels))])
+    return Alignment(PhoneSequence(labels, increasing(edges)), tuple(spans), confidence, by_phone)
 
 
 def _seconds(frame: int) -> float:

@@ -7,8 +7,9 @@ from lexicon.dictionary import Dictionary, cmudict_lookup
 from lexicon.errors import DataError
 from lexicon.pronounce import Word, pronounce
 from lexicon.sequence import PhoneSequence, WordSpan, concatenated
-from tts2face.speech.forced_alignment import Aligner
+from tts2face.speech.forced_alignment import Aligner, Alignment
 from tts2face.speech.pauses import stretches
+from tts2face.speech.text_fit import TextMismatch, find_misfits, mismatch_of, surrounded
 from tts2face.types import Waveform
 
 Ways = tuple[tuple[str, ...], ...]  # pronunciations of one word, each a row of phones
@@ -44,8 +45,10 @@ def _ways(word: Word, language: str, own: Dictionary | None) -> Ways:
     return tuple(dict.fromkeys(ways))
 
 
-def phones_in(sound: Waveform, words: Script) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
-    """Phones and words on the clock of a sound, from 0 s to its end.
+def phones_in(
+    sound: Waveform, words: Script, *, is_english: bool = True
+) -> tuple[PhoneSequence, tuple[WordSpan, ...], tuple[TextMismatch, ...]]:
+    """Phones and words on the clock of a sound, from 0 s to its end, and where the words do not fit it.
 
     Raises
     ------
@@ -57,18 +60,50 @@ def phones_in(sound: Waveform, words: Script) -> tuple[PhoneSequence, tuple[Word
     aligner = Aligner()
     if sound.duration <= LONGEST_AT_ONCE_S:
         found = aligner.align(sound, words)
-        return found.phones, found.words
+        return found.phones, found.words, _mismatches(aligner, sound, words, found, is_english=is_english)
     parts = [_part(sound, span) for span in stretches(sound, LONGEST_STRETCH_S)]
-    phones, spans = [], []
+    phones: list[PhoneSequence] = []
+    spans: list[tuple[WordSpan, ...]] = []
+    mismatches: list[TextMismatch] = []
+    begin = 0.0
     for part, said in zip(parts, _placed(parts, words), strict=True):
         if said:
             found = aligner.align(part, said)
             phones.append(found.phones)
             spans.append(found.words)
+            fits = _mismatches(aligner, part, said, found, is_english=is_english)
+            mismatches += [one.shifted(begin) for one in fits]
         else:
             phones.append(PhoneSequence(["sil"], [0.0, part.duration]))
             spans.append(())
-    return concatenated(phones, spans)
+        begin += part.duration
+    return *concatenated(phones, spans), tuple(mismatches)
+
+
+def _mismatches(
+    aligner: Aligner, sound: Waveform, words: Script, found: Alignment, *, is_english: bool
+) -> tuple[TextMismatch, ...]:
+    """Spans that do not fit, each confirmed by aligning it again with what surrounds it.
+
+    The acoustic model normalises by the mean of what it is given: pauses of a long recording lower all of its scores,
+    those of a few seconds cut out of it less.
+    """
+    confirmed: list[TextMismatch] = []
+    behind = 0.0  # where the last confirmed span ends
+    for misfit in find_misfits(found, is_english=is_english):
+        first, last, begin, end = surrounded(found, *misfit)
+        if last - first == len(words):  # there is nothing else to compare with
+            return (mismatch_of(found, *misfit),)
+        try:
+            again = aligner.align(_part(sound, (begin, end)), words[first:last])
+        except DataError:  # not even found there
+            here = [mismatch_of(found, *misfit)]
+        else:
+            misfits = find_misfits(again, is_english=is_english)
+            here = [mismatch_of(again, *span).shifted(begin) for span in misfits]
+        confirmed += [one for one in here if one.begin >= behind]
+        behind = max([behind, *(one.end for one in here)])
+    return tuple(confirmed)
 
 
 def _placed(parts: Sequence[Waveform], words: Script) -> list[Script]:

@@ -22,6 +22,7 @@ from tts2face.models.talker import Talker, speech_channels
 from tts2face.request import Request
 from tts2face.speech.features import FEATURE_RATE, speech_level
 from tts2face.speech.streaming_listener import Ear
+from tts2face.speech.text_fit import TextMismatch
 from tts2face.speech.transcript_alignment import phones_in, script
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, frame_count
 from tts2face.video.media import sound_blocks
@@ -35,10 +36,14 @@ BEST_DRIVE = "network"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Heard:
-    """What a recording says: its phones and words on its own clock; one silence where the words are not known."""
+    """What a recording says: its phones and words on its own clock; one silence where the words are not known.
+
+    ``mismatches`` are the spans in which it probably says something else.
+    """
 
     phones: PhoneSequence
     words: tuple[WordSpan, ...]
+    mismatches: tuple[TextMismatch, ...] = ()
 
     @property
     def duration(self) -> float:
@@ -76,7 +81,7 @@ def heard(request: Request, path: Path) -> Heard:
     own = read_dictionary(request.dictionary) if request.dictionary else None
     words = script(request.text, request.language, own)
     sound = Waveform(np.concatenate(list(_audible(path))), FEATURE_RATE)
-    return Heard(*phones_in(sound, words))
+    return Heard(*phones_in(sound, words, is_english=request.language.startswith("en")))
 
 
 def driven(path: Path, drive: Drive, talker: Talker, fps: float) -> tuple[Heard, Trajectory]:

@@ -5,17 +5,20 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from tts2face.clock import on_frames
 from tts2face.exemplar.explanation import ShownPhone, explain_selection
 from tts2face.exemplar.synthesis import TokenSelection, VisualVoice, select_tokens
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.talker import Talker
+from tts2face.speech.text_fit import TextMismatch
 from tts2face.synthesis.animated_face import AnimatedFace, resting_head
 from tts2face.synthesis.audio_input import Heard, clips_in, drive_of, driven, heard
 from tts2face.synthesis.gesture_layer import GestureLayer
 from tts2face.synthesis.marked_speech import Reached, Said, reached_in, say, silent
 from tts2face.synthesis.prepared_request import IDLE_STEPS, RECORDING_STEPS, PreparedRequest
-from tts2face.types import Clip, Speech, Trajectory, frame_count
+from tts2face.types import Clip, Speech, Trajectory, Waveform, frame_count
 from tts2face.voice.engine import Voice
 
 
@@ -36,6 +39,8 @@ class Piece:
     shown
         For each phone, the recorded tokens that move the lips; on the clock of the whole clip. Empty for an idle face
         and for a recording without words; the first piece of a recording holds those of the whole.
+    mismatches
+        Words that the recording probably does not say, where they begin in this part; on the clock of the whole clip.
     """
 
     clip: Clip
@@ -44,6 +49,7 @@ class Piece:
     timeline: Timeline = field(default_factory=Timeline)
     marks: tuple[Reached, ...] = ()
     shown: Callable[[], tuple[ShownPhone, ...]] = tuple
+    mismatches: tuple[TextMismatch, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +89,7 @@ def _spoken_pieces(prepared: PreparedRequest, performers: Performers, layer: Ges
         n_frames = frame_count(speech.waveform.duration, float(fps))
         selection = select_tokens(speech.phones, performers.exemplars, prepared.options)
         lips = performers.face.motion_of_tokens(selection, fps=float(fps), n_frames=n_frames)
-        clip = _with_gestures(speech, lips, timeline, layer)
+        clip = _with_sound(_with_gestures(speech, lips, timeline, layer), said.sound)
         first_frame += n_frames
         marks = tuple(replace(mark, seconds=mark.seconds + begin) for mark in said.marks)
         yield Piece(clip, begin, n_steps, timeline, marks, _explanation(selection, performers.exemplars, begin))
@@ -119,6 +125,7 @@ def _recording_pieces(
             marked,
             tuple(mark for mark in marks if begin <= mark.seconds < end),
             shown if before == 0 else tuple,
+            tuple(one for one in said.mismatches if begin <= one.begin < end),
         )
         before = after
 
@@ -141,6 +148,14 @@ def _with_gestures(speech: Speech, lips: Trajectory, timeline: Timeline, layer: 
     if layer is not None:
         return layer.add(speech, lips, timeline)
     return Clip(lips, resting_head(len(lips), lips.fps), speech)
+
+
+def _with_sound(clip: Clip, sound: Waveform) -> Clip:
+    """The clip with its final sound; the sound that its motion follows may be longer by a silence."""
+    speech = clip.speech
+    samples = np.zeros_like(speech.waveform.samples)
+    samples[: len(sound.samples)] = sound.samples
+    return replace(clip, speech=replace(speech, waveform=Waveform(samples, sound.rate)))
 
 
 def _explanation(

@@ -3,13 +3,14 @@
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lexicon.cleaning import plain
 from lexicon.errors import InputError
@@ -28,12 +29,15 @@ from tts2face.request import RATES, VOLUMES, Request
 from tts2face.synthesis.speech_joining import joined, silence
 from tts2face.types import Speech, Waveform, frame_count, joined_speech
 from tts2face.voice.engine import Voice, at_volume
+from tts2face.voice.level import level_speech
 
 LEAST_GAP_S = 0.02  # between utterances of a sentence: less cuts into their sounds (edges are good to 16 ms)
 JOINT_S = 0.06  # where only the speed changes
 IDLE_PART_S = 10.0  # of a silent clip, as a long sentence
 IDLE_RATE = 48_000  # Hz, of its silence
 RAMP_S = 0.03  # from one loudness to another
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +50,15 @@ class Reached:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Said:
-    """A sentence's sound, and what its marks ask for, on its own clock."""
+    """A sentence's sound, and what its marks ask for, on its own clock.
+
+    ``speech`` is as the voice gives it, which motion is computed from; ``sound`` the same at the loudness of the clip.
+    """
 
     speech: Speech
     timeline: Timeline
     marks: tuple[Reached, ...]
+    sound: Waveform
 
 
 class WordTimes:
@@ -132,28 +140,40 @@ class _SentenceTimes:
 def say(voice: Voice, sentence: Sentence, request: Request) -> Said:
     """Speak a sentence with its pauses, speeds and loudness, and find when its marks are reached.
 
-    A sentence in which nothing is marked is what the voice makes of it, byte for byte.
+    The speech of a sentence in which nothing is marked is what the voice makes of it, byte for byte; its sound is
+    brought to the loudness of all clips, to which the loudness of the request and of marks is relative.
 
     Raises
     ------
     InputError
         The voice cannot say it.
     """
-    speeches, clocks = [], []
+    spoken: list[Speech] = []
+    clocks: list[WordTimes] = []
+    gains: list[Floats] = []
     for part in sentence.utterances:
-        speech = voice.speak(part.text, rate=request.rate * part.rate, volume=request.volume, seed=request.seed)
+        speech = voice.speak(part.text, rate=request.rate * part.rate, seed=request.seed)
         clock = WordTimes(part.written, speech.phones, speech.words, language=request.language, first=part.first)
-        speeches.append(_louder(speech, sentence.runs, part, clock))
+        spoken.append(speech)
         clocks.append(clock)
+        gains.append(_gain(speech.waveform, sentence.runs, part, clock))
+    quiet = [_turned_down(speech, request.volume, gain) for speech, gain in zip(spoken, gains, strict=True)]
+    speech, begins = _joined_sentence(quiet, sentence, voice.sample_rate)
+    levelled = level_speech(spoken, [request.volume * gain for gain in gains])
+    sound = _joined_sentence(levelled, sentence, voice.sample_rate)[0].waveform
+    times = _SentenceTimes(tuple(part.first for part in sentence.utterances), tuple(clocks), tuple(begins))
+    return Said(speech, *reached(sentence.runs, sentence.marks, times, (sentence.first, sentence.last)), sound)
+
+
+def _joined_sentence(speeches: Sequence[Speech], sentence: Sentence, rate: int) -> tuple[Speech, list[float]]:
+    """Utterances of a sentence with its silences, and the second that is now each one's 0."""
     speech, begins = joined(speeches, [_gap(part) for part in sentence.utterances[:-1]])
     if sentence.lead > 0:
-        before = silence(sentence.lead, voice.sample_rate)
+        before = silence(sentence.lead, rate)
         speech, begins = joined_speech([before, speech]), [second + before.waveform.duration for second in begins]
-    pause = sentence.utterances[-1].pause
-    if pause:
-        speech = joined_speech([speech, silence(pause, voice.sample_rate)])
-    times = _SentenceTimes(tuple(part.first for part in sentence.utterances), tuple(clocks), tuple(begins))
-    return Said(speech, *reached(sentence.runs, sentence.marks, times, (sentence.first, sentence.last)))
+    if pause := sentence.utterances[-1].pause:
+        speech = joined_speech([speech, silence(pause, rate)])
+    return speech, begins
 
 
 def silent(seconds: float, fps: Fraction, n_steps: int) -> Iterator[tuple[Said, int]]:
@@ -163,7 +183,8 @@ def silent(seconds: float, fps: Fraction, n_steps: int) -> Iterator[tuple[Said, 
     for first, last in pairwise(bounds):
         n_samples = first_sample(last, IDLE_RATE, fps) - first_sample(first, IDLE_RATE, fps)
         steps = n_steps * last // n_frames - n_steps * first // n_frames
-        yield Said(silence(n_samples / IDLE_RATE, IDLE_RATE), Timeline(), ()), steps
+        quiet = silence(n_samples / IDLE_RATE, IDLE_RATE)
+        yield Said(quiet, Timeline(), (), quiet.waveform), steps
 
 
 def reached(
@@ -258,16 +279,15 @@ def _gap(utterance: Utterance) -> float:
     return max(PAUSES_S.get(utterance.written[-1:], 0.0), JOINT_S)
 
 
-def _louder(speech: Speech, runs: Sequence[Run], part: Utterance, times: WordTimes) -> Speech:
-    """An utterance with the loudness of its runs; turned down as a whole where it would exceed full scale."""
+def _gain(sound: Waveform, runs: Sequence[Run], part: Utterance, times: WordTimes) -> Floats:
+    """(n,) or (1,) factor of an utterance's samples: the loudness of its runs."""
     mine = [
         (run.volume, max(run.start, part.first), end)
         for run, end in zip(runs, [*(run.start for run in runs[1:]), part.last], strict=True)
         if run.start < part.last and end > part.first
     ]
     if all(volume == 1.0 for volume, _, _ in mine):
-        return speech
-    sound = speech.waveform
+        return np.ones(1)
     seconds = np.arange(len(sound.samples)) / sound.rate
     gain = np.ones(len(seconds))
     for volume, first, last in mine:
@@ -275,5 +295,12 @@ def _louder(speech: Speech, runs: Sequence[Run], part: Utterance, times: WordTim
         end = times.end(last) if last < part.last else math.inf
         if start < end:
             gain += (volume - 1.0) * presence(seconds, start, end, RAMP_S)
-    louder = at_volume(sound.samples * np.maximum(gain, 0.0), 1.0)
-    return Speech(Waveform(louder, sound.rate), speech.phones, speech.words)
+    factors: Floats = np.maximum(gain, 0.0)
+    return factors
+
+
+def _turned_down(speech: Speech, volume: float, gain: Floats) -> Speech:
+    """An utterance at a loudness, turned down where it would exceed full scale: what motion is computed from."""
+    samples = at_volume(speech.waveform.samples, volume)
+    louder = samples if len(gain) == 1 else at_volume(samples * gain, 1.0)
+    return replace(speech, waveform=Waveform(louder, speech.waveform.rate))

@@ -1,0 +1,57 @@
+"""A text that is not what a recording says: the core reports the words, the command line says so in one sentence."""
+
+import wave
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from cli.main import run
+from tts2face.api import stream, write_clip
+from tts2face.models.face_file import load_face
+from tts2face.models.talker import load_talker
+from tts2face.render.picture import Picture
+from tts2face.request import Request
+from tts2face.session import cast
+from tts2face.voice.engine import load_voice
+
+SAID = "The young chef usually pushes five big maps before noon."
+WRONG = "Please wait for the beep, then say your name."
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The project's own voice as the recording."""
+    sound = load_voice("heart", "en-us").speak(SAID).waveform
+    path = tmp_path_factory.mktemp("recording") / "speech.wav"
+    with wave.open(str(path), "wb") as file:
+        file.setparams((1, 2, sound.rate, 0, "NONE", "not compressed"))
+        file.writeframes((sound.samples * 32767).astype("<i2").tobytes())
+    return path
+
+
+def test_the_core_reports_the_words(recording: Path, tmp_path: Path) -> None:
+    ready = cast(load_talker("grid_s1"), load_face("cartoon"))
+    request = Request(audio=recording, text=WRONG, fps=10.0, gestures=False)
+    pieces = list(stream(request, ready))
+    (mismatch,) = (one for piece in pieces for one in piece.mismatches)
+    assert set(mismatch.words) <= set(WRONG.replace(",", "").replace(".", "").split())
+    assert 0.0 <= mismatch.begin < mismatch.end <= sum(piece.clip.speech.waveform.duration for piece in pieces)
+    written = write_clip(request, Picture(size="64x64"), ready, tmp_path / "wrong.mp4")
+    assert [one.words for one in written.mismatches] == [mismatch.words]
+    assert [piece.mismatches for piece in stream(replace(request, text=SAID), ready)] == [()]
+
+
+@pytest.mark.parametrize(("text", "n_lines"), [(SAID, 0), (WRONG, 1)])
+def test_the_command_line_says_so(
+    text: str, n_lines: int, recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "clip.mp4"
+    options = ["--size", "64x64", "--fps", "10", "--no-gestures", "--quiet"]
+    assert run(["--audio", str(recording), "--text", text, "--out", str(out), *options]) == 0
+    lines = [line for line in capsys.readouterr().err.splitlines() if "does not fit the recording from" in line]
+    assert len(lines) == n_lines
+    assert out.is_file()
+    for line in lines:
+        assert line.startswith("tts2face: warning: the text does not fit the recording from ")
+        assert "beep" in line

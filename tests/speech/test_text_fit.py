@@ -1,0 +1,113 @@
+"""A text that a recording does not say is noticed, and only where it is wrong."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lexicon.errors import DataError
+from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from tts2face.speech.forced_alignment import Alignment
+from tts2face.speech.text_fit import (
+    LEAST_FOREIGN_CONFIDENCE,
+    LEAST_LOCAL_CONFIDENCE,
+    TextMismatch,
+    find_misfits,
+    mismatch_of,
+    surrounded,
+)
+from tts2face.speech.transcript_alignment import phones_in, script
+from tts2face.types import Waveform
+from tts2face.video.media import read_sound
+from tts2face.voice.engine import load_voice
+
+RIGHT = ("Please wait for the beep, then say your name.", "The young chef usually pushes five big maps before noon.")
+WRONG = "She sold seven old houses near the river."
+WORD_S = 0.4
+
+
+def alignment(*confidences: float) -> Alignment:
+    """Words of 0.4 s with a silence of 0.1 s behind each, and their log likelihoods per second."""
+    phones = [phone for _ in confidences for phone in ("a", SILENCE)]
+    edges = np.concatenate([[0.0], np.cumsum([WORD_S, 0.1] * len(confidences))])
+    words = tuple(WordSpan(f"w{at}", 2 * at, 2 * at + 1) for at in range(len(confidences)))
+    scores = np.array([score for value in confidences for score in (value * WORD_S, 0.0)])
+    return Alignment(PhoneSequence(phones, edges), words, float(np.mean(confidences)), scores)
+
+
+def test_words_that_fit_badly_together_are_found() -> None:
+    found = alignment(*[-4000.0] * 6, *[-11000.0] * 4, *[-4000.0] * 6)
+    (misfit,) = find_misfits(found, is_english=True)
+    assert misfit == (6, 10)
+    mismatch = mismatch_of(found, *misfit)
+    assert mismatch.words == ("w6", "w7", "w8", "w9")
+    assert (mismatch.begin, mismatch.end, mismatch.confidence) == pytest.approx((3.0, 4.9, -11000.0))
+
+
+def test_a_single_word_is_not_enough() -> None:
+    assert find_misfits(alignment(*[-3000.0] * 4, -9000.0, *[-3000.0] * 4), is_english=True) == []
+
+
+def test_other_languages_have_a_limit_of_their_own() -> None:
+    found = alignment(*[(LEAST_LOCAL_CONFIDENCE + LEAST_FOREIGN_CONFIDENCE) / 2] * 5)
+    assert find_misfits(found, is_english=True) == [(0, 5)]
+    assert find_misfits(found, is_english=False) == []
+
+
+def test_what_surrounds_a_span_is_cut_between_words() -> None:
+    first, last, begin, end = surrounded(alignment(*[-4000.0] * 20), 8, 10)
+    assert (first, last) == (5, 13)
+    assert (begin, end) == pytest.approx((2.45, 6.45))
+
+
+def test_a_mismatch_says_where_and_what() -> None:
+    mismatch = TextMismatch(1.0, 2.5, ("one", "two"), -9000.0).shifted(2.0)
+    assert mismatch.sentence == ("the text does not fit the recording from 3.0 to 4.5 s (one two); check the words")
+    long = TextMismatch(0.0, 9.0, tuple("abcdefghij"), -9000.0)
+    assert "(a b c d ... h i j)" in long.sentence
+
+
+def test_another_text_for_the_project_s_own_voice() -> None:
+    speech = load_voice("heart", "en-us").speak(RIGHT[1])
+    assert phones_in(speech.waveform, script(RIGHT[1], "en-us"))[2] == ()
+    (mismatch,) = phones_in(speech.waveform, script("Please wait for the beep, then say your name.", "en-us"))[2]
+    assert len(mismatch.words) >= 6
+    assert mismatch.end - mismatch.begin > 1.0
+
+
+def test_one_wrong_sentence_among_right_ones() -> None:
+    voice = load_voice("heart", "en-us")
+    said = [RIGHT[0], RIGHT[1], "It was a sunny day in the park.", "Nobody saw the dog again."]
+    sounds = [voice.speak(text).waveform for text in said]
+    sound = Waveform(np.concatenate([one.samples for one in sounds]), voice.sample_rate)
+    assert phones_in(sound, script(" ".join(said), "en-us"))[2] == ()
+    begin, end = sounds[0].duration, sounds[0].duration + sounds[1].duration
+    found = phones_in(sound, script(" ".join([said[0], WRONG, *said[2:]]), "en-us"))[2]
+    assert found
+    assert min(abs(one.begin - begin) for one in found) < 1.0
+    assert all(begin - 1.5 < one.begin and one.end < end + 1.5 for one in found)
+    wrong = {word for one in found for word in one.words}
+    assert len(wrong & set(WRONG.rstrip(".").split())) >= 5
+
+
+@pytest.mark.parametrize("n_sentences", [1, 6])
+def test_real_recordings(n_sentences: int, shared_recordings: Path) -> None:
+    """GRID s1: no warning with the right text; a sentence of another one is noticed, or refused."""
+    folder = shared_recordings / "grid_s1"
+    with (folder / "manifest.csv").open() as file:
+        rows = list(csv.DictReader(file))[50:800:125][:n_sentences]
+    samples = [read_sound(folder / "clips" / f"{row['clip']}.mkv", 16000).samples for row in rows]
+    sound = Waveform(np.concatenate(samples), 16000)
+    texts = [row["transcript"] for row in rows]
+    assert phones_in(sound, script(". ".join(texts), "en-us"))[2] == ()
+    place = n_sentences // 2
+    begin = sum(map(len, samples[:place])) / 16000
+    end = begin + len(samples[place]) / 16000
+    texts[place] = "My brother usually drinks coffee"
+    try:
+        found = phones_in(sound, script(". ".join(texts), "en-us"))[2]
+    except DataError:
+        assert n_sentences == 1  # the words are not found at all
+    else:
+        assert any("usually" in one.words and begin - 1.5 < one.begin and one.end < end + 1.5 for one in found)

@@ -1,0 +1,113 @@
+"""Whether a recording says the text that was aligned with it, and where it does not.
+
+Forced alignment always places the words; how well they fit is told by the log likelihood of their phones.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.speech.forced_alignment import Alignment
+
+LEAST_CONFIDENCE = (
+    -6500.0
+)  # log likelihood per second of a whole utterance; docs/decisions.md, "A recording is refused"
+CONTEXT_S = 1.5  # on either side of a span that is aligned again
+WINDOW_S = 1.0  # of speech that is judged together: two to four words; single words scatter by half as much again
+# Log likelihood per second in the window; measured in docs/decisions.md, "A text that a recording does not say".
+LEAST_LOCAL_CONFIDENCE = -7000.0
+LEAST_FOREIGN_CONFIDENCE = -9000.0  # the acoustic model is English: right texts of other languages reach -8200
+LONGEST_GAP_S = 1.0  # spans closer than this are one
+
+
+@dataclass(frozen=True, slots=True)
+class TextMismatch:
+    """Words that a recording probably does not say, and the seconds of the recording at which they were placed."""
+
+    begin: float
+    end: float
+    words: tuple[str, ...]
+    confidence: float
+
+    @property
+    def sentence(self) -> str:
+        """One line for a person.."""
+        shown = " ".join(self.words if len(self.words) <= 8 else (*self.words[:4], "...", *self.words[-3:]))
+        return (
+            f"the text does not fit the recording from {self.begin:.1f} to {self.end:.1f} s ({shown}); check the words"
+        )
+
+    def shifted(self, seconds: float) -> "TextMismatch":
+        """The same that many seconds later."""
+        return replace(self, begin=self.begin + seconds, end=self.end + seconds)
+
+
+def find_misfits(found: Alignment, *, is_english: bool) -> list[tuple[int, int]]:
+    """Ranges of words, half open, that fit worse than right texts do."""
+    least = LEAST_LOCAL_CONFIDENCE if is_english else LEAST_FOREIGN_CONFIDENCE
+    edges, words, sums = found.phones.edges, found.words, _sums(found)
+    misfits: list[tuple[int, int]] = []
+    for first, last in _windows(sums):
+        seconds, score = sums[first:last].sum(axis=0)
+        if score / seconds >= least:
+            continue
+        if misfits and edges[words[first].first] - edges[words[misfits[-1][1] - 1].last] < LONGEST_GAP_S:
+            misfits[-1] = (misfits[-1][0], max(last, misfits[-1][1]))
+        else:
+            misfits.append((first, last))
+    fits = [bool(score / seconds >= least) for seconds, score in sums]
+    return [_trimmed(fits, *misfit) for misfit in misfits]
+
+
+def _trimmed(fits: Sequence[bool], first: int, last: int) -> tuple[int, int]:
+    """A range without the words at its ends that fit by themselves: windows reach beyond what is wrong."""
+    while last - first > 1 and fits[first]:
+        first += 1
+    while last - first > 1 and fits[last - 1]:
+        last -= 1
+    return first, last
+
+
+def mismatch_of(found: Alignment, first: int, last: int) -> TextMismatch:
+    """A range of an alignment's words as a mismatch, on the alignment's clock."""
+    edges, words, sums = found.phones.edges, found.words[first:last], _sums(found)[first:last]
+    begin, end = float(edges[words[0].first]), float(edges[words[-1].last])
+    return TextMismatch(begin, end, tuple(word.text for word in words), float(sums[:, 1].sum() / sums[:, 0].sum()))
+
+
+def surrounded(found: Alignment, first: int, last: int) -> tuple[int, int, float, float]:
+    """A range of words with what is said within `CONTEXT_S` of it, and the seconds that these words lie in."""
+    edges, words = found.phones.edges, found.words
+    begin, end = edges[words[first].first] - CONTEXT_S, edges[words[last - 1].last] + CONTEXT_S
+    while first > 0 and edges[words[first - 1].first] >= begin:
+        first -= 1
+    while last < len(words) and edges[words[last].last] <= end:
+        last += 1
+    before = edges[words[first - 1].last] if first > 0 else found.phones.start
+    behind = edges[words[last].first] if last < len(words) else found.phones.end
+    return first, last, float(edges[words[first].first] + before) / 2, float(edges[words[last - 1].last] + behind) / 2
+
+
+def _sums(found: Alignment) -> NDArray[np.float64]:
+    """(W, 2) seconds and log likelihood of each word."""
+    lengths, scores = np.diff(found.phones.edges), found.scores
+    sums = [[lengths[word.first : word.last].sum(), scores[word.first : word.last].sum()] for word in found.words]
+    return np.array(sums).reshape(-1, 2)
+
+
+def _windows(sums: NDArray[np.float64]) -> list[tuple[int, int]]:
+    """For each word the range of words about it, the nearer side first, that lasts `WINDOW_S` or is all there is."""
+    ends = np.concatenate([[0.0], np.cumsum(sums[:, 0])])
+    ranges = []
+    for at in range(len(sums)):
+        first, last = at, at + 1
+        while ends[last] - ends[first] < WINDOW_S and last - first < len(sums):
+            is_before_nearer = ends[at] - ends[first] <= ends[last] - ends[at + 1]
+            if last == len(sums) or (first > 0 and is_before_nearer):
+                first -= 1
+            else:
+                last += 1
+        ranges.append((first, last))
+    return ranges
