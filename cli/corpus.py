@@ -9,7 +9,7 @@ from cyclopts import App, Parameter
 
 from cli.flags import whole_number
 from cli.progress import progress_bar, say, stage_bar
-from tts2face.output_names import check_file_name
+from tts2face.storage.output_names import check_file_name
 
 corpus = App(name="corpus", help="Build, show and measure talkers.")
 

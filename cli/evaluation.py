@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from cli.progress import progress_bar, say
 from lexicon.errors import InputError
-from tts2face.output_names import check_file_name
+from tts2face.storage.output_names import check_file_name
 
 if TYPE_CHECKING:
     from corpus_tools.evaluation.evaluate import Run
@@ -135,7 +135,7 @@ def _observations(folder: Path, effort: "Effort") -> "tuple[Observation, ...]":
 
 
 def _write(out: Path, result: "Evaluation", runs: "tuple[Run, ...]") -> None:
-    from tts2face.models.files import write_whole
+    from tts2face.storage.files import write_whole
 
     if out.suffix == ".json":
         write_whole(out, json.dumps(result.to_json(), indent=1).encode())

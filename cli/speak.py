@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from cli.progress import progress_bar, say
 from lexicon.errors import InputError
-from tts2face.models.files import write_whole
-from tts2face.output_names import check_file_name
 from tts2face.render.picture import Picture
 from tts2face.request import Request
+from tts2face.storage.files import write_whole
+from tts2face.storage.output_names import check_file_name
 
 if TYPE_CHECKING:
     from tts2face.exemplar.explanation import ShownPhone

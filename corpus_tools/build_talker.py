@@ -17,8 +17,8 @@ from corpus_tools.training.train_phone_network import with_network
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import read_json
-from tts2face.models.files import write_whole
 from tts2face.models.talker import Talker, write_talker
+from tts2face.storage.files import write_whole
 
 PROVENANCE = "provenance.json"  # in the folder of recordings: where they come from and how they may be used
 PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")

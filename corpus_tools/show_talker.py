@@ -79,6 +79,6 @@ def _shares(variances: tuple[float, ...]) -> str:
     """Number of modes and the share of their variance that the first of them carry."""
     if not variances:
         return "0"
-    total = np.cumsum(variances) / sum(variances)
+    total = np.cumsum(variances) / (sum(variances) or 1.0)
     marks = [n for n in (1, 2, 4, 8, 16) if n < len(variances)]
     return f"{len(variances)}; of their variance " + ", ".join(f"{total[n - 1]:.1%} in the first {n}" for n in marks)

@@ -14,12 +14,12 @@ from corpus_tools.similarity.write import write_similarity
 from lexicon.phones import ipa_to_arpabet
 from lexicon.sequence import SILENCE
 from tts2face.models.face_file import identities_of, load_face
-from tts2face.models.files import named_file
 from tts2face.models.talker import load_talker
 from tts2face.render.draw import draw
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.session import Session
+from tts2face.storage.files import named_file
 
 HERE = Path(__file__).parent / "pictures"
 SENTENCE = "We were away a year ago, but Bob may move five big maps."

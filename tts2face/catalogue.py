@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError
-from tts2face.models.files import SHIPPED, named_file
+from tts2face.storage.files import SHIPPED, named_file
 
 OWN_FACE = "self"
 
@@ -180,7 +180,7 @@ def _shipped(kind: str) -> list[Path]:
 
 def _read(path: Path, kind: str) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
     from tts2face.models.face_file import FORMAT_VERSION
-    from tts2face.models.tensors import read_tensors
+    from tts2face.storage.tensors import read_tensors
 
     return read_tensors(path, kind, FORMAT_VERSION)
 

@@ -11,7 +11,7 @@ from corpus_tools.decomposition.markers import MarkerFace, still_of_markers
 from corpus_tools.recordings.folder import VIDEO_SUFFIXES
 from lexicon.errors import DataError, InputError
 from tts2face.models.palette import EXPRESSIONS
-from tts2face.picture_files import opened_picture
+from tts2face.storage.picture_files import opened_picture
 from tts2face.video.media import Picture, read_pictures
 from tts2face.video.pose import remove_pose
 from tts2face.video.track import FaceTracker

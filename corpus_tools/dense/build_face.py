@@ -18,7 +18,7 @@ from corpus_tools.dense.visible_texels import canvas_of
 from corpus_tools.recordings.corpus_video import Eyes
 from corpus_tools.run_options import Effort, Progress
 from tts2face.models.face_file import read_face, write_face
-from tts2face.models.files import named_file
+from tts2face.storage.files import named_file
 from tts2face.video.landmark_models import find_bundle
 
 HEAD = "head"  # the shipped face that is adapted

@@ -10,9 +10,9 @@ from corpus_tools.gesture_study.page import gestures_page
 from corpus_tools.gesture_study.text import gestures_csv, gestures_json
 from corpus_tools.report.panels import panels_png
 from lexicon.errors import InputError
-from tts2face.models.files import write_whole
 from tts2face.models.palette import load_palette
-from tts2face.output_names import check_name
+from tts2face.storage.files import write_whole
+from tts2face.storage.output_names import check_name
 
 COLUMNS = 3
 

@@ -13,8 +13,8 @@ from corpus_tools.recordings.corpus_video import content_key
 from corpus_tools.recordings.folder import Spoken
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence, WordSpan
-from tts2face.models.tensors import read_tensors, write_tensors
 from tts2face.speech.pauses import Span, stretches
+from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from lexicon.inputs import check_regular_file
-from tts2face.models.tensors import read_tensors, write_tensors
+from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.video.landmark_models import MODEL_SHA256
 from tts2face.video.media import media_facts, read_pictures
 from tts2face.video.track import Tracking

@@ -11,9 +11,9 @@ from corpus_tools.similarity.page import similarity_page
 from corpus_tools.similarity.picture import ipa_font_name, table_png
 from corpus_tools.similarity.text import analysis_json, difference_csv, table_csv
 from lexicon.errors import InputError
-from tts2face.models.files import write_whole
 from tts2face.models.talker import load_talker
-from tts2face.output_names import check_name
+from tts2face.storage.files import write_whole
+from tts2face.storage.output_names import check_name
 
 
 def write_similarity(

@@ -20,8 +20,8 @@ from lexicon.errors import DataError, InputError
 from tts2face.face.deformation import posed_vertices
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
-from tts2face.models.files import named_file
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
+from tts2face.storage.files import named_file
 
 LIPS_MM = 0.5  # facing lips that are nearer touch
 

@@ -148,8 +148,8 @@ def test_every_kind_of_error_has_an_exit_code() -> None:
 def test_bad_input_gets_one_sentence_and_leaves_nothing(
     arguments: list[str], code: int, reason: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from tts2face.models.files import SHIPPED
-    from tts2face.models.tensors import write_tensors
+    from tts2face.storage.files import SHIPPED
+    from tts2face.storage.tensors import write_tensors
 
     (here / "junk.talker").write_bytes(b"no talker at all")
     (here / "face.talker").write_bytes((SHIPPED / "head.face").read_bytes())

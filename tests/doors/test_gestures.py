@@ -13,11 +13,11 @@ from lexicon.errors import InputError
 from tts2face.face.gesture_transfer import gesture_face
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
-from tts2face.models.files import SHIPPED
 from tts2face.models.palette import FEATURES, load_palette, write_palette
 from tts2face.models.talker import Talker, load_talker
 from tts2face.request import Request
 from tts2face.session import Session
+from tts2face.storage.files import SHIPPED
 from tts2face.types import Clip
 
 TEXT = "Bob may move five big maps, but we keep two."

@@ -13,8 +13,8 @@ from PIL import Image
 from cli.main import app, run
 from cli.options import check_options
 from lexicon.errors import InputError
-from tts2face.output_names import check_name
 from tts2face.render.output_path import checked_output
+from tts2face.storage.output_names import check_name
 
 QUICK_S = 0.3  # of processor time, the interpreter's own start not counted
 

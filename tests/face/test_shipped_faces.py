@@ -5,8 +5,8 @@ import pytest
 
 from tts2face.face.deformation import posed_vertices
 from tts2face.models.face_file import identities_of, load_face, read_face
-from tts2face.models.files import named_file
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
+from tts2face.storage.files import named_file
 
 UPPER_LID, LOWER_LID = (159, 386), (145, 374)  # right and left eye, in the middle
 

@@ -12,6 +12,8 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.audio_map import Drive, drive_arrays, drives_of
 from tts2face.models.talker import ShapeModel, Talker, Utterance, read_talker, write_talker
 
+THREE = "level+level+level"  # three numbers a frame, as the lessons have
+
 
 def lessons(n: int = 12, seed: int = 0, bend: float = 0.0) -> list[Lesson]:
     """Parameters that follow this frame's and the next frame's features, straight or bent."""
@@ -113,15 +115,15 @@ def test_a_talker_file_keeps_its_drives_and_old_files_have_none(tmp_path: Path) 
         np.zeros(4, np.float32),
     )
     motion = np.zeros((5, 4), np.float32)
-    spoken = Utterance("a", PhoneSequence([SILENCE], [0.0, 0.2]), (), motion, np.zeros((5, 6)), np.zeros(5))
-    drive = learn_network(lessons(), feature="lsf", options=NetworkOptions(n_hidden=3, before=1, after=2))
-    for drives in ({}, {"network": drive, "linear": learn_linear(lessons(), feature="mfcc")}):
+    spoken = Utterance("a", PhoneSequence([SILENCE, "m"], [0.0, 0.1, 0.2]), (), motion, np.zeros((5, 6)), np.zeros(5))
+    drive = learn_network(lessons(), feature=THREE, options=NetworkOptions(n_hidden=3, before=1, after=2))
+    for drives in ({}, {"network": drive, "linear": learn_linear(lessons(), feature=THREE)}):
         path = tmp_path / "a.talker"
         write_talker(path, Talker(25.0, model, (spoken,), {"name": "Ada"}, drives=drives))
         kept = read_talker(path).drives
         assert set(kept) == set(drives)
     heard = lessons(1)[0].features
-    assert (kept["network"].feature, kept["network"].before, kept["network"].after) == ("lsf", 1, 2)
+    assert (kept["network"].feature, kept["network"].before, kept["network"].after) == (THREE, 1, 2)
     np.testing.assert_array_equal(kept["network"].parameters(heard), drive.parameters(heard))
 
 

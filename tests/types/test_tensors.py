@@ -7,7 +7,7 @@ import pytest
 from safetensors.numpy import save_file
 
 from lexicon.errors import DataError
-from tts2face.models.tensors import read_tensors
+from tts2face.storage.tensors import read_tensors
 
 
 @pytest.mark.parametrize(

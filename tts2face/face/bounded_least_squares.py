@@ -41,7 +41,10 @@ def bounded_least_squares(curvature: FloatArray, linear: FloatArray, limits: Flo
     solved: FloatArray = np.zeros(linear.shape)
     slack = UNEVEN * float(np.trace(curvature)) / len(curvature)
     bounds = (low, high, slack)
-    rounds = _solve_all(np.ascontiguousarray(curvature), np.ascontiguousarray(linear), bounds, solved)
+    try:
+        rounds = _solve_all(np.ascontiguousarray(curvature), np.ascontiguousarray(linear), bounds, solved)
+    except ZeroDivisionError:  # a pivot of the factor is 0
+        rounds = MOST_ROUNDS
     if rounds >= MOST_ROUNDS or not np.isfinite(solved).all():
         raise DataError("the face's shapes cannot be told apart, so their weights are not unique; build the face again")
     return solved
@@ -76,6 +79,8 @@ def _solve_all(curvature, linear, bounds, weights):  # type: ignore[no-untyped-d
             fewest = min(fewest, n_wrong)
             _exchange(state, belongs, patience < 0)
         longest = max(longest, rounds)
+        if rounds >= MOST_ROUNDS:  # no answer: the other frames have none either
+            break
     return longest
 
 

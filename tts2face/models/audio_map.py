@@ -6,6 +6,7 @@ How they are learnt stands in `corpus_tools.training`: `linear_audio_map` and `n
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,9 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError, InputError
 
 PREFIX = "drive."
+# Numbers a frame of each kind of feature (`tts2face.speech.features`, which measures them).
+FEATURE_SIZES: Mapping[str, int] = MappingProxyType({"formants": 4, "mfcc": 13, "lpc": 16, "lsf": 16, "level": 1})
+MOST_CONTEXT = 1000  # frames on either side
 MOST_GAIN_DB = 40.0  # a recording that is fainter holds more noise than speech
 Values = NDArray[np.floating]
 

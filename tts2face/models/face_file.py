@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.face import Eye, Face, Part
-from tts2face.models.files import named_file
-from tts2face.models.tensors import read_tensors, write_tensors
+from tts2face.models.face_layout import check_face
+from tts2face.storage.files import named_file
+from tts2face.storage.tensors import read_tensors, write_tensors
 
 KIND = "face"
 FORMAT_VERSION = 1
 STEPS_PER_SHAPE = 32000.0  # a shape's largest displacement in 16-bit steps: below 0.002 mm for 60 mm
 JPEG_QUALITY = 92
+MOST_TEXTURE = 8192  # pixels along a side: 200 MB when decoded
 LIGHTENED = 150  # a tint lightens texels up to this and no further: skin at the edge of dark hair stays skin
 
 
@@ -87,25 +89,22 @@ def read_face(path: Path, identity: str | None = None) -> Face:
     InputError
         There is no such file, or it has no such identity.
     DataError
-        It is damaged, not a face, or of another version.
+        It is damaged, not a face, of another version, or holds what no face can (`tts2face.models.face_layout`).
     """
     arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
-    names = _identity_names(header, path)
+    check_face(path, arrays, header)
+    names = [name for name, _, _ in header["identities"]]
     if identity is not None and identity not in names:
         offered = ", ".join(names) or "none"
         raise InputError(f"the face {path.stem} has no identity {identity!r}; it has: {offered}")
-    try:
-        face = _assembled(arrays, header)
-        return face if identity is None else _identified(face, arrays, header, names.index(identity))
-    except (KeyError, IndexError, ValueError, TypeError, OSError) as broken:
-        if isinstance(broken, DataError):
-            raise
-        raise DataError(f"{path} lacks a part of a face ({broken}); build or copy it again") from broken
+    face = _assembled(arrays, header, path)
+    return face if identity is None else _identified(face, arrays, header, names.index(identity))
 
 
 def identities_of(path: Path) -> dict[str, str]:
     """Names and summaries of a face file's identity presets."""
-    _, header = read_tensors(path, KIND, FORMAT_VERSION)
+    arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
+    check_face(path, arrays, header)
     return {name: summary for name, _, summary in header["identities"]}
 
 
@@ -153,21 +152,19 @@ def _jpeg(texture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.frombuffer(content.getvalue(), np.uint8)
 
 
-def _pixels(content: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _pixels(content: NDArray[np.uint8], path: Path) -> NDArray[np.uint8]:
     from PIL import Image
 
-    with Image.open(io.BytesIO(content.tobytes())) as image:
-        return np.array(image.convert("RGB"))
-
-
-def _identity_names(header: Mapping[str, Any], path: Path) -> list[str]:
     try:
-        return [name for name, _, _ in header["identities"]]
-    except (KeyError, TypeError, ValueError) as broken:
-        raise DataError(f"{path} lacks its list of identities; build or copy it again") from broken
+        with Image.open(io.BytesIO(content.tobytes()), formats=["JPEG"]) as image:
+            if max(image.size) > MOST_TEXTURE:
+                raise DataError(f"{path}: the texture has {image.size} pixels; make it at most {MOST_TEXTURE} wide")
+            return np.array(image.convert("RGB"))
+    except (OSError, SyntaxError) as broken:
+        raise DataError(f"{path}: the texture cannot be decoded ({broken}); build or copy the face again") from broken
 
 
-def _assembled(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> Face:
+def _assembled(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> Face:
     eyes = [
         Eye(
             eye["first"],
@@ -187,7 +184,7 @@ def _assembled(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) ->
         eyes=tuple(eyes),
         colours=arrays["colours"],
         uv=(arrays["uv"] / 65535).astype(np.float32) if "uv" in arrays else None,
-        texture=_pixels(arrays["texture"]) if "texture" in arrays else None,
+        texture=_pixels(arrays["texture"], path) if "texture" in arrays else None,
         landmarks=arrays["landmarks"],
         landmark_vertices=arrays["landmark_vertices"],
         landmark_weights=arrays["landmark_weights"],

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.models.files import named_file
-from tts2face.models.tensors import read_tensors, write_tensors
+from tts2face.models.palette_layout import check_palette
+from tts2face.storage.files import named_file
+from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import HEAD_CHANNELS
 
 KIND = "palette"
@@ -212,17 +213,14 @@ def read_palette(path: Path) -> Palette:
     InputError
         There is no such file.
     DataError
-        It is damaged, not a palette, of another version, or recorded at another rate.
+        It is damaged, not a palette, of another version, recorded at another rate, or holds what no palette can
+        (`tts2face.models.palette_layout`).
     """
     arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
-    try:
-        if float(header["fps"]) != GESTURE_FPS:
-            raise DataError(f"{path} was recorded at {header['fps']:g} frames/s, not {GESTURE_FPS:g}; build it again")
-        return _assembled(arrays, header)
-    except (KeyError, IndexError, ValueError, TypeError, AttributeError) as broken:
-        if isinstance(broken, DataError):
-            raise
-        raise DataError(f"{path} lacks a part of a palette ({broken}); build it again") from broken
+    check_palette(path, arrays, header, {name: FIXED_CHANNELS.get(name) for name in FEATURES})
+    if header["fps"] != GESTURE_FPS:
+        raise DataError(f"{path} was recorded at {header['fps']:g} frames/s, not {GESTURE_FPS:g}; build it again")
+    return _assembled(arrays, header)
 
 
 def load_palette(name: str) -> Palette:

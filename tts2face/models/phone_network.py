@@ -20,6 +20,8 @@ WINDOW_S = 0.28  # either side
 STEP_S = 0.04
 NEIGHBOURS = (-3, -2, -1, 1, 2, 3)  # phones about the one that sounds
 PREFIX = "network."
+N_PHONES_SEEN = 2 * round(WINDOW_S / STEP_S) + 1 + len(NEIGHBOURS)
+N_PLACE = 4  # numbers of the place within the present phone
 
 
 @dataclass(frozen=True, slots=True, eq=False)

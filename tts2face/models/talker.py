@@ -12,9 +12,10 @@ from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.models.appearance import STEPS_PER_LOOK, Appearance, appearance_arrays, appearance_of
 from tts2face.models.audio_map import Drive, drive_arrays, drives_of
-from tts2face.models.files import named_file
 from tts2face.models.phone_network import WindowNetwork, network_arrays, network_of
-from tts2face.models.tensors import read_tensors, write_tensors
+from tts2face.models.talker_layout import check_talker
+from tts2face.storage.files import named_file
+from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
 KIND = "talker"
@@ -182,13 +183,11 @@ def read_talker(path: Path) -> Talker:
     InputError
         There is no such file.
     DataError
-        It is damaged, not a talker, or of another version.
+        It is damaged, not a talker, of another version, or holds what no talker can (`tts2face.models.talker_layout`).
     """
     arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
-    try:
-        return _assembled(arrays, header)
-    except (KeyError, IndexError, ValueError, TypeError) as broken:
-        raise DataError(f"{path} lacks a part of a talker ({broken}); build it again") from broken
+    check_talker(path, arrays, header)
+    return _assembled(arrays, header)
 
 
 def load_talker(name: str) -> Talker:

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.picture_files import opened_picture
 from tts2face.render.picture import STUDIO, Picture, background_kind
+from tts2face.storage.picture_files import opened_picture
 
 STUDIO_BRIGHT, STUDIO_DARK = (128.0, 137.0, 148.0), (52.0, 58.0, 67.0)  # sRGB: the pool of light, and the corners
 STUDIO_MIDDLE = (0.5, 0.42)  # of the pool, in shares of width and height

@@ -50,7 +50,7 @@ def framed_box(face: Face) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     rest = face.vertices.astype(np.float64)
     low, high = rest.min(axis=0), rest.max(axis=0)
     chin_y = _chin_height(face, float(high[1]))
-    if chin_y is not None:
+    if chin_y is not None and chin_y < high[1]:
         head = rest[rest[:, 1] > chin_y]
         bottom = max(chin_y - NECK * (high[1] - chin_y), low[1])
         low, high = head.min(axis=0), head.max(axis=0)

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lexicon.errors import BackendError, InputError
-from tts2face.output_names import check_name
 from tts2face.render.png_folder import is_stills_folder
+from tts2face.storage.output_names import check_name
 
 MP4, WEBM, GIF, FOLDER = ".mp4", ".webm", ".gif", ""
 KINDS = (MP4, WEBM, GIF)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.models.appearance import Appearance, nearest_pixels
+from tts2face.models.appearance import Appearance, Plate, nearest_pixels
 from tts2face.models.landmarks import FACE_OVAL
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.own_face.gestures import OwnGestures
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 FINE = 3  # samples along a pixel's side about the mouth, where the lips' edge is drawn
 MOST_RAW_BYTES = 400_000_000  # of frames kept as they are: 250 of 720 x 740
 PACKED_QUALITY = 95
+MOST_VIDEO_SIDE = 8192  # px: a picture of 200 MB
 MARGIN = 3  # pixels around the mouth that are drawn finely
 Floats = NDArray[np.float32]
 
@@ -241,7 +242,7 @@ class Frames:
 
 def _own_size(appearance: Appearance) -> str:
     """The size of the talker's video, within what can be drawn."""
-    height, width = next(_decoded(appearance.plate.video)).shape[:2]
+    height, width = next(_decoded(appearance.plate)).shape[:2]
     scale = min(1.0, SIDES[1] / max(height, width))
     return "x".join(str(max(int(side * scale) // 2 * 2, SIDES[0])) for side in (width, height))
 
@@ -253,7 +254,7 @@ def _fitted(appearance: Appearance, picture: Picture) -> tuple[Frames, float, ND
     """
     from PIL import Image
 
-    height, width = next(_decoded(appearance.plate.video)).shape[:2]
+    height, width = next(_decoded(appearance.plate)).shape[:2]
     scale = max(picture.width / width, picture.height / height)
     middle = (appearance.plate.points.mean(axis=(0, 1)) + 0.5) * scale
     room = np.array([width * scale - picture.width, height * scale - picture.height])
@@ -261,19 +262,38 @@ def _fitted(appearance: Appearance, picture: Picture) -> tuple[Frames, float, ND
     sides = picture.width, picture.height
     left, top = (float(at) for at in shift / scale)
     box = left, top, min(left + sides[0] / scale, float(width)), min(top + sides[1] / scale, float(height))
-    frames = (Image.fromarray(pixels) for pixels in _decoded(appearance.plate.video))
+    frames = (Image.fromarray(pixels) for pixels in _decoded(appearance.plate))
     return Frames(frame.resize(sides, Image.Resampling.BICUBIC, box=box) for frame in frames), scale, shift
 
 
-def _decoded(film: NDArray[np.uint8]) -> Iterator[NDArray[np.uint8]]:
+def _decoded(plate: Plate) -> Iterator[NDArray[np.uint8]]:
+    """Pictures of a plate's video, one for each row of its points.
+
+    Raises
+    ------
+    DataError
+        It cannot be decoded, its pictures are too large or change their size, or they are not as many as the points.
+    """
     import av
 
+    n_frames = 0
     try:
-        with av.open(io.BytesIO(film.tobytes()), "r") as container:
-            for frame in container.decode(video=0):
+        with av.open(io.BytesIO(plate.video.tobytes()), "r", format="mp4", metadata_errors="replace") as container:
+            stream = container.streams.video[0]
+            size = stream.width, stream.height
+            for frame in container.decode(stream) if max(size) <= MOST_VIDEO_SIDE else ():
+                if n_frames == len(plate.points) or (frame.width, frame.height) != size:
+                    n_frames = -1
+                    break
+                n_frames += 1
                 yield frame.to_ndarray(format="rgb24").astype(np.uint8, copy=False)
-    except av.FFmpegError as broken:
-        raise DataError(f"the talker's plate cannot be decoded ({broken.strerror}); build the talker again") from broken
+    except (av.FFmpegError, IndexError) as broken:
+        raise DataError(f"the talker's plate cannot be decoded ({broken}); build the talker again") from broken
+    if n_frames != len(plate.points):
+        raise DataError(
+            f"the talker's plate must show {len(plate.points)} pictures, as its points do, of one size up to "
+            f"{MOST_VIDEO_SIDE} px; build the talker again"
+        )
 
 
 def ring_triangles(n_mesh: int) -> NDArray[np.int32]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence
 from tts2face.face.bounded_least_squares import bounded_least_squares
 from tts2face.face.landmark_fit import landmark_motion, landmark_places, turn_onto
@@ -168,6 +169,9 @@ def _onto_face(talker: Talker, face: Face, rest: FloatArray) -> tuple[FloatArray
     rows = {int(landmark): row for row, landmark in enumerate(face.landmarks)}
     width = np.linalg.norm(rest[rows[MOUTH_CORNER_LEFT]] - rest[rows[MOUTH_CORNER_RIGHT]])
     own_width = np.linalg.norm(own[MOUTH_CORNER_LEFT] - own[MOUTH_CORNER_RIGHT])
+    if not min(width, own_width) > 0:
+        which = "face" if own_width > 0 else "talker"
+        raise DataError(f"the corners of the {which}'s mouth lie at one place; build the {which} again")
     return turn_onto(own[face.landmarks], rest), float(width / own_width)
 
 

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import parse_json
-from tts2face.models.files import write_whole
+from tts2face.storage.files import write_whole
 
+MOST_METADATA = 32_000_000  # characters; 800 utterances with their words take 150,000
 Arrays = Mapping[str, NDArray[Any]]
 
 
@@ -64,8 +65,24 @@ def read_tensors(path: Path, kind: str, version: int) -> tuple[dict[str, NDArray
                     "build it again"
                 )
             arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
-            return arrays, parse_json(header["metadata"], f"the metadata of {path}")
-    except (SafetensorError, KeyError, OSError, ValueError) as broken:
+            return arrays, _metadata(header["metadata"], path)
+    except (SafetensorError, KeyError, OSError, ValueError, TypeError, AttributeError) as broken:
         if isinstance(broken, DataError):
             raise
         raise DataError(f"{path} is damaged or not a {kind} file; build or copy it again") from broken
+
+
+def _metadata(text: str, path: Path) -> dict[str, Any]:
+    """The metadata: a JSON object.
+
+    Raises
+    ------
+    DataError
+        It is something else, or too long.
+    """
+    if len(text) > MOST_METADATA:
+        raise DataError(f"{path}: the metadata have {len(text)} characters, more than {MOST_METADATA}; build it again")
+    found = parse_json(text, f"the metadata of {path}")
+    if not isinstance(found, dict):
+        raise DataError(f"{path}: the metadata are a {type(found).__name__}, not an object; build or copy it again")
+    return found

@@ -1,0 +1,39 @@
+"""Model files with something wrong in them are refused with one DataError, or serve; nothing crashes or hangs."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.model_files.made import write_made_face, write_made_palette, write_made_talker
+
+N_MUTATIONS = int(os.environ.get("TTS2FACE_MUTATIONS", "60"))  # of each kind; tests/bench tries 1000 of shipped files
+MOST_S = 2.0  # of processor time, beyond what the file as it is takes
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def write_own_talker(path: Path) -> None:
+    write_made_talker(path, has_face=True)
+
+
+MADE = {"face": write_made_face, "palette": write_made_palette, "talker": write_own_talker}
+
+
+@pytest.mark.parametrize("kind", MADE)
+def test_a_mutated_file_is_refused_or_serves(kind: str, tmp_path: Path) -> None:
+    file = tmp_path / f"made.{kind}"
+    MADE[kind](file)
+    words = [sys.executable, "-m", "tests.model_files.usage", kind, str(file), "0", str(N_MUTATIONS)]
+    tried = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    rows = [json.loads(line) for line in tried.stdout.splitlines()]
+    assert tried.returncode == 0, f"ended after {rows[-1:]}: {tried.stderr[-2000:]}"
+    assert len(rows) == 1 + N_MUTATIONS
+    assert rows[0]["answer"] == "used"
+    for row in rows[1:]:
+        assert row["answer"] == "used" or row["answer"].startswith("DataError"), f"{row['what']}: {row['answer']}"
+        assert row["seconds"] < MOST_S + rows[0]["seconds"], row["what"]
+    refused = sum(row["answer"] != "used" for row in rows)
+    assert N_MUTATIONS / 2 < refused < N_MUTATIONS

@@ -1,0 +1,120 @@
+"""What every model file that loads must allow, and a process that tries it on mutations of a file.
+
+``python -m tests.model_files.usage KIND FILE FIRST LAST`` prints one JSON line for each mutation from FIRST to LAST,
+after one for the file as it is (seed -1); seconds are the process's own, which other work does not lengthen.
+"""
+
+import faulthandler
+import json
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from corpus_tools.show_talker import describe
+from lexicon.errors import DataError
+from lexicon.sequence import SILENCE, PhoneSequence
+from tests.model_files.mutations import mutate
+from tts2face.exemplar.appearance_trajectory import looks_of, looks_trajectory
+from tts2face.exemplar.options import SynthesisOptions
+from tts2face.exemplar.synthesis import speech_trajectory, visual_voice
+from tts2face.gesture.gesture_stream import Fields, GestureStream
+from tts2face.gesture.perlin_noise import NoiseStream
+from tts2face.gesture.timeline import Timeline
+from tts2face.models.face_file import identities_of, load_face, read_face
+from tts2face.models.palette import read_palette
+from tts2face.models.talker import load_talker, read_talker, speech_channels
+from tts2face.render.draw import draw, staged
+from tts2face.render.own_face import plate_drawn, plate_frame, plate_staged
+from tts2face.render.picture import Picture
+from tts2face.retargeting.to_face import retargeter
+from tts2face.types import Trajectory, Waveform
+
+HANG_S = 60.0  # after which the process ends itself
+PHONES = PhoneSequence([SILENCE, "b", "ɑ", "m", "i", "t", "f", "u", SILENCE], np.arange(10) * 0.1)
+SOUND = Waveform(0.1 * np.sin(np.arange(24_000) ** 1.2), 16_000)
+
+
+def use_face(path: Path) -> None:
+    """Draw a small frame and retarget a few frames; with an identity where there is one."""
+    identity = next(iter(identities_of(path)), None)
+    face = read_face(path, identity)
+    talker = load_talker("grid_s1")
+    n_speech = talker.model.n_speech
+    values = talker.utterances[0].shape[:5, :n_speech]
+    lips = retargeter(talker, face, contact=np.zeros(11)).retarget(
+        Trajectory(speech_channels(talker.model), values, 25.0)
+    )
+    stage = staged(face, Picture(size="64x64", supersampling=1))
+    draw(stage, lips.values[2])
+    draw(stage, face.limits.max(axis=1), np.array([0.1, 0.2, 0.1, 1, 2, 3], np.float32))
+
+
+def use_palette(path: Path) -> None:
+    """Make a short stream of gestures, by a style and by noise."""
+    palette = read_palette(path)
+    fields = Fields(palette, with_pitch=True)
+    for name in (palette.names[0], palette.names[-1]):
+        for stream in (GestureStream, NoiseStream):
+            made = stream(fields, style=name, seed=3, fps=30.0).next(SOUND, 45, Timeline())
+            assert all(np.isfinite(values).all() for values in made.values())
+
+
+def use_talker(path: Path) -> None:
+    """Describe it, animate a few phones, carry them to a face, drive lips by features, and draw its own face."""
+    talker = read_talker(path)
+    assert describe(talker).text()
+    voice = visual_voice(talker)
+    lips = speech_trajectory(PHONES, voice, fps=25.0, n_frames=22, options=SynthesisOptions())
+    retargeter(talker, load_face("head")).retarget(lips)
+    for drive in talker.drives.values():
+        assert np.isfinite(drive.parameters(np.ones((5, len(drive.mean)), np.float32))).all()
+    if talker.appearance is not None:
+        looks = looks_trajectory(
+            PHONES, voice, looks_of(talker, voice), fps=25.0, n_frames=22, options=SynthesisOptions()
+        )
+        stage = plate_staged(talker, Picture(size="64x64", supersampling=1))
+        for number in (0, 10):
+            motion = np.concatenate([lips.values[number], looks.values[number]])
+            plate_drawn(stage, motion, plate_frame(stage, number / 25.0))
+
+
+USES: dict[str, Callable[[Path], None]] = {"face": use_face, "palette": use_palette, "talker": use_talker}
+
+
+def outcome(kind: str, path: Path) -> str:
+    """``used``, the DataError, or the traceback of anything else."""
+    try:
+        USES[kind](path)
+    except DataError as refused:
+        return f"DataError: {refused}"
+    except Exception:  # noqa: BLE001 - any other error is what is looked for
+        return traceback.format_exc()
+    return "used"
+
+
+def main(kind: str, file: str, first: int, last: int) -> None:
+    """Try mutations of a file, and before them the file as it is."""
+    warnings.simplefilter("ignore")
+    source = Path(file)
+    USES[kind](source)  # compiles
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / f"mutated.{kind}"
+        for seed in (-1, *range(first, last)):
+            faulthandler.dump_traceback_later(HANG_S, exit=True)
+            what = "nothing" if seed < 0 else mutate(source, kind, out, seed)
+            begin = time.process_time()
+            answer = outcome(kind, source if seed < 0 else out)
+            row = {"seed": seed, "what": what, "seconds": time.process_time() - begin, "answer": answer}
+            sys.stdout.write(json.dumps(row) + "\n")
+            sys.stdout.flush()
+    faulthandler.cancel_dump_traceback_later()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]))

@@ -1,0 +1,124 @@
+"""What a ``.palette`` file must hold (docs/file-formats.md), checked once when it is read."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.models.landmarks import N_LANDMARKS
+from tts2face.storage.schema import Check, Contents, Tensor, free, millimetres, number, record, refuse, table, text
+
+MOST_MODES = 64  # of a region
+MOST_VALUE = 1e4  # of any motion: mm, radians, or weights; 16 bits in steps of 1/2000 of the spread reach 16 spreads
+LOUDNESS_DB = 400.0  # of either sign
+SEMITONES = 120.0  # ten octaves
+MOST_GAIN = 100.0
+# A tempo of 0.05 makes 30 frames last 20 s; one of 20 makes 600 frames a second, which is all that a clip takes.
+SLOWEST, FASTEST = 0.05, 20.0
+
+_CHANGE = record(
+    {},
+    {
+        "gain": number(-MOST_GAIN, MOST_GAIN),
+        "offset": table(number(-MOST_VALUE, MOST_VALUE)),
+        "tempo": number(SLOWEST, FASTEST),
+    },
+)
+METADATA: Mapping[str, Check] = {
+    "metadata": free,
+    "fps": number(1.0, 1000.0),
+    "styles": table(free),
+    "derivations": table(record({"source": text, "summary": text, "changes": table(_CHANGE)})),
+}
+
+
+def check_palette(
+    path: Path,
+    arrays: Mapping[str, NDArray[Any]],
+    header: Mapping[str, Any],
+    channels: Mapping[str, tuple[str, ...] | None],
+) -> None:
+    """Refuse a palette's file whose arrays or metadata are not what they must be.
+
+    Parameters
+    ----------
+    channels
+        Channels of each feature; None where they are the modes of a region of that name.
+
+    Raises
+    ------
+    DataError
+        A part is missing, of another type or shape, out of range, not finite, or does not fit the others.
+    """
+    contents = Contents(path, "palette", arrays, header)
+    contents.metadata(METADATA)
+    contents.tensors({"neutral": millimetres(N_LANDMARKS, 3)})
+    widths = {name: ("modes of " + name if known is None else len(known)) for name, known in channels.items()}
+    for name, known in channels.items():
+        if known is None:
+            _check_region(contents, name)
+    for style in header["styles"]:
+        _check_style(contents, style, widths)
+    contents.only_known()
+    _check_derivations(contents, channels)
+
+
+def _check_region(contents: Contents, name: str) -> None:
+    landmarks, modes = f"region.{name}.landmarks", f"region.{name}.modes"
+    contents.tensors(
+        {
+            landmarks: Tensor("int32", (f"landmarks of {name}",)),
+            modes: Tensor("float32", (f"modes of {name}", f"landmarks of {name}", 3), -1.01, 1.01),
+        }
+    )
+    contents.indices(landmarks, N_LANDMARKS, "landmarks of the face mesh")
+    contents.distinct(landmarks)
+    n_modes = contents.sizes[f"modes of {name}"]
+    contents.require(n_modes <= MOST_MODES, f"{modes} are {n_modes}; at most {MOST_MODES} are possible")
+    contents.orthonormal(modes)
+
+
+def _check_style(contents: Contents, style: str, widths: Mapping[str, int | str]) -> None:
+    here, frames = f"style.{style}", f"frames of {style}"
+    contents.tensors(
+        {
+            f"{here}.intensity": Tensor("float16", (frames,), -LOUDNESS_DB, LOUDNESS_DB),
+            f"{here}.pitch": Tensor("float16", (frames,), -SEMITONES, SEMITONES),
+            f"{here}.lengths": Tensor("int32", (f"recordings of {style}",), 1),
+        }
+    )
+    contents.sums_to(f"{here}.lengths", contents.sizes[frames], "frames of intensity")
+    for feature, width in widths.items():
+        values, step = f"{here}.{feature}", f"{here}.{feature}.step"
+        present = values in contents.arrays
+        contents.tensors(
+            {
+                values: Tensor("int16", (frames, width), is_optional=True),
+                step: Tensor("float32", (width,), 0.0, MOST_VALUE, is_optional=not present),
+            }
+        )
+        if present:
+            steps = contents.arrays[step]
+            contents.require(bool((steps > 0).all()), f"{step} holds 0; a step is above it")
+            most = float(np.abs(contents.arrays[values].astype(np.int32)).max() * np.float64(steps.max()))
+            contents.require(most <= MOST_VALUE, f"{values} in steps of {step} reaches {most:g}, beyond {MOST_VALUE:g}")
+
+
+def _check_derivations(contents: Contents, channels: Mapping[str, tuple[str, ...] | None]) -> None:
+    header = contents.header
+    contents.require(bool(header["styles"]), "holds no style")
+    twice = sorted(header["styles"].keys() & header["derivations"].keys())
+    contents.require(not twice, f"has a measured and a derived style of the name {twice[:1]}")
+    for name, derived in header["derivations"].items():
+        for feature, change in derived["changes"].items():
+            where = f"{contents.path}: the derived style {name!r} changes"
+            if feature not in channels:
+                refuse(f"{where} {feature!r}; it must be one of {', '.join(channels)}", "palette")
+            known = channels[feature]
+            if known is None:
+                known = tuple(f"{feature}{i}" for i in range(contents.sizes["modes of " + feature]))
+            for channel in change.get("offset", {}):
+                if channel not in known:
+                    refuse(f"{where} {channel!r} of {feature}; it must be one of {', '.join(known)}", "palette")

@@ -1,0 +1,229 @@
+"""What a ``.talker`` file must hold (docs/file-formats.md), checked once when it is read."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.phones import PHONES
+from lexicon.sequence import SILENCE
+from tts2face.models.audio_map import FEATURE_SIZES, MOST_CONTEXT
+from tts2face.models.landmarks import FACE_OVAL, N_LANDMARKS
+from tts2face.models.phone_network import N_PHONES_SEEN, N_PLACE
+from tts2face.storage.schema import (
+    MOST_MM,
+    Check,
+    Contents,
+    Tensor,
+    anything,
+    listed,
+    millimetres,
+    number,
+    record,
+    refuse,
+    row,
+    text,
+    whole,
+)
+from tts2face.types import HEAD_CHANNELS
+
+MOST_WEIGHT = 1e6  # of a network, and of a feature of sound
+MOST_PX = 1e5
+MOST_TEXTURE = 4096  # pixels along a side
+N_MESH = 468  # points of a face in pictures: the landmarks but for the irises
+ROUNDING_S, BEYOND_S = 1e-6, 1.0  # phones lie this far at most before and behind the frames of their utterance
+
+METADATA: Mapping[str, Check] = {
+    "fps": number(1.0, 1000.0),
+    "n_speech": whole(1, 10_000),
+    "inventory": listed(text),
+    "head_channels": listed(text, len(HEAD_CHANNELS)),
+}
+OPTIONAL_METADATA: Mapping[str, Check] = {
+    "refused": listed(row(text, text)),
+    "phones_recognised": listed(text),
+    "consent": record({"name": anything, "statement": text, "date": text}),
+    "network_inventory": listed(text),
+}
+TENSORS: Mapping[str, Tensor] = {
+    "mean": millimetres(N_LANDMARKS, 3),
+    "basis": Tensor("float32", ("modes", N_LANDMARKS, 3), -1.01, 1.01),
+    "spread": Tensor("float32", ("modes",), 0.0, MOST_MM),
+    "rest": millimetres("modes"),
+    "shape": Tensor("int16", ("frames", "modes")),
+    "head": Tensor("float16", ("frames", len(HEAD_CHANNELS)), -MOST_MM, MOST_MM),
+    "intensity": Tensor("float16", ("frames",), -1000.0, 1000.0),
+    "n_frames": Tensor("int32", ("utterances",), 1),
+    "n_phones": Tensor("int32", ("utterances",), 1),
+    "phones": Tensor("int16", ("phones",)),
+    "edges": Tensor("float64", ("edges",), -ROUNDING_S, 1e6),
+}
+
+
+def check_talker(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> None:
+    """Refuse a talker's file whose arrays or metadata are not what they must be.
+
+    Raises
+    ------
+    DataError
+        A part is missing, of another type or shape, out of range, not finite, or does not fit the others.
+    """
+    contents = Contents(path, "talker", arrays, header)
+    _check_metadata(contents)
+    contents.tensors(TENSORS)
+    contents.orthonormal("basis")
+    n_modes = contents.sizes["modes"]
+    contents.require(header["n_speech"] <= n_modes, f"n_speech is {header['n_speech']}, but there are {n_modes} modes")
+    _check_utterances(contents)
+    if any(name.startswith("appearance.") for name in arrays):
+        _check_appearance(contents)
+    if any(name.startswith("network.") for name in arrays):
+        _check_network(contents)
+    for drive in sorted({name.split(".")[1] for name in arrays if name.startswith("drive.")}):
+        _check_drive(contents, f"drive.{drive}")
+    contents.only_known()
+
+
+def _check_metadata(contents: Contents) -> None:
+    header = contents.header
+    stated = {name: check for name, check in OPTIONAL_METADATA.items() if name in header}
+    contents.metadata({**METADATA, **stated, "utterances": _utterance_rows})
+    contents.require(
+        header["head_channels"] == list(HEAD_CHANNELS), f"head_channels must be {', '.join(HEAD_CHANNELS)}"
+    )
+    for name in ("inventory", "network_inventory"):
+        phones = header.get(name, [SILENCE])
+        unknown = [phone for phone in phones if phone not in PHONES]
+        contents.require(not unknown, f"{name} holds {unknown[:1]}, which is no phone of the phone table")
+        contents.require(len(set(phones)) == len(phones), f"{name} holds a phone twice")
+
+
+def _utterance_rows(value: Any, where: str) -> None:
+    """Check names and words; in one loop, for a talker has tens of thousands of words."""
+    if type(value) is not list:
+        refuse(f"{where} is not a list", "talker")
+    for at, one in enumerate(value):
+        if type(one) is not list or len(one) != 2 or type(one[0]) is not str or type(one[1]) is not list:
+            refuse(f"{where}[{at}] is not a name with a list of words", "talker")
+        for word in one[1]:
+            fits = type(word) is list and len(word) == 3 and type(word[0]) is str
+            if not fits or type(word[1]) is not int or type(word[2]) is not int or not 0 <= word[1] < word[2] < 2**31:
+                refuse(f"{where}[{at}] holds a word that is not a text with its first and last phone", "talker")
+
+
+def _check_utterances(contents: Contents) -> None:
+    arrays, sizes = contents.arrays, contents.sizes
+    inventory, utterances = contents.header["inventory"], contents.header["utterances"]
+    n = sizes["utterances"]
+    contents.require(len(utterances) == n, f"names {len(utterances)} utterances, but n_frames has {n}")
+    contents.sums_to("n_frames", sizes["frames"], "frames")
+    contents.sums_to("n_phones", sizes["phones"], "phones")
+    contents.require(sizes["edges"] == sizes["phones"] + n, f"has {sizes['edges']} edges of {sizes['phones']} phones")
+    contents.indices("phones", len(inventory), "phones of the inventory")
+    spoken = np.array([phone != SILENCE for phone in inventory], bool)
+    contents.require(bool(spoken[arrays["phones"]].any()), "holds no phone but silence")
+    ends = np.cumsum(arrays["n_phones"] + 1)
+    steps = np.diff(arrays["edges"])
+    steps[ends[:-1] - 1] = 1.0  # from an utterance to the next
+    falls = np.flatnonzero(steps <= 0)
+    contents.require(not len(falls), f"edges do not increase at {falls[:1]}")
+    late = np.flatnonzero(arrays["edges"][ends - 1] > arrays["n_frames"] / contents.header["fps"] + BEYOND_S)
+    if len(late):
+        contents.fail(f"phones of the utterance {utterances[late[0]][0]!r} end behind its frames")
+    reach = np.zeros(n, np.int64) + [max((word[2] for word in words), default=0) for _, words in utterances]
+    beyond = np.flatnonzero(reach > arrays["n_phones"])
+    if len(beyond):
+        contents.fail(f"a word of the utterance {utterances[beyond[0]][0]!r} reaches beyond its phones")
+
+
+def _check_appearance(contents: Contents) -> None:
+    contents.tensors(
+        {
+            "appearance.mouth_points": Tensor("int32", ("points of mouth",)),
+            "appearance.moved_by_speech": Tensor("float16", ("pixels of face",), 0.0, 1.0),
+        }
+    )
+    contents.sizes["points of face"] = N_MESH
+    for name in ("face", "mouth"):
+        _check_texture(contents, name)
+    n_points = N_MESH + len(FACE_OVAL)
+    contents.indices("appearance.mouth_points", N_MESH, "points of the face")
+    looks = contents.sizes["looks of face"]
+    contents.tensors(
+        {
+            "appearance.plate.video": Tensor("uint8", ("bytes",)),
+            "appearance.plate.points": Tensor("float32", ("plate", n_points, 2), -MOST_PX, MOST_PX),
+            "appearance.plate.axes": Tensor("float32", ("plate", 2, 3), -MOST_PX, MOST_PX),
+            "appearance.plate.shape": millimetres("plate", "modes", most=1e6),
+            "appearance.plate.looks": Tensor("float32", ("plate", "looks of face"), -MOST_WEIGHT, MOST_WEIGHT),
+            "looks": Tensor("int16", ("frames", looks + contents.sizes["looks of mouth"])),
+        }
+    )
+
+
+def _check_texture(contents: Contents, name: str) -> None:
+    here, points, pixels, looks = f"appearance.{name}", f"points of {name}", f"pixels of {name}", f"looks of {name}"
+    contents.tensors(
+        {
+            f"{here}.size": Tensor("int32", (2,), 1, MOST_TEXTURE),
+            f"{here}.reference": Tensor("float32", (points, 2), -MOST_PX, MOST_PX),
+            f"{here}.triangles": Tensor("int32", (f"triangles of {name}", 3)),
+            f"{here}.pixels": Tensor("int32", (pixels,)),
+            f"{here}.mean": Tensor("float16", (pixels, 3), -1e4, 1e4),
+            f"{here}.basis": Tensor("float16", (looks, pixels, 3), -1.01, 1.01),
+            f"{here}.spread": Tensor("float32", (looks,), 0.0, MOST_WEIGHT),
+        }
+    )
+    width, height = (int(side) for side in contents.arrays[f"{here}.size"])
+    contents.indices(f"{here}.triangles", contents.sizes[points], "points")
+    contents.indices(f"{here}.pixels", width * height, "pixels")
+    contents.distinct(f"{here}.pixels")
+
+
+def _check_network(contents: Contents) -> None:
+    contents.require("network_inventory" in contents.header, "has a network, but its metadata lack network_inventory")
+    inventory = contents.header["network_inventory"]
+    contents.require(bool(set(inventory) - {SILENCE}), "network_inventory holds no phone but silence")
+    n_layers = sum(name.startswith("network.weights") for name in contents.arrays)
+    contents.require(n_layers >= 2, f"has a network of {n_layers} layers; it needs two or more")
+    widths: list[int | str] = [N_PHONES_SEEN * len(inventory) + N_PLACE]
+    widths += [f"units of layer {at}" for at in range(1, n_layers)] + [contents.header["n_speech"]]
+    for at in range(n_layers):
+        shape = ("networks", widths[at], widths[at + 1])
+        contents.tensors(
+            {
+                f"network.weights{at}": Tensor("float16", shape),
+                f"network.biases{at}": Tensor("float32", (shape[0], shape[2]), -MOST_WEIGHT, MOST_WEIGHT),
+            }
+        )
+
+
+def _check_drive(contents: Contents, here: str) -> None:
+    contents.tensors(
+        {
+            f"{here}.feature": Tensor("uint8", (f"{here} text",), 43, 122),
+            f"{here}.context": Tensor("int32", (3,), 0, MOST_CONTEXT),
+            f"{here}.loudness": Tensor("float32", (1,), -1000.0, 1000.0, may_be_nan=True),
+        }
+    )
+    feature = contents.arrays[f"{here}.feature"].tobytes().decode("ascii")
+    kinds = feature.split("+")
+    if any(kind not in FEATURE_SIZES for kind in kinds):
+        contents.fail(f"{here}.feature is {feature!r}, not a sum of {', '.join(FEATURE_SIZES)}")
+    before, after, bends = (int(number_) for number_ in contents.arrays[f"{here}.context"])
+    contents.require(bends in (0, 1), f"{here}.context ends with {bends}, not 0 or 1")
+    n_features, hidden = sum(FEATURE_SIZES[kind] for kind in kinds), f"{here} units"
+    weights, n_speech = (-MOST_WEIGHT, MOST_WEIGHT), contents.header["n_speech"]
+    contents.tensors(
+        {
+            f"{here}.mean": Tensor("float32", (n_features,), *weights),
+            f"{here}.spread": Tensor("float32", (n_features,), 0.0, MOST_WEIGHT),
+            f"{here}.inner": Tensor("float32", (hidden, (before + 1 + after) * n_features), *weights),
+            f"{here}.bias": Tensor("float32", (hidden,), *weights),
+            f"{here}.outer": Tensor("float32", (n_speech, hidden), *weights),
+            f"{here}.offset": Tensor("float32", (n_speech,), *weights),
+        }
+    )
+    contents.require(bool((contents.arrays[f"{here}.spread"] > 0).all()), f"{here}.spread holds 0; it is above it")
