@@ -10,12 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from tts2face.models.face_file import load_face
 from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT
-from tts2face.render.draw import staged
-from tts2face.render.encode import ClipWriter
+from tts2face.render.encode import write_clips
 from tts2face.render.picture import Picture
 from tts2face.retargeting.performer import aperture, lip_gaps
+from tts2face.session import Session
 from tts2face.synthesis.performance import clips_of, motion_of_take
 from tts2face.video.blendshapes import BlendshapeReader
 from tts2face.video.media import media_facts, read_pictures, read_sound
@@ -61,15 +60,14 @@ def main() -> None:
     print(f"watching {film_s:.0f} s of film: {film_s / read_s:.1f} x real time")
     print("| face | r opening | r width | r lids | range | pitch, yaw, roll off (degrees) | whole, x real time |")
     for name in ("head", "cartoon"):
-        face = load_face(name)
-        stage, rows, drawn_s = staged(face, Picture()), [], 0.0
+        session = Session(face=name, palette=None)
+        rows, drawn_s = [], 0.0
         for video, take in zip(videos, takes, strict=True):
             with tempfile.TemporaryDirectory() as folder:
                 out = Path(folder) / "out.mp4"
                 began = time.perf_counter()
-                with ClipWriter(out, stage) as writer:
-                    for clip in clips_of(motion_of_take(take, face), read_sound(video, 48_000)):
-                        writer.add(clip)
+                clips = clips_of(motion_of_take(take, session.face), read_sound(video, 48_000))
+                write_clips(out, clips, session.renderer(Picture()))
                 drawn_s += time.perf_counter() - began
                 rows.append(compared(take, seen_again(out, tracker)))
         middle = np.median(rows, axis=0)

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from tests.oracles.loudness_meter import measured
-from tts2face.api import Piece, stream, write_clip
 from tts2face.models.face_file import load_face
 from tts2face.models.talker import load_talker
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.session import Cast, cast
+from tts2face.session import Session
 from tts2face.speech.bs1770 import integrated_loudness, true_peak
+from tts2face.synthesis.clip_stream import Piece
 from tts2face.types import Waveform, joined_clips
 from tts2face.voice import level
 
@@ -36,16 +36,16 @@ TEXTS = (
 
 
 @pytest.fixture(scope="module")
-def ready() -> Cast:
-    return cast(load_talker("grid_s1"), load_face("cartoon"))
+def ready() -> Session:
+    return Session(load_talker("grid_s1"), load_face("cartoon"))
 
 
-def pieces_of(ready: Cast, text: str, **options: object) -> list[Piece]:
-    return list(stream(Request(text=text, gestures=False, **options), ready))
+def pieces_of(ready: Session, text: str, **options: object) -> list[Piece]:
+    return list(ready.stream(Request(text=text, gestures=False, **options)))
 
 
 @pytest.mark.parametrize(("voice", "language", "text"), TEXTS)
-def test_clips_are_equally_loud(voice: str, language: str, text: str, ready: Cast) -> None:
+def test_clips_are_equally_loud(voice: str, language: str, text: str, ready: Session) -> None:
     pieces = pieces_of(ready, text, voice=voice, language=language)
     loudness, peak = measured(joined_clips([piece.clip for piece in pieces]).speech.waveform)
     assert loudness == pytest.approx(-16.0, abs=1.0)  # LUFS
@@ -54,12 +54,12 @@ def test_clips_are_equally_loud(voice: str, language: str, text: str, ready: Cas
     assert max((abs(b - a) for a, b in pairwise(levels)), default=0.0) < 0.7  # LU; 3.8 as the voice says them
 
 
-def test_the_first_sentence_sounds_the_same_whatever_follows(ready: Cast) -> None:
+def test_the_first_sentence_sounds_the_same_whatever_follows(ready: Session) -> None:
     alone, first = (pieces_of(ready, text)[0].clip.speech.waveform for text in ("Stop!", "Stop! Hello there."))
     assert alone.samples.tobytes() == first.samples.tobytes()
 
 
-def test_volume_and_marks_are_relative(ready: Cast) -> None:
+def test_volume_and_marks_are_relative(ready: Session) -> None:
     """The middle word of three at half the loudness: 6 dB lower, and --volume on top of it."""
     text = '<speak>wonderful <prosody volume="-6dB">wonderful</prosody> wonderful</speak>'
     plain, marked, half = (
@@ -76,21 +76,21 @@ def test_volume_and_marks_are_relative(ready: Cast) -> None:
         assert 20 * np.log10(change / base) == pytest.approx(expected, abs=0.1)
 
 
-def test_motion_does_not_depend_on_the_loudness_of_the_clip(ready: Cast, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_motion_does_not_depend_on_the_loudness_of_the_clip(ready: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     request = Request(text="Bob may move. Stop!", pitch=True)
-    usual = joined_clips([piece.clip for piece in stream(request, ready)])
+    usual = joined_clips([piece.clip for piece in ready.stream(request)])
     monkeypatch.setattr(level, "LOUDNESS_LUFS", -40.0)
-    quiet = joined_clips([piece.clip for piece in stream(request, ready)])
+    quiet = joined_clips([piece.clip for piece in ready.stream(request)])
     assert quiet.motion.values.tobytes() == usual.motion.values.tobytes()
     assert quiet.head.values.tobytes() == usual.head.values.tobytes()
     assert integrated_loudness([quiet.speech.waveform]) == pytest.approx(-40.0, abs=1.0)
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".webm"])
-def test_the_sound_of_a_file_has_the_loudness_too(suffix: str, ready: Cast, tmp_path: Path) -> None:
+def test_the_sound_of_a_file_has_the_loudness_too(suffix: str, ready: Session, tmp_path: Path) -> None:
     out = tmp_path / f"clip{suffix}"
     request = Request(text="Buenos días. ¿Cómo está usted?", voice="espeak", language="es", fps=10.0, gestures=False)
-    write_clip(request, Picture(size="64x64"), ready, out)
+    ready.write(request, out, picture=Picture(size="64x64"))
     with av.open(str(out)) as container:
         reader = av.AudioResampler("flt", "mono", 48_000)
         frames = [part for frame in container.decode(audio=0) for part in reader.resample(frame)]

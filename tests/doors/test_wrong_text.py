@@ -7,12 +7,11 @@ from pathlib import Path
 import pytest
 
 from cli.main import run
-from tts2face.api import stream, write_clip
 from tts2face.models.face_file import load_face
 from tts2face.models.talker import load_talker
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.session import cast
+from tts2face.session import Session
 from tts2face.voice.engine import load_voice
 
 SAID = "The young chef usually pushes five big maps before noon."
@@ -31,15 +30,15 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_core_reports_the_words(recording: Path, tmp_path: Path) -> None:
-    ready = cast(load_talker("grid_s1"), load_face("cartoon"))
+    ready = Session(load_talker("grid_s1"), load_face("cartoon"))
     request = Request(audio=recording, text=WRONG, fps=10.0, gestures=False)
-    pieces = list(stream(request, ready))
+    pieces = list(ready.stream(request))
     (mismatch,) = (one for piece in pieces for one in piece.mismatches)
     assert set(mismatch.words) <= set(WRONG.replace(",", "").replace(".", "").split())
     assert 0.0 <= mismatch.begin < mismatch.end <= sum(piece.clip.speech.waveform.duration for piece in pieces)
-    written = write_clip(request, Picture(size="64x64"), ready, tmp_path / "wrong.mp4")
+    written = ready.write(request, tmp_path / "wrong.mp4", picture=Picture(size="64x64"))
     assert [one.words for one in written.mismatches] == [mismatch.words]
-    assert [piece.mismatches for piece in stream(replace(request, text=SAID), ready)] == [()]
+    assert [piece.mismatches for piece in ready.stream(replace(request, text=SAID))] == [()]
 
 
 @pytest.mark.parametrize(("text", "n_lines"), [(SAID, 0), (WRONG, 1)])

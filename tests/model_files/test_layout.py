@@ -18,7 +18,7 @@ from tts2face.models.audio_map import FEATURE_SIZES
 from tts2face.models.face_file import read_face
 from tts2face.models.palette import read_palette
 from tts2face.models.talker import read_talker
-from tts2face.render.own_face import plate_staged
+from tts2face.render.own_face import own_face_renderer
 from tts2face.render.picture import Picture
 from tts2face.speech.features import FEATURE_RATE, speech_features
 from tts2face.storage.tensors import read_tensors, write_tensors
@@ -169,7 +169,7 @@ def test_a_plate_with_fewer_pictures_than_points() -> None:
     longer = replace(plate, points=np.concatenate([plate.points, plate.points]))
     wrong = replace(talker, appearance=replace(talker.appearance, plate=longer))
     with pytest.raises(DataError, match="must show 8 pictures"):
-        plate_staged(wrong, Picture(size="64x64"))
+        own_face_renderer(wrong, Picture(size="64x64"))
 
 
 def test_a_plate_that_is_no_video() -> None:
@@ -179,7 +179,7 @@ def test_a_plate_that_is_no_video() -> None:
     plate = replace(talker.appearance.plate, video=text)
     wrong = replace(talker, appearance=replace(talker.appearance, plate=plate))
     with pytest.raises(DataError, match="plate cannot be decoded"):
-        plate_staged(wrong, Picture(size="64x64"))
+        own_face_renderer(wrong, Picture(size="64x64"))
 
 
 def test_shapes_that_do_not_move() -> None:

@@ -21,16 +21,15 @@ from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.model_files.mutations import mutate
 from tts2face.exemplar.appearance_trajectory import looks_of, looks_trajectory
-from tts2face.exemplar.options import SynthesisOptions
-from tts2face.exemplar.synthesis import speech_trajectory, visual_voice
+from tts2face.exemplar.synthesis import blend_trajectory, select_tokens, visual_voice
 from tts2face.gesture.gesture_stream import Fields, GestureStream
 from tts2face.gesture.perlin_noise import NoiseStream
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.face_file import identities_of, load_face, read_face
 from tts2face.models.palette import read_palette
 from tts2face.models.talker import load_talker, read_talker, speech_channels
-from tts2face.render.draw import draw, staged
-from tts2face.render.own_face import plate_drawn, plate_frame, plate_staged
+from tts2face.render.draw import mesh_renderer
+from tts2face.render.own_face import own_face_renderer, plate_drawn
 from tts2face.render.picture import Picture
 from tts2face.retargeting.to_face import retargeter
 from tts2face.types import Trajectory, Waveform
@@ -50,9 +49,9 @@ def use_face(path: Path) -> None:
     lips = retargeter(talker, face, contact=np.zeros(11)).retarget(
         Trajectory(speech_channels(talker.model), values, 25.0)
     )
-    stage = staged(face, Picture(size="64x64", supersampling=1))
-    draw(stage, lips.values[2])
-    draw(stage, face.limits.max(axis=1), np.array([0.1, 0.2, 0.1, 1, 2, 3], np.float32))
+    stage = mesh_renderer(face, Picture(size="64x64", supersampling=1))
+    stage.draw(lips.values[2])
+    stage.draw(face.limits.max(axis=1), np.array([0.1, 0.2, 0.1, 1, 2, 3], np.float32))
 
 
 def use_palette(path: Path) -> None:
@@ -70,18 +69,17 @@ def use_talker(path: Path) -> None:
     talker = read_talker(path)
     assert describe(talker).text()
     voice = visual_voice(talker)
-    lips = speech_trajectory(PHONES, voice, fps=25.0, n_frames=22, options=SynthesisOptions())
+    selection = select_tokens(PHONES, voice)
+    lips = blend_trajectory(selection, voice, fps=25.0, n_frames=22)
     retargeter(talker, load_face("head")).retarget(lips)
     for drive in talker.drives.values():
         assert np.isfinite(drive.parameters(np.ones((5, len(drive.mean)), np.float32))).all()
     if talker.appearance is not None:
-        looks = looks_trajectory(
-            PHONES, voice, looks_of(talker, voice), fps=25.0, n_frames=22, options=SynthesisOptions()
-        )
-        stage = plate_staged(talker, Picture(size="64x64", supersampling=1))
+        looks = looks_trajectory(selection, looks_of(talker, voice), fps=25.0, n_frames=22)
+        stage = own_face_renderer(talker, Picture(size="64x64", supersampling=1))
         for number in (0, 10):
             motion = np.concatenate([lips.values[number], looks.values[number]])
-            plate_drawn(stage, motion, plate_frame(stage, number / 25.0))
+            plate_drawn(stage, motion, stage.plate_frame(number / 25.0))
 
 
 USES: dict[str, Callable[[Path], None]] = {"face": use_face, "palette": use_palette, "talker": use_talker}
