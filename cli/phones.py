@@ -18,9 +18,9 @@ def phones(
 ) -> None:
     """Print the words of a text and their phones, in ARPABET and IPA, with stress and syllables."""
     from lexicon.dictionary import read_dictionary
+    from lexicon.given import pronounce_marked
     from lexicon.mark_parser import marked
-    from lexicon.pronounce import pronounce
     from tts2face.export.text import FORMATS
 
-    spoken = pronounce(marked(text).text, language, read_dictionary(dictionary) if dictionary else None)
+    spoken = pronounce_marked(marked(text, language), language, read_dictionary(dictionary) if dictionary else None)
     print(FORMATS[format](spoken), end="")  # noqa: T201 - the answer

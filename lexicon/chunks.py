@@ -4,20 +4,21 @@ import re
 from collections.abc import Iterator
 
 from lexicon.errors import InputError
+from lexicon.stops import ends_sentence
 
 # A sentence ends at ., !, ? or … (with closing quotes) before a space and no small letter, at an end mark of East Asian
 # or Indic writing, or at a blank line.
 _END = re.compile(r"""[.!?…]+["'”’)\]]*(?=\s+[^\sa-z])|[。！？｡।॥؟۔]+["'”’」』）]*|\n\s*\n""")
 _CLAUSE = re.compile(r"[,;:—–、，；：،؛](?=\s)|[、，；：]")
-# What a full stop behind does not end a sentence: titles, and initials.
-_NO_END = re.compile(r"(?:\b(?:Mr|Mrs|Ms|Dr|Prof|St|Rev|Gen|Col|Capt|Lt|Sgt|Jr|Sr|vs|etc|No|e\.g|i\.e)|\b[A-Z])\.$")
+_SEEN_BEFORE, _SEEN_BEHIND = 24, 40  # characters around a full stop by which an abbreviation is known
 
 
-def chunks(text: str, limit: int) -> Iterator[str]:
+def chunks(text: str, limit: int, language: str = "en-us") -> Iterator[str]:
     """Sentences of a text, none longer than `limit` characters unless a single word is.
 
     A longer sentence is cut behind the last clause mark that fits, else at the last space, and where a text has neither
-    (Chinese, Japanese) behind `limit` characters. Nothing but space is lost.
+    (Chinese, Japanese) behind `limit` characters. Nothing but space is lost. Abbreviations are those of the language
+    (`lexicon.stops`).
 
     Raises
     ------
@@ -28,11 +29,19 @@ def chunks(text: str, limit: int) -> Iterator[str]:
         raise InputError(f"a piece of text needs at least 1 character, not {limit}")
     begin = 0
     for match in _END.finditer(text):
-        if _NO_END.search(text, max(begin, match.end() - 12), match.end()):
+        if _is_abbreviated(text, begin, match, language):
             continue
         yield from _fitting(text[begin : match.end()], limit)
         begin = match.end()
     yield from _fitting(text[begin:], limit)
+
+
+def _is_abbreviated(text: str, begin: int, end: "re.Match[str]", language: str) -> bool:
+    """The full stop of a possible sentence end belongs to an abbreviation."""
+    if end.group().rstrip("\"'”’)]") != ".":
+        return False
+    before = text[max(begin, end.start() - _SEEN_BEFORE) : end.start()]
+    return not ends_sentence(before, text[end.end() : end.end() + _SEEN_BEHIND].lstrip(), language)
 
 
 def _fitting(sentence: str, limit: int) -> Iterator[str]:

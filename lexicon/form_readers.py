@@ -5,7 +5,10 @@ import unicodedata
 from collections.abc import Callable
 
 from lexicon import written_forms as readings
+from lexicon.letters import letter_name
 from lexicon.numbers import cardinal, digits, number, ordinal, roman, year
+from lexicon.stops import is_abbreviated, starts_sentence
+from lexicon.writing_systems import script_of, scripts_of
 
 
 def _words(written: str) -> frozenset[str]:
@@ -136,13 +139,22 @@ def initial(m: re.Match[str], previous: str) -> str:
     """The J of J. Smith; a letter that ends a sentence keeps its full stop."""
     if m.group()[0] in "IVXLCDM" and previous.lower() in _RULERS | _BEFORE_ROMAN:
         return m.group()
-    starts_name = not previous or previous in _MARKS or previous[:1].isupper() or previous in {"by", "and", "with"}
+    is_first = not previous or previous in _MARKS
+    if not is_first and starts_sentence(m.string[m.end() : m.end() + _SEEN_BEHIND].lstrip()):
+        return m.group()
+    starts_name = is_first or previous[:1].isupper() or previous in {"by", "and", "with"}
     return m.group()[0] if starts_name else m.group()
 
 
 def nothing(_m: re.Match[str], _: str) -> str:
     """Space says nothing."""
     return ""
+
+
+def mark(m: re.Match[str], _: str) -> str:
+    """Punctuation; nothing for the full stop of an abbreviation that ends no sentence (Insp. Morse)."""
+    before, after = m.string[max(m.start() - 24, 0) : m.start()], m.string[m.end() : m.end() + _SEEN_BEHIND]
+    return "" if m.group() == "." and is_abbreviated(before, after.lstrip(), "en") else m.group()
 
 
 def dot(m: re.Match[str], _: str) -> str:
@@ -197,12 +209,13 @@ _BEFORE_NAME = re.compile(r" [A-Z]")
 _BEFORE_NUMBER = re.compile(r" ?[0-9]")
 _NO_NAMES = _words("The On In At And But When Dear I If As To From Near")
 _AT_END = re.compile(r"\s*$")
-_STARTS_SENTENCE = re.compile(r"\s+(?:The|A|An|He|She|It|We|They|You|I|This|That|But|And|In|On|At|If|There|Then|So)\b")
+_SEEN_BEHIND = 48  # characters behind a full stop that tell whether a sentence begins there
 
 
 def _ended(words: str, m: re.Match[str]) -> str:
     """Keep the full stop of an abbreviation that also ends the sentence."""
-    ends = _AT_END.match(m.string, m.end()) or _STARTS_SENTENCE.match(m.string, m.end())
+    after = m.string[m.end() : m.end() + _SEEN_BEHIND]
+    ends = _AT_END.match(m.string, m.end()) or (after[:1].isspace() and starts_sentence(after.lstrip()))
     return f"{words}." if ends and m.group().endswith(".") else words
 
 
@@ -251,6 +264,16 @@ def slashed(m: re.Match[str], _: str) -> str:
 def same(m: re.Match[str], _: str) -> str:
     """What is written."""
     return m.group()
+
+
+def unit_name(m: re.Match[str], _: str) -> str:
+    """A unit without a number: the kΩ of "in kΩ" is kiloohms."""
+    return readings.table("units.tsv")[m.group()][1]
+
+
+def letter(m: re.Match[str], _: str) -> str:
+    """A single letter of another script is its name: π is pi."""
+    return m.group() if script_of(m.group()) in scripts_of("en") else letter_name(m.group()) or m.group()
 
 
 def symbol(m: re.Match[str], _: str) -> str:

@@ -6,6 +6,7 @@ Only these are marks; any other bracket is text.
 import re
 
 from lexicon.errors import InputError
+from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.marked_text import Gathering, MarkedText, NodMark, PauseMark
 from lexicon.ssml import is_ssml, spoken_by_ssml
 
@@ -16,8 +17,13 @@ SHOWN_CHARACTERS = 40
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
 
 
-def marked(text: str) -> MarkedText:
+def marked(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
     """A text and the marks in it; one that begins with ``<speak`` is read as SSML (`lexicon.ssml`).
+
+    Parameters
+    ----------
+    language
+        Of the text, by which SSML reads numbers and chooses voices.
 
     Raises
     ------
@@ -26,7 +32,7 @@ def marked(text: str) -> MarkedText:
         message names it and how it is written.
     """
     if is_ssml(text):
-        return spoken_by_ssml(text)
+        return spoken_by_ssml(text, language)
     gathering = Gathering()
     behind = 0
     for match in MARK.finditer(text):

@@ -3,9 +3,10 @@
 Places are characters of the text that is said, in which the marks themselves are missing.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from lexicon.errors import InputError
+from lexicon.ipa import Segment
 
 RATES = (0.5, 2.0)  # speed of marked words, as of a whole request
 VOLUMES = (0.0, 2.0)
@@ -16,12 +17,17 @@ DEEPEST = 16  # marks within marks; nobody reads more
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """From a character on, to the next run: styles in force, outermost first, and factors of speed and loudness."""
+    """From a character on, to the next run: styles in force, outermost first, and factors of speed and loudness.
+
+    ``voice`` and ``language`` are those of a span that another voice speaks, or in another language; None elsewhere.
+    """
 
     start: int
     styles: tuple[str, ...] = ()
     rate: float = 1.0
     volume: float = 1.0
+    voice: str | None = None
+    language: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,13 +56,22 @@ class NodMark:
 
 @dataclass(frozen=True, slots=True)
 class NameMark:
-    """A place whose time is told."""
+    """A place whose time is kept."""
 
     at: int
     name: str
 
 
-Mark = PauseMark | NodMark | NameMark
+@dataclass(frozen=True, slots=True)
+class PhoneMark:
+    """A word, from a character up to another, that is said with these phones."""
+
+    at: int
+    end: int
+    segments: tuple[Segment, ...]
+
+
+Mark = PauseMark | NodMark | NameMark | PhoneMark
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +97,10 @@ class MarkedText:
 
     @property
     def changes_voice(self) -> bool:
-        """A pause, speed or loudness is marked: what only a voice that has not spoken yet can do."""
-        spoken_alike = all(run.rate == run.volume == 1.0 for run in self.runs)
+        """A pause, speed, loudness, voice or language is marked: what only a voice that has not spoken yet can do."""
+        spoken_alike = all(
+            run.rate == run.volume == 1.0 and run.voice is None and run.language is None for run in self.runs
+        )
         return not spoken_alike or any(isinstance(mark, PauseMark) for mark in self.marks)
 
 
@@ -144,14 +161,31 @@ class Gathering:
         InputError
             Spans are nested too deep, or together too fast, slow or loud.
         """
-        if len(self._open) >= DEEPEST:
-            raise InputError(f"{shown} stands within {DEEPEST} other marks; nest them less deep")
-        before = self._runs[-1]
-        self._open.append(_Open(kind, shown, self._length, before))
+        before = self._begin(kind, shown)
         _check_range(f"the speed within {shown}", before.rate * rate, RATES)
         _check_range(f"the loudness within {shown}", before.volume * volume, VOLUMES)
         styles = (*before.styles, style) if style is not None else before.styles
-        self._turn(Run(self._length, styles, before.rate * rate, before.volume * volume))
+        self._turn(
+            replace(before, start=self._length, styles=styles, rate=before.rate * rate, volume=before.volume * volume)
+        )
+
+    def open_voice(self, kind: str, shown: str, *, voice: str | None, language: str | None) -> None:
+        """Begin a span of another voice or language that `close` ends; None keeps what is in force.
+
+        Raises
+        ------
+        InputError
+            Spans are nested too deep.
+        """
+        before = self._begin(kind, shown)
+        self._turn(
+            replace(before, start=self._length, voice=voice or before.voice, language=language or before.language)
+        )
+
+    @property
+    def language(self) -> str | None:
+        """Language of the span at the present place; None where it is that of the whole text."""
+        return self._runs[-1].language
 
     def close(self, kind: str, shown: str) -> None:
         """End the span that was opened last.
@@ -168,10 +202,10 @@ class Gathering:
             raise InputError(f"{shown} stands where {last.shown} must be closed first")
         if self._length == last.start and self._runs[-1].styles != last.before.styles:
             raise InputError(f"{last.shown} holds no word; put what is said between it and its end")
-        self._turn(Run(self._length, last.before.styles, last.before.rate, last.before.volume))
+        self._turn(replace(last.before, start=self._length))
 
-    def done(self, language: str | None = None) -> MarkedText:
-        """All that was given.
+    def done(self, language: str | None = None, *, spoken: str | None = None) -> MarkedText:
+        """All that was given; a span in the language that is `spoken` anyway is none of its own.
 
         Raises
         ------
@@ -180,13 +214,26 @@ class Gathering:
         """
         if self._open:
             raise InputError(f"{self._open[-1].shown} is never closed; say where it ends")
-        return MarkedText("".join(self._pieces), tuple(self._runs), tuple(self._marks), language)
+        runs: list[Run] = []
+        for run in self._runs:
+            kept = replace(run, language=None) if run.language == spoken else run
+            if not runs or replace(runs[-1], start=run.start) != kept:
+                runs.append(kept)
+        return MarkedText("".join(self._pieces), tuple(runs), tuple(self._marks), language)
+
+    def _begin(self, kind: str, shown: str) -> Run:
+        """Note a span that opens here; the run before it."""
+        if len(self._open) >= DEEPEST:
+            raise InputError(f"{shown} stands within {DEEPEST} other marks; nest them less deep")
+        before = self._runs[-1]
+        self._open.append(_Open(kind, shown, self._length, before))
+        return before
 
     def _turn(self, run: Run) -> None:
         if self._runs[-1].start == run.start:
             self._runs.pop()
         last = self._runs[-1] if self._runs else None
-        if last is None or (last.styles, last.rate, last.volume) != (run.styles, run.rate, run.volume):
+        if last is None or replace(last, start=run.start) != run:
             self._runs.append(run)
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from lexicon import form_readers as forms
 from lexicon import written_forms as readings
 from lexicon.cleaning import plain
+from lexicon.foreign import with_names_inside
 
 MARKS = frozenset(".,;:!?")
 _FULL_MONTH = "|".join(readings.MONTHS)
@@ -42,6 +43,12 @@ def _unit_pattern() -> str:
     return "(?:" + "|".join(re.escape(unit) + (r"(?![\w^/'])" if unit[-1].isalnum() else "") for unit in units) + ")"
 
 
+def _letter_unit_pattern() -> str:
+    """Units that hold a letter by which they cannot be taken for a word (μm, kΩ)."""
+    units = [unit for unit in readings.table("units.tsv") if len(unit) > 1 and set(unit) & set("μΩ")]
+    return "(?:" + "|".join(sorted(units, key=len, reverse=True)) + ")"
+
+
 def _abbreviation_pattern() -> str:
     written = sorted(readings.table("abbreviations.tsv"), key=len, reverse=True)
     dotless = rf"(?:Mr|Mrs|Ms|Dr|Prof|etc|vs|approx){_STOP}"
@@ -55,7 +62,7 @@ def _forms() -> tuple[tuple[str, str, forms.Reader], ...]:
     return (
         ("quick", r"(?!(?:etc|vs|approx|et)\b)[a-z]+(?= |$|[,;!?](?: |$))", forms.same),
         ("space", r" +", forms.nothing),
-        ("mark", r"[.,;:!?](?= |$)", forms.same),
+        ("mark", r"[.,;:!?](?= |$)", forms.mark),
         ("email", rf"[\w+-](?:[\w.+-]{{0,62}}[\w+-])?@{_LABEL}(?:\.{_LABEL}){{1,5}}(?!\w)", forms.address),
         ("url", rf"(?:(?:https?|ftp)://|www\.){_TAIL}", forms.address),
         ("host", rf"(?:{_LABEL}\.){{1,4}}{_TLD}\b(?![.]\w)(?:/(?:{_TAIL})?)?", forms.address),
@@ -132,7 +139,8 @@ def _forms() -> tuple[tuple[str, str, forms.Reader], ...]:
         ),
         ("initial", rf"{_START}[A-Z]\.(?= [A-Z](?:[a-z]|\.))", forms.initial),
         ("roman", rf"{_START}[IVXLCDM]{{1,15}}{_STOP}(?!['-][^\W\d_])", forms.roman_numeral),
-        ("greek", r"(?<![^\W\d_])[πΩµμαβγδΔλσΣθφω](?![^\W\d_])", forms.symbol),
+        ("unitname", rf"{_START}{_letter_unit_pattern()}{_STOP}", forms.unit_name),
+        ("letter", rf"{_START}(?![\u0000-\u024f])[^\W\d_]{_STOP}", forms.letter),
         ("word", rf"{_LETTERS}(?:['-]{_LETTERS})*", forms.same),
         ("sentence", r"(?<=[a-z])\.(?=[A-Z])|[,;:!?]", forms.same),
         ("dot", r"\.", forms.dot),
@@ -152,7 +160,7 @@ def tokens(text: str) -> Iterator[Token]:
     """Written forms of an English text in order, each with what it says; text between them is white space."""
     pattern, readers = _scanner()
     previous = ""
-    for match in pattern.finditer(plain(text)):
+    for match in pattern.finditer(with_names_inside(plain(text))):
         spoken = readers[match.lastgroup or ""](match, previous)
         if spoken:
             yield Token(match.group(), spoken)

@@ -15,6 +15,7 @@ from lexicon.ipa import Segment
 from lexicon.languages import language_code
 from lexicon.normalize import MARKS, tokens
 from lexicon.phones import ipa_to_arpabet
+from lexicon.said import as_said
 from lexicon.syllables import syllables
 from lexicon.writing_systems import check_script
 
@@ -194,15 +195,16 @@ def pronounce(text: str, language: str = DEFAULT_LANGUAGE, dictionary: Dictionar
         A word needs espeak-ng, which is not installed.
     """
     language = language_code(language)
+    check_script(text, language)
     own = dictionary or Dictionary(MappingProxyType({}))
     if language.partition("-")[0] == "en":
         words = _spoken_words((token.source, token.spoken) for token in tokens(text))
     else:
-        words = _spoken_words((piece, piece) for piece in plain(text, keep_marks=True).split())
+        said = as_said(text, language)
+        words = _spoken_words((piece, piece) for piece in plain(said, keep_marks=True).split())
         words = [word for word in words if any(letter.isalnum() for letter in word.text)]
     if not words:
         raise InputError("there is no word to say in this text; give at least one word or number")
-    check_script(" ".join(word.text for word in words), language)
     if language == DEFAULT_LANGUAGE:
         _american(words, own)
     else:

@@ -4,14 +4,15 @@ Places in the text are counted in letters here, that is in characters that are n
 changes its spaces and nothing else.
 """
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from lexicon.chunks import chunks
-from lexicon.marked_text import Mark, MarkedText, NodMark, PauseMark, Run
-from lexicon.normalize import normalize
+from lexicon.given import GivenWord, given_words
+from lexicon.marked_text import Mark, MarkedText, NodMark, PauseMark, PhoneMark, Run
+from lexicon.said import as_said
 
 LONGEST = 300  # characters; a sentence that is longer is cut at a clause mark or a space
 
@@ -28,6 +29,10 @@ class Utterance:
         Its letters in the whole text, half open.
     pause
         Seconds of silence that are marked behind it; None where nothing is.
+    voice, language
+        Of a span that another voice speaks, or in another language; None elsewhere.
+    words
+        The words of `text` where phones are given for some of them; empty elsewhere.
     """
 
     written: str
@@ -36,6 +41,9 @@ class Utterance:
     last: int
     rate: float = 1.0
     pause: float | None = None
+    voice: str | None = None
+    language: str | None = None
+    words: tuple[GivenWord, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +56,7 @@ class Sentence:
         At least one.
     runs, marks
         What is marked in it, by letters of the whole text: runs begin with the one in force at its first letter; marks
-        are all but pauses.
+        are all but pauses and phones.
     lead
         Seconds of silence marked before the first sentence.
     n_characters
@@ -81,14 +89,19 @@ def sentences(text: MarkedText, language: str) -> Iterator[Sentence]:
     starts = [run.start for run in placed.runs]
     pauses = [mark for mark in placed.marks if isinstance(mark, PauseMark)]
     silent = [mark.at for mark in pauses]
-    others = [mark for mark in placed.marks if not isinstance(mark, PauseMark)]
+    phones = [mark for mark in placed.marks if isinstance(mark, PhoneMark)]
+    phoned = [mark.at for mark in phones]
+    others = [mark for mark in placed.marks if not isinstance(mark, PauseMark | PhoneMark)]
     held: Sentence | None = None
     lead, done, told = sum(mark.seconds for mark in pauses[:1] if mark.at == 0), 0, 0
-    for chunk in chunks(text.text, LONGEST):
+    for chunk in chunks(text.text, LONGEST, language):
         begin, done = done, done + n_letters(chunk)
         runs = _runs_within(placed.runs, starts, begin, done)
         inside = pauses[bisect_right(silent, begin) : bisect_right(silent, done)]
         utterances, silence = _utterances(chunk, begin, runs, inside, language)
+        given = phones[bisect_left(phoned, begin) : bisect_left(phoned, done)]
+        if given:
+            utterances = [_with_phones(part, given, part.language or language) for part in utterances]
         if held is not None:
             held = _longer(held, silence)
         else:
@@ -128,7 +141,8 @@ def by_letters(text: MarkedText) -> MarkedText:
     InputError
         The pauses at one place are too long together.
     """
-    places = sorted({0, *(run.start for run in text.runs), *(mark.at for mark in text.marks)})
+    ends = (mark.end for mark in text.marks if isinstance(mark, PhoneMark))
+    places = sorted({0, *(run.start for run in text.runs), *(mark.at for mark in text.marks), *ends})
     letters = {0: 0}
     for before, place in pairwise(places):
         letters[place] = letters[before] + n_letters(text.text[before:place])
@@ -142,6 +156,8 @@ def by_letters(text: MarkedText) -> MarkedText:
             pauses[at] = PauseMark(at, mark.seconds + (pauses[at].seconds if at in pauses else 0.0))
         elif isinstance(mark, NodMark):
             nods[at] = NodMark(at, max(mark.size, nods[at].size if at in nods else 0.0))
+        elif isinstance(mark, PhoneMark):
+            names.append(replace(mark, at=at, end=letters[mark.end]))
         else:
             names.append(replace(mark, at=at))
     marks = sorted([*nods.values(), *names, *pauses.values()], key=lambda mark: mark.at)
@@ -159,17 +175,17 @@ def _utterances(
     places = [at for at, character in enumerate(chunk) if not character.isspace()]
     end = begin + len(places)
     silences = {mark.at: mark.seconds for mark in pauses}
-    faster = [run.start for before, run in pairwise(runs) if run.rate != before.rate]
-    bounds = sorted({begin, end, *faster, *silences})
+    changes = [run.start for before, run in pairwise(runs) if _speaker(run) != _speaker(before)]
+    bounds = sorted({begin, end, *changes, *silences})
     found: list[Utterance] = []
     before = 0.0
     for first, last in pairwise(bounds):
         written = chunk[places[first - begin] : places[last - begin - 1] + 1]
-        text = normalize(written) if language.startswith("en") else written
-        rate = next(run.rate for run in reversed(runs) if run.start <= first)
+        run = next(run for run in reversed(runs) if run.start <= first)
+        text = as_said(written, run.language or language)
         pause = silences.get(last)
         if any(character.isalnum() for character in text):
-            found.append(Utterance(written, text, first, last, rate, pause))
+            found.append(Utterance(written, text, first, last, run.rate, pause, run.voice, run.language))
         elif found:  # punctuation by itself belongs to the words before it
             found[-1] = _with_more(found[-1], written, last, pause, language)
         else:
@@ -179,9 +195,24 @@ def _utterances(
 
 def _with_more(utterance: Utterance, written: str, last: int, pause: float | None, language: str) -> Utterance:
     whole = utterance.written + written
-    text = normalize(whole) if language.startswith("en") else whole
+    text = as_said(whole, utterance.language or language)
     seconds = [silence for silence in (utterance.pause, pause) if silence is not None]
     return replace(utterance, written=whole, text=text, last=last, pause=sum(seconds) if seconds else None)
+
+
+def _speaker(run: Run) -> tuple[float, str | None, str | None]:
+    return run.rate, run.voice, run.language
+
+
+def _with_phones(part: Utterance, phones: Sequence[PhoneMark], language: str) -> Utterance:
+    """An utterance with the phones that are given for words within it."""
+    places = [at for at, character in enumerate(part.written) if not character.isspace()]
+    inside = [
+        replace(mark, at=places[mark.at - part.first], end=places[mark.end - part.first - 1] + 1)
+        for mark in phones
+        if part.first <= mark.at < mark.end <= min(part.last, part.first + len(places))
+    ]
+    return replace(part, words=given_words(part.written, inside, language)) if inside else part
 
 
 def _longer(sentence: Sentence, seconds: float) -> Sentence:

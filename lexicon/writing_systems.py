@@ -1,24 +1,32 @@
-"""Which writing systems a language is read in, and which letters of a text it cannot read."""
+"""Which writing systems a language is read in, and which words of a text it cannot read."""
 
+import functools
+import re
 import unicodedata
+from collections.abc import Iterator
 from types import MappingProxyType
 
+from lexicon import written_forms as readings
 from lexicon.errors import InputError
+from lexicon.japanese import has_kanji, load_reader
+from lexicon.letters import run_name
 
 _CYRILLIC = frozenset({"CYRILLIC"})
 _ARABIC = frozenset({"ARABIC"})
 _DEVANAGARI = frozenset({"DEVANAGARI"})
 _HAN = frozenset({"CJK"})
+_JAPANESE = frozenset({"HIRAGANA", "KATAKANA", "CJK", "IDEOGRAPHIC"})
 
 # First words of the Unicode names of a language's letters, by its espeak-ng code or the first part of it. Latin is read
 # in every language (espeak-ng spells it or switches to English); a language without a line reads nothing else. Chinese
-# characters are missing under ja, ko and hak: espeak-ng says "Chinese letter" for each. Japanese goes in as kana.
+# characters are missing under ko and hak: espeak-ng says "Chinese letter" for each; in Japanese `lexicon.japanese`
+# reads them.
 SCRIPTS = MappingProxyType({
     "am": frozenset({"ETHIOPIC"}), "ar": _ARABIC, "as": frozenset({"BENGALI"}), "ba": _CYRILLIC,
     "be": _CYRILLIC, "bg": _CYRILLIC, "bn": frozenset({"BENGALI"}), "bpy": frozenset({"BENGALI"}),
     "chr": frozenset({"CHEROKEE"}), "cmn": _HAN, "cv": _CYRILLIC, "el": frozenset({"GREEK"}), "fa": _ARABIC,
     "grc": frozenset({"GREEK"}), "gu": frozenset({"GUJARATI"}), "he": frozenset({"HEBREW"}), "hi": _DEVANAGARI,
-    "hy": frozenset({"ARMENIAN"}), "hyw": frozenset({"ARMENIAN"}), "ja": frozenset({"HIRAGANA", "KATAKANA"}),
+    "hy": frozenset({"ARMENIAN"}), "hyw": frozenset({"ARMENIAN"}), "ja": _JAPANESE,
     "ka": frozenset({"GEORGIAN"}), "kk": _CYRILLIC, "kn": frozenset({"KANNADA"}), "ko": frozenset({"HANGUL"}),
     "kok": _DEVANAGARI, "ky": _CYRILLIC, "mk": _CYRILLIC, "ml": frozenset({"MALAYALAM"}), "mr": _DEVANAGARI,
     "my": frozenset({"MYANMAR"}), "ne": _DEVANAGARI, "nog": _CYRILLIC, "or": frozenset({"ORIYA"}),
@@ -28,7 +36,13 @@ SCRIPTS = MappingProxyType({
     "ur": _ARABIC, "yue": _HAN, "en-shaw": frozenset({"SHAVIAN"}),
 })  # fmt: skip
 _EVERYWHERE = frozenset({"LATIN", "MODIFIER", "MASCULINE", "FEMININE", "KATAKANA-HIRAGANA", "VULGAR"})
-SHOWN_LETTERS = 8  # letters that a refusal names
+_NAMES = MappingProxyType({"CJK": "Chinese"})
+SHOWN_WORDS, SHOWN_CHARACTERS = 3, 24  # that a refusal names, of each at most so many characters
+# Combining marks that no script needs to tell its words apart: accents, enclosing marks.
+_LOOSE_MARKS = re.compile(
+    "[\u0300-\u036f\u0483-\u0489\u1ab0-\u1aff\u1dc0-\u1dff\u20d0-\u20ff\ufe00-\ufe0f\ufe20-\ufe2f]"
+)
+_FOREIGN = re.compile("f[fm]*")
 
 
 def script_of(letter: str) -> str:
@@ -42,21 +56,60 @@ def scripts_of(language: str) -> frozenset[str]:
     return own | _EVERYWHERE
 
 
+class _Kinds(dict[int, str]):
+    """Each character as f (foreign letter), m (mark of a letter) or o (other), decided once."""
+
+    def __init__(self, language: str) -> None:
+        super().__init__()
+        self._readable = scripts_of(language)
+
+    def __missing__(self, code: int) -> str:
+        self[code] = kind = self._kind(chr(code))
+        return kind
+
+    def _kind(self, letter: str) -> str:
+        if unicodedata.category(letter)[0] == "M":
+            return "o" if _LOOSE_MARKS.match(letter) else "m"
+        plain = unicodedata.normalize("NFKC", letter)
+        is_foreign = any(unicodedata.category(c)[0] == "L" and script_of(c) not in self._readable for c in plain)
+        return "f" if is_foreign else "o"
+
+
+@functools.lru_cache(maxsize=16)
+def _kinds(language: str) -> _Kinds:
+    return _Kinds(language)
+
+
+def foreign_runs(text: str, language: str) -> Iterator[tuple[int, int]]:
+    """Where letters stand that a language does not read: half-open ranges, each as long as it can be."""
+    if not text.isascii():
+        for run in _FOREIGN.finditer(text.translate(_kinds(language))):
+            yield run.span()
+
+
 def check_script(text: str, language: str) -> None:
-    """Refuse letters that a language cannot read; digits, punctuation and symbols are fine everywhere.
+    """Refuse words that a language cannot read; digits, symbols and single letters with a name are fine everywhere.
 
     Raises
     ------
     InputError
-        The text holds letters of another script; the message names them, their script and the language.
+        The text holds words of another script; the message names them, their script and the language.
+    BackendError
+        It is Japanese with Chinese characters, and the library that reads them is not installed.
     """
-    if text.isascii():
-        return
-    readable = scripts_of(language)
-    foreign = [c for c in sorted(set(text)) if unicodedata.category(c)[0] == "L" and script_of(c) not in readable]
-    if foreign:
-        shown = " ".join(foreign[:SHOWN_LETTERS]) + (" ..." if len(foreign) > SHOWN_LETTERS else "")
-        scripts = ", ".join(sorted({script_of(c).capitalize() or "unnamed" for c in foreign}))
+    if language == "ja" and has_kanji(text):
+        load_reader()
+    words: dict[str, None] = {}
+    for begin, end in foreign_runs(text, language):
+        run = text[begin:end]
+        if not run_name(run) and unicodedata.normalize("NFKC", run) not in readings.table("units.tsv"):
+            words[run] = None
+    if words:
+        shown = ", ".join(word[:SHOWN_CHARACTERS] for word in list(words)[:SHOWN_WORDS])
+        scripts = {script_of(unicodedata.normalize("NFKC", c)[0]) for word in words for c in word if c.isalpha()}
+        names = ", ".join(sorted(_NAMES.get(script, script.capitalize() or "unnamed") for script in scripts))
+        more = ", ..." if len(words) > SHOWN_WORDS else ""
         raise InputError(
-            f"language {language!r} cannot read {shown} ({scripts} letters); choose the text's own language"
+            f"language {language!r} cannot read {shown}{more} ({names} letters); "
+            "choose the text's own language, or write it in another way"
         )

@@ -48,9 +48,11 @@ class Request:
     language: str = option(
         "en-us",
         "Language of the text: a code (en-us, de), a tag (pt-BR, zh-Hans) or a name (German); `tts2face languages` "
-        "lists all.",
+        "lists all. Chinese characters in Japanese need the extra japanese.",
     )
-    voice: str | None = option(None, "heart (English), espeak (every language), or a Piper voice by path (x.onnx).")
+    voice: str | None = option(
+        None, "heart (English), espeak or espeak-female (every language), or a Piper voice (x.onnx)."
+    )
     rate: float = option(1.0, "Speed of speech, 0.5 to 2.")
     volume: float = option(1.0, "Loudness of the sound, 0 to 2; 1 is -16 LUFS, or a recording as it is.")
     seed: int = option(0, "The same seed gives the same sound and motion.")

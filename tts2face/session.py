@@ -3,7 +3,7 @@
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -30,7 +30,7 @@ from tts2face.synthesis.marked_speech import Reached
 from tts2face.synthesis.performance import Performance, clips_of, perform
 from tts2face.synthesis.prepared_request import PreparedRequest, prepare
 from tts2face.types import Clip, joined_clips
-from tts2face.voice.engine import Voice, load_voice
+from tts2face.voice.engine import Pronouncing, Voice, load_voice
 
 OWN_FACE = "self"  # the face that the talker's own video shows
 VOICES_KEPT = 2  # idle voices by name and language; each keeps some 100 MB
@@ -261,7 +261,12 @@ class Session:
         face = self._face(request.gestures)
         palette = self.palette if request.gestures else None
         layer = None if palette is None else GestureLayer(prepared, self._fields(palette, request.pitch), face)
-        performers = Performers(self.talker, self._exemplars, face, lambda: self._lent_voice(request))
+        own = read_dictionary(request.dictionary).entries if request.dictionary else {}
+
+        def lent_voice(name: str | None, language: str) -> AbstractContextManager[Voice]:
+            return self._lent_voice(name, language, own)
+
+        performers = Performers(self.talker, self._exemplars, face, lent_voice)
         return pieces(prepared, performers, layer)
 
     def _face(self, has_gestures: bool) -> AnimatedFace:
@@ -288,14 +293,13 @@ class Session:
             return kept
 
     @contextmanager
-    def _lent_voice(self, request: Request) -> Iterator[Voice]:
+    def _lent_voice(self, name: str | None, language: str, own: Pronouncing) -> Iterator[Voice]:
         """A voice for the time of a request, used by nobody else; loading one takes half a second."""
-        own = read_dictionary(request.dictionary).entries if request.dictionary else {}
-        key = (request.voice, request.language, frozenset(own.items()))
+        key = (name, language, frozenset(own.items()))
         with self._lock:
             idle = self._voices.get(key)
             voice = idle.pop() if idle else None
-        voice = voice or load_voice(request.voice, request.language, own)
+        voice = voice or load_voice(name, language, own)
         try:
             yield voice
         finally:

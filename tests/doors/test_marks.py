@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cli.main import run
+from lexicon.errors import InputError
 from lexicon.sequence import SILENCE
 from tts2face.gesture.spans import StyleSpan
 from tts2face.models.face_file import load_face
@@ -66,6 +67,27 @@ def test_a_pause_is_silent_and_the_lips_rest_in_it(ready: Session) -> None:
     assert len(paused.clip.motion) > len(plain.clip.motion) + 30
 
 
+def test_a_document_with_voices_languages_and_phones_is_one_sound(ready: Session) -> None:
+    text = (
+        '<speak>One <phoneme ph="kæt">two</phoneme>. <lang xml:lang="de">Guten Tag.</lang> <voice gender="male">Three '
+        '<say-as interpret-as="ordinal">4</say-as></voice> <voice name="heart">five.</voice></speak>'
+    )
+    for voice, rate in (("espeak", 22_050), ("heart", 24_000)):
+        speech = joined_clips([piece.clip for piece in ready.stream(Request(text=text, voice=voice))]).speech
+        assert speech.waveform.rate == rate
+        names = [word.text.strip(".") for word in speech.words]
+        assert names == ["One", "two", "Guten", "Tag", "Three", "fourth", "five"]
+        first, last = speech.words[1].first, speech.words[1].last
+        assert speech.phones.phones[first:last] == ("k", "æ", "t")
+
+
+def test_one_foreign_letter_is_read_and_a_word_is_refused(ready: Session) -> None:
+    (piece,) = pieces("The value of π is 3.", ready)
+    assert "pi" in [word.text for word in piece.clip.speech.words]
+    with pytest.raises(InputError, match="language 'en-us' cannot read Привет"):
+        pieces("Hello Привет.", ready)
+
+
 def test_a_file_with_marks_counts_characters_and_tells_the_times_of_names(ready: Session, tmp_path: Path) -> None:
     text = '<speak>Hello <mark name="here"/>there. <break time="1s"/>Bye.</speak>'
     told: list[tuple[int, int]] = []
@@ -95,6 +117,11 @@ def test_phones_are_those_of_the_words(capsys: pytest.CaptureFixture[str]) -> No
         assert run(["phones", text]) == 0
         told.append(capsys.readouterr().out)
     assert told[0] == told[1]
+
+
+def test_phones_are_those_that_the_text_gives(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["phones", '<speak>A <phoneme ph="kæt">dog</phoneme>.</speak>']) == 0
+    assert capsys.readouterr().out.splitlines()[-1].split() == ["dog", "dog.", "kæt", "K", "AE0", "T"]
 
 
 def test_the_command_tells_when_names_are_reached(tmp_path: Path) -> None:

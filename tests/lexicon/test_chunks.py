@@ -1,5 +1,8 @@
 """A long text in pieces."""
 
+import time
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -45,3 +48,27 @@ def test_a_megabyte_comes_in_bounded_pieces() -> None:
     pieces = list(chunks("The quick brown fox jumps over the lazy dog, and again. " * 18_000, 300))
     assert len(pieces) == 18_000
     assert max(map(len, pieces)) < 60
+
+
+def sentence_ends() -> list[tuple[str, list[str]]]:
+    rows = Path(__file__).with_name("sentence_ends.tsv").read_text(encoding="utf-8").splitlines()[1:]
+    return [(language, written.split("|")) for language, written in (row.split("\t") for row in rows)]
+
+
+@pytest.mark.parametrize(("language", "expected"), sentence_ends())
+def test_abbreviations_end_no_sentence_and_sentence_ends_do(language: str, expected: list[str]) -> None:
+    assert list(chunks(" ".join(expected), 300, language)) == expected
+
+
+def test_the_list_of_sentence_ends_holds_both_kinds() -> None:
+    english = [pieces for language, pieces in sentence_ends() if language == "en-us"]
+    assert len(english) >= 60
+    assert sum(len(pieces) > 1 for pieces in english) >= 25
+    assert sum(len(pieces) == 1 and "." in pieces[0][:-2] for pieces in english) >= 25
+
+
+@pytest.mark.parametrize("text", ["etc. " * 50_000, "A. " * 80_000, "x" * 200_000 + ". A", "5. " * 80_000])
+def test_a_row_of_abbreviations_is_cut_at_once(text: str) -> None:
+    begin = time.perf_counter()
+    assert sum(1 for _ in chunks(text, 300, "de")) > 0
+    assert time.perf_counter() - begin < 5

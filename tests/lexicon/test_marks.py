@@ -157,7 +157,6 @@ def test_speeds(written: str, rate: float) -> None:
         ("<express-as>a</express-as>", "<express-as> needs a style"),
         ("<express-as style='a' styledegree='2'>a</express-as>", "no attribute 'styledegree'"),
         ("<express-as style='a'/>", "holds no word"),
-        ("<p xml:lang='de'>a</p><p xml:lang='fr'>b</p>", "one voice speaks one language, de or fr"),
         ("<p>" * 40 + "</p>" * 40, "stands within 33 others"),
     ],
 )

@@ -113,7 +113,7 @@ def test_text_without_a_word_is_refused(text: str, language: str) -> None:
 def test_other_refusals() -> None:
     with pytest.raises(InputError, match="there is no language 'xq'"):
         pronounce("hello", "xq")
-    with pytest.raises(InputError, match="'en-us' cannot read 世 界"):
+    with pytest.raises(InputError, match="'en-us' cannot read 世界"):
         pronounce("hello 世界")
 
 
@@ -124,3 +124,18 @@ def test_nominal_times_cover_words_and_pauses() -> None:
     assert tuple(p for p in phones.phones if p != SILENCE) == spoken.phones
     assert phones.phones[words[2].last] == SILENCE
     assert phones.phones[0] == phones.phones[-1] == SILENCE
+
+
+@pytest.mark.parametrize(
+    ("text", "marked"),
+    [
+        ("He has a Ph.D. in physics.", ["physics."]),
+        ("He has a Ph.D. She left.", ["PHD.", "left."]),
+        ("Insp. Morse met Adm. Lee.", ["Lee."]),
+        ("On Jan. 3rd, see Fig. 2.", ["third,", "two."]),
+        ("Mt. Everest and Op. 5.", ["five."]),
+        ("We chose plan B. Then we left.", ["B.", "left."]),
+    ],
+)
+def test_abbreviations_pause_nowhere_and_sentence_ends_do(text: str, marked: list[str]) -> None:
+    assert [word.text + word.mark for word in pronounce(text).words if word.mark] == marked

@@ -15,13 +15,13 @@ LEAD, TRAIL, LETTER, LEVEL = 0.2, 0.3, 0.1, 0.25
 class FakeVoice:
     """Splits words at hyphens where ``splits`` says so, as voices may."""
 
-    def __init__(self, splits: bool = False) -> None:
+    def __init__(self, splits: bool = False, rate: int = RATE) -> None:
         self.said: list[tuple[str, float]] = []
-        self._splits = splits
+        self._splits, self._rate = splits, rate
 
     @property
     def sample_rate(self) -> int:
-        return RATE
+        return self._rate
 
     def speak(self, spoken: str | Sequence, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
         self.said.append((str(spoken), rate))
@@ -29,9 +29,9 @@ class FakeVoice:
         n = sum(map(len, words))
         edges = np.concatenate([[0.0], LEAD + np.arange(n + 1) * LETTER / rate, [0.0]])
         edges[-1] = edges[-2] + TRAIL
-        samples = np.zeros(round(edges[-1] * RATE), np.float32)
-        samples[round(edges[1] * RATE) : round(edges[-2] * RATE)] = LEVEL * volume
-        edges[-1] = len(samples) / RATE
+        samples = np.zeros(round(edges[-1] * self._rate), np.float32)
+        samples[round(edges[1] * self._rate) : round(edges[-2] * self._rate)] = LEVEL * volume
+        edges[-1] = len(samples) / self._rate
         firsts = 1 + np.concatenate([[0], np.cumsum([len(word) for word in words])])
         spans = tuple(WordSpan(word, int(firsts[k]), int(firsts[k + 1])) for k, word in enumerate(words))
-        return Speech(Waveform(samples, RATE), PhoneSequence([SILENCE, *["a"] * n, SILENCE], edges), spans)
+        return Speech(Waveform(samples, self._rate), PhoneSequence([SILENCE, *["a"] * n, SILENCE], edges), spans)

@@ -19,6 +19,7 @@ from tts2face.request import Request
 from tts2face.synthesis.marked_speech import LEAST_GAP_S, Reached, Said, check_marks, marked_styles, reached_in, say
 from tts2face.synthesis.speech_joining import joined, shortened, silence
 from tts2face.voice.engine import load_voice
+from tts2face.voice.spans import voice_in
 
 
 def said(text: str, voice: object | None = None, **options: object) -> list[Said]:
@@ -161,6 +162,60 @@ def test_emphasis_is_louder_with_a_nod() -> None:
     assert answer.timeline.nods == (Nod(start),)
 
 
+def test_spans_are_spoken_by_their_voice_at_the_rate_of_the_first() -> None:
+    asked: list[tuple[str | None, str]] = []
+    other = FakeVoice(rate=2 * RATE)
+
+    def voices(name: str | None, language: str) -> FakeVoice:
+        asked.append((name, language))
+        return other
+
+    text = '<speak>one <lang xml:lang="de">zwei drei</lang> <voice gender="male">four</voice> [x]</speak>'
+    voice = FakeVoice()
+    (sentence,) = sentences(marked(text), "en-us")
+    answer = say(voice, sentence, Request(text=text), voices)
+    assert asked == [(None, "de"), ("espeak", "en-us")]
+    assert ([said_ for said_, _ in voice.said], [said_ for said_, _ in other.said]) == (
+        ["one", "x"],
+        ["zwei drei", "four"],
+    )
+    assert answer.speech.waveform.rate == RATE
+    assert [word.text for word in answer.speech.words] == ["one", "zwei", "drei", "four", "x"]
+    with pytest.raises(InputError, match="needs voices to speak them"):
+        say(voice, sentence, Request(text=text))
+
+
+@pytest.mark.parametrize(
+    ("name", "language", "chosen"),
+    [
+        (None, "de", None),
+        ("heart", "de", None),
+        ("heart", "en-gb", "heart"),
+        ("heart", None, "heart"),
+        ("espeak", "de", "espeak"),
+        ("espeak-female", "de", "espeak-female"),
+        ("my.onnx", "de", None),
+        ("my.onnx", None, "my.onnx"),
+    ],
+)
+def test_a_span_keeps_the_voice_that_speaks_its_language(
+    name: str | None, language: str | None, chosen: str | None
+) -> None:
+    assert voice_in(name, language) == chosen
+
+
+@pytest.mark.parametrize("name", ["heart", "espeak"])
+def test_given_phones_reach_the_voice(name: str) -> None:
+    sheep, cat = '<phoneme ph="ʃˈiːp">Bob</phoneme>', '<phoneme alphabet="x-arpabet" ph="K AE1 T">2</phoneme>'
+    text = f"We saw {sheep}, and {cat}."
+    answer = one(f"<speak>{text}</speak>", load_voice(name, "en-us"))
+    phones = answer.speech.phones.phones
+    found = {word.text.strip(".,"): "".join(phones[word.first : word.last]) for word in answer.speech.words}
+    assert "ʃip" in found.values()
+    assert "kæt" in found.values()
+    assert (found["We"], found["saw"]) == ("wi", "sɔ")
+
+
 WORDS = st.lists(
     st.sampled_from(["one", "seven", "cat", "it's", "25", "$3.50", "Dr. Who", "well-known"]), min_size=1, max_size=8
 )
@@ -252,6 +307,7 @@ def test_in_a_recording_marks_come_with_their_words() -> None:
         ("<speak xml:lang='de'>a</speak>", {}, "the text names the language de, not en-us"),
         ("a [pause 1] b", {"audio": Path("a.wav")}, "a recording keeps its own pauses"),
         ("<speak><emphasis>a</emphasis></speak>", {"audio": Path("a.wav")}, "a recording keeps its own pauses"),
+        ("<speak><lang xml:lang='de'>a</lang></speak>", {"audio": Path("a.wav")}, "a recording keeps its own pauses"),
     ],
 )
 def test_marks_that_go_with_no_request_are_refused(text: str, options: dict, reason: str) -> None:

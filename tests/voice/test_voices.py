@@ -7,9 +7,10 @@ from lexicon.dictionary import MOST_PHONES, parse_dictionary
 from lexicon.errors import BackendError, DataError, InputError
 from lexicon.ipa import Segment, parse_ipa
 from lexicon.phones import PHONES
-from lexicon.sequence import SILENCE
-from tts2face.types import Speech
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.types import Speech, Waveform
 from tts2face.voice.engine import SpokenWord, Voice, at_volume, load_voice
+from tts2face.voice.resample import resampled_speech
 
 SENTENCE = "Bob may move five big maps."
 WORDS = ["Bob", "may", "move", "five", "big", "maps"]
@@ -80,6 +81,55 @@ def test_silences_are_silent_and_phones_are_not(voice: Voice) -> None:
 def test_phones_in_instead_of_text(voice: Voice) -> None:
     words = [SpokenWord("map", parse_ipa("mˈæp")), SpokenWord("you", parse_ipa("jˈuː"), ".")]
     assert spoken_words(voice.speak(words)) == {"map": "mæp", "you": "ju"}
+
+
+def test_words_with_and_without_phones(voice: Voice) -> None:
+    words = [SpokenWord(text, ()) for text in ("Of", "the", "twenty-five")]
+    mixed = [*words, SpokenWord("Bob", parse_ipa("ʃˈiː"), ","), SpokenWord("may", ()), SpokenWord("move.", ())]
+    found = spoken_words(voice.speak(mixed))
+    assert (found["Bob"], found["may"], found["move"], found["twenty-five"]) == ("ʃi", "meɪ", "muv", "twɛntifaɪv")
+
+
+@pytest.mark.parametrize("name", ["heart", "espeak"])
+def test_a_users_words_win_beside_given_phones(name: str) -> None:
+    voice = load_voice(name, "en-us", {"bob": parse_ipa("ʃˈiː")})
+    found = spoken_words(
+        voice.speak([SpokenWord("May", parse_ipa("kˈæt")), SpokenWord("Bob", ()), SpokenWord("move.", ())])
+    )
+    assert (found["May"], found["Bob"]) == ("kæt", "ʃi")
+
+
+def test_espeak_has_a_female_voice() -> None:
+    male, female = (load_voice(name, "de").speak("Guten Morgen.") for name in ("espeak", "espeak-female"))
+    assert male.phones.phones == female.phones.phones
+    assert pitch_hz(female) > 1.4 * pitch_hz(male)
+
+
+def pitch_hz(speech: Speech) -> float:
+    """Median of the voiced frames, by autocorrelation."""
+    samples, rate = speech.waveform.samples, speech.waveform.rate
+    found = []
+    for start in range(0, len(samples) - 2048, 1024):
+        frame = samples[start : start + 2048] - samples[start : start + 2048].mean()
+        power = np.correlate(frame, frame, "full")[2047:]
+        lag = 50 + int(power[50:350].argmax())
+        if power[0] > 0.5 and power[lag] > 0.4 * power[0]:
+            found.append(rate / lag)
+    return float(np.median(found))
+
+
+@pytest.mark.parametrize("rate", [16_000, 24_000, 48_000])
+def test_speech_at_another_rate_keeps_its_phones_and_pitch(rate: int) -> None:
+    samples = 0.5 * np.sin(2 * np.pi * 200 * np.arange(22_050) / 22_050)
+    phones = PhoneSequence([SILENCE, "a", SILENCE], [0.0, 0.2, 0.8, 1.0])
+    found = resampled_speech(Speech(Waveform(samples, 22_050), phones, ()), rate)
+    assert (found.waveform.rate, len(found.waveform.samples)) == (rate, rate)
+    assert found.phones.edges.tolist() == pytest.approx([0.0, 0.2, 0.8, 1.0])
+    same = 0.5 * np.sin(2 * np.pi * 200 * np.arange(rate) / rate)
+    middle = slice(rate // 10, -rate // 10)
+    np.testing.assert_allclose(found.waveform.samples[middle], same[middle], atol=1e-3)
+    at_home = Speech(Waveform(samples, 22_050), phones, ())
+    assert resampled_speech(at_home, 22_050) is at_home
 
 
 @pytest.mark.parametrize("name", ["heart", "espeak"])

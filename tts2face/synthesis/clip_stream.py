@@ -1,8 +1,9 @@
 """A prepared request becomes clips, piece by piece: spoken text, a recording, or an idle face."""
 
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -54,12 +55,15 @@ class Piece:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Performers:
-    """Who performs a request: the talker, the talker's exemplars, the face, and a voice for as long as it is needed."""
+    """Who performs a request: the talker, the talker's exemplars, the face, and voices.
+
+    ``voice`` lends the voice of a name and a language for the time of a ``with`` block.
+    """
 
     talker: Talker
     exemplars: VisualVoice
     face: AnimatedFace
-    voice: Callable[[], AbstractContextManager[Voice]]
+    voice: Callable[[str | None, str], AbstractContextManager[Voice]]
 
 
 def pieces(prepared: PreparedRequest, performers: Performers, layer: GestureLayer | None) -> Iterator[Piece]:
@@ -101,9 +105,15 @@ def _sentences(prepared: PreparedRequest, performers: Performers) -> Iterator[tu
     if request.idle is not None:
         yield from silent(request.idle, prepared.fps, IDLE_STEPS)
         return
-    with performers.voice() as voice:
+    with ExitStack() as held:
+
+        @cache
+        def voice_of(name: str | None, language: str) -> Voice:
+            return held.enter_context(performers.voice(name, language))
+
+        voice = voice_of(request.voice, request.language)
         for sentence in prepared.sentences():
-            yield say(voice, sentence, request), sentence.n_characters
+            yield say(voice, sentence, request, voice_of), sentence.n_characters
 
 
 def _recording_pieces(

@@ -16,8 +16,8 @@ from lexicon.cleaning import plain
 from lexicon.errors import InputError
 from lexicon.languages import language_code
 from lexicon.marked_text import Mark, MarkedText, NameMark, NodMark, Run
-from lexicon.normalize import normalize
 from lexicon.pronounce import PAUSES_S
+from lexicon.said import as_said
 from lexicon.sentences import Sentence, Utterance, by_letters, n_letters, up_to
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.clock import first_sample
@@ -28,8 +28,10 @@ from tts2face.gesture.timeline import Timeline
 from tts2face.request import RATES, VOLUMES, Request
 from tts2face.synthesis.speech_joining import joined, silence
 from tts2face.types import Speech, Waveform, frame_count, joined_speech
-from tts2face.voice.engine import Voice, at_volume
+from tts2face.voice.engine import SpokenWord, Voice, at_volume
 from tts2face.voice.level import level_speech
+from tts2face.voice.resample import resampled_speech
+from tts2face.voice.spans import Voices, speaker_of
 
 LEAST_GAP_S = 0.02  # between utterances of a sentence: less cuts into their sounds (edges are good to 16 ms)
 JOINT_S = 0.06  # where only the speed changes
@@ -109,8 +111,9 @@ class WordTimes:
         return min(self._count(before) - is_inside, len(self._onsets))
 
     def _count(self, written: str) -> int:
-        is_english = self._language.startswith("en")
-        said = normalize(written) if is_english else plain(written, keep_marks=True)
+        said = as_said(written, self._language)
+        if not self._language.startswith("en"):
+            said = plain(said, keep_marks=True)
         return sum(any(letter.isalnum() for letter in word) for word in said.split())
 
 
@@ -137,11 +140,16 @@ class _SentenceTimes:
         return self.begins[at] + self.clocks[at].end(letter)
 
 
-def say(voice: Voice, sentence: Sentence, request: Request) -> Said:
+def say(voice: Voice, sentence: Sentence, request: Request, voices: Voices | None = None) -> Said:
     """Speak a sentence with its pauses, speeds and loudness, and find when its marks are reached.
 
     The speech of a sentence in which nothing is marked is what the voice makes of it, byte for byte; its sound is
     brought to the loudness of all clips, to which the loudness of the request and of marks is relative.
+
+    Parameters
+    ----------
+    voices
+        Gives the voices of spans in another voice or language; their sound gets the sample rate of `voice`.
 
     Raises
     ------
@@ -152,8 +160,12 @@ def say(voice: Voice, sentence: Sentence, request: Request) -> Said:
     clocks: list[WordTimes] = []
     gains: list[Floats] = []
     for part in sentence.utterances:
-        speech = voice.speak(part.text, rate=request.rate * part.rate, seed=request.seed)
-        clock = WordTimes(part.written, speech.phones, speech.words, language=request.language, first=part.first)
+        speaker = speaker_of(part, voice, request, voices)
+        given = [SpokenWord(word.text, word.segments, word.after) for word in part.words] or part.text
+        speech = speaker.speak(given, rate=request.rate * part.rate, seed=request.seed)
+        speech = resampled_speech(speech, voice.sample_rate)
+        language = part.language or request.language
+        clock = WordTimes(part.written, speech.phones, speech.words, language=language, first=part.first)
         spoken.append(speech)
         clocks.append(clock)
         gains.append(_gain(speech.waveform, sentence.runs, part, clock))
@@ -249,8 +261,8 @@ def check_marks(text: MarkedText, request: Request) -> None:
     """
     if request.audio is not None and text.changes_voice:
         raise InputError(
-            "a recording keeps its own pauses, speed and loudness; "
-            "leave [pause], <break>, <prosody> and <emphasis> away"
+            "a recording keeps its own pauses, speed, loudness and voice; "
+            "leave [pause], <break>, <prosody>, <emphasis>, <voice> and <lang> away"
         )
     if text.language is not None and _primary(language_code(text.language)) != _primary(request.language):
         raise InputError(f"the text names the language {text.language}, not {request.language}; choose one of them")

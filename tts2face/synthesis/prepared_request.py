@@ -7,8 +7,8 @@ from fractions import Fraction
 from lexicon.errors import InputError
 from lexicon.mark_parser import marked
 from lexicon.marked_text import MarkedText
+from lexicon.readable import check_readable
 from lexicon.sentences import Sentence, sentences
-from lexicon.writing_systems import check_script
 from tts2face.clock import exact_rate
 from tts2face.exemplar.options import METHODS, SynthesisOptions
 from tts2face.gesture.request_timeline import asked
@@ -69,10 +69,12 @@ def prepare(request: Request) -> PreparedRequest:
     """
     if request.audio is not None and not request.audio.is_file():
         raise InputError(f"there is no recording {request.audio}; check the path")
-    prepared = PreparedRequest(request, marked(request.text), asked(request), synthesis_options(request))
+    prepared = PreparedRequest(
+        request, marked(request.text, request.language), asked(request), synthesis_options(request)
+    )
     if not request.text.strip() and (request.audio is not None or request.idle is not None):
         return prepared
-    check_script(prepared.text.text, request.language)
+    check_readable(prepared.text, request.language)
     check_marks(prepared.text, request)
     if next(prepared.sentences(), None) is None:
         raise InputError(f"there is nothing to say in {request.text[:40]!r}; give at least one word")

@@ -17,12 +17,16 @@ ENGLISH = ("en", "en-us", "en-gb")
 NAMES: Mapping[str, str] = {
     "heart": "neural, American English, female",
     "espeak": "formant synthesis, every language of espeak-ng",
+    "espeak-female": "the same, female",
 }
 
 
 @dataclass(frozen=True, slots=True)
 class SpokenWord:
-    """A written word and how it is spoken; `after` is the punctuation that follows it."""
+    """A written word and how it is spoken; `after` is the punctuation that follows it.
+
+    A word without segments is read by the voice, as it reads text.
+    """
 
     text: str
     segments: tuple[Segment, ...]
@@ -79,10 +83,10 @@ def load_voice(name: str | None, language: str, own_words: Pronouncing | None = 
         from tts2face.voice.neural import NeuralVoice
 
         return NeuralVoice(own_words or {})
-    if chosen == "espeak":
+    if chosen in {"espeak", "espeak-female"}:
         from tts2face.voice.espeak import EspeakVoice
 
-        return EspeakVoice(language, own_words or {})
+        return EspeakVoice(language, own_words or {}, is_female=chosen == "espeak-female")
     if chosen.endswith(".onnx"):
         from tts2face.voice.piper import PiperVoice
 

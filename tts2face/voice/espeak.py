@@ -4,8 +4,9 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from lexicon.errors import BackendError, InputError
 from lexicon.g2p import segments_of
 from lexicon.ipa import Segment
+from lexicon.japanese import has_kanji, with_kana
 from lexicon.languages import language_code
 from lexicon.phones import PHONES, nearest_phones
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
@@ -26,6 +28,7 @@ from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, at_volume
 
 CHILD = Path(__file__).with_name("espeak_child.py")
 WORD_EVENT, PHONEME_EVENT = 1, 7
+ANY_GENDER, FEMALE = 0, 2  # espeak_VOICE.gender; any is male where a language has both
 SWITCH = re.compile(r"\([a-z0-9-]+\)")  # espeak-ng marks where a foreign word begins and ends: (en)...(fr)
 USUAL_WORDS_PER_MINUTE = 175  # espeak-ng's default; its events go wrong above 400
 PATIENCE_S = 60.0  # a sentence takes some 50 ms
@@ -57,8 +60,9 @@ class _Sounded:
 class EspeakVoice:
     """A voice of espeak-ng, 22.05 kHz; every request runs in a process of its own."""
 
-    def __init__(self, language: str, own_words: Pronouncing) -> None:
+    def __init__(self, language: str, own_words: Pronouncing, *, is_female: bool = False) -> None:
         self._language, self._own_words = language_code(language), own_words
+        self._gender = FEMALE if is_female else ANY_GENDER
         self._rate = 22050
 
     @property
@@ -69,9 +73,14 @@ class EspeakVoice:
     def speak(self, spoken: Spoken, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
         """Speech of a sentence; see `tts2face.voice.engine.Voice`. Nothing is random: `seed` changes nothing."""
         text, words = self._written(spoken)
-        header, samples = _ask(text, self._language, round(USUAL_WORDS_PER_MINUTE * rate), bool(words))
+        header, samples = _ask({
+            "text": text, "language": self._language, "gender": self._gender, "has_phonemes": bool(words),
+            "words_per_minute": round(USUAL_WORDS_PER_MINUTE * rate),
+        })  # fmt: skip
         sound = np.pad(samples / np.float32(32768), round(QUIET_S * self._rate)).astype(np.float32)
         sounded, names = self._sounded(header, text, sound)
+        if words:
+            sounded = _by_written_words(sounded, header, text)
         if not any(phone != SILENCE for event in sounded for phone in event.phones):
             raise InputError(f"there is nothing to say in {text[:40]!r}; give at least one word")
         phones, spans = _sequence(sounded, words or names, len(sound) / self._rate)
@@ -81,15 +90,23 @@ class EspeakVoice:
         """Text for espeak-ng; and the words, where they are given as phones."""
         if isinstance(spoken, str):
             check_script(spoken, self._language)
-            plain = spoken.replace("[[", " ").replace("]]", " ")
-            chosen = [self._own_words.get(word.strip(".,;:!?\"'()").lower()) for word in plain.split()]
-            if not any(chosen):
+            if self._language == "ja" and has_kanji(spoken):
+                spoken = with_kana(spoken)
+            plain = _without_brackets(spoken)
+            if not any(map(self._own, plain.split())):
                 return plain, []
-            spoken = [
-                SpokenWord(word, own) if own else SpokenWord(word, ())
-                for word, own in zip(plain.split(), chosen, strict=True)
-            ]
-        return " ".join(_mnemonic(word) for word in spoken), [word.text for word in spoken]
+            spoken = [SpokenWord(word, ()) for word in plain.split()]
+        words = [word if word.segments else self._read(word) for word in spoken]
+        return " ".join(_mnemonic(word) for word in words), [word.text for word in words]
+
+    def _own(self, word: str) -> tuple[Segment, ...] | None:
+        return self._own_words.get(word.strip(".,;:!?\"'()").lower())
+
+    def _read(self, word: SpokenWord) -> SpokenWord:
+        """A word whose phones nobody gives: those of the user's dictionary, or none."""
+        check_script(word.text, self._language)
+        text = "".join(_without_brackets(word.text).split())
+        return SpokenWord(text, self._own(text) or (), word.after)
 
     def _sounded(
         self, header: dict[str, Any], text: str, sound: NDArray[np.float32]
@@ -110,6 +127,13 @@ class EspeakVoice:
         return _true_silences(found, sound, self._rate), names
 
 
+def _by_written_words(found: Sequence[_Sounded], header: Mapping[str, Any], text: str) -> list[_Sounded]:
+    """Events with the words between spaces in place of espeak-ng's own, which splits and joins words."""
+    starts = [0, *(match.end() for match in re.finditer(" ", text))]
+    owners = [bisect_right(starts, value[0]) - 1 for kind, _, value in header["events"] if kind == WORD_EVENT]
+    return [replace(event, word=owners[event.word] if event.word >= 0 else -1) for event in found]
+
+
 def _true_silences(found: Sequence[_Sounded], sound: NDArray[np.float32], rate: int) -> list[_Sounded]:
     """Events less those that name no phone though something sounds (a mark of the phone before, such as ʲ)."""
     ends = [event.start for event in found[1:]] + [len(sound) / rate]
@@ -121,9 +145,13 @@ def _true_silences(found: Sequence[_Sounded], sound: NDArray[np.float32], rate: 
     ]
 
 
+def _without_brackets(text: str) -> str:
+    return text.replace("[[", " ").replace("]]", " ")
+
+
 def _mnemonic(word: SpokenWord) -> str:
     if not word.segments:
-        return word.text
+        return word.text + word.after
     return f"[[{''.join(_mnemonics(segment) for segment in word.segments)}]]{word.after}"
 
 
@@ -132,12 +160,7 @@ def _mnemonics(segment: Segment) -> str:
     return STRESS_MARKS.get(segment.stress, "") + "".join(MNEMONICS[phone] for phone in phones)
 
 
-def _ask(
-    text: str, language: str, words_per_minute: int, has_phonemes: bool
-) -> tuple[dict[str, Any], NDArray[np.int16]]:
-    request = {
-        "text": text, "language": language, "words_per_minute": words_per_minute, "has_phonemes": has_phonemes,
-    }  # fmt: skip
+def _ask(request: Mapping[str, Any]) -> tuple[dict[str, Any], NDArray[np.int16]]:
     try:
         answer = subprocess.run(
             [sys.executable, "-I", str(CHILD)],
@@ -150,7 +173,7 @@ def _ask(
         raise BackendError(f"espeak-ng did not answer within {PATIENCE_S:.0f} s; try a shorter text") from late
     if answer.returncode < 0:
         raise BackendError(
-            f"espeak-ng crashed (signal {-answer.returncode}) on {text[:40]!r}; "
+            f"espeak-ng crashed (signal {-answer.returncode}) on {str(request['text'])[:40]!r}; "
             "write it in another way, or choose another voice"
         )
     if answer.returncode != 0:

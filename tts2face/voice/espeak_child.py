@@ -76,7 +76,7 @@ def _event(event: _Event) -> tuple[int, int, Any] | None:
 
 
 def speak(request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
-    """Header and samples for a request: text, language, words_per_minute, and whether ``[[...]]`` holds phonemes."""
+    """Header and samples for a request: text, language, gender, words_per_minute; has_phonemes: [[...]] holds some."""
     library, rate = _library()
     chunks: list[bytes] = []
     events: list[tuple[int, int, Any]] = []
@@ -94,7 +94,7 @@ def speak(request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
 
     callback = _Callback(collect)
     library.espeak_SetSynthCallback(callback)
-    voice = _Voice(languages=request["language"].encode())
+    voice = _Voice(languages=request["language"].encode(), gender=request["gender"])
     if rate <= 0 or library.espeak_SetVoiceByProperties(ctypes.byref(voice)) != 0:
         return {"error": f"espeak-ng does not speak {request['language']}"}, b""
     library.espeak_SetParameter(RATE_PARAMETER, request["words_per_minute"], 0)

@@ -20,6 +20,7 @@ MOST_LETTERS = 400  # the model hears at most this many letters at once
 UNIT_S = 0.025  # length of one step of the model's durations
 LATE_S = 0.045  # the model's own boundaries lie this much behind the sound (41-51 ms)
 DURATIONS = "/Cast_32_output_0"  # inner tensor of the ONNX graph: steps of 25 ms for each letter
+NO_LETTER = re.compile(r"[^\w'’-]+")  # what a word in the reader's brackets may not hold
 SAYABLE = re.compile(r"[^\W_]")
 """Anything that must be heard: a letter or a digit."""
 
@@ -59,9 +60,12 @@ class NeuralVoice:
 
     def _parts(self, spoken: Spoken) -> Iterator[list[_Token]]:
         if isinstance(spoken, str):
-            sentences = [self._tokens(sentence) for sentence in self._model.split_sentences(spoken)]
-        else:
+            split = self._model.split_sentences(spoken)
+            sentences = [self._tokens(self._with_own_words(sentence)) for sentence in split]
+        elif all(word.segments for word in spoken):
             sentences = [[_given(word) for word in spoken]]
+        else:
+            sentences = [self._tokens(" ".join(self._in_text(word) for word in spoken))]
         for sentence in sentences:
             for part in _cut(sentence):
                 if any(token.letters.strip() for token in part):
@@ -71,7 +75,7 @@ class NeuralVoice:
         from hibari.g2p.normalize import normalize
 
         reader = self._model.g2p
-        read = reader.phonemize_tokens(reader.tokenize(normalize(self._with_own_words(sentence))))
+        read = reader.phonemize_tokens(reader.tokenize(normalize(sentence)))
         tokens = [_Token(token.text, self._known(token.phonemes), bool(token.whitespace)) for token in read]
         unsaid = [token.text for token in tokens if SAYABLE.search(token.text) and not phones_of(token.letters)[0]]
         if unsaid:
@@ -87,6 +91,13 @@ class NeuralVoice:
 
         plain = re.sub(r"[\[\]]", " ", sentence)
         return re.sub(r"[^\W_]+(?:['’-][^\W_]+)*", marked, plain) if self._own_words else plain
+
+    def _in_text(self, word: SpokenWord) -> str:
+        """A word as the reader takes it: with its phones where they are given."""
+        if not word.segments:
+            return self._with_own_words(word.text) + word.after
+        shown = NO_LETTER.sub("", word.text) or "word"
+        return f"[{shown}](/{letters_of(word.segments)}/){word.after}"
 
     def _known(self, letters: str | None) -> str:
         return "".join(letter for letter in letters or "" if letter in self._model.vocab)

@@ -62,7 +62,7 @@ class PiperVoice:
 
     def _words(self, spoken: Spoken) -> list[SpokenWord]:
         if not isinstance(spoken, str):
-            return list(spoken)
+            return [part for word in spoken for part in ([word] if word.segments else self._read(word))]
         check_script(spoken, self._language)
         written = WORD.findall(spoken)
         own = {word: self._own_words.get(word.lower()) for word in written}
@@ -71,6 +71,12 @@ class PiperVoice:
             read = [segment for part in spoken_parts for segment in segments_of(part, self._language)]
             words.append(SpokenWord(text, own[text] or tuple(read)))
         return [word for word in words if word.segments]
+
+    def _read(self, word: SpokenWord) -> list[SpokenWord]:
+        """The words of a text whose phones nobody gives."""
+        *others, last = self._words(word.text) or [SpokenWord("", ())]
+        behind = "".join(re.findall("[.,;:!?]+$", word.text)) + word.after
+        return [*others, SpokenWord(last.text, last.segments, behind)] if last.segments else []
 
     def _marked(self, text: str) -> str:
         """The text with a user's words as ``[[IPA]]``, which Piper says as it stands."""

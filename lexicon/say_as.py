@@ -1,0 +1,227 @@
+"""What ``<say-as>`` says: a text read as a number, a date, letters, ..., in words.
+
+English reads every kind. In other languages espeak-ng reads numbers itself, and only kinds that need no words of the
+language are read: letters, digits, telephone and cardinal numbers.
+"""
+
+import re
+from collections.abc import Callable
+from types import MappingProxyType
+
+from lexicon import written_forms as readings
+from lexicon.errors import InputError
+from lexicon.normalize import normalize
+from lexicon.numbers import cardinal, digits, number, ordinal, roman
+
+LONGEST = 300  # characters of one reading
+_SIGNS = MappingProxyType({
+    ".": "dot", "-": "dash", "/": "slash", "_": "underscore", ":": "colon", ",": "comma", ";": "semicolon", "*": "star",
+    "!": "exclamation mark", "?": "question mark", "'": "apostrophe", '"': "quote", "(": "open parenthesis",
+    ")": "close parenthesis", "#": "hash", "$": "dollar sign", "~": "tilde", "|": "bar", "\\": "backslash",
+})  # fmt: skip
+_NUMBER = re.compile(r"([+-]?)([0-9]{1,3}(?:[ ,\u00a0\u202f][0-9]{3})+(?:\.[0-9]+)?|[0-9]+(?:\.[0-9]+)?|\.[0-9]+)")
+_ROMAN = re.compile("[IVXLCDM]+")
+_ORDINAL = re.compile(r"([0-9][0-9,]*)(?:st|nd|rd|th|\.)?")
+_FRACTION = re.compile(r"(?:([0-9]{1,6})[ +])?([0-9]{1,6})\s*[/⁄]\s*([0-9]{1,6})")
+_CLOCK = re.compile(
+    r"([0-9]{1,2})[:.h]([0-9]{2})(?:[:.]([0-9]{2}))?\s*([aApP]\.?[mM]\.?)?|([0-9]{1,2})\s*([aApP]\.?[mM]\.?)"
+)
+_DURATION = re.compile(r"(?:([0-9]{1,3})h ?)?([0-9]{1,3})(?:'|′|m ?)(?:([0-9]{1,2})(?:\"|″|''|s))?")
+_CURRENCY_FIRST = re.compile(r"([A-Z]{3})\s*([0-9][0-9,]*(?:\.[0-9]+)?)")
+_COMPACT = re.compile("[0-9?]{8}")
+_PARTS = re.compile(r"[0-9]+|[^\W\d_]+|\?+")
+DATE_FORMATS = ("mdy", "dmy", "ymd", "ydm", "md", "dm", "ym", "my", "y", "m", "d")
+
+
+def say_as(kind: str, text: str, written_format: str, language: str) -> str:
+    """The words for a text that is to be read as something.
+
+    Parameters
+    ----------
+    kind
+        ``interpret-as``: one of `KINDS`.
+    written_format
+        ``format``: of dates one of `DATE_FORMATS`, of times hms12 or hms24, of currencies a code such as USD; or empty.
+
+    Raises
+    ------
+    InputError
+        There is no such kind, the text is none of it, or the language cannot say it.
+    """
+    if kind not in KINDS:
+        raise InputError(f"<say-as> cannot read as {kind[:40]!r}; choose {', '.join(KINDS)}")
+    content = " ".join("".join(str(int(c)) if c.isdecimal() else c for c in text).split())
+    if not content or len(content) > LONGEST:
+        raise InputError(f"<say-as> needs 1 to {LONGEST} characters to read, not {len(content)}")
+    if language.partition("-")[0] == "en":
+        return KINDS[kind](content, written_format.strip())
+    if kind not in _ELSEWHERE:
+        raise InputError(f"<say-as> reads {kind} in English only, not in {language}; write it in words")
+    return _ELSEWHERE[kind](content)
+
+
+def _unreadable(text: str, what: str, example: str) -> InputError:
+    return InputError(f"cannot read {text[:40]!r} as {what}; write it as in {example}")
+
+
+def _cardinal(text: str, _: str) -> str:
+    match = _NUMBER.fullmatch(text)
+    if match:
+        return readings.signed(match[1] + re.sub(r"[ \u00a0\u202f]", "", match[2]))
+    if _ROMAN.fullmatch(text) and roman(text):
+        return cardinal(roman(text))
+    raise _unreadable(text, "a cardinal number", "1,234")
+
+
+def _ordinal(text: str, _: str) -> str:
+    match = _ORDINAL.fullmatch(text)
+    if match:
+        return ordinal(int(match[1].replace(",", "")[:15]))
+    if _ROMAN.fullmatch(text) and roman(text):
+        return ordinal(roman(text))
+    raise _unreadable(text, "an ordinal number", "3 or 3rd")
+
+
+def _characters(text: str, _: str) -> str:
+    return " ".join(_character(character) for character in text if not character.isspace())
+
+
+def _character(character: str) -> str:
+    if character.isdigit():
+        return digits(character) if character.isascii() else character
+    if character.isalpha():
+        return character.upper()
+    return _SIGNS.get(character) or readings.table("symbols.tsv").get(character, (normalize(character),))[0]
+
+
+def _digits(text: str, _: str) -> str:
+    if not re.fullmatch(r"[0-9 .,-]*[0-9][0-9 .,-]*", text):
+        raise _unreadable(text, "digits", "4711")
+    return digits(text)
+
+
+def _telephone(text: str, _: str) -> str:
+    groups = re.findall(r"[0-9]+|[A-Za-z]+", text)
+    if not any(group.isdigit() for group in groups):
+        raise _unreadable(text, "a telephone number", "+1 555 123 4567")
+    said = ", ".join(digits(group) if group.isdigit() else _characters(group, "") for group in groups)
+    return f"plus {said}" if text.startswith("+") else said
+
+
+def _fraction(text: str, _: str) -> str:
+    match = _FRACTION.fullmatch(text)
+    if match is None:
+        raise _unreadable(text, "a fraction", "3/4 or 1 1/2")
+    return readings.ratio(match[2], match[3], match[1] or "")
+
+
+def _time(text: str, written_format: str) -> str:
+    match, lasts = _CLOCK.fullmatch(text), _DURATION.fullmatch(text)
+    if match and written_format in {"", "hms12", "hms24"}:
+        hour, minute = int(match[1] or match[5]), int(match[2] or 0)
+        half = match[4] or match[6] or ""
+        if hour <= 24 and minute <= 59 and int(match[3] or 0) <= 59:
+            return readings.time_of_day(hour, minute, int(match[3] or 0), half)
+    if lasts and not written_format:
+        named = zip((lasts[1], lasts[2], lasts[3]), ("hour", "minute", "second"), strict=True)
+        return " ".join(f"{number(n)} {unit}{'' if int(n) == 1 else 's'}" for n, unit in named if n)
+    if written_format not in {"", "hms12", "hms24"}:
+        raise InputError(f"there is no format {written_format[:20]!r} of times; choose hms12 or hms24")
+    raise _unreadable(text, "a time", "3:05pm or 1'21\"")
+
+
+def _date(text: str, written_format: str) -> str:
+    if not written_format:
+        said = normalize(text)
+        if said == text or not any(character.isdigit() for character in text):
+            raise _unreadable(text, "a date", '2024-03-15, with format="ymd" where it is unclear')
+        return said
+    if written_format not in DATE_FORMATS:
+        raise InputError(f"there is no format {written_format[:20]!r} of dates; choose {', '.join(DATE_FORMATS)}")
+    try:
+        return _spoken_date(_date_parts(text, written_format))
+    except (ValueError, IndexError, StopIteration) as wrong:
+        raise _unreadable(text, f"a date of the format {written_format}", "12/31/1999 for mdy") from wrong
+
+
+def _date_parts(text: str, written_format: str) -> dict[str, str]:
+    parts = _PARTS.findall(text)
+    if _COMPACT.fullmatch(text) and len(written_format) == 3:
+        lengths = [4 if letter == "y" else 2 for letter in written_format]
+        starts = [sum(lengths[:at]) for at in range(3)]
+        parts = [text[start : start + length] for start, length in zip(starts, lengths, strict=True)]
+    return dict(zip(written_format, parts, strict=True))
+
+
+def _spoken_date(found: dict[str, str]) -> str:
+    known = {letter: part for letter, part in found.items() if part.strip("?")}
+    year = known.get("y", "")
+    if "m" not in known:
+        said = ordinal(int(known["d"])) if "d" in known else readings.year_or_number(year)
+        return said
+    month = int(known["m"]) if known["m"].isdigit() else readings.month_number(known["m"])
+    day = int(re.sub(r"\D", "", known["d"])) if "d" in known else 0
+    if not 1 <= month <= 12 or day > 31 or ("d" in known and day < 1):
+        raise ValueError(month, day)
+    if day:
+        return readings.date(day, month, year)
+    return (
+        f"{readings.MONTHS[month - 1]} {readings.year_or_number(year)}".rstrip() if year else readings.MONTHS[month - 1]
+    )
+
+
+def _currency(text: str, code: str) -> str:
+    match = _CURRENCY_FIRST.fullmatch(text)
+    if match is None and code and _NUMBER.fullmatch(text):
+        match = _CURRENCY_FIRST.fullmatch(f"{code.upper()} {text}")
+    if match:
+        if match[1] not in readings.CURRENCIES:
+            raise InputError(f"there is no currency {match[1]!r} here; write it in words")
+        return readings.money(match[2], match[1], "")
+    said = normalize(text)
+    if said == text or not any(character.isdigit() for character in text):
+        raise _unreadable(text, "money", "$12.50 or 12 EUR")
+    return said
+
+
+def _unit(text: str, _: str) -> str:
+    said = normalize(text)
+    if not said or any(character.isdigit() for character in said):
+        raise _unreadable(text, "a measure", "5 km")
+    return said
+
+
+def _bleep(_text: str, _: str) -> str:
+    return "bleep"
+
+
+Reader = Callable[[str, str], str]
+KINDS: MappingProxyType[str, Reader] = MappingProxyType({
+    "cardinal": _cardinal, "number": _cardinal, "ordinal": _ordinal, "characters": _characters,
+    "spell-out": _characters, "verbatim": _characters, "digits": _digits, "date": _date, "time": _time,
+    "telephone": _telephone, "fraction": _fraction, "currency": _currency, "money": _currency, "unit": _unit,
+    "address": _unit, "expletive": _bleep, "bleep": _bleep,
+})  # fmt: skip
+
+
+def _apart(text: str) -> str:
+    return " ".join("".join(text.split()))
+
+
+def _grouped(text: str) -> str:
+    groups = re.findall(r"[^\W_]+", text)
+    if not groups:
+        raise _unreadable(text, "a telephone number", "+1 555 123 4567")
+    return ", ".join(_apart(group) for group in groups)
+
+
+def _plain_number(text: str) -> str:
+    if not re.fullmatch(r"[+-]?[\d ,.\u00a0\u202f']*\d", text):
+        raise _unreadable(text, "a cardinal number", "1234")
+    return re.sub(r"[ \u00a0\u202f']", "", text)
+
+
+_ELSEWHERE: MappingProxyType[str, Callable[[str], str]] = MappingProxyType({
+    "cardinal": _plain_number, "number": _plain_number, "characters": _apart, "spell-out": _apart, "verbatim": _apart,
+    "digits": _apart, "telephone": _grouped,
+})  # fmt: skip
