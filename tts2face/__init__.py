@@ -11,27 +11,51 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
-    from tts2face.api import write_clip
-    from tts2face.models.face import Face
-    from tts2face.models.face_file import load_face
-    from tts2face.models.palette import Palette, load_palette
-    from tts2face.models.talker import Talker, load_talker
-    from tts2face.render.picture import Picture
-    from tts2face.request import Request
-    from tts2face.session import Session
-    from tts2face.types import Clip, Speech, Trajectory, Waveform
+    from lexicon.errors import BackendError as BackendError
+    from lexicon.errors import DataError as DataError
+    from lexicon.errors import InputError as InputError
+    from lexicon.errors import Tts2faceError as Tts2faceError
+    from lexicon.sequence import PhoneSequence as PhoneSequence
+    from lexicon.sequence import WordSpan as WordSpan
+    from tts2face.api import write_clip as write_clip
+    from tts2face.catalogue import faces as faces
+    from tts2face.catalogue import identities as identities
+    from tts2face.catalogue import languages as languages
+    from tts2face.catalogue import styles as styles
+    from tts2face.catalogue import talkers as talkers
+    from tts2face.catalogue import voices as voices
+    from tts2face.models.face import Face as Face
+    from tts2face.models.face_file import load_face as load_face
+    from tts2face.models.palette import Palette as Palette
+    from tts2face.models.palette import load_palette as load_palette
+    from tts2face.models.talker import Talker as Talker
+    from tts2face.models.talker import load_talker as load_talker
+    from tts2face.render.picture import Picture as Picture
+    from tts2face.request import Request as Request
+    from tts2face.session import Session as Session
+    from tts2face.session import Written as Written
+    from tts2face.synthesis.animated_face import AnimatedFace as AnimatedFace
+    from tts2face.synthesis.clip_stream import Piece as Piece
+    from tts2face.synthesis.performance import Performance as Performance
+    from tts2face.types import Clip as Clip
+    from tts2face.types import Speech as Speech
+    from tts2face.types import Trajectory as Trajectory
+    from tts2face.types import Waveform as Waveform
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "AnimatedFace",
     "BackendError",
     "Clip",
     "DataError",
     "Face",
     "InputError",
     "Palette",
+    "Performance",
+    "PhoneSequence",
     "Picture",
+    "Piece",
     "Request",
     "Session",
     "Speech",
@@ -39,32 +63,38 @@ __all__ = [
     "Trajectory",
     "Tts2faceError",
     "Waveform",
+    "WordSpan",
+    "Written",
+    "faces",
+    "identities",
+    "languages",
     "load_face",
     "load_palette",
     "load_talker",
+    "styles",
+    "talkers",
+    "voices",
     "write_clip",
 ]
 
-_HOMES = {
-    "BackendError": "lexicon.errors",
-    "Clip": "tts2face.types",
-    "DataError": "lexicon.errors",
-    "Face": "tts2face.models.face",
-    "InputError": "lexicon.errors",
-    "Palette": "tts2face.models.palette",
-    "Picture": "tts2face.render.picture",
-    "Request": "tts2face.request",
-    "Session": "tts2face.session",
-    "Speech": "tts2face.types",
-    "Talker": "tts2face.models.talker",
-    "Trajectory": "tts2face.types",
-    "Tts2faceError": "lexicon.errors",
-    "Waveform": "tts2face.types",
-    "load_face": "tts2face.models.face_file",
-    "load_palette": "tts2face.models.palette",
-    "load_talker": "tts2face.models.talker",
-    "write_clip": "tts2face.api",
+_MODULES = {
+    "lexicon.errors": ("BackendError", "DataError", "InputError", "Tts2faceError"),
+    "lexicon.sequence": ("PhoneSequence", "WordSpan"),
+    "tts2face.api": ("write_clip",),
+    "tts2face.catalogue": ("faces", "identities", "languages", "styles", "talkers", "voices"),
+    "tts2face.models.face": ("Face",),
+    "tts2face.models.face_file": ("load_face",),
+    "tts2face.models.palette": ("Palette", "load_palette"),
+    "tts2face.models.talker": ("Talker", "load_talker"),
+    "tts2face.render.picture": ("Picture",),
+    "tts2face.request": ("Request",),
+    "tts2face.session": ("Session", "Written"),
+    "tts2face.synthesis.animated_face": ("AnimatedFace",),
+    "tts2face.synthesis.clip_stream": ("Piece",),
+    "tts2face.synthesis.performance": ("Performance",),
+    "tts2face.types": ("Clip", "Speech", "Trajectory", "Waveform"),
 }
+_HOMES = {name: module for module, names in _MODULES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:

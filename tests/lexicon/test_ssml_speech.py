@@ -260,8 +260,8 @@ def test_documents_may_name_the_voices_that_need_no_file() -> None:
         ('<voice gender="robot">a</voice>', "no gender 'robot'"),
         ('<voice age="9">a</voice>', "<voice> has no attribute 'age' here"),
         ('<voice name="heart" language="de">a</voice>', "heart speaks English, not de"),
-        ("<lang>a</lang>", "no language '' here; give a tag"),
-        ('<lang xml:lang="tlh">a</lang>', "no language 'tlh' here"),
+        ("<lang>a</lang>", "no language ''; `tts2face languages` lists all"),
+        ('<lang xml:lang="tlh">a</lang>', "no language 'tlh'"),
         (f'<sub alias="{"a" * (LONGEST_ATTRIBUTE + 1)}">a</sub>', "attribute alias of <sub> has 10001 characters"),
     ],
 )

@@ -1,0 +1,68 @@
+"""The public names of the package: imported lazily, without side effects, and complete for type checkers."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import tts2face
+
+HEAVY = ("numpy", "numba", "scipy", "av", "PIL", "onnxruntime", "hibari", "cyclopts")
+
+
+def run_python(code: str, home: Path) -> str:
+    """What a fresh process with an empty home folder prints."""
+    environment = {"PATH": os.environ["PATH"], "HOME": str(home), "PYTHONPATH": str(Path(tts2face.__file__).parents[1])}
+    answer = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True, cwd=home
+    )
+    return answer.stdout
+
+
+def test_importing_the_package_has_no_side_effect(tmp_path: Path) -> None:
+    code = (
+        "import os, sys; before = dict(os.environ)\n"
+        "import tts2face\n"
+        "assert dict(os.environ) == before\n"
+        f"print([name for name in {HEAVY!r} if name in sys.modules])"
+    )
+    assert run_python(code, tmp_path).strip() == "[]"
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", tts2face.__all__)
+def test_every_public_name_has_a_home(name: str) -> None:
+    value = getattr(tts2face, name)
+    assert value.__doc__
+    assert name in dir(tts2face)
+
+
+def test_a_name_that_does_not_exist_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'synthesise'"):
+        _ = tts2face.synthesise
+
+
+def test_lazy_names_and_names_for_type_checkers_are_the_same() -> None:
+    assert sorted(tts2face._HOMES) == sorted(tts2face.__all__)
+
+
+def test_a_script_that_uses_the_package_passes_mypy_strict(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import tts2face\n"
+        "session = tts2face.Session(talker='grid_s1', face='head')\n"
+        "clip: tts2face.Clip = session.clip('Hello there.', style='delighted')\n"
+        "rate: int = clip.speech.waveform.rate\n"
+        "names: tuple[str, ...] = clip.motion.channels\n"
+        "for piece in session.stream('A long text.', fps=25):\n"
+        "    part: tts2face.Clip = piece.clip\n"
+        "tts2face.write_clip(clip, session.face, 'again.mp4')\n"
+        "styles: list[str] = [style.name for style in tts2face.styles()]\n"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path / "cache"), str(script)],
+        capture_output=True, text=True, check=False, cwd=Path(tts2face.__file__).parents[1],
+    )  # fmt: skip
+    assert answer.returncode == 0, answer.stdout

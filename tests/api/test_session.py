@@ -1,0 +1,100 @@
+"""A session: what it returns can be drawn, it serves several threads, and options are checked."""
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tts2face
+from lexicon.errors import InputError
+from tests.golden.requests import starter_with_pictures
+from tts2face.types import joined_clips
+
+TEXTS = ("Bob may move.", "We were away.", "Five big maps.", "Hello there.")
+SMALL = tts2face.Picture(size="64x64", supersampling=1)
+
+
+@pytest.fixture(scope="module")
+def session() -> tts2face.Session:
+    return tts2face.Session()
+
+
+def test_a_clip_moves_the_face_s_own_shapes_first(session: tts2face.Session) -> None:
+    clip = session.clip("Bob may move.")
+    own = tts2face.load_face("head").shape_names
+    assert clip.motion.channels[: len(own)] == own
+    assert clip.motion.channels == session.face.channels
+    assert len(clip.motion.channels) > len(own)
+
+
+@pytest.mark.parametrize("options", [{}, {"gestures": False}, {"idle": 0.5}], ids=["gestures", "lips only", "idle"])
+def test_what_a_session_returns_can_be_drawn(
+    options: dict[str, object], session: tts2face.Session, tmp_path: Path
+) -> None:
+    clip = session.clip("" if "idle" in options else "Bob may.", **options)
+    tts2face.write_clip(clip, session.face, tmp_path / "again", picture=SMALL)
+    session.write("" if "idle" in options else "Bob may.", tmp_path / "at_once", picture=SMALL, **options)
+    again, at_once = (sorted((tmp_path / name).glob("*.png")) for name in ("again", "at_once"))
+    assert len(again) == len(clip.motion)
+    assert [path.read_bytes() for path in again] == [path.read_bytes() for path in at_once]
+
+
+def test_a_talker_s_own_face_is_drawn_by_the_same_calls(tmp_path: Path) -> None:
+    own = tts2face.Session(starter_with_pictures(), "self")
+    clip = own.clip("Bob may.", fps=25)
+    tts2face.write_clip(clip, own.face, tmp_path / "own", picture=SMALL)
+    assert len(list((tmp_path / "own").glob("*.png"))) == len(clip.motion)
+    with pytest.raises(InputError, match="has no mesh"):
+        _ = own.mesh
+
+
+def test_a_clip_of_another_face_is_refused(session: tts2face.Session, tmp_path: Path) -> None:
+    clip = tts2face.Session(starter_with_pictures(), "self").clip("Bob.", fps=25)
+    with pytest.raises(InputError, match="not in the shapes of this face"):
+        tts2face.write_clip(clip, session.face, tmp_path / "a", picture=SMALL)
+
+
+def test_threads_get_what_one_gets(session: tts2face.Session) -> None:
+    alone = [tts2face.Session(palette=session.palette).clip(text, seed=2) for text in TEXTS]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(lambda text: session.clip(text, seed=2), TEXTS * 2))
+    for one, other in zip(alone * 2, together, strict=True):
+        assert np.array_equal(one.motion.values, other.motion.values)
+        assert np.array_equal(one.head.values, other.head.values)
+        assert np.array_equal(one.speech.waveform.samples, other.speech.waveform.samples)
+
+
+def test_a_stream_is_the_clip_in_pieces(session: tts2face.Session) -> None:
+    pieces = list(session.stream("Bob may move. We were away.", fps=25))
+    whole = session.clip("Bob may move. We were away.", fps=25)
+    assert [piece.begin for piece in pieces] == [0.0, len(pieces[0].clip.motion) / 25]
+    assert np.array_equal(joined_clips([piece.clip for piece in pieces]).motion.values, whole.motion.values)
+    assert [phone.phone for phone in pieces[1].shown()][:3] == ["sil", "w", "i"]
+    assert pieces[1].shown()[0].start >= pieces[1].begin
+
+
+@pytest.mark.parametrize(
+    ("call", "reason"),
+    [
+        (lambda session: session.clip("Hello.", stile="delighted"), "there is no option 'stile'"),
+        (lambda session: session.clip(tts2face.Request(text="Hello."), seed=1), "stands beside a whole request"),
+        (lambda session: session.clip("Hello.", style="gleeful"), "no style 'gleeful'"),
+        (lambda session: session.write("Hello.", "a.mp4", sise="64x64"), "there is no option 'sise'"),
+        (lambda session: session.write("Hello.", "a.avi"), "a.avi"),
+        (lambda session: tts2face.Session(face="self"), "motion only"),
+        (lambda session: tts2face.Session(face="self", identity="kofi"), "no identity presets"),
+        (lambda session: tts2face.Session(talker="nobody"), "nobody"),
+    ],
+)
+def test_wrong_calls_are_refused(call: object, reason: str, session: tts2face.Session) -> None:
+    assert callable(call)
+    with pytest.raises(InputError, match=reason):
+        call(session)
+
+
+def test_a_session_without_a_palette_moves_lips_alone() -> None:
+    bare = tts2face.Session(palette=None)
+    clip = bare.clip("Bob may move.")
+    assert clip.motion.channels == tts2face.load_face("head").shape_names
+    assert not clip.head.values.any()
