@@ -10,6 +10,7 @@ from cyclopts import App, Parameter
 from cli.flags import whole_number
 from cli.progress import progress_bar, say, stage_bar
 from tts2face.storage.output_names import check_file_name
+from tts2face.storage.overwrite import refuse_overwriting
 
 corpus = App(name="corpus", help="Build, show and measure talkers.")
 
@@ -54,6 +55,9 @@ def build(  # noqa: PLR0913 - one parameter a flag
     check_suffix(out, "talker")
     if report is not None:
         check_file_name(report, "a report", (".html", ".htm"))
+    folder = recordings if recordings.is_dir() else recordings.parent  # transcripts lie beside a video
+    given = {"the recordings": recordings, "--provenance": provenance, "--model": model}
+    refuse_overwriting({"--out": out, "--report": report}, given | {"the folder of recordings": folder})
     from corpus_tools.build_talker import build_talker
     from corpus_tools.run_options import Effort, no_stages
 
@@ -103,6 +107,7 @@ def face(
 ) -> None:
     """Make a head with the shape and skin of the person in videos, to be shown with `--face`."""
     check_suffix(out, "face")
+    refuse_overwriting({"--out": out}, {"the recordings": recordings, "--model": model})
     from corpus_tools.dense.build_face import build_face
     from corpus_tools.run_options import Effort
 
@@ -126,6 +131,7 @@ def clone(
 ) -> None:
     """Carry one talker's speech to another's face: write a talker with the target's face and the source's motion."""
     check_suffix(out, "talker")
+    refuse_overwriting({"--out": out}, {"the source": source, "the target": target})
     from corpus_tools.clone_talker import clone_talker
 
     made = clone_talker(source, target, out, gain=gain, append=append_missing)
@@ -148,6 +154,7 @@ def drives(
 ) -> None:
     """Learn how a talker's lips follow sound alone (`--audio`), for talkers that were built without it."""
     check_suffix(out, "talker")
+    refuse_overwriting({"--out": out}, {"the recordings": recordings, "--talker": talker, "--model": model})
     from corpus_tools.build_talker import add_drives
     from corpus_tools.run_options import Effort, no_stages
     from tts2face.models.talker import load_talker
@@ -203,5 +210,7 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
     """Measure synthesised lips against real ones that were not learnt from."""
     from cli.evaluation import Asked, Beside, evaluated
 
+    folders = {"--recordings": recordings, "--train": train, "--test": test}
+    refuse_overwriting({"--out": out}, folders | {"--cross-talker": cross_talker, "--tracks": tracks, "--model": model})
     asked = Asked(recordings, hold_out, seed, folds, hold_out_words, train, test, cross_talker)
     evaluated(asked, Beside(tracks, own_durations), out, (cache, jobs, model))

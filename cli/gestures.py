@@ -7,6 +7,7 @@ from cyclopts import Parameter
 
 from cli.corpus import Cache, Jobs, Model, check_suffix, corpus
 from cli.progress import say, stage_bar
+from tts2face.storage.overwrite import refuse_overwriting
 
 
 @corpus.command
@@ -42,6 +43,8 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
 ) -> None:
     """Learn how a person moves beside the lips, from recordings without transcripts: a style for `--palette`."""
     check_suffix(out, "palette")
+    given = {"the recordings": recordings, "--stills": stills, "--markers": markers, "--neutral": neutral}
+    refuse_overwriting({"--out": out}, given | {"--palette": palette, "--provenance": provenance, "--model": model})
     from corpus_tools.build_palette import Recorded, build_style
     from corpus_tools.decomposition.capture_files import Worn
     from corpus_tools.decomposition.marker_set import SHIPPED

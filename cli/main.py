@@ -13,10 +13,12 @@ from cli.corpus import corpus
 from cli.exits import exit_code, sentence
 from cli.flags import chosen, flags_from
 from cli.lists import LISTS
+from cli.memory import return_large_blocks
 from cli.mimic import mimic
 from cli.options import check_options
 from cli.phones import phones
 from cli.report import report
+from cli.stopping import raise_on_signals, stop_code
 from cli.streams import complain, drop_output, settle_streams
 from lexicon.errors import DataError, InputError, Tts2faceError
 from lexicon.inputs import LARGEST_TEXT_BYTES, decoded, read_bounded, read_text
@@ -74,14 +76,14 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     **options: Any,
 ) -> None:
     """Turn text into a talking face."""
-    from cli.speak import SpeakOptions, run
-
     if text is not None and said is not None:
         raise InputError("give the text once, with or without --text")
     needs_text = options.get("audio") is None and options.get("idle") is None
+    from cli.speak import SpeakOptions, run_request
+
     request = chosen(Request, options, text=_text(text if said is None else said, file, is_needed=needs_text))
-    speak_options = SpeakOptions(out, talker, face, identity, palette, explain, view, quiet)
-    run(request, chosen(Picture, options), speak_options)
+    speak_options = SpeakOptions(out, talker, face, identity, palette, explain, view, quiet, file)
+    run_request(request, chosen(Picture, options), speak_options)
 
 
 def _text(text: str | None, file: Path | None, *, is_needed: bool) -> str:
@@ -118,13 +120,15 @@ def run(arguments: Sequence[str]) -> int:
             drop_output()
         complain(f"tts2face: {sentence(refused)}")
         return exit_code(refused)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stopped:
         complain("\ntts2face: stopped; nothing was written")
-        return 130
+        return stop_code(stopped)
     return 0
 
 
 def main() -> None:
     """Entry point of the ``tts2face`` command."""
     settle_streams()
+    raise_on_signals()
+    return_large_blocks()
     sys.exit(run(sys.argv[1:]))

@@ -8,6 +8,7 @@ from cyclopts import Parameter
 
 from cli.progress import say, stage_bar
 from lexicon.errors import InputError
+from tts2face.storage.overwrite import refuse_overwriting
 
 OWN_FACE = "self"
 
@@ -53,6 +54,8 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
         return live(camera, face, identity, Picture(size=size, background=background), model)
     if take is None or out is None:
         raise InputError("give a take and --out, or --camera for a live camera")
+    given = {"the take": take, "--audio": audio, "--talker": talker, "--face": face, "--background": background}
+    refuse_overwriting({"--out": out}, given | {"--model": model})
     if (face == OWN_FACE) != (talker is not None):
         raise InputError("--face self shows a talker's own face: give both --face self and --talker FILE")
     if append_missing and talker is None:

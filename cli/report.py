@@ -8,6 +8,7 @@ from cyclopts import App, Parameter
 from cli.flags import whole_number
 from cli.progress import progress_bar, say
 from lexicon.errors import InputError
+from tts2face.storage.overwrite import refuse_overwriting
 
 report = App(name="report", help="Study what recordings tell: which phones look alike, how a person gestures.")
 
@@ -34,6 +35,7 @@ def similarity(  # noqa: PLR0913 - one parameter a flag
     labels: Annotated[str, Parameter(help="How phones are labelled: both, ipa or arpabet (.json has both).")] = "both",
 ) -> None:
     """Analyse which phones look alike: matrix, neighbours, viseme classes, reliability, articulation."""
+    refuse_overwriting({"--out": out}, {"the talker": talker, "--compare": compare})
     from corpus_tools.similarity.analysis import Options
     from corpus_tools.similarity.write import write_similarity
 
@@ -64,6 +66,7 @@ def gestures(
     seed: Annotated[int, Parameter(help="Which recordings, halves and clips are drawn.", converter=whole_number)] = 0,
 ) -> None:
     """Compare each style's gestures with those that its fields, and noise, make of the same sound."""
+    refuse_overwriting({"--out": out}, {"the palette": palette})
     from corpus_tools.gesture_study.analysis import Options
     from corpus_tools.gesture_study.write import write_gestures
 

@@ -36,11 +36,12 @@ class SpeakOptions:
     explain: Path | None
     view: bool
     quiet: bool
+    file: Path | None = None
 
 
-def run(request: Request, picture: Picture, options: SpeakOptions) -> None:
+def run_request(request: Request, picture: Picture, options: SpeakOptions) -> None:
     """Write, explain or show a clip."""
-    _check(request, options)
+    _check(request, picture, options)
     from tts2face.synthesis.prepared_request import prepare
 
     prepare(request)  # refuses a wrong request before anything is loaded
@@ -65,12 +66,13 @@ def run(request: Request, picture: Picture, options: SpeakOptions) -> None:
         view(session.clip(request), session.mesh, picture)
 
 
-def _check(request: Request, options: SpeakOptions) -> None:
+def _check(request: Request, picture: Picture, options: SpeakOptions) -> None:
     """Refuse flags that do not go together, before anything is loaded."""
     if options.out is None and options.explain is None and not options.view:
         raise InputError("there is no output; add --out clip.mp4 (or .webm, .gif, or a folder for .png files)")
     if options.explain is not None:
         check_file_name(options.explain, "an explanation", EXPLANATIONS)
+    _check_overwriting(request, picture, options)
     is_silent = request.audio is not None or request.idle is not None
     if not request.text.strip() and (not is_silent or options.explain is not None):
         raise InputError("the text is empty; give something to say, or the words of --audio")
@@ -80,6 +82,16 @@ def _check(request: Request, options: SpeakOptions) -> None:
         from tts2face.render.window import require_display
 
         require_display("--view")
+
+
+def _check_overwriting(request: Request, picture: Picture, options: SpeakOptions) -> None:
+    from tts2face.storage.overwrite import refuse_overwriting
+    from tts2face.synthesis.prepared_request import input_paths
+
+    read = {f"--{name}": path for name, path in input_paths(request, picture).items()}
+    models = {"--talker": options.talker, "--face": options.face, "--palette": options.palette}
+    outputs = {"--out": options.out, "--explain": options.explain}
+    refuse_overwriting(outputs, {"--file": options.file} | models | read)
 
 
 def _write(

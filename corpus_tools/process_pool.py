@@ -5,9 +5,11 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
 from lexicon.errors import BackendError
+from tts2face.child_process import exit_after
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -18,24 +20,34 @@ def each_done(
 ) -> Iterator[tuple[Task, Result]]:
     """Tasks with their results as they come, in no order; every process calls ``start(*ready)`` once.
 
+    The processes end at once when the caller stops early, by an error or an interruption, and when this process dies.
+
     Raises
     ------
     BackendError
         A process died.
     """
-    pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_begin, initargs=(start, ready))
+    context = get_context("spawn")
+    ends, alive = context.Pipe(duplex=False)  # nothing is ever sent: it ends with whoever holds `alive`
+    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_begin, initargs=(ends, start, ready))
     try:
         waiting = {pool.submit(work, task): task for task in tasks}
         for future in as_completed(waiting):
             yield waiting[future], future.result()
+        pool.shutdown()
     except BrokenProcessPool as died:
         raise BackendError(
             "a process that read recordings died; run the command again (it goes on), with fewer jobs"
         ) from died
     finally:
+        alive.close()  # where processes still work, nobody waits for their results any more
         pool.shutdown(cancel_futures=True)
+        ends.close()
 
 
-def _begin(start: Callable[..., None], ready: tuple[Any, ...]) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent stops the pool
+def _begin(ends: Connection, start: Callable[..., None], ready: tuple[Any, ...]) -> None:
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):  # sent to the whole group, too; the parent stops the pool
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    exit_after(ends.recv_bytes)
     start(*ready)

@@ -23,12 +23,13 @@ from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
 from tts2face.request import Request
 from tts2face.speech.text_fit import TextMismatch
+from tts2face.storage.overwrite import refuse_overwriting
 from tts2face.synthesis.animated_face import AnimatedFace, mesh_face, own_appearance_face
 from tts2face.synthesis.clip_stream import Performers, Piece, pieces
 from tts2face.synthesis.gesture_layer import GestureLayer
 from tts2face.synthesis.marked_speech import Reached
 from tts2face.synthesis.performance import Performance, clips_of, perform
-from tts2face.synthesis.prepared_request import PreparedRequest, prepare
+from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, prepare
 from tts2face.types import Clip, joined_clips
 from tts2face.voice.engine import Pronouncing, Voice, load_voice
 
@@ -193,8 +194,10 @@ class Session:
         """
         of_picture = {name: options.pop(name) for name in _names(Picture) if name in options and picture is None}
         prepared = prepare(request_of(text, options))
+        picture = picture or Picture(**of_picture)
         checked_output(out)
-        renderer = self.renderer(picture or Picture(**of_picture), has_gestures=prepared.request.gestures)
+        refuse_overwriting({"out": out}, input_paths(prepared.request, picture))
+        renderer = self.renderer(picture, has_gestures=prepared.request.gestures)
         progress = _Steps(prepared.n_steps, on_progress)
         marks: list[Reached] = []
         mismatches: list[TextMismatch] = []

@@ -21,10 +21,10 @@ from tts2face.render.output_path import (
     place_beside,
     put_in_place,
     refusals,
-    remove,
 )
 from tts2face.render.png_folder import Stills
 from tts2face.render.renderer import FrameRenderer
+from tts2face.storage.temporary import Temporary
 from tts2face.types import Clip
 
 N_SWATCHES = 6  # frames of the first clip from which a GIF's palette is made
@@ -78,7 +78,7 @@ class ClipWriter:
         self._n_frames = self._n_given = self._n_samples = 0
         self._clock: tuple[float, int] | None = None
         self._lane: Lane | None = None
-        self._beside: Path | None = None
+        self._beside: Temporary | None = None
 
     def __enter__(self) -> "ClipWriter":
         """Take a place on the disk."""
@@ -128,13 +128,18 @@ class ClipWriter:
             raise InputError("a clip writer is used in a with statement")
         fps, rate, picture = exact_rate(clip.fps), clip.speech.waveform.rate, self._renderer.picture
         if self._kind == FOLDER:
-            return Stills(self._beside, rate, self._renderer.notice)
+            return Stills(self._beside.path, rate, self._renderer.notice)
         if self._kind == GIF:
             chosen = np.linspace(0, len(clip.motion) - 1, N_SWATCHES).astype(int)
-            return Gif(self._beside, [self._renderer.frame(clip, int(i)) for i in chosen], fps, self._renderer.notice)
+            pictures = [self._renderer.frame(clip, int(i)) for i in chosen]
+            return Gif(self._beside.path, pictures, fps, self._renderer.notice)
         shape = (picture.height, picture.width, picture.channels)
         return Movie(
-            self._beside, WEBM_MOVIE if self._kind == WEBM else MP4_MOVIE, shape, (fps, rate), self._renderer.notice
+            self._beside.path,
+            WEBM_MOVIE if self._kind == WEBM else MP4_MOVIE,
+            shape,
+            (fps, rate),
+            self._renderer.notice,
         )
 
     def _complete(self) -> None:
@@ -152,7 +157,7 @@ class ClipWriter:
                 self._lane.abandon()
             self._lane = None
         if self._beside is not None:
-            remove(self._beside)
+            self._beside.remove()
             self._beside = None
 
 

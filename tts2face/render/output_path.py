@@ -2,14 +2,13 @@
 
 import contextlib
 import os
-import shutil
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from lexicon.errors import BackendError, InputError
 from tts2face.render.png_folder import is_stills_folder
 from tts2face.storage.output_names import check_name
+from tts2face.storage.temporary import Temporary
 
 MP4, WEBM, GIF, FOLDER = ".mp4", ".webm", ".gif", ""
 KINDS = (MP4, WEBM, GIF)
@@ -55,7 +54,7 @@ def checked_output(path: Path | str) -> Path:
     return where
 
 
-def place_beside(path: Path, kind: str) -> Path:
+def place_beside(path: Path, kind: str) -> Temporary:
     """A new, empty, hidden file or folder beside a path.
 
     Raises
@@ -64,30 +63,13 @@ def place_beside(path: Path, kind: str) -> Path:
         The folder cannot be written.
     """
     with refusals(path):
-        if kind == FOLDER:
-            folder = tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent)
-            os.chmod(folder, 0o755)
-            return Path(folder)
-        handle, beside = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=kind, dir=path.parent)
-        os.close(handle)
-        os.chmod(beside, 0o644)
-        return Path(beside)
+        return Temporary(path, is_folder=kind == FOLDER)
 
 
-def put_in_place(beside: Path, path: Path) -> None:
+def put_in_place(beside: Temporary, path: Path) -> None:
     """Let what was written beside appear under its name, in place of what was there."""
     with refusals(path):
-        if path.is_dir():
-            shutil.rmtree(path)
-        os.replace(beside, path)
-
-
-def remove(beside: Path) -> None:
-    """Leave nothing of what was written beside."""
-    if beside.is_dir():
-        shutil.rmtree(beside, ignore_errors=True)
-    else:
-        beside.unlink(missing_ok=True)
+        beside.replace(path)
 
 
 @contextlib.contextmanager

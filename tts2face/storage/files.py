@@ -1,10 +1,9 @@
 """Files that appear whole or not at all, and those that are shipped."""
 
-import os
-import tempfile
 from pathlib import Path
 
 from lexicon.errors import BackendError, InputError
+from tts2face.storage.temporary import Temporary
 
 SHIPPED = Path(__file__).parents[1] / "data"
 
@@ -17,16 +16,11 @@ def write_whole(path: Path, content: bytes) -> None:
     BackendError
         The folder cannot be written or the disk is full.
     """
-    beside = None
     try:
-        handle, beside = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.chmod(beside, 0o644)
-        os.replace(beside, path)
+        with Temporary(path) as beside:
+            beside.path.write_bytes(content)
+            beside.replace(path)
     except OSError as refused:
-        if beside is not None:
-            Path(beside).unlink(missing_ok=True)
         raise BackendError(
             f"cannot write {path}: {refused.strerror}; free some space or choose another folder"
         ) from refused

@@ -13,7 +13,9 @@ from tts2face.clock import exact_rate
 from tts2face.exemplar.options import METHODS, SynthesisOptions
 from tts2face.gesture.request_timeline import asked
 from tts2face.gesture.timeline import Timeline
+from tts2face.render.picture import Picture
 from tts2face.request import Request
+from tts2face.storage.overwrite import AnyPath
 from tts2face.synthesis.marked_speech import check_marks
 
 RECORDING_STEPS = 1000  # of progress through a recording
@@ -89,3 +91,15 @@ def synthesis_options(request: Request) -> SynthesisOptions:
     if request.exemplars is not None:
         options = replace(options, k=request.exemplars)
     return options
+
+
+def input_paths(request: Request, picture: Picture) -> dict[str, AnyPath]:
+    """Files that a request and a picture read, by the name of their option."""
+    return {
+        "audio": request.audio,
+        "dictionary": request.dictionary,
+        "timeline": request.timeline,
+        "voice": request.voice,
+        "voice settings": f"{request.voice}.json" if request.voice else None,
+        "background": picture.background,
+    }

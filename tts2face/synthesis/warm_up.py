@@ -17,7 +17,13 @@ from tts2face.render import raster
 from tts2face.render.draw import draw
 from tts2face.render.picture import Picture
 
-COMPILE_MOTION = "from tts2face.synthesis.warm_up import compile_motion; compile_motion()"
+COMPILE_MOTION = """
+import os
+from tts2face.child_process import exit_after
+exit_after(lambda: os.read(0, 1))
+from tts2face.synthesis.warm_up import compile_motion
+compile_motion()
+"""
 PATIENCE_S = 120.0
 
 
@@ -32,7 +38,10 @@ def compile_kernels() -> None:
     """Compile all kernels that a clip needs. Where the other process fails they are compiled at their first use."""
     face = load_face("head")
     other = subprocess.Popen(
-        [sys.executable, "-c", COMPILE_MOTION], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        [sys.executable, "-c", COMPILE_MOTION],
+        stdin=subprocess.PIPE,  # by whose end the other process knows that this one is dead
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
     )
     try:
         draw(face, np.zeros(len(face.shape_names), np.float32), picture=Picture(size="64x64"))
@@ -43,6 +52,8 @@ def compile_kernels() -> None:
         if other.poll() is None:
             other.kill()
         other.wait()
+        if other.stdin is not None:
+            other.stdin.close()
 
 
 def compile_motion() -> None:

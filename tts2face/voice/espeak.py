@@ -1,6 +1,7 @@
 """espeak-ng: a formant voice for every language, whose phoneme events are the phone edges."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -75,7 +76,7 @@ class EspeakVoice:
         text, words = self._written(spoken)
         header, samples = _ask({
             "text": text, "language": self._language, "gender": self._gender, "has_phonemes": bool(words),
-            "words_per_minute": round(USUAL_WORDS_PER_MINUTE * rate),
+            "words_per_minute": round(USUAL_WORDS_PER_MINUTE * rate), "parent": os.getpid(),
         })  # fmt: skip
         sound = np.pad(samples / np.float32(32768), round(QUIET_S * self._rate)).astype(np.float32)
         sounded, names = self._sounded(header, text, sound)

@@ -7,7 +7,10 @@ nothing but the standard library and espeakng_loader.
 
 import ctypes
 import json
+import os
 import sys
+import threading
+import time
 from typing import Any
 
 SYNCHRONOUS, PHONEME_EVENTS, IPA_EVENTS, DO_NOT_EXIT = 2, 0x0001, 0x0002, 0x8000  # speak_lib.h
@@ -15,6 +18,7 @@ WORD_EVENT, PHONEME_EVENT = 1, 7
 CHARACTERS_UTF8, PHONEMES_IN_BRACKETS, POSITION_IN_CHARACTERS = 1, 0x100, 1
 RATE_PARAMETER = 1
 USUAL_BUFFER_MS = 200
+WATCH_S = 0.2  # between looks at whether the parent lives
 
 
 class _Name(ctypes.Union):
@@ -106,9 +110,19 @@ def speak(request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
     return {"rate": rate, "events": events}, b"".join(chunks)
 
 
+def _exit_without(parent: int) -> None:
+    """End this process when its parent is dead: whoever adopts it has another number (POSIX)."""
+    while os.getppid() == parent:
+        time.sleep(WATCH_S)
+    os._exit(1)
+
+
 def main() -> None:
     """Answer one request."""
-    header, samples = speak(json.load(sys.stdin))
+    request = json.load(sys.stdin)
+    if os.name == "posix":
+        threading.Thread(target=_exit_without, args=(request["parent"],), daemon=True).start()
+    header, samples = speak(request)
     sys.stdout.buffer.write(json.dumps({**header, "n_bytes": len(samples)}).encode() + b"\n" + samples)
 
 

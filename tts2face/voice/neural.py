@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lexicon.errors import BackendError, DataError, InputError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.speech.forced_alignment import Aligner, increasing
+from tts2face.telemetry import disable_telemetry
 from tts2face.types import Speech, Waveform, joined_speech
 from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, at_volume
 from tts2face.voice.heart_phonemes import letters_of, phones_of
@@ -39,11 +40,13 @@ class NeuralVoice:
 
     def __init__(self, own_words: Pronouncing) -> None:
         self._own_words = {word: letters_of(segments) for word, segments in own_words.items()}
+        disable_telemetry()
         try:
             from hibari import Hibari
         except ImportError as missing:
             raise BackendError("the voice heart needs hibari-tts; run: pip install hibari-tts") from missing
         self._model: Any = Hibari(voice="heart", threads=1)
+        self._model.sess = _session_without_arena(self._model.model_path)
         self._aligner = Aligner()
 
     @property
@@ -134,6 +137,7 @@ class NeuralVoice:
 
     def _durations(self, letters: str, rate: float) -> NDArray[np.float64]:
         """Steps of `UNIT_S` for the letters with one pad before and one behind."""
+        disable_telemetry()
         import onnxruntime
 
         graph = with_output(Path(self._model.model_path).read_bytes(), DURATIONS)
@@ -144,6 +148,17 @@ class NeuralVoice:
         }
         steps: NDArray[np.float64] = np.asarray(session.run([DURATIONS], given)[0], np.float64).ravel()
         return steps
+
+
+def _session_without_arena(path: str) -> Any:
+    """A session that frees what a sentence took; the arena keeps what the longest one took, up to 100 MB."""
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 3  # errors
+    options.enable_cpu_mem_arena = options.enable_mem_pattern = False
+    return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
 
 
 def _given(word: SpokenWord) -> _Token:

@@ -13,6 +13,7 @@ from lexicon.g2p import phonemize, segments_of
 from lexicon.inputs import read_json
 from lexicon.writing_systems import check_script
 from tts2face.speech.forced_alignment import Aligner
+from tts2face.telemetry import disable_telemetry
 from tts2face.types import Speech, Waveform
 from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, at_volume
 
@@ -29,6 +30,7 @@ class PiperVoice:
         settings = path.with_name(path.name + ".json")
         if not settings.is_file():
             raise DataError(f"the Piper voice {path} lacks its settings; put {settings.name} beside it")
+        disable_telemetry()
         try:
             read_json(settings)  # piper itself reads it without limits
         except OSError as refused:

@@ -1,0 +1,90 @@
+"""Commands that are ended from outside leave nothing behind, neither files nor processes."""
+
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
+TEXT = "This is a rather long sentence that takes some time to speak. " * 20
+PATIENCE_S = 120.0
+POOL = """
+import os, sys, time
+from pathlib import Path
+from corpus_tools.process_pool import each_done
+
+def start(folder):
+    (Path(folder) / str(os.getpid())).touch()
+
+if __name__ == "__main__":
+    from cli.stopping import raise_on_signals
+    raise_on_signals()
+    list(each_done([600.0, 600.0], time.sleep, start, (sys.argv[1],), 2))
+"""
+
+pytestmark = pytest.mark.skipif(
+    not hasattr(signal, "SIGHUP") or shutil.which("ps") is None, reason="needs POSIX signals and ps"
+)
+
+
+def wait_until(holds: Callable[[], object]) -> None:
+    deadline = time.monotonic() + PATIENCE_S
+    while not holds():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def speaking(here: Path) -> "subprocess.Popen[str]":
+    """A command that has begun to write x.mp4."""
+    process = subprocess.Popen(
+        [*COMMAND, TEXT, "--out", "x.mp4", "--size", "64x64"], stderr=subprocess.PIPE, text=True, cwd=here
+    )
+    wait_until(lambda: list(here.glob(".x*")) or process.poll() is not None)
+    assert process.poll() is None
+    return process
+
+
+@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
+def test_a_signal_leaves_nothing(tmp_path: Path, name: str, code: int) -> None:
+    with speaking(tmp_path) as process:
+        process.send_signal(getattr(signal, name))
+        _, told = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == code
+    assert "stopped; nothing was written" in told
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_a_killed_command_left_is_removed_by_the_next_one(tmp_path: Path) -> None:
+    with speaking(tmp_path) as process:
+        process.kill()
+    assert list(tmp_path.glob(".x*"))
+    subprocess.run([*COMMAND, "Hi.", "--out", "x.mp4", "--size", "64x64", "--fps", "5"], check=True, cwd=tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["x.mp4"]
+
+
+def is_running(number: int) -> bool:
+    """Whether a process works; one that has ended and waits for its parent to notice does not."""
+    told = subprocess.run(["ps", "-o", "stat=", "-p", str(number)], capture_output=True, text=True, check=False)
+    return told.stdout.strip() not in {"", "Z"} and not told.stdout.startswith("Z")
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP", "SIGKILL"])
+def test_processes_of_a_pool_end_with_their_parent(tmp_path: Path, name: str) -> None:
+    script = tmp_path / "pool_script.py"
+    script.write_text(POOL)
+    started = tmp_path / "started"
+    started.mkdir()
+    with subprocess.Popen([sys.executable, str(script), str(started)], stderr=subprocess.DEVNULL) as process:
+        wait_until(lambda: len(list(started.iterdir())) == 2)
+        children = [int(path.name) for path in started.iterdir()]
+        assert all(is_running(child) for child in children)
+        process.send_signal(getattr(signal, name))
+        ended = time.monotonic()
+        process.wait(PATIENCE_S)
+        wait_until(lambda: not any(is_running(child) for child in children))
+    assert time.monotonic() - ended < 15.0  # their tasks take ten minutes

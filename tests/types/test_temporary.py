@@ -1,0 +1,85 @@
+"""Temporary files beside their place: taken away with their process, never another's."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tts2face.storage.files import write_whole
+from tts2face.storage.temporary import OURS, Temporary
+
+pytest.importorskip("fcntl", reason="without file locks nothing that was left behind is removed")
+
+HOLD = """
+import sys
+from pathlib import Path
+from tts2face.storage.temporary import Temporary
+held = Temporary(Path(sys.argv[1]), is_folder=sys.argv[2] == "folder")
+if held.path.is_dir():
+    (held.path / "000000.png").touch()
+print("ready", flush=True)
+sys.stdin.read()
+"""
+
+
+def other_process(target: Path, kind: str) -> "subprocess.Popen[str]":
+    child = subprocess.Popen(
+        [sys.executable, "-c", HOLD, str(target), kind], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert child.stdout is not None
+    assert child.stdout.readline() == "ready\n"
+    return child
+
+
+@pytest.mark.parametrize("kind", ["file", "folder"])
+def test_what_a_killed_process_left_is_removed_and_what_a_living_one_writes_is_not(tmp_path: Path, kind: str) -> None:
+    target = tmp_path / "clip.mp4"
+    with other_process(target, kind) as child:
+        (written,) = tmp_path.iterdir()
+        with Temporary(target) as mine:
+            assert {*tmp_path.iterdir()} == {written, mine.path}
+        assert [*tmp_path.iterdir()] == [written]
+        child.kill()
+        child.wait()
+        assert [*tmp_path.iterdir()] == [written]
+    write_whole(target, b"new")
+    assert [*tmp_path.iterdir()] == [target]
+    assert target.read_bytes() == b"new"
+
+
+def test_only_files_of_the_same_target_are_removed(tmp_path: Path) -> None:
+    for name in (f".other.mp4{OURS}abc", ".clip.mp4.abc", f"clip.mp4{OURS}abc"):
+        (tmp_path / name).touch()
+    (tmp_path / f".clip.mp4{OURS}abc").touch()
+    with Temporary(tmp_path / "clip.mp4") as mine:
+        mine.replace(tmp_path / "clip.mp4")
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        ".clip.mp4.abc", f".other.mp4{OURS}abc", "clip.mp4", f"clip.mp4{OURS}abc",
+    ]  # fmt: skip
+
+
+def test_a_link_with_the_name_of_a_temporary_file_is_not_followed(tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_text("keep")
+    (tmp_path / f".clip.mp4{OURS}abc").symlink_to(tmp_path / "mine.txt")
+    write_whole(tmp_path / "clip.mp4", b"new")
+    assert (tmp_path / "mine.txt").read_text() == "keep"
+
+
+def test_a_file_never_replaces_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "kept" / "inside").touch()
+    with Temporary(tmp_path / "kept") as mine, pytest.raises(OSError, match="kept"):
+        mine.replace(tmp_path / "kept")
+    assert (tmp_path / "kept" / "inside").exists()
+
+
+def test_it_is_readable_as_a_file_of_the_user(tmp_path: Path) -> None:
+    write_whole(tmp_path / "clip.mp4", b"new")
+    assert (tmp_path / "clip.mp4").stat().st_mode & 0o777 == 0o644
+
+
+def test_a_name_of_the_greatest_length_can_be_written(tmp_path: Path) -> None:
+    write_whole(tmp_path / ("é" * 127), b"new")
+    assert os.listdir(tmp_path) == ["é" * 127]
