@@ -70,8 +70,11 @@ def evaluated(
         raise InputError("--cross-talker takes no --tracks and no --own-durations; measure them on the talker's own")
     if out is not None:
         check_file_name(out, "an evaluation", SUFFIXES)
+    from corpus_tools.report.drawing import load_matplotlib
     from corpus_tools.run_options import Effort
 
+    if out is not None and out.suffix == ".html":
+        load_matplotlib()  # a missing package is reported before the measurement
     result, runs = _measured(asked, beside, Effort(*effort))
     print(f"{result.table()}\n\n{result.class_table()}")  # noqa: T201 - the answer
     if out is not None:

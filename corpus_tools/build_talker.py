@@ -9,6 +9,7 @@ from typing import Any
 
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import Refusal, observe, require_kept
+from corpus_tools.report.drawing import load_matplotlib
 from corpus_tools.report.recordings import recordings_page
 from corpus_tools.run_options import Effort, Stages, no_stages
 from corpus_tools.training.pose_correction import without_leak
@@ -77,6 +78,8 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
     BackendError
         A package or the landmark models are missing, or a file cannot be written.
     """
+    if report is not None:
+        load_matplotlib()  # a missing package is reported before hours of work
     stated = read_provenance(provenance or recordings / PROVENANCE, must_exist=provenance is not None)
     observations = observe(recordings, effort=effort, on_progress=stages(READING))
     called = name or stated.get("name") or recordings.resolve().stem

@@ -6,13 +6,13 @@ Run: python docs/make_gestures.py
 from dataclasses import replace
 from pathlib import Path
 
-from corpus_tools.gesture_study.analysis import Compared, Options, StyleFound, study
+from corpus_tools.gesture_study.analysis import Options, StyleStudy, TraitComparison, study
 from tts2face.models.palette import load_palette
 
 PAGE = Path(__file__).with_name("gestures.md")
 
 
-def distances(found: StyleFound) -> str:
+def distances(found: StyleStudy) -> str:
     """Markdown table of all traits, those with a target first and in bold."""
     heads = ("trait", "unit", "n", "recorded, mean", "field", "noise", "W halves", "W field", "W noise")
     lines = _headed((*heads, "field / halves", "field / noise"))
@@ -21,7 +21,7 @@ def distances(found: StyleFound) -> str:
     return "\n".join(lines)
 
 
-def _line(one: Compared) -> str:
+def _line(one: TraitComparison) -> str:
     means = (float(values.mean()) for values in (one.real, one.field, one.noise))
     near = [f"{one.to_field / one.halves:.2f}", f"{one.to_field / one.to_noise:.2f}"]
     mark = "**" if one.trait.has_target else ""
@@ -36,7 +36,7 @@ def _line(one: Compared) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def movements(found: StyleFound) -> str:
+def movements(found: StyleStudy) -> str:
     """Markdown table of sound, spectra, seeds and long clips, by feature."""
     lines = _headed(
         (
@@ -62,7 +62,7 @@ def movements(found: StyleFound) -> str:
     return "\n".join(lines)
 
 
-def blinks(found: StyleFound) -> str:
+def blinks(found: StyleStudy) -> str:
     """A line on how often lids shut."""
     real, field, noise = found.blinks_per_minute
     return f"Blinks a minute: {real:.1f} recorded, {field:.1f} by the field, {noise:.1f} by noise."

@@ -67,11 +67,16 @@ def judged_frames(phones: PhoneSequence, n_frames: int, fps: float) -> slice:
     return slice(int(np.searchsorted(times, start)), int(np.searchsorted(times, end, side="right")))
 
 
-def correlation(real: Values, made: Values) -> float:
-    """Pearson's r of two series (T,); 0 where one of them stands still."""
-    a, b = real - real.mean(dtype=np.float64), made - made.mean(dtype=np.float64)
+def pearson(one: Values, other: Values) -> float:
+    """Pearson's r of two series (T,); NaN where one of them is constant."""
+    a, b = one - one.mean(dtype=np.float64), other - other.mean(dtype=np.float64)
     norm = float(np.sqrt((a @ a) * (b @ b)))
-    return float(a @ b) / norm if norm > 1e-9 * len(a) else 0.0
+    return float(a @ b) / norm if norm > 1e-9 * len(a) else float("nan")
+
+
+def correlation(real: Values, made: Values) -> float:
+    """Pearson's r of two series (T,); 0 where one of them is constant."""
+    return float(np.nan_to_num(pearson(real, made)))
 
 
 def range_ratio(real: Values, made: Values) -> float:

@@ -1,1 +1,1 @@
-"""What recorded gestures are like, and how near made ones come to them."""
+"""Statistics of recorded gestures, and the distance of synthesised ones from them."""

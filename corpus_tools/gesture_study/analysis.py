@@ -1,4 +1,4 @@
-"""Each style of a palette: recordings that its fields have not seen, against what fields and noise make of them."""
+"""Comparison of each style's held-out recordings with the motion that its fields and noise make for their sound."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -6,29 +6,29 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.evaluation.measures import pearson
 from corpus_tools.gesture_study.blinks import blinks_of
-from corpus_tools.gesture_study.clips import dealt, from_field, from_noise, with_source
+from corpus_tools.gesture_study.clips import field_clip, hold_out, noise_clip, replace_style
 from corpus_tools.gesture_study.longrun import LongRun, long_run
 from corpus_tools.gesture_study.measures import (
     Spectrum,
     between_frames,
-    correlation,
     distance,
     diversity,
     halves,
     ratio,
-    recordings,
     spectrum,
+    split_recordings,
 )
-from corpus_tools.gesture_study.traits import Trait, traits_of, visible
+from corpus_tools.gesture_study.traits import Trait, in_display_units, traits_of
 from lexicon.errors import InputError
 from tts2face.gesture.gesture_stream import Fields
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
 
-NEAR, HALF = 1.5, 0.5  # a field's distance: at most so many of that between halves, below this share of noise's
+NEAR, HALF = 1.5, 0.5  # targets of a field's distance, over that between halves and over that of noise
 CORRELATION_WITHIN = 0.1
-FEWEST = 10  # recordings of which some can be held out
-N_TAKES = 60  # recordings whose distances tell how unlike takes are
+FEWEST = 10  # recordings; with fewer none is held out
+N_TAKES = 60  # recordings whose distances are the reference of diversity
 
 Doubles = NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -37,7 +37,7 @@ Motion = Mapping[str, NDArray[np.floating]]
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """One in so many recordings is held out; so many random halvings of them; so many clips; the seed of all.
+    """One in `one_in` recordings is held out; numbers of random halvings and of clips; the seed.
 
     Raises
     ------
@@ -51,7 +51,7 @@ class Options:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse numbers that leave nothing to compare."""
+        """Check the numbers."""
         if self.one_in < 2:
             raise InputError(f"one in {self.one_in} recordings cannot be held out; give 2 or more")
         if self.halves < 1:
@@ -63,7 +63,7 @@ class Options:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Compared:
+class TraitComparison:
     """A trait of recordings, of a field's clips and of noise, and Wasserstein distances in its unit.
 
     `halves` lies between random halves of the recordings (mean); the others between all of them and one clip (mean).
@@ -79,13 +79,13 @@ class Compared:
 
     @property
     def is_met(self) -> bool:
-        """Whether the field is as near as a trait with a target must be."""
+        """Whether the field is within the targets `NEAR` and `HALF`."""
         return self.to_field <= NEAR * self.halves and self.to_field < HALF * self.to_noise
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Moving:
-    """Spectra of a feature that moves, and how its speed goes with the sound's intensity (r)."""
+class MotionComparison:
+    """Spectra of a feature, the correlation (r) of its speed with the sound's intensity, and diversity."""
 
     feature: str
     unit: str
@@ -94,7 +94,7 @@ class Moving:
     diversity: tuple[float, float]
 
     @property
-    def goes_with_sound(self) -> bool:
+    def follows_sound(self) -> bool:
         """Whether the field's r is near the recordings'."""
         return abs(self.with_intensity[0] - self.with_intensity[1]) <= CORRELATION_WITHIN
 
@@ -106,10 +106,10 @@ class Moving:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StyleFound:
-    """What one style is like: `real` is its recordings, or for a derived style what the field of its source makes.
+class StyleStudy:
+    """Results for one style: `real` is its recordings, or for a derived style the motion of its source's field.
 
-    Long clips are of measured styles alone: derived ones are theirs, changed.
+    Only measured styles have long clips; derived styles transform those.
     """
 
     name: str
@@ -120,31 +120,31 @@ class StyleFound:
     is_held_out: bool
     minutes: float
     blinks_per_minute: tuple[float, float, float]
-    compared: tuple[Compared, ...]
-    moving: tuple[Moving, ...]
+    compared: tuple[TraitComparison, ...]
+    moving: tuple[MotionComparison, ...]
     long: LongRun
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class GesturesFound:
-    """The whole study of a palette."""
+class GestureStudy:
+    """Results for all styles of a palette."""
 
     name: str
     options: Options
-    styles: tuple[StyleFound, ...]
+    styles: tuple[StyleStudy, ...]
 
     @property
     def targets(self) -> tuple[int, int]:
-        """How many targets of measured styles are met, and how many there are."""
+        """Number of targets of measured styles that are met, and number of targets."""
         measured = [style for style in self.styles if style.source is None]
         kept = [one.is_met for style in measured for one in style.compared if one.trait.has_target]
-        kept += [one.goes_with_sound for style in measured for one in style.moving if one.feature == "head"]
+        kept += [one.follows_sound for style in measured for one in style.moving if one.feature == "head"]
         return sum(kept), len(kept)
 
 
-def study(name: str, palette: Palette, options: Options, on_progress: Progress | None = None) -> GesturesFound:
+def study(name: str, palette: Palette, options: Options, on_progress: Progress | None = None) -> GestureStudy:
     """Measure every style of a palette."""
-    found: list[StyleFound] = []
+    found: list[StyleStudy] = []
     ready: dict[str, _Ready] = {}
     for done, style in enumerate(names := (*palette.styles, *palette.derivations)):
         if on_progress:
@@ -155,14 +155,14 @@ def study(name: str, palette: Palette, options: Options, on_progress: Progress |
         found.append(_style_found(palette, style, ready[source], options))
     if on_progress:
         on_progress(len(names), len(names))
-    return GesturesFound(name, options, tuple(found))
+    return GestureStudy(name, options, tuple(found))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Ready:
-    """A measured style: what its fields are made of, what they have not seen, the fields, and a clip of theirs.
+    """A measured style: the recordings of its fields, the held-out ones, the fields, and a clip of theirs.
 
-    The clip is what derived styles are compared with.
+    Derived styles are compared with the clip.
     """
 
     learnt: Style
@@ -175,21 +175,21 @@ class _Ready:
 def _ready(palette: Palette, source: str, options: Options) -> _Ready:
     whole = palette.styles[source]
     is_held_out = len(whole.lengths) >= FEWEST
-    learnt, held = dealt(whole, options.one_in, options.seed) if is_held_out else (whole, whole)
-    fields = Fields(with_source(palette, source, learnt))
+    learnt, held = hold_out(whole, options.one_in, options.seed) if is_held_out else (whole, whole)
+    fields = Fields(replace_style(palette, source, learnt))
     again = _from_fields(fields, source, held, options.seed + options.clips) if palette.derivations else {}
     return _Ready(learnt, held, is_held_out, fields, again)
 
 
-def _style_found(palette: Palette, name: str, ready: _Ready, options: Options) -> StyleFound:
+def _style_found(palette: Palette, name: str, ready: _Ready, options: Options) -> StyleStudy:
     derived = palette.derivations.get(name)
     source = name if derived is None else derived.source
     learnt, held, fields = ready.learnt, ready.held, ready.fields
     clips = [_from_fields(fields, name, held, options.seed + k) for k in range(options.clips)]
-    noises = [from_noise(fields, name, len(held.intensity), options.seed + k) for k in range(options.clips)]
+    noises = [noise_clip(fields, name, len(held.intensity), options.seed + k) for k in range(options.clips)]
     real = held.motion if derived is None else ready.again
     rates = [_rate(real, held), _rate(clips[0], held), _rate(noises[0], held)]
-    return StyleFound(
+    return StyleStudy(
         name=name,
         source=None if derived is None else source,
         summary="" if derived is None else derived.summary,
@@ -205,7 +205,7 @@ def _style_found(palette: Palette, name: str, ready: _Ready, options: Options) -
 
 
 def _from_fields(fields: Fields, name: str, held: Style, seed: int) -> Motion:
-    return {feature: from_field(fields, name, feature, held.intensity, seed).values for feature in held.motion}
+    return {feature: field_clip(fields, name, feature, held.intensity, seed).values for feature in held.motion}
 
 
 def _rate(motion: Motion, held: Style) -> float:
@@ -214,12 +214,12 @@ def _rate(motion: Motion, held: Style) -> float:
 
 def _compared(
     trait: Trait, held: Style, kinds: tuple[Motion, list[Motion], list[Motion]], options: Options
-) -> Compared:
-    def read(motion: Motion) -> list[Doubles]:
-        return [trait.of(part) for part in recordings(motion[trait.feature], held.lengths)]
+) -> TraitComparison:
+    def values_of(motion: Motion) -> list[Doubles]:
+        return [trait.of(part) for part in split_recordings(motion[trait.feature], held.lengths)]
 
-    parts = read(kinds[0])
-    clips, noises = ([np.concatenate(read(clip)) for clip in kind] for kind in kinds[1:])
+    parts = values_of(kinds[0])
+    clips, noises = ([np.concatenate(values_of(clip)) for clip in kind] for kind in kinds[1:])
     generator = np.random.default_rng([options.seed, 2])
     apart = [
         distance(np.concatenate([parts[i] for i in one]), np.concatenate([parts[i] for i in other]))
@@ -227,7 +227,7 @@ def _compared(
         if len(parts) > 1
     ]
     real = np.concatenate(parts)
-    return Compared(
+    return TraitComparison(
         trait,
         real,
         np.concatenate(clips),
@@ -240,9 +240,9 @@ def _compared(
 
 def _moving(
     palette: Palette, held: Style, real: Motion, clips: list[Motion], noises: list[Motion]
-) -> tuple[Moving, ...]:
-    shown = [visible(palette, motion) for motion in (real, clips[0], noises[0])]
-    heard = between_frames(held.intensity, held.lengths)
+) -> tuple[MotionComparison, ...]:
+    shown = [in_display_units(palette, motion) for motion in (real, clips[0], noises[0])]
+    intensity = between_frames(held.intensity, held.lengths)
     found = []
     for trait in traits_of(palette, held):
         if not trait.name.endswith(" speed") or trait.feature == "blink":
@@ -250,13 +250,17 @@ def _moving(
         feature = trait.feature
         spectra = [spectrum(motion[feature], held.lengths, GESTURE_FPS) for motion in shown]
         together = [
-            float(np.mean([correlation(trait.all_of(recordings(one[feature], held.lengths)), heard) for one in kind]))
+            float(
+                np.mean(
+                    [pearson(trait.all_of(split_recordings(one[feature], held.lengths)), intensity) for one in kind]
+                )
+            )
             for kind in ([real], clips, noises)
         ]
         unlike = [_diversity([one[feature] for one in kind], real[feature], held) for kind in (clips, noises)]
         unit = trait.unit.removesuffix("/s")
         found.append(
-            Moving(
+            MotionComparison(
                 feature,
                 "" if unit == "1" else unit,
                 (spectra[0], spectra[1], spectra[2]),
@@ -268,10 +272,10 @@ def _moving(
 
 
 def _diversity(clips: list[NDArray[np.floating]], real: NDArray[np.floating], held: Style) -> float:
-    """Mean over the recordings' sounds of how unlike the clips of one are, against how unlike takes are."""
+    """Mean of `diversity` over the clips made for each recording's sound."""
     if len(held.lengths) < 2:
         return float("nan")
     least = int(held.lengths.min())
-    takes = [part[:least] for part in recordings(real, held.lengths)][:N_TAKES]
-    cut = [[part[:least] for part in recordings(clip, held.lengths)] for clip in clips]
+    takes = [part[:least] for part in split_recordings(real, held.lengths)][:N_TAKES]
+    cut = [[part[:least] for part in split_recordings(clip, held.lengths)] for clip in clips]
     return float(np.mean([diversity([clip[at] for clip in cut], takes) for at in range(len(takes))]))

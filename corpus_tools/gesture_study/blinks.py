@@ -1,7 +1,4 @@
-"""Blinks: when lids shut, how long, how fast.
-
-Times between frames are those of straight lines through them.
-"""
+"""Blinks: onsets, durations and speeds, interpolated linearly between frames."""
 
 from dataclasses import dataclass
 
@@ -9,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 SHUT = 0.5  # share from which lids count as shut (as in tts2face.gesture.perlin_noise)
-OPEN = 0.2  # share below which they count as open: trackers read a narrowed eye as a tenth
+OPEN = 0.2  # share below which they count as open; trackers measure about .1 for a narrowed eye
 
 Doubles = NDArray[np.float64]
 
@@ -21,13 +18,13 @@ class Blinks:
     Parameters
     ----------
     n, seconds
-        How many there are, and in how much time.
+        Number of blinks and duration of the recordings.
     intervals : (I,)
-        Seconds from onset to onset within a recording; an onset is where the lids pass `SHUT`.
+        Seconds from onset to onset within a recording; an onset is an upward crossing of `SHUT`.
     closing, opening : (B,)
-        Seconds from `OPEN` to the instant of the most shut lids, and from there to `OPEN`.
+        Seconds from `OPEN` to the instant of the greatest closure, and from there to `OPEN`.
     closing_speeds, opening_speeds : (B,)
-        Highest speed of each, shares a second.
+        Highest speed of each, shares per second.
 
     Of blinks that begin or end outside their recording only the onsets count.
     """
@@ -47,12 +44,12 @@ class Blinks:
 
     @property
     def per_minute(self) -> float:
-        """How often the lids shut."""
+        """Blinks per minute."""
         return 60 * self.n / self.seconds
 
 
 def blinks_of(shut: NDArray[np.floating], lengths: NDArray[np.int32], fps: float) -> Blinks:
-    """Blinks of recordings of `lengths` (R,) frames, one behind the other; shut (T, 2) or (T,) shares of lids."""
+    """Blinks of recordings of `lengths` (R,) frames, concatenated; shut (T, 2) or (T,) shares of lids."""
     lids = np.asarray(shut, np.float64).reshape(len(shut), -1).mean(axis=1)
     n, intervals, found = 0, [np.zeros(0)], [np.zeros((0, 4))]
     for part in np.split(lids, np.cumsum(lengths)[:-1]):

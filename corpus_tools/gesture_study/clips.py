@@ -1,4 +1,4 @@
-"""Clips of gestures to measure: recorded ones, and what fields that have not seen them make of their sound."""
+"""Clips of gestures to measure: held-out recordings, and motion from fields that were not built from them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -7,7 +7,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.gesture_study.measures import recordings
+from corpus_tools.gesture_study.measures import split_recordings
 from lexicon.errors import InputError
 from tts2face.gesture.field import begun, walked
 from tts2face.gesture.gesture_stream import Fields
@@ -23,14 +23,14 @@ NO_SOUND = Waveform(np.zeros(2, np.float32), 16000)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clip:
-    """Motion (T, k), and the recorded moment (T',) that each frame of the field was drawn from."""
+    """Motion (T, k), and the recorded moment (T',) from which each frame of the field was drawn."""
 
     values: Floats
     moments: NDArray[np.int64]
 
 
-def dealt(style: Style, one_in: int, seed: int) -> tuple[Style, Style]:
-    """A style of most recordings, and one of every so manyth of them, drawn by the seed.
+def hold_out(style: Style, one_in: int, seed: int) -> tuple[Style, Style]:
+    """A style of most recordings, and one of a random 1 / `one_in` of them.
 
     Raises
     ------
@@ -40,16 +40,18 @@ def dealt(style: Style, one_in: int, seed: int) -> tuple[Style, Style]:
     n = len(style.lengths)
     n_held = round(n / one_in)
     if one_in < 2 or n_held < 2 or n - n_held < 2:
-        raise InputError(f"of {n} recordings one in {one_in} cannot be held out; two must be, and two must be left")
+        raise InputError(
+            f"of {n} recordings one in {one_in} cannot be held out: at least 2 must be held out and 2 must remain"
+        )
     order = np.random.default_rng([seed, 1]).permutation(n)
-    return some_of(style, np.sort(order[n_held:])), some_of(style, np.sort(order[:n_held]))
+    return select_recordings(style, np.sort(order[n_held:])), select_recordings(style, np.sort(order[:n_held]))
 
 
-def some_of(style: Style, chosen: NDArray[np.int64]) -> Style:
+def select_recordings(style: Style, chosen: NDArray[np.int64]) -> Style:
     """A style of some of its recordings, in that order."""
 
     def kept(values: Floats) -> Floats:
-        parts = recordings(values, style.lengths)
+        parts = split_recordings(values, style.lengths)
         return np.concatenate([parts[at] for at in chosen])
 
     return replace(
@@ -61,27 +63,27 @@ def some_of(style: Style, chosen: NDArray[np.int64]) -> Style:
     )
 
 
-def with_source(palette: Palette, name: str, style: Style) -> Palette:
+def replace_style(palette: Palette, name: str, style: Style) -> Palette:
     """The palette with a measured style's recordings replaced."""
     return replace(palette, styles={**palette.styles, name: style})
 
 
-def from_field(fields: Fields, style: str, feature: str, intensity: Floats, seed: int) -> Clip:
+def field_clip(fields: Fields, style: str, feature: str, intensity: Floats, seed: int) -> Clip:
     """A feature of a style, measured or derived, for an intensity (T,) at `GESTURE_FPS`."""
     source, tempo = fields.source(style, feature), fields.change(style, feature).tempo
     made = fields.of(source, feature)
     times = np.arange(0.0, len(intensity) * tempo + 2)  # in frames of the field; two more for the cubic
-    heard = np.interp(times / tempo, np.arange(len(intensity)), intensity).astype(np.float32)[:, None]
+    intensities = np.interp(times / tempo, np.arange(len(intensity)), intensity).astype(np.float32)[:, None]
     generator = np.random.default_rng([seed, crc32(feature.encode())])  # as `tts2face.gesture.gesture_stream` draws
     start = begun(made, generator.random())
-    walk = walked(made, start, heard, generator.random(len(heard)))
+    walk = walked(made, start, intensities, generator.random(len(intensities)))
     values = walk.values[: len(intensity)]
     if tempo != 1.0:
         values = cubic_at(walk.values, tempo * np.arange(len(intensity), dtype=np.float64))
     return Clip(fields.changed(style, feature, values), walk.moments[: round(len(intensity) * tempo)])
 
 
-def from_noise(fields: Fields, style: str, n_frames: int, seed: int) -> Mapping[str, Floats]:
-    """All features of a style by noise; it hears nothing."""
+def noise_clip(fields: Fields, style: str, n_frames: int, seed: int) -> Mapping[str, Floats]:
+    """All features of a style by noise, which does not depend on the sound."""
     stream = NoiseStream(fields, style=style, seed=seed, fps=GESTURE_FPS)
     return stream.next(NO_SOUND, n_frames, Timeline())

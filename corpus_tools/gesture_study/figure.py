@@ -1,83 +1,133 @@
-"""The plots of a style: what is real in ink, what a field makes in the first colour, noise in the second."""
+"""The plots of a style: distributions, spectra and autocorrelations of recordings, field and noise."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.gesture_study.analysis import Compared, Moving, StyleFound
+from corpus_tools.gesture_study.analysis import MotionComparison, StyleStudy, TraitComparison
 from corpus_tools.gesture_study.longrun import FROM_S, LAGS_S
-from corpus_tools.report.panels import Line, Panel, histogram
-from corpus_tools.report.plots import Axes
+from corpus_tools.report.drawing import SERIES, draw_png, draw_svg
 
-WIDTH, HEIGHT = 380, 250  # px of a panel
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH, HEIGHT, HEAD, COLUMNS = 380, 250, 26, 3  # px of a panel and of the title; panels in a row of the picture
+MARGINS = {"left": 0.175, "right": 0.985, "bottom": 0.17, "top": 0.9}  # of a panel of a page
 N_BINS = 40
-SHOWN = 0.995  # of the values lie within a plot; those beyond are in its first or last bin
-DECADES = 7.0  # of a spectrum
-COLOURS = ("ink", "first", "second")
-BRIEF = ("head speed", "brow height", "blink interval", "blink duration")  # in the picture
+SHOWN = 0.995  # of the values are within a plot; those beyond count in its first or last bin
+DECADES = 7  # of a spectrum
+MOST_HZ = 15.0  # half of the frame rate of gestures
+BRIEF = ("head speed", "brow height", "blink interval", "blink duration")  # traits in the picture
 
 
-def names_of(found: StyleFound) -> tuple[str, str, str]:
-    """What the three lines of a plot show."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Panel:
+    """A title and how the plot below it is drawn."""
+
+    title: str
+    draw: "Callable[[Axes], None]"
+
+
+def series_names(found: StyleStudy) -> tuple[str, str, str]:
+    """Names of the three lines of a plot."""
     return ("recorded" if found.source is None else found.source, "field", "noise")
 
 
-def distribution(found: StyleFound, compared: Compared) -> Panel:
-    """Histograms of a trait; the same bins for all."""
+def panel_svg(panel: Panel) -> str:
+    """A panel for a page."""
+
+    def draw(figure: "Figure") -> tuple[()]:
+        figure.set_layout_engine("none")  # half of the time
+        panel.draw(figure.subplots(gridspec_kw=MARGINS))
+        return ()
+
+    return draw_svg(draw, WIDTH, HEIGHT, panel.title)
+
+
+def panels_png(title: str, panels: Sequence[Panel]) -> bytes:
+    """The panels in rows of `COLUMNS` below a title, as PNG bytes."""
+    rows = -(-len(panels) // COLUMNS)
+
+    def draw(figure: "Figure") -> tuple[()]:
+        figure.suptitle(title)
+        for at, panel in enumerate(panels, start=1):
+            panel.draw(figure.add_subplot(rows, COLUMNS, at))
+        return ()
+
+    return draw_png(draw, COLUMNS * WIDTH, rows * HEIGHT + HEAD)
+
+
+def distribution(found: StyleStudy, compared: TraitComparison) -> Panel:
+    """Histograms of a trait over the same bins."""
     kinds = compared.real, compared.field, compared.noise
-    values = np.concatenate([compared.real, compared.field])
-    low, high = _range(values)
-    edges = np.linspace(low, high, N_BINS + 1)
-    drawn = [histogram(kind, edges) for kind in kinds if len(kind)]
-    names = [(name, colour) for name, colour, kind in zip(names_of(found), COLOURS, kinds, strict=True) if len(kind)]
-    lines = [Line(name, colour, x, 100 * y) for (name, colour), (x, y) in zip(names, drawn, strict=True)]
-    top = max((float(line.y.max()) for line in lines[:2]), default=1.0) * 1.25
+    edges = np.linspace(*_limits(np.concatenate(kinds[:2])), N_BINS + 1)
     unit = f", {compared.trait.unit}" if compared.trait.unit else ""
-    return Panel(
-        compared.trait.name,
-        Axes(f"{compared.trait.name}{unit}", "% of values", (low, high), (0.0, top or 1.0), WIDTH, HEIGHT),
-        tuple(lines),
-    )
+
+    def draw(axes: "Axes") -> None:
+        highest = 0.0
+        for name, values, (colour, dash) in zip(series_names(found), kinds, SERIES, strict=False):
+            if len(values):
+                counts, _ = np.histogram(np.clip(values, edges[0], edges[-1]), edges)
+                shares = 100 * counts / len(values)
+                axes.stairs(shares, edges, color=colour, linestyle=dash, linewidth=1.5, label=name)
+                highest = max(highest, shares.max() if values is not compared.noise else 0.0)
+        axes.set(title=compared.trait.name, xlabel=f"{compared.trait.name}{unit}", ylabel="% of values")
+        axes.set(xlim=edges[[0, -1]], ylim=(0, 1.25 * highest or 1.0))
+        if axes.patches:
+            axes.legend()
+
+    return Panel(compared.trait.name, draw)
 
 
-def power(found: StyleFound, moving: Moving) -> Panel:
-    """Power spectra, on a logarithmic scale; without the mean."""
-    lines = []
-    for name, colour, one in zip(names_of(found), COLOURS, moving.spectra, strict=True):
-        lines.append(Line(name, colour, one.hz[1:], np.log10(np.maximum(one.power[1:], 1e-30))))
-    highest = max(float(np.nanmax(line.y)) if np.isfinite(line.y).any() else 0.0 for line in lines[:2])
-    top = np.ceil(highest)
-    unit = f"{moving.unit}^2/Hz" if moving.unit else "1/Hz"
-    return Panel(
-        f"{moving.feature}: power",
-        Axes("Hz", unit, (0.0, 15.0), (top - DECADES, top), WIDTH, HEIGHT),
-        tuple(lines),
-        is_logarithmic=True,
-    )
+def power(found: StyleStudy, moving: MotionComparison) -> Panel:
+    """Power spectra without the mean, on a logarithmic scale."""
+    title = f"{moving.feature}: power"
+
+    def draw(axes: "Axes") -> None:
+        from matplotlib.ticker import NullLocator
+
+        highest = [np.nanmax(one.power[1:]) for one in moving.spectra[:2] if np.isfinite(one.power[1:]).any()]
+        top = float(np.ceil(np.log10(max(highest, default=1.0))))
+        for name, one, (colour, dash) in zip(series_names(found), moving.spectra, SERIES, strict=False):
+            axes.plot(one.hz[1:], np.maximum(one.power[1:], 1e-30), color=colour, linestyle=dash, label=name)
+        axes.set(
+            title=title, xlabel="frequency, Hz", ylabel=f"power, {moving.unit}²/Hz" if moving.unit else "power, 1/Hz"
+        )
+        axes.set(yscale="log", xlim=(0, MOST_HZ), ylim=(10 ** (top - DECADES), 10**top))
+        axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        axes.yaxis.set_minor_locator(NullLocator())
+        axes.legend()
+
+    return Panel(title, draw)
 
 
-def repetition(found: StyleFound, feature: str) -> Panel:
+def repetition(found: StyleStudy, feature: str) -> Panel:
     """Autocorrelation of ten minutes over the lag."""
-    one = found.long.repeating[feature]
+    one, title = found.long.repeating[feature], f"{feature}: autocorrelation"
     lags = np.arange(FROM_S, LAGS_S) + 0.5
     kinds = ("recordings, shuffled", one.real), ("field, speech", one.speech), ("field, silence", one.silence)
-    lines = [Line(name, colour, lags, values[FROM_S:]) for (name, values), colour in zip(kinds, COLOURS, strict=True)]
-    return Panel(
-        f"{feature}: likeness to itself",
-        Axes("lag, s", "highest r in a second", (0.0, float(LAGS_S)), (-0.2, 1.0), WIDTH, HEIGHT),
-        tuple(lines),
-    )
+
+    def draw(axes: "Axes") -> None:
+        for (name, values), (colour, dash) in zip(kinds, SERIES, strict=False):
+            axes.plot(lags, values[FROM_S:], color=colour, linestyle=dash, label=name)
+        axes.set(title=title, xlabel="lag, s", ylabel="highest r in a second", xlim=(0, LAGS_S), ylim=(-0.2, 1))
+        axes.legend()
+
+    return Panel(title, draw)
 
 
-def brief(found: StyleFound) -> Sequence[Panel]:
+def brief(found: StyleStudy) -> Sequence[Panel]:
     """The panels of the picture."""
     traits = [distribution(found, one) for one in found.compared if one.trait.name in BRIEF]
     spectra = [power(found, one) for one in found.moving if one.feature in {"head", "brows"}]
     return [*traits, *spectra] or [distribution(found, found.compared[0])]
 
 
-def _range(values: NDArray[np.float64]) -> tuple[float, float]:
+def _limits(values: NDArray[np.float64]) -> tuple[float, float]:
     if not len(values):
         return 0.0, 1.0
     low, high = np.quantile(values, [1 - SHOWN, SHOWN])

@@ -1,4 +1,4 @@
-"""Clips of ten minutes: how much of the palette they visit, and whether they repeat themselves."""
+"""Clips of ten minutes: the share of the palette that they visit, and their autocorrelation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.gesture_study.clips import from_field
-from corpus_tools.gesture_study.measures import autocorrelation, coverage, recordings
+from corpus_tools.gesture_study.clips import field_clip
+from corpus_tools.gesture_study.measures import autocorrelation, coverage, split_recordings
 from tts2face.gesture.field_kernels import APART
 from tts2face.gesture.gesture_stream import Fields
 from tts2face.gesture.prosody import SILENCE
@@ -15,15 +15,15 @@ from tts2face.models.palette import GESTURE_FPS, Style
 
 MINUTES = 10
 VISITED_AFTER = (1, 3, MINUTES)  # minutes
-LAGS_S = 300  # half of the clip: every lag is seen for as long
-FROM_S = 5  # lags below are a gesture's own length
+LAGS_S = 300  # half of the clip, so that every lag is averaged over at least as long
+FROM_S = 5  # shorter lags are within one gesture
 
 Doubles = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Repeating:
-    """(L,) highest autocorrelation within each second of lag: recordings in random order, speech, silence."""
+class Repetition:
+    """(L,) highest autocorrelation in each second of lag: recordings in random order, speech, silence."""
 
     real: Doubles
     speech: Doubles
@@ -31,7 +31,7 @@ class Repeating:
 
     @property
     def highest(self) -> tuple[float, float, float]:
-        """From `FROM_S` on."""
+        """Maxima over the lags from `FROM_S`."""
         return (
             float(self.real[FROM_S:].max()),
             float(self.speech[FROM_S:].max()),
@@ -44,33 +44,33 @@ class LongRun:
     """By feature: shares of recorded moments that speech visits after `VISITED_AFTER`, and repetition."""
 
     visited: Mapping[str, tuple[float, ...]]
-    repeating: Mapping[str, Repeating]
+    repeating: Mapping[str, Repetition]
 
 
 def long_run(fields: Fields, name: str, learnt: Style, held: Style, seed: int) -> LongRun:
-    """Make clips of `MINUTES` of a style, with speech of the recordings in random order and with silence."""
+    """Measure clips of `MINUTES` of a style, with the recordings' sound in random order and with silence."""
     n_frames = round(MINUTES * 60 * GESTURE_FPS)
     order = np.random.default_rng([seed, 3]).permutation(len(learnt.lengths))
-    heard = _shuffled(learnt.intensity, learnt.lengths, order, n_frames)
+    intensity = _shuffled(learnt.intensity, learnt.lengths, order, n_frames)
     silence = np.full(n_frames, SILENCE[0], np.float32)
     visited, repeating = {}, {}
     for feature in held.motion:
-        speech = from_field(fields, name, feature, heard, seed)
-        quiet = from_field(fields, name, feature, silence, seed)
+        speech = field_clip(fields, name, feature, intensity, seed)
+        quiet = field_clip(fields, name, feature, silence, seed)
         visited[feature] = tuple(
             coverage(speech.moments[: round(minutes * 60 * GESTURE_FPS)], learnt.lengths, APART)
             for minutes in VISITED_AFTER
         )
-        taken = _shuffled(learnt.motion[feature], learnt.lengths, order, n_frames)
-        repeating[feature] = Repeating(*(_by_second(values) for values in (taken, speech.values, quiet.values)))
+        real = _shuffled(learnt.motion[feature], learnt.lengths, order, n_frames)
+        repeating[feature] = Repetition(*(_by_second(values) for values in (real, speech.values, quiet.values)))
     return LongRun(visited, repeating)
 
 
 def _shuffled(
     values: NDArray[np.float32], lengths: NDArray[np.int32], order: NDArray[np.int64], n_frames: int
 ) -> NDArray[np.float32]:
-    """Recordings one behind the other in some order, again from the first one where they do not suffice."""
-    parts = recordings(values, lengths)
+    """`n_frames` of recordings concatenated in an order, repeated from the first one where they are too short."""
+    parts = split_recordings(values, lengths)
     whole = np.concatenate([parts[at] for at in order])
     return np.resize(whole, (n_frames, *whole.shape[1:])) if len(whole) < n_frames else whole[:n_frames]
 

@@ -1,7 +1,6 @@
 """Measures of gestures: speeds, spectra, distances of distributions, correlation, diversity, coverage, repetition.
 
-Motion is (T, k); recordings stand one behind the other, `lengths` (R,) frames each, and nothing is measured across
-their borders.
+Motion is (T, k): recordings of `lengths` (R,) frames each, concatenated. No measure crosses their borders.
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,7 +12,7 @@ from scipy.signal import welch
 from scipy.spatial.distance import cdist
 from scipy.stats import wasserstein_distance
 
-FAST_HZ = 6.0  # from here on a head or a brow that moves is seen to tremble
+FAST_HZ = 6.0  # motion of head or brows above this is seen as trembling
 SEGMENT = 64  # frames of a spectrum's window: 2.1 s, which a recording of 3 s holds
 
 Doubles = NDArray[np.float64]
@@ -21,15 +20,9 @@ Motion = NDArray[np.floating]
 Lengths = NDArray[np.int32]
 
 
-def recordings(values: Motion, lengths: Lengths) -> list[Motion]:
-    """Each recording's part."""
+def split_recordings(values: Motion, lengths: Lengths) -> list[Motion]:
+    """The recordings, split again."""
     return np.split(values, np.cumsum(lengths)[:-1])
-
-
-def speeds(values: Motion, lengths: Lengths, fps: float) -> Doubles:
-    """(T - R,) length of the change a second, over all channels."""
-    changes = [np.linalg.norm(np.diff(part.astype(np.float64), axis=0), axis=1) for part in recordings(values, lengths)]
-    return np.concatenate(changes) * fps
 
 
 def distance(one: Motion, other: Motion) -> float:
@@ -38,7 +31,7 @@ def distance(one: Motion, other: Motion) -> float:
 
 
 def halves(n: int, n_times: int, generator: np.random.Generator) -> Iterator[tuple[NDArray[np.int64], ...]]:
-    """Two random halves of n things, so many times."""
+    """`n_times` pairs of random halves of the indices below n."""
     for _ in range(n_times):
         order = generator.permutation(n)
         yield order[: n // 2], order[n // 2 :]
@@ -46,7 +39,7 @@ def halves(n: int, n_times: int, generator: np.random.Generator) -> Iterator[tup
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spectrum:
-    """Power (F,) of frequencies (F,) in Hz: squared units a Hz, all channels together."""
+    """Power (F,) of frequencies (F,) in Hz: squared units per Hz, summed over the channels."""
 
     hz: Doubles
     power: Doubles
@@ -58,11 +51,11 @@ class Spectrum:
 
 
 def spectrum(values: Motion, lengths: Lengths, fps: float) -> Spectrum:
-    """Mean power spectrum of the recordings (Welch 1967; Hann windows of `SEGMENT` frames, no mean)."""
+    """Mean power spectrum of the recordings without their means (Welch 1967; Hann windows of `SEGMENT` frames)."""
     total: Doubles | None = None
     hz: Motion = np.zeros(0)
     used = 0
-    for part in recordings(values, lengths):
+    for part in split_recordings(values, lengths):
         if len(part) < SEGMENT:
             continue
         level = part.astype(np.float64) - part.mean(axis=0, dtype=np.float64)
@@ -76,26 +69,20 @@ def spectrum(values: Motion, lengths: Lengths, fps: float) -> Spectrum:
 
 
 def ratio(one: float, other: float) -> float:
-    """One over the other; NaN over 0."""
+    """The quotient; NaN where the divisor is 0."""
     return one / other if other else float("nan")
 
 
-def correlation(one: Motion, other: Motion) -> float:
-    """Pearson's r; NaN where one of them stands still."""
-    if not (np.ptp(one) > 0 and np.ptp(other) > 0):
-        return float("nan")
-    return float(np.corrcoef(one, other)[0, 1])
-
-
 def between_frames(values: Motion, lengths: Lengths) -> Doubles:
-    """(T - R,) means of neighbours (T,): what is heard when a speed of `speeds` is seen."""
-    return np.concatenate([(part[1:] + part[:-1]) / 2.0 for part in recordings(values, lengths)])
+    """(T - R,) means of neighbouring frames of (T,): values at the instants of the speeds of `speeds`."""
+    return np.concatenate([(part[1:] + part[:-1]) / 2.0 for part in split_recordings(values, lengths)])
 
 
 def diversity(clips: Sequence[Motion], takes: Sequence[Motion]) -> float:
     """Mean distance between clips of different seeds, over that between different takes of the same length.
 
-    Distance: square root of the mean square over frames. 0: every seed gives the same; 1: as unlike as recordings.
+    Distance: square root of the mean square over frames. 0: all seeds give the same motion; 1: clips differ as
+    recordings do.
     """
     return ratio(_mean_distance(clips), _mean_distance(takes))
 
@@ -118,9 +105,9 @@ def coverage(shown: NDArray[np.int64], lengths: Lengths, within: int) -> float:
 
 
 def autocorrelation(values: Motion, most: int) -> Doubles:
-    """(most + 1,) correlation of a clip with itself so many frames later, all channels together; 1 at lag 0.
+    """(most + 1,) autocorrelation of a clip at lags of 0 to `most` frames, over all channels; 1 at lag 0.
 
-    About 1 at a lag with which it repeats itself. Each lag is weighed by the frames that it has.
+    About 1 at the period of a repetition. Each lag is averaged over the frames that it has.
     """
     away = values.astype(np.float64) - values.mean(axis=0, dtype=np.float64)
     size = 1 << int(np.ceil(np.log2(2 * len(away))))

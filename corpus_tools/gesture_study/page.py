@@ -1,6 +1,6 @@
 """The study as a page."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from html import escape
 
 import numpy as np
@@ -8,24 +8,20 @@ import numpy as np
 from corpus_tools.gesture_study.analysis import (
     HALF,
     NEAR,
-    Compared,
-    GesturesFound,
-    Moving,
-    StyleFound,
+    GestureStudy,
+    MotionComparison,
+    StyleStudy,
+    TraitComparison,
 )
-from corpus_tools.gesture_study.figure import distribution, names_of, power, repetition
+from corpus_tools.gesture_study.figure import Panel, distribution, panel_svg, power, repetition, series_names
 from corpus_tools.gesture_study.longrun import FROM_S, MINUTES, VISITED_AFTER
 from corpus_tools.gesture_study.measures import FAST_HZ, ratio
-from corpus_tools.report.page import page, table
-from corpus_tools.report.panels import panel_svg
+from corpus_tools.report.page import note, page, paragraphs, table
 
-LAYOUT = (
-    "<style>.panels { display: flex; flex-wrap: wrap; gap: .5rem 1rem; } figure { margin: 0; } "
-    "figcaption { font-size: .85rem; color: var(--soft); text-align: center; }</style>"
-)
+LAYOUT = "<style>.panels { display: flex; flex-wrap: wrap; gap: .5rem 1rem; }</style>"
 
 
-def gestures_page(found: GesturesFound) -> str:
+def gestures_page(found: GestureStudy) -> str:
     """The page (HTML)."""
     parts = [LAYOUT, _method(found)]
     for style in found.styles:
@@ -34,26 +30,26 @@ def gestures_page(found: GesturesFound) -> str:
 
 
 def number(value: float, digits: int = 2) -> str:
-    """A number, or a dash where there is none."""
+    """A number, or a dash for NaN."""
     if not np.isfinite(value):
         return "\N{EN DASH}"
     return f"{value:.{digits}f}" if abs(value) >= 0.01 or value == 0 else f"{value:.1g}"
 
 
-def _method(found: GesturesFound) -> str:
+def _method(found: GestureStudy) -> str:
     options = found.options
-    return _soft(
-        f"One in {options.one_in} recordings is held out (seed {options.seed}). Fields are made of the others and hear "
-        f"the held-out ones' intensity; noise hears nothing. {options.clips} clips of each are cut into recordings' "
-        "lengths, so that what a border hides is hidden alike. Distances are Wasserstein's, in the trait's unit: "
-        f"between {options.halves} random halves of the held-out recordings, and from all of them to a clip (means). "
-        f"Target: at most {NEAR:g} times the halves' distance, below {HALF:g} of noise's."
+    return note(
+        f"One in {options.one_in} recordings is held out (seed {options.seed}). Fields are built from the others and "
+        "driven by the intensity of the held-out ones; noise does not depend on the sound. "
+        f"{options.clips} clips of each are cut to the recordings' lengths, so that all have the same borders. "
+        f"Distances are Wasserstein distances (W) in the trait's unit: between {options.halves} random halves of the "
+        "held-out recordings, and from all of them to a clip (means). "
+        f"Target: at most {NEAR:g} times the distance between halves, and below {HALF:g} times that of noise."
     )
 
 
-def _style(found: StyleFound) -> list[str]:
-    real, *_ = names_of(found)
-    by_feature: dict[str, list[Compared]] = {}
+def _style(found: StyleStudy) -> list[str]:
+    by_feature: dict[str, list[TraitComparison]] = {}
     for one in found.compared:
         by_feature.setdefault(one.trait.feature, []).append(one)
     return [
@@ -61,33 +57,33 @@ def _style(found: StyleFound) -> list[str]:
         _origin(found),
         _distances(found),
         "<h3>Distributions</h3>",
-        _soft(f"Those beyond a plot are in its first or last bin. Ink: {real}."),
-        _panels([panel_svg(distribution(found, one)) for ones in by_feature.values() for one in ones]),
+        note("Values beyond a plot count in its first or last bin."),
+        _panels(distribution(found, one) for ones in by_feature.values() for one in ones),
         "<h3>Spectra, sound, seeds</h3>",
         _moving(found),
-        _panels([panel_svg(power(found, one)) for one in found.moving]),
+        _panels(power(found, one) for one in found.moving),
         *_long(found),
     ]
 
 
-def _origin(found: StyleFound) -> str:
+def _origin(found: StyleStudy) -> str:
     rates = " / ".join(number(rate, 1) for rate in found.blinks_per_minute)
     if found.source is not None:
-        return _said(
+        return paragraphs(
             f"{found.summary[:1].upper()}{found.summary[1:]}.",
-            f"Nobody recorded it: it is compared with what the field of {found.source} makes; no targets.",
-            f"Blinks a minute, {found.source} / field / noise: {rates}.",
+            f"A derived style without recordings: compared with the motion of the field of {found.source}; no targets.",
+            f"Blinks per minute, {found.source} / field / noise: {rates}.",
         )
     held = (
         f"{found.n_learnt} recordings learnt from, {found.n_held} held out."
         if found.is_held_out
-        else f"{found.n_learnt} recordings, too few to hold any out: compared with those learnt from."
+        else f"{found.n_learnt} recordings, too few to hold any out: compared with the recordings of the fields."
     )
-    return _said(f"{found.minutes:.1f} minutes. {held}", f"Blinks a minute, recorded / field / noise: {rates}.")
+    return paragraphs(f"{found.minutes:.1f} minutes. {held}", f"Blinks per minute, recorded / field / noise: {rates}.")
 
 
-def _distances(found: StyleFound) -> str:
-    real, *_ = names_of(found)
+def _distances(found: StyleStudy) -> str:
+    real, *_ = series_names(found)
     rows = [
         (
             one.trait.name,
@@ -109,15 +105,15 @@ def _distances(found: StyleFound) -> str:
     return table((*head, "field / halves", "field / noise", "target"), rows, numbers=range(2, 11))
 
 
-def verdict(found: StyleFound, one: Compared) -> str:
-    """Whether a trait with a target meets it."""
+def verdict(found: StyleStudy, one: TraitComparison) -> str:
+    """Whether a trait with a target meets it; empty without a target."""
     if not one.trait.has_target or found.source is not None:
         return ""
     return "met" if one.is_met else "missed"
 
 
-def _moving(found: StyleFound) -> str:
-    real, *_ = names_of(found)
+def _moving(found: StyleStudy) -> str:
+    real, *_ = series_names(found)
     rows = [
         (
             one.feature,
@@ -130,18 +126,18 @@ def _moving(found: StyleFound) -> str:
     ]
     above = f"power above {FAST_HZ:g} Hz / {real}"
     head = ("feature", f"r of speed with intensity: {real}", "field", "noise", "target", f"{above}: field", "noise")
-    return table((*head, "diversity: field", "noise"), rows, numbers=(1, 2, 3, 5, 6, 7, 8)) + _soft(
+    return table((*head, "diversity: field", "noise"), rows, numbers=(1, 2, 3, 5, 6, 7, 8)) + note(
         "Diversity: distance between clips of different seeds for the same sound, over that between recordings."
     )
 
 
-def _near(found: StyleFound, one: Moving) -> str:
+def _near(found: StyleStudy, one: MotionComparison) -> str:
     if one.feature != "head" or found.source is not None:
         return ""
-    return "met" if one.goes_with_sound else "missed"
+    return "met" if one.follows_sound else "missed"
 
 
-def _long(found: StyleFound) -> list[str]:
+def _long(found: StyleStudy) -> list[str]:
     if not found.long.visited:
         return []
     rows = [
@@ -153,22 +149,14 @@ def _long(found: StyleFound) -> list[str]:
         for feature in found.long.visited
     ]
     after = [f"moments visited after {minutes} min" for minutes in VISITED_AFTER]
-    likeness = [f"highest r from {FROM_S} s: {kind}" for kind in ("recordings", "speech", "silence")]
+    highest = [f"highest r from {FROM_S} s: {kind}" for kind in ("recordings", "speech", "silence")]
     return [
         f"<h3>Clips of {MINUTES} minutes</h3>",
-        table(("feature", *after, *likeness), rows, numbers=range(1, 7)),
-        _soft("A clip that runs in a loop is like itself (r = 1) at the loop's lag."),
-        _panels([panel_svg(repetition(found, feature)) for feature in found.long.repeating]),
+        table(("feature", *after, *highest), rows, numbers=range(1, 7)),
+        note("A clip that repeats itself has r = 1 at the period of the repetition."),
+        _panels(repetition(found, feature) for feature in found.long.repeating),
     ]
 
 
-def _panels(parts: Sequence[str]) -> str:
-    return f'<div class="panels">{"".join(parts)}</div>'
-
-
-def _said(*sentences: str) -> str:
-    return "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences)
-
-
-def _soft(sentence: str) -> str:
-    return f'<p class="soft">{escape(sentence)}</p>'
+def _panels(panels: Iterable[Panel]) -> str:
+    return f'<div class="panels">{"".join(panel_svg(panel) for panel in panels)}</div>'

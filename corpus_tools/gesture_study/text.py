@@ -1,4 +1,4 @@
-"""The study as numbers for other programs: one line a trait as CSV, everything as JSON."""
+"""The study as numbers for other programs: one line for each trait as CSV, all figures as JSON."""
 
 import csv
 import json
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.gesture_study.analysis import Compared, GesturesFound, Moving, StyleFound
+from corpus_tools.gesture_study.analysis import GestureStudy, MotionComparison, StyleStudy, TraitComparison
 from corpus_tools.gesture_study.longrun import VISITED_AFTER
 from corpus_tools.gesture_study.page import verdict
 
@@ -16,21 +16,23 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 HEAD = ("style", "source", "trait", "unit", "n", "w_halves", "w_field", "w_noise", "target")
 
 
-def gestures_csv(found: GesturesFound) -> str:
-    """Distances of every style's traits."""
+def gestures_csv(found: GestureStudy) -> str:
+    """Distances of the traits of every style."""
     file = StringIO()
     rows = csv.writer(file, lineterminator="\n")
     rows.writerow(HEAD)
     for style in found.styles:
         for one in style.compared:
-            told = [f"{value:.6g}" for value in (one.halves, one.to_field, one.to_noise)]
+            distances = [f"{value:.6g}" for value in (one.halves, one.to_field, one.to_noise)]
             trait = one.trait
-            rows.writerow([style.name, style.source, trait.name, trait.unit, len(one.real), *told, verdict(style, one)])
+            rows.writerow(
+                [style.name, style.source, trait.name, trait.unit, len(one.real), *distances, verdict(style, one)]
+            )
     return file.getvalue()
 
 
-def gestures_json(found: GesturesFound) -> str:
-    """Everything but the values themselves, of which there are quantiles."""
+def gestures_json(found: GestureStudy) -> str:
+    """All figures, and quantiles of the values."""
     options = found.options
     content = {
         "palette": found.name,
@@ -44,7 +46,7 @@ def gestures_json(found: GesturesFound) -> str:
     return json.dumps(content, ensure_ascii=False, indent=1) + "\n"
 
 
-def _style(found: StyleFound) -> dict[str, Any]:
+def _style(found: StyleStudy) -> dict[str, Any]:
     return {
         "name": found.name,
         "derived_from": found.source,
@@ -68,7 +70,7 @@ def _style(found: StyleFound) -> dict[str, Any]:
     }
 
 
-def _compared(found: StyleFound, one: Compared) -> dict[str, Any]:
+def _compared(found: StyleStudy, one: TraitComparison) -> dict[str, Any]:
     kinds = {"real": one.real, "field": one.field, "noise": one.noise}
     return {
         "name": one.trait.name,
@@ -84,7 +86,7 @@ def _compared(found: StyleFound, one: Compared) -> dict[str, Any]:
     }
 
 
-def _moving(one: Moving) -> dict[str, Any]:
+def _moving(one: MotionComparison) -> dict[str, Any]:
     return {
         "name": one.feature,
         "r_with_intensity": _three(one.with_intensity),

@@ -1,4 +1,4 @@
-"""What of gestures is compared: a number for each frame, or for each blink, of one recording."""
+"""The traits of gestures that are compared: a number for each frame, or for each blink, of a recording."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ IN_DEGREES = 180.0 / np.pi
 
 @dataclass(frozen=True, slots=True)
 class Trait:
-    """A name, its unit, the feature that shows it, and how it is read from a recording's motion (T, k).
+    """A name, its unit, its feature, and how it is computed from a recording's motion (T, k).
 
-    The traits with a target are those that a field must keep near the recorded ones (docs/gestures.md).
+    A field must keep the traits with a target near the recorded ones (docs/gestures.md).
     """
 
     name: str
@@ -29,42 +29,42 @@ class Trait:
     has_target: bool = False
 
     def all_of(self, parts: Sequence[Motion]) -> Doubles:
-        """Of all recordings."""
+        """Values of all recordings."""
         return np.concatenate([self.of(part) for part in parts]) if len(parts) else np.zeros(0)
 
 
 def traits_of(palette: Palette, style: Style) -> tuple[Trait, ...]:
-    """The traits that a style's features show; amplitudes are distances from its medians."""
+    """The traits of a style's features; amplitudes are distances from its medians."""
     middle = {feature: middle_of(style, feature).astype(np.float64) for feature in style.motion}
     found: list[Trait] = []
     for feature in style.motion:
         if feature == "blink":
             found += [Trait(name, unit, feature, of, name == INTERVALS) for name, unit, of in BLINKS]
         else:
-            found += _moved(palette, feature, middle[feature])
+            found += _motion_traits(palette, feature, middle[feature])
     return tuple(found)
 
 
 INTERVALS = "blink interval"
 
 
-def _blinking(value: Callable[[Blinks], Doubles]) -> Callable[[Motion], Doubles]:
+def _blink_trait(value: Callable[[Blinks], Doubles]) -> Callable[[Motion], Doubles]:
     return lambda part: value(blinks_of(part, np.array([len(part)], np.int32), GESTURE_FPS))
 
 
 BLINKS: tuple[tuple[str, str, Callable[[Motion], Doubles]], ...] = (
-    (INTERVALS, "s", _blinking(lambda found: found.intervals)),
-    ("blink duration", "s", _blinking(lambda found: found.durations)),
-    ("closing time", "s", _blinking(lambda found: found.closing)),
-    ("opening time", "s", _blinking(lambda found: found.opening)),
-    ("closing speed", "1/s", _blinking(lambda found: found.closing_speeds)),
-    ("opening speed", "1/s", _blinking(lambda found: found.opening_speeds)),
+    (INTERVALS, "s", _blink_trait(lambda found: found.intervals)),
+    ("blink duration", "s", _blink_trait(lambda found: found.durations)),
+    ("closing time", "s", _blink_trait(lambda found: found.closing)),
+    ("opening time", "s", _blink_trait(lambda found: found.opening)),
+    ("closing speed", "1/s", _blink_trait(lambda found: found.closing_speeds)),
+    ("opening speed", "1/s", _blink_trait(lambda found: found.opening_speeds)),
 )
 
 
-def _moved(palette: Palette, feature: str, middle: Doubles) -> list[Trait]:
-    """Speed and amplitude of a feature that moves, in a unit that can be seen."""
-    see, unit = seen(palette, feature)
+def _motion_traits(palette: Palette, feature: str, middle: Doubles) -> list[Trait]:
+    """Speed and amplitude of a feature in display units."""
+    display, unit = display_units(palette, feature)
     if feature == "brows":
         lift = brow_lift(palette)
         return [
@@ -76,15 +76,15 @@ def _moved(palette: Palette, feature: str, middle: Doubles) -> list[Trait]:
             f"{feature} speed",
             f"{unit}/s" if unit else "1/s",
             feature,
-            lambda part: np.linalg.norm(np.diff(see(part), axis=0), axis=1) * GESTURE_FPS,
+            lambda part: np.linalg.norm(np.diff(display(part), axis=0), axis=1) * GESTURE_FPS,
             has_target=feature == "head",
         ),
-        Trait(f"{feature} amplitude", unit, feature, lambda part: np.linalg.norm(see(part - middle), axis=1)),
+        Trait(f"{feature} amplitude", unit, feature, lambda part: np.linalg.norm(display(part - middle), axis=1)),
     ]
 
 
-def seen(palette: Palette, feature: str) -> tuple[Callable[[Motion], Motion], str]:
-    """How channels become what is seen, and its unit: the head's three angles, landmarks' mean motion in mm."""
+def display_units(palette: Palette, feature: str) -> tuple[Callable[[Motion], Motion], str]:
+    """Conversion of a feature's channels to visible motion, and its unit: the head's angles, mean landmark motion."""
     if feature == "head":
         return lambda values: values[:, :3].astype(np.float64) * IN_DEGREES, "deg"
     if feature == "gaze":
@@ -96,10 +96,10 @@ def seen(palette: Palette, feature: str) -> tuple[Callable[[Motion], Motion], st
 
 
 def brow_lift(palette: Palette) -> Doubles:
-    """(k,) mean height in mm of the brows' landmarks a unit of each mode."""
+    """(k,) mean height in mm of the brows' landmarks for one unit of each mode."""
     return np.asarray(palette.regions["brows"].modes[:, :, 1].mean(axis=1), np.float64)
 
 
-def visible(palette: Palette, motion: Mapping[str, Motion]) -> dict[str, Motion]:
-    """All features in the units that are seen."""
-    return {feature: seen(palette, feature)[0](values) for feature, values in motion.items()}
+def in_display_units(palette: Palette, motion: Mapping[str, Motion]) -> dict[str, Motion]:
+    """All features in display units."""
+    return {feature: display_units(palette, feature)[0](values) for feature, values in motion.items()}

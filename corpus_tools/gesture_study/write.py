@@ -1,49 +1,44 @@
-"""The study of a palette written to a file: what its suffix says."""
+"""Write the study of a palette as a page, tables or a picture."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from corpus_tools.gesture_study.analysis import GesturesFound, Options, Progress, study
-from corpus_tools.gesture_study.figure import brief
+from corpus_tools.gesture_study.analysis import GestureStudy, Options, Progress, study
+from corpus_tools.gesture_study.figure import brief, panels_png
 from corpus_tools.gesture_study.page import gestures_page
 from corpus_tools.gesture_study.text import gestures_csv, gestures_json
-from corpus_tools.report.panels import panels_png
-from lexicon.errors import InputError
+from corpus_tools.report.output import report_writer
 from tts2face.models.palette import load_palette
 from tts2face.storage.files import write_whole
 from tts2face.storage.output_names import check_name
 
-COLUMNS = 3
 
+def write_gestures(palette: str, out: Path, options: Options, *, on_progress: Progress | None = None) -> GestureStudy:
+    """Study a palette (by name or path), write the file, and return the study.
 
-def write_gestures(palette: str, out: Path, options: Options, *, on_progress: Progress | None = None) -> GesturesFound:
-    """Study a palette (by name or path), write the file, and give what was found.
-
-    ``.html`` is a page, ``.json`` everything, ``.csv`` distances, ``.png`` the main plots of the first style.
+    ``.html`` is a page, ``.json`` has every figure, ``.csv`` the distances, ``.png`` the main plots of the first style.
 
     Raises
     ------
     InputError
-        A suffix that there is not; errors as `load_palette`. Nothing is written then.
+        The suffix is unknown; errors as `load_palette`. Nothing is written then.
     BackendError
-        The file cannot be written.
+        matplotlib is not installed, or the file cannot be written.
     """
-    suffix = out.suffix.lower()
-    if suffix not in WRITERS:
-        raise InputError(f"a report is written as {', '.join(WRITERS)}, not {out.name}")
+    writer = report_writer(out, WRITERS)
     check_name(out)
     found = study(palette, load_palette(palette), options, on_progress)
-    write_whole(out, WRITERS[suffix](found))
+    write_whole(out, writer(found))
     return found
 
 
-def _picture(found: GesturesFound) -> bytes:
+def _picture(found: GestureStudy) -> bytes:
     first = found.styles[0]
-    return panels_png(f"Gestures of {first.name}: recorded, by its fields, by noise", brief(first), COLUMNS)
+    return panels_png(f"Gestures of {first.name}: recorded, by its fields, by noise", brief(first))
 
 
-WRITERS: Mapping[str, Callable[[GesturesFound], bytes]] = MappingProxyType(
+WRITERS: Mapping[str, Callable[[GestureStudy], bytes]] = MappingProxyType(
     {
         ".html": lambda found: gestures_page(found).encode(),
         ".csv": lambda found: gestures_csv(found).encode(),

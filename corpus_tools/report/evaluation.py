@@ -1,27 +1,38 @@
-"""A page about accuracy: figures, where methods differ, and curves of the best, usual and worst sentences."""
+"""A page about accuracy: figures, where methods differ, and curves of the best, median and worst sentences."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import cycle
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from corpus_tools.evaluation.evaluate import CEILING, Run
 from corpus_tools.evaluation.scores import CONFIDENCE, Scores, shown
 from corpus_tools.evaluation.tables import Evaluation, figure_text
-from corpus_tools.report.page import page, table
-from corpus_tools.report.trajectories import Series, curves_plot, histogram
+from corpus_tools.report.drawing import RULE, SERIES, draw_svg
+from corpus_tools.report.page import page, paragraphs, table, wide
 from corpus_tools.report.videos import Films
+from lexicon.sequence import SILENCE, PhoneSequence
 
-SHOWN = "exemplar"  # whose best, usual and worst sentences are shown, if it was compared; else the last but one
-PLAIN = "theobald2007"
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Floats = NDArray[np.floating]
+SHOWN = "exemplar"  # the method whose sentences are shown where it was compared; otherwise the last one
+PLAIN = "theobald2007"  # shown beside it
 N_SHOWN = 3  # sentences of each kind
+WIDTH, HEIGHT = 1100, 236  # px of a plot
+N_BINS = 30
 ABOUT = {
     False: "{n_test} utterances held out, {n_train} learnt from; true phone edges.",
-    True: "{n_test} utterances of somebody else with their own phone edges, {n_train} learnt from; curves z-scored "
-    "by each one's own speech.",
+    True: "{n_test} utterances of somebody else with their own phone edges, {n_train} learnt from; each talker's "
+    "curves are z-scored over that talker's speech.",
 }
 ABOUT_OWN = (
-    "The words in the default English voice with its own durations, its clock put onto the real one word by word. "
-    "DTW cost, free: on its own clock, without a band."
+    "The words in the default English voice with its own durations, mapped to the recorded times word by word. "
+    "DTW cost, free: on the voice's own clock, without a band."
 )
 
 
@@ -33,14 +44,14 @@ def evaluation_page(result: Evaluation, runs: Sequence[Run]) -> str:
     return page(
         "Accuracy against real lips",
         [
-            f"<p>{about} In brackets: {CONFIDENCE:.0%} intervals from drawing utterances again.</p>",
+            f"<p>{about} In brackets: {CONFIDENCE:.0%} bootstrap intervals over utterances.</p>",
             _figures(result.scores),
             *_own(result.own),
             *_folds(result),
             "<h2>By class of phone</h2>",
             _classes(result.scores),
             "<h2>DTW cost of the sentences</h2>",
-            histogram(
+            cost_histogram(
                 {one.method: [u.dtw_cost for u in one.utterances] for one in result.scores if one.method != CEILING}
             ),
             *_sentences(result, runs, seen, PLAIN if PLAIN in compared and seen != PLAIN else None),
@@ -59,7 +70,7 @@ def _figures(scores: Sequence[Scores]) -> str:
 def _own(scores: Sequence[Scores]) -> Iterator[str]:
     if scores:
         n = len(scores[0].utterances)
-        yield f"<h2>With own durations</h2>\n<p>{n} utterances. {ABOUT_OWN}</p>\n{_figures(scores)}"
+        yield f"<h2>With own durations</h2>\n{paragraphs(f'{n} utterances. {ABOUT_OWN}')}\n{_figures(scores)}"
 
 
 def _folds(result: Evaluation) -> Iterator[str]:
@@ -74,8 +85,10 @@ def _folds(result: Evaluation) -> Iterator[str]:
             rows.append((one.method, f"{number} ({fold.n_test} held out, {fold.n_train} learnt from)", *cells))
         over = ((result.over_folds(one.method, name), digits) for name, _, digits in heads)
         rows.append((one.method, "mean ± spread", *(f"{mean:.{n}f} ± {spread:.{n}f}" for (mean, spread), n in over)))
-    yield f"<h2>{len(result.folds)} folds</h2>\n<p>Each learnt from the utterances of the others. Spread: standard "
-    yield "deviation over the folds.</p>"
+    yield f"<h2>{len(result.folds)} folds</h2>"
+    yield paragraphs(
+        "Each fold is tested on methods learnt from the others. Spread: standard deviation over the folds."
+    )
     yield table(("method", "fold", *(head for _, head, _ in heads)), rows, numbers=range(2, len(heads) + 2))
 
 
@@ -92,7 +105,7 @@ def _classes(scores: Sequence[Scores]) -> str:
 
 
 def _sentences(result: Evaluation, runs: Sequence[Run], seen: str, plain: str | None) -> Iterator[str]:
-    """Curves of real and synthesised lips, as in T07, figs 6-8, and for the worst the faces themselves."""
+    """Curves of real and synthesised lips, as in T07, figs 6-8, and for the worst the faces."""
     scores = next(one for one in result.scores if one.method == seen)
     order = np.argsort([one.dtw_cost for one in scores.utterances], kind="stable")
     middle = len(order) // 2 - N_SHOWN // 2
@@ -100,7 +113,7 @@ def _sentences(result: Evaluation, runs: Sequence[Run], seen: str, plain: str | 
     films = Films(seen)
     for title, chosen in (
         ("Worst sentences", order[::-1][:N_SHOWN]),
-        ("Usual sentences", order[middle : middle + N_SHOWN]),
+        ("Median sentences", order[middle : middle + N_SHOWN]),
         ("Best sentences", order[:N_SHOWN]),
     ):
         yield f"<h2>{title} of {seen}</h2>"
@@ -120,7 +133,54 @@ def _curves(run: Run, at: int, names: Sequence[str]) -> str:
     made = {name: run.curves(name, at) for name in names}
     plots = []
     for label, curve in ((f"gap of the lips {unit}", "opening"), (f"width of the mouth {unit}", "width")):
-        series = [Series("real", times, getattr(one.curves, curve))]
-        series += [Series(name, times, getattr(curves, curve)) for name, curves in made.items()]
-        plots.append(curves_plot(series, label, one.observation.phones))
+        values = {"real": getattr(one.curves, curve)}
+        values |= {name: getattr(curves, curve) for name, curves in made.items()}
+        plots.append(curves_plot(times, values, label, one.observation.phones))
     return "\n".join(plots)
+
+
+def curves_plot(times: Floats, curves: Mapping[str, Floats], label: str, phones: PhoneSequence) -> str:
+    """Named curves (T,) at times (T,) in seconds, with the phones above (SVG)."""
+
+    def draw(figure: "Figure") -> tuple[()]:
+        axes = _series_axes(figure, label, "seconds")
+        for (name, values), (colour, dash) in zip(curves.items(), cycle(SERIES), strict=False):
+            axes.plot(times, values, color=colour, linestyle=dash, label=name)
+        label_phones(axes, phones, float(times[-1]))
+        figure.legend(loc="outside lower right", ncols=len(curves))
+        return ()
+
+    return wide(draw_svg(draw, WIDTH, HEIGHT, f"{label} over time"))
+
+
+def label_phones(axes: "Axes", phones: PhoneSequence, end: float) -> None:
+    """Draw a line at each phone edge up to `end` seconds and write the phones above the axes."""
+    place = axes.get_xaxis_transform()
+    axes.vlines(phones.edges[phones.edges <= end], 0, 1, RULE, linewidth=1, transform=place, zorder=0)
+    for phone, begin, stop in zip(phones.phones, phones.edges, phones.edges[1:], strict=False):
+        if phone != SILENCE and begin < end:
+            axes.text(float(begin + min(stop, end)) / 2, 1.02, phone, ha="center", va="bottom", transform=place)
+
+
+def cost_histogram(samples: Mapping[str, Sequence[float]]) -> str:
+    """How many utterances have which DTW cost, one outline for each method (SVG)."""
+    edges = np.histogram_bin_edges(np.concatenate([np.asarray(values) for values in samples.values()]), N_BINS)
+
+    def draw(figure: "Figure") -> tuple[()]:
+        from matplotlib.ticker import MaxNLocator
+
+        axes = _series_axes(figure, "utterances", "DTW cost")
+        for (name, values), (colour, dash) in zip(samples.items(), cycle(SERIES), strict=False):
+            axes.stairs(np.histogram(values, edges)[0], edges, color=colour, linestyle=dash, linewidth=1.5, label=name)
+        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+        figure.legend(loc="outside lower right", ncols=len(samples))
+        return ()
+
+    return wide(draw_svg(draw, WIDTH, HEIGHT, "histogram of DTW costs"))
+
+
+def _series_axes(figure: "Figure", y_label: str, x_label: str) -> "Axes":
+    axes = figure.subplots()
+    axes.grid(visible=False, axis="x")
+    axes.set(xlabel=x_label, ylabel=y_label)
+    return axes

@@ -21,14 +21,13 @@ table { border-collapse: collapse; } td, th { padding: .25rem .8rem .25rem 0; te
 section.item { display: flex; gap: 1rem; padding: .6rem 0; border-top: 1px solid var(--line); }
 section.item > div { overflow-x: auto; } section.item > div:first-child { flex: none; }
 p { margin: .2rem 0; } .soft { color: var(--soft); } .bad { color: var(--bad); }
-img { border-radius: 4px; } svg text { fill: var(--soft); font: 10px system-ui, sans-serif; }
-svg.figure text { fill: var(--ink); font-size: var(--letters); } .wide { overflow-x: auto; }
-svg .cell:hover { stroke: #fff; stroke-width: 2px; }
+img { border-radius: 4px; } .wide { overflow-x: auto; }
+svg .tip { fill: transparent; } svg .tip:hover { stroke: var(--ink); stroke-width: 1.5px; }
 """.strip()
 
 
 def page(title: str, parts: Iterable[str]) -> str:
-    """A whole page; the parts are HTML already."""
+    """A complete page; the parts are HTML already."""
     body = "\n".join(parts)
     return (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
@@ -38,7 +37,7 @@ def page(title: str, parts: Iterable[str]) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Iterable[int] = ()) -> str:
-    """A table of texts; the columns in `numbers` stand to the right."""
+    """A table of texts; the columns in `numbers` are aligned to the right."""
     right = set(numbers)
 
     def row(cells: Sequence[str], tag: str) -> str:
@@ -48,8 +47,23 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Iterable[
     return "\n".join(["<table>", row(head, "th"), *(row(cells, "td") for cells in rows), "</table>"])
 
 
+def paragraphs(*sentences: str) -> str:
+    """One paragraph for each sentence."""
+    return "\n".join(f"<p>{escape(sentence)}</p>" for sentence in sentences)
+
+
+def note(sentence: str) -> str:
+    """A paragraph in a softer colour."""
+    return f'<p class="soft">{escape(sentence)}</p>'
+
+
+def wide(element: str) -> str:
+    """An element that scrolls sideways where the window is narrower."""
+    return f'<div class="wide">{element}</div>'
+
+
 def picture_tag(pixels: NDArray[np.uint8], height: int) -> str:
-    """An (H, W, 3) sRGB picture as a small JPEG inside the page."""
+    """An (H, W, 3) sRGB picture as a JPEG of at most `height` px inside the page."""
     from PIL import Image
 
     shown = Image.fromarray(pixels)

@@ -1,9 +1,10 @@
-"""A page about recordings: what was kept, what was refused and why, and how good each one is."""
+"""A page about recordings: which were kept, which were refused and why, and the measures of each."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,24 +12,33 @@ from numpy.typing import NDArray
 from corpus_tools.recordings.limits import LIMITS
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import Observations, Refusal
-from corpus_tools.report.curves import utterance_curves
-from corpus_tools.report.page import page, picture_tag, table
+from corpus_tools.report.drawing import FIRST, SECOND, draw_svg
+from corpus_tools.report.evaluation import label_phones
+from corpus_tools.report.page import note, page, paragraphs, picture_tag, table
+from corpus_tools.training.train_talker import lip_gap
 from lexicon.errors import DataError, InputError
 from lexicon.phones import ARPABET
 from lexicon.sequence import SILENCE
 from tts2face.video.media import read_pictures
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 THUMBNAIL_PX = 92
+PX_PER_S, SIDES, HEIGHT = 260, 84, 124  # px: a second of the curves, both margins together, the height
+TICK_S = 0.5
+GAP_RANGE = (0.0, 0.35)  # of the eye distance: up to a mouth wide open in speech
+DB_RANGE = (25.0, 85.0)
 MEASURES = {
     "confidence": ("fit of the words", "log likelihood / s", 1.0),
-    "score": ("least face score", "", 1.0),
-    "n_filled": ("frames filled in", "", 1.0),
-    "lag": ("sound late by, taken out", "ms", 1000.0),
+    "score": ("lowest face score", "", 1.0),
+    "n_filled": ("interpolated frames", "", 1.0),
+    "lag": ("delay of the sound, corrected", "ms", 1000.0),
     "clipped": ("clipped speech", "%", 100.0),
-    "snr_db": ("speech over noise", "dB", 1.0),
-    "crowded": ("pictures with more faces", "%", 100.0),
+    "snr_db": ("signal-to-noise ratio", "dB", 1.0),
+    "crowded": ("pictures with several faces", "%", 100.0),
     "turn_deg": ("face turned away", "degrees", 1.0),
-    "frozen_s": ("picture stood still", "s", 1.0),
+    "frozen_s": ("frozen picture", "s", 1.0),
 }
 
 
@@ -39,21 +49,21 @@ def recordings_page(name: str, found: Observations) -> str:
         f"Recordings of {name}",
         [
             _summary(found),
-            "<h2>Measures of what was kept</h2>",
+            "<h2>Measures of the kept recordings</h2>",
             _measures(found.kept),
             "<h2>Phones spoken</h2>",
             _phones(found.kept),
             f"<h2>Refused ({len(found.refused)})</h2>",
             *(_refused(refusal, pictures.get(refusal.name)) for refusal in found.refused),
             f"<h2>Kept ({len(found.kept)})</h2>",
-            '<p class="soft">Blue: gap of the lips over the distance of the eyes. Ochre: loudness.</p>',
+            note("Blue: gap of the lips over the distance of the eyes. Ochre: intensity of the sound, 25 to 85 dB."),
             *(_kept(seen, pictures.get(seen.name)) for seen in found.kept),
         ],
     )
 
 
 def thumbnails(found: Observations) -> dict[str, NDArray[np.uint8]]:
-    """A picture of each recording by its name, none of those that cannot be read."""
+    """A picture of each recording by its name; those that cannot be read are missing."""
     wanted: dict[Path, list[tuple[float, str]]] = {}
     for seen in found.kept:
         middle = seen.quality.cut + len(seen.landmarks) / seen.fps / 2
@@ -72,7 +82,7 @@ def _at(video: Path, moments: Sequence[tuple[float, str]]) -> Iterator[tuple[str
             if not waiting:
                 return
     except (DataError, InputError):
-        return  # what cannot be read has no picture; its refusal stands in the list
+        return  # a video that cannot be read has no picture; its refusal is in the list
 
 
 def _summary(found: Observations) -> str:
@@ -83,15 +93,15 @@ def _summary(found: Observations) -> str:
     if found.kept:
         lines.append(f"Frames per second: {found.kept[0].fps:g}.")
     if recognised:
-        lines.append(f"{recognised} have no transcript: their phones were recognised, and some are wrong.")
+        lines.append(f"{recognised} have no transcript: their phones were recognised automatically, with errors.")
     if lags:
-        lines.append(f"Sound and picture were put together: {', '.join(f'{1000 * lag:+.0f} ms' for lag in lags)}.")
-    return "\n".join(f"<p>{escape(line)}</p>" for line in lines)
+        lines.append(f"Sound and picture were synchronised by {', '.join(f'{1000 * lag:+.0f} ms' for lag in lags)}.")
+    return paragraphs(*lines)
 
 
 def _measures(kept: Sequence[Observation]) -> str:
     if not kept:
-        return "<p>Nothing was kept.</p>"
+        return paragraphs("No recording was kept.")
     limits = {limit.measure: limit for limit in LIMITS}
     rows = []
     for measure, (label, unit, factor) in MEASURES.items():
@@ -106,7 +116,7 @@ def _phones(kept: Iterable[Observation]) -> str:
     counts = Counter(phone for seen in kept for phone in seen.phones.phones if phone != SILENCE)
     spoken = ", ".join(f"{phone} {count}" for phone, count in counts.most_common()) or "none"
     missing = ", ".join(sorted({phone for phone in ARPABET.values() if phone not in counts})) or "none"
-    return f"<p>{escape(spoken)}</p>\n<p>English phones never spoken: {escape(missing)}</p>"
+    return paragraphs(spoken, f"English phones never spoken: {missing}")
 
 
 def _refused(refusal: Refusal, picture: NDArray[np.uint8] | None) -> str:
@@ -120,10 +130,38 @@ def _kept(seen: Observation, picture: NDArray[np.uint8] | None) -> str:
         if measure in {"confidence", "snr_db", "turn_deg"} or (value != 0 and measure != "score"):
             texts.append(f"{label} {value:.3g} {unit}".strip())
     how = " (phones recognised)" if seen.is_recognised else ""
-    about = f'<p class="soft">{escape("; ".join(texts))}{how}</p>'
-    return _item(seen.name, about + utterance_curves(seen), picture)
+    return _item(seen.name, note("; ".join(texts) + how) + utterance_curves(seen), picture)
 
 
 def _item(name: str, content: str, picture: NDArray[np.uint8] | None) -> str:
     image = picture_tag(picture, THUMBNAIL_PX) if picture is not None else ""
     return f'<section class="item"><div>{image}</div><div><b>{escape(name)}</b>{content}</div></section>'
+
+
+def utterance_curves(seen: Observation) -> str:
+    """Gap of the lips and intensity over time, with words and phones above (SVG)."""
+    times = np.arange(len(seen.landmarks)) / seen.fps
+    width = len(times) / seen.fps * PX_PER_S + SIDES
+
+    def draw(figure: "Figure") -> tuple[()]:
+        figure.set_layout_engine("none")
+        axes = figure.add_axes((SIDES / 2 / width, 0.3, 1 - SIDES / width, 0.38))
+        axes.plot(times, np.clip(lip_gap(seen.landmarks), *GAP_RANGE), color=FIRST)
+        axes.set(xlim=(0, len(times) / seen.fps), ylim=GAP_RANGE, yticks=GAP_RANGE)
+        axes.set_xticks(np.arange(0, len(times) / seen.fps, TICK_S))
+        axes.set_xlabel("seconds", loc="left")
+        axes.grid(visible=False)
+        axes.set_ylabel("gap", color=FIRST)
+        sound = axes.twinx()
+        sound.plot(times, np.clip(seen.intensity, *DB_RANGE), color=SECOND)
+        sound.set(ylim=DB_RANGE, yticks=DB_RANGE)
+        sound.grid(visible=False)
+        sound.set_ylabel("dB", color=SECOND)
+        label_phones(axes, seen.phones, times[-1])
+        edges = seen.phones.edges
+        for word in seen.words:
+            middle = (edges[word.first] + edges[word.last]) / 2
+            axes.text(middle, 1.35, word.text, ha="center", transform=axes.get_xaxis_transform())
+        return ()
+
+    return draw_svg(draw, width, HEIGHT, f"lips and sound of {seen.name}")

@@ -1,10 +1,9 @@
-"""Small films inside a page: the recording, and beside it the default head with what was made of it."""
+"""Small films inside a page: the recording, and beside it the default head with the synthesised motion."""
 
 from base64 import b64encode
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from functools import cached_property
-from html import escape
 from io import BytesIO
 from typing import Any
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.evaluation.evaluate import Run
 from corpus_tools.evaluation.reference import Real
+from corpus_tools.report.page import note
 from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
@@ -25,14 +25,14 @@ from tts2face.video.media import read_pictures
 
 SIDE_PX = 240
 SETTINGS = {"crf": "26", "preset": "veryfast"}  # some 100 kB a sentence
-NOTE = "Left the recording, right {method} on the default head; without sound."
+NOTE = "Left: the recording; right: {method} on the default head. No sound."
 
 
 class Films:
-    """Films of what one method made; the head is made ready when the first is asked for."""
+    """Films of the motion that one method synthesised; the head is loaded with the first film."""
 
     def __init__(self, method: str) -> None:
-        """Show what `method` made."""
+        """Films of `method`."""
         self._method = method
 
     @cached_property
@@ -44,7 +44,7 @@ class Films:
         return mesh_renderer(self._face, Picture(size=f"{SIDE_PX}x{SIDE_PX}", camera="close"))
 
     def film(self, run: Run, at: int) -> str:
-        """A film of one utterance (HTML); nothing where its video has gone since or shows no picture."""
+        """A film of one utterance (HTML); empty where its video is missing or shows too few pictures."""
         one = run.real[at]
         seen = list(pictures_of(one))
         if len(seen) < one.judged.stop - one.judged.start:
@@ -52,7 +52,7 @@ class Films:
         speech = Trajectory(speech_channels(run.model), run.made[self._method][at], one.observation.fps)
         weights = retargeter(run.talker, self._face).retarget(speech).values
         sides = [
-            np.concatenate([fitted(pixels), self._renderer.draw(row)], axis=1)
+            np.concatenate([letterbox(pixels), self._renderer.draw(row)], axis=1)
             for pixels, row in zip(seen, weights[one.judged], strict=False)
         ]
         return film_tag(sides, one.observation.fps, NOTE.format(method=self._method))
@@ -71,10 +71,10 @@ def pictures_of(one: Real) -> Iterator[NDArray[np.uint8]]:
             if at == len(instants):
                 return
     except (DataError, InputError):
-        return  # the video has gone since; the curves stay
+        return  # the video was removed after the evaluation; its curves are shown all the same
 
 
-def fitted(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def letterbox(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """An (H, W, 3) picture in the middle of a black square of `SIDE_PX`."""
     from PIL import Image
 
@@ -85,8 +85,8 @@ def fitted(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(square)
 
 
-def film_tag(pictures: Sequence[NDArray[np.uint8]], fps: float, note: str) -> str:
-    """A silent film that runs round and round inside the page, and a line below it."""
+def film_tag(pictures: Sequence[NDArray[np.uint8]], fps: float, text: str) -> str:
+    """A silent film that repeats inside the page, with a note below it."""
     import av
 
     height, width = pictures[0].shape[:2]
@@ -100,5 +100,5 @@ def film_tag(pictures: Sequence[NDArray[np.uint8]], fps: float, note: str) -> st
     data = b64encode(content.getvalue()).decode()
     return (
         f'<video autoplay loop muted playsinline controls width="{width}" height="{height}" '
-        f'src="data:video/mp4;base64,{data}"></video>\n<p class="soft">{escape(note)}</p>'
+        f'src="data:video/mp4;base64,{data}"></video>\n{note(text)}'
     )

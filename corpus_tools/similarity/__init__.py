@@ -1,1 +1,1 @@
-"""How alike phones look on one talker's face, and how far that can be trusted: for people who study visual speech."""
+"""Similarity of phones on one talker's face, and its reliability: for the study of visual speech."""

@@ -1,4 +1,4 @@
-"""The whole analysis of one talker's similarity table, in one record."""
+"""The complete analysis of one talker's similarity table."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from corpus_tools.similarity.compare import Comparison, compare_tables
 from corpus_tools.similarity.consistency import Consistency, mode_consistency, movement_consistency
 from corpus_tools.similarity.mantel import Agreement, articulatory_distances, mantel
 from corpus_tools.similarity.reliability import Reliability, split_half
-from corpus_tools.similarity.spoken import LEAST_PHONES, SimilarityTable, Spoken, similarity_table, spoken_tokens
+from corpus_tools.similarity.tokens import LEAST_PHONES, SimilarityTable, SpokenTokens, similarity_table, spoken_tokens
 from lexicon.errors import InputError
 from lexicon.phones import phone_of
 from tts2face.exemplar.similarity import Similarity
@@ -30,13 +30,13 @@ Progress = Callable[[int, int], None]
 USUAL_CLASSES = (4, 6, 8, 10, 12)
 STREAMS = MappingProxyType(
     {"utterances": 0, "words": 1, "articulation": 2, "comparison": 3, "same phones": 4}
-)  # each draws its own
+)  # each statistic has its own random stream
 N_NEIGHBOURS = 3  # as in T07 Table 1
 
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What is asked: numbers of `classes` (the usual ones that the phones allow without), random halves, seed."""
+    """Numbers of `classes` (None: `USUAL_CLASSES` below the number of phones), of random halves, and the seed."""
 
     classes: tuple[int, ...] | None = None
     halves: int = 20
@@ -44,8 +44,8 @@ class Options:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Named:
-    """A talker and the name by which it was asked for."""
+class NamedTalker:
+    """A talker and the name or path by which it was loaded."""
 
     name: str
     talker: Talker
@@ -53,9 +53,9 @@ class Named:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Analysis:
-    """All that is known about one talker's similarity table.
+    """All results on one talker's similarity table.
 
-    ``curve`` holds classes for every number from 2 to P - 1, ``chosen`` those asked for, ``best`` the one with the
+    ``curve`` holds classes for every number from 2 to P - 1, ``chosen`` those of the options, ``best`` the one with the
     highest silhouette. ``by_words`` is None where the corpus has too few different words; ``by_utterances_alike``
     compares the phones of ``by_words`` between halves of the utterances. ``articulation`` (P, P) are distances of the
     phones by their features, ``articulatory`` how they agree with the table: all phones first, then consonants, vowels.
@@ -81,21 +81,21 @@ class Analysis:
 
 
 def analyse(
-    asked: Named, options: Options, other: Named | None = None, on_progress: Progress | None = None
+    subject: NamedTalker, options: Options, other: NamedTalker | None = None, on_progress: Progress | None = None
 ) -> Analysis:
     """Analyse a talker's similarity table, and compare it with another's.
 
     Raises
     ------
     InputError
-        A talker has too few phones, tokens or utterances; numbers of classes or halves that cannot be; too few common
-        phones.
+        A talker has too few phones, tokens or utterances, the talkers too few common phones, or the number of classes
+        or halves is impossible.
     """
     if options.halves < 2:
         raise InputError(f"a reliability needs at least 2 random halves, not {options.halves}")
     if options.seed < 0:
         raise InputError(f"a seed is a whole number from 0, not {options.seed}")
-    spoken = spoken_tokens(asked.talker, asked.name)
+    spoken = spoken_tokens(subject.talker, subject.name)
     table = similarity_table(spoken)
     numbers = _numbers(options, len(table.phones))
     against = None if other is None else similarity_table(spoken_tokens(other.talker, other.name))
@@ -104,12 +104,12 @@ def analyse(
     curve = tuple(viseme_classes(apart, tree, n) for n in range(2, len(table.phones)))
     by_utterances, by_words, alike = _halves(spoken, options, on_progress)
     if by_utterances is None:
-        raise InputError(f"halves of {asked.name}'s utterances share too few phones; record more")
+        raise InputError(f"halves of {subject.name}'s utterances share too few phones; record more")
     similarity = Similarity(table.phones, table.matrix)
     articulation = articulatory_distances(table.phones)
     return Analysis(
-        asked.name,
-        len(asked.talker.utterances),
+        subject.name,
+        len(subject.talker.utterances),
         options,
         table,
         tuple(tuple(similarity.nearest(phone, N_NEIGHBOURS)) for phone in table.phones),
@@ -122,8 +122,8 @@ def analyse(
         alike,
         articulation,
         _articulatory(table.phones, apart, articulation, options),
-        movement_consistency(spoken, table.phones, asked.talker.model),
-        mode_consistency(spoken, table.phones, asked.talker.model),
+        movement_consistency(spoken, table.phones, subject.talker.model),
+        mode_consistency(spoken, table.phones, subject.talker.model),
         _compared(table, against, other, options),
     )
 
@@ -137,7 +137,7 @@ def _numbers(options: Options, n_phones: int) -> tuple[int, ...]:
 
 
 def _halves(
-    spoken: Spoken, options: Options, on_progress: Progress | None
+    spoken: SpokenTokens, options: Options, on_progress: Progress | None
 ) -> tuple[Reliability | None, Reliability | None, Reliability | None]:
     """Halves of the utterances, of the words, and of the utterances over the phones that the second could compare."""
     n, done = options.halves, 0
@@ -160,7 +160,7 @@ def _halves(
 def _articulatory(
     phones: tuple[str, ...], apart: NDArray[np.float64], articulation: NDArray[np.float64], options: Options
 ) -> tuple[tuple[str, Agreement], ...]:
-    """Agreement over all phones, and within consonants and vowels where `LEAST_PHONES` of them were said."""
+    """Agreement over all phones, and within consonants and vowels where there are `LEAST_PHONES` of them."""
     vowel = np.array([phone_of(phone).is_vowel for phone in phones])
     stream = _stream(options, "articulation")
     made = []
@@ -172,7 +172,7 @@ def _articulatory(
 
 
 def _compared(
-    table: SimilarityTable, against: SimilarityTable | None, other: Named | None, options: Options
+    table: SimilarityTable, against: SimilarityTable | None, other: NamedTalker | None, options: Options
 ) -> Comparison | None:
     if against is None or other is None:
         return None

@@ -1,20 +1,20 @@
-"""Viseme classes from data: phones clustered by how they look, and how well the classes stand apart."""
+"""Viseme classes from data: phones clustered by similarity, and the silhouettes of the classes."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import InputError
+from lexicon.errors import BackendError, InputError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tree:
     """Average-linkage clustering of P phones.
 
-    ``links`` (P - 1, 4) as scipy gives them: the two clusters joined (phones are 0 to P - 1, join i makes cluster
+    ``links`` (P - 1, 4) is scipy's linkage matrix: the two clusters joined (phones are 0 to P - 1, join i makes cluster
     P + i), their distance, the number of phones. ``order`` (P,) is the phones from one end of the dendrogram to the
-    other, neighbours as alike as the tree allows (Bar-Joseph et al. 2001).
+    other, with the most similar neighbours that the tree allows (Bar-Joseph et al. 2001).
     """
 
     links: NDArray[np.float64]
@@ -35,7 +35,7 @@ class VisemeClasses:
 
     @property
     def silhouette(self) -> float:
-        """Mean over the phones; near 1 where classes stand apart, 0 where they touch."""
+        """Mean over the phones; near 1 where classes are separate, 0 where they touch."""
         return float(self.silhouettes.mean())
 
 
@@ -63,20 +63,16 @@ def cut(tree: Tree, n_classes: int) -> NDArray[np.int64]:
     InputError
         There are fewer than 2 classes, or more than phones.
     """
-    n = len(tree.order)
-    check_classes(n_classes, n)
-    members: dict[int, list[int]] = {at: [at] for at in range(n)}
-    for step, (first, second, *_) in enumerate(tree.links[: n - n_classes]):
-        members[n + step] = members.pop(int(first)) + members.pop(int(second))
-    cluster_of = {phone: cluster for cluster, phones in members.items() for phone in phones}
-    numbers: dict[int, int] = {}
-    for phone in tree.order:
-        numbers.setdefault(cluster_of[int(phone)], len(numbers))
-    return np.array([numbers[cluster_of[phone]] for phone in range(n)], np.int64)
+    from scipy.cluster.hierarchy import cut_tree
+
+    check_classes(n_classes, len(tree.order))
+    clusters = cut_tree(tree.links, [n_classes])[:, 0]
+    _, first = np.unique(clusters[tree.order], return_index=True)
+    return np.argsort(np.argsort(first))[clusters].astype(np.int64)
 
 
 def check_classes(n_classes: int, n_phones: int) -> None:
-    """Refuse a number of classes that the phones cannot have; errors as `cut`."""
+    """Check a number of classes; errors as `cut`."""
     if not 2 <= n_classes <= n_phones:
         raise InputError(f"{n_phones} phones cannot make {n_classes} classes; give a number from 2 to {n_phones}")
 
@@ -91,19 +87,19 @@ def silhouettes(distance: NDArray[np.floating], labels: NDArray[np.integer]) -> 
     ------
     InputError
         There is one class only, or the arrays do not fit each other.
+    BackendError
+        scikit-learn is not installed.
     """
-    if distance.shape != (len(labels), len(labels)) or len(np.unique(labels)) < 2:
-        raise InputError(
-            f"a silhouette needs two classes and a square matrix; got {len(np.unique(labels))} and {distance.shape}"
-        )
-    member = labels[:, None] == np.unique(labels)[None, :]  # (P, K)
-    sizes = member.sum(axis=0)
-    sums = distance @ member
-    own_size = (member * sizes).sum(axis=1)
-    a = np.where(member, sums, 0.0).sum(axis=1) / np.maximum(own_size - 1, 1)
-    b = np.where(member, np.inf, sums / sizes).min(axis=1)
-    widest = np.maximum(a, b)
-    return np.where((own_size > 1) & (widest > 0), (b - a) / np.where(widest > 0, widest, 1.0), 0.0)
+    n_classes = len(np.unique(labels))
+    if distance.shape != (len(labels), len(labels)) or n_classes < 2:
+        raise InputError(f"a silhouette needs two classes and a square matrix; got {n_classes} and {distance.shape}")
+    if n_classes == len(labels):
+        return np.zeros(len(labels))  # scikit-learn refuses classes of one item each
+    try:
+        from sklearn.metrics import silhouette_samples
+    except ImportError as missing:
+        raise BackendError("silhouettes need scikit-learn; run: pip install 'tts2face[report]'") from missing
+    return np.asarray(silhouette_samples(distance, labels, metric="precomputed"), np.float64)
 
 
 def viseme_classes(distance: NDArray[np.floating], tree: Tree, n_classes: int) -> VisemeClasses:

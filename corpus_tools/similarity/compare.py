@@ -1,4 +1,4 @@
-"""Two talkers: whether the same phones look alike on both."""
+"""Comparison of two talkers' similarity tables."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.similarity.mantel import Agreement, mantel
-from corpus_tools.similarity.spoken import LEAST_PHONES, SimilarityTable
+from corpus_tools.similarity.tokens import LEAST_PHONES, SimilarityTable
 from lexicon.errors import InputError
 
 

@@ -1,4 +1,4 @@
-"""What a phone holds and what it leaves free: how much each movement of the mouth varies within the phones."""
+"""How much each movement of the mouth varies within the phones: which movements a phone constrains."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.similarity.spoken import Spoken
+from corpus_tools.similarity.tokens import SpokenTokens
 from lexicon.sequence import SILENCE
 from tts2face.models.landmarks import (
     CHIN,
@@ -33,13 +33,13 @@ MOVEMENTS: Mapping[str, tuple[tuple[int, int, float], ...]] = MappingProxyType({
     "corner raise": ((MOUTH_CORNER_LEFT, Y, 0.5), (MOUTH_CORNER_RIGHT, Y, 0.5)),
     "sideways": ((MOUTH_CORNER_LEFT, X, 0.5), (MOUTH_CORNER_RIGHT, X, 0.5)),
 })  # fmt: skip
-LEAST_MM = 0.1  # a mode that moves nothing by this much at one spread is called fine detail
+LEAST_MM = 0.1  # a mode with smaller movements at one spread is named fine detail
 N_NAMED = 2  # movements in a mode's name
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Consistency:
-    """How far K movements (or modes) are held by P phones.
+    """How far P phones constrain K movements (or modes).
 
     Parameters
     ----------
@@ -47,9 +47,9 @@ class Consistency:
     spread : (K,)
         Standard deviation over all tokens, mm (modes: mm over all landmarks together).
     free : (P, K)
-        Standard deviation within the phone over that of all tokens: 0 held always alike, 1 as varied as any speech.
+        Standard deviation within the phone over that of all tokens: 0 constant, 1 as varied as all speech.
     free_share : (K,)
-        Share of the variance that the phones do not explain; their neighbours and chance do.
+        Share of the variance that the phones do not explain: that of context and chance.
     """
 
     names: tuple[str, ...]
@@ -66,18 +66,18 @@ def movement_weights(model: ShapeModel) -> NDArray[np.float64]:
     )
 
 
-def movement_consistency(spoken: Spoken, phones: tuple[str, ...], model: ShapeModel) -> Consistency:
-    """How far the phones hold each of the `MOVEMENTS`."""
+def movement_consistency(spoken: SpokenTokens, phones: tuple[str, ...], model: ShapeModel) -> Consistency:
+    """How far the phones constrain each of the `MOVEMENTS`."""
     return _consistency(spoken, phones, spoken.samples @ movement_weights(model).T, tuple(MOVEMENTS))
 
 
-def mode_consistency(spoken: Spoken, phones: tuple[str, ...], model: ShapeModel) -> Consistency:
-    """How far the phones hold each speech parameter, named by what it moves."""
+def mode_consistency(spoken: SpokenTokens, phones: tuple[str, ...], model: ShapeModel) -> Consistency:
+    """How far the phones constrain each speech parameter, named by the movements it makes."""
     return _consistency(spoken, phones, spoken.samples.astype(np.float64), mode_names(model))
 
 
 def mode_names(model: ShapeModel) -> tuple[str, ...]:
-    """What each speech parameter moves most, with the mm at one spread, such as ``opening -4.6, jaw lowering -2.6``."""
+    """The largest movements of each speech parameter in mm at one spread, like ``opening -4.6, jaw lowering -2.6``."""
     amounts = movement_weights(model) * model.spread[: model.n_speech]
     names, kinds = [], tuple(MOVEMENTS)
     for column in amounts.T:
@@ -87,9 +87,9 @@ def mode_names(model: ShapeModel) -> tuple[str, ...]:
 
 
 def _consistency(
-    spoken: Spoken, phones: tuple[str, ...], values: NDArray[np.floating], names: tuple[str, ...]
+    spoken: SpokenTokens, phones: tuple[str, ...], values: NDArray[np.floating], names: tuple[str, ...]
 ) -> Consistency:
-    """Spread within and over phones of (N, S, K) values, sample by sample, meant over the samples."""
+    """Spread within and over phones of (N, S, K) values, sample by sample, averaged over the samples."""
     sounding = spoken.phone != spoken.inventory.index(SILENCE)
     total = values[sounding].var(axis=0).mean(axis=0)
     within = np.zeros((len(phones), values.shape[2]))

@@ -1,4 +1,4 @@
-"""What a phone is called in figures and tables."""
+"""Labels of phones in figures and tables."""
 
 from lexicon.errors import InputError
 from lexicon.phones import phone_of
@@ -7,13 +7,7 @@ LABELS = ("both", "ipa", "arpabet")
 
 
 def check_labels(labels: str) -> None:
-    """Refuse a way to label phones that there is not.
-
-    Raises
-    ------
-    InputError
-        It is none of `LABELS`.
-    """
+    """Check a kind of label; `InputError` where it is none of `LABELS`."""
     if labels not in LABELS:
         raise InputError(f"phones are labelled in {', '.join(LABELS[1:])} or {LABELS[0]}, not {labels!r}")
 

@@ -1,4 +1,4 @@
-"""Whether two tables over the same items agree: the Mantel test."""
+"""Mantel test: the agreement of two tables over the same items."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -6,6 +6,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.evaluation.measures import pearson
 from lexicon.errors import InputError
 from lexicon.phones import phone_distance
 
@@ -22,7 +23,7 @@ class Agreement:
     n_pairs: int
 
 
-def upper(matrix: NDArray[np.floating]) -> NDArray[np.float64]:
+def upper_triangle(matrix: NDArray[np.floating]) -> NDArray[np.float64]:
     """(P (P - 1) / 2,) values above the diagonal, row by row."""
     return np.asarray(matrix[np.triu_indices(len(matrix), 1)], np.float64)
 
@@ -47,11 +48,13 @@ def mantel(
     if first.shape != second.shape or len(first) < 3:
         raise InputError(f"two tables over the same 3 items or more are needed, not {first.shape} and {second.shape}")
     orders = np.array([stream.permutation(len(first)) for _ in range(n_permutations)])
-    found = correlation(upper(first), upper(second))
+    found = pearson(upper_triangle(first), upper_triangle(second))
     if np.isnan(found):
-        raise InputError("all pairs of a table are equally alike: nothing can be correlated with it")
+        raise InputError(
+            "all pairs of a table have the same value, so that no correlation is defined; compare other tables"
+        )
     as_high = shuffled_correlations(first, second, orders) >= found - 1e-12
-    return Agreement(found, (1 + int(as_high.sum())) / (1 + n_permutations), n_permutations, len(upper(first)))
+    return Agreement(found, (1 + int(as_high.sum())) / (1 + n_permutations), n_permutations, len(upper_triangle(first)))
 
 
 def shuffled_correlations(
@@ -59,19 +62,12 @@ def shuffled_correlations(
 ) -> NDArray[np.float64]:
     """(K,) correlation of the tables' upper triangles for K orders (K, P) of the second's items."""
     rows, columns = np.triu_indices(len(first), 1)
-    fixed = _standard(upper(first))
+    fixed = _standardize(upper_triangle(first))
     moved = np.stack([second[order[rows], order[columns]] for order in orders])
-    return np.asarray(_standard(moved) @ fixed / len(rows))
+    return np.asarray(_standardize(moved) @ fixed / len(rows))
 
 
-def correlation(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:
-    """Pearson's r; NaN where one of them does not vary."""
-    if np.ptp(a) == 0 or np.ptp(b) == 0:
-        return float("nan")
-    return float(_standard(a) @ _standard(b) / len(a))
-
-
-def _standard(values: NDArray[np.floating]) -> NDArray[np.float64]:
+def _standardize(values: NDArray[np.floating]) -> NDArray[np.float64]:
     offsets = values - values.mean(axis=-1, keepdims=True)
     return np.asarray(offsets / np.sqrt(np.square(offsets).mean(axis=-1, keepdims=True)))
 

@@ -5,21 +5,24 @@ from html import escape
 
 import numpy as np
 
-from corpus_tools.report.page import page, table
-from corpus_tools.report.plots import Axes, Point, bars, line_plot, scatter
-from corpus_tools.report.ramps import Ramp
+from corpus_tools.report.page import note, page, paragraphs, table, wide
 from corpus_tools.similarity.analysis import Analysis
 from corpus_tools.similarity.classes import VisemeClasses
 from corpus_tools.similarity.compare import Comparison
-from corpus_tools.similarity.figure import difference_figure, similarity_figure
-from corpus_tools.similarity.heatmap import grid, heatmap
+from corpus_tools.similarity.figure import (
+    articulation_svg,
+    difference_figure,
+    freedom_svg,
+    shares_svg,
+    silhouettes_svg,
+    similarity_figure,
+    table_svg,
+)
 from corpus_tools.similarity.labels import label
-from corpus_tools.similarity.mantel import N_PERMUTATIONS, upper
+from corpus_tools.similarity.mantel import N_PERMUTATIONS
 from corpus_tools.similarity.reliability import Reliability
-from corpus_tools.similarity.spoken import LEAST_TOKENS
-from lexicon.phones import phone_of
+from corpus_tools.similarity.tokens import LEAST_TOKENS
 
-FREEDOM = ((33, 102, 172), (146, 197, 222), (243, 240, 232), (230, 170, 80))  # held blue, free ochre
 N_DIFFERENT = 10
 
 
@@ -28,18 +31,20 @@ def similarity_page(found: Analysis, labels: str) -> str:
     parts = [
         _summary(found),
         "<h2>Phone by phone</h2>",
-        _soft("Silence is left out. Point at a field for its number."),
-        _wide(heatmap(similarity_figure(found, labels))),
+        note("Without silence. Point at a cell for its number."),
+        wide(table_svg(similarity_figure(found, labels))),
         "<h2>Most similar phones</h2>",
-        _soft("As Table 1 of Theobald et al. 2007. Agreement: of the phone's similarities between random halves."),
+        note(
+            "Table 1 of Theobald et al. 2007. Agreement: correlation of a phone's similarities between random halves."
+        ),
         _neighbours(found, labels),
         "<h2>Viseme classes</h2>",
         *_classes(found, labels),
         "<h2>Reliability</h2>",
         *_reliability(found, labels),
-        "<h2>Look and articulation</h2>",
+        "<h2>Similarity and articulation</h2>",
         *_articulation(found, labels),
-        "<h2>What phones hold and what they leave free</h2>",
+        "<h2>Movements that phones constrain</h2>",
         *_consistency(found, labels),
     ]
     if found.comparison is not None:
@@ -50,8 +55,8 @@ def similarity_page(found: Analysis, labels: str) -> str:
 def _summary(found: Analysis) -> str:
     n_tokens = int(found.table.counts.sum())
     agree, words = found.by_utterances, found.by_words
-    other_words = "" if words is None else f"; halves of the words, that share no word, by {words.mean:.3f}"
-    return _said(
+    other_words = "" if words is None else f"; halves of the vocabulary by {words.mean:.3f}"
+    return paragraphs(
         f"{len(found.table.phones)} phones, {n_tokens} tokens, {found.n_utterances} utterances.",
         f"Best number of viseme classes: {found.best.n_classes} (silhouette {found.best.silhouette:.2f}).",
         f"Reliability: halves of the utterances correlate by {agree.mean:.3f}{other_words}.",
@@ -83,14 +88,6 @@ def _neighbours(found: Analysis, labels: str) -> str:
 
 
 def _classes(found: Analysis, labels: str) -> list[str]:
-    points = [Point(c.n_classes, c.silhouette, f"{c.n_classes} classes: {c.silhouette:.3f}") for c in found.curve]
-    heights = [point.y for point in points]
-    axes = Axes(
-        "number of classes",
-        "mean silhouette",
-        (1.0, points[-1].x + 1),
-        (min(0.0, *heights), max(0.05, *heights) * 1.1),
-    )
     shown = {classes.n_classes: classes for classes in (found.best, *found.chosen)}
     rows = [
         (
@@ -101,11 +98,11 @@ def _classes(found: Analysis, labels: str) -> list[str]:
         for n, classes in sorted(shown.items())
     ]
     return [
-        _soft(
-            "Average linkage on 1 - similarity, cut into so many classes. A phone's silhouette is near 1 where it "
-            "looks like its own class and unlike the next; 0 for a phone alone."
+        note(
+            "Average linkage on 1 - similarity, cut into the given number of classes. A phone's silhouette is near 1 "
+            "where it is similar to its own class and dissimilar to the nearest other; 0 for a phone alone."
         ),
-        line_plot(axes, points, found.curve.index(found.best)),
+        silhouettes_svg(found),
         table(("classes", "silhouette", "phones"), rows, numbers=(1,)),
     ]
 
@@ -127,20 +124,21 @@ def _reliability(found: Analysis, labels: str) -> list[str]:
     ]
     rows = [_reliability_row(name, split) for name, split in splits]
     left = [
-        f"Left out of the halves of {name}, with fewer than {LEAST_TOKENS} tokens in a half: "
+        f"Not compared between halves of {name}, with fewer than {LEAST_TOKENS} tokens in a half: "
         f"{', '.join(label(phone, labels) for phone in split.left_out)}."
         for name, split in splits
         if split is not None and split.left_out and split is not found.by_utterances_alike
     ]
     head = ("halves of", "halves", "phones", "correlation", "lowest", "highest", "whole (Spearman-Brown)")
     return [
-        _soft(
-            f"The corpus is dealt in two at random, {found.options.halves} times, a table made of each half, and the "
-            "tables' pairs correlated. Halves of the utterances hold the same words: they tell what more recordings of "
-            "the same kind would change. Halves of the words share no word: they tell what other words would change."
+        note(
+            f"The corpus is split in two at random, {found.options.halves} times; a table is computed from each half, "
+            "and the two are correlated over the pairs of phones. Halves of the utterances contain the same words: "
+            "they measure what more recordings of the same kind would change. Halves of the words have no word in "
+            "common: they measure what other words would change."
         ),
         table(head, rows, numbers=range(1, 7)),
-        _said(*left),
+        paragraphs(*left),
     ]
 
 
@@ -154,38 +152,19 @@ def _reliability_row(name: str, split: Reliability | None) -> Sequence[str]:
 
 
 def _articulation(found: Analysis, labels: str) -> list[str]:
-    phones = found.table.phones
-    rows, columns = np.triu_indices(len(phones), 1)
-    apart, alike = found.articulation[rows, columns], upper(found.table.matrix)
-    points = [
-        Point(
-            float(x),
-            float(y),
-            f"{label(phones[a], labels)} – {label(phones[b], labels)}: {y:.3f}",
-            _pair_colour(phones[a], phones[b]),
-        )
-        for a, b, x, y in zip(rows, columns, apart, alike, strict=True)
-    ]
-    slope, intercept = np.polyfit(apart, alike, 1)
-    axes = Axes("distance by articulatory features", "similarity", (0.0, float(apart.max()) * 1.03), (0.0, 1.0))
     agreements = [
         (name, str(agreement.n_pairs), f"{agreement.r:.3f}", f"{agreement.p:.4f}")
         for name, agreement in found.articulatory
     ]
     return [
-        _soft(
+        note(
             "Mantel test: correlation r of the distances on the face with those by articulatory features, and the "
             f"share p of {N_PERMUTATIONS} permutations with at least this r."
         ),
         table(("phones", "pairs", "r", "p"), agreements, numbers=(1, 2, 3)),
-        _soft("Blue: two consonants; ochre: two vowels; grey: one of each."),
-        scatter(axes, points, (float(intercept), float(slope))),
+        note("One mark for each pair of phones; point at it for their names."),
+        articulation_svg(found, labels),
     ]
-
-
-def _pair_colour(a: str, b: str) -> str:
-    n_vowels = phone_of(a).is_vowel + phone_of(b).is_vowel
-    return ("var(--first)", "var(--soft)", "var(--second)")[n_vowels]
 
 
 def _consistency(found: Analysis, labels: str) -> list[str]:
@@ -197,22 +176,22 @@ def _consistency(found: Analysis, labels: str) -> list[str]:
         for number, (name, spread, share) in enumerate(zip(modes.names, modes.spread, modes.free_share, strict=True))
     ]
     return [
-        _soft(
-            "Share of each movement's variance that the phones do not explain: what the neighbours and chance move. "
-            "0: each phone holds it; 1: no phone does."
+        note(
+            "Share of each movement's variance that the phones do not explain: that of context and chance. "
+            "0: constant within each phone; 1: independent of the phone."
         ),
-        bars(list(zip(movements.names, movements.free_share.tolist(), strict=True))),
-        _soft(
-            "Phone by phone: spread within the phone over the spread in all speech. Blue: held, whatever stands beside "
-            "it; ochre: as free as any speech, or freer. A phone of few words seems held: its neighbours are "
-            "always the same."
+        shares_svg(movements.names, movements.free_share),
+        note(
+            "Phone by phone: spread within the phone over the spread in all speech. Blue: constrained, whatever the "
+            "context; yellow: as variable as all speech, or more. A phone that occurs in few words seems constrained "
+            "because its context is always the same."
         ),
-        _wide(grid(names, movements.names, movements.free[order], Ramp(0.3, 1.2, FREEDOM))),
-        _soft(
-            "The talker's own parameters, named by what one spread of each moves (mm), with their spread (mm over all "
-            "landmarks together) and the share that the phones do not explain:"
+        wide(freedom_svg(names, movements.names, movements.free[order])),
+        note(
+            "The talker's own parameters, named by the movement of one spread of each (mm), with their spread (mm over "
+            "all landmarks together) and the share that the phones do not explain:"
         ),
-        table(("mode", "moves", "spread", "share"), rows, numbers=(0, 2, 3)),
+        table(("mode", "movement", "spread", "share"), rows, numbers=(0, 2, 3)),
     ]
 
 
@@ -225,16 +204,16 @@ def _comparison(found: Analysis, labels: str) -> list[str]:
     order = np.argsort(-compared.per_phone, kind="stable")[:N_DIFFERENT]
     phones = [(label(compared.phones[at], labels), f"{compared.per_phone[at]:.3f}") for at in order]
     return [
-        _said(
-            f"{len(compared.phones)} phones in common; of one talker only: {apart}.",
+        paragraphs(
+            f"{len(compared.phones)} phones in common; phones of one talker only: {apart}.",
             f"The tables correlate by r = {agreement.r:.3f} over {agreement.n_pairs} pairs; p = {agreement.p:.4f} "
             f"by {agreement.n_permutations} permutations, one-sided.",
         ),
-        _soft(f"Similarity on {found.name} minus that on {compared.other}: orange where it is higher on {found.name}."),
-        _wide(heatmap(difference_figure(found, compared, labels))),
-        "<h2>Phones and pairs that differ most</h2>",
+        note(f"Similarity on {found.name} minus that on {compared.other}: orange where it is higher on {found.name}."),
+        wide(table_svg(difference_figure(found, compared, labels))),
+        "<h2>Phones and pairs with the largest differences</h2>",
         table(("phone", "mean difference"), phones, numbers=(1,)),
-        _soft("Pairs, with the sign of the difference:"),
+        note("Pairs, with the sign of the difference:"),
         _pairs(compared, labels),
     ]
 
@@ -243,15 +222,3 @@ def _pairs(compared: Comparison, labels: str) -> str:
     pairs = compared.largest(N_DIFFERENT)
     rows = [(f"{label(a, labels)} – {label(b, labels)}", f"{value:+.3f}") for a, b, value in pairs]
     return table(("pair", "difference"), rows, numbers=(1,))
-
-
-def _said(*lines: str) -> str:
-    return "\n".join(f"<p>{escape(line)}</p>" for line in lines)
-
-
-def _soft(line: str) -> str:
-    return f'<p class="soft">{escape(line)}</p>'
-
-
-def _wide(svg: str) -> str:
-    return f'<div class="wide">{svg}</div>'

@@ -1,4 +1,4 @@
-"""Whether another corpus of the same talker would give the same table: random halves of this one are compared."""
+"""Split-half reliability of a similarity table: tables from random halves of the corpus are compared."""
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.similarity.mantel import correlation, upper
-from corpus_tools.similarity.spoken import LEAST_PHONES, LEAST_TOKENS, SimilarityTable, Spoken, similarity_table
+from corpus_tools.evaluation.measures import pearson
+from corpus_tools.similarity.mantel import upper_triangle
+from corpus_tools.similarity.tokens import LEAST_PHONES, LEAST_TOKENS, SimilarityTable, SpokenTokens, similarity_table
 from lexicon.errors import InputError
 
 
@@ -24,9 +25,9 @@ class Reliability:
     phones, per_phone : P labels, (P,)
         Mean correlation of a phone's similarities to the others; NaN for a phone never compared.
     left_out
-        Phones that no pair of halves could compare.
-    n_asked
-        Halves that were asked for.
+        Phones that had too few tokens in every pair of halves.
+    n_requested
+        Halves that were drawn.
     """
 
     correlations: NDArray[np.float64]
@@ -34,7 +35,7 @@ class Reliability:
     phones: tuple[str, ...]
     per_phone: NDArray[np.float64]
     left_out: tuple[str, ...]
-    n_asked: int
+    n_requested: int
 
     @property
     def mean(self) -> float:
@@ -53,7 +54,7 @@ def spearman_brown(r: float) -> float:
 
 
 def split_half(
-    spoken: Spoken,
+    spoken: SpokenTokens,
     units: NDArray[np.integer],
     n_halves: int,
     stream: np.random.Generator,
@@ -107,8 +108,8 @@ def _agreement(
     rows = np.full(len(enough), np.nan)
     for at, phone in enumerate(kept):
         others = np.arange(len(kept)) != at
-        rows[phone] = correlation(a[at, others], b[at, others])
-    return rows, correlation(upper(a), upper(b))
+        rows[phone] = pearson(a[at, others], b[at, others])
+    return rows, pearson(upper_triangle(a), upper_triangle(b))
 
 
 def _mean_of_known(rows: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""The analysis as numbers for other programs: the matrix as CSV, everything as JSON."""
+"""The analysis as numbers for other programs: the matrix as CSV, all figures as JSON."""
 
 import csv
 import json
@@ -16,18 +16,18 @@ from corpus_tools.similarity.consistency import Consistency
 from corpus_tools.similarity.labels import label
 from corpus_tools.similarity.mantel import Agreement
 from corpus_tools.similarity.reliability import Reliability
-from corpus_tools.similarity.spoken import LEAST_TOKENS, SimilarityTable
+from corpus_tools.similarity.tokens import LEAST_TOKENS, SimilarityTable
 from lexicon.phones import phone_of
 
 
 def table_csv(found: SimilarityTable, labels: str) -> str:
-    """One line a phone: its label, its tokens, its similarity to each phone."""
+    """One line for each phone: its label, its tokens, its similarity to each phone."""
     counts = [[str(count)] for count in found.counts]
     return _csv([label(phone, labels) for phone in found.phones], ["tokens"], counts, found.matrix)
 
 
 def difference_csv(compared: Comparison, labels: str) -> str:
-    """One line a phone: its label, its similarity to each phone on the first talker minus that on the other."""
+    """One line for each phone: its label, its similarity to each phone on the first talker minus that on the other."""
     names = [label(phone, labels) for phone in compared.phones]
     return _csv(names, [], [[] for _ in names], compared.difference)
 
@@ -44,7 +44,7 @@ def _csv(
 
 
 def analysis_json(found: Analysis) -> str:
-    """Everything; similarities in the order of ``phones``."""
+    """All figures; similarities in the order of ``phones``."""
     content = {
         "talker": found.name,
         "utterances": found.n_utterances,
@@ -85,7 +85,7 @@ def analysis_json(found: Analysis) -> str:
 
 
 def _rounded(values: NDArray[np.floating]) -> Any:
-    """Lists with four digits behind the point, None for what is not known."""
+    """Lists with four decimals, None for NaN."""
     if values.ndim > 1:
         return [_rounded(row) for row in values]
     return [round(float(value), 4) if np.isfinite(value) else None for value in values]
@@ -112,7 +112,7 @@ def _reliability(split: Reliability | None) -> dict[str, Any] | None:
         "mean": round(split.mean, 4),
         "spearman_brown": round(split.corrected, 4),
         "halves": _rounded(split.correlations),
-        "halves_asked": split.n_asked,
+        "halves_asked": split.n_requested,
         "phones_compared": split.n_phones.tolist(),
         "phones": dict(zip(split.phones, _rounded(split.per_phone), strict=True)),
         "left_out": list(split.left_out),

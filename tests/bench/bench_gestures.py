@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from corpus_tools.gesture_study.clips import some_of, with_source
-from corpus_tools.gesture_study.measures import recordings
+from corpus_tools.gesture_study.clips import replace_style, select_recordings
+from corpus_tools.gesture_study.measures import split_recordings
 from tts2face.gesture.field import Field, FieldState, begun, continued
 from tts2face.gesture.gesture_stream import Fields
 from tts2face.models.palette import GESTURE_FPS, Palette, Style, load_palette
@@ -43,7 +43,7 @@ def megabytes() -> float:
 
 def spoken(style: Style) -> np.ndarray:
     """(T, 1) intensity of the style's recordings in random order."""
-    parts = recordings(style.intensity, style.lengths)
+    parts = split_recordings(style.intensity, style.lengths)
     order = np.random.default_rng(5).permutation(len(parts))
     return np.resize(np.concatenate([parts[at] for at in order]), round(SECONDS * GESTURE_FPS))[:, None]
 
@@ -77,14 +77,14 @@ def main() -> None:
     name = max(palette.styles, key=lambda one: palette.styles[one].seconds)
     whole = palette.styles[name]
     heard = spoken(whole)
-    timed(with_source(palette, name, some_of(whole, np.arange(20))), name, heard[:90])  # compile
+    timed(replace_style(palette, name, select_recordings(whole, np.arange(20))), name, heard[:90])  # compile
     before = megabytes()
     order = np.random.default_rng(6).permutation(len(whole.lengths))
     found = {}
     for part in PARTS:
         kept = np.sort(order[: max(2, round(part * len(order)))])
-        style = whole if part == 1 else some_of(whole, kept)
-        found[part] = timed(with_source(palette, name, style), name, heard)
+        style = whole if part == 1 else select_recordings(whole, kept)
+        found[part] = timed(replace_style(palette, name, style), name, heard)
     features = list(found[1.0].frame_us)
     print(f"| {whole.seconds / 60:.0f} minutes | {' | '.join(features)} | twelve fields, x real time |")
     print(f"| --- |{' --- |' * (len(features) + 1)}")

@@ -89,6 +89,8 @@ def test_the_report_shows_every_recording_and_nothing_from_outside(read: Observa
     assert "<title>Recordings of a &amp; b</title>" in html
     assert html.count('<section class="item">') == len(read.kept)
     assert html.count("data:image/jpeg") == len(read.kept)
-    assert html.count("<polyline") == 2 * len(read.kept)
+    assert html.count('aria-label="lips and sound of ') == len(read.kept)
+    for colour in ("first", "second"):
+        assert html.count(f"fill: none; stroke: var(--{colour})") == len(read.kept)
     assert "http" not in html
-    assert "Sound and picture were put together: +2" in html
+    assert "Sound and picture were synchronised by +2" in html

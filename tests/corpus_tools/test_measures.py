@@ -38,6 +38,14 @@ def test_correlation_of_known_series():
     assert measures.correlation(np.array([1.0, 2.0, 3.0]), np.ones(3)) == 0.0
 
 
+def test_pearson_of_whole_numbers_and_of_a_constant():
+    assert measures.pearson(np.array([1, 2, 3]), np.array([2, 4, 6])) == pytest.approx(1.0)
+    assert measures.pearson(np.array([1, 2, 3]), np.array([6, 4, 2])) == pytest.approx(-1.0)
+    assert np.isnan(measures.pearson(np.ones(3), np.arange(3)))
+    one, other = np.random.default_rng(0).normal(size=(2, 50))
+    assert measures.pearson(one, other) == pytest.approx(np.corrcoef(one, other)[0, 1], rel=1e-12)
+
+
 def test_range_ratio_is_the_ratio_of_spreads():
     assert measures.range_ratio(np.array([0.0, 2.0]), np.array([5.0, 6.0])) == pytest.approx(0.5)
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from corpus_tools.gesture_study.analysis import Compared, Options, StyleFound, study
-from corpus_tools.gesture_study.clips import dealt, from_field, from_noise, some_of, with_source
-from corpus_tools.gesture_study.measures import recordings
+from corpus_tools.gesture_study.analysis import Options, StyleStudy, TraitComparison, study
+from corpus_tools.gesture_study.clips import field_clip, hold_out, noise_clip, replace_style, select_recordings
+from corpus_tools.gesture_study.measures import split_recordings
 from corpus_tools.gesture_study.traits import brow_lift, traits_of
 from lexicon.errors import InputError
 from tests.corpus_tools.gesture_study.made_palette import BLINK, N_FRAMES, made_palette, made_style
@@ -15,24 +15,24 @@ from tts2face.models.palette import GESTURE_FPS
 from tts2face.types import Waveform
 
 
-def compared(style: StyleFound, name: str) -> Compared:
+def compared(style: StyleStudy, name: str) -> TraitComparison:
     return next(one for one in style.compared if one.trait.name == name)
 
 
 def test_recordings_are_dealt_whole_and_once():
     style = made_style()
-    learnt, held = dealt(style, 4, 0)
+    learnt, held = hold_out(style, 4, 0)
     assert (len(learnt.lengths), len(held.lengths)) == (45, 15)
-    takes = {part.tobytes() for part in recordings(style.intensity, style.lengths)}
-    kept, away = ({part.tobytes() for part in recordings(one.intensity, one.lengths)} for one in (learnt, held))
+    takes = {part.tobytes() for part in split_recordings(style.intensity, style.lengths)}
+    kept, away = ({part.tobytes() for part in split_recordings(one.intensity, one.lengths)} for one in (learnt, held))
     assert kept | away == takes
     assert not kept & away
-    assert not np.array_equal(dealt(style, 4, 1)[1].intensity, held.intensity)
+    assert not np.array_equal(hold_out(style, 4, 1)[1].intensity, held.intensity)
 
 
 def test_some_recordings_keep_their_parts_together():
     style = made_style()
-    chosen = some_of(style, np.array([5, 2]))
+    chosen = select_recordings(style, np.array([5, 2]))
     rows = np.r_[5 * N_FRAMES : 6 * N_FRAMES, 2 * N_FRAMES : 3 * N_FRAMES]
     np.testing.assert_array_equal(chosen.motion["head"], style.motion["head"][rows])
     np.testing.assert_array_equal(chosen.intensity, style.intensity[rows])
@@ -40,7 +40,7 @@ def test_some_recordings_keep_their_parts_together():
 
 def test_too_few_to_hold_out():
     with pytest.raises(InputError, match="of 4 recordings one in 4 cannot be held out"):
-        dealt(made_style(n=4), 4, 0)
+        hold_out(made_style(n=4), 4, 0)
 
 
 def test_a_field_in_silence_does_what_a_stream_does():
@@ -49,7 +49,7 @@ def test_a_field_in_silence_does_what_a_stream_does():
     stream = GestureStream(fields, style="quick", seed=3, fps=GESTURE_FPS)
     streamed = stream.next(Waveform(np.zeros(2, np.float32), 16000), 200, Timeline())
     for feature in fields.features:
-        made = from_field(fields, "quick", feature, quiet, 3).values
+        made = field_clip(fields, "quick", feature, quiet, 3).values
         np.testing.assert_allclose(made, streamed[feature], atol=1e-4)
 
 
@@ -57,14 +57,14 @@ def test_a_derived_style_is_the_changed_clip_of_its_source():
     palette = made_palette()
     fields = Fields(palette)
     heard = palette.styles["calm"].intensity[:300]
-    plain, larger = (from_field(fields, style, "head", heard, 1).values for style in ("calm", "quick"))
+    plain, larger = (field_clip(fields, style, "head", heard, 1).values for style in ("calm", "quick"))
     middle = middle_of(palette.styles["calm"], "head")
     np.testing.assert_allclose(larger - middle, 2 * (plain - middle), atol=1e-5)
 
 
 def test_noise_hears_nothing_and_differs_by_seed():
     fields = Fields(made_palette())
-    one, same, other = (from_noise(fields, "calm", 100, seed)["head"] for seed in (1, 1, 2))
+    one, same, other = (noise_clip(fields, "calm", 100, seed)["head"] for seed in (1, 1, 2))
     np.testing.assert_array_equal(one, same)
     assert not np.array_equal(one, other)
 
@@ -125,7 +125,7 @@ def test_targets_are_those_of_measured_styles(found):
 
 def test_few_recordings_are_compared_with_themselves():
     palette = made_palette(n=5)
-    (calm,) = study("few", with_source(palette, "calm", palette.styles["calm"]), Options(clips=2)).styles[:1]
+    (calm,) = study("few", replace_style(palette, "calm", palette.styles["calm"]), Options(clips=2)).styles[:1]
     assert (calm.n_learnt, calm.n_held, calm.is_held_out) == (5, 5, False)
 
 

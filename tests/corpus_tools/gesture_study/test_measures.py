@@ -7,15 +7,13 @@ from corpus_tools.gesture_study.blinks import blinks_of, onsets_of
 from corpus_tools.gesture_study.measures import (
     autocorrelation,
     between_frames,
-    correlation,
     coverage,
     distance,
     diversity,
     halves,
     ratio,
-    recordings,
     spectrum,
-    speeds,
+    split_recordings,
 )
 
 FPS = 10.0
@@ -72,11 +70,9 @@ def test_which_blinks_count(lids, n_onsets, n_courses):
     assert (found.n, len(found.durations)) == (n_onsets, n_courses)
 
 
-def test_speeds_are_of_all_channels_and_within_recordings():
-    values = np.array([[0, 0], [3, 4], [3, 4], [100, 100], [100, 101]])
-    np.testing.assert_allclose(speeds(values, lengths(3, 2), FPS), [50, 0, 10])
+def test_means_of_neighbours_stay_within_recordings():
     np.testing.assert_allclose(between_frames(np.array([0, 2, 4, 10, 30]), lengths(3, 2)), [1, 3, 20])
-    assert [part.tolist() for part in recordings(np.arange(5), lengths(3, 2))] == [[0, 1, 2], [3, 4]]
+    assert [part.tolist() for part in split_recordings(np.arange(5), lengths(3, 2))] == [[0, 1, 2], [3, 4]]
 
 
 def test_distance_is_how_far_numbers_must_be_moved():
@@ -109,12 +105,6 @@ def test_recordings_too_short_for_a_spectrum_have_none():
 def test_ratio():
     assert ratio(1.0, 4.0) == 0.25
     assert np.isnan(ratio(1.0, 0.0))
-
-
-def test_correlation():
-    assert correlation(np.array([1, 2, 3]), np.array([2, 4, 6])) == pytest.approx(1.0)
-    assert correlation(np.array([1, 2, 3]), np.array([6, 4, 2])) == pytest.approx(-1.0)
-    assert np.isnan(correlation(np.ones(3), np.arange(3)))
 
 
 def test_diversity_by_hand():

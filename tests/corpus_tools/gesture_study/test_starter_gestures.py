@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from corpus_tools.gesture_study.analysis import Compared, Moving, Options, StyleFound, study
+from corpus_tools.gesture_study.analysis import MotionComparison, Options, StyleStudy, TraitComparison, study
 from lexicon.errors import InputError
 from tts2face.models.palette import load_palette
 
@@ -12,7 +12,7 @@ NO_JITTER = 1.3  # times the recorded power above 6 Hz
 
 
 @pytest.fixture(scope="module")
-def style() -> StyleFound:
+def style() -> StyleStudy:
     try:
         palette = load_palette("starter")
     except InputError:
@@ -20,28 +20,28 @@ def style() -> StyleFound:
     return study("starter", replace(palette, derivations={}), Options()).styles[0]
 
 
-def compared(style: StyleFound, name: str) -> Compared:
+def compared(style: StyleStudy, name: str) -> TraitComparison:
     return next(one for one in style.compared if one.trait.name == name)
 
 
-def moving(style: StyleFound, feature: str) -> Moving:
+def moving(style: StyleStudy, feature: str) -> MotionComparison:
     return next(one for one in style.moving if one.feature == feature)
 
 
-def test_hundreds_of_recordings_are_studied(style: StyleFound) -> None:
+def test_hundreds_of_recordings_are_studied(style: StyleStudy) -> None:
     assert style.is_held_out
     assert style.n_held > 100
     assert len(compared(style, "blink interval").real) > 100
 
 
 @pytest.mark.parametrize("name", ["head speed", "brow height", "blink interval"])
-def test_fields_are_as_near_as_other_recordings_of_the_same_person(name: str, style: StyleFound) -> None:
+def test_fields_are_as_near_as_other_recordings_of_the_same_person(name: str, style: StyleStudy) -> None:
     found = compared(style, name)
     assert found.to_field <= 1.5 * found.halves
     assert found.to_field < 0.5 * found.to_noise
 
 
-def test_heads_move_with_the_sound_as_real_ones_do(style: StyleFound) -> None:
+def test_heads_move_with_the_sound_as_real_ones_do(style: StyleStudy) -> None:
     real, field, noise = moving(style, "head").with_intensity
     assert real > 0.3
     assert abs(field - real) <= 0.1
@@ -49,16 +49,16 @@ def test_heads_move_with_the_sound_as_real_ones_do(style: StyleFound) -> None:
 
 
 @pytest.mark.parametrize("feature", ["head", "brows"])
-def test_nothing_trembles(feature: str, style: StyleFound) -> None:
+def test_nothing_trembles(feature: str, style: StyleStudy) -> None:
     assert 0.7 < moving(style, feature).fast[0] < NO_JITTER
 
 
-def test_clips_of_ten_minutes_do_not_repeat_themselves(style: StyleFound) -> None:
+def test_clips_of_ten_minutes_do_not_repeat_themselves(style: StyleStudy) -> None:
     for found in style.long.repeating.values():
         _, speech, silence = found.highest
         assert max(speech, silence) < 0.5
 
 
-def test_another_seed_is_another_clip(style: StyleFound) -> None:
+def test_another_seed_is_another_clip(style: StyleStudy) -> None:
     for found in style.moving:
         assert found.diversity[0] > 0.4

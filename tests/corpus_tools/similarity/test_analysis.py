@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.similarity.analysis import Named, Options, analyse
+from corpus_tools.similarity.analysis import NamedTalker, Options, analyse
 from corpus_tools.similarity.compare import compare_tables
 from corpus_tools.similarity.consistency import MOVEMENTS, mode_names, movement_consistency, movement_weights
 from corpus_tools.similarity.page import similarity_page
 from corpus_tools.similarity.reliability import spearman_brown, split_half
-from corpus_tools.similarity.spoken import NO_WORD, SimilarityTable, similarity_table, spoken_tokens
 from corpus_tools.similarity.text import analysis_json
+from corpus_tools.similarity.tokens import NO_WORD, SimilarityTable, similarity_table, spoken_tokens
 from lexicon.errors import InputError
 from tests.corpus_tools.similarity.steady_talker import BLOCKS, POSES, made_model, made_talker
 from tts2face.exemplar.synthesis import visual_voice
@@ -24,7 +24,7 @@ def spoken(talker):
 
 @pytest.fixture(scope="module")
 def found(talker):
-    return analyse(Named("made", talker), Options(halves=4))
+    return analyse(NamedTalker("made", talker), Options(halves=4))
 
 
 def test_the_table_is_the_one_that_synthesis_uses_without_silence(talker, spoken):
@@ -65,7 +65,7 @@ def test_spearman_brown(r, whole):
 
 def test_halves_of_a_steady_talker_agree_and_each_holds_half(found):
     split = found.by_utterances
-    assert len(split.correlations) == split.n_asked == 4
+    assert len(split.correlations) == split.n_requested == 4
     assert (split.n_phones == len(POSES) - 1).all()
     assert split.mean > 0.98
     assert split.corrected == spearman_brown(split.mean)
@@ -89,7 +89,7 @@ def test_halves_compare_only_the_phones_among_those_given(spoken):
 
 def test_a_talker_without_words_has_no_halves_of_words(talker):
     wordless = replace(talker, utterances=tuple(replace(spoken, words=()) for spoken in talker.utterances))
-    found = analyse(Named("made", wordless), Options(halves=2))
+    found = analyse(NamedTalker("made", wordless), Options(halves=2))
     assert found.by_words is None
     assert found.by_utterances_alike is None
     assert "too few phones with tokens in both halves" in similarity_page(found, "both")
@@ -98,7 +98,7 @@ def test_a_talker_without_words_has_no_halves_of_words(talker):
 
 def test_progress_runs_to_its_end(talker):
     told = []
-    analyse(Named("made", talker), Options(halves=2), on_progress=lambda done, of: told.append((done, of)))
+    analyse(NamedTalker("made", talker), Options(halves=2), on_progress=lambda done, of: told.append((done, of)))
     assert told == [(done, 6) for done in range(1, 7)]
 
 
@@ -132,8 +132,8 @@ def test_no_halves_where_all_is_one_word(spoken):
 
 
 def test_the_seed_chooses_the_halves(talker, found):
-    again = analyse(Named("made", talker), Options(halves=4))
-    other = analyse(Named("made", talker), Options(halves=4, seed=1))
+    again = analyse(NamedTalker("made", talker), Options(halves=4))
+    other = analyse(NamedTalker("made", talker), Options(halves=4, seed=1))
     assert (again.by_utterances.correlations == found.by_utterances.correlations).all()
     assert (other.by_utterances.correlations != found.by_utterances.correlations).any()
 
@@ -180,8 +180,8 @@ def test_a_comparison_by_hand():
 
 
 def test_the_phones_made_to_differ_differ_most(talker):
-    other = Named("other", made_talker(seed=9, gain=20.0))
-    compared = analyse(Named("made", talker), Options(halves=2), other).comparison
+    other = NamedTalker("other", made_talker(seed=9, gain=20.0))
+    compared = analyse(NamedTalker("made", talker), Options(halves=2), other).comparison
     assert compared is not None
     assert {compared.phones[at] for at in np.argsort(-compared.per_phone)[:2]} <= {"p", "b", "m"}
     assert compared.agreement.p < 0.01
@@ -205,7 +205,7 @@ def test_refuses_talkers_without_common_phones():
 )
 def test_refuses_options_out_of_range(talker, options, reason):
     with pytest.raises(InputError, match=reason):
-        analyse(Named("made", talker), options)
+        analyse(NamedTalker("made", talker), options)
 
 
 def test_refuses_a_talker_with_too_few_phones():

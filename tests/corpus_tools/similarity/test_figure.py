@@ -1,41 +1,60 @@
-"""Figures: the geometry of the dendrogram, colours, axes, and that every number is there."""
+"""Figures: the geometry of the dendrogram, colours, axes, and every number in its place."""
 
 import re
+from html import unescape
 from io import BytesIO
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from corpus_tools.report.plots import Axes, Point, bars, line_plot, scatter, ticks
-from corpus_tools.report.ramps import Ramp, difference_ramp, likeness_ramp
-from corpus_tools.similarity import picture
-from corpus_tools.similarity.analysis import Named, Options, analyse
-from corpus_tools.similarity.classes import cluster_tree
-from corpus_tools.similarity.figure import brackets_of, similarity_figure
-from corpus_tools.similarity.heatmap import heatmap
+from corpus_tools.report.drawing import drawn_figure
+from corpus_tools.similarity.analysis import NamedTalker, Options, analyse
+from corpus_tools.similarity.classes import cluster_tree, distances
+from corpus_tools.similarity.figure import (
+    FREEDOM,
+    LIKENESS,
+    articulation_svg,
+    draw_table,
+    freedom_svg,
+    shares_svg,
+    silhouettes_svg,
+    similarity_figure,
+    table_png,
+    table_svg,
+    tree_joins,
+)
 from corpus_tools.similarity.labels import label
 
 
 @pytest.fixture(scope="module")
 def found(talker):
-    return analyse(Named("made", talker), Options(halves=2))
+    return analyse(NamedTalker("made", talker), Options(halves=2))
 
 
-def test_the_brackets_of_three_phones_by_hand():
+def test_the_joins_of_three_phones_by_hand():
     tree = cluster_tree(np.array([[0.0, 0.9, 0.2], [0.9, 0.0, 0.7], [0.2, 0.7, 0.0]]))
-    low, high = brackets_of(tree)
-    rank = {int(phone): at + 0.5 for at, phone in enumerate(tree.order)}
-    assert low.rows == tuple(sorted((rank[0], rank[2])))
-    assert (low.heights, low.height) == ((0.0, 0.0), 0.2)
-    assert high.height == pytest.approx((0.9 + 0.7) / 2)
-    assert set(high.rows) == {rank[1], (rank[0] + rank[2]) / 2}
-    assert dict(zip(high.rows, high.heights, strict=True))[rank[1]] == 0.0
+    joins = tree_joins(tree.links)
+    low, high = sorted(joins, key=lambda join: join[:, 0].max())
+    rank = {int(phone): at for at, phone in enumerate(tree.order)}
+    assert sorted(low[[0, 3], 1]) == sorted((rank[0], rank[2]))
+    assert low[:, 0].tolist() == [0.0, 0.2, 0.2, 0.0]
+    np.testing.assert_allclose(high[1:3, 0], (0.9 + 0.7) / 2)
+    assert {row: height for height, row in high[[0, 3]]} == {rank[1]: 0.0, (rank[0] + rank[2]) / 2: 0.2}
+
+
+def test_the_leaves_of_the_joins_are_in_the_dendrogram_s_order():
+    matrix = np.random.default_rng(6).uniform(size=(12, 12))
+    tree = cluster_tree(distances((matrix + matrix.T) / 2))
+    joins = tree_joins(tree.links)
+    lowest = tree.links[0]
+    (first,) = (join for join in joins if join[1, 0] == lowest[2])
+    assert sorted(tree.order[first[[0, 3], 1].astype(int)]) == sorted(lowest[:2])
 
 
 def test_the_cut_crosses_as_many_branches_as_there_are_classes(found):
     figure = similarity_figure(found, "ipa")
-    below = [h for bracket in figure.brackets for h in bracket.heights if h < figure.cut <= bracket.height]
+    below = [join for join in figure.joins for height in join[[0, 3], 0] if height < figure.cut <= join[1, 0]]
     assert len(below) == found.best.n_classes == len(figure.blocks) - 1
 
 
@@ -49,7 +68,7 @@ def test_the_figure_is_the_table_in_another_order(found):
 
 def test_every_field_of_the_heat_map_tells_its_number(found):
     figure = similarity_figure(found, "both")
-    titles = re.findall(r"<title>([^<]*) – ([^<]*): ([\d.]+)</title>", heatmap(figure))
+    titles = re.findall(r"<title>([^<]*) – ([^<]*): ([\d.]+)</title>", table_svg(figure))
     assert len(titles) == len(figure.names) ** 2
     told = {(a, b): float(value) for a, b, value in titles}
     for i, a in enumerate(figure.names):
@@ -62,64 +81,57 @@ def test_labels():
     assert label("ø", "arpabet") == label("ø", "both") == "ø"
 
 
-def lightness(colour):
-    return 0.2126 * colour[0] + 0.7152 * colour[1] + 0.0722 * colour[2]
+@pytest.mark.parametrize("colours", [LIKENESS, FREEDOM])
+def test_sequential_colours_rise_in_lightness(colours):
+    import matplotlib as mpl
 
-
-def test_the_ramp_of_likeness_rises_in_lightness():
-    shades = [lightness(likeness_ramp().colour(value)) for value in np.linspace(0, 1, 50)]
+    shades = mpl.colormaps[colours](np.linspace(0, 1, 50))[:, :3] @ [0.2126, 0.7152, 0.0722]
     assert (np.diff(shades) > 0).all()
 
 
-def test_a_ramp_is_straight_between_its_stops_and_held_beyond():
-    ramp = Ramp(0.0, 2.0, ((0, 0, 0), (100, 50, 10), (200, 0, 0)))
-    assert ramp.colour(0.5) == (50, 25, 5)
-    assert ramp.colour(-3) == (0, 0, 0)
-    assert ramp.hexadecimal(9) == "#c80000"
-    assert difference_ramp(0.3).colour(0.0) == difference_ramp(0.9).colour(0.0)
+def words_of(svg):
+    return [unescape(word) for word in re.findall(r">([^<>]+)</text>", svg)]
 
 
-@pytest.mark.parametrize(
-    ("span", "expected"),
-    [((0, 1), [0, 0.2, 0.4, 0.6, 0.8, 1]), ((1, 33), [5, 10, 15, 20, 25, 30]), ((-0.4, 0.4), None)],
-)
-def test_ticks_are_round(span, expected):
-    found = ticks(*span)
-    assert 0.0 in found or span[0] > 0
-    assert all(span[0] - 1e-9 <= value <= span[1] + 1e-9 for value in found)
-    if expected is not None:
-        np.testing.assert_allclose(found, expected)
+def tips_of(svg):
+    return [unescape(tip) for tip in re.findall(r"<title>([^<]*)</title>", svg)]
 
 
-def test_points_lie_where_their_numbers_say():
-    axes = Axes("x", "y", (0.0, 10.0), (0.0, 1.0))
-    found = scatter(axes, [Point(0.0, 0.0, "a < b"), Point(10.0, 1.0, "far")], (0.0, 0.1))
-    circles = re.findall(r'cx="([\d.]+)" cy="([\d.]+)"', found)
-    (x0, y0), (x1, y1) = ((float(x), float(y)) for x, y in circles)
-    assert (x0, y0, x1, y1) == (56.0, 256.0, 546.0, 12.0)
-    assert f"M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}" in found
-    assert "a &lt; b" in found
+def test_the_silhouettes_have_a_point_for_each_number_of_classes(found):
+    tips = tips_of(silhouettes_svg(found))
+    assert tips == [f"{classes.n_classes} classes: {classes.silhouette:.3f}" for classes in found.curve]
+    assert {"number of classes", "mean silhouette"} <= set(words_of(silhouettes_svg(found)))
 
 
-def test_the_best_point_of_a_line_is_marked():
-    axes = Axes("x", "y", (0.0, 3.0), (0.0, 1.0))
-    points = [Point(x, 0.5, "") for x in (0.0, 1.0, 2.0)]
-    radii = re.findall(r' r="([\d.]+)" fill="([^"]+)"', line_plot(axes, points, 1))
-    assert [radius for radius, _ in radii] == ["3.5", "6", "3.5"]
+def test_articulation_has_a_point_for_each_pair(found):
+    svg = articulation_svg(found, "ipa")
+    assert len(tips_of(svg)) == len(found.table.phones) * (len(found.table.phones) - 1) / 2
+    a, b = found.table.phones[:2]
+    assert tips_of(svg)[0] == f"{a} – {b}: {found.table.matrix[0, 1]:.3f}"
+    assert {"two consonants", "one of each", "two vowels", "similarity"} <= set(words_of(svg))
 
 
 def test_a_bar_is_as_long_as_its_number():
-    widths = [float(width) for width in re.findall(r'width="([\d.]+)" height="14"', bars([("a", 0.25), ("b", 1.0)]))]
-    whole = widths[0]
-    assert widths == [whole, whole / 4, whole, whole]
+    svg = shares_svg(["a", "b"], np.array([0.25, 1.0]))
+    bars = re.findall(r'<path d="([^"]*)"[^>]*style="fill: var\(--first\)', svg)
+    ends = [np.array(re.findall(r"[ML] ([\d.]+) ", bar), float) for bar in bars]
+    short, long = (np.ptp(end) for end in ends)
+    assert short == pytest.approx(long / 4, rel=1e-4)
+    assert {"0.25", "1.00", "a", "b", "share of the variance"} <= set(words_of(svg))
+
+
+def test_the_spreads_within_phones_are_written_in_their_cells():
+    words = words_of(freedom_svg(["p", "b"], ["opening", "width"], np.array([[0.31, 0.5], [1.0, 1.15]])))
+    assert {"0.31", "0.50", "1.00", "1.15", "p", "b", "opening", "width"} <= set(words)
 
 
 def test_the_picture_shows_the_colours_of_the_table(found):
-    figure = similarity_figure(found, "arpabet")
-    image = Image.open(BytesIO(picture.table_png(figure))).convert("RGB")
-    left = picture.MARGIN + picture.TREE + picture.LABEL
-    top = picture.MARGIN + picture.HEAD + picture.LABEL
-    for i in range(len(figure.names)):
-        for j in range(len(figure.names)):
-            middle = left + (j + 0.5) * picture.CELL, top + (i + 0.5) * picture.CELL
-            assert image.getpixel((int(middle[0]), int(middle[1]))) == figure.ramp.colour(figure.values[i, j])
+    import matplotlib as mpl
+
+    table = similarity_figure(found, "arpabet")
+    image = Image.open(BytesIO(table_png(table))).convert("RGB")
+    with drawn_figure(lambda figure: draw_table(figure, table), *image.size) as (_, tips):
+        middles = [tip.axes.transData.transform((tip.x + 0.5, tip.y + 0.5)) for tip in tips]
+    expected = mpl.colormaps[LIKENESS](table.values.ravel(), bytes=True)[:, :3]
+    for (x, y), colour in zip(middles, expected, strict=True):
+        assert image.getpixel((int(x), int(image.height - y))) == tuple(colour)

@@ -1,4 +1,4 @@
-"""What a talker said, as the similarity analysis needs it: sampled tokens, and the table of phone by phone."""
+"""Phone tokens of a talker, sampled in time, and the similarity table made of them."""
 
 from dataclasses import dataclass
 
@@ -12,13 +12,13 @@ from tts2face.exemplar.similarity import phone_similarity, token_samples
 from tts2face.exemplar.tokens import tokens_of
 from tts2face.models.talker import Talker
 
-LEAST_PHONES = 4  # fewer have no two classes to tell apart
+LEAST_PHONES = 4  # fewer phones do not make two classes of two
 LEAST_TOKENS = 10  # of a phone, in each half: a mean of fewer shows their neighbours as much as the phone
 NO_WORD = -1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Spoken:
+class SpokenTokens:
     """N phone tokens of a talker, silence among them, and their motion.
 
     Parameters
@@ -51,7 +51,7 @@ class SimilarityTable:
     silence: NDArray[np.float64]
 
 
-def spoken_tokens(talker: Talker, name: str) -> Spoken:
+def spoken_tokens(talker: Talker, name: str) -> SpokenTokens:
     """Tokens of a talker.
 
     Raises
@@ -73,11 +73,11 @@ def spoken_tokens(talker: Talker, name: str) -> Spoken:
             f"{2 * LEAST_TOKENS} times or more; the analysis needs 2 utterances and {LEAST_PHONES} such phones: "
             "record more"
         )
-    return Spoken(tokens.inventory, token_samples(tokens), tokens.phone, tokens.utterance, _words(talker), spread)
+    return SpokenTokens(tokens.inventory, token_samples(tokens), tokens.phone, tokens.utterance, _words(talker), spread)
 
 
 def _words(talker: Talker) -> NDArray[np.int64]:
-    """(N,) number of the word, by its text, in which each token stands."""
+    """(N,) number of the word, by its text, to which each token belongs."""
     numbers: dict[str, int] = {}
     made = []
     for spoken in talker.utterances:
@@ -88,10 +88,10 @@ def _words(talker: Talker) -> NDArray[np.int64]:
     return np.concatenate(made)
 
 
-def similarity_table(spoken: Spoken, chosen: NDArray[np.bool_] | None = None) -> SimilarityTable:
+def similarity_table(spoken: SpokenTokens, chosen: NDArray[np.bool_] | None = None) -> SimilarityTable:
     """Similarity of the sounding phones, in the phone table's order, from all tokens or the `chosen` (N,) ones.
 
-    The figures are those that synthesis uses: silence is measured with the phones and then left out.
+    The figures are those that synthesis uses: silence is measured with the phones and then removed.
 
     Raises
     ------

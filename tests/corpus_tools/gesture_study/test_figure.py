@@ -1,0 +1,93 @@
+"""Panels: histograms by hand, logarithmic axes, the same panels in the page and in the picture."""
+
+import re
+from io import BytesIO
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from corpus_tools.gesture_study.figure import (
+    COLUMNS,
+    HEAD,
+    HEIGHT,
+    N_BINS,
+    WIDTH,
+    brief,
+    distribution,
+    panel_svg,
+    panels_png,
+    power,
+    repetition,
+)
+from corpus_tools.report.drawing import FIRST, INK, PNG_SCALE, SECOND, load_matplotlib
+
+
+@pytest.fixture
+def calm(found):
+    return found.styles[0]
+
+
+def drawn(panel):
+    load_matplotlib()
+    from matplotlib.figure import Figure
+
+    axes = Figure().subplots()
+    panel.draw(axes)
+    return axes
+
+
+def steps(axes):
+    return {patch.get_label(): patch.get_data() for patch in axes.patches}
+
+
+def test_a_distribution_is_in_percent_and_holds_what_is_beyond(calm):
+    compared = calm.compared[0]
+    found = steps(drawn(distribution(calm, compared)))
+    assert set(found) == {"recorded", "field", "noise"}
+    for name, values in (("recorded", compared.real), ("field", compared.field), ("noise", compared.noise)):
+        shares, edges, _ = found[name]
+        inside = [((values >= low) & (values < high)).mean() for low, high in pairwise(edges[:-1])]
+        inside[0] += (values < edges[0]).mean()
+        np.testing.assert_allclose(shares[:-1], 100 * np.array(inside), rtol=1e-12)
+        assert shares.sum() == pytest.approx(100)
+        assert len(shares) == N_BINS
+
+
+def test_a_trait_without_values_is_an_empty_plot(calm):
+    empty = SimpleNamespace(real=np.zeros(0), field=np.zeros(0), noise=np.zeros(0), trait=calm.compared[0].trait)
+    axes = drawn(distribution(calm, empty))
+    assert not axes.patches
+    assert axes.get_xlim() == (0, 1)
+
+
+def test_a_spectrum_names_powers_of_ten_and_its_unit(calm):
+    (moving,) = (one for one in calm.moving if one.feature == "head")
+    axes = drawn(power(calm, moving))
+    np.testing.assert_array_equal(axes.lines[1].get_ydata(), moving.spectra[1].power[1:])
+    assert axes.get_ylabel() == "power, deg²/Hz"
+    words = re.findall(r">([^<>]+)</text>", panel_svg(power(calm, moving)))
+    assert {"0.1", "1"} <= set(words)
+    assert not [word for word in words if "$" in word or "^" in word]
+
+
+def test_repetition_is_over_seconds_of_lag(calm):
+    axes = drawn(repetition(calm, "head"))
+    line = axes.lines[1]
+    assert line.get_xdata()[0] == 5.5
+    np.testing.assert_array_equal(line.get_ydata(), calm.long.repeating["head"].speech[5:])
+
+
+def test_the_picture_shows_each_panel_in_its_place(calm):
+    panels = brief(calm)
+    with Image.open(BytesIO(panels_png("title", panels))) as image:
+        rows = -(-len(panels) // COLUMNS)
+        assert image.size == (COLUMNS * WIDTH * PNG_SCALE, (rows * HEIGHT + HEAD) * PNG_SCALE)
+        pixels = np.asarray(image.convert("RGB"))
+    for at in range(len(panels)):
+        column, row = at % COLUMNS * WIDTH * PNG_SCALE, (HEAD + at // COLUMNS * HEIGHT) * PNG_SCALE
+        part = pixels[row : row + HEIGHT * PNG_SCALE, column : column + WIDTH * PNG_SCALE].reshape(-1, 3)
+        for colour in (INK, FIRST, SECOND):
+            assert (part == tuple(bytes.fromhex(colour[1:]))).all(axis=1).any()
