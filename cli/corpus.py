@@ -93,7 +93,7 @@ def _consent(name: str, statement: str | None) -> Mapping[str, str]:
 
 
 @corpus.command
-def face(
+def face(  # noqa: PLR0913 - one parameter a flag
     recordings: Annotated[Path, Parameter(help="Folder of recordings, or one video; no transcripts needed.")],
     /,
     *,
@@ -102,6 +102,13 @@ def face(
     consent: Annotated[
         str | None, Parameter(help="The consent of the person shown, kept with name and date; asked for without it.")
     ] = None,
+    basis: Annotated[
+        int,
+        Parameter(
+            help="Modes of the person's own dense shape model to add, as the shapes denseMean, dense1, dense2, ...",
+            converter=whole_number,
+        ),
+    ] = 0,
     cache: Cache = None,
     model: Model = None,
 ) -> None:
@@ -113,7 +120,15 @@ def face(
 
     agreed = _consent(name or recordings.resolve().stem, consent)
     with progress_bar("looking at videos") as on_progress:
-        built = build_face(recordings, out, consent=agreed, effort=Effort(cache, None, model), on_progress=on_progress)
+        effort = Effort(cache, None, model)
+        built = build_face(recordings, out, consent=agreed, n_modes=basis, effort=effort, on_progress=on_progress)
+    if built.model is not None:
+        found = built.model
+        say(
+            f"{basis} dense modes: {found.dense.shares()[basis - 1]:.1%} of the variance of {found.n_frames} frames; "
+            f"95 % in {found.dense.n_modes(0.95)}, 99 % in {found.dense.n_modes(0.99)} "
+            f"(landmarks alone: {found.sparse.n_modes(0.95)}, {found.sparse.n_modes(0.99)})"
+        )
     say(f"wrote {out}: {built.n_videos} of {built.n_found} videos, {built.error_mm:.2f} mm off the talker's landmarks")
 
 

@@ -33,6 +33,9 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
     estimator: Annotated[
         str, Parameter(help="Of expressions: least-squares, or samples as published.")
     ] = "least-squares",
+    epsilon: Annotated[
+        float, Parameter(help="How far below 0 and above 1 weights of expressions may lie, 0 to 1; 0 is steadiest.")
+    ] = 0.0,
     provenance: Annotated[
         Path | None,
         Parameter(help="JSON with name, language, sources, licence, attribution; provenance.json of the folder."),
@@ -63,6 +66,7 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
             out,
             base=base,
             estimator=estimator,
+            epsilon=epsilon,
             effort=Effort(cache, jobs, model),
             stages=stages or no_stages,
         )

@@ -24,7 +24,7 @@ from lexicon.errors import DataError, InputError, Tts2faceError
 from lexicon.inputs import LARGEST_TEXT_BYTES, decoded, read_bounded, read_text
 from tts2face import __version__
 from tts2face.render.picture import Picture
-from tts2face.request import Request
+from tts2face.request import GESTURES, Request
 
 app = App(
     name="tts2face",
@@ -73,17 +73,31 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     ] = None,
     view: Annotated[bool, Parameter(help="Show the head in a window (extra [view]).", negative="")] = False,
     quiet: Annotated[bool, Parameter(help="No progress bar and no last line.", negative="")] = False,
+    noise: Annotated[bool, Parameter(help="Short for --gestures noise.", negative="")] = False,
+    no_gestures: Annotated[bool, Parameter(help="Short for --gestures none.", negative="")] = False,
     **options: Any,
 ) -> None:
     """Turn text into a talking face."""
     if text is not None and said is not None:
         raise InputError("give the text once, with or without --text")
+    options["gestures"] = _gestures(options.get("gestures"), noise=noise, none=no_gestures)
     needs_text = options.get("audio") is None and options.get("idle") is None
     from cli.speak import SpeakOptions, run_request
 
     request = chosen(Request, options, text=_text(text if said is None else said, file, is_needed=needs_text))
     speak_options = SpeakOptions(out, talker, face, identity, palette, explain, view, quiet, file)
     run_request(request, chosen(Picture, options), speak_options)
+
+
+def _gestures(method: str | None, *, noise: bool, none: bool) -> str:
+    """The method of gestures from the flag and its two short forms."""
+    flags = {"--gestures " + (method or ""): method, "--noise": "noise" if noise else None}
+    flags["--no-gestures"] = "none" if none else None
+    given = {flag: value for flag, value in flags.items() if value is not None}
+    if len(set(given.values())) > 1:
+        first, second, *_ = given
+        raise InputError(f"{first} cannot be combined with {second}; remove one of them")
+    return next(iter(given.values()), GESTURES[0])
 
 
 def _text(text: str | None, file: Path | None, *, is_needed: bool) -> str:

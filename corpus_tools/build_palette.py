@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.build_talker import PROVENANCE, PROVENANCE_FIELDS, UNSTATED, read_provenance
 from corpus_tools.decomposition.basis_expressions import Basis, captured_basis, carried_basis
-from corpus_tools.decomposition.blend_weights import Estimator, least_squares, nearest_samples
+from corpus_tools.decomposition.blend_weights import MOST_SLACK, Estimator, least_squares, nearest_samples
 from corpus_tools.decomposition.capture import Captured
 from corpus_tools.decomposition.capture_files import CAPTURE_SUFFIXES, Worn, captured_file
 from corpus_tools.decomposition.decompose import Parts, as_counted, taken_apart
@@ -86,15 +86,18 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
     *,
     base: Palette | None,
     estimator: str = ESTIMATORS[0],
+    epsilon: float = 0.0,
     effort: Effort | None = None,
     stages: Stages = no_stages,
 ) -> Made:
     """Learn a style from recordings and write a palette: `base` with it, or it alone with the styles derived from it.
 
+    Weights of expressions lie within ``-epsilon`` and ``1 + epsilon`` (Ju and Lee 2008, section 4.1).
+
     Raises
     ------
     InputError
-        There is nothing to learn from, the palette has the style already, or an estimator does not exist.
+        There is nothing to learn from, the palette has the style, or an estimator or epsilon that there is not.
     DataError
         No recording could be used, or a still cannot.
     BackendError
@@ -102,6 +105,8 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
     """
     if estimator not in ESTIMATORS:
         raise InputError(f"there is no estimator {estimator!r}; choose {' or '.join(ESTIMATORS)}")
+    if not 0.0 <= epsilon <= MOST_SLACK:
+        raise InputError(f"epsilon must lie between 0 and {MOST_SLACK:g}, not {epsilon:g}")
     if base is not None and style in base.names:
         raise InputError(f"the palette has a style {style} already; choose another name")
     stated = read_provenance(
@@ -112,16 +117,16 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
     if not captured:
         raise DataError(f"no recording could be used; the first: {refused[0].name}: {refused[0].reason}")
     basis = basis_of(recorded, captured, face)
-    told = estimator_of(estimator, basis)
-    parts = parts_of(captured, basis, told, stages("taking them apart"))
-    learnt = with_style(base, style, parts, basis.rest, _metadata(recorded, stated, style, out, base is None))
+    parts = parts_of(captured, basis, estimator_of(estimator, basis, epsilon), stages("taking them apart"))
+    words = _words(recorded, style, out, base is None, epsilon)
+    learnt = with_style(base, style, parts, basis.rest, _metadata(recorded, stated, words))
     palette = learnt.palette
     if base is None:
         palette = replace(palette, derivations=derived_styles(style))
     write_palette(out, palette)
-    seconds = learnt.palette.styles[style].seconds
+    minutes = learnt.palette.styles[style].seconds / 60
     notes = tuple(f"{one.name}: {note}" for one in captured for note in one.notes)
-    return Made(len(captured), seconds / 60, tuple(refused), notes, learnt.kept)
+    return Made(len(captured), minutes, tuple(refused), notes, learnt.kept)
 
 
 def parts_of(
@@ -137,11 +142,12 @@ def parts_of(
     return parts
 
 
-def estimator_of(name: str, basis: Basis) -> Estimator:
-    """One of `ESTIMATORS` for a basis."""
+def estimator_of(name: str, basis: Basis, epsilon: float = 0.0) -> Estimator:
+    """One of `ESTIMATORS` for a basis, of weights within ``-epsilon`` and ``1 + epsilon``."""
+    expressions = as_counted(basis.expressions)
     if name == "least-squares":
-        return least_squares(as_counted(basis.expressions))
-    return nearest_samples(as_counted(basis.expressions), np.random.default_rng(SAMPLES_SEED))
+        return least_squares(expressions, epsilon)
+    return nearest_samples(expressions, np.random.default_rng(SAMPLES_SEED), slack=epsilon)
 
 
 def basis_of(recorded: Recorded, captured: Sequence[Captured], face: Face) -> Basis:
@@ -279,14 +285,19 @@ def _work(file: Path) -> Outcome:
     return _worker[0].outcome(file)
 
 
-def _metadata(recorded: Recorded, stated: Mapping[str, Any], style: str, out: Path, is_alone: bool) -> dict[str, Any]:
-    words = ["tts2face", "corpus", "gestures", recorded.recordings.name, "--style", style]
-    words += ["--alone"] if is_alone else []
+def _words(recorded: Recorded, style: str, out: Path, is_alone: bool, epsilon: float) -> list[str]:
+    """The command that makes the style again."""
+    words = ["tts2face", "corpus", "gestures", recorded.recordings.name, "--style", style, *["--alone"] * is_alone]
     words += ["--provenance", recorded.provenance.name] if recorded.provenance else []
+    words += ["--epsilon", f"{epsilon:g}"] if epsilon else []
+    return [*words, "--out", out.name]
+
+
+def _metadata(recorded: Recorded, stated: Mapping[str, Any], words: Sequence[str]) -> dict[str, Any]:
     return {
         **dict.fromkeys(PROVENANCE_FIELDS, UNSTATED),
         **stated,
-        "command": shlex.join([*words, "--out", out.name]),
+        "command": shlex.join(words),
         "created": datetime.now(UTC).date().isoformat(),
         "content": CONTENT,
     }

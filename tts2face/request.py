@@ -14,6 +14,7 @@ VOLUMES = (0.0, 2.0)
 FRAMES_PER_SECOND = (1.0, 120.0)
 DRIVES = ("linear", "network")
 SYNTHESES = ("exemplar", "theobald2007")
+GESTURES = ("fields", "ju2008", "noise", "none")
 IDLE_S = (0.1, 3600.0)
 
 
@@ -61,7 +62,11 @@ class Request:
     context: int | None = option(None, "Phones either side by which exemplars are chosen; the method's own without it.")
     exemplars: int | None = option(None, "Exemplars averaged for each phone; the method's own without it.")
     fps: float = option(30.0, "Frames per second, 1 to 120.")
-    gestures: bool = option(True, "Whether face and head move with the speech, or only the lips.")
+    gestures: str = option(
+        "fields",
+        "How face and head move with the speech: fields, ju2008 (fields as published), noise (Perlin, for comparison), "
+        "or none (only the lips move).",
+    )
     style: str | None = option(
         None, "Style of the gestures: a name, or names by feature (brows=annoyed,head=delighted)."
     )
@@ -74,8 +79,12 @@ class Request:
     )
     timeline: Path | None = option(None, "A JSON file with styles, expressions, nods and gains over time.")
     pitch: bool = option(False, "Gestures follow the pitch of the voice, not only its loudness.")
-    noise: bool = option(False, "Gestures from Perlin noise, to compare with.")
     idle: float | None = option(None, "Seconds of a living, silent face, in place of a text.")
+
+    @property
+    def has_gestures(self) -> bool:
+        """Whether face and head move beside the lips."""
+        return self.gestures != "none"
 
     def __post_init__(self) -> None:
         """Refuse numbers outside their range."""
@@ -109,13 +118,15 @@ def _check_drive(request: Request) -> None:
 
 
 def _check_gestures(request: Request) -> None:
-    if request.noise and request.pitch:
-        raise InputError("noise hears no voice; leave --pitch or --noise away")
-    asked = (request.style, request.gain, request.expression, request.timeline, request.noise, request.pitch)
-    if not request.gestures and asked != (None, None, None, None, False, False):
+    if request.gestures not in GESTURES:
+        raise InputError(f"gestures must be {', '.join(GESTURES[:-1])} or {GESTURES[-1]}, not {request.gestures!r}")
+    if request.gestures == "noise" and request.pitch:
+        raise InputError("--pitch has no effect with --gestures noise; remove one of them")
+    asked = (request.style, request.gain, request.expression, request.timeline, request.pitch)
+    if request.gestures == "none" and asked != (None, None, None, None, False):
         raise InputError(
-            "without gestures there is nothing to style; leave --style, --gain, --expression, --timeline, --noise and "
-            "--pitch away, or --no-gestures"
+            "without gestures there is nothing to style; remove --style, --gain, --expression, --timeline and --pitch, "
+            "or choose --gestures fields"
         )
 
 

@@ -12,6 +12,7 @@ from lexicon.dictionary import read_dictionary
 from lexicon.errors import InputError
 from tts2face.exemplar.synthesis import VisualVoice, visual_voice
 from tts2face.gesture.gesture_stream import Fields
+from tts2face.gesture.ju2008 import FIELD_OPTIONS
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
 from tts2face.models.palette import Palette, load_palette
@@ -33,6 +34,7 @@ from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, pr
 from tts2face.types import Clip, joined_clips
 from tts2face.voice.engine import Pronouncing, Voice, load_voice
 
+DEFAULT_FIELDS = "fields"
 OWN_FACE = "self"  # the face that the talker's own video shows
 VOICES_KEPT = 2  # idle voices by name and language; each keeps some 100 MB
 RENDERERS_KEPT = 2  # by picture; each keeps some 30 MB
@@ -197,7 +199,7 @@ class Session:
         picture = picture or Picture(**of_picture)
         checked_output(out)
         refuse_overwriting({"out": out}, input_paths(prepared.request, picture))
-        renderer = self.renderer(picture, has_gestures=prepared.request.gestures)
+        renderer = self.renderer(picture, has_gestures=prepared.request.has_gestures)
         progress = _Steps(prepared.n_steps, on_progress)
         marks: list[Reached] = []
         mismatches: list[TextMismatch] = []
@@ -261,9 +263,9 @@ class Session:
 
     def _pieces(self, prepared: PreparedRequest) -> Iterator[Piece]:
         request = prepared.request
-        face = self._face(request.gestures)
-        palette = self.palette if request.gestures else None
-        layer = None if palette is None else GestureLayer(prepared, self._fields(palette, request.pitch), face)
+        face = self._face(request.has_gestures)
+        palette = self.palette if request.has_gestures else None
+        layer = None if palette is None else GestureLayer(prepared, self._fields(palette, request), face)
         own = read_dictionary(request.dictionary).entries if request.dictionary else {}
 
         def lent_voice(name: str | None, language: str) -> AbstractContextManager[Voice]:
@@ -279,8 +281,10 @@ class Session:
     def _exemplars(self) -> VisualVoice:
         return self._once("exemplars", lambda: visual_voice(self.talker))
 
-    def _fields(self, palette: Palette, with_pitch: bool) -> Fields:
-        return self._once(("fields", with_pitch), lambda: Fields(palette, with_pitch=with_pitch))
+    def _fields(self, palette: Palette, request: Request) -> Fields:
+        method = request.gestures if request.gestures in FIELD_OPTIONS else DEFAULT_FIELDS  # noise uses no options
+        key = ("fields", method, request.pitch)
+        return self._once(key, lambda: Fields(palette, FIELD_OPTIONS[method], with_pitch=request.pitch))
 
     def _prepare_face(self, palette: Palette | None) -> AnimatedFace:
         if self._mesh is None:

@@ -11,12 +11,14 @@ import numpy as np
 from corpus_tools.build_talker import PROVENANCE, UNSTATED, read_provenance
 from corpus_tools.dense.adapt_head import adapted
 from corpus_tools.dense.mesh_fit import N_MESH, aligned, fitting, landmarks_of, settled
+from corpus_tools.dense.modes import MOST_MODES, DenseModel, dense_model, mode_fitter, with_modes
 from corpus_tools.dense.skin_colour import fitter, gathered
 from corpus_tools.dense.texture_painting import painted_like
 from corpus_tools.dense.video_landmarks import resting_landmarks, seen_in, videos_of
 from corpus_tools.dense.visible_texels import canvas_of
 from corpus_tools.recordings.corpus_video import Eyes
 from corpus_tools.run_options import Effort, Progress
+from lexicon.errors import InputError
 from tts2face.models.face_file import read_face, write_face
 from tts2face.storage.files import named_file
 from tts2face.video.landmark_models import find_bundle
@@ -25,13 +27,14 @@ HEAD = "head"  # the shipped face that is adapted
 CONTENT = "a head with the shape and, with the stated consent, the skin of a real person"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class BuiltFace:
-    """What was made: videos used of those found, and the mean distance of the head's landmarks from the talker's."""
+    """Videos used of those found, the mean distance of the head's landmarks from the talker's, and its dense model."""
 
     n_videos: int
     n_found: int
     error_mm: float
+    model: DenseModel | None = None
 
 
 def build_face(
@@ -39,6 +42,7 @@ def build_face(
     out: Path,
     *,
     consent: Mapping[str, str],
+    n_modes: int = 0,
     effort: Effort | None = None,
     on_progress: Progress | None = None,
 ) -> BuiltFace:
@@ -51,6 +55,8 @@ def build_face(
         licence of the person's likeness; the mesh's own says nothing about it.
     consent
         Of the person shown, from `corpus_tools.consent.consent_of`; kept in the file.
+    n_modes
+        Modes of the talker's own dense shape model, added as the shapes denseMean, dense1, dense2, ...
     effort
         Its cache and landmark models; the work is done in one process.
     on_progress
@@ -59,12 +65,14 @@ def build_face(
     Raises
     ------
     InputError
-        There is no video.
+        There is no video, or there are not so many modes.
     DataError
         No video shows a face, or the provenance cannot be read.
     BackendError
         A package or the landmark models are missing, or the file cannot be written.
     """
+    if not 0 <= n_modes <= MOST_MODES:
+        raise InputError(f"a basis has 0 to {MOST_MODES} dense modes, not {n_modes}")
     effort = effort or Effort()
     videos = videos_of(recordings)
     stated = read_provenance(recordings / PROVENANCE, must_exist=False)
@@ -78,14 +86,17 @@ def build_face(
     used = np.flatnonzero(fitting(rest, settled(rest, target)))
     shaped = adapted(head, talker)
     canvas = canvas_of(shaped)
+    fit = fitter(shaped, canvas.opened, used)
+    model = dense_model(shaped, mode_fitter(shaped, used), seen, talker, n_modes) if n_modes else None
     painting = gathered(
         shaped,
         canvas,
-        fitter(shaped, canvas.opened, used),
+        fit,
         seen,
         lambda done, of: report(len(videos) + done * len(videos) // of, 2 * len(videos)),
     )
     face = painted_like(shaped, canvas, painting)
+    words = ["tts2face", "corpus", "face", recordings.name, "--out", out.name]
     metadata = {
         **head.metadata,
         "name": consent["name"],
@@ -93,10 +104,12 @@ def build_face(
         "attribution": "; ".join(filter(None, [head.metadata["attribution"], stated.get("attribution")])),
         "content": CONTENT,
         "consent": dict(consent),
-        "command": shlex.join(["tts2face", "corpus", "face", recordings.name, "--out", out.name]),
+        "command": shlex.join([*words, *(["--basis", str(n_modes)] if n_modes else [])]),
         "created": datetime.now(UTC).date().isoformat(),
     }
+    if model is not None:
+        face, metadata = with_modes(face, model), {**metadata, "dense": model.summary()}
     write_face(out, replace(face, metadata=metadata))
     reached = landmarks_of(shaped, shaped.vertices)[:N_MESH]
     again = aligned(talker, reached)
-    return BuiltFace(len(seen), len(videos), float(np.linalg.norm(again - reached, axis=1)[used].mean()))
+    return BuiltFace(len(seen), len(videos), float(np.linalg.norm(again - reached, axis=1)[used].mean()), model)

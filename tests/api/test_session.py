@@ -28,7 +28,7 @@ def test_a_clip_moves_the_face_s_own_shapes_first(session: tts2face.Session) -> 
     assert len(clip.motion.channels) > len(own)
 
 
-@pytest.mark.parametrize("options", [{}, {"gestures": False}, {"idle": 0.5}], ids=["gestures", "lips only", "idle"])
+@pytest.mark.parametrize("options", [{}, {"gestures": "none"}, {"idle": 0.5}], ids=["gestures", "lips only", "idle"])
 def test_what_a_session_returns_can_be_drawn(
     options: dict[str, object], session: tts2face.Session, tmp_path: Path
 ) -> None:

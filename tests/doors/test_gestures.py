@@ -71,7 +71,7 @@ def test_the_starter_palette_holds_the_paper_s_moods_and_says_where_it_is_from()
 
 @pytest.mark.parametrize("style", ["depressed", "delighted", "annoyed", "exaggerated", "exasperated"])
 def test_lips_that_meet_still_meet_in_every_mood(style: str, talker: Talker, face: Face) -> None:
-    plain = Session(talker, face).clip(Request(text=TEXT, gestures=False))
+    plain = Session(talker, face).clip(Request(text=TEXT, gestures="none"))
     made = Session(talker, face).clip(Request(text=TEXT, style=style))
     shown = gesture_face(face, load_palette("starter")).face
     before, after = lip_gap(face, plain), lip_gap(shown, made)
@@ -82,7 +82,7 @@ def test_lips_that_meet_still_meet_in_every_mood(style: str, talker: Talker, fac
 
 
 def test_neutral_gestures_leave_lips_as_they_are(alive: Clip, talker: Talker, face: Face) -> None:
-    plain = Session(talker, face).clip(Request(text=TEXT, gestures=False))
+    plain = Session(talker, face).clip(Request(text=TEXT, gestures="none"))
     shown = gesture_face(face, load_palette("starter")).face
     assert np.corrcoef(lip_gap(face, plain), lip_gap(shown, alive))[0, 1] > 0.995
     assert np.corrcoef(lip_width(face, plain), lip_width(shown, alive))[0, 1] > 0.99

@@ -41,7 +41,7 @@ def ready() -> Session:
 
 
 def pieces_of(ready: Session, text: str, **options: object) -> list[Piece]:
-    return list(ready.stream(Request(text=text, gestures=False, **options)))
+    return list(ready.stream(Request(text=text, gestures="none", **options)))
 
 
 @pytest.mark.parametrize(("voice", "language", "text"), TEXTS)
@@ -89,7 +89,7 @@ def test_motion_does_not_depend_on_the_loudness_of_the_clip(ready: Session, monk
 @pytest.mark.parametrize("suffix", [".mp4", ".webm"])
 def test_the_sound_of_a_file_has_the_loudness_too(suffix: str, ready: Session, tmp_path: Path) -> None:
     out = tmp_path / f"clip{suffix}"
-    request = Request(text="Buenos días. ¿Cómo está usted?", voice="espeak", language="es", fps=10.0, gestures=False)
+    request = Request(text="Buenos días. ¿Cómo está usted?", voice="espeak", language="es", fps=10.0, gestures="none")
     ready.write(request, out, picture=Picture(size="64x64"))
     with av.open(str(out)) as container:
         reader = av.AudioResampler("flt", "mono", 48_000)

@@ -57,7 +57,7 @@ def test_marks_come_with_their_words_on_the_whole_clip_s_clock(fps: float, ready
 
 def test_a_pause_is_silent_and_the_lips_rest_in_it(ready: Session) -> None:
     texts = ("Bob may go away.", "Bob may [pause 1.5] go away.")
-    (plain,), (paused,) = (list(ready.stream(Request(text=text, gestures=False))) for text in texts)
+    (plain,), (paused,) = (list(ready.stream(Request(text=text, gestures="none"))) for text in texts)
     phones = paused.clip.speech.phones
     assert phones.phones.count(SILENCE) == 3
     middle = phones.phones.index(SILENCE, 1)

@@ -58,6 +58,7 @@ def test_the_table_has_a_line_a_trait(here: Path) -> None:
     assert len(rows) == 20
     assert {row["style"]: row["source"] for row in rows} == {"calm": "", "quick": "calm"}
     assert all(float(row[name]) >= 0 for row in rows for name in ("w_halves", "w_field", "w_noise"))
+    assert all((row["w_ju2008"] == "") == (row["style"] == "quick") for row in rows)
     assert {row["trait"] for row in rows if row["target"]} == {"head speed", "brow height", "blink interval"}
 
 
@@ -67,6 +68,8 @@ def test_the_json_says_the_same_as_the_table(here: Path) -> None:
     told = [(style["name"], trait["name"], trait["field"]) for style in content["styles"] for trait in style["traits"]]
     assert told == [(row["style"], row["trait"], float(row["w_field"])) for row in rows]
     calm = content["styles"][0]
+    assert [trait["ju2008"] for trait in calm["traits"]] == [float(row["w_ju2008"]) for row in rows[:10]]
+    assert set(calm["features"][0]["power"]) == set(calm["blinks_per_minute"]) == {"real", "field", "noise", "ju2008"}
     assert calm["blinks_per_minute"]["real"] == pytest.approx(60)
     assert set(calm["repetition"]) == {"brows", "blink", "head"}
     assert set(calm["visited"]["head"]) == {"1 min", "3 min", "10 min"}

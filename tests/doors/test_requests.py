@@ -13,7 +13,7 @@ from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
 from tts2face.models.talker import Talker, load_talker
-from tts2face.request import Request
+from tts2face.request import GESTURES, Request
 from tts2face.session import Session
 from tts2face.types import Clip, joined_clips
 
@@ -29,9 +29,8 @@ CHANGES = {
     "context": 1,
     "exemplars": 3,
     "fps": 25.0,
-    "gestures": False,
+    "gestures": "ju2008",
     "pitch": True,
-    "noise": True,
     "style": "delighted",
     "gain": "head=2,blink=0",
     "expression": "happy=0.6@0.2-0.9",
@@ -97,6 +96,16 @@ def test_a_stream_is_the_whole_in_pieces(clip: Clip, talker: Talker, face: Face)
     assert digest(joined_clips([piece.clip for piece in pieces])) == digest(clip)
 
 
+def test_every_method_of_gestures_is_another_clip_of_the_same_speech(clip: Clip, talker: Talker, face: Face) -> None:
+    session = Session(talker, face)
+    made = {method: session.clip(TEXT, gestures=method) for method in GESTURES}
+    assert digest(made["fields"]) == digest(clip)
+    assert len({digest(one) for one in made.values()}) == len(GESTURES)
+    for one in made.values():
+        np.testing.assert_array_equal(one.speech.waveform.samples, clip.speech.waveform.samples)
+    assert not made["none"].head.values.any()
+
+
 @pytest.mark.parametrize(("seconds", "fps"), [(0.1, 30.0), (25.0, 29.97), (12.3, 7.0)])
 def test_an_idle_face_is_silent_for_as_long_as_it_says(seconds: float, fps: float, talker: Talker, face: Face) -> None:
     pieces = list(Session(talker, face).stream(Request(idle=seconds, fps=fps)))
@@ -119,7 +128,7 @@ def test_pieces_end_on_frames_at_any_rate(fps: float, talker: Talker, face: Face
 
 
 def test_lips_rest_in_silence_and_at_both_ends(talker: Talker, face: Face) -> None:
-    weights = Session(talker, face).clip(Request(text=TEXT, gestures=False)).motion.values
+    weights = Session(talker, face).clip(Request(text=TEXT, gestures="none")).motion.values
     for frame in (0, -1):
         assert np.abs(weights[frame] - weights[0]).max() < 1e-4
     assert np.abs(np.diff(weights[:5], axis=0)).max() < 0.02
@@ -153,9 +162,9 @@ def test_what_cannot_be_said_is_refused(change: dict, reason: str, talker: Talke
         ({"idle": 5.0}, "an idle face is silent; leave the text and --audio away"),
         ({"idle": 5.0, "text": "", "voice": "espeak"}, "says nothing; leave --voice, --rate and --volume away"),
         ({"idle": 0.0, "text": ""}, "idle must lie between 0.1 and 3600, not 0"),
-        ({"gestures": False, "style": "calm"}, "without gestures there is nothing to style"),
-        ({"gestures": False, "pitch": True}, "without gestures there is nothing to style"),
-        ({"noise": True, "pitch": True}, "noise hears no voice; leave --pitch or --noise away"),
+        ({"gestures": "none", "style": "calm"}, "without gestures there is nothing to style"),
+        ({"gestures": "none", "pitch": True}, "without gestures there is nothing to style"),
+        ({"gestures": "noise", "pitch": True}, "noise hears no voice; leave --pitch or --noise away"),
     ],
 )
 def test_options_out_of_range_are_refused(change: dict, reason: str) -> None:

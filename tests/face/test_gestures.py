@@ -38,7 +38,7 @@ def ready(name: str) -> GestureFace:
 
 @cache
 def spoken(name: str) -> Trajectory:
-    return Session(load_talker("grid_s1"), load_face(name)).clip(Request(text=BILABIALS, gestures=False)).motion
+    return Session(load_talker("grid_s1"), load_face(name)).clip(Request(text=BILABIALS, gestures="none")).motion
 
 
 def silence(face: Face, n_frames: int = 1) -> Trajectory:

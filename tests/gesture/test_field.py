@@ -173,8 +173,11 @@ def test_sound_without_weight():
         ({"stride": 61}, "its stride 1 to 60"),
         ({"memory": -1}, "remembers 0 to 1000 leaps, not -1"),
         ({"candidates": 17}, "1 to 16 candidates, not 17"),
-        ({"alpha": (-1.0,)}, "alpha must not be negative"),
-        ({"sigma": 0.0}, "sigma and settling time must be above 0"),
+        ({"alpha": (-1.0,)}, "alpha and settling time must not be negative"),
+        ({"sigma": 0.0}, "its sigma must be above 0"),
+        ({"settle_s": -0.1}, "alpha and settling time must not be negative"),
+        ({"apart": 0}, "candidates lie 1 to 600 frames apart"),
+        ({"search_error": 0.9}, "its search error is 1 to 10"),
         ({"continuity": 1.5}, "continuity must lie from 0 to 1, not 1.5"),
     ],
 )

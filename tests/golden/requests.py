@@ -47,7 +47,7 @@ class Golden:
 GOLDEN: dict[str, Golden] = {
     "heart": Golden({"text": "We were away a year ago, but Bob may move five big maps."}),
     "espeak_as_published": Golden(
-        {"text": "Big maps move.", "voice": "espeak", "synthesis": "theobald2007", "gestures": False}
+        {"text": "Big maps move.", "voice": "espeak", "synthesis": "theobald2007", "gestures": "none"}
     ),
     "german": Golden({"text": "Guten Morgen, liebe Welt.", "language": "de"}),
     "delighted": Golden(
@@ -58,7 +58,7 @@ GOLDEN: dict[str, Golden] = {
     ),
     "cartoon": Golden({"text": "Five ships shall measure joy.", "fps": 25.0}, face="cartoon"),
     "identity_transparent": Golden(
-        {"text": "Hello.", "rate": 1.2, "noise": True},
+        {"text": "Hello.", "rate": 1.2, "gestures": "noise"},
         identity="kofi",
         picture={"background": "transparent", "camera": "three-quarter"},
     ),

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture.field_kernels import APART, nearest, walk
+from tts2face.gesture.field_kernels import APART, SLACK, nearest, walk
 from tts2face.gesture.kd_tree import Tree, tree_of
 from tts2face.models.palette import GESTURE_FPS
 
@@ -43,9 +43,14 @@ class FieldOptions:
     future
         Frames that must follow a moment in its recording to be leapt to: at a recording's end there is no way on.
     settle_s
-        Time constant of the spring that takes what is left of a leap away: after three of it a fifth is left.
+        Time constant of the spring that takes what is left of a leap away: after three of it a fifth is left. 0 for
+        none: frames are those of the recordings.
     memory
         Leaps after which the same moment may be leapt to again: without it silence ends in a loop.
+    apart
+        Least number of frames between two candidates of one recording; 1 makes every frame a candidate of its own.
+    search_error
+        Candidates are at most this factor farther than the best ones; 1 is an exact search.
 
     Raises
     ------
@@ -62,6 +67,8 @@ class FieldOptions:
     future: int = 20
     settle_s: float = 0.06
     memory: int = 400
+    apart: int = APART
+    search_error: float = SLACK
 
     def __post_init__(self) -> None:
         """Refuse numbers outside their range."""
@@ -71,10 +78,12 @@ class FieldOptions:
             raise InputError(f"a field remembers 0 to 1000 leaps, not {self.memory}")
         if not 1 <= self.candidates <= 16:
             raise InputError(f"a field draws among 1 to 16 candidates, not {self.candidates}")
-        if min(self.alpha, default=0.0) < 0 or not self.sigma > 0 or not self.settle_s > 0:
-            raise InputError("a field's alpha must not be negative, its sigma and settling time must be above 0")
+        if min(self.alpha, default=0.0) < 0 or not self.sigma > 0 or not self.settle_s >= 0:
+            raise InputError("a field's alpha and settling time must not be negative, its sigma must be above 0")
         if not 0 <= self.continuity <= 1:
             raise InputError(f"a field's continuity must lie from 0 to 1, not {self.continuity}")
+        if not 1 <= self.apart <= 600 or not 1.0 <= self.search_error <= 10.0:
+            raise InputError("a field's candidates lie 1 to 600 frames apart, its search error is 1 to 10")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -208,6 +217,14 @@ def _none(made: Field) -> NDArray[np.int64]:
     return np.full(min(made.options.memory, len(made.tree.order) // (8 * APART)), -APART, np.int64)
 
 
+def _spring(settle_s: float) -> tuple[np.float32, np.float32]:
+    """Stiffness of a critically damped spring and what it keeps of a leap in a frame; 0 and 0 for no spring."""
+    if settle_s == 0:
+        return np.float32(0.0), np.float32(0.0)
+    stiffness = np.float32(1.0 / (settle_s * GESTURE_FPS))
+    return stiffness, np.exp(-stiffness)
+
+
 def begun(field: Field, chance: float) -> FieldState:
     """The state after the first frames of one of the recordings; `chance` in [0, 1) tells which."""
     history = field.options.history
@@ -250,7 +267,7 @@ def walked(field: Field, state: FieldState, heard: Floats, chances: NDArray[np.f
     shown = np.concatenate([state.shown, np.zeros((len(chances), state.offset.shape[1]), np.float32)])
     sound = np.concatenate([state.heard, (heard * field.weights).astype(np.float32)])
     moments, offset, recent = np.zeros(len(chances), np.int64), state.offset.copy(), state.recent.copy()
-    stiffness = np.float32(1.0 / (options.settle_s * GESTURE_FPS))
+    stiffness, fade = _spring(options.settle_s)
     walk(
         _corpus(field),
         _flat(field.tree),
@@ -262,7 +279,8 @@ def walked(field: Field, state: FieldState, heard: Floats, chances: NDArray[np.f
             options.stride,
             options.continuity,
             stiffness,
-            np.exp(-stiffness),
+            fade,
+            (options.apart, options.search_error),
         ),
         (shown, sound, moments, offset, recent, state.moment, state.n_frames, chances),
     )

@@ -4,8 +4,8 @@ import numpy as np
 
 from tts2face.compilation import kernel
 
-SLACK = 1.1  # moments are found that are at most so much farther than the best; the paper's search has one, too
-APART = 10  # frames between two moments that count as different
+SLACK = 1.1  # default search error: moments found are at most so much farther than the best (Ju and Lee 2008 use ANN)
+APART = 10  # default least number of frames between two moments that count as different
 
 
 @kernel
@@ -20,7 +20,7 @@ def nearest(corpus, tree, axes, history, asked):  # type: ignore[no-untyped-def]
         best[:], distance[:] = -1, np.inf
         window = (values[moments[n] - history : moments[n]], recorded[moments[n] - history : moments[n]], 0, history)
         _project(window, axes, query)
-        _search(corpus, tree, window, query, (best[:0], best, distance, stack, bounds))
+        _search(corpus, tree, window, query, (best[:0], best, distance, (APART, SLACK), stack, bounds))
         away[n] = distance[1]
 
 
@@ -31,7 +31,7 @@ def walk(corpus, tree, axes, options, track):  # type: ignore[no-untyped-def]
     What is left of a leap goes as a critically damped spring, so that neither place nor speed jumps (Bollo 2018).
     """
     values, _, starts = corpus
-    history, n_candidates, sigma, stride, continuity, stiffness, fade = options
+    history, n_candidates, sigma, stride, continuity, stiffness, fade, rule = options
     shown, heard, moments, offset, recent, moment, n_before, chances = track
     none = recent[:0]
     best, distance = np.zeros(n_candidates, np.int64), np.zeros(n_candidates)
@@ -45,9 +45,9 @@ def walk(corpus, tree, axes, options, track):  # type: ignore[no-untyped-def]
             best[:], distance[:] = -1, np.inf
             if goes_on:
                 away = continuity * _apart(corpus, (shown, heard, i, history), following, np.inf)
-                _offer(following, away, (starts, none), (best, distance))
+                _offer(following, away, (starts, none, rule[0]), (best, distance))
             _project((shown, heard, i, history), axes, query)
-            _search(corpus, tree, (shown, heard, i, history), query, (recent, best, distance, stack, bounds))
+            _search(corpus, tree, (shown, heard, i, history), query, (recent, best, distance, rule, stack, bounds))
             chosen = _drawn(best, distance, sigma, chances[i])
         last = i + history - 1
         for d in range(values.shape[1]):
@@ -83,8 +83,8 @@ def _drawn(best, distance, sigma, chance):  # type: ignore[no-untyped-def]
 
 @kernel
 def _offer(moment, away, known, found):  # type: ignore[no-untyped-def]
-    """Keep a moment among the best ones if it is nearer than those that it is hardly different from, and not recent."""
-    starts, recent = known
+    """Keep a moment among the best ones if it is nearer than those within `apart` frames of it, and not recent."""
+    starts, recent, apart = known
     best, distance = found
     at = len(best) - 1
     if away >= distance[at]:
@@ -93,7 +93,7 @@ def _offer(moment, away, known, found):  # type: ignore[no-untyped-def]
         if abs(recent[r] - moment) < APART:
             return
     for c in range(len(best)):
-        if best[c] >= 0 and starts[best[c]] == starts[moment] and abs(best[c] - moment) < APART:
+        if best[c] >= 0 and starts[best[c]] == starts[moment] and abs(best[c] - moment) < apart:
             if away >= distance[c]:
                 return
             at = c
@@ -144,9 +144,9 @@ def _search(corpus, tree, window, query, found):  # type: ignore[no-untyped-def]
     A place's distance from the query is at most that of the windows: the axes are orthonormal.
     """
     places, order, spans, axes, cuts = tree
-    recent, best, distance, stack, bounds = found
+    recent, best, distance, (apart, error), stack, bounds = found
     history = window[3]
-    slack = SLACK * SLACK / history
+    slack = error * error / history
     height = 1
     stack[0], bounds[0] = 0, 0.0
     while height > 0:
@@ -167,4 +167,4 @@ def _search(corpus, tree, window, query, found):  # type: ignore[no-untyped-def]
             if squared < distance[-1] * history:
                 moment = np.int64(order[at])
                 away = _apart(corpus, window, moment, distance[-1])
-                _offer(moment, away, (corpus[2], recent), (best, distance))
+                _offer(moment, away, (corpus[2], recent, apart), (best, distance))

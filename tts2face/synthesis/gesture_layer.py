@@ -38,7 +38,7 @@ class GestureLayer:
         for style in marked_styles(prepared.text):
             palette.require(style)
         face.check_gains(self._requested.gains.factors)
-        kind: type[NoiseStream] | type[GestureStream] = NoiseStream if request.noise else GestureStream
+        kind: type[NoiseStream] | type[GestureStream] = NoiseStream if request.gestures == "noise" else GestureStream
         starter = ThreadPoolExecutor(1)  # fields take half a second to make, in which a voice can be loaded and speak
         self._stream: Future[GestureStream | NoiseStream] = starter.submit(
             kind, fields, style=usual_style(palette), seed=request.seed, fps=float(prepared.fps)

@@ -54,6 +54,20 @@ def test_markers_and_their_stills_become_a_style(recorded: Recorded, made: Made,
     assert np.corrcoef(moved[10:-10], raised[10:-10])[0, 1] > 0.6  # the rest is in the expressions
 
 
+def test_epsilon_widens_the_limits_of_the_weights(recorded: Recorded, tmp_path: Path) -> None:
+    weights = {}
+    for epsilon in (0.0, 0.5):
+        out = tmp_path / f"{epsilon}.palette"
+        build_style(recorded, "worn", out, base=None, epsilon=epsilon, effort=Effort(tmp_path / "cache", 1))
+        style = read_palette(out).styles["worn"]
+        weights[epsilon] = style.motion["expression"]
+        assert ("--epsilon 0.5" in style.metadata["command"]) == (epsilon == 0.5)
+    assert weights[0.0].min() >= -1e-3  # steps of 16 bits
+    assert -0.5 - 1e-3 <= weights[0.5].min() < -0.01
+    with pytest.raises(InputError, match=r"epsilon must lie between 0 and 1, not 1\.1"):
+        build_style(recorded, "x", tmp_path / "x.palette", base=None, epsilon=1.1)
+
+
 def test_stills_of_two_kinds(recorded: Recorded, tmp_path: Path) -> None:
     mixed = {**recorded.stills, "sad": Still(tmp_path / "sad.png")}
     with pytest.raises(InputError, match="stills of markers need each other and the person at rest"):

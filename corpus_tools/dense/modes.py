@@ -1,0 +1,248 @@
+"""A dense linear model of a talker's shape: the head's mesh fitted to many frames, then its principal modes.
+
+Theobald et al. 2007, section 2.1: the generic mesh is fitted to the sparse shape of every frame (eqs 3 and 4), and the
+modes of eq. 1 are those of the dense shapes. The centres of eq. 4 lie where the mesh is in its default position, so a
+dense shape is a linear function of the landmarks, ``spread @ displacements``; its principal components are those of the
+landmarks under the metric ``spread.T @ spread`` and are found there, exactly, without dense frames in memory.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.dense.adapt_head import EYE_PARTS, MOUTH_PARTS
+from corpus_tools.dense.mesh_fit import N_MESH, landmarks_of, part_vertices
+from corpus_tools.dense.skin_colour import Fitter, fitter
+from corpus_tools.dense.video_landmarks import Seen
+from lexicon.errors import InputError
+from tts2face.face.mouth_model import CHIN_POINTS
+from tts2face.face.shape_transfer import appended
+from tts2face.models.face import Face
+from tts2face.video.pose import similarity
+
+OPEN_JAW = (
+    0.6  # weight of jawOpen at which eq. 4 is asked; at 0.12 the edge of the lower lip is serrated between landmarks
+)
+SKIN = "skin"  # the part whose vertices are the dense shape
+JAW = ("jawOpen", "jawForward", "jawLeft")  # shapes that move the lower teeth and the tongue with a mode's chin
+LIMIT = 3.0  # standard deviations within which a mode looks right (Theobald et al. 2007, section 3.1)
+MEAN, MODE = "denseMean", "dense"  # names of the added shapes: denseMean, dense1, dense2, ...
+MOST_MODES = 100  # 30 hold 99.8 % of the variance of GRID s1
+HELD_OUT = 5  # one in so many videos is held out, to measure the model on frames that it has not seen
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Components:
+    """Principal components of displacements of N landmarks.
+
+    Parameters
+    ----------
+    mean : (N, 3)
+        Mean displacement, mm.
+    modes : (K, N, 3)
+        Displacements of the landmarks, of unit length in the metric.
+    duals : (K, N, 3)
+        Their inner products with a displacement are its parameters.
+    variances : (K,)
+        Of the parameters, falling; all of them, so that their sum is the whole variance.
+    """
+
+    mean: Floats
+    modes: Floats
+    duals: Floats
+    variances: Floats
+
+    def shares(self) -> Floats:
+        """(K,) share of the variance in the first 1, 2, ... modes: the compactness of the model."""
+        shares: Floats = np.cumsum(self.variances) / self.variances.sum()
+        return shares
+
+    def n_modes(self, share: float) -> int:
+        """The fewest modes that hold a share of the variance."""
+        return int(np.searchsorted(self.shares(), share - 1e-12)) + 1
+
+    def left(self, displacements: Floats, n_modes: int) -> Floats:
+        """(T, N, 3) what the first modes do not describe of displacements (T, N, 3)."""
+        away = displacements - self.mean
+        parameters = np.tensordot(away, self.duals[:n_modes], axes=((1, 2), (1, 2)))
+        rest: Floats = away - np.tensordot(parameters, self.modes[:n_modes], axes=1)
+        return rest
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldOut:
+    """Root mean square errors, mm, in frames of videos that were held out, with a number of modes of either model.
+
+    ``dense`` and ``sparse`` are errors of the dense shape: of the dense model, and of the sparse model's landmarks with
+    the mesh fitted to them. None is known of fewer than `HELD_OUT` videos.
+    """
+
+    n_modes: tuple[int, ...]
+    dense: tuple[float, ...]
+    sparse: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DenseModel:
+    """The dense model of a talker, and the sparse one of the same frames.
+
+    Parameters
+    ----------
+    dense, sparse
+        Components of the dense shapes, and of the landmarks alone.
+    mean : (V, 3)
+        Displacement of the mean shape from the head at rest, mm.
+    modes : (K, V, 3)
+        Displacement at one standard deviation, mm.
+    n_frames, n_landmarks
+        From which it was learnt.
+    """
+
+    dense: Components
+    sparse: Components
+    mean: Floats
+    modes: Floats
+    n_frames: int
+    n_landmarks: int
+    held_out: HeldOut | None
+
+    def summary(self) -> dict[str, Any]:
+        """The figures kept in a face file (docs/file-formats.md)."""
+        held = self.held_out or HeldOut((), (), ())
+        return {
+            "frames": self.n_frames,
+            "landmarks": self.n_landmarks,
+            "modes": len(self.modes),
+            "shares": _rounded(self.dense.shares()[: len(self.modes)]),
+            "sparse_shares": _rounded(self.sparse.shares()[: len(self.modes)]),
+            "modes_for_95_and_99": [self.dense.n_modes(share) for share in (0.95, 0.99)],
+            "sparse_modes_for_95_and_99": [self.sparse.n_modes(share) for share in (0.95, 0.99)],
+            "held_out": {
+                "modes": list(held.n_modes),
+                "dense_mm": _rounded(held.dense),
+                "sparse_mm": _rounded(held.sparse),
+            },
+        }
+
+
+def _rounded(values: Iterable[float]) -> list[float]:
+    return [round(float(value), 6) for value in values]
+
+
+def mode_fitter(face: Face, used: NDArray[np.int64]) -> Fitter:
+    """The fitter of an adapted head by the landmarks `used`, asked with the jaw open, so that lips do not tear."""
+    jaw = face.shapes[face.shape_names.index("jawOpen")].astype(np.float64)
+    return fitter(face, face.vertices + OPEN_JAW * jaw, used)
+
+
+def dense_model(
+    face: Face, fit: Fitter, seen: Sequence[Seen], talker: NDArray[np.floating], n_modes: int
+) -> DenseModel:
+    """Fit the head's mesh to every frame of a talker's videos and find its modes.
+
+    Parameters
+    ----------
+    face
+        The head adapted to the talker.
+    fit
+        Its fitter (`mode_fitter`): the spread of eqs 3 and 4.
+    talker : (478, 3)
+        The talker's landmarks at rest, to which the head was adapted.
+    n_modes
+        Modes to keep.
+
+    Raises
+    ------
+    InputError
+        There are fewer frames or directions than modes, or no mode is wanted.
+    """
+    videos = [displacements(fit, one.landmarks, talker) for one in seen]
+    frames = np.concatenate(videos)
+    most = min(len(frames) - 1, MOST_MODES)
+    if not 1 <= n_modes <= most:
+        raise InputError(f"{n_modes} dense modes cannot be found in {len(frames)} frames; ask for 1 to {most}")
+    skin = fit.spread[part_vertices(face, (SKIN,))]
+    metric = skin.T @ skin
+    dense, sparse = components(frames, metric), components(frames, np.eye(len(metric)))
+    scaled = np.sqrt(dense.variances[:n_modes])[:, None, None] * dense.modes[:n_modes]
+    shapes = spread_shapes(face, fit, np.concatenate([dense.mean[None], scaled]))
+    return DenseModel(
+        dense, sparse, shapes[0], shapes[1:], len(frames), len(fit.used), _held_out(videos, metric, len(skin), n_modes)
+    )
+
+
+def displacements(fit: Fitter, landmarks: NDArray[np.floating], talker: NDArray[np.floating]) -> Floats:
+    """(T', N, 3) u of eq. 3 in the head's size: the landmarks of each frame with a face, less the talker's at rest.
+
+    Landmarks (T, 478, 3) are without head pose; those of a frame without a face are NaN, and it is left out.
+    """
+    rest = np.asarray(talker, np.float64)[:N_MESH]
+    turns, scales = similarity(rest[None], fit.marks, np.full(N_MESH, 1.0 / N_MESH))
+    known = landmarks[np.isfinite(landmarks[:, 0, 0])].astype(np.float64)
+    moved: Floats = (known[:, fit.used] - rest[fit.used]) @ (scales[0] * turns[0]).T
+    return moved
+
+
+def components(frames: Floats, metric: Floats) -> Components:
+    """Principal components of displacements (T, N, 3) under a metric (N, N), which is the same for each axis."""
+    root = np.linalg.cholesky(metric).T
+    mean = frames.mean(axis=0)
+    rows = _times(root, frames - mean).reshape(len(frames), -1)
+    variances, vectors = np.linalg.eigh(rows.T @ rows / len(rows))
+    n_modes = min(len(frames) - 1, len(variances))
+    columns = vectors[:, ::-1].T[:n_modes].reshape(n_modes, *mean.shape)
+    modes = _times(np.linalg.inv(root), columns)
+    down = -np.sign(modes[..., 1].sum(axis=1))[:, None, None]  # at positive weights a mode moves the face down
+    variances = np.maximum(variances[::-1][:n_modes], 0.0)
+    return Components(mean, down * modes, down * _times(root.T, columns), variances)
+
+
+def _times(matrix: NDArray[np.floating], frames: Floats) -> Floats:
+    """(T, M, 3) a matrix (M, N) times each of the frames (T, N, 3), as one product."""
+    product: Floats = np.einsum("mn,tnc->tmc", matrix, frames, optimize=True)
+    return product
+
+
+def spread_shapes(face: Face, fit: Fitter, moved: Floats) -> Floats:
+    """(K, V, 3) displacement of every vertex for displacements (K, N, 3) of the landmarks.
+
+    Eyeballs stay; lower teeth and tongue, which no camera sees, go with the jaw that the chin shows.
+    """
+    shapes: Floats = _times(fit.spread, moved)
+    shapes[:, part_vertices(face, EYE_PARTS)] = 0.0
+    numbers = [face.shape_names.index(name) for name in JAW]
+    chin = [row for row, landmark in enumerate(fit.used) if landmark in CHIN_POINTS]
+    own = np.stack([landmarks_of(face, face.shapes[number])[fit.used[chin]].ravel() for number in numbers], axis=1)
+    opened = np.linalg.lstsq(own, moved[:, chin].reshape(len(moved), -1).T, rcond=None)[0]
+    bone = part_vertices(face, MOUTH_PARTS)
+    shapes[:, bone] = np.einsum("jk,jvc->kvc", opened, face.shapes[numbers][:, bone].astype(np.float64))
+    return shapes
+
+
+def with_modes(face: Face, model: DenseModel) -> Face:
+    """The face with the shapes denseMean, dense1, dense2, ...: denseMean at 1 and the modes' parameters give eq. 1."""
+    names = (MEAN, *(f"{MODE}{number}" for number in range(1, len(model.modes) + 1)))
+    limits = np.array([(0.0, 1.0), *[(-LIMIT, LIMIT)] * len(model.modes)])
+    shapes = np.concatenate([model.mean[None], model.modes]).astype(np.float32)
+    return appended(face, names, shapes, limits)
+
+
+def _held_out(videos: Sequence[Floats], metric: Floats, n_vertices: int, n_modes: int) -> HeldOut | None:
+    held = [video for number, video in enumerate(videos) if number % HELD_OUT == HELD_OUT - 1]
+    if not held:
+        return None
+    learnt = np.concatenate([video for number, video in enumerate(videos) if number % HELD_OUT != HELD_OUT - 1])
+    frames = np.concatenate(held)
+    counts = tuple(k for k in (1, 2, 3, 4, 6, 8, 10, 15, 20, 30, 40, 60, 100) if k <= n_modes)
+    errors = []
+    for own in (metric, np.eye(len(metric))):
+        found = components(learnt, own)
+        left = [found.left(frames, k) for k in counts]
+        squares = [(one * _times(metric, one)).sum(axis=(1, 2)).mean() for one in left]
+        errors.append(tuple(float(np.sqrt(square / n_vertices)) for square in squares))
+    return HeldOut(counts, *errors)

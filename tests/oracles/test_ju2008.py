@@ -1,0 +1,91 @@
+"""The published fields against the paper's formula in plain Python: Ju and Lee 2008, section 5.1."""
+
+import numpy as np
+import pytest
+
+from tts2face.gesture.field import Field, FieldState, begun, field_of, walked
+from tts2face.gesture.ju2008 import FIELD_OPTIONS, JU_2008
+from tts2face.models.palette import FEATURES
+
+N, LENGTH, N_SHOWN = 12, 60, 200
+H = 10  # preceding frames
+N_BEST = 4  # "a small number (2 to 4 in our experiments) of good candidates"
+
+
+def recordings(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Smooth motion (T, 2), its sound (T, 1), and the lengths of the recordings."""
+    generator = np.random.default_rng(seed)
+    steps = generator.normal(size=(3, N * LENGTH))
+    smooth = np.stack([np.convolve(row, np.hanning(9), "same") for row in steps], axis=1).astype(np.float32)
+    return smooth[:, :2], smooth[:, 2:], np.full(N, LENGTH, np.int32)
+
+
+def distances(made: Field, shown: np.ndarray, heard: np.ndarray) -> dict[int, float]:
+    """dist(t, t') of every recorded frame with h frames before it in its recording; alpha is in `heard` already."""
+    found = {}
+    for moment in range(N * LENGTH):
+        if moment % LENGTH >= H:
+            before = slice(moment - H, moment)
+            of_sound = np.square(heard.astype(float) - made.heard[before]).sum()
+            found[moment] = float(of_sound + np.square(shown.astype(float) - made.values[before]).sum())
+    return found
+
+
+def drawn(away: dict[int, float], sigma: float, chance: float) -> int:
+    """One of the best candidates, with a probability proportional to exp(-dist / sigma)."""
+    best = sorted(away, key=lambda moment: away[moment])[:N_BEST]
+    weights = np.exp(-(np.array([away[moment] for moment in best]) - away[best[0]]) / sigma)
+    passed = np.cumsum(weights) / weights.sum()
+    return best[int(np.searchsorted(passed, chance, side="right"))]
+
+
+def test_the_preset_is_what_the_paper_prints() -> None:
+    assert JU_2008.history == H
+    assert 2 <= JU_2008.candidates <= 4
+    assert (JU_2008.stride, JU_2008.continuity, JU_2008.memory) == (1, 1.0, 0)
+    assert (JU_2008.settle_s, JU_2008.apart, JU_2008.search_error) == (0.0, 1, 1.0)
+    assert set(FIELD_OPTIONS["ju2008"]) == set(FEATURES)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_every_frame_is_drawn_as_the_formula_says(seed: int) -> None:
+    values, heard, lengths = recordings(seed)
+    made = field_of(values, heard, lengths, JU_2008)
+    generator = np.random.default_rng(50 + seed)
+    sound = np.convolve(generator.normal(size=N_SHOWN), np.hanning(9), "same").astype(np.float32)[:, None]
+    chances = generator.random(N_SHOWN)
+    state = begun(made, 0.4)
+    walk = walked(made, state, sound, chances)
+    shown, driving = list(state.shown), [*state.heard, *(sound * made.weights)]
+    expected = []
+    for frame in range(N_SHOWN):
+        away = distances(made, np.array(shown[-H:]), np.array(driving[frame : frame + H]))
+        moment = drawn(away, H * JU_2008.sigma * made.nearness, chances[frame])
+        expected.append(moment)
+        shown.append(made.values[moment])
+    assert walk.moments.tolist() == expected
+    np.testing.assert_array_equal(walk.values, made.values[expected] * np.float32(made.scale))
+    assert (np.diff(expected) != 1).sum() > N_SHOWN / 20  # leaps are among them
+
+
+def test_sound_and_motion_weigh_alike() -> None:
+    """alpha is 1 in units of variance: the windows' two terms have the same mean."""
+    values, heard, lengths = recordings(4)
+    made = field_of(values, heard, lengths, JU_2008)
+    assert np.square(made.heard - made.heard.mean(axis=0)).sum(axis=1).mean() == pytest.approx(1.0, rel=1e-3)
+    assert np.square(made.values - made.values.mean(axis=0)).sum(axis=1).mean() == pytest.approx(1.0, rel=1e-3)
+
+
+def test_candidates_come_with_the_frequencies_of_the_formula() -> None:
+    values, heard, lengths = recordings(5)
+    made = field_of(values, heard, lengths, JU_2008)
+    start = begun(made, 0.0)
+    state = FieldState(np.zeros_like(start.shown), np.zeros_like(start.heard), -1, start.offset, start.recent, 0)
+    away = distances(made, state.shown, state.heard)
+    best = sorted(away, key=lambda moment: away[moment])[:N_BEST]
+    weights = np.exp(-np.array([away[moment] - away[best[0]] for moment in best]) / (H * JU_2008.sigma * made.nearness))
+    chances = (np.arange(2000) + 0.5) / 2000
+    found = [int(walked(made, state, np.zeros((1, 1), np.float32), chances[i : i + 1]).moments[0]) for i in range(2000)]
+    assert set(found) <= set(best)
+    shares = [found.count(moment) / 2000 for moment in best]
+    np.testing.assert_allclose(shares, weights / weights.sum(), atol=2 / 2000)
