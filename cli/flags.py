@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from cyclopts import Token
 
 
-def whole_number(_: Any, tokens: "Sequence[Token]") -> int:
+def parse_whole_number(_: Any, tokens: "Sequence[Token]") -> int:
     """The number of a flag that counts; cyclopts itself rounds 2.5 to 2."""
     try:
         return int(tokens[0].value)
@@ -19,10 +19,10 @@ def whole_number(_: Any, tokens: "Sequence[Token]") -> int:
         raise ValueError(f'"{tokens[0].value}" is no whole number') from wrong
 
 
-def flags_from(*groups: tuple[str, type], without: frozenset[str] = frozenset()) -> Callable[..., Any]:
+def add_option_flags(*groups: tuple[str, type], without: frozenset[str] = frozenset()) -> Callable[..., Any]:
     """Give a command one keyword flag for each field of the option dataclasses, under a heading for each class.
 
-    The command takes them as ``**options``; `chosen` turns them back into an instance.
+    The command takes them as ``**options``; `options_from_flags` turns them back into an instance.
     """
     headed = [(Group.create_ordered(heading), options) for heading, options in groups]
 
@@ -47,7 +47,7 @@ def flags_from(*groups: tuple[str, type], without: frozenset[str] = frozenset())
 
 def _parameter(option: "Field[Any]", kind: Any, group: Group) -> inspect.Parameter:
     default = inspect.Parameter.empty if option.default is MISSING else option.default
-    converter = whole_number if kind in (int, int | None) else None
+    converter = parse_whole_number if kind in (int, int | None) else None
     negative = f"--no-{option.name}" if default is True else ""
     annotation = Annotated[
         kind, Parameter(help=option.metadata["help"], group=group, negative=negative, converter=converter)
@@ -55,7 +55,7 @@ def _parameter(option: "Field[Any]", kind: Any, group: Group) -> inspect.Paramet
     return inspect.Parameter(option.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 
-def chosen(options: type, flags: dict[str, Any], **more: Any) -> Any:
+def options_from_flags(options: type, flags: dict[str, Any], **more: Any) -> Any:
     """An instance of an option dataclass from the flags that belong to it."""
     names = {option.name for option in fields(options)}
     return options(**{name: value for name, value in flags.items() if name in names}, **more)

@@ -6,7 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from cli.corpus import Cache, Jobs, Model, check_suffix, corpus
-from cli.progress import say, stage_bar
+from cli.progress import stage_bar, write_message
 from tts2face.storage.overwrite import refuse_overwriting
 
 
@@ -48,16 +48,16 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
     check_suffix(out, "palette")
     given = {"the recordings": recordings, "--stills": stills, "--markers": markers, "--neutral": neutral}
     refuse_overwriting({"--out": out}, given | {"--palette": palette, "--provenance": provenance, "--model": model})
-    from corpus_tools.build_palette import Recorded, build_style
-    from corpus_tools.decomposition.capture_files import Worn
+    from corpus_tools.build_palette import StyleSource, build_style
+    from corpus_tools.decomposition.capture_files import MarkerOptions
     from corpus_tools.decomposition.marker_set import SHIPPED
-    from corpus_tools.decomposition.stills import named_stills, stills_in
-    from corpus_tools.run_options import Effort, no_stages
+    from corpus_tools.decomposition.stills import find_stills, parse_stills
+    from corpus_tools.run_options import RunOptions, ignore_stage
     from tts2face.models.palette import load_palette
 
-    shown = (stills_in(stills) if stills is not None else {}) | named_stills(still or [])
-    worn = Worn(markers or SHIPPED, neutral, marker_rate)
-    recorded = Recorded(recordings=recordings, stills=shown, worn=worn, provenance=provenance)
+    shown = (find_stills(stills) if stills is not None else {}) | parse_stills(still or [])
+    worn = MarkerOptions(markers or SHIPPED, neutral, marker_rate)
+    recorded = StyleSource(recordings=recordings, stills=shown, worn=worn, provenance=provenance)
     base = None if alone else load_palette(palette)
     with stage_bar() as stages:
         made = build_style(
@@ -67,12 +67,14 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
             base=base,
             estimator=estimator,
             epsilon=epsilon,
-            effort=Effort(cache, jobs, model),
-            stages=stages or no_stages,
+            effort=RunOptions(cache, jobs, model),
+            stages=stages or ignore_stage,
         )
     for refusal in made.refused:
-        say(f"refused {refusal.name}: {refusal.reason}")
+        write_message(f"refused {refusal.name}: {refusal.reason}")
     for note in made.notes:
-        say(note)
+        write_message(note)
     kept = ", ".join(f"{share:.0%} of the {feature}'s motion" for feature, share in made.kept.items())
-    say(f"wrote {out}: the style {style} of {made.n_kept} recordings, {made.minutes:.1f} minutes; kept {kept}")
+    write_message(
+        f"wrote {out}: the style {style} of {made.n_kept} recordings, {made.minutes:.1f} minutes; kept {kept}"
+    )

@@ -20,7 +20,7 @@ def voices(*, as_json: AsJson = False) -> None:
 
     entries = voices()
     rows = (
-        (one.name, one.engine, _languages(one.languages), "yes" if one.is_installed else "no", one.summary)
+        (one.name, one.engine, _languages_text(one.languages), "yes" if one.is_installed else "no", one.summary)
         for one in entries
     )
     _print(entries, ("voice", "engine", "languages", "installed", "summary"), rows, as_json)
@@ -88,7 +88,7 @@ def talkers(*, as_json: AsJson = False) -> None:
 LISTS = (voices, languages, faces, identities, styles, talkers)
 
 
-def _languages(codes: Sequence[str]) -> str:
+def _languages_text(codes: Sequence[str]) -> str:
     if not codes:
         return "its own"
     return ", ".join(codes) if len(codes) < 6 else str(len(codes))

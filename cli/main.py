@@ -10,8 +10,8 @@ from cyclopts import App, CycloptsError, Parameter
 import cli.gestures  # noqa: F401 - adds its command to `corpus`
 from cli.completion import add_completion
 from cli.corpus import corpus
-from cli.exits import exit_code, sentence
-from cli.flags import chosen, flags_from
+from cli.exits import error_message, exit_code
+from cli.flags import add_option_flags, options_from_flags
 from cli.lists import LISTS
 from cli.memory import return_large_blocks
 from cli.mimic import mimic
@@ -19,7 +19,7 @@ from cli.options import check_options
 from cli.phones import phones
 from cli.report import report
 from cli.stopping import raise_on_signals, stop_code
-from cli.streams import complain, drop_output, settle_streams
+from cli.streams import discard_output, repair_streams, write_error
 from lexicon.errors import DataError, InputError, Tts2faceError
 from lexicon.inputs import LARGEST_TEXT_BYTES, decoded, read_bounded, read_text
 from tts2face import __version__
@@ -44,7 +44,7 @@ add_completion(app)
 
 
 @app.default
-@flags_from(
+@add_option_flags(
     ("What is said and how the face moves", Request), ("How it is drawn", Picture), without=frozenset({"text"})
 )  # fmt: skip
 def speak(  # noqa: PLR0913 - one parameter a flag
@@ -84,9 +84,11 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     needs_text = options.get("audio") is None and options.get("idle") is None
     from cli.speak import SpeakOptions, run_request
 
-    request = chosen(Request, options, text=_text(text if said is None else said, file, is_needed=needs_text))
+    request = options_from_flags(
+        Request, options, text=_read_text(text if said is None else said, file, is_needed=needs_text)
+    )
     speak_options = SpeakOptions(out, talker, face, identity, palette, explain, view, quiet, file)
-    run_request(request, chosen(Picture, options), speak_options)
+    run_request(request, options_from_flags(Picture, options), speak_options)
 
 
 def _gestures(method: str | None, *, noise: bool, none: bool) -> str:
@@ -100,7 +102,7 @@ def _gestures(method: str | None, *, noise: bool, none: bool) -> str:
     return next(iter(given.values()), GESTURES[0])
 
 
-def _text(text: str | None, file: Path | None, *, is_needed: bool) -> str:
+def _read_text(text: str | None, file: Path | None, *, is_needed: bool) -> str:
     if text is None and file is None and not is_needed:
         return ""
     if text is not None and file is not None:
@@ -127,22 +129,22 @@ def run(arguments: Sequence[str]) -> int:
         app(list(arguments), exit_on_error=False, print_error=False, result_action="return_none")
         sys.stdout.flush()
     except BrokenPipeError:
-        drop_output()
+        discard_output()
         return 141
     except (Tts2faceError, CycloptsError, OSError) as refused:
         if isinstance(refused, OSError) and refused.filename is None:
-            drop_output()
-        complain(f"tts2face: {sentence(refused)}")
+            discard_output()
+        write_error(f"tts2face: {error_message(refused)}")
         return exit_code(refused)
     except KeyboardInterrupt as stopped:
-        complain("\ntts2face: stopped; nothing was written")
+        write_error("\ntts2face: stopped; nothing was written")
         return stop_code(stopped)
     return 0
 
 
 def main() -> None:
     """Entry point of the ``tts2face`` command."""
-    settle_streams()
+    repair_streams()
     raise_on_signals()
     return_large_blocks()
     sys.exit(run(sys.argv[1:]))

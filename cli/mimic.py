@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from cli.progress import say, stage_bar
+from cli.progress import stage_bar, write_message
 from lexicon.errors import InputError
 from tts2face.storage.overwrite import refuse_overwriting
 
@@ -49,9 +49,9 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     if camera is not None:
         if take is not None or out is not None or face == OWN_FACE:
             raise InputError("--camera is shown live in a window: give neither a take nor --out, and a head as --face")
-        from cli.live import live
+        from cli.live import run_live_window
 
-        return live(camera, face, identity, Picture(size=size, background=background), model)
+        return run_live_window(camera, face, identity, Picture(size=size, background=background), model)
     if take is None or out is None:
         raise InputError("give a take and --out, or --camera for a live camera")
     given = {"the take": take, "--audio": audio, "--talker": talker, "--face": face, "--background": background}
@@ -71,6 +71,8 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     if quiet:
         return
     if written.is_silent:
-        say(f"{take} holds no sound; the clip is silent")
+        write_message(f"{take} holds no sound; the clip is silent")
     took = time.perf_counter() - began
-    say(f"wrote {out}: {written.seconds:.1f} s, made in {took:.1f} s ({written.seconds / took:.1f} x real time)")
+    write_message(
+        f"wrote {out}: {written.seconds:.1f} s, made in {took:.1f} s ({written.seconds / took:.1f} x real time)"
+    )

@@ -28,7 +28,7 @@ def check_options(app: App, arguments: Sequence[str]) -> None:
     command = app.parse_commands(given)[1][-1]
     if command.default_command is None:  # a group of commands; which of them is meant is not known
         return
-    known = [*flags, *options_of(command)]
+    known = [*flags, *option_names(command)]
     for name in written:
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1, cutoff=0.6) if " " not in name else []
@@ -41,7 +41,7 @@ def is_option(argument: str) -> bool:
     return argument.startswith(END) or _SHORT.fullmatch(argument) is not None
 
 
-def options_of(command: App) -> list[str]:
+def option_names(command: App) -> list[str]:
     """Every option of a command, as it is written."""
     arguments = command.assemble_argument_collection()
     names = [name for argument in arguments for name in (*argument.names, *argument.negatives)]

@@ -19,8 +19,10 @@ def phones(
     """Print the words of a text and their phones, in ARPABET and IPA, with stress and syllables."""
     from lexicon.dictionary import read_dictionary
     from lexicon.given import pronounce_marked
-    from lexicon.mark_parser import marked
+    from lexicon.mark_parser import parse_marks
     from tts2face.export.text import FORMATS
 
-    spoken = pronounce_marked(marked(text, language), language, read_dictionary(dictionary) if dictionary else None)
+    spoken = pronounce_marked(
+        parse_marks(text, language), language, read_dictionary(dictionary) if dictionary else None
+    )
     print(FORMATS[format](spoken), end="")  # noqa: T201 - the answer

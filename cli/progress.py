@@ -4,14 +4,14 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from cli.streams import complain
+from cli.streams import write_error
 
 Progress = Callable[[int, int], None]
 
 
-def say(line: str) -> None:
+def write_message(line: str) -> None:
     """One line for the person at the terminal."""
-    complain(line)
+    write_error(line)
 
 
 @contextmanager

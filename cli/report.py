@@ -5,8 +5,8 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from cli.flags import whole_number
-from cli.progress import progress_bar, say
+from cli.flags import parse_whole_number
+from cli.progress import progress_bar, write_message
 from lexicon.errors import InputError
 from tts2face.storage.overwrite import refuse_overwriting
 
@@ -24,10 +24,10 @@ def similarity(  # noqa: PLR0913 - one parameter a flag
         Parameter(help="Numbers of viseme classes to list; without it those of 4,6,8,10,12 that the phones allow."),
     ] = None,
     halves: Annotated[
-        int, Parameter(help="Random halves of the corpus to compare (.html, .json).", converter=whole_number)
+        int, Parameter(help="Random halves of the corpus to compare (.html, .json).", converter=parse_whole_number)
     ] = 20,
     seed: Annotated[
-        int, Parameter(help="Which halves and permutations are drawn (.html, .json).", converter=whole_number)
+        int, Parameter(help="Which halves and permutations are drawn (.html, .json).", converter=parse_whole_number)
     ] = 0,
     compare: Annotated[
         str | None, Parameter(help="Another talker to compare with; .csv and .png then hold the difference.")
@@ -39,10 +39,10 @@ def similarity(  # noqa: PLR0913 - one parameter a flag
     from corpus_tools.similarity.analysis import Options
     from corpus_tools.similarity.write import write_similarity
 
-    options = Options(_numbers(classes), halves, seed)
+    options = Options(_parse_numbers(classes), halves, seed)
     with progress_bar("comparing halves") as on_progress:
         found = write_similarity(talker, out, options, other=compare, labels=labels, on_progress=on_progress)
-    say(
+    write_message(
         f"wrote {out}: {len(found.table.phones)} phones, best in {found.best.n_classes} classes, "
         f"reliability {found.by_utterances.corrected:.3f}"
     )
@@ -55,15 +55,17 @@ def gestures(
     *,
     out: Annotated[Path, Parameter(help="What to write: .html, .csv, .json or .png.", alias="-o")],
     held_out: Annotated[
-        int, Parameter(help="One in so many recordings is held out, to compare with.", converter=whole_number)
+        int, Parameter(help="One in so many recordings is held out, to compare with.", converter=parse_whole_number)
     ] = 5,
     halves: Annotated[
-        int, Parameter(help="Random halves of the held-out recordings to compare.", converter=whole_number)
+        int, Parameter(help="Random halves of the held-out recordings to compare.", converter=parse_whole_number)
     ] = 50,
     clips: Annotated[
-        int, Parameter(help="Clips of different seeds that fields and noise make.", converter=whole_number)
+        int, Parameter(help="Clips of different seeds that fields and noise make.", converter=parse_whole_number)
     ] = 3,
-    seed: Annotated[int, Parameter(help="Which recordings, halves and clips are drawn.", converter=whole_number)] = 0,
+    seed: Annotated[
+        int, Parameter(help="Which recordings, halves and clips are drawn.", converter=parse_whole_number)
+    ] = 0,
 ) -> None:
     """Compare each style's gestures with those that its fields, and noise, make of the same sound."""
     refuse_overwriting({"--out": out}, {"the palette": palette})
@@ -74,10 +76,10 @@ def gestures(
     with progress_bar("studying styles") as on_progress:
         found = write_gestures(palette, out, options, on_progress=on_progress)
     n_met, n_targets = found.targets
-    say(f"wrote {out}: {len(found.styles)} styles, {n_met} of {n_targets} targets met")
+    write_message(f"wrote {out}: {len(found.styles)} styles, {n_met} of {n_targets} targets met")
 
 
-def _numbers(classes: str | None) -> tuple[int, ...] | None:
+def _parse_numbers(classes: str | None) -> tuple[int, ...] | None:
     if classes is None:
         return None
     try:

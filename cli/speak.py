@@ -7,15 +7,15 @@ from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.progress import progress_bar, say
+from cli.progress import progress_bar, write_message
 from lexicon.errors import InputError
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.storage.files import write_whole
+from tts2face.storage.files import write_atomically
 from tts2face.storage.output_names import check_file_name
 
 if TYPE_CHECKING:
-    from tts2face.exemplar.explanation import ShownPhone
+    from tts2face.exemplar.explanation import PhoneExplanation
     from tts2face.session import Session
     from tts2face.speech.text_fit import TextMismatch
     from tts2face.synthesis.clip_stream import Piece
@@ -41,32 +41,32 @@ class SpeakOptions:
 
 def run_request(request: Request, picture: Picture, options: SpeakOptions) -> None:
     """Write, explain or show a clip."""
-    _check(request, picture, options)
+    _check_options(request, picture, options)
     from tts2face.synthesis.prepared_request import prepare
 
     prepare(request)  # refuses a wrong request before anything is loaded
-    session = _session(options)
-    shown: list[ShownPhone] = []
+    session = _open_session(options)
+    shown: list[PhoneExplanation] = []
 
     def keep(piece: "Piece") -> None:
         if options.explain is not None:
             shown.extend(piece.shown())
 
     if options.out is not None:
-        _write(session, (request, picture), options.out, (keep, options.quiet))
+        _write_clip(session, (request, picture), options.out, (keep, options.quiet))
     elif options.explain is not None:
         for piece in session.stream(request):
             keep(piece)
-            _warn(piece.mismatches)
+            _warn_mismatches(piece.mismatches)
     if options.explain is not None:
         _write_explanation(tuple(shown), options.explain)
     if options.view:
-        from tts2face.render.window import view
+        from tts2face.render.window import show_clip
 
-        view(session.clip(request), session.mesh, picture)
+        show_clip(session.clip(request), session.mesh, picture)
 
 
-def _check(request: Request, picture: Picture, options: SpeakOptions) -> None:
+def _check_options(request: Request, picture: Picture, options: SpeakOptions) -> None:
     """Refuse flags that do not go together, before anything is loaded."""
     if options.out is None and options.explain is None and not options.view:
         raise InputError("there is no output; add --out clip.mp4 (or .webm, .gif, or a folder for .png files)")
@@ -94,49 +94,49 @@ def _check_overwriting(request: Request, picture: Picture, options: SpeakOptions
     refuse_overwriting(outputs, {"--file": options.file} | models | read)
 
 
-def _write(
+def _write_clip(
     session: "Session", what: tuple[Request, Picture], out: Path, how: tuple[Callable[["Piece"], None], bool]
 ) -> None:
     began = time.perf_counter()
     (request, picture), (keep, is_quiet) = what, how
     with progress_bar("speaking and drawing", is_quiet) as on_progress:
         written = session.write(request, out, picture=picture, on_progress=on_progress, on_piece=keep)
-    _warn(written.mismatches)
+    _warn_mismatches(written.mismatches)
     if is_quiet:
         return
     took = time.perf_counter() - began
-    say(
+    write_message(
         f"wrote {written.path}: {written.seconds:.1f} s, {written.n_frames} frames, "
         f"made in {took:.1f} s ({written.seconds / took:.1f} x real time)"
     )
     for mark in written.marks:
-        say(f"{mark.seconds:.2f} s: {mark.name}")
+        write_message(f"{mark.seconds:.2f} s: {mark.name}")
 
 
-def _warn(mismatches: "Sequence[TextMismatch]") -> None:
+def _warn_mismatches(mismatches: "Sequence[TextMismatch]") -> None:
     """One line for each span of a recording that does not fit its text; in quiet runs too: the clip is wrong there."""
     for mismatch in mismatches:
-        say(f"tts2face: warning: {mismatch.sentence}")
+        write_message(f"tts2face: warning: {mismatch.sentence}")
 
 
-def _session(options: SpeakOptions) -> "Session":
-    from tts2face.render.output_path import checked_output
+def _open_session(options: SpeakOptions) -> "Session":
+    from tts2face.render.output_path import check_output
     from tts2face.session import Session
     from tts2face.synthesis.warm_up import compile_kernels, kernels_are_compiled
 
     if options.out is not None:
-        checked_output(options.out)
+        check_output(options.out)
     session = Session(options.talker, options.face, identity=options.identity, palette=options.palette)
     if not kernels_are_compiled():
         if not options.quiet:
-            say("first run on this machine: compiling the kernels, which takes some ten seconds once")
+            write_message("first run on this machine: compiling the kernels, which takes some ten seconds once")
         compile_kernels()
     return session
 
 
-def _write_explanation(shown: "tuple[ShownPhone, ...]", path: Path) -> None:
+def _write_explanation(shown: "tuple[PhoneExplanation, ...]", path: Path) -> None:
     from tts2face.exemplar.explanation import explanation_json, explanation_text
 
     is_json = path.suffix == ".json"
     text = dumps(explanation_json(shown), ensure_ascii=False) if is_json else explanation_text(shown)
-    write_whole(path, text.encode())
+    write_atomically(path, text.encode())

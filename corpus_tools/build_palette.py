@@ -11,24 +11,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.build_talker import PROVENANCE, PROVENANCE_FIELDS, UNSTATED, read_provenance
-from corpus_tools.decomposition.basis_expressions import Basis, captured_basis, carried_basis
-from corpus_tools.decomposition.blend_weights import MOST_SLACK, Estimator, least_squares, nearest_samples
-from corpus_tools.decomposition.capture import Captured
-from corpus_tools.decomposition.capture_files import CAPTURE_SUFFIXES, Worn, captured_file
-from corpus_tools.decomposition.decompose import Parts, as_counted, taken_apart
-from corpus_tools.decomposition.derived_styles import derived_styles
+from corpus_tools.decomposition.basis_expressions import ExpressionBasis, basis_from_stills, transfer_basis
+from corpus_tools.decomposition.blend_weights import (
+    MOST_SLACK,
+    Estimator,
+    build_least_squares_estimator,
+    build_nearest_samples_estimator,
+)
+from corpus_tools.decomposition.capture import FaceRecording
+from corpus_tools.decomposition.capture_files import CAPTURE_SUFFIXES, MarkerOptions, read_capture_file
+from corpus_tools.decomposition.decompose import Decomposition, decompose, weight_displacements
+from corpus_tools.decomposition.derived_styles import read_derived_styles
 from corpus_tools.decomposition.face_motion import rest_landmarks
 from corpus_tools.decomposition.marker_set import read_marker_set
-from corpus_tools.decomposition.markers import marker_face
-from corpus_tools.decomposition.stills import NEUTRAL, PictureReader, Still, marker_reader
-from corpus_tools.decomposition.style import with_style
-from corpus_tools.decomposition.video import captured_video
-from corpus_tools.process_pool import each_done
-from corpus_tools.recordings.corpus_video import Eyes
+from corpus_tools.decomposition.markers import read_marker_face
+from corpus_tools.decomposition.stills import NEUTRAL, PictureReader, Still, build_marker_reader
+from corpus_tools.decomposition.style import add_style
+from corpus_tools.decomposition.video import read_video_recording
+from corpus_tools.process_pool import map_unordered
+from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.folder import MANIFEST, VIDEO_SUFFIXES
 from corpus_tools.recordings.observe import Refusal
-from corpus_tools.run_options import Effort, Progress, Stages, no_stages
-from corpus_tools.training.pose_correction import pose_leak
+from corpus_tools.run_options import Progress, RunOptions, Stages, ignore_stage
+from corpus_tools.training.pose_correction import fit_pose_correction
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import check_regular_file
 from tts2face.face.expressions import expression_landmarks
@@ -36,7 +41,7 @@ from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
 from tts2face.models.palette import Palette, write_palette
-from tts2face.retargeting.performer import CLOSED_SHARE, aperture, lip_gaps
+from tts2face.retargeting.performer import CLOSED_SHARE, eye_aperture, lip_gaps
 from tts2face.video.landmark_models import find_bundle
 
 ESTIMATORS = ("least-squares", "samples")
@@ -47,7 +52,7 @@ CONTENT = "expression, brows, lids, cheeks, gaze, head pose, loudness and pitch;
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Recorded:
+class StyleSource:
     """What a style is learnt from.
 
     Parameters
@@ -64,12 +69,12 @@ class Recorded:
 
     recordings: Path
     stills: Mapping[str, Still] = field(default_factory=dict)
-    worn: Worn = Worn()  # noqa: RUF009 - frozen
+    worn: MarkerOptions = MarkerOptions()  # noqa: RUF009 - frozen
     provenance: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Made:
+class BuiltStyle:
     """What a build gave: recordings kept, minutes of them, what was refused, notes, and the share of motion kept."""
 
     n_kept: int
@@ -80,16 +85,16 @@ class Made:
 
 
 def build_style(  # noqa: PLR0913 - the effort changes no motion
-    recorded: Recorded,
+    recorded: StyleSource,
     style: str,
     out: Path,
     *,
     base: Palette | None,
     estimator: str = ESTIMATORS[0],
     epsilon: float = 0.0,
-    effort: Effort | None = None,
-    stages: Stages = no_stages,
-) -> Made:
+    effort: RunOptions | None = None,
+    stages: Stages = ignore_stage,
+) -> BuiltStyle:
     """Learn a style from recordings and write a palette: `base` with it, or it alone with the styles derived from it.
 
     Weights of expressions lie within ``-epsilon`` and ``1 + epsilon`` (Ju and Lee 2008, section 4.1).
@@ -113,44 +118,46 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
         recorded.provenance or recorded.recordings / PROVENANCE, must_exist=recorded.provenance is not None
     )
     face = load_face("head")
-    captured, refused = captured_all(recorded, face, effort or Effort(), stages("watching recordings"))
+    captured, refused = read_recordings(recorded, face, effort or RunOptions(), stages("watching recordings"))
     if not captured:
         raise DataError(f"no recording could be used; the first: {refused[0].name}: {refused[0].reason}")
-    basis = basis_of(recorded, captured, face)
-    parts = parts_of(captured, basis, estimator_of(estimator, basis, epsilon), stages("taking them apart"))
+    basis = build_basis(recorded, captured, face)
+    parts = decompose_recordings(
+        captured, basis, build_estimator(estimator, basis, epsilon), stages("taking them apart")
+    )
     words = _words(recorded, style, out, base is None, epsilon)
-    learnt = with_style(base, style, parts, basis.rest, _metadata(recorded, stated, words))
+    learnt = add_style(base, style, parts, basis.rest, _metadata(recorded, stated, words))
     palette = learnt.palette
     if base is None:
-        palette = replace(palette, derivations=derived_styles(style))
+        palette = replace(palette, derivations=read_derived_styles(style))
     write_palette(out, palette)
     minutes = learnt.palette.styles[style].seconds / 60
     notes = tuple(f"{one.name}: {note}" for one in captured for note in one.notes)
-    return Made(len(captured), minutes, tuple(refused), notes, learnt.kept)
+    return BuiltStyle(len(captured), minutes, tuple(refused), notes, learnt.kept)
 
 
-def parts_of(
-    captured: Sequence[Captured], basis: Basis, estimator: Estimator, on_progress: Progress | None = None
-) -> list[Parts]:
+def decompose_recordings(
+    captured: Sequence[FaceRecording], basis: ExpressionBasis, estimator: Estimator, on_progress: Progress | None = None
+) -> list[Decomposition]:
     """Recordings of one person taken apart, without what turning the head does to landmarks."""
-    leak = pose_leak(captured)
+    leak = fit_pose_correction(captured)
     parts = []
     for number, one in enumerate(captured, start=1):
-        parts.append(taken_apart(leak.removed(one), basis, estimator))
+        parts.append(decompose(leak.removed(one), basis, estimator))
         if on_progress:
             on_progress(number, len(captured))
     return parts
 
 
-def estimator_of(name: str, basis: Basis, epsilon: float = 0.0) -> Estimator:
+def build_estimator(name: str, basis: ExpressionBasis, epsilon: float = 0.0) -> Estimator:
     """One of `ESTIMATORS` for a basis, of weights within ``-epsilon`` and ``1 + epsilon``."""
-    expressions = as_counted(basis.expressions)
+    expressions = weight_displacements(basis.expressions)
     if name == "least-squares":
-        return least_squares(expressions, epsilon)
-    return nearest_samples(expressions, np.random.default_rng(SAMPLES_SEED), slack=epsilon)
+        return build_least_squares_estimator(expressions, epsilon)
+    return build_nearest_samples_estimator(expressions, np.random.default_rng(SAMPLES_SEED), slack=epsilon)
 
 
-def basis_of(recorded: Recorded, captured: Sequence[Captured], face: Face) -> Basis:
+def build_basis(recorded: StyleSource, captured: Sequence[FaceRecording], face: Face) -> ExpressionBasis:
     """The person's basis expressions: as captured, or the default head's, carried over.
 
     Raises
@@ -158,14 +165,14 @@ def basis_of(recorded: Recorded, captured: Sequence[Captured], face: Face) -> Ba
     InputError, DataError
         A still is missing or cannot be read.
     """
-    rest = rest_of(captured)
+    rest = person_at_rest(captured)
     if recorded.stills:
         known = None if NEUTRAL in recorded.stills else rest
-        return captured_basis(recorded.stills, reader_of(recorded, face), rest=known)
-    return carried_basis(expression_landmarks(face), rest_landmarks(face), rest)
+        return basis_from_stills(recorded.stills, build_still_reader(recorded, face), rest=known)
+    return transfer_basis(expression_landmarks(face), rest_landmarks(face), rest)
 
 
-def reader_of(recorded: Recorded, face: Face) -> Callable[[Still], NDArray[np.float64]]:
+def build_still_reader(recorded: StyleSource, face: Face) -> Callable[[Still], NDArray[np.float64]]:
     """What reads the stills: the tracker, or for markers the person's markers at rest.
 
     Raises
@@ -179,27 +186,27 @@ def reader_of(recorded: Recorded, face: Face) -> Callable[[Still], NDArray[np.fl
     at_rest = recorded.worn.neutral or (recorded.stills[NEUTRAL].path if NEUTRAL in recorded.stills else None)
     if are_markers != {True} or at_rest is None:
         raise InputError("stills of markers need each other and the person at rest; give all as markers, with neutral")
-    worn = read_marker_set(recorded.worn.markers)
-    return marker_reader(marker_face(at_rest, face, worn, fps=recorded.worn.fps))
+    worn = read_marker_set(recorded.worn.marker_table)
+    return build_marker_reader(read_marker_face(at_rest, face, worn, fps=recorded.worn.fps))
 
 
-def rest_of(captured: Sequence[Captured]) -> NDArray[np.float64]:
+def person_at_rest(captured: Sequence[FaceRecording]) -> NDArray[np.float64]:
     """(478, 3) landmarks of the person at rest: as captured, or the median of frames with closed lips and open lids."""
     known = next((one.rest for one in captured if one.rest is not None), None)
     if known is not None:
         return np.asarray(known, np.float64)
     frames = np.concatenate([one.landmarks for one in captured])
     frames = frames[:: max(1, len(frames) // RESTING_FRAMES)]
-    opened = np.minimum(aperture(frames, "Left"), aperture(frames, "Right"))
+    opened = np.minimum(eye_aperture(frames, "Left"), eye_aperture(frames, "Right"))
     awake = opened >= AWAKE * np.median(opened)
     gaps = lip_gaps(frames)[:, MIDDLE_PAIR]
     closed = gaps <= np.quantile(gaps[awake], CLOSED_SHARE)
     return np.asarray(np.median(frames[awake & closed], axis=0), np.float64)
 
 
-def captured_all(
-    recorded: Recorded, face: Face, effort: Effort, on_progress: Progress | None
-) -> tuple[list[Captured], list[Refusal]]:
+def read_recordings(
+    recorded: StyleSource, face: Face, effort: RunOptions, on_progress: Progress | None
+) -> tuple[list[FaceRecording], list[Refusal]]:
     """Every recording, or why it cannot serve; both by name.
 
     Raises
@@ -209,13 +216,13 @@ def captured_all(
     BackendError
         The landmark models are missing, the cache cannot be written, or a process died.
     """
-    files = files_in(recorded.recordings)
-    jobs = min(effort.processes(), len(files))
+    files = find_recording_files(recorded.recordings)
+    jobs = min(effort.n_processes(), len(files))
     model = find_bundle(effort.model) if any(file.suffix.lower() in VIDEO_SUFFIXES for file in files) else None
     ready = (effort.folder(), model, face, recorded.worn)
-    captured: list[Captured] = []
+    captured: list[FaceRecording] = []
     refused: list[Refusal] = []
-    for number, outcome in enumerate(_outcomes(files, ready, jobs), start=1):
+    for number, outcome in enumerate(_read_files(files, ready, jobs), start=1):
         if isinstance(outcome, Refusal):
             refused.append(outcome)
         else:
@@ -225,7 +232,7 @@ def captured_all(
     return sorted(captured, key=lambda one: one.name), sorted(refused, key=lambda one: one.name)
 
 
-def files_in(recordings: Path) -> list[Path]:
+def find_recording_files(recordings: Path) -> list[Path]:
     """Videos and captures of a folder and of its folder ``clips``; or the file that is given.
 
     Raises
@@ -245,47 +252,47 @@ def files_in(recordings: Path) -> list[Path]:
     return sorted(file for file in found if file.name != MANIFEST)
 
 
-Ready = tuple[Path, Path | None, Face, Worn]
-Outcome = Captured | Refusal
+Ready = tuple[Path, Path | None, Face, MarkerOptions]
+Outcome = FaceRecording | Refusal
 
 
-def _outcomes(files: Sequence[Path], ready: Ready, jobs: int) -> Iterator[Outcome]:
+def _read_files(files: Sequence[Path], ready: Ready, jobs: int) -> Iterator[Outcome]:
     if jobs > 1:
-        yield from (outcome for _, outcome in each_done(files, _work, _start, ready, jobs))
+        yield from (outcome for _, outcome in map_unordered(files, _read_file, _start_worker, ready, jobs))
         return
-    worker = _Worker(*ready)
+    worker = _FileReader(*ready)
     for file in files:
-        yield worker.outcome(file)
+        yield worker.read(file)
 
 
-class _Worker:
-    def __init__(self, cache: Path, model: Path | None, face: Face, worn: Worn) -> None:
-        self._eyes = Eyes(cache, model) if model is not None else None
-        self._face, self._worn = face, worn
+class _FileReader:
+    def __init__(self, cache: Path, model: Path | None, face: Face, worn: MarkerOptions) -> None:
+        self._tracker = CachedTracker(cache, model) if model is not None else None
+        self._face, self._marker_options = face, worn
 
-    def outcome(self, file: Path) -> Outcome:
+    def read(self, file: Path) -> Outcome:
         """A recording, or why it cannot serve."""
         try:
             check_regular_file(file)
-            if self._eyes is not None and file.suffix.lower() in VIDEO_SUFFIXES:
-                return captured_video(file, self._eyes)
-            return captured_file(file, self._face, worn=self._worn)
+            if self._tracker is not None and file.suffix.lower() in VIDEO_SUFFIXES:
+                return read_video_recording(file, self._tracker)
+            return read_capture_file(file, self._face, worn=self._marker_options)
         except DataError as reason:
             return Refusal(file.stem, str(reason), file, 0.0)
 
 
-_worker: list[_Worker] = []  # of this process; filled once by the pool
+_worker: list[_FileReader] = []  # of this process; filled once by the pool
 
 
-def _start(*ready: Any) -> None:
-    _worker.append(_Worker(*ready))
+def _start_worker(*ready: Any) -> None:
+    _worker.append(_FileReader(*ready))
 
 
-def _work(file: Path) -> Outcome:
-    return _worker[0].outcome(file)
+def _read_file(file: Path) -> Outcome:
+    return _worker[0].read(file)
 
 
-def _words(recorded: Recorded, style: str, out: Path, is_alone: bool, epsilon: float) -> list[str]:
+def _words(recorded: StyleSource, style: str, out: Path, is_alone: bool, epsilon: float) -> list[str]:
     """The command that makes the style again."""
     words = ["tts2face", "corpus", "gestures", recorded.recordings.name, "--style", style, *["--alone"] * is_alone]
     words += ["--provenance", recorded.provenance.name] if recorded.provenance else []
@@ -293,7 +300,7 @@ def _words(recorded: Recorded, style: str, out: Path, is_alone: bool, epsilon: f
     return [*words, "--out", out.name]
 
 
-def _metadata(recorded: Recorded, stated: Mapping[str, Any], words: Sequence[str]) -> dict[str, Any]:
+def _metadata(recorded: StyleSource, stated: Mapping[str, Any], words: Sequence[str]) -> dict[str, Any]:
     return {
         **dict.fromkeys(PROVENANCE_FIELDS, UNSTATED),
         **stated,

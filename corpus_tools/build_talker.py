@@ -8,18 +8,18 @@ from pathlib import Path
 from typing import Any
 
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.recordings.observe import Refusal, observe, require_kept
+from corpus_tools.recordings.observe import Refusal, check_any_kept, observe
 from corpus_tools.report.drawing import load_matplotlib
 from corpus_tools.report.recordings import recordings_page
-from corpus_tools.run_options import Effort, Stages, no_stages
-from corpus_tools.training.pose_correction import without_leak
-from corpus_tools.training.train_audio_map import learn_drives
-from corpus_tools.training.train_phone_network import with_network
+from corpus_tools.run_options import RunOptions, Stages, ignore_stage
+from corpus_tools.training.pose_correction import correct_pose
+from corpus_tools.training.train_audio_map import learn_audio_maps
+from corpus_tools.training.train_phone_network import add_phone_network
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import read_json
 from tts2face.models.talker import Talker, write_talker
-from tts2face.storage.files import write_whole
+from tts2face.storage.files import write_atomically
 
 PROVENANCE = "provenance.json"  # in the folder of recordings: where they come from and how they may be used
 PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
@@ -32,7 +32,7 @@ CONTENT = "motion only: landmark shapes, head pose, phones and loudness; no imag
 
 
 @dataclass(frozen=True, slots=True)
-class Built:
+class BuiltTalker:
     """What a build gave: recordings kept, minutes of them, and those refused."""
 
     n_kept: int
@@ -46,12 +46,12 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
     *,
     name: str | None = None,
     provenance: Path | None = None,
-    effort: Effort | None = None,
+    effort: RunOptions | None = None,
     created: str | None = None,
     consent: Mapping[str, str] | None = None,
     report: Path | None = None,
-    stages: Stages = no_stages,
-) -> Built:
+    stages: Stages = ignore_stage,
+) -> BuiltTalker:
     """Observe recordings, learn their talker, and write it; the same recordings give the same bytes but for `created`.
 
     Parameters
@@ -63,7 +63,7 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
     created
         Date for the metadata; today when None.
     consent
-        Of the person shown, from `corpus_tools.consent.consent_of`; with it the talker gets an appearance.
+        Of the person shown, from `corpus_tools.consent.consent_record`; with it the talker gets an appearance.
     report
         HTML page about the recordings to write; it is written even where none could be used.
     stages
@@ -84,34 +84,34 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
     observations = observe(recordings, effort=effort, on_progress=stages(READING))
     called = name or stated.get("name") or recordings.resolve().stem
     if report is not None:
-        write_whole(report, recordings_page(called, observations).encode())
-    require_kept(observations)
+        write_atomically(report, recordings_page(called, observations).encode())
+    check_any_kept(observations)
     metadata = {
         **dict.fromkeys(PROVENANCE_FIELDS, UNSTATED),
         **stated,
         "name": called,
-        "command": _command(recordings, out, name, provenance),
+        "command": _command_line(recordings, out, name, provenance),
         "created": created or datetime.now(UTC).date().isoformat(),
         "content": CONTENT if consent is None else CONTENT_WITH_PICTURES,
         **({} if consent is None else {"consent": dict(consent)}),
         "refused": [[refusal.name, refusal.reason] for refusal in observations.refused],
-        **_marks(observations.kept),
+        **_reading_metadata(observations.kept),
     }
-    steady = without_leak(observations.kept)
-    talker = with_network(learn_talker(steady, metadata=metadata), on_progress=stages("learning lips"))
-    talker = replace(talker, drives=learn_drives(steady, talker, stages=stages))
+    steady = correct_pose(observations.kept)
+    talker = add_phone_network(learn_talker(steady, metadata=metadata), on_progress=stages("learning lips"))
+    talker = replace(talker, audio_maps=learn_audio_maps(steady, talker, stages=stages))
     if consent is not None:
-        from corpus_tools.aam.add_appearance import with_appearance
+        from corpus_tools.aam.add_appearance import add_appearance
 
         looks = stages("learning looks")
-        talker = with_appearance(talker, observations.kept, effort=effort or Effort(), on_progress=looks)
+        talker = add_appearance(talker, observations.kept, effort=effort or RunOptions(), on_progress=looks)
     write_talker(out, talker)
     seconds = sum(len(utterance.shape) for utterance in talker.utterances) / talker.fps
-    return Built(len(talker.utterances), seconds / 60.0, observations.refused)
+    return BuiltTalker(len(talker.utterances), seconds / 60.0, observations.refused)
 
 
-def add_drives(
-    recordings: Path, talker: Talker, out: Path, *, effort: Effort | None = None, stages: Stages = no_stages
+def add_audio_maps(
+    recordings: Path, talker: Talker, out: Path, *, effort: RunOptions | None = None, stages: Stages = ignore_stage
 ) -> Talker:
     """Learn the drives of a talker from the recordings that she was learnt from, and write her with them.
 
@@ -122,18 +122,18 @@ def add_drives(
     DataError
         A recording holds no sound, or its frame rate is not the talker's.
     """
-    kept = without_leak(require_kept(observe(recordings, effort=effort, on_progress=stages(READING))))
+    kept = correct_pose(check_any_kept(observe(recordings, effort=effort, on_progress=stages(READING))))
     if any(one.fps != talker.fps for one in kept):
         raise DataError(f"the recordings do not have the talker's {talker.fps:g} frames per second; convert them")
-    drives = learn_drives(kept, talker, stages=stages)
+    drives = learn_audio_maps(kept, talker, stages=stages)
     if not drives:
         raise InputError(f"{recordings} holds too little speech to learn drives from; give 20 utterances or more")
-    made = replace(talker, drives=drives)
+    made = replace(talker, audio_maps=drives)
     write_talker(out, made)
     return made
 
 
-def _marks(kept: Sequence[Observation]) -> dict[str, Any]:
+def _reading_metadata(kept: Sequence[Observation]) -> dict[str, Any]:
     """What users of the talker must know of how its recordings were read."""
     recognised = [seen.name for seen in kept if seen.is_recognised]
     lags = {seen.video.name: seen.quality.lag for seen in kept if seen.quality.lag}
@@ -162,7 +162,7 @@ def read_provenance(path: Path, *, must_exist: bool) -> Mapping[str, Any]:
     return stated
 
 
-def _command(recordings: Path, out: Path, name: str | None, provenance: Path | None) -> str:
+def _command_line(recordings: Path, out: Path, name: str | None, provenance: Path | None) -> str:
     words = ["tts2face", "corpus", "build", recordings.name]
     words += ["--name", name] if name else []
     words += ["--provenance", provenance.name] if provenance else []

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.aam.appearance_transfer import looks_map
+from corpus_tools.aam.appearance_transfer import build_appearance_transfer
 from lexicon.errors import InputError
-from tts2face.cloning.parameter_transfer import Cloning, cloning, with_missing
+from tts2face.cloning.parameter_transfer import ParameterTransfer, build_parameter_transfer, extend_talker
 from tts2face.models.talker import Talker, Utterance, load_talker, speech_channels, write_talker
-from tts2face.own_face.appearance_regression import own_face
+from tts2face.own_face.appearance_regression import fit_appearance_regression
 from tts2face.types import Trajectory
 
 CONTENT = "motion only: one talker's recorded motion carried to the shape model of another's face; no image, no sound"
@@ -26,7 +26,7 @@ UNSTATED = "not stated"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Cloned:
+class ClonedTalker:
     """A cloned talker and what happened on the way.
 
     ``n_appended`` modes were added to the target's; ``at_limits`` is the share of frames with a parameter at the
@@ -35,13 +35,13 @@ class Cloned:
 
     talker: Talker
     n_appended: int
-    at_limits: float
-    left_pictures: bool
+    share_at_limits: float
+    lacks_appearance: bool
 
 
 def clone_talker(
     source: str, target: str, out: Path, *, gain: float = 1.0, append: bool = False, created: str | None = None
-) -> Cloned:
+) -> ClonedTalker:
     """Clone one talker's speech onto another's face and write it; equal talkers give equal bytes but for the date.
 
     Parameters
@@ -64,7 +64,7 @@ def clone_talker(
     BackendError
         The file cannot be written.
     """
-    made = cloned_talker(load_talker(source), load_talker(target), gain=gain, append=append)
+    made = transfer_talker(load_talker(source), load_talker(target), gain=gain, append=append)
     flags = [*(["--gain", f"{gain:g}"] if gain != 1.0 else []), *(["--append-missing"] if append else [])]
     words = ["tts2face", "corpus", "clone", Path(source).name, Path(target).name, "--out", out.name, *flags]
     dated = {"command": shlex.join(words), "created": created or datetime.now(UTC).date().isoformat()}
@@ -73,7 +73,7 @@ def clone_talker(
     return made
 
 
-def cloned_talker(source: Talker, target: Talker, *, gain: float = 1.0, append: bool = False) -> Cloned:
+def transfer_talker(source: Talker, target: Talker, *, gain: float = 1.0, append: bool = False) -> ClonedTalker:
     """The talker with the target's face whose utterances are the source's, carried over.
 
     Sizes of the head's motion follow the faces' sizes, its angles stay. Where the target has pictures, so has the
@@ -89,30 +89,30 @@ def cloned_talker(source: Talker, target: Talker, *, gain: float = 1.0, append: 
     if not source.utterances:
         raise InputError("the source talker has no utterance to clone; give one that was built from recordings")
     n_before = len(target.model.spread)
-    target = with_missing(source.model, target) if append else target
-    ready = cloning(source.model, target.model, gain=gain)
-    looks = _looks(source, target, gain)
-    utterances = tuple(_carried(utterance, ready, looks) for utterance in source.utterances)
+    target = extend_talker(source.model, target) if append else target
+    ready = build_parameter_transfer(source.model, target.model, gain=gain)
+    looks = _appearance_function(source, target, gain)
+    utterances = tuple(_transfer_utterance(utterance, ready, looks) for utterance in source.utterances)
     shapes = np.concatenate([utterance.shape for utterance in utterances])
     n_appended = len(target.model.spread) - n_before
     about = {"gain": gain, "size": round(ready.size, 4), "appended_modes": n_appended}
     metadata = _metadata(source.metadata, target.metadata, about, has_pictures=target.appearance is not None)
     at_limits = float((np.abs(shapes) >= ready.limits).any(axis=1).mean())
     talker = Talker(source.fps, target.model, utterances, metadata, target.appearance)
-    return Cloned(talker, n_appended, at_limits, source.appearance is not None and target.appearance is None)
+    return ClonedTalker(talker, n_appended, at_limits, source.appearance is not None and target.appearance is None)
 
 
 Looks = Callable[[Utterance, NDArray[np.float32]], NDArray[np.float32] | None]
 
 
-def _looks(source: Talker, target: Talker, gain: float) -> Looks:
+def _appearance_function(source: Talker, target: Talker, gain: float) -> Looks:
     """The looks of an utterance of the source on the target, given its shape there; none without pictures."""
     if target.appearance is None:
         return lambda spoken, shape: None
     if source.appearance is not None:
-        carry = looks_map(source.appearance, target.appearance)
+        carry = build_appearance_transfer(source.appearance, target.appearance)
         return lambda spoken, shape: None if spoken.looks is None else carry.carried(spoken.looks, gain=gain)
-    own, channels = own_face(target), speech_channels(target.model)
+    own, channels = fit_appearance_regression(target), speech_channels(target.model)
 
     def with_lips(_spoken: Utterance, shape: NDArray[np.float32]) -> NDArray[np.float32]:
         lips = Trajectory(channels, shape[:, : len(channels)], source.fps)
@@ -121,7 +121,7 @@ def _looks(source: Talker, target: Talker, gain: float) -> Looks:
     return with_lips
 
 
-def _carried(utterance: Utterance, ready: Cloning, looks: Looks) -> Utterance:
+def _transfer_utterance(utterance: Utterance, ready: ParameterTransfer, looks: Looks) -> Utterance:
     head = utterance.head.copy()
     head[:, 3:] *= ready.size
     shape = ready.parameters(utterance.shape)
@@ -139,12 +139,12 @@ def _metadata(
     return {
         "name": f"{target.get('name', UNSTATED)} with the speech of {source.get('name', UNSTATED)}",
         "language": source.get("language", UNSTATED),
-        **{key: _both(source.get(key, UNSTATED), target.get(key, UNSTATED)) for key in STATED},
+        **{key: _merge_statements(source.get(key, UNSTATED), target.get(key, UNSTATED)) for key in STATED},
         "content": CONTENT_WITH_PICTURES if has_pictures else CONTENT,
         **({"consent": target["consent"]} if has_pictures and "consent" in target else {}),
         "cloning": {**about, **origins},
     }
 
 
-def _both(of_speech: str, of_face: str) -> str:
+def _merge_statements(of_speech: str, of_face: str) -> str:
     return of_speech if of_speech == of_face else f"speech: {of_speech}; face: {of_face}"

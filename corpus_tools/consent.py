@@ -8,7 +8,7 @@ from lexicon.errors import InputError
 LEAST_WORDS = 3  # shorter is a slip of the keyboard, not a statement
 
 
-def consent_of(name: str, statement: str | None, *, date: str | None = None) -> Mapping[str, str]:
+def consent_record(name: str, statement: str | None, *, date: str | None = None) -> Mapping[str, str]:
     """The consent as a file's metadata keep it: name, statement, date.
 
     Raises

@@ -15,7 +15,7 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 
-def each_done(
+def map_unordered(
     tasks: Sequence[Task], work: Callable[[Task], Result], start: Callable[..., None], ready: tuple[Any, ...], jobs: int
 ) -> Iterator[tuple[Task, Result]]:
     """Tasks with their results as they come, in no order; every process calls ``start(*ready)`` once.
@@ -29,7 +29,7 @@ def each_done(
     """
     context = get_context("spawn")
     ends, alive = context.Pipe(duplex=False)  # nothing is ever sent: it ends with whoever holds `alive`
-    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_begin, initargs=(ends, start, ready))
+    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_initialise, initargs=(ends, start, ready))
     try:
         waiting = {pool.submit(work, task): task for task in tasks}
         for future in as_completed(waiting):
@@ -45,7 +45,7 @@ def each_done(
         ends.close()
 
 
-def _begin(ends: Connection, start: Callable[..., None], ready: tuple[Any, ...]) -> None:
+def _initialise(ends: Connection, start: Callable[..., None], ready: tuple[Any, ...]) -> None:
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):  # sent to the whole group, too; the parent stops the pool
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)

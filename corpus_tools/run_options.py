@@ -13,7 +13,7 @@ Stages = Callable[[str], Progress]  # begins a stage of a long piece of work by 
 
 
 @dataclass(frozen=True, slots=True)
-class Effort:
+class RunOptions:
     """How the work is done, which changes nothing in its result.
 
     ``cache`` is the folder for finished parts (the user's cache when None), ``jobs`` the number of processes (one per
@@ -39,7 +39,7 @@ class Effort:
             raise BackendError(f"cannot write {folder}: {refused.strerror}; choose another cache folder") from refused
         return folder
 
-    def processes(self) -> int:
+    def n_processes(self) -> int:
         """Number of processes.
 
         Raises
@@ -53,6 +53,6 @@ class Effort:
         return jobs
 
 
-def no_stages(_: str) -> Progress:
+def ignore_stage(_: str) -> Progress:
     """Stages that nobody watches."""
     return lambda done, of: None

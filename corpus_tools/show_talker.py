@@ -48,8 +48,8 @@ class Description:
                 f"triphones:   {self.n_triphones}",
                 f"phones:      {len(self.phones)} different, {sum(count for _, count in self.phones)} spoken",
                 *rows,
-                f"mouth modes: {_shares(self.variances[: self.n_speech])}",
-                f"other modes: {_shares(self.variances[self.n_speech :])}",
+                f"mouth modes: {_variance_text(self.variances[: self.n_speech])}",
+                f"other modes: {_variance_text(self.variances[self.n_speech :])}",
             ]
         )
 
@@ -75,7 +75,7 @@ def describe(talker: Talker) -> Description:
     )
 
 
-def _shares(variances: tuple[float, ...]) -> str:
+def _variance_text(variances: tuple[float, ...]) -> str:
     """Number of modes and the share of their variance that the first of them carry."""
     if not variances:
         return "0"

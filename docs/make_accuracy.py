@@ -10,13 +10,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from corpus_tools.evaluation.evaluate import evaluate, evaluate_across
-from corpus_tools.evaluation.livelink_reference import captured
+from corpus_tools.evaluation.evaluate import evaluate, evaluate_across_talkers
+from corpus_tools.evaluation.livelink_reference import observe_livelink
 from corpus_tools.evaluation.scores import FIGURES, Scores
-from corpus_tools.evaluation.splits import split, without_words
+from corpus_tools.evaluation.splits import split, split_by_words
 from corpus_tools.evaluation.tables import Evaluation
 from corpus_tools.recordings.observe import observe
-from corpus_tools.run_options import Effort
+from corpus_tools.run_options import RunOptions
 from tts2face.exemplar.options import METHODS
 from tts2face.voice.engine import load_voice
 
@@ -27,12 +27,12 @@ LANGUAGE = "en-us"
 TABLES = ("utterances", "own durations", "words", "another talker")
 
 
-def measured(recordings: Path, other: Path, effort: Effort) -> dict[str, Any]:
+def measured(recordings: Path, other: Path, effort: RunOptions) -> dict[str, Any]:
     """The figures of both splits and of another talker, and the options that were measured."""
     kept = observe(recordings, effort=effort).kept
     utterances, _ = evaluate([split(kept, hold_out=HELD_OUT, seed=SEED)], voice=load_voice(None, LANGUAGE))
-    words, _ = evaluate([without_words(kept, WORDS)])
-    across, _ = evaluate_across(kept, captured(other, effort))
+    words, _ = evaluate([split_by_words(kept, WORDS)])
+    across, _ = evaluate_across_talkers(kept, observe_livelink(other, effort))
     return {
         "options": {name: asdict(options) for name, options in METHODS.items()},
         "utterances": _plain(utterances.scores, utterances),
@@ -82,7 +82,7 @@ def main() -> None:
     parser.add_argument("other", type=Path)
     parser.add_argument("--cache", type=Path)
     arguments = parser.parse_args()
-    figures = measured(arguments.recordings, arguments.other, Effort(arguments.cache))
+    figures = measured(arguments.recordings, arguments.other, RunOptions(arguments.cache))
     FIGURES_FILE.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
     PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8"), figures), encoding="utf-8")
 

@@ -13,7 +13,7 @@ _CLAUSE = re.compile(r"[,;:—–、，；：،؛](?=\s)|[、，；：]")
 _SEEN_BEFORE, _SEEN_BEHIND = 24, 40  # characters around a full stop by which an abbreviation is known
 
 
-def chunks(text: str, limit: int, language: str = "en-us") -> Iterator[str]:
+def split_chunks(text: str, limit: int, language: str = "en-us") -> Iterator[str]:
     """Sentences of a text, none longer than `limit` characters unless a single word is.
 
     A longer sentence is cut behind the last clause mark that fits, else at the last space, and where a text has neither
@@ -31,9 +31,9 @@ def chunks(text: str, limit: int, language: str = "en-us") -> Iterator[str]:
     for match in _END.finditer(text):
         if _is_abbreviated(text, begin, match, language):
             continue
-        yield from _fitting(text[begin : match.end()], limit)
+        yield from _split_sentence(text[begin : match.end()], limit)
         begin = match.end()
-    yield from _fitting(text[begin:], limit)
+    yield from _split_sentence(text[begin:], limit)
 
 
 def _is_abbreviated(text: str, begin: int, end: "re.Match[str]", language: str) -> bool:
@@ -44,17 +44,17 @@ def _is_abbreviated(text: str, begin: int, end: "re.Match[str]", language: str) 
     return not ends_sentence(before, text[end.end() : end.end() + _SEEN_BEHIND].lstrip(), language)
 
 
-def _fitting(sentence: str, limit: int) -> Iterator[str]:
+def _split_sentence(sentence: str, limit: int) -> Iterator[str]:
     rest = " ".join(sentence.split())
     while len(rest) > limit:
-        at = _cut(rest, limit)
+        at = _cut_position(rest, limit)
         yield rest[:at].rstrip()
         rest = rest[at:].lstrip()
     if rest:
         yield rest
 
 
-def _cut(text: str, limit: int) -> int:
+def _cut_position(text: str, limit: int) -> int:
     """Where a text that is too long is cut."""
     clauses = [match.end() for match in _CLAUSE.finditer(text, limit // 3, limit)]
     if clauses:

@@ -33,7 +33,7 @@ _TRANSLATION = (
 _SPOKEN_PUNCTUATION = frozenset(".,;:!?'-–/&@#%‰§¶^")
 
 
-def _kept(code: int) -> int | str:
+def _replacement(code: int) -> int | str:
     """What stands for a character: itself, a space, a newline, an ASCII digit, or nothing."""
     category = unicodedata.category(chr(code))
     if code in {10, 13, 0x2028, 0x2029}:
@@ -46,17 +46,17 @@ def _kept(code: int) -> int | str:
     return str(unicodedata.digit(chr(code))) if category == "Nd" and code > 127 else code
 
 
-class _Table(dict[int, int | str | None]):
+class _TranslationTable(dict[int, int | str | None]):
     """Translation that decides once for each character it meets."""
 
     def __missing__(self, code: int) -> int | str:
-        self[code] = kept = _kept(code)
+        self[code] = kept = _replacement(code)
         return kept
 
 
 @functools.cache
-def _table() -> _Table:
-    return _Table(_TRANSLATION)
+def _translation_table() -> _TranslationTable:
+    return _TranslationTable(_TRANSLATION)
 
 
 _MARKS = re.compile("[\u0300-\u036f\u0483-\u0489\u1ab0-\u1aff\u1dc0-\u1dff\u20d0-\u20ff\ufe20-\ufe2f]+")
@@ -82,20 +82,20 @@ _PUNCTUATION_RUN = re.compile(r"[.,;:!?](?: ?[.,;:!?](?![0-9]))+")
 _STRENGTH = ",;:.!?"
 
 
-def _strongest(run: re.Match[str]) -> str:
+def _strongest_mark(run: re.Match[str]) -> str:
     return max(run.group(), key=_STRENGTH.find) + (" " if run.group()[-1] == " " else "")
 
 
-def plain(text: str, *, keep_marks: bool = False) -> str:
+def canonical_text(text: str, *, keep_marks: bool = False) -> str:
     """The text in canonical characters: NFKC, ASCII digits, plain quotes, single spaces, no two marks together.
 
     Loose combining marks go, unless they are kept for a script that is written with them.
     """
     text = _AREA_CODE.sub(r"\1-", text)
-    text = _VULGAR.sub(r" \1", text).translate(_table())
-    text = unicodedata.normalize("NFKC", text).translate(_table())
+    text = _VULGAR.sub(r" \1", text).translate(_translation_table())
+    text = unicodedata.normalize("NFKC", text).translate(_translation_table())
     if not keep_marks:
-        text = unicodedata.normalize("NFKC", _MARKS.sub("", text)).translate(_table())
+        text = unicodedata.normalize("NFKC", _MARKS.sub("", text)).translate(_translation_table())
     for pattern, replacement in _STEPS:
         text = pattern.sub(replacement, text)
-    return _PUNCTUATION_RUN.sub(_strongest, text).strip(" ,;:")
+    return _PUNCTUATION_RUN.sub(_strongest_mark, text).strip(" ,;:")

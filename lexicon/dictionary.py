@@ -61,7 +61,7 @@ class Dictionary:
         return self.entries.get(word_key(word))
 
 
-def _entry(line: str, where: str) -> tuple[str, tuple[Segment, ...]]:
+def _parse_entry(line: str, where: str) -> tuple[str, tuple[Segment, ...]]:
     word, _, written = line.partition(" ")
     written = written.strip()
     if not written:
@@ -94,7 +94,7 @@ def parse_dictionary(text: str, name: str = "dictionary") -> Dictionary:
     for number, line in enumerate(text.splitlines(), start=1):
         content = " ".join(re.sub(r"(^|\s)#.*", "", line).split())
         if content:
-            word, segments = _entry(content, f"{name}, line {number}")
+            word, segments = _parse_entry(content, f"{name}, line {number}")
             entries[word] = segments
     return Dictionary(MappingProxyType(entries))
 
@@ -130,7 +130,7 @@ def _cmudict_table() -> dict[str, str]:
     return dict(_cmudict_lines())
 
 
-def _scanned(word: str) -> str | None:
+def _scan_cmudict(word: str) -> str | None:
     text = _cmudict_text()
     at = text.find(f"\n{word} ")
     if at < 0:
@@ -142,7 +142,7 @@ def _scanned(word: str) -> str | None:
 @functools.lru_cache(maxsize=50_000)
 def _cmudict_names(word: str) -> str | None:
     if _cmudict_names.cache_info().currsize < SCANNED_WORDS:
-        return _scanned(word)
+        return _scan_cmudict(word)
     return _cmudict_table().get(word)
 
 

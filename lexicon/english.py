@@ -26,7 +26,7 @@ _VOICELESS_ENDINGS = frozenset({"p", "t", "k", "f", "θ"})
 _SIBILANTS = frozenset({"s", "z", "ʃ", "ʒ", "tʃ", "dʒ"})
 
 
-def folded(segments: tuple[Segment, ...]) -> tuple[Segment, ...]:
+def fold_to_arpabet(segments: tuple[Segment, ...]) -> tuple[Segment, ...]:
     """The same word in CMUdict's phones: 39 ARPABET phones and the reduced vowels."""
     result: list[Segment] = []
     for segment in segments:
@@ -45,7 +45,7 @@ def folded(segments: tuple[Segment, ...]) -> tuple[Segment, ...]:
     return tuple(result)
 
 
-def _spelled(letters: str) -> tuple[Segment, ...] | None:
+def _spell_letters(letters: str) -> tuple[Segment, ...] | None:
     """Names of letters one behind the other; each letter's name keeps its stress."""
     result: list[Segment] = []
     for letter in letters:
@@ -56,7 +56,7 @@ def _spelled(letters: str) -> tuple[Segment, ...] | None:
     return tuple(result)
 
 
-def _with_s(base: tuple[Segment, ...]) -> tuple[Segment, ...]:
+def _add_s(base: tuple[Segment, ...]) -> tuple[Segment, ...]:
     last = base[-1].phone
     if last in _SIBILANTS:
         return (*base, Segment("ɪ", is_syllabic=True), Segment("z"))
@@ -72,7 +72,7 @@ def _is_initialism(word: str) -> bool:
 Lookup = Callable[[str], tuple[Segment, ...] | None]
 
 
-def known_word(word: str, *, is_letter: bool, own: Lookup) -> tuple[Segment, ...] | None:
+def look_up_word(word: str, *, is_letter: bool, own: Lookup) -> tuple[Segment, ...] | None:
     """Phones of an English word by `own` entries, CMUdict and its parts; None where only spelling rules can tell.
 
     Parameters
@@ -86,16 +86,16 @@ def known_word(word: str, *, is_letter: bool, own: Lookup) -> tuple[Segment, ...
     if entry is not None:
         return entry
     if (len(word) == 1 and is_letter) or (len(word) > 1 and _is_initialism(word)):
-        return _spelled(word)
+        return _spell_letters(word)
     if word[-1:] == "s" and len(word) > 2 and _is_initialism(word[:-1]):
-        letters = _spelled(word[:-1])
-        return None if letters is None else _with_s(letters)
+        letters = _spell_letters(word[:-1])
+        return None if letters is None else _add_s(letters)
     entry = cmudict_lookup(word)
     if entry is not None:
         return entry
     if "-" in word:
-        parts = [known_word(part, is_letter=False, own=own) for part in word.split("-") if part]
+        parts = [look_up_word(part, is_letter=False, own=own) for part in word.split("-") if part]
         return None if None in parts else tuple(segment for part in parts for segment in part or ())
     stem = word[:-2] if word[-2:] in {"'s", "'S"} else ""
-    base = known_word(stem, is_letter=False, own=own) if stem else None
-    return _with_s(base) if base else None
+    base = look_up_word(stem, is_letter=False, own=own) if stem else None
+    return _add_s(base) if base else None

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from lexicon import written_forms as readings
 from lexicon.letters import run_name
-from lexicon.writing_systems import foreign_runs, script_of
+from lexicon.writing_systems import foreign_runs, letter_script
 
 # Scripts whose letters espeak-ng names in every language; of others it says a code, as in "Thai letter E 0 1".
 NAMED_BY_ESPEAK = frozenset({
@@ -32,7 +32,7 @@ def with_names_inside(text: str) -> str:
 
 def _named_inside(match: "re.Match[str]") -> str:
     word = match.group()
-    if len(word) == 1 or word.isascii() or word in readings.table("units.tsv"):
+    if len(word) == 1 or word.isascii() or word in readings.read_table("units.tsv"):
         return word
     return "".join(_pieces(word, "en", frozenset()))
 
@@ -40,7 +40,7 @@ def _named_inside(match: "re.Match[str]") -> str:
 def _pieces(text: str, language: str, kept: frozenset[str]) -> Iterator[str]:
     behind = 0
     for begin, end in foreign_runs(text, language):
-        name = "" if script_of(text[begin]) in kept else run_name(text[begin:end])
+        name = "" if letter_script(text[begin]) in kept else run_name(text[begin:end])
         if name:
             yield text[behind:begin]
             yield " " * text[begin - 1 : begin].isalnum() + name + " " * text[end : end + 1].isalnum()

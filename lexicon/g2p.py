@@ -38,7 +38,7 @@ _SPELLINGS = (
 
 
 @functools.cache
-def _wrapper() -> Any:
+def _espeak_wrapper() -> Any:
     """Phonemizer's espeak-ng class, told where the library and its data lie."""
     try:
         import espeakng_loader
@@ -66,7 +66,7 @@ def languages() -> Mapping[str, str]:
         espeak-ng is not installed or cannot be loaded.
     """
     with _LOCK:
-        wrapper = _wrapper()
+        wrapper = _espeak_wrapper()
         try:
             voices = wrapper().available_voices()
         except RuntimeError as broken:
@@ -90,8 +90,8 @@ def check_language(language: str) -> None:
 
 
 @functools.cache
-def _backend(language: str) -> Any:
-    _wrapper()
+def _espeak_backend(language: str) -> Any:
+    _espeak_wrapper()
     from phonemizer.backend import EspeakBackend
 
     quiet = logging.getLogger("tts2face.phonemizer")
@@ -115,7 +115,7 @@ def phonemize(lines: Sequence[str], language: str) -> tuple[tuple[str, ...], ...
     if not lines:
         return ()
     with _LOCK:
-        backend = _backend(language)
+        backend = _espeak_backend(language)
         from phonemizer.separator import Separator
 
         flat = [line.replace("\n", " ") for line in lines]
@@ -128,7 +128,7 @@ def phonemize(lines: Sequence[str], language: str) -> tuple[tuple[str, ...], ...
     return tuple(written)
 
 
-def segments_of(written: str, language: str) -> tuple[Segment, ...]:
+def parse_espeak_word(written: str, language: str) -> tuple[Segment, ...]:
     """Phones of one word as espeak-ng wrote it.
 
     Raises

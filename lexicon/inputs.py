@@ -100,7 +100,11 @@ def parse_json(content: str, name: str) -> Any:
     _check_depth(content, name)
     try:
         parsed = json.loads(
-            content, object_pairs_hook=_once, parse_constant=_constant, parse_int=_integer, parse_float=_number
+            content,
+            object_pairs_hook=_refuse_duplicates,
+            parse_constant=_constant,
+            parse_int=_integer,
+            parse_float=_number,
         )
     except json.JSONDecodeError as broken:
         raise DataError(f"{name}, line {broken.lineno}: not JSON ({broken.msg}); correct it there") from broken
@@ -130,7 +134,7 @@ def _check_characters(parsed: Any, name: str) -> None:
         raise DataError(f"{name} holds {half}, half of a surrogate pair; write the whole character") from broken
 
 
-def _once(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+def _refuse_duplicates(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name, value in pairs:
         if name in found:

@@ -57,7 +57,7 @@ def _spellings() -> tuple[dict[str, str], int]:
     return spelt, max(map(len, spelt))
 
 
-def _match(text: str, at: int) -> str:
+def _longest_spelling(text: str, at: int) -> str:
     """Longest spelling that begins at a place; empty where none does."""
     spelt, longest = _spellings()
     for length in range(min(longest, len(text) - at), 0, -1):
@@ -66,7 +66,7 @@ def _match(text: str, at: int) -> str:
     return ""
 
 
-def _marked(segments: list[Segment], mark: str) -> bool:
+def _apply_mark(segments: list[Segment], mark: str) -> bool:
     """Apply a mark to the phone before it; say whether the mark is one."""
     if mark in LENGTHS:
         if segments:
@@ -79,7 +79,7 @@ def _marked(segments: list[Segment], mark: str) -> bool:
     return mark in _IGNORED or mark in SEPARATORS or unicodedata.combining(mark) > 0
 
 
-def _stressed(segments: Sequence[Segment], marks: Sequence[tuple[int, int]]) -> tuple[Segment, ...]:
+def _apply_stress(segments: Sequence[Segment], marks: Sequence[tuple[int, int]]) -> tuple[Segment, ...]:
     """Give each mark (index of the next phone, stress) to the first syllabic phone from there on."""
     stressed = list(segments)
     for start, stress in marks:
@@ -107,14 +107,14 @@ def parse_ipa(text: str) -> tuple[Segment, ...]:
     at = 0
     while at < len(decomposed):
         letter = decomposed[at]
-        spelling = _match(decomposed, at)
+        spelling = _longest_spelling(decomposed, at)
         if letter in STRESSES:
             marks.append((len(segments), STRESSES[letter]))
         elif spelling:
             symbol = spelt[spelling]
             segments.append(Segment(symbol, is_syllabic=PHONES[symbol].is_vowel))
-        elif not _marked(segments, letter):
+        elif not _apply_mark(segments, letter):
             name = unicodedata.name(letter, f"U+{ord(letter):04X}")
             raise InputError(f"{letter!r} ({name}) in {text!r} is no phone of the table lexicon/phones.tsv")
         at += max(1, len(spelling))
-    return _stressed(segments, marks)
+    return _apply_stress(segments, marks)

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from lexicon.chunks import chunks
+from lexicon.chunks import split_chunks
 from lexicon.errors import BackendError
 
 _KANJI = re.compile("[㐀-䶿一-鿿豈-﫿々〆〇𠀀-𪛟]")
@@ -52,7 +52,7 @@ def with_kana(text: str) -> str:
         The library is not installed.
     """
     read = load_reader().run_frontend
-    return " ".join("".join(_spoken(read(chunk))).strip() for chunk in chunks(text, LONGEST, "ja"))
+    return " ".join("".join(_spoken(read(chunk))).strip() for chunk in split_chunks(text, LONGEST, "ja"))
 
 
 def _spoken(words: list[Mapping[str, Any]]) -> Iterator[str]:

@@ -18,7 +18,7 @@ def letter_name(letter: str) -> str:
 
     Chinese characters have none: each is a word.
     """
-    known = readings.table("symbols.tsv").get(letter)
+    known = readings.read_table("symbols.tsv").get(letter)
     if known:
         return known[0]
     base = unicodedata.normalize("NFD", letter)[:1]

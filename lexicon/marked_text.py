@@ -16,7 +16,7 @@ DEEPEST = 16  # marks within marks; nobody reads more
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class StyleRun:
     """From a character on, to the next run: styles in force, outermost first, and factors of speed and loudness.
 
     ``voice`` and ``language`` are those of a span that another voice speaks, or in another language; None elsewhere.
@@ -91,12 +91,12 @@ class MarkedText:
     """
 
     text: str
-    runs: tuple[Run, ...] = (Run(0),)
+    runs: tuple[StyleRun, ...] = (StyleRun(0),)
     marks: tuple[Mark, ...] = ()
     language: str | None = None
 
     @property
-    def changes_voice(self) -> bool:
+    def has_voice_changes(self) -> bool:
         """A pause, speed, loudness, voice or language is marked: what only a voice that has not spoken yet can do."""
         spoken_alike = all(
             run.rate == run.volume == 1.0 and run.voice is None and run.language is None for run in self.runs
@@ -105,24 +105,24 @@ class MarkedText:
 
 
 @dataclass(slots=True)
-class _Open:
+class _OpenSpan:
     """A mark that is not closed yet."""
 
     kind: str
     shown: str
     start: int
-    before: Run
+    before: StyleRun
 
 
-class Gathering:
+class MarkedTextBuilder:
     """Takes text and marks in order, and becomes a `MarkedText`."""
 
     def __init__(self) -> None:
         self._pieces: list[str] = []
         self._length = 0
-        self._runs = [Run(0)]
+        self._runs = [StyleRun(0)]
         self._marks: list[Mark] = []
-        self._open: list[_Open] = []
+        self._open_spans: list[_OpenSpan] = []
         self._last_pause: tuple[int, PauseMark | None] = (0, None)
 
     @property
@@ -130,7 +130,7 @@ class Gathering:
         """Characters so far."""
         return self._length
 
-    def say(self, text: str) -> None:
+    def add_text(self, text: str) -> None:
         """Add words."""
         self._pieces.append(text)
         self._length += len(text)
@@ -165,7 +165,7 @@ class Gathering:
         _check_range(f"the speed within {shown}", before.rate * rate, RATES)
         _check_range(f"the loudness within {shown}", before.volume * volume, VOLUMES)
         styles = (*before.styles, style) if style is not None else before.styles
-        self._turn(
+        self._start_run(
             replace(before, start=self._length, styles=styles, rate=before.rate * rate, volume=before.volume * volume)
         )
 
@@ -178,7 +178,7 @@ class Gathering:
             Spans are nested too deep.
         """
         before = self._begin(kind, shown)
-        self._turn(
+        self._start_run(
             replace(before, start=self._length, voice=voice or before.voice, language=language or before.language)
         )
 
@@ -195,14 +195,14 @@ class Gathering:
         InputError
             None of this kind is open, another one is, or a style holds nothing that is said.
         """
-        if not self._open:
+        if not self._open_spans:
             raise InputError(f"{shown} closes nothing; open it before, or leave it away")
-        last = self._open.pop()
+        last = self._open_spans.pop()
         if last.kind != kind:
             raise InputError(f"{shown} stands where {last.shown} must be closed first")
         if self._length == last.start and self._runs[-1].styles != last.before.styles:
             raise InputError(f"{last.shown} holds no word; put what is said between it and its end")
-        self._turn(replace(last.before, start=self._length))
+        self._start_run(replace(last.before, start=self._length))
 
     def done(self, language: str | None = None, *, spoken: str | None = None) -> MarkedText:
         """All that was given; a span in the language that is `spoken` anyway is none of its own.
@@ -212,24 +212,24 @@ class Gathering:
         InputError
             A span is still open.
         """
-        if self._open:
-            raise InputError(f"{self._open[-1].shown} is never closed; say where it ends")
-        runs: list[Run] = []
+        if self._open_spans:
+            raise InputError(f"{self._open_spans[-1].shown} is never closed; say where it ends")
+        runs: list[StyleRun] = []
         for run in self._runs:
             kept = replace(run, language=None) if run.language == spoken else run
             if not runs or replace(runs[-1], start=run.start) != kept:
                 runs.append(kept)
         return MarkedText("".join(self._pieces), tuple(runs), tuple(self._marks), language)
 
-    def _begin(self, kind: str, shown: str) -> Run:
+    def _begin(self, kind: str, shown: str) -> StyleRun:
         """Note a span that opens here; the run before it."""
-        if len(self._open) >= DEEPEST:
+        if len(self._open_spans) >= DEEPEST:
             raise InputError(f"{shown} stands within {DEEPEST} other marks; nest them less deep")
         before = self._runs[-1]
-        self._open.append(_Open(kind, shown, self._length, before))
+        self._open_spans.append(_OpenSpan(kind, shown, self._length, before))
         return before
 
-    def _turn(self, run: Run) -> None:
+    def _start_run(self, run: StyleRun) -> None:
         if self._runs[-1].start == run.start:
             self._runs.pop()
         last = self._runs[-1] if self._runs else None

@@ -18,7 +18,7 @@ STRESSED = 1.3  # times as long is a vowel with stress
 LEAD_S = 0.1  # silence before the first word and, at least, behind the last
 
 
-def nominal_sequence(spoken: Pronunciation) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+def nominal_phones(spoken: Pronunciation) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
     """Phones, with a silence at each punctuation mark, and the words as ranges of them."""
     phones, edges = [SILENCE], [0.0, LEAD_S]
     spans = []

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from lexicon import form_readers as forms
 from lexicon import written_forms as readings
-from lexicon.cleaning import plain
+from lexicon.cleaning import canonical_text
 from lexicon.foreign import with_names_inside
 
 MARKS = frozenset(".,;:!?")
@@ -31,7 +31,7 @@ _LETTERS = r"[^\W\d_]+"
 
 
 @dataclass(frozen=True, slots=True)
-class Token:
+class WrittenForm:
     """A written form and the words that it is said with; a punctuation mark stands for itself."""
 
     source: str
@@ -39,135 +39,135 @@ class Token:
 
 
 def _unit_pattern() -> str:
-    units = sorted(readings.table("units.tsv"), key=len, reverse=True)
+    units = sorted(readings.read_table("units.tsv"), key=len, reverse=True)
     return "(?:" + "|".join(re.escape(unit) + (r"(?![\w^/'])" if unit[-1].isalnum() else "") for unit in units) + ")"
 
 
 def _letter_unit_pattern() -> str:
     """Units that hold a letter by which they cannot be taken for a word (μm, kΩ)."""
-    units = [unit for unit in readings.table("units.tsv") if len(unit) > 1 and set(unit) & set("μΩ")]
+    units = [unit for unit in readings.read_table("units.tsv") if len(unit) > 1 and set(unit) & set("μΩ")]
     return "(?:" + "|".join(sorted(units, key=len, reverse=True)) + ")"
 
 
 def _abbreviation_pattern() -> str:
-    written = sorted(readings.table("abbreviations.tsv"), key=len, reverse=True)
+    written = sorted(readings.read_table("abbreviations.tsv"), key=len, reverse=True)
     dotless = rf"(?:Mr|Mrs|Ms|Dr|Prof|etc|vs|approx){_STOP}"
     return rf"(?P<abbr>(?:{'|'.join(map(re.escape, written))})(?=\.)|{dotless})\.?"
 
 
 # Name, pattern and reader, in the order in which they are tried at each place; every repeat over letters is bounded or
 # cannot be tried again from its own middle, so that the scan is linear.
-def _forms() -> tuple[tuple[str, str, forms.Reader], ...]:
+def _form_table() -> tuple[tuple[str, str, forms.Reader], ...]:
     unit = _unit_pattern()
     return (
-        ("quick", r"(?!(?:etc|vs|approx|et)\b)[a-z]+(?= |$|[,;!?](?: |$))", forms.same),
-        ("space", r" +", forms.nothing),
+        ("quick", r"(?!(?:etc|vs|approx|et)\b)[a-z]+(?= |$|[,;!?](?: |$))", forms.read_unchanged),
+        ("space", r" +", forms.read_nothing),
         ("mark", r"[.,;:!?](?= |$)", forms.mark),
-        ("email", rf"[\w+-](?:[\w.+-]{{0,62}}[\w+-])?@{_LABEL}(?:\.{_LABEL}){{1,5}}(?!\w)", forms.address),
-        ("url", rf"(?:(?:https?|ftp)://|www\.){_TAIL}", forms.address),
-        ("host", rf"(?:{_LABEL}\.){{1,4}}{_TLD}\b(?![.]\w)(?:/(?:{_TAIL})?)?", forms.address),
-        ("tag", r"[#@](?=[0-9_]{0,60}[^\W\d_])\w{1,140}", forms.hashtag),
-        ("slashed", r"and/or\b|w/o\b|w/(?= )|[nN]/[aA]\b", forms.slashed),
-        ("iso", r"(?P<isoy>[0-9]{4})-(?P<isom>[0-9]{2})-(?P<isod>[0-9]{2})(?![\w-])", forms.iso_date),
+        ("email", rf"[\w+-](?:[\w.+-]{{0,62}}[\w+-])?@{_LABEL}(?:\.{_LABEL}){{1,5}}(?!\w)", forms.read_address),
+        ("url", rf"(?:(?:https?|ftp)://|www\.){_TAIL}", forms.read_address),
+        ("host", rf"(?:{_LABEL}\.){{1,4}}{_TLD}\b(?![.]\w)(?:/(?:{_TAIL})?)?", forms.read_address),
+        ("tag", r"[#@](?=[0-9_]{0,60}[^\W\d_])\w{1,140}", forms.read_hashtag),
+        ("slashed", r"and/or\b|w/o\b|w/(?= )|[nN]/[aA]\b", forms.read_slashed),
+        ("iso", r"(?P<isoy>[0-9]{4})-(?P<isom>[0-9]{2})-(?P<isod>[0-9]{2})(?![\w-])", forms.read_iso_date),
         (
             "monthday",
             rf"(?P<mf>{_MONTH}) (?P<mfd>[0-9]{{1,2}})(?:st|nd|rd|th)?(?![\w:/%-]|[.,][0-9])"
             r"(?:,? (?P<mfy>[12][0-9]{3})(?![\w-]|[.,:][0-9]))?",
-            forms.month_first,
+            forms.read_month_first,
         ),
-        ("monthyear", rf"(?P<my>{_MONTH}),? (?P<myy>[12][0-9]{{3}})(?![\w-]|[.,:][0-9])", forms.month_year),
+        ("monthyear", rf"(?P<my>{_MONTH}),? (?P<myy>[12][0-9]{{3}})(?![\w-]|[.,:][0-9])", forms.read_month_year),
         (
             "daymonth",
             rf"(?P<dfd>[0-9]{{1,2}})(?:st|nd|rd|th)?(?: of)?[ -](?P<df>{_MONTH})"
             r"(?:,?[ -](?P<dfy>[12][0-9]{3})(?![\w-]))?",
-            forms.day_first,
+            forms.read_day_first,
         ),
         (
             "numericdate",
             r"(?P<nd1>[0-9]{1,2})(?P<ndsep>[/.-])(?P<nd2>[0-9]{1,2})(?P=ndsep)(?P<ndy>[12][0-9]{3}|[0-9]{2})"
             r"(?![\w/-]|\.[0-9])",
-            forms.numeric_date,
+            forms.read_numeric_date,
         ),
-        ("version", r"[0-9]{1,4}(?:\.[0-9]{1,4}){2,6}(?!\w)", forms.version),
+        ("version", r"[0-9]{1,4}(?:\.[0-9]{1,4}){2,6}(?!\w)", forms.read_version),
         (
             "clock",
             rf"(?P<hh>[0-9]{{1,2}}):(?P<mm>[0-9]{{2}})(?::(?P<ss>[0-9]{{2}}))?(?![\w:])(?: ?(?P<half>{_HALF}))?"
             rf"|(?P<hh2>[0-9]{{1,2}}) ?(?P<half2>{_HALF})|(?P<hh3>[0-9]{{1,2}}):(?P<mm3>[0-9]{{2}})(?P<half3>{_HALF})",
-            forms.clock,
+            forms.read_clock,
         ),
-        ("ratio", r"(?P<ra>[0-9]{1,3}):(?P<rb>[0-9]{1,3})(?![\w:])", forms.proportion),
+        ("ratio", r"(?P<ra>[0-9]{1,3}):(?P<rb>[0-9]{1,3})(?![\w:])", forms.read_proportion),
         (
             "money",
             rf"(?P<moneyminus>(?<![\w.])-)?(?P<sign>{_SIGN}) ?(?P<moneya>-?{_AMOUNT})"
             rf"(?:[–-](?:{_SIGN})?(?P<moneyto>{_AMOUNT})(?![\w-]))?(?: ?(?P<mag>{_MAGNITUDE}))?",
-            forms.money,
+            forms.read_money,
         ),
         (
             "moneyafter",
             rf"(?P<moneyb>{_SIGNED})(?: ?(?P<mag2>thousand|million|billion|trillion|bn))?"
             rf" ?(?:(?P<sign2>[$£€¥₹₩₽₺₿¢])|(?P<sign3>{_CODE})\b)",
-            forms.money_after,
+            forms.read_money_after,
         ),
         (
             "telephone",
             r"(?:\+[0-9]{1,3}[ .-]?)?(?:\([0-9]{2,4}\) ?|[0-9]{3,4}[ .-])[0-9]{3}[ .-][0-9]{4}(?![\w-])"
             r"|\+[0-9]{1,3}(?:[ .-][0-9]{2,4}){2,5}(?![\w-])|(?<![\w-])[0-9]{3}-[0-9]{4}(?![\w-])|\+[0-9]{8,15}(?!\w)",
-            forms.telephone,
+            forms.read_telephone,
         ),
-        ("feet", r"(?P<feet>[1-9])'(?P<inches>[0-9]{1,2})?(?![\w'])", forms.feet),
-        ("decade", r"'?(?P<decade>[1-9]0|[12][0-9]{2}0)'?s\b", forms.decade),
-        ("ordinal", r"(?P<ord>[0-9]{1,3}(?:,[0-9]{3}){1,5}|[0-9]{1,15})(?:st|nd|rd|th)\b", forms.ordinal_number),
+        ("feet", r"(?P<feet>[1-9])'(?P<inches>[0-9]{1,2})?(?![\w'])", forms.read_feet),
+        ("decade", r"'?(?P<decade>[1-9]0|[12][0-9]{2}0)'?s\b", forms.read_decade),
+        ("ordinal", r"(?P<ord>[0-9]{1,3}(?:,[0-9]{3}){1,5}|[0-9]{1,15})(?:st|nd|rd|th)\b", forms.read_ordinal),
         (
             "fraction",
             r"(?:(?P<whole>[0-9]{1,6})[ -])?(?P<frac>(?P<top>[0-9]{1,3})/(?P<bottom>[0-9]{1,3}))(?![\w/])",
-            forms.fraction,
+            forms.read_fraction,
         ),
         (
             "range",
             rf"(?P<from>{_AMOUNT})[–-](?P<sign4>[$£€])?(?P<to>{_AMOUNT})(?![\w-])(?: ?(?P<runit>{unit}))?",
-            forms.span,
+            forms.read_range,
         ),
-        ("measure", rf"(?P<amount>{_SIGNED})[ -]?(?P<unit>{unit})", forms.measure),
-        ("power", r"\^(?P<power>-?[0-9]{1,3})(?![0-9])", forms.power),
-        ("kilo", rf"(?P<kilo>{_AMOUNT})k\b", forms.thousands),
-        ("number", _SIGNED, forms.plain_number),
-        ("abbreviation", rf"{_START}{_abbreviation_pattern()}{_STOP}", forms.abbreviation),
+        ("measure", rf"(?P<amount>{_SIGNED})[ -]?(?P<unit>{unit})", forms.read_measure),
+        ("power", r"\^(?P<power>-?[0-9]{1,3})(?![0-9])", forms.read_power),
+        ("kilo", rf"(?P<kilo>{_AMOUNT})k\b", forms.read_thousands),
+        ("number", _SIGNED, forms.read_plain_number),
+        ("abbreviation", rf"{_START}{_abbreviation_pattern()}{_STOP}", forms.read_abbreviation),
         (
             "dotted",
             rf"{_START}(?:[^\W\d_]\.){{2,12}}{_STOP}|{_START}[^\W\d_](?:\.[^\W\d_]){{1,12}}(?![\w.])",
-            forms.dotted,
+            forms.read_dotted_letters,
         ),
-        ("initial", rf"{_START}[A-Z]\.(?= [A-Z](?:[a-z]|\.))", forms.initial),
-        ("roman", rf"{_START}[IVXLCDM]{{1,15}}{_STOP}(?!['-][^\W\d_])", forms.roman_numeral),
+        ("initial", rf"{_START}[A-Z]\.(?= [A-Z](?:[a-z]|\.))", forms.read_initial),
+        ("roman", rf"{_START}[IVXLCDM]{{1,15}}{_STOP}(?!['-][^\W\d_])", forms.read_roman_numeral),
         ("unitname", rf"{_START}{_letter_unit_pattern()}{_STOP}", forms.unit_name),
         ("letter", rf"{_START}(?![\u0000-\u024f])[^\W\d_]{_STOP}", forms.letter),
-        ("word", rf"{_LETTERS}(?:['-]{_LETTERS})*", forms.same),
-        ("sentence", r"(?<=[a-z])\.(?=[A-Z])|[,;:!?]", forms.same),
-        ("dot", r"\.", forms.dot),
-        ("symbol", r"[\s\S]", forms.symbol),
+        ("word", rf"{_LETTERS}(?:['-]{_LETTERS})*", forms.read_unchanged),
+        ("sentence", r"(?<=[a-z])\.(?=[A-Z])|[,;:!?]", forms.read_unchanged),
+        ("dot", r"\.", forms.read_dot),
+        ("symbol", r"[\s\S]", forms.read_symbol),
     )
 
 
 @functools.cache
 def _scanner() -> tuple[re.Pattern[str], dict[str, forms.Reader]]:
-    rows = _forms()
+    rows = _form_table()
     return re.compile("|".join(f"(?P<f_{name}>{pattern})" for name, pattern, _ in rows)), {
         f"f_{name}": reader for name, _, reader in rows
     }
 
 
-def tokens(text: str) -> Iterator[Token]:
+def split_tokens(text: str) -> Iterator[WrittenForm]:
     """Written forms of an English text in order, each with what it says; text between them is white space."""
     pattern, readers = _scanner()
     previous = ""
-    for match in pattern.finditer(with_names_inside(plain(text))):
+    for match in pattern.finditer(with_names_inside(canonical_text(text))):
         spoken = readers[match.lastgroup or ""](match, previous)
         if spoken:
-            yield Token(match.group(), spoken)
+            yield WrittenForm(match.group(), spoken)
             previous = spoken[-1] if spoken[-1] in MARKS else spoken.rpartition(" ")[2]
 
 
-def joined(spoken: list[str]) -> str:
+def join_words(spoken: list[str]) -> str:
     """Words with single spaces, marks behind their word; of marks that meet, the first of the strongest stays."""
     pieces: list[str] = []
     for piece in spoken:
@@ -186,5 +186,5 @@ def normalize(text: str, language: str = "en-us") -> str:
     espeak-ng itself reads the numbers of the other languages.
     """
     if not language.startswith("en"):
-        return plain(text, keep_marks=True)
-    return joined([token.spoken for token in tokens(text)])
+        return canonical_text(text, keep_marks=True)
+    return join_words([token.spoken for token in split_tokens(text)])

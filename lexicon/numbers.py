@@ -12,7 +12,7 @@ LONGEST_CARDINAL = 3 * len(_SCALES)  # digits; longer numbers are read digit by 
 _ROMAN = {"I": 1, "V": 5, "X": 10, "L": 50, "C": 100, "D": 500, "M": 1000}
 
 
-def digits(written: str) -> str:
+def digit_words(written: str) -> str:
     """Each digit by itself: 007 is zero zero seven."""
     return " ".join(_ONES[int(digit)] for digit in written if digit.isdigit())
 
@@ -30,12 +30,12 @@ def _below_thousand(value: int) -> str:
     return " ".join([*words, _below_hundred(rest)] if rest or not hundreds else words)
 
 
-def cardinal(value: int) -> str:
+def cardinal_words(value: int) -> str:
     """42 is forty-two, 1234 is one thousand two hundred thirty-four; beyond quintillions digit by digit."""
     if value < 0:
-        return f"minus {cardinal(-value)}"
+        return f"minus {cardinal_words(-value)}"
     if value >= 10**LONGEST_CARDINAL:
-        return digits(str(value))
+        return digit_words(str(value))
     groups: list[str] = []
     scale = 0
     while value:
@@ -46,14 +46,14 @@ def cardinal(value: int) -> str:
     return " ".join(reversed(groups)) or "zero"
 
 
-def number(written: str) -> str:
+def number_words(written: str) -> str:
     """A number as it is written, with thousands commas, decimals, leading zeros: 3.14 is three point one four."""
     whole, _, decimals = written.replace(",", "").partition(".")
     if len(whole) > LONGEST_CARDINAL or (len(whole) > 1 and whole[0] == "0" and not decimals):
-        words = digits(whole)
+        words = digit_words(whole)
     else:
-        words = cardinal(int(whole or "0"))
-    return f"{words} point {digits(decimals)}" if decimals else words
+        words = cardinal_words(int(whole or "0"))
+    return f"{words} point {digit_words(decimals)}" if decimals else words
 
 
 def ordinal_of(words: str) -> str:
@@ -64,19 +64,19 @@ def ordinal_of(words: str) -> str:
     return words[:start] + _IRREGULAR.get(last, regular)
 
 
-def ordinal(value: int) -> str:
+def ordinal_words(value: int) -> str:
     """21 is twenty-first."""
-    return ordinal_of(cardinal(value))
+    return ordinal_of(cardinal_words(value))
 
 
-def year(value: int) -> str:
+def year_words(value: int) -> str:
     """1999 is nineteen ninety-nine, 2005 two thousand five, 1905 nineteen oh five, 1900 nineteen hundred."""
     century, rest = divmod(value, 100)
     if value < 1000 or value > 9999 or (value % 1000 < 10):
-        return cardinal(value)
+        return cardinal_words(value)
     if not rest:
-        return f"{cardinal(century)} hundred"
-    return f"{cardinal(century)} {'oh ' if rest < 10 else ''}{cardinal(rest)}"
+        return f"{cardinal_words(century)} hundred"
+    return f"{cardinal_words(century)} {'oh ' if rest < 10 else ''}{cardinal_words(rest)}"
 
 
 def plural(words: str) -> str:
@@ -86,31 +86,31 @@ def plural(words: str) -> str:
     return f"{words}es" if words.endswith("x") else f"{words}s"
 
 
-def decade(value: int) -> str:
+def decade_year_words(value: int) -> str:
     """1990 is nineteen nineties, 90 nineties, 2000 two thousands."""
-    return plural(year(value) if value >= 1000 else cardinal(value))
+    return plural(year_words(value) if value >= 1000 else cardinal_words(value))
 
 
-def fraction(top: int, bottom: int) -> str:
+def fraction_words(top: int, bottom: int) -> str:
     """1/2 is one half, 3/4 three quarters, 5/8 five eighths; others are read with over."""
     if bottom in {0, 1} or bottom > 100 or top == 0:
-        return f"{cardinal(top)} over {cardinal(bottom)}"
-    part = {2: "half", 4: "quarter"}.get(bottom) or ordinal(bottom)
+        return f"{cardinal_words(top)} over {cardinal_words(bottom)}"
+    part = {2: "half", 4: "quarter"}.get(bottom) or ordinal_words(bottom)
     if top == 1:
         return f"one {part}"
-    return f"{cardinal(top)} {'halves' if bottom == 2 else part + 's'}"
+    return f"{cardinal_words(top)} {'halves' if bottom == 2 else part + 's'}"
 
 
-def roman(numeral: str) -> int:
+def roman_value(numeral: str) -> int:
     """Value of a Roman numeral in its one proper spelling; 0 for any other string."""
     value = 0
     for letter, following in zip(numeral, [*numeral[1:], ""], strict=True):
         worth = _ROMAN[letter]
         value += -worth if following and _ROMAN[following] > worth else worth
-    return value if 0 < value < 4000 and _to_roman(value) == numeral else 0
+    return value if 0 < value < 4000 and _roman_numeral(value) == numeral else 0
 
 
-def _to_roman(value: int) -> str:
+def _roman_numeral(value: int) -> str:
     pairs = [(1000, "M"), (900, "CM"), (500, "D"), (400, "CD"), (100, "C"), (90, "XC"), (50, "L"), (40, "XL")]
     pairs += [(10, "X"), (9, "IX"), (5, "V"), (4, "IV"), (1, "I")]
     written = ""

@@ -73,7 +73,7 @@ class Phone:
         return self.voicing == "voiced"
 
 
-def _row(line: str, where: str) -> Phone:
+def _parse_row(line: str, where: str) -> Phone:
     cells = line.split("\t")
     if len(cells) != 13:
         raise DataError(f"{where}: {len(cells)} cells instead of 13; the cells stand between tabs")
@@ -119,7 +119,7 @@ def read_phones(text: str, name: str = "phones.tsv") -> dict[str, Phone]:
     """
     phones: dict[str, Phone] = {}
     for number, line in enumerate(text.splitlines()[1:], start=2):
-        phone = _row(line, f"{name}, line {number}")
+        phone = _parse_row(line, f"{name}, line {number}")
         if phone.symbol in phones:
             raise DataError(f"{name}, line {number}: {phone.symbol} stands there twice; remove one")
         phones[phone.symbol] = phone

@@ -48,7 +48,7 @@ SILENCE = next(symbol for symbol, phone in PHONES.items() if phone.kind == "sile
 ARPABET: Mapping[str, str] = MappingProxyType({p.arpabet: p.symbol for p in PHONES.values() if p.arpabet})
 
 
-def phone_of(label: str) -> Phone:
+def look_up_phone(label: str) -> Phone:
     """The table's line for a label.
 
     Raises
@@ -87,7 +87,7 @@ def ipa_to_arpabet(label: str, stress: int | None = None) -> str:
     InputError
         The label is unknown, ARPABET has no name for it, or stress is not 0, 1 or 2.
     """
-    phone = phone_of(label)
+    phone = look_up_phone(label)
     if not phone.arpabet:
         raise InputError(f"ARPABET has no name for {label}; it names English phones only")
     if stress not in {None, 0, 1, 2}:
@@ -98,7 +98,7 @@ def ipa_to_arpabet(label: str, stress: int | None = None) -> str:
     return f"{name}{stress}"
 
 
-def _features(phone: Phone) -> dict[str, float]:
+def _articulatory_features(phone: Phone) -> dict[str, float]:
     is_nasal = phone.kind == "nasal" or phone.nasality == "nasal"
     tongue = PLACES.get(phone.place, 0.0)
     opening = _OPENINGS.get(phone.manner, 0.0)
@@ -134,14 +134,14 @@ def phone_features(label: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
     InputError
         The label is not in the table.
     """
-    phone = phone_of(label)
+    phone = look_up_phone(label)
     parts = phone.parts or (label,)
-    first, last = (_features(PHONES[part]) for part in (parts[0], parts[-1]))
+    first, last = (_articulatory_features(PHONES[part]) for part in (parts[0], parts[-1]))
     return tuple(first[name] for name in WEIGHTS), tuple(last[name] for name in WEIGHTS)
 
 
 @functools.cache
-def _halves(label: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def _weighted_halves(label: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Weighted features of a phone's first and last half."""
     first, last = (tuple(map(operator.mul, half, WEIGHTS.values())) for half in phone_features(label))
     return first, last
@@ -160,11 +160,11 @@ def phone_distance(a: str, b: str) -> float:
     Euclidean over the features times `WEIGHTS`, averaged over first and last half (a diphthong's vowels, an affricate's
     stop and fricative), hence symmetric and within the triangle inequality.
     """
-    (first_a, last_a), (first_b, last_b) = _halves(a), _halves(b)
+    (first_a, last_a), (first_b, last_b) = _weighted_halves(a), _weighted_halves(b)
     return math.sqrt((math.dist(first_a, first_b) ** 2 + math.dist(last_a, last_b) ** 2) / 2)
 
 
-def _nearest(label: str, available: Collection[str]) -> str:
+def _nearest_phone(label: str, available: Collection[str]) -> str:
     return min(sorted(available), key=lambda other: phone_distance(label, other))
 
 
@@ -178,23 +178,23 @@ def nearest_phones(label: str, available: Collection[str]) -> tuple[str, ...]:
     InputError
         A label is not in the table, or nothing is available.
     """
-    phone = phone_of(label)
+    phone = look_up_phone(label)
     if label in available:
         return (label,)
-    sounding = {phone_of(other).symbol for other in available} - {SILENCE}
+    sounding = {look_up_phone(other).symbol for other in available} - {SILENCE}
     if not sounding:
         raise InputError(f"nothing can stand in for {label}: no phone is available")
-    whole = _nearest(label, sounding)
+    whole = _nearest_phone(label, sounding)
     if not phone.parts:
         return (whole,)
     simple = {other for other in sounding if not PHONES[other].parts} or sounding
-    parts = tuple(_nearest(part, simple) for part in phone.parts)
+    parts = tuple(_nearest_phone(part, simple) for part in phone.parts)
     apart = math.hypot(*(phone_distance(part, own) for part, own in zip(parts, phone.parts, strict=True))) / math.sqrt(
         2
     )
     return parts if apart < phone_distance(label, whole) and len(set(parts)) > 1 else (whole,)
 
 
-def vowels() -> tuple[str, ...]:
+def vowel_symbols() -> tuple[str, ...]:
     """Symbols of all vowels and diphthongs, in the table's order."""
     return tuple(symbol for symbol, phone in PHONES.items() if phone.is_vowel)

@@ -6,17 +6,17 @@ from dataclasses import dataclass
 from itertools import pairwise
 from types import MappingProxyType
 
-from lexicon.cleaning import plain
+from lexicon.cleaning import canonical_text
 from lexicon.dictionary import Dictionary
-from lexicon.english import SHOUTED, folded, known_word
+from lexicon.english import SHOUTED, fold_to_arpabet, look_up_word
 from lexicon.errors import InputError
-from lexicon.g2p import DEFAULT_LANGUAGE, phonemize, segments_of
+from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word, phonemize
 from lexicon.ipa import Segment
 from lexicon.languages import language_code
-from lexicon.normalize import MARKS, tokens
+from lexicon.normalize import MARKS, split_tokens
 from lexicon.phones import ipa_to_arpabet
 from lexicon.said import as_said
-from lexicon.syllables import syllables
+from lexicon.syllables import split_syllables
 from lexicon.writing_systems import check_script
 
 PAUSES_S = MappingProxyType({"": 0.0, ",": 0.2, ";": 0.3, ":": 0.3, ".": 0.5, "!": 0.5, "?": 0.5})  # nominal
@@ -83,35 +83,35 @@ class Pronunciation:
 
 
 @dataclass(slots=True)
-class _Spoken:
+class _WordDraft:
     text: str
     source: str
     mark: str = ""
     segments: tuple[Segment, ...] | None = None
 
 
-def _spoken_words(forms: Iterator[tuple[str, str]]) -> list[_Spoken]:
+def _split_words(forms: Iterator[tuple[str, str]]) -> list[_WordDraft]:
     """Words of (written, spoken) pairs, each with the punctuation behind it."""
-    words: list[_Spoken] = []
+    words: list[_WordDraft] = []
     for written, spoken in forms:
         for piece in _PIECE.findall(spoken):
             if piece not in MARKS:
-                words.append(_Spoken(piece, written.strip(" .,;:!?") or piece))
+                words.append(_WordDraft(piece, written.strip(" .,;:!?") or piece))
             elif words:
                 words[-1].mark = max(words[-1].mark, piece, key=_STRENGTH.index)
     return words
 
 
-def _are_shouted(words: Sequence[_Spoken]) -> bool:
+def _are_all_capitals(words: Sequence[_WordDraft]) -> bool:
     """All words are capitals: a heading, not a row of initialisms."""
     long = [word.text for word in words if len(word.text) > 1]
     return len(long) > 1 and all(text.isupper() for text in long) and any(len(text) > 3 for text in long)
 
 
-def _lowered(words: Sequence[_Spoken]) -> list[str]:
+def _lookup_forms(words: Sequence[_WordDraft]) -> list[str]:
     """Words as they are looked up: capitals that only shout are small."""
     texts = ["", *(word.text for word in words), ""]
-    if _are_shouted(words):
+    if _are_all_capitals(words):
         return [text.lower() for text in texts[1:-1]]
     return [
         text.lower() if len(text) > 1 and SHOUTED & {before, text, after} and text.isupper() else text
@@ -119,44 +119,44 @@ def _lowered(words: Sequence[_Spoken]) -> list[str]:
     ]
 
 
-def _american(words: list[_Spoken], own: Dictionary) -> None:
+def _pronounce_english(words: list[_WordDraft], own: Dictionary) -> None:
     """Give English words CMUdict's phones, and espeak-ng's to the rest, in one call."""
-    for word, text, following in zip(words, _lowered(words), [*words[1:], None], strict=True):
+    for word, text, following in zip(words, _lookup_forms(words), [*words[1:], None], strict=True):
         is_article = text == "A" and not word.mark and following is not None and following.text[:1].islower()
-        word.segments = known_word(text, is_letter=text.isupper() and not is_article, own=own.lookup)
-    _by_rules([word for word in words if word.segments is None], DEFAULT_LANGUAGE)
+        word.segments = look_up_word(text, is_letter=text.isupper() and not is_article, own=own.lookup)
+    _pronounce_by_rules([word for word in words if word.segments is None], DEFAULT_LANGUAGE)
     for word, following in pairwise(words):
         first = (following.segments or ())[:1]
         if word.text.lower() == "the" and first and first[0].is_syllabic and own.lookup("the") is None:
             word.segments = (Segment("ð"), Segment("i", is_syllabic=True))
 
 
-def _by_rules(words: Sequence[_Spoken], language: str) -> None:
+def _pronounce_by_rules(words: Sequence[_WordDraft], language: str) -> None:
     """Phones by espeak-ng, each word by itself."""
     for word, written in zip(words, phonemize([word.text for word in words], language), strict=True):
-        segments = tuple(segment for part in written for segment in segments_of(part, language))
-        word.segments = folded(segments) if language == DEFAULT_LANGUAGE else segments
+        segments = tuple(segment for part in written for segment in parse_espeak_word(part, language))
+        word.segments = fold_to_arpabet(segments) if language == DEFAULT_LANGUAGE else segments
 
 
-def _in_context(words: list[_Spoken], language: str) -> None:
+def _pronounce_in_context(words: list[_WordDraft], language: str) -> None:
     """Phones by espeak-ng clause by clause; word by word where it joins or splits the words of a clause."""
-    clauses: list[list[_Spoken]] = [[]]
+    clauses: list[list[_WordDraft]] = [[]]
     for word in words:
         clauses[-1].append(word)
         if word.mark:
             clauses.append([])
     spoken = phonemize([" ".join(word.text for word in clause) for clause in clauses], language)
-    alone: list[_Spoken] = []
+    alone: list[_WordDraft] = []
     for clause, written in zip(clauses, spoken, strict=True):
         if len(clause) == len(written):
             for word, part in zip(clause, written, strict=True):
-                word.segments = segments_of(part, language)
+                word.segments = parse_espeak_word(part, language)
         else:
             alone += clause
-    _by_rules(alone, language)
+    _pronounce_by_rules(alone, language)
 
 
-def _finished(word: _Spoken, language: str) -> Word:
+def _build_word(word: _WordDraft, language: str) -> Word:
     segments = word.segments or ()
     if not segments:
         raise InputError(
@@ -164,14 +164,16 @@ def _finished(word: _Spoken, language: str) -> Word:
         )
     is_english = language.partition("-")[0] == "en"
     names = (
-        [ipa_to_arpabet(s.phone, s.stress if s.is_syllabic else None) for s in folded(segments)] if is_english else []
+        [ipa_to_arpabet(s.phone, s.stress if s.is_syllabic else None) for s in fold_to_arpabet(segments)]
+        if is_english
+        else []
     )
     return Word(
         text=word.text,
         source=word.source,
         phones=tuple(segment.phone for segment in segments),
         stress=tuple(segment.stress for segment in segments),
-        syllables=syllables(segments, is_english=is_english),
+        syllables=split_syllables(segments, is_english=is_english),
         mark=word.mark,
         arpabet=tuple(names),
     )
@@ -198,17 +200,17 @@ def pronounce(text: str, language: str = DEFAULT_LANGUAGE, dictionary: Dictionar
     check_script(text, language)
     own = dictionary or Dictionary(MappingProxyType({}))
     if language.partition("-")[0] == "en":
-        words = _spoken_words((token.source, token.spoken) for token in tokens(text))
+        words = _split_words((token.source, token.spoken) for token in split_tokens(text))
     else:
         said = as_said(text, language)
-        words = _spoken_words((piece, piece) for piece in plain(said, keep_marks=True).split())
+        words = _split_words((piece, piece) for piece in canonical_text(said, keep_marks=True).split())
         words = [word for word in words if any(letter.isalnum() for letter in word.text)]
     if not words:
         raise InputError("there is no word to say in this text; give at least one word or number")
     if language == DEFAULT_LANGUAGE:
-        _american(words, own)
+        _pronounce_english(words, own)
     else:
-        _in_context(words, language)
+        _pronounce_in_context(words, language)
         for word in words:
             word.segments = own.lookup(word.text) or word.segments
-    return Pronunciation(text, language, tuple(_finished(word, language) for word in words))
+    return Pronunciation(text, language, tuple(_build_word(word, language) for word in words))

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from lexicon import written_forms as readings
 from lexicon.errors import InputError
 from lexicon.normalize import normalize
-from lexicon.numbers import cardinal, digits, number, ordinal, roman
+from lexicon.numbers import cardinal_words, digit_words, number_words, ordinal_words, roman_value
 
 LONGEST = 300  # characters of one reading
 _SIGNS = MappingProxyType({
@@ -67,18 +67,18 @@ def _unreadable(text: str, what: str, example: str) -> InputError:
 def _cardinal(text: str, _: str) -> str:
     match = _NUMBER.fullmatch(text)
     if match:
-        return readings.signed(match[1] + re.sub(r"[ \u00a0\u202f]", "", match[2]))
-    if _ROMAN.fullmatch(text) and roman(text):
-        return cardinal(roman(text))
+        return readings.signed_number_words(match[1] + re.sub(r"[ \u00a0\u202f]", "", match[2]))
+    if _ROMAN.fullmatch(text) and roman_value(text):
+        return cardinal_words(roman_value(text))
     raise _unreadable(text, "a cardinal number", "1,234")
 
 
 def _ordinal(text: str, _: str) -> str:
     match = _ORDINAL.fullmatch(text)
     if match:
-        return ordinal(int(match[1].replace(",", "")[:15]))
-    if _ROMAN.fullmatch(text) and roman(text):
-        return ordinal(roman(text))
+        return ordinal_words(int(match[1].replace(",", "")[:15]))
+    if _ROMAN.fullmatch(text) and roman_value(text):
+        return ordinal_words(roman_value(text))
     raise _unreadable(text, "an ordinal number", "3 or 3rd")
 
 
@@ -88,23 +88,23 @@ def _characters(text: str, _: str) -> str:
 
 def _character(character: str) -> str:
     if character.isdigit():
-        return digits(character) if character.isascii() else character
+        return digit_words(character) if character.isascii() else character
     if character.isalpha():
         return character.upper()
-    return _SIGNS.get(character) or readings.table("symbols.tsv").get(character, (normalize(character),))[0]
+    return _SIGNS.get(character) or readings.read_table("symbols.tsv").get(character, (normalize(character),))[0]
 
 
 def _digits(text: str, _: str) -> str:
     if not re.fullmatch(r"[0-9 .,-]*[0-9][0-9 .,-]*", text):
         raise _unreadable(text, "digits", "4711")
-    return digits(text)
+    return digit_words(text)
 
 
 def _telephone(text: str, _: str) -> str:
     groups = re.findall(r"[0-9]+|[A-Za-z]+", text)
     if not any(group.isdigit() for group in groups):
         raise _unreadable(text, "a telephone number", "+1 555 123 4567")
-    said = ", ".join(digits(group) if group.isdigit() else _characters(group, "") for group in groups)
+    said = ", ".join(digit_words(group) if group.isdigit() else _characters(group, "") for group in groups)
     return f"plus {said}" if text.startswith("+") else said
 
 
@@ -112,7 +112,7 @@ def _fraction(text: str, _: str) -> str:
     match = _FRACTION.fullmatch(text)
     if match is None:
         raise _unreadable(text, "a fraction", "3/4 or 1 1/2")
-    return readings.ratio(match[2], match[3], match[1] or "")
+    return readings.ratio_words(match[2], match[3], match[1] or "")
 
 
 def _time(text: str, written_format: str) -> str:
@@ -121,10 +121,10 @@ def _time(text: str, written_format: str) -> str:
         hour, minute = int(match[1] or match[5]), int(match[2] or 0)
         half = match[4] or match[6] or ""
         if hour <= 24 and minute <= 59 and int(match[3] or 0) <= 59:
-            return readings.time_of_day(hour, minute, int(match[3] or 0), half)
+            return readings.time_words(hour, minute, int(match[3] or 0), half)
     if lasts and not written_format:
         named = zip((lasts[1], lasts[2], lasts[3]), ("hour", "minute", "second"), strict=True)
-        return " ".join(f"{number(n)} {unit}{'' if int(n) == 1 else 's'}" for n, unit in named if n)
+        return " ".join(f"{number_words(n)} {unit}{'' if int(n) == 1 else 's'}" for n, unit in named if n)
     if written_format not in {"", "hms12", "hms24"}:
         raise InputError(f"there is no format {written_format[:20]!r} of times; choose hms12 or hms24")
     raise _unreadable(text, "a time", "3:05pm or 1'21\"")
@@ -157,16 +157,18 @@ def _spoken_date(found: dict[str, str]) -> str:
     known = {letter: part for letter, part in found.items() if part.strip("?")}
     year = known.get("y", "")
     if "m" not in known:
-        said = ordinal(int(known["d"])) if "d" in known else readings.year_or_number(year)
+        said = ordinal_words(int(known["d"])) if "d" in known else readings.year_or_number_words(year)
         return said
     month = int(known["m"]) if known["m"].isdigit() else readings.month_number(known["m"])
     day = int(re.sub(r"\D", "", known["d"])) if "d" in known else 0
     if not 1 <= month <= 12 or day > 31 or ("d" in known and day < 1):
         raise ValueError(month, day)
     if day:
-        return readings.date(day, month, year)
+        return readings.date_words(day, month, year)
     return (
-        f"{readings.MONTHS[month - 1]} {readings.year_or_number(year)}".rstrip() if year else readings.MONTHS[month - 1]
+        f"{readings.MONTHS[month - 1]} {readings.year_or_number_words(year)}".rstrip()
+        if year
+        else readings.MONTHS[month - 1]
     )
 
 
@@ -177,7 +179,7 @@ def _currency(text: str, code: str) -> str:
     if match:
         if match[1] not in readings.CURRENCIES:
             raise InputError(f"there is no currency {match[1]!r} here; write it in words")
-        return readings.money(match[2], match[1], "")
+        return readings.money_words(match[2], match[1], "")
     said = normalize(text)
     if said == text or not any(character.isdigit() for character in text):
         raise _unreadable(text, "money", "$12.50 or 12 EUR")

@@ -9,16 +9,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from lexicon.chunks import chunks
+from lexicon.chunks import split_chunks
 from lexicon.given import GivenWord, given_words
-from lexicon.marked_text import Mark, MarkedText, NodMark, PauseMark, PhoneMark, Run
+from lexicon.marked_text import Mark, MarkedText, NodMark, PauseMark, PhoneMark, StyleRun
 from lexicon.said import as_said
 
 LONGEST = 300  # characters; a sentence that is longer is cut at a clause mark or a space
 
 
 @dataclass(frozen=True, slots=True)
-class Utterance:
+class Phrase:
     """What is spoken in one go, at one speed.
 
     Parameters
@@ -35,7 +35,7 @@ class Utterance:
         The words of `text` where phones are given for some of them; empty elsewhere.
     """
 
-    written: str
+    source: str
     text: str
     first: int
     last: int
@@ -63,10 +63,10 @@ class Sentence:
         Its share of the text.
     """
 
-    utterances: tuple[Utterance, ...]
-    runs: tuple[Run, ...]
+    utterances: tuple[Phrase, ...]
+    runs: tuple[StyleRun, ...]
     marks: tuple[Mark, ...]
-    lead: float
+    leading_pause: float
     n_characters: int
 
     @property
@@ -80,12 +80,12 @@ class Sentence:
         return self.utterances[-1].last
 
 
-def sentences(text: MarkedText, language: str) -> Iterator[Sentence]:
+def split_sentences(text: MarkedText, language: str) -> Iterator[Sentence]:
     """Sentences that hold something to say; English ones as they are said. Linear, and lazy but for one sentence.
 
     Sentences are those of the text without marks. A pause or a change of speed within one begins a new utterance.
     """
-    placed = by_letters(text)
+    placed = index_by_letters(text)
     starts = [run.start for run in placed.runs]
     pauses = [mark for mark in placed.marks if isinstance(mark, PauseMark)]
     silent = [mark.at for mark in pauses]
@@ -94,16 +94,16 @@ def sentences(text: MarkedText, language: str) -> Iterator[Sentence]:
     others = [mark for mark in placed.marks if not isinstance(mark, PauseMark | PhoneMark)]
     held: Sentence | None = None
     lead, done, told = sum(mark.seconds for mark in pauses[:1] if mark.at == 0), 0, 0
-    for chunk in chunks(text.text, LONGEST, language):
+    for chunk in split_chunks(text.text, LONGEST, language):
         begin, done = done, done + n_letters(chunk)
-        runs = _runs_within(placed.runs, starts, begin, done)
+        runs = _overlapping_runs(placed.runs, starts, begin, done)
         inside = pauses[bisect_right(silent, begin) : bisect_right(silent, done)]
-        utterances, silence = _utterances(chunk, begin, runs, inside, language)
+        utterances, silence = _phrases(chunk, begin, runs, inside, language)
         given = phones[bisect_left(phoned, begin) : bisect_left(phoned, done)]
         if given:
             utterances = [_with_phones(part, given, part.language or language) for part in utterances]
         if held is not None:
-            held = _longer(held, silence)
+            held = _extend_last_pause(held, silence)
         else:
             lead += silence
         if not utterances:
@@ -124,7 +124,7 @@ def n_letters(text: str) -> int:
     return len("".join(text.split()))
 
 
-def up_to(written: str, n: int) -> str:
+def text_prefix(written: str, n: int) -> str:
     """The beginning of a text with so many letters."""
     for at, character in enumerate(written):
         if n == 0 and not character.isspace():
@@ -133,7 +133,7 @@ def up_to(written: str, n: int) -> str:
     return written
 
 
-def by_letters(text: MarkedText) -> MarkedText:
+def index_by_letters(text: MarkedText) -> MarkedText:
     """The same with places counted in letters; what meets at one place is one: last run, one pause, largest nod.
 
     Raises
@@ -164,20 +164,20 @@ def by_letters(text: MarkedText) -> MarkedText:
     return replace(text, runs=tuple(runs.values()), marks=tuple(marks))
 
 
-def _runs_within(runs: tuple[Run, ...], starts: list[int], begin: int, end: int) -> tuple[Run, ...]:
+def _overlapping_runs(runs: tuple[StyleRun, ...], starts: list[int], begin: int, end: int) -> tuple[StyleRun, ...]:
     return runs[bisect_right(starts, begin) - 1 : bisect_right(starts, end - 1)]
 
 
-def _utterances(
-    chunk: str, begin: int, runs: tuple[Run, ...], pauses: Sequence[PauseMark], language: str
-) -> tuple[list[Utterance], float]:
+def _phrases(
+    chunk: str, begin: int, runs: tuple[StyleRun, ...], pauses: Sequence[PauseMark], language: str
+) -> tuple[list[Phrase], float]:
     """Utterances of a chunk of text, and the silence that is marked before the first of them."""
     places = [at for at, character in enumerate(chunk) if not character.isspace()]
     end = begin + len(places)
     silences = {mark.at: mark.seconds for mark in pauses}
     changes = [run.start for before, run in pairwise(runs) if _speaker(run) != _speaker(before)]
     bounds = sorted({begin, end, *changes, *silences})
-    found: list[Utterance] = []
+    found: list[Phrase] = []
     before = 0.0
     for first, last in pairwise(bounds):
         written = chunk[places[first - begin] : places[last - begin - 1] + 1]
@@ -185,37 +185,37 @@ def _utterances(
         text = as_said(written, run.language or language)
         pause = silences.get(last)
         if any(character.isalnum() for character in text):
-            found.append(Utterance(written, text, first, last, run.rate, pause, run.voice, run.language))
+            found.append(Phrase(written, text, first, last, run.rate, pause, run.voice, run.language))
         elif found:  # punctuation by itself belongs to the words before it
-            found[-1] = _with_more(found[-1], written, last, pause, language)
+            found[-1] = _extend_phrase(found[-1], written, last, pause, language)
         else:
             before += pause or 0.0
     return found, before
 
 
-def _with_more(utterance: Utterance, written: str, last: int, pause: float | None, language: str) -> Utterance:
-    whole = utterance.written + written
+def _extend_phrase(utterance: Phrase, written: str, last: int, pause: float | None, language: str) -> Phrase:
+    whole = utterance.source + written
     text = as_said(whole, utterance.language or language)
     seconds = [silence for silence in (utterance.pause, pause) if silence is not None]
-    return replace(utterance, written=whole, text=text, last=last, pause=sum(seconds) if seconds else None)
+    return replace(utterance, source=whole, text=text, last=last, pause=sum(seconds) if seconds else None)
 
 
-def _speaker(run: Run) -> tuple[float, str | None, str | None]:
+def _speaker(run: StyleRun) -> tuple[float, str | None, str | None]:
     return run.rate, run.voice, run.language
 
 
-def _with_phones(part: Utterance, phones: Sequence[PhoneMark], language: str) -> Utterance:
+def _with_phones(part: Phrase, phones: Sequence[PhoneMark], language: str) -> Phrase:
     """An utterance with the phones that are given for words within it."""
-    places = [at for at, character in enumerate(part.written) if not character.isspace()]
+    places = [at for at, character in enumerate(part.source) if not character.isspace()]
     inside = [
         replace(mark, at=places[mark.at - part.first], end=places[mark.end - part.first - 1] + 1)
         for mark in phones
         if part.first <= mark.at < mark.end <= min(part.last, part.first + len(places))
     ]
-    return replace(part, words=given_words(part.written, inside, language)) if inside else part
+    return replace(part, words=given_words(part.source, inside, language)) if inside else part
 
 
-def _longer(sentence: Sentence, seconds: float) -> Sentence:
+def _extend_last_pause(sentence: Sentence, seconds: float) -> Sentence:
     """A sentence with more silence behind it."""
     if seconds == 0.0:
         return sentence

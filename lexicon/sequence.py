@@ -92,7 +92,7 @@ class WordSpan:
             raise InputError(f"word {self.text!r} needs a range of phones, not [{self.first}, {self.last})")
 
 
-def concatenated(
+def concatenate_phones(
     parts: Sequence[PhoneSequence], words: Sequence[Sequence[WordSpan]]
 ) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
     """Put sequences and their words one behind the other; silences that meet at a joint become one.

@@ -26,7 +26,7 @@ from xml.parsers import expat
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.languages import language_code
-from lexicon.marked_text import DEEPEST, Gathering, MarkedText, NameMark, NodMark, PauseMark, PhoneMark
+from lexicon.marked_text import DEEPEST, MarkedText, MarkedTextBuilder, NameMark, NodMark, PauseMark, PhoneMark
 from lexicon.say_as import say_as
 from lexicon.ssml_speech import named_voice, phoned_words
 from lexicon.ssml_values import BREAKS_S, check_lengths, choice, loudness, only, primary_of, speed
@@ -49,7 +49,7 @@ def is_ssml(text: str) -> bool:
     return _BEGINS.match(text) is not None
 
 
-def spoken_by_ssml(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
+def parse_ssml(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
     """What an SSML document says, and how.
 
     Parameters
@@ -63,7 +63,7 @@ def spoken_by_ssml(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
         It is not well-formed, has a document type, an element or attribute outside the subset, or a value out of range;
         the message names it and its line.
     """
-    reader = _Reader(language)
+    reader = _SsmlReader(language)
     try:
         return reader.read(text)
     except expat.ExpatError as broken:
@@ -75,11 +75,11 @@ def spoken_by_ssml(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
         raise InputError(f"SSML, line {reader.line}: {wrong}") from wrong
 
 
-class _Reader:
+class _SsmlReader:
     """Follows the elements of one document."""
 
     def __init__(self, language: str) -> None:
-        self._gathering = Gathering()
+        self._gathering = MarkedTextBuilder()
         self._elements: list[str] = []
         self._spans: list[str] = []  # for each element the kind of span that it opened, or nothing
         self._held: list[str] = []  # text of a phoneme or say-as
@@ -148,7 +148,7 @@ class _Reader:
         if span:
             self._gathering.close(span, f"</{tag}>")
         if name in {"p", "s"}:
-            self._gathering.say("\n\n")
+            self._gathering.add_text("\n\n")
 
     def _words(self, text: str) -> None:
         inside = self._elements[-1]
@@ -161,7 +161,7 @@ class _Reader:
         if inside in HELD_KINDS:
             self._held.append(text)
         else:
-            self._gathering.say(text)
+            self._gathering.add_text(text)
 
     def _speak(self, attributes: Attributes) -> None:
         known = {name: value for name, value in attributes.items() if not name.startswith("xmlns")}
@@ -169,7 +169,7 @@ class _Reader:
 
     def _stretch(self, attributes: Attributes) -> None:
         tag = only(self._elements[-1], attributes, LANGUAGE).get(LANGUAGE)
-        self._gathering.say("\n\n")  # a blank line ends what was said before
+        self._gathering.add_text("\n\n")  # a blank line ends what was said before
         if tag is not None and primary_of(tag) != primary_of(self._spoken):
             self._spans[-1] = "lang"
             self._gathering.open_voice("lang", f"<{self._elements[-1]}>", voice=None, language=language_code(tag))
@@ -200,12 +200,12 @@ class _Reader:
     def _say_held(self, kind: str) -> None:
         given, text = self._held_attributes, "".join(self._held)
         if kind == "say-as":
-            self._gathering.say(say_as(given["interpret-as"].strip(), text, given.get("format", ""), self._spoken))
+            self._gathering.add_text(say_as(given["interpret-as"].strip(), text, given.get("format", ""), self._spoken))
             return
         for number, (word, segments) in enumerate(phoned_words(text, given["ph"], given.get("alphabet", "ipa"))):
             begin = self._gathering.at + (number > 0)
             self._gathering.mark(PhoneMark(begin, begin + len(word), segments))
-            self._gathering.say(f" {word}" if number else word)
+            self._gathering.add_text(f" {word}" if number else word)
 
     def _break(self, attributes: Attributes) -> None:
         told = only("break", attributes, "time", "strength")
@@ -245,7 +245,7 @@ class _Reader:
         alias = only("sub", attributes, "alias").get("alias", "")
         if not alias.strip():
             raise InputError('a <sub> needs what is said instead; write <sub alias="doctor">Dr</sub>')
-        self._gathering.say(alias)
+        self._gathering.add_text(alias)
 
     def _express_as(self, attributes: Attributes) -> None:
         style = only("express-as", attributes, "style").get("style", "")

@@ -46,7 +46,7 @@ def _table() -> dict[str, dict[str, _Stop]]:
     for line in lines:
         language, written, rule, words = line.split("\t")
         found.setdefault(language, {})[written] = _Stop(rule, frozenset(words.split()))
-    for written, (_, context) in readings.table("abbreviations.tsv").items():
+    for written, (_, context) in readings.read_table("abbreviations.tsv").items():
         is_lower = written.islower() and context in {"any", "after"}
         found["en"].setdefault(written, _Stop("number" if is_lower else _OF_CONTEXT[context]))
     return found

@@ -27,18 +27,18 @@ def _is_english_onset(onset: tuple[str, ...]) -> bool:
     return (len(onset) == 1 and onset[0] != "ŋ") or onset in ENGLISH_ONSETS
 
 
-def _is_rising(onset: tuple[str, ...]) -> bool:
+def _is_sonority_rising(onset: tuple[str, ...]) -> bool:
     """Sonority rises towards the vowel: the rule for languages without a table of their own."""
     steps = [_SONORITY[PHONES[phone].kind] for phone in onset]
     return all(low < high for low, high in pairwise(steps))
 
 
-def syllables(segments: Sequence[Segment], *, is_english: bool) -> tuple[tuple[int, int], ...]:
+def split_syllables(segments: Sequence[Segment], *, is_english: bool) -> tuple[tuple[int, int], ...]:
     """Half-open ranges of the phones of each syllable; a word without vowel is one syllable.
 
     Consonants before the first vowel and behind the last one belong to the first and the last syllable.
     """
-    is_legal = _is_english_onset if is_english else _is_rising
+    is_legal = _is_english_onset if is_english else _is_sonority_rising
     middles = [at for at, segment in enumerate(segments) if segment.is_syllabic]
     starts = [0]
     for before, middle in pairwise(middles):

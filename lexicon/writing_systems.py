@@ -45,12 +45,12 @@ _LOOSE_MARKS = re.compile(
 _FOREIGN = re.compile("f[fm]*")
 
 
-def script_of(letter: str) -> str:
+def letter_script(letter: str) -> str:
     """First word of a letter's Unicode name: LATIN, CYRILLIC, CJK, ...; empty for a letter without name."""
     return unicodedata.name(letter, "").partition(" ")[0]
 
 
-def scripts_of(language: str) -> frozenset[str]:
+def language_scripts(language: str) -> frozenset[str]:
     """Writing systems that a language is read in, Latin included."""
     own = SCRIPTS.get(language, SCRIPTS.get(language.partition("-")[0], frozenset()))
     return own | _EVERYWHERE
@@ -61,7 +61,7 @@ class _Kinds(dict[int, str]):
 
     def __init__(self, language: str) -> None:
         super().__init__()
-        self._readable = scripts_of(language)
+        self._readable = language_scripts(language)
 
     def __missing__(self, code: int) -> str:
         self[code] = kind = self._kind(chr(code))
@@ -71,7 +71,7 @@ class _Kinds(dict[int, str]):
         if unicodedata.category(letter)[0] == "M":
             return "o" if _LOOSE_MARKS.match(letter) else "m"
         plain = unicodedata.normalize("NFKC", letter)
-        is_foreign = any(unicodedata.category(c)[0] == "L" and script_of(c) not in self._readable for c in plain)
+        is_foreign = any(unicodedata.category(c)[0] == "L" and letter_script(c) not in self._readable for c in plain)
         return "f" if is_foreign else "o"
 
 
@@ -102,11 +102,11 @@ def check_script(text: str, language: str) -> None:
     words: dict[str, None] = {}
     for begin, end in foreign_runs(text, language):
         run = text[begin:end]
-        if not run_name(run) and unicodedata.normalize("NFKC", run) not in readings.table("units.tsv"):
+        if not run_name(run) and unicodedata.normalize("NFKC", run) not in readings.read_table("units.tsv"):
             words[run] = None
     if words:
         shown = ", ".join(word[:SHOWN_CHARACTERS] for word in list(words)[:SHOWN_WORDS])
-        scripts = {script_of(unicodedata.normalize("NFKC", c)[0]) for word in words for c in word if c.isalpha()}
+        scripts = {letter_script(unicodedata.normalize("NFKC", c)[0]) for word in words for c in word if c.isalpha()}
         names = ", ".join(sorted(_NAMES.get(script, script.capitalize() or "unnamed") for script in scripts))
         more = ", ..." if len(words) > SHOWN_WORDS else ""
         raise InputError(

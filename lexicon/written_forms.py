@@ -7,7 +7,15 @@ import functools
 import re
 from importlib import resources
 
-from lexicon.numbers import cardinal, decade, digits, fraction, number, ordinal, year
+from lexicon.numbers import (
+    cardinal_words,
+    decade_year_words,
+    digit_words,
+    fraction_words,
+    number_words,
+    ordinal_words,
+    year_words,
+)
 
 MONTHS = (
     "January", "February", "March", "April", "May", "June", "July", "August", "September", "October", "November",
@@ -33,65 +41,67 @@ MAGNITUDES = {
 
 
 @functools.cache
-def table(name: str) -> dict[str, tuple[str, ...]]:
+def read_table(name: str) -> dict[str, tuple[str, ...]]:
     """Rows of one of this package's tables, by their first cell."""
     lines = resources.files("lexicon").joinpath(name).read_text(encoding="utf-8").splitlines()[1:]
     return {row[0]: tuple(row[1:]) for row in (line.split("\t") for line in lines)}
 
 
-def signed(written: str) -> str:
+def signed_number_words(written: str) -> str:
     """A number with its sign."""
     if written[0] in "+-":
-        return f"{'minus' if written[0] == '-' else 'plus'} {number(written[1:])}"
-    return number(written)
+        return f"{'minus' if written[0] == '-' else 'plus'} {number_words(written[1:])}"
+    return number_words(written)
 
 
-def money(amount: str, currency: str, magnitude: str) -> str:
+def money_words(amount: str, currency: str, magnitude: str) -> str:
     """$5.20 is five dollars and twenty cents, $2.5M two point five million dollars."""
     one, many, cent, cents = CURRENCIES[currency]
     sign = "minus " if amount.startswith("-") else ""
     amount = amount.lstrip("+-")
     whole, _, decimals = amount.replace(",", "").partition(".")
     if magnitude:
-        return f"{sign}{number(amount)} {MAGNITUDES.get(magnitude, magnitude)} {many}"
+        return f"{sign}{number_words(amount)} {MAGNITUDES.get(magnitude, magnitude)} {many}"
     if decimals and (len(decimals) != 2 or not cent):
-        return f"{sign}{number(amount)} {many}"
-    whole_words = f"{number(whole or '0')} {one if int(whole or 0) == 1 else many}"
+        return f"{sign}{number_words(amount)} {many}"
+    whole_words = f"{number_words(whole or '0')} {one if int(whole or 0) == 1 else many}"
     if not int(decimals or 0):
         return sign + whole_words
-    small = f"{cardinal(int(decimals))} {cent if int(decimals) == 1 else cents}"
+    small = f"{cardinal_words(int(decimals))} {cent if int(decimals) == 1 else cents}"
     return sign + (f"{whole_words} and {small}" if int(whole or 0) else small)
 
 
-def measure(amount: str, unit: str) -> str:
+def measure_words(amount: str, unit: str) -> str:
     """5 km is five kilometers, 1 km one kilometer."""
-    one, many = table("units.tsv")[unit]
-    return f"{signed(amount)} {one if amount.lstrip('+-') == '1' else many}"
+    one, many = read_table("units.tsv")[unit]
+    return f"{signed_number_words(amount)} {one if amount.lstrip('+-') == '1' else many}"
 
 
-def year_or_number(written: str) -> str:
+def year_or_number_words(written: str) -> str:
     """A year where four digits look like one."""
-    return year(int(written)) if len(written) == 4 and written[0] != "0" else number(written)
+    return year_words(int(written)) if len(written) == 4 and written[0] != "0" else number_words(written)
 
 
-def date(day: int, month: int, year_written: str, *, day_first: bool = False) -> str:
+def date_words(day: int, month: int, year_written: str, *, day_first: bool = False) -> str:
     """March third, twenty twenty-four, or the third of March."""
-    spoken = f"the {ordinal(day)} of {MONTHS[month - 1]}" if day_first else f"{MONTHS[month - 1]} {ordinal(day)}"
+    spoken = (
+        f"the {ordinal_words(day)} of {MONTHS[month - 1]}" if day_first else f"{MONTHS[month - 1]} {ordinal_words(day)}"
+    )
     if not year_written:
         return spoken
     full = int(year_written)
     if len(year_written) == 2:
         full += 2000 if full < 50 else 1900
-    return f"{spoken}, {year(full)}"
+    return f"{spoken}, {year_words(full)}"
 
 
-def numeric_date(first: int, second: int, year_written: str, separator: str) -> str | None:
+def numeric_date_words(first: int, second: int, year_written: str, separator: str) -> str | None:
     """3/15/2024 month first, 15/3/2024 and 15.3.2024 day first; None where it is no date."""
     day_first = separator == "." or first > 12
     day, month = (first, second) if day_first else (second, first)
     if not (1 <= day <= 31 and 1 <= month <= 12):
         return None
-    return date(day, month, year_written)
+    return date_words(day, month, year_written)
 
 
 def month_number(name: str) -> int:
@@ -99,21 +109,21 @@ def month_number(name: str) -> int:
     return next(at for at, month in enumerate(MONTHS, start=1) if month[:3].lower() == name[:3].lower())
 
 
-def time_of_day(hour: int, minute: int, second: int, half: str) -> str:
+def time_words(hour: int, minute: int, second: int, half: str) -> str:
     """3:05 pm is three oh five PM, 15:00 fifteen hundred, 3:00 three o'clock."""
-    words = cardinal(hour)
+    words = cardinal_words(hour)
     if minute:
-        words += f" {'oh ' if minute < 10 else ''}{cardinal(minute)}"
+        words += f" {'oh ' if minute < 10 else ''}{cardinal_words(minute)}"
     elif not half:
         words += " hundred" if hour > 12 else " o'clock"
     if second:
-        words += f" and {cardinal(second)} second{'s' if second != 1 else ''}"
+        words += f" and {cardinal_words(second)} second{'s' if second != 1 else ''}"
     return f"{words} {half.replace('.', '').upper()}" if half else words
 
 
-def telephone(written: str) -> str:
+def telephone_words(written: str) -> str:
     """Digit by digit, with a comma between groups."""
-    groups = [digits(group) for group in re.findall(r"[0-9]+", written)]
+    groups = [digit_words(group) for group in re.findall(r"[0-9]+", written)]
     return ("plus " if written.lstrip().startswith("+") else "") + ", ".join(groups)
 
 
@@ -125,16 +135,16 @@ _ADDRESS_SIGNS = {
 _SPELLED_ENDINGS = re.compile("uk|us|de|fr|eu|io|ai|tv|ca|ch|at|au|nz|jp|cn|ru|es|nl|se|pl|be|dk|fi|ie|br|mx|kr")
 
 
-def _name_word(written: str) -> str:
+def _readable_name(written: str) -> str:
     """A word of an address or tag, in a form that is read in no other way: small, or an initialism in capitals."""
     is_initialism = written.isupper() and len(written) > 1 and not re.fullmatch("[IVXLCDM]+", written)
     if is_initialism:
         return written
     small = written.lower()
-    return _SPELT_OUT.get(small) or table("symbols.tsv").get(small, (small,))[0]
+    return _SPELT_OUT.get(small) or read_table("symbols.tsv").get(small, (small,))[0]
 
 
-def address(written: str) -> str:
+def address_words(written: str) -> str:
     """www.example.com/a is WWW dot example dot com slash a."""
     bare = re.sub(r"^[A-Za-z]{2,8}://", "", written).rstrip("/")
     host = re.match(r"[^/?#]*", bare)
@@ -143,29 +153,29 @@ def address(written: str) -> str:
     for piece in re.finditer(r"[^\W\d_]+|[0-9]+|[^\w\s]|_", bare):
         text = piece.group()
         if text[0].isdigit():
-            words.append(number(text) if len(text) < 5 else digits(text))
+            words.append(number_words(text) if len(text) < 5 else digit_words(text))
         elif text.isalpha():
             is_spelled = text == "www" or (piece.start() == last_dot + 1 and _SPELLED_ENDINGS.fullmatch(text))
-            words.append(text.upper() if is_spelled else _name_word(text.lower()))
+            words.append(text.upper() if is_spelled else _readable_name(text.lower()))
         elif text in _ADDRESS_SIGNS:
             words.append(_ADDRESS_SIGNS[text])
     return " ".join(words)
 
 
-def hashtag(written: str) -> str:
+def hashtag_words(written: str) -> str:
     """#MachineLearning2024 is machine learning twenty twenty-four."""
     pieces = re.findall(r"[A-Z]{2,}(?![a-z])|[A-Z]?[^\W\d_A-Z]+|[A-Z]|[0-9]+|[^\W\d_]+", written.lstrip("#@"))
-    return " ".join(year_or_number(piece) if piece[0].isdigit() else _name_word(piece) for piece in pieces)
+    return " ".join(year_or_number_words(piece) if piece[0].isdigit() else _readable_name(piece) for piece in pieces)
 
 
-def ratio(top: str, bottom: str, whole: str = "") -> str:
+def ratio_words(top: str, bottom: str, whole: str = "") -> str:
     """1/2 is one half, 2 1/2 two and a half."""
-    part = fraction(int(top), int(bottom))
+    part = fraction_words(int(top), int(bottom))
     if not whole:
         return part
-    return f"{number(whole)} and {'a' + part.removeprefix('one') if part.startswith('one ') else part}"
+    return f"{number_words(whole)} and {'a' + part.removeprefix('one') if part.startswith('one ') else part}"
 
 
-def decade_of(written: str) -> str:
+def decade_words(written: str) -> str:
     """1990s is nineteen nineties."""
-    return decade(int(written))
+    return decade_year_words(int(written))

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from lexicon.errors import Tts2faceError as Tts2faceError
     from lexicon.sequence import PhoneSequence as PhoneSequence
     from lexicon.sequence import WordSpan as WordSpan
-    from tts2face.api import write_clip as write_clip
+    from tts2face.api import write_request as write_clip
     from tts2face.catalogue import faces as faces
     from tts2face.catalogue import identities as identities
     from tts2face.catalogue import languages as languages
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from tts2face.render.picture import Picture as Picture
     from tts2face.request import Request as Request
     from tts2face.session import Session as Session
-    from tts2face.session import Written as Written
+    from tts2face.session import WrittenClip as Written
     from tts2face.synthesis.animated_face import AnimatedFace as AnimatedFace
     from tts2face.synthesis.clip_stream import Piece as Piece
     from tts2face.synthesis.performance import Performance as Performance

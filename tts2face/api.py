@@ -9,7 +9,7 @@ from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.types import Clip
 
 
-def write_clip(
+def write_request(
     clip: Clip,
     face: AnimatedFace,
     out: str | Path,

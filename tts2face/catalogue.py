@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError
-from tts2face.storage.files import SHIPPED, named_file
+from tts2face.storage.files import SHIPPED, find_file
 
 OWN_FACE = "self"
 
@@ -127,7 +127,7 @@ def identities(face: str = "head") -> tuple[IdentityEntry, ...]:
     DataError
         The file is damaged, or no face.
     """
-    path = named_file(face, "face")
+    path = find_file(face, "face")
     _, header = _read(path, "face")
     try:
         return tuple(IdentityEntry(name, face, summary) for name, _, summary in header["identities"])

@@ -34,7 +34,7 @@ def first_sample(frame: int, rate: int, fps: Fraction) -> int:
     return round(Fraction(frame) * rate / fps)
 
 
-def on_frames(speech: Speech, first_frame: int, fps: Fraction) -> Speech:
+def pad_to_frame(speech: Speech, first_frame: int, fps: Fraction) -> Speech:
     """Speech lengthened by silence to the last sample of a frame, counted from the start of the whole sound."""
     rate, samples = speech.waveform.rate, speech.waveform.samples
     n_frames = frame_count(speech.waveform.duration, float(fps))

@@ -40,12 +40,12 @@ def inlined_kernel(function: Callable[Arguments, Result]) -> Callable[Arguments,
 
 def cache_folder(package: Path) -> Path | None:
     """A private folder for compiled kernels; None where numba's own choice can be written."""
-    if VARIABLE in os.environ or _can_write(package / "__pycache__") or _can_write(_user_cache()):
+    if VARIABLE in os.environ or _can_write(package / "__pycache__") or _can_write(_user_cache_folder()):
         return None
     return _private_folder()
 
 
-def _user_cache() -> Path:
+def _user_cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "numba"
 
 

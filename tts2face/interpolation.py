@@ -11,7 +11,7 @@ Array = NDArray[Any]
 
 
 @kernel
-def bilinear(picture: Array, x: float, y: float, c: int) -> float:
+def interpolate_bilinear(picture: Array, x: float, y: float, c: int) -> float:
     """One channel of an (H, W, C) picture at a place; beyond its edge the edge goes on."""
     height, width = picture.shape[0], picture.shape[1]
     x = min(max(x, 0.0), width - 1.0)
@@ -25,7 +25,7 @@ def bilinear(picture: Array, x: float, y: float, c: int) -> float:
 
 
 @kernel
-def sampled(picture: Array, points: Array, corners: Array, weights: Array, out: Array) -> None:
+def sample_triangles(picture: Array, points: Array, corners: Array, weights: Array, out: Array) -> None:
     """Write into (P, C) `out` an (H, W, C) picture at P places inside triangles of (N, 2) points.
 
     Place i is the sum of ``weights[i, k] * points[corners[i, k]]``, k = 0..2: piecewise-affine warping.
@@ -36,10 +36,10 @@ def sampled(picture: Array, points: Array, corners: Array, weights: Array, out: 
             x += weights[i, k] * points[corners[i, k], 0]
             y += weights[i, k] * points[corners[i, k], 1]
         for c in range(out.shape[1]):
-            out[i, c] = bilinear(picture, x, y, c)
+            out[i, c] = interpolate_bilinear(picture, x, y, c)
 
 
-def cubic_at(values: NDArray[np.float32], at: NDArray[np.float64]) -> NDArray[np.float32]:
+def interpolate_cubic(values: NDArray[np.float32], at: NDArray[np.float64]) -> NDArray[np.float32]:
     """(N, D) of (T, D) values at rows between them, by cubics through them (Catmull and Rom 1974)."""
     low = np.minimum(at, len(values) - 1).astype(int)
     part = (at - low)[:, None].astype(np.float32)

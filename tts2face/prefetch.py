@@ -25,8 +25,8 @@ class Prefetch(Generic[Item]):
         self._source = source
         self._made: queue.Queue[Offer] = queue.Queue(room)
         self._stopped = threading.Event()
-        self._maker = threading.Thread(target=self._make, name="prefetch", daemon=True)
-        self._maker.start()
+        self._thread = threading.Thread(target=self._fill, name="prefetch", daemon=True)
+        self._thread.start()
 
     def __enter__(self) -> "Prefetch[Item]":
         """Give the items."""
@@ -37,7 +37,7 @@ class Prefetch(Generic[Item]):
     ) -> None:
         """Let the maker finish the item at hand and end: a process that ends around running native code aborts."""
         self._stopped.set()
-        self._maker.join()
+        self._thread.join()
 
     def __iter__(self) -> Iterator[Item]:
         """Items in their order."""
@@ -49,17 +49,17 @@ class Prefetch(Generic[Item]):
                 raise error
             yield item
 
-    def _make(self) -> None:
+    def _fill(self) -> None:
         try:
             for item in self._source:
-                self._offer((item, None))
+                self._put((item, None))
                 if self._stopped.is_set():
                     return
-            self._offer((None, StopIteration()))
+            self._put((None, StopIteration()))
         except BaseException as error:  # noqa: BLE001 - raised again in the thread that asked
-            self._offer((None, error))
+            self._put((None, error))
 
-    def _offer(self, item: Offer) -> None:
+    def _put(self, item: Offer) -> None:
         while not self._stopped.is_set():
             with contextlib.suppress(queue.Full):
                 return self._made.put(item, timeout=PATIENCE_S)

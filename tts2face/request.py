@@ -91,24 +91,24 @@ class Request:
         from lexicon.languages import language_code
 
         object.__setattr__(self, "language", language_code(self.language))
-        _check("rate", self.rate, RATES)
-        _check("volume", self.volume, VOLUMES)
-        _check("fps", self.fps, FRAMES_PER_SECOND)
+        _check_limits("rate", self.rate, RATES)
+        _check_limits("volume", self.volume, VOLUMES)
+        _check_limits("fps", self.fps, FRAMES_PER_SECOND)
         if self.synthesis not in SYNTHESES:
             raise InputError(f"there is no synthesis {self.synthesis!r}; choose {' or '.join(SYNTHESES)}")
         if self.seed < 0:
             raise InputError(f"seed must be 0 or more, not {self.seed}")
         if self.drive is not None:
-            _check_drive(self)
+            _check_audio_map(self)
         if self.audio is not None and (self.voice is not None or self.rate != 1.0):
             raise InputError("a recording keeps its own voice and speed; leave --voice and --rate away")
         if self.idle is not None:
-            _check("idle", self.idle, IDLE_S)
+            _check_limits("idle", self.idle, IDLE_S)
             _check_idle(self)
         _check_gestures(self)
 
 
-def _check_drive(request: Request) -> None:
+def _check_audio_map(request: Request) -> None:
     if request.drive not in DRIVES:
         raise InputError(f"there is no drive {request.drive!r}; choose {' or '.join(DRIVES)}")
     if request.audio is None:
@@ -137,7 +137,7 @@ def _check_idle(request: Request) -> None:
         raise InputError("an idle face says nothing; leave --voice, --rate and --volume away")
 
 
-def _check(name: str, value: float, limits: tuple[float, float]) -> None:
+def _check_limits(name: str, value: float, limits: tuple[float, float]) -> None:
     low, high = limits
     if not low <= value <= high:
         raise InputError(f"{name} must lie between {low:g} and {high:g}, not {value:g}")

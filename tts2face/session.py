@@ -10,8 +10,8 @@ from typing import Any, TypeVar
 
 from lexicon.dictionary import read_dictionary
 from lexicon.errors import InputError
-from tts2face.exemplar.synthesis import VisualVoice, visual_voice
-from tts2face.gesture.gesture_stream import Fields
+from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model
+from tts2face.gesture.gesture_stream import GestureFields
 from tts2face.gesture.ju2008 import FIELD_OPTIONS
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
@@ -19,7 +19,7 @@ from tts2face.models.palette import Palette, load_palette
 from tts2face.models.talker import Talker, load_talker
 from tts2face.prefetch import Prefetch
 from tts2face.render.encode import ClipWriter, write_clips
-from tts2face.render.output_path import checked_output
+from tts2face.render.output_path import check_output
 from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
 from tts2face.request import Request
@@ -28,10 +28,10 @@ from tts2face.storage.overwrite import refuse_overwriting
 from tts2face.synthesis.animated_face import AnimatedFace, mesh_face, own_appearance_face
 from tts2face.synthesis.clip_stream import Performers, Piece, pieces
 from tts2face.synthesis.gesture_layer import GestureLayer
-from tts2face.synthesis.marked_speech import Reached
-from tts2face.synthesis.performance import Performance, clips_of, perform
+from tts2face.synthesis.marked_speech import MarkTime
+from tts2face.synthesis.performance import Performance, perform, take_clips
 from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, prepare
-from tts2face.types import Clip, joined_clips
+from tts2face.types import Clip, concatenate_clips
 from tts2face.voice.engine import Pronouncing, Voice, load_voice
 
 DEFAULT_FIELDS = "fields"
@@ -45,7 +45,7 @@ Value = TypeVar("Value")
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class WrittenClip:
     """What a file holds: seconds of sound, frames, and when the named marks of the text are reached.
 
     ``mismatches`` are words of the text that the recording probably does not say.
@@ -54,7 +54,7 @@ class Written:
     path: Path
     seconds: float
     n_frames: int
-    marks: tuple[Reached, ...] = ()
+    marks: tuple[MarkTime, ...] = ()
     is_silent: bool = False
     mismatches: tuple[TextMismatch, ...] = ()
 
@@ -153,7 +153,7 @@ class Session:
         BackendError
             The voice is not installed.
         """
-        return joined_clips([piece.clip for piece in self.stream(text, **options)])
+        return concatenate_clips([piece.clip for piece in self.stream(text, **options)])
 
     def stream(self, text: str | Request, **options: Any) -> Iterator[Piece]:
         """The clip of a text or request piece by piece, in bounded memory; arguments as for `clip`.
@@ -171,7 +171,7 @@ class Session:
         on_progress: Progress | None = None,
         on_piece: Callable[[Piece], None] | None = None,
         **options: Any,
-    ) -> Written:
+    ) -> WrittenClip:
         """Speak, animate, draw and encode a text or request into a file.
 
         The next sentence is spoken while one is drawn.
@@ -197,11 +197,11 @@ class Session:
         of_picture = {name: options.pop(name) for name in _names(Picture) if name in options and picture is None}
         prepared = prepare(request_of(text, options))
         picture = picture or Picture(**of_picture)
-        checked_output(out)
+        check_output(out)
         refuse_overwriting({"out": out}, input_paths(prepared.request, picture))
         renderer = self.renderer(picture, has_gestures=prepared.request.has_gestures)
         progress = _Steps(prepared.n_steps, on_progress)
-        marks: list[Reached] = []
+        marks: list[MarkTime] = []
         mismatches: list[TextMismatch] = []
         seconds, n_frames = 0.0, 0
         with (
@@ -218,7 +218,7 @@ class Session:
                 seconds += piece.clip.speech.waveform.duration
                 n_frames += len(piece.clip.motion)
         progress.finish()
-        return Written(Path(out), seconds, n_frames, tuple(marks), mismatches=tuple(mismatches))
+        return WrittenClip(Path(out), seconds, n_frames, tuple(marks), mismatches=tuple(mismatches))
 
     def write_performance(
         self,
@@ -227,7 +227,7 @@ class Session:
         *,
         picture: Picture | None = None,
         stages: Callable[[str], Progress] | None = None,
-    ) -> Written:
+    ) -> WrittenClip:
         """Let a recorded person drive the session's face, and write the clip into a file.
 
         Parameters
@@ -240,16 +240,16 @@ class Session:
         InputError, DataError, BackendError
             As `tts2face.synthesis.performance.perform`; or the file cannot be written.
         """
-        checked_output(out)
+        check_output(out)
         picture = picture or Picture()
         self._still_face.renderer(picture)  # refuses what cannot be drawn before the take is watched
         take = perform(performance, self._still_face, on_progress=stages("watching") if stages else None)
         n_frames = len(take.motion.face)
         draw = stages("drawing") if stages else None
-        clips = clips_of(take.motion, take.sound)
+        clips = take_clips(take.motion, take.sound)
         progress = (lambda done, _: draw(done, n_frames)) if draw else None
         write_clips(out, clips, take.face.renderer(picture), on_progress=progress)
-        return Written(Path(out), take.seconds, n_frames, is_silent=not len(take.sound.samples))
+        return WrittenClip(Path(out), take.seconds, n_frames, is_silent=not len(take.sound.samples))
 
     def renderer(self, picture: Picture, *, has_gestures: bool = True) -> FrameRenderer:
         """What draws the session's face into pictures of a kind; the last `RENDERERS_KEPT` of them are kept."""
@@ -278,13 +278,13 @@ class Session:
         return self.face if has_gestures else self._still_face
 
     @property
-    def _exemplars(self) -> VisualVoice:
-        return self._once("exemplars", lambda: visual_voice(self.talker))
+    def _exemplars(self) -> ExemplarModel:
+        return self._once("exemplars", lambda: build_exemplar_model(self.talker))
 
-    def _fields(self, palette: Palette, request: Request) -> Fields:
+    def _fields(self, palette: Palette, request: Request) -> GestureFields:
         method = request.gestures if request.gestures in FIELD_OPTIONS else DEFAULT_FIELDS  # noise uses no options
         key = ("fields", method, request.pitch)
-        return self._once(key, lambda: Fields(palette, FIELD_OPTIONS[method], with_pitch=request.pitch))
+        return self._once(key, lambda: GestureFields(palette, FIELD_OPTIONS[method], with_pitch=request.pitch))
 
     def _prepare_face(self, palette: Palette | None) -> AnimatedFace:
         if self._mesh is None:

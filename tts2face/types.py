@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lexicon.errors import InputError
-from lexicon.sequence import PhoneSequence, WordSpan, concatenated
+from lexicon.sequence import PhoneSequence, WordSpan, concatenate_phones
 
 HEAD_CHANNELS = ("pitch", "yaw", "roll", "x", "y", "z")  # radians (nod down, turn to own left, tilt) and mm
 
@@ -24,7 +24,7 @@ def frame_count(duration_s: float, fps: float) -> int:
     return max(1, math.ceil(duration_s * fps - 0.01))
 
 
-def _locked(values: ArrayLike, what: str, ndim: int) -> NDArray[np.float32]:
+def _read_only(values: ArrayLike, what: str, ndim: int) -> NDArray[np.float32]:
     array = np.array(values, dtype=np.float32)
     if array.ndim != ndim:
         raise InputError(f"{what} must have {ndim} dimension(s), not shape {array.shape}")
@@ -42,7 +42,7 @@ class Waveform:
     rate: int
 
     def __init__(self, samples: ArrayLike, rate: int) -> None:
-        locked = _locked(samples, "samples", 1)
+        locked = _read_only(samples, "samples", 1)
         if rate <= 0:
             raise InputError(f"a waveform's rate must be above 0 Hz, not {rate}")
         if locked.size and float(np.abs(locked).max()) > 1.0:
@@ -65,7 +65,7 @@ class Trajectory:
     fps: float
 
     def __init__(self, channels: Sequence[str], values: ArrayLike, fps: float) -> None:
-        locked = _locked(values, "trajectory values", 2)
+        locked = _read_only(values, "trajectory values", 2)
         if len(set(channels)) != len(channels):
             raise InputError("trajectory channels must have different names")
         if locked.shape[1] != len(channels):
@@ -136,19 +136,19 @@ class Clip:
         return self.motion.fps
 
 
-def joined_speech(parts: Sequence[Speech]) -> Speech:
+def concatenate_speech(parts: Sequence[Speech]) -> Speech:
     """Speech put one behind the other, at one sample rate."""
     rate = parts[0].waveform.rate
     if any(part.waveform.rate != rate for part in parts):
         raise InputError("speech is joined at one sample rate only; resample it first")
-    phones, words = concatenated([part.phones for part in parts], [part.words for part in parts])
+    phones, words = concatenate_phones([part.phones for part in parts], [part.words for part in parts])
     samples = np.concatenate([part.waveform.samples for part in parts])
     edges = phones.edges.copy()
     edges[-1] = len(samples) / rate
     return Speech(Waveform(samples, rate), PhoneSequence(phones.phones, edges), words)
 
 
-def joined_clips(clips: Sequence[Clip]) -> Clip:
+def concatenate_clips(clips: Sequence[Clip]) -> Clip:
     """Clips put one behind the other; all but the last must end on a frame, as `tts2face.api.stream` makes them."""
     first = clips[0]
     motion = np.concatenate([clip.motion.values for clip in clips])
@@ -156,5 +156,5 @@ def joined_clips(clips: Sequence[Clip]) -> Clip:
     return Clip(
         Trajectory(first.motion.channels, motion, first.fps),
         Trajectory(HEAD_CHANNELS, head, first.fps),
-        joined_speech([clip.speech for clip in clips]),
+        concatenate_speech([clip.speech for clip in clips]),
     )

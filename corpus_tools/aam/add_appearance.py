@@ -3,20 +3,20 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from corpus_tools.aam.source_videos import filmed
+from corpus_tools.aam.source_videos import build_appearance_recording
 from corpus_tools.aam.train_appearance import TextureOptions, learn_appearance
-from corpus_tools.recordings.corpus_video import Eyes
+from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.run_options import Effort, Progress
+from corpus_tools.run_options import Progress, RunOptions
 from tts2face.models.talker import Talker
 from tts2face.video.landmark_models import find_bundle
 
 
-def with_appearance(
+def add_appearance(
     talker: Talker,
     observations: Sequence[Observation],
     *,
-    effort: Effort,
+    effort: RunOptions,
     options: TextureOptions | None = None,
     on_progress: Progress | None = None,
 ) -> Talker:
@@ -34,9 +34,9 @@ def with_appearance(
     BackendError
         A package or the landmark models are missing.
     """
-    eyes = Eyes(effort.folder(), find_bundle(effort.model))
+    eyes = CachedTracker(effort.folder(), find_bundle(effort.model))
     recordings = [
-        filmed(observation, spoken.shape, eyes)
+        build_appearance_recording(observation, spoken.shape, eyes)
         for observation, spoken in zip(observations, talker.utterances, strict=True)
     ]
     learnt = learn_appearance(recordings, options, on_progress=on_progress)

@@ -5,16 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.aam.reference_frame import covered
+from corpus_tools.aam.reference_frame import rasterise_triangles
 from tts2face.cloning.parameter_transfer import SPREADS
-from tts2face.interpolation import sampled
+from tts2face.interpolation import sample_triangles
 from tts2face.models.appearance import Appearance, TextureModel, nearest_pixels
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LooksMap:
+class AppearanceTransfer:
     """``relation`` (A, B) gives the target's looks for the source's; ``limits`` (A,) are the largest of each."""
 
     relation: Floats
@@ -26,7 +26,7 @@ class LooksMap:
         return np.clip(wanted, -self.limits, self.limits).astype(np.float32)
 
 
-def looks_map(source: Appearance, target: Appearance) -> LooksMap:
+def build_appearance_transfer(source: Appearance, target: Appearance) -> AppearanceTransfer:
     """The way from the looks of one talker to those of another, face to face and mouth to mouth.
 
     Notes
@@ -35,19 +35,19 @@ def looks_map(source: Appearance, target: Appearance) -> LooksMap:
     products with the target's; textures of all talkers are sRGB values over the same landmarks.
     """
     blocks = [
-        _relation(source.face, target.face),
-        _relation(source.mouth, target.mouth),
+        _basis_products(source.face, target.face),
+        _basis_products(source.mouth, target.mouth),
     ]
     relation = np.zeros((sum(len(block) for block in blocks), sum(block.shape[1] for block in blocks)))
     (n_target, n_source), (face, mouth) = blocks[0].shape, blocks
     relation[:n_target, :n_source] = face
     relation[n_target:, n_source:] = mouth
-    return LooksMap(relation, SPREADS * target.spread.astype(np.float64))
+    return AppearanceTransfer(relation, SPREADS * target.spread.astype(np.float64))
 
 
-def _relation(source: TextureModel, target: TextureModel) -> Floats:
+def _basis_products(source: TextureModel, target: TextureModel) -> Floats:
     """(A, B) inner products of the target's basis textures with the source's, warped to the target's frame."""
-    owner, weights = covered(target.reference.astype(np.float64), target.triangles, target.size)
+    owner, weights = rasterise_triangles(target.reference.astype(np.float64), target.triangles, target.size)
     corners = target.triangles[owner[target.pixels]].astype(np.int32)
     inside = weights[target.pixels].astype(np.float32)
     fill = nearest_pixels(source)
@@ -57,6 +57,6 @@ def _relation(source: TextureModel, target: TextureModel) -> Floats:
     relation = np.zeros((target.n_modes, source.n_modes))
     for number, texture in enumerate(source.basis):
         picture = np.ascontiguousarray(texture[fill].reshape(height, width, 3))
-        sampled(picture, source.reference.astype(np.float64), corners, inside, warped)
+        sample_triangles(picture, source.reference.astype(np.float64), corners, inside, warped)
         relation[:, number] = own @ warped.ravel()
     return relation

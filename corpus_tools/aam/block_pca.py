@@ -9,7 +9,7 @@ Floats = NDArray[np.float32]
 
 
 @dataclass(slots=True)
-class GrowingComponents:
+class IncrementalPca:
     """Principal components that grow with the data; memory does not depend on the number of rows.
 
     Sequential Karhunen-Loeve (Levey and Lindenbaum 2000), with the mean of Ross et al. 2008.
@@ -24,8 +24,8 @@ class GrowingComponents:
     n_rows: int = 0
     mean: Floats = field(default_factory=lambda: np.zeros(0, np.float32))
     basis: Floats = field(default_factory=lambda: np.zeros((0, 0), np.float32))
-    scales: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
-    total: float = 0.0
+    singular_values: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    total_variance: float = 0.0
 
     def add(self, rows: NDArray[np.floating]) -> None:
         """Take in (B, D) more rows."""
@@ -35,30 +35,34 @@ class GrowingComponents:
             return
         mean = rows.mean(axis=0, dtype=np.float64).astype(np.float32)
         parts = [rows - mean]
-        self.total += float(np.square(parts[0], dtype=np.float64).sum())
+        self.total_variance += float(np.square(parts[0], dtype=np.float64).sum())
         if self.n_rows:
             n_all = self.n_rows + n_new
             between = np.sqrt(self.n_rows * n_new / n_all) * (self.mean - mean).astype(np.float64)
-            self.total += float(between @ between)
-            parts = [self.scales[:, None].astype(np.float32) * self.basis, *parts, between[None].astype(np.float32)]
+            self.total_variance += float(between @ between)
+            parts = [
+                self.singular_values[:, None].astype(np.float32) * self.basis,
+                *parts,
+                between[None].astype(np.float32),
+            ]
             mean = ((self.n_rows * self.mean.astype(np.float64) + n_new * mean.astype(np.float64)) / n_all).astype(
                 np.float32
             )
         self.mean, self.n_rows = mean, self.n_rows + n_new
-        self.basis, self.scales = _decomposed(np.concatenate(parts), self.n_kept)
+        self.basis, self.singular_values = _truncated_svd(np.concatenate(parts), self.n_kept)
 
     def spread(self) -> NDArray[np.float64]:
         """(K,) standard deviation along each component."""
-        deviations: NDArray[np.float64] = self.scales / np.sqrt(max(self.n_rows, 1))
+        deviations: NDArray[np.float64] = self.singular_values / np.sqrt(max(self.n_rows, 1))
         return deviations
 
     def explained(self) -> NDArray[np.float64]:
         """(K,) share of the variance in the first 1, 2, ... components."""
-        shares: NDArray[np.float64] = np.cumsum(self.scales**2) / max(self.total, 1e-300)
+        shares: NDArray[np.float64] = np.cumsum(self.singular_values**2) / max(self.total_variance, 1e-300)
         return shares
 
 
-def _decomposed(rows: Floats, n_kept: int) -> tuple[Floats, NDArray[np.float64]]:
+def _truncated_svd(rows: Floats, n_kept: int) -> tuple[Floats, NDArray[np.float64]]:
     """Leading right singular vectors (K, D) and singular values (K,) of (B, D) rows, by the smaller Gram matrix."""
     products = rows @ rows.T if len(rows) <= rows.shape[1] else rows.T @ rows
     values, vectors = np.linalg.eigh(products.astype(np.float64))

@@ -6,12 +6,12 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.aam.block_pca import GrowingComponents
+from corpus_tools.aam.block_pca import IncrementalPca
 from corpus_tools.aam.mesh import MOUTH_POINTS, N_MESH
-from corpus_tools.aam.procrustes import aligned, fitted, moved
-from corpus_tools.aam.source_videos import Filmed
-from corpus_tools.aam.train_appearance import Learnt
-from corpus_tools.recordings.audio_video_sync import LEAD_S, agreement
+from corpus_tools.aam.procrustes import align_shapes, apply_similarities, fit_similarities
+from corpus_tools.aam.source_videos import AppearanceRecording
+from corpus_tools.aam.train_appearance import LearnedAppearance
+from corpus_tools.recordings.audio_video_sync import LEAD_S, estimate_sync
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.training.train_talker import CLOSED
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
@@ -24,7 +24,7 @@ INNER_LIPS = (*INNER_LIP_UPPER, *INNER_LIP_LOWER)
 
 
 @dataclass(frozen=True, slots=True)
-class Figures:
+class AppearanceMeasures:
     """Figures of shape and texture; pixels are those of the video, ``held_out`` is what no model was learnt from.
 
     ``shape_modes``, ``texture_modes`` and ``mouth_modes`` explain 95 and 99 % of the variance (0: more than were kept).
@@ -47,57 +47,60 @@ class Figures:
         return asdict(self)
 
 
-def figures(
-    learnt_from: Sequence[Filmed], learnt: Learnt, held_out: Sequence[Filmed], observations: Sequence[Observation]
-) -> Figures:
+def measure_appearance(
+    learnt_from: Sequence[AppearanceRecording],
+    learnt: LearnedAppearance,
+    held_out: Sequence[AppearanceRecording],
+    observations: Sequence[Observation],
+) -> AppearanceMeasures:
     """Figures of a model on recordings held out; closures and lag are those of all `observations`."""
     components, mean = shape_components(learnt_from)
     shape, lips, gap = shape_errors(held_out, components, mean)
     texture, mouth = texture_quality(held_out, learnt)
-    return Figures(
-        shape_modes=modes_for(components.explained()),
-        texture_modes=modes_for(texture_variance(learnt_from, learnt)),
-        mouth_modes=modes_for(learnt.explained[1]),
+    return AppearanceMeasures(
+        shape_modes=n_modes_for_variance(components.explained()),
+        texture_modes=n_modes_for_variance(texture_variance(learnt_from, learnt)),
+        mouth_modes=n_modes_for_variance(learnt.explained[1]),
         held_out_shape_px=shape,
         held_out_lips_px=lips,
         held_out_gap_px=gap,
         held_out_texture_db=texture,
         held_out_mouth_db=mouth,
-        closed=closed_share(observations),
-        lag_ms=1000 * (agreement(observations).lag + LEAD_S),
+        closed=bilabial_closure_share(observations),
+        lag_ms=1000 * (estimate_sync(observations).lag + LEAD_S),
     )
 
 
-def shape_components(recordings: Sequence[Filmed]) -> tuple[GrowingComponents, NDArray[np.float64]]:
+def shape_components(recordings: Sequence[AppearanceRecording]) -> tuple[IncrementalPca, NDArray[np.float64]]:
     """Components of the aligned shapes (eq. 1), and the mean shape (468, 2) that they are aligned with."""
-    shapes, mean = aligned(np.concatenate([recording.points[:, :N_MESH] for recording in recordings]))
-    grown = GrowingComponents(60)
+    shapes, mean = align_shapes(np.concatenate([recording.points[:, :N_MESH] for recording in recordings]))
+    grown = IncrementalPca(60)
     for block in np.array_split(shapes.reshape(len(shapes), -1), max(1, len(shapes) // 500)):
         grown.add(block)
     return grown, mean
 
 
 def shape_errors(
-    recordings: Sequence[Filmed], components: GrowingComponents, mean: NDArray[np.float64]
+    recordings: Sequence[AppearanceRecording], components: IncrementalPca, mean: NDArray[np.float64]
 ) -> tuple[float, float, float]:
     """Mean distance in pixels of all landmarks, of the inner lips, and mean error of the inner gap, with 20 modes."""
     everywhere, lips, gaps = [], [], []
     basis = components.basis[:SHAPE_MODES].astype(np.float64)
     for recording in recordings:
         points = recording.points[:, :N_MESH].astype(np.float64)
-        turns, shifts = fitted(points, mean)
-        flat = moved(points, turns, shifts).reshape(len(points), -1) - components.mean
+        turns, shifts = fit_similarities(points, mean)
+        flat = apply_similarities(points, turns, shifts).reshape(len(points), -1) - components.mean
         modelled = ((flat @ basis.T) @ basis + components.mean).reshape(points.shape)
         back = (modelled - shifts[:, None]) @ np.array([1.0, 1j]) / turns[:, None]
         seen = np.stack([back.real, back.imag], axis=-1)
         away = np.linalg.norm(seen - points, axis=2)
         everywhere.append(away.mean())
         lips.append(away[:, list(INNER_LIPS)].mean())
-        gaps.append(np.abs(_gap(seen) - _gap(points)).mean())
+        gaps.append(np.abs(_inner_lip_gaps(seen) - _inner_lip_gaps(points)).mean())
     return float(np.mean(everywhere)), float(np.mean(lips)), float(np.mean(gaps))
 
 
-def texture_variance(recordings: Sequence[Filmed], learnt: Learnt) -> NDArray[np.float64]:
+def texture_variance(recordings: Sequence[AppearanceRecording], learnt: LearnedAppearance) -> NDArray[np.float64]:
     """Share of the face texture's variance in the first 1, 2, ... components of a sample of frames."""
     frame, light_of = learnt.frames[0], learnt.lights.of
     n_frames = sum(len(recording.points) for recording in recordings)
@@ -113,13 +116,13 @@ def texture_variance(recordings: Sequence[Filmed], learnt: Learnt) -> NDArray[np
     return shares
 
 
-def texture_quality(recordings: Sequence[Filmed], learnt: Learnt) -> tuple[float, float]:
+def texture_quality(recordings: Sequence[AppearanceRecording], learnt: LearnedAppearance) -> tuple[float, float]:
     """Peak signal-to-noise ratio in dB of the face's and of the inner mouth's texture through their models."""
     (face, mouth), appearance = learnt.frames, learnt.appearance
     face_errors, mouth_errors = [], []
     for recording in recordings:
         light = learnt.lights.of(recording)
-        gaps = _gap(recording.points)
+        gaps = _inner_lip_gaps(recording.points)
         for number, picture in enumerate(recording.pictures()):
             points = recording.points[number]
             seen = light.removed(face.texture(picture, points))[None]
@@ -127,10 +130,10 @@ def texture_quality(recordings: Sequence[Filmed], learnt: Learnt) -> tuple[float
             if gaps[number] >= np.median(gaps):
                 seen = light.removed(mouth.texture(picture, points[list(MOUTH_POINTS)]))[None]
                 mouth_errors.append(_mean_square(seen, appearance.mouth.textures(appearance.mouth.parameters(seen))))
-    return _decibels(face_errors), _decibels(mouth_errors)
+    return _peak_snr_db(face_errors), _peak_snr_db(mouth_errors)
 
 
-def closed_share(observations: Sequence[Observation]) -> float:
+def bilabial_closure_share(observations: Sequence[Observation]) -> float:
     """Share of /p b m/ in whose time, with `REACH_S` either side, the inner lips were seen to close."""
     least = []
     for seen in observations:
@@ -144,14 +147,14 @@ def closed_share(observations: Sequence[Observation]) -> float:
     return float(np.mean(np.array(least) < CLOSED)) if least else float("nan")
 
 
-def modes_for(explained: NDArray[np.float64]) -> tuple[int, int]:
+def n_modes_for_variance(explained: NDArray[np.float64]) -> tuple[int, int]:
     """Modes that explain 95 and 99 % of the variance; 0 where those that were kept do not."""
     needed = [int(np.searchsorted(explained, share)) + 1 for share in (0.95, 0.99)]
     reached = [count if count <= len(explained) else 0 for count in needed]
     return reached[0], reached[1]
 
 
-def _gap(points: NDArray[np.floating]) -> NDArray[np.float64]:
+def _inner_lip_gaps(points: NDArray[np.floating]) -> NDArray[np.float64]:
     return np.asarray(np.linalg.norm(points[:, UPPER_LIP_INNER_MID] - points[:, LOWER_LIP_INNER_MID], axis=1))
 
 
@@ -159,5 +162,5 @@ def _mean_square(seen: NDArray[np.floating], modelled: NDArray[np.floating]) -> 
     return float(np.square(seen - modelled).mean())
 
 
-def _decibels(errors: Sequence[float]) -> float:
+def _peak_snr_db(errors: Sequence[float]) -> float:
     return float(10 * np.log10(255.0**2 / np.mean(errors)))

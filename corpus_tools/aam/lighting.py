@@ -14,7 +14,7 @@ Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Light:
+class LightingCorrection:
     """``texture in the reference's light = gain * texture + offset``, each (3,)."""
 
     gain: Floats
@@ -25,7 +25,7 @@ class Light:
         return self.gain * texture + self.offset
 
 
-def light_of(texture: Floats, reference: Floats, still: NDArray[np.bool_]) -> Light:
+def fit_lighting(texture: Floats, reference: Floats, still: NDArray[np.bool_]) -> LightingCorrection:
     """The light of a recording whose mean texture (P, 3) this is, by least squares on the pixels that speech leaves.
 
     Parameters
@@ -38,4 +38,4 @@ def light_of(texture: Floats, reference: Floats, still: NDArray[np.bool_]) -> Li
     gain = (centred * (there - there.mean(axis=0))).sum(axis=0) / np.maximum((centred**2).sum(axis=0), 1e-9)
     gain = np.clip(gain, *GAINS)
     offset = there.mean(axis=0) - gain * here.mean(axis=0)
-    return Light(gain.astype(np.float32), offset.astype(np.float32))
+    return LightingCorrection(gain.astype(np.float32), offset.astype(np.float32))

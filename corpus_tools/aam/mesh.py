@@ -16,7 +16,7 @@ def face_triangles(shape: NDArray[np.floating]) -> NDArray[np.int32]:
 
     triangles = np.asarray(Delaunay(shape[:N_MESH]).simplices)
     middles = shape[triangles].mean(axis=1)
-    kept = inside(middles, shape[list(FACE_OVAL)]) & ~inside(middles, shape[list(MOUTH_POINTS)])
+    kept = points_in_polygon(middles, shape[list(FACE_OVAL)]) & ~points_in_polygon(middles, shape[list(MOUTH_POINTS)])
     return np.asarray(triangles[kept], np.int32)
 
 
@@ -30,14 +30,14 @@ def mouth_triangles() -> NDArray[np.int32]:
     return np.array([row for row in rows if len(set(row)) == 3], np.int32)
 
 
-def ring(points: NDArray[np.floating]) -> NDArray[np.float64]:
+def face_ring(points: NDArray[np.floating]) -> NDArray[np.float64]:
     """(..., 36, 2) points around the face, of (..., N, 2) landmarks."""
     oval = np.asarray(points[..., list(FACE_OVAL), :], np.float64)
     middle = oval.mean(axis=-2, keepdims=True)
     return np.asarray(middle + RING_SCALE * (oval - middle))
 
 
-def inside(places: NDArray[np.floating], polygon: NDArray[np.floating]) -> NDArray[np.bool_]:
+def points_in_polygon(places: NDArray[np.floating], polygon: NDArray[np.floating]) -> NDArray[np.bool_]:
     """(P,) whether each of (P, 2) places lies within a polygon (N, 2), by counting the edges to its right."""
     x, y = places[:, 0, None], places[:, 1, None]
     (ax, ay), (bx, by) = polygon.T, np.roll(polygon, -1, axis=0).T

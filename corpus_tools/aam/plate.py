@@ -14,7 +14,7 @@ LONGEST = 250  # frames; a film that goes to and fro hides its length
 NEAR_LOSSLESS = {"crf": "8", "preset": "slow"}
 
 
-def chosen_stretch(points: Sequence[NDArray[np.float32]]) -> tuple[int, int, int]:
+def choose_plate_frames(points: Sequence[NDArray[np.float32]]) -> tuple[int, int, int]:
     """The recording with the stillest mouth, and the range of its frames, of (T, N, 2) landmarks of each."""
 
     def unrest(places: NDArray[np.float32]) -> float:
@@ -28,7 +28,7 @@ def chosen_stretch(points: Sequence[NDArray[np.float32]]) -> tuple[int, int, int
     return number, 0, min(len(points[number]), LONGEST)
 
 
-def film_of(pictures: Iterator[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+def encode_plate_video(pictures: Iterator[NDArray[np.uint8]]) -> NDArray[np.uint8]:
     """The bytes of an MP4 film of (H, W, 3) pictures; odd sides lose their last row or column."""
     import av
 

@@ -7,7 +7,9 @@ N_ROUNDS = 5  # the mean stands still to 1e-4 px after three
 Floats = NDArray[np.float64]
 
 
-def fitted(shapes: NDArray[np.floating], target: NDArray[np.floating]) -> tuple[NDArray[np.complex128], Floats]:
+def fit_similarities(
+    shapes: NDArray[np.floating], target: NDArray[np.floating]
+) -> tuple[NDArray[np.complex128], Floats]:
     """Similarity transforms that bring shapes nearest to a target, least squares over the points.
 
     Parameters
@@ -19,7 +21,7 @@ def fitted(shapes: NDArray[np.floating], target: NDArray[np.floating]) -> tuple[
     turns, shifts : (T,), (T, 2)
         ``target ~ turn * shape + shift`` with points read as complex numbers x + i y.
     """
-    here, there = as_complex(shapes), as_complex(target)
+    here, there = to_complex(shapes), to_complex(target)
     middle, aim = here.mean(axis=1), there.mean()
     centred = here - middle[:, None]
     turns = (np.conj(centred) * (there - aim)).sum(axis=1) / (np.abs(centred) ** 2).sum(axis=1)
@@ -27,13 +29,13 @@ def fitted(shapes: NDArray[np.floating], target: NDArray[np.floating]) -> tuple[
     return turns, np.stack([offsets.real, offsets.imag], axis=-1)
 
 
-def moved(shapes: NDArray[np.floating], turns: NDArray[np.complex128], shifts: Floats) -> Floats:
+def apply_similarities(shapes: NDArray[np.floating], turns: NDArray[np.complex128], shifts: Floats) -> Floats:
     """(T, N, 2) shapes under similarity transforms."""
-    there = turns[:, None] * as_complex(shapes)
+    there = turns[:, None] * to_complex(shapes)
     return np.stack([there.real, there.imag], axis=-1) + shifts[:, None]
 
 
-def aligned(shapes: NDArray[np.floating]) -> tuple[Floats, Floats]:
+def align_shapes(shapes: NDArray[np.floating]) -> tuple[Floats, Floats]:
     """(T, N, 2) shapes aligned with their mean, and the mean (N, 2), of the mean size of the shapes.
 
     Generalised Procrustes analysis (Goodall 1991): the mean keeps the place, size and turn of the mean of the shapes as
@@ -43,12 +45,12 @@ def aligned(shapes: NDArray[np.floating]) -> tuple[Floats, Floats]:
     anchor = mean
     placed = np.asarray(shapes, np.float64)
     for _ in range(N_ROUNDS):
-        placed = moved(shapes, *fitted(shapes, mean))
+        placed = apply_similarities(shapes, *fit_similarities(shapes, mean))
         mean = placed.mean(axis=0)
-        mean = moved(mean[None], *fitted(mean[None], anchor))[0]
-    return moved(shapes, *fitted(shapes, mean)), mean
+        mean = apply_similarities(mean[None], *fit_similarities(mean[None], anchor))[0]
+    return apply_similarities(shapes, *fit_similarities(shapes, mean)), mean
 
 
-def as_complex(points: NDArray[np.floating]) -> NDArray[np.complex128]:
+def to_complex(points: NDArray[np.floating]) -> NDArray[np.complex128]:
     """(..., N) complex numbers of (..., N, 2) points."""
     return np.asarray(points[..., 0] + 1j * points[..., 1], np.complex128)

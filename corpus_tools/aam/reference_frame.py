@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.interpolation import sampled
+from tts2face.interpolation import sample_triangles
 
 MARGIN_PX = 2.0  # between the mesh and the edge of the texture
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Frame:
+class ReferenceFrame:
     """A reference shape of N points in a texture, and where its pixels lie in the triangles.
 
     ``points`` (N, 2) pixels; ``triangles`` (F, 3); ``size`` (width, height); ``pixels`` (P,) as ``y * width + x``;
@@ -29,20 +29,20 @@ class Frame:
     def texture(self, picture: NDArray[np.uint8], points: NDArray[np.floating]) -> NDArray[np.float32]:
         """(P, 3) texture of an (H, W, 3) picture whose (N, 2) points are these, warped piece by piece."""
         texture = np.zeros((len(self.pixels), 3), np.float32)
-        sampled(picture, np.asarray(points, np.float64), self.corners, self.weights, texture)
+        sample_triangles(picture, np.asarray(points, np.float64), self.corners, self.weights, texture)
         return texture
 
 
-def framed(shape: NDArray[np.floating], triangles: NDArray[np.int32], side: int) -> Frame:
+def build_reference_frame(shape: NDArray[np.floating], triangles: NDArray[np.int32], side: int) -> ReferenceFrame:
     """The frame of a reference shape (N, 2), its longer side `side` pixels long."""
     used = shape[np.unique(triangles)]
     low, high = used.min(axis=0), used.max(axis=0)
     scale = (side - 1 - 2 * MARGIN_PX) / (high - low).max()
     points = (np.asarray(shape, np.float64) - low) * scale + MARGIN_PX
     width, height = (int(np.ceil(length)) for length in (high - low) * scale + 2 * MARGIN_PX + 1)
-    owner, weights = covered(points, triangles, (width, height))
+    owner, weights = rasterise_triangles(points, triangles, (width, height))
     pixels = np.flatnonzero(owner >= 0)
-    return Frame(
+    return ReferenceFrame(
         points.astype(np.float32),
         triangles.astype(np.int32),
         (width, height),
@@ -52,7 +52,7 @@ def framed(shape: NDArray[np.floating], triangles: NDArray[np.int32], side: int)
     )
 
 
-def covered(
+def rasterise_triangles(
     points: Floats, triangles: NDArray[np.int32], size: tuple[int, int]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Triangle over each pixel (-1: none) and the pixel's barycentric coordinates in it."""
@@ -63,14 +63,14 @@ def covered(
         low = np.maximum(np.floor(corners.min(axis=0)).astype(int), 0)
         high = np.minimum(np.ceil(corners.max(axis=0)).astype(int), (width - 1, height - 1))
         x, y = np.meshgrid(np.arange(low[0], high[0] + 1), np.arange(low[1], high[1] + 1))
-        inside = barycentric(np.stack([x.ravel(), y.ravel()], axis=1), corners)
+        inside = barycentric_coordinates(np.stack([x.ravel(), y.ravel()], axis=1), corners)
         hit = (inside >= -1e-9).all(axis=1)
         at = y.ravel()[hit] * width + x.ravel()[hit]
         owner[at], weights[at] = number, np.clip(inside[hit], 0.0, 1.0)
     return owner, weights
 
 
-def barycentric(places: NDArray[np.floating], corners: Floats) -> Floats:
+def barycentric_coordinates(places: NDArray[np.floating], corners: Floats) -> Floats:
     """(P, 3) barycentric coordinates of (P, 2) places in a triangle (3, 2); a flat one holds nothing."""
     a, b, c = corners
     across, along, off = b - a, c - a, places - a

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.recordings.corpus_video import Eyes
+from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.observation import Observation
-from tts2face.video.frame_grid import filled_gaps, on_grid
-from tts2face.video.media import read_pictures
+from tts2face.video.frame_grid import fill_gaps, resample_to_grid
+from tts2face.video.media import read_frames
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Filmed:
+class AppearanceRecording:
     """One recording as an appearance model needs it.
 
     ``points`` (T, 478, 2) pixels and ``landmarks`` (T, 478, 3) mm; frame i is the instant ``begin + i / fps`` of the
@@ -31,8 +31,10 @@ class Filmed:
     def pictures(self) -> Iterator[NDArray[np.uint8]]:
         """The picture (H, W, 3) shown at each frame's instant; the file's own rate may change."""
         n_given, n_frames, shown = 0, len(self.points), None
-        for picture in read_pictures(self.video):
-            while shown is not None and n_given < n_frames and picture.time > self._instant(n_given) + 0.5 / self.fps:
+        for picture in read_frames(self.video):
+            while (
+                shown is not None and n_given < n_frames and picture.time > self._frame_time(n_given) + 0.5 / self.fps
+            ):
                 yield shown
                 n_given += 1
             if n_given == n_frames:
@@ -42,11 +44,13 @@ class Filmed:
             yield shown
             n_given += 1
 
-    def _instant(self, frame: int) -> float:
+    def _frame_time(self, frame: int) -> float:
         return self.begin + frame / self.fps
 
 
-def filmed(observation: Observation, shape: NDArray[np.float32], eyes: Eyes) -> Filmed:
+def build_appearance_recording(
+    observation: Observation, shape: NDArray[np.float32], eyes: CachedTracker
+) -> AppearanceRecording:
     """A recording that was observed, with its landmarks in the picture; tracking comes from the cache.
 
     Parameters
@@ -59,9 +63,9 @@ def filmed(observation: Observation, shape: NDArray[np.float32], eyes: Eyes) -> 
     DataError
         The video cannot be read any more.
     """
-    seen = eyes.watched(observation.video)
-    points, first = on_grid(seen.tracking.points, seen.times, seen.fps)
+    seen = eyes.track(observation.video)
+    points, first = resample_to_grid(seen.tracking.points, seen.times, seen.fps)
     begin = observation.quality.cut
     start = round(begin * seen.fps) - first
-    here, _ = filled_gaps(points[start : start + len(observation.landmarks)], seen.fps)
-    return Filmed(observation.video, begin, seen.fps, here[:, :, :2].copy(), observation.landmarks, shape)
+    here, _ = fill_gaps(points[start : start + len(observation.landmarks)], seen.fps)
+    return AppearanceRecording(observation.video, begin, seen.fps, here[:, :, :2].copy(), observation.landmarks, shape)

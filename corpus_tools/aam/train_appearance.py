@@ -7,13 +7,13 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.aam.block_pca import GrowingComponents
-from corpus_tools.aam.lighting import Light, light_of
-from corpus_tools.aam.mesh import MOUTH_POINTS, N_MESH, face_triangles, mouth_triangles, ring
-from corpus_tools.aam.plate import chosen_stretch, film_of
-from corpus_tools.aam.procrustes import aligned
-from corpus_tools.aam.reference_frame import Frame, framed
-from corpus_tools.aam.source_videos import Filmed
+from corpus_tools.aam.block_pca import IncrementalPca
+from corpus_tools.aam.lighting import LightingCorrection, fit_lighting
+from corpus_tools.aam.mesh import MOUTH_POINTS, N_MESH, face_ring, face_triangles, mouth_triangles
+from corpus_tools.aam.plate import choose_plate_frames, encode_plate_video
+from corpus_tools.aam.procrustes import align_shapes
+from corpus_tools.aam.reference_frame import ReferenceFrame, build_reference_frame
+from corpus_tools.aam.source_videos import AppearanceRecording
 from corpus_tools.run_options import Progress
 from lexicon.errors import InputError
 from tts2face.models.appearance import Appearance, Plate, TextureModel
@@ -43,12 +43,12 @@ class TextureOptions:
 
     side: int = 128
     modes: int = 40
-    mouth_side: int = 64
+    mouth_side_px: int = 64
     mouth_modes: int = 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Learnt:
+class LearnedAppearance:
     """An appearance and how it was learnt.
 
     ``frames`` and ``lights`` are those of the textures, ``looks`` (T, A + B) of every recording in turn, ``explained``
@@ -56,15 +56,18 @@ class Learnt:
     """
 
     appearance: Appearance
-    frames: tuple[Frame, Frame]
-    lights: "Lights"
+    frames: tuple[ReferenceFrame, ReferenceFrame]
+    lights: "LightingReference"
     looks: tuple[NDArray[np.float32], ...]
     explained: tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 def learn_appearance(
-    recordings: Sequence[Filmed], options: TextureOptions | None = None, *, on_progress: Progress | None = None
-) -> Learnt:
+    recordings: Sequence[AppearanceRecording],
+    options: TextureOptions | None = None,
+    *,
+    on_progress: Progress | None = None,
+) -> LearnedAppearance:
     """Texture models of the face and of the inner mouth, the plate, and the looks of every frame.
 
     Raises
@@ -76,79 +79,81 @@ def learn_appearance(
         raise InputError("no recording could be used; give at least one")
     options = options or TextureOptions()
     frames = reference_frames(recordings, options)
-    moving = changed_by_speech(frames[0])
-    stretch = chosen_stretch([recording.points for recording in recordings])
-    lights = Lights(frames[0], mean_texture(recordings[stretch[0]], frames[0]), moving < STILL)
-    grown = GrowingComponents(options.modes + SPARE), GrowingComponents(options.mouth_modes + SPARE)
+    moving = speech_weights(frames[0])
+    stretch = choose_plate_frames([recording.points for recording in recordings])
+    lights = LightingReference(frames[0], mean_texture(recordings[stretch[0]], frames[0]), moving < STILL)
+    grown = IncrementalPca(options.modes + SPARE), IncrementalPca(options.mouth_modes + SPARE)
     steps, found = 2 * len(recordings), []
     for number, recording in enumerate(recordings):
         found.append(lights.of(recording))
-        _learn_from(recording, frames, found[-1], grown)
+        _add_textures(recording, frames, found[-1], grown)
         if on_progress:
             on_progress(number + 1, steps)
     models = (
-        _model(frames[0], grown[0], options.modes, "the face"),
-        _model(frames[1], grown[1], options.mouth_modes, "the inside of the mouth"),
+        _build_texture_model(frames[0], grown[0], options.modes, "the face"),
+        _build_texture_model(frames[1], grown[1], options.mouth_modes, "the inside of the mouth"),
     )
     looks = []
     for number, (recording, light) in enumerate(zip(recordings, found, strict=True)):
-        looks.append(looks_of(recording, frames, light, models))
+        looks.append(appearance_parameters(recording, frames, light, models))
         if on_progress:
             on_progress(len(recordings) + number + 1, steps)
-    plate = _plate(recordings, stretch, looks, models[0].n_modes)
+    plate = _build_plate(recordings, stretch, looks, models[0].n_modes)
     appearance = Appearance(models[0], models[1], np.array(MOUTH_POINTS, np.int32), moving, plate)
-    return Learnt(appearance, frames, lights, tuple(looks), (grown[0].explained(), grown[1].explained()))
+    return LearnedAppearance(appearance, frames, lights, tuple(looks), (grown[0].explained(), grown[1].explained()))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lights:
+class LightingReference:
     """The light that textures are brought to: that of the plate, whose mean ``texture`` (P, 3) this is.
 
     ``still`` (P,) marks the pixels of the face's ``frame`` that speech leaves.
     """
 
-    frame: Frame
+    frame: ReferenceFrame
     texture: NDArray[np.float32]
-    still: NDArray[np.bool_]
+    is_still: NDArray[np.bool_]
 
-    def of(self, recording: Filmed) -> Light:
+    def of(self, recording: AppearanceRecording) -> LightingCorrection:
         """The light of a recording."""
-        return light_of(mean_texture(recording, self.frame), self.texture, self.still)
+        return fit_lighting(mean_texture(recording, self.frame), self.texture, self.is_still)
 
 
-def mean_texture(recording: Filmed, frame: Frame) -> NDArray[np.float32]:
+def mean_texture(recording: AppearanceRecording, frame: ReferenceFrame) -> NDArray[np.float32]:
     """(P, 3) mean of the first textures of a recording."""
     pictures = islice(recording.pictures(), LIGHT_FRAMES)
     textures = [frame.texture(picture, points) for picture, points in zip(pictures, recording.points, strict=False)]
     return np.asarray(np.mean(textures, axis=0), np.float32)
 
 
-def reference_frames(recordings: Sequence[Filmed], options: TextureOptions) -> tuple[Frame, Frame]:
+def reference_frames(
+    recordings: Sequence[AppearanceRecording], options: TextureOptions
+) -> tuple[ReferenceFrame, ReferenceFrame]:
     """Reference frames of the face and of the inner mouth: the mean of the frames with lips well apart."""
     n_frames = sum(len(recording.points) for recording in recordings)
     every = max(1, n_frames // SHAPES_READ)
     points = np.concatenate([recording.points for recording in recordings])[::every]
-    shapes, _ = aligned(points[:, :N_MESH])
-    gaps = lip_gap(shapes)
+    shapes, _ = align_shapes(points[:, :N_MESH])
+    gaps = normalised_lip_gap(shapes)
     opened = shapes[gaps >= np.quantile(gaps, OPEN_SHARE)].mean(axis=0)
-    face = framed(opened, face_triangles(opened), options.side)
-    return face, framed(opened[list(MOUTH_POINTS)], mouth_triangles(), options.mouth_side)
+    face = build_reference_frame(opened, face_triangles(opened), options.side)
+    return face, build_reference_frame(opened[list(MOUTH_POINTS)], mouth_triangles(), options.mouth_side_px)
 
 
-def lip_gap(points: NDArray[np.floating]) -> NDArray[np.float64]:
+def normalised_lip_gap(points: NDArray[np.floating]) -> NDArray[np.float64]:
     """(T,) distance of the inner lips over that of the outer eye corners, of (T, N, 2 or 3) points."""
     lips = np.linalg.norm(points[:, UPPER_LIP_INNER_MID] - points[:, LOWER_LIP_INNER_MID], axis=1)
     eyes = np.linalg.norm(points[:, EYE_OUTER_LEFT] - points[:, EYE_OUTER_RIGHT], axis=1)
     return np.asarray(lips / eyes, np.float64)
 
 
-def _learn_from(
-    recording: Filmed,
-    frames: tuple[Frame, Frame],
-    light: Light,
-    grown: tuple[GrowingComponents, GrowingComponents],
+def _add_textures(
+    recording: AppearanceRecording,
+    frames: tuple[ReferenceFrame, ReferenceFrame],
+    light: LightingCorrection,
+    grown: tuple[IncrementalPca, IncrementalPca],
 ) -> None:
-    gaps = lip_gap(recording.points)
+    gaps = normalised_lip_gap(recording.points)
     faces, mouths = [], []
     for number, picture in enumerate(recording.pictures()):
         points = recording.points[number]
@@ -165,7 +170,7 @@ def _learn_from(
             components.add(np.array(rows))
 
 
-def _model(frame: Frame, grown: GrowingComponents, n_modes: int, what: str) -> TextureModel:
+def _build_texture_model(frame: ReferenceFrame, grown: IncrementalPca, n_modes: int, what: str) -> TextureModel:
     if len(grown.basis) < n_modes:
         raise InputError(f"{grown.n_rows} pictures of {what} have no {n_modes} modes; record more, or ask for fewer")
     n_pixels = len(frame.pixels)
@@ -180,14 +185,17 @@ def _model(frame: Frame, grown: GrowingComponents, n_modes: int, what: str) -> T
     )
 
 
-def looks_of(
-    recording: Filmed, frames: tuple[Frame, Frame], light: Light, models: tuple[TextureModel, TextureModel]
+def appearance_parameters(
+    recording: AppearanceRecording,
+    frames: tuple[ReferenceFrame, ReferenceFrame],
+    light: LightingCorrection,
+    models: tuple[TextureModel, TextureModel],
 ) -> NDArray[np.float32]:
     """(T, A + B) looks of a recording; where the lips hide the mouth, its looks go straight from before to behind."""
     face, mouth = frames
     n_frames, n_face = len(recording.points), models[0].n_modes
     looks = np.zeros((n_frames, n_face + models[1].n_modes), np.float32)
-    seen = lip_gap(recording.points) >= OPEN_GAP
+    seen = normalised_lip_gap(recording.points) >= OPEN_GAP
     for number, picture in enumerate(recording.pictures()):
         points = recording.points[number]
         looks[number, :n_face] = models[0].parameters(light.removed(face.texture(picture, points))[None])[0]
@@ -200,7 +208,7 @@ def looks_of(
     return looks
 
 
-def changed_by_speech(face: Frame) -> NDArray[np.float32]:
+def speech_weights(face: ReferenceFrame) -> NDArray[np.float32]:
     """(P,) how far each pixel of the face's texture follows speech: 1 about the mouth, 0 on the oval and above."""
     weight = np.isin(np.arange(N_MESH), MOUTH_REGION).astype(np.float64)
     weight[list(FACE_OVAL)] = 0.0
@@ -217,22 +225,25 @@ def changed_by_speech(face: Frame) -> NDArray[np.float32]:
     return spread
 
 
-def _plate(
-    recordings: Sequence[Filmed], stretch: tuple[int, int, int], looks: Sequence[NDArray[np.float32]], n_face: int
+def _build_plate(
+    recordings: Sequence[AppearanceRecording],
+    stretch: tuple[int, int, int],
+    looks: Sequence[NDArray[np.float32]],
+    n_face: int,
 ) -> Plate:
     number, first, last = stretch
     recording, here = recordings[number], slice(first, last)
     points = recording.points[here, :N_MESH]
     return Plate(
-        video=film_of(islice(recording.pictures(), first, last)),
-        points=np.concatenate([points, ring(points)], axis=1).astype(np.float32),
-        axes=picture_axes(recording.points[here], recording.landmarks[here]),
+        video=encode_plate_video(islice(recording.pictures(), first, last)),
+        points=np.concatenate([points, face_ring(points)], axis=1).astype(np.float32),
+        axes=camera_axes(recording.points[here], recording.landmarks[here]),
         shape=recording.shape[here],
         looks=looks[number][here, :n_face],
     )
 
 
-def picture_axes(points: NDArray[np.floating], landmarks: NDArray[np.floating]) -> NDArray[np.float32]:
+def camera_axes(points: NDArray[np.floating], landmarks: NDArray[np.floating]) -> NDArray[np.float32]:
     """(T, 2, 3) pixels for each millimetre along the landmarks' axes: the camera without perspective, least squares."""
     seen = points - points.mean(axis=1, keepdims=True)
     local = landmarks - landmarks.mean(axis=1, keepdims=True)

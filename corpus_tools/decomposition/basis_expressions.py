@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.decomposition.stills import NEUTRAL, Still, required
+from corpus_tools.decomposition.stills import NEUTRAL, Still, required_stills
 from lexicon.errors import DataError, InputError
 from tts2face.face.landmark_fit import N_SKIN
 from tts2face.models.landmarks import N_LANDMARKS
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Basis:
+class ExpressionBasis:
     """A person's basis expressions.
 
     Parameters
@@ -33,9 +33,9 @@ class Basis:
     expressions: Floats
 
 
-def carried_basis(
+def transfer_basis(
     expressions: NDArray[np.floating], face_rest: NDArray[np.floating], rest: NDArray[np.floating]
-) -> Basis:
+) -> ExpressionBasis:
     """Expressions of one face as another person would show them.
 
     Parameters
@@ -62,12 +62,12 @@ def carried_basis(
     there = np.asarray(face_rest, np.float64)[:N_SKIN]
     centred = there - there.mean(axis=0)
     affine, *_ = np.linalg.lstsq(centred, own[:N_SKIN] - own[:N_SKIN].mean(axis=0), rcond=None)
-    return Basis(own, np.asarray(expressions, np.float64) @ affine)
+    return ExpressionBasis(own, np.asarray(expressions, np.float64) @ affine)
 
 
-def captured_basis(
+def basis_from_stills(
     stills: Mapping[str, Still], read: Callable[[Still], Floats], *, rest: NDArray[np.floating] | None = None
-) -> Basis:
+) -> ExpressionBasis:
     """Expressions that a person was captured with.
 
     Parameters
@@ -86,7 +86,7 @@ def captured_basis(
     DataError
         A still shows no face, or one as the face at rest; or as `read` says.
     """
-    needed = required(stills, is_rest_known=rest is not None)
+    needed = required_stills(stills, is_rest_known=rest is not None)
     own = np.asarray(read(stills[NEUTRAL]) if rest is None else rest, np.float64)
     expressions = np.stack([read(stills[name]) - own for name in needed if name != NEUTRAL])
     expressions[:, N_SKIN:] = 0.0
@@ -94,4 +94,4 @@ def captured_basis(
     for name, size in zip(EXPRESSIONS, sizes, strict=True):
         if size < LEAST_MOTION_MM:
             raise DataError(f"{stills[name]} shows {name} as the face at rest; capture it stronger")
-    return Basis(own, expressions)
+    return ExpressionBasis(own, expressions)

@@ -34,7 +34,7 @@ class Estimator(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reduced:
+class ReducedBasis:
     """A basis in its own span: ``basis = rows @ axes.T``, so that distances within the span are kept exactly.
 
     Parameters
@@ -62,10 +62,10 @@ class Reduced:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LeastSquares:
+class LeastSquaresEstimator:
     """The weights of least squared error within the limits."""
 
-    basis: Reduced
+    basis: ReducedBasis
 
     def weights(self, displacements: NDArray[np.floating]) -> Floats:
         """As `Estimator`; exact up to rounding."""
@@ -77,7 +77,7 @@ class LeastSquares:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NearestSamples:
+class NearestSamplesEstimator:
     """The paper's estimator.
 
     Parameters
@@ -90,7 +90,7 @@ class NearestSamples:
         n_k of the paper.
     """
 
-    basis: Reduced
+    basis: ReducedBasis
     samples: Floats
     tree: "cKDTree[Any]"
     n_nearest: int
@@ -106,10 +106,10 @@ class NearestSamples:
         found = np.zeros((len(displacements), self.samples.shape[1]))
         for first in range(0, len(displacements), AT_ONCE):
             span = slice(first, first + AT_ONCE)
-            found[span] = self._mixed(*self.basis.split(displacements[span]))
+            found[span] = self._mix_samples(*self.basis.split(displacements[span]))
         return found
 
-    def _mixed(self, within: Floats, beyond: Floats) -> Floats:
+    def _mix_samples(self, within: Floats, beyond: Floats) -> Floats:
         near, at = self.tree.query(within, k=self.n_nearest)
         shape = (len(within), self.n_nearest)
         squares = np.reshape(near, shape) ** 2 + beyond[:, None]
@@ -120,7 +120,7 @@ class NearestSamples:
         return mixed
 
 
-def averaged(motion: NDArray[np.floating], n_frames: int = N_AVERAGED) -> Floats:
+def moving_average(motion: NDArray[np.floating], n_frames: int = N_AVERAGED) -> Floats:
     """Centred mean of the `n_frames` frames about each; beyond a recording's ends its motion is mirrored.
 
     Parameters
@@ -148,38 +148,38 @@ def averaged(motion: NDArray[np.floating], n_frames: int = N_AVERAGED) -> Floats
     return mean
 
 
-def least_squares(basis: NDArray[np.floating], slack: float = 0.0) -> LeastSquares:
-    """Bounded least squares on a basis (B, ...) of displacements in mm; errors as `reduced`."""
-    return LeastSquares(reduced(basis, slack))
+def build_least_squares_estimator(basis: NDArray[np.floating], slack: float = 0.0) -> LeastSquaresEstimator:
+    """Bounded least squares on a basis (B, ...) of displacements in mm; errors as `reduce_basis`."""
+    return LeastSquaresEstimator(reduce_basis(basis, slack))
 
 
-def nearest_samples(
+def build_nearest_samples_estimator(
     basis: NDArray[np.floating],
     generator: np.random.Generator,
     *,
     slack: float = 0.0,
     n_samples: int = N_SAMPLES,
     n_nearest: int = N_NEAREST,
-) -> NearestSamples:
+) -> NearestSamplesEstimator:
     """The paper's estimator on a basis (B, ...) of displacements in mm.
 
     Raises
     ------
     InputError
-        There are fewer samples than neighbours, no neighbour, or as `reduced`.
+        There are fewer samples than neighbours, no neighbour, or as `reduce_basis`.
     DataError
-        As `reduced`.
+        As `reduce_basis`.
     """
     from scipy.spatial import cKDTree
 
     if not 1 <= n_nearest <= n_samples:
         raise InputError(f"{n_nearest} nearest of {n_samples} samples cannot be found; ask for 1 to {n_samples}")
-    within = reduced(basis, slack)
+    within = reduce_basis(basis, slack)
     samples = generator.uniform(-slack, 1.0 + slack, (n_samples, len(within.rows)))
-    return NearestSamples(within, samples, cKDTree(samples @ within.rows), n_nearest)
+    return NearestSamplesEstimator(within, samples, cKDTree(samples @ within.rows), n_nearest)
 
 
-def reduced(basis: NDArray[np.floating], slack: float = 0.0) -> Reduced:
+def reduce_basis(basis: NDArray[np.floating], slack: float = 0.0) -> ReducedBasis:
     """A basis (B, ...) of displacements in the axes of its span.
 
     Raises
@@ -198,7 +198,7 @@ def reduced(basis: NDArray[np.floating], slack: float = 0.0) -> Reduced:
     if len(flat) > flat.shape[1] or strengths[-1] <= LEAST_CONDITION * strengths[0]:
         raise DataError("the basis expressions depend on each other; capture each as a face of its own")
     axes, upper = np.linalg.qr(flat.T)
-    return Reduced(np.asarray(axes), np.asarray(upper).T, slack)
+    return ReducedBasis(np.asarray(axes), np.asarray(upper).T, slack)
 
 
 def approximation_error(

@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Captured:
+class FaceRecording:
     """One recording; frame i is the instant ``i / fps`` of its sound.
 
     Parameters
@@ -48,7 +48,7 @@ class Captured:
     sound: Waveform | None = None
     rest: NDArray[np.float32] | None = None
     eyes: NDArray[np.float32] | None = None
-    missing: frozenset[str] = frozenset()
+    missing_features: frozenset[str] = frozenset()
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -60,25 +60,25 @@ class Captured:
             )
         if not n_frames or not np.isfinite(self.landmarks).all() or not np.isfinite(self.head).all():
             raise DataError(f"{self.name} has no frame, or frames without a face; record it again")
-        unknown = self.missing - set(FEATURES)
+        unknown = self.missing_features - set(FEATURES)
         if unknown:
             raise InputError(f"there is no feature {sorted(unknown)[0]!r}; gestures consist of {', '.join(FEATURES)}")
 
 
-def at_gesture_rate(captured: Captured) -> Captured:
+def resample_to_gesture_rate(captured: FaceRecording) -> FaceRecording:
     """The recording at `GESTURE_FPS` frames a second."""
     if abs(captured.fps - GESTURE_FPS) < SAME_RATE:
         return captured
     return replace(
         captured,
         fps=GESTURE_FPS,
-        landmarks=resampled(captured.landmarks, captured.fps, GESTURE_FPS).astype(np.float32),
-        head=resampled(captured.head, captured.fps, GESTURE_FPS).astype(np.float32),
-        eyes=None if captured.eyes is None else resampled(captured.eyes, captured.fps, GESTURE_FPS).astype(np.float32),
+        landmarks=resample(captured.landmarks, captured.fps, GESTURE_FPS).astype(np.float32),
+        head=resample(captured.head, captured.fps, GESTURE_FPS).astype(np.float32),
+        eyes=None if captured.eyes is None else resample(captured.eyes, captured.fps, GESTURE_FPS).astype(np.float32),
     )
 
 
-def resampled(values: NDArray[np.floating], fps: float, wanted: float) -> Floats:
+def resample(values: NDArray[np.floating], fps: float, wanted: float) -> Floats:
     """Values (T, ...) at another frame rate, the first frame staying where it is.
 
     Raises
@@ -99,11 +99,11 @@ def resampled(values: NDArray[np.floating], fps: float, wanted: float) -> Floats
     read = np.zeros((n_frames, flat.shape[1]))
     for first in range(0, flat.shape[1], AT_ONCE):
         columns = slice(first, first + AT_ONCE)
-        read[:, columns] = _read(flat[:, columns], fps, wanted, n_frames)
+        read[:, columns] = _interpolate_frames(flat[:, columns], fps, wanted, n_frames)
     return read.reshape(n_frames, *values.shape[1:])
 
 
-def _read(values: Floats, fps: float, wanted: float, n_frames: int) -> Floats:
+def _interpolate_frames(values: Floats, fps: float, wanted: float, n_frames: int) -> Floats:
     from scipy.interpolate import make_interp_spline
 
     instants, end = np.arange(n_frames) / wanted, (len(values) - 1) / fps
@@ -117,19 +117,19 @@ def _read(values: Floats, fps: float, wanted: float, n_frames: int) -> Floats:
     return np.asarray((area(stop) - area(begin)) / (stop - begin)[:, None])
 
 
-def sound_of(capture: Path, given: Path | None = None) -> Waveform | None:
-    """The sound that belongs to a capture: the file that is given, or `sound_beside` it.
+def read_capture_sound(capture: Path, given: Path | None = None) -> Waveform | None:
+    """The sound that belongs to a capture: the file that is given, or `find_capture_sound` it.
 
     Raises
     ------
     InputError, DataError
-        As `sound_beside` and `tts2face.video.media.read_sound`.
+        As `find_capture_sound` and `tts2face.video.media.read_sound`.
     """
-    found = given or sound_beside(capture)
+    found = given or find_capture_sound(capture)
     return None if found is None else read_sound(found, SOUND_RATE)
 
 
-def sound_beside(capture: Path) -> Path | None:
+def find_capture_sound(capture: Path) -> Path | None:
     """The sound file of the same name beside a capture, or the only one there; None where there is none.
 
     Raises

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from corpus_tools.decomposition.capture import Captured
-from corpus_tools.decomposition.livelink import captured_livelink
+from corpus_tools.decomposition.capture import FaceRecording
+from corpus_tools.decomposition.livelink import read_livelink_recording
 from corpus_tools.decomposition.marker_set import SHIPPED, read_marker_set
-from corpus_tools.decomposition.markers import captured_markers
+from corpus_tools.decomposition.markers import read_marker_recording
 from lexicon.errors import InputError
 from tts2face.models.face import Face
 
@@ -15,10 +15,10 @@ LIVELINK = "timecode"  # first column of a Live Link Face table
 
 
 @dataclass(frozen=True, slots=True)
-class Worn:
+class MarkerOptions:
     """How markers are read: the table of their set, a recording of the person at rest, frames a second of tables."""
 
-    markers: Path = SHIPPED
+    marker_table: Path = SHIPPED
     neutral: Path | None = None
     fps: float | None = None
 
@@ -31,7 +31,9 @@ def is_livelink(path: Path) -> bool:
         return file.read(64).decode("utf-8-sig", errors="replace").lower().startswith(LIVELINK)
 
 
-def captured_file(path: Path, face: Face, *, sound: Path | None = None, worn: Worn | None = None) -> Captured:
+def read_capture_file(
+    path: Path, face: Face, *, sound: Path | None = None, worn: MarkerOptions | None = None
+) -> FaceRecording:
     """A capture of whichever kind, as landmarks; sound from the file, as given, or of the same name beside it.
 
     Raises
@@ -39,13 +41,15 @@ def captured_file(path: Path, face: Face, *, sound: Path | None = None, worn: Wo
     InputError
         There is no such file, or it is of another kind.
     DataError
-        It is damaged; or as `captured_markers` says.
+        It is damaged; or as `read_marker_recording` says.
     BackendError
         Reading C3D needs a package that is missing.
     """
     if path.suffix.lower() not in CAPTURE_SUFFIXES:
         raise InputError(f"{path.name} is no facial capture; they are read from {', '.join(sorted(CAPTURE_SUFFIXES))}")
     if is_livelink(path):
-        return captured_livelink(path, face, sound=sound)
-    how = worn or Worn()
-    return captured_markers(path, face, read_marker_set(how.markers), neutral=how.neutral, sound=sound, fps=how.fps)
+        return read_livelink_recording(path, face, sound=sound)
+    how = worn or MarkerOptions()
+    return read_marker_recording(
+        path, face, read_marker_set(how.marker_table), neutral=how.neutral, sound=sound, fps=how.fps
+    )

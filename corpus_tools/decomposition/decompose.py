@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.decomposition.basis_expressions import Basis
-from corpus_tools.decomposition.blend_weights import Estimator, averaged
-from corpus_tools.decomposition.capture import Captured, at_gesture_rate
+from corpus_tools.decomposition.basis_expressions import ExpressionBasis
+from corpus_tools.decomposition.blend_weights import Estimator, moving_average
+from corpus_tools.decomposition.capture import FaceRecording, resample_to_gesture_rate
 from corpus_tools.decomposition.regions import feature_landmarks
-from tts2face.gesture.prosody import SILENCE, drivers
+from tts2face.gesture.prosody import SILENCE, prosody_features
 from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS
 from tts2face.models.palette import FEATURES, GESTURE_FPS, REGION_FEATURES
-from tts2face.retargeting.performer import LIDS, aperture
+from tts2face.retargeting.performer import LIDS, eye_aperture
 
 STEADY_S = 0.03  # standard deviation of the Gaussian that takes the tracker's tremor from head, brows and cheeks
 SHUT_APERTURE = 0.055  # of tracked lids that touch; first percentile of 40 minutes of one person (docs/gestures.md)
@@ -34,7 +34,7 @@ Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Parts:
+class Decomposition:
     """One recording taken apart, at `GESTURE_FPS`.
 
     Parameters
@@ -54,7 +54,7 @@ class Parts:
     pitch: Floats
 
 
-def taken_apart(captured: Captured, basis: Basis, estimator: Estimator) -> Parts:
+def decompose(captured: FaceRecording, basis: ExpressionBasis, estimator: Estimator) -> Decomposition:
     """Head pose, expression, independent motion, lids, gaze, speech and sound of a recording.
 
     Parameters
@@ -62,55 +62,55 @@ def taken_apart(captured: Captured, basis: Basis, estimator: Estimator) -> Parts
     basis
         Of the person, in the size of the landmarks.
     estimator
-        Of weights in displacements `as_counted`.
+        Of weights in displacements `weight_displacements`.
     """
-    recorded = at_gesture_rate(captured)
+    recorded = resample_to_gesture_rate(captured)
     moved = recorded.landmarks - basis.rest
-    weights = estimator.weights(as_counted(averaged(moved)))
+    weights = estimator.weights(weight_displacements(moving_average(moved)))
     left = moved - np.tensordot(weights, basis.expressions, axes=1)
     if recorded.eyes is None:
-        shut = lids_shut(basis.rest + left, basis.rest)
-        turned = eyes_turned(recorded.landmarks)
+        shut = lid_closure(basis.rest + left, basis.rest)
+        turned = eye_angles(recorded.landmarks)
     else:
         shut, turned = recorded.eyes[:, :2], recorded.eyes[:, 2:].astype(np.float64)
-    head = _steady(recorded.head - np.median(recorded.head, axis=0))
+    head = _smooth(recorded.head - np.median(recorded.head, axis=0))
     motion = {
         "expression": weights.astype(np.float32),
-        **{name: _steady(left[:, feature_landmarks(name)]) for name in REGION_FEATURES},
+        **{name: _smooth(left[:, feature_landmarks(name)]) for name in REGION_FEATURES},
         "blink": shut,
-        "gaze": line_of_sight(turned, recorded.head, shut),
+        "gaze": gaze_angles(turned, recorded.head, shut),
         "head": head,
     }
     times = np.arange(len(moved)) / GESTURE_FPS
     heard = np.tile(SILENCE, (len(times), 1))
     if recorded.sound is not None:
-        heard = drivers(recorded.sound, times, with_pitch=True)
-    return Parts(
+        heard = prosody_features(recorded.sound, times, with_pitch=True)
+    return Decomposition(
         recorded.name,
-        {name: motion[name] for name in FEATURES if name not in recorded.missing},
+        {name: motion[name] for name in FEATURES if name not in recorded.missing_features},
         left[:, list(MOUTH_REGION)].astype(np.float32),
         heard[:, 0],
         heard[:, 1],
     )
 
 
-def as_counted(displacements: NDArray[np.floating]) -> NDArray[np.float64]:
+def weight_displacements(displacements: NDArray[np.floating]) -> NDArray[np.float64]:
     """Displacements (N, 478, 3) as they count for expressions: lips move for speech most of the time."""
     counts = np.ones((N_LANDMARKS, 1))
     counts[list(MOUTH_REGION)] = LIPS_COUNT
     return np.asarray(displacements, np.float64) * counts
 
 
-def lids_shut(landmarks: NDArray[np.floating], rest: NDArray[np.floating]) -> Floats:
+def lid_closure(landmarks: NDArray[np.floating], rest: NDArray[np.floating]) -> Floats:
     """(T, 2) share by which the left and the right lids are shut, of (T, 478, 3): 0 as at rest (478, 3), 1 fully."""
     columns = []
     for side in ("Left", "Right"):
-        opened = float(aperture(rest[None], side)[0])
-        columns.append((opened - aperture(landmarks, side)) / (opened - SHUT_APERTURE))
+        opened = float(eye_aperture(rest[None], side)[0])
+        columns.append((opened - eye_aperture(landmarks, side)) / (opened - SHUT_APERTURE))
     return np.stack(columns, axis=1).astype(np.float32)
 
 
-def eyes_turned(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
+def eye_angles(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
     """(T, 2) pitch and yaw of the eyes in the head, of tracked landmarks (T, 478, 3): from where the irises stand."""
     turned = []
     for side, iris in IRIS.items():
@@ -122,7 +122,7 @@ def eyes_turned(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
     return np.asarray(np.mean(turned, axis=0), np.float64)
 
 
-def line_of_sight(turned: NDArray[np.float64], head: NDArray[np.floating], shut: Floats) -> Floats:
+def gaze_angles(turned: NDArray[np.float64], head: NDArray[np.floating], shut: Floats) -> Floats:
     """(T, 2) pitch and yaw at which eyes look that are turned (T, 2) in the head, against the recording's median.
 
     Where lids hide the irises the line goes straight from before to behind.
@@ -136,7 +136,7 @@ def line_of_sight(turned: NDArray[np.float64], head: NDArray[np.floating], shut:
     return centred
 
 
-def _steady(values: NDArray[np.floating]) -> Floats:
+def _smooth(values: NDArray[np.floating]) -> Floats:
     from scipy.ndimage import gaussian_filter1d
 
     return np.asarray(gaussian_filter1d(values, STEADY_S * GESTURE_FPS, axis=0), np.float32)

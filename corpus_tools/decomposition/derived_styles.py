@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from lexicon.errors import DataError
-from tts2face.models.palette import FIXED_CHANNELS, REGION_FEATURES, Change, Derivation
+from tts2face.models.palette import FIXED_CHANNELS, REGION_FEATURES, Derivation, FeatureChange
 
 TABLE = Path(__file__).with_name("derived_styles.tsv")
 
 
-def derived_styles(source: str, table: Path = TABLE) -> dict[str, Derivation]:
+def read_derived_styles(source: str, table: Path = TABLE) -> dict[str, Derivation]:
     """Derivations from a measured style, by name.
 
     Raises
@@ -18,7 +18,7 @@ def derived_styles(source: str, table: Path = TABLE) -> dict[str, Derivation]:
     DataError
         A line of the table names no feature or channel, or holds no number.
     """
-    changes: dict[str, dict[str, Change]] = {}
+    changes: dict[str, dict[str, FeatureChange]] = {}
     reasons: dict[str, list[str]] = {}
     lines = [line for line in table.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     for row in csv.DictReader(lines, delimiter="\t"):
@@ -26,8 +26,8 @@ def derived_styles(source: str, table: Path = TABLE) -> dict[str, Derivation]:
         if feature not in FIXED_CHANNELS and feature not in REGION_FEATURES:
             raise DataError(f"{table.name}: {style} changes {feature!r}, which is no feature; correct the table")
         try:
-            offset = _offsets(row["offsets"] or "", feature)
-            changes.setdefault(style, {})[feature] = Change(float(row["gain"]), offset, float(row["tempo"]))
+            offset = _parse_offsets(row["offsets"] or "", feature)
+            changes.setdefault(style, {})[feature] = FeatureChange(float(row["gain"]), offset, float(row["tempo"]))
         except ValueError as broken:
             raise DataError(f"{table.name}: {feature} of {style} cannot be read ({broken}); correct it") from broken
         reasons.setdefault(style, []).extend([row["why"]] if row["why"] else [])
@@ -37,7 +37,7 @@ def derived_styles(source: str, table: Path = TABLE) -> dict[str, Derivation]:
     }
 
 
-def _offsets(written: str, feature: str) -> Mapping[str, float]:
+def _parse_offsets(written: str, feature: str) -> Mapping[str, float]:
     found = {}
     for part in written.split():
         channel, _, value = part.partition("=")

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.face.landmark_fit import all_landmarks, landmark_motion, landmark_places
+from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.types import Trajectory
@@ -22,7 +22,7 @@ def rest_landmarks(face: Face) -> Floats:
     """
     if sorted(face.landmarks.tolist()) != list(range(N_LANDMARKS)):
         raise DataError(f"the face has {len(face.landmarks)} of {N_LANDMARKS} landmarks; build it with all of them")
-    return all_landmarks(face, landmark_places(face))
+    return scatter_landmarks(face, landmark_positions(face))
 
 
 def moved_landmarks(face: Face, motion: Trajectory) -> NDArray[np.float32]:
@@ -36,7 +36,7 @@ def moved_landmarks(face: Face, motion: Trajectory) -> NDArray[np.float32]:
     if motion.channels != face.shape_names:
         raise DataError("the weights are not of this face's shapes; carry them to it first")
     weights = motion.values.astype(np.float64)
-    moves = all_landmarks(face, landmark_motion(face, np.arange(len(face.shapes))))
+    moves = scatter_landmarks(face, landmark_motion(face, np.arange(len(face.shapes))))
     found = rest_landmarks(face) + np.tensordot(weights, moves, axes=(1, 2))
     _turn_eyes(face, weights, found)
     return found.astype(np.float32)

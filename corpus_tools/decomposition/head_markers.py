@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.decomposition.marker_gaps import check_gap
 from lexicon.errors import DataError
-from tts2face.video.pose import similarity
+from tts2face.video.pose import similarity_transforms
 
 LEAST_SEEN = 3  # markers that show a pose
 MOST_MISFIT_MM = 5.0  # of the head's markers against a rigid head, root mean square; caps slip by less
@@ -37,13 +37,13 @@ class HeadPoses:
     places: Floats
     misfit_mm: float
 
-    def without(self, points: Floats) -> Floats:
+    def remove_from(self, points: Floats) -> Floats:
         """(T, M, 3) points in the head's own axes."""
         local: Floats = np.einsum("tij,tmi->tmj", self.rotations, points - self.places[:, None])
         return local
 
 
-def head_poses(
+def fit_head_poses(
     points: Floats, names: Sequence[str], fps: float, *, reference: Floats | None = None
 ) -> tuple[HeadPoses, tuple[str, ...]]:
     """Poses of the head, and a sentence that says what was filled.
@@ -75,12 +75,12 @@ def head_poses(
     if spreads[1] <= LINE * spreads[0]:
         raise DataError("the head's markers lie on a line, so that its pose is not known; wear them apart")
     shown, seen = points[posed], seen[posed]
-    rotations, places = _fitted(shown, seen, head)
+    rotations, places = _fit_poses(shown, seen, head)
     for _ in range(N_ROUNDS if reference is None else 0):
         local = np.einsum("tij,tmi->tmj", rotations, np.nan_to_num(shown) - places[:, None])
         head = np.einsum("tm,tmi->mi", seen, local) / seen.sum(axis=0)[:, None]
         head = head - head.mean(axis=0)
-        rotations, places = _fitted(shown, seen, head)
+        rotations, places = _fit_poses(shown, seen, head)
     off = np.einsum("tij,mj->tmi", rotations, head) + places[:, None] - shown
     misfit = float(np.sqrt(np.square(off[seen]).sum(axis=1).mean()))
     if misfit > MOST_MISFIT_MM:
@@ -88,10 +88,10 @@ def head_poses(
             f"the head's markers do not move as one ({misfit:.1f} mm apart); name only those on the skull as head"
         )
     notes = () if posed.all() else (f"the head's pose was filled in in {int((~posed).sum())} frames",)
-    return HeadPoses(head, *_between(rotations, places, posed), misfit), notes
+    return HeadPoses(head, *_interpolate_poses(rotations, places, posed), misfit), notes
 
 
-def _between(rotations: Floats, places: Floats, posed: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+def _interpolate_poses(rotations: Floats, places: Floats, posed: NDArray[np.bool_]) -> tuple[Floats, Floats]:
     """Poses of all frames from those of the frames that have one: evenly turned and straight between them."""
     from scipy.spatial.transform import Rotation, Slerp
 
@@ -112,7 +112,7 @@ def _first_reference(points: Floats, seen: NDArray[np.bool_]) -> Floats:
     return head
 
 
-def _fitted(points: Floats, seen: NDArray[np.bool_], head: Floats) -> tuple[Floats, Floats]:
+def _fit_poses(points: Floats, seen: NDArray[np.bool_], head: Floats) -> tuple[Floats, Floats]:
     """Rotations (T, 3, 3) and places (T, 3) of the head; frames in which the same markers are seen go together."""
     rotations, places = np.zeros((len(points), 3, 3)), np.zeros((len(points), 3))
     patterns, which = np.unique(seen, axis=0, return_inverse=True)
@@ -120,7 +120,7 @@ def _fitted(points: Floats, seen: NDArray[np.bool_], head: Floats) -> tuple[Floa
         here = which.ravel() == number
         weights = np.full(int(pattern.sum()), 1.0 / pattern.sum())
         there, known = points[here][:, pattern], head[pattern]
-        into_head, _ = similarity(there, known, weights)
+        into_head, _ = similarity_transforms(there, known, weights)
         rotations[here] = into_head.swapaxes(1, 2)
         places[here] = there.mean(axis=1) - rotations[here] @ known.mean(axis=0)
     return rotations, places

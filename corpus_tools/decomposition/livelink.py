@@ -5,19 +5,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.decomposition.capture import Captured, sound_of
+from corpus_tools.decomposition.capture import FaceRecording, read_capture_sound
 from corpus_tools.decomposition.face_motion import moved_landmarks, rest_landmarks
 from tts2face.models.face import Face
 from tts2face.retargeting.performer import match_shapes
 from tts2face.types import Trajectory
-from tts2face.video.livelink import Capture, read_livelink
+from tts2face.video.livelink import FaceCapture, read_livelink
 
 # Channels without which a feature is not told.
 NEEDED = {"gaze": ("eyeLook",), "blink": ("eyeBlink",), "brows": ("brow",), "cheeks": ("cheek", "nose")}
 
 
-def captured_livelink(path: Path, face: Face, *, sound: Path | None = None) -> Captured:
-    """A capture, in the size of the face that it moves; sound as `sound_of` finds it.
+def read_livelink_recording(path: Path, face: Face, *, sound: Path | None = None) -> FaceRecording:
+    """A capture, in the size of the face that it moves; sound as `read_capture_sound` finds it.
 
     Raises
     ------
@@ -28,19 +28,19 @@ def captured_livelink(path: Path, face: Face, *, sound: Path | None = None) -> C
     """
     capture = read_livelink(path)
     motion = match_shapes(capture.weights, face)
-    return Captured(
+    return FaceRecording(
         name=path.stem,
         fps=capture.weights.fps,
         landmarks=moved_landmarks(face, motion),
         head=np.asarray(capture.head.values, np.float32),
-        sound=sound_of(path, sound),
+        sound=read_capture_sound(path, sound),
         rest=rest_landmarks(face).astype(np.float32),
-        eyes=eyes_of(face, motion),
-        missing=_untold(capture),
+        eyes=eye_motion(face, motion),
+        missing_features=_missing_features(capture),
     )
 
 
-def eyes_of(face: Face, motion: Trajectory) -> NDArray[np.float32]:
+def eye_motion(face: Face, motion: Trajectory) -> NDArray[np.float32]:
     """(T, 4) shares by which both lids are shut, and pitch and yaw of the eyes, of weights (T, K) of a face's shapes.
 
     The capture's own measure: its lids are shut at 1, wherever those of the face meet.
@@ -54,7 +54,7 @@ def eyes_of(face: Face, motion: Trajectory) -> NDArray[np.float32]:
     return np.column_stack([*lids, turned]).astype(np.float32)
 
 
-def _untold(capture: Capture) -> frozenset[str]:
+def _missing_features(capture: FaceCapture) -> frozenset[str]:
     """Features whose channels are missing or never move."""
     moving = [
         name for name, values in zip(capture.weights.channels, capture.weights.values.T, strict=True) if np.ptp(values)

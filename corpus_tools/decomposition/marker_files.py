@@ -139,15 +139,15 @@ def read_marker_table(path: Path, fps: float | None = None) -> MarkerTake:
     first = rows[0][0].lower() if rows else ""
     if first not in ("time", "frame") or len(rows) < 2:
         raise DataError(f"{path} is not a CSV table of markers: it needs the columns time or frame, then NAME_x, ...")
-    names = _named(path, rows[0])
-    values = np.array([_numbers(path, number, row, len(rows[0])) for number, row in enumerate(rows[1:], start=2)])
+    names = _parse_header(path, rows[0])
+    values = np.array([_parse_row(path, number, row, len(rows[0])) for number, row in enumerate(rows[1:], start=2)])
     columns = [[rows[0].index(f"{name}_{axis}") for axis in AXES] for name in names]
     points = values[:, np.array(columns)]
     points[np.isnan(points).any(axis=2)] = np.nan
-    return _even(path, names, points, (first, values[:, 0]), fps)
+    return _build_even_take(path, names, points, (first, values[:, 0]), fps)
 
 
-def _named(path: Path, header: list[str]) -> tuple[str, ...]:
+def _parse_header(path: Path, header: list[str]) -> tuple[str, ...]:
     names = tuple(dict.fromkeys(column.rpartition("_")[0] for column in header[1:]))
     wanted = sorted(f"{name}_{axis}" for name in names for axis in AXES)
     if sorted(header[1:]) != wanted:
@@ -156,7 +156,7 @@ def _named(path: Path, header: list[str]) -> tuple[str, ...]:
     return names
 
 
-def _numbers(path: Path, number: int, row: list[str], n_columns: int) -> list[float]:
+def _parse_row(path: Path, number: int, row: list[str], n_columns: int) -> list[float]:
     if len(row) != n_columns:
         raise DataError(f"line {number} of {path} has {len(row)} columns, not {n_columns}; export it again")
     try:
@@ -165,7 +165,7 @@ def _numbers(path: Path, number: int, row: list[str], n_columns: int) -> list[fl
         raise DataError(f"line {number} of {path} cannot be read ({broken}); export it again") from broken
 
 
-def _even(
+def _build_even_take(
     path: Path, names: tuple[str, ...], points: Floats, counted: tuple[str, Floats], fps: float | None
 ) -> MarkerTake:
     """Frames at an even rate; those that a table leaves out are gaps."""

@@ -14,7 +14,7 @@ MOST_NAMED = 4  # markers in a sentence
 Floats = NDArray[np.float64]
 
 
-def filled(tracks: Floats, names: Sequence[str], fps: float) -> tuple[Floats, tuple[str, ...]]:
+def fill_marker_gaps(tracks: Floats, names: Sequence[str], fps: float) -> tuple[Floats, tuple[str, ...]]:
     """Tracks without gaps, and a sentence that says what was filled.
 
     Parameters
@@ -37,7 +37,7 @@ def filled(tracks: Floats, names: Sequence[str], fps: float) -> tuple[Floats, tu
         if not gone.any():
             continue
         check_gap(f"marker {name}", gone, fps)
-        whole[gone, marker] = _bridged(tracks[:, marker], gone)
+        whole[gone, marker] = _interpolate_gaps(tracks[:, marker], gone)
         counts[name] = int(gone.sum())
     if not counts:
         return whole, ()
@@ -46,17 +46,17 @@ def filled(tracks: Floats, names: Sequence[str], fps: float) -> tuple[Floats, tu
     return whole, (f"gaps were filled in {named}{more}",)
 
 
-def gaps_of(gone: NDArray[np.bool_]) -> NDArray[np.int64]:
+def find_gaps(gone: NDArray[np.bool_]) -> NDArray[np.int64]:
     """(G, 2) first frame and one past the last of each run of True in (T,)."""
     borders = np.flatnonzero(np.diff(np.concatenate([[False], gone, [False]])))
     return borders.reshape(-1, 2)
 
 
 def check_gap(what: str, gone: NDArray[np.bool_], fps: float) -> None:
-    """Refuse gaps, True in (T,), that are too long to be filled; errors as `filled`."""
+    """Refuse gaps, True in (T,), that are too long to be filled; errors as `fill_marker_gaps`."""
     if gone.all():
         raise DataError(f"the {what} is never seen; {OTHERWISE}, or capture it again")
-    begin, end = max(gaps_of(gone).tolist(), key=lambda gap: gap[1] - gap[0], default=(0, 0))
+    begin, end = max(find_gaps(gone).tolist(), key=lambda gap: gap[1] - gap[0], default=(0, 0))
     if (end - begin) / fps > LONGEST_GAP_S:
         raise DataError(
             f"the {what} is out of sight for {(end - begin) / fps:.2f} s from {begin / fps:.2f} s on, and gaps up to "
@@ -64,7 +64,7 @@ def check_gap(what: str, gone: NDArray[np.bool_], fps: float) -> None:
         )
 
 
-def _bridged(track: Floats, gone: NDArray[np.bool_]) -> Floats:
+def _interpolate_gaps(track: Floats, gone: NDArray[np.bool_]) -> Floats:
     """(G, 3) places in the frames that are gone."""
     from scipy.interpolate import PchipInterpolator
 

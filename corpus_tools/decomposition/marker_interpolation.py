@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.face.landmark_fit import N_SKIN
-from tts2face.face.rbf import interpolant
+from tts2face.face.rbf import fit_interpolant
 from tts2face.models.landmarks import (
     INNER_LIP_LOWER,
     INNER_LIP_UPPER,
@@ -16,7 +16,7 @@ from tts2face.models.landmarks import (
     OUTER_LIP_LOWER,
     OUTER_LIP_UPPER,
 )
-from tts2face.video.pose import similarity
+from tts2face.video.pose import similarity_transforms
 
 FACE_SIDES = (234, 454)  # landmarks as far apart as the face is wide
 LEAST_SIZE, MOST_SIZE = 0.6, 1.7  # of the common face over the person's; beyond it the unit is wrong
@@ -45,7 +45,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Spread:
+class MarkerInterpolator:
     """A person's face in the axes of the common one.
 
     Parameters
@@ -60,17 +60,17 @@ class Spread:
 
     rest: Floats
     shares: Floats
-    turn: Floats
-    shift: Floats
+    rotation: Floats
+    translation: Floats
     size: float
 
     def landmarks(self, displacements: Floats) -> Floats:
         """(T, 478, 3) landmarks for displacements (T, M, 3) of the markers in the head's axes, mm."""
-        moved: Floats = np.einsum("lm,tmi->tli", self.shares, displacements @ self.turn.T, optimize=True)
+        moved: Floats = np.einsum("lm,tmi->tli", self.shares, displacements @ self.rotation.T, optimize=True)
         return self.rest + moved
 
 
-def spread_to_landmarks(markers: Floats, at: Sequence[int], common: Floats) -> Spread:
+def build_marker_interpolator(markers: Floats, at: Sequence[int], common: Floats) -> MarkerInterpolator:
     """The way from a person's markers to landmarks.
 
     Parameters
@@ -96,26 +96,26 @@ def spread_to_landmarks(markers: Floats, at: Sequence[int], common: Floats) -> S
     """
     places = common[list(at)]
     weights = np.full(len(at), 1.0 / len(at))
-    turns, sizes = similarity(markers[None], places, weights)
+    turns, sizes = similarity_transforms(markers[None], places, weights)
     turn, size = turns[0], float(sizes[0])
     if not LEAST_SIZE <= size <= MOST_SIZE:
         raise DataError(f"the markers lie {1 / size:.3g} times as far apart as on a face; check the file's unit")
     shift = weights @ places / size - turn @ (weights @ markers)
     own = common / size
     width = float(np.linalg.norm(own[FACE_SIDES[0]] - own[FACE_SIDES[1]]))
-    bent = interpolant(own[list(at)], markers @ turn.T + shift - own[list(at)], width)
+    bent = fit_interpolant(own[list(at)], markers @ turn.T + shift - own[list(at)], width)
     rest = own + bent(own)
     shares = np.zeros((len(common), len(at)))
-    asked = _asked(rest)
-    for side, opposite in _sides(common):
+    asked = _query_points(rest)
+    for side, opposite in _landmark_groups(common):
         free = [marker for marker, landmark in enumerate(at) if landmark not in opposite]
         if free:
-            follow = interpolant(rest[[at[marker] for marker in free]], np.eye(len(free)), width)
+            follow = fit_interpolant(rest[[at[marker] for marker in free]], np.eye(len(free)), width)
             shares[np.ix_(side, free)] = follow(asked[side])
-    return Spread(rest, shares, turn, shift, size)
+    return MarkerInterpolator(rest, shares, turn, shift, size)
 
 
-def _asked(rest: Floats) -> Floats:
+def _query_points(rest: Floats) -> Floats:
     """(478, 3) places whose motion landmarks take: their own, but for those inside the lips."""
     asked = rest.copy()
     for outer, lines in ((OUTER_LIP_UPPER, UPPER_LIP_LINES), (OUTER_LIP_LOWER, LOWER_LIP_LINES)):
@@ -124,7 +124,7 @@ def _asked(rest: Floats) -> Floats:
     return asked
 
 
-def _sides(common: Floats) -> list[tuple[list[int], set[int]]]:
+def _landmark_groups(common: Floats) -> list[tuple[list[int], set[int]]]:
     """Landmarks that follow the same markers, each with the landmarks whose markers they do not follow."""
     corners = {landmark for line in (OUTER_LIP_UPPER, *UPPER_LIP_LINES) for landmark in (line[0], line[-1])}
     upper = {*OUTER_LIP_UPPER, *(landmark for line in UPPER_LIP_LINES for landmark in line)} - corners

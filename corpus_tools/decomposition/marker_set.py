@@ -45,7 +45,7 @@ class MarkerSet:
         return tuple(self.landmarks)
 
     @property
-    def untold(self) -> frozenset[str]:
+    def missing_features(self) -> frozenset[str]:
         """Features of a palette that these markers cannot tell; no marker lies on an eyeball."""
         there = set(self.regions.values())
         return frozenset({"gaze"} | {feature for feature, regions in NEEDED.items() if not there.issuperset(regions)})
@@ -75,7 +75,7 @@ def read_marker_set(path: Path = SHIPPED) -> MarkerSet:
     regions: dict[str, str] = {}
     landmarks: dict[str, int] = {}
     for row in rows[1:]:
-        _add(path, row, regions, landmarks)
+        _add_row(path, row, regions, landmarks)
     n_head = len(regions) - len(landmarks)
     if n_head < LEAST_HEAD:
         raise DataError(
@@ -87,7 +87,7 @@ def read_marker_set(path: Path = SHIPPED) -> MarkerSet:
     return MarkerSet(regions, landmarks)
 
 
-def _add(path: Path, row: list[str], regions: dict[str, str], landmarks: dict[str, int]) -> None:
+def _add_row(path: Path, row: list[str], regions: dict[str, str], landmarks: dict[str, int]) -> None:
     """Write one row of the table into both."""
     if len(row) != len(COLUMNS) or not row[0]:
         raise DataError(f"{path} has the row {row}; it needs {', '.join(COLUMNS)}, between tabs")

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.decomposition.capture import Captured, sound_of
+from corpus_tools.decomposition.capture import FaceRecording, read_capture_sound
 from corpus_tools.decomposition.face_motion import rest_landmarks
-from corpus_tools.decomposition.head_markers import HeadPoses, head_poses
+from corpus_tools.decomposition.head_markers import HeadPoses, fit_head_poses
 from corpus_tools.decomposition.marker_files import MarkerTake, read_markers
-from corpus_tools.decomposition.marker_gaps import filled
-from corpus_tools.decomposition.marker_interpolation import Spread, spread_to_landmarks
+from corpus_tools.decomposition.marker_gaps import fill_marker_gaps
+from corpus_tools.decomposition.marker_interpolation import MarkerInterpolator, build_marker_interpolator
 from corpus_tools.decomposition.marker_set import LEAST_FACE, MarkerSet
 from lexicon.errors import DataError
 from tts2face.models.face import Face
@@ -41,13 +41,13 @@ class MarkerFace:
     head_names: tuple[str, ...]
     head: Floats
     rest: Floats
-    spread: Spread
+    spread: MarkerInterpolator
 
 
-def captured_markers(
+def read_marker_recording(
     path: Path, face: Face, worn: MarkerSet, *, neutral: Path | None = None, sound: Path | None = None,
     fps: float | None = None,
-) -> Captured:  # fmt: skip
+) -> FaceRecording:  # fmt: skip
     """A recording of markers as landmarks in the person's own size; gaps are filled and told.
 
     Parameters
@@ -57,7 +57,7 @@ def captured_markers(
     neutral
         A recording of the person at rest; without it the median of the recording is taken for rest.
     sound
-        As `sound_of`, where the file itself holds none.
+        As `read_capture_sound`, where the file itself holds none.
     fps
         Of a table that counts frames.
 
@@ -71,25 +71,25 @@ def captured_markers(
         Reading C3D needs a package that is missing.
     """
     take = read_markers(path, fps)
-    rest = marker_face(path if neutral is None else neutral, face, worn, fps=fps)
-    points, poses, notes = _in_head(path, take, rest.names, rest.head_names, rest.head)
+    rest = read_marker_face(path if neutral is None else neutral, face, worn, fps=fps)
+    points, poses, notes = _face_in_head_axes(path, take, rest.names, rest.head_names, rest.head)
     landmarks = rest.spread.landmarks(points - rest.rest)
     if neutral is None:
         notes = ("the recording's median stands for the face at rest", *notes)
-    return Captured(
+    return FaceRecording(
         name=path.stem,
         fps=take.fps,
         landmarks=landmarks.astype(np.float32),
         head=_head_motion(poses, rest.spread, face).astype(np.float32),
-        sound=take.sound or sound_of(path, sound),
+        sound=take.sound or read_capture_sound(path, sound),
         rest=rest.spread.rest.astype(np.float32),
-        missing=worn.untold,
-        notes=(*_absent(take, worn), *notes),
+        missing_features=worn.missing_features,
+        notes=(*_absent_markers(take, worn), *notes),
     )
 
 
-def marker_face(path: Path, face: Face, worn: MarkerSet, *, fps: float | None = None) -> MarkerFace:
-    """The person's face at rest: the median of a recording; errors as `captured_markers`."""
+def read_marker_face(path: Path, face: Face, worn: MarkerSet, *, fps: float | None = None) -> MarkerFace:
+    """The person's face at rest: the median of a recording; errors as `read_marker_recording`."""
     take = read_markers(path, fps)
     check_regions(path, take, worn)
     there = set(take.names)
@@ -97,15 +97,15 @@ def marker_face(path: Path, face: Face, worn: MarkerSet, *, fps: float | None = 
     if len(names) < LEAST_FACE:
         raise DataError(f"{path} has {len(names)} of the set's markers of the face; it takes at least {LEAST_FACE}")
     head_names = tuple(name for name in worn.head if name in there)
-    points, poses, _ = _in_head(path, take, names, head_names, None)
+    points, poses, _ = _face_in_head_axes(path, take, names, head_names, None)
     rest = np.median(points, axis=0)
-    spread = spread_to_landmarks(rest, [worn.landmarks[name] for name in names], rest_landmarks(face))
+    spread = build_marker_interpolator(rest, [worn.landmarks[name] for name in names], rest_landmarks(face))
     return MarkerFace(worn, names, head_names, poses.reference, rest, spread)
 
 
-def still_of_markers(path: Path, rest: MarkerFace) -> Floats:
-    """(478, 3) landmarks of a static capture, the median of its frames; errors as `captured_markers`."""
-    points, _, _ = _in_head(path, read_markers(path), rest.names, rest.head_names, rest.head)
+def read_marker_still(path: Path, rest: MarkerFace) -> Floats:
+    """(478, 3) landmarks of a static capture, the median of its frames; errors as `read_marker_recording`."""
+    points, _, _ = _face_in_head_axes(path, read_markers(path), rest.names, rest.head_names, rest.head)
     found: Floats = rest.spread.landmarks(np.median(points, axis=0)[None] - rest.rest)[0]
     return found
 
@@ -132,12 +132,12 @@ def check_regions(path: Path, take: MarkerTake, worn: MarkerSet) -> None:
             )
 
 
-def _absent(take: MarkerTake, worn: MarkerSet) -> tuple[str, ...]:
+def _absent_markers(take: MarkerTake, worn: MarkerSet) -> tuple[str, ...]:
     gone = [name for name in worn.regions if name not in take.names]
     return (f"the file has no marker {', '.join(gone)}; its region goes by the others",) if gone else ()
 
 
-def _in_head(
+def _face_in_head_axes(
     path: Path, take: MarkerTake, names: tuple[str, ...], head_names: tuple[str, ...], head: Floats | None
 ) -> tuple[Floats, HeadPoses, tuple[str, ...]]:
     """(T, M, 3) markers of the face in the head's axes without gaps, the head's poses, and what was filled."""
@@ -147,20 +147,20 @@ def _in_head(
         raise DataError(f"{path} lacks the marker {gone[0]}, which the face at rest has; capture both with all markers")
     try:
         of_head = take.points[:, [at[name] for name in head_names]]
-        poses, head_notes = head_poses(of_head, head_names, take.fps, reference=head)
-        local = poses.without(take.points[:, [at[name] for name in names]])
-        whole, notes = filled(local, names, take.fps)
+        poses, head_notes = fit_head_poses(of_head, head_names, take.fps, reference=head)
+        local = poses.remove_from(take.points[:, [at[name] for name in names]])
+        whole, notes = fill_marker_gaps(local, names, take.fps)
     except DataError as refused:
         raise DataError(f"{path}: {refused}") from refused
     return whole, poses, (*head_notes, *notes)
 
 
-def _head_motion(poses: HeadPoses, spread: Spread, face: Face) -> Floats:
+def _head_motion(poses: HeadPoses, spread: MarkerInterpolator, face: Face) -> Floats:
     """(T, 6) `HEAD_CHANNELS` in the face's axes: angles against the mean, place of the pivot against the median."""
-    turn = spread.turn
+    turn = spread.rotation
     left, _, right = np.linalg.svd(poses.rotations.mean(axis=0))
     mean = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
     level = turn @ mean.T  # the world's axes, as the face has them when the head is as it mostly is
-    pivot = (face.pivot / spread.size - spread.shift) @ turn
+    pivot = (face.pivot / spread.size - spread.translation) @ turn
     places = (poses.rotations @ pivot + poses.places) @ level.T
     return np.column_stack([head_angles(level @ poses.rotations @ turn.T), places - np.median(places, axis=0)])

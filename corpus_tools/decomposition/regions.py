@@ -11,15 +11,15 @@ TABLE = Path(__file__).with_name("regions.tsv")
 
 def region_landmarks() -> dict[str, NDArray[np.int32]]:
     """Landmarks of each region, by name."""
-    return {row["region"]: np.array([int(n) for n in row["landmarks"].split()], np.int32) for row in _rows()}
+    return {row["region"]: np.array([int(n) for n in row["landmarks"].split()], np.int32) for row in _read_rows()}
 
 
 def feature_landmarks(feature: str) -> NDArray[np.int32]:
     """Landmarks of all regions that a feature moves together: both brows, both eyes."""
-    found = [row["landmarks"].split() for row in _rows() if row["feature"] == feature]
+    found = [row["landmarks"].split() for row in _read_rows() if row["feature"] == feature]
     return np.array([int(n) for part in found for n in part], np.int32)
 
 
-def _rows() -> list[dict[str, str]]:
+def _read_rows() -> list[dict[str, str]]:
     lines = [line for line in TABLE.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     return list(csv.DictReader(lines, delimiter="\t"))

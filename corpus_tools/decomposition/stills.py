@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.decomposition.markers import MarkerFace, still_of_markers
+from corpus_tools.decomposition.markers import MarkerFace, read_marker_still
 from corpus_tools.recordings.folder import VIDEO_SUFFIXES
 from lexicon.errors import DataError, InputError
 from tts2face.models.palette import EXPRESSIONS
 from tts2face.storage.picture_files import opened_picture
-from tts2face.video.media import Picture, read_pictures
+from tts2face.video.media import TimedFrame, read_frames
 from tts2face.video.pose import remove_pose
 from tts2face.video.track import FaceTracker
 
@@ -41,7 +41,7 @@ class Still:
         return self.path.suffix.lower() in MARKER_SUFFIXES
 
 
-def stills_in(folder: Path) -> dict[str, Still]:
+def find_stills(folder: Path) -> dict[str, Still]:
     """Stills of a folder whose files are named as their expressions: sad.png, happy.png, ..., neutral.png.
 
     Raises
@@ -54,10 +54,10 @@ def stills_in(folder: Path) -> dict[str, Still]:
     known = PICTURE_SUFFIXES | MARKER_SUFFIXES
     files = [path for path in sorted(folder.iterdir()) if path.suffix.lower() in known]
     named = [f"{path.stem.lower()}={path}" for path in files if path.stem.lower() in (*EXPRESSIONS, NEUTRAL)]
-    return named_stills(named)
+    return parse_stills(named)
 
 
-def named_stills(named: Sequence[str]) -> dict[str, Still]:
+def parse_stills(named: Sequence[str]) -> dict[str, Still]:
     """Stills from ``sad=FILE``; an instant of a video is ``sad=VIDEO@SECONDS``.
 
     Raises
@@ -74,11 +74,11 @@ def named_stills(named: Sequence[str]) -> dict[str, Still]:
             )
         if name in stills:
             raise InputError(f"there are two stills for {name}, {stills[name]} and {place}; give one")
-        stills[name] = _still(place)
+        stills[name] = _parse_still(place)
     return stills
 
 
-def required(stills: Mapping[str, Still], *, is_rest_known: bool) -> tuple[str, ...]:
+def required_stills(stills: Mapping[str, Still], *, is_rest_known: bool) -> tuple[str, ...]:
     """Names of the stills that a basis takes.
 
     Raises
@@ -107,19 +107,19 @@ class PictureReader:
         DataError
             It cannot be read, or shows no face.
         """
-        pixels = _pixels(still)
+        pixels = _read_pixels(still)
         tracking = self._tracker.track(lambda: [pixels], 1.0)
         if tracking.is_missing[0]:
             raise DataError(f"{still} shows no face; take another picture, lit well and facing the camera")
         return np.asarray(remove_pose(tracking.points, 1.0).landmarks[0], np.float64)
 
 
-def marker_reader(rest: MarkerFace) -> Callable[[Still], Floats]:
+def build_marker_reader(rest: MarkerFace) -> Callable[[Still], Floats]:
     """What reads static marker captures of a person, in the person's own size."""
-    return lambda still: still_of_markers(still.path, rest)
+    return lambda still: read_marker_still(still.path, rest)
 
 
-def _still(place: str) -> Still:
+def _parse_still(place: str) -> Still:
     path, _, at = place.rpartition("@")
     if path and Path(path).suffix.lower() in VIDEO_SUFFIXES:
         try:
@@ -138,19 +138,19 @@ def _still(place: str) -> Still:
     return still
 
 
-def _pixels(still: Still) -> NDArray[np.uint8]:
+def _read_pixels(still: Still) -> NDArray[np.uint8]:
     if still.at is not None:
-        return _frame(still, still.at)
+        return _read_frame(still, still.at)
     from PIL import ImageOps
 
     with opened_picture(still.path, "the still") as image:
         return np.array(ImageOps.exif_transpose(image).convert("RGB"))
 
 
-def _frame(still: Still, at: float) -> NDArray[np.uint8]:
+def _read_frame(still: Still, at: float) -> NDArray[np.uint8]:
     """The frame of a video that is shown at an instant."""
-    shown: Picture | None = None
-    for picture in read_pictures(still.path):
+    shown: TimedFrame | None = None
+    for picture in read_frames(still.path):
         if shown is not None and picture.time > at:
             return shown.pixels
         shown = picture

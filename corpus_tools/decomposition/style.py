@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.decomposition.decompose import Parts
+from corpus_tools.decomposition.decompose import Decomposition
 from corpus_tools.decomposition.regions import feature_landmarks
 from lexicon.errors import InputError
-from tts2face.models.palette import FEATURES, REGION_FEATURES, Palette, Region, Style
+from tts2face.models.palette import FEATURES, REGION_FEATURES, FaceRegion, Palette, Style
 
 VARIANCE = 0.95  # of a region's motion that its modes keep: the rest is the tracker's
 MOST_MODES = 10
@@ -19,16 +19,20 @@ Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Learnt:
+class LearnedStyle:
     """A palette with a new style, and the share of each region's motion (variance) that its modes keep."""
 
     palette: Palette
     kept: Mapping[str, float]
 
 
-def with_style(
-    base: Palette | None, name: str, parts: Sequence[Parts], neutral: NDArray[np.floating], metadata: Mapping[str, Any]
-) -> Learnt:
+def add_style(
+    base: Palette | None,
+    name: str,
+    parts: Sequence[Decomposition],
+    neutral: NDArray[np.floating],
+    metadata: Mapping[str, Any],
+) -> LearnedStyle:
     """The palette `base` and a style in it, in its modes; a palette of this style alone without a base.
 
     Parameters
@@ -49,13 +53,13 @@ def with_style(
     if base is None and missing:
         raise InputError(f"the recordings do not show {missing[0]}; a palette begins with recordings that do")
     common = base.neutral if base is not None else np.asarray(neutral, np.float32)
-    sizes = sizes_of(neutral, common)
+    sizes = size_ratios(neutral, common)
     moved = {
         feature: np.concatenate([one.motion[feature] for one in parts]) * sizes
         for feature in REGION_FEATURES
         if feature not in missing
     }
-    regions = dict(base.regions) if base is not None else {name: _region(name, moved[name]) for name in moved}
+    regions = dict(base.regions) if base is not None else {name: _build_region(name, moved[name]) for name in moved}
     motion = {
         feature: np.concatenate([one.motion[feature] for one in parts])
         for feature in FEATURES
@@ -75,18 +79,18 @@ def with_style(
         metadata=dict(metadata),
     )
     if base is None:
-        return Learnt(Palette(common, regions, {name: style}, {}, {}), kept)
-    return Learnt(replace(base, styles={**base.styles, name: style}), kept)
+        return LearnedStyle(Palette(common, regions, {name: style}, {}, {}), kept)
+    return LearnedStyle(replace(base, styles={**base.styles, name: style}), kept)
 
 
-def sizes_of(person: NDArray[np.floating], common: NDArray[np.floating]) -> NDArray[np.float64]:
+def size_ratios(person: NDArray[np.floating], common: NDArray[np.floating]) -> NDArray[np.float64]:
     """(3,) factors of width, height and depth by which one face at rest (478, 3) becomes as large as another."""
     here, there = (np.asarray(face, np.float64) for face in (person, common))
     here, there = here - here.mean(axis=0), there - there.mean(axis=0)
     return np.asarray((here * there).sum(axis=0) / np.square(here).sum(axis=0))
 
 
-def _region(feature: str, displaced: NDArray[np.floating]) -> Region:
+def _build_region(feature: str, displaced: NDArray[np.floating]) -> FaceRegion:
     """Principal modes of a region's displacements (T, L, 3) about none; each one's largest entry is positive."""
     flat = displaced.reshape(len(displaced), -1).astype(np.float64)
     variances, vectors = np.linalg.eigh(np.einsum("ti,tj->ij", flat, flat))
@@ -95,4 +99,4 @@ def _region(feature: str, displaced: NDArray[np.floating]) -> Region:
     n_modes = min(int(np.searchsorted(share, VARIANCE)) + 1, MOST_MODES)
     modes = vectors[:n_modes]
     modes = modes * np.sign(modes[np.arange(n_modes), np.abs(modes).argmax(axis=1)])[:, None]
-    return Region(feature_landmarks(feature), modes.reshape(n_modes, -1, 3).astype(np.float32))
+    return FaceRegion(feature_landmarks(feature), modes.reshape(n_modes, -1, 3).astype(np.float32))

@@ -4,18 +4,18 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.decomposition.capture import Captured
+from corpus_tools.decomposition.capture import FaceRecording
 from corpus_tools.recordings.corpus_audio import SOUND_RATE
-from corpus_tools.recordings.corpus_video import Eyes
-from corpus_tools.recordings.limits import picture_measures, refuse, turn_deg
+from corpus_tools.recordings.corpus_video import CachedTracker
+from corpus_tools.recordings.limits import check_limits, head_turn_deg, picture_measures
 from lexicon.errors import DataError
 from tts2face.types import Waveform
-from tts2face.video.frame_grid import face_span, filled_gaps, on_grid
+from tts2face.video.frame_grid import face_span, fill_gaps, resample_to_grid
 from tts2face.video.media import read_sound
 from tts2face.video.pose import head_angles, remove_pose
 
 
-def captured_video(video: Path, eyes: Eyes) -> Captured:
+def read_video_recording(video: Path, eyes: CachedTracker) -> FaceRecording:
     """The face in a video, from the first picture that shows it to the last, and the sound meanwhile.
 
     Raises
@@ -23,28 +23,28 @@ def captured_video(video: Path, eyes: Eyes) -> Captured:
     DataError
         The video cannot be read, shows no face, or cannot serve; the message says why.
     """
-    seen = eyes.watched(video)
-    points, first = on_grid(seen.tracking.points, seen.times, seen.fps)
+    seen = eyes.track(video)
+    points, first = resample_to_grid(seen.tracking.points, seen.times, seen.fps)
     if np.isnan(points).all():
         raise DataError("no frame shows a face")
     start, end = face_span(points)
-    filled, n_filled = filled_gaps(points[start:end], seen.fps)
+    filled, n_filled = fill_gaps(points[start:end], seen.fps)
     posed = remove_pose(filled, seen.fps)
     angles = head_angles(posed.rotations)
-    refuse(picture_measures(seen.n_faces, seen.changes, seen.times) | {"turn_deg": turn_deg(angles)})
-    place = posed.shifts - np.median(posed.shifts, axis=0)
+    check_limits(picture_measures(seen.n_faces, seen.changes, seen.times) | {"turn_deg": head_turn_deg(angles)})
+    place = posed.translations - np.median(posed.translations, axis=0)
     begin = (first + start) / seen.fps
-    return Captured(
+    return FaceRecording(
         name=video.stem,
         fps=seen.fps,
         landmarks=posed.landmarks,
         head=np.column_stack([angles, place]).astype(np.float32),
-        sound=sound_from(video, begin, len(filled) / seen.fps),
+        sound=read_sound_span(video, begin, len(filled) / seen.fps),
         notes=(f"{n_filled} frames without a face were filled in",) if n_filled else (),
     )
 
 
-def sound_from(video: Path, begin: float, seconds: float) -> Waveform:
+def read_sound_span(video: Path, begin: float, seconds: float) -> Waveform:
     """Sound of a video from `begin`, which may lie before it."""
     heard = read_sound(video, SOUND_RATE)
     samples = np.zeros(round(seconds * heard.rate), np.float32)

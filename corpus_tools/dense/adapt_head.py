@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.mesh_fit import Warp, eyes_from_right, part_vertices, warp_onto
+from corpus_tools.dense.mesh_fit import HeadWarp, eyes_from_right, fit_head_warp, part_vertices
 from tts2face.models.face import Eye, Face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
-from tts2face.video.pose import similarity
+from tts2face.video.pose import similarity_transforms
 
 Floats = NDArray[np.float64]
 
@@ -17,7 +17,7 @@ EYE_PARTS = ("sclera", "iris")
 MOVED_MM = 1e-4  # a shape that moves a vertex less does not move it
 
 
-def adapted(face: Face, talker: NDArray[np.floating]) -> Face:
+def adapt_head(face: Face, talker: NDArray[np.floating]) -> Face:
     """The face with the talker's shape.
 
     Parameters
@@ -27,23 +27,23 @@ def adapted(face: Face, talker: NDArray[np.floating]) -> Face:
     talker : (478, 3)
         Mean landmarks of the talker at rest, lips closed, axes as in `tts2face.models.landmarks`; of any size.
     """
-    warp = warp_onto(face, talker)
+    warp = fit_head_warp(face, talker)
     rest = face.vertices.astype(np.float64)
     bone, balls = part_vertices(face, MOUTH_PARTS), part_vertices(face, EYE_PARTS)
     soft = np.setdiff1d(np.arange(len(rest)), np.concatenate([bone, balls]))
     moved = rest.copy()
     moved[soft] = warp.carried(rest[soft], soft)
-    linear, shift = _as_one(rest[bone], rest[bone] + warp.field(rest[bone]))
-    shift[2] += _lips_forward(warp) - (rest[bone] @ linear.T + shift - rest[bone])[:, 2].max()
+    linear, shift = _fit_similarity(rest[bone], rest[bone] + warp.field(rest[bone]))
+    shift[2] += _lip_protrusion(warp) - (rest[bone] @ linear.T + shift - rest[bone])[:, 2].max()
     moved[bone] = rest[bone] @ linear.T + shift
-    eyes = _eyes(face, warp, rest, moved)
-    shapes = _carried_shapes(face, warp, soft, moved)
+    eyes = _place_eyes(face, warp, rest, moved)
+    shapes = _warp_shapes(face, warp, soft, moved)
     shapes[:, bone] = face.shapes[:, bone] @ linear.T
     for eye, socket in zip(eyes_from_right(face), warp.sockets, strict=True):
         span = slice(eye.first, eye.first + eye.count)
         shapes[:, span] = socket.scale * face.shapes[:, span]  # an eyeball gives way to a lid that closes
     origin = np.mean([eye.centre for eye in eyes], axis=0)
-    turning = _pivot(face, warp)
+    turning = _warp_pivot(face, warp)
     return replace(
         face,
         vertices=(moved - origin).astype(np.float32),
@@ -53,21 +53,21 @@ def adapted(face: Face, talker: NDArray[np.floating]) -> Face:
     )
 
 
-def _as_one(before: Floats, after: Floats) -> tuple[Floats, Floats]:
+def _fit_similarity(before: Floats, after: Floats) -> tuple[Floats, Floats]:
     """Scaled rotation (3, 3) and shift (3,) nearest to a motion of points (P, 3)."""
-    turns, scales = similarity(before[None], after, np.full(len(before), 1.0 / len(before)))
+    turns, scales = similarity_transforms(before[None], after, np.full(len(before), 1.0 / len(before)))
     linear = scales[0] * turns[0]
     return linear, after.mean(axis=0) - linear @ before.mean(axis=0)
 
 
-def _lips_forward(warp: Warp) -> float:
+def _lip_protrusion(warp: HeadWarp) -> float:
     """How far the lips come forward, mm: teeth and tongue stay as far behind them as they were."""
     lips = np.isin(warp.landmarks, (*INNER_LIP_UPPER, *INNER_LIP_LOWER))
     centres = warp.field.centres[lips]
     return float(warp.field(centres)[:, 2].mean())
 
 
-def _eyes(face: Face, warp: Warp, rest: Floats, moved: Floats) -> list[Eye]:
+def _place_eyes(face: Face, warp: HeadWarp, rest: Floats, moved: Floats) -> list[Eye]:
     """The eyes in their new sockets; writes their vertices into `moved`."""
     places = {}
     for eye, socket in zip(eyes_from_right(face), warp.sockets, strict=True):
@@ -77,7 +77,7 @@ def _eyes(face: Face, warp: Warp, rest: Floats, moved: Floats) -> list[Eye]:
     return [replace(eye, centre=places[eye.first].astype(np.float32)) for eye in face.eyes]
 
 
-def _carried_shapes(face: Face, warp: Warp, soft: NDArray[np.int64], moved: Floats) -> Floats:
+def _warp_shapes(face: Face, warp: HeadWarp, soft: NDArray[np.int64], moved: Floats) -> Floats:
     """(K, V, 3) shapes: where the warp brings a vertex that the head's shape has moved, less where it was.
 
     mouthClose is carried from the open jaw, which it closes.
@@ -96,7 +96,7 @@ def _carried_shapes(face: Face, warp: Warp, soft: NDArray[np.int64], moved: Floa
     return shapes
 
 
-def _pivot(face: Face, warp: Warp) -> Floats:
+def _warp_pivot(face: Face, warp: HeadWarp) -> Floats:
     place = face.pivot.astype(np.float64)[None]
     turned: Floats = (place + warp.field(place))[0]
     return turned

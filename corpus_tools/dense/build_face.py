@@ -9,18 +9,24 @@ from pathlib import Path
 import numpy as np
 
 from corpus_tools.build_talker import PROVENANCE, UNSTATED, read_provenance
-from corpus_tools.dense.adapt_head import adapted
-from corpus_tools.dense.mesh_fit import N_MESH, aligned, fitting, landmarks_of, settled
+from corpus_tools.dense.adapt_head import adapt_head
+from corpus_tools.dense.mesh_fit import (
+    N_MESH,
+    align_to_head,
+    correct_lips_and_lids,
+    face_landmarks,
+    select_consistent_landmarks,
+)
 from corpus_tools.dense.modes import MOST_MODES, DenseModel, dense_model, mode_fitter, with_modes
-from corpus_tools.dense.skin_colour import fitter, gathered
-from corpus_tools.dense.texture_painting import painted_like
-from corpus_tools.dense.video_landmarks import resting_landmarks, seen_in, videos_of
-from corpus_tools.dense.visible_texels import canvas_of
-from corpus_tools.recordings.corpus_video import Eyes
-from corpus_tools.run_options import Effort, Progress
+from corpus_tools.dense.skin_colour import average_skin_colours, build_picture_fitter
+from corpus_tools.dense.texture_painting import paint_skin
+from corpus_tools.dense.video_landmarks import find_videos, resting_landmarks, track_videos
+from corpus_tools.dense.visible_texels import build_canvas
+from corpus_tools.recordings.corpus_video import CachedTracker
+from corpus_tools.run_options import Progress, RunOptions
 from lexicon.errors import InputError
 from tts2face.models.face_file import read_face, write_face
-from tts2face.storage.files import named_file
+from tts2face.storage.files import find_file
 from tts2face.video.landmark_models import find_bundle
 
 HEAD = "head"  # the shipped face that is adapted
@@ -43,7 +49,7 @@ def build_face(
     *,
     consent: Mapping[str, str],
     n_modes: int = 0,
-    effort: Effort | None = None,
+    effort: RunOptions | None = None,
     on_progress: Progress | None = None,
 ) -> BuiltFace:
     """Adapt the default head to the talker in videos, and write it as a face.
@@ -54,7 +60,7 @@ def build_face(
         A folder of recordings, or one video; transcripts are not needed. A ``provenance.json`` in the folder tells the
         licence of the person's likeness; the mesh's own says nothing about it.
     consent
-        Of the person shown, from `corpus_tools.consent.consent_of`; kept in the file.
+        Of the person shown, from `corpus_tools.consent.consent_record`; kept in the file.
     n_modes
         Modes of the talker's own dense shape model, added as the shapes denseMean, dense1, dense2, ...
     effort
@@ -73,29 +79,29 @@ def build_face(
     """
     if not 0 <= n_modes <= MOST_MODES:
         raise InputError(f"a basis has 0 to {MOST_MODES} dense modes, not {n_modes}")
-    effort = effort or Effort()
-    videos = videos_of(recordings)
+    effort = effort or RunOptions()
+    videos = find_videos(recordings)
     stated = read_provenance(recordings / PROVENANCE, must_exist=False)
-    eyes = Eyes(effort.folder(), find_bundle(effort.model))
+    eyes = CachedTracker(effort.folder(), find_bundle(effort.model))
     report = on_progress or (lambda done, of: None)
-    seen = seen_in(videos, eyes, lambda done, of: report(done, 2 * of))
-    head = read_face(named_file(HEAD, "face"))
+    seen = track_videos(videos, eyes, lambda done, of: report(done, 2 * of))
+    head = read_face(find_file(HEAD, "face"))
     talker = resting_landmarks(seen)
-    rest = landmarks_of(head, head.vertices)[:N_MESH]
-    target = aligned(talker, rest)
-    used = np.flatnonzero(fitting(rest, settled(rest, target)))
-    shaped = adapted(head, talker)
-    canvas = canvas_of(shaped)
-    fit = fitter(shaped, canvas.opened, used)
+    rest = face_landmarks(head, head.vertices)[:N_MESH]
+    target = align_to_head(talker, rest)
+    used = np.flatnonzero(select_consistent_landmarks(rest, correct_lips_and_lids(rest, target)))
+    shaped = adapt_head(head, talker)
+    canvas = build_canvas(shaped)
+    fit = build_picture_fitter(shaped, canvas.opened, used)
     model = dense_model(shaped, mode_fitter(shaped, used), seen, talker, n_modes) if n_modes else None
-    painting = gathered(
+    painting = average_skin_colours(
         shaped,
         canvas,
         fit,
         seen,
         lambda done, of: report(len(videos) + done * len(videos) // of, 2 * len(videos)),
     )
-    face = painted_like(shaped, canvas, painting)
+    face = paint_skin(shaped, canvas, painting)
     words = ["tts2face", "corpus", "face", recordings.name, "--out", out.name]
     metadata = {
         **head.metadata,
@@ -110,6 +116,6 @@ def build_face(
     if model is not None:
         face, metadata = with_modes(face, model), {**metadata, "dense": model.summary()}
     write_face(out, replace(face, metadata=metadata))
-    reached = landmarks_of(shaped, shaped.vertices)[:N_MESH]
-    again = aligned(talker, reached)
+    reached = face_landmarks(shaped, shaped.vertices)[:N_MESH]
+    again = align_to_head(talker, reached)
     return BuiltFace(len(seen), len(videos), float(np.linalg.norm(again - reached, axis=1)[used].mean()), model)

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.face.rbf import Interpolant, interpolant
+from tts2face.face.rbf import Interpolant, fit_interpolant
 from tts2face.models.face import Eye, Face
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
-from tts2face.video.pose import similarity
+from tts2face.video.pose import similarity_transforms
 
 Floats = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ ROUNDS = 3  # a landmark lies within a triangle whose corners move each by itsel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Socket:
+class EyeSocket:
     """An eyeball's centre (3,) and radius before, centre (3,) and scale after."""
 
     before: Floats
@@ -36,7 +36,7 @@ class Socket:
     after: Floats
     scale: float
 
-    def kept_round(self, places: Floats, moved: Floats) -> Floats:
+    def keep_distance(self, places: Floats, moved: Floats) -> Floats:
         """(P, 3) moved places whose distance from the eyeball is as it was at places (P, 3) near it, but for scale."""
         off = np.linalg.norm(places - self.before, axis=1)
         share = np.clip((self.radius + LOOSE_MM - off) / (LOOSE_MM - ROUND_MM), 0.0, 1.0)
@@ -49,7 +49,7 @@ class Socket:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Warp:
+class HeadWarp:
     """Carries places of the default head to the talker.
 
     ``opened`` (V, 3) is what a slightly open jaw adds to each vertex: the field is asked there. ``landmarks`` (N,) are
@@ -58,35 +58,35 @@ class Warp:
 
     field: Interpolant
     opened: Floats
-    sockets: tuple[Socket, ...]
+    sockets: tuple[EyeSocket, ...]
     landmarks: NDArray[np.int64]
 
     def carried(self, places: Floats, rows: NDArray[np.int64]) -> Floats:
         """(P, 3) new places of the vertices `rows` (P,), each at its place (P, 3) on the head with closed lips."""
         moved = places + self.field(places + self.opened[rows])
         for socket in self.sockets:
-            moved = socket.kept_round(places, moved)
+            moved = socket.keep_distance(places, moved)
         return moved
 
 
-def warp_onto(face: Face, talker: NDArray[np.floating]) -> Warp:
+def fit_head_warp(face: Face, talker: NDArray[np.floating]) -> HeadWarp:
     """The warp onto resting landmarks (478, 3) of a talker with closed lips, in the place and size of the head."""
     opened = OPEN_JAW * face.shapes[face.shape_names.index("jawOpen")].astype(np.float64)
-    rest = landmarks_of(face, face.vertices)[:N_MESH]
-    target = settled(rest, aligned(talker, rest))
-    used = np.flatnonzero(fitting(rest, target))
-    centres = (rest + landmarks_of(face, opened)[:N_MESH])[used]
+    rest = face_landmarks(face, face.vertices)[:N_MESH]
+    target = correct_lips_and_lids(rest, align_to_head(talker, rest))
+    used = np.flatnonzero(select_consistent_landmarks(rest, target))
+    centres = (rest + face_landmarks(face, opened)[:N_MESH])[used]
     width = face_width(rest)
     missing = (target - rest)[used]
-    warp = Warp(interpolant(centres, missing, width), opened, sockets(face, rest, target), used)
+    warp = HeadWarp(fit_interpolant(centres, missing, width), opened, fit_eye_sockets(face, rest, target), used)
     for _ in range(ROUNDS - 1):
         reached = face.vertices + warp.field(face.vertices + opened)
-        missing = missing + (target - landmarks_of(face, reached)[:N_MESH])[used]
-        warp = Warp(interpolant(centres, missing, width), opened, warp.sockets, used)
+        missing = missing + (target - face_landmarks(face, reached)[:N_MESH])[used]
+        warp = HeadWarp(fit_interpolant(centres, missing, width), opened, warp.sockets, used)
     return warp
 
 
-def landmarks_of(face: Face, vertices: NDArray[np.floating]) -> Floats:
+def face_landmarks(face: Face, vertices: NDArray[np.floating]) -> Floats:
     """(478, 3) landmarks, by number, of vertices (V, 3) in the face's topology."""
     found = np.zeros((int(face.landmarks.max()) + 1, 3))
     weights = face.landmark_weights.astype(np.float64)[..., None]
@@ -99,16 +99,16 @@ def face_width(landmarks: Floats) -> float:
     return float(np.ptp(landmarks[list(FACE_OVAL), 0]))
 
 
-def aligned(talker: NDArray[np.floating], rest: Floats) -> Floats:
+def align_to_head(talker: NDArray[np.floating], rest: Floats) -> Floats:
     """(468, 3) landmarks of the talker brought to the head's by the nearest similarity: a camera shows no size."""
     own = np.asarray(talker, np.float64)[:N_MESH]
     weights = np.full(N_MESH, 1.0 / N_MESH)
-    turns, scales = similarity(own[None], rest, weights)
+    turns, scales = similarity_transforms(own[None], rest, weights)
     brought: Floats = scales[0] * (own - own.mean(axis=0)) @ turns[0].T + rest.mean(axis=0)
     return brought
 
 
-def settled(rest: Floats, target: Floats) -> Floats:
+def correct_lips_and_lids(rest: Floats, target: Floats) -> Floats:
     """(468, 3) the talker's landmarks with lips that meet as the head's do, and lids as deep as their eye."""
     placed = target.copy()
     upper, lower = list(INNER_LIP_UPPER[1:-1]), list(INNER_LIP_LOWER[1:-1])
@@ -121,7 +121,7 @@ def settled(rest: Floats, target: Floats) -> Floats:
     return placed
 
 
-def fitting(rest: Floats, target: Floats) -> NDArray[np.bool_]:
+def select_consistent_landmarks(rest: Floats, target: Floats) -> NDArray[np.bool_]:
     """(468,) landmarks that move as their neighbours do."""
     apart = np.linalg.norm(rest[:, None] - rest[None], axis=2)
     nearest = np.argsort(apart, axis=1)[:, : NEIGHBOURS + 1]
@@ -131,7 +131,7 @@ def fitting(rest: Floats, target: Floats) -> NDArray[np.bool_]:
     return fits
 
 
-def sockets(face: Face, rest: Floats, target: Floats) -> tuple[Socket, ...]:
+def fit_eye_sockets(face: Face, rest: Floats, target: Floats) -> tuple[EyeSocket, ...]:
     """Where the eyeballs go: with the middle of their lids, as much larger as the eye is longer."""
     found = []
     for eye, lids, (outer, inner) in zip(eyes_from_right(face), LIDS, CORNERS, strict=True):
@@ -141,7 +141,7 @@ def sockets(face: Face, rest: Floats, target: Floats) -> tuple[Socket, ...]:
         centre = np.asarray(eye.centre, np.float64)
         after = target[edge].mean(axis=0) + scale * (centre - rest[edge].mean(axis=0))
         around = face.vertices[eye.first : eye.first + eye.count].astype(np.float64) - centre
-        found.append(Socket(centre, float(np.median(np.linalg.norm(around, axis=1))), after, scale))
+        found.append(EyeSocket(centre, float(np.median(np.linalg.norm(around, axis=1))), after, scale))
     return tuple(found)
 
 

@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.dense.adapt_head import EYE_PARTS, MOUTH_PARTS
-from corpus_tools.dense.mesh_fit import N_MESH, landmarks_of, part_vertices
-from corpus_tools.dense.skin_colour import Fitter, fitter
-from corpus_tools.dense.video_landmarks import Seen
+from corpus_tools.dense.mesh_fit import N_MESH, face_landmarks, part_vertices
+from corpus_tools.dense.skin_colour import PictureFitter, build_picture_fitter
+from corpus_tools.dense.video_landmarks import VideoLandmarks
 from lexicon.errors import InputError
 from tts2face.face.mouth_model import CHIN_POINTS
-from tts2face.face.shape_transfer import appended
+from tts2face.face.shape_transfer import append_shapes
 from tts2face.models.face import Face
-from tts2face.video.pose import similarity
+from tts2face.video.pose import similarity_transforms
 
 OPEN_JAW = (
     0.6  # weight of jawOpen at which eq. 4 is asked; at 0.12 the edge of the lower lip is serrated between landmarks
@@ -134,14 +134,14 @@ def _rounded(values: Iterable[float]) -> list[float]:
     return [round(float(value), 6) for value in values]
 
 
-def mode_fitter(face: Face, used: NDArray[np.int64]) -> Fitter:
+def mode_fitter(face: Face, used: NDArray[np.int64]) -> PictureFitter:
     """The fitter of an adapted head by the landmarks `used`, asked with the jaw open, so that lips do not tear."""
     jaw = face.shapes[face.shape_names.index("jawOpen")].astype(np.float64)
-    return fitter(face, face.vertices + OPEN_JAW * jaw, used)
+    return build_picture_fitter(face, face.vertices + OPEN_JAW * jaw, used)
 
 
 def dense_model(
-    face: Face, fit: Fitter, seen: Sequence[Seen], talker: NDArray[np.floating], n_modes: int
+    face: Face, fit: PictureFitter, seen: Sequence[VideoLandmarks], talker: NDArray[np.floating], n_modes: int
 ) -> DenseModel:
     """Fit the head's mesh to every frame of a talker's videos and find its modes.
 
@@ -176,13 +176,13 @@ def dense_model(
     )
 
 
-def displacements(fit: Fitter, landmarks: NDArray[np.floating], talker: NDArray[np.floating]) -> Floats:
+def displacements(fit: PictureFitter, landmarks: NDArray[np.floating], talker: NDArray[np.floating]) -> Floats:
     """(T', N, 3) u of eq. 3 in the head's size: the landmarks of each frame with a face, less the talker's at rest.
 
     Landmarks (T, 478, 3) are without head pose; those of a frame without a face are NaN, and it is left out.
     """
     rest = np.asarray(talker, np.float64)[:N_MESH]
-    turns, scales = similarity(rest[None], fit.marks, np.full(N_MESH, 1.0 / N_MESH))
+    turns, scales = similarity_transforms(rest[None], fit.marks, np.full(N_MESH, 1.0 / N_MESH))
     known = landmarks[np.isfinite(landmarks[:, 0, 0])].astype(np.float64)
     moved: Floats = (known[:, fit.used] - rest[fit.used]) @ (scales[0] * turns[0]).T
     return moved
@@ -208,7 +208,7 @@ def _times(matrix: NDArray[np.floating], frames: Floats) -> Floats:
     return product
 
 
-def spread_shapes(face: Face, fit: Fitter, moved: Floats) -> Floats:
+def spread_shapes(face: Face, fit: PictureFitter, moved: Floats) -> Floats:
     """(K, V, 3) displacement of every vertex for displacements (K, N, 3) of the landmarks.
 
     Eyeballs stay; lower teeth and tongue, which no camera sees, go with the jaw that the chin shows.
@@ -217,7 +217,7 @@ def spread_shapes(face: Face, fit: Fitter, moved: Floats) -> Floats:
     shapes[:, part_vertices(face, EYE_PARTS)] = 0.0
     numbers = [face.shape_names.index(name) for name in JAW]
     chin = [row for row, landmark in enumerate(fit.used) if landmark in CHIN_POINTS]
-    own = np.stack([landmarks_of(face, face.shapes[number])[fit.used[chin]].ravel() for number in numbers], axis=1)
+    own = np.stack([face_landmarks(face, face.shapes[number])[fit.used[chin]].ravel() for number in numbers], axis=1)
     opened = np.linalg.lstsq(own, moved[:, chin].reshape(len(moved), -1).T, rcond=None)[0]
     bone = part_vertices(face, MOUTH_PARTS)
     shapes[:, bone] = np.einsum("jk,jvc->kvc", opened, face.shapes[numbers][:, bone].astype(np.float64))
@@ -229,7 +229,7 @@ def with_modes(face: Face, model: DenseModel) -> Face:
     names = (MEAN, *(f"{MODE}{number}" for number in range(1, len(model.modes) + 1)))
     limits = np.array([(0.0, 1.0), *[(-LIMIT, LIMIT)] * len(model.modes)])
     shapes = np.concatenate([model.mean[None], model.modes]).astype(np.float32)
-    return appended(face, names, shapes, limits)
+    return append_shapes(face, names, shapes, limits)
 
 
 def _held_out(videos: Sequence[Floats], metric: Floats, n_vertices: int, n_modes: int) -> HeldOut | None:

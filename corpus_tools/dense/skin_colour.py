@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.mesh_fit import N_MESH, face_width, landmarks_of
-from corpus_tools.dense.video_landmarks import Seen, eyes_open
-from corpus_tools.dense.visible_texels import Canvas, ramp
+from corpus_tools.dense.mesh_fit import N_MESH, face_landmarks, face_width
+from corpus_tools.dense.video_landmarks import VideoLandmarks, eye_opening
+from corpus_tools.dense.visible_texels import SkinCanvas, smooth_step
 from corpus_tools.run_options import Progress
 from lexicon.errors import DataError
-from tts2face.face.rbf import FACE_WIDTH, REACH, basis
+from tts2face.face.rbf import FACE_WIDTH, REACH, rbf_values
 from tts2face.models.face import Face
-from tts2face.video.media import read_pictures
-from tts2face.video.pose import similarity
+from tts2face.video.media import read_frames
+from tts2face.video.pose import similarity_transforms
 
 Floats = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ CROWN, HAIR_MM = 10, (10.0, 28.0, 32.0)  # landmark at the top of the forehead; 
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Gathered:
+class SkinColours:
     """Colour (P, 3) and weight (P,) of each texel, sRGB 0..255, and the hair's colour (3,), NaN where none is seen."""
 
     colour: Floats
@@ -35,7 +35,7 @@ class Gathered:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fitter:
+class PictureFitter:
     """Brings a head's vertices into pictures: similarity on the landmarks, then eqs 3 and 4 on what is left."""
 
     vertices: Floats
@@ -43,11 +43,11 @@ class Fitter:
     used: NDArray[np.int64]
     spread: Floats
 
-    def placed(self, points: NDArray[np.floating]) -> tuple[Floats, Floats]:
+    def fit(self, points: NDArray[np.floating]) -> tuple[Floats, Floats]:
         """(V, 3) vertices, x right, y up, z towards the camera in pixels, and the (3, 3) rotation, for (478, 3)."""
         wanted = points[self.used].astype(np.float64) * (1.0, -1.0, -1.0)
         own = self.marks[self.used]
-        turns, scales = similarity(own[None], wanted, np.full(len(own), 1.0 / len(own)))
+        turns, scales = similarity_transforms(own[None], wanted, np.full(len(own), 1.0 / len(own)))
         linear = scales[0] * turns[0]
         shift = wanted.mean(axis=0) - linear @ own.mean(axis=0)
         left = wanted - (own @ linear.T + shift)
@@ -55,19 +55,21 @@ class Fitter:
         return placed, turns[0]
 
 
-def fitter(face: Face, opened: Floats, used: NDArray[np.int64]) -> Fitter:
+def build_picture_fitter(face: Face, opened: Floats, used: NDArray[np.int64]) -> PictureFitter:
     """The fitter of a face; `opened` (V, 3) is where the interpolation takes place, the lips apart."""
     from scipy.linalg import solve
 
-    centres = landmarks_of(face, opened)[used]
-    marks = landmarks_of(face, face.vertices.astype(np.float64))[:N_MESH]
+    centres = face_landmarks(face, opened)[used]
+    marks = face_landmarks(face, face.vertices.astype(np.float64))[:N_MESH]
     reach = REACH / FACE_WIDTH * face_width(marks)
-    matrix = basis(centres, centres, reach)
-    spread = solve(matrix, basis(opened, centres, reach).T, assume_a="pos").T
-    return Fitter(face.vertices.astype(np.float64), marks, used, spread)
+    matrix = rbf_values(centres, centres, reach)
+    spread = solve(matrix, rbf_values(opened, centres, reach).T, assume_a="pos").T
+    return PictureFitter(face.vertices.astype(np.float64), marks, used, spread)
 
 
-def gathered(face: Face, canvas: Canvas, fit: Fitter, seen: Sequence[Seen], on_progress: Progress) -> Gathered:
+def average_skin_colours(
+    face: Face, canvas: SkinCanvas, fit: PictureFitter, seen: Sequence[VideoLandmarks], on_progress: Progress
+) -> SkinColours:
     """Colours from the frames of all videos that show open eyes.
 
     Raises
@@ -78,18 +80,18 @@ def gathered(face: Face, canvas: Canvas, fit: Fitter, seen: Sequence[Seen], on_p
     rows = np.flatnonzero(canvas.share > 0)
     corners, weights = canvas.texels.corners[rows], canvas.texels.weights[rows]
     normals = vertex_normals(face)
-    own_normals = unit(np.einsum("pk,pkd->pd", weights, normals[corners]))
+    own_normals = unit_vectors(np.einsum("pk,pkd->pd", weights, normals[corners]))
     total, weight = np.zeros((len(rows), 3)), np.zeros(len(rows))
     hair: list[Floats] = []
     crown = hair_vertices(face, fit, normals)
-    for picture, points in chosen_frames(seen, on_progress):
-        placed, turn = fit.placed(points)
+    for picture, points in select_frames(seen, on_progress):
+        placed, turn = fit.fit(points)
         flat = placed[:, :2] * (1.0, -1.0)
-        colour, inside = sampled(picture, np.einsum("pk,pkd->pd", weights, flat[corners]))
-        facing = ramp(own_normals @ turn[2], *FACING) * inside
+        colour, inside = sample_picture(picture, np.einsum("pk,pkd->pd", weights, flat[corners]))
+        facing = smooth_step(own_normals @ turn[2], *FACING) * inside
         total += facing[:, None] * colour
         weight += facing
-        found, is_inside = sampled(picture, flat[crown])
+        found, is_inside = sample_picture(picture, flat[crown])
         hair.append(found[is_inside])
     if not weight.any():
         raise DataError("no frame shows the face with open eyes; give a video of the person looking at the camera")
@@ -97,26 +99,26 @@ def gathered(face: Face, canvas: Canvas, fit: Fitter, seen: Sequence[Seen], on_p
     all_colours[rows] = total / np.maximum(weight, 1e-9)[:, None]
     all_weights[rows] = weight
     strands = np.concatenate(hair)
-    return Gathered(all_colours, all_weights, np.median(strands, axis=0) if len(strands) else np.full(3, np.nan))
+    return SkinColours(all_colours, all_weights, np.median(strands, axis=0) if len(strands) else np.full(3, np.nan))
 
 
-def chosen_frames(
-    seen: Sequence[Seen], on_progress: Progress
+def select_frames(
+    seen: Sequence[VideoLandmarks], on_progress: Progress
 ) -> Iterator[tuple[NDArray[np.uint8], NDArray[np.float32]]]:
     """Yield picture (H, W, 3) and landmarks (478, 3) of `N_FRAMES` frames spread over the videos, eyes open."""
     per_video = int(np.ceil(N_FRAMES / len(seen)))
-    usual = float(np.nanmedian(np.concatenate([eyes_open(one.landmarks) for one in seen])))
+    usual = float(np.nanmedian(np.concatenate([eye_opening(one.landmarks) for one in seen])))
     for number, one in enumerate(seen):
-        awake = np.flatnonzero(np.nan_to_num(eyes_open(one.landmarks)) > BLINKING * usual)
+        awake = np.flatnonzero(np.nan_to_num(eye_opening(one.landmarks)) > BLINKING * usual)
         if len(awake):
             wanted = set(awake[np.linspace(0, len(awake) - 1, per_video).round().astype(int)].tolist())
-            for at, picture in enumerate(read_pictures(one.video)):
+            for at, picture in enumerate(read_frames(one.video)):
                 if at in wanted:
                     yield picture.pixels, one.points[at]
         on_progress(number + 1, len(seen))
 
 
-def sampled(picture: NDArray[np.uint8], places: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def sample_picture(picture: NDArray[np.uint8], places: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     """Colours (P, 3) of a picture (H, W, 3) at places (P, 2), x and y, and which lie in it; cubic."""
     import cv2
 
@@ -129,7 +131,7 @@ def sampled(picture: NDArray[np.uint8], places: Floats) -> tuple[Floats, NDArray
     return found.reshape(-1, 3)[:n].astype(np.float64), inside
 
 
-def hair_vertices(face: Face, fit: Fitter, normals: Floats) -> NDArray[np.int64]:
+def hair_vertices(face: Face, fit: PictureFitter, normals: Floats) -> NDArray[np.int64]:
     """Vertices in the hair above the forehead, in sight from the front."""
     away = face.vertices - fit.marks[CROWN]
     low, high, half = HAIR_MM
@@ -146,10 +148,10 @@ def vertex_normals(face: Face) -> Floats:
     total = np.zeros((len(face.vertices), 3))
     for corner in range(3):
         np.add.at(total, place[face.triangles[:, corner]], across)
-    return unit(total[place])
+    return unit_vectors(total[place])
 
 
-def unit(vectors: Floats) -> Floats:
+def unit_vectors(vectors: Floats) -> Floats:
     """Vectors (N, 3) of length 1."""
     scaled: Floats = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
     return scaled

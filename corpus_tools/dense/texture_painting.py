@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.mesh_fit import landmarks_of
-from corpus_tools.dense.skin_colour import Gathered, vertex_normals
-from corpus_tools.dense.visible_texels import Canvas, ramp, softened
+from corpus_tools.dense.mesh_fit import face_landmarks
+from corpus_tools.dense.skin_colour import SkinColours, vertex_normals
+from corpus_tools.dense.visible_texels import SkinCanvas, smooth_step, soften_edges
 from corpus_tools.head.layout import Texels
 from tts2face.models.face import Face
 
@@ -28,20 +28,20 @@ SHARP_TEXELS, SHARP_GAIN = 4.0, 0.7  # unsharp masking, Gaussian of this deviati
 LEAST_WEIGHT = 0.02  # of the largest: texels seen less count less than in full
 
 
-def painted_like(face: Face, canvas: Canvas, seen: Gathered) -> Face:
+def paint_skin(face: Face, canvas: SkinCanvas, seen: SkinColours) -> Face:
     """The face with the talker's texture and hair colour."""
     texels = canvas.texels
     base = canvas.texture[texels.rows, texels.columns].astype(np.float64)
-    share = canvas.share * ramp(seen.weight / seen.weight.max(), 0.0, LEAST_WEIGHT)
-    own = _unshaded(canvas.texels.carried(vertex_normals(face)), seen.colour, share)
-    share = softened(_without_fringe(face, canvas, own, share), texels, len(canvas.texture))
-    hair = 1.0 - ramp(base @ LUMA, *HAIR_LUMA)
-    tint = _tint(face, canvas, own / np.maximum(base, 1.0), (share, base @ LUMA))
+    share = canvas.share * smooth_step(seen.weight / seen.weight.max(), 0.0, LEAST_WEIGHT)
+    own = _remove_shading(canvas.texels.carried(vertex_normals(face)), seen.colour, share)
+    share = soften_edges(_remove_fringe(face, canvas, own, share), texels, len(canvas.texture))
+    hair = 1.0 - smooth_step(base @ LUMA, *HAIR_LUMA)
+    tint = _skin_tint(face, canvas, own / np.maximum(base, 1.0), (share, base @ LUMA))
     usual = np.median(base[hair > 0.9], axis=0) if (hair > 0.9).any() else np.ones(3)
     strands = np.clip(seen.hair / np.maximum(usual, 1.0), *TINT_BOUNDS) if np.isfinite(seen.hair).all() else np.ones(3)
     tint = tint * (1 - hair)[:, None] + strands * hair[:, None]
     tint[canvas.in_mouth] = 1.0
-    own = sharpened(own, share, texels, len(canvas.texture))
+    own = sharpen(own, share, texels, len(canvas.texture))
     colour = share[:, None] * own + (1 - share)[:, None] * base * tint
     colours = face.colours.astype(np.float64)
     for part in face.parts:
@@ -50,12 +50,12 @@ def painted_like(face: Face, canvas: Canvas, seen: Gathered) -> Face:
             colours[rows] *= strands
     return replace(
         face,
-        texture=_filled(canvas.texture, texels, colour),
+        texture=_fill_texture(canvas.texture, texels, colour),
         colours=np.rint(np.clip(colours, 0, 255)).astype(np.uint8),
     )
 
 
-def _unshaded(normals: Floats, colour: Floats, share: Floats) -> Floats:
+def _remove_shading(normals: Floats, colour: Floats, share: Floats) -> Floats:
     """Colours (P, 3) without the shading of the room's lamps, so far as it follows the surface's direction.
 
     Source: the shading of a matt surface under distant light is nearly a quadratic function of its normal (Ramamoorthi
@@ -64,28 +64,28 @@ def _unshaded(normals: Floats, colour: Floats, share: Floats) -> Floats:
     told = np.flatnonzero(share > 0.5)
     brightness = colour[told] @ LUMA
     lit = told[brightness > SKIN_LUMA * np.median(brightness)]
-    terms = np.column_stack([_directions(normals), np.ones(len(normals))])
+    terms = np.column_stack([_shading_terms(normals), np.ones(len(normals))])
     slopes = np.linalg.lstsq(terms[lit], np.log(np.maximum(colour[lit], 1.0)), rcond=None)[0]
     shade = np.exp((terms - terms[lit].mean(axis=0)) @ slopes)
     flat: Floats = colour / np.clip(shade, *SHADE_BOUNDS)
     return flat
 
 
-def _directions(normals: Floats) -> Floats:
+def _shading_terms(normals: Floats) -> Floats:
     x, y, z = normals.T
     return np.column_stack([x, y, z, x * y, x * z, y * z, x * x - y * y])
 
 
-def _without_fringe(face: Face, canvas: Canvas, own: Floats, share: Floats) -> Floats:
+def _remove_fringe(face: Face, canvas: SkinCanvas, own: Floats, share: Floats) -> Floats:
     """Shares (P,) without the dark strands that hang over the forehead: hair is no skin."""
     from scipy.ndimage import gaussian_filter, minimum_filter
 
-    marks = landmarks_of(face, face.vertices)
+    marks = face_landmarks(face, face.vertices)
     above = canvas.texels.carried(face.vertices.astype(np.float64))[:, 1] - float(marks[list(BROWS), 1].max())
     luma = own @ LUMA
     usual = float(np.median(luma[share > 0.5]))
-    clear = ramp(luma / usual, *FRINGE_LUMA)
-    near = 1.0 - ramp(above, *FRINGE_MM)
+    clear = smooth_step(luma / usual, *FRINGE_LUMA)
+    near = 1.0 - smooth_step(above, *FRINGE_MM)
     picture = np.ones(canvas.texture.shape[:2])
     picture[canvas.texels.rows, canvas.texels.columns] = np.maximum(clear, near)
     grown = gaussian_filter(minimum_filter(picture, STRAND_TEXELS), STRAND_TEXELS / 3)
@@ -93,7 +93,7 @@ def _without_fringe(face: Face, canvas: Canvas, own: Floats, share: Floats) -> F
     return kept
 
 
-def _tint(face: Face, canvas: Canvas, ratio: Floats, told: tuple[Floats, Floats]) -> Floats:
+def _skin_tint(face: Face, canvas: SkinCanvas, ratio: Floats, told: tuple[Floats, Floats]) -> Floats:
     """(P, 3) factors for the head's own skin: those of the nearest seen skin, blending into the usual one."""
     from scipy.spatial.distance import cdist
 
@@ -113,7 +113,7 @@ def _tint(face: Face, canvas: Canvas, ratio: Floats, told: tuple[Floats, Floats]
     return factors
 
 
-def sharpened(colour: Floats, share: Floats, texels: Texels, side: int) -> Floats:
+def sharpen(colour: Floats, share: Floats, texels: Texels, side: int) -> Floats:
     """Colours (P, 3) with edges as crisp as in one frame: an average over frames is blurred by the tracker's jitter."""
     from scipy.ndimage import gaussian_filter
 
@@ -129,7 +129,7 @@ def sharpened(colour: Floats, share: Floats, texels: Texels, side: int) -> Float
     return crisp
 
 
-def _filled(texture: NDArray[np.uint8], texels: Texels, colour: Floats) -> NDArray[np.uint8]:
+def _fill_texture(texture: NDArray[np.uint8], texels: Texels, colour: Floats) -> NDArray[np.uint8]:
     """The texture with new texels; those off the surface take the nearest colour on it."""
     from scipy.ndimage import distance_transform_edt
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.recordings.corpus_video import Eyes
+from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.folder import VIDEO_SUFFIXES, find_recordings
 from corpus_tools.run_options import Progress
 from lexicon.errors import DataError, InputError
@@ -29,7 +29,7 @@ RIGHT_LIDS, LEFT_LIDS = (159, 145), (386, 374)  # upper and lower, in the middle
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class VideoLandmarks:
     """One video: `points` (T, 478, 3) pixels as the tracker gives them, `landmarks` (T, 478, 3) mm without pose.
 
     Both are NaN in frames without a face; frame i is the video's i-th.
@@ -40,7 +40,7 @@ class Seen:
     landmarks: NDArray[np.float32]
 
 
-def videos_of(recordings: Path) -> tuple[Path, ...]:
+def find_videos(recordings: Path) -> tuple[Path, ...]:
     """The videos of a folder of recordings, or the one video; not more than `MOST_VIDEOS`, evenly chosen.
 
     Raises
@@ -57,7 +57,7 @@ def videos_of(recordings: Path) -> tuple[Path, ...]:
     return tuple(found[row] for row in rows)
 
 
-def seen_in(videos: Sequence[Path], eyes: Eyes, on_progress: Progress) -> tuple[Seen, ...]:
+def track_videos(videos: Sequence[Path], eyes: CachedTracker, on_progress: Progress) -> tuple[VideoLandmarks, ...]:
     """The videos that can be read and show a face.
 
     Raises
@@ -68,9 +68,9 @@ def seen_in(videos: Sequence[Path], eyes: Eyes, on_progress: Progress) -> tuple[
     kept, reason = [], ""
     for number, video in enumerate(videos):
         try:
-            found = eyes.watched(video)
+            found = eyes.track(video)
             posed = remove_pose(found.tracking.points, found.fps)
-            kept.append(Seen(video, found.tracking.points, posed.landmarks))
+            kept.append(VideoLandmarks(video, found.tracking.points, posed.landmarks))
         except DataError as refused:
             reason = f" ({video.name}: {refused})"
         on_progress(number + 1, len(videos))
@@ -79,21 +79,21 @@ def seen_in(videos: Sequence[Path], eyes: Eyes, on_progress: Progress) -> tuple[
     return tuple(kept)
 
 
-def resting_landmarks(seen: Sequence[Seen]) -> Floats:
+def resting_landmarks(seen: Sequence[VideoLandmarks]) -> Floats:
     """(478, 3) mean landmarks in mm of the frames with closed lips and open eyes."""
     landmarks = np.concatenate([one.landmarks for one in seen])
     landmarks = landmarks[np.isfinite(landmarks[:, 0, 0])].astype(np.float64)
     eyes = np.linalg.norm(landmarks[:, EYE_OUTER_LEFT] - landmarks[:, EYE_OUTER_RIGHT], axis=1)
     gaps = np.linalg.norm(landmarks[:, UPPER_LIP_INNER_MID] - landmarks[:, LOWER_LIP_INNER_MID], axis=1) / eyes
     limit = max(CLOSED, float(np.sort(gaps)[min(LEAST_CLOSED, len(gaps)) - 1]))
-    open_eyes = eyes_open(landmarks)
+    open_eyes = eye_opening(landmarks)
     still = gaps <= limit
     wide = still & (open_eyes >= np.percentile(open_eyes[still], EYES_OPEN_PERCENTILE))
     mean: Floats = landmarks[wide].mean(axis=0)
     return mean
 
 
-def eyes_open(landmarks: NDArray[np.floating]) -> Floats:
+def eye_opening(landmarks: NDArray[np.floating]) -> Floats:
     """(T,) mean height of the two eye openings of (T, 478, 3) landmarks."""
     heights = [np.linalg.norm(landmarks[:, up] - landmarks[:, low], axis=1) for up, low in (RIGHT_LIDS, LEFT_LIDS)]
     return np.asarray(np.mean(heights, axis=0), np.float64)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.mesh_fit import LIDS, N_MESH, OPEN_JAW, landmarks_of
+from corpus_tools.dense.mesh_fit import LIDS, N_MESH, OPEN_JAW, face_landmarks
 from corpus_tools.head.layout import BELOW, Texels, texels_of
 from lexicon.errors import DataError
 from tts2face.models.face import Face
@@ -23,7 +23,7 @@ MASK_BLUR = 2.0  # texels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Canvas:
+class SkinCanvas:
     """The skin as a picture.
 
     Parameters
@@ -47,7 +47,7 @@ class Canvas:
     in_mouth: NDArray[np.bool_]
 
 
-def canvas_of(face: Face) -> Canvas:
+def build_canvas(face: Face) -> SkinCanvas:
     """The canvas of an adapted head.
 
     Raises
@@ -67,22 +67,22 @@ def canvas_of(face: Face) -> Canvas:
     share = _front_share(face, texels, opened)
     share[island] = 0.0
     in_mouth = island & (texels.columns < 0.24 * side)
-    return Canvas(face.texture, texels, opened, softened(share, texels, side), in_mouth)
+    return SkinCanvas(face.texture, texels, opened, soften_edges(share, texels, side), in_mouth)
 
 
 def _front_share(face: Face, texels: Texels, opened: Floats) -> Floats:
     place = texels.carried(opened)
-    marks = landmarks_of(face, opened)[:N_MESH]
-    share = ramp(depth_inside(place[:, :2], marks[list(FACE_OVAL), :2], RIM_MM[1] + 1), *RIM_MM)
+    marks = face_landmarks(face, opened)[:N_MESH]
+    share = smooth_step(polygon_depth(place[:, :2], marks[list(FACE_OVAL), :2], RIM_MM[1] + 1), *RIM_MM)
     share[place[:, 2] < float(marks[list(FACE_OVAL), 2].min())] = 0.0
-    share[_hidden(place)] = 0.0
-    share *= ramp(-depth_inside(place[:, :2], marks[list(INNER_LIPS), :2], LIP_MM[1] + 1), *LIP_MM)
+    share[_is_hidden(place)] = 0.0
+    share *= smooth_step(-polygon_depth(place[:, :2], marks[list(INNER_LIPS), :2], LIP_MM[1] + 1), *LIP_MM)
     for lids in LIDS:
-        share *= ramp(-depth_inside(place[:, :2], marks[list(lids), :2], LID_MM[1] + 1), *LID_MM)
+        share *= smooth_step(-polygon_depth(place[:, :2], marks[list(lids), :2], LID_MM[1] + 1), *LID_MM)
     return share
 
 
-def _hidden(place: Floats) -> NDArray[np.bool_]:
+def _is_hidden(place: Floats) -> NDArray[np.bool_]:
     """(P,) whether another texel lies before one."""
     cells = np.floor(place[:, :2] / CELL_MM).astype(np.int64)
     cells -= cells.min(axis=0)
@@ -92,7 +92,7 @@ def _hidden(place: Floats) -> NDArray[np.bool_]:
     return hidden
 
 
-def depth_inside(places: Floats, polygon: Floats, most: float) -> Floats:
+def polygon_depth(places: Floats, polygon: Floats, most: float) -> Floats:
     """(P,) distance of places (P, 2) from a polygon's edge, above 0 inside; not looked for beyond `most`."""
     low, high = polygon.min(axis=0) - most, polygon.max(axis=0) + most
     near = np.flatnonzero(((places > low) & (places < high)).all(axis=1))
@@ -111,14 +111,14 @@ def depth_inside(places: Floats, polygon: Floats, most: float) -> Floats:
     return clipped
 
 
-def ramp(values: Floats, low: float, high: float) -> Floats:
+def smooth_step(values: Floats, low: float, high: float) -> Floats:
     """0 up to `low`, 1 from `high`, smooth between."""
     t = np.clip((values - low) / (high - low), 0.0, 1.0)
     smooth: Floats = t * t * (3.0 - 2.0 * t)
     return smooth
 
 
-def softened(share: Floats, texels: Texels, side: int) -> Floats:
+def soften_edges(share: Floats, texels: Texels, side: int) -> Floats:
     """Shares without steps: blurred, and never above what they were."""
     from scipy.ndimage import gaussian_filter
 

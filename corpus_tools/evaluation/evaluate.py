@@ -7,18 +7,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.cross_talker import Scale, in_own_units, judged_across
-from corpus_tools.evaluation.methods import Method, methods_of
-from corpus_tools.evaluation.own_durations import Said, judged_own, said_by
-from corpus_tools.evaluation.reference import Curves, Real, Thresholds
-from corpus_tools.evaluation.scores import Judged, Scores, scored, scores_of
-from corpus_tools.evaluation.splits import Parts, require_parted
+from corpus_tools.evaluation.cross_talker import SpeakerScale, compare_across_talkers, standardise_reference
+from corpus_tools.evaluation.methods import Method, build_methods
+from corpus_tools.evaluation.own_durations import VoicedUtterance, compare_own_durations, speak_references
+from corpus_tools.evaluation.reference import LipCurves, ReferenceUtterance, Thresholds
+from corpus_tools.evaluation.scores import Scores, UtteranceComparison, compute_scores, score_splits
+from corpus_tools.evaluation.splits import Parts, check_disjoint
 from corpus_tools.evaluation.tables import Evaluation, Fold
-from corpus_tools.evaluation.tracks import Track, mapped
+from corpus_tools.evaluation.tracks import ExternalTrack, map_tracks
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.run_options import Progress
-from corpus_tools.training.pose_correction import pose_leak, without_leak
-from corpus_tools.training.train_phone_network import with_network
+from corpus_tools.training.pose_correction import correct_pose, fit_pose_correction
+from corpus_tools.training.train_phone_network import add_phone_network
 from corpus_tools.training.train_talker import learn_talker
 from tts2face.exemplar.options import SynthesisOptions
 from tts2face.models.talker import ShapeModel, Talker
@@ -31,38 +31,38 @@ TRACKS, CEILING = "tracks", "real, through the model"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Run:
+class SplitResult:
     """One split, made: the talker, the real utterances, and what each method made of them (T, S), by name.
 
     ``own`` is what methods made of a voice's own durations. ``scale`` is the talker's where curves are z-scored.
     """
 
     talker: Talker
-    real: tuple[Real, ...]
+    real: tuple[ReferenceUtterance, ...]
     made: Mapping[str, tuple[NDArray[np.float32], ...]]
-    spent: Mapping[str, float]
-    own: Mapping[str, tuple[Judged, ...]] = field(default_factory=dict)
-    scale: Scale | None = None
+    seconds: Mapping[str, float]
+    own: Mapping[str, tuple[UtteranceComparison, ...]] = field(default_factory=dict)
+    scale: SpeakerScale | None = None
 
     @property
     def model(self) -> ShapeModel:
         """The talker's shape model."""
         return self.talker.model
 
-    def curves(self, method: str, at: int) -> Curves:
+    def curves(self, method: str, at: int) -> LipCurves:
         """Curves of the lips as a method made them, in the units of the real ones."""
-        curves = Curves.of(self.model.shapes(self.made[method][at]))
-        return curves if self.scale is None else self.scale.scored(curves)
+        curves = LipCurves.of(self.model.shapes(self.made[method][at]))
+        return curves if self.scale is None else self.scale.z_score(curves)
 
 
 def evaluate(
     parts: Sequence[Parts],
     *,
     options: Mapping[str, SynthesisOptions] | None = None,
-    tracks: Mapping[str, Track] | None = None,
+    tracks: Mapping[str, ExternalTrack] | None = None,
     voice: Voice | None = None,
     on_progress: Progress | None = None,
-) -> tuple[Evaluation, tuple[Run, ...]]:
+) -> tuple[Evaluation, tuple[SplitResult, ...]]:
     """Every method on held-out utterances, with their true phone edges; all is learnt from the training parts.
 
     Parameters
@@ -87,57 +87,57 @@ def evaluate(
     """
     runs = []
     for number, (train, test) in enumerate(parts):
-        require_parted(train, test)
-        tell = _stage(on_progress, number, len(parts))
-        runs.append(run(train, test, options=options, tracks=tracks, voice=voice, on_progress=tell))
+        check_disjoint(train, test)
+        tell = _split_progress(on_progress, number, len(parts))
+        runs.append(evaluate_split(train, test, options=options, tracks=tracks, voice=voice, on_progress=tell))
     limits = Thresholds.of([one for each in runs for one in each.real])
     n_train = len(parts[0][0]) if len(parts) == 1 else min(len(train) for train, _ in parts)
     result = Evaluation(
         n_train,
         sum(len(one.real) for one in runs),
-        _together(runs, limits),
-        own=_own_together(runs, limits),
-        folds=_folds(parts, runs, limits) if len(runs) > 1 else (),
+        _pooled_scores(runs, limits),
+        own=_pooled_own_scores(runs, limits),
+        folds=_score_folds(parts, runs, limits) if len(runs) > 1 else (),
     )
     return result, tuple(runs)
 
 
-def run(
+def evaluate_split(
     train: Sequence[Observation],
     test: Sequence[Observation],
     *,
     options: Mapping[str, SynthesisOptions] | None = None,
-    tracks: Mapping[str, Track] | None = None,
+    tracks: Mapping[str, ExternalTrack] | None = None,
     voice: Voice | None = None,
     on_progress: Progress | None = None,
-) -> Run:
+) -> SplitResult:
     """One split: learn a talker from `train`, and make the motion of `test` by every method."""
-    leak = pose_leak(train)
+    leak = fit_pose_correction(train)
     train, test = ([leak.removed(seen) for seen in part] for part in (train, test))
-    talker = _learnt(train)
-    methods = methods_of(talker, options)
-    real = tuple(Real.of(seen, talker.model) for seen in test)
-    said = said_by(voice, real) if voice is not None else ()
+    talker = _train_talker(train)
+    methods = build_methods(talker, options)
+    real = tuple(ReferenceUtterance.of(seen, talker.model) for seen in test)
+    said = speak_references(voice, real) if voice is not None else ()
     made, spent, own = {}, {}, {}
     for number, (name, method) in enumerate(methods.items()):
-        made[name], spent[name] = _made(method, real)
+        made[name], spent[name] = _synthesise(method, real)
         if said:
-            own[name] = _made_own(method, real, said, talker.model)
+            own[name] = _synthesise_own_durations(method, real, said, talker.model)
         if on_progress:
             on_progress(number + 1, len(methods))
     if tracks is not None:
-        made[TRACKS], spent[TRACKS] = mapped(tracks, talker, real), 0.0
+        made[TRACKS], spent[TRACKS] = map_tracks(tracks, talker, real), 0.0
     made[CEILING], spent[CEILING] = tuple(one.parameters for one in real), 0.0
-    return Run(talker, real, made, spent, own)
+    return SplitResult(talker, real, made, spent, own)
 
 
-def evaluate_across(
+def evaluate_across_talkers(
     train: Sequence[Observation],
     others: Sequence[Observation],
     *,
     options: Mapping[str, SynthesisOptions] | None = None,
     on_progress: Progress | None = None,
-) -> tuple[Evaluation, tuple[Run, ...]]:
+) -> tuple[Evaluation, tuple[SplitResult, ...]]:
     """Every method, learnt from one person, on what somebody else said, with that person's phone edges.
 
     Opening and width are z-scored by the spread of each one's speech, and all figures are those of these two curves.
@@ -149,73 +149,79 @@ def evaluate_across(
     BackendError
         scikit-learn is missing.
     """
-    require_parted(train, others)
-    train, others = without_leak(train), without_leak(others)
-    talker = _learnt(train)
-    hers, theirs = Scale.of(train), Scale.of(others)
-    real = tuple(in_own_units(Real.of(seen, talker.model), theirs) for seen in others)
+    check_disjoint(train, others)
+    train, others = correct_pose(train), correct_pose(others)
+    talker = _train_talker(train)
+    hers, theirs = SpeakerScale.of(train), SpeakerScale.of(others)
+    real = tuple(standardise_reference(ReferenceUtterance.of(seen, talker.model), theirs) for seen in others)
     made, spent = {}, {}
-    methods = methods_of(talker, options)
+    methods = build_methods(talker, options)
     for number, (name, method) in enumerate(methods.items()):
-        made[name], spent[name] = _made(method, real)
+        made[name], spent[name] = _synthesise(method, real)
         if on_progress:
             on_progress(number + 1, len(methods))
     limits = Thresholds.of(real)
     scores = tuple(
-        scores_of(
+        compute_scores(
             name,
-            [judged_across(one, values, talker.model, hers) for one, values in zip(real, made[name], strict=True)],
+            [
+                compare_across_talkers(one, values, talker.model, hers)
+                for one, values in zip(real, made[name], strict=True)
+            ],
             limits,
             spent[name],
         )
         for name in methods
     )
     result = Evaluation(len(train), len(others), scores, is_across=True)
-    return result, (Run(talker, real, made, spent, scale=hers),)
+    return result, (SplitResult(talker, real, made, spent, scale=hers),)
 
 
-def _learnt(train: Sequence[Observation]) -> Talker:
-    return with_network(learn_talker(train, metadata=LEARNT_FOR_EVALUATION))
+def _train_talker(train: Sequence[Observation]) -> Talker:
+    return add_phone_network(learn_talker(train, metadata=LEARNT_FOR_EVALUATION))
 
 
-def _made(method: Method, real: Sequence[Real]) -> tuple[tuple[NDArray[np.float32], ...], float]:
+def _synthesise(method: Method, real: Sequence[ReferenceUtterance]) -> tuple[tuple[NDArray[np.float32], ...], float]:
     began = time.perf_counter()
     made = tuple(method(one.observation.phones, len(one.parameters), one.observation.fps) for one in real)
     return made, time.perf_counter() - began
 
 
-def _made_own(
-    method: Method, real: Sequence[Real], said: Sequence[Said | None], model: ShapeModel
-) -> tuple[Judged, ...]:
+def _synthesise_own_durations(
+    method: Method, real: Sequence[ReferenceUtterance], said: Sequence[VoicedUtterance | None], model: ShapeModel
+) -> tuple[UtteranceComparison, ...]:
     pairs = zip(real, said, strict=True)
-    return tuple(judged_own(method, one, spoken, model) for one, spoken in pairs if spoken is not None)
+    return tuple(compare_own_durations(method, one, spoken, model) for one, spoken in pairs if spoken is not None)
 
 
-def _together(runs: Sequence[Run], limits: Thresholds) -> tuple[Scores, ...]:
+def _pooled_scores(runs: Sequence[SplitResult], limits: Thresholds) -> tuple[Scores, ...]:
     """Scores of each method over runs."""
     return tuple(
-        scored(
-            name, [(each.model, each.real, each.made[name]) for each in runs], limits, sum(r.spent[name] for r in runs)
+        score_splits(
+            name,
+            [(each.model, each.real, each.made[name]) for each in runs],
+            limits,
+            sum(r.seconds[name] for r in runs),
         )
         for name in runs[0].made
     )
 
 
-def _own_together(runs: Sequence[Run], limits: Thresholds) -> tuple[Scores, ...]:
+def _pooled_own_scores(runs: Sequence[SplitResult], limits: Thresholds) -> tuple[Scores, ...]:
     return tuple(
-        scores_of(name, [judged for each in runs for judged in each.own[name]], limits) for name in runs[0].own
+        compute_scores(name, [judged for each in runs for judged in each.own[name]], limits) for name in runs[0].own
     )
 
 
-def _folds(parts: Sequence[Parts], runs: Sequence[Run], limits: Thresholds) -> tuple[Fold, ...]:
+def _score_folds(parts: Sequence[Parts], runs: Sequence[SplitResult], limits: Thresholds) -> tuple[Fold, ...]:
     """Figures of every run alone; thresholds are those of all."""
     return tuple(
-        Fold(len(train), len(test), {one.method: one.values() for one in _together([each], limits)})
+        Fold(len(train), len(test), {one.method: one.values() for one in _pooled_scores([each], limits)})
         for (train, test), each in zip(parts, runs, strict=True)
     )
 
 
-def _stage(on_progress: Progress | None, number: int, of: int) -> Callable[[int, int], None] | None:
+def _split_progress(on_progress: Progress | None, number: int, of: int) -> Callable[[int, int], None] | None:
     if on_progress is None:
         return None
     return lambda done, n_methods: on_progress(number * n_methods + done, of * n_methods)

@@ -5,16 +5,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.decomposition.capture import sound_beside
+from corpus_tools.decomposition.capture import find_capture_sound
 from corpus_tools.decomposition.face_motion import moved_landmarks
-from corpus_tools.recordings.corpus_audio import Ears
-from corpus_tools.recordings.observation import Observation, Quality, trimmed
-from corpus_tools.run_options import Effort
+from corpus_tools.recordings.corpus_audio import CachedAligner
+from corpus_tools.recordings.observation import Observation, Quality, trim_to_picture
+from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
 from tts2face.models.face_file import load_face
 from tts2face.retargeting.performer import match_shapes
 from tts2face.speech.loudness import intensity
-from tts2face.speech.pauses import stretches
+from tts2face.speech.pauses import cut_at_pauses
 from tts2face.types import Trajectory
 from tts2face.video.livelink import read_livelink
 
@@ -22,7 +22,7 @@ SUFFIX = ".csv"
 LONGEST_S = 6.0  # cut at pauses into utterances of about a sentence: intervals come from drawing utterances again
 
 
-def captured(path: Path, effort: Effort) -> tuple[Observation, ...]:
+def observe_livelink(path: Path, effort: RunOptions) -> tuple[Observation, ...]:
     """Utterances of a Live Link Face capture and the one sound file that lies beside it, in sync with it.
 
     Raises
@@ -35,27 +35,31 @@ def captured(path: Path, effort: Effort) -> tuple[Observation, ...]:
         Nothing on this machine recognises phones.
     """
     capture = read_livelink(path)
-    sound = sound_beside(path)
+    sound = find_capture_sound(path)
     if sound is None:
         raise InputError(f"no sound lies beside {path.name}; put its sound file there")
     face = load_face("head")
     motion = match_shapes(capture.weights, face)
-    ears = Ears(effort.folder())
+    ears = CachedAligner(effort.folder())
     found = []
-    for number, span in enumerate(stretches(ears.sound(sound), LONGEST_S), start=1):
+    for number, span in enumerate(cut_at_pauses(ears.sound(sound), LONGEST_S), start=1):
         begin, end = (round(second * motion.fps) for second in span)
         part = Trajectory(motion.channels, motion.values[begin:end], motion.fps)
         landmarks = moved_landmarks(face, part)
-        found.append(_observed(f"{path.stem}-{number:02d}", (ears, sound), span, landmarks, motion.fps))
+        found.append(_build_observation(f"{path.stem}-{number:02d}", (ears, sound), span, landmarks, motion.fps))
     return tuple(found)
 
 
-def _observed(
-    name: str, heard_in: tuple[Ears, Path], span: tuple[float, float], landmarks: NDArray[np.float32], fps: float
+def _build_observation(
+    name: str,
+    heard_in: tuple[CachedAligner, Path],
+    span: tuple[float, float],
+    landmarks: NDArray[np.float32],
+    fps: float,
 ) -> Observation:
     ears, sound = heard_in
     heard = ears.heard(sound, None, span)
-    phones, words = trimmed(heard, 0.0, len(landmarks) / fps)
+    phones, words = trim_to_picture(heard, 0.0, len(landmarks) / fps)
     return Observation(
         name,
         fps,

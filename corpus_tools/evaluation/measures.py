@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from lexicon.phones import phone_of, vowels
+from lexicon.phones import look_up_phone, vowel_symbols
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.exemplar.time_warping import distances, path_cost, warp_path
+from tts2face.exemplar.time_warping import frame_distances, path_cost, warp_path
 from tts2face.models.landmarks import (
     EYE_OUTER_LEFT,
     EYE_OUTER_RIGHT,
@@ -37,20 +37,20 @@ Values = NDArray[np.floating]
 
 def lip_opening(landmarks: Values) -> NDArray[np.float64]:
     """(T,) distance of the inner lips at their middle over the eye distance, of (T, 478, 3) landmarks."""
-    return _apart(landmarks, UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID)
+    return _normalised_distance(landmarks, UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID)
 
 
 def lip_width(landmarks: Values) -> NDArray[np.float64]:
     """(T,) distance of the mouth's corners over the eye distance, of (T, 478, 3) landmarks."""
-    return _apart(landmarks, MOUTH_CORNER_RIGHT, MOUTH_CORNER_LEFT)
+    return _normalised_distance(landmarks, MOUTH_CORNER_RIGHT, MOUTH_CORNER_LEFT)
 
 
-def _apart(landmarks: Values, one: int, other: int) -> NDArray[np.float64]:
+def _normalised_distance(landmarks: Values, one: int, other: int) -> NDArray[np.float64]:
     eyes = np.linalg.norm(landmarks[:, EYE_OUTER_LEFT] - landmarks[:, EYE_OUTER_RIGHT], axis=1)
     return np.asarray(np.linalg.norm(landmarks[:, one] - landmarks[:, other], axis=1) / eyes, np.float64)
 
 
-def judged_frames(phones: PhoneSequence, n_frames: int, fps: float) -> slice:
+def speech_frames(phones: PhoneSequence, n_frames: int, fps: float) -> slice:
     """Frames from `SPEECH_MARGIN_S` before the first sounding phone to as much behind the last.
 
     Raises
@@ -91,12 +91,12 @@ def rmse_z(real: Values, made: Values, spread: Values) -> float:
 
 def warping_cost(real: Values, made: Values, spread: Values, band: int | None) -> float:
     """Mean distance of motions (T, D) and (U, D) in units of `spread` (D,), along the cheapest warp within a band."""
-    cost = distances(real / spread, made / spread)
+    cost = frame_distances(real / spread, made / spread)
     path = warp_path(cost, band=band)
     return path_cost(cost, path) / len(path)
 
 
-def least_openings(
+def min_openings(
     opening: Values, phones: PhoneSequence, fps: float, labels: Collection[str] = BILABIALS
 ) -> NDArray[np.float64]:
     """Least opening within each phone with one of the labels, `CLOSURE_MARGIN_S` either side included."""
@@ -122,8 +122,8 @@ def midpoint_openings(
 
 def open_vowels() -> frozenset[str]:
     """Vowels spoken with open lips, and diphthongs that begin with one."""
-    first = {label: phone_of(label).parts[0] if phone_of(label).parts else label for label in vowels()}
-    heights = {label: phone_of(start) for label, start in first.items()}
+    first = {label: look_up_phone(label).parts[0] if look_up_phone(label).parts else label for label in vowel_symbols()}
+    heights = {label: look_up_phone(start) for label, start in first.items()}
     return frozenset(label for label, phone in heights.items() if phone.height in OPEN_HEIGHTS and not phone.nasality)
 
 
@@ -142,11 +142,11 @@ def peak_times(opening: Values, phones: PhoneSequence, fps: float) -> NDArray[np
         if label in wanted:
             low = max(1, int(np.ceil((phones.edges[at] - PEAK_MARGIN_S) * fps)))
             high = min(len(opening) - 2, int(np.floor((phones.edges[at + 1] + PEAK_MARGIN_S) * fps)))
-            peaks.append(_peak(opening, low, high) / fps if low < high else np.nan)
+            peaks.append(_peak_position(opening, low, high) / fps if low < high else np.nan)
     return np.array(peaks, np.float64)
 
 
-def _peak(curve: Values, low: int, high: int) -> float:
+def _peak_position(curve: Values, low: int, high: int) -> float:
     top = low + int(np.argmax(curve[low : high + 1]))
     before, here, behind = (float(value) for value in curve[top - 1 : top + 2])
     if not (here >= before and here >= behind and here > min(before, behind)):

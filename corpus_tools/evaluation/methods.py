@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from lexicon.sequence import PhoneSequence
 from tts2face.exemplar.options import METHODS, SynthesisOptions
-from tts2face.exemplar.phone_substitution import targets_of
-from tts2face.exemplar.synthesis import VisualVoice, speech_trajectory, visual_voice
-from tts2face.models.phone_network import WindowNetwork
+from tts2face.exemplar.phone_substitution import build_targets
+from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model, speech_trajectory
+from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker
 
 NETWORK = "sliding-window network"
@@ -18,19 +18,19 @@ NETWORK = "sliding-window network"
 Method = Callable[[PhoneSequence, int, float], NDArray[np.float32]]
 
 
-def methods_of(talker: Talker, options: Mapping[str, SynthesisOptions] | None = None) -> dict[str, Method]:
+def build_methods(talker: Talker, options: Mapping[str, SynthesisOptions] | None = None) -> dict[str, Method]:
     """Baselines and exemplar methods by name; `METHODS` without options."""
-    voice = visual_voice(talker)
+    voice = build_exemplar_model(talker)
     n_speech = talker.model.n_speech
     return {
         "mean face": lambda _, n_frames, __: np.zeros((n_frames, n_speech), np.float32),
-        "mean phone pose": mean_phone_pose(talker, voice),
-        **({NETWORK: one_network(talker.network)} if talker.network is not None else {}),
+        "mean phone pose": mean_pose_method(talker, voice),
+        **({NETWORK: network_method(talker.network)} if talker.network is not None else {}),
         **{name: exemplar_method(voice, chosen) for name, chosen in (options or METHODS).items()},
     }
 
 
-def one_network(network: WindowNetwork) -> Method:
+def network_method(network: PhoneNetwork) -> Method:
     """The first of a talker's networks alone: what a plain sliding-window network makes of phones."""
 
     def made(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
@@ -39,7 +39,7 @@ def one_network(network: WindowNetwork) -> Method:
     return made
 
 
-def exemplar_method(voice: VisualVoice, options: SynthesisOptions) -> Method:
+def exemplar_method(voice: ExemplarModel, options: SynthesisOptions) -> Method:
     """Synthesis from exemplars."""
 
     def made(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
@@ -48,7 +48,7 @@ def exemplar_method(voice: VisualVoice, options: SynthesisOptions) -> Method:
     return made
 
 
-def mean_phone_pose(talker: Talker, voice: VisualVoice) -> Method:
+def mean_pose_method(talker: Talker, voice: ExemplarModel) -> Method:
     """The simplest synthesis that knows phones: their mean poses, joined by straight lines from middle to middle."""
     n_speech, inventory = talker.model.n_speech, voice.tokens.inventory
     poses: dict[str, list[NDArray[np.float64]]] = {label: [] for label in inventory}
@@ -61,7 +61,7 @@ def mean_phone_pose(talker: Talker, voice: VisualVoice) -> Method:
     mean = {label: np.mean(seen, axis=0) for label, seen in poses.items() if seen}
 
     def made(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
-        targets = targets_of(phones, inventory)
+        targets = build_targets(phones, inventory)
         middles = targets.spans[:, 1:3].mean(axis=1)
         keys = np.stack([mean[label] for label in targets.labels])
         times = np.arange(n_frames) / fps

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.measures import judged_frames
+from corpus_tools.evaluation.measures import speech_frames
 from corpus_tools.evaluation.methods import Method
-from corpus_tools.evaluation.reference import Curves, Real
-from corpus_tools.evaluation.scores import Judged, OwnClock, compared_spread
+from corpus_tools.evaluation.reference import LipCurves, ReferenceUtterance
+from corpus_tools.evaluation.scores import OwnDurationMotion, UtteranceComparison, compared_spread
 from lexicon.errors import InputError
 from lexicon.normalize import normalize
 from lexicon.sequence import PhoneSequence, WordSpan
@@ -29,7 +29,7 @@ BEYOND_S = 60.0  # outside the words time runs evenly, this far
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Said:
+class VoicedUtterance:
     """One utterance in a voice's own time: phones, frames of the sound, and where its words lie on both clocks.
 
     ``ours`` and ``real`` (K,) are the same instants, in seconds of the voice's clock and of the real one.
@@ -37,15 +37,15 @@ class Said:
 
     phones: PhoneSequence
     n_frames: int
-    ours: NDArray[np.float64]
+    voice_s: NDArray[np.float64]
     real: NDArray[np.float64]
 
     def times(self, real: NDArray[np.float64]) -> NDArray[np.float64]:
         """Seconds of the voice's clock for seconds of the real one."""
-        return np.interp(real, self.real, self.ours)
+        return np.interp(real, self.real, self.voice_s)
 
 
-def said_by(voice: Voice, real: Sequence[Real]) -> tuple[Said | None, ...]:
+def speak_references(voice: Voice, real: Sequence[ReferenceUtterance]) -> tuple[VoicedUtterance | None, ...]:
     """Utterances as a voice says them; None for those without words, and where it counts other words.
 
     Raises
@@ -53,31 +53,31 @@ def said_by(voice: Voice, real: Sequence[Real]) -> tuple[Said | None, ...]:
     InputError
         None is left.
     """
-    said = tuple(_said(voice, one) for one in real)
+    said = tuple(_speak_reference(voice, one) for one in real)
     if all(one is None for one in said):
         raise InputError("own durations need recordings whose words are known; add transcripts")
     return said
 
 
-def _said(voice: Voice, one: Real) -> Said | None:
+def _speak_reference(voice: Voice, one: ReferenceUtterance) -> VoicedUtterance | None:
     words = one.observation.words
     if not words or one.observation.is_recognised:
         return None
     speech = voice.speak(normalize(" ".join(word.text for word in words)))
     if len(speech.words) != len(words):
         return None
-    return on_one_clock(speech, one.observation.phones, words, one.observation.fps)
+    return map_word_times(speech, one.observation.phones, words, one.observation.fps)
 
 
-def on_one_clock(speech: Speech, phones: PhoneSequence, words: Sequence[WordSpan], fps: float) -> Said:
+def map_word_times(speech: Speech, phones: PhoneSequence, words: Sequence[WordSpan], fps: float) -> VoicedUtterance:
     """Speech, and where its words lie among those of a recording."""
-    ours, real = _edges(speech.phones, speech.words), _edges(phones, words)
+    ours, real = _word_edges(speech.phones, speech.words), _word_edges(phones, words)
     outside = np.array([-BEYOND_S, BEYOND_S])
     ours, real = (np.concatenate([each[:1] + outside[:1], each, each[-1:] + outside[1:]]) for each in (ours, real))
-    return Said(speech.phones, frame_count(speech.waveform.duration, fps), ours, real)
+    return VoicedUtterance(speech.phones, frame_count(speech.waveform.duration, fps), ours, real)
 
 
-def _edges(phones: PhoneSequence, words: Sequence[WordSpan]) -> NDArray[np.float64]:
+def _word_edges(phones: PhoneSequence, words: Sequence[WordSpan]) -> NDArray[np.float64]:
     """(2 W,) seconds at which words begin and end, always rising."""
     begins = np.array([phones.edges[word.first] for word in words])
     ends = np.array([phones.edges[word.last] for word in words])
@@ -85,12 +85,16 @@ def _edges(phones: PhoneSequence, words: Sequence[WordSpan]) -> NDArray[np.float
     return np.stack([begins, ends], axis=1).ravel()
 
 
-def judged_own(method: Method, one: Real, said: Said, model: ShapeModel) -> Judged:
+def compare_own_durations(
+    method: Method, one: ReferenceUtterance, said: VoicedUtterance, model: ShapeModel
+) -> UtteranceComparison:
     """What a method makes of the voice's phones, beside the real utterance."""
     fps, n_fine = one.observation.fps, FINE * (said.n_frames - 1) + 1
     made = method(said.phones, n_fine, FINE * fps)
     wanted = said.times(np.arange(len(one.parameters)) / fps)
     columns = [np.interp(wanted, np.arange(n_fine) / (FINE * fps), column) for column in made.T]
     there, ours = np.stack(columns, axis=1).astype(np.float32), made[::FINE]
-    own = OwnClock(said.phones, judged_frames(said.phones, said.n_frames, fps), ours, Curves.of(model.shapes(ours)))
-    return Judged(one, there, Curves.of(model.shapes(there)), compared_spread(model), own)
+    own = OwnDurationMotion(
+        said.phones, speech_frames(said.phones, said.n_frames, fps), ours, LipCurves.of(model.shapes(ours))
+    )
+    return UtteranceComparison(one, there, LipCurves.of(model.shapes(there)), compared_spread(model), own)

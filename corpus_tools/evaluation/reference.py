@@ -22,14 +22,14 @@ OTHER = "other"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Curves:
+class LipCurves:
     """Opening and width (T,) of the lips over the eye distance."""
 
     opening: NDArray[np.float64]
     width: NDArray[np.float64]
 
     @classmethod
-    def of(cls, landmarks: NDArray[np.floating]) -> "Curves":
+    def of(cls, landmarks: NDArray[np.floating]) -> "LipCurves":
         """Of (T, 478, 3) landmarks."""
         return cls(measures.lip_opening(landmarks), measures.lip_width(landmarks))
 
@@ -39,24 +39,24 @@ class Curves:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Real:
+class ReferenceUtterance:
     """One held-out utterance: its judged frames, speech parameters (T, S), curves, and the class of each frame (T,)."""
 
     observation: Observation
     judged: slice
     parameters: NDArray[np.float32]
-    curves: Curves
+    curves: LipCurves
     classes: NDArray[np.str_]
 
     @classmethod
-    def of(cls, seen: Observation, model: ShapeModel) -> "Real":
+    def of(cls, seen: Observation, model: ShapeModel) -> "ReferenceUtterance":
         """The utterance in the parameters of a model."""
         n_frames = len(seen.landmarks)
         return cls(
             seen,
-            measures.judged_frames(seen.phones, n_frames, seen.fps),
+            measures.speech_frames(seen.phones, n_frames, seen.fps),
             model.parameters(seen.landmarks)[:, : model.n_speech],
-            Curves.of(seen.landmarks),
+            LipCurves.of(seen.landmarks),
             frame_classes(seen.phones.phones, seen.phones.edges, np.arange(n_frames) / seen.fps),
         )
 
@@ -75,12 +75,12 @@ class Thresholds:
     rounded: float
 
     @classmethod
-    def of(cls, real: Sequence[Real]) -> "Thresholds":
+    def of(cls, real: Sequence[ReferenceUtterance]) -> "Thresholds":
         """Of held-out utterances."""
 
         def threshold(curve: str, labels: Collection[str]) -> float:
             least = [
-                measures.least_openings(getattr(one.curves, curve), one.observation.phones, one.observation.fps, labels)
+                measures.min_openings(getattr(one.curves, curve), one.observation.phones, one.observation.fps, labels)
                 for one in real
             ]
             return measures.closure_threshold(np.concatenate(least))

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.evaluation import measures
-from corpus_tools.evaluation.reference import CLASSES, OTHER, Curves, Real, Thresholds
+from corpus_tools.evaluation.reference import CLASSES, OTHER, LipCurves, ReferenceUtterance, Thresholds
 from lexicon.sequence import PhoneSequence
 from tts2face.models.talker import ShapeModel
 
@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
+class IntervalEstimate:
     """A value and the interval in which it lies with `CONFIDENCE`."""
 
     value: float
@@ -69,7 +69,7 @@ class Scores:
     """
 
     method: str
-    figures: Mapping[str, Figure]
+    figures: Mapping[str, IntervalEstimate]
     classes: tuple[ClassScore, ...]
     real_time_factor: float
     utterances: tuple[UtteranceScore, ...]
@@ -84,7 +84,7 @@ class Scores:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tally:
+class UtteranceStatistics:
     """What one utterance adds to the figures of a method.
 
     ``opening`` and ``width`` (6,) are moments of real and made curves; ``counts`` (4, 2) are events that happened, and
@@ -101,7 +101,7 @@ class Tally:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OwnClock:
+class OwnDurationMotion:
     """The same words as a voice says them, on its own clock: its phones, and parameters (U, S) and curves made of them.
 
     ``judged`` are the frames about its speech.
@@ -110,40 +110,42 @@ class OwnClock:
     phones: PhoneSequence
     judged: slice
     values: NDArray[np.floating]
-    curves: Curves
+    curves: LipCurves
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Judged:
+class UtteranceComparison:
     """One utterance as it was and as it was made: parameters (T, S) and curves of the lips on the real clock.
 
     Of the parameters the first ``len(spread)`` are compared. Where the motion was made on an ``own`` clock, what the
     lips do in its phones is looked at there.
     """
 
-    real: Real
+    real: ReferenceUtterance
     made: NDArray[np.floating]
-    curves: Curves
+    curves: LipCurves
     spread: NDArray[np.floating]
-    own: OwnClock | None = None
+    own: OwnDurationMotion | None = None
 
 
-Made = tuple[ShapeModel, Sequence[Real], Sequence[NDArray[np.float32]]]  # of one split: (T, S) for each utterance
+Made = tuple[
+    ShapeModel, Sequence[ReferenceUtterance], Sequence[NDArray[np.float32]]
+]  # of one split: (T, S) for each utterance
 
 
-def shown(scores: Sequence[Scores]) -> tuple[tuple[str, str, int], ...]:
+def available_figures(scores: Sequence[Scores]) -> tuple[tuple[str, str, int], ...]:
     """Those of `FIGURES` that the scores have."""
     return tuple(figure for figure in FIGURES if all(figure[0] in one.figures for one in scores))
 
 
-def scored(method: str, splits: Sequence[Made], limits: Thresholds, spent: float = 0.0) -> Scores:
+def score_splits(method: str, splits: Sequence[Made], limits: Thresholds, spent: float = 0.0) -> Scores:
     """Figures of a method over the utterances of all splits; making them took `spent` seconds."""
     judged = [
-        Judged(one, values, Curves.of(model.shapes(values)), compared_spread(model))
+        UtteranceComparison(one, values, LipCurves.of(model.shapes(values)), compared_spread(model))
         for model, real, made in splits
         for one, values in zip(real, made, strict=True)
     ]
-    return scores_of(method, judged, limits, spent)
+    return compute_scores(method, judged, limits, spent)
 
 
 def compared_spread(model: ShapeModel) -> NDArray[np.float32]:
@@ -151,36 +153,38 @@ def compared_spread(model: ShapeModel) -> NDArray[np.float32]:
     return model.spread[: min(measures.DTW_PARAMETERS, model.n_speech)]
 
 
-def scores_of(method: str, judged: Sequence[Judged], limits: Thresholds, spent: float = 0.0) -> Scores:
+def compute_scores(
+    method: str, judged: Sequence[UtteranceComparison], limits: Thresholds, spent: float = 0.0
+) -> Scores:
     """Figures of a method over judged utterances; making them took `spent` seconds."""
-    tallies = [_tally(one, limits) for one in judged]
+    tallies = [_utterance_statistics(one, limits) for one in judged]
     return Scores(
         method,
-        _figures(tallies),
+        _estimate_figures(tallies),
         tuple(_class_scores(judged)),
         spent / sum(one.real.seconds for one in judged),
-        tuple(_utterance(tally, one) for tally, one in zip(tallies, judged, strict=True)),
+        tuple(_utterance_score(tally, one) for tally, one in zip(tallies, judged, strict=True)),
     )
 
 
-def _tally(judged: Judged, limits: Thresholds) -> Tally:
+def _utterance_statistics(judged: UtteranceComparison, limits: Thresholds) -> UtteranceStatistics:
     one, seen, n, here = judged.real, judged.curves, len(judged.spread), judged.real.judged
     phones, fps = one.observation.phones, one.observation.fps
     real, made = one.parameters[here, :n], judged.made[here, :n]
     peaks = [measures.peak_times(curve, phones, fps) for curve in (one.curves.opening, seen.opening)]
     offsets = peaks[1] - peaks[0]
-    return Tally(
-        _moments(one.curves.opening[here], seen.opening[here]),
-        _moments(one.curves.width[here], seen.width[here]),
+    return UtteranceStatistics(
+        _curve_moments(one.curves.opening[here], seen.opening[here]),
+        _curve_moments(one.curves.width[here], seen.width[here]),
         measures.rmse_z(real, made, judged.spread),
         measures.warping_cost(real, made, judged.spread, round(measures.DTW_BAND_S * fps)),
         _free_cost(judged),
-        _counts(judged, limits),
+        _event_counts(judged, limits),
         np.abs(offsets[np.isfinite(offsets)]),
     )
 
 
-def _free_cost(judged: Judged) -> float | None:
+def _free_cost(judged: UtteranceComparison) -> float | None:
     """Warping cost of what was made on its own clock, without a band."""
     if judged.own is None:
         return None
@@ -189,13 +193,13 @@ def _free_cost(judged: Judged) -> float | None:
     return measures.warping_cost(real, judged.own.values[judged.own.judged, :n], judged.spread, None)
 
 
-def _counts(judged: Judged, limits: Thresholds) -> Floats:
+def _event_counts(judged: UtteranceComparison, limits: Thresholds) -> Floats:
     """(4, 2) events that happened and that could, in the phones of the clock on which the motion was made."""
     own, fps = judged.own, judged.real.observation.fps
     phones, seen = (own.phones, own.curves) if own else (judged.real.observation.phones, judged.curves)
 
     def events(curve: NDArray[np.floating], labels: str, limit: float) -> tuple[float, float]:
-        least = measures.least_openings(curve, phones, fps, CLASSES[labels])
+        least = measures.min_openings(curve, phones, fps, CLASSES[labels])
         return float((least <= limit).sum()), float(len(least))
 
     middles = measures.midpoint_openings(seen.opening, phones, fps)
@@ -209,11 +213,11 @@ def _counts(judged: Judged, limits: Thresholds) -> Floats:
     )
 
 
-def _moments(real: Floats, made: Floats) -> Floats:
+def _curve_moments(real: Floats, made: Floats) -> Floats:
     return np.array([len(real), real.sum(), made.sum(), real @ real, made @ made, real @ made])
 
 
-def _figures(tallies: Sequence[Tally]) -> dict[str, Figure]:
+def _estimate_figures(tallies: Sequence[UtteranceStatistics]) -> dict[str, IntervalEstimate]:
     draws = np.random.default_rng(0).multinomial(len(tallies), np.full(len(tallies), 1 / len(tallies)), N_DRAWS)
     weights = np.concatenate([np.ones((1, len(tallies))), draws])  # the first row: each utterance once
     rows = {
@@ -223,7 +227,7 @@ def _figures(tallies: Sequence[Tally]) -> dict[str, Figure]:
         "r_width": _curve_figures(weights, [one.width for one in tallies])[0],
         "rmse_z": weights @ [one.rmse_z for one in tallies] / weights.sum(axis=1),
         "dtw_cost": weights @ [one.dtw_cost for one in tallies] / weights.sum(axis=1),
-        "peak_offset_ms": 1000 * _medians(weights, [one.offsets for one in tallies]),
+        "peak_offset_ms": 1000 * _weighted_medians(weights, [one.offsets for one in tallies]),
     }
     free = [one.free_cost for one in tallies if one.free_cost is not None]
     if len(free) == len(tallies):
@@ -233,7 +237,7 @@ def _figures(tallies: Sequence[Tally]) -> dict[str, Figure]:
         rows[name] = counts[:, at, 0] / np.maximum(counts[:, at, 1], 1.0)
     edges = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
     return {
-        name: Figure(float(rows[name][0]), *(float(value) for value in np.quantile(rows[name][1:], edges)))
+        name: IntervalEstimate(float(rows[name][0]), *(float(value) for value in np.quantile(rows[name][1:], edges)))
         for name, _, _ in FIGURES
         if name in rows
     }
@@ -248,7 +252,7 @@ def _curve_figures(weights: Floats, moments: Sequence[Floats]) -> tuple[Floats, 
     return r, np.sqrt(made / np.maximum(real, 1e-12))
 
 
-def _medians(weights: Floats, offsets: Sequence[Floats]) -> Floats:
+def _weighted_medians(weights: Floats, offsets: Sequence[Floats]) -> Floats:
     """Weighted median of all offsets for each row of weights (W, U); 0 where there is none."""
     values = np.concatenate(offsets)
     if not len(values):
@@ -260,17 +264,17 @@ def _medians(weights: Floats, offsets: Sequence[Floats]) -> Floats:
     return np.asarray(values[order][np.minimum(at, len(values) - 1)])
 
 
-def _class_scores(judged: Sequence[Judged]) -> list[ClassScore]:
+def _class_scores(judged: Sequence[UtteranceComparison]) -> list[ClassScore]:
     classes, away, opening = [], [], []
     for each in judged:
         one, here, n = each.real, each.real.judged, len(each.spread)
         classes.append(one.classes[here])
         away.append((each.made - one.parameters)[here, :n] / each.spread)
         opening.append((each.curves.opening - one.curves.opening)[here])
-    return _by_class(np.concatenate(classes), np.concatenate(away), np.concatenate(opening))
+    return _score_classes(np.concatenate(classes), np.concatenate(away), np.concatenate(opening))
 
 
-def _by_class(classes: NDArray[np.str_], away: NDArray[np.float32], opening: Floats) -> list[ClassScore]:
+def _score_classes(classes: NDArray[np.str_], away: NDArray[np.float32], opening: Floats) -> list[ClassScore]:
     found = []
     for name in (*CLASSES, OTHER):
         here = classes == name
@@ -281,7 +285,7 @@ def _by_class(classes: NDArray[np.str_], away: NDArray[np.float32], opening: Flo
     return found
 
 
-def _utterance(tally: Tally, judged: Judged) -> UtteranceScore:
+def _utterance_score(tally: UtteranceStatistics, judged: UtteranceComparison) -> UtteranceScore:
     one, seen, here, curves = judged.real, judged.curves, judged.real.judged, judged.real.curves
     return UtteranceScore(
         one.observation.name,

@@ -22,12 +22,12 @@ def split(observations: Sequence[Observation], *, hold_out: int, seed: int) -> P
         raise InputError(
             f"of {len(observations)} utterances, 1 to {len(observations) - 1} can be held out, not {hold_out}"
         )
-    ordered = _ordered(observations)
+    ordered = _sort_by_name(observations)
     held = set(np.random.default_rng(seed).permutation(len(ordered))[:hold_out].tolist())
-    return _parted(ordered, held)
+    return _split_at(ordered, held)
 
 
-def folds(observations: Sequence[Observation], *, n_folds: int, seed: int) -> tuple[Parts, ...]:
+def split_into_folds(observations: Sequence[Observation], *, n_folds: int, seed: int) -> tuple[Parts, ...]:
     """As many splits as folds; every utterance is held out once.
 
     Raises
@@ -37,12 +37,12 @@ def folds(observations: Sequence[Observation], *, n_folds: int, seed: int) -> tu
     """
     if not 2 <= n_folds <= len(observations):
         raise InputError(f"{len(observations)} utterances make 2 to {len(observations)} folds, not {n_folds}")
-    ordered = _ordered(observations)
+    ordered = _sort_by_name(observations)
     order = np.random.default_rng(seed).permutation(len(ordered))
-    return tuple(_parted(ordered, set(held.tolist())) for held in np.array_split(order, n_folds))
+    return tuple(_split_at(ordered, set(held.tolist())) for held in np.array_split(order, n_folds))
 
 
-def without_words(observations: Sequence[Observation], words: Collection[str]) -> Parts:
+def split_by_words(observations: Sequence[Observation], words: Collection[str]) -> Parts:
     """Utterances without any of the words, and those with one: their contexts are never seen in training.
 
     Raises
@@ -54,14 +54,14 @@ def without_words(observations: Sequence[Observation], words: Collection[str]) -
     said = {word.text.lower() for seen in observations for word in seen.words}
     if missing := sorted(wanted - said):
         raise InputError(f"nobody says {', '.join(missing)}; words that are said: {', '.join(sorted(said)[:60])}")
-    ordered = _ordered(observations)
+    ordered = _sort_by_name(observations)
     held = {at for at, seen in enumerate(ordered) if wanted & {word.text.lower() for word in seen.words}}
     if len(held) == len(ordered):
         raise InputError(f"every utterance has one of {', '.join(sorted(wanted))}; nothing is left to learn from")
-    return _parted(ordered, held)
+    return _split_at(ordered, held)
 
 
-def require_parted(train: Sequence[Observation], test: Sequence[Observation]) -> None:
+def check_disjoint(train: Sequence[Observation], test: Sequence[Observation]) -> None:
     """Refuse a split in which an utterance is on both sides.
 
     Raises
@@ -73,20 +73,20 @@ def require_parted(train: Sequence[Observation], test: Sequence[Observation]) ->
         raise InputError("there is no utterance to test")
     if not train:
         raise InputError("there is no utterance to learn from")
-    known = {_identity(seen) for seen in train}
-    if both := sorted(seen.name for seen in test if _identity(seen) in known):
+    known = {_content_identity(seen) for seen in train}
+    if both := sorted(seen.name for seen in test if _content_identity(seen) in known):
         raise InputError(f"{both[0]} is learnt from and tested on ({len(both)} such); take it out of one part")
 
 
-def _identity(seen: Observation) -> tuple[int, bytes]:
+def _content_identity(seen: Observation) -> tuple[int, bytes]:
     """What is the same in copies of one recording, whatever they are called."""
     return len(seen.landmarks), seen.landmarks[:: max(1, len(seen.landmarks) // 4), :20].tobytes()
 
 
-def _ordered(observations: Sequence[Observation]) -> list[Observation]:
+def _sort_by_name(observations: Sequence[Observation]) -> list[Observation]:
     return sorted(observations, key=lambda one: one.name)
 
 
-def _parted(ordered: Sequence[Observation], held: Collection[int]) -> Parts:
+def _split_at(ordered: Sequence[Observation], held: Collection[int]) -> Parts:
     train = tuple(one for at, one in enumerate(ordered) if at not in held)
     return train, tuple(one for at, one in enumerate(ordered) if at in held)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from corpus_tools.evaluation.scores import FIGURES, Scores, shown
+from corpus_tools.evaluation.scores import FIGURES, Scores, available_figures
 
 TRUE, OWN, ACROSS = "true durations", "own durations", "another talker"
 
@@ -65,14 +65,14 @@ class Evaluation:
 
     def fold_table(self) -> str:
         """Markdown table of the standard deviation of each figure over the folds, one method a line."""
-        heads = shown(self.scores)
+        heads = available_figures(self.scores)
         lines = [f"| method | {' | '.join(head for _, head, _ in heads)} |", "| --- |" + " --- |" * len(heads)]
         for one in self.scores:
-            cells = [f"{self.over_folds(one.method, name)[1]:.{digits}f}" for name, _, digits in heads]
+            cells = [f"{self.fold_mean_and_deviation(one.method, name)[1]:.{digits}f}" for name, _, digits in heads]
             lines.append(f"| {one.method} | {' | '.join(cells)} |")
         return "\n".join(lines)
 
-    def over_folds(self, method: str, figure: str) -> tuple[float, float]:
+    def fold_mean_and_deviation(self, method: str, figure: str) -> tuple[float, float]:
         """Mean and standard deviation (of a sample) of a figure over the folds."""
         values = [fold.figures[method][figure] for fold in self.folds]
         return float(np.mean(values)), float(np.std(values, ddof=1))
@@ -83,15 +83,15 @@ class Evaluation:
         Folds have no interval of their own: those cells are empty, and so is what a table does not have.
         """
         head = ("table", "method", *(part for name, _, _ in FIGURES for part in (name, f"{name}_low", f"{name}_high")))
-        rows = [(name, one.method, *_cells(one)) for name, scores in self.tables() for one in scores]
+        rows = [(name, one.method, *_interval_cells(one)) for name, scores in self.tables() for one in scores]
         for number, fold in enumerate(self.folds, start=1):
-            rows += [(f"fold {number}", name, *_plain(values)) for name, values in fold.figures.items()]
+            rows += [(f"fold {number}", name, *_value_cells(values)) for name, values in fold.figures.items()]
         return (head, *rows)
 
 
 def figures_table(scores: Sequence[Scores], *, intervals: bool = False) -> str:
     """Markdown table of figures, one method a line."""
-    heads = shown(scores)
+    heads = available_figures(scores)
     lines = [f"| method | {' | '.join(head for _, head, _ in heads)} |", "| --- |" + " --- |" * len(heads)]
     for one in scores:
         cells = [figure_text(one, name, digits, intervals=intervals) for name, _, digits in heads]
@@ -106,13 +106,13 @@ def figure_text(scores: Scores, name: str, digits: int, *, intervals: bool) -> s
     return f"{text} ({figure.low:.{digits}f}-{figure.high:.{digits}f})" if intervals else text
 
 
-def _cells(scores: Scores) -> Iterator[str]:
+def _interval_cells(scores: Scores) -> Iterator[str]:
     for name, _, _ in FIGURES:
         figure = scores.figures.get(name)
         values = (figure.value, figure.low, figure.high) if figure else ()
         yield from (f"{x:.6g}" for x in values) if values else ("", "", "")
 
 
-def _plain(values: Mapping[str, float]) -> Iterator[str]:
+def _value_cells(values: Mapping[str, float]) -> Iterator[str]:
     for name, _, _ in FIGURES:
         yield from (f"{values[name]:.6g}" if name in values else "", "", "")

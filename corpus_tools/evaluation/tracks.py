@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.reference import Real
-from corpus_tools.training.ridge import ridge
+from corpus_tools.evaluation.reference import ReferenceUtterance
+from corpus_tools.training.ridge import fit_ridge
 from lexicon.errors import DataError, InputError
 from tts2face.models.talker import Talker
 
@@ -18,7 +18,7 @@ LEAST_TRAINING = 10  # sentences from which a map is fitted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Track:
+class ExternalTrack:
     """Curves of one utterance: seconds (T,) on the clock of its first frame, and values (T, C)."""
 
     times: NDArray[np.float64]
@@ -30,7 +30,7 @@ class Track:
         return np.stack(columns, axis=1)
 
 
-def read_tracks(path: Path) -> Mapping[str, Track]:
+def read_tracks(path: Path) -> Mapping[str, ExternalTrack]:
     """Curves by utterance from a CSV file with the columns utterance, time (seconds), and one for each channel.
 
     Raises
@@ -52,17 +52,17 @@ def read_tracks(path: Path) -> Mapping[str, Track]:
             for number, row in enumerate(reader, start=2):
                 if len(row) != len(head):
                     raise DataError(f"{path}, line {number}: {len(row)} columns, not {len(head)}; mend it")
-                rows.setdefault(row[0], []).append([_number(value, path, number) for value in row[1:]])
+                rows.setdefault(row[0], []).append([_parse_number(value, path, number) for value in row[1:]])
     except (OSError, UnicodeDecodeError, csv.Error) as broken:
         raise DataError(f"{path} cannot be read as CSV in UTF-8 ({broken}); export it again") from broken
     tracks = {name: np.array(values) for name, values in rows.items()}
     for name, values in tracks.items():
         if (np.diff(values[:, 0]) <= 0).any():
             raise DataError(f"{path}: the times of {name} do not increase; sort them")
-    return {name: Track(values[:, 0], values[:, 1:]) for name, values in tracks.items()}
+    return {name: ExternalTrack(values[:, 0], values[:, 1:]) for name, values in tracks.items()}
 
 
-def _number(text: str, path: Path, line: int) -> float:
+def _parse_number(text: str, path: Path, line: int) -> float:
     try:
         value = float(text)
     except ValueError:
@@ -72,7 +72,9 @@ def _number(text: str, path: Path, line: int) -> float:
     return value
 
 
-def mapped(tracks: Mapping[str, Track], talker: Talker, real: Sequence[Real]) -> tuple[NDArray[np.float32], ...]:
+def map_tracks(
+    tracks: Mapping[str, ExternalTrack], talker: Talker, real: Sequence[ReferenceUtterance]
+) -> tuple[NDArray[np.float32], ...]:
     """Speech parameters (T, S) of the held-out utterances, by a ridge regression fitted on the training ones.
 
     Raises
@@ -92,9 +94,9 @@ def mapped(tracks: Mapping[str, Track], talker: Talker, real: Sequence[Real]) ->
     wanted = np.concatenate([one.shape[:, :n_speech] for one in known]).astype(np.float64)
     spread = np.maximum(terms.std(axis=0), 1e-9)
     middle = wanted.mean(axis=0)
-    fit = ridge(terms / spread, wanted - middle)
+    fit = fit_ridge(terms / spread, wanted - middle)
 
-    def made(one: Real) -> NDArray[np.float32]:
+    def made(one: ReferenceUtterance) -> NDArray[np.float32]:
         times = np.arange(len(one.parameters)) / one.observation.fps
         seen = tracks[one.observation.name].at(times) / spread
         return np.asarray(middle + (seen - fit.mean) @ fit.weights, np.float32)

@@ -22,7 +22,7 @@ from corpus_tools.gesture_study.measures import (
 )
 from corpus_tools.gesture_study.traits import Trait, in_display_units, traits_of
 from lexicon.errors import InputError
-from tts2face.gesture.gesture_stream import Fields
+from tts2face.gesture.gesture_stream import GestureFields
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
 
 NEAR, HALF = 1.5, 0.5  # targets of a field's distance, over that between halves and over that of noise
@@ -168,7 +168,7 @@ class _Ready:
     learnt: Style
     held: Style
     is_held_out: bool
-    fields: Fields
+    fields: GestureFields
     again: Motion
 
 
@@ -176,7 +176,7 @@ def _ready(palette: Palette, source: str, options: Options) -> _Ready:
     whole = palette.styles[source]
     is_held_out = len(whole.lengths) >= FEWEST
     learnt, held = hold_out(whole, options.one_in, options.seed) if is_held_out else (whole, whole)
-    fields = Fields(replace_style(palette, source, learnt))
+    fields = GestureFields(replace_style(palette, source, learnt))
     again = _from_fields(fields, source, held, options.seed + options.clips) if palette.derivations else {}
     return _Ready(learnt, held, is_held_out, fields, again)
 
@@ -204,7 +204,7 @@ def _style_found(palette: Palette, name: str, ready: _Ready, options: Options) -
     )
 
 
-def _from_fields(fields: Fields, name: str, held: Style, seed: int) -> Motion:
+def _from_fields(fields: GestureFields, name: str, held: Style, seed: int) -> Motion:
     return {feature: field_clip(fields, name, feature, held.intensity, seed).values for feature in held.motion}
 
 

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from corpus_tools.gesture_study.measures import split_recordings
 from lexicon.errors import InputError
-from tts2face.gesture.field import begun, walked
-from tts2face.gesture.gesture_stream import Fields
+from tts2face.gesture.field import initial_state, sample_field_moments
+from tts2face.gesture.gesture_stream import GestureFields
 from tts2face.gesture.perlin_noise import NoiseStream
 from tts2face.gesture.timeline import Timeline
-from tts2face.interpolation import cubic_at
+from tts2face.interpolation import interpolate_cubic
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
 from tts2face.types import Waveform
 
@@ -68,22 +68,22 @@ def replace_style(palette: Palette, name: str, style: Style) -> Palette:
     return replace(palette, styles={**palette.styles, name: style})
 
 
-def field_clip(fields: Fields, style: str, feature: str, intensity: Floats, seed: int) -> Clip:
+def field_clip(fields: GestureFields, style: str, feature: str, intensity: Floats, seed: int) -> Clip:
     """A feature of a style, measured or derived, for an intensity (T,) at `GESTURE_FPS`."""
     source, tempo = fields.source(style, feature), fields.change(style, feature).tempo
     made = fields.of(source, feature)
     times = np.arange(0.0, len(intensity) * tempo + 2)  # in frames of the field; two more for the cubic
     intensities = np.interp(times / tempo, np.arange(len(intensity)), intensity).astype(np.float32)[:, None]
     generator = np.random.default_rng([seed, crc32(feature.encode())])  # as `tts2face.gesture.gesture_stream` draws
-    start = begun(made, generator.random())
-    walk = walked(made, start, intensities, generator.random(len(intensities)))
+    start = initial_state(made, generator.random())
+    walk = sample_field_moments(made, start, intensities, generator.random(len(intensities)))
     values = walk.values[: len(intensity)]
     if tempo != 1.0:
-        values = cubic_at(walk.values, tempo * np.arange(len(intensity), dtype=np.float64))
-    return Clip(fields.changed(style, feature, values), walk.moments[: round(len(intensity) * tempo)])
+        values = interpolate_cubic(walk.values, tempo * np.arange(len(intensity), dtype=np.float64))
+    return Clip(fields.apply_change(style, feature, values), walk.moments[: round(len(intensity) * tempo)])
 
 
-def noise_clip(fields: Fields, style: str, n_frames: int, seed: int) -> Mapping[str, Floats]:
+def noise_clip(fields: GestureFields, style: str, n_frames: int, seed: int) -> Mapping[str, Floats]:
     """All features of a style by noise, which does not depend on the sound."""
     stream = NoiseStream(fields, style=style, seed=seed, fps=GESTURE_FPS)
     return stream.next(NO_SOUND, n_frames, Timeline())

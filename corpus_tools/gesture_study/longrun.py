@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from corpus_tools.gesture_study.clips import field_clip
 from corpus_tools.gesture_study.measures import autocorrelation, coverage, split_recordings
 from tts2face.gesture.field_kernels import APART
-from tts2face.gesture.gesture_stream import Fields
+from tts2face.gesture.gesture_stream import GestureFields
 from tts2face.gesture.prosody import SILENCE
 from tts2face.models.palette import GESTURE_FPS, Style
 
@@ -47,7 +47,7 @@ class LongRun:
     repeating: Mapping[str, Repetition]
 
 
-def long_run(fields: Fields, name: str, learnt: Style, held: Style, seed: int) -> LongRun:
+def long_run(fields: GestureFields, name: str, learnt: Style, held: Style, seed: int) -> LongRun:
     """Measure clips of `MINUTES` of a style, with the recordings' sound in random order and with silence."""
     n_frames = round(MINUTES * 60 * GESTURE_FPS)
     order = np.random.default_rng([seed, 3]).permutation(len(learnt.lengths))

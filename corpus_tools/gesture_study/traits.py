@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.gesture_study.blinks import Blinks, blinks_of
-from tts2face.gesture.gesture_stream import middle_of
+from tts2face.gesture.gesture_stream import style_median
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
 
 Doubles = NDArray[np.float64]
@@ -35,7 +35,7 @@ class Trait:
 
 def traits_of(palette: Palette, style: Style) -> tuple[Trait, ...]:
     """The traits of a style's features; amplitudes are distances from its medians."""
-    middle = {feature: middle_of(style, feature).astype(np.float64) for feature in style.motion}
+    middle = {feature: style_median(style, feature).astype(np.float64) for feature in style.motion}
     found: list[Trait] = []
     for feature in style.motion:
         if feature == "blink":

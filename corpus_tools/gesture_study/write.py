@@ -10,7 +10,7 @@ from corpus_tools.gesture_study.page import gestures_page
 from corpus_tools.gesture_study.text import gestures_csv, gestures_json
 from corpus_tools.report.output import report_writer
 from tts2face.models.palette import load_palette
-from tts2face.storage.files import write_whole
+from tts2face.storage.files import write_atomically
 from tts2face.storage.output_names import check_name
 
 
@@ -29,7 +29,7 @@ def write_gestures(palette: str, out: Path, options: Options, *, on_progress: Pr
     writer = report_writer(out, WRITERS)
     check_name(out)
     found = study(palette, load_palette(palette), options, on_progress)
-    write_whole(out, writer(found))
+    write_atomically(out, writer(found))
     return found
 
 

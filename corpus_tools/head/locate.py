@@ -24,7 +24,7 @@ from corpus_tools.head.subdivide import triangulated
 from lexicon.errors import DataError
 from tts2face.models.face import Face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
-from tts2face.render.camera import optics
+from tts2face.render.camera import camera_matrices
 from tts2face.render.draw import mesh_renderer
 from tts2face.render.picture import Picture
 from tts2face.video.track import N_MESH, FaceTracker
@@ -53,7 +53,7 @@ def located(face: Face, skin: Skin, cage: Cage, tracker: FaceTracker) -> dict[in
     """Place (3,) of each of the 468 landmarks of the mesh on the source's base mesh."""
     twin = twins_of(face, tracker)
     triangles = triangulated(skin.quads)
-    seen = [cast(face, picture, tracker) for picture in pictures()]
+    seen = [open_session(face, picture, tracker) for picture in pictures()]
     on_face = middle_of(np.stack([hits for hits, _ in seen]), np.stack([is_sure for _, is_sure in seen]))
     number, weights, _ = nearest_on_surface(on_face, skin.vertices, triangles)
     places = np.einsum("pk,pkd->pd", weights, skin.base[triangles[number]])
@@ -76,11 +76,11 @@ def pictures() -> Iterator[Picture]:
                 yield Picture(size=f"{size}x{size}", camera=f"{yaw},{pitch}", background="#8a8f98")
 
 
-def cast(face: Face, picture: Picture, tracker: FaceTracker) -> tuple[Floats, NDArray[np.bool_]]:
+def open_session(face: Face, picture: Picture, tracker: FaceTracker) -> tuple[Floats, NDArray[np.bool_]]:
     """Places on the head (468, 3), mm, at which its landmarks are seen in a picture, and which of them are sure."""
     drawn = mesh_renderer(face, picture).draw(np.zeros(len(face.shape_names), np.float32))
     points = tracker.track(lambda: [drawn], 25.0).points[0, :N_MESH, :2].astype(np.float64)
-    camera = optics(picture.view, face, (picture.width, picture.height))
+    camera = camera_matrices(picture.view, face, (picture.width, picture.height))
     focal, middle_x, middle_y, _ = camera.lens
     seen = np.column_stack([points[:, 0] + 0.5 - middle_x, points[:, 1] + 0.5 - middle_y, np.full(N_MESH, focal)])
     rays = seen @ camera.view[:, :3]

@@ -29,7 +29,7 @@ LEAST_CORRELATION = 0.28
 
 
 @dataclass(frozen=True, slots=True)
-class Agreement:
+class SyncEstimate:
     """Seconds of ``lag`` by which the sound comes late, how well lips and loudness then agree, and of how much."""
 
     lag: float
@@ -37,13 +37,13 @@ class Agreement:
     seconds: float
 
     @property
-    def correction(self) -> float:
+    def lag_correction_s(self) -> float:
         """The lag to take out: 0 where it cannot be told from none."""
         least = LEAST_LAG_S * np.sqrt(LEAST_S / self.seconds) if self.seconds >= LEAST_S else np.inf
         return round(self.lag, 3) if abs(self.lag) >= least else 0.0
 
     @property
-    def fault(self) -> str | None:
+    def problem(self) -> str | None:
         """Why sound and picture do not belong together, None where they do or where too little tells."""
         if self.seconds < LEAST_S:
             return None
@@ -54,17 +54,17 @@ class Agreement:
         return None
 
 
-def agreements(observations: Sequence[Observation]) -> Mapping[Path, Agreement]:
+def estimate_sync_by_video(observations: Sequence[Observation]) -> Mapping[Path, SyncEstimate]:
     """How sound and picture of each video agree; videos of less than `LEAST_S` are taken together."""
     together: dict[Path, list[Observation]] = {}
     for observation in observations:
         together.setdefault(observation.video, []).append(observation)
-    short = [video for video, group in together.items() if _seconds(group) < LEAST_S]
-    of_short = agreement([seen for video in short for seen in together[video]])
-    return {video: of_short if video in short else agreement(group) for video, group in together.items()}
+    short = [video for video, group in together.items() if _total_duration(group) < LEAST_S]
+    of_short = estimate_sync([seen for video in short for seen in together[video]])
+    return {video: of_short if video in short else estimate_sync(group) for video, group in together.items()}
 
 
-def timings(observations: Sequence[Observation], found: Mapping[Path, Agreement]) -> Mapping[Path, Timing]:
+def corrected_timings(observations: Sequence[Observation], found: Mapping[Path, SyncEstimate]) -> Mapping[Path, Timing]:
     """How the videos must be read that were read otherwise: at the rate that most frames have, without a lag."""
     frames: Counter[float] = Counter()
     rates = {}
@@ -72,15 +72,17 @@ def timings(observations: Sequence[Observation], found: Mapping[Path, Agreement]
         frames[seen.fps] += len(seen.landmarks)
         rates[seen.video] = seen.fps
     common = min(frames, key=lambda fps: (-frames[fps], fps), default=None)
-    wanted = {video: Timing(common if rates[video] != common else None, found[video].correction) for video in rates}
+    wanted = {
+        video: Timing(common if rates[video] != common else None, found[video].lag_correction_s) for video in rates
+    }
     return {video: timing for video, timing in wanted.items() if timing != Timing()}
 
 
-def agreement(observations: Iterable[Observation]) -> Agreement:
+def estimate_sync(observations: Iterable[Observation]) -> SyncEstimate:
     """The lag at which lips and loudness of recordings agree best; 0 and 0 where nothing moves."""
-    found = [(curve, seen) for seen in observations if (curve := agreement_curve(seen)) is not None]
+    found = [(curve, seen) for seen in observations if (curve := lag_correlations(seen)) is not None]
     if not found:
-        return Agreement(0.0, 0.0, 0.0)
+        return SyncEstimate(0.0, 0.0, 0.0)
     lengths = [len(seen.landmarks) for _, seen in found]
     total = np.average([curve for curve, _ in found], axis=0, weights=lengths)
     at = int(total.argmax())
@@ -89,12 +91,12 @@ def agreement(observations: Iterable[Observation]) -> Agreement:
         before, peak, behind = total[at - 1 : at + 2]
         bend = before - 2 * peak + behind
         offset = 0.5 * (before - behind) / bend if bend else 0.0
-    return Agreement(
-        float(LAGS[at] + offset * STEP_S - LEAD_S), float(total[at]), _seconds([seen for _, seen in found])
+    return SyncEstimate(
+        float(LAGS[at] + offset * STEP_S - LEAD_S), float(total[at]), _total_duration([seen for _, seen in found])
     )
 
 
-def agreement_curve(seen: Observation) -> NDArray[np.float64] | None:
+def lag_correlations(seen: Observation) -> NDArray[np.float64] | None:
     """Correlations of the lips' speed with the rise of the loudness `LAGS` later; None with too little to compare."""
     apart = seen.landmarks[:, UPPER_LIP_INNER_MID] - seen.landmarks[:, LOWER_LIP_INNER_MID]
     times = np.arange(len(apart)) / seen.fps
@@ -113,5 +115,5 @@ def agreement_curve(seen: Observation) -> NDArray[np.float64] | None:
     return correlations
 
 
-def _seconds(observations: Sequence[Observation]) -> float:
+def _total_duration(observations: Sequence[Observation]) -> float:
     return float(sum(len(seen.landmarks) / seen.fps for seen in observations))

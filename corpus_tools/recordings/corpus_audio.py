@@ -13,7 +13,7 @@ from corpus_tools.recordings.corpus_video import content_key
 from corpus_tools.recordings.folder import Spoken
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence, WordSpan
-from tts2face.speech.pauses import Span, stretches
+from tts2face.speech.pauses import Span, cut_at_pauses
 from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
@@ -31,7 +31,7 @@ LONGEST_UTTERANCE_S = 20.0  # longer recordings are cut at pauses
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Heard:
+class AlignedSpeech:
     """Phones, words, the alignment's confidence, and the sound.
 
     ``is_recognised`` where nobody wrote what is said: the words then are the phones heard, between slashes.
@@ -44,7 +44,7 @@ class Heard:
     is_recognised: bool
 
 
-class Ears:
+class CachedAligner:
     """Listens to recordings; models are loaded when they are needed, the last file's sound is kept."""
 
     def __init__(self, cache: Path) -> None:
@@ -66,9 +66,9 @@ class Ears:
             self._last = None  # two long sounds need not lie in memory together
             self._last = key, read_sound(video, SOUND_RATE)
         whole = self._last[1]
-        return whole if span is None else part_of(whole, span)
+        return whole if span is None else cut_sound(whole, span)
 
-    def heard(self, video: Path, words: Spoken | None, span: Span | None = None) -> Heard:
+    def heard(self, video: Path, words: Spoken | None, span: Span | None = None) -> AlignedSpeech:
         """Phones of a recording's sound, from the cache when the same sound and words were aligned before.
 
         Parameters
@@ -88,7 +88,7 @@ class Ears:
         sound = self.sound(video, span)
         asked = hashlib.sha256(json.dumps([words, span]).encode()).hexdigest()[:8]
         kept = self._cache / f"{content_key(video)}-{asked}-{ALIGNMENT_VERSION}.{KIND}"
-        found = _aligned_before(kept, sound, is_recognised=words is None)
+        found = _read_cached_alignment(kept, sound, is_recognised=words is None)
         return found or self._aligned(sound, words, kept)
 
     def utterances(self, video: Path, words: Spoken | None) -> tuple[tuple[Span, Spoken | None], ...]:
@@ -101,23 +101,27 @@ class Ears:
         BackendError
             Nothing on this machine recognises phones, by which the words are placed.
         """
-        from tts2face.speech.transcript_placement import stretch_of_words
+        from tts2face.speech.transcript_placement import assign_words
 
-        spans = stretches(self.sound(video), LONGEST_UTTERANCE_S)
+        spans = cut_at_pauses(self.sound(video), LONGEST_UTTERANCE_S)
         if words is None:
             return tuple((span, None) for span in spans)
-        heard = [[phone for word in said for phone in word] for said in self._recognised(video, spans)]
-        places = stretch_of_words([ways[0] for _, ways in words], heard)
+        heard = [[phone for word in said for phone in word] for said in self._recognise_spans(video, spans)]
+        places = assign_words([ways[0] for _, ways in words], heard)
         said_in = [
             tuple(word for word, place in zip(words, places, strict=True) if place == at) for at in range(len(spans))
         ]
         return tuple((span, said) for span, said in zip(spans, said_in, strict=True) if said)
 
-    def _aligned(self, sound: Waveform, words: Spoken | None, kept: Path) -> Heard:
+    def _aligned(self, sound: Waveform, words: Spoken | None, kept: Path) -> AlignedSpeech:
         from tts2face.speech.forced_alignment import Aligner
 
         self._aligner = self._aligner or Aligner()
-        said = words if words is not None else tuple((f"/{''.join(word)}/", (word,)) for word in self._words_in(sound))
+        said = (
+            words
+            if words is not None
+            else tuple((f"/{''.join(word)}/", (word,)) for word in self._recognise_words(sound))
+        )
         if not said:
             raise DataError("no speech is heard; give recordings of somebody who speaks")
         found = self._aligner.align(sound, said)
@@ -127,9 +131,9 @@ class Ears:
             "confidence": found.confidence,
         }
         write_tensors(kept, KIND, ALIGNMENT_VERSION, {"edges": found.phones.edges}, header)
-        return Heard(found.phones, found.words, found.confidence, sound, words is None)
+        return AlignedSpeech(found.phones, found.words, found.confidence, sound, words is None)
 
-    def _recognised(self, video: Path, spans: Sequence[Span]) -> list[list[tuple[str, ...]]]:
+    def _recognise_spans(self, video: Path, spans: Sequence[Span]) -> list[list[tuple[str, ...]]]:
         """Phones of the words heard in each span, from the cache when they were recognised before."""
         kept = self._cache / f"{content_key(video)}-{HEARING_VERSION}.{HEARING}"
         if kept.is_file():
@@ -139,25 +143,25 @@ class Ears:
                     return [[tuple(word) for word in words] for words in said]
             except (DataError, KeyError):
                 pass  # damaged: made again
-        found = [list(self._words_in(self.sound(video, span))) for span in spans]
+        found = [list(self._recognise_words(self.sound(video, span))) for span in spans]
         write_tensors(kept, HEARING, HEARING_VERSION, {"spans": np.array(spans)}, {"words": found})
         return found
 
-    def _words_in(self, sound: Waveform) -> tuple[tuple[str, ...], ...]:
+    def _recognise_words(self, sound: Waveform) -> tuple[tuple[str, ...], ...]:
         from tts2face.speech.phone_recognition import LONGEST_S, PhoneRecogniser
 
         self._recogniser = self._recogniser or PhoneRecogniser()
-        parts = [part_of(sound, span) for span in stretches(sound, LONGEST_S)]
+        parts = [cut_sound(sound, span) for span in cut_at_pauses(sound, LONGEST_S)]
         return tuple(word for part in parts for word in self._recogniser.words(part))
 
 
-def part_of(sound: Waveform, span: Span) -> Waveform:
+def cut_sound(sound: Waveform, span: Span) -> Waveform:
     """The sound in a span of seconds."""
     first, last = (round(second * sound.rate) for second in span)
     return Waveform(sound.samples[first:last], sound.rate)
 
 
-def _aligned_before(kept: Path, sound: Waveform, *, is_recognised: bool) -> Heard | None:
+def _read_cached_alignment(kept: Path, sound: Waveform, *, is_recognised: bool) -> AlignedSpeech | None:
     """What the cache holds; None where it holds nothing or is damaged."""
     if not kept.is_file():
         return None
@@ -165,6 +169,6 @@ def _aligned_before(kept: Path, sound: Waveform, *, is_recognised: bool) -> Hear
         arrays, header = read_tensors(kept, KIND, ALIGNMENT_VERSION)
         words = tuple(WordSpan(text, first, last) for text, first, last in header["words"])
         phones = PhoneSequence(header["phones"], arrays["edges"])
-        return Heard(phones, words, float(header["confidence"]), sound, is_recognised)
+        return AlignedSpeech(phones, words, float(header["confidence"]), sound, is_recognised)
     except (DataError, KeyError):
         return None

@@ -14,11 +14,11 @@ from lexicon.errors import DataError
 from lexicon.inputs import check_regular_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.video.landmark_models import MODEL_SHA256
-from tts2face.video.media import media_facts, read_pictures
+from tts2face.video.media import read_frames, read_media_info
 from tts2face.video.track import Tracking
 
 if TYPE_CHECKING:
-    from tts2face.video.streaming_tracker import FilmReader
+    from tts2face.video.streaming_tracker import StreamingTracker
 
 KIND = "tracking"
 TRACKING_VERSION = 2  # rises when tracking gives other numbers, so that cached ones are made again
@@ -28,7 +28,7 @@ Tell = Callable[[float], None]  # told the share of a video that is done
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Watched:
+class TrackedVideo:
     """What the camera saw in T frames.
 
     Parameters
@@ -52,15 +52,15 @@ class Watched:
     changes: NDArray[np.float32]
 
 
-class Eyes:
+class CachedTracker:
     """Watches videos; the networks are loaded for the first that is not in the cache, the last one seen is kept."""
 
     def __init__(self, cache: Path, model: Path) -> None:
         self._cache, self._model = cache, model
-        self._reader: FilmReader | None = None
-        self._last: tuple[Path, Watched] | None = None
+        self._reader: StreamingTracker | None = None
+        self._last: tuple[Path, TrackedVideo] | None = None
 
-    def watched(self, video: Path, tell: Tell | None = None) -> Watched:
+    def track(self, video: Path, tell: Tell | None = None) -> TrackedVideo:
         """What a video shows, from the cache when its content was tracked before.
 
         Parameters
@@ -76,16 +76,19 @@ class Eyes:
         kept = self._cache / f"{content_key(video)}-{MODEL_SHA256[:8]}-{TRACKING_VERSION}.{KIND}"
         if self._last is None or self._last[0] != kept:
             self._last = None  # two long videos need not lie in memory together
-            self._last = kept, _kept_in(kept) or self._tracked(video, kept, tell or (lambda share: None))
+            self._last = (
+                kept,
+                _read_cached_tracking(kept) or self._track_and_cache(video, kept, tell or (lambda share: None)),
+            )
         return self._last[1]
 
-    def _tracked(self, video: Path, kept: Path, tell: Tell) -> Watched:
-        from tts2face.video.streaming_tracker import FilmReader
+    def _track_and_cache(self, video: Path, kept: Path, tell: Tell) -> TrackedVideo:
+        from tts2face.video.streaming_tracker import StreamingTracker
 
-        self._reader = self._reader or FilmReader(self._model)
-        facts = media_facts(video)
+        self._reader = self._reader or StreamingTracker(self._model)
+        facts = read_media_info(video)
         sights = []
-        for sight in self._reader.sights(read_pictures(video), facts.fps):
+        for sight in self._reader.track(read_frames(video), facts.fps):
             sights.append(sight)
             tell(min(sight.time / max(facts.duration, sight.time, 1e-3), 1.0))
         if not sights:
@@ -94,11 +97,11 @@ class Eyes:
             "points": np.array([sight.points for sight in sights]),
             "scores": np.array([sight.score for sight in sights], np.float32),
             "times": np.array([sight.time for sight in sights]),
-            "n_faces": np.array([_count(sight.n_faces) for sight in sights], np.int8),
+            "n_faces": np.array([_stored_face_count(sight.n_faces) for sight in sights], np.int8),
             "changes": np.array([sight.change for sight in sights], np.float32),
         }
         write_tensors(kept, KIND, TRACKING_VERSION, arrays, {"fps": facts.fps})
-        return _watched(arrays, facts.fps)
+        return _build_tracked_video(arrays, facts.fps)
 
 
 def content_key(path: Path) -> str:
@@ -120,21 +123,21 @@ def _content_key(path: Path, _size: int, _changed_ns: int) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()[:32]
 
 
-def _kept_in(path: Path) -> Watched | None:
+def _read_cached_tracking(path: Path) -> TrackedVideo | None:
     """What the cache holds; None where it holds nothing or is damaged."""
     if not path.is_file():
         return None
     try:
         arrays, header = read_tensors(path, KIND, TRACKING_VERSION)
-        return _watched(arrays, float(header["fps"]))
+        return _build_tracked_video(arrays, float(header["fps"]))
     except (DataError, KeyError):
         return None
 
 
-def _watched(arrays: Mapping[str, NDArray[Any]], fps: float) -> Watched:
+def _build_tracked_video(arrays: Mapping[str, NDArray[Any]], fps: float) -> TrackedVideo:
     tracking = Tracking(arrays["points"], arrays["scores"])
-    return Watched(tracking, arrays["times"], fps, arrays["n_faces"], arrays["changes"])
+    return TrackedVideo(tracking, arrays["times"], fps, arrays["n_faces"], arrays["changes"])
 
 
-def _count(n_faces: int | None) -> int:
+def _stored_face_count(n_faces: int | None) -> int:
     return NOT_COUNTED if n_faces is None else min(n_faces, np.iinfo(np.int8).max)

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from corpus_tools.recordings.subtitles import read_cues, subtitles_beside
-from corpus_tools.transcripts.find import said_in, transcript_of
+from corpus_tools.recordings.subtitles import find_subtitles, read_cues
+from corpus_tools.transcripts.find import find_transcript, read_transcript
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import DataError, InputError
 from lexicon.normalize import normalize
@@ -61,17 +61,17 @@ def find_recordings(folder: Path) -> tuple[Recording, ...]:
         The manifest cannot be read.
     """
     if folder.is_file() and folder.suffix.lower() in VIDEO_SUFFIXES:
-        return tuple(_said_in(folder))
+        return tuple(_recordings_in_video(folder))
     if not folder.is_dir():
         raise InputError(f"there is no folder {folder}; give the folder of recordings")
     manifest = folder / MANIFEST
-    found = _listed(folder, manifest) if manifest.is_file() else _plain(folder)
+    found = _recordings_from_manifest(folder, manifest) if manifest.is_file() else _recordings_without_manifest(folder)
     if not found:
         raise InputError(f"{folder} holds no video ({', '.join(sorted(VIDEO_SUFFIXES))}); give a folder of recordings")
     return found
 
 
-def spoken_words(recording: Recording) -> Spoken | None:
+def pronounce_recording(recording: Recording) -> Spoken | None:
     """Each word of a transcript with its pronunciations; None without a transcript.
 
     Raises
@@ -81,15 +81,17 @@ def spoken_words(recording: Recording) -> Spoken | None:
     """
     if recording.words is not None or recording.transcript is None:
         return recording.words
-    said = said_in(recording.transcript) if isinstance(recording.transcript, Path) else recording.transcript
+    said = read_transcript(recording.transcript) if isinstance(recording.transcript, Path) else recording.transcript
     text = said if recording.is_spelling else normalize(said)
     words = re.findall(r"[^\W_]+(?:['’][^\W_]+)*", text)
     if not words:
         raise DataError(f"the transcript of {recording.name} holds no word; write what is said")
-    return tuple((word, pronunciations(word, is_letter=recording.is_spelling and len(word) == 1)) for word in words)
+    return tuple(
+        (word, look_up_pronunciations(word, is_letter=recording.is_spelling and len(word) == 1)) for word in words
+    )
 
 
-def pronunciations(word: str, *, is_letter: bool) -> Ways:
+def look_up_pronunciations(word: str, *, is_letter: bool) -> Ways:
     """All ways to say a word, in phones of the table; the letter's names if it stands for one.
 
     A word that the dictionary does not hold is said by rule.
@@ -108,13 +110,13 @@ def pronunciations(word: str, *, is_letter: bool) -> Ways:
         while variant := cmudict_lookup(word if not found else f"{word}({len(found) + 1})"):
             found.append(variant)
     if not found:
-        return (_by_rule(word),)
+        return (_pronounce_by_rule(word),)
     ways = dict.fromkeys(tuple(segment.phone for segment in segments) for segments in found)
     plain = [way for way in ways if way[:2] != BREATHED_W]
     return tuple(plain or ways)
 
 
-def _by_rule(word: str) -> tuple[str, ...]:
+def _pronounce_by_rule(word: str) -> tuple[str, ...]:
     from lexicon.pronounce import pronounce
 
     try:
@@ -124,24 +126,24 @@ def _by_rule(word: str) -> tuple[str, ...]:
     return tuple(phone for said in spoken.words for phone in said.phones)
 
 
-def _listed(folder: Path, manifest: Path) -> tuple[Recording, ...]:
+def _recordings_from_manifest(folder: Path, manifest: Path) -> tuple[Recording, ...]:
     try:
         with manifest.open(encoding="utf-8-sig", newline="") as file:
             said = {row["clip"]: row["transcript"] for row in csv.DictReader(file)}
     except (OSError, UnicodeDecodeError, KeyError, csv.Error) as broken:
         raise DataError(f"{manifest} needs the columns clip and transcript in UTF-8; mend it") from broken
     clips = folder / "clips"
-    videos = _videos(clips if clips.is_dir() else folder)
+    videos = _list_videos(clips if clips.is_dir() else folder)
     return tuple(Recording(video.stem, video, said.get(video.stem), is_spelling=True) for video in videos)
 
 
-def _plain(folder: Path) -> tuple[Recording, ...]:
-    return tuple(recording for video in _videos(folder) for recording in _said_in(video))
+def _recordings_without_manifest(folder: Path) -> tuple[Recording, ...]:
+    return tuple(recording for video in _list_videos(folder) for recording in _recordings_in_video(video))
 
 
-def _said_in(video: Path) -> Iterator[Recording]:
+def _recordings_in_video(video: Path) -> Iterator[Recording]:
     """The recordings in a video: one for each cue of its subtitles, or the whole; damage is told when it is read."""
-    subtitles = subtitles_beside(video)
+    subtitles = find_subtitles(video)
     try:
         cues = read_cues(subtitles) if subtitles else ()
     except DataError:
@@ -149,8 +151,8 @@ def _said_in(video: Path) -> Iterator[Recording]:
     for number, cue in enumerate(cues, start=1):
         yield Recording(f"{video.stem}-{number:04d}", video, cue.text, span=(cue.begin, cue.end))
     if not cues:
-        yield Recording(video.stem, video, subtitles or transcript_of(video))
+        yield Recording(video.stem, video, subtitles or find_transcript(video))
 
 
-def _videos(folder: Path) -> list[Path]:
+def _list_videos(folder: Path) -> list[Path]:
     return sorted(path for path in folder.iterdir() if path.suffix.lower() in VIDEO_SUFFIXES)

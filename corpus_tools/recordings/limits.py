@@ -27,12 +27,12 @@ class Limit:
 
     measure: str
     bound: float
-    is_least: bool
+    is_minimum: bool
     sentence: str
 
     def is_broken_by(self, value: float) -> bool:
         """Whether a value lies beyond."""
-        return value < self.bound if self.is_least else value > self.bound
+        return value < self.bound if self.is_minimum else value > self.bound
 
 
 LIMITS = (
@@ -57,7 +57,7 @@ LIMITS = (
 )
 
 
-def refuse(measured: Mapping[str, float]) -> None:
+def check_limits(measured: Mapping[str, float]) -> None:
     """Let good measures pass; those that are not among the limits are not looked at.
 
     Raises
@@ -99,7 +99,7 @@ def picture_measures(
     Parameters
     ----------
     n_faces, changes, times : (T,)
-        As `corpus_tools.recordings.corpus_video.Watched` has them.
+        As `corpus_tools.recordings.corpus_video.TrackedVideo` has them.
     """
     counted = n_faces[n_faces != NOT_COUNTED]
     crowded = float((counted > 1).mean()) if len(counted) else 0.0
@@ -109,7 +109,7 @@ def picture_measures(
     return {"crowded": crowded, "frozen_s": frozen}
 
 
-def turn_deg(angles: NDArray[np.floating]) -> float:
+def head_turn_deg(angles: NDArray[np.floating]) -> float:
     """Degrees by which a face looks away from the camera, from (T, 3) pitch, yaw and roll: the median over time."""
     away = np.arccos(np.clip(np.cos(angles[:, 0]) * np.cos(angles[:, 1]), -1.0, 1.0))
     return float(np.degrees(np.median(away)))

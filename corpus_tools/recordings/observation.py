@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.recordings.corpus_audio import Ears, Heard
-from corpus_tools.recordings.corpus_video import Eyes, Watched
-from corpus_tools.recordings.folder import Recording, spoken_words
-from corpus_tools.recordings.limits import picture_measures, refuse, sound_measures, turn_deg
+from corpus_tools.recordings.corpus_audio import AlignedSpeech, CachedAligner
+from corpus_tools.recordings.corpus_video import CachedTracker, TrackedVideo
+from corpus_tools.recordings.folder import Recording, pronounce_recording
+from corpus_tools.recordings.limits import check_limits, head_turn_deg, picture_measures, sound_measures
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.speech.loudness import intensity
-from tts2face.video.frame_grid import face_span, filled_gaps, on_grid
-from tts2face.video.pose import Posed, head_angles, remove_pose
+from tts2face.video.frame_grid import face_span, fill_gaps, resample_to_grid
+from tts2face.video.pose import PoseFreeLandmarks, head_angles, remove_pose
 
 ROUNDING = 1e-6  # seconds
 NEIGHBOURS = 2.0  # frames about a span, from which those in it are read
@@ -79,7 +79,7 @@ class Observation:
     is_recognised: bool = False
 
 
-def observed(recording: Recording, eyes: Eyes, ears: Ears, timing: Timing) -> Observation:
+def observe_recording(recording: Recording, eyes: CachedTracker, ears: CachedAligner, timing: Timing) -> Observation:
     """One recording, read and measured.
 
     Raises
@@ -87,26 +87,26 @@ def observed(recording: Recording, eyes: Eyes, ears: Ears, timing: Timing) -> Ob
     DataError
         The recording cannot serve; the message says why.
     """
-    sound = ears.heard(recording.video, spoken_words(recording), recording.span)
-    refuse({"recognised" if sound.is_recognised else "confidence": sound.confidence})
+    sound = ears.heard(recording.video, pronounce_recording(recording), recording.span)
+    check_limits({"recognised" if sound.is_recognised else "confidence": sound.confidence})
     measures = sound_measures(sound.sound, sound.phones)
-    refuse(measures)
-    seen = eyes.watched(recording.video)
-    filled, first, n_filled = _frames(seen, recording.span, timing)
+    check_limits(measures)
+    seen = eyes.track(recording.video)
+    filled, first, n_filled = _span_landmarks(seen, recording.span, timing)
     fps = timing.fps or seen.fps
     begin = first / fps
     start = begin + timing.lag - (recording.span[0] if recording.span else 0.0)  # on the clock of the sound
-    phones, spans = trimmed(sound, start, start + len(filled) / fps)
+    phones, spans = trim_to_picture(sound, start, start + len(filled) / fps)
     posed = remove_pose(filled, fps)
     here = (seen.times > begin - ROUNDING) & (seen.times < begin + len(filled) / fps - ROUNDING)
     measures |= picture_measures(seen.n_faces[here], seen.changes[here], seen.times[here])
-    measures["turn_deg"] = turn_deg(head_angles(posed.rotations))
-    refuse(measures)
+    measures["turn_deg"] = head_turn_deg(head_angles(posed.rotations))
+    check_limits(measures)
     return Observation(
         name=recording.name,
         fps=fps,
         landmarks=posed.landmarks,
-        head=_head(posed),
+        head=_head_motion(posed),
         phones=phones,
         words=spans,
         intensity=intensity(sound.sound, start + np.arange(len(filled)) / fps),
@@ -123,7 +123,9 @@ def observed(recording: Recording, eyes: Eyes, ears: Ears, timing: Timing) -> Ob
     )
 
 
-def _frames(seen: Watched, span: tuple[float, float] | None, timing: Timing) -> tuple[NDArray[np.float32], int, int]:
+def _span_landmarks(
+    seen: TrackedVideo, span: tuple[float, float] | None, timing: Timing
+) -> tuple[NDArray[np.float32], int, int]:
     """Landmarks of the frames that belong to a span of the sound, the number of the first, and how many were filled.
 
     Raises
@@ -137,18 +139,18 @@ def _frames(seen: Watched, span: tuple[float, float] | None, timing: Timing) -> 
     if near.sum() < LEAST_FRAMES:
         where = "" if span is None else f" from {span[0]:.2f} s to {span[1]:.2f} s"
         raise DataError(f"the video shows nothing{where}; check its length and the times")
-    points, first = on_grid(seen.tracking.points[near], seen.times[near], fps)
+    points, first = resample_to_grid(seen.tracking.points[near], seen.times[near], fps)
     instants = (first + np.arange(len(points))) / fps
     inside = (instants > begin - ROUNDING) & (instants < end + ROUNDING)
     points, first = points[inside], first + int(inside.argmax())
     if np.isnan(points).all():
         raise DataError("no frame shows a face")
     start, end = face_span(points)
-    filled, n_filled = filled_gaps(points[start:end], fps)
+    filled, n_filled = fill_gaps(points[start:end], fps)
     return filled, first + start, n_filled
 
 
-def trimmed(sound: Heard, begin: float, stop: float) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+def trim_to_picture(sound: AlignedSpeech, begin: float, stop: float) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
     """Phones and words on a clock that starts at `begin`, the silence outside [begin, stop] cut away.
 
     Raises
@@ -172,10 +174,10 @@ def trimmed(sound: Heard, begin: float, stop: float) -> tuple[PhoneSequence, tup
     return PhoneSequence(phones, edges - begin), words
 
 
-def _head(posed: Posed) -> NDArray[np.float32]:
-    place = posed.shifts - np.median(posed.shifts, axis=0)
+def _head_motion(posed: PoseFreeLandmarks) -> NDArray[np.float32]:
+    place = posed.translations - np.median(posed.translations, axis=0)
     return np.column_stack([head_angles(posed.rotations), place]).astype(np.float32)
 
 
-def _lowest_score(seen: Watched, here: NDArray[np.bool_]) -> float:
+def _lowest_score(seen: TrackedVideo, here: NDArray[np.bool_]) -> float:
     return float(seen.tracking.scores[here & ~seen.tracking.is_missing].min(initial=1.0))

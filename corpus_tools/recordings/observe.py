@@ -4,13 +4,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from corpus_tools.process_pool import each_done
-from corpus_tools.recordings.audio_video_sync import agreements, timings
-from corpus_tools.recordings.corpus_audio import LONGEST_UTTERANCE_S, Ears
-from corpus_tools.recordings.corpus_video import Eyes
-from corpus_tools.recordings.folder import Recording, find_recordings, spoken_words
-from corpus_tools.recordings.observation import Observation, Timing, observed
-from corpus_tools.run_options import Effort, Progress
+from corpus_tools.process_pool import map_unordered
+from corpus_tools.recordings.audio_video_sync import corrected_timings, estimate_sync_by_video
+from corpus_tools.recordings.corpus_audio import LONGEST_UTTERANCE_S, CachedAligner
+from corpus_tools.recordings.corpus_video import CachedTracker
+from corpus_tools.recordings.folder import Recording, find_recordings, pronounce_recording
+from corpus_tools.recordings.observation import Observation, Timing, observe_recording
+from corpus_tools.run_options import Progress, RunOptions
 from lexicon.errors import DataError, InputError
 from tts2face.video.landmark_models import find_bundle
 
@@ -38,7 +38,7 @@ class Observations:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Task:
+class VideoTask:
     """The recordings of one video, read together so that it is watched once."""
 
     recordings: tuple[Recording, ...]
@@ -54,7 +54,7 @@ Outcomes = list[Observation | Refusal]
 Tell = Callable[[float], None]  # told the share of a task that is done
 
 
-def observe(recordings: Path, *, effort: Effort | None = None, on_progress: Progress | None = None) -> Observations:
+def observe(recordings: Path, *, effort: RunOptions | None = None, on_progress: Progress | None = None) -> Observations:
     """Every recording of a folder, or the reason why not; all at one frame rate, sound and picture together.
 
     Parameters
@@ -71,22 +71,22 @@ def observe(recordings: Path, *, effort: Effort | None = None, on_progress: Prog
     BackendError
         A package or the landmark models are missing, the cache cannot be written, or a process died.
     """
-    effort = effort or Effort()
-    processes, cache = effort.processes(), effort.folder()
-    tasks = by_video(find_recordings(recordings))
+    effort = effort or RunOptions()
+    processes, cache = effort.n_processes(), effort.folder()
+    tasks = group_by_video(find_recordings(recordings))
     model = find_bundle(effort.model)
     found: dict[Path, Outcomes] = {}
-    for task, outcomes in _done(tasks, cache, model, min(processes, len(tasks)), on_progress):
+    for task, outcomes in _observe_tasks(tasks, cache, model, min(processes, len(tasks)), on_progress):
         found[task.video] = outcomes
-    kept = _kept(found)
-    agreed = agreements(kept)
-    timing = timings(kept, agreed)
+    kept = _kept_observations(found)
+    agreed = estimate_sync_by_video(kept)
+    timing = corrected_timings(kept, agreed)
     again = [replace(task, timing=timing[task.video]) for task in tasks if task.video in timing]
-    for task, outcomes in _done(again, cache, model, min(processes, len(again)), None):
+    for task, outcomes in _observe_tasks(again, cache, model, min(processes, len(again)), None):
         found[task.video] = outcomes
     for video, agreement in agreed.items():
-        if agreement.fault:
-            found[video] = [_out_of_step(outcome, agreement.fault) for outcome in found[video]]
+        if agreement.problem:
+            found[video] = [_refuse_unsynchronised(outcome, agreement.problem) for outcome in found[video]]
     every = [outcome for outcomes in found.values() for outcome in outcomes]
     return Observations(
         tuple(sorted((one for one in every if isinstance(one, Observation)), key=lambda one: one.name)),
@@ -94,7 +94,7 @@ def observe(recordings: Path, *, effort: Effort | None = None, on_progress: Prog
     )
 
 
-def require_kept(observations: Observations) -> tuple[Observation, ...]:
+def check_any_kept(observations: Observations) -> tuple[Observation, ...]:
     """The recordings that were kept.
 
     Raises
@@ -110,7 +110,7 @@ def require_kept(observations: Observations) -> tuple[Observation, ...]:
     raise InputError(f"no recording could be used: {reasons}{more}")
 
 
-def _kept(found: Mapping[Path, Outcomes]) -> list[Observation]:
+def _kept_observations(found: Mapping[Path, Outcomes]) -> list[Observation]:
     return [one for outcomes in found.values() for one in outcomes if isinstance(one, Observation)]
 
 
@@ -118,82 +118,82 @@ def _refusal(recording: Recording, reason: DataError) -> Refusal:
     return Refusal(recording.name, str(reason), recording.video, sum(recording.span or (0.0, 0.0)) / 2)
 
 
-def _out_of_step(outcome: Observation | Refusal, fault: str) -> Refusal:
+def _refuse_unsynchronised(outcome: Observation | Refusal, fault: str) -> Refusal:
     if isinstance(outcome, Refusal):
         return outcome
     return Refusal(outcome.name, fault, outcome.video, outcome.quality.cut)
 
 
-def by_video(recordings: Sequence[Recording]) -> list[Task]:
+def group_by_video(recordings: Sequence[Recording]) -> list[VideoTask]:
     """Recordings of one video together."""
     together: dict[Path, list[Recording]] = {}
     for recording in recordings:
         together.setdefault(recording.video, []).append(recording)
-    return [Task(tuple(group)) for group in together.values()]
+    return [VideoTask(tuple(group)) for group in together.values()]
 
 
-def _done(
-    tasks: Sequence[Task], cache: Path, model: Path, jobs: int, on_progress: Progress | None
-) -> Iterator[tuple[Task, Outcomes]]:
+def _observe_tasks(
+    tasks: Sequence[VideoTask], cache: Path, model: Path, jobs: int, on_progress: Progress | None
+) -> Iterator[tuple[VideoTask, Outcomes]]:
     """Tasks with their outcomes as they come, in no order."""
     tell = on_progress or (lambda done, of: None)
     of = STEPS * len(tasks)
     if jobs <= 1:
-        worker = _Worker(cache, model)
+        worker = _VideoReader(cache, model)
         for number, task in enumerate(tasks):
-            yield task, worker.outcomes(task, _share_of(tell, number, of))
+            yield task, worker.outcomes(task, _task_share_callback(tell, number, of))
         return
-    for number, done in enumerate(each_done(tasks, _work, _start, (cache, model), jobs), start=1):
+    for number, done in enumerate(map_unordered(tasks, _observe_task, _start_worker, (cache, model), jobs), start=1):
         yield done
         tell(STEPS * number, of)
 
 
-def _share_of(tell: Progress, number: int, of: int) -> Tell:
+def _task_share_callback(tell: Progress, number: int, of: int) -> Tell:
     return lambda share: tell(int(STEPS * (number + share)), of)
 
 
-class _Worker:
+class _VideoReader:
     """Reads videos one after the other; the networks and the acoustic models are loaded once."""
 
     def __init__(self, cache: Path, model: Path) -> None:
-        self._eyes, self._ears = Eyes(cache, model), Ears(cache)
+        self._tracker, self._aligner = CachedTracker(cache, model), CachedAligner(cache)
 
-    def outcomes(self, task: Task, tell: Tell) -> Outcomes:
+    def outcomes(self, task: VideoTask, tell: Tell) -> Outcomes:
         """An observation, or why there is none, for each utterance of a video."""
         found: Outcomes = []
         try:
-            recordings = self._utterances(task.recordings)
-            self._eyes.watched(task.video, lambda share: tell(WATCHING * share))
+            recordings = self._split_long_recording(task.recordings)
+            self._tracker.track(task.video, lambda share: tell(WATCHING * share))
         except DataError as reason:
             recordings = ()
             found = [_refusal(recording, reason) for recording in task.recordings]
         for number, recording in enumerate(recordings, start=1):
             try:
-                found.append(observed(recording, self._eyes, self._ears, task.timing))
+                found.append(observe_recording(recording, self._tracker, self._aligner, task.timing))
             except DataError as reason:
                 found.append(_refusal(recording, reason))
             tell(WATCHING + (1 - WATCHING) * number / len(recordings))
         tell(1.0)
         return found
 
-    def _utterances(self, recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:
+    def _split_long_recording(self, recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:
         """The recordings; where one takes the whole of a long video, its utterances, cut at pauses."""
         whole = recordings[0]
-        if whole.span is not None or self._ears.sound(whole.video).duration <= LONGEST_UTTERANCE_S:
+        if whole.span is not None or self._aligner.sound(whole.video).duration <= LONGEST_UTTERANCE_S:
             return recordings
-        said = self._ears.utterances(whole.video, spoken_words(whole))
+        said = self._aligner.utterances(whole.video, pronounce_recording(whole))
         return tuple(
             replace(whole, name=f"{whole.name}-{number:04d}", span=span, words=words)
             for number, (span, words) in enumerate(said, start=1)
         )
 
 
-_worker: list[_Worker] = []  # of this process; filled once by the pool
+_worker: list[_VideoReader] = []  # of this process; filled once by the pool
 
 
-def _start(cache: Path, model: Path) -> None:
-    _worker.append(_Worker(cache, model))
+def _start_worker(cache: Path, model: Path) -> None:
+    _worker.append(_VideoReader(cache, model))
 
 
-def _work(task: Task) -> Outcomes:
+def _observe_task(task: VideoTask) -> Outcomes:
     return _worker[0].outcomes(task, lambda share: None)

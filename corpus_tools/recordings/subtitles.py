@@ -25,7 +25,7 @@ class Cue:
     text: str
 
 
-def subtitles_beside(video: Path) -> Path | None:
+def find_subtitles(video: Path) -> Path | None:
     """The file of subtitles of a video, if there is one."""
     return next((path for suffix in FORMATS if (path := video.with_suffix(suffix)).is_file()), None)
 
@@ -51,7 +51,7 @@ def read_cues(path: Path) -> tuple[Cue, ...]:
         read = pysubs2.SSAFile.from_string(text, format_=FORMATS[path.suffix.lower()])
     except (pysubs2.exceptions.Pysubs2Error, ValueError, OverflowError) as broken:
         raise DataError(f"{path} cannot be read as subtitles ({broken}); export them again") from broken
-    spoken = sorted((event.start / 1000, event.end / 1000, _spoken(event.plaintext)) for event in read)
+    spoken = sorted((event.start / 1000, event.end / 1000, _spoken_text(event.plaintext)) for event in read)
     spoken = [(begin, end, text) for begin, end, text in spoken if text and end > begin]
     if not spoken:
         raise DataError(f"{path} holds no subtitles; export them again")
@@ -64,6 +64,6 @@ def read_cues(path: Path) -> tuple[Cue, ...]:
     return tuple(cues)
 
 
-def _spoken(text: str) -> str:
+def _spoken_text(text: str) -> str:
     """What is said in a cue, on one line; nothing where it shows noises only."""
     return " ".join(_SPEAKER.sub(" ", _NOISE.sub(" ", text)).split())

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.evaluate import CEILING, Run
-from corpus_tools.evaluation.scores import CONFIDENCE, Scores, shown
+from corpus_tools.evaluation.evaluate import CEILING, SplitResult
+from corpus_tools.evaluation.scores import CONFIDENCE, Scores, available_figures
 from corpus_tools.evaluation.tables import Evaluation, figure_text
 from corpus_tools.report.drawing import RULE, SERIES, draw_svg
 from corpus_tools.report.page import page, paragraphs, table, wide
@@ -36,7 +36,7 @@ ABOUT_OWN = (
 )
 
 
-def evaluation_page(result: Evaluation, runs: Sequence[Run]) -> str:
+def evaluation_page(result: Evaluation, runs: Sequence[SplitResult]) -> str:
     """The page (HTML)."""
     compared = [one.method for one in result.scores if one.method != CEILING]
     seen = SHOWN if SHOWN in compared else compared[-1]
@@ -60,7 +60,7 @@ def evaluation_page(result: Evaluation, runs: Sequence[Run]) -> str:
 
 
 def _figures(scores: Sequence[Scores]) -> str:
-    heads = shown(scores)
+    heads = available_figures(scores)
     rows = [
         (one.method, *(figure_text(one, name, digits, intervals=True) for name, _, digits in heads)) for one in scores
     ]
@@ -77,13 +77,13 @@ def _folds(result: Evaluation) -> Iterator[str]:
     """Figures of each fold, and over the folds their mean and standard deviation."""
     if not result.folds:
         return
-    heads = shown(result.scores)
+    heads = available_figures(result.scores)
     rows = []
     for one in result.scores:
         for number, fold in enumerate(result.folds, start=1):
             cells = (f"{fold.figures[one.method][name]:.{digits}f}" for name, _, digits in heads)
             rows.append((one.method, f"{number} ({fold.n_test} held out, {fold.n_train} learnt from)", *cells))
-        over = ((result.over_folds(one.method, name), digits) for name, _, digits in heads)
+        over = ((result.fold_mean_and_deviation(one.method, name), digits) for name, _, digits in heads)
         rows.append((one.method, "mean ± spread", *(f"{mean:.{n}f} ± {spread:.{n}f}" for (mean, spread), n in over)))
     yield f"<h2>{len(result.folds)} folds</h2>"
     yield paragraphs(
@@ -104,7 +104,7 @@ def _classes(scores: Sequence[Scores]) -> str:
     return table(heads, rows, numbers=range(2, 6))
 
 
-def _sentences(result: Evaluation, runs: Sequence[Run], seen: str, plain: str | None) -> Iterator[str]:
+def _sentences(result: Evaluation, runs: Sequence[SplitResult], seen: str, plain: str | None) -> Iterator[str]:
     """Curves of real and synthesised lips, as in T07, figs 6-8, and for the worst the faces."""
     scores = next(one for one in result.scores if one.method == seen)
     order = np.argsort([one.dtw_cost for one in scores.utterances], kind="stable")
@@ -126,7 +126,7 @@ def _sentences(result: Evaluation, runs: Sequence[Run], seen: str, plain: str | 
                 yield films.film(run, at)
 
 
-def _curves(run: Run, at: int, names: Sequence[str]) -> str:
+def _curves(run: SplitResult, at: int, names: Sequence[str]) -> str:
     one = run.real[at]
     times = np.arange(len(one.parameters)) / one.observation.fps
     unit = "/ eyes" if run.scale is None else "(z)"

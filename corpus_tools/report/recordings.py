@@ -15,11 +15,11 @@ from corpus_tools.recordings.observe import Observations, Refusal
 from corpus_tools.report.drawing import FIRST, SECOND, draw_svg
 from corpus_tools.report.evaluation import label_phones
 from corpus_tools.report.page import note, page, paragraphs, picture_tag, table
-from corpus_tools.training.train_talker import lip_gap
+from corpus_tools.training.train_talker import normalised_lip_gap
 from lexicon.errors import DataError, InputError
 from lexicon.phones import ARPABET
 from lexicon.sequence import SILENCE
-from tts2face.video.media import read_pictures
+from tts2face.video.media import read_frames
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,7 +76,7 @@ def thumbnails(found: Observations) -> dict[str, NDArray[np.uint8]]:
 def _at(video: Path, moments: Sequence[tuple[float, str]]) -> Iterator[tuple[str, NDArray[np.uint8]]]:
     waiting = list(reversed(moments))
     try:
-        for picture in read_pictures(video):
+        for picture in read_frames(video):
             while waiting and picture.time >= waiting[-1][0]:
                 yield waiting.pop()[1], picture.pixels
             if not waiting:
@@ -107,7 +107,7 @@ def _measures(kept: Sequence[Observation]) -> str:
     for measure, (label, unit, factor) in MEASURES.items():
         values = factor * np.array([getattr(seen.quality, measure) for seen in kept], np.float64)
         limit = limits.get(measure)
-        bound = "" if limit is None else f"{'at least' if limit.is_least else 'at most'} {factor * limit.bound:g}"
+        bound = "" if limit is None else f"{'at least' if limit.is_minimum else 'at most'} {factor * limit.bound:g}"
         rows.append((label, unit, *(f"{value:.3g}" for value in np.quantile(values, [0, 0.5, 1])), bound))
     return table(("measure", "unit", "lowest", "median", "highest", "limit"), rows, numbers=(2, 3, 4))
 
@@ -146,7 +146,7 @@ def utterance_curves(seen: Observation) -> str:
     def draw(figure: "Figure") -> tuple[()]:
         figure.set_layout_engine("none")
         axes = figure.add_axes((SIDES / 2 / width, 0.3, 1 - SIDES / width, 0.38))
-        axes.plot(times, np.clip(lip_gap(seen.landmarks), *GAP_RANGE), color=FIRST)
+        axes.plot(times, np.clip(normalised_lip_gap(seen.landmarks), *GAP_RANGE), color=FIRST)
         axes.set(xlim=(0, len(times) / seen.fps), ylim=GAP_RANGE, yticks=GAP_RANGE)
         axes.set_xticks(np.arange(0, len(times) / seen.fps, TICK_S))
         axes.set_xlabel("seconds", loc="left")

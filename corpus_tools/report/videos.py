@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.evaluate import Run
-from corpus_tools.evaluation.reference import Real
+from corpus_tools.evaluation.evaluate import SplitResult
+from corpus_tools.evaluation.reference import ReferenceUtterance
 from corpus_tools.report.page import note
 from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face
@@ -19,9 +19,9 @@ from tts2face.models.face_file import load_face
 from tts2face.models.talker import speech_channels
 from tts2face.render.draw import MeshRenderer, mesh_renderer
 from tts2face.render.picture import Picture
-from tts2face.retargeting.to_face import retargeter
+from tts2face.retargeting.to_face import build_retargeter
 from tts2face.types import Trajectory
-from tts2face.video.media import read_pictures
+from tts2face.video.media import read_frames
 
 SIDE_PX = 240
 SETTINGS = {"crf": "26", "preset": "veryfast"}  # some 100 kB a sentence
@@ -43,14 +43,14 @@ class Films:
     def _renderer(self) -> MeshRenderer:
         return mesh_renderer(self._face, Picture(size=f"{SIDE_PX}x{SIDE_PX}", camera="close"))
 
-    def film(self, run: Run, at: int) -> str:
+    def film(self, run: SplitResult, at: int) -> str:
         """A film of one utterance (HTML); empty where its video is missing or shows too few pictures."""
         one = run.real[at]
         seen = list(pictures_of(one))
         if len(seen) < one.judged.stop - one.judged.start:
             return ""
         speech = Trajectory(speech_channels(run.model), run.made[self._method][at], one.observation.fps)
-        weights = retargeter(run.talker, self._face).retarget(speech).values
+        weights = build_retargeter(run.talker, self._face).retarget(speech).values
         sides = [
             np.concatenate([letterbox(pixels), self._renderer.draw(row)], axis=1)
             for pixels, row in zip(seen, weights[one.judged], strict=False)
@@ -58,13 +58,13 @@ class Films:
         return film_tag(sides, one.observation.fps, NOTE.format(method=self._method))
 
 
-def pictures_of(one: Real) -> Iterator[NDArray[np.uint8]]:
+def pictures_of(one: ReferenceUtterance) -> Iterator[NDArray[np.uint8]]:
     """The pictures of an utterance's judged frames; fewer where the video cannot be read."""
     seen = one.observation
     instants = seen.quality.cut + (np.arange(one.judged.start, one.judged.stop) - 0.5) / seen.fps
     at = 0
     try:
-        for picture in read_pictures(seen.video):
+        for picture in read_frames(seen.video):
             while at < len(instants) and picture.time >= instants[at]:
                 yield picture.pixels
                 at += 1

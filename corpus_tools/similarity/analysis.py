@@ -22,8 +22,8 @@ from corpus_tools.similarity.mantel import Agreement, articulatory_distances, ma
 from corpus_tools.similarity.reliability import Reliability, split_half
 from corpus_tools.similarity.tokens import LEAST_PHONES, SimilarityTable, SpokenTokens, similarity_table, spoken_tokens
 from lexicon.errors import InputError
-from lexicon.phones import phone_of
-from tts2face.exemplar.similarity import Similarity
+from lexicon.phones import look_up_phone
+from tts2face.exemplar.similarity import PhoneSimilarity
 from tts2face.models.talker import Talker
 
 Progress = Callable[[int, int], None]
@@ -105,7 +105,7 @@ def analyse(
     by_utterances, by_words, alike = _halves(spoken, options, on_progress)
     if by_utterances is None:
         raise InputError(f"halves of {subject.name}'s utterances share too few phones; record more")
-    similarity = Similarity(table.phones, table.matrix)
+    similarity = PhoneSimilarity(table.phones, table.matrix)
     articulation = articulatory_distances(table.phones)
     return Analysis(
         subject.name,
@@ -161,7 +161,7 @@ def _articulatory(
     phones: tuple[str, ...], apart: NDArray[np.float64], articulation: NDArray[np.float64], options: Options
 ) -> tuple[tuple[str, Agreement], ...]:
     """Agreement over all phones, and within consonants and vowels where there are `LEAST_PHONES` of them."""
-    vowel = np.array([phone_of(phone).is_vowel for phone in phones])
+    vowel = np.array([look_up_phone(phone).is_vowel for phone in phones])
     stream = _stream(options, "articulation")
     made = []
     for name, kept in (("all phones", vowel | True), ("consonants", ~vowel), ("vowels", vowel)):

@@ -14,7 +14,7 @@ from corpus_tools.similarity.classes import cluster_tree
 from corpus_tools.similarity.compare import Comparison
 from corpus_tools.similarity.labels import label
 from corpus_tools.similarity.mantel import upper_triangle
-from lexicon.phones import phone_of
+from lexicon.phones import look_up_phone
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -178,7 +178,7 @@ def articulation_svg(found: Analysis, labels: str) -> str:
     phones = found.table.phones
     rows, columns = np.triu_indices(len(phones), 1)
     apart, alike = found.articulation[rows, columns], upper_triangle(found.table.matrix)
-    vowels = np.array([phone_of(phone).is_vowel for phone in phones]).astype(int)
+    vowels = np.array([look_up_phone(phone).is_vowel for phone in phones]).astype(int)
     n_vowels = vowels[rows] + vowels[columns]
 
     def draw(figure: "Figure") -> list[Tip]:

@@ -1,7 +1,7 @@
 """Labels of phones in figures and tables."""
 
 from lexicon.errors import InputError
-from lexicon.phones import phone_of
+from lexicon.phones import look_up_phone
 
 LABELS = ("both", "ipa", "arpabet")
 
@@ -14,7 +14,7 @@ def check_labels(labels: str) -> None:
 
 def label(phone: str, labels: str) -> str:
     """A phone in IPA, in ARPABET, or in both: ``tʃ CH``; IPA where ARPABET has no name."""
-    name = phone_of(phone).arpabet
+    name = look_up_phone(phone).arpabet
     if not name or labels == "ipa":
         return phone
     return name if labels == "arpabet" else f"{phone} {name}"

@@ -17,7 +17,7 @@ from corpus_tools.similarity.labels import label
 from corpus_tools.similarity.mantel import Agreement
 from corpus_tools.similarity.reliability import Reliability
 from corpus_tools.similarity.tokens import LEAST_TOKENS, SimilarityTable
-from lexicon.phones import phone_of
+from lexicon.phones import look_up_phone
 
 
 def table_csv(found: SimilarityTable, labels: str) -> str:
@@ -49,7 +49,7 @@ def analysis_json(found: Analysis) -> str:
         "talker": found.name,
         "utterances": found.n_utterances,
         "seed": found.options.seed,
-        "phones": [{"ipa": phone, "arpabet": phone_of(phone).arpabet or None} for phone in found.table.phones],
+        "phones": [{"ipa": phone, "arpabet": look_up_phone(phone).arpabet or None} for phone in found.table.phones],
         "tokens": found.table.counts.tolist(),
         "similarity": _rounded(found.table.matrix),
         "similarity_to_silence": _rounded(found.table.silence),

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from lexicon.phones import PHONES, phone_of
+from lexicon.phones import PHONES, look_up_phone
 from lexicon.sequence import SILENCE
 from tts2face.exemplar.similarity import phone_similarity, token_samples
-from tts2face.exemplar.tokens import tokens_of
+from tts2face.exemplar.tokens import collect_tokens
 from tts2face.models.talker import Talker
 
 LEAST_PHONES = 4  # fewer phones do not make two classes of two
@@ -59,7 +59,7 @@ def spoken_tokens(talker: Talker, name: str) -> SpokenTokens:
     InputError
         Fewer than `LEAST_PHONES` phones have the tokens for two halves, or there is one utterance only.
     """
-    tokens = tokens_of(talker)
+    tokens = collect_tokens(talker)
     n_speech = talker.model.n_speech
     spread = np.maximum(talker.model.spread[:n_speech], 1e-6).astype(np.float32)
     counts = np.bincount(tokens.phone, minlength=len(tokens.inventory))
@@ -103,7 +103,7 @@ def similarity_table(spoken: SpokenTokens, chosen: NDArray[np.bool_] | None = No
     counts = np.bincount(spoken.phone[take], minlength=len(spoken.inventory))
     place = {label: at for at, label in enumerate(PHONES)}
     sounding = [at for at, label in enumerate(spoken.inventory) if label != SILENCE]
-    order = sorted(sounding, key=lambda at: place[phone_of(spoken.inventory[at]).symbol])
+    order = sorted(sounding, key=lambda at: place[look_up_phone(spoken.inventory[at]).symbol])
     silence = spoken.inventory.index(SILENCE)
     return SimilarityTable(
         tuple(spoken.inventory[at] for at in order),

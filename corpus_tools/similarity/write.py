@@ -11,7 +11,7 @@ from corpus_tools.similarity.labels import check_labels
 from corpus_tools.similarity.page import similarity_page
 from corpus_tools.similarity.text import analysis_json, difference_csv, table_csv
 from tts2face.models.talker import load_talker
-from tts2face.storage.files import write_whole
+from tts2face.storage.files import write_atomically
 from tts2face.storage.output_names import check_name
 
 
@@ -41,7 +41,7 @@ def write_similarity(
     check_name(out)
     against = None if other is None else NamedTalker(other, load_talker(other))
     found = analyse(NamedTalker(talker, load_talker(talker)), options, against, on_progress)
-    write_whole(out, writer(found, labels))
+    write_atomically(out, writer(found, labels))
     return found
 
 

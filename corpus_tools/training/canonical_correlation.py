@@ -13,7 +13,7 @@ RANK = 1e-10  # singular values below this part of the largest belong to measure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Canonical:
+class CanonicalFactors:
     """Canonical factor pairs, strongest first.
 
     Parameters
@@ -38,7 +38,7 @@ class Canonical:
     loadings_b: NDArray[np.float64]
 
 
-def canonical_correlation(a: Values, b: Values) -> Canonical:
+def canonical_correlation(a: Values, b: Values) -> CanonicalFactors:
     """Canonical correlations of (T, D) and (T, E) measurements taken together.
 
     Raises
@@ -55,12 +55,12 @@ def canonical_correlation(a: Values, b: Values) -> Canonical:
     if len(a) <= max(a.shape[1], b.shape[1]) + 1:
         raise InputError(f"{len(a)} frames are too few for {a.shape[1]} and {b.shape[1]} measurements; give more")
     centred_a, centred_b = (np.asarray(one - one.mean(axis=0), np.float64) for one in (a, b))
-    basis_a, back_a = _orthonormal(centred_a)
-    basis_b, back_b = _orthonormal(centred_b)
+    basis_a, back_a = _orthonormal_basis(centred_a)
+    basis_b, back_b = _orthonormal_basis(centred_b)
     left, correlations, right = np.linalg.svd(basis_a.T @ basis_b, full_matrices=False)
     scale = np.sqrt(len(a))
     weights_a, weights_b = back_a @ left * scale, back_b @ right.T * scale
-    return Canonical(
+    return CanonicalFactors(
         np.clip(correlations, 0.0, 1.0),
         weights_a,
         weights_b,
@@ -71,7 +71,7 @@ def canonical_correlation(a: Values, b: Values) -> Canonical:
     )
 
 
-def tie_strength(
+def sampled_correlations(
     a: Values, b: Values, n_frames: Sequence[int], *, trials: int, rng: np.random.Generator
 ) -> NDArray[np.float64]:
     """(N, trials) first canonical correlation of as many randomly selected frames (T07 Fig. 5).
@@ -91,7 +91,7 @@ def tie_strength(
     return strengths
 
 
-def _orthonormal(centred: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _orthonormal_basis(centred: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(T, R) orthonormal columns that span the measurements, and (D, R) what makes them from these."""
     spread = centred.std(axis=0)
     if not (spread > 0.0).any():

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from corpus_tools.training.canonical_correlation import canonical_correlation
 from lexicon.errors import InputError
-from tts2face.models.audio_map import Drive, windows
+from tts2face.models.audio_map import AudioMap, context_windows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lesson:
+class TrainingUtterance:
     """One utterance to learn from: features (T, D) and shape parameters (T, S) on the same frames."""
 
     features: NDArray[np.float32]
@@ -28,16 +28,18 @@ class Lesson:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Material:
+class TrainingData:
     """Lessons as numbers: standardised windows (N, W), parameters (N, S), and the features' mean and spread."""
 
     heard: NDArray[np.float32]
-    seen: NDArray[np.float32]
+    targets: NDArray[np.float32]
     mean: NDArray[np.float32]
     spread: NDArray[np.float32]
 
 
-def learn_linear(lessons: Sequence[Lesson], *, feature: str, before: int = 0, after: int = 0) -> Drive:
+def learn_linear_map(
+    lessons: Sequence[TrainingUtterance], *, feature: str, before: int = 0, after: int = 0
+) -> AudioMap:
     """The linear map through canonical factors; the paper's has no context.
 
     Raises
@@ -45,13 +47,13 @@ def learn_linear(lessons: Sequence[Lesson], *, feature: str, before: int = 0, af
     InputError
         There are not more frames than numbers in a window, or nothing moves.
     """
-    material = gathered(lessons, before, after)
-    factors = canonical_correlation(material.heard, material.seen)
+    material = build_training_data(lessons, before, after)
+    factors = canonical_correlation(material.heard, material.targets)
     projected = (material.heard - factors.mean_a) @ factors.weights_a  # eq. 6
-    offsets = material.seen - factors.mean_b
+    offsets = material.targets - factors.mean_b
     mapping = np.linalg.lstsq(projected, offsets, rcond=None)[0].T  # eq. 7
     inner = factors.weights_a.T
-    return Drive(
+    return AudioMap(
         feature,
         before,
         after,
@@ -61,11 +63,11 @@ def learn_linear(lessons: Sequence[Lesson], *, feature: str, before: int = 0, af
         (-inner @ factors.mean_a).astype(np.float32),
         mapping.astype(np.float32),
         factors.mean_b.astype(np.float32),
-        bends=False,
+        is_nonlinear=False,
     )
 
 
-def gathered(lessons: Sequence[Lesson], before: int, after: int) -> Material:
+def build_training_data(lessons: Sequence[TrainingUtterance], before: int, after: int) -> TrainingData:
     """Lessons as one table of windows; an utterance's first and last frame go on beyond its ends.
 
     Raises
@@ -78,14 +80,14 @@ def gathered(lessons: Sequence[Lesson], before: int, after: int) -> Material:
     every = np.concatenate([lesson.features for lesson in lessons])
     mean, spread = every.mean(axis=0, dtype=np.float64), every.std(axis=0, dtype=np.float64)
     mean32, spread32 = mean.astype(np.float32), np.where(spread > 0.0, spread, 1.0).astype(np.float32)
-    heard = [heard_windows(lesson.features, (mean32, spread32), before, after) for lesson in lessons]
-    return Material(np.concatenate(heard), np.concatenate([one.parameters for one in lessons]), mean32, spread32)
+    heard = [standardised_windows(lesson.features, (mean32, spread32), before, after) for lesson in lessons]
+    return TrainingData(np.concatenate(heard), np.concatenate([one.parameters for one in lessons]), mean32, spread32)
 
 
-def heard_windows(
+def standardised_windows(
     features: NDArray[np.floating], standard: tuple[NDArray[np.float32], NDArray[np.float32]], before: int, after: int
 ) -> NDArray[np.float32]:
     """(T, W) standardised windows of an utterance's (T, D) features."""
     mean, spread = standard
     padded = np.pad(features, ((before, after), (0, 0)), mode="edge")
-    return windows((padded - mean) / spread, before, after).astype(np.float32)
+    return context_windows((padded - mean) / spread, before, after).astype(np.float32)

@@ -7,9 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.training.linear_audio_map import Lesson, Material, gathered, heard_windows
+from corpus_tools.training.linear_audio_map import (
+    TrainingData,
+    TrainingUtterance,
+    build_training_data,
+    standardised_windows,
+)
 from lexicon.errors import InputError
-from tts2face.models.audio_map import Drive
+from tts2face.models.audio_map import AudioMap
 
 VALIDATION_SHARE = 0.1  # of the utterances: they end the training before it learns the others by heart
 PATIENCE = 30  # steps without a better error on them
@@ -18,7 +23,7 @@ Layers = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], ND
 
 
 @dataclass(frozen=True, slots=True)
-class NetworkOptions:
+class NetworkMapOptions:
     """Shape and training of a network.
 
     ``decay`` is the weight of the mean square of the weights against the error; ``emphasis`` the power of a
@@ -30,18 +35,18 @@ class NetworkOptions:
     n_hidden: int = 10
     before: int = 5
     after: int = 5
-    decay: float = 1e-4
-    emphasis: float = 0.5
+    weight_decay: float = 1e-4
+    spread_exponent: float = 0.5
     articulation: float = 0.5
     seed: int = 0
 
     def __post_init__(self) -> None:
         """Refuse a network that cannot be."""
-        if self.n_hidden < 1 or min(self.before, self.after) < 0 or self.decay < 0.0:
+        if self.n_hidden < 1 or min(self.before, self.after) < 0 or self.weight_decay < 0.0:
             raise InputError(f"a network needs a hidden unit, and no negative context or decay: not {self}")
 
 
-def learn_network(lessons: Sequence[Lesson], *, feature: str, options: NetworkOptions) -> Drive:
+def learn_network_map(lessons: Sequence[TrainingUtterance], *, feature: str, options: NetworkMapOptions) -> AudioMap:
     """The network that drives best on utterances set aside; the same lessons and seed give the same network.
 
     Raises
@@ -54,25 +59,27 @@ def learn_network(lessons: Sequence[Lesson], *, feature: str, options: NetworkOp
     rng = np.random.default_rng(options.seed)
     order = rng.permutation(len(lessons))
     n_aside = max(1, round(VALIDATION_SHARE * len(lessons)))
-    material = gathered([lessons[i] for i in order[n_aside:]], options.before, options.after)
+    material = build_training_data([lessons[i] for i in order[n_aside:]], options.before, options.after)
     aside = [lessons[i] for i in order[:n_aside]]
     standard = (material.mean, material.spread)
-    heard = np.concatenate([heard_windows(one.features, standard, options.before, options.after) for one in aside])
-    centre = material.seen.mean(axis=0, dtype=np.float64)
-    spread = np.maximum(material.seen.std(axis=0, dtype=np.float64), 1e-9)
-    weight = spread**options.emphasis / np.sqrt(np.mean(spread ** (2 * options.emphasis)))
+    heard = np.concatenate(
+        [standardised_windows(one.features, standard, options.before, options.after) for one in aside]
+    )
+    centre = material.targets.mean(axis=0, dtype=np.float64)
+    spread = np.maximum(material.targets.std(axis=0, dtype=np.float64), 1e-9)
+    weight = spread**options.spread_exponent / np.sqrt(np.mean(spread ** (2 * options.spread_exponent)))
     seen, seen_aside = (
         ((one - centre) / spread * weight).astype(np.float32)
-        for one in (material.seen, np.concatenate([one.parameters for one in aside]))
+        for one in (material.targets, np.concatenate([one.parameters for one in aside]))
     )
-    checked = Material(heard, seen_aside, material.mean, material.spread)
-    layers = _trained(Material(material.heard, seen, material.mean, material.spread), checked, options, rng)
+    checked = TrainingData(heard, seen_aside, material.mean, material.spread)
+    layers = _train_layers(TrainingData(material.heard, seen, material.mean, material.spread), checked, options, rng)
     inner, bias, outer, offset = layers
     moved = np.tanh(heard @ inner.T + bias) @ outer.T
     gain = float(np.sqrt(seen_aside.var(axis=0).sum() / moved.var(axis=0).sum())) ** options.articulation
     outer, offset = gain * outer, gain * offset
     back = spread / weight
-    return Drive(
+    return AudioMap(
         feature,
         options.before,
         options.after,
@@ -82,17 +89,19 @@ def learn_network(lessons: Sequence[Lesson], *, feature: str, options: NetworkOp
         bias.astype(np.float32),
         (outer * back[:, None]).astype(np.float32),
         (offset * back + centre).astype(np.float32),
-        bends=True,
+        is_nonlinear=True,
     )
 
 
-def _trained(material: Material, checked: Material, options: NetworkOptions, rng: np.random.Generator) -> Layers:
+def _train_layers(
+    material: TrainingData, checked: TrainingData, options: NetworkMapOptions, rng: np.random.Generator
+) -> Layers:
     """Layers with the least error on what is checked, along the way of L-BFGS."""
     import scipy.optimize
 
     minimize: Any = scipy.optimize.minimize  # its stubs know no gradient that comes with the value
 
-    n_inputs, n_outputs = material.heard.shape[1], material.seen.shape[1]
+    n_inputs, n_outputs = material.heard.shape[1], material.targets.shape[1]
     shapes = ((options.n_hidden, n_inputs), (options.n_hidden,), (n_outputs, options.n_hidden), (n_outputs,))
     start = [
         rng.normal(0.0, 1.0 / np.sqrt(n_inputs), shapes[0]),
@@ -100,16 +109,16 @@ def _trained(material: Material, checked: Material, options: NetworkOptions, rng
         rng.normal(0.0, 1.0 / np.sqrt(options.n_hidden), shapes[2]),
         np.zeros(shapes[3]),
     ]
-    best = _Best(checked)
+    best = _EarlyStopping(checked)
 
     def step(weights: NDArray[np.float64]) -> None:
-        if best.is_stale(weights, unpacked(weights, shapes)):
+        if best.should_stop(weights, unpack_layers(weights, shapes)):
             raise StopIteration
 
     first = np.concatenate([layer.ravel() for layer in start])
 
     def error(weights: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-        return error_and_slope(unpacked(weights, shapes), material.heard, material.seen, options.decay)
+        return loss_and_gradient(unpack_layers(weights, shapes), material.heard, material.targets, options.weight_decay)
 
     minimize(
         error,
@@ -119,28 +128,28 @@ def _trained(material: Material, checked: Material, options: NetworkOptions, rng
         callback=step,
         options={"maxiter": MOST_STEPS, "maxcor": 20},
     )
-    return unpacked(best.weights, shapes)
+    return unpack_layers(best.weights, shapes)
 
 
-class _Best:
+class _EarlyStopping:
     """The best weights so far by the error on utterances set aside."""
 
-    def __init__(self, checked: Material) -> None:
-        self._checked = checked
+    def __init__(self, checked: TrainingData) -> None:
+        self._validation = checked
         self._error = np.inf
-        self._since = 0
+        self._n_stalled = 0
         self.weights: NDArray[np.float64] = np.zeros(0)
 
-    def is_stale(self, weights: NDArray[np.float64], layers: Layers) -> bool:
+    def should_stop(self, weights: NDArray[np.float64], layers: Layers) -> bool:
         """Look at new weights; true when none was better for `PATIENCE` steps."""
-        error = error_and_slope(layers, self._checked.heard, self._checked.seen, 0.0)[0]
-        self._since += 1
+        error = loss_and_gradient(layers, self._validation.heard, self._validation.targets, 0.0)[0]
+        self._n_stalled += 1
         if error < self._error:
-            self._error, self._since, self.weights = error, 0, weights.copy()
-        return self._since >= PATIENCE
+            self._error, self._n_stalled, self.weights = error, 0, weights.copy()
+        return self._n_stalled >= PATIENCE
 
 
-def unpacked(weights: NDArray[np.float64], shapes: Sequence[tuple[int, ...]]) -> Layers:
+def unpack_layers(weights: NDArray[np.float64], shapes: Sequence[tuple[int, ...]]) -> Layers:
     """The four layers that lie end to end in one vector."""
     ends = np.cumsum([int(np.prod(shape)) for shape in shapes])
     parts = np.split(weights, ends[:-1])
@@ -148,7 +157,7 @@ def unpacked(weights: NDArray[np.float64], shapes: Sequence[tuple[int, ...]]) ->
     return inner, bias, outer, offset
 
 
-def error_and_slope(
+def loss_and_gradient(
     layers: Layers, heard: NDArray[np.floating], seen: NDArray[np.floating], decay: float
 ) -> tuple[float, NDArray[np.float64]]:
     """Mean square error of a network with weight decay, and its gradient by back-propagation, as one vector.

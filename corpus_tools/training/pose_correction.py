@@ -12,7 +12,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.training.ridge import ridge
+from corpus_tools.training.ridge import fit_ridge
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 
 CHUNK_S = 3.0  # a sentence: long enough for speech to average out
@@ -20,7 +20,7 @@ LEAST_CHUNKS = 12  # with fewer nothing is taken out
 Floats = NDArray[np.float64]
 
 
-class Seen(Protocol):
+class PosedLandmarks(Protocol):
     """A recording of which landmarks (T, L, 3) without head pose and the head's pose (T, 6) are known."""
 
     @property
@@ -36,11 +36,11 @@ class Seen(Protocol):
         """As `tts2face.types.HEAD_CHANNELS`."""
 
 
-AnySeen = TypeVar("AnySeen", bound=Seen)
+AnySeen = TypeVar("AnySeen", bound=PosedLandmarks)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PoseLeak:
+class PoseCorrection:
     """Displacements (K, L, 3) of landmarks in mm for terms of the head's angles about ``centre`` over ``scale``."""
 
     centre: Floats
@@ -57,21 +57,21 @@ class PoseLeak:
         return replace(observation, landmarks=landmarks)  # type: ignore[type-var] # protocols cannot ask for a dataclass
 
 
-def pose_leak(observations: Sequence[Seen]) -> PoseLeak:
+def fit_pose_correction(observations: Sequence[PosedLandmarks]) -> PoseCorrection:
     """The leak in recordings of one person; none where they are too few or where taking it out predicts nothing."""
-    angles, landmarks = _chunks(observations)
+    angles, landmarks = _chunk_means(observations)
     centre, scale = angles.mean(axis=0), np.maximum(angles.std(axis=0), 1e-6)
     terms = angle_terms((angles - centre) / scale)
     away = landmarks.reshape(len(landmarks), -1) - landmarks.reshape(len(landmarks), -1).mean(axis=0)
     offsets = np.zeros((terms.shape[1], away.shape[1]))
     if len(angles) >= LEAST_CHUNKS:
-        fit = ridge(terms, away)
+        fit = fit_ridge(terms, away)
         if fit.left_out_error < float(np.square(away).sum()):
             offsets = fit.weights
-    return PoseLeak(centre, scale, _keeping_contact(offsets.reshape(terms.shape[1], *landmarks.shape[1:])))
+    return PoseCorrection(centre, scale, _keep_lip_contact(offsets.reshape(terms.shape[1], *landmarks.shape[1:])))
 
 
-def _keeping_contact(offsets: Floats) -> Floats:
+def _keep_lip_contact(offsets: Floats) -> Floats:
     """Offsets by which facing points of the inner lips move together: lips that touch at one angle touch at all."""
     kept = offsets.copy()
     upper, lower = list(INNER_LIP_UPPER), list(INNER_LIP_LOWER)
@@ -79,9 +79,9 @@ def _keeping_contact(offsets: Floats) -> Floats:
     return kept
 
 
-def without_leak(observations: Sequence[AnySeen]) -> tuple[AnySeen, ...]:
+def correct_pose(observations: Sequence[AnySeen]) -> tuple[AnySeen, ...]:
     """Observations of one person without the leak that they show."""
-    leak = pose_leak(observations) if observations else None
+    leak = fit_pose_correction(observations) if observations else None
     return tuple(leak.removed(seen) for seen in observations) if leak else ()
 
 
@@ -91,7 +91,7 @@ def angle_terms(angles: NDArray[np.floating]) -> Floats:
     return np.column_stack([pitch, yaw, roll, pitch**2, yaw**2, roll**2, pitch * yaw, pitch * roll, yaw * roll])
 
 
-def _chunks(observations: Sequence[Seen]) -> tuple[Floats, Floats]:
+def _chunk_means(observations: Sequence[PosedLandmarks]) -> tuple[Floats, Floats]:
     """Mean angles (C, 3) and landmarks (C, L, 3) of every chunk."""
     angles, landmarks = [], []
     for seen in observations:

@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ridge:
+class RidgeFit:
     """Weights (K, V) of terms about their ``mean`` (K,), and the sum of squares of the errors of rows left out."""
 
     mean: Floats
@@ -19,7 +19,7 @@ class Ridge:
     left_out_error: float
 
 
-def ridge(terms: Floats, wanted: Floats, efforts: Sequence[float] = EFFORTS) -> Ridge:
+def fit_ridge(terms: Floats, wanted: Floats, efforts: Sequence[float] = EFFORTS) -> RidgeFit:
     """The best regression of (R, V) values, whose mean is 0, on (R, K) terms.
 
     Each row's error when it is left out follows from its leverage. Source: Allen 1974 (PRESS).
@@ -27,12 +27,14 @@ def ridge(terms: Floats, wanted: Floats, efforts: Sequence[float] = EFFORTS) -> 
     mean = terms.mean(axis=0)
     centred = terms - mean
     normal, right = centred.T @ centred, centred.T @ wanted
-    found = [_fitted(centred, wanted, normal + effort * np.eye(terms.shape[1]), right) for effort in efforts]
+    found = [
+        _fit_and_cross_validate(centred, wanted, normal + effort * np.eye(terms.shape[1]), right) for effort in efforts
+    ]
     error, weights = min(found, key=lambda one: one[0])
-    return Ridge(mean, weights, error)
+    return RidgeFit(mean, weights, error)
 
 
-def _fitted(centred: Floats, wanted: Floats, normal: Floats, right: Floats) -> tuple[float, Floats]:
+def _fit_and_cross_validate(centred: Floats, wanted: Floats, normal: Floats, right: Floats) -> tuple[float, Floats]:
     inverse = np.linalg.inv(normal)
     weights: Floats = inverse @ right
     leverage = np.einsum("rk,kj,rj->r", centred, inverse, centred) + 1.0 / len(centred)

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.run_options import Progress, Stages, no_stages
-from corpus_tools.training.linear_audio_map import Lesson, learn_linear
-from corpus_tools.training.network_audio_map import NetworkOptions, learn_network
-from tts2face.models.audio_map import Drive
+from corpus_tools.run_options import Progress, Stages, ignore_stage
+from corpus_tools.training.linear_audio_map import TrainingUtterance, learn_linear_map
+from corpus_tools.training.network_audio_map import NetworkMapOptions, learn_network_map
+from tts2face.models.audio_map import AudioMap
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.speech.features import FEATURE_RATE, speech_features, speech_level
 from tts2face.types import Waveform
@@ -18,14 +18,14 @@ from tts2face.video.media import read_sound
 
 # Chosen by inner cross-validation on the training utterances of GRID s1 (docs/accuracy.md, "Speech-driven").
 FEATURE = "mfcc+lsf"
-NETWORK = NetworkOptions(n_hidden=40)
+NETWORK = NetworkMapOptions(n_hidden=40)
 LEAST_UTTERANCES = 20  # a network sets a tenth of them aside
 LEAST_FRAMES = 1000  # below, canonical correlation feigns ties (docs/accuracy.md)
 
 Heard = Mapping[str, NDArray[np.float32]]  # features of each utterance by its name
 
 
-def heard_features(
+def sound_features(
     observations: Sequence[Observation], kinds: Sequence[str], *, on_progress: Progress | None = None
 ) -> dict[str, Heard]:
     """For each kind of feature, the (T, D) features of every utterance on the frames of its landmarks.
@@ -36,33 +36,37 @@ def heard_features(
         A recording holds no sound.
     """
     found: dict[str, dict[str, NDArray[np.float32]]] = {kind: {} for kind in kinds}
-    for done, (observation, sound) in enumerate(_with_sound(observations)):
+    for done, (observation, sound) in enumerate(_read_sounds(observations)):
         for kind in kinds:
-            found[kind][observation.name] = heard_in(observation, sound, kind)
+            found[kind][observation.name] = utterance_features(observation, sound, kind)
         if on_progress:
             on_progress(done + 1, len(observations))
     return dict(found)
 
 
-def heard_in(observation: Observation, sound: Waveform, kind: str) -> NDArray[np.float32]:
+def utterance_features(observation: Observation, sound: Waveform, kind: str) -> NDArray[np.float32]:
     """(T, D) features of the sound of a video on the frames of one utterance in it."""
     start = observation.quality.cut + observation.quality.lag
     n_frames = len(observation.landmarks)
     return speech_features(sound, kind, fps=observation.fps, n_frames=n_frames, start=start).values
 
 
-def lessons_of(observations: Sequence[Observation], model: ShapeModel, heard: Heard) -> list[Lesson]:
+def build_training_utterances(
+    observations: Sequence[Observation], model: ShapeModel, heard: Heard
+) -> list[TrainingUtterance]:
     """What a drive learns from: features of utterances, and the speech parameters of their landmarks."""
-    return [Lesson(heard[one.name], model.parameters(one.landmarks)[:, : model.n_speech]) for one in observations]
+    return [
+        TrainingUtterance(heard[one.name], model.parameters(one.landmarks)[:, : model.n_speech]) for one in observations
+    ]
 
 
-def learn_drives(
+def learn_audio_maps(
     observations: Sequence[Observation],
     talker: Talker,
     *,
-    network: NetworkOptions = NETWORK,
-    stages: Stages = no_stages,
-) -> dict[str, Drive]:
+    network: NetworkMapOptions = NETWORK,
+    stages: Stages = ignore_stage,
+) -> dict[str, AudioMap]:
     """The linear and the network drive of a talker; none where the recordings are too few to learn them.
 
     Raises
@@ -72,18 +76,18 @@ def learn_drives(
     """
     if len(observations) < LEAST_UTTERANCES or sum(len(one.landmarks) for one in observations) < LEAST_FRAMES:
         return {}
-    heard = heard_features(observations, (FEATURE, "level"), on_progress=stages("listening"))
-    lessons = lessons_of(observations, talker.model, heard[FEATURE])
+    heard = sound_features(observations, (FEATURE, "level"), on_progress=stages("listening"))
+    lessons = build_training_utterances(observations, talker.model, heard[FEATURE])
     loudness = speech_level(np.concatenate(list(heard["level"].values())))
     told = stages("learning drives")
-    linear = learn_linear(lessons, feature=FEATURE)
+    linear = learn_linear_map(lessons, feature=FEATURE)
     told(1, 2)
-    bent = learn_network(lessons, feature=FEATURE, options=network)
+    bent = learn_network_map(lessons, feature=FEATURE, options=network)
     told(2, 2)
     return {"linear": replace(linear, loudness=loudness), "network": replace(bent, loudness=loudness)}
 
 
-def _with_sound(observations: Sequence[Observation]) -> Iterator[tuple[Observation, Waveform]]:
+def _read_sounds(observations: Sequence[Observation]) -> Iterator[tuple[Observation, Waveform]]:
     """Each utterance with the sound of its video; a video with many is read once."""
     last: tuple[object, Waveform] | None = None
     for observation in sorted(observations, key=lambda one: str(one.video)):

@@ -18,7 +18,7 @@ from corpus_tools.run_options import Progress
 from lexicon.errors import BackendError
 from lexicon.phones import phone_features
 from lexicon.sequence import SILENCE
-from tts2face.models.phone_network import WindowNetwork, window_features
+from tts2face.models.phone_network import PhoneNetwork, window_features
 from tts2face.models.talker import Talker
 
 MARGIN_S = 0.2  # of silence that is learnt from
@@ -30,7 +30,7 @@ LEAST_FRAMES = 3000  # two minutes; from less a network learns nothing that exam
 Floats = NDArray[np.float32]
 
 
-def with_network(talker: Talker, *, on_progress: Progress | None = None) -> Talker:
+def add_phone_network(talker: Talker, *, on_progress: Progress | None = None) -> Talker:
     """The talker with networks trained on what it holds; as it is where that is too little.
 
     Raises
@@ -55,12 +55,12 @@ def with_network(talker: Talker, *, on_progress: Progress | None = None) -> Talk
     tables = [np.eye(len(inventory), dtype=np.float32)] * N_BY_LABEL + [feature_table(inventory)] * N_BY_FEATURES
     networks = []
     for seed, table in enumerate(tables):
-        networks.append(_network(*seen, np.concatenate(wanted), table, seed))
+        networks.append(_train_network(*seen, np.concatenate(wanted), table, seed))
         if on_progress:
             on_progress(seed + 1, len(tables))
-    weights, biases = (_stacked(layers) for layers in zip(*networks, strict=True))
+    weights, biases = (_stack_layers(layers) for layers in zip(*networks, strict=True))
     weights[-1], biases[-1] = weights[-1] * spread, biases[-1] * spread
-    return replace(talker, network=WindowNetwork(inventory, tuple(weights), tuple(biases)))
+    return replace(talker, network=PhoneNetwork(inventory, tuple(weights), tuple(biases)))
 
 
 def feature_table(inventory: Iterable[str]) -> Floats:
@@ -68,32 +68,32 @@ def feature_table(inventory: Iterable[str]) -> Floats:
     return np.array([[*first, *last] for first, last in map(phone_features, inventory)], np.float32)
 
 
-def described(shown: NDArray[np.integer], place: Floats, table: Floats) -> Any:
+def encode_windows(shown: NDArray[np.integer], place: Floats, table: Floats) -> Any:
     """Sparse (T, C K + 4) inputs: for each of the phones (T, C) its line of the table (P, K), then its place (T, 4)."""
     lines = sparse.csr_matrix(table)
     return sparse.hstack([*(lines[column] for column in shown.T), sparse.csr_matrix(place)]).tocsr()
 
 
-def by_phone(weights: Floats, table: Floats, n_shown: int) -> Floats:
-    """(C P + 4, H) first weights for C phones as one of P that do what (C K + 4, H) do for `described` ones."""
+def expand_to_phones(weights: Floats, table: Floats, n_shown: int) -> Floats:
+    """(C P + 4, H) first weights for C phones as one of P that do what (C K + 4, H) do for `encode_windows` ones."""
     n_features = table.shape[1]
     told, place = weights[: n_shown * n_features], weights[n_shown * n_features :]
     return np.concatenate([*(table @ each for each in np.split(told, n_shown)), place])
 
 
-def _stacked(members: Iterable[Iterable[Floats]]) -> list[Floats]:
+def _stack_layers(members: Iterable[Iterable[Floats]]) -> list[Floats]:
     return [np.stack(layer).astype(np.float32) for layer in zip(*members, strict=True)]
 
 
-def _network(
+def _train_network(
     shown: NDArray[np.integer], place: Floats, wanted: Floats, table: Floats, seed: int
 ) -> tuple[list[Floats], list[Floats]]:
     """Weights and biases of one network for phones as one of N, learnt from phones as the table tells them."""
-    fitted = _fitted(described(shown, place, table), wanted, seed)
-    return [by_phone(fitted.coefs_[0], table, shown.shape[1]), *fitted.coefs_[1:]], fitted.intercepts_
+    fitted = _fit_regressor(encode_windows(shown, place, table), wanted, seed)
+    return [expand_to_phones(fitted.coefs_[0], table, shown.shape[1]), *fitted.coefs_[1:]], fitted.intercepts_
 
 
-def _fitted(inputs: Any, wanted: Any, seed: int) -> Any:
+def _fit_regressor(inputs: Any, wanted: Any, seed: int) -> Any:
     try:
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.neural_network import MLPRegressor

@@ -51,7 +51,7 @@ def learn_talker(
             raise DataError(f"{observation.name} has {observation.fps:g} frames per second, others {fps:g}; convert it")
     model = learn_shapes(observations, n_speech, n_other)
     turn = mean_rotation(observations)
-    utterances = tuple(_utterance(observation, model, turn) for observation in observations)
+    utterances = tuple(_build_utterance(observation, model, turn) for observation in observations)
     return Talker(fps, model, utterances, dict(metadata))
 
 
@@ -74,7 +74,7 @@ def learn_shapes(observations: Sequence[Observation], n_speech: int, n_other: in
             raise InputError(
                 f"{n_frames} frames of {int(region.sum())} landmarks have no {n_modes} modes; ask for fewer"
             )
-        components, variance = _principal(observations, mean, region, n_modes)
+        components, variance = _principal_components(observations, mean, region, n_modes)
         basis = np.zeros((n_modes, N_LANDMARKS, 3))
         basis[:, region] = components
         rows.append(basis)
@@ -104,11 +104,11 @@ def resting_frames(observation: Observation) -> NDArray[np.bool_]:
     phones = observation.phones
     speech = phones.edges[1] if phones.phones[0] == SILENCE else phones.edges[0]
     times = np.arange(len(observation.landmarks)) / observation.fps
-    still: NDArray[np.bool_] = (times < speech - REST_MARGIN_S) & (lip_gap(observation.landmarks) < CLOSED)
+    still: NDArray[np.bool_] = (times < speech - REST_MARGIN_S) & (normalised_lip_gap(observation.landmarks) < CLOSED)
     return still
 
 
-def lip_gap(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
+def normalised_lip_gap(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
     """(T,) distance of the inner lips at their middle over the distance of the outer eye corners."""
     apart: NDArray[np.floating] = landmarks[:, UPPER_LIP_INNER_MID] - landmarks[:, LOWER_LIP_INNER_MID]
     eyes: NDArray[np.floating] = landmarks[:, EYE_OUTER_LEFT] - landmarks[:, EYE_OUTER_RIGHT]
@@ -118,14 +118,14 @@ def lip_gap(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
 
 def mean_rotation(observations: Sequence[Observation]) -> NDArray[np.float64]:
     """(3, 3) mean of the head's rotations: the rotation nearest to the mean of the matrices."""
-    total = sum(_rotations(observation.head[:, :3]).sum(axis=0) for observation in observations)
+    total = sum(_rotation_matrices(observation.head[:, :3]).sum(axis=0) for observation in observations)
     left, _, right = np.linalg.svd(np.asarray(total))
     signs = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
     mean: NDArray[np.float64] = left @ signs @ right
     return mean
 
 
-def _principal(
+def _principal_components(
     observations: Sequence[Observation], mean: NDArray[np.float64], region: NDArray[np.bool_], n_modes: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(n_modes, R, 3) principal components of a region and the (n_modes,) variances along them, largest first.
@@ -146,14 +146,14 @@ def _principal(
     return components.reshape(n_modes, -1, 3), np.maximum(variances[::-1][:n_modes], 0.0)
 
 
-def _utterance(observation: Observation, model: ShapeModel, turn: NDArray[np.float64]) -> Utterance:
-    relative = turn.T @ _rotations(observation.head[:, :3])
+def _build_utterance(observation: Observation, model: ShapeModel, turn: NDArray[np.float64]) -> Utterance:
+    relative = turn.T @ _rotation_matrices(observation.head[:, :3])
     head = np.column_stack([head_angles(relative), observation.head[:, 3:]]).astype(np.float32)
     shape = model.parameters(observation.landmarks)
     return Utterance(observation.name, observation.phones, observation.words, shape, head, observation.intensity)
 
 
-def _rotations(angles: NDArray[np.floating]) -> NDArray[np.float64]:
+def _rotation_matrices(angles: NDArray[np.floating]) -> NDArray[np.float64]:
     """(T, 3, 3) rotations of (T, 3) pitch, yaw, roll; the inverse of `head_angles`."""
     from scipy.spatial.transform import Rotation
 

@@ -32,13 +32,13 @@ def read_text(path: Path) -> str:
         raise DataError(f"{path} cannot be read ({refused.strerror}); check the file") from refused
     if len(content) > LARGEST_BYTES:
         raise DataError(f"{path} is larger than {LARGEST_BYTES >> 20} MiB; a transcript holds words only")
-    text = _decoded(content, path)
+    text = _decode(content, path)
     if "\0" in text:
         raise DataError(f"{path} is no text (it holds zero bytes); save it as UTF-8")
     return text
 
 
-def _decoded(content: bytes, path: Path) -> str:
+def _decode(content: bytes, path: Path) -> str:
     try:
         for mark, encoding in _MARKS:
             if content.startswith(mark):

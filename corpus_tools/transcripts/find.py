@@ -11,13 +11,13 @@ TEXT = ".txt"
 READERS = {".textgrid": read_textgrid, ".align": read_word_times, **dict.fromkeys(FORMATS, read_cues)}
 
 
-def transcript_of(video: Path) -> Path | None:
+def find_transcript(video: Path) -> Path | None:
     """The transcript beside a video: text before TextGrid, word times and subtitles; None without one."""
     beside = {path.suffix.lower(): path for path in sorted(video.parent.iterdir()) if path.stem == video.stem}
     return next((beside[suffix] for suffix in (TEXT, *READERS) if suffix in beside), None)
 
 
-def said_in(transcript: Path) -> str:
+def read_transcript(transcript: Path) -> str:
     """All words of a transcript, in order.
 
     Raises

@@ -22,11 +22,11 @@ def read_textgrid(path: Path) -> tuple[Cue, ...]:
     DataError
         It is no TextGrid, is cut short, or holds no word.
     """
-    items = _items(read_text(path))
+    items = _split_items(read_text(path))
     if list(items[:2]) != ["ooTextFile", "TextGrid"]:
         raise DataError(f"{path} is no TextGrid; save it with Praat as text")
     try:
-        tiers = list(_tiers(iter(items[5:])))
+        tiers = list(_read_tiers(iter(items[5:])))
     except (StopIteration, RuntimeError, TypeError, ValueError, OverflowError, KeyError) as broken:
         raise DataError(f"{path} is a damaged TextGrid; save it with Praat again") from broken
     named = [cues for name, cues in tiers if "word" in name.lower()]
@@ -37,7 +37,7 @@ def read_textgrid(path: Path) -> tuple[Cue, ...]:
     return found
 
 
-def _items(text: str) -> list[str | float]:
+def _split_items(text: str) -> list[str | float]:
     """Labels and numbers in order."""
     items: list[str | float] = []
     for match in _TOKEN.finditer(text):
@@ -48,16 +48,16 @@ def _items(text: str) -> list[str | float]:
     return items
 
 
-def _tiers(items: Iterator[str | float]) -> Iterator[tuple[str, tuple[Cue, ...]]]:
+def _read_tiers(items: Iterator[str | float]) -> Iterator[tuple[str, tuple[Cue, ...]]]:
     """Name and cues of each tier of intervals; tiers of points are read over."""
     for kind in items:
         name, _, _, size = (next(items) for _ in range(4))
         rows = [[next(items) for _ in range(_KINDS[str(kind)])] for _ in range(int(size))]
         if kind == "IntervalTier":
-            yield str(name), tuple(_cue(*row) for row in rows)
+            yield str(name), tuple(_parse_cue(*row) for row in rows)
 
 
-def _cue(start: str | float, end: str | float, label: str | float) -> Cue:
+def _parse_cue(start: str | float, end: str | float, label: str | float) -> Cue:
     if not isinstance(label, str) or not 0 <= float(start) < float(end):
         raise ValueError(label)
     return Cue(float(start), float(end), label.strip())

@@ -9,7 +9,7 @@ import pytest
 import tts2face
 from lexicon.errors import InputError
 from tests.golden.requests import starter_with_pictures
-from tts2face.types import joined_clips
+from tts2face.types import concatenate_clips
 
 TEXTS = ("Bob may move.", "We were away.", "Five big maps.", "Hello there.")
 SMALL = tts2face.Picture(size="64x64", supersampling=1)
@@ -69,7 +69,7 @@ def test_a_stream_is_the_clip_in_pieces(session: tts2face.Session) -> None:
     pieces = list(session.stream("Bob may move. We were away.", fps=25))
     whole = session.clip("Bob may move. We were away.", fps=25)
     assert [piece.begin for piece in pieces] == [0.0, len(pieces[0].clip.motion) / 25]
-    assert np.array_equal(joined_clips([piece.clip for piece in pieces]).motion.values, whole.motion.values)
+    assert np.array_equal(concatenate_clips([piece.clip for piece in pieces]).motion.values, whole.motion.values)
     assert [phone.phone for phone in pieces[1].shown()][:3] == ["sil", "w", "i"]
     assert pieces[1].shown()[0].start >= pieces[1].begin
 

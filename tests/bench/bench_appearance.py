@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.aam.evaluation import figures
-from corpus_tools.aam.source_videos import filmed
+from corpus_tools.aam.evaluation import measure_appearance
+from corpus_tools.aam.source_videos import build_appearance_recording
 from corpus_tools.aam.train_appearance import learn_appearance
-from corpus_tools.recordings.corpus_video import Eyes
+from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.observe import observe
-from corpus_tools.run_options import Effort
+from corpus_tools.run_options import RunOptions
 from corpus_tools.training.train_talker import learn_talker
 from tts2face.models.talker import write_talker
-from tts2face.render.own_face import own_face_renderer, plate_drawn
+from tts2face.render.own_face import draw_video_frame, own_face_renderer
 from tts2face.render.picture import Picture
 from tts2face.video.landmark_models import find_bundle
 
@@ -38,7 +38,7 @@ def main() -> None:
         print(f"{what}: {time.perf_counter() - began:.1f} s")
         began = time.perf_counter()
 
-    kept = observe(options.recordings, effort=Effort(options.cache)).kept
+    kept = observe(options.recordings, effort=RunOptions(options.cache)).kept
     stage("observing (from the cache where it was done before)")
     order = np.random.default_rng(options.seed).permutation(len(kept))
     learn = [kept[i] for i in order[: options.learn]]
@@ -46,12 +46,15 @@ def main() -> None:
     about = dict.fromkeys(("name", "language", "sources", "licence", "attribution", "command", "created"), "")
     talker = learn_talker(learn, metadata=about)
     stage("shape model")
-    eyes = Eyes(Effort(options.cache).folder(), find_bundle())
-    films = [filmed(seen, spoken.shape, eyes) for seen, spoken in zip(learn, talker.utterances, strict=True)]
+    eyes = CachedTracker(RunOptions(options.cache).folder(), find_bundle())
+    films = [
+        build_appearance_recording(seen, spoken.shape, eyes)
+        for seen, spoken in zip(learn, talker.utterances, strict=True)
+    ]
     learnt = learn_appearance(films)
     stage(f"appearance of {len(films)} recordings")
-    unseen = [filmed(seen, talker.model.parameters(seen.landmarks), eyes) for seen in held_out]
-    for name, value in figures(films, learnt, unseen, kept).as_dict().items():
+    unseen = [build_appearance_recording(seen, talker.model.parameters(seen.landmarks), eyes) for seen in held_out]
+    for name, value in measure_appearance(films, learnt, unseen, kept).as_dict().items():
         print(f"{name}: {value}")
     stage("measuring")
     spoken = tuple(replace(one, looks=looks) for one, looks in zip(talker.utterances, learnt.looks, strict=True))
@@ -63,10 +66,10 @@ def main() -> None:
     for size in ("360x288", "512x512"):
         made = own_face_renderer(whole, Picture(size=size))
         motion = np.concatenate([spoken[0].shape[30, :20], spoken[0].looks[30]])
-        plate_drawn(made, motion, 0)
+        draw_video_frame(made, motion, 0)
         began = time.perf_counter()
         for number in range(len(made.plate)):
-            plate_drawn(made, motion, number)
+            draw_video_frame(made, motion, number)
         print(f"drawing at {size}, one thread: {len(made.plate) / (time.perf_counter() - began):.0f} frames/s")
 
 

@@ -18,15 +18,15 @@ from numpy.typing import NDArray
 
 from corpus_tools.recordings.observation import Observation, Quality
 from corpus_tools.recordings.observe import observe
-from corpus_tools.run_options import Effort
-from corpus_tools.training.train_talker import CLOSED, learn_shapes, lip_gap
+from corpus_tools.run_options import RunOptions
+from corpus_tools.training.train_talker import CLOSED, learn_shapes, normalised_lip_gap
 from tests.bench.bench_retarget import bilabial_frames, landmarks_of, opening
 from tts2face.cloning.lip_gaps import facing_gaps
-from tts2face.cloning.parameter_transfer import Cloning, append_missing, cloning
+from tts2face.cloning.parameter_transfer import ParameterTransfer, append_missing_components, build_parameter_transfer
 from tts2face.models.face_file import load_face
 from tts2face.models.landmarks import MOUTH_REGION
 from tts2face.models.talker import ShapeModel, Talker, load_talker
-from tts2face.retargeting.to_face import retargeter
+from tts2face.retargeting.to_face import build_retargeter
 
 Floats = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ EVERY = 8  # utterance of the source is cloned
 def driven(talker: Talker, name: str) -> list[Observation]:
     """A shipped face that speaks the talker's utterances, observed without error; brows and eyelids move, too."""
     face = load_face(name)
-    ready, rng = retargeter(talker, face), np.random.default_rng(0)
+    ready, rng = build_retargeter(talker, face), np.random.default_rng(0)
     free = [i for i, shape in enumerate(face.shape_names) if shape.startswith(("brow", "eyeBlink", "eyeWide", "cheek"))]
     found = []
     for utterance in talker.utterances[1::EVERY]:
@@ -55,7 +55,7 @@ def driven(talker: Talker, name: str) -> list[Observation]:
 
 def targets(recordings: Path, cache: Path | None, talker: Talker) -> Iterator[tuple[str, ShapeModel]]:
     """Second talkers by name."""
-    kept = observe(recordings, effort=Effort(cache, 1)).kept
+    kept = observe(recordings, effort=RunOptions(cache, 1)).kept
     yield "even half, 12 + 6 modes", learn_shapes(kept[::2], 12, 6)
     yield "odd half, 30 + 15 modes", learn_shapes(kept[1::2], 30, 15)
     for name in ("head", "cartoon"):
@@ -68,7 +68,9 @@ def distance(one: NDArray[np.floating], other: NDArray[np.floating]) -> Floats:
     return np.asarray(np.sqrt(squares.mean(axis=1)), np.float64)
 
 
-def least_squares(source: ShapeModel, target: ShapeModel, values: NDArray[np.float32], ready: Cloning) -> Floats:
+def least_squares(
+    source: ShapeModel, target: ShapeModel, values: NDArray[np.float32], ready: ParameterTransfer
+) -> Floats:
     """(T, q) displacements from rest by full least squares on all landmark coordinates."""
     moved = values.astype(np.float64) - ready.source_rest
     wanted = np.tensordot(moved, source.basis.astype(np.float64), axes=1) * ready.size
@@ -78,15 +80,17 @@ def least_squares(source: ShapeModel, target: ShapeModel, values: NDArray[np.flo
 
 def closed(talker: Talker, shapes: list[NDArray[np.float32]], at: list[list[int]]) -> float:
     """Share of bilabials with closed lips."""
-    gaps = [lip_gap(one[frames]) * np.sign(opening(one[frames])) for one, frames in zip(shapes, at, strict=True)]
+    gaps = [
+        normalised_lip_gap(one[frames]) * np.sign(opening(one[frames])) for one, frames in zip(shapes, at, strict=True)
+    ]
     return float((np.concatenate(gaps) < CLOSED).mean())
 
 
 def there_and_back(
-    source: ShapeModel, back: Cloning, values: NDArray[np.float32], mapped: tuple[Floats, NDArray[np.float32]]
+    source: ShapeModel, back: ParameterTransfer, values: NDArray[np.float32], mapped: tuple[Floats, NDArray[np.float32]]
 ) -> tuple[Floats, Floats]:
     """(T,) distances from the source of what comes back by eq. 5 alone, and with limits and lips."""
-    by_rule, all_done = back.unlimited(mapped[0]), back.parameters(mapped[1])
+    by_rule, all_done = back.clone_unlimited(mapped[0]), back.parameters(mapped[1])
     wanted = source.shapes(values)
     return distance(source.shapes(by_rule), wanted), distance(source.shapes(all_done), wanted)
 
@@ -95,12 +99,12 @@ def report(talker: Talker, name: str, target: ShapeModel, gain: float = 1.0) -> 
     """Print the figures of one target."""
     source, utterances = talker.model, talker.utterances[::EVERY]
     values = np.concatenate([utterance.shape for utterance in utterances])
-    ready = cloning(source, target, gain=gain)
+    ready = build_parameter_transfer(source, target, gain=gain)
     began = time.perf_counter()
     mapped = ready.parameters(values)
     spent = time.perf_counter() - began
     some = np.linspace(0, len(values) - 1, N_FRAMES).astype(int)
-    wanted = ready.unlimited(values)
+    wanted = ready.clone_unlimited(values)
     apart = wanted[some] - ready.target_rest - gain * least_squares(source, target, values[some], ready)
     spans = np.cumsum([len(utterance.shape) for utterance in utterances])[:-1]
     before, after = np.split(source.shapes(values), spans), np.split(target.shapes(mapped), spans)
@@ -112,7 +116,9 @@ def report(talker: Talker, name: str, target: ShapeModel, gain: float = 1.0) -> 
     changed = np.any(np.abs(mapped - held) > 1e-3, axis=1)
     kept_back = distance(target.shapes(held), target.shapes(wanted))
     limited = np.abs(wanted) > ready.limits
-    linear, returned = there_and_back(source, cloning(target, source, gain=1 / gain), values, (wanted, mapped))
+    linear, returned = there_and_back(
+        source, build_parameter_transfer(target, source, gain=1 / gain), values, (wanted, mapped)
+    )
     kept = ((ready.relation[:, : source.n_speech] / (gain * ready.size)) ** 2).sum(axis=0)
     share = (kept * source.spread[: source.n_speech] ** 2).sum() / (source.spread[: source.n_speech] ** 2).sum()
     open_ = [np.concatenate([opening(one) for one in parts]) for parts in (before, after)]
@@ -149,7 +155,7 @@ def main() -> None:
     report(talker, "itself", talker.model)
     for name, model in targets(arguments.recordings, arguments.cache, talker):
         report(talker, name, model)
-        joined = append_missing(talker.model, model)
+        joined = append_missing_components(talker.model, model)
         report(talker, f"{name}, {len(joined.spread) - len(model.spread)} appended", joined)
         report(talker, name, model, gain=1.3)
 

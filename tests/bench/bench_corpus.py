@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.recordings.folder import find_recordings, spoken_words
+from corpus_tools.recordings.folder import find_recordings, pronounce_recording
 from tts2face.speech.forced_alignment import Aligner
-from tts2face.video.media import read_pictures, read_sound
+from tts2face.video.media import read_frames, read_sound
 from tts2face.video.pose import remove_pose
 from tts2face.video.track import FaceTracker
 
@@ -34,11 +34,11 @@ def main(folder: Path, n_recordings: int) -> None:
     found = find_recordings(folder)
     for recording in found[:: max(1, len(found) // n_recordings)][:n_recordings]:
         marks = [time.perf_counter()]
-        pictures = [picture.pixels for picture in read_pictures(recording.video)]
+        pictures = [picture.pixels for picture in read_frames(recording.video)]
         marks.append(time.perf_counter())
         tracked = tracker.track(lambda pictures=pictures: pictures, 25.0).points
         marks.append(time.perf_counter())
-        aligner.align(read_sound(recording.video, 16_000), spoken_words(recording))
+        aligner.align(read_sound(recording.video, 16_000), pronounce_recording(recording))
         marks.append(time.perf_counter())
         remove_pose(tracked, 25.0)
         marks.append(time.perf_counter())

@@ -13,18 +13,24 @@ import numpy as np
 
 from corpus_tools.evaluation import measures
 from corpus_tools.evaluation.evaluate import LEARNT_FOR_EVALUATION
-from corpus_tools.evaluation.reference import Real, Thresholds
-from corpus_tools.evaluation.scores import Scores, scored
-from corpus_tools.evaluation.splits import folds, split
+from corpus_tools.evaluation.reference import ReferenceUtterance, Thresholds
+from corpus_tools.evaluation.scores import Scores, score_splits
+from corpus_tools.evaluation.splits import split, split_into_folds
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import observe
-from corpus_tools.training.canonical_correlation import tie_strength
-from corpus_tools.training.linear_audio_map import learn_linear
-from corpus_tools.training.network_audio_map import NetworkOptions, learn_network
-from corpus_tools.training.pose_correction import pose_leak
-from corpus_tools.training.train_audio_map import FEATURE, NETWORK, heard_features, heard_in, lessons_of
+from corpus_tools.training.canonical_correlation import sampled_correlations
+from corpus_tools.training.linear_audio_map import learn_linear_map
+from corpus_tools.training.network_audio_map import NetworkMapOptions, learn_network_map
+from corpus_tools.training.pose_correction import fit_pose_correction
+from corpus_tools.training.train_audio_map import (
+    FEATURE,
+    NETWORK,
+    build_training_utterances,
+    sound_features,
+    utterance_features,
+)
 from corpus_tools.training.train_talker import learn_talker
-from tts2face.models.audio_map import Drive
+from tts2face.models.audio_map import AudioMap
 from tts2face.speech.features import FEATURE_RATE, speech_level
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
@@ -53,7 +59,7 @@ def main() -> None:
     if options.quick:
         kept, options.hold_out, options.trials = kept[:120], 30, 10
     train, test = split(kept, hold_out=options.hold_out, seed=options.seed)
-    leak = pose_leak(train)
+    leak = fit_pose_correction(train)
     bench = Bench(*(tuple(leak.removed(one) for one in part) for part in (train, test)))
     if options.choose:
         bench.choose()
@@ -74,7 +80,7 @@ class Bench:
         if kind not in self.heard:
             parts = kind.split("+")
             missing = [part for part in parts if part not in self.heard]
-            self.heard |= heard_features(self.kept, missing) if missing else {}
+            self.heard |= sound_features(self.kept, missing) if missing else {}
             names = self.heard[parts[0]]
             self.heard[kind] = {
                 name: np.concatenate([self.heard[part][name] for part in parts], axis=1) for name in names
@@ -84,7 +90,7 @@ class Bench:
     def ties(self, trials: int, seed: int) -> dict[str, np.ndarray]:
         """First canonical correlation of randomly selected frames, mean over trials."""
         model = learn_talker(self.train, metadata=LEARNT_FOR_EVALUATION).model
-        speech = [measures.judged_frames(one.phones, len(one.landmarks), one.fps) for one in self.train]
+        speech = [measures.speech_frames(one.phones, len(one.landmarks), one.fps) for one in self.train]
         seen = np.concatenate(
             [model.parameters(one.landmarks[here])[:, :20] for one, here in zip(self.train, speech, strict=True)]
         )
@@ -94,21 +100,23 @@ class Bench:
             heard = self.of(kind)
             table = np.concatenate([heard[one.name][here] for one, here in zip(self.train, speech, strict=True)])
             ns = [n for n in FRAMES if n <= len(table)]
-            strengths = tie_strength(table, seen, ns, trials=trials, rng=np.random.default_rng(seed))
+            strengths = sampled_correlations(table, seen, ns, trials=trials, rng=np.random.default_rng(seed))
             found[kind] = strengths.mean(axis=1)
             print(f"| {kind} | " + " | ".join(f"{value:.3f}" for value in found[kind]) + " |", flush=True)
         return found
 
-    def learnt(self, kind: str, network: NetworkOptions | None, context: int, learn: tuple, talker: object) -> Drive:
-        lessons = lessons_of(learn, talker.model, self.of(kind))
+    def learnt(
+        self, kind: str, network: NetworkMapOptions | None, context: int, learn: tuple, talker: object
+    ) -> AudioMap:
+        lessons = build_training_utterances(learn, talker.model, self.of(kind))
         if network is None:
-            return learn_linear(lessons, feature=kind, before=context, after=context)
-        return learn_network(lessons, feature=kind, options=network)
+            return learn_linear_map(lessons, feature=kind, before=context, after=context)
+        return learn_network_map(lessons, feature=kind, options=network)
 
-    def score(self, name: str, kind: str, drive: Drive, test: tuple, talker: object) -> Scores:
-        real = [Real.of(one, talker.model) for one in test]
+    def score(self, name: str, kind: str, drive: AudioMap, test: tuple, talker: object) -> Scores:
+        real = [ReferenceUtterance.of(one, talker.model) for one in test]
         made = [drive.parameters(self.of(kind)[one.name]) for one in test]
-        one = scored(name, [(talker.model, real, made)], Thresholds.of(real))
+        one = score_splits(name, [(talker.model, real, made)], Thresholds.of(real))
         print(
             f"| {one.method} | {one['r_opening']:.3f} | {one['r_width']:.3f} | {one['rmse_z']:.3f} "
             f"| {one['dtw_cost']:.3f} | {one['range_ratio']:.2f} | {one['closure']:.2f} | {one['false_closure']:.2f} |",
@@ -116,7 +124,7 @@ class Bench:
         )
         return one
 
-    def methods(self) -> list[tuple[str, str, NetworkOptions | None, int]]:
+    def methods(self) -> list[tuple[str, str, NetworkMapOptions | None, int]]:
         found: list = [(f"linear, {kind}", kind, None, 0) for kind in (*PLAIN, "mfcc+level", "lsf+level", "mfcc+lsf")]
         found += [(f"linear, {kind}, 5 frames either side", kind, None, 5) for kind in ("mfcc", "mfcc+lsf")]
         plain = replace(NETWORK, n_hidden=10, articulation=0.0)
@@ -151,7 +159,7 @@ class Bench:
             self.score(name, kind, drive, self.test, talker)
         self.made_as_loud(drive, talker)
 
-    def made_as_loud(self, drive: Drive, talker: object) -> None:
+    def made_as_loud(self, drive: AudioMap, talker: object) -> None:
         """Every utterance made as loud as all together, as recordings of others are."""
         learnt = np.concatenate([self.of("level")[one.name] for one in self.train])
         drive = replace(drive, loudness=speech_level(learnt))
@@ -160,14 +168,16 @@ class Bench:
         for one in self.test:
             sound = read_sound(one.video, FEATURE_RATE)
             gain = drive.gain_for(speech_level(self.of("level")[one.name]))
-            louder[one.name] = heard_in(one, Waveform(np.clip(gain * sound.samples, -1, 1), FEATURE_RATE), FEATURE)
+            louder[one.name] = utterance_features(
+                one, Waveform(np.clip(gain * sound.samples, -1, 1), FEATURE_RATE), FEATURE
+            )
         self.heard[FEATURE] = louder
         self.score("the same, each utterance made as loud as the talker", FEATURE, drive, self.test, talker)
         self.heard[FEATURE] = kept
 
     def choose(self) -> None:
         """Every method by three-fold cross-validation on the training utterances; means of the folds."""
-        parts = folds(self.train, n_folds=3, seed=0)
+        parts = split_into_folds(self.train, n_folds=3, seed=0)
         talkers = [learn_talker(learn, metadata=LEARNT_FOR_EVALUATION) for learn, _ in parts]
         rows = []
         for name, kind, network, context in self.methods():

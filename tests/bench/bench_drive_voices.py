@@ -12,9 +12,9 @@ import numpy as np
 from sentences import sentences
 
 from corpus_tools.evaluation import measures
-from tts2face.exemplar.synthesis import speech_trajectory, visual_voice
+from tts2face.exemplar.synthesis import build_exemplar_model, speech_trajectory
 from tts2face.models.talker import Talker, load_talker
-from tts2face.synthesis.audio_input import driven
+from tts2face.synthesis.audio_input import map_audio_to_motion
 from tts2face.types import Speech, frame_count
 from tts2face.voice.engine import load_voice
 
@@ -31,21 +31,21 @@ def main() -> None:
         said = [voice.speak(text, rate=1.0, volume=1.0, seed=0) for text in sentences(options.sentences)]
         for drive in ("linear", "network"):
             for is_matched in (False, True):
-                kept = talker.drives[drive]
+                kept = talker.audio_maps[drive]
                 used = kept if is_matched else replace(kept, loudness=float("nan"))
                 figures = " | ".join(f"{value:.3f}" for value in compared(said, talker, used))
                 print(f"| {name} | {drive} | {'matched' if is_matched else 'as it is'} | {figures} |", flush=True)
 
 
 def compared(said: list[Speech], talker: Talker, drive: object) -> tuple[float, float, float]:
-    known = visual_voice(talker)
+    known = build_exemplar_model(talker)
     exemplars, heard = [], []
     with tempfile.TemporaryDirectory() as folder:
         for speech in said:
             path = written(Path(folder) / "said.wav", speech)
             n_frames = frame_count(speech.waveform.duration, talker.fps)
             exemplars.append(speech_trajectory(speech.phones, known, fps=talker.fps, n_frames=n_frames).values)
-            heard.append(driven(path, drive, talker, talker.fps)[1].values[:n_frames])
+            heard.append(map_audio_to_motion(path, drive, talker, talker.fps)[1].values[:n_frames])
     n = [min(len(a), len(b)) for a, b in zip(exemplars, heard, strict=True)]
     shapes = [
         talker.model.shapes(np.concatenate([one[:k] for one, k in zip(ways, n, strict=True)]))

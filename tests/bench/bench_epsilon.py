@@ -11,16 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.build_palette import ESTIMATORS, Recorded, basis_of, estimator_of
-from corpus_tools.decomposition.blend_weights import approximation_error, averaged
-from corpus_tools.decomposition.capture import Captured, at_gesture_rate
-from corpus_tools.decomposition.decompose import as_counted
-from corpus_tools.decomposition.livelink import captured_livelink
-from corpus_tools.decomposition.video import captured_video
-from corpus_tools.dense.video_landmarks import videos_of
-from corpus_tools.recordings.corpus_video import Eyes
-from corpus_tools.run_options import Effort
-from corpus_tools.training.pose_correction import pose_leak
+from corpus_tools.build_palette import ESTIMATORS, StyleSource, build_basis, build_estimator
+from corpus_tools.decomposition.blend_weights import approximation_error, moving_average
+from corpus_tools.decomposition.capture import FaceRecording, resample_to_gesture_rate
+from corpus_tools.decomposition.decompose import weight_displacements
+from corpus_tools.decomposition.livelink import read_livelink_recording
+from corpus_tools.decomposition.video import read_video_recording
+from corpus_tools.dense.video_landmarks import find_videos
+from corpus_tools.recordings.corpus_video import CachedTracker
+from corpus_tools.run_options import RunOptions
+from corpus_tools.training.pose_correction import fit_pose_correction
 from tts2face.face.landmark_fit import N_SKIN
 from tts2face.models.face_file import load_face
 from tts2face.models.palette import GESTURE_FPS
@@ -29,17 +29,17 @@ from tts2face.video.landmark_models import find_bundle
 EPSILONS = (0.0, 0.1, 0.25, 0.5, 1.0)
 
 
-def report(name: str, captured: list[Captured]) -> None:
-    face, leak = load_face("head"), pose_leak(captured)
-    basis = basis_of(Recorded(recordings=Path()), captured, face)
-    slow = [averaged(at_gesture_rate(leak.removed(one)).landmarks - basis.rest) for one in captured]
-    counted, expressions = as_counted(np.concatenate(slow)), as_counted(basis.expressions)
+def report(name: str, captured: list[FaceRecording]) -> None:
+    face, leak = load_face("head"), fit_pose_correction(captured)
+    basis = build_basis(StyleSource(recordings=Path()), captured, face)
+    slow = [moving_average(resample_to_gesture_rate(leak.removed(one)).landmarks - basis.rest) for one in captured]
+    counted, expressions = weight_displacements(np.concatenate(slow)), weight_displacements(basis.expressions)
     print(f"\n{name}: {len(counted)} frames, {root_mean_square(counted):.3f} mm from rest")
     print("| estimator | epsilon | error, mm | beyond 0 to 1 | mean size | spread in a recording | speed, 1/s |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
     for estimator in ESTIMATORS:
         for epsilon in EPSILONS:
-            weights = estimator_of(estimator, basis, epsilon).weights(counted)
+            weights = build_estimator(estimator, basis, epsilon).weights(counted)
             error = approximation_error(counted[:, :N_SKIN], expressions[:, :N_SKIN], weights).mean()
             beyond = np.mean((weights < -1e-9) | (weights > 1 + 1e-9))
             parts = np.split(weights, np.cumsum([len(one) for one in slow])[:-1])
@@ -58,10 +58,10 @@ def main() -> None:
     parser.add_argument("recordings", type=Path)
     parser.add_argument("--cache", type=Path)
     options = parser.parse_args()
-    eyes = Eyes(Effort(options.cache).folder(), find_bundle(None))
-    report("GRID s1", [captured_video(video, eyes) for video in videos_of(options.recordings / "grid_s1")])
+    eyes = CachedTracker(RunOptions(options.cache).folder(), find_bundle(None))
+    report("GRID s1", [read_video_recording(video, eyes) for video in find_videos(options.recordings / "grid_s1")])
     take = options.recordings / "livelink" / "testset_arkit61_60fps.csv"
-    report("Live Link Face", [captured_livelink(take, load_face("head"))])
+    report("Live Link Face", [read_livelink_recording(take, load_face("head"))])
 
 
 if __name__ == "__main__":

@@ -13,8 +13,8 @@ import numpy as np
 
 from corpus_tools.gesture_study.clips import replace_style, select_recordings
 from corpus_tools.gesture_study.measures import split_recordings
-from tts2face.gesture.field import Field, FieldState, begun, continued
-from tts2face.gesture.gesture_stream import Fields
+from tts2face.gesture.field import Field, FieldState, initial_state, sample_field
+from tts2face.gesture.gesture_stream import GestureFields
 from tts2face.models.palette import GESTURE_FPS, Palette, Style, load_palette
 
 SECONDS = 120
@@ -49,23 +49,23 @@ def spoken(style: Style) -> np.ndarray:
 
 
 def frame_us(made: Field, start: FieldState, heard: np.ndarray) -> float:
-    continued(made, start, heard[:3], np.full(3, 0.5))  # compile
+    sample_field(made, start, heard[:3], np.full(3, 0.5))  # compile
     times = []
     for seed in range(TRIES):
         chances = np.random.default_rng(seed).random(len(heard))
         began = time.process_time()
-        continued(made, start, heard, chances)
+        sample_field(made, start, heard, chances)
         times.append(time.process_time() - began)
     return min(times) / len(heard) * 1e6
 
 
 def timed(palette: Palette, name: str, heard: np.ndarray) -> Timed:
-    fields, frames, made_s = Fields(palette), {}, {}
+    fields, frames, made_s = GestureFields(palette), {}, {}
     for feature in fields.features:
         began = time.process_time()
         made = fields.of(name, feature)
         made_s[feature] = time.process_time() - began
-        frames[feature] = frame_us(made, begun(made, 0.5), heard)
+        frames[feature] = frame_us(made, initial_state(made, 0.5), heard)
     return Timed(frames, made_s)
 
 

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.decomposition.basis_expressions import carried_basis
-from corpus_tools.decomposition.blend_weights import averaged, least_squares
-from corpus_tools.decomposition.capture import at_gesture_rate, resampled
+from corpus_tools.decomposition.basis_expressions import transfer_basis
+from corpus_tools.decomposition.blend_weights import build_least_squares_estimator, moving_average
+from corpus_tools.decomposition.capture import resample, resample_to_gesture_rate
 from corpus_tools.decomposition.face_motion import rest_landmarks
-from corpus_tools.decomposition.livelink import captured_livelink
+from corpus_tools.decomposition.livelink import read_livelink_recording
 from corpus_tools.decomposition.marker_set import read_marker_set
-from corpus_tools.decomposition.markers import captured_markers
+from corpus_tools.decomposition.markers import read_marker_recording
 from tests.corpus_tools.decomposition.made_markers import FPS, SIZE, made_take, write_c3d
 from tts2face.face.expressions import expression_landmarks
 from tts2face.face.landmark_fit import N_SKIN
@@ -40,8 +40,8 @@ def main() -> None:
     parser.add_argument("--noise", type=float, default=0.0, help="mm, standard deviation of each coordinate")
     options = parser.parse_args()
     face, worn = load_face("head"), read_marker_set()
-    take = captured_livelink(options.capture, face)
-    landmarks, head = (resampled(values, take.fps, FPS) for values in (take.landmarks, take.head))
+    take = read_livelink_recording(options.capture, face)
+    landmarks, head = (resample(values, take.fps, FPS) for values in (take.landmarks, take.head))
     made = made_take(landmarks, head, face, worn)
     own = rest_landmarks(face)
     with tempfile.TemporaryDirectory() as folder:
@@ -49,8 +49,8 @@ def main() -> None:
         path = write_c3d(Path(folder) / "take.c3d", made.names, made.points + noise)
         still = made_take(np.repeat(own[None], 5, axis=0), np.zeros((5, 6)), face, worn)
         rest = write_c3d(Path(folder) / "rest.c3d", still.names, still.points)
-        found = at_gesture_rate(captured_markers(path, face, worn, neutral=rest))
-    truth = resampled(made.landmarks, FPS, 30.0)
+        found = resample_to_gesture_rate(read_marker_recording(path, face, worn, neutral=rest))
+    truth = resample(made.landmarks, FPS, 30.0)
     moved, wanted = found.landmarks[:, :N_SKIN] - found.landmarks.mean(axis=0)[:N_SKIN], truth - truth.mean(axis=0)
     away = np.square(moved - wanted[:, :N_SKIN]).sum(axis=2)
     off, worn_off = np.sqrt(away.mean()), np.sqrt(away[:, list(worn.landmarks.values())].mean())
@@ -60,13 +60,13 @@ def main() -> None:
         far = [np.linalg.norm(places[:, a] - places[:, b], axis=1) for places in (found.landmarks, truth)]
         slope = np.polyfit(far[1], far[0], 1)[0]
         print(f"{name}: r {np.corrcoef(far)[0, 1]:.3f}, slope {slope:.2f}, spread {far[1].std():.2f} mm")
-    turned = resampled(head, FPS, 30.0)[:, :3]
+    turned = resample(head, FPS, 30.0)[:, :3]
     angles = found.head[:, :3] - found.head[:, :3].mean(axis=0) - turned + turned.mean(axis=0)
     print(f"head: {np.degrees(np.abs(angles)).mean():.2f} degrees, at most {np.degrees(np.abs(angles)).max():.2f}")
-    basis = carried_basis(expression_landmarks(face), own, own * SIZE)
-    fitted = least_squares(basis.expressions[:, :N_SKIN], 0.25)
-    seen = fitted.weights(averaged((found.landmarks - found.rest)[:, :N_SKIN]))
-    real = fitted.weights(averaged((truth - own * SIZE)[:, :N_SKIN]))
+    basis = transfer_basis(expression_landmarks(face), own, own * SIZE)
+    fitted = build_least_squares_estimator(basis.expressions[:, :N_SKIN], 0.25)
+    seen = fitted.weights(moving_average((found.landmarks - found.rest)[:, :N_SKIN]))
+    real = fitted.weights(moving_average((truth - own * SIZE)[:, :N_SKIN]))
     for at, name in enumerate(EXPRESSIONS):
         both = seen[:, at], real[:, at]
         print(f"{name}: r {np.corrcoef(*both)[0, 1]:.3f}, mean {both[0].mean():.2f} for {both[1].mean():.2f}")

@@ -13,21 +13,21 @@ import numpy as np
 from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT
 from tts2face.render.encode import write_clips
 from tts2face.render.picture import Picture
-from tts2face.retargeting.performer import aperture, lip_gaps
+from tts2face.retargeting.performer import eye_aperture, lip_gaps
 from tts2face.session import Session
-from tts2face.synthesis.performance import clips_of, motion_of_take
+from tts2face.synthesis.performance import retarget_take, take_clips
 from tts2face.video.blendshapes import BlendshapeReader
-from tts2face.video.media import media_facts, read_pictures, read_sound
+from tts2face.video.media import read_frames, read_media_info, read_sound
 from tts2face.video.pose import head_angles, remove_pose
-from tts2face.video.streaming_tracker import FilmReader
+from tts2face.video.streaming_tracker import StreamingTracker
 from tts2face.video.take import Take, read_take
 from tts2face.video.track import FaceTracker
 
 
 def seen_again(path: Path, tracker: FaceTracker) -> tuple[np.ndarray, np.ndarray]:
     """Landmarks in mm and head angles in degrees against their middle, of a clip."""
-    fps = media_facts(path).fps
-    posed = remove_pose(tracker.track(lambda: (picture.pixels for picture in read_pictures(path)), fps).points, fps)
+    fps = read_media_info(path).fps
+    posed = remove_pose(tracker.track(lambda: (picture.pixels for picture in read_frames(path)), fps).points, fps)
     angles = np.degrees(head_angles(posed.rotations))
     return posed.landmarks, angles - np.median(angles, axis=0)
 
@@ -37,7 +37,7 @@ def compared(take: Take, shown: tuple[np.ndarray, np.ndarray]) -> list[float]:
 
     def curves(landmarks: np.ndarray) -> list[np.ndarray]:
         width = np.linalg.norm(landmarks[:, MOUTH_CORNER_LEFT] - landmarks[:, MOUTH_CORNER_RIGHT], axis=1)
-        return [lip_gaps(landmarks)[:, 5], width, aperture(landmarks, "Left")]
+        return [lip_gaps(landmarks)[:, 5], width, eye_aperture(landmarks, "Left")]
 
     source, again = curves(take.landmarks), curves(shown[0])
     rates = [float(np.corrcoef(a, b)[0, 1]) for a, b in zip(source, again, strict=True)]
@@ -54,7 +54,7 @@ def main() -> None:
     videos = [videos[i] for i in np.linspace(0, len(videos) - 1, options.takes).astype(int)]
     tracker, reader = FaceTracker(), BlendshapeReader()
     began = time.perf_counter()
-    film = FilmReader()
+    film = StreamingTracker()
     takes = [read_take(video, film, reader) for video in videos]
     read_s, film_s = time.perf_counter() - began, sum(len(take.landmarks) / take.fps for take in takes)
     print(f"watching {film_s:.0f} s of film: {film_s / read_s:.1f} x real time")
@@ -66,7 +66,7 @@ def main() -> None:
             with tempfile.TemporaryDirectory() as folder:
                 out = Path(folder) / "out.mp4"
                 began = time.perf_counter()
-                clips = clips_of(motion_of_take(take, session.face), read_sound(video, 48_000))
+                clips = take_clips(retarget_take(take, session.face), read_sound(video, 48_000))
                 write_clips(out, clips, session.renderer(Picture()))
                 drawn_s += time.perf_counter() - began
                 rows.append(compared(take, seen_again(out, tracker)))

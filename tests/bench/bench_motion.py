@@ -14,9 +14,15 @@ import numpy as np
 
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar.options import THEOBALD_2007
-from tts2face.exemplar.synthesis import DEFAULT_OPTIONS, VisualVoice, select_tokens, speech_trajectory, visual_voice
+from tts2face.exemplar.synthesis import (
+    DEFAULT_OPTIONS,
+    ExemplarModel,
+    build_exemplar_model,
+    select_tokens,
+    speech_trajectory,
+)
 from tts2face.models.talker import Talker, Utterance, read_talker
-from tts2face.speech.forced_alignment import increasing
+from tts2face.speech.forced_alignment import enforce_increasing
 from tts2face.types import frame_count
 
 FPS = 30.0
@@ -51,8 +57,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("talker", nargs="?", type=Path, default=STARTER)
     talker = read_talker(parser.parse_args().talker)
-    voice = visual_voice(talker)
-    print(f"{len(voice.tokens)} tokens; made ready in {least_time(lambda: visual_voice(talker)) * 1000:.0f} ms\n")
+    voice = build_exemplar_model(talker)
+    print(
+        f"{len(voice.tokens)} tokens; made ready in {least_time(lambda: build_exemplar_model(talker)) * 1000:.0f} ms\n"
+    )
     print("| speech | phones | time | real-time factor | plain T07 |\n| --- | --- | --- | --- | --- |")
     for seconds in (1, 10, 60, 600):
         phones = text(talker, seconds)
@@ -64,12 +72,12 @@ def main() -> None:
     print("\n| corpus | tokens | search, each phone |\n| --- | --- | --- |")
     phones = text(talker, 60)
     for copies in (0.125, 0.5, 1, 4, 10, 100):
-        larger = visual_voice(_of_size(talker, copies))
+        larger = build_exemplar_model(_of_size(talker, copies))
         spent = least_time(lambda larger=larger: select_tokens(phones, larger, DEFAULT_OPTIONS))
         print(f"| x {copies:g} | {len(larger.tokens)} | {spent / len(phones) * 1e6:.1f} us |")
 
 
-def _motion_time(phones: PhoneSequence, voice: VisualVoice, options: object) -> float:
+def _motion_time(phones: PhoneSequence, voice: ExemplarModel, options: object) -> float:
     n_frames = frame_count(phones.end, FPS)
     return least_time(lambda: speech_trajectory(phones, voice, fps=FPS, n_frames=n_frames, options=options))
 
@@ -85,7 +93,7 @@ def _of_size(talker: Talker, copies: float) -> Talker:
 def _jittered(spoken: Utterance, generator: np.random.Generator) -> Utterance:
     edges = spoken.phones.edges.copy()
     edges[1:-1] += generator.normal(0, 0.003, len(edges) - 2)
-    return replace(spoken, phones=PhoneSequence(spoken.phones.phones, increasing(edges)))
+    return replace(spoken, phones=PhoneSequence(spoken.phones.phones, enforce_increasing(edges)))
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ from tts2face.models.landmarks import (
     UPPER_LIP_INNER_MID,
 )
 from tts2face.models.talker import Talker, Utterance, read_talker
-from tts2face.retargeting.to_face import BILABIALS, retargeter
+from tts2face.retargeting.to_face import BILABIALS, build_retargeter
 from tts2face.types import Trajectory
 
 Floats = NDArray[np.float64]
@@ -68,7 +68,7 @@ def bilabial_frames(utterance: Utterance, gaps: Floats, fps: float) -> list[int]
 def report(talker: Talker, face: Face, n_utterances: int) -> None:
     """Print the figures."""
     began = time.perf_counter()
-    ready = retargeter(talker, face)
+    ready = build_retargeter(talker, face)
     prepared = time.perf_counter() - began
     chosen = talker.utterances[:: max(1, len(talker.utterances) // n_utterances)][:n_utterances]
     ready.retarget(talker.speech_trajectory(chosen[0]))

@@ -68,7 +68,7 @@ def main() -> None:
         spent, length = spent + time.perf_counter() - began, length + speech.waveform.duration
         (tokens,) = voice._parts(text)
         letters = "".join(token.letters + " " * token.has_space for token in tokens).strip()
-        shifted = sounding(voice._predicted(tokens, letters, 1.0, speech.waveform)[0])
+        shifted = sounding(voice._predict_phones(tokens, letters, 1.0, speech.waveform)[0])
         ways = {
             "own": PhoneSequence(shifted.phones, shifted.edges + neural.LATE_S),
             "own less 45 ms": shifted,

@@ -12,22 +12,22 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.decomposition.basis_expressions import carried_basis
+from corpus_tools.decomposition.basis_expressions import transfer_basis
 from corpus_tools.decomposition.blend_weights import (
     N_AVERAGED,
     N_NEAREST,
     N_SAMPLES,
     Estimator,
     approximation_error,
-    averaged,
-    least_squares,
-    nearest_samples,
+    build_least_squares_estimator,
+    build_nearest_samples_estimator,
+    moving_average,
 )
-from corpus_tools.decomposition.capture import at_gesture_rate, resampled
+from corpus_tools.decomposition.capture import resample, resample_to_gesture_rate
 from corpus_tools.decomposition.face_motion import rest_landmarks
-from corpus_tools.decomposition.livelink import captured_livelink
+from corpus_tools.decomposition.livelink import read_livelink_recording
 from corpus_tools.recordings.observe import observe
-from corpus_tools.training.pose_correction import without_leak
+from corpus_tools.training.pose_correction import correct_pose
 from tts2face.face.expressions import expression_landmarks
 from tts2face.face.landmark_fit import N_SKIN
 from tts2face.models.face_file import load_face
@@ -48,7 +48,7 @@ class Faces:
     def __init__(self, name: str, seen: list[np.ndarray], basis: np.ndarray) -> None:
         self.name, self.basis = name, basis[:, :N_SKIN]
         self.raw = np.concatenate([one[::EVERY, :N_SKIN] for one in seen])
-        self.slow = np.concatenate([averaged(one[:, :N_SKIN])[::EVERY] for one in seen])
+        self.slow = np.concatenate([moving_average(one[:, :N_SKIN])[::EVERY] for one in seen])
 
     def error(self, estimator: Estimator) -> float:
         return float(approximation_error(self.slow, self.basis, estimator.weights(self.slow)).mean())
@@ -66,7 +66,11 @@ class Faces:
         return float(
             np.mean(
                 [
-                    self.error(nearest_samples(self.basis, draw, slack=slack, n_samples=n_samples, n_nearest=n_nearest))
+                    self.error(
+                        build_nearest_samples_estimator(
+                            self.basis, draw, slack=slack, n_samples=n_samples, n_nearest=n_nearest
+                        )
+                    )
                     for draw in draws
                 ]
             )
@@ -78,8 +82,8 @@ class Faces:
         print("| epsilon | least squares | paper, 1000 and 60 | weights by least squares | by the paper's |")
         print("| --- | --- | --- | --- | --- |")
         for slack in SLACKS:
-            exact = least_squares(self.basis, slack)
-            paper = nearest_samples(self.basis, np.random.default_rng(0), slack=slack)
+            exact = build_least_squares_estimator(self.basis, slack)
+            paper = build_nearest_samples_estimator(self.basis, np.random.default_rng(0), slack=slack)
             means = [
                 ", ".join(f"{value:.2f}" for value in one.weights(self.slow).mean(axis=0)) for one in (exact, paper)
             ]
@@ -100,11 +104,11 @@ class Faces:
 
 def ends_of(seen: np.ndarray, n_frames: int = 60) -> None:
     """Print how far means at the beginning of recordings cut short are from those of the whole."""
-    whole, away = averaged(seen), []
+    whole, away = moving_average(seen), []
     for first in range(25, len(seen) - n_frames, 5):
         cut = seen[first : first + n_frames]
         guesses = (
-            averaged(cut)[:AFFECTED],
+            moving_average(cut)[:AFFECTED],
             np.stack([cut[: 2 * t + 1].mean(axis=0) for t in range(AFFECTED)]),
             np.stack([cut[: t + AFFECTED].mean(axis=0) for t in range(AFFECTED)]),
         )
@@ -128,7 +132,7 @@ def drawn(panels: list[tuple[Faces, dict[int, list[float]]]]) -> str:
 
 
 def _panel(faces: Faces, errors: dict[int, list[float]], left: int) -> list[str]:
-    bound = faces.error(least_squares(faces.basis, DRAWN_SLACK))
+    bound = faces.error(build_least_squares_estimator(faces.basis, DRAWN_SLACK))
     top = np.ceil(np.nanmax([max(row) for row in (np.nan_to_num(one) for one in errors.values())]) * 2) / 2
 
     def x(n: int) -> float:
@@ -172,11 +176,13 @@ def sources(recordings: Path, observations: Path | None) -> tuple[Faces, Faces, 
     sizes = np.sqrt(np.square(expressions[:, :N_SKIN]).sum(axis=2).mean(axis=1))
     print("expressions, mm: " + ", ".join(f"{name} {size:.2f}" for name, size in zip(EXPRESSIONS, sizes, strict=True)))
     kept = pickle.loads(observations.read_bytes()).kept if observations else observe(recordings / "grid_s1").kept
-    kept = without_leak(kept)
+    kept = correct_pose(kept)
     rest = np.median(np.concatenate([one.landmarks[::5] for one in kept]), axis=0)
-    seen = [resampled(one.landmarks - rest, one.fps, GESTURE_FPS) for one in kept]
-    grid = Faces("GRID s1, neutral sentences", seen, carried_basis(expressions, own, rest).expressions)
-    take = at_gesture_rate(captured_livelink(recordings / "livelink" / "testset_arkit61_60fps.csv", face))
+    seen = [resample(one.landmarks - rest, one.fps, GESTURE_FPS) for one in kept]
+    grid = Faces("GRID s1, neutral sentences", seen, transfer_basis(expressions, own, rest).expressions)
+    take = resample_to_gesture_rate(
+        read_livelink_recording(recordings / "livelink" / "testset_arkit61_60fps.csv", face)
+    )
     moved = take.landmarks[:, :N_SKIN] - own[:N_SKIN]
     return grid, Faces("Live Link Face, 20 s of speech", [moved], expressions), moved
 

@@ -10,7 +10,12 @@ from scipy.optimize import lsq_linear
 
 from lexicon.errors import DataError, InputError
 from tts2face.cloning.lip_gaps import LOWER, UPPER
-from tts2face.cloning.parameter_transfer import append_missing, cloning, face_size, largest_parameters
+from tts2face.cloning.parameter_transfer import (
+    append_missing_components,
+    build_parameter_transfer,
+    face_size,
+    parameter_limits,
+)
 from tts2face.models.landmarks import (
     EYE_OUTER_LEFT,
     EYE_OUTER_RIGHT,
@@ -76,21 +81,21 @@ def gaps_of(model: ShapeModel, parameters: np.ndarray) -> np.ndarray:
 def test_a_talker_cloned_onto_itself_moves_as_before(seed: int) -> None:
     model = model_of(seed)
     values = motion_of(model, spreads=2.9)
-    assert cloning(model, model).parameters(values) == pytest.approx(values, abs=1e-5)
+    assert build_parameter_transfer(model, model).parameters(values) == pytest.approx(values, abs=1e-5)
 
 
 @some
 @given(seeds)
 def test_equal_bases_have_the_unit_matrix_as_relation(seed: int) -> None:
     model = model_of(seed)
-    assert cloning(model, model).relation == pytest.approx(np.eye(len(model.spread)), abs=1e-6)
+    assert build_parameter_transfer(model, model).relation == pytest.approx(np.eye(len(model.spread)), abs=1e-6)
 
 
 @some
 @given(seeds, st.floats(0.5, 2.0))
 def test_rest_becomes_rest_whatever_the_gain_and_the_size(seed: int, gain: float) -> None:
     source, target = model_of(seed), model_of(seed + 1, 3, 4, size=1.7)
-    mapped = cloning(source, target, gain=gain).parameters(source.rest[None])
+    mapped = build_parameter_transfer(source, target, gain=gain).parameters(source.rest[None])
     assert mapped[0] == pytest.approx(target.rest, abs=1e-5)
 
 
@@ -101,10 +106,10 @@ def test_signs_look_after_themselves(seed: int, signs: list[float]) -> None:
     flips = np.array(signs, np.float32)
     flipped = replace(source, basis=source.basis * flips[:, None, None], rest=source.rest * flips)
     values = motion_of(source)
-    expected = cloning(source, target).parameters(values)
-    assert cloning(flipped, target).parameters(values * flips) == pytest.approx(expected, abs=1e-5)
+    expected = build_parameter_transfer(source, target).parameters(values)
+    assert build_parameter_transfer(flipped, target).parameters(values * flips) == pytest.approx(expected, abs=1e-5)
     turned = replace(target, basis=target.basis * flips[:, None, None], rest=target.rest * flips)
-    assert cloning(source, turned).parameters(values) == pytest.approx(expected * flips, abs=1e-5)
+    assert build_parameter_transfer(source, turned).parameters(values) == pytest.approx(expected * flips, abs=1e-5)
 
 
 @some
@@ -117,14 +122,14 @@ def test_eq_5_is_least_squares_on_the_landmarks(seed: int) -> None:
     wanted = size * (source.shapes(values) - source.shapes(source.rest[None])).reshape(len(values), -1)
     design = target.basis.reshape(len(target.basis), -1).T.astype(np.float64)
     known = np.linalg.lstsq(design, wanted.T.astype(np.float64), rcond=None)[0].T + target.rest
-    assert cloning(source, target).unlimited(values) == pytest.approx(known, abs=1e-3)
+    assert build_parameter_transfer(source, target).clone_unlimited(values) == pytest.approx(known, abs=1e-3)
 
 
 def test_limits_are_least_squares_within_limits() -> None:
     """An orthonormal basis: the nearest shape within limits is eq. 5, clipped."""
     source, target = model_of(5), replace(model_of(6), spread=np.full(6, 0.3, np.float32), rest=np.zeros(6, np.float32))
     values = motion_of(source, spreads=3)
-    mapped = cloning(source, target).parameters(values)
+    mapped = build_parameter_transfer(source, target).parameters(values)
     design = target.basis.reshape(6, -1).T.astype(np.float64)
     wanted = (values - source.rest) @ source.basis.reshape(6, -1).astype(np.float64)
     assert (np.abs(mapped) > 0.899).any()
@@ -137,7 +142,7 @@ def test_limits_are_least_squares_within_limits() -> None:
 def test_no_parameter_leaves_three_spreads(seed: int, gain: float, narrow: float) -> None:
     source, target = model_of(seed), model_of(seed + 1)
     target = replace(target, spread=target.spread * np.float32(narrow), rest=target.rest * np.float32(narrow))
-    mapped = cloning(source, target, gain=gain).parameters(motion_of(source, spreads=4))
+    mapped = build_parameter_transfer(source, target, gain=gain).parameters(motion_of(source, spreads=4))
     assert (np.abs(mapped.astype(np.float64)) <= 3.0 * target.spread.astype(np.float64)).all()
 
 
@@ -146,8 +151,10 @@ def test_no_parameter_leaves_three_spreads(seed: int, gain: float, narrow: float
 def test_the_gain_scales_the_displacement_from_rest(seed: int, gain: float) -> None:
     source, target = model_of(seed), model_of(seed + 1)
     values = motion_of(source)
-    plain = cloning(source, target).unlimited(values) - target.rest
-    assert cloning(source, target, gain=gain).unlimited(values) - target.rest == pytest.approx(gain * plain, abs=1e-9)
+    plain = build_parameter_transfer(source, target).clone_unlimited(values) - target.rest
+    assert build_parameter_transfer(source, target, gain=gain).clone_unlimited(values) - target.rest == pytest.approx(
+        gain * plain, abs=1e-9
+    )
 
 
 def test_two_modes_in_closed_form() -> None:
@@ -158,7 +165,9 @@ def test_two_modes_in_closed_form() -> None:
     basis = np.tensordot(turn, source.basis, axes=1).astype(np.float32)
     rest = np.array([1.0, -2.0, 0.5], np.float32)
     target = ShapeModel(2 * source.mean, basis, np.full(3, 100, np.float32), 2, rest)
-    moved = cloning(source, target, gain=1.5).parameters(source.rest + np.array([[4.0, 0.0, 0.0], [0.0, 4.0, 1.0]]))
+    moved = build_parameter_transfer(source, target, gain=1.5).parameters(
+        source.rest + np.array([[4.0, 0.0, 0.0], [0.0, 4.0, 1.0]])
+    )
     expected = rest + 12 * np.array([[np.cos(np.pi / 6), -0.5, 0.0], [0.5, np.cos(np.pi / 6), 0.25]])
     assert moved == pytest.approx(expected, abs=1e-4)
 
@@ -168,11 +177,15 @@ def test_there_and_back_again_loses_only_what_the_target_lacks() -> None:
     wide = np.full(6, 1000, np.float32)
     source, target = replace(source, spread=wide), replace(target, spread=wide)
     values = motion_of(model_of(8))
-    lost = cloning(target, source).parameters(cloning(source, target).parameters(values))
+    lost = build_parameter_transfer(target, source).parameters(
+        build_parameter_transfer(source, target).parameters(values)
+    )
     seen = inner_product_map(source.basis.reshape(6, -1), target.basis.reshape(6, -1))
     assert lost - source.rest == pytest.approx((values - source.rest) @ seen.T @ seen, abs=1e-4)
-    whole = append_missing(source, target)
-    back = cloning(whole, source).parameters(cloning(source, whole).parameters(values))
+    whole = append_missing_components(source, target)
+    back = build_parameter_transfer(whole, source).parameters(
+        build_parameter_transfer(source, whole).parameters(values)
+    )
     assert back == pytest.approx(values, abs=1e-3)
 
 
@@ -180,7 +193,7 @@ def test_there_and_back_again_loses_only_what_the_target_lacks() -> None:
 @given(seeds, st.integers(0, 6))
 def test_appended_modes_keep_the_talker_file_s_invariants(seed: int, n: int) -> None:
     source, target = model_of(seed), model_of(seed + 1, 3, 3, size=1.2)
-    joined = append_missing(source, target, n)
+    joined = append_missing_components(source, target, n)
     flat = joined.basis.reshape(len(joined.basis), -1).astype(np.float64)
     assert flat @ flat.T == pytest.approx(np.eye(6 + n), abs=1e-6)
     assert not joined.basis[: joined.n_speech, ~MOUTH].any()
@@ -194,7 +207,7 @@ def test_appended_modes_keep_the_talker_file_s_invariants(seed: int, n: int) -> 
 
 def test_with_all_missing_components_the_target_spans_the_source() -> None:
     source, target = model_of(1), model_of(2, 3, 3)
-    joined = append_missing(source, target)
+    joined = append_missing_components(source, target)
     seen = inner_product_map(source.basis.reshape(6, -1), joined.basis.reshape(len(joined.basis), -1))
     assert (seen**2).sum(axis=0) == pytest.approx(np.ones(6), abs=1e-6)
 
@@ -203,7 +216,7 @@ def test_what_is_appended_first_moves_most() -> None:
     source, target = model_of(1), model_of(2, 3, 3, size=1.5)
     lost = []
     for n in range(7):
-        ready = cloning(source, append_missing(source, target, n))
+        ready = build_parameter_transfer(source, append_missing_components(source, target, n))
         lost.append(((source.spread**2) * (1.5**2 - (ready.relation**2).sum(axis=0))).sum())
     assert all(np.diff(lost) < 0)
     assert lost[-1] == pytest.approx(0, abs=1e-4)
@@ -213,8 +226,8 @@ def test_the_spread_of_an_appended_mode_is_the_source_s_about_its_rest() -> None
     """A source with one mode outside the target: what is missing is that mode, at the target's size."""
     target = model_of(3, 3, 2, size=2.0)
     own = model_of(4, 1, 1)
-    joined = append_missing(replace(own, spread=np.array([3.0, 0.01], np.float32), rest=np.array([4.0, 0], np.float32)),
-                            target)  # fmt: skip
+    own = replace(own, spread=np.array([3.0, 0.01], np.float32), rest=np.array([4.0, 0], np.float32))
+    joined = append_missing_components(own, target)
     unseen = inner_product_map(own.basis.reshape(2, -1), target.basis.reshape(5, -1))[:, 0]
     assert joined.spread[3] == pytest.approx(2 * 5 * np.sqrt(1 - unseen @ unseen), rel=1e-5)
     assert len(joined.spread) == 6
@@ -222,21 +235,21 @@ def test_the_spread_of_an_appended_mode_is_the_source_s_about_its_rest() -> None
 
 def test_nothing_is_missing_in_the_same_model() -> None:
     model = model_of(1)
-    assert np.array_equal(append_missing(model, model).basis, model.basis)
+    assert np.array_equal(append_missing_components(model, model).basis, model.basis)
     with pytest.raises(InputError, match="0 components of the source are missing in the target, not 1"):
-        append_missing(model, model, 1)
+        append_missing_components(model, model, 1)
 
 
 def test_frames_do_not_know_each_other() -> None:
     source, target = model_of(1), opening_model()
-    ready, values = cloning(source, target), motion_of(source, spreads=3)
+    ready, values = build_parameter_transfer(source, target), motion_of(source, spreads=3)
     assert np.array_equal(ready.parameters(values)[::-1], ready.parameters(values[::-1]))
     assert np.array_equal(ready.parameters(values)[4:5], ready.parameters(values[4:5]))
 
 
 def test_speech_becomes_speech_and_all_becomes_all() -> None:
     source, target = model_of(1, 4, 2), model_of(2, 3, 5)
-    ready, values = cloning(source, target), motion_of(source)
+    ready, values = build_parameter_transfer(source, target), motion_of(source)
     whole = ready.clone(Trajectory([f"shape{i}" for i in range(6)], values, 25.0))
     speech = ready.clone(Trajectory([f"shape{i}" for i in range(4)], values[:, :4], 25.0))
     assert (len(whole.channels), speech.channels, speech.fps) == (8, ("shape0", "shape1", "shape2"), 25.0)
@@ -246,22 +259,24 @@ def test_speech_becomes_speech_and_all_becomes_all() -> None:
 def test_what_does_not_fit_is_refused() -> None:
     source, target = model_of(1), model_of(2)
     with pytest.raises(InputError, match="gain must be 0 or more, not -1"):
-        cloning(source, target, gain=-1)
+        build_parameter_transfer(source, target, gain=-1)
     with pytest.raises(InputError, match="not nan"):
-        cloning(source, target, gain=float("nan"))
+        build_parameter_transfer(source, target, gain=float("nan"))
     with pytest.raises(InputError, match=r"channels \('jawOpen',\)... \(1\) are not the source's 4 speech"):
-        cloning(source, target).clone(Trajectory(["jawOpen"], [[0.0]], 25.0))
+        build_parameter_transfer(source, target).clone(Trajectory(["jawOpen"], [[0.0]], 25.0))
     with pytest.raises(InputError, match=r"\(5\) are not the source's 4 speech"):
-        cloning(source, target).clone(Trajectory([f"shape{i}" for i in range(5)], np.zeros((1, 5)), 25.0))
+        build_parameter_transfer(source, target).clone(
+            Trajectory([f"shape{i}" for i in range(5)], np.zeros((1, 5)), 25.0)
+        )
     few = replace(source, mean=source.mean[:68], basis=source.basis[:, :68])
     with pytest.raises(DataError, match="68 landmarks, not 478"):
-        cloning(few, target)
+        build_parameter_transfer(few, target)
     with pytest.raises(DataError, match="68 landmarks, not 478"):
-        append_missing(source, few)
+        append_missing_components(source, few)
     with pytest.raises(DataError, match="rests beyond 3 spreads in mode 2"):
-        cloning(source, replace(target, rest=np.array([0, 0, 9e9, 0, 0, 0], np.float32)))
+        build_parameter_transfer(source, replace(target, rest=np.array([0, 0, 9e9, 0, 0, 0], np.float32)))
     with pytest.raises(InputError, match="6 components of the source are missing in the target, not 13"):
-        append_missing(source, target, 13)
+        append_missing_components(source, target, 13)
 
 
 def test_a_real_talker_keeps_limits_and_lips_under_gain() -> None:
@@ -270,9 +285,9 @@ def test_a_real_talker_keeps_limits_and_lips_under_gain() -> None:
     own, kept = talker.model, [*range(10), *range(20, 25)]
     half = ShapeModel(own.mean, own.basis[kept], own.spread[kept], 10, own.rest[kept])
     values = np.concatenate([utterance.shape for utterance in talker.utterances[:10]])
-    ready = cloning(own, half, gain=1.5)
+    ready = build_parameter_transfer(own, half, gain=1.5)
     mapped = ready.parameters(values)
-    assert (np.abs(mapped) <= largest_parameters(half)).all()
+    assert (np.abs(mapped) <= parameter_limits(half)).all()
     assert gaps_of(half, mapped).min() > 0
     middle = [UPPER.index(UPPER_LIP_INNER_MID)]
     assert LOWER[middle[0]] == LOWER_LIP_INNER_MID

@@ -9,8 +9,8 @@ from scipy.optimize import minimize
 
 from lexicon.errors import DataError
 from tests.cloning.test_clone import gaps_of, opening_model, seeds, some
-from tts2face.cloning.lip_gaps import LEAST_GAP_MM, LOWER, nearest_allowed
-from tts2face.cloning.parameter_transfer import cloning
+from tts2face.cloning.lip_gaps import LEAST_GAP_MM, LOWER, nearest_valid_parameters
+from tts2face.cloning.parameter_transfer import build_parameter_transfer
 from tts2face.face.bounded_least_squares import bounded_least_squares
 
 
@@ -18,7 +18,7 @@ def test_crossing_lips_are_parted_and_no_more() -> None:
     """In closed form: a lower lip that would rise 2 mm stops where the lips are 0.01 mm apart."""
     model = opening_model()
     values = np.array([[-2 * np.sqrt(len(LOWER)), 5.0], [6.0, 1.0]], np.float32)
-    mapped = cloning(model, model).parameters(values)
+    mapped = build_parameter_transfer(model, model).parameters(values)
     assert gaps_of(model, mapped)[0] == pytest.approx(0.01, abs=1e-4)
     assert mapped[0, 1] == 5.0
     assert mapped[1] == pytest.approx(values[1], abs=1e-6)
@@ -28,7 +28,7 @@ def test_lips_that_overlap_at_rest_are_parted_there_too() -> None:
     """By 0.31 mm in closed form; other frames keep their displacement from there."""
     model = opening_model(gap=-0.3)
     parted = 0.31 * np.sqrt(len(LOWER))
-    mapped = cloning(model, model).parameters(np.array([[0, 0], [-9, 3], [4, 4]], np.float32))
+    mapped = build_parameter_transfer(model, model).parameters(np.array([[0, 0], [-9, 3], [4, 4]], np.float32))
     assert mapped == pytest.approx(np.array([[parted, 0], [parted, 3], [4, 4]]), abs=1e-4)
     assert gaps_of(model, mapped).min() == pytest.approx(0.01, abs=1e-4)
 
@@ -42,7 +42,7 @@ def test_lips_are_set_right_by_the_least_motion(seed: int) -> None:
     wanted, limits = rng.normal(size=(2, 5)) * 2, rng.uniform(0.5, 1.5, 5)
     most = rng.uniform(0.6, 1.5, (2, 3))
     sides, heights = gaps[:, :-1], gaps[:, -1]
-    found = nearest_allowed(wanted, limits, gaps, most)
+    found = nearest_valid_parameters(wanted, limits, gaps, most)
     reached = found @ sides.T + heights
     assert (reached > LEAST_GAP_MM - 1e-8).all()
     assert (reached < most + 1e-8).all()
@@ -59,7 +59,7 @@ def test_lips_are_set_right_by_the_least_motion(seed: int) -> None:
             options={"ftol": 1e-14, "maxiter": 500},
         )
         assert frame == pytest.approx(known.x, abs=1e-4)
-    free = nearest_allowed(wanted, np.full(5, 1e3), gaps, np.full((2, 3), 1e3))
+    free = nearest_valid_parameters(wanted, np.full(5, 1e3), gaps, np.full((2, 3), 1e3))
     forces = bounded_least_squares(
         sides @ sides.T, LEAST_GAP_MM - (wanted @ sides.T + heights), np.tile([0.0, 1e6], (3, 1))
     )
@@ -70,7 +70,9 @@ def test_lips_that_touch_on_the_source_touch_under_gain_and_open_lips_open_wide(
     """0.4 mm apart at rest; 0.8 mm, which is contact, stays 0.8 mm; 10 mm becomes 20 mm less the rest's 0.4."""
     model, per_mm = opening_model(), np.sqrt(len(LOWER))
     values = np.array([[0.4 * per_mm, 2.0], [9.6 * per_mm, 2.0]], np.float32)
-    mapped = cloning(model, replace(model, spread=np.full(2, 100, np.float32)), gain=2).parameters(values)
+    mapped = build_parameter_transfer(model, replace(model, spread=np.full(2, 100, np.float32)), gain=2).parameters(
+        values
+    )
     assert gaps_of(model, mapped)[:, 0] == pytest.approx([0.8, 19.6], abs=1e-3)
     assert mapped[:, 1] == pytest.approx([4.0, 4.0], abs=1e-5)
 
@@ -82,7 +84,7 @@ def test_frames_never_come_further_apart(seed: int) -> None:
     rng = np.random.default_rng(seed)
     model = opening_model()
     before = rng.normal(size=(30, 2)).astype(np.float32) * 25
-    mapped = cloning(model, model).parameters(before)
+    mapped = build_parameter_transfer(model, model).parameters(before)
     assert (
         np.linalg.norm(np.diff(mapped, axis=0), axis=1) <= np.linalg.norm(np.diff(before, axis=0), axis=1) + 1e-4
     ).all()
@@ -91,4 +93,4 @@ def test_frames_never_come_further_apart(seed: int) -> None:
 
 def test_lips_that_nothing_parts_are_refused() -> None:
     with pytest.raises(DataError, match="lips cannot be as they must within its limits"):
-        nearest_allowed(np.zeros((1, 1)), np.ones(1), np.array([[1.0, -2.0]]), np.full((1, 1), 9.0))
+        nearest_valid_parameters(np.zeros((1, 1)), np.ones(1), np.array([[1.0, -2.0]]), np.full((1, 1), 9.0))

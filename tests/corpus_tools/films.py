@@ -7,7 +7,7 @@ from pathlib import Path
 import av
 import numpy as np
 
-from tts2face.video.media import read_pictures, read_sound
+from tts2face.video.media import read_frames, read_sound
 
 
 def joined(sources: list[Path], out: Path, late_s: float = 0.0) -> list[tuple[float, float]]:
@@ -17,7 +17,7 @@ def joined(sources: list[Path], out: Path, late_s: float = 0.0) -> list[tuple[fl
     """
     spans, sounds, pictures = [], [], []
     for source in sources:
-        here = [picture.pixels for picture in read_pictures(source)]
+        here = [picture.pixels for picture in read_frames(source)]
         spans.append((len(pictures) / 25, (len(pictures) + len(here)) / 25))
         pictures += here
         sound = read_sound(source, 16_000).samples

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from corpus_tools.aam.block_pca import GrowingComponents
-from corpus_tools.aam.lighting import light_of
-from corpus_tools.aam.mesh import MOUTH_POINTS, face_triangles, inside, mouth_triangles, ring
-from corpus_tools.aam.procrustes import aligned, fitted, moved
-from corpus_tools.aam.reference_frame import barycentric, framed
-from corpus_tools.aam.source_videos import Filmed
-from corpus_tools.aam.train_appearance import changed_by_speech, picture_axes
-from corpus_tools.consent import consent_of
+from corpus_tools.aam.block_pca import IncrementalPca
+from corpus_tools.aam.lighting import fit_lighting
+from corpus_tools.aam.mesh import MOUTH_POINTS, face_ring, face_triangles, mouth_triangles, points_in_polygon
+from corpus_tools.aam.procrustes import align_shapes, apply_similarities, fit_similarities
+from corpus_tools.aam.reference_frame import barycentric_coordinates, build_reference_frame
+from corpus_tools.aam.source_videos import AppearanceRecording
+from corpus_tools.aam.train_appearance import camera_axes, speech_weights
+from corpus_tools.consent import consent_record
 from lexicon.errors import InputError
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.render.own_face import ring_triangles
@@ -24,7 +24,7 @@ def turned(shape, angle, size, shift):
 def test_turned_copies_of_a_shape_are_aligned_onto_one_another():
     shape = np.random.default_rng(0).normal(0, 30, (20, 2))
     copies = np.array([turned(shape, 0.1 * k, 1 + 0.05 * k, (3 * k, -k)) for k in range(6)])
-    placed, mean = aligned(copies)
+    placed, mean = align_shapes(copies)
     assert np.abs(placed - placed[0]).max() < 1e-9
     assert np.abs(placed[0] - mean).max() < 1e-9
 
@@ -32,14 +32,14 @@ def test_turned_copies_of_a_shape_are_aligned_onto_one_another():
 def test_a_similarity_is_found_again():
     shape = np.random.default_rng(1).normal(0, 30, (20, 2))
     target = turned(shape, 0.4, 1.7, (5.0, -9.0))
-    assert np.abs(moved(shape[None], *fitted(shape[None], target))[0] - target).max() < 1e-9
+    assert np.abs(apply_similarities(shape[None], *fit_similarities(shape[None], target))[0] - target).max() < 1e-9
 
 
 @pytest.mark.parametrize("blocks", [(60,), (7, 20, 33), (30, 30)])
 def test_components_block_by_block_are_those_of_all_rows(blocks):
     generator = np.random.default_rng(2)
     rows = generator.normal(size=(60, 3)) @ generator.normal(size=(3, 40)) * 5 + generator.normal(0, 0.01, (60, 40)) + 9
-    grown = GrowingComponents(10)
+    grown = IncrementalPca(10)
     for block in np.split(rows, np.cumsum(blocks)[:-1]):
         grown.add(block)
     centred = rows - rows.mean(axis=0)
@@ -54,7 +54,7 @@ def test_components_block_by_block_are_those_of_all_rows(blocks):
 def test_a_texture_does_not_depend_on_where_the_face_is():
     shape = np.array([[0.0, 0], [40, 2], [20, 50], [22, 20]])
     triangles = np.array([(0, 1, 3), (1, 2, 3), (2, 0, 3)], np.int32)
-    frame = framed(shape, triangles, 32)
+    frame = build_reference_frame(shape, triangles, 32)
     y, x = np.mgrid[:200, :200]
     for angle, size, shift in ((0.0, 1.0, (30.0, 30.0)), (0.3, 1.5, (60.0, 40.0))):
         points = turned(shape, angle, size, shift)
@@ -71,7 +71,7 @@ def test_a_texture_does_not_depend_on_where_the_face_is():
 def test_barycentric_coordinates_give_the_place_back():
     corners = np.array([[0.0, 0], [10, 1], [3, 8]])
     places = np.random.default_rng(0).uniform(-5, 10, (50, 2))
-    weights = barycentric(places, corners)
+    weights = barycentric_coordinates(places, corners)
     assert np.abs(weights @ corners - places).max() < 1e-9
     assert np.abs(weights.sum(axis=1) - 1).max() < 1e-9
 
@@ -79,7 +79,7 @@ def test_barycentric_coordinates_give_the_place_back():
 def test_a_point_is_inside_a_polygon_where_its_winding_says_so():
     polygon = np.array([[0.0, 0], [10, 0], [10, 10], [5, 3], [0, 10]])
     places = np.array([[5.0, 1], [5, 5], [1, 8], [11, 5], [-1, 1]])
-    assert inside(places, polygon).tolist() == [True, False, True, False, False]
+    assert points_in_polygon(places, polygon).tolist() == [True, False, True, False, False]
 
 
 def test_the_mouth_s_triangles_fill_the_inner_lips_and_no_more():
@@ -100,10 +100,10 @@ def test_the_ring_lies_around_the_oval():
     shape = np.random.default_rng(0).normal(0, 5, (468, 2))
     angles = np.linspace(0, 2 * np.pi, len(FACE_OVAL), endpoint=False)
     shape[list(FACE_OVAL)] = 40 * np.stack([np.sin(angles), -np.cos(angles)], axis=1)
-    assert not inside(ring(shape), shape[list(FACE_OVAL)]).any()
+    assert not points_in_polygon(face_ring(shape), shape[list(FACE_OVAL)]).any()
     assert len(np.unique(ring_triangles(468))) == 2 * len(FACE_OVAL)
     triangles = face_triangles(shape)
-    assert inside(shape[triangles].mean(axis=1), shape[list(FACE_OVAL)]).all()
+    assert points_in_polygon(shape[triangles].mean(axis=1), shape[list(FACE_OVAL)]).all()
 
 
 def test_a_light_is_found_again_on_the_pixels_that_stay():
@@ -112,7 +112,7 @@ def test_a_light_is_found_again_on_the_pixels_that_stay():
     reference = texture * (1.2, 0.9, 1.0) + np.array((3.0, -4.0, 8.0))
     reference[:100] += 50  # the mouth moved
     still = np.arange(300) >= 100
-    found = light_of(texture, reference.astype(np.float32), still)
+    found = fit_lighting(texture, reference.astype(np.float32), still)
     assert np.abs(found.gain - (1.2, 0.9, 1.0)).max() < 1e-4
     assert np.abs(found.removed(texture)[100:] - reference[100:]).max() < 0.01
 
@@ -124,8 +124,8 @@ def test_speech_changes_the_mouth_and_neither_forehead_nor_outline():
     shape[list(FACE_OVAL)] = 60 * np.stack([np.sin(angles), -np.cos(angles)], axis=1)
     lips = np.linspace(0, 2 * np.pi, len(MOUTH_POINTS), endpoint=False)
     shape[list(MOUTH_POINTS)] = np.stack([-8 * np.cos(lips), 20 - 4 * np.sin(lips)], axis=1)
-    frame = framed(shape, face_triangles(shape), 64)
-    weight = changed_by_speech(frame)
+    frame = build_reference_frame(shape, face_triangles(shape), 64)
+    weight = speech_weights(frame)
     assert 0 <= weight.min() <= weight.max() <= 1
     nearest = frame.weights.argmax(axis=1)
     at = frame.corners[np.arange(len(nearest)), nearest]
@@ -139,7 +139,7 @@ def test_picture_axes_are_those_of_the_camera():
     landmarks = generator.normal(0, 40, (4, 478, 3))
     axes = np.array([[1.3, 0.1, 0.0], [0.0, -1.2, 0.3]])
     points = landmarks @ axes.T + np.array([90.0, 120.0])
-    assert np.abs(picture_axes(points, landmarks) - axes).max() < 1e-4
+    assert np.abs(camera_axes(points, landmarks) - axes).max() < 1e-4
 
 
 def test_pictures_come_at_the_instants_of_the_frames(tmp_path, monkeypatch):
@@ -147,16 +147,16 @@ def test_pictures_come_at_the_instants_of_the_frames(tmp_path, monkeypatch):
              enumerate([0.0, 0.04, 0.08, 0.2, 0.24])]  # fmt: skip
     monkeypatch.setattr("corpus_tools.aam.source_videos.read_pictures", lambda path: iter(shown))
     nothing = np.zeros((5, 478, 3), np.float32)
-    film = Filmed(tmp_path / "x.mkv", 0.04, 25.0, nothing[:, :, :2], nothing, nothing[:, 0])
+    film = AppearanceRecording(tmp_path / "x.mkv", 0.04, 25.0, nothing[:, :, :2], nothing, nothing[:, 0])
     assert [int(pixels[0, 0, 0]) for pixels in film.pictures()] == [1, 2, 2, 2, 3]
 
 
 @pytest.mark.parametrize("statement", [None, "", "yes"])
 def test_pictures_of_a_person_need_a_statement(statement):
     with pytest.raises(InputError, match="state the consent"):
-        consent_of("Ada", statement)
+        consent_record("Ada", statement)
 
 
 def test_a_consent_is_kept_with_name_and_date():
-    kept = consent_of("Ada", " I agree to this. ", date="2026-01-02")
+    kept = consent_record("Ada", " I agree to this. ", date="2026-01-02")
     assert kept == {"name": "Ada", "statement": "I agree to this.", "date": "2026-01-02"}

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from corpus_tools.decomposition.face_motion import moved_landmarks
-from corpus_tools.evaluation.cross_talker import Scale
-from corpus_tools.evaluation.evaluate import Run, evaluate_across
-from corpus_tools.evaluation.livelink_reference import captured
-from corpus_tools.evaluation.measures import least_openings, midpoint_openings
-from corpus_tools.evaluation.reference import Curves
+from corpus_tools.evaluation.cross_talker import SpeakerScale
+from corpus_tools.evaluation.evaluate import SplitResult, evaluate_across_talkers
+from corpus_tools.evaluation.livelink_reference import observe_livelink
+from corpus_tools.evaluation.measures import midpoint_openings, min_openings
+from corpus_tools.evaluation.reference import LipCurves
 from corpus_tools.evaluation.tables import Evaluation
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.report.evaluation import evaluation_page
-from corpus_tools.run_options import Effort
+from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
 from tests.corpus_tools.speaking import observation
 from tts2face.models.face_file import load_face
@@ -32,11 +32,13 @@ def others(gain: float) -> list[Observation]:
 
 
 @pytest.fixture(scope="module")
-def measured(train: list[Observation]) -> tuple[Evaluation, tuple[Run, ...]]:
-    return evaluate_across(train, others(2.0))
+def measured(train: list[Observation]) -> tuple[Evaluation, tuple[SplitResult, ...]]:
+    return evaluate_across_talkers(train, others(2.0))
 
 
-def test_somebody_who_opens_the_mouth_twice_as_far_is_predicted(measured: tuple[Evaluation, tuple[Run, ...]]) -> None:
+def test_somebody_who_opens_the_mouth_twice_as_far_is_predicted(
+    measured: tuple[Evaluation, tuple[SplitResult, ...]],
+) -> None:
     scores = {one.method: one for one in measured[0].scores}
     assert list(scores) == ["mean face", "mean phone pose", "exemplar", "theobald2007"]
     assert scores["exemplar"]["r_opening"] > 0.97
@@ -47,21 +49,21 @@ def test_somebody_who_opens_the_mouth_twice_as_far_is_predicted(measured: tuple[
 
 
 def test_figures_do_not_depend_on_how_far_the_other_one_moves(
-    train: list[Observation], measured: tuple[Evaluation, tuple[Run, ...]]
+    train: list[Observation], measured: tuple[Evaluation, tuple[SplitResult, ...]]
 ) -> None:
-    alike, _ = evaluate_across(train, others(1.0))
+    alike, _ = evaluate_across_talkers(train, others(1.0))
     for one, other in zip(alike.scores, measured[0].scores, strict=True):
         for name in ("r_opening", "rmse_z", "dtw_cost", "range_ratio", "closure"):
             assert one[name] == pytest.approx(other[name], abs=0.01), name
 
 
 def test_a_scale_makes_the_mean_0_and_the_spread_1(train: list[Observation]) -> None:
-    scale = Scale.of(train)
-    scored = scale.scored(Curves(scale.mean[:1] + 2 * scale.spread[:1], scale.mean[1:] - scale.spread[1:]))
+    scale = SpeakerScale.of(train)
+    scored = scale.z_score(LipCurves(scale.mean[:1] + 2 * scale.spread[:1], scale.mean[1:] - scale.spread[1:]))
     np.testing.assert_allclose((scored.opening[0], scored.width[0]), (2.0, -1.0), rtol=1e-12)
 
 
-def test_the_answer_says_what_it_is(measured: tuple[Evaluation, tuple[Run, ...]]) -> None:
+def test_the_answer_says_what_it_is(measured: tuple[Evaluation, tuple[SplitResult, ...]]) -> None:
     result, runs = measured
     assert result.to_json()["is_across"]
     assert result.rows()[1][:2] == ("another talker", "mean face")
@@ -72,7 +74,7 @@ def test_the_answer_says_what_it_is(measured: tuple[Evaluation, tuple[Run, ...]]
 
 def test_the_talker_herself_is_refused(train: list[Observation]) -> None:
     with pytest.raises(InputError, match="u03 is learnt from and tested on"):
-        evaluate_across(train, train[3:5])
+        evaluate_across_talkers(train, train[3:5])
 
 
 def test_landmarks_of_a_face_are_its_own_at_rest_and_follow_its_shapes() -> None:
@@ -80,7 +82,7 @@ def test_landmarks_of_a_face_are_its_own_at_rest_and_follow_its_shapes() -> None
     jaw = face.shape_names.index("jawOpen")
     weights = np.zeros((3, len(face.shape_names)))
     weights[1:, jaw] = (0.5, 1.0)
-    opening = Curves.of(moved_landmarks(face, Trajectory(face.shape_names, weights, 30.0))).opening
+    opening = LipCurves.of(moved_landmarks(face, Trajectory(face.shape_names, weights, 30.0))).opening
     np.testing.assert_allclose(opening[1] - opening[0], opening[2] - opening[1], rtol=0.2)  # eyes hold, the jaw drops
     assert opening[2] > opening[0] + 0.1
 
@@ -92,11 +94,11 @@ def livelink(shared_recordings: Path) -> Path:
 
 def test_a_real_capture_closes_its_lips_where_bilabials_are_heard(livelink: Path, tmp_path: Path) -> None:
     pytest.importorskip("hama", reason="needs the extra [capture]")
-    found = captured(livelink, Effort(tmp_path))
+    found = observe_livelink(livelink, RunOptions(tmp_path))
     assert len(found) >= 4
     assert all(one.fps == 60.0 and one.is_recognised for one in found)
-    curves = [Curves.of(one.landmarks).opening for one in found]
-    closed = [least_openings(curve, one.phones, 60.0) for curve, one in zip(curves, found, strict=True)]
+    curves = [LipCurves.of(one.landmarks).opening for one in found]
+    closed = [min_openings(curve, one.phones, 60.0) for curve, one in zip(curves, found, strict=True)]
     opened = [midpoint_openings(curve, one.phones, 60.0) for curve, one in zip(curves, found, strict=True)]
     assert 2 * np.median(np.concatenate(closed)) < np.median(np.concatenate(opened))
 
@@ -112,4 +114,4 @@ def test_a_capture_needs_one_sound(sounds: tuple[str, ...], reason: str, tmp_pat
     for sound in sounds:
         (tmp_path / sound).touch()
     with pytest.raises(InputError, match=reason):
-        captured(tmp_path / "take.csv", Effort(tmp_path / "cache"))
+        observe_livelink(tmp_path / "take.csv", RunOptions(tmp_path / "cache"))

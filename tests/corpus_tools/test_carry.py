@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from corpus_tools.aam.appearance_transfer import looks_map
+from corpus_tools.aam.appearance_transfer import build_appearance_transfer
 from corpus_tools.aam.mesh import face_triangles
-from corpus_tools.aam.reference_frame import framed
+from corpus_tools.aam.reference_frame import build_reference_frame
 from tests.render.tiny_talker import face_points, own_talker
 from tts2face.models.appearance import Appearance, TextureModel
 
@@ -14,7 +14,7 @@ from tts2face.models.appearance import Appearance, TextureModel
 def painted(stretch: float, side: int, across: float) -> TextureModel:
     """A texture model with one component: a wave over the landmarks' places on one face, whatever shape is shown."""
     shape = face_points()
-    frame = framed(shape * (1.0, stretch), face_triangles(shape * (1.0, stretch)), side)
+    frame = build_reference_frame(shape * (1.0, stretch), face_triangles(shape * (1.0, stretch)), side)
     places = (frame.weights[:, :, None] * (shape / 96.0)[frame.corners]).sum(axis=1)
     wave = np.cos(6 * np.pi * (across * places[:, 0] + (1 - across) * places[:, 1]))
     basis = np.repeat(wave[None, :, None], 3, axis=2)
@@ -39,7 +39,7 @@ def looking(face: TextureModel) -> Appearance:
 def test_the_same_paint_on_a_larger_and_longer_face_keeps_its_size() -> None:
     """5 %: the frames sample the wave at other places. Components have length 1, however many pixels they have."""
     small, large = painted(1.0, 48, 1.0), painted(1.2, 90, 1.0)
-    found = looks_map(looking(small), looking(large)).relation
+    found = build_appearance_transfer(looking(small), looking(large)).relation
     grown = np.sqrt(len(large.pixels) / len(small.pixels))
     assert abs(found[0, 0] / grown - 1.0) < 0.05
     assert not found[0, 1:].any()
@@ -47,13 +47,13 @@ def test_the_same_paint_on_a_larger_and_longer_face_keeps_its_size() -> None:
 
 
 def test_paint_that_the_target_does_not_have_is_lost() -> None:
-    found = looks_map(looking(painted(1.0, 64, 1.0)), looking(painted(1.0, 64, 0.0))).relation
+    found = build_appearance_transfer(looking(painted(1.0, 64, 1.0)), looking(painted(1.0, 64, 0.0))).relation
     assert abs(found[0, 0]) < 0.2
 
 
 def test_looks_stay_within_three_spreads_and_follow_the_gain() -> None:
     face = looking(painted(1.0, 48, 1.0))
-    made = looks_map(face, face)
+    made = build_appearance_transfer(face, face)
     looks = np.array([[4.0, 0.0, 0.0]])
     np.testing.assert_allclose(made.carried(looks, gain=2.0), 2 * made.carried(looks), rtol=1e-6)
     np.testing.assert_allclose(made.carried(looks)[0, 0], 4.0, rtol=1e-4)

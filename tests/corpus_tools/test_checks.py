@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from corpus_tools.recordings.corpus_video import NOT_COUNTED
-from corpus_tools.recordings.limits import LIMITS, picture_measures, refuse, sound_measures, turn_deg
+from corpus_tools.recordings.limits import LIMITS, check_limits, head_turn_deg, picture_measures, sound_measures
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.types import Waveform
@@ -20,7 +20,7 @@ def sound(speech: float, noise: float) -> Waveform:
 
 
 def test_good_measures_pass() -> None:
-    refuse(GOOD)
+    check_limits(GOOD)
 
 
 @pytest.mark.parametrize(
@@ -37,7 +37,7 @@ def test_good_measures_pass() -> None:
 )
 def test_a_measure_beyond_its_limit_is_refused(measure: str, value: float, reason: str) -> None:
     with pytest.raises(DataError, match=reason):
-        refuse({**GOOD, measure: value})
+        check_limits({**GOOD, measure: value})
 
 
 def test_every_limit_is_asked() -> None:
@@ -76,6 +76,6 @@ def test_a_picture_that_never_stands_still() -> None:
 
 
 def test_the_angle_between_face_and_camera() -> None:
-    assert turn_deg(np.radians([[0.0, 50.0, 30.0]])) == pytest.approx(50.0)
-    assert turn_deg(np.radians([[40.0, 0.0, 0.0]])) == pytest.approx(40.0)
-    assert turn_deg(np.radians([[45.0, 45.0, 0.0]])) == pytest.approx(60.0)
+    assert head_turn_deg(np.radians([[0.0, 50.0, 30.0]])) == pytest.approx(50.0)
+    assert head_turn_deg(np.radians([[40.0, 0.0, 0.0]])) == pytest.approx(40.0)
+    assert head_turn_deg(np.radians([[45.0, 45.0, 0.0]])) == pytest.approx(60.0)

@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from corpus_tools.clone_talker import clone_talker, cloned_talker
+from corpus_tools.clone_talker import clone_talker, transfer_talker
 from lexicon.errors import InputError
 from tests.cloning.test_clone import gaps_of, model_of, opening_model
-from tts2face.cloning.parameter_transfer import cloning, face_size
+from tts2face.cloning.parameter_transfer import build_parameter_transfer, face_size
 from tts2face.models.talker import Talker, load_talker, read_talker
 
 SOURCE_STATED = {
@@ -44,8 +44,8 @@ def talkers() -> tuple[Talker, Talker]:
 
 def test_the_target_speaks_with_the_source_s_articulation() -> None:
     source, target = talkers()
-    made = cloned_talker(source, target, gain=0.9)
-    ready = cloning(source.model, target.model, gain=0.9)
+    made = transfer_talker(source, target, gain=0.9)
+    ready = build_parameter_transfer(source.model, target.model, gain=0.9)
     assert made.n_appended == 0
     assert made.talker.model is target.model
     for before, after in zip(source.utterances, made.talker.utterances, strict=True):
@@ -59,7 +59,7 @@ def test_the_target_speaks_with_the_source_s_articulation() -> None:
 def test_appended_components_bring_the_opening_back() -> None:
     """The target lacks the source's first mode, which opens the mouth."""
     source, target = talkers()
-    made = {append: cloned_talker(source, target, append=append) for append in (False, True)}
+    made = {append: transfer_talker(source, target, append=append) for append in (False, True)}
     assert made[True].n_appended == len(made[True].talker.model.spread) - len(target.model.spread) > 0
     frames = np.concatenate([utterance.shape for utterance in source.utterances])
     opened = 1.2 * gaps_of(source.model, frames)[:, 4]
@@ -72,7 +72,7 @@ def test_appended_components_bring_the_opening_back() -> None:
 
 
 def test_provenance_of_both_is_kept() -> None:
-    stated = cloned_talker(*talkers(), gain=1.5).talker.metadata
+    stated = transfer_talker(*talkers(), gain=1.5).talker.metadata
     assert stated["name"] == "B with the speech of A"
     assert stated["language"] == "en"
     assert stated["licence"] == "speech: CC BY 4.0; face: CC0"
@@ -87,12 +87,12 @@ def test_provenance_of_both_is_kept() -> None:
 
 def test_the_share_at_limits_is_counted() -> None:
     source, target = talkers()
-    made = cloned_talker(source, target, gain=2.0)
+    made = transfer_talker(source, target, gain=2.0)
     frames = np.concatenate([utterance.shape for utterance in source.utterances])
-    ready = cloning(source.model, target.model, gain=2.0)
+    ready = build_parameter_transfer(source.model, target.model, gain=2.0)
     expected = (np.abs(ready.parameters(frames)) >= ready.limits).any(axis=1).mean()
-    assert made.at_limits == pytest.approx(expected)
-    assert 0 < made.at_limits < 1
+    assert made.share_at_limits == pytest.approx(expected)
+    assert 0 < made.share_at_limits < 1
 
 
 def test_the_written_talker_keeps_limits_and_lips(tmp_path: Path) -> None:
@@ -114,9 +114,9 @@ def test_the_written_talker_keeps_limits_and_lips(tmp_path: Path) -> None:
 
 def test_pictures_of_the_source_are_left_behind_where_the_target_has_none() -> None:
     source, target = talkers()
-    assert not cloned_talker(source, target).left_pictures
-    made = cloned_talker(replace(source, appearance=SimpleNamespace()), target)
-    assert made.left_pictures
+    assert not transfer_talker(source, target).lacks_appearance
+    made = transfer_talker(replace(source, appearance=SimpleNamespace()), target)
+    assert made.lacks_appearance
     assert made.talker.appearance is None
     assert all(utterance.looks is None for utterance in made.talker.utterances)
 
@@ -124,9 +124,9 @@ def test_pictures_of_the_source_are_left_behind_where_the_target_has_none() -> N
 def test_a_source_without_speech_is_refused() -> None:
     source, target = talkers()
     with pytest.raises(InputError, match="no utterance to clone"):
-        cloned_talker(replace(source, utterances=()), target)
+        transfer_talker(replace(source, utterances=()), target)
 
 
 def test_sizes_are_those_of_the_mean_shapes() -> None:
     assert face_size(model_of(1, size=1.5)) == pytest.approx(1.5 * face_size(model_of(1)), rel=1e-5)
-    assert cloning(opening_model(), opening_model()).size == 1.0
+    assert build_parameter_transfer(opening_model(), opening_model()).size == 1.0

@@ -8,40 +8,40 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.consent import consent_of
-from corpus_tools.dense.adapt_head import MOUTH_PARTS, adapted
+from corpus_tools.consent import consent_record
+from corpus_tools.dense.adapt_head import MOUTH_PARTS, adapt_head
 from corpus_tools.dense.build_face import build_face
-from corpus_tools.dense.mesh_fit import N_MESH, OPEN_JAW, aligned, landmarks_of, part_vertices
-from corpus_tools.dense.skin_colour import fitter, vertex_normals
-from corpus_tools.dense.video_landmarks import videos_of
-from corpus_tools.dense.visible_texels import canvas_of, depth_inside
-from corpus_tools.run_options import Effort
+from corpus_tools.dense.mesh_fit import N_MESH, OPEN_JAW, align_to_head, face_landmarks, part_vertices
+from corpus_tools.dense.skin_colour import build_picture_fitter, vertex_normals
+from corpus_tools.dense.video_landmarks import find_videos
+from corpus_tools.dense.visible_texels import build_canvas, polygon_depth
+from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, InputError
 from tts2face.face.deformation import posed_vertices
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
-from tts2face.storage.files import named_file
+from tts2face.storage.files import find_file
 
 LIPS_MM = 0.5  # facing lips that are nearer touch
 
 
 @pytest.fixture(scope="module")
 def head() -> Face:
-    return read_face(named_file("head", "face"))
+    return read_face(find_file("head", "face"))
 
 
 @pytest.fixture(scope="module")
 def long_face(head: Face) -> np.ndarray:
     """Landmarks of a talker whose face is longer and narrower than the head's, in another place and size."""
-    rest = landmarks_of(head, head.vertices)
+    rest = face_landmarks(head, head.vertices)
     taller = rest * (0.95, 1.06, 1.0)
     return 1.7 * taller + (30.0, -400.0, 12.0)
 
 
 @pytest.fixture(scope="module")
 def long_head(head: Face, long_face: np.ndarray) -> Face:
-    return adapted(head, long_face)
+    return adapt_head(head, long_face)
 
 
 def weights_of(face: Face, **shown: float) -> np.ndarray:
@@ -49,19 +49,19 @@ def weights_of(face: Face, **shown: float) -> np.ndarray:
 
 
 def lip_gaps(face: Face, **shown: float) -> np.ndarray:
-    marks = landmarks_of(face, posed_vertices(face, weights_of(face, **shown)))
+    marks = face_landmarks(face, posed_vertices(face, weights_of(face, **shown)))
     return marks[list(INNER_LIP_UPPER), 1] - marks[list(INNER_LIP_LOWER), 1]
 
 
 def test_landmarks_of_the_adapted_head_are_the_talkers(long_head: Face, long_face: np.ndarray) -> None:
-    reached = landmarks_of(long_head, long_head.vertices)[:N_MESH]
-    off = np.linalg.norm(aligned(long_face, reached) - reached, axis=1)
+    reached = face_landmarks(long_head, long_head.vertices)[:N_MESH]
+    off = np.linalg.norm(align_to_head(long_face, reached) - reached, axis=1)
     assert np.median(off) < 0.3
     assert np.percentile(off, 95) < 1.5
 
 
 def test_the_heads_own_landmarks_leave_it_as_it_is(head: Face) -> None:
-    same = adapted(head, landmarks_of(head, head.vertices))
+    same = adapt_head(head, face_landmarks(head, head.vertices))
     np.testing.assert_allclose(same.vertices, head.vertices, atol=1e-4)
     np.testing.assert_allclose(same.shapes, head.shapes, atol=1e-3)
 
@@ -75,7 +75,7 @@ def test_shapes_keep_their_names_and_meanings(head: Face, long_head: Face) -> No
 
 def test_eyeballs_stay_round_and_the_lids_close_over_them(head: Face, long_head: Face) -> None:
     blinks = weights_of(head, eyeBlinkLeft=1, eyeBlinkRight=1)
-    own, blinking = (landmarks_of(face, posed_vertices(face, blinks)) for face in (head, long_head))
+    own, blinking = (face_landmarks(face, posed_vertices(face, blinks)) for face in (head, long_head))
     for upper, lower in ((159, 145), (386, 374)):
         overlap = own[upper, 1] - own[lower, 1]
         assert overlap < 0
@@ -108,19 +108,19 @@ def test_no_triangle_of_the_skin_is_torn_or_turned_over(head: Face, long_head: F
 
 def test_the_fitter_finds_a_posed_head_again(long_head: Face) -> None:
     opened = long_head.vertices + OPEN_JAW * long_head.shapes[long_head.shape_names.index("jawOpen")]
-    fit = fitter(long_head, opened, np.arange(N_MESH))
+    fit = build_picture_fitter(long_head, opened, np.arange(N_MESH))
     turn = np.array([[np.cos(0.3), 0, np.sin(0.3)], [0, 1, 0], [-np.sin(0.3), 0, np.cos(0.3)]])
     there = 2.0 * long_head.vertices.astype(np.float64) @ turn.T + (300, -200, 10)
-    points = landmarks_of(long_head, there) * (1, -1, -1)
-    placed, found = fit.placed(points.astype(np.float32))
+    points = face_landmarks(long_head, there) * (1, -1, -1)
+    placed, found = fit.fit(points.astype(np.float32))
     np.testing.assert_allclose(found, turn, atol=1e-4)
     np.testing.assert_allclose(placed, there, atol=0.01)
 
 
 def test_the_canvas_leaves_out_eyes_mouth_and_the_back(long_head: Face) -> None:
-    canvas = canvas_of(long_head)
+    canvas = build_canvas(long_head)
     place = canvas.texels.carried(long_head.vertices.astype(np.float64))
-    marks = landmarks_of(long_head, long_head.vertices)
+    marks = face_landmarks(long_head, long_head.vertices)
     assert canvas.share[place[:, 2] < -70].max() == 0
     assert canvas.share[canvas.in_mouth].max() == 0
     cheek = np.linalg.norm(place - marks[205], axis=1) < 5
@@ -130,31 +130,31 @@ def test_the_canvas_leaves_out_eyes_mouth_and_the_back(long_head: Face) -> None:
 def test_depth_inside_a_square() -> None:
     square = np.array([(0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0)])
     places = np.array([(5.0, 5.0), (5.0, 1.0), (5.0, -2.0), (13.0, 14.0), (80.0, 5.0)])
-    np.testing.assert_allclose(depth_inside(places, square, 6.0), [5.0, 1.0, -2.0, -5.0, -6.0])
+    np.testing.assert_allclose(polygon_depth(places, square, 6.0), [5.0, 1.0, -2.0, -5.0, -6.0])
 
 
 def test_a_head_without_texture_is_refused(head: Face) -> None:
     with pytest.raises(DataError, match="has no texture"):
-        canvas_of(replace(head, texture=None))
+        build_canvas(replace(head, texture=None))
 
 
 def test_only_videos_are_looked_at(tmp_path: Path) -> None:
     note = tmp_path / "note.txt"
     note.write_text("no video")
     with pytest.raises(InputError, match="is no video"):
-        videos_of(note)
+        find_videos(note)
     with pytest.raises(InputError, match="there is no folder"):
-        videos_of(tmp_path / "nowhere")
+        find_videos(tmp_path / "nowhere")
 
 
 def test_a_real_talkers_head(real_folder: Path, face_model: Path, tmp_path: Path, head: Face) -> None:
-    consent = consent_of("Speaker 1", "The corpus is published for research.", date="2026-01-31")
+    consent = consent_record("Speaker 1", "The corpus is published for research.", date="2026-01-31")
     out, steps = tmp_path / "me.face", []
     built = build_face(
         real_folder,
         out,
         consent=consent,
-        effort=Effort(tmp_path / "cache", 1, face_model),
+        effort=RunOptions(tmp_path / "cache", 1, face_model),
         on_progress=lambda done, of: steps.append((done, of)),
     )
     face = read_face(out)
@@ -168,8 +168,8 @@ def test_a_real_talkers_head(real_folder: Path, face_model: Path, tmp_path: Path
     assert face.shape_names == head.shape_names
     assert face.texture is not None
     assert head.texture is not None
-    inside = canvas_of(face).in_mouth
-    texels = canvas_of(face).texels
+    inside = build_canvas(face).in_mouth
+    texels = build_canvas(face).texels
     rows, columns = texels.rows[inside], texels.columns[inside]
     difference = face.texture[rows, columns].astype(int) - head.texture[rows, columns]
     assert np.abs(difference).mean() < 3  # JPEG's, no pixels of the talker's mouth

@@ -7,7 +7,7 @@ import pytest
 
 from cli.main import run
 from corpus_tools.dense.adapt_head import EYE_PARTS
-from corpus_tools.dense.mesh_fit import N_MESH, face_width, landmarks_of, part_vertices
+from corpus_tools.dense.mesh_fit import N_MESH, face_landmarks, face_width, part_vertices
 from corpus_tools.dense.modes import (
     LIMIT,
     MEAN,
@@ -21,8 +21,8 @@ from corpus_tools.dense.modes import (
     spread_shapes,
     with_modes,
 )
-from corpus_tools.dense.skin_colour import Fitter, fitter
-from corpus_tools.dense.video_landmarks import Seen
+from corpus_tools.dense.skin_colour import PictureFitter, build_picture_fitter
+from corpus_tools.dense.video_landmarks import VideoLandmarks
 from lexicon.errors import InputError
 from tts2face.face.deformation import posed_vertices
 from tts2face.models.face import Face
@@ -44,27 +44,29 @@ def head() -> Face:
 @pytest.fixture(scope="module")
 def talker(head: Face) -> np.ndarray:
     """The head's own landmarks, in another place and size: what is known of the frames is exact."""
-    return 0.5 * landmarks_of(head, head.vertices) + (7.0, -3.0, 11.0)
+    return 0.5 * face_landmarks(head, head.vertices) + (7.0, -3.0, 11.0)
 
 
 @pytest.fixture(scope="module")
-def seen(head: Face, talker: np.ndarray) -> list[Seen]:
+def seen(head: Face, talker: np.ndarray) -> list[VideoLandmarks]:
     """Frames of five known shapes at random weights; one frame shows no face."""
     numbers = [head.shape_names.index(name) for name in SHOWN]
-    directions = np.stack([landmarks_of(head, head.shapes[number]) for number in numbers])
+    directions = np.stack([face_landmarks(head, head.shapes[number]) for number in numbers])
     amounts = np.random.default_rng(2).uniform(0, list(SHOWN.values()), (N_VIDEOS, N_FRAMES, len(SHOWN)))
     videos = talker + 0.5 * np.einsum("vtk,klc->vtlc", amounts, directions)
     videos[0, 3] = np.nan
-    return [Seen(Path(f"{number}.mkv"), video, video) for number, video in enumerate(videos.astype(np.float32))]
+    return [
+        VideoLandmarks(Path(f"{number}.mkv"), video, video) for number, video in enumerate(videos.astype(np.float32))
+    ]
 
 
 @pytest.fixture(scope="module")
-def fit(head: Face) -> Fitter:
+def fit(head: Face) -> PictureFitter:
     return mode_fitter(head, USED)
 
 
 @pytest.fixture(scope="module")
-def model(head: Face, fit: Fitter, seen: list[Seen], talker: np.ndarray) -> DenseModel:
+def model(head: Face, fit: PictureFitter, seen: list[VideoLandmarks], talker: np.ndarray) -> DenseModel:
     return dense_model(head, fit, seen, talker, N_MODES)
 
 
@@ -76,13 +78,15 @@ def weights_of(face: Face, **shown: float) -> np.ndarray:
     return np.array([shown.get(name, 0.0) for name in face.shape_names])
 
 
-def test_a_dense_fit_is_the_direct_solution_of_eqs_3_and_4(head: Face, fit: Fitter, seen: list[Seen], talker) -> None:
+def test_a_dense_fit_is_the_direct_solution_of_eqs_3_and_4(
+    head: Face, fit: PictureFitter, seen: list[VideoLandmarks], talker
+) -> None:
     """u = x - x0 at the constrained places, c = Phi^-1 u, f = sum c phi(|x - x_i|), phi(r) = exp(-r / 64) at 200 px."""
     moved = displacements(fit, seen[1].landmarks[:3], talker)
     wanted = 2.0 * (seen[1].landmarks[:3] - talker)[:, USED]
     np.testing.assert_allclose(moved, wanted, atol=1e-4)
-    places, centres = opened_of(head)[::97], landmarks_of(head, opened_of(head))[USED]
-    pixels = 200.0 / face_width(landmarks_of(head, head.vertices.astype(np.float64))[:N_MESH])
+    places, centres = opened_of(head)[::97], face_landmarks(head, opened_of(head))[USED]
+    pixels = 200.0 / face_width(face_landmarks(head, head.vertices.astype(np.float64))[:N_MESH])
     between = np.linalg.norm(centres[:, None] - centres, axis=2)
     away = np.linalg.norm(places[:, None] - centres, axis=2)
     for frame in moved:
@@ -92,7 +96,7 @@ def test_a_dense_fit_is_the_direct_solution_of_eqs_3_and_4(head: Face, fit: Fitt
 
 
 def test_modes_are_the_principal_components_of_the_dense_shapes(
-    head: Face, fit: Fitter, seen: list[Seen], talker: np.ndarray, model: DenseModel
+    head: Face, fit: PictureFitter, seen: list[VideoLandmarks], talker: np.ndarray, model: DenseModel
 ) -> None:
     frames = np.concatenate([displacements(fit, one.landmarks, talker) for one in seen])
     assert model.n_frames == len(frames) == N_VIDEOS * N_FRAMES - 1
@@ -112,7 +116,9 @@ def test_modes_are_the_principal_components_of_the_dense_shapes(
     assert model.dense.n_modes(0.95) == int(np.argmax(shares >= 0.95)) + 1
 
 
-def test_the_sparse_model_is_that_of_the_landmarks(seen: list[Seen], fit: Fitter, talker, model: DenseModel) -> None:
+def test_the_sparse_model_is_that_of_the_landmarks(
+    seen: list[VideoLandmarks], fit: PictureFitter, talker, model: DenseModel
+) -> None:
     frames = np.concatenate([displacements(fit, one.landmarks, talker) for one in seen]).reshape(model.n_frames, -1)
     scales = np.linalg.svd(frames - frames.mean(axis=0), compute_uv=False)
     np.testing.assert_allclose(model.sparse.variances[:N_MODES], scales[:N_MODES] ** 2 / len(frames), rtol=1e-6)
@@ -140,7 +146,7 @@ def test_errors_of_held_out_frames_are_those_of_dense_shapes() -> None:
 
 
 def test_a_face_file_shows_a_frame_by_its_parameters(
-    head: Face, fit: Fitter, seen: list[Seen], talker: np.ndarray, model: DenseModel, tmp_path: Path
+    head: Face, fit: PictureFitter, seen: list[VideoLandmarks], talker: np.ndarray, model: DenseModel, tmp_path: Path
 ) -> None:
     write_face(tmp_path / "me.face", with_modes(head, model))
     face = read_face(tmp_path / "me.face")
@@ -177,7 +183,7 @@ def test_no_mode_tears_the_lips_or_moves_upper_teeth(head: Face, model: DenseMod
 def test_the_edge_of_the_lower_lip_follows_the_jaw_evenly(head: Face) -> None:
     """Between landmarks it moves as far as at them; asked with lips that hardly part it lags behind in teeth."""
     jaw = head.shapes[head.shape_names.index("jawOpen")].astype(np.float64)
-    moved, marks = landmarks_of(head, jaw), landmarks_of(head, head.vertices)
+    moved, marks = face_landmarks(head, jaw), face_landmarks(head, head.vertices)
     lower = list(INNER_LIP_LOWER[3:-3])
     away = np.linalg.norm(head.vertices[:, None] - marks[lower], axis=2)
     edge = np.flatnonzero((away.min(axis=1) < 3.0) & (jaw[:, 1] < 0.9 * moved[lower, 1][away.argmin(axis=1)]))
@@ -185,7 +191,7 @@ def test_the_edge_of_the_lower_lip_follows_the_jaw_evenly(head: Face) -> None:
     lags = {}
     for name, fit in (
         ("open", mode_fitter(head, np.arange(N_MESH))),
-        ("closed", fitter(head, opened_of(head, 0.12), np.arange(N_MESH))),
+        ("closed", build_picture_fitter(head, opened_of(head, 0.12), np.arange(N_MESH))),
     ):
         lags[name] = float(np.abs(fit.spread[edge] @ moved[:N_MESH, 1] / jaw[edge, 1] - 1).mean())
     assert lags["open"] < 0.03
@@ -193,7 +199,9 @@ def test_the_edge_of_the_lower_lip_follows_the_jaw_evenly(head: Face) -> None:
 
 
 @pytest.mark.parametrize("n_modes", [0, N_VIDEOS * N_FRAMES])
-def test_more_modes_than_frames_are_refused(n_modes: int, head: Face, fit: Fitter, seen: list[Seen], talker) -> None:
+def test_more_modes_than_frames_are_refused(
+    n_modes: int, head: Face, fit: PictureFitter, seen: list[VideoLandmarks], talker
+) -> None:
     with pytest.raises(InputError, match=f"{n_modes} dense modes cannot be found in 59 frames; ask for 1 to 58"):
         dense_model(head, fit, seen, talker, n_modes)
 
@@ -225,5 +233,5 @@ def test_a_real_talkers_modes(real_folder: Path, face_model: Path, tmp_path: Pat
     assert face.shape_names[-9:] == (MEAN, *[f"dense{number}" for number in range(1, 9)])
     assert face.metadata["dense"]["frames"] == 225
     assert face.metadata["command"].endswith("--basis 8")
-    opens = landmarks_of(face, face.shapes[face.shape_names.index("dense1")])
+    opens = face_landmarks(face, face.shapes[face.shape_names.index("dense1")])
     assert opens[13, 1] - opens[14, 1] > 1.0  # mm: the first mode of speech opens the lips

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from corpus_tools.build_talker import add_drives
+from corpus_tools.build_talker import add_audio_maps
 from corpus_tools.recordings.observe import Observations
-from corpus_tools.training.network_audio_map import NetworkOptions
-from corpus_tools.training.train_audio_map import FEATURE, heard_features, heard_in, learn_drives
+from corpus_tools.training.network_audio_map import NetworkMapOptions
+from corpus_tools.training.train_audio_map import FEATURE, learn_audio_maps, sound_features, utterance_features
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
 from tts2face.models.talker import read_talker, write_talker
@@ -27,7 +27,7 @@ def test_features_stand_on_the_clock_of_the_landmarks(make_observation) -> None:
     seen = replace(seen, quality=replace(seen.quality, cut=0.4, lag=0.2))
     samples = np.zeros(4 * FEATURE_RATE)
     samples[round((0.4 + 0.2 + 10 / 25) * FEATURE_RATE)] = 1.0
-    levels = heard_in(seen, Waveform(samples, FEATURE_RATE), "level")
+    levels = utterance_features(seen, Waveform(samples, FEATURE_RATE), "level")
     assert levels.shape == (60, 1)
     assert levels.argmax() == 10
 
@@ -67,13 +67,13 @@ def test_drives_follow_the_sound_that_they_were_taught(corpus: list) -> None:
         told.append((name, []))
         return lambda done, of: told[-1][1].append((done, of))
 
-    drives = learn_drives(corpus, talker, network=NetworkOptions(n_hidden=4, before=1, after=1), stages=stages)
+    drives = learn_audio_maps(corpus, talker, network=NetworkMapOptions(n_hidden=4, before=1, after=1), stages=stages)
     assert told == [
         ("listening", [(n, 22) for n in range(1, 23)]),
         ("learning drives", [(1, 2), (2, 2)]),
     ]
     assert set(drives) == {"linear", "network"}
-    heard = heard_features(corpus[:3], (FEATURE,))[FEATURE]
+    heard = sound_features(corpus[:3], (FEATURE,))[FEATURE]
     for drive in drives.values():
         assert drive.feature == FEATURE
         assert np.isfinite(drive.loudness)
@@ -93,7 +93,7 @@ def test_a_talker_without_drives_is_given_them(
     assert run([*command, str(tmp_path / "full.talker")]) == 0
     assert "linear (hears mfcc+lsf), network (hears mfcc+lsf)" in capsys.readouterr().err
     full = read_talker(tmp_path / "full.talker")
-    assert set(full.drives) == {"linear", "network"}
+    assert set(full.audio_maps) == {"linear", "network"}
     assert len(full.utterances) == len(talker.utterances)
 
 
@@ -108,10 +108,10 @@ def test_recordings_that_teach_no_drive_are_refused(
     monkeypatch.setattr("corpus_tools.build_talker.observe", lambda *_, **__: Observations(tuple(corpus[:n]), ()))
     kind, reason = refusal
     with pytest.raises(kind, match=reason):
-        add_drives(tmp_path, talker, tmp_path / "full.talker")
+        add_audio_maps(tmp_path, talker, tmp_path / "full.talker")
     assert not (tmp_path / "full.talker").exists()
 
 
 def test_few_utterances_teach_no_drive(corpus: list) -> None:
     talker = learn_talker(corpus[:5], n_speech=2, n_other=1, metadata=ABOUT)
-    assert learn_drives(corpus[:5], talker) == {}
+    assert learn_audio_maps(corpus[:5], talker) == {}

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.evaluation.evaluate import CEILING, Run, evaluate
+from corpus_tools.evaluation.evaluate import CEILING, SplitResult, evaluate
 from corpus_tools.evaluation.scores import FIGURES
-from corpus_tools.evaluation.splits import folds, split, without_words
+from corpus_tools.evaluation.splits import split, split_by_words, split_into_folds
 from corpus_tools.evaluation.tables import Evaluation
-from corpus_tools.evaluation.tracks import Track, read_tracks
+from corpus_tools.evaluation.tracks import ExternalTrack, read_tracks
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.report.evaluation import evaluation_page
 from lexicon.errors import DataError, InputError
@@ -25,11 +25,11 @@ def observations() -> list[Observation]:
 
 
 @pytest.fixture(scope="module")
-def measured(observations: list[Observation]) -> tuple[Evaluation, tuple[Run, ...]]:
+def measured(observations: list[Observation]) -> tuple[Evaluation, tuple[SplitResult, ...]]:
     return evaluate([split(observations, hold_out=8, seed=0)])
 
 
-def test_a_face_that_follows_its_phones_is_predicted(measured: tuple[Evaluation, tuple[Run, ...]]):
+def test_a_face_that_follows_its_phones_is_predicted(measured: tuple[Evaluation, tuple[SplitResult, ...]]):
     scores = {one.method: one for one in measured[0].scores}
     assert list(scores) == ["mean face", "mean phone pose", "exemplar", "theobald2007", CEILING]
     assert scores["mean face"]["r_opening"] == 0.0
@@ -41,7 +41,7 @@ def test_a_face_that_follows_its_phones_is_predicted(measured: tuple[Evaluation,
     assert all(len(one.utterances) == 8 for one in measured[0].scores)
 
 
-def test_intervals_hold_their_value(measured: tuple[Evaluation, tuple[Run, ...]]):
+def test_intervals_hold_their_value(measured: tuple[Evaluation, tuple[SplitResult, ...]]):
     for one in measured[0].scores:
         assert set(one.figures) == {name for name, _, _ in FIGURES} - {"free_cost"}
         for name, figure in one.figures.items():
@@ -50,7 +50,7 @@ def test_intervals_hold_their_value(measured: tuple[Evaluation, tuple[Run, ...]]
     assert (exact.low, exact.high) == (0.0, 0.0)
 
 
-def test_classes_hold_every_judged_frame_once(measured: tuple[Evaluation, tuple[Run, ...]]):
+def test_classes_hold_every_judged_frame_once(measured: tuple[Evaluation, tuple[SplitResult, ...]]):
     result, (run,) = measured
     n_frames = sum(one.judged.stop - one.judged.start for one in run.real)
     for one in result.scores:
@@ -60,7 +60,7 @@ def test_classes_hold_every_judged_frame_once(measured: tuple[Evaluation, tuple[
     assert mean_face["open"].opening_bias < 0 < mean_face["bilabial"].opening_bias  # too little, and too much
 
 
-def test_tells_itself_as_tables_json_and_rows(measured: tuple[Evaluation, tuple[Run, ...]]):
+def test_tells_itself_as_tables_json_and_rows(measured: tuple[Evaluation, tuple[SplitResult, ...]]):
     result, _ = measured
     lines = result.table().splitlines()
     assert len(lines) == 2 + 5
@@ -76,7 +76,7 @@ def test_tells_itself_as_tables_json_and_rows(measured: tuple[Evaluation, tuple[
     assert all(len(row) == len(head) for row in rows)
 
 
-def test_the_page_shows_all_figures_and_nothing_from_outside(measured: tuple[Evaluation, tuple[Run, ...]]):
+def test_the_page_shows_all_figures_and_nothing_from_outside(measured: tuple[Evaluation, tuple[SplitResult, ...]]):
     html = evaluation_page(*measured)
     assert html.count("<h3>") == 9
     assert "Worst sentences of exemplar" in html
@@ -86,7 +86,7 @@ def test_the_page_shows_all_figures_and_nothing_from_outside(measured: tuple[Eva
 
 
 def test_folds_hold_out_every_utterance_once(observations: list[Observation]):
-    parts = folds(observations, n_folds=4, seed=1)
+    parts = split_into_folds(observations, n_folds=4, seed=1)
     assert sorted(one.name for _, test in parts for one in test) == [one.name for one in observations]
     assert all(len(train) == 30 for train, _ in parts)
     result, runs = evaluate(parts[:2])
@@ -94,7 +94,7 @@ def test_folds_hold_out_every_utterance_once(observations: list[Observation]):
     assert len(result.scores[0].utterances) == 20
     assert [(fold.n_train, fold.n_test) for fold in result.folds] == [(30, 10), (30, 10)]
     for one in result.scores:  # a mean over utterances is the mean of the folds' means where these are alike in size
-        mean, spread = result.over_folds(one.method, "dtw_cost")
+        mean, spread = result.fold_mean_and_deviation(one.method, "dtw_cost")
         assert mean == pytest.approx(one["dtw_cost"], rel=1e-12)
         each = [fold.figures[one.method]["dtw_cost"] for fold in result.folds]
         assert spread == pytest.approx(abs(each[0] - each[1]) / np.sqrt(2), rel=1e-12)
@@ -109,18 +109,18 @@ def test_folds_hold_out_every_utterance_once(observations: list[Observation]):
 @pytest.mark.parametrize("n_folds", [1, 41])
 def test_refuses_folds_that_cannot_be(observations: list[Observation], n_folds):
     with pytest.raises(InputError, match="40 utterances make 2 to 40 folds"):
-        folds(observations, n_folds=n_folds, seed=0)
+        split_into_folds(observations, n_folds=n_folds, seed=0)
 
 
 def test_words_are_held_out_with_every_utterance_that_holds_them(observations: list[Observation]):
     worded = [replace(one, words=(WordSpan("ab"[number % 2], 1, 2),)) for number, one in enumerate(observations)]
-    train, test = without_words(worded, ["B"])
+    train, test = split_by_words(worded, ["B"])
     assert {word.text for one in train for word in one.words} == {"a"}
     assert {word.text for one in test for word in one.words} == {"b"}
     with pytest.raises(InputError, match="nobody says zebra"):
-        without_words(worded, ["zebra"])
+        split_by_words(worded, ["zebra"])
     with pytest.raises(InputError, match="nothing is left to learn from"):
-        without_words(worded, ["a", "b"])
+        split_by_words(worded, ["a", "b"])
 
 
 def test_refuses_an_utterance_on_both_sides(observations: list[Observation]):
@@ -161,14 +161,14 @@ def test_a_network_is_trained_and_compared_with_where_there_is_enough_to_learn(
     assert scores["exemplar"]["r_opening"] > 0.95
 
 
-def curves_of(observations: list[Observation], hidden: np.ndarray) -> dict[str, Track]:
+def curves_of(observations: list[Observation], hidden: np.ndarray) -> dict[str, ExternalTrack]:
     """What another system might give: opening and width of the lips mixed, at 60 frames a second."""
     found = {}
     for one in observations:
         opening, width = one.landmarks[:, 13, 1] - one.landmarks[:, 14, 1], one.landmarks[:, 291, 0]
         times = np.arange(0, len(opening) / FPS, 1 / 60)
         read = np.stack([np.interp(times, np.arange(len(opening)) / FPS, curve) for curve in (opening, width)], axis=1)
-        found[one.name] = Track(times, read @ hidden)
+        found[one.name] = ExternalTrack(times, read @ hidden)
     return found
 
 
@@ -178,7 +178,9 @@ def test_good_curves_of_others_score_high_whatever_their_channels(observations: 
     result, _ = evaluate([parts], tracks=curves_of(observations, hidden))
     scores = {one.method: one for one in result.scores}
     assert scores["tracks"]["r_opening"] > 0.99
-    still = {name: Track(track.times, 0 * track.values) for name, track in curves_of(observations, hidden).items()}
+    still = {
+        name: ExternalTrack(track.times, 0 * track.values) for name, track in curves_of(observations, hidden).items()
+    }
     assert {one.method: one for one in evaluate([parts], tracks=still)[0].scores}["tracks"]["r_opening"] < 0.1
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.training.pose_correction import LEAST_CHUNKS, angle_terms, pose_leak, without_leak
+from corpus_tools.training.pose_correction import LEAST_CHUNKS, angle_terms, correct_pose, fit_pose_correction
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
 
 N = 40
@@ -36,7 +36,7 @@ def test_a_known_leak_is_taken_out(recorded: list[Observation]) -> None:
     offsets = np.random.default_rng(1).normal(0, 1.0, (9, N_LANDMARKS, 3))
     offsets[:, list(INNER_LIP_LOWER)] = offsets[:, list(INNER_LIP_UPPER)]
     leaky = leaking(recorded, offsets)
-    clean = without_leak(leaky)
+    clean = correct_pose(leaky)
 
     def off(seen: list[Observation] | tuple[Observation, ...]) -> float:
         away = np.array([one.landmarks - true.landmarks for one, true in zip(seen, recorded, strict=True)])
@@ -48,20 +48,20 @@ def test_a_known_leak_is_taken_out(recorded: list[Observation]) -> None:
 def test_lips_that_touch_keep_touching(recorded: list[Observation]) -> None:
     offsets = np.random.default_rng(2).normal(0, 1.0, (9, N_LANDMARKS, 3))
     leaky = leaking(recorded, offsets)
-    for before, after in zip(leaky, without_leak(leaky), strict=True):
+    for before, after in zip(leaky, correct_pose(leaky), strict=True):
         gaps = [one.landmarks[:, INNER_LIP_UPPER] - one.landmarks[:, INNER_LIP_LOWER] for one in (before, after)]
         np.testing.assert_allclose(gaps[0], gaps[1], atol=1e-3)
 
 
 def test_too_few_recordings_are_left_alone(recorded: list[Observation]) -> None:
     few = leaking(recorded, np.ones((9, N_LANDMARKS, 3)))[: LEAST_CHUNKS - 1]
-    assert not pose_leak(few).offsets.any()
-    for before, after in zip(few, without_leak(few), strict=True):
+    assert not fit_pose_correction(few).offsets.any()
+    for before, after in zip(few, correct_pose(few), strict=True):
         np.testing.assert_array_equal(before.landmarks, after.landmarks)
 
 
 def test_nobody_leaks_nothing() -> None:
-    assert without_leak([]) == ()
+    assert correct_pose([]) == ()
 
 
 def test_terms_are_angles_squares_and_products() -> None:

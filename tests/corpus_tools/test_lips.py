@@ -7,7 +7,7 @@ import pytest
 
 from corpus_tools.evaluation.evaluate import LEARNT_FOR_EVALUATION
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.training.train_phone_network import by_phone, described, feature_table, with_network
+from corpus_tools.training.train_phone_network import add_phone_network, encode_windows, expand_to_phones, feature_table
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.phones import PHONES, WEIGHTS
 from lexicon.sequence import SILENCE
@@ -36,7 +36,7 @@ def test_phones_are_told_by_what_the_mouth_does_first_and_last() -> None:
 def test_inputs_are_the_lines_of_the_table_beside_each_other(stream: np.random.Generator) -> None:
     shown, place = stream.integers(0, 4, (5, N_SHOWN)), stream.normal(size=(5, 4)).astype(np.float32)
     table = feature_table(KNOWN)
-    dense = described(shown, place, table).toarray()
+    dense = encode_windows(shown, place, table).toarray()
     for row, labels, where in zip(dense, shown, place, strict=True):
         np.testing.assert_array_equal(row, [*(value for label in labels for value in table[label]), *where])
 
@@ -45,11 +45,13 @@ def test_weights_by_phone_tell_what_weights_by_feature_do(stream: np.random.Gene
     shown, place = stream.integers(0, 4, (5, N_SHOWN)), stream.normal(size=(5, 4)).astype(np.float32)
     table, ones = feature_table(KNOWN), np.eye(4, dtype=np.float32)
     weights = stream.normal(size=(N_SHOWN * table.shape[1] + 4, 6)).astype(np.float32)
-    told = described(shown, place, ones) @ by_phone(weights, table, N_SHOWN)
-    np.testing.assert_allclose(told, described(shown, place, table) @ weights, rtol=1e-4, atol=1e-4)
-    np.testing.assert_array_equal(by_phone(weights[: 4 * N_SHOWN + 4], ones, N_SHOWN), weights[: 4 * N_SHOWN + 4])
+    told = encode_windows(shown, place, ones) @ expand_to_phones(weights, table, N_SHOWN)
+    np.testing.assert_allclose(told, encode_windows(shown, place, table) @ weights, rtol=1e-4, atol=1e-4)
+    np.testing.assert_array_equal(
+        expand_to_phones(weights[: 4 * N_SHOWN + 4], ones, N_SHOWN), weights[: 4 * N_SHOWN + 4]
+    )
 
 
 def test_too_little_is_not_learnt_from(make_observation: Callable[..., Observation]) -> None:
     talker = learn_talker([make_observation("u0", 0, 75)], n_speech=5, n_other=3, metadata=LEARNT_FOR_EVALUATION)
-    assert with_network(talker) is talker
+    assert add_phone_network(talker) is talker

@@ -23,12 +23,12 @@ def test_opening_and_width_are_told_in_eye_distances():
 
 
 def test_judged_from_a_tenth_of_a_second_before_speech_to_a_tenth_behind():
-    assert measures.judged_frames(SPEECH, 60, 50.0) == slice(15, 46)  # 0.30 s to 0.90 s, both frames included
+    assert measures.speech_frames(SPEECH, 60, 50.0) == slice(15, 46)  # 0.30 s to 0.90 s, both frames included
 
 
 def test_silence_cannot_be_judged():
     with pytest.raises(InputError, match="without speech"):
-        measures.judged_frames(PhoneSequence([SILENCE], [0.0, 1.0]), 25, 25.0)
+        measures.speech_frames(PhoneSequence([SILENCE], [0.0, 1.0]), 25, 25.0)
 
 
 def test_correlation_of_known_series():
@@ -72,10 +72,10 @@ def test_least_opening_looks_a_little_beyond_the_phone():
     opening = np.full(60, 1.0)
     opening[19] = 0.3  # 0.38 s: 20 ms before the p
     opening[40] = 0.1  # in the silence
-    assert measures.least_openings(opening, SPEECH, 50.0).tolist() == [0.3]
+    assert measures.min_openings(opening, SPEECH, 50.0).tolist() == [0.3]
     opening[18] = 0.2  # 0.36 s: 40 ms before, too far
-    assert measures.least_openings(opening, SPEECH, 50.0).tolist() == [0.3]
-    assert measures.least_openings(opening, SPEECH, 50.0, ("m",)).tolist() == []
+    assert measures.min_openings(opening, SPEECH, 50.0).tolist() == [0.3]
+    assert measures.min_openings(opening, SPEECH, 50.0, ("m",)).tolist() == []
 
 
 def test_open_vowels_are_read_in_their_middle():

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from corpus_tools.recordings.corpus_audio import Heard
-from corpus_tools.recordings.observation import trimmed
+from corpus_tools.recordings.corpus_audio import AlignedSpeech
+from corpus_tools.recordings.observation import trim_to_picture
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.types import Waveform
-from tts2face.video.frame_grid import face_span, filled_gaps, on_grid
+from tts2face.video.frame_grid import face_span, fill_gaps, resample_to_grid
 
 FPS = 25.0
 
@@ -20,28 +20,28 @@ def _line(times: np.ndarray) -> np.ndarray:
 
 def test_times_rounded_to_milliseconds_are_frames():
     times = np.round(np.arange(30) / 30, 3)
-    points, first = on_grid(_line(times), times, 30.0)
+    points, first = resample_to_grid(_line(times), times, 30.0)
     assert first == 0
     np.testing.assert_array_equal(points, _line(times))
 
 
 def test_uneven_times_are_put_on_even_ones():
     times = np.array([0.0, 0.03, 0.09, 0.11, 0.17, 0.2])
-    points, first = on_grid(_line(times), times, FPS)
+    points, first = resample_to_grid(_line(times), times, FPS)
     assert first == 0
     np.testing.assert_allclose(points, _line(np.arange(6) / FPS), atol=1e-6)
 
 
 def test_a_late_start_keeps_its_place_on_the_clock():
     times = 0.5 + np.arange(10) / FPS
-    points, first = on_grid(_line(times), times, FPS)
+    points, first = resample_to_grid(_line(times), times, FPS)
     assert first == 13
     np.testing.assert_allclose(points, _line(np.arange(13, 13 + len(points)) / FPS), atol=1e-5)
 
 
 def test_times_that_run_back():
     with pytest.raises(DataError, match="do not follow each other"):
-        on_grid(_line(np.arange(3.0)), np.array([0.0, 0.08, 0.04]), FPS)
+        resample_to_grid(_line(np.arange(3.0)), np.array([0.0, 0.08, 0.04]), FPS)
 
 
 def test_blank_frames_at_the_ends_and_short_gaps():
@@ -50,7 +50,7 @@ def test_blank_frames_at_the_ends_and_short_gaps():
     points[[0, 1, 2, 9, 10, 19]] = np.nan
     start, end = face_span(points)
     assert (start, end) == (3, 19)
-    filled, n_filled = filled_gaps(points[start:end], FPS)
+    filled, n_filled = fill_gaps(points[start:end], FPS)
     assert n_filled == 2
     np.testing.assert_allclose(filled, whole[3:19], atol=1e-6)
 
@@ -59,23 +59,23 @@ def test_a_long_gap():
     points = _line(np.arange(20) / FPS)
     points[5:9] = np.nan
     with pytest.raises(DataError, match=r"out of sight for 0\.16 s"):
-        filled_gaps(points, FPS)
+        fill_gaps(points, FPS)
 
 
-def _heard() -> Heard:
+def _heard() -> AlignedSpeech:
     phones = PhoneSequence([SILENCE, "b", "i", SILENCE], [0.0, 1.0, 1.1, 1.5, 3.0])
-    return Heard(phones, (WordSpan("b", 1, 3),), -3000.0, Waveform(np.zeros(100), 100), False)
+    return AlignedSpeech(phones, (WordSpan("b", 1, 3),), -3000.0, Waveform(np.zeros(100), 100), False)
 
 
 def test_a_cut_moves_phones_and_pictures_together():
-    phones, words = trimmed(_heard(), 0.2, 2.0)
+    phones, words = trim_to_picture(_heard(), 0.2, 2.0)
     assert phones.phones == (SILENCE, "b", "i", SILENCE)
     np.testing.assert_allclose(phones.edges, [0, 0.8, 0.9, 1.3, 1.8])
     assert words == (WordSpan("b", 1, 3),)
 
 
 def test_a_silence_that_is_cut_away_leaves_no_phone():
-    phones, words = trimmed(_heard(), 1.0, 1.5)
+    phones, words = trim_to_picture(_heard(), 1.0, 1.5)
     assert phones.phones == ("b", "i")
     np.testing.assert_allclose(phones.edges, [0, 0.1, 0.5])
     assert words == (WordSpan("b", 0, 2),)
@@ -84,4 +84,4 @@ def test_a_silence_that_is_cut_away_leaves_no_phone():
 @pytest.mark.parametrize(("begin", "stop"), [(1.05, 3.0), (0.0, 1.4)])
 def test_words_without_a_face(begin, stop):
     with pytest.raises(DataError, match="words are spoken while no face is seen"):
-        trimmed(_heard(), begin, stop)
+        trim_to_picture(_heard(), begin, stop)

@@ -13,10 +13,10 @@ import pytest
 
 from corpus_tools.build_talker import build_talker, read_provenance
 from corpus_tools.recordings.observe import STEPS, observe
-from corpus_tools.run_options import Effort
+from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, InputError
 from tts2face.models.talker import read_talker
-from tts2face.video.streaming_tracker import FilmReader
+from tts2face.video.streaming_tracker import StreamingTracker
 
 CHILD = """
 import sys
@@ -60,7 +60,7 @@ def test_good_recordings_are_kept_and_bad_ones_refused_with_their_reason(real_fo
         file.write("other,yesterday my seventeen elephants remembered nothing whatsoever\n")
     seen = []
     found = observe(
-        real_folder, effort=Effort(cache, 1, face_model), on_progress=lambda done, of: seen.append((done, of))
+        real_folder, effort=RunOptions(cache, 1, face_model), on_progress=lambda done, of: seen.append((done, of))
     )
     assert [one.name for one in found.kept] == ["bbaf2n", "bbaf3s", "bbaf5a"]
     reasons = {refusal.name: refusal.reason for refusal in found.refused}
@@ -80,7 +80,7 @@ def test_good_recordings_are_kept_and_bad_ones_refused_with_their_reason(real_fo
 
 
 def test_an_observation_is_on_one_clock(real_folder, cache, face_model):
-    one = observe(real_folder, effort=Effort(cache, 1, face_model)).kept[0]
+    one = observe(real_folder, effort=RunOptions(cache, 1, face_model)).kept[0]
     assert one.landmarks.shape == (75, 478, 3)
     assert one.head.shape == (75, 6)
     assert one.intensity.shape == (75,)
@@ -93,8 +93,8 @@ def test_an_observation_is_on_one_clock(real_folder, cache, face_model):
 
 
 def test_processes_change_nothing(real_folder, tmp_path, face_model):
-    alone = observe(real_folder, effort=Effort(tmp_path / "a", 1, face_model)).kept
-    together = observe(real_folder, effort=Effort(tmp_path / "b", 2, face_model)).kept
+    alone = observe(real_folder, effort=RunOptions(tmp_path / "a", 1, face_model)).kept
+    together = observe(real_folder, effort=RunOptions(tmp_path / "b", 2, face_model)).kept
     for one, other in zip(alone, together, strict=True):
         assert one.name == other.name
         np.testing.assert_array_equal(one.landmarks, other.landmarks)
@@ -114,15 +114,15 @@ def test_a_killed_run_goes_on_where_it_stopped(real_folder, tmp_path, face_model
     before = {path: path.stat().st_mtime_ns for path in kept.glob("[!.]*.tracking")}
     assert 0 < len(before) < 3
     tracked = []
-    sights = FilmReader.sights
-    monkeypatch.setattr(FilmReader, "sights", lambda *args: tracked.append(1) or sights(*args))
-    assert len(observe(real_folder, effort=Effort(kept, 1, face_model)).kept) == 3
+    sights = StreamingTracker.track
+    monkeypatch.setattr(StreamingTracker, "track", lambda *args: tracked.append(1) or sights(*args))
+    assert len(observe(real_folder, effort=RunOptions(kept, 1, face_model)).kept) == 3
     assert len(tracked) == 3 - len(before)
     assert all(path.stat().st_mtime_ns == stamp for path, stamp in before.items())
 
 
 def test_a_damaged_part_of_the_cache_is_made_again(real_folder, tmp_path, face_model):
-    effort = Effort(tmp_path / "cache", 1, face_model)
+    effort = RunOptions(tmp_path / "cache", 1, face_model)
     first = observe(real_folder, effort=effort).kept
     for path in (tmp_path / "cache").iterdir():
         path.write_bytes(path.read_bytes()[:100])
@@ -141,7 +141,7 @@ def test_a_talker_is_built_and_says_where_it_comes_from(real_folder, cache, tmp_
         told[name] = (0, 1)
         return lambda done, of: told.update({name: (done, of)})
 
-    effort = Effort(cache, 1, face_model)
+    effort = RunOptions(cache, 1, face_model)
     built = build_talker(real_folder, out, name="s1", effort=effort, created="2000-01-01", stages=stages)
     assert told["reading recordings"] == (400, 400)
     assert list(told) == ["reading recordings", "learning lips"]  # three recordings teach no drive
@@ -160,7 +160,7 @@ def test_nothing_is_written_when_every_recording_is_refused(tmp_path, face_model
     folder.mkdir()
     (folder / "a.mkv").touch()
     with pytest.raises(InputError, match="no recording could be used"):
-        build_talker(folder, tmp_path / "x.talker", effort=Effort(tmp_path / "cache", 1, face_model))
+        build_talker(folder, tmp_path / "x.talker", effort=RunOptions(tmp_path / "cache", 1, face_model))
     assert not (tmp_path / "x.talker").exists()
 
 
@@ -181,4 +181,4 @@ def test_a_provenance_that_is_not_there(tmp_path):
 
 def test_no_job(real_folder, tmp_path):
     with pytest.raises(InputError, match="jobs must be 1 or more"):
-        observe(real_folder, effort=Effort(tmp_path, -1))
+        observe(real_folder, effort=RunOptions(tmp_path, -1))

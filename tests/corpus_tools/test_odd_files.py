@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from corpus_tools.recordings.folder import find_recordings, spoken_words
-from corpus_tools.recordings.observe import Observations, Refusal, _Worker, by_video, require_kept
+from corpus_tools.recordings.folder import find_recordings, pronounce_recording
+from corpus_tools.recordings.observe import Observations, Refusal, _VideoReader, check_any_kept, group_by_video
 from lexicon.errors import DataError, InputError
-from tts2face.video.media import media_facts, read_sound
+from tts2face.video.media import read_media_info, read_sound
 
 REASONS = {
     "folder": "folder.mp4 is a folder, not a file",
@@ -28,16 +28,16 @@ def recordings(tmp_path: Path) -> Path:
 
 
 def test_each_is_refused_by_name(recordings: Path, tmp_path: Path) -> None:
-    worker = _Worker(tmp_path, tmp_path / "no.task")
+    worker = _VideoReader(tmp_path, tmp_path / "no.task")
     found = [
         outcome
-        for task in by_video(find_recordings(recordings))
+        for task in group_by_video(find_recordings(recordings))
         for outcome in worker.outcomes(task, lambda share: None)
     ]
     reasons = {outcome.name: outcome.reason for outcome in found if isinstance(outcome, Refusal)}
     assert set(reasons) == set(REASONS)
     assert [name for name, reason in REASONS.items() if reason not in reasons[name]] == []
-    for read in (media_facts, lambda path: read_sound(path, 16_000)):
+    for read in (read_media_info, lambda path: read_sound(path, 16_000)):
         for name in REASONS:
             with pytest.raises(DataError, match=rf"{name}\.mp4 (is|cannot be read)"):
                 read(recordings / f"{name}.mp4")
@@ -48,12 +48,12 @@ def test_a_transcript_that_is_a_pipe_is_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "a.txt")
     (recording,) = find_recordings(tmp_path)
     with pytest.raises(DataError, match=r"a\.txt is a pipe, not a file"):
-        spoken_words(recording)
+        pronounce_recording(recording)
 
 
 def test_where_nothing_is_left_the_reasons_are_said(tmp_path: Path) -> None:
     refused = tuple(Refusal(name, f"reason {name}", tmp_path / name, 0.0) for name in "abcde")
     with pytest.raises(InputError, match=r"^no recording could be used: a: reason a$"):
-        require_kept(Observations((), refused[:1]))
+        check_any_kept(Observations((), refused[:1]))
     with pytest.raises(InputError, match=r"^no recording could be used: a: reason a; b: reason b; c: reason c; and"):
-        require_kept(Observations((), refused))
+        check_any_kept(Observations((), refused))

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.evaluation.evaluate import Run, evaluate
-from corpus_tools.evaluation.own_durations import Said, judged_own, on_one_clock
+from corpus_tools.evaluation.evaluate import SplitResult, evaluate
+from corpus_tools.evaluation.own_durations import VoicedUtterance, compare_own_durations, map_word_times
 from corpus_tools.evaluation.splits import split
 from corpus_tools.evaluation.tables import Evaluation
 from corpus_tools.recordings.observation import Observation
@@ -22,11 +22,11 @@ def observations() -> list[Observation]:
     return [worded(observation(number)) for number in range(40)]
 
 
-def measured(observations: list[Observation], stretch) -> tuple[Evaluation, tuple[Run, ...]]:
+def measured(observations: list[Observation], stretch) -> tuple[Evaluation, tuple[SplitResult, ...]]:
     return evaluate([split(observations, hold_out=8, seed=0)], voice=OwnVoice(observations, stretch))
 
 
-def on_clock(ours: list[float], real: list[float]) -> Said:
+def on_clock(ours: list[float], real: list[float]) -> VoicedUtterance:
     """Two words of one phone each between silences, with a silence of our own between them."""
     speech = Speech(
         Waveform(np.zeros(round(ours[-1] * 1000)), 1000),
@@ -34,7 +34,7 @@ def on_clock(ours: list[float], real: list[float]) -> Said:
         (WordSpan("one", 1, 2), WordSpan("two", 3, 4)),
     )
     phones = PhoneSequence([SILENCE, "ɑ", "i", SILENCE], real)
-    return on_one_clock(speech, phones, (WordSpan("one", 1, 2), WordSpan("two", 2, 3)), 25.0)
+    return map_word_times(speech, phones, (WordSpan("one", 1, 2), WordSpan("two", 2, 3)), 25.0)
 
 
 def test_words_fall_on_words_and_time_runs_evenly_between() -> None:
@@ -76,13 +76,13 @@ def test_what_lips_do_in_phones_is_looked_at_on_the_clock_of_the_voice(observati
 
     (word, *_) = one.observation.words
     doubled = PhoneSequence(one.observation.phones.phones, 2 * one.observation.phones.edges)
-    said = on_one_clock(
+    said = map_word_times(
         Speech(Waveform(np.zeros(round(doubled.end * 1e5)), 100_000), doubled, one.observation.words),
         one.observation.phones,
         one.observation.words,
         25.0,
     )
-    judged = judged_own(clockwork, one, said, run.model)
+    judged = compare_own_durations(clockwork, one, said, run.model)
     assert judged.own is not None
     np.testing.assert_allclose(judged.own.values[:, 0], np.arange(said.n_frames) / 25.0, atol=1e-5)
     begin, end = one.observation.phones.edges[[word.first, one.observation.words[-1].last]]

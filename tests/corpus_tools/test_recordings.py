@@ -1,6 +1,12 @@
 import pytest
 
-from corpus_tools.recordings.folder import LETTER_NAMES, Recording, find_recordings, pronunciations, spoken_words
+from corpus_tools.recordings.folder import (
+    LETTER_NAMES,
+    Recording,
+    find_recordings,
+    look_up_pronunciations,
+    pronounce_recording,
+)
 from lexicon.dictionary import arpabet_segments
 from lexicon.errors import DataError, InputError
 
@@ -21,25 +27,25 @@ def test_plain_videos_have_their_text_beside_them(tmp_path):
     (tmp_path / "notes.doc").touch()
     (found,) = find_recordings(tmp_path)
     assert (found.name, found.transcript, found.is_spelling) == ("x", tmp_path / "x.txt", False)
-    assert [word for word, _ in spoken_words(found)] == ["A", "word"]
+    assert [word for word, _ in pronounce_recording(found)] == ["A", "word"]
 
 
 def test_single_letters_are_letter_names_where_the_corpus_spells(tmp_path):
-    ways = dict(spoken_words(Recording("r", tmp_path / "r.mkv", "at a b", is_spelling=True)))
+    ways = dict(pronounce_recording(Recording("r", tmp_path / "r.mkv", "at a b", is_spelling=True)))
     assert ways["a"] == (("eɪ",),)
     assert ways["b"] == (("b", "i"),)
 
 
 def test_an_article_may_sound_both_ways():
-    assert set(pronunciations("a", is_letter=False)) == {("ə",), ("eɪ",)}
+    assert set(look_up_pronunciations("a", is_letter=False)) == {("ə",), ("eɪ",)}
 
 
 def test_all_variants_of_the_dictionary_are_offered():
-    assert set(pronunciations("either", is_letter=False)) == {("i", "ð", "ɚ"), ("aɪ", "ð", "ɚ")}
+    assert set(look_up_pronunciations("either", is_letter=False)) == {("i", "ð", "ɚ"), ("aɪ", "ð", "ɚ")}
 
 
 def test_white_begins_with_w():
-    assert pronunciations("white", is_letter=False) == (("w", "aɪ", "t"),)
+    assert look_up_pronunciations("white", is_letter=False) == (("w", "aɪ", "t"),)
 
 
 def test_letters_have_names_in_the_phone_table():
@@ -65,28 +71,32 @@ def test_a_manifest_with_other_columns(tmp_path):
 
 
 def test_a_recording_without_a_transcript_has_no_words(tmp_path):
-    assert spoken_words(Recording("r", tmp_path / "r.mkv", None)) is None
+    assert pronounce_recording(Recording("r", tmp_path / "r.mkv", None)) is None
 
 
 def test_words_that_are_known_already_are_not_read_again(tmp_path):
     words = (("bob", (("b", "ɑ", "b"),)),)
-    assert spoken_words(Recording("r", tmp_path / "r.mkv", "other words", words=words)) == words
+    assert pronounce_recording(Recording("r", tmp_path / "r.mkv", "other words", words=words)) == words
 
 
 def test_a_transcript_of_nothing_but_signs(tmp_path):
     with pytest.raises(DataError, match="holds no word"):
-        spoken_words(Recording("r", tmp_path / "r.mkv", "... !"))
+        pronounce_recording(Recording("r", tmp_path / "r.mkv", "... !"))
 
 
 def test_a_word_that_the_dictionary_lacks_is_said_by_rule(tmp_path):
-    words = dict(spoken_words(Recording("r", tmp_path / "r.mkv", "the zorblatt")))
+    words = dict(pronounce_recording(Recording("r", tmp_path / "r.mkv", "the zorblatt")))
     assert words["zorblatt"] == (("z", "ɔ", "ɹ", "b", "l", "æ", "t"),)
 
 
 def test_numbers_of_a_transcript_are_written_out(tmp_path):
-    assert [word for word, _ in spoken_words(Recording("r", tmp_path / "r.mkv", "I have 2."))] == ["I", "have", "two"]
+    assert [word for word, _ in pronounce_recording(Recording("r", tmp_path / "r.mkv", "I have 2."))] == [
+        "I",
+        "have",
+        "two",
+    ]
 
 
 def test_a_word_that_nobody_can_say(tmp_path):
     with pytest.raises(DataError, match="no pronunciation is known for '東京'"):
-        spoken_words(Recording("r", tmp_path / "r.mkv", "bin 東京"))
+        pronounce_recording(Recording("r", tmp_path / "r.mkv", "bin 東京"))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from corpus_tools.training.ridge import ridge
+from corpus_tools.training.ridge import fit_ridge
 
 
 def test_errors_left_out_are_those_of_leaving_each_row_out() -> None:
@@ -18,7 +18,7 @@ def test_errors_left_out_are_those_of_leaving_each_row_out() -> None:
         weights = np.linalg.solve(design.T @ design + penalty, design.T @ wanted[rest])
         here = np.concatenate([[1.0], terms[row] - terms.mean(axis=0)])
         total += float(np.square(wanted[row] - here @ weights).sum())
-    assert ridge(terms, wanted, [effort]).left_out_error == pytest.approx(total, rel=1e-9)
+    assert fit_ridge(terms, wanted, [effort]).left_out_error == pytest.approx(total, rel=1e-9)
 
 
 def test_noise_asks_for_effort_and_a_law_for_none() -> None:
@@ -27,7 +27,7 @@ def test_noise_asks_for_effort_and_a_law_for_none() -> None:
     law = terms @ generator.normal(size=(10, 1))
     noise = generator.normal(size=(40, 1))
     law, noise = law - law.mean(axis=0), noise - noise.mean(axis=0)
-    sizes = [np.abs(ridge(terms, wanted).weights).sum() for wanted in (law, noise)]
+    sizes = [np.abs(fit_ridge(terms, wanted).weights).sum() for wanted in (law, noise)]
     least = [
         np.abs(np.linalg.lstsq(terms - terms.mean(axis=0), wanted, rcond=None)[0]).sum() for wanted in (law, noise)
     ]

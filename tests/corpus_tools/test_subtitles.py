@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from corpus_tools.recordings.folder import Recording, find_recordings
-from corpus_tools.recordings.observe import by_video, observe
+from corpus_tools.recordings.observe import group_by_video, observe
 from corpus_tools.recordings.subtitles import read_cues
-from corpus_tools.run_options import Effort
+from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError
 from tests.corpus_tools.films import joined
 
@@ -74,7 +74,7 @@ def test_a_video_with_subtitles_is_a_recording_for_each_cue(tmp_path: Path) -> N
     assert [one.name for one in found] == ["talk-0001", "talk-0002"]
     assert found[0].span == pytest.approx((0.7, 2.05))
     assert find_recordings(tmp_path / "talk.mp4") == found
-    assert by_video([*found, Recording("x", tmp_path / "x.mp4", "A.")])[0].recordings == found
+    assert group_by_video([*found, Recording("x", tmp_path / "x.mp4", "A.")])[0].recordings == found
 
 
 def test_one_long_video_with_subtitles_gives_what_its_parts_gave(
@@ -91,7 +91,7 @@ def test_one_long_video_with_subtitles_gives_what_its_parts_gave(
         start, end = begin + float(row["speech_start_s"]), begin + float(row["speech_end_s"])
         lines += [str(number), f"00:00:{start:06.3f} --> 00:00:{end:06.3f}".replace(".", ","), row["transcript"], ""]
     (tmp_path / "long" / "talk.srt").write_text("\n".join(lines), encoding="utf-8")
-    effort = Effort(tmp_path / "cache", 1, face_model)
+    effort = RunOptions(tmp_path / "cache", 1, face_model)
     cut = observe(tmp_path / "long", effort=effort)
     assert not cut.refused
     assert [one.name for one in cut.kept] == ["talk-0001", "talk-0002", "talk-0003"]

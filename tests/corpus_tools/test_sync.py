@@ -7,7 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.recordings.audio_video_sync import LEAD_S, REACH_S, agreement, agreements, timings
+from corpus_tools.recordings.audio_video_sync import (
+    LEAD_S,
+    REACH_S,
+    corrected_timings,
+    estimate_sync,
+    estimate_sync_by_video,
+)
 from corpus_tools.recordings.observation import Observation, Timing
 
 FPS = 25.0
@@ -33,28 +39,28 @@ def filmed(make_observation: Callable[..., Observation]) -> Callable[..., Observ
 @pytest.mark.parametrize("lag", [-0.2, 0.0, 0.093, 0.25])
 def test_a_known_lag_is_found(filmed: Callable[..., Observation], lag: float) -> None:
     """5 ms: half a step, between which the peak is interpolated."""
-    found = agreement([filmed("a", lag)])
+    found = estimate_sync([filmed("a", lag)])
     assert found.lag == pytest.approx(lag, abs=0.005)
     assert found.correlation > 0.9
-    assert found.fault is None
+    assert found.problem is None
 
 
 def test_lags_of_less_than_can_be_told_stay(filmed: Callable[..., Observation]) -> None:
-    assert agreement([filmed("a", 0.02)]).correction == 0.0
-    assert agreement([filmed("a", 0.06)]).correction == pytest.approx(0.06, abs=0.005)
-    assert agreement([filmed("a", 0.02, seconds=600.0)]).correction == pytest.approx(0.02, abs=0.005)
-    assert agreement([filmed("a", 0.2, seconds=10.0)]).correction == 0.0
+    assert estimate_sync([filmed("a", 0.02)]).lag_correction_s == 0.0
+    assert estimate_sync([filmed("a", 0.06)]).lag_correction_s == pytest.approx(0.06, abs=0.005)
+    assert estimate_sync([filmed("a", 0.02, seconds=600.0)]).lag_correction_s == pytest.approx(0.02, abs=0.005)
+    assert estimate_sync([filmed("a", 0.2, seconds=10.0)]).lag_correction_s == 0.0
 
 
 def test_another_sound_is_a_fault(filmed: Callable[..., Observation]) -> None:
     seen, other = filmed("a", 0.0), filmed("b", 0.0, seed=2)
-    fault = agreement([replace(seen, intensity=other.intensity)]).fault
+    fault = estimate_sync([replace(seen, intensity=other.intensity)]).problem
     assert fault is not None
     assert "do not move with the sound" in fault
 
 
 def test_a_lag_at_the_border_is_a_fault(filmed: Callable[..., Observation]) -> None:
-    fault = agreement([filmed("a", REACH_S)]).fault
+    fault = estimate_sync([filmed("a", REACH_S)]).problem
     assert fault is not None
     assert "apart" in fault
 
@@ -62,26 +68,26 @@ def test_a_lag_at_the_border_is_a_fault(filmed: Callable[..., Observation]) -> N
 def test_short_videos_are_taken_together_and_long_ones_alone(filmed: Callable[..., Observation]) -> None:
     short = [filmed(f"s{number}", 0.1, seconds=12.0, seed=number) for number in range(5)]
     long = filmed("long", -0.15)
-    found = agreements([*short, long])
+    found = estimate_sync_by_video([*short, long])
     assert found[Path("long.mkv")].lag == pytest.approx(-0.15, abs=0.005)
     assert [found[one.video].seconds for one in short] == pytest.approx([60.0] * 5)
-    wanted = timings([*short, long], found)
+    wanted = corrected_timings([*short, long], found)
     assert wanted[Path("long.mkv")].lag == pytest.approx(-0.15, abs=0.005)
     assert wanted[short[0].video].lag == pytest.approx(0.1, abs=0.005)
 
 
 def test_the_rate_of_most_frames_is_everybodys(filmed: Callable[..., Observation]) -> None:
     seen = [filmed("a", 0.0, fps=30.0), filmed("b", 0.0, seconds=90.0, fps=25.0), filmed("c", 0.0, 50.0, fps=30.0)]
-    assert timings(seen, agreements(seen)) == {Path("b.mkv"): Timing(30.0, 0.0)}
+    assert corrected_timings(seen, estimate_sync_by_video(seen)) == {Path("b.mkv"): Timing(30.0, 0.0)}
 
 
 def test_nothing_is_read_again_where_all_is_well(filmed: Callable[..., Observation]) -> None:
     seen = [filmed("a", 0.0), filmed("b", 0.01)]
-    assert timings(seen, agreements(seen)) == {}
+    assert corrected_timings(seen, estimate_sync_by_video(seen)) == {}
 
 
 def test_lips_that_do_not_move_tell_nothing(filmed: Callable[..., Observation]) -> None:
     seen = filmed("a", 0.1)
     still = replace(seen, landmarks=np.repeat(seen.landmarks[:1], len(seen.landmarks), axis=0))
-    found = agreement([still])
-    assert (found.lag, found.correction, found.fault) == (0.0, 0.0, None)
+    found = estimate_sync([still])
+    assert (found.lag, found.lag_correction_s, found.problem) == (0.0, 0.0, None)

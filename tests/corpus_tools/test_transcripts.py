@@ -5,10 +5,10 @@ import contextlib
 import numpy as np
 import pytest
 
-from corpus_tools.recordings.folder import find_recordings, spoken_words
+from corpus_tools.recordings.folder import find_recordings, pronounce_recording
 from corpus_tools.recordings.subtitles import Cue, read_cues
 from corpus_tools.transcripts.decoding import LARGEST_BYTES, read_text
-from corpus_tools.transcripts.find import READERS, said_in, transcript_of
+from corpus_tools.transcripts.find import READERS, find_transcript, read_transcript
 from lexicon.errors import DataError
 
 SRT = """1
@@ -119,16 +119,16 @@ def test_word_times_are_samples_of_25_khz(write):
 def test_all_grid_alignments_say_what_the_manifest_says(shared_recordings):
     folder = shared_recordings / "grid_s1"
     listed = {one.name: one.transcript for one in find_recordings(folder)}
-    aligned = {path.stem: said_in(path) for path in sorted((folder / "align").glob("*.align"))}
+    aligned = {path.stem: read_transcript(path) for path in sorted((folder / "align").glob("*.align"))}
     assert aligned
     assert aligned == {name: listed[name] for name in aligned}
 
 
 def test_text_goes_before_the_others(write, tmp_path):
     write(".align", ALIGN)
-    assert transcript_of(tmp_path / "take.mp4") == tmp_path / "take.align"
+    assert find_transcript(tmp_path / "take.mp4") == tmp_path / "take.align"
     write(".TXT", "words")
-    assert transcript_of(tmp_path / "take.mp4") == tmp_path / "take.TXT"
+    assert find_transcript(tmp_path / "take.mp4") == tmp_path / "take.TXT"
 
 
 def test_damaged_subtitles_refuse_their_video_alone(write, tmp_path):
@@ -137,9 +137,9 @@ def test_damaged_subtitles_refuse_their_video_alone(write, tmp_path):
     (tmp_path / "whole.mp4").touch()
     (tmp_path / "whole.TextGrid").write_text(LONG_GRID)
     broken, whole = find_recordings(tmp_path)
-    assert [word for word, _ in spoken_words(whole)] == ["say", "hi", "two"]
+    assert [word for word, _ in pronounce_recording(whole)] == ["say", "hi", "two"]
     with pytest.raises(DataError, match="holds no subtitles"):
-        spoken_words(broken)
+        pronounce_recording(broken)
 
 
 @pytest.mark.parametrize(
@@ -158,7 +158,7 @@ def test_damaged_subtitles_refuse_their_video_alone(write, tmp_path):
 )
 def test_what_cannot_be_read_is_refused(write, suffix, content, reason):
     with pytest.raises(DataError, match=reason):
-        said_in(write(suffix, content))
+        read_transcript(write(suffix, content))
 
 
 def test_a_file_that_vanished(tmp_path):

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from corpus_tools.recordings.observe import Observations, observe
-from corpus_tools.run_options import Effort
+from corpus_tools.run_options import RunOptions
 from tests.corpus_tools.films import doubled, film
-from tts2face.video.media import read_pictures, read_sound
+from tts2face.video.media import read_frames, read_sound
 
 REASONS = {
     "crowd": "show more than one face",
@@ -28,7 +28,7 @@ def found(shared_recordings: Path, face_model: Path, tmp_path_factory: pytest.Te
     with (source / "manifest.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))[:2]
     clip = source / "clips" / f"{rows[0]['clip']}.mkv"
-    pictures = [picture.pixels for picture in read_pictures(clip)]
+    pictures = [picture.pixels for picture in read_frames(clip)]
     sound = read_sound(clip, 16_000).samples
     grey = np.full_like(pictures[0], 90)
     loud = np.abs(sound).max()
@@ -49,7 +49,7 @@ def found(shared_recordings: Path, face_model: Path, tmp_path_factory: pytest.Te
     (folder / "wrong.txt").write_text("yesterday seventeen elephants remembered nothing")
     film(pictures, sound, folder / "second.mp4")
     (folder / "second.txt").write_text(rows[0]["transcript"])
-    return observe(folder, effort=Effort(folder / "cache", 2, face_model))
+    return observe(folder, effort=RunOptions(folder / "cache", 2, face_model))
 
 
 def test_what_is_wrong_is_said(found: Observations) -> None:

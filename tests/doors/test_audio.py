@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from corpus_tools.training.linear_audio_map import Lesson, learn_linear
-from corpus_tools.training.network_audio_map import NetworkOptions, learn_network
+from corpus_tools.training.linear_audio_map import TrainingUtterance, learn_linear_map
+from corpus_tools.training.network_audio_map import NetworkMapOptions, learn_network_map
 from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
@@ -17,9 +17,9 @@ from tts2face.models.talker import Talker, load_talker, write_talker
 from tts2face.request import Request
 from tts2face.session import Session
 from tts2face.speech.features import FEATURE_RATE, speech_features
-from tts2face.synthesis.audio_input import PIECE_FRAMES, between, driven
-from tts2face.types import Trajectory, frame_count, joined_clips
-from tts2face.video.media import media_facts, read_sound, sound_blocks
+from tts2face.synthesis.audio_input import PIECE_FRAMES, map_audio_to_motion, resample_motion
+from tts2face.types import Trajectory, concatenate_clips, frame_count
+from tts2face.video.media import read_media_info, read_sound, sound_blocks
 
 TEXT = "bin blue at F two now"
 LEARNT_FROM = 60  # utterances: enough to be far better than nothing
@@ -45,9 +45,9 @@ def talker(clips: Path) -> Talker:
     for one in spoken:
         sound = read_sound(clips / f"{one.name}.mkv", FEATURE_RATE)
         features = speech_features(sound, "mfcc", fps=shipped.fps, n_frames=len(one.shape)).values
-        lessons.append(Lesson(features, one.shape[:, : shipped.model.n_speech]))
-    network = learn_network(lessons, feature="mfcc", options=NetworkOptions())
-    return replace(shipped, drives={"linear": learn_linear(lessons, feature="mfcc"), "network": network})
+        lessons.append(TrainingUtterance(features, one.shape[:, : shipped.model.n_speech]))
+    network = learn_network_map(lessons, feature="mfcc", options=NetworkMapOptions())
+    return replace(shipped, audio_maps={"linear": learn_linear_map(lessons, feature="mfcc"), "network": network})
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +82,7 @@ def opening(motion: np.ndarray, talker: Talker) -> np.ndarray:
 def test_lips_that_hear_a_new_sentence_move_as_the_speaker_s(
     drive: str, least: float, film: Path, talker: Talker
 ) -> None:
-    _, lips = driven(film, talker.drives[drive], talker, talker.fps)
+    _, lips = map_audio_to_motion(film, talker.audio_maps[drive], talker, talker.fps)
     (real,) = (one.shape for one in talker.utterances if one.name == "bbaf2n")
     n = min(len(real), len(lips))
     assert np.corrcoef(opening(real[:n], talker), opening(lips.values[:n], talker))[0, 1] > least
@@ -128,7 +128,7 @@ def test_a_long_recording_comes_in_pieces(text: str, film: Path, talker: Talker,
     pieces = list(Session(talker, face).stream(Request(audio=sound, text=text, fps=60.0)))
     assert [len(piece.clip.motion) for piece in pieces[:-1]] == [PIECE_FRAMES] * (len(pieces) - 1)
     assert sum(piece.n_steps for piece in pieces) == 1000
-    whole = joined_clips([piece.clip for piece in pieces])
+    whole = concatenate_clips([piece.clip for piece in pieces])
     assert whole.speech.waveform.duration == pytest.approx(len(whole.motion) / 60.0, abs=1e-3)
     if text:
         assert len(whole.speech.words) == len(text.split())
@@ -147,9 +147,10 @@ def test_files_of_sound_alone_are_read(suffix: str, here: Path) -> None:
 
 def test_a_faint_recording_moves_the_lips_as_a_loud_one(film: Path, talker: Talker, here: Path) -> None:
     sound = read_sound(film, 16000).samples
-    drive = replace(talker.drives["network"], loudness=-18.0)
+    drive = replace(talker.audio_maps["network"], loudness=-18.0)
     loud, faint = (
-        driven(written(here / f"{gain}.wav", gain * sound), drive, talker, 25.0)[1].values for gain in (1.0, 0.1)
+        map_audio_to_motion(written(here / f"{gain}.wav", gain * sound), drive, talker, 25.0)[1].values
+        for gain in (1.0, 0.1)
     )
     spread = talker.model.spread[: talker.model.n_speech]
     assert np.median(np.abs(loud - faint) / spread) < 0.1  # 16-bit noise is left
@@ -157,9 +158,9 @@ def test_a_faint_recording_moves_the_lips_as_a_loud_one(film: Path, talker: Talk
 
 def test_motion_between_frames_goes_through_them() -> None:
     values = np.random.default_rng(0).normal(size=(20, 3)).astype(np.float32)
-    np.testing.assert_allclose(between(values, 25.0, 50.0, 39)[::2], values, atol=1e-5)
+    np.testing.assert_allclose(resample_motion(values, 25.0, 50.0, 39)[::2], values, atol=1e-5)
     line = np.arange(20, dtype=np.float32)[:, None]
-    np.testing.assert_allclose(between(line, 25.0, 30.0, 22)[2:-2, 0], np.arange(22)[2:-2] / 30 * 25, atol=1e-4)
+    np.testing.assert_allclose(resample_motion(line, 25.0, 30.0, 22)[2:-2, 0], np.arange(22)[2:-2] / 30 * 25, atol=1e-4)
 
 
 def test_the_command_writes_clips(film: Path, talker: Talker, here: Path) -> None:
@@ -174,7 +175,7 @@ def test_the_command_writes_clips(film: Path, talker: Talker, here: Path) -> Non
         ("script.mp4", ["--transcript", "said.txt", "--explain", "why.json"]),
     ):
         assert run([*common, *more, "--out", out]) == 0
-        facts = media_facts(here / out)
+        facts = read_media_info(here / out)
         assert facts.rate == 48000
         assert facts.duration == pytest.approx(3.0, abs=0.25)
     assert (here / "why.json").stat().st_size > 100
@@ -221,7 +222,7 @@ def test_a_recording_that_is_not_there_and_a_talker_without_drives_are_refused(
     with pytest.raises(InputError, match=r"there is no recording none\.wav"):
         Session(talker, face).clip(Request(audio=Path("none.wav")))
     with pytest.raises(InputError, match="has no network drive"):
-        Session(replace(talker, drives={}), face).clip(Request(audio=film))
+        Session(replace(talker, audio_maps={}), face).clip(Request(audio=film))
 
 
 def test_the_text_is_given_once(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -235,7 +236,7 @@ def test_an_explanation_needs_words(film: Path, capsys: pytest.CaptureFixture[st
 
 
 def test_lips_are_in_the_talker_s_channels(film: Path, talker: Talker) -> None:
-    said, lips = driven(film, talker.drives["linear"], talker, 30.0)
+    said, lips = map_audio_to_motion(film, talker.audio_maps["linear"], talker, 30.0)
     assert isinstance(lips, Trajectory)
     assert said.phones.phones == ("sil",)
     assert lips.channels == tuple(f"shape{i}" for i in range(talker.model.n_speech))

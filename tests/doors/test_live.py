@@ -9,12 +9,12 @@ from cli.main import run
 from lexicon.errors import BackendError
 from tests.corpus_tools.films import joined
 from tts2face.models.face_file import load_face
-from tts2face.synthesis.live_capture import LEARNING_S, Actor, Pose, poses
-from tts2face.synthesis.performance import motion_of_take
+from tts2face.synthesis.live_capture import LEARNING_S, LiveCapture, LivePose, track_poses
+from tts2face.synthesis.performance import retarget_take
 from tts2face.video.blendshapes import BlendshapeReader
 from tts2face.video.landmark_models import find_bundle
-from tts2face.video.media import Picture, read_pictures
-from tts2face.video.streaming_tracker import FilmReader
+from tts2face.video.media import TimedFrame, read_frames
+from tts2face.video.streaming_tracker import StreamingTracker
 from tts2face.video.take import read_take
 from tts2face.video.track import FaceTracker
 
@@ -39,18 +39,18 @@ def film(shared_recordings: Path, bundle: Path, tmp_path_factory: pytest.TempPat
 
 
 @pytest.fixture(scope="module")
-def live(film: Path, bundle: Path) -> list[Pose | None]:
-    return list(poses(read_pictures(film), load_face("head"), FaceTracker(bundle), BlendshapeReader(bundle), FPS))
+def live(film: Path, bundle: Path) -> list[LivePose | None]:
+    return list(track_poses(read_frames(film), load_face("head"), FaceTracker(bundle), BlendshapeReader(bundle), FPS))
 
 
-def test_a_person_is_learnt_and_then_followed(live: list[Pose | None], film: Path, bundle: Path) -> None:
+def test_a_person_is_learnt_and_then_followed(live: list[LivePose | None], film: Path, bundle: Path) -> None:
     """Against the take read as a whole, which knows the future and more of her."""
     head = load_face("head")
     learnt = round(LEARNING_S * FPS)
     assert all(pose is None for pose in live[:learnt])
     followed = live[learnt + 1 :]
     assert all(pose is not None for pose in followed)
-    motion = motion_of_take(read_take(film, FilmReader(bundle), BlendshapeReader(bundle)), head)
+    motion = retarget_take(read_take(film, StreamingTracker(bundle), BlendshapeReader(bundle)), head)
     weights = np.array([pose.weights for pose in followed if pose is not None])
     whole = motion.face.values[learnt + 1 : learnt + 1 + len(weights)]
     for shape, least in (("jawOpen", 0.9), ("eyeBlinkLeft", 0.9), ("mouthPucker", 0.7)):
@@ -61,19 +61,19 @@ def test_a_person_is_learnt_and_then_followed(live: list[Pose | None], film: Pat
 
 
 def test_without_a_face_the_head_waits(bundle: Path) -> None:
-    blank = [Picture(number / FPS, np.full((64, 64, 3), 90, np.uint8)) for number in range(5)]
-    found = list(poses(blank, load_face("head"), FaceTracker(bundle), BlendshapeReader(bundle), FPS))
+    blank = [TimedFrame(number / FPS, np.full((64, 64, 3), 90, np.uint8)) for number in range(5)]
+    found = list(track_poses(blank, load_face("head"), FaceTracker(bundle), BlendshapeReader(bundle), FPS))
     assert found == [None] * 5
 
 
 def test_an_actor_gives_each_pose_once(film: Path, bundle: Path) -> None:
-    with Actor(read_pictures(film), load_face("head"), FPS, bundle) as actor:
-        actor._watching.join()
-        now = actor.newest()
+    with LiveCapture(read_frames(film), load_face("head"), FPS, bundle) as actor:
+        actor._thread.join()
+        now = actor.latest_pose()
         assert now is not None
         assert now[0].shape == (len(load_face("head").shape_names),)
         assert now[1].shape == (6,)
-        assert actor.newest() is None
+        assert actor.latest_pose() is None
 
 
 @pytest.mark.parametrize(

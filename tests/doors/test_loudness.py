@@ -15,7 +15,7 @@ from tts2face.request import Request
 from tts2face.session import Session
 from tts2face.speech.bs1770 import integrated_loudness, true_peak
 from tts2face.synthesis.clip_stream import Piece
-from tts2face.types import Waveform, joined_clips
+from tts2face.types import Waveform, concatenate_clips
 from tts2face.voice import level
 
 TEXTS = (
@@ -47,7 +47,7 @@ def pieces_of(ready: Session, text: str, **options: object) -> list[Piece]:
 @pytest.mark.parametrize(("voice", "language", "text"), TEXTS)
 def test_clips_are_equally_loud(voice: str, language: str, text: str, ready: Session) -> None:
     pieces = pieces_of(ready, text, voice=voice, language=language)
-    loudness, peak = measured(joined_clips([piece.clip for piece in pieces]).speech.waveform)
+    loudness, peak = measured(concatenate_clips([piece.clip for piece in pieces]).speech.waveform)
     assert loudness == pytest.approx(-16.0, abs=1.0)  # LUFS
     assert peak < -1.0  # dB of full scale
     levels = [integrated_loudness([piece.clip.speech.waveform]) for piece in pieces]
@@ -78,9 +78,9 @@ def test_volume_and_marks_are_relative(ready: Session) -> None:
 
 def test_motion_does_not_depend_on_the_loudness_of_the_clip(ready: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     request = Request(text="Bob may move. Stop!", pitch=True)
-    usual = joined_clips([piece.clip for piece in ready.stream(request)])
+    usual = concatenate_clips([piece.clip for piece in ready.stream(request)])
     monkeypatch.setattr(level, "LOUDNESS_LUFS", -40.0)
-    quiet = joined_clips([piece.clip for piece in ready.stream(request)])
+    quiet = concatenate_clips([piece.clip for piece in ready.stream(request)])
     assert quiet.motion.values.tobytes() == usual.motion.values.tobytes()
     assert quiet.head.values.tobytes() == usual.head.values.tobytes()
     assert integrated_loudness([quiet.speech.waveform]) == pytest.approx(-40.0, abs=1.0)

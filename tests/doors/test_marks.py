@@ -18,8 +18,8 @@ from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.session import Session
 from tts2face.synthesis.clip_stream import Piece
-from tts2face.types import joined_clips
-from tts2face.video.media import media_facts
+from tts2face.types import concatenate_clips
+from tts2face.video.media import read_media_info
 
 COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
 SMALL = Picture(size="64x64")
@@ -36,7 +36,7 @@ def pieces(text: str, ready: Session, **options: object) -> list[Piece]:
 
 def words(found: list[Piece]) -> dict[str, float]:
     """Onset of each word on the whole clip's clock."""
-    speech = joined_clips([piece.clip for piece in found]).speech
+    speech = concatenate_clips([piece.clip for piece in found]).speech
     return {word.text.strip("."): float(speech.phones.edges[word.first]) for word in speech.words}
 
 
@@ -73,7 +73,7 @@ def test_a_document_with_voices_languages_and_phones_is_one_sound(ready: Session
         '<say-as interpret-as="ordinal">4</say-as></voice> <voice name="heart">five.</voice></speak>'
     )
     for voice, rate in (("espeak", 22_050), ("heart", 24_000)):
-        speech = joined_clips([piece.clip for piece in ready.stream(Request(text=text, voice=voice))]).speech
+        speech = concatenate_clips([piece.clip for piece in ready.stream(Request(text=text, voice=voice))]).speech
         assert speech.waveform.rate == rate
         names = [word.text.strip(".") for word in speech.words]
         assert names == ["One", "two", "Guten", "Tag", "Three", "fourth", "five"]
@@ -98,7 +98,7 @@ def test_a_file_with_marks_counts_characters_and_tells_the_times_of_names(ready:
     assert 0.3 < here.seconds < 1.2
     assert told[-1] == (len("Hello there. Bye."),) * 2
     assert [done for done, _ in told] == sorted(done for done, _ in told)
-    assert media_facts(tmp_path / "a.mp4").duration == pytest.approx(written.seconds, abs=0.2)
+    assert read_media_info(tmp_path / "a.mp4").duration == pytest.approx(written.seconds, abs=0.2)
 
 
 def test_the_command_makes_the_pause(tmp_path: Path) -> None:
@@ -107,7 +107,7 @@ def test_the_command_makes_the_pause(tmp_path: Path) -> None:
         out = tmp_path / f"{number}.mp4"
         arguments = [text, "--out", str(out), "--size", "64x64", "--voice", "espeak"]
         subprocess.run([*COMMAND, *arguments], check=True, capture_output=True)
-        lengths.append(media_facts(out).duration)
+        lengths.append(read_media_info(out).duration)
     assert 1.7 < lengths[1] - lengths[0] < 2.5
 
 

@@ -11,9 +11,9 @@ import pytest
 
 from cli.main import run
 from lexicon.errors import BackendError
-from tts2face.retargeting.performer import aperture
+from tts2face.retargeting.performer import eye_aperture
 from tts2face.video.landmark_models import find_bundle
-from tts2face.video.media import media_facts, read_pictures
+from tts2face.video.media import read_frames, read_media_info
 from tts2face.video.pose import head_angles, remove_pose
 from tts2face.video.track import FaceTracker
 
@@ -42,7 +42,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def watched(path: Path, bundle: Path) -> tuple[np.ndarray, np.ndarray]:
     """(T, 478, 3) landmarks in mm and (T, 3) head angles in degrees against their middle."""
-    points = FaceTracker(bundle).track(lambda: (picture.pixels for picture in read_pictures(path)), FPS).points
+    points = FaceTracker(bundle).track(lambda: (picture.pixels for picture in read_frames(path)), FPS).points
     posed = remove_pose(points, FPS)
     angles = np.degrees(head_angles(posed.rotations))
     return posed.landmarks, angles - np.median(angles, axis=0)
@@ -55,7 +55,7 @@ def gap(landmarks: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("face", ["head", "cartoon"])
 def test_lips_lids_and_head_of_the_clip_are_the_performer_s(face: str, film: Path, bundle: Path, here: Path) -> None:
     assert run(["mimic", str(film), "--face", face, "--out", "m.mp4", "--quiet", "--model", str(bundle)]) == 0
-    facts = media_facts(here / "m.mp4")
+    facts = read_media_info(here / "m.mp4")
     assert facts.fps == FPS
     assert facts.rate == 48_000
     source, source_head = watched(film, bundle)
@@ -65,7 +65,7 @@ def test_lips_lids_and_head_of_the_clip_are_the_performer_s(face: str, film: Pat
     assert (np.abs(source_head - shown_head).mean(axis=0) <= 1.0).all()
     if face == "head":
         for side in ("Left", "Right"):
-            assert np.corrcoef(aperture(source, side), aperture(shown, side))[0, 1] > 0.8
+            assert np.corrcoef(eye_aperture(source, side), eye_aperture(shown, side))[0, 1] > 0.8
 
 
 def test_a_capture_moves_the_shapes_of_its_names(shared_recordings: Path, here: Path) -> None:
@@ -74,7 +74,7 @@ def test_a_capture_moves_the_shapes_of_its_names(shared_recordings: Path, here: 
     (here / "short.csv").write_text("\n".join(rows[:121]) + "\n")
     sound = str(folder / "testset_audio.flac")
     assert run(["mimic", "short.csv", "--audio", sound, "--out", "m.mp4", "--size", "64x64", "--quiet"]) == 0
-    facts = media_facts(here / "m.mp4")
+    facts = read_media_info(here / "m.mp4")
     assert facts.fps == 30.0
     assert facts.duration == pytest.approx(2.0, abs=0.1)
 
@@ -82,7 +82,7 @@ def test_a_capture_moves_the_shapes_of_its_names(shared_recordings: Path, here: 
 def test_a_film_without_sound_makes_a_silent_clip_and_says_so(
     film: Path, bundle: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    written(here / "mute.mp4", [picture.pixels for picture in read_pictures(film)][:20])
+    written(here / "mute.mp4", [picture.pixels for picture in read_frames(film)][:20])
     assert run(["mimic", "mute.mp4", "--out", "m.mp4", "--size", "64x64", "--model", str(bundle)]) == 0
     assert "holds no sound; the clip is silent" in capsys.readouterr().err
     assert (here / "m.mp4").exists()
@@ -102,7 +102,7 @@ def written(path: Path, pictures: list[np.ndarray]) -> None:
 def test_films_that_cannot_drive_a_face_are_refused(
     film: Path, bundle: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    pictures = [picture.pixels for picture in read_pictures(film)][:30]
+    pictures = [picture.pixels for picture in read_frames(film)][:30]
     blue = np.zeros_like(pictures[0])
     blue[:, :, 2] = np.arange(blue.shape[1])
     written(here / "nobody.mp4", [blue] * 6)

@@ -13,7 +13,7 @@ from PIL import Image
 from cli.main import app, run
 from cli.options import check_options
 from lexicon.errors import InputError
-from tts2face.render.output_path import checked_output
+from tts2face.render.output_path import check_output
 from tts2face.storage.output_names import check_name
 
 QUICK_S = 0.3  # of processor time, the interpreter's own start not counted
@@ -122,10 +122,10 @@ def test_what_cannot_be_done_is_refused_before_work_begins(
 
 def test_the_longest_name_can_be_written(here: Path) -> None:
     longest = os.pathconf(here, "PC_NAME_MAX") - 16
-    assert checked_output(here / ("x" * (longest - 4) + ".mp4")).suffix == ".mp4"
+    assert check_output(here / ("x" * (longest - 4) + ".mp4")).suffix == ".mp4"
     with pytest.raises(InputError, match=f"has {longest + 1} bytes; use at most {longest}"):
         check_name(here / ("x" * (longest + 1)))
-    assert checked_output(here / ".frames_of_mine").name == ".frames_of_mine"
+    assert check_output(here / ".frames_of_mine").name == ".frames_of_mine"
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from corpus_tools.aam.appearance_transfer import looks_map
+from corpus_tools.aam.appearance_transfer import build_appearance_transfer
 from lexicon.errors import BackendError
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.models.talker import read_talker
@@ -131,7 +131,7 @@ def test_another_s_speech_on_her_own_face(source: str, talker: Path, tmp_path: P
 def test_her_looks_carried_to_herself_stay(talker: Path) -> None:
     """The basis is kept in 16-bit floating point, with three digits."""
     hers = read_talker(talker)
-    carry = looks_map(hers.appearance, hers.appearance)
+    carry = build_appearance_transfer(hers.appearance, hers.appearance)
     np.testing.assert_allclose(carry.relation, np.eye(len(carry.relation)), atol=0.01)
 
 

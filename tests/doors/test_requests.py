@@ -15,7 +15,7 @@ from tts2face.models.face_file import load_face
 from tts2face.models.talker import Talker, load_talker
 from tts2face.request import GESTURES, Request
 from tts2face.session import Session
-from tts2face.types import Clip, joined_clips
+from tts2face.types import Clip, concatenate_clips
 
 TEXT = "Bob may move. We were away."
 CHANGES = {
@@ -86,14 +86,14 @@ def test_the_same_request_gives_the_same_bytes_in_another_process(clip: Clip) ->
 def test_a_voice_that_has_spoken_before_gives_the_same_bytes(clip: Clip, talker: Talker, face: Face) -> None:
     ready = Session(talker, face)
     for text in ("Something else was said. Bob may have been away.", TEXT):
-        said = joined_clips([piece.clip for piece in ready.stream(Request(text=text))])
+        said = concatenate_clips([piece.clip for piece in ready.stream(Request(text=text))])
     assert digest(said) == digest(clip)
 
 
 def test_a_stream_is_the_whole_in_pieces(clip: Clip, talker: Talker, face: Face) -> None:
     pieces = list(Session(talker, face).stream(Request(text=TEXT)))
     assert len(pieces) == 2
-    assert digest(joined_clips([piece.clip for piece in pieces])) == digest(clip)
+    assert digest(concatenate_clips([piece.clip for piece in pieces])) == digest(clip)
 
 
 def test_every_method_of_gestures_is_another_clip_of_the_same_speech(clip: Clip, talker: Talker, face: Face) -> None:
@@ -109,7 +109,7 @@ def test_every_method_of_gestures_is_another_clip_of_the_same_speech(clip: Clip,
 @pytest.mark.parametrize(("seconds", "fps"), [(0.1, 30.0), (25.0, 29.97), (12.3, 7.0)])
 def test_an_idle_face_is_silent_for_as_long_as_it_says(seconds: float, fps: float, talker: Talker, face: Face) -> None:
     pieces = list(Session(talker, face).stream(Request(idle=seconds, fps=fps)))
-    clip = joined_clips([piece.clip for piece in pieces])
+    clip = concatenate_clips([piece.clip for piece in pieces])
     assert clip.speech.waveform.duration == pytest.approx(seconds, abs=1.01 / fps)
     assert not clip.speech.waveform.samples.any()
     assert clip.speech.phones.phones == ("sil",)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.exemplar.synthesis import VisualVoice, visual_voice
+from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, N_LANDMARKS, UPPER_LIP_INNER_MID
 from tts2face.models.talker import ShapeModel, Talker, Utterance
 
@@ -52,5 +52,5 @@ def talker() -> Talker:
 
 
 @pytest.fixture(scope="session")
-def voice(talker: Talker) -> VisualVoice:
-    return visual_voice(talker)
+def voice(talker: Talker) -> ExemplarModel:
+    return build_exemplar_model(talker)

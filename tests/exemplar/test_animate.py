@@ -12,11 +12,11 @@ from tts2face.exemplar.explanation import explain_selection, explanation_json, e
 from tts2face.exemplar.options import METHODS, THEOBALD_2007, SynthesisOptions
 from tts2face.exemplar.synthesis import (
     REST_FROM_S,
-    VisualVoice,
+    ExemplarModel,
+    build_exemplar_model,
+    rest_weights,
     select_tokens,
     speech_trajectory,
-    stillness,
-    visual_voice,
 )
 from tts2face.exemplar.tokens import MAX_CONTEXT
 from tts2face.models.talker import Talker
@@ -46,7 +46,7 @@ def spoken(draw):
 
 @settings(max_examples=60, deadline=None)
 @given(phones=spoken(), fps=st.sampled_from([12.5, 24.0, 25.0, 30.0, 60.0]), method=st.sampled_from(sorted(METHODS)))
-def test_every_chunk_begins_and_ends_at_rest_and_stays_finite(voice: VisualVoice, phones, fps, method):
+def test_every_chunk_begins_and_ends_at_rest_and_stays_finite(voice: ExemplarModel, phones, fps, method):
     made = speech_trajectory(
         phones, voice, fps=fps, n_frames=frame_count(phones.end, fps), options=METHODS[method]
     ).values
@@ -58,7 +58,7 @@ def test_every_chunk_begins_and_ends_at_rest_and_stays_finite(voice: VisualVoice
 
 @settings(max_examples=40, deadline=None)
 @given(phones=spoken())
-def test_silence_far_from_speech_is_at_rest(voice: VisualVoice, phones):
+def test_silence_far_from_speech_is_at_rest(voice: ExemplarModel, phones):
     made = moved(voice, phones).values
     times = np.arange(len(made)) / 50.0
     sounding = [at for at, label in enumerate(phones.phones) if label != SILENCE]
@@ -68,12 +68,12 @@ def test_silence_far_from_speech_is_at_rest(voice: VisualVoice, phones):
     assert (made[~near] == voice.rest).all()
 
 
-def test_frame_rates_agree_where_their_frames_meet(voice: VisualVoice):
+def test_frame_rates_agree_where_their_frames_meet(voice: ExemplarModel):
     slow, fast = moved(voice, SENTENCE, 25.0).values, moved(voice, SENTENCE, 50.0).values
     np.testing.assert_allclose(slow, fast[::2][: len(slow)], atol=1e-5)
 
 
-def test_a_pause_cuts_a_text_into_parts_that_move_alone(voice: VisualVoice):
+def test_a_pause_cuts_a_text_into_parts_that_move_alone(voice: ExemplarModel):
     """Where a sentence is surrounded by silence, it moves as if nothing else were said."""
     twice = sequence([*SENTENCE.phones[:-1], SILENCE, *SENTENCE.phones[1:]],
                      [*SENTENCE.durations[:-1], 2.1, *SENTENCE.durations[1:]])  # fmt: skip
@@ -82,7 +82,7 @@ def test_a_pause_cuts_a_text_into_parts_that_move_alone(voice: VisualVoice):
     np.testing.assert_allclose(both[:n], alone[:n], atol=1e-5)
 
 
-def test_shows_the_mouth_of_each_phone(voice: VisualVoice):
+def test_shows_the_mouth_of_each_phone(voice: ExemplarModel):
     made = moved(voice, SENTENCE, 100.0).values
     middles = ((SENTENCE.edges[:-1] + SENTENCE.edges[1:]) / 2 * 100).round().astype(int)
     opening = dict(zip(SENTENCE.phones, made[middles, 0], strict=True))
@@ -91,7 +91,7 @@ def test_shows_the_mouth_of_each_phone(voice: VisualVoice):
     assert opening["m"] < 1.0
 
 
-def test_averaging_opens_lips_and_keeping_contacts_closes_them(voice: VisualVoice):
+def test_averaging_opens_lips_and_keeping_contacts_closes_them(voice: ExemplarModel):
     keep, lose = (moved(voice, SENTENCE, 100.0, contacts=kept, smoothing_s=0.03).values[:, 0] for kept in (True, False))
     during = slice(62, 72)  # p
     assert keep[during].min() < 0.2
@@ -99,7 +99,7 @@ def test_averaging_opens_lips_and_keeping_contacts_closes_them(voice: VisualVoic
     np.testing.assert_array_equal(keep[:40], lose[:40])
 
 
-def test_lips_move_before_the_sound(voice: VisualVoice):
+def test_lips_move_before_the_sound(voice: ExemplarModel):
     made = moved(voice, sequence([SILENCE, "ɑ", SILENCE], [0.6, 0.2, 0.6]), 100.0).values[:, 0]
     assert made[35] == voice.rest[0]
     assert made[59] > voice.rest[0] + 0.5
@@ -107,30 +107,30 @@ def test_lips_move_before_the_sound(voice: VisualVoice):
 
 def test_moves_only_in_speech():
     phones = sequence([SILENCE, "p", SILENCE], [0.5, 0.1, 0.5])
-    pull = stillness(phones, np.arange(101) / 100)
+    pull = rest_weights(phones, np.arange(101) / 100)
     assert pull[0] == pull[-1] == pull[25] == pull[85] == 1
     assert (pull[45:66] == 0).all()
     assert (np.diff(pull[:50]) <= 0).all()
 
 
-def test_silence_is_rest(voice: VisualVoice):
+def test_silence_is_rest(voice: ExemplarModel):
     assert (moved(voice, sequence([SILENCE], [1.0])).values == voice.rest).all()
 
 
-def test_a_throat_sound_takes_the_next_phone_s_shape(voice: VisualVoice):
+def test_a_throat_sound_takes_the_next_phone_s_shape(voice: ExemplarModel):
     with_h = sequence([SILENCE, "h", "i", SILENCE], [0.4, 0.1, 0.1, 0.4])
     without = sequence([SILENCE, "i", SILENCE], [0.4, 0.2, 0.4])
     # The pull to rest ends with the sound of either, so that both agree in full.
     np.testing.assert_allclose(moved(voice, with_h).values, moved(voice, without).values, atol=1e-6)
 
 
-def test_a_recorded_sentence_finds_itself_first(voice: VisualVoice, talker: Talker):
+def test_a_recorded_sentence_finds_itself_first(voice: ExemplarModel, talker: Talker):
     spoken = talker.utterances[7]
     found = select_tokens(spoken.phones, voice, SynthesisOptions(context=4, k=1)).found
     assert (voice.tokens.utterance[found.tokens[:, 0]] == 7).all()
 
 
-def test_one_exemplar_of_a_recorded_sentence_gives_the_recording_back(voice: VisualVoice, talker: Talker):
+def test_one_exemplar_of_a_recorded_sentence_gives_the_recording_back(voice: ExemplarModel, talker: Talker):
     spoken = talker.utterances[7]
     options = SynthesisOptions(context=4, k=1, smoothing_s=0.0, contacts=False, articulation=1.0)
     made = speech_trajectory(spoken.phones, voice, fps=25.0, n_frames=len(spoken.shape), options=options).values
@@ -140,7 +140,7 @@ def test_one_exemplar_of_a_recorded_sentence_gives_the_recording_back(voice: Vis
 
 
 @pytest.mark.parametrize("name", [field.name for field in fields(SynthesisOptions) if field.name != "network"])
-def test_every_option_matters(voice: VisualVoice, name):
+def test_every_option_matters(voice: ExemplarModel, name):
     changed = {
         "context": 1, "k": 1, "duration": 0.0, "sharpness": 0.0, "overlap": False, "precision": 0.0, "align": False,
         "articulation": 1.2, "smoothing_s": 0.04, "contacts": False,
@@ -153,12 +153,12 @@ def test_the_published_method_is_kept():
     assert METHODS["exemplar"] == SynthesisOptions()
 
 
-def test_same_arguments_give_the_same_bytes(voice: VisualVoice, talker: Talker):
-    again = visual_voice(talker)
+def test_same_arguments_give_the_same_bytes(voice: ExemplarModel, talker: Talker):
+    again = build_exemplar_model(talker)
     assert moved(voice, SENTENCE).values.tobytes() == moved(again, SENTENCE).values.tobytes()
 
 
-def test_refuses_impossible_requests(voice: VisualVoice):
+def test_refuses_impossible_requests(voice: ExemplarModel):
     for change, reason in [
         ({"context": 0}, "context must be"),
         ({"context": MAX_CONTEXT + 1}, "context must be"),
@@ -174,7 +174,7 @@ def test_refuses_impossible_requests(voice: VisualVoice):
         moved(voice, sequence(["§"], [0.2]))
 
 
-def test_explains_which_tokens_were_used(voice: VisualVoice):
+def test_explains_which_tokens_were_used(voice: ExemplarModel):
     phones = sequence([SILENCE, "b", "ɔɪ", SILENCE], [0.3, 0.1, 0.2, 0.3])
     shown = explain_selection(select_tokens(phones, voice), voice)
     assert [phone.phone for phone in shown] == [SILENCE, "b", "ɔɪ", SILENCE] or len(shown) == 5
@@ -192,7 +192,7 @@ def test_explains_which_tokens_were_used(voice: VisualVoice):
     assert json.loads(json.dumps(explanation_json(shown)))[1]["tokens"][0]["utterance"] == first.utterance
 
 
-def test_articulation_is_counted_from_the_mean_speaking_pose(voice: VisualVoice, talker: Talker):
+def test_articulation_is_counted_from_the_mean_speaking_pose(voice: ExemplarModel, talker: Talker):
     plain = SynthesisOptions(contacts=False, articulation=1.0)
     more = replace(plain, articulation=1.5)
     phones = sequence([SILENCE, "b", "i", "p", "ɑ", "b", SILENCE], [0.4, *[0.1] * 5, 0.4])
@@ -201,5 +201,7 @@ def test_articulation_is_counted_from_the_mean_speaking_pose(voice: VisualVoice,
     )
     inner = slice(50, 80)  # no silence is near: nothing is drawn to rest
     np.testing.assert_allclose(
-        other[inner] - voice.speaking, 1.5 * (one[inner] - voice.speaking), atol=1e-3 * voice.spread.max()
+        other[inner] - voice.mean_speaking_pose,
+        1.5 * (one[inner] - voice.mean_speaking_pose),
+        atol=1e-3 * voice.spread.max(),
     )

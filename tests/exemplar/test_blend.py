@@ -3,28 +3,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tts2face.exemplar.blending import Pieces, averaged_pieces, exemplar_weights, joined_pieces, smoothed
+from tts2face.exemplar.blending import AveragedTokens, average_tokens, exemplar_weights, gaussian_smooth, join_averages
 from tts2face.exemplar.contacts import (
     RULES,
+    ChosenExemplars,
     ContactRule,
     Contacts,
-    Exemplars,
-    Gap,
+    LipGap,
     contact_rule,
-    contacts_told,
-    with_contacts,
+    enforce_contacts,
+    find_contacts,
 )
 from tts2face.exemplar.options import THEOBALD_2007, SynthesisOptions
 from tts2face.exemplar.phone_substitution import Targets
-from tts2face.exemplar.synthesis import VisualVoice
-from tts2face.exemplar.tokens import reaching_spans
+from tts2face.exemplar.synthesis import ExemplarModel
+from tts2face.exemplar.tokens import spans_with_reach
 
-GAP = Gap(np.zeros(3, np.float32), np.array([[0.0, 1.0, 0.0]], np.float32))
+GAP = LipGap(np.zeros(3, np.float32), np.array([[0.0, 1.0, 0.0]], np.float32))
 
 
 def targets(*edges):
     starts, ends = np.array(edges[:-1]), np.array(edges[1:])
-    return Targets(("x",) * len(starts), reaching_spans(starts, ends), np.arange(len(starts)))
+    return Targets(("x",) * len(starts), spans_with_reach(starts, ends), np.arange(len(starts)))
 
 
 def test_weights_fall_with_the_score_and_sum_to_one():
@@ -33,9 +33,9 @@ def test_weights_fall_with_the_score_and_sum_to_one():
     np.testing.assert_allclose(exemplar_weights(np.array([[2.0, 1.0, -np.inf]]), 0.0), [[0.5, 0.5, 0.0]])
 
 
-def test_the_average_of_one_token_is_its_own_motion(voice: VisualVoice):
+def test_the_average_of_one_token_is_its_own_motion(voice: ExemplarModel):
     options = SynthesisOptions(overlap=False)
-    pieces = averaged_pieces(voice.tokens, np.array([[30]], np.int32), np.array([[1.0]]), voice.spread, options)
+    pieces = average_tokens(voice.tokens, np.array([[30]], np.int32), np.array([[1.0]]), voice.spread, options)
     start, end = voice.tokens.spans[30, 1:3] * voice.tokens.fps
     first = voice.tokens.first_frame[voice.tokens.utterance[30]]
     knots = np.linspace(start, end, pieces.mean.shape[1])
@@ -45,14 +45,14 @@ def test_the_average_of_one_token_is_its_own_motion(voice: VisualVoice):
     assert pieces.variance.max() < 1e-6
 
 
-def test_mean_and_variance_of_several_tokens(voice: VisualVoice):
+def test_mean_and_variance_of_several_tokens(voice: ExemplarModel):
     options = SynthesisOptions(align=False)
     chosen = np.array([[30, 100, 200, -1]], np.int32)
     weights = np.array([[0.5, 0.3, 0.2, 0.0]])
-    together = averaged_pieces(voice.tokens, chosen, weights, voice.spread, options)
+    together = average_tokens(voice.tokens, chosen, weights, voice.spread, options)
     alone = np.concatenate(
         [
-            averaged_pieces(voice.tokens, chosen[:, e : e + 1], np.ones((1, 1)), voice.spread, options).mean
+            average_tokens(voice.tokens, chosen[:, e : e + 1], np.ones((1, 1)), voice.spread, options).mean
             for e in range(3)
         ]
     )
@@ -64,11 +64,11 @@ def test_mean_and_variance_of_several_tokens(voice: VisualVoice):
 
 def pieces_of(*values, knots=25):
     mean = np.tile(np.array(values, np.float32)[:, None, None], (1, knots, 1))
-    return Pieces(mean, np.zeros_like(mean))
+    return AveragedTokens(mean, np.zeros_like(mean))
 
 
 def test_pieces_edge_to_edge_stand_where_they_belong():
-    joined, told = joined_pieces(pieces_of(1.0, 3.0, knots=9), targets(0.1, 0.2, 0.4), 60, THEOBALD_2007)
+    joined, told = join_averages(pieces_of(1.0, 3.0, knots=9), targets(0.1, 0.2, 0.4), 60, THEOBALD_2007)
     assert told.nonzero()[0].tolist() == list(range(10, 41))
     np.testing.assert_allclose(joined[11:20, 0], 1.0)
     np.testing.assert_allclose(joined[21:41, 0], 3.0)
@@ -76,7 +76,7 @@ def test_pieces_edge_to_edge_stand_where_they_belong():
 
 
 def test_overlapping_pieces_hand_over_without_a_jump():
-    joined, told = joined_pieces(pieces_of(0.0, 1.0), targets(0.0, 0.2, 0.4), 41, SynthesisOptions(precision=0.0))
+    joined, told = join_averages(pieces_of(0.0, 1.0), targets(0.0, 0.2, 0.4), 41, SynthesisOptions(precision=0.0))
     assert told.all()
     steps = np.diff(joined[:, 0])
     assert (steps >= -1e-6).all()
@@ -86,20 +86,20 @@ def test_overlapping_pieces_hand_over_without_a_jump():
 
 def test_the_surer_piece_wins_where_they_overlap():
     even = pieces_of(0.0, 1.0)
-    unsure = Pieces(even.mean, np.where(even.mean == 0, 1.0, 0.0).astype(np.float32))
-    joined, _ = joined_pieces(unsure, targets(0.0, 0.2, 0.4), 41, SynthesisOptions(precision=1.5))
+    unsure = AveragedTokens(even.mean, np.where(even.mean == 0, 1.0, 0.0).astype(np.float32))
+    joined, _ = join_averages(unsure, targets(0.0, 0.2, 0.4), 41, SynthesisOptions(precision=1.5))
     assert joined[20, 0] > 0.95
 
 
 def test_smoothing_is_a_gaussian_in_seconds():
     pulse = np.zeros((201, 1))
     pulse[100] = 1.0
-    made = smoothed(pulse, 0.05, 100.0)[:, 0]
+    made = gaussian_smooth(pulse, 0.05, 100.0)[:, 0]
     times = (np.arange(201) - 100) / 100
     gauss = np.exp(-(times**2) / (2 * 0.05**2))
     np.testing.assert_allclose(made, gauss / gauss.sum(), atol=2e-5)  # the kernel ends at four sigma
-    np.testing.assert_allclose(smoothed(np.full((30, 2), 3.0), 0.05, 100.0), 3.0, rtol=1e-6)  # edges do not sag
-    assert smoothed(pulse, 0.0, 100.0)[100, 0] == 1.0
+    np.testing.assert_allclose(gaussian_smooth(np.full((30, 2), 3.0), 0.05, 100.0), 3.0, rtol=1e-6)  # edges do not sag
+    assert gaussian_smooth(pulse, 0.0, 100.0)[100, 0] == 1.0
 
 
 def test_knows_the_phones_that_bring_the_lips_together():
@@ -112,7 +112,7 @@ def test_a_contact_closes_what_averaging_left_open():
     values = np.full((100, 1), 4.0, np.float32)
     values[45:56, 0] = 2.0
     contact = Contacts(np.array([[0.46, 0.54]]), np.array([[0.1]], np.float32), np.array([0.1], np.float32))
-    kept = with_contacts(values, contact, GAP, 100.0)
+    kept = enforce_contacts(values, contact, GAP, 100.0)
     low = int(kept[:, 0].argmin())
     assert 43 <= low <= 57
     np.testing.assert_allclose(kept[low, 0], 0.1, atol=1e-6)
@@ -124,23 +124,23 @@ def test_a_contact_closes_what_averaging_left_open():
 def test_a_closed_contact_is_left_alone():
     values = np.full((100, 1), 0.05, np.float32)
     contact = Contacts(np.array([[0.46, 0.54]]), np.array([[0.1]], np.float32), np.array([0.1], np.float32))
-    assert (with_contacts(values, contact, GAP, 100.0) == values).all()
+    assert (enforce_contacts(values, contact, GAP, 100.0) == values).all()
     beyond = replace(contact, spans=np.array([[5.0, 5.1]]), enough=np.zeros(1, np.float32))
-    assert (with_contacts(values + 1, beyond, GAP, 100.0) == values + 1).all()
+    assert (enforce_contacts(values + 1, beyond, GAP, 100.0) == values + 1).all()
     lenient = replace(contact, enough=np.array([1.1], np.float32))
-    assert (with_contacts(values + 1, lenient, GAP, 100.0) == values + 1).all()
+    assert (enforce_contacts(values + 1, lenient, GAP, 100.0) == values + 1).all()
 
 
-def test_poses_are_taken_where_each_token_is_closest(voice: VisualVoice):
+def test_poses_are_taken_where_each_token_is_closest(voice: ExemplarModel):
     """Two p tokens, and one that never closes: the closer ones by weight tell the pose."""
     label = voice.tokens.inventory.index("p")
     p = np.flatnonzero(voice.tokens.phone == label)[:2]
     open_one = np.flatnonzero(voice.tokens.phone == voice.tokens.inventory.index("ɑ"))[0]
     chosen = np.array([[open_one, *p]], np.int32)
-    exemplars = Exemplars(voice.tokens, chosen, np.array([[0.2, 0.4, 0.4]]))
+    exemplars = ChosenExemplars(voice.tokens, chosen, np.array([[0.2, 0.4, 0.4]]))
 
     def told(enough: float) -> Contacts:
-        return contacts_told(exemplars, voice.lip_gap, np.array([[0.0, 0.1]]), [ContactRule(0.7, enough)])
+        return find_contacts(exemplars, voice.lip_gap, np.array([[0.0, 0.1]]), [ContactRule(0.7, enough)])
 
     least, frames = [], voice.tokens.frames
     for token in (*p, open_one):

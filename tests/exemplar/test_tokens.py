@@ -1,18 +1,18 @@
 import numpy as np
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.exemplar.phone_substitution import stand_ins, targets_of
-from tts2face.exemplar.recorded_motion import sampled_tokens
+from tts2face.exemplar.phone_substitution import build_targets, substitute_phones
+from tts2face.exemplar.recorded_motion import sample_tokens
 from tts2face.exemplar.similarity import token_samples
-from tts2face.exemplar.synthesis import VisualVoice
-from tts2face.exemplar.tokens import PAUSE_REACH_S, contexts, spoken_spans, tokens_of
+from tts2face.exemplar.synthesis import ExemplarModel
+from tts2face.exemplar.tokens import PAUSE_REACH_S, collect_tokens, phone_contexts, spoken_spans
 from tts2face.models.talker import Talker
 
 INVENTORY = tuple(sorted({"p", "b", "s", "t", "i", "ɪ", "ɔ", "u", SILENCE}))
 
 
 def test_tokens_are_the_phones_of_all_utterances(talker: Talker):
-    tokens = tokens_of(talker)
+    tokens = collect_tokens(talker)
     assert len(tokens) == 40 * 12
     said = [label for spoken in talker.utterances for label in spoken.phones.phones]
     assert [tokens.inventory[at] for at in tokens.phone] == said
@@ -22,11 +22,11 @@ def test_tokens_are_the_phones_of_all_utterances(talker: Talker):
 
 def test_contexts_are_nearest_first_and_end_with_the_utterance():
     phone, utterance = np.array([1, 2, 3, 4, 5], np.int32), np.array([0, 0, 0, 1, 1], np.int32)
-    around = contexts(phone, utterance, 0)
+    around = phone_contexts(phone, utterance, 0)
     assert around[1, :6].tolist() == [1, 3, 0, 0, 0, 0]
     assert around[2, :6].tolist() == [2, 0, 1, 0, 0, 0]
     assert around[3, :4].tolist() == [0, 5, 0, 0]
-    assert contexts(phone[:1], utterance[:1], 7).tolist() == [[7] * 12]
+    assert phone_contexts(phone[:1], utterance[:1], 7).tolist() == [[7] * 12]
 
 
 def test_silence_keeps_only_what_lies_beside_speech():
@@ -40,18 +40,18 @@ def test_silence_keeps_only_what_lies_beside_speech():
 def test_motion_passes_through_its_frames_and_is_exact_for_a_parabola():
     frames = (np.arange(8.0) ** 2).astype(np.float32)[:, None]
     positions = np.array([[0.0, 3.0, 2.5, 4.25, 7.0, 9.0, -1.0]])
-    read = sampled_tokens(frames, np.array([[0, 8]]), positions)[0, :, 0]
+    read = sample_tokens(frames, np.array([[0, 8]]), positions)[0, :, 0]
     np.testing.assert_allclose(read, [0.0, 9.0, 6.25, 18.0625, 49.0, 49.0, 0.0], rtol=1e-6)
 
 
 def test_motion_never_reads_beyond_its_utterance():
     frames = np.array([[5.0], [1.0], [2.0], [9.0]], np.float32)
-    read = sampled_tokens(frames, np.array([[1, 3]]), np.array([[-1.0, 0.0, 0.5, 1.0, 5.0]]))[0, :, 0]
+    read = sample_tokens(frames, np.array([[1, 3]]), np.array([[-1.0, 0.0, 0.5, 1.0, 5.0]]))[0, :, 0]
     np.testing.assert_allclose(read, [1.0, 1.0, 1.5, 2.0, 2.0])
-    assert sampled_tokens(frames, np.array([[3, 4]]), np.array([[0.3]]))[0, 0, 0] == 9.0
+    assert sample_tokens(frames, np.array([[3, 4]]), np.array([[0.3]]))[0, 0, 0] == 9.0
 
 
-def test_token_samples_lie_within_the_token(talker: Talker, voice: VisualVoice):
+def test_token_samples_lie_within_the_token(talker: Talker, voice: ExemplarModel):
     samples = token_samples(voice.tokens)
     assert samples.shape == (len(voice.tokens), 5, 3)
     at = 5  # a phone of the first utterance: its middle sample is the motion at its middle
@@ -62,34 +62,34 @@ def test_token_samples_lie_within_the_token(talker: Talker, voice: VisualVoice):
 
 
 def test_a_said_phone_stands_for_itself_and_an_unsaid_one_for_its_nearest():
-    assert stand_ins("p", INVENTORY) == ("p",)
-    assert stand_ins("m", INVENTORY) == ("b",)
-    assert stand_ins("h", INVENTORY) == ()
-    assert stand_ins("h", (*INVENTORY, "h")) == ("h",)
+    assert substitute_phones("p", INVENTORY) == ("p",)
+    assert substitute_phones("m", INVENTORY) == ("b",)
+    assert substitute_phones("h", INVENTORY) == ()
+    assert substitute_phones("h", (*INVENTORY, "h")) == ("h",)
 
 
 def test_a_diphthong_is_shown_by_its_parts_in_halves():
-    targets = targets_of(PhoneSequence(["b", "ɔɪ", "t"], [0.0, 0.1, 0.3, 0.4]), INVENTORY)
+    targets = build_targets(PhoneSequence(["b", "ɔɪ", "t"], [0.0, 0.1, 0.3, 0.4]), INVENTORY)
     assert targets.labels == ("b", "ɔ", "ɪ", "t")
     np.testing.assert_allclose(targets.spans[:, 1], [0.0, 0.1, 0.2, 0.3])
     assert targets.source.tolist() == [0, 1, 1, 2]
 
 
 def test_a_throat_sound_lends_its_time():
-    before_vowel = targets_of(PhoneSequence(["p", "h", "i"], [0.0, 0.1, 0.2, 0.3]), INVENTORY)
+    before_vowel = build_targets(PhoneSequence(["p", "h", "i"], [0.0, 0.1, 0.2, 0.3]), INVENTORY)
     assert before_vowel.labels == ("p", "i")
     np.testing.assert_allclose(before_vowel.spans[1, 1:3], [0.1, 0.3])
-    before_silence = targets_of(PhoneSequence(["i", "h", SILENCE], [0.0, 0.1, 0.2, 0.5]), INVENTORY)
+    before_silence = build_targets(PhoneSequence(["i", "h", SILENCE], [0.0, 0.1, 0.2, 0.5]), INVENTORY)
     assert before_silence.labels == ("i", SILENCE)
     np.testing.assert_allclose(before_silence.spans[0, 1:3], [0.0, 0.2])
-    alone = targets_of(PhoneSequence(["h"], [0.0, 0.1]), INVENTORY)
+    alone = build_targets(PhoneSequence(["h"], [0.0, 0.1]), INVENTORY)
     assert alone.labels == (SILENCE,)
 
 
 def test_a_long_pause_belongs_half_to_either_side():
-    targets = targets_of(PhoneSequence(["i", SILENCE, "p"], [0.0, 0.1, 2.0, 2.1]), INVENTORY)
+    targets = build_targets(PhoneSequence(["i", SILENCE, "p"], [0.0, 0.1, 2.0, 2.1]), INVENTORY)
     assert targets.labels == ("i", SILENCE, SILENCE, "p")
     np.testing.assert_allclose(targets.spans[1, 1:3], [0.1, 0.1 + PAUSE_REACH_S])
     np.testing.assert_allclose(targets.spans[2, 1:3], [2.0 - PAUSE_REACH_S, 2.0])
-    short = targets_of(PhoneSequence(["i", SILENCE, "p"], [0.0, 0.1, 0.4, 0.5]), INVENTORY)
+    short = build_targets(PhoneSequence(["i", SILENCE, "p"], [0.0, 0.1, 0.4, 0.5]), INVENTORY)
     assert short.labels == ("i", SILENCE, "p")

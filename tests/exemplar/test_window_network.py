@@ -8,9 +8,9 @@ import pytest
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar.options import SynthesisOptions
-from tts2face.exemplar.phone_substitution import Targets, shown_phones
-from tts2face.exemplar.synthesis import VisualVoice, speech_trajectory
-from tts2face.models.phone_network import WindowNetwork, window_features
+from tts2face.exemplar.phone_substitution import Targets, target_phones
+from tts2face.exemplar.synthesis import ExemplarModel, speech_trajectory
+from tts2face.models.phone_network import PhoneNetwork, window_features
 from tts2face.models.talker import Talker, read_talker, write_talker
 
 PHONES = PhoneSequence([SILENCE, "b", "i", "p", SILENCE], [0.0, 0.3, 0.4, 0.6, 0.7, 1.0])
@@ -23,13 +23,13 @@ def seen_as_ones(phones: PhoneSequence, times: np.ndarray) -> np.ndarray:
     return np.array([[*np.eye(len(KNOWN))[row].ravel(), *where] for row, where in zip(shown, place, strict=True)])
 
 
-def random_network(n_outputs: int, n_networks: int = 2) -> WindowNetwork:
+def random_network(n_outputs: int, n_networks: int = 2) -> PhoneNetwork:
     generator = np.random.default_rng(0)
     n_features = seen_as_ones(PHONES, TIMES).shape[1]
     shapes = [(n_features, 7), (7, 5), (5, n_outputs)]
     weights = tuple(generator.normal(0, 1, (n_networks, *shape)).astype(np.float32) for shape in shapes)
     biases = tuple(generator.normal(0, 1, (n_networks, shape[1])).astype(np.float32) for shape in shapes)
-    return WindowNetwork(KNOWN, weights, biases)
+    return PhoneNetwork(KNOWN, weights, biases)
 
 
 def test_the_answer_is_the_mean_of_the_networks_neuron_by_neuron() -> None:
@@ -90,11 +90,11 @@ def test_a_talker_keeps_its_networks(talker: Talker, tmp_path) -> None:
     assert read_talker(tmp_path / "b.talker").network is None
 
 
-def test_the_share_of_the_networks_is_what_it_says(voice: VisualVoice) -> None:
+def test_the_share_of_the_networks_is_what_it_says(voice: ExemplarModel) -> None:
     knowing = replace(voice, network=random_network(len(voice.spread)))
     plain = SynthesisOptions(network=0.0, articulation=1.0, smoothing_s=0.0, contacts=False)
 
-    def moved(which: VisualVoice, share: float) -> np.ndarray:
+    def moved(which: ExemplarModel, share: float) -> np.ndarray:
         options = replace(plain, network=share)
         return speech_trajectory(PHONES, which, fps=100.0, n_frames=100, options=options).values[35:65]
 
@@ -107,6 +107,6 @@ def test_the_share_of_the_networks_is_what_it_says(voice: VisualVoice) -> None:
 
 def test_time_that_belongs_to_no_target_is_silence() -> None:
     spans = np.array([[0.0, 0.2, 0.4, 0.5], [0.2, 0.4, 0.5, 0.5], [0.8, 0.9, 1.0, 1.1]])
-    shown = shown_phones(Targets(("b", "i", "p"), spans, np.arange(3)))
+    shown = target_phones(Targets(("b", "i", "p"), spans, np.arange(3)))
     assert shown.phones == (SILENCE, "b", "i", SILENCE, "p")
     np.testing.assert_allclose(shown.edges, [0.0, 0.2, 0.4, 0.5, 0.9, 1.0])

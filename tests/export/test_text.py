@@ -10,7 +10,7 @@ import pytest
 from parselmouth.praat import call
 
 from lexicon.errors import InputError
-from lexicon.nominal_durations import nominal_sequence
+from lexicon.nominal_durations import nominal_phones
 from lexicon.pronounce import pronounce
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.export.text import FORMATS, NOMINAL_NOTE, textgrid, timed_json, timed_table
@@ -53,7 +53,7 @@ def test_praat_reads_times_and_labels_back(tmp_path: Path) -> None:
 def test_praat_reads_nominal_times_and_their_note(tmp_path: Path) -> None:
     spoken = pronounce("Hello, Bob.")
     grid = _read(FORMATS["textgrid"](spoken), tmp_path)
-    phones, _ = nominal_sequence(spoken)
+    phones, _ = nominal_phones(spoken)
     assert [label for _, _, label in _tier(grid, 2)] == list(phones.phones)
     assert [label for _, _, label in _tier(grid, 3)] == [NOMINAL_NOTE]
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tts2face.face.landmark_fit import landmark_motion, landmark_places
+from tts2face.face.landmark_fit import landmark_motion, landmark_positions
 from tts2face.models.face import Face
-from tts2face.models.palette import Palette, Region, Style
+from tts2face.models.palette import FaceRegion, Palette, Style
 from tts2face.models.talker import load_talker
 
 BROWS = (70, 63, 105, 66, 107, 55, 65, 52, 53, 46, 336, 296, 334, 293, 300, 276, 283, 282, 295, 285)
@@ -17,13 +17,13 @@ def neutral() -> np.ndarray:
     return model.mean + np.einsum("m,mld->ld", model.rest, model.basis)
 
 
-def region(landmarks: tuple[int, ...]) -> Region:
+def region(landmarks: tuple[int, ...]) -> FaceRegion:
     """Two modes: all up, and the own left up with the right down."""
     sides = np.sign(neutral()[list(landmarks), 0])
     up, apart = np.zeros((2, len(landmarks), 3))
     up[:, 1], apart[:, 1] = 1 / np.sqrt(len(landmarks)), sides / np.sqrt(len(landmarks))
     apart -= (apart * up).sum() * up
-    return Region(np.array(landmarks, np.int32), np.stack([up, apart / np.linalg.norm(apart)]).astype(np.float32))
+    return FaceRegion(np.array(landmarks, np.int32), np.stack([up, apart / np.linalg.norm(apart)]).astype(np.float32))
 
 
 def palette() -> Palette:
@@ -36,4 +36,4 @@ def palette() -> Palette:
 def posed_landmarks(face: Face, weights: np.ndarray) -> np.ndarray:
     """(T, L, 3) landmarks for weights (T, K); eyeballs do not turn."""
     motion = landmark_motion(face, np.arange(len(face.shape_names)))
-    return landmark_places(face) + np.einsum("lck,tk->tlc", motion, weights)
+    return landmark_positions(face) + np.einsum("lck,tk->tlc", motion, weights)

@@ -9,8 +9,8 @@ import pytest
 from lexicon.errors import DataError, InputError
 from tts2face.face.deformation import posed_vertices
 from tts2face.models.face import Eye, Face, Part
-from tts2face.models.face_file import Identity, identities_of, load_face, read_face, write_face
-from tts2face.storage.files import named_file
+from tts2face.models.face_file import Identity, list_identities, load_face, read_face, write_face
+from tts2face.storage.files import find_file
 from tts2face.storage.tensors import write_tensors
 
 N = 40
@@ -89,7 +89,7 @@ def test_an_identity_moves_vertices_and_eyes_and_tints_its_part(written: tuple[F
     only_skin = np.setdiff1d(face.triangles[:12], face.triangles[12:])
     assert read.colours[only_skin] == pytest.approx(face.colours[only_skin] * np.array(TINT), abs=1)
     assert read.metadata["identity"] == "older"
-    assert identities_of(path) == {"older": "somebody else"}
+    assert list_identities(path) == {"older": "somebody else"}
 
 
 def test_the_same_face_gives_the_same_bytes(written: tuple[Face, Path], tmp_path: Path) -> None:
@@ -106,7 +106,7 @@ def test_an_unknown_identity_is_refused_with_those_there_are(written: tuple[Face
 
 def test_an_unknown_name_is_refused() -> None:
     with pytest.raises(InputError, match="there is no face 'nobody'"):
-        named_file("nobody", "face")
+        find_file("nobody", "face")
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:

@@ -5,7 +5,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tts2face.face.deformation import posed_vertices
-from tts2face.face.landmark_fit import all_landmarks, axis_scales, landmark_motion, landmark_places, turn_onto
+from tts2face.face.landmark_fit import (
+    axis_scales,
+    landmark_motion,
+    landmark_positions,
+    procrustes_rotation,
+    scatter_landmarks,
+)
 from tts2face.models.face_file import load_face
 
 
@@ -14,7 +20,7 @@ def test_a_known_rotation_is_found_again(seed: int) -> None:
     generator = np.random.default_rng(seed)
     places = generator.normal(0, 40, (60, 3))
     turn = Rotation.random(random_state=seed).as_matrix()
-    assert turn_onto(places, 1.7 * places @ turn.T + [3, -5, 8]) == pytest.approx(turn, abs=1e-8)
+    assert procrustes_rotation(places, 1.7 * places @ turn.T + [3, -5, 8]) == pytest.approx(turn, abs=1e-8)
 
 
 def test_known_sizes_are_found_again_and_held_within_bounds() -> None:
@@ -29,6 +35,6 @@ def test_landmarks_move_as_those_of_the_posed_face() -> None:
     weights = np.zeros(len(face.shape_names))
     weights[number] = 0.7
     posed = (posed_vertices(face, weights)[face.landmark_vertices] * face.landmark_weights[..., None]).sum(axis=1)
-    moved = landmark_places(face) + 0.7 * landmark_motion(face, np.array([number]))[..., 0]
+    moved = landmark_positions(face) + 0.7 * landmark_motion(face, np.array([number]))[..., 0]
     assert moved == pytest.approx(posed, abs=1e-4)
-    assert np.isnan(all_landmarks(face, moved)).sum() == 3 * (478 - len(face.landmarks))
+    assert np.isnan(scatter_landmarks(face, moved)).sum() == 3 * (478 - len(face.landmarks))

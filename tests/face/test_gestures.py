@@ -9,10 +9,10 @@ from scipy.spatial import KDTree
 
 from lexicon.errors import DataError, InputError
 from tests.face.gestures import BROWS, CHEEKS, palette, posed_landmarks
-from tts2face.face.deformation import rigged
-from tts2face.face.expressions import expression_landmarks, expression_table, expressive
+from tts2face.face.deformation import build_rig
+from tts2face.face.expressions import add_expression_shapes, expression_landmarks, expression_table
 from tts2face.face.gesture_transfer import LID_RIMS, LIPS, GestureFace, gesture_face
-from tts2face.face.landmark_fit import landmark_places
+from tts2face.face.landmark_fit import landmark_positions
 from tts2face.face.shape_transfer import eye_distance
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
@@ -60,7 +60,7 @@ def at(face: Face, landmarks: tuple[int, ...]) -> list[int]:
 
 def gaps(face: Face, weights: np.ndarray) -> np.ndarray:
     """(T, P) heights of facing inner lip points over each other, beyond those of the face at rest, mm."""
-    posed = posed_landmarks(face, weights)[:, :, 1] - landmark_places(face)[:, 1]
+    posed = posed_landmarks(face, weights)[:, :, 1] - landmark_positions(face)[:, 1]
     return posed[:, at(face, INNER_LIP_UPPER)] - posed[:, at(face, INNER_LIP_LOWER)]
 
 
@@ -123,8 +123,8 @@ def test_a_smile_leaves_rounded_lips_round() -> None:
 def test_without_gestures_speech_passes_unchanged(name: str) -> None:
     face, speech = ready(name), spoken(name)
     performed = face.perform(speech, {})
-    assert np.array_equal(performed.motion.values[:, : face.n_own], speech.values)
-    assert not performed.motion.values[:, face.n_own :].any()
+    assert np.array_equal(performed.motion.values[:, : face.n_speech_shapes], speech.values)
+    assert not performed.motion.values[:, face.n_speech_shapes :].any()
     assert performed.head.channels == HEAD_CHANNELS
     assert not performed.head.values.any()
 
@@ -167,7 +167,7 @@ def test_one_eye_winks_and_a_negative_share_opens_wider() -> None:
 def test_eyes_look_where_they_are_told(name: str, gaze: tuple[float, float]) -> None:
     face = ready(name)
     weights = face.perform(silence(load_face(name)), {"gaze": np.array([gaze], np.float32)}).motion.values[0]
-    turns = rigged(face.face).eye_turns
+    turns = build_rig(face.face).eye_turns
     for turn in np.einsum("ekc,k->ec", turns, weights):
         assert turn == pytest.approx([*gaze, 0], abs=1e-5)
 
@@ -181,7 +181,7 @@ def test_regions_move_their_landmarks_and_leave_lips_and_lids(
     face = ready(name)
     raised = np.array([[4 * np.sqrt(len(landmarks)), 0]], np.float32)
     weights = face.perform(silence(load_face(name)), {feature: raised}).motion.values
-    moved = (posed_landmarks(face.face, weights) - landmark_places(face.face))[0]
+    moved = (posed_landmarks(face.face, weights) - landmark_positions(face.face))[0]
     assert 2 < moved[at(face.face, landmarks), 1].mean() < 8
     assert np.abs(moved[at(face.face, tuple({*LIPS, *LID_RIMS}))]).max() < 0.3  # mm; they lie inside triangles
     shape = face.face.shapes[face.face.shape_names.index(f"{feature}0")]
@@ -201,7 +201,7 @@ def test_regions_move_their_landmarks_and_leave_lips_and_lids(
         assert part.name not in still or not shape[used].any()
     support = 0.31 * eye_distance(face.face)
     moving, kept = (
-        KDTree(landmark_places(face.face)[at(face.face, some)]).query(face.face.vertices, p=np.inf)[0] > support
+        KDTree(landmark_positions(face.face)[at(face.face, some)]).query(face.face.vertices, p=np.inf)[0] > support
         for some in (landmarks, (*landmarks, *LIPS, *LID_RIMS))
     )
     assert not shape[kept].any()
@@ -246,12 +246,12 @@ def test_a_rig_with_other_names_gestures_as_the_one_it_is_made_of(kept: tuple[st
             posed_landmarks(one.face, one.perform(silence(own), felt(1, **{name: 1})).motion.values)[0, :468]
             for one, own in ((known, head), (face, renamed(head, kept)))
         )
-        rest = landmark_places(head)[:468]
+        rest = landmark_positions(head)[:468]
         assert np.corrcoef((there - rest).ravel(), (here - rest).ravel())[0, 1] > 0.9
     shut = face.perform(silence(renamed(head, kept)), {"blink": np.ones((1, 2), np.float32)}).motion.values
     assert np.abs(lid_openings(face.face, shut)).max() < 0.8
     looking = face.perform(silence(renamed(head, kept)), {"gaze": np.array([[0.1, 0.1]], np.float32)}).motion.values[0]
-    for turn in np.einsum("ekc,k->ec", rigged(face.face).eye_turns, looking):
+    for turn in np.einsum("ekc,k->ec", build_rig(face.face).eye_turns, looking):
         assert turn == pytest.approx([0.1, 0.1, 0], abs=1e-5)
 
 
@@ -264,7 +264,7 @@ def test_basis_expressions_have_closed_lips_and_open_eyes() -> None:
         assert np.abs(lips).max() < KEPT_MM
         lids = moved[:, UPPER_LIDS, 1] - moved[:, LOWER_LIDS, 1]
         assert (
-            landmark_places(face)[list(UPPER_LIDS), 1] - landmark_places(face)[list(LOWER_LIDS), 1] + lids > 3
+            landmark_positions(face)[list(UPPER_LIDS), 1] - landmark_positions(face)[list(LOWER_LIDS), 1] + lids > 3
         ).all()
         corners = moved[MASK["happy"], [MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT]]
         assert (corners[:, 1] > 3).all()
@@ -275,7 +275,7 @@ def test_basis_expressions_have_closed_lips_and_open_eyes() -> None:
 
 def test_the_table_names_shapes_of_the_default_head() -> None:
     assert set(expression_table()) <= set(load_face("head").shape_names)
-    assert expressive(load_face("head")).shape_names == load_face("head").shape_names
+    assert add_expression_shapes(load_face("head")).shape_names == load_face("head").shape_names
 
 
 def test_refuses_what_does_not_fit() -> None:

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from lexicon.errors import InputError
 from tests.render.tiny_face import tiny_face
-from tts2face.face.deformation import head_rotation, posed_vertices, rigged, rotation_matrix
+from tts2face.face.deformation import build_rig, head_rotation, posed_vertices, rotation_matrix
 from tts2face.models.landmarks import CHIN
 
 WEIGHTS = np.array([0.4, -0.3, 1.0, 0.6])
@@ -16,12 +16,12 @@ WEIGHTS = np.array([0.4, -0.3, 1.0, 0.6])
 
 def test_the_rig_poses_as_the_plain_formula_does():
     face = tiny_face()
-    np.testing.assert_allclose(rigged(face).posed(WEIGHTS), posed_vertices(face, WEIGHTS), atol=1e-4)
+    np.testing.assert_allclose(build_rig(face).pose(WEIGHTS), posed_vertices(face, WEIGHTS), atol=1e-4)
 
 
 def test_rest_is_rest():
     face = tiny_face()
-    np.testing.assert_allclose(rigged(face).posed(np.zeros(4)), face.vertices, atol=1e-5)
+    np.testing.assert_allclose(build_rig(face).pose(np.zeros(4)), face.vertices, atol=1e-5)
 
 
 @pytest.mark.parametrize("turn", [(0, 0, 0), (0.3, 0, 0), (0, -1.2, 0.4), (2, 1, -0.5)])
@@ -41,7 +41,7 @@ def test_a_head_pose_nods_down_turns_left_and_tilts():
 
 def test_a_face_without_neck_moves_rigidly_about_its_pivot():
     face = tiny_face()
-    moved = rigged(face).posed(np.zeros(4), np.array([0.1, 0.2, 0.3, 4.0, 5.0, 6.0]))
+    moved = build_rig(face).pose(np.zeros(4), np.array([0.1, 0.2, 0.3, 4.0, 5.0, 6.0]))
     turn = head_rotation(0.1, 0.2, 0.3)
     expected = (face.vertices - face.pivot) @ turn.T + face.pivot + [4.0, 5.0, 6.0]
     np.testing.assert_allclose(moved, expected, atol=1e-3)
@@ -56,7 +56,7 @@ def test_the_end_of_a_neck_stays_while_the_head_turns():
         landmark_vertices=np.full((1, 3), chin, np.int32),
         landmark_weights=np.array([[1, 0, 0]], np.float32),
     )
-    moved = rigged(face).posed(np.zeros(4), np.array([0, 0.3, 0, 0, 0, 0])) - face.vertices
+    moved = build_rig(face).pose(np.zeros(4), np.array([0, 0.3, 0, 0, 0, 0])) - face.vertices
     lowest, highest = np.argmin(face.vertices[:, 1]), np.argmax(face.vertices[:, 1])
     np.testing.assert_allclose(moved[lowest], 0, atol=1e-5)
     expected = (head_rotation(0, 0.3, 0) - np.eye(3)) @ (face.vertices[highest] - face.pivot)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.rbf import AT_ONCE, interpolant
+from tts2face.face.rbf import AT_ONCE, fit_interpolant
 
 WIDTH = 150.0
 REACH = 64.0 / 200.0 * WIDTH  # mm; eq. 4's 64 on a face 200 wide
@@ -17,18 +17,18 @@ def scattered(n: int = 40) -> tuple[np.ndarray, np.ndarray]:
 
 def test_takes_the_given_displacements_at_the_centres() -> None:
     centres, moved = scattered()
-    np.testing.assert_allclose(interpolant(centres, moved, WIDTH)(centres), moved, atol=1e-9)
+    np.testing.assert_allclose(fit_interpolant(centres, moved, WIDTH)(centres), moved, atol=1e-9)
 
 
 def test_one_centre_falls_off_as_the_paper_says() -> None:
-    field = interpolant(np.zeros((1, 3)), np.array([[2.0, 0.0, -1.0]]), 200.0)
+    field = fit_interpolant(np.zeros((1, 3)), np.array([[2.0, 0.0, -1.0]]), 200.0)
     far = field(np.array([[64.0, 0.0, 0.0], [0.0, 0.0, 128.0]]))
     np.testing.assert_allclose(far, np.exp([[-1.0], [-2.0]]) * [2.0, 0.0, -1.0], rtol=1e-12)
 
 
 def test_between_two_centres_on_a_line_it_is_a_hyperbolic_sine() -> None:
     a, u0, u1 = 64.0, 3.0, -1.0
-    field = interpolant(np.array([[0.0], [90.0]]), np.array([[u0], [u1]]), 200.0)
+    field = fit_interpolant(np.array([[0.0], [90.0]]), np.array([[u0], [u1]]), 200.0)
     x = np.linspace(0, 90, 31)
     wanted = (u0 * np.sinh((90 - x) / a) + u1 * np.sinh(x / a)) / np.sinh(90 / a)
     np.testing.assert_allclose(field(x[:, None])[:, 0], wanted, rtol=1e-10, atol=1e-12)
@@ -40,25 +40,25 @@ def test_equals_scipys_interpolation_with_the_same_kernel() -> None:
     centres, moved = scattered()
     places = np.random.default_rng(5).uniform(-100, 100, (60, 3))
     wanted = [Rbf(*centres.T, u, function=lambda _, r: np.exp(-r / REACH))(*places.T) for u in moved.T]
-    np.testing.assert_allclose(interpolant(centres, moved, WIDTH)(places), np.transpose(wanted), atol=1e-9)
+    np.testing.assert_allclose(fit_interpolant(centres, moved, WIDTH)(places), np.transpose(wanted), atol=1e-9)
 
 
 def test_does_not_depend_on_the_unit_of_length() -> None:
     centres, moved = scattered()
     places = centres + 3.0
-    in_metres = interpolant(centres / 1000, moved / 1000, WIDTH / 1000)(places / 1000)
-    np.testing.assert_allclose(1000 * in_metres, interpolant(centres, moved, WIDTH)(places), atol=1e-9)
+    in_metres = fit_interpolant(centres / 1000, moved / 1000, WIDTH / 1000)(places / 1000)
+    np.testing.assert_allclose(1000 * in_metres, fit_interpolant(centres, moved, WIDTH)(places), atol=1e-9)
 
 
 def test_nothing_moves_far_from_the_face_for_there_is_no_affine_term() -> None:
     centres, _ = scattered()
-    field = interpolant(centres, np.ones((len(centres), 3)), WIDTH)
+    field = fit_interpolant(centres, np.ones((len(centres), 3)), WIDTH)
     assert np.abs(field(np.array([[3000.0, 0.0, 0.0]]))).max() < 1e-12
 
 
 def test_many_places_are_those_one_by_one() -> None:
     centres, moved = scattered(5)
-    field = interpolant(centres, moved, WIDTH)
+    field = fit_interpolant(centres, moved, WIDTH)
     places = np.random.default_rng(6).uniform(-75, 75, (AT_ONCE + 3, 3))
     np.testing.assert_allclose(field(places)[[0, -1]], np.concatenate([field(places[:1]), field(places[-1:])]), 1e-12)
 
@@ -66,10 +66,10 @@ def test_many_places_are_those_one_by_one() -> None:
 def test_refuses_what_has_no_answer() -> None:
     centres, moved = scattered(3)
     with pytest.raises(InputError, match="must have the same rows"):
-        interpolant(centres, moved[:2], WIDTH)
+        fit_interpolant(centres, moved[:2], WIDTH)
     with pytest.raises(InputError, match="must be finite"):
-        interpolant(centres, np.where(moved == moved[0, 0], np.nan, moved), WIDTH)
+        fit_interpolant(centres, np.where(moved == moved[0, 0], np.nan, moved), WIDTH)
     with pytest.raises(InputError, match="width must be above 0, not 0"):
-        interpolant(centres, moved, 0.0)
+        fit_interpolant(centres, moved, 0.0)
     with pytest.raises(DataError, match="two centres lie in one place"):
-        interpolant(centres[[0, 1, 0]], moved, WIDTH)
+        fit_interpolant(centres[[0, 1, 0]], moved, WIDTH)

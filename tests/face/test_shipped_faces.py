@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tts2face.face.deformation import posed_vertices
-from tts2face.models.face_file import identities_of, load_face, read_face
+from tts2face.models.face_file import list_identities, load_face, read_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
-from tts2face.storage.files import named_file
+from tts2face.storage.files import find_file
 
 UPPER_LID, LOWER_LID = (159, 386), (145, 374)  # right and left eye, in the middle
 
@@ -34,7 +34,7 @@ def test_has_all_shapes_landmarks_and_parts(face):
 
 def test_is_small_enough(face):
     assert len(face.vertices) < 28_000
-    assert named_file(face.metadata["name"], "face").stat().st_size < 6_000_000
+    assert find_file(face.metadata["name"], "face").stat().st_size < 6_000_000
 
 
 def test_stands_between_its_eyes(face):
@@ -72,8 +72,8 @@ def test_the_lower_teeth_and_the_tongue_follow_the_jaw(face):
 
 
 def test_every_identity_keeps_the_eyes_in_their_sockets():
-    path = named_file("head", "face")
-    for name, summary in identities_of(path).items():
+    path = find_file("head", "face")
+    for name, summary in list_identities(path).items():
         person = read_face(path, name)
         assert summary
         for eye in person.eyes:

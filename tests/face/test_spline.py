@@ -5,8 +5,8 @@ import pytest
 from scipy.interpolate import BSpline
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.compact_spline import AT_ONCE, bell, local_interpolant
-from tts2face.face.landmark_fit import landmark_motion, landmark_places
+from tts2face.face.compact_spline import AT_ONCE, cubic_bspline, fit_local_interpolant
+from tts2face.face.landmark_fit import landmark_motion, landmark_positions
 from tts2face.models.face_file import load_face
 
 SUPPORT = 30.0  # mm
@@ -23,20 +23,20 @@ def brows(n: int = 20) -> tuple[np.ndarray, np.ndarray]:
 def test_the_bell_is_the_cubic_b_spline() -> None:
     share = np.linspace(0, 0.999, 101)
     known = 1.5 * BSpline.basis_element([-2, -1, 0, 1, 2])(2 * share)  # its value at 0 is 2/3
-    np.testing.assert_allclose(bell(share), known, atol=1e-12)
-    assert bell(np.array([0.5, 1.0, 7.0])).tolist() == [0.25, 0.0, 0.0]
+    np.testing.assert_allclose(cubic_bspline(share), known, atol=1e-12)
+    assert cubic_bspline(np.array([0.5, 1.0, 7.0])).tolist() == [0.25, 0.0, 0.0]
 
 
 def test_takes_the_given_displacements_of_near_centres_exactly() -> None:
     centres, moved = brows()
-    np.testing.assert_allclose(local_interpolant(centres, moved, SUPPORT)(centres), moved, atol=1e-9)
+    np.testing.assert_allclose(fit_local_interpolant(centres, moved, SUPPORT)(centres), moved, atol=1e-9)
 
 
 def test_a_cubic_spline_on_a_line_comes_back() -> None:
     """Centres at half the support are a spline's knots: the coefficients of its own basis are found again."""
     knots = np.arange(12.0)
     wanted = np.random.default_rng(2).normal(size=(len(knots), 2))
-    found = local_interpolant(knots[:, None], sum_of_bells(knots, knots, wanted), 2.0)
+    found = fit_local_interpolant(knots[:, None], sum_of_bells(knots, knots, wanted), 2.0)
     np.testing.assert_allclose(found.coefficients, wanted, atol=1e-12)
 
 
@@ -49,14 +49,14 @@ def test_nothing_moves_beyond_the_support() -> None:
     centres, moved = brows()
     places = np.random.default_rng(5).uniform(-80, 80, (2000, 3))
     far = np.abs(places[:, None] - centres).max(axis=2).min(axis=1) >= SUPPORT
-    field = local_interpolant(centres, moved, SUPPORT)(places)
+    field = fit_local_interpolant(centres, moved, SUPPORT)(places)
     assert far.any()
     assert not field[far].any()
     assert field[~far].any(axis=1).mean() > 0.95
 
 
 def test_one_centre_is_the_product_of_splines_along_the_axes() -> None:
-    field = local_interpolant(np.zeros((1, 3)), np.array([[2.0, 0.0, -1.0]]), 10.0)
+    field = fit_local_interpolant(np.zeros((1, 3)), np.array([[2.0, 0.0, -1.0]]), 10.0)
     place = np.array([[5.0, 0.0, -5.0]])
     np.testing.assert_allclose(field(place), np.array([[2.0, 0.0, -1.0]]) / 16, rtol=1e-12)
 
@@ -64,17 +64,17 @@ def test_one_centre_is_the_product_of_splines_along_the_axes() -> None:
 def test_stays_calm_between_the_landmarks_of_a_dense_mesh() -> None:
     """Splines of the distance, which are not positive definite in space, carry a blink of 13 mm off by 114 mm here."""
     head = load_face("head")
-    places = landmark_places(head)[:468:2]
+    places = landmark_positions(head)[:468:2]
     blink = landmark_motion(head, np.array([head.shape_names.index("eyeBlinkLeft")]))[:468:2, :, 0]
-    field = local_interpolant(places, blink, SUPPORT)(head.vertices[::7])
+    field = fit_local_interpolant(places, blink, SUPPORT)(head.vertices[::7])
     assert np.abs(field).max() < 1.5 * np.abs(blink).max()
 
 
 def test_does_not_depend_on_the_unit_of_length_or_on_how_many_places_there_are() -> None:
     centres, moved = brows()
     places = np.random.default_rng(6).uniform(-20, 40, (AT_ONCE + 3, 3))
-    field = local_interpolant(centres, moved, SUPPORT)
-    in_metres = local_interpolant(centres / 1000, moved / 1000, SUPPORT / 1000)(places / 1000)
+    field = fit_local_interpolant(centres, moved, SUPPORT)
+    in_metres = fit_local_interpolant(centres / 1000, moved / 1000, SUPPORT / 1000)(places / 1000)
     np.testing.assert_allclose(1000 * in_metres, field(places), atol=1e-9)
     np.testing.assert_allclose(field(places)[[0, -1]], np.concatenate([field(places[:1]), field(places[-1:])]), 1e-12)
 
@@ -82,10 +82,10 @@ def test_does_not_depend_on_the_unit_of_length_or_on_how_many_places_there_are()
 def test_refuses_what_has_no_answer() -> None:
     centres, moved = brows(3)
     with pytest.raises(InputError, match="must have the same rows"):
-        local_interpolant(centres, moved[:2], SUPPORT)
+        fit_local_interpolant(centres, moved[:2], SUPPORT)
     with pytest.raises(InputError, match="must be finite"):
-        local_interpolant(centres, moved * np.nan, SUPPORT)
+        fit_local_interpolant(centres, moved * np.nan, SUPPORT)
     with pytest.raises(InputError, match="support must be above 0, not 0"):
-        local_interpolant(centres, moved, 0)
+        fit_local_interpolant(centres, moved, 0)
     with pytest.raises(DataError, match="too near to each other"):
-        local_interpolant(centres[[0, 1, 0]], moved, SUPPORT)
+        fit_local_interpolant(centres[[0, 1, 0]], moved, SUPPORT)

@@ -6,10 +6,10 @@ import pytest
 from tts2face.models.palette import (
     FIXED_CHANNELS,
     REGION_FEATURES,
-    Change,
     Derivation,
+    FaceRegion,
+    FeatureChange,
     Palette,
-    Region,
     Style,
 )
 
@@ -40,8 +40,12 @@ def palette() -> Palette:
     for at, name in enumerate(REGION_FEATURES):
         modes, _ = np.linalg.qr(generator.normal(size=(12, N_MODES)))
         landmarks = np.arange(4, dtype=np.int32) + 10 * at
-        regions[name] = Region(landmarks, modes.T.reshape(N_MODES, 4, 3).astype(np.float32))
-    changes = {"head": Change(gain=2.0), "expression": Change(offset={"happy": 0.5}), "brows": Change(tempo=2.0)}
+        regions[name] = FaceRegion(landmarks, modes.T.reshape(N_MODES, 4, 3).astype(np.float32))
+    changes = {
+        "head": FeatureChange(gain=2.0),
+        "expression": FeatureChange(offset={"happy": 0.5}),
+        "brows": FeatureChange(tempo=2.0),
+    }
     return Palette(
         neutral=generator.normal(size=(478, 3)).astype(np.float32),
         regions=regions,

@@ -5,8 +5,8 @@ import pytest
 
 from lexicon.errors import InputError
 from tts2face.gesture.field import FieldOptions
-from tts2face.gesture.gesture_stream import Fields, GestureStream, middle_of
-from tts2face.gesture.perlin_noise import NoiseStream, blinks, blinks_per_second, perlin
+from tts2face.gesture.gesture_stream import GestureFields, GestureStream, style_median
+from tts2face.gesture.perlin_noise import NoiseStream, blink_closure, blinks_per_second, perlin_noise
 from tts2face.gesture.spans import ExpressionSpan, Gains, Nod, StyleSpan
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import EXPRESSIONS, FEATURES
@@ -26,8 +26,8 @@ def _sound(seconds: float, seed: int = 0) -> Waveform:
 
 
 @pytest.fixture(scope="module")
-def fields(palette) -> Fields:
-    return Fields(palette, dict.fromkeys(FEATURES, FieldOptions(sigma=1.0, candidates=3)))
+def fields(palette) -> GestureFields:
+    return GestureFields(palette, dict.fromkeys(FEATURES, FieldOptions(sigma=1.0, candidates=3)))
 
 
 def _made(fields, timeline=PLAIN, *, style="calm", seed=0, seconds=6.0, fps=FPS, kind=GestureStream):  # noqa: PLR0913 - a clip's choices
@@ -88,7 +88,7 @@ def test_a_layer_changes_no_other(fields):
 
 def test_a_derived_style_is_its_source_changed_as_stated(fields, palette):
     plain, double = _made(fields), _made(fields, style="double")
-    middle = middle_of(palette.styles["calm"], "head")
+    middle = style_median(palette.styles["calm"], "head")
     np.testing.assert_allclose(double["head"] - middle, 2 * (plain["head"] - middle), atol=1e-5)
     happy = EXPRESSIONS.index("happy")
     np.testing.assert_allclose(double["expression"][:, happy], plain["expression"][:, happy] + 0.5, atol=1e-6)
@@ -132,7 +132,7 @@ def test_loud_speech_and_silence_differ(fields):
 def test_pitch_matters_where_it_is_asked_for(palette):
     tone = np.sin(2 * np.pi * (150 + 50 * np.sin(np.arange(4 * RATE) / RATE * 5)) * np.arange(4 * RATE) / RATE)
     made = {
-        with_pitch: GestureStream(Fields(palette, {}, with_pitch), style="calm", seed=0, fps=FPS).next(
+        with_pitch: GestureStream(GestureFields(palette, {}, with_pitch), style="calm", seed=0, fps=FPS).next(
             Waveform(0.3 * tone, RATE), 120, PLAIN
         )["head"]
         for with_pitch in (False, True)
@@ -149,7 +149,7 @@ def test_a_feature_that_a_style_lacks_comes_from_another(palette):
     from dataclasses import replace
 
     lacking = replace(palette.styles["wild"], motion={"head": palette.styles["wild"].motion["head"]})
-    fields = Fields(replace(palette, styles={"calm": palette.styles["calm"], "wild": lacking}), {})
+    fields = GestureFields(replace(palette, styles={"calm": palette.styles["calm"], "wild": lacking}), {})
     made = _made(fields, style="wild")
     assert set(made) == set(FEATURES)
     assert fields.source("wild", "gaze") == "calm"
@@ -158,17 +158,17 @@ def test_a_feature_that_a_style_lacks_comes_from_another(palette):
 
 def test_noise_is_as_strong_as_stated():
     times = np.arange(0, 3600, 1 / 30)
-    noise = perlin(times, 7)
+    noise = perlin_noise(times, 7)
     assert noise.std() == pytest.approx(1.0, abs=0.05)
     assert abs(noise.mean()) < 0.1
-    assert np.corrcoef(noise, perlin(times, 8))[0, 1] == pytest.approx(0.0, abs=0.05)
-    np.testing.assert_array_equal(perlin(times[1000:2000], 7), noise[1000:2000])
+    assert np.corrcoef(noise, perlin_noise(times, 8))[0, 1] == pytest.approx(0.0, abs=0.05)
+    np.testing.assert_array_equal(perlin_noise(times[1000:2000], 7), noise[1000:2000])
     assert np.abs(np.diff(noise)).max() < 0.5
 
 
 def test_blinks_at_random_are_as_many_as_stated():
     times = np.arange(0, 3600, 1 / 30)
-    shut = blinks(times, 0.3, 1)
+    shut = blink_closure(times, 0.3, 1)
     assert shut.min() == 0
     assert shut.max() <= 1
     assert blinks_per_second(np.stack([shut, shut], axis=1)) == pytest.approx(0.3, rel=0.1)

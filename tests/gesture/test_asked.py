@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture.request_timeline import asked
+from tts2face.gesture.request_timeline import build_request_timeline
 from tts2face.gesture.spans import ExpressionSpan, Nod
 from tts2face.models.palette import FEATURES
 from tts2face.request import Request
@@ -16,7 +16,7 @@ PLAN = """{"style": {"all": "calm", "head": "cross"}, "nods": [{"time": 1}], "ga
 
 def test_flags_win_over_the_file(tmp_path: Path) -> None:
     (tmp_path / "plan.json").write_text(PLAN)
-    timeline = asked(
+    timeline = build_request_timeline(
         Request(
             text="Hi.",
             timeline=tmp_path / "plan.json",
@@ -36,7 +36,7 @@ def test_flags_win_over_the_file(tmp_path: Path) -> None:
 
 
 def test_nothing_asked_is_an_empty_timeline() -> None:
-    timeline = asked(Request(text="Hi."))
+    timeline = build_request_timeline(Request(text="Hi."))
     assert (timeline.style, timeline.spans, timeline.expressions, timeline.nods) == ({}, (), (), ())
 
 
@@ -52,4 +52,4 @@ def test_nothing_asked_is_an_empty_timeline() -> None:
 )
 def test_what_cannot_be_read_is_refused(options: dict, kind: type, reason: str) -> None:
     with pytest.raises(kind, match=reason):
-        asked(Request(text="Hi.", **options))
+        build_request_timeline(Request(text="Hi.", **options))

@@ -4,9 +4,18 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture.field import Field, FieldOptions, FieldState, begun, continued, field_of, taken_over, walked
+from tts2face.gesture.field import (
+    Field,
+    FieldOptions,
+    FieldState,
+    build_field,
+    initial_state,
+    sample_field,
+    sample_field_moments,
+    transfer_state,
+)
 from tts2face.gesture.field_kernels import APART, SLACK
-from tts2face.gesture.kd_tree import tree_of
+from tts2face.gesture.kd_tree import build_tree
 
 OPTIONS = FieldOptions(history=5, candidates=3, future=4, alpha=(1.0,))
 
@@ -52,7 +61,7 @@ def _brute_force(made, state, n_best: int) -> list[int]:
 
 def test_a_tree_holds_every_place_once_and_on_its_side():
     places = np.random.default_rng(0).normal(size=(777, 3)).astype(np.float32)
-    tree = tree_of(places)
+    tree = build_tree(places)
     assert sorted(tree.order.tolist()) == list(range(777))
     np.testing.assert_array_equal(tree.places, places[tree.order])
     for node in np.flatnonzero(tree.axes >= 0):
@@ -64,11 +73,11 @@ def test_a_tree_holds_every_place_once_and_on_its_side():
 @pytest.mark.parametrize("seed", range(8))
 def test_the_search_finds_what_brute_force_finds(seed, monkeypatch):
     values, heard, lengths = _recordings(seed)
-    made = field_of(values, heard, lengths, FieldOptions(history=5, candidates=1, future=4, alpha=(1.0,)))
+    made = build_field(values, heard, lengths, FieldOptions(history=5, candidates=1, future=4, alpha=(1.0,)))
     generator = np.random.default_rng(100 + seed)
     state = resting(made, generator.normal(size=2).astype(np.float32), np.float32([0.3]))
     (expected,) = _brute_force(made, state, 1)
-    _, behind = continued(made, state, np.zeros((1, 1), np.float32), np.array([0.5]))
+    _, behind = sample_field(made, state, np.zeros((1, 1), np.float32), np.array([0.5]))
     found = np.square(made.values[behind.moment - 5 : behind.moment] - state.shown).sum()
     found += np.square(made.heard[behind.moment - 5 : behind.moment] - state.heard).sum()
     nearest = np.square(made.values[expected - 5 : expected] - state.shown).sum()
@@ -78,17 +87,19 @@ def test_the_search_finds_what_brute_force_finds(seed, monkeypatch):
 
 def test_candidates_are_drawn_by_their_distance():
     values, heard, lengths = _recordings(1)
-    made = field_of(values, heard, lengths, FieldOptions(history=5, candidates=3, future=4, alpha=(1.0,), sigma=0.5))
+    made = build_field(values, heard, lengths, FieldOptions(history=5, candidates=3, future=4, alpha=(1.0,), sigma=0.5))
     state = resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32))
     best = _brute_force(made, state, 3)
     chances = (np.arange(3000) + 0.5) / 3000
-    drawn = [continued(made, state, np.zeros((1, 1), np.float32), np.array([chance]))[1].moment for chance in chances]
+    drawn = [
+        sample_field(made, state, np.zeros((1, 1), np.float32), np.array([chance]))[1].moment for chance in chances
+    ]
     away = []
     for moment in best:
         rows = slice(moment - 5, moment)
         squares = np.square(made.values[rows] - state.shown).sum() + np.square(made.heard[rows] - state.heard).sum()
         away.append(squares / 5)
-    shares = np.exp((away[0] - np.array(away)) / (0.5 * made.nearness))
+    shares = np.exp((away[0] - np.array(away)) / (0.5 * made.median_distance))
     expected = shares / shares.sum()
     got = [drawn.count(moment) / len(drawn) for moment in best]
     np.testing.assert_allclose(got, expected, atol=2 / 3000)
@@ -96,14 +107,14 @@ def test_candidates_are_drawn_by_their_distance():
 
 def test_in_parts_as_at_once():
     values, heard, lengths = _recordings(2)
-    made = field_of(values, heard, lengths, OPTIONS)
+    made = build_field(values, heard, lengths, OPTIONS)
     generator = np.random.default_rng(3)
     sound, chances = generator.normal(size=(200, 1)).astype(np.float32), generator.random(200)
     start = resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32))
-    whole, _ = continued(made, start, sound, chances)
+    whole, _ = sample_field(made, start, sound, chances)
     parts, state = [], start
     for low, high in ((0, 1), (1, 50), (50, 50), (50, 200)):
-        part, state = continued(made, state, sound[low:high], chances[low:high])
+        part, state = sample_field(made, state, sound[low:high], chances[low:high])
         parts.append(part)
     np.testing.assert_array_equal(np.concatenate(parts), whole)
 
@@ -111,34 +122,34 @@ def test_in_parts_as_at_once():
 def test_without_leaps_a_recording_is_repeated():
     values, heard, lengths = _recordings(4, n=1, length=300)
     options = FieldOptions(history=5, future=20, alpha=(1.0,), continuity=0.0, sigma=1e-6)
-    made = field_of(values, heard, lengths, options)
+    made = build_field(values, heard, lengths, options)
     state = FieldState(
         made.values[20:25], made.heard[20:25], 24, np.zeros((2, 2), np.float32), np.zeros(0, np.int64), 0
     )
-    shown, behind = continued(made, state, heard[25:150], np.full(125, 0.5))
+    shown, behind = sample_field(made, state, heard[25:150], np.full(125, 0.5))
     assert behind.moment == 149
     np.testing.assert_allclose(shown, values[25:150], atol=1e-5)
 
 
 def test_after_a_leap_motion_goes_on_from_where_it_was():
     values, heard, lengths = _recordings(5)
-    made = field_of(values, heard, lengths, FieldOptions(history=5, future=4, alpha=(5.0,), settle_s=0.2))
+    made = build_field(values, heard, lengths, FieldOptions(history=5, future=4, alpha=(5.0,), settle_s=0.2))
     generator = np.random.default_rng(6)
     sound = generator.normal(size=(600, 1)).astype(np.float32)
     start = resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32))
-    shown, _ = continued(made, start, sound, generator.random(600))
+    shown, _ = sample_field(made, start, sound, generator.random(600))
     recorded = np.abs(np.diff(values.reshape(12, 60, 2), axis=1)).max()
     assert np.abs(np.diff(shown, axis=0)).max() < 1.5 * recorded
 
 
 def test_no_dead_end_and_no_loop_in_silence():
     values, heard, lengths = _recordings(7)
-    made = field_of(values, heard, lengths, OPTIONS)
+    made = build_field(values, heard, lengths, OPTIONS)
     start = resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32))
     moments, state = [], start
     generator = np.random.default_rng(8)
     for _ in range(1500):
-        _, state = continued(made, state, np.zeros((1, 1), np.float32), generator.random(1))
+        _, state = sample_field(made, state, np.zeros((1, 1), np.float32), generator.random(1))
         moments.append(state.moment)
     assert len(set(moments[:500])) > 100
     assert set(moments[1000:]) - set(moments[500:1000])
@@ -146,10 +157,10 @@ def test_no_dead_end_and_no_loop_in_silence():
 
 def test_another_style_goes_on_where_the_first_stood():
     values, heard, lengths = _recordings(9)
-    first = field_of(values, heard, lengths, OPTIONS)
-    second = field_of(2.0 * values[::-1].copy(), heard[::-1].copy(), lengths, OPTIONS)
+    first = build_field(values, heard, lengths, OPTIONS)
+    second = build_field(2.0 * values[::-1].copy(), heard[::-1].copy(), lengths, OPTIONS)
     state = resting(first, np.float32([1.0, 2.0]), np.float32([0.5]))
-    there = taken_over(state, first, second)
+    there = transfer_state(state, first, second)
     np.testing.assert_allclose(there.shown * second.scale, state.shown * first.scale, rtol=1e-6)
     np.testing.assert_allclose(there.heard / second.weights, state.heard / first.weights, rtol=1e-6)
 
@@ -157,13 +168,13 @@ def test_another_style_goes_on_where_the_first_stood():
 def test_too_short_recordings():
     values, heard, _ = _recordings(10, n=1, length=9)
     with pytest.raises(DataError, match="no recording of the style has 10 frames"):
-        field_of(values, heard, np.array([9], np.int32), OPTIONS)
+        build_field(values, heard, np.array([9], np.int32), OPTIONS)
 
 
 def test_sound_without_weight():
     values, heard, lengths = _recordings(11)
     with pytest.raises(InputError, match="2 sound features need as many weights, not 1"):
-        field_of(values, np.repeat(heard, 2, axis=1), lengths, OPTIONS)
+        build_field(values, np.repeat(heard, 2, axis=1), lengths, OPTIONS)
 
 
 @pytest.mark.parametrize(
@@ -188,12 +199,12 @@ def test_options_out_of_range(wrong, reason):
 
 def test_a_walk_tells_which_moments_it_shows():
     values, heard, lengths = _recordings(4)
-    made = field_of(values, heard, lengths, OPTIONS)
+    made = build_field(values, heard, lengths, OPTIONS)
     generator = np.random.default_rng(5)
     sound, chances = generator.normal(size=(300, 1)).astype(np.float32), generator.random(300)
     start = resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32))
-    walk = walked(made, start, sound, chances)
-    np.testing.assert_array_equal(walk.values, continued(made, start, sound, chances)[0])
+    walk = sample_field_moments(made, start, sound, chances)
+    np.testing.assert_array_equal(walk.values, sample_field(made, start, sound, chances)[0])
     assert walk.moments[-1] == walk.state.moment
     leaps = np.flatnonzero(np.diff(walk.moments) != 1) + 1
     ended = (walk.moments[leaps - 1] + 1) % lengths[0] == 0
@@ -203,10 +214,10 @@ def test_a_walk_tells_which_moments_it_shows():
 
 def test_what_is_left_of_a_leap_is_a_critically_damped_spring():
     values, heard, lengths = _recordings(4)
-    made = field_of(values, heard, lengths, OPTIONS)
+    made = build_field(values, heard, lengths, OPTIONS)
     generator = np.random.default_rng(5)
     sound, chances = generator.normal(size=(300, 1)).astype(np.float32), generator.random(300)
-    walk = walked(made, resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32)), sound, chances)
+    walk = sample_field_moments(made, resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32)), sound, chances)
     leaps = np.flatnonzero(np.diff(walk.moments) != 1) + 1
     omega = 1 / (OPTIONS.settle_s * 30)
     for leap, following in zip(leaps, [*leaps[1:], 300], strict=True):
@@ -220,8 +231,8 @@ def test_what_is_left_of_a_leap_is_a_critically_damped_spring():
 @pytest.mark.parametrize("chance", [0.0, 0.5, 0.999])
 def test_a_clip_begins_as_a_recording_did(chance: float):
     values, heard, lengths = _recordings(12)
-    made = field_of(values, heard, lengths, OPTIONS)
-    state = begun(made, chance)
+    made = build_field(values, heard, lengths, OPTIONS)
+    state = initial_state(made, chance)
     start = 60 * int(chance * 12)
     np.testing.assert_array_equal(state.shown, made.values[start : start + OPTIONS.history])
     assert state.moment == start + OPTIONS.history - 1

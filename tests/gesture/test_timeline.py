@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture.notation import expressions_of, gains_of, style_of
+from tts2face.gesture.notation import parse_expressions, parse_gains, parse_style
 from tts2face.gesture.spans import GAINED, ExpressionSpan, Gains, Nod, StyleSpan
 from tts2face.gesture.timeline import BLEND_S, ONSET_S, Timeline
 from tts2face.gesture.timeline_file import parse_timeline, read_timeline
@@ -58,7 +58,7 @@ def test_away_from_edges_there_is_one_style(spans: tuple[StyleSpan, ...]) -> Non
 
 @given(disjoint(), disjoint())
 def test_of_two_timelines_the_second_is_seen(under: tuple[StyleSpan, ...], over: tuple[StyleSpan, ...]) -> None:
-    both = Timeline(spans=under).merged(Timeline(spans=over))
+    both = Timeline(spans=under).merge(Timeline(spans=over))
     first, second, seen = (
         one.style_at("brows", TIMES, default="-") for one in (Timeline(spans=under), Timeline(spans=over), both)
     )
@@ -69,7 +69,7 @@ def test_of_two_timelines_the_second_is_seen(under: tuple[StyleSpan, ...], over:
 def test_a_part_of_a_timeline_is_the_same_there(spans: tuple[StyleSpan, ...], start: float, length: float) -> None:
     whole = Timeline(spans=spans)
     inside = np.array([second for second in TIMES if start <= second < start + length])
-    assert whole.within(start, start + length).style_at("brows", inside, default="-") == whole.style_at(
+    assert whole.restrict(start, start + length).style_at("brows", inside, default="-") == whole.style_at(
         "brows", inside, default="-"
     )
 
@@ -170,21 +170,21 @@ def test_spans_to_the_end_fit_every_clip() -> None:
     ],
 )
 def test_styles_as_people_write_them(written: str, meant: dict) -> None:
-    assert style_of(written) == meant
+    assert parse_style(written) == meant
 
 
 @given(st.dictionaries(st.sampled_from(GAINED), st.integers(0, 30).map(lambda n: n / 10), min_size=1))
 def test_written_gains_are_read_back(factors: dict) -> None:
-    assert gains_of(",".join(f"{name}={factor:g}" for name, factor in factors.items())).factors == factors
+    assert parse_gains(",".join(f"{name}={factor:g}" for name, factor in factors.items())).factors == factors
 
 
 def test_gains_of_everything() -> None:
-    gains = gains_of("all=0.5,head=2")
+    gains = parse_gains("all=0.5,head=2")
     assert [gains.of(name) for name in ("brows", "head", "jaw")] == [0.5, 2.0, 1.0]
 
 
 def test_expressions_as_people_write_them() -> None:
-    assert expressions_of("happy=0.6@1.2-3.4,sad=-0.3, angry=1@2,afraid=1@2-") == (
+    assert parse_expressions("happy=0.6@1.2-3.4,sad=-0.3, angry=1@2,afraid=1@2-") == (
         ExpressionSpan("happy", 0.6, 1.2, 3.4),
         ExpressionSpan("sad", -0.3, 0.0, math.inf),
         ExpressionSpan("angry", 1.0, 2.0, math.inf),
@@ -195,26 +195,26 @@ def test_expressions_as_people_write_them() -> None:
 @pytest.mark.parametrize(
     ("read", "written", "reason"),
     [
-        (style_of, "", "cannot read '' in ''; a style is a name"),
-        (style_of, "head=", "cannot read 'head='"),
-        (style_of, "=calm", "cannot read '=calm'"),
-        (style_of, "head=a=b", "cannot read 'head=a=b'"),
-        (style_of, "head=a,,brows=b", "cannot read ''"),
-        (style_of, "head=a,head=b", "for head twice"),
-        (style_of, "calm,cross", "for all twice"),
-        (style_of, "ears=calm", "no feature 'ears'"),
-        (gains_of, "head", "cannot read 'head' in 'head'; gains are written"),
-        (gains_of, "head=big", "'big' is no number; gains are written"),
-        (gains_of, "head=nan", "'nan' is no finite number"),
-        (gains_of, "head=4", "gain of head must lie between 0 and 3, not 4"),
-        (gains_of, "jaw=1,jaw=2", "for jaw twice"),
-        (gains_of, "ears=1", "no feature 'ears'"),
-        (expressions_of, "happy", "cannot read 'happy'"),
-        (expressions_of, "happy=much", "'much' is no number"),
-        (expressions_of, "happy=1@x-2", "'x' is no number"),
-        (expressions_of, "happy=1@3-2", "must end after it begins"),
-        (expressions_of, "happy=2", "must lie between -0.5 and 1.5, not 2"),
-        (expressions_of, "happy=1@", "'' is no number"),
+        (parse_style, "", "cannot read '' in ''; a style is a name"),
+        (parse_style, "head=", "cannot read 'head='"),
+        (parse_style, "=calm", "cannot read '=calm'"),
+        (parse_style, "head=a=b", "cannot read 'head=a=b'"),
+        (parse_style, "head=a,,brows=b", "cannot read ''"),
+        (parse_style, "head=a,head=b", "for head twice"),
+        (parse_style, "calm,cross", "for all twice"),
+        (parse_style, "ears=calm", "no feature 'ears'"),
+        (parse_gains, "head", "cannot read 'head' in 'head'; gains are written"),
+        (parse_gains, "head=big", "'big' is no number; gains are written"),
+        (parse_gains, "head=nan", "'nan' is no finite number"),
+        (parse_gains, "head=4", "gain of head must lie between 0 and 3, not 4"),
+        (parse_gains, "jaw=1,jaw=2", "for jaw twice"),
+        (parse_gains, "ears=1", "no feature 'ears'"),
+        (parse_expressions, "happy", "cannot read 'happy'"),
+        (parse_expressions, "happy=much", "'much' is no number"),
+        (parse_expressions, "happy=1@x-2", "'x' is no number"),
+        (parse_expressions, "happy=1@3-2", "must end after it begins"),
+        (parse_expressions, "happy=2", "must lie between -0.5 and 1.5, not 2"),
+        (parse_expressions, "happy=1@", "'' is no number"),
     ],
 )
 def test_what_is_written_wrongly_is_refused(read, written: str, reason: str) -> None:

@@ -32,7 +32,7 @@ def test_words_are_found(word: str, phones: str | None) -> None:
 
 def test_scanning_and_table_agree() -> None:
     for word in ["'bout", "a", "zyuganov's", "zywicki", "middle", "no-such-word", "read"]:
-        assert dictionary._scanned(word) == dictionary._cmudict_table().get(word)
+        assert dictionary._scan_cmudict(word) == dictionary._cmudict_table().get(word)
 
 
 def test_user_entries() -> None:

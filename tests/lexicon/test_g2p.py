@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from lexicon.errors import InputError
-from lexicon.g2p import check_language, languages, phonemize, segments_of
+from lexicon.g2p import check_language, languages, parse_espeak_word, phonemize
 from lexicon.writing_systems import check_script
 
 SENTENCES = {
@@ -53,7 +53,7 @@ SENTENCES = {
 @pytest.mark.parametrize("language", SENTENCES)
 def test_what_espeak_writes_is_in_the_table(language: str) -> None:
     for sentence, words in zip(SENTENCES[language], phonemize(SENTENCES[language], language), strict=True):
-        segments = [segment for word in words for segment in segments_of(word, language)]
+        segments = [segment for word in words for segment in parse_espeak_word(word, language)]
         assert len(segments) >= 2, sentence
         assert any(segment.is_syllabic for segment in segments), sentence
 
@@ -71,8 +71,8 @@ def test_what_espeak_writes_is_in_the_table(language: str) -> None:
 )
 def test_known_words(language: str, word: str, phones: str) -> None:
     (written,) = phonemize([word], language)
-    found = [segment.phone for part in written for segment in segments_of(part, language)]
-    wanted = [segment.phone for part in phones.split() for segment in segments_of(part, language)]
+    found = [segment.phone for part in written for segment in parse_espeak_word(part, language)]
+    wanted = [segment.phone for part in phones.split() for segment in parse_espeak_word(part, language)]
     assert "".join(found) == "".join(wanted)
 
 

@@ -7,15 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lexicon.errors import InputError
-from lexicon.mark_parser import marked
-from lexicon.marked_text import DEEPEST, MarkedText, NameMark, NodMark, PauseMark, Run
+from lexicon.mark_parser import parse_marks
+from lexicon.marked_text import DEEPEST, MarkedText, NameMark, NodMark, PauseMark, StyleRun
 
 PLAIN = st.text(st.characters(blacklist_characters="[]<"))
 
 
 @given(st.text(st.characters(blacklist_characters="[<")))
 def test_text_without_marks_is_itself(text: str) -> None:
-    assert marked(text) == MarkedText(text)
+    assert parse_marks(text) == MarkedText(text)
 
 
 @pytest.mark.parametrize(
@@ -34,30 +34,30 @@ def test_text_without_marks_is_itself(text: str) -> None:
     ],
 )
 def test_other_brackets_are_text(text: str) -> None:
-    assert marked(text) == MarkedText(text)
+    assert parse_marks(text) == MarkedText(text)
 
 
 @given(st.lists(st.tuples(PLAIN, st.sampled_from([0.1, 0.4, 2.0])), max_size=6), PLAIN)
 def test_marks_stand_where_they_were_written(parts: list, last: str) -> None:
-    found = marked("".join(f"{text}[nod {size:g}]" for text, size in parts) + last)
+    found = parse_marks("".join(f"{text}[nod {size:g}]" for text, size in parts) + last)
     assert found.text == "".join(text for text, _ in parts) + last
     places = [sum(len(text) for text, _ in parts[: k + 1]) for k in range(len(parts))]
     assert found.marks == tuple(NodMark(at, size) for at, (_, size) in zip(places, parts, strict=True))
 
 
 def test_every_mark() -> None:
-    found = marked(
+    found = parse_marks(
         "Well, [pause 0.4]yes [nod 0.5][pause .5s][style:head=calm]one [style: cross ]two[/style][/style].[nod]"
     )
     assert found.text == "Well, yes one two."
     assert found.marks == (PauseMark(6, 0.4), NodMark(10, 0.5), PauseMark(10, 0.5), NodMark(18))
-    assert found.runs == (Run(0), Run(10, ("head=calm",)), Run(14, ("head=calm", "cross")), Run(17))
-    assert found.changes_voice
-    assert not marked("[style:a]b[/style]").changes_voice
+    assert found.runs == (StyleRun(0), StyleRun(10, ("head=calm",)), StyleRun(14, ("head=calm", "cross")), StyleRun(17))
+    assert found.has_voice_changes
+    assert not parse_marks("[style:a]b[/style]").has_voice_changes
 
 
 def test_pauses_at_one_place_add_up() -> None:
-    assert marked("a[pause 1][nod][pause 2]b[pause 3]").marks == (PauseMark(1, 3.0), NodMark(1), PauseMark(2, 3.0))
+    assert parse_marks("a[pause 1][nod][pause 2]b[pause 3]").marks == (PauseMark(1, 3.0), NodMark(1), PauseMark(2, 3.0))
 
 
 @pytest.mark.parametrize(
@@ -86,21 +86,21 @@ def test_pauses_at_one_place_add_up() -> None:
 )
 def test_marks_written_wrongly_are_refused(text: str, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
-        marked(f"Hello {text}")
+        parse_marks(f"Hello {text}")
 
 
 def ssml(inside: str, more: str = "") -> MarkedText:
-    return marked(f"<speak{more}>{inside}</speak>")
+    return parse_marks(f"<speak{more}>{inside}</speak>")
 
 
 def test_ssml_says_the_same_as_marks() -> None:
-    assert ssml('Hi <break time="400ms"/>there <express-as style="cross">you</express-as>') == marked(
+    assert ssml('Hi <break time="400ms"/>there <express-as style="cross">you</express-as>') == parse_marks(
         "Hi [pause 0.4]there [style:cross]you[/style]"
     )
 
 
 def test_every_element() -> None:
-    found = marked(
+    found = parse_marks(
         '\ufeff <?xml version="1.0" encoding="UTF-16"?>\n<speak version="1.1" '
         'xmlns="http://www.w3.org/2001/10/synthesis" xml:lang="en-US"><p><s>One &amp; <sub alias="two">2</sub></s></p>'
         "<!-- no --><![CDATA[<3]]>"
@@ -183,13 +183,13 @@ BILLION = "".join(f'<!ENTITY l{n} "{f"&l{n - 1};" * 10}">' for n in range(1, 10)
 )
 def test_nothing_is_expanded_or_fetched(head: str) -> None:
     with pytest.raises(InputError, match="a document type declaration is not read"):
-        marked(f"{head}<speak>&l9;</speak>")
+        parse_marks(f"{head}<speak>&l9;</speak>")
 
 
 @pytest.mark.parametrize("piece", ["[", "[nod]", "[pause 0]", "[style:a]b[/style]", "[pause 1]c", "a [b ", "word "])
 def test_a_megabyte_of_marks_is_read_at_once(piece: str) -> None:
     begin = time.perf_counter()
-    marked(piece * (1_000_000 // len(piece)))
+    parse_marks(piece * (1_000_000 // len(piece)))
     assert time.perf_counter() - begin < 10
 
 

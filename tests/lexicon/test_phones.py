@@ -11,10 +11,10 @@ from lexicon.phones import (
     PHONES,
     arpabet_to_ipa,
     ipa_to_arpabet,
+    look_up_phone,
     nearest_phones,
     phone_distance,
-    phone_of,
-    vowels,
+    vowel_symbols,
 )  # fmt: skip
 from lexicon.sequence import SILENCE
 
@@ -30,7 +30,7 @@ HEADER = (
 @pytest.mark.parametrize("name", CMU)
 def test_arpabet_goes_to_ipa_and_back(name: str) -> None:
     assert ipa_to_arpabet(arpabet_to_ipa(name)) == name
-    if phone_of(arpabet_to_ipa(name)).is_vowel:
+    if look_up_phone(arpabet_to_ipa(name)).is_vowel:
         for stress in (1, 2):
             assert ipa_to_arpabet(arpabet_to_ipa(f"{name}{stress}"), stress) == f"{name}{stress}"
 
@@ -49,7 +49,7 @@ def test_an_unknown_arpabet_name_is_refused(name: str) -> None:
 
 def test_unknown_labels_are_named() -> None:
     with pytest.raises(InputError, match="'Q' is no phone of the table"):
-        phone_of("Q")
+        look_up_phone("Q")
     with pytest.raises(InputError, match=r"'AA' is no phone.*did you mean ɑ"):
         phone_distance("p", "AA")
     with pytest.raises(InputError, match="ARPABET has no name for y"):
@@ -59,8 +59,8 @@ def test_unknown_labels_are_named() -> None:
 
 
 def test_silence_is_the_label_of_phone_sequences() -> None:
-    assert phone_of(SILENCE).kind == "silence"
-    assert SILENCE not in vowels()
+    assert look_up_phone(SILENCE).kind == "silence"
+    assert SILENCE not in vowel_symbols()
 
 
 def test_every_phone_has_the_features_of_its_kind() -> None:

@@ -5,11 +5,11 @@ import pytest
 from lexicon.dictionary import parse_dictionary
 from lexicon.errors import InputError
 from lexicon.ipa import parse_ipa
-from lexicon.nominal_durations import nominal_sequence
+from lexicon.nominal_durations import nominal_phones
 from lexicon.phones import ARPABET, PHONES
 from lexicon.pronounce import pronounce
 from lexicon.sequence import SILENCE
-from lexicon.syllables import syllables
+from lexicon.syllables import split_syllables
 
 
 def _arpabet(text: str) -> list[str]:
@@ -78,7 +78,7 @@ def test_the_user_wins() -> None:
 )
 def test_syllables(ipa: str, is_english: bool, parts: list[str]) -> None:
     segments = parse_ipa("_".join(ipa) if "tʃ" not in ipa else ipa)
-    spans = syllables(segments, is_english=is_english)
+    spans = split_syllables(segments, is_english=is_english)
     assert ["".join(s.phone for s in segments[first:last]) for first, last in spans] == parts
 
 
@@ -119,7 +119,7 @@ def test_other_refusals() -> None:
 
 def test_nominal_times_cover_words_and_pauses() -> None:
     spoken = pronounce("Pay $5, now!")
-    phones, words = nominal_sequence(spoken)
+    phones, words = nominal_phones(spoken)
     assert [word.text for word in words] == ["Pay", "five", "dollars", "now"]
     assert tuple(p for p in phones.phones if p != SILENCE) == spoken.phones
     assert phones.phones[words[2].last] == SILENCE

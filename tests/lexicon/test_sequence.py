@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lexicon.errors import InputError
-from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, concatenated
+from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, concatenate_phones
 
 
 @st.composite
@@ -45,7 +45,7 @@ def test_spans_are_half_open(seconds: float, index: int) -> None:
 def test_silences_that_meet_become_one_and_words_keep_their_phones() -> None:
     first = PhoneSequence(["p", "ɑ", SILENCE], [0.0, 0.1, 0.2, 0.3])
     second = PhoneSequence([SILENCE, "t", "i"], [0.0, 0.1, 0.2, 0.4])
-    joined, words = concatenated([first, second], [[WordSpan("pa", 0, 2)], [WordSpan("tea", 1, 3)]])
+    joined, words = concatenate_phones([first, second], [[WordSpan("pa", 0, 2)], [WordSpan("tea", 1, 3)]])
     assert joined.phones == ("p", "ɑ", SILENCE, "t", "i")
     assert joined.edges == pytest.approx([0.0, 0.1, 0.2, 0.4, 0.5, 0.7])
     assert [joined.phones[word.first : word.last] for word in words] == [("p", "ɑ"), ("t", "i")]
@@ -53,7 +53,7 @@ def test_silences_that_meet_become_one_and_words_keep_their_phones() -> None:
 
 def test_joining_needs_parts_that_begin_at_zero() -> None:
     with pytest.raises(InputError, match=r"begins at 1\.0 s"):
-        concatenated([PhoneSequence(["p"], [1.0, 2.0])], [[]])
+        concatenate_phones([PhoneSequence(["p"], [1.0, 2.0])], [[]])
 
 
 def test_a_word_needs_phones() -> None:
@@ -63,7 +63,7 @@ def test_a_word_needs_phones() -> None:
 
 @given(st.lists(sequences(), min_size=1, max_size=5))
 def test_joining_keeps_length_and_sounding_phones(parts: list[PhoneSequence]) -> None:
-    joined, _ = concatenated(parts, [[] for _ in parts])
+    joined, _ = concatenate_phones(parts, [[] for _ in parts])
     assert joined.end == pytest.approx(sum(part.end for part in parts))
     sounding = [phone for part in parts for phone in part.phones if phone != SILENCE]
     assert [phone for phone in joined.phones if phone != SILENCE] == sounding

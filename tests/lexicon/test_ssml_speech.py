@@ -12,18 +12,18 @@ from lexicon.errors import InputError
 from lexicon.given import given_words, pronounce_marked
 from lexicon.ipa import parse_ipa
 from lexicon.languages import language_code
-from lexicon.mark_parser import marked
-from lexicon.marked_text import MarkedText, PhoneMark, Run
+from lexicon.mark_parser import parse_marks
+from lexicon.marked_text import MarkedText, PhoneMark, StyleRun
 from lexicon.readable import check_readable
 from lexicon.say_as import KINDS, say_as
-from lexicon.sentences import sentences
+from lexicon.sentences import split_sentences
 from lexicon.ssml_speech import VOICES
 from lexicon.ssml_values import LONGEST_ATTRIBUTE
 from tts2face.voice.engine import NAMES
 
 
 def ssml(inside: str, language: str = "en-us") -> MarkedText:
-    return marked(f"<speak>{inside}</speak>", language)
+    return parse_marks(f"<speak>{inside}</speak>", language)
 
 
 def test_phones_are_given_in_ipa_and_arpabet() -> None:
@@ -37,7 +37,7 @@ def test_phones_are_given_in_ipa_and_arpabet() -> None:
         PhoneMark(10, 16, arpabet_segments("T AH0 M EY1 T OW2")),
         PhoneMark(17, 18, parse_ipa("bi")),
     )
-    assert not found.changes_voice
+    assert not found.has_voice_changes
 
 
 def test_as_many_words_as_phones_are_words_each() -> None:
@@ -49,7 +49,9 @@ def test_as_many_words_as_phones_are_words_each() -> None:
 
 
 def test_given_phones_stay_with_their_word_through_normalisation() -> None:
-    (sentence,) = sentences(ssml('Dr. <phoneme ph="kæt">Who</phoneme>, 25 of <phoneme ph="dɒɡ">2</phoneme>.'), "en-us")
+    (sentence,) = split_sentences(
+        ssml('Dr. <phoneme ph="kæt">Who</phoneme>, 25 of <phoneme ph="dɒɡ">2</phoneme>.'), "en-us"
+    )
     (part,) = sentence.utterances
     assert [(word.text, bool(word.segments), word.after) for word in part.words] == [
         ("Doctor", False, ""),
@@ -61,7 +63,7 @@ def test_given_phones_stay_with_their_word_through_normalisation() -> None:
 
 
 def test_only_the_sentence_with_given_phones_is_spoken_word_by_word() -> None:
-    first, second = sentences(ssml('One. Two <phoneme ph="kæt">x</phoneme>.'), "en-us")
+    first, second = split_sentences(ssml('One. Two <phoneme ph="kæt">x</phoneme>.'), "en-us")
     assert [bool(part.utterances[0].words) for part in (first, second)] == [False, True]
 
 
@@ -86,7 +88,10 @@ def test_words_of_a_text_have_its_phones() -> None:
 def test_every_given_word_is_found_again(pieces: list) -> None:
     inside = " ".join('<phoneme ph="kæt">Bob</phoneme>' if piece == "<P>" else piece for piece in pieces)
     given_count = sum(
-        bool(word.segments) for part in sentences(ssml(inside), "en-us") for u in part.utterances for word in u.words
+        bool(word.segments)
+        for part in split_sentences(ssml(inside), "en-us")
+        for u in part.utterances
+        for word in u.words
     )
     assert given_count == pieces.count("<P>")
 
@@ -199,25 +204,27 @@ def test_spans_have_a_voice_and_a_language() -> None:
         (None, "es"),
         (None, None),
     ]
-    assert found.changes_voice
+    assert found.has_voice_changes
 
 
 def test_the_language_of_the_text_is_no_span() -> None:
     plain = ssml("Hello there.").runs
     assert ssml('<lang xml:lang="en-US">Hello</lang> there.').runs == plain
     assert ssml('<voice gender="neutral">Hello</voice> there.').runs == plain
-    assert marked('<speak><p xml:lang="en-GB">Hi.</p></speak>').runs == (Run(0),)
+    assert parse_marks('<speak><p xml:lang="en-GB">Hi.</p></speak>').runs == (StyleRun(0),)
 
 
 def test_paragraphs_and_sentences_have_languages() -> None:
     found = ssml('<p xml:lang="de">Hallo. <s xml:lang="fr">Salut.</s></p><p>Hello.</p>')
-    parts = [(part.written, part.language) for sentence in sentences(found, "en-us") for part in sentence.utterances]
+    parts = [
+        (part.source, part.language) for sentence in split_sentences(found, "en-us") for part in sentence.utterances
+    ]
     assert parts == [("Hallo.", "de"), ("Salut.", "fr-fr"), ("Hello.", None)]
 
 
 def test_a_span_is_read_in_its_own_language() -> None:
     found = ssml('See 3 <lang xml:lang="de">Bäume</lang> 5')
-    (sentence,) = sentences(found, "en-us")
+    (sentence,) = split_sentences(found, "en-us")
     assert [part.text for part in sentence.utterances] == ["See three", "Bäume", "five"]
     check_readable(ssml('<lang xml:lang="ru">Привет</lang> you <phoneme ph="x">мир</phoneme>'), "en-us")
     with pytest.raises(InputError, match="language 'en-us' cannot read мир"):

@@ -10,10 +10,10 @@ from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tests.corpus_tools.gesture_study.made_palette import made_palette
 from tests.render.tiny_face import tiny_face
 from tests.render.tiny_talker import own_talker
-from tts2face.models.audio_map import FEATURE_SIZES, Drive
+from tts2face.models.audio_map import FEATURE_SIZES, AudioMap
 from tts2face.models.face_file import Identity, write_face
 from tts2face.models.palette import write_palette
-from tts2face.models.phone_network import N_PHONES_SEEN, N_PLACE, WindowNetwork
+from tts2face.models.phone_network import N_PHONES_SEEN, N_PLACE, PhoneNetwork
 from tts2face.models.talker import Talker, Utterance, write_talker
 
 INVENTORY = ("i", "m", "p", "s", SILENCE, "ɑ")
@@ -55,10 +55,10 @@ def write_made_talker(path: Path, *, has_face: bool) -> None:
         utterances.append(Utterance(f"u{number}", phones, (word,), shape, head, head[:, 0], seen))
     sizes = (N_PHONES_SEEN * len(INVENTORY) + N_PLACE, 4, 2)
     layers = [rng.normal(0, 0.1, (2, a, b)).astype(np.float32) for a, b in pairwise(sizes)]
-    network = WindowNetwork(INVENTORY, tuple(layers), tuple(layer[:, 0] for layer in layers))
+    network = PhoneNetwork(INVENTORY, tuple(layers), tuple(layer[:, 0] for layer in layers))
     n = FEATURE_SIZES["mfcc"]
     weights = [rng.normal(0, 0.1, size).astype(np.float32) for size in ((4, 3 * n), (4,), (2, 4), (2,))]
-    drive = Drive("mfcc", 1, 1, np.zeros(n, np.float32), np.ones(n, np.float32), *weights, bends=True)
+    drive = AudioMap("mfcc", 1, 1, np.zeros(n, np.float32), np.ones(n, np.float32), *weights, is_nonlinear=True)
     metadata = {"name": "Ada", "refused": [["u9", "no face"]], "phones_recognised": ["u1"]}
     made = Talker(talker.fps, talker.model, tuple(utterances), metadata, talker.appearance, network, {"linear": drive})
     write_talker(path, made)

@@ -20,18 +20,18 @@ from corpus_tools.show_talker import describe
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.model_files.mutations import mutate
-from tts2face.exemplar.appearance_trajectory import looks_of, looks_trajectory
-from tts2face.exemplar.synthesis import blend_trajectory, select_tokens, visual_voice
-from tts2face.gesture.gesture_stream import Fields, GestureStream
+from tts2face.exemplar.appearance_trajectory import appearance_trajectory, build_appearance_exemplars
+from tts2face.exemplar.synthesis import blend_trajectory, build_exemplar_model, select_tokens
+from tts2face.gesture.gesture_stream import GestureFields, GestureStream
 from tts2face.gesture.perlin_noise import NoiseStream
 from tts2face.gesture.timeline import Timeline
-from tts2face.models.face_file import identities_of, load_face, read_face
+from tts2face.models.face_file import list_identities, load_face, read_face
 from tts2face.models.palette import read_palette
 from tts2face.models.talker import load_talker, read_talker, speech_channels
 from tts2face.render.draw import mesh_renderer
-from tts2face.render.own_face import own_face_renderer, plate_drawn
+from tts2face.render.own_face import draw_video_frame, own_face_renderer
 from tts2face.render.picture import Picture
-from tts2face.retargeting.to_face import retargeter
+from tts2face.retargeting.to_face import build_retargeter
 from tts2face.types import Trajectory, Waveform
 
 HANG_S = 60.0  # after which the process ends itself
@@ -41,12 +41,12 @@ SOUND = Waveform(0.1 * np.sin(np.arange(24_000) ** 1.2), 16_000)
 
 def use_face(path: Path) -> None:
     """Draw a small frame and retarget a few frames; with an identity where there is one."""
-    identity = next(iter(identities_of(path)), None)
+    identity = next(iter(list_identities(path)), None)
     face = read_face(path, identity)
     talker = load_talker("grid_s1")
     n_speech = talker.model.n_speech
     values = talker.utterances[0].shape[:5, :n_speech]
-    lips = retargeter(talker, face, contact=np.zeros(11)).retarget(
+    lips = build_retargeter(talker, face, contact=np.zeros(11)).retarget(
         Trajectory(speech_channels(talker.model), values, 25.0)
     )
     stage = mesh_renderer(face, Picture(size="64x64", supersampling=1))
@@ -57,7 +57,7 @@ def use_face(path: Path) -> None:
 def use_palette(path: Path) -> None:
     """Make a short stream of gestures, by a style and by noise."""
     palette = read_palette(path)
-    fields = Fields(palette, with_pitch=True)
+    fields = GestureFields(palette, with_pitch=True)
     for name in (palette.names[0], palette.names[-1]):
         for stream in (GestureStream, NoiseStream):
             made = stream(fields, style=name, seed=3, fps=30.0).next(SOUND, 45, Timeline())
@@ -68,18 +68,18 @@ def use_talker(path: Path) -> None:
     """Describe it, animate a few phones, carry them to a face, drive lips by features, and draw its own face."""
     talker = read_talker(path)
     assert describe(talker).text()
-    voice = visual_voice(talker)
+    voice = build_exemplar_model(talker)
     selection = select_tokens(PHONES, voice)
     lips = blend_trajectory(selection, voice, fps=25.0, n_frames=22)
-    retargeter(talker, load_face("head")).retarget(lips)
-    for drive in talker.drives.values():
+    build_retargeter(talker, load_face("head")).retarget(lips)
+    for drive in talker.audio_maps.values():
         assert np.isfinite(drive.parameters(np.ones((5, len(drive.mean)), np.float32))).all()
     if talker.appearance is not None:
-        looks = looks_trajectory(selection, looks_of(talker, voice), fps=25.0, n_frames=22)
+        looks = appearance_trajectory(selection, build_appearance_exemplars(talker, voice), fps=25.0, n_frames=22)
         stage = own_face_renderer(talker, Picture(size="64x64", supersampling=1))
         for number in (0, 10):
             motion = np.concatenate([lips.values[number], looks.values[number]])
-            plate_drawn(stage, motion, stage.plate_frame(number / 25.0))
+            draw_video_frame(stage, motion, stage.plate_frame(number / 25.0))
 
 
 USES: dict[str, Callable[[Path], None]] = {"face": use_face, "palette": use_palette, "talker": use_talker}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from corpus_tools.training.canonical_correlation import canonical_correlation, tie_strength
+from corpus_tools.training.canonical_correlation import canonical_correlation, sampled_correlations
 from lexicon.errors import InputError
 
 KNOWN = (0.9, 0.5, 0.2)
@@ -68,7 +68,7 @@ def test_a_measurement_given_twice_changes_nothing() -> None:
 def test_few_frames_feign_a_strong_tie_that_falls_to_the_true_one() -> None:
     a, b = tied()
     rng = np.random.default_rng(0)
-    means = tie_strength(a, b, (12, 50, 2000), trials=30, rng=rng).mean(axis=1)
+    means = sampled_correlations(a, b, (12, 50, 2000), trials=30, rng=rng).mean(axis=1)
     assert means[0] > means[1] > means[2]
     assert means[2] == pytest.approx(0.9, abs=0.005)
 
@@ -88,4 +88,4 @@ def test_what_has_no_correlation_is_refused(a: np.ndarray, b: np.ndarray, reason
 
 def test_more_frames_than_there_are_are_refused() -> None:
     with pytest.raises(InputError, match="4000 frames, not 5000"):
-        tie_strength(*tied(), (100, 5000), trials=1, rng=np.random.default_rng(0))
+        sampled_correlations(*tied(), (100, 5000), trials=1, rng=np.random.default_rng(0))

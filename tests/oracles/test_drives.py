@@ -5,17 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.training.linear_audio_map import Lesson, learn_linear
-from corpus_tools.training.network_audio_map import NetworkOptions, error_and_slope, learn_network
+from corpus_tools.training.linear_audio_map import TrainingUtterance, learn_linear_map
+from corpus_tools.training.network_audio_map import NetworkMapOptions, learn_network_map, loss_and_gradient
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.models.audio_map import Drive, drive_arrays, drives_of
+from tts2face.models.audio_map import AudioMap, audio_map_arrays, audio_maps_from_arrays
 from tts2face.models.talker import ShapeModel, Talker, Utterance, read_talker, write_talker
 
 THREE = "level+level+level"  # three numbers a frame, as the lessons have
 
 
-def lessons(n: int = 12, seed: int = 0, bend: float = 0.0) -> list[Lesson]:
+def lessons(n: int = 12, seed: int = 0, bend: float = 0.0) -> list[TrainingUtterance]:
     """Parameters that follow this frame's and the next frame's features, straight or bent."""
     generator = np.random.default_rng(seed)
     mixing = np.random.default_rng(7).normal(size=(3, 4))
@@ -25,7 +25,11 @@ def lessons(n: int = 12, seed: int = 0, bend: float = 0.0) -> list[Lesson]:
         ahead = np.concatenate([features[1:], features[-1:]])
         cause = (features - 2.0 + 0.5 * (ahead - 2.0)) @ mixing
         seen = np.sin(bend * cause) / bend if bend else cause
-        made.append(Lesson(features.astype(np.float32), (seen + generator.normal(0, 0.05, (60, 4))).astype(np.float32)))
+        made.append(
+            TrainingUtterance(
+                features.astype(np.float32), (seen + generator.normal(0, 0.05, (60, 4))).astype(np.float32)
+            )
+        )
     return made
 
 
@@ -35,10 +39,10 @@ def test_with_all_factors_equation_8_is_direct_regression(before: int, after: in
     generator = np.random.default_rng(3)
     n_inputs = 3 * (before + 1 + after)
     taught = [
-        Lesson(one.features, generator.normal(size=(60, n_inputs)).astype(np.float32) + one.features[:, :1])
+        TrainingUtterance(one.features, generator.normal(size=(60, n_inputs)).astype(np.float32) + one.features[:, :1])
         for one in lessons()
     ]
-    drive = learn_linear(taught, feature="mfcc", before=before, after=after)
+    drive = learn_linear_map(taught, feature="mfcc", before=before, after=after)
     rows = [np.pad(one.features, ((before, after), (0, 0)), mode="edge") for one in taught]
     heard = np.concatenate(
         [np.concatenate([row[k : k + 60] for k in range(before + 1 + after)], axis=1) for row in rows]
@@ -52,8 +56,8 @@ def test_with_all_factors_equation_8_is_direct_regression(before: int, after: in
 
 def test_with_fewer_factors_equation_8_is_still_least_squares_on_what_it_can_reach() -> None:
     """The factors of two seen parameters reach both: the fit is direct regression again."""
-    taught = [Lesson(one.features, one.parameters[:, :2]) for one in lessons()]
-    drive = learn_linear(taught, feature="mfcc")
+    taught = [TrainingUtterance(one.features, one.parameters[:, :2]) for one in lessons()]
+    drive = learn_linear_map(taught, feature="mfcc")
     assert len(drive.bias) == 2
     heard = np.concatenate([one.features for one in taught])
     table = np.concatenate([heard, np.ones((len(heard), 1))], axis=1).astype(np.float64)
@@ -68,7 +72,7 @@ def test_the_gradient_is_that_of_finite_differences(decay: float) -> None:
     shapes = ((4, 6), (4,), (3, 4), (3,))
     layers = tuple(generator.normal(0, 0.5, shape) for shape in shapes)
     heard, seen = generator.normal(size=(20, 6)), generator.normal(size=(20, 3))
-    _, slope = error_and_slope(layers, heard, seen, decay)
+    _, slope = loss_and_gradient(layers, heard, seen, decay)
     differences = []
     for which, layer in enumerate(layers):
         for place in np.ndindex(layer.shape):
@@ -76,15 +80,17 @@ def test_the_gradient_is_that_of_finite_differences(decay: float) -> None:
             for step in (1e-6, -1e-6):
                 moved = [one.copy() for one in layers]
                 moved[which][place] += step
-                errors.append(error_and_slope(tuple(moved), heard, seen, decay)[0])
+                errors.append(loss_and_gradient(tuple(moved), heard, seen, decay)[0])
             differences.append((errors[0] - errors[1]) / 2e-6)
     np.testing.assert_allclose(slope, differences, atol=1e-8)
 
 
 def test_the_network_learns_what_a_linear_map_cannot() -> None:
     taught, unseen = lessons(40, bend=0.5), lessons(5, seed=9, bend=0.5)
-    straight = learn_linear(taught, feature="mfcc", after=1)
-    bent = learn_network(taught, feature="mfcc", options=NetworkOptions(n_hidden=30, before=0, after=1, decay=1e-6))
+    straight = learn_linear_map(taught, feature="mfcc", after=1)
+    bent = learn_network_map(
+        taught, feature="mfcc", options=NetworkMapOptions(n_hidden=30, before=0, after=1, weight_decay=1e-6)
+    )
     error = {
         name: np.mean([np.square(drive.parameters(one.features) - one.parameters).mean() for one in unseen])
         for name, drive in (("linear", straight), ("network", bent))
@@ -93,14 +99,14 @@ def test_the_network_learns_what_a_linear_map_cannot() -> None:
 
 
 def test_the_same_seed_gives_the_same_network_and_another_seed_another() -> None:
-    options = [NetworkOptions(n_hidden=3, before=1, after=1, seed=seed) for seed in (0, 0, 1)]
-    first, again, other = (learn_network(lessons(), feature="mfcc", options=one) for one in options)
+    options = [NetworkMapOptions(n_hidden=3, before=1, after=1, seed=seed) for seed in (0, 0, 1)]
+    first, again, other = (learn_network_map(lessons(), feature="mfcc", options=one) for one in options)
     np.testing.assert_array_equal(first.inner, again.inner)
     assert not np.array_equal(first.inner, other.inner)
 
 
 def test_pieces_with_their_context_are_the_whole() -> None:
-    drive = learn_linear(lessons(), feature="mfcc", before=2, after=3)
+    drive = learn_linear_map(lessons(), feature="mfcc", before=2, after=3)
     features = lessons(1)[0].features
     whole = drive.parameters(features)
     np.testing.assert_array_equal(drive.inside(features[5:20]), whole[7:17])
@@ -116,11 +122,11 @@ def test_a_talker_file_keeps_its_drives_and_old_files_have_none(tmp_path: Path) 
     )
     motion = np.zeros((5, 4), np.float32)
     spoken = Utterance("a", PhoneSequence([SILENCE, "m"], [0.0, 0.1, 0.2]), (), motion, np.zeros((5, 6)), np.zeros(5))
-    drive = learn_network(lessons(), feature=THREE, options=NetworkOptions(n_hidden=3, before=1, after=2))
-    for drives in ({}, {"network": drive, "linear": learn_linear(lessons(), feature=THREE)}):
+    drive = learn_network_map(lessons(), feature=THREE, options=NetworkMapOptions(n_hidden=3, before=1, after=2))
+    for drives in ({}, {"network": drive, "linear": learn_linear_map(lessons(), feature=THREE)}):
         path = tmp_path / "a.talker"
-        write_talker(path, Talker(25.0, model, (spoken,), {"name": "Ada"}, drives=drives))
-        kept = read_talker(path).drives
+        write_talker(path, Talker(25.0, model, (spoken,), {"name": "Ada"}, audio_maps=drives))
+        kept = read_talker(path).audio_maps
         assert set(kept) == set(drives)
     heard = lessons(1)[0].features
     assert (kept["network"].feature, kept["network"].before, kept["network"].after) == (THREE, 1, 2)
@@ -128,14 +134,14 @@ def test_a_talker_file_keeps_its_drives_and_old_files_have_none(tmp_path: Path) 
 
 
 def test_a_drive_that_lost_a_part_is_refused() -> None:
-    arrays = drive_arrays({"linear": learn_linear(lessons(), feature="mfcc")})
+    arrays = audio_map_arrays({"linear": learn_linear_map(lessons(), feature="mfcc")})
     arrays["drive.linear.inner"] = arrays["drive.linear.inner"][:, :2]
     with pytest.raises(DataError, match="do not fit each other"):
-        drives_of(arrays)
+        audio_maps_from_arrays(arrays)
 
 
 def test_features_of_another_number_are_refused() -> None:
-    drive: Drive = learn_linear(lessons(), feature="mfcc")
+    drive: AudioMap = learn_linear_map(lessons(), feature="mfcc")
     with pytest.raises(InputError, match="hears 3 features a frame, not the shape"):
         drive.parameters(np.zeros((10, 4)))
 
@@ -143,10 +149,10 @@ def test_features_of_another_number_are_refused() -> None:
 @pytest.mark.parametrize(
     ("make", "reason"),
     [
-        (lambda: learn_linear([], feature="mfcc"), "there is none"),
-        (lambda: learn_network(lessons(1), feature="mfcc", options=NetworkOptions()), "at least 2 utterances"),
-        (lambda: NetworkOptions(n_hidden=0), "needs a hidden unit"),
-        (lambda: Lesson(np.zeros((3, 2)), np.zeros((4, 2))), "not 3 and 4"),
+        (lambda: learn_linear_map([], feature="mfcc"), "there is none"),
+        (lambda: learn_network_map(lessons(1), feature="mfcc", options=NetworkMapOptions()), "at least 2 utterances"),
+        (lambda: NetworkMapOptions(n_hidden=0), "needs a hidden unit"),
+        (lambda: TrainingUtterance(np.zeros((3, 2)), np.zeros((4, 2))), "not 3 and 4"),
     ],
 )
 def test_what_nothing_can_be_learnt_from_is_refused(make: object, reason: str) -> None:

@@ -46,7 +46,7 @@ def test_formants_of_a_made_vowel_are_found() -> None:
 
 def test_prediction_finds_the_filter_that_made_the_sound() -> None:
     """The spectrum of the prediction filter peaks where the resonances are."""
-    found = features.lpc(features.cells(vowel().samples, np.array([8000])))[0]
+    found = features.lpc(features.analysis_windows(vowel().samples, np.array([8000])))[0]
     angles = np.linspace(0, np.pi, 2000)
     response = 1 / np.abs(np.exp(-1j * np.outer(angles, np.arange(17))) @ np.concatenate([[1], found]))
     peaks = angles[1:-1][(response[1:-1] > response[:-2]) & (response[1:-1] > response[2:])] * FEATURE_RATE / 2 / np.pi
@@ -81,7 +81,7 @@ def test_pieces_are_the_whole(kind: str, fps: float) -> None:
         cut = max(0, round(first / fps * FEATURE_RATE) - features.HALF_CELL)
         rest = round((first + n) / fps * FEATURE_RATE) + features.HALF_CELL
         part = features.MEASURES[kind](
-            features.cells(
+            features.analysis_windows(
                 sound.samples[cut:rest], np.rint((first + np.arange(n)) / fps * FEATURE_RATE).astype(int) - cut
             )
         )
@@ -97,7 +97,7 @@ def test_silence_and_the_ends_of_a_sound_have_features(kind: str) -> None:
 
 def test_the_level_is_that_of_the_sound() -> None:
     tone = Waveform(0.1 * np.sin(2 * np.pi * 500 * np.arange(16000) / 16000), FEATURE_RATE)
-    found = features.level(features.cells(tone.samples, np.array([8000])))
+    found = features.level(features.analysis_windows(tone.samples, np.array([8000])))
     assert found[0, 0] == pytest.approx(20 * np.log10(0.1 / np.sqrt(2)), abs=0.05)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tts2face.gesture.field import Field, FieldState, begun, field_of, walked
+from tts2face.gesture.field import Field, FieldState, build_field, initial_state, sample_field_moments
 from tts2face.gesture.ju2008 import FIELD_OPTIONS, JU_2008
 from tts2face.models.palette import FEATURES
 
@@ -50,17 +50,17 @@ def test_the_preset_is_what_the_paper_prints() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_every_frame_is_drawn_as_the_formula_says(seed: int) -> None:
     values, heard, lengths = recordings(seed)
-    made = field_of(values, heard, lengths, JU_2008)
+    made = build_field(values, heard, lengths, JU_2008)
     generator = np.random.default_rng(50 + seed)
     sound = np.convolve(generator.normal(size=N_SHOWN), np.hanning(9), "same").astype(np.float32)[:, None]
     chances = generator.random(N_SHOWN)
-    state = begun(made, 0.4)
-    walk = walked(made, state, sound, chances)
+    state = initial_state(made, 0.4)
+    walk = sample_field_moments(made, state, sound, chances)
     shown, driving = list(state.shown), [*state.heard, *(sound * made.weights)]
     expected = []
     for frame in range(N_SHOWN):
         away = distances(made, np.array(shown[-H:]), np.array(driving[frame : frame + H]))
-        moment = drawn(away, H * JU_2008.sigma * made.nearness, chances[frame])
+        moment = drawn(away, H * JU_2008.sigma * made.median_distance, chances[frame])
         expected.append(moment)
         shown.append(made.values[moment])
     assert walk.moments.tolist() == expected
@@ -71,21 +71,26 @@ def test_every_frame_is_drawn_as_the_formula_says(seed: int) -> None:
 def test_sound_and_motion_weigh_alike() -> None:
     """alpha is 1 in units of variance: the windows' two terms have the same mean."""
     values, heard, lengths = recordings(4)
-    made = field_of(values, heard, lengths, JU_2008)
+    made = build_field(values, heard, lengths, JU_2008)
     assert np.square(made.heard - made.heard.mean(axis=0)).sum(axis=1).mean() == pytest.approx(1.0, rel=1e-3)
     assert np.square(made.values - made.values.mean(axis=0)).sum(axis=1).mean() == pytest.approx(1.0, rel=1e-3)
 
 
 def test_candidates_come_with_the_frequencies_of_the_formula() -> None:
     values, heard, lengths = recordings(5)
-    made = field_of(values, heard, lengths, JU_2008)
-    start = begun(made, 0.0)
-    state = FieldState(np.zeros_like(start.shown), np.zeros_like(start.heard), -1, start.offset, start.recent, 0)
+    made = build_field(values, heard, lengths, JU_2008)
+    start = initial_state(made, 0.0)
+    state = FieldState(np.zeros_like(start.shown), np.zeros_like(start.heard), -1, start.offset, start.recent_jumps, 0)
     away = distances(made, state.shown, state.heard)
     best = sorted(away, key=lambda moment: away[moment])[:N_BEST]
-    weights = np.exp(-np.array([away[moment] - away[best[0]] for moment in best]) / (H * JU_2008.sigma * made.nearness))
+    weights = np.exp(
+        -np.array([away[moment] - away[best[0]] for moment in best]) / (H * JU_2008.sigma * made.median_distance)
+    )
     chances = (np.arange(2000) + 0.5) / 2000
-    found = [int(walked(made, state, np.zeros((1, 1), np.float32), chances[i : i + 1]).moments[0]) for i in range(2000)]
+    found = [
+        int(sample_field_moments(made, state, np.zeros((1, 1), np.float32), chances[i : i + 1]).moments[0])
+        for i in range(2000)
+    ]
     assert set(found) <= set(best)
     shares = [found.count(moment) / 2000 for moment in best]
     np.testing.assert_allclose(shares, weights / weights.sum(), atol=2 / 2000)

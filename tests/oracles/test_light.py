@@ -13,7 +13,7 @@ from tts2face.render.fragments import (
     AT_WRAP,
     N_ROWS,
 )
-from tts2face.render.shade import BOUNCE, N_SCRATCH_ROWS, REACH, SHOULDER, SKY_GLOSS, light
+from tts2face.render.shade import BOUNCE, N_SCRATCH_ROWS, REACH, SHOULDER, SKY_GLOSS, shade_fragments
 
 N = 200
 
@@ -53,7 +53,7 @@ def test_the_kernel_is_the_formula():
     lights[2:, :3] = rng.normal(size=(4, 3))
     lights[2:, :3] /= np.linalg.norm(lights[2:, :3], axis=1, keepdims=True)
     table, colour = np.ascontiguousarray(rows.T, np.float32), np.zeros((3, N), np.float32)
-    light(table, N, lights.astype(np.float32), np.zeros((N_SCRATCH_ROWS, N), np.float32), colour)
+    shade_fragments(table, N, lights.astype(np.float32), np.zeros((N_SCRATCH_ROWS, N), np.float32), colour)
     wanted = np.array([expected(row, lights) for row in rows])
     np.testing.assert_allclose(colour.T, wanted, atol=2e-4)  # single precision, highlights of exponent 300
     assert colour.min() >= 0

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from lexicon.errors import DataError, InputError
 from tts2face.face.deformation import head_rotation
 from tts2face.models.landmarks import CHIN, MOUTH_REGION, N_LANDMARKS
-from tts2face.video.pose import PIVOT, head_angles, remove_pose, rigid_points, similarity
+from tts2face.video.pose import PIVOT, head_angles, remove_pose, rigid_points, similarity_transforms
 
 FPS = 25.0
 PX_PER_MM = 1.3
@@ -41,8 +41,8 @@ def test_a_known_pose_is_found_and_taken_out():
     np.testing.assert_allclose(posed.landmarks, faces, atol=1e-4)  # mm; float32
     np.testing.assert_allclose(head_angles(posed.rotations), wanted, atol=1e-9)
     pivots = np.einsum("tij,j->ti", rotations, PIVOT) + shifts / PX_PER_MM * (1, -1, 1)
-    np.testing.assert_allclose(posed.shifts[:, :2], pivots[:, :2], atol=1e-9)
-    np.testing.assert_allclose(posed.shifts[:, 2], 0, atol=1e-9)
+    np.testing.assert_allclose(posed.translations[:, :2], pivots[:, :2], atol=1e-9)
+    np.testing.assert_allclose(posed.translations[:, 2], 0, atol=1e-9)
 
 
 def test_a_jaw_that_opens_moves_neither_head_nor_upper_face():
@@ -60,7 +60,7 @@ def test_coming_nearer_is_a_shift_and_not_a_shape():
     posed = remove_pose(_filmed(faces, np.repeat(np.eye(3)[None], 100, 0), np.zeros((100, 3))) * size, FPS)
     middle = slice(40, 60)  # away from the ends, where smoothing holds the last value
     np.testing.assert_allclose(posed.landmarks[middle], faces[middle], atol=0.5)
-    assert (np.diff(posed.shifts[:, 2]) > 0).all()
+    assert (np.diff(posed.translations[:, 2]) > 0).all()
 
 
 @given(st.integers(0, 1000))
@@ -69,7 +69,7 @@ def test_rotation_equals_scipys(seed):
     source, target = generator.normal(size=(1, 8, 3)), generator.normal(size=(8, 3))
     weights = generator.uniform(0.1, 1, 8)
     weights /= weights.sum()
-    rotation, scale = similarity(source, target, weights)
+    rotation, scale = similarity_transforms(source, target, weights)
     expected, _ = Rotation.align_vectors(target - weights @ target, source[0] - weights @ source[0], weights=weights)
     np.testing.assert_allclose(rotation[0], expected.as_matrix(), atol=1e-6)
     moved = (source[0] - weights @ source[0]) @ rotation[0].T

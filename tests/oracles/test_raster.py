@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from tts2face.render.raster import BACK_BIAS, GRID, NOTHING, draw_band, gather, sort_into_bands, to_camera
+from tts2face.render.raster import (
+    BACK_BIAS,
+    GRID,
+    NOTHING,
+    draw_band,
+    gather_triangles,
+    sort_into_bands,
+    transform_to_camera,
+)
 
 LENS = np.array([60.0, 20.0, 15.0, 5.0])  # focal length, centre x, centre y in samples; near plane in mm
 VIEW = np.eye(3, 4)  # the world is camera space
@@ -17,10 +25,10 @@ def rasterised(points, triangles, translucent=None, band_rows=SIZE[1]):
     """(3, H, W) owner and depth of the kernels."""
     points = np.asarray(points, np.float32)
     camera, grid = np.zeros((len(points), 3), np.float32), np.zeros((len(points), 2), np.int32)
-    to_camera(points, VIEW, LENS, camera, grid)
+    transform_to_camera(points, VIEW, LENS, camera, grid)
     triangles = np.asarray(triangles, np.int32)
     corners, source = np.zeros((2 * len(triangles), 6), np.int32), np.zeros(2 * len(triangles), np.int32)
-    count = gather(camera, grid, triangles, (LENS, SIZE), corners, source)
+    count = gather_triangles(camera, grid, triangles, (LENS, SIZE), corners, source)
     n_bands = -(-SIZE[1] // band_rows)
     starts, members = np.zeros(n_bands + 1, np.int64), np.zeros(n_bands * 2 * len(triangles), np.int32)
     sort_into_bands(corners, count, band_rows, starts, members)

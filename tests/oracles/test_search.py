@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tts2face.exemplar import token_search as select
-from tts2face.exemplar.tokens import Tokens, contexts
+from tts2face.exemplar.tokens import Tokens, phone_contexts
 
 PHONES = 9
 
@@ -19,7 +19,7 @@ def tokens() -> Tokens:
     utterance = np.repeat(np.arange(250, dtype=np.int32), 12)
     steps = stream.uniform(0.03, 0.3, (3000, 4))
     return Tokens(
-        tuple("abcdefghi"), phone, utterance, np.cumsum(steps, axis=1), contexts(phone, utterance, 0),
+        tuple("abcdefghi"), phone, utterance, np.cumsum(steps, axis=1), phone_contexts(phone, utterance, 0),
         np.zeros((1, 1), np.float32), np.array([0, 1]), 25.0,
     )  # fmt: skip
 
@@ -49,8 +49,8 @@ def slow_score(tokens, similarity, wanted, pair, rule):
 def test_finds_exactly_what_scoring_every_token_finds(tokens, similarity, context, k, duration):
     stream = np.random.default_rng(context)
     phone = stream.integers(0, PHONES, 30).astype(np.int32)
-    around = contexts(phone, np.zeros(30, np.int32), 0)
-    wanted = select.Wanted(phone, around, np.log(stream.uniform(0.03, 0.3, (30, 3))))
+    around = phone_contexts(phone, np.zeros(30, np.int32), 0)
+    wanted = select.TokenQuery(phone, around, np.log(stream.uniform(0.03, 0.3, (30, 3))))
     found = select.best_tokens(
         wanted, select.context_index(tokens, similarity), context=context, k=k, duration=duration
     )
@@ -81,11 +81,11 @@ def test_equal_scores_go_to_the_first_in_the_corpus():
         phone,
         utterance,
         spans,
-        contexts(phone, utterance, 0),
+        phone_contexts(phone, utterance, 0),
         np.zeros((1, 1), np.float32),
         np.array([0]),
         25.0,
     )
-    wanted = select.Wanted(phone[:1], tokens.context[:1], select.log_durations(spans[:1]))
+    wanted = select.TokenQuery(phone[:1], tokens.context[:1], select.log_durations(spans[:1]))
     found = select.best_tokens(wanted, select.context_index(tokens, np.ones((1, 1))), context=2, k=3, duration=0.5)
     assert found.tokens.tolist() == [[0, 1, 2]]

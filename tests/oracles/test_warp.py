@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.exemplar.time_warping import distances, lay_over, path_cost, warp_path, warped_times
+from tts2face.exemplar.time_warping import frame_distances, path_cost, warp_path, warp_times, warp_to_reference
 
 
 def every_path(n, m):
@@ -41,19 +41,19 @@ def test_agrees_with_fastdtw_at_a_radius_that_makes_it_exact():
     fastdtw = pytest.importorskip("fastdtw", reason="fastdtw is the second opinion; install the extra [test]")
     stream = np.random.default_rng(8)
     source, target = np.cumsum(stream.normal(size=(40, 3)), axis=0), np.cumsum(stream.normal(size=(33, 3)), axis=0)
-    cost = distances(source, target)
+    cost = frame_distances(source, target)
     theirs, _ = fastdtw.fastdtw(source, target, radius=50, dist=2)
     assert path_cost(cost, warp_path(cost)) == pytest.approx(theirs, rel=1e-9)
 
 
 def test_distances_are_euclidean():
-    assert distances(np.array([[0.0, 0.0]]), np.array([[3.0, 4.0], [0.0, 1.0]])).tolist() == [[5.0, 1.0]]
+    assert frame_distances(np.array([[0.0, 0.0]]), np.array([[3.0, 4.0], [0.0, 1.0]])).tolist() == [[5.0, 1.0]]
 
 
 def test_equal_motions_map_onto_themselves():
     motion = np.arange(6.0)[:, None]
-    path = warp_path(distances(motion, motion))
-    assert warped_times(path, 6).tolist() == [0, 1, 2, 3, 4, 5]
+    path = warp_path(frame_distances(motion, motion))
+    assert warp_times(path, 6).tolist() == [0, 1, 2, 3, 4, 5]
 
 
 def test_a_late_event_is_laid_over_the_reference_s():
@@ -62,7 +62,7 @@ def test_a_late_event_is_laid_over_the_reference_s():
     reference = np.exp(-((knots - 5) ** 2) / 2)[:, None].astype(np.float32)
     late = np.exp(-((knots - 6) ** 2) / 2)[:, None].astype(np.float32)
     out = np.zeros_like(late)
-    lay_over(late, reference, np.ones(1, np.float32), 2, out)
+    warp_to_reference(late, reference, np.ones(1, np.float32), 2, out)
     assert int(out.argmax()) == 5
     assert np.mean([out[5, 0], reference[5, 0]]) > 0.95 > np.mean([late[5, 0], reference[5, 0]])
     assert out[0] == late[0]

@@ -9,7 +9,7 @@ from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.test_plate import own_talker
 from tts2face.models.talker import Utterance
-from tts2face.own_face.appearance_regression import own_face
+from tts2face.own_face.appearance_regression import fit_appearance_regression
 from tts2face.types import Trajectory
 
 
@@ -21,7 +21,7 @@ def test_looks_that_follow_the_lips_are_found_again():
     looks = (shape[:, :2] @ mix + offset).astype(np.float32)
     phones = PhoneSequence([SILENCE], [0.0, 20.0])
     spoken = Utterance("a", phones, (), shape, np.zeros((500, 6), np.float32), np.zeros(500, np.float32), looks)
-    driven = own_face(replace(talker, utterances=(spoken,)))
+    driven = fit_appearance_regression(replace(talker, utterances=(spoken,)))
     motion = driven.motion(Trajectory(("shape0", "shape1"), [[0.5, -1.0], [0.0, 0.0]], 25.0))
     assert motion.channels == ("shape0", "shape1", "face0", "face1", "mouth0", "mouth1")
     assert motion.values[0, :2].tolist() == [0.5, -1.0]
@@ -34,11 +34,11 @@ def test_motion_of_somebody_else_is_refused():
     spoken = Utterance(
         "a", phones, (), still, np.zeros((10, 6), np.float32), still[:, 0], np.zeros((10, 4), np.float32)
     )
-    driven = own_face(replace(own_talker(), utterances=(spoken,)))
+    driven = fit_appearance_regression(replace(own_talker(), utterances=(spoken,)))
     with pytest.raises(InputError, match="clone it to her first"):
         driven.motion(Trajectory(("jawOpen",), [[0.0]], 25.0))
 
 
 def test_a_talker_without_pictures_has_no_own_face():
     with pytest.raises(InputError, match="motion only"):
-        own_face(own_talker(has_face=False))
+        fit_appearance_regression(own_talker(has_face=False))

@@ -14,8 +14,8 @@ from tts2face.face.gesture_transfer import LID_RIMS
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.models.palette import EXPRESSIONS
 from tts2face.models.talker import ShapeModel, Talker, Utterance
-from tts2face.own_face.gestures import OwnGestures, own_gestures
-from tts2face.render.own_face import own_face_renderer, plate_drawn
+from tts2face.own_face.gestures import OwnFaceGestures, build_own_face_gestures
+from tts2face.render.own_face import draw_video_frame, own_face_renderer
 from tts2face.render.picture import Picture
 from tts2face.retargeting.performer import LIDS
 from tts2face.types import Trajectory
@@ -55,8 +55,8 @@ def blinker() -> Talker:
 
 
 @cache
-def ready() -> OwnGestures:
-    return own_gestures(blinker(), palette())
+def ready() -> OwnFaceGestures:
+    return build_own_face_gestures(blinker(), palette())
 
 
 def spoken(n_frames: int = 1) -> Trajectory:
@@ -72,7 +72,7 @@ def felt(**gestures: list[float]) -> np.ndarray:
 
 @pytest.mark.parametrize("share", [0.25, 0.5, 1.0])
 def test_lids_move_and_look_as_in_recorded_blinks(share: float) -> None:
-    moved, looks = ready().moved(felt(blink=[share, share]), 0)
+    moved, looks = ready().displacements(felt(blink=[share, share]), 0)
     recorded = share * blinker().utterances[0].shape[6, 2] * blinker().model.basis[2, :468]
     assert np.abs(moved - recorded).max() < 0.1  # mm
     assert looks == pytest.approx([30 * share, 50 * share**2], abs=0.5)
@@ -80,13 +80,13 @@ def test_lids_move_and_look_as_in_recorded_blinks(share: float) -> None:
 
 def test_lids_that_are_shut_on_the_video_stay_so() -> None:
     for share in (0.0, 0.5, 1.0):
-        moved, looks = ready().moved(felt(blink=[share, share]), 3)
+        moved, looks = ready().displacements(felt(blink=[share, share]), 3)
         assert np.abs(moved).max() < 0.02
         assert np.abs(looks).max() < 0.2
 
 
 def test_brows_rise_and_lids_and_lips_stay() -> None:
-    moved, looks = ready().moved(felt(brows=[4 * np.sqrt(len(BROWS)), 0]), 0)
+    moved, looks = ready().displacements(felt(brows=[4 * np.sqrt(len(BROWS)), 0]), 0)
     assert moved[list(BROWS), 1] == pytest.approx(np.full(len(BROWS), 4.0), abs=0.2)
     assert np.abs(moved[[*LID_RIMS, *INNER_LIP_UPPER, *INNER_LIP_LOWER]]).max() < 1e-4
     assert not looks.any()
@@ -94,7 +94,7 @@ def test_brows_rise_and_lids_and_lips_stay() -> None:
 
 @pytest.mark.parametrize("mood", range(len(EXPRESSIONS)))
 def test_expressions_leave_the_gap_of_the_lips(mood: int) -> None:
-    moved, _ = ready().moved(felt(expression=np.eye(5)[mood].tolist()), 0)
+    moved, _ = ready().displacements(felt(expression=np.eye(5)[mood].tolist()), 0)
     assert np.abs(moved).max() > 1
     assert np.abs(moved[INNER_LIP_UPPER, 1] - moved[INNER_LIP_LOWER, 1]).max() < 0.2
 
@@ -105,8 +105,8 @@ def test_without_gestures_the_picture_is_the_same_and_with_them_another() -> Non
     own = spoken()
     assert stage.channels == plain.channels + ready().channels
     still, blink = (ready().motion(own, g).values[0] for g in ({}, {"blink": np.ones((1, 2), np.float32)}))
-    assert np.array_equal(plate_drawn(stage, still, 1), plate_drawn(plain, own.values[0], 1))
-    assert not np.array_equal(plate_drawn(stage, blink, 1), plate_drawn(plain, own.values[0], 1))
+    assert np.array_equal(draw_video_frame(stage, still, 1), draw_video_frame(plain, own.values[0], 1))
+    assert not np.array_equal(draw_video_frame(stage, blink, 1), draw_video_frame(plain, own.values[0], 1))
 
 
 def test_gains_multiply_and_gaze_and_head_have_no_effect() -> None:
@@ -120,13 +120,13 @@ def test_who_never_blinks_on_video_has_no_blinks_to_show() -> None:
     talker = blinker()
     shape = talker.utterances[0].shape.copy()
     shape[:, 2] = 0
-    calm = own_gestures(replace(talker, utterances=(replace(talker.utterances[0], shape=shape),)), palette())
+    calm = build_own_face_gestures(replace(talker, utterances=(replace(talker.utterances[0], shape=shape),)), palette())
     assert not calm.lids.any()
-    assert not calm.lid_looks.any()
+    assert not calm.lid_appearance.any()
 
 
 def test_refuses_what_does_not_fit() -> None:
     with pytest.raises(InputError, match=r"brows must be finite values \(1, 2\), not \(1, 3\)"):
         ready().motion(spoken(), {"brows": np.zeros((1, 3), np.float32)})
     with pytest.raises(InputError, match="motion only"):
-        own_gestures(own_talker(has_face=False), palette())
+        build_own_face_gestures(own_talker(has_face=False), palette())

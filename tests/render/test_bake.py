@@ -7,8 +7,8 @@ import pytest
 
 from tests.render.tiny_face import ball, tiny_face
 from tts2face.models.face import Part
-from tts2face.render.soft_shadows import cone, exposed, sphere
-from tts2face.render.surface import surfaced
+from tts2face.render.soft_shadows import compute_exposure, cone_directions, sphere_directions
+from tts2face.render.surface import build_surface
 
 LAMPS = np.array([[0, 0, 1.0], [1.0, 0, 0], [0, 1.0, 0]])
 
@@ -36,7 +36,7 @@ def of_parts(*bodies):
 
 def rest(*bodies):
     face = of_parts(*bodies)
-    return exposed(face, surfaced(face), LAMPS, threads=1).rest
+    return compute_exposure(face, build_surface(face), LAMPS, threads=1).rest
 
 
 def test_nothing_shades_a_lone_ball():
@@ -59,9 +59,9 @@ def test_a_ball_in_front_hides_one_lamp_and_not_the_others():
 
 
 def test_directions_are_unit_vectors_spread_evenly():
-    np.testing.assert_allclose(np.linalg.norm(sphere(40), axis=1), 1)
-    np.testing.assert_allclose(sphere(40).mean(axis=0), 0, atol=0.02)
-    around = cone(np.array([0.6, 0.0, 0.8]), 12, 0.2)
+    np.testing.assert_allclose(np.linalg.norm(sphere_directions(40), axis=1), 1)
+    np.testing.assert_allclose(sphere_directions(40).mean(axis=0), 0, atol=0.02)
+    around = cone_directions(np.array([0.6, 0.0, 0.8]), 12, 0.2)
     assert np.arccos(np.clip(around @ [0.6, 0.0, 0.8], -1, 1)).max() <= 0.2 + 1e-9
     np.testing.assert_allclose(np.linalg.norm(around, axis=1), 1)
 
@@ -69,6 +69,6 @@ def test_directions_are_unit_vectors_spread_evenly():
 @pytest.mark.parametrize("threads", [2, 3])
 def test_threads_do_not_matter(threads):
     face = tiny_face()
-    one, many = (exposed(face, surfaced(face), LAMPS, n) for n in (1, threads))
+    one, many = (compute_exposure(face, build_surface(face), LAMPS, n) for n in (1, threads))
     np.testing.assert_array_equal(one.rest, many.rest)
     np.testing.assert_array_equal(one.gain, many.gain)

@@ -17,7 +17,7 @@ from tts2face.clock import exact_rate
 from tts2face.render import encode
 from tts2face.render.draw import draw, mesh_renderer
 from tts2face.render.encode import ClipWriter, write_clips
-from tts2face.render.output_path import checked_output
+from tts2face.render.output_path import check_output
 from tts2face.render.picture import Picture
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, frame_count
 
@@ -212,25 +212,25 @@ def test_progress_counts_every_frame(tmp_path, stage):
 @pytest.mark.parametrize("name", ["a.avi", "a.mov", "a.MP3", "a.mp4.bak"])
 def test_unknown_suffixes_are_refused_with_the_known_ones(tmp_path, name):
     with pytest.raises(InputError, match=r"unknown suffix.*\.mp4, \.webm, \.gif"):
-        checked_output(tmp_path / name)
+        check_output(tmp_path / name)
 
 
 def test_a_missing_folder_is_refused(tmp_path):
     with pytest.raises(InputError, match="there is no folder"):
-        checked_output(tmp_path / "none" / "a.mp4")
+        check_output(tmp_path / "none" / "a.mp4")
 
 
 def test_a_folder_with_other_things_is_not_touched(tmp_path):
     (tmp_path / "notes").mkdir()
     (tmp_path / "notes" / "letter.txt").write_text("dear")
     with pytest.raises(InputError, match="holds other things"):
-        checked_output(tmp_path / "notes")
+        check_output(tmp_path / "notes")
 
 
 def test_a_folder_named_like_a_movie_is_refused(tmp_path):
     (tmp_path / "a.mp4").mkdir()
     with pytest.raises(InputError, match="is a folder"):
-        checked_output(tmp_path / "a.mp4")
+        check_output(tmp_path / "a.mp4")
 
 
 def test_a_folder_that_cannot_be_written_is_refused(tmp_path, stage, monkeypatch):

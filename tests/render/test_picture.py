@@ -4,8 +4,8 @@ import pytest
 
 from lexicon.errors import InputError
 from tts2face.clock import exact_rate, first_sample
-from tts2face.render.camera_views import NAMED, camera_named
-from tts2face.render.picture import Picture, background_kind, sides_of
+from tts2face.render.camera_views import NAMED, parse_camera
+from tts2face.render.picture import Picture, parse_background, parse_size
 
 
 @pytest.mark.parametrize("size", ["15x16", "16x15", "4098x16", "17x32", "0x0", "14"])
@@ -21,10 +21,10 @@ def test_what_is_no_size_is_refused(size):
 
 
 def test_sizes_are_read():
-    assert sides_of("640x480") == (640, 480)
-    assert sides_of(" 1280 X 720 ") == (1280, 720)
-    assert sides_of("256") == (256, 256)
-    assert sides_of("auto") == (512, 512)
+    assert parse_size("640x480") == (640, 480)
+    assert parse_size(" 1280 X 720 ") == (1280, 720)
+    assert parse_size("256") == (256, 256)
+    assert parse_size("auto") == (512, 512)
 
 
 @pytest.mark.parametrize("camera", ["top", "", "1", "1,2,3,4", "nan,0", "inf,0,900", "a,b"])
@@ -40,9 +40,9 @@ def test_cameras_out_of_range_are_refused(camera):
 
 
 def test_cameras_are_read():
-    assert camera_named("front") is NAMED["front"]
-    assert camera_named("20,-5,900").distance == 900
-    assert camera_named("-20,5").yaw_deg == -20
+    assert parse_camera("front") is NAMED["front"]
+    assert parse_camera("20,-5,900").distance == 900
+    assert parse_camera("-20,5").yaw_deg == -20
 
 
 @pytest.mark.parametrize("background", ["mauvish", "#12345", "12345g", "", "wall.txt"])
@@ -57,10 +57,10 @@ def test_a_missing_image_is_refused(tmp_path):
 
 
 def test_backgrounds_are_read():
-    assert background_kind("white") == (255, 255, 255)
-    assert background_kind("#1a2B3c") == (0x1A, 0x2B, 0x3C)
-    assert background_kind("f08") == (0xFF, 0x00, 0x88)
-    assert background_kind("studio") == "studio"
+    assert parse_background("white") == (255, 255, 255)
+    assert parse_background("#1a2B3c") == (0x1A, 0x2B, 0x3C)
+    assert parse_background("f08") == (0xFF, 0x00, 0x88)
+    assert parse_background("studio") == "studio"
 
 
 @pytest.mark.parametrize("supersampling", [0, 4, -1])

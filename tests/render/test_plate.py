@@ -9,8 +9,8 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_talker import SIZE, face_points, own_talker
 from tts2face.models.talker import Talker
 from tts2face.render import own_face as plate
-from tts2face.render.image_warp import bend, lay
-from tts2face.render.own_face import own_face_renderer, plate_drawn
+from tts2face.render.image_warp import draw_texture, warp_image
+from tts2face.render.own_face import draw_video_frame, own_face_renderer
 from tts2face.render.picture import Picture
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
@@ -36,7 +36,7 @@ def test_bending_follows_the_corners_exactly():
     plate = np.stack([x * 2.0, y * 3.0, x + y], axis=2)
     drawn = np.full((50, 50, 3), -1.0, np.float32)
     none = np.zeros((2, 2, 3), np.float32), np.zeros((0, 2))
-    bend(np.array([[0, 1, 2]], np.int32), target, source, plate, none, drawn)
+    warp_image(np.array([[0, 1, 2]], np.int32), target, source, plate, none, drawn)
     affine = np.linalg.solve(np.column_stack([target, np.ones(3)]), source)
     edges = np.roll(target, -1, axis=0) - target
     for row in range(50):
@@ -55,14 +55,14 @@ def test_a_texture_is_laid_where_its_points_are():
     places = np.array([[0.0, 0], [7, 0], [0, 7]])
     texture = np.mgrid[:8, :8].transpose(1, 2, 0)[:, :, [1, 0, 0]].astype(np.float32)
     drawn = np.zeros((16, 16, 3), np.float32)
-    lay(np.array([[0, 1, 2]], np.int32), 2 * places, texture, places, drawn)
+    draw_texture(np.array([[0, 1, 2]], np.int32), 2 * places, texture, places, drawn)
     assert drawn[4, 6].tolist() == [3.0, 2.0, 2.0]
 
 
 def test_the_plate_s_own_parameters_leave_the_plate_alone_but_for_the_open_mouth():
     talker = own_talker()
     stage = own_face_renderer(talker, Picture(size=f"{SIZE}x{SIZE}"))
-    drawn = plate_drawn(stage, motion_of_plate(talker, 2), 2)
+    drawn = draw_video_frame(stage, motion_of_plate(talker, 2), 2)
     changed = np.abs(drawn.astype(int) - stage.plate[2]).max(axis=2) > 1
     y, x = np.nonzero(changed)
     lips = face_points()[list(MOUTH_POINTS)]
@@ -77,7 +77,7 @@ def test_motion_moves_the_face_and_neither_corner_of_the_picture():
     stage = own_face_renderer(talker, Picture(size=f"{SIZE}x{SIZE}"))
     motion = motion_of_plate(talker, 0)
     motion[0] += 40
-    moved = plate_drawn(stage, motion, 0)
+    moved = draw_video_frame(stage, motion, 0)
     assert np.abs(moved.astype(int) - stage.plate[0]).max() > 10
     assert np.array_equal(moved[:6, :6], stage.plate[0][:6, :6])
 
@@ -87,7 +87,7 @@ def test_looks_change_the_texture_by_their_basis():
     stage = own_face_renderer(talker, Picture(size=f"{SIZE}x{SIZE}"))
     motion = motion_of_plate(talker, 1)
     motion[2] += 2000
-    difference = plate_drawn(stage, motion, 1).astype(float) - stage.plate[1]
+    difference = draw_video_frame(stage, motion, 1).astype(float) - stage.plate[1]
     wanted = 2000 * talker.appearance.face.basis[0]
     assert 0.3 * np.abs(wanted).max() < np.abs(difference).max() <= np.abs(wanted).max() + 1
 

@@ -10,8 +10,8 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_face import tiny_face
 from tts2face.render import vtk_renderer as vtk
 from tts2face.render import window as view
-from tts2face.render.camera import optics
-from tts2face.render.camera_views import camera_named
+from tts2face.render.camera import camera_matrices
+from tts2face.render.camera_views import parse_camera
 from tts2face.render.picture import Picture
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
@@ -29,7 +29,7 @@ def test_without_a_display_it_is_refused_before_anything_is_opened(monkeypatch):
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.setattr(view, "probe", lambda window: pytest.fail("no child is needed to know this"))
     with pytest.raises(BackendError, match=r"this machine has no display; write a file with --out"):
-        view.view(clip_of(tiny_face()), tiny_face(), Picture())
+        view.show_clip(clip_of(tiny_face()), tiny_face(), Picture())
 
 
 def test_a_display_that_vtk_cannot_use_is_refused(monkeypatch):
@@ -37,21 +37,21 @@ def test_a_display_that_vtk_cannot_use_is_refused(monkeypatch):
     monkeypatch.setenv("DISPLAY", ":77")
     monkeypatch.setattr(view, "probe", lambda window: False)
     with pytest.raises(BackendError, match="VTK cannot open a window on this display"):
-        view.view(clip_of(tiny_face()), tiny_face(), Picture())
+        view.show_clip(clip_of(tiny_face()), tiny_face(), Picture())
 
 
 def test_without_pyvista_it_says_what_to_install(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(BackendError, match=r"--view needs pyvista.*pip install 'tts2face\[view\]'"):
-        view.view(clip_of(tiny_face()), tiny_face(), Picture())
+        view.show_clip(clip_of(tiny_face()), tiny_face(), Picture())
 
 
 @pytest.mark.parametrize("name", ["front", "three-quarter", "profile", "close", "-20,15,700"])
 def test_the_windows_camera_stands_where_the_pictures_camera_stands(name):
     pyvista = pytest.importorskip("pyvista", reason="needs pyvista: pip install 'tts2face[view]'")
-    wanted = optics(camera_named(name), tiny_face(), (320, 240))
+    wanted = camera_matrices(parse_camera(name), tiny_face(), (320, 240))
     plotter = SimpleNamespace(camera=pyvista.Camera())
-    vtk.aim(plotter, wanted, 240)
+    vtk.aim_camera(plotter, wanted, 240)
     np.testing.assert_allclose(view.camera_matrix(plotter.camera), wanted.view, atol=1e-3)
     assert np.tan(np.radians(plotter.camera.view_angle) / 2) == pytest.approx(120 / wanted.lens[0])
 
@@ -62,7 +62,7 @@ def test_a_clip_plays_its_last_frame_stays_and_turning_lights_it_anew():
     except BackendError as missing:
         pytest.skip(f"needs a display and pyvista: {missing}")
     face = tiny_face()
-    player = view.Player(clip_of(face), face, Picture(size="128x128"))
+    player = view.ClipPlayer(clip_of(face), face, Picture(size="128x128"))
     try:
         player.plotter.show(auto_close=False, interactive=False)
         seen = []
@@ -87,7 +87,7 @@ def test_a_mirror_shows_what_came_last():
         pytest.skip(f"needs a display and pyvista: {missing}")
     face = tiny_face()
     came = [None, (np.array([1.0, 0, 0, 0], np.float32), np.zeros(6, np.float32)), None]
-    mirror = view.Mirror(face, Picture(size="128x128"), lambda: came.pop(0))
+    mirror = view.LiveWindow(face, Picture(size="128x128"), lambda: came.pop(0))
     try:
         mirror.plotter.show(auto_close=False, interactive=False)
         seen = []

@@ -22,15 +22,15 @@ TURNED = np.array([0.05, 0.2, 0.0, 3.0, 0.0, 0.0])
 @pytest.fixture(scope="module")
 def gl():
     pytest.importorskip("pyvista", reason="needs pyvista: pip install 'tts2face[view]'")
-    if not vtk.probe(vtk.OFF_SCREEN):
+    if not vtk.can_draw_with(vtk.OFF_SCREEN):
         pytest.skip("needs a GPU or software GL, and VTK finds neither on this machine")
 
 
 @pytest.fixture
 def _fresh_probe():
-    vtk.probe.cache_clear()
+    vtk.can_draw_with.cache_clear()
     yield
-    vtk.probe.cache_clear()
+    vtk.can_draw_with.cache_clear()
 
 
 def both(face, weights, head=TURNED * 0, **options):
@@ -97,7 +97,7 @@ def test_without_pyvista_one_sentence_says_what_to_install(monkeypatch):
 
 def test_without_gl_one_sentence_says_what_to_install(monkeypatch):
     monkeypatch.setattr(vtk, "require_pyvista", lambda purpose: None)
-    monkeypatch.setattr(vtk, "probe", lambda window: False)
+    monkeypatch.setattr(vtk, "can_draw_with", lambda window: False)
     with pytest.raises(BackendError, match=r"neither a GPU nor software GL.*--renderer numba"):
         mesh_renderer(tiny_face(), Picture(renderer=PYVISTA))
 
@@ -107,7 +107,7 @@ def test_without_gl_one_sentence_says_what_to_install(monkeypatch):
 def test_a_child_that_crashes_fails_or_hangs_means_no_gl(monkeypatch, code):
     monkeypatch.setattr(vtk, "PROBE", code)
     monkeypatch.setattr(vtk, "PROBE_SECONDS", 1.0)
-    assert not vtk.probe(vtk.OFF_SCREEN)
+    assert not vtk.can_draw_with(vtk.OFF_SCREEN)
 
 
 @pytest.mark.usefixtures("_fresh_probe")
@@ -120,14 +120,14 @@ def test_a_child_is_asked_once_and_with_the_window_class(monkeypatch):
 
     monkeypatch.setattr(vtk.subprocess, "run", run)
     monkeypatch.setattr(vtk, "sys", SimpleNamespace(platform="linux", executable="python"))
-    assert vtk.probe(vtk.OFF_SCREEN)
-    assert vtk.probe(vtk.OFF_SCREEN)
+    assert vtk.can_draw_with(vtk.OFF_SCREEN)
+    assert vtk.can_draw_with(vtk.OFF_SCREEN)
     assert [env["VTK_DEFAULT_OPENGL_WINDOW"] for env in asked] == ["vtkEGLRenderWindow"]
 
 
 def test_the_environment_is_left_as_it_was(monkeypatch):
     monkeypatch.setattr(vtk, "sys", SimpleNamespace(platform="linux"))
     monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "mine")
-    with vtk.windows_of(vtk.OFF_SCREEN):
+    with vtk.use_window_class(vtk.OFF_SCREEN):
         assert vtk.os.environ["VTK_DEFAULT_OPENGL_WINDOW"] == "vtkEGLRenderWindow"
     assert vtk.os.environ["VTK_DEFAULT_OPENGL_WINDOW"] == "mine"

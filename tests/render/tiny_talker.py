@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from corpus_tools.aam.mesh import MOUTH_POINTS, N_MESH, face_triangles, mouth_triangles, ring
-from corpus_tools.aam.plate import film_of
-from corpus_tools.aam.reference_frame import framed
+from corpus_tools.aam.mesh import MOUTH_POINTS, N_MESH, face_ring, face_triangles, mouth_triangles
+from corpus_tools.aam.plate import encode_plate_video
+from corpus_tools.aam.reference_frame import build_reference_frame
 from tts2face.models.appearance import Appearance, Plate, TextureModel
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.models.talker import ShapeModel, Talker
@@ -24,7 +24,7 @@ def face_points() -> np.ndarray:
 
 
 def texture_model(shape: np.ndarray, triangles: np.ndarray, side: int, level: float) -> TextureModel:
-    frame = framed(shape, triangles, side)
+    frame = build_reference_frame(shape, triangles, side)
     n_pixels = len(frame.pixels)
     basis, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3 * n_pixels, 2)))
     return TextureModel(
@@ -52,11 +52,11 @@ def own_talker(*, has_face: bool = True) -> Talker:
         return Talker(25.0, model, (), {"name": "Ada"})
     shape = face_points()
     face = texture_model(shape, face_triangles(shape), 48, 100.0)
-    points = np.concatenate([shape, ring(shape)])
+    points = np.concatenate([shape, face_ring(shape)])
     y, x = np.mgrid[:SIZE, :SIZE]
     pictures = [np.stack([2 * x + k, 2 * y, x + y], axis=2).clip(0, 255).astype(np.uint8) for k in range(4)]
     plate = Plate(
-        video=film_of(iter(pictures)),
+        video=encode_plate_video(iter(pictures)),
         points=np.repeat(points[None], 4, axis=0).astype(np.float32),
         axes=np.tile(np.array([[1.0, 0, 0], [0, -1.0, 0]], np.float32), (4, 1, 1)),
         shape=generator.normal(0, 1, (4, 3)).astype(np.float32),

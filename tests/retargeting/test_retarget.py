@@ -23,7 +23,7 @@ from tts2face.models.landmarks import (
     UPPER_LIP_INNER_MID,
 )
 from tts2face.models.talker import ShapeModel, Talker, Utterance, speech_channels
-from tts2face.retargeting.to_face import contact_gaps, inner_product_map, retargeter
+from tts2face.retargeting.to_face import build_retargeter, contact_gaps, inner_product_map
 from tts2face.types import Trajectory
 
 N_MODES = 3
@@ -124,7 +124,7 @@ def test_a_face_with_the_talkers_own_modes_moves_as_the_talker() -> None:
     talker = talker_of()
     face = face_of(talker.model.basis * SCALE)
     motion = motion_of(talker)
-    weights = retargeter(talker, face).retarget(motion).values
+    weights = build_retargeter(talker, face).retarget(motion).values
     elsewhere = [landmark for landmark in MOUTH_REGION if landmark not in INNER_LIP_LOWER]  # contact closes those
     moved = np.tensordot(weights, face.shapes, axes=1)[:, elsewhere]
     wanted = np.tensordot(motion.values, talker.model.basis * SCALE, axes=1)[:, elsewhere]
@@ -135,7 +135,7 @@ def test_rest_stays_at_rest() -> None:
     talker = talker_of()
     face = face_of(talker.model.basis)
     still = Trajectory(speech_channels(talker.model), np.zeros((4, N_MODES)), 25.0)
-    moved = np.tensordot(retargeter(talker, face).retarget(still).values, face.shapes, axes=1)
+    moved = np.tensordot(build_retargeter(talker, face).retarget(still).values, face.shapes, axes=1)
     assert np.abs(moved[:, np.setdiff1d(np.arange(N_LANDMARKS), INNER_LIP_LOWER)]).max() < 0.05
 
 
@@ -145,7 +145,7 @@ def test_lips_that_touch_on_the_talker_touch_on_the_face() -> None:
     assert contact_gaps(talker)[1:-1] == pytest.approx(0.4, abs=0.01)
     face = face_of(talker.model.basis)
     closed = Trajectory(speech_channels(talker.model), np.zeros((1, N_MODES)), 25.0)
-    moved = np.tensordot(retargeter(talker, face).retarget(closed).values[0], face.shapes, axes=1)
+    moved = np.tensordot(build_retargeter(talker, face).retarget(closed).values[0], face.shapes, axes=1)
     assert abs(moved[UPPER_LIP_INNER_MID, 1] - moved[LOWER_LIP_INNER_MID, 1]) < 0.1
 
 
@@ -156,7 +156,7 @@ def test_known_weights_are_found_again() -> None:
     turned = np.linalg.qr(np.random.default_rng(2).normal(size=(N_MODES, N_MODES)))[0]
     face = face_of(np.tensordot(turned, shapes, axes=1))
     motion = Trajectory(speech_channels(talker.model), [[12.0, 1.0, -2.0], [20.0, -1.0, 0.5]], 25.0)  # open lips
-    weights = retargeter(talker, face).retarget(motion).values
+    weights = build_retargeter(talker, face).retarget(motion).values
     closed = np.array([0.4 * np.sqrt(len(INNER_LIP_UPPER)), 0, 0])  # the face opens from lips that touch
     assert weights == pytest.approx((motion.values + closed) @ turned.T, rel=0.01, abs=0.1)
 
@@ -164,7 +164,7 @@ def test_known_weights_are_found_again() -> None:
 def test_no_motion_gives_no_weights() -> None:
     talker = talker_of()
     still = Trajectory(speech_channels(talker.model), np.tile(talker.model.rest, (3, 1)), 25.0)
-    assert np.abs(retargeter(talker, face_of(talker.model.basis)).retarget(still).values).max() < 1e-6
+    assert np.abs(build_retargeter(talker, face_of(talker.model.basis)).retarget(still).values).max() < 1e-6
 
 
 def test_shapes_that_cannot_be_told_apart_are_refused() -> None:
@@ -174,7 +174,7 @@ def test_shapes_that_cannot_be_told_apart_are_refused() -> None:
 
 def test_limits_hold_and_frames_do_not_know_each_other() -> None:
     talker = talker_of()
-    ready = retargeter(talker, face_of(talker.model.basis, (-0.5, 2.0)))
+    ready = build_retargeter(talker, face_of(talker.model.basis, (-0.5, 2.0)))
     motion = motion_of(talker)
     weights = ready.retarget(motion).values
     assert weights.min() >= -0.5
@@ -195,7 +195,7 @@ def test_a_face_without_lips_is_refused() -> None:
         landmark_weights=whole.landmark_weights[kept],
     )
     with pytest.raises(DataError, match="lacks landmark 13 of the lips"):
-        retargeter(talker, lipless)
+        build_retargeter(talker, lipless)
     still = replace(whole, shape_names=tuple(f"brow{i}" for i in range(N_MODES)))
     with pytest.raises(DataError, match="shapes named jaw"):
-        retargeter(talker, still)
+        build_retargeter(talker, still)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError
-from tts2face.speech.forced_alignment import Aligner, acoustic_phones, increasing
+from tts2face.speech.forced_alignment import Aligner, acoustic_phones, enforce_increasing
 from tts2face.types import Waveform
 from tts2face.voice.engine import load_voice
 
@@ -78,7 +78,7 @@ def test_phones_the_model_lacks_are_heard_as_their_nearest() -> None:
     ],
 )
 def test_edges_increase(edges: list[float], moved: list[float]) -> None:
-    assert increasing(np.array(edges)) == pytest.approx(moved)
+    assert enforce_increasing(np.array(edges)) == pytest.approx(moved)
 
 
 def test_real_recordings_agree_with_their_word_times(aligner: Aligner, shared_recordings: Path) -> None:

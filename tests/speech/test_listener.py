@@ -3,26 +3,26 @@
 import numpy as np
 import pytest
 
-from corpus_tools.training.linear_audio_map import Lesson, learn_linear
-from corpus_tools.training.network_audio_map import NetworkOptions, learn_network
+from corpus_tools.training.linear_audio_map import TrainingUtterance, learn_linear_map
+from corpus_tools.training.network_audio_map import NetworkMapOptions, learn_network_map
 from lexicon.errors import InputError
 from tests.oracles.test_features import babble
-from tts2face.models.audio_map import Drive
+from tts2face.models.audio_map import AudioMap
 from tts2face.speech.features import FEATURE_RATE, FEATURES, speech_features
-from tts2face.speech.streaming_listener import Ear, Listener
+from tts2face.speech.streaming_listener import StreamingAudioMap, StreamingFeatures
 from tts2face.types import frame_count
 
 SOUND = babble(2.3)
 
 
-def taught(feature: str, before: int, after: int, *, bends: bool) -> Drive:
+def taught(feature: str, before: int, after: int, *, bends: bool) -> AudioMap:
     features = speech_features(SOUND, feature, fps=25.0, n_frames=57).values
     moved = np.random.default_rng(1).normal(size=(57, 3)).astype(np.float32)
-    lessons = [Lesson(features, moved)] * 3
+    lessons = [TrainingUtterance(features, moved)] * 3
     if bends:
-        options = NetworkOptions(n_hidden=4, before=before, after=after)
-        return learn_network(lessons, feature=feature, options=options)
-    return learn_linear(lessons, feature=feature, before=before, after=after)
+        options = NetworkMapOptions(n_hidden=4, before=before, after=after)
+        return learn_network_map(lessons, feature=feature, options=options)
+    return learn_linear_map(lessons, feature=feature, before=before, after=after)
 
 
 def blocks(*sizes: int) -> list[np.ndarray]:
@@ -39,7 +39,7 @@ def blocks(*sizes: int) -> list[np.ndarray]:
 @pytest.mark.parametrize("fps", [25.0, 29.97])
 @pytest.mark.parametrize("kind", [*FEATURES, "mfcc+lsf"])
 def test_features_of_blocks_are_those_of_the_whole(kind: str, fps: float, sizes: tuple[int, ...]) -> None:
-    ear = Ear(kind, fps)
+    ear = StreamingFeatures(kind, fps)
     found = np.concatenate([*(ear.hear(block) for block in blocks(*sizes)), ear.finish()])
     whole = speech_features(SOUND, kind, fps=fps, n_frames=frame_count(SOUND.duration, fps))
     np.testing.assert_array_equal(found, whole.values)
@@ -49,7 +49,7 @@ def test_features_of_blocks_are_those_of_the_whole(kind: str, fps: float, sizes:
 @pytest.mark.parametrize(("before", "after", "bends"), [(0, 0, False), (2, 3, False), (3, 1, True)])
 def test_lips_of_blocks_are_those_of_the_whole(before: int, after: int, bends: bool, sizes: tuple[int, ...]) -> None:
     drive = taught("mfcc", before, after, bends=bends)
-    listener = Listener(drive, 25.0)
+    listener = StreamingAudioMap(drive, 25.0)
     made = np.concatenate([*(listener.hear(block) for block in blocks(*sizes)), listener.finish()])
     features = speech_features(SOUND, "mfcc", fps=25.0, n_frames=frame_count(SOUND.duration, 25.0))
     np.testing.assert_array_equal(made, drive.parameters(features.values))
@@ -57,7 +57,7 @@ def test_lips_of_blocks_are_those_of_the_whole(before: int, after: int, bends: b
 
 def test_lips_come_no_later_than_stated() -> None:
     drive = taught("lsf", 2, 3, bends=True)
-    listener = Listener(drive, 25.0)
+    listener = StreamingAudioMap(drive, 25.0)
     assert listener.look_ahead_s == pytest.approx(3 / 25 + 0.0427, abs=1e-3)
     known, heard = 0, 0
     for block in blocks(160):
@@ -68,7 +68,7 @@ def test_lips_come_no_later_than_stated() -> None:
 
 
 def test_a_sound_shorter_than_the_look_ahead_has_lips() -> None:
-    listener = Listener(taught("mfcc", 2, 5, bends=False), 25.0)
+    listener = StreamingAudioMap(taught("mfcc", 2, 5, bends=False), 25.0)
     assert len(listener.hear(SOUND.samples[:1000])) == 0
     made = listener.finish()
     assert made.shape == (2, 3)
@@ -76,7 +76,7 @@ def test_a_sound_shorter_than_the_look_ahead_has_lips() -> None:
 
 
 def test_memory_does_not_grow_with_what_was_heard() -> None:
-    ear = Ear("level", 25.0)
+    ear = StreamingFeatures("level", 25.0)
     for block in blocks(1600) * 20:
         ear.hear(block)
     assert ear.n_samples == 20 * len(SOUND.samples)
@@ -86,4 +86,4 @@ def test_memory_does_not_grow_with_what_was_heard() -> None:
 @pytest.mark.parametrize("block", [np.zeros((2, 10)), np.array([0.0, np.nan])])
 def test_what_is_no_sound_is_refused(block: np.ndarray) -> None:
     with pytest.raises(InputError, match="row of finite samples"):
-        Ear("mfcc", 25.0).hear(block)
+        StreamingFeatures("mfcc", 25.0).hear(block)

@@ -5,7 +5,7 @@ import pytest
 
 from lexicon.errors import InputError
 from tts2face.speech import transcript_placement as place
-from tts2face.speech.transcript_placement import stretch_of_words
+from tts2face.speech.transcript_placement import assign_words
 
 PHONES = "pbtdkgfvszmnlrwiuaeo"
 
@@ -37,7 +37,7 @@ def test_the_path_is_the_cheapest(seed: int) -> None:
     generator = np.random.default_rng(seed)
     written, sounded = ("".join(generator.choice(list("pba"), generator.integers(1, 9))) for _ in range(2))
     numbers = {phone: number for number, phone in enumerate("pba")}
-    partners = place._partners(
+    partners = place._match_phones(
         np.array([numbers[one] for one in written]), np.array([numbers[one] for one in sounded]), 20
     )
     assert (np.diff(partners) >= 0).all()
@@ -63,7 +63,7 @@ def test_words_go_where_their_phones_were_heard() -> None:
             heard[at].append(phone if luck < 0.8 else str(generator.choice(list(PHONES))))
             if luck > 0.95:
                 heard[at].append(str(generator.choice(list(PHONES))))
-    found = stretch_of_words(words, heard)
+    found = assign_words(words, heard)
     assert (np.diff(found) >= 0).all()
     assert (found == truth).mean() > 0.99
 
@@ -71,15 +71,15 @@ def test_words_go_where_their_phones_were_heard() -> None:
 def test_text_far_longer_than_the_sound_has_its_places(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(place, "BAND", 4)
     words = [tuple("pa")] * 40 + [tuple("si")] * 5
-    found = stretch_of_words(words, [list("papa"), list("sisisisisi")])
+    found = assign_words(words, [list("papa"), list("sisisisisi")])
     assert found[0] == 0
     assert found[-5:].tolist() == [1] * 5
 
 
 def test_silence_holds_all_words() -> None:
-    assert stretch_of_words([("p",), ("a",)], [[], []]).tolist() == [0, 0]
+    assert assign_words([("p",), ("a",)], [[], []]).tolist() == [0, 0]
 
 
 def test_nothing_to_place() -> None:
     with pytest.raises(InputError, match="needs words, and stretches"):
-        stretch_of_words([], [["p"]])
+        assign_words([], [["p"]])

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.recordings.folder import Recording, spoken_words
+from corpus_tools.recordings.folder import Recording, pronounce_recording
 from lexicon.errors import InputError
 from tts2face.speech.forced_alignment import acoustic_phones
 from tts2face.speech.phone_recognition import LONGEST_S, PhoneRecogniser
@@ -39,7 +39,7 @@ def test_most_phones_of_real_sentences_are_heard(recogniser: PhoneRecogniser, sh
     wrong = total = 0
     for row in rows:
         video = folder / "clips" / f"{row['clip']}.mkv"
-        words = spoken_words(Recording(row["clip"], video, row["transcript"], is_spelling=True))
+        words = pronounce_recording(Recording(row["clip"], video, row["transcript"], is_spelling=True))
         assert words is not None
         written = acoustic_phones([phone for _, ways in words for phone in ways[0]])
         heard = acoustic_phones([phone for word in recogniser.words(read_sound(video, 16_000)) for phone in word])

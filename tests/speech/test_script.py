@@ -8,29 +8,29 @@ import pytest
 from lexicon.dictionary import parse_dictionary
 from lexicon.errors import DataError, InputError
 from tts2face.speech import transcript_alignment as scripts
-from tts2face.speech.transcript_alignment import phones_in, script
+from tts2face.speech.transcript_alignment import align_recording, pronounce_transcript
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 
 
 def test_words_have_all_the_pronunciations_of_the_dictionary() -> None:
-    (read,) = script("read", "en-us")
+    (read,) = pronounce_transcript("read", "en-us")
     assert read[0] == "read"
     assert set(read[1]) == {("ɹ", "ɛ", "d"), ("ɹ", "i", "d")}
 
 
 def test_numbers_are_words() -> None:
-    assert [text for text, _ in script("Chapter 2.", "en-us")] == ["Chapter", "two"]
+    assert [text for text, _ in pronounce_transcript("Chapter 2.", "en-us")] == ["Chapter", "two"]
 
 
 def test_own_pronunciations_stand_alone() -> None:
     own = parse_dictionary("read  B AA1 B\n")
-    assert script("read", "en-us", own) == (("read", (("b", "ɑ", "b"),)),)
+    assert pronounce_transcript("read", "en-us", own) == (("read", (("b", "ɑ", "b"),)),)
 
 
 def test_a_text_without_words_is_refused() -> None:
     with pytest.raises(InputError):
-        script("?!", "en-us")
+        pronounce_transcript("?!", "en-us")
 
 
 def test_long_recordings_are_aligned_part_by_part(shared_recordings: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -40,11 +40,11 @@ def test_long_recordings_are_aligned_part_by_part(shared_recordings: Path, monke
     names = {"bbaf2n": "bin blue at F two now", "bbaf3s": "bin blue at F three soon"}
     sounds = [read_sound(clips / f"{name}.mkv", 16000).samples for name in names]
     sound = Waveform(np.concatenate(sounds * 2), 16000)
-    words = script(". ".join([*names.values()] * 2), "en-us")
-    whole, spans, _ = phones_in(sound, words)
+    words = pronounce_transcript(". ".join([*names.values()] * 2), "en-us")
+    whole, spans, _ = align_recording(sound, words)
     monkeypatch.setattr(scripts, "LONGEST_AT_ONCE_S", 5.0)
     monkeypatch.setattr(scripts, "LONGEST_STRETCH_S", 5.0)
-    cut, cut_spans, mismatches = phones_in(sound, words)
+    cut, cut_spans, mismatches = align_recording(sound, words)
     assert mismatches == ()
     assert [word.text for word in cut_spans] == [word.text for word in spans]
     assert cut.end == pytest.approx(sound.duration, abs=1e-3)
@@ -58,4 +58,6 @@ def test_long_recordings_are_aligned_part_by_part(shared_recordings: Path, monke
 def test_a_sound_without_the_words_is_refused() -> None:
     noise = Waveform(np.random.default_rng(0).normal(0, 0.01, 1600), 16000)
     with pytest.raises(DataError, match="check the transcript"):
-        phones_in(noise, script("a long sentence that nobody could say in a tenth of a second", "en-us"))
+        align_recording(
+            noise, pronounce_transcript("a long sentence that nobody could say in a tenth of a second", "en-us")
+        )

@@ -17,7 +17,7 @@ from tts2face.speech.text_fit import (
     mismatch_of,
     surrounded,
 )
-from tts2face.speech.transcript_alignment import phones_in, script
+from tts2face.speech.transcript_alignment import align_recording, pronounce_transcript
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 from tts2face.voice.engine import load_voice
@@ -70,8 +70,10 @@ def test_a_mismatch_says_where_and_what() -> None:
 
 def test_another_text_for_the_project_s_own_voice() -> None:
     speech = load_voice("heart", "en-us").speak(RIGHT[1])
-    assert phones_in(speech.waveform, script(RIGHT[1], "en-us"))[2] == ()
-    (mismatch,) = phones_in(speech.waveform, script("Please wait for the beep, then say your name.", "en-us"))[2]
+    assert align_recording(speech.waveform, pronounce_transcript(RIGHT[1], "en-us"))[2] == ()
+    (mismatch,) = align_recording(
+        speech.waveform, pronounce_transcript("Please wait for the beep, then say your name.", "en-us")
+    )[2]
     assert len(mismatch.words) >= 6
     assert mismatch.end - mismatch.begin > 1.0
 
@@ -81,9 +83,9 @@ def test_one_wrong_sentence_among_right_ones() -> None:
     said = [RIGHT[0], RIGHT[1], "It was a sunny day in the park.", "Nobody saw the dog again."]
     sounds = [voice.speak(text).waveform for text in said]
     sound = Waveform(np.concatenate([one.samples for one in sounds]), voice.sample_rate)
-    assert phones_in(sound, script(" ".join(said), "en-us"))[2] == ()
+    assert align_recording(sound, pronounce_transcript(" ".join(said), "en-us"))[2] == ()
     begin, end = sounds[0].duration, sounds[0].duration + sounds[1].duration
-    found = phones_in(sound, script(" ".join([said[0], WRONG, *said[2:]]), "en-us"))[2]
+    found = align_recording(sound, pronounce_transcript(" ".join([said[0], WRONG, *said[2:]]), "en-us"))[2]
     assert found
     assert min(abs(one.begin - begin) for one in found) < 1.0
     assert all(begin - 1.5 < one.begin and one.end < end + 1.5 for one in found)
@@ -100,13 +102,13 @@ def test_real_recordings(n_sentences: int, shared_recordings: Path) -> None:
     samples = [read_sound(folder / "clips" / f"{row['clip']}.mkv", 16000).samples for row in rows]
     sound = Waveform(np.concatenate(samples), 16000)
     texts = [row["transcript"] for row in rows]
-    assert phones_in(sound, script(". ".join(texts), "en-us"))[2] == ()
+    assert align_recording(sound, pronounce_transcript(". ".join(texts), "en-us"))[2] == ()
     place = n_sentences // 2
     begin = sum(map(len, samples[:place])) / 16000
     end = begin + len(samples[place]) / 16000
     texts[place] = "My brother usually drinks coffee"
     try:
-        found = phones_in(sound, script(". ".join(texts), "en-us"))[2]
+        found = align_recording(sound, pronounce_transcript(". ".join(texts), "en-us"))[2]
     except DataError:
         assert n_sentences == 1  # the words are not found at all
     else:

@@ -9,30 +9,41 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lexicon.errors import InputError
-from lexicon.mark_parser import marked
+from lexicon.mark_parser import parse_marks
 from lexicon.marked_text import NodMark
-from lexicon.sentences import Sentence, by_letters, sentences
+from lexicon.sentences import Sentence, index_by_letters, split_sentences
 from lexicon.sequence import SILENCE
 from tests.synthesis.fake_voice import LEAD, LETTER, LEVEL, RATE, TRAIL, FakeVoice
 from tts2face.gesture.spans import Nod, StyleSpan
 from tts2face.request import Request
-from tts2face.synthesis.marked_speech import LEAST_GAP_S, Reached, Said, check_marks, marked_styles, reached_in, say
-from tts2face.synthesis.speech_joining import joined, shortened, silence
+from tts2face.synthesis.marked_speech import (
+    LEAST_GAP_S,
+    MarkTime,
+    SpokenSentence,
+    check_marks,
+    marked_styles,
+    resolve_recording_marks,
+    speak_sentence,
+)
+from tts2face.synthesis.speech_joining import join_utterances, silent_speech, trim_silence
 from tts2face.voice.engine import load_voice
 from tts2face.voice.spans import voice_in
 
 
-def said(text: str, voice: object | None = None, **options: object) -> list[Said]:
+def said(text: str, voice: object | None = None, **options: object) -> list[SpokenSentence]:
     request = Request(text=text, **options)
-    return [say(voice or FakeVoice(), part, request) for part in sentences(marked(text), request.language)]
+    return [
+        speak_sentence(voice or FakeVoice(), part, request)
+        for part in split_sentences(parse_marks(text), request.language)
+    ]
 
 
-def one(text: str, voice: object | None = None, **options: object) -> Said:
+def one(text: str, voice: object | None = None, **options: object) -> SpokenSentence:
     (only,) = said(text, voice, **options)
     return only
 
 
-def words(answer: Said) -> dict[str, tuple[float, float]]:
+def words(answer: SpokenSentence) -> dict[str, tuple[float, float]]:
     edges = answer.speech.phones.edges
     return {word.text: (float(edges[word.first]), float(edges[word.last])) for word in answer.speech.words}
 
@@ -77,12 +88,14 @@ def test_punctuation_behind_a_pause_belongs_to_the_words_before() -> None:
 
 
 def test_pauses_where_nothing_is_said_are_kept() -> None:
-    assert [part.utterances[-1].pause for part in sentences(marked("One. … [pause 1] Two. [pause 2] …"), "en-us")] == [
+    assert [
+        part.utterances[-1].pause for part in split_sentences(parse_marks("One. … [pause 1] Two. [pause 2] …"), "en-us")
+    ] == [
         1.0,
         2.0,
     ]
-    (only,) = sentences(marked("… [pause 1] One."), "en-us")
-    assert only.lead == 1.0
+    (only,) = split_sentences(parse_marks("… [pause 1] One."), "en-us")
+    assert only.leading_pause == 1.0
 
 
 def test_nods_and_names_come_with_the_onset_of_their_word() -> None:
@@ -91,7 +104,7 @@ def test_nods_and_names_come_with_the_onset_of_their_word() -> None:
     assert answer.timeline.nods == (Nod(at["two"][0]), Nod(at["four"][0], 0.5), Nod(at["four"][1]))
     named = one('<speak>one <mark name="x"/>two <break time="1s"/><mark name="y"/>three</speak>')
     at = words(named)
-    assert named.marks == (Reached("x", at["two"][0]), Reached("y", pytest.approx(at["three"][0])))
+    assert named.marks == (MarkTime("x", at["two"][0]), MarkTime("y", pytest.approx(at["three"][0])))
     assert at["three"][0] == pytest.approx(LEAD + 6 * LETTER + 1, abs=2 / RATE)
 
 
@@ -128,7 +141,7 @@ def test_a_style_around_all_sentences_holds_throughout() -> None:
 
 
 def test_the_styles_of_a_text_are_known_beforehand() -> None:
-    assert marked_styles(marked("[style:calm]a [style:head=cross]b[/style][/style] [style:calm]c[/style]")) == (
+    assert marked_styles(parse_marks("[style:calm]a [style:head=cross]b[/style][/style] [style:calm]c[/style]")) == (
         "calm",
         "cross",
     )
@@ -172,8 +185,8 @@ def test_spans_are_spoken_by_their_voice_at_the_rate_of_the_first() -> None:
 
     text = '<speak>one <lang xml:lang="de">zwei drei</lang> <voice gender="male">four</voice> [x]</speak>'
     voice = FakeVoice()
-    (sentence,) = sentences(marked(text), "en-us")
-    answer = say(voice, sentence, Request(text=text), voices)
+    (sentence,) = split_sentences(parse_marks(text), "en-us")
+    answer = speak_sentence(voice, sentence, Request(text=text), voices)
     assert asked == [(None, "de"), ("espeak", "en-us")]
     assert ([said_ for said_, _ in voice.said], [said_ for said_, _ in other.said]) == (
         ["one", "x"],
@@ -182,7 +195,7 @@ def test_spans_are_spoken_by_their_voice_at_the_rate_of_the_first() -> None:
     assert answer.speech.waveform.rate == RATE
     assert [word.text for word in answer.speech.words] == ["one", "zwei", "drei", "four", "x"]
     with pytest.raises(InputError, match="needs voices to speak them"):
-        say(voice, sentence, Request(text=text))
+        speak_sentence(voice, sentence, Request(text=text))
 
 
 @pytest.mark.parametrize(
@@ -237,8 +250,8 @@ def test_times_of_marks_increase_and_lie_in_the_sound(texts: list, data: st.Data
 @given(WORDS, st.data())
 def test_sentences_hold_the_same_words_with_pauses(texts: list, data: st.DataObject) -> None:
     text = " ".join(word + data.draw(st.sampled_from(["", "[pause 1]", " [nod] "])) for word in texts)
-    parts = list(sentences(marked(text), "en-us"))
-    spoken = "".join("".join(part.written.split()) for sentence in parts for part in sentence.utterances)
+    parts = list(split_sentences(parse_marks(text), "en-us"))
+    spoken = "".join("".join(part.source.split()) for sentence in parts for part in sentence.utterances)
     assert spoken == "".join("".join(texts).split())
 
 
@@ -247,11 +260,11 @@ BITS = st.one_of(st.text(max_size=8), st.sampled_from(["[nod]", "[pause 0.5]", "
 
 @given(st.lists(BITS, max_size=12))
 def test_any_text_is_cut_without_loss(bits: list) -> None:
-    text = marked("".join(bit if bit in {"[nod]", "[pause 0.5]"} else bit.replace("[", "") for bit in bits))
-    parts = list(sentences(text, "de"))
-    written = "".join(part.written for sentence in parts for part in sentence.utterances)
+    text = parse_marks("".join(bit if bit in {"[nod]", "[pause 0.5]"} else bit.replace("[", "") for bit in bits))
+    parts = list(split_sentences(text, "de"))
+    written = "".join(part.source for sentence in parts for part in sentence.utterances)
     assert [letter for letter in written if letter.isalnum()] == [letter for letter in text.text if letter.isalnum()]
-    nods = {mark.at for mark in by_letters(text).marks if isinstance(mark, NodMark)}
+    nods = {mark.at for mark in index_by_letters(text).marks if isinstance(mark, NodMark)}
     assert sum(len(sentence.marks) for sentence in parts) == (len(nods) if parts else 0)
     for sentence in parts:
         bounds = [(part.first, part.last) for part in sentence.utterances]
@@ -261,12 +274,12 @@ def test_any_text_is_cut_without_loss(bits: list) -> None:
 
 def test_silences_are_taken_away_and_put_in_exactly() -> None:
     first, second = FakeVoice().speak("ab"), FakeVoice().speak("cd")
-    short, cut = shortened(second, before=0.05, behind=0.1)
+    short, cut = trim_silence(second, before=0.05, behind=0.1)
     assert cut == pytest.approx(0.15)
     assert short.phones.durations[[0, -1]] == pytest.approx([0.05, 0.1])
-    both, begins = joined([first, second], [1.0])
+    both, begins = join_utterances([first, second], [1.0])
     assert begins == pytest.approx([0.0, LEAD + 0.2 + 1.0 - LEAD])
-    assert silence(0.5, RATE).phones.end == 0.5
+    assert silent_speech(0.5, RATE).phones.end == 0.5
     assert len(both.words) == 2
 
 
@@ -288,9 +301,9 @@ def test_words_of_a_language_without_spaces_are_found_by_letters() -> None:
 
 
 def test_in_a_recording_marks_come_with_their_words() -> None:
-    text = marked("one [style:head=calm]two[/style] [nod]three")
+    text = parse_marks("one [style:head=calm]two[/style] [nod]three")
     speech = FakeVoice().speak(text.text)
-    timeline, _ = reached_in(text, speech.phones, speech.words, "en-us")
+    timeline, _ = resolve_recording_marks(text, speech.phones, speech.words, "en-us")
     assert timeline.nods[0].time == pytest.approx(LEAD + 6 * LETTER)
     assert [(span.start, span.end) for span in timeline.spans] == [
         pytest.approx((LEAD + 3 * LETTER, LEAD + 6 * LETTER))
@@ -313,16 +326,16 @@ def test_in_a_recording_marks_come_with_their_words() -> None:
 def test_marks_that_go_with_no_request_are_refused(text: str, options: dict, reason: str) -> None:
     request = Request(text=text, **options)
     with pytest.raises(InputError, match=reason):
-        check_marks(marked(text), request)
+        check_marks(parse_marks(text), request)
 
 
 def test_pauses_that_meet_over_spaces_are_limited_too() -> None:
     with pytest.raises(InputError, match="a pause must lie between 0 and 10 s, not 12 s"):
-        next(sentences(marked("a [pause 6] [pause 6] b"), "en-us"))
+        next(split_sentences(parse_marks("a [pause 6] [pause 6] b"), "en-us"))
 
 
 def test_a_megabyte_of_marks_is_cut_at_once() -> None:
-    n = sum(1 for _ in sentences(marked("Hello [nod] there [pause 1] my friend. " * 3000), "en-us"))
+    n = sum(1 for _ in split_sentences(parse_marks("Hello [nod] there [pause 1] my friend. " * 3000), "en-us"))
     assert n == 3000
     assert LEAST_GAP_S < 0.06
-    assert isinstance(next(sentences(marked("a"), "en-us")), Sentence)
+    assert isinstance(next(split_sentences(parse_marks("a"), "en-us")), Sentence)

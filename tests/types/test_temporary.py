@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tts2face.storage.files import write_whole
+from tts2face.storage.files import write_atomically
 from tts2face.storage.temporary import OURS, Temporary
 
 pytest.importorskip("fcntl", reason="without file locks nothing that was left behind is removed")
@@ -44,7 +44,7 @@ def test_what_a_killed_process_left_is_removed_and_what_a_living_one_writes_is_n
         child.kill()
         child.wait()
         assert [*tmp_path.iterdir()] == [written]
-    write_whole(target, b"new")
+    write_atomically(target, b"new")
     assert [*tmp_path.iterdir()] == [target]
     assert target.read_bytes() == b"new"
 
@@ -63,7 +63,7 @@ def test_only_files_of_the_same_target_are_removed(tmp_path: Path) -> None:
 def test_a_link_with_the_name_of_a_temporary_file_is_not_followed(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("keep")
     (tmp_path / f".clip.mp4{OURS}abc").symlink_to(tmp_path / "mine.txt")
-    write_whole(tmp_path / "clip.mp4", b"new")
+    write_atomically(tmp_path / "clip.mp4", b"new")
     assert (tmp_path / "mine.txt").read_text() == "keep"
 
 
@@ -76,10 +76,10 @@ def test_a_file_never_replaces_a_folder(tmp_path: Path) -> None:
 
 
 def test_it_is_readable_as_a_file_of_the_user(tmp_path: Path) -> None:
-    write_whole(tmp_path / "clip.mp4", b"new")
+    write_atomically(tmp_path / "clip.mp4", b"new")
     assert (tmp_path / "clip.mp4").stat().st_mode & 0o777 == 0o644
 
 
 def test_a_name_of_the_greatest_length_can_be_written(tmp_path: Path) -> None:
-    write_whole(tmp_path / ("é" * 127), b"new")
+    write_atomically(tmp_path / ("é" * 127), b"new")
     assert os.listdir(tmp_path) == ["é" * 127]

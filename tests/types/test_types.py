@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, frame_count, joined_clips
+from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, concatenate_clips, frame_count
 
 RATE = 8000
 
@@ -86,7 +86,7 @@ def test_a_clip_has_one_clock() -> None:
 
 
 def test_joined_clips_are_one_clip() -> None:
-    joined = joined_clips([clip_of(10, 25), clip_of(5, 25)])
+    joined = concatenate_clips([clip_of(10, 25), clip_of(5, 25)])
     assert len(joined.motion) == 15
     assert joined.speech.phones.phones == (SILENCE, "p", SILENCE, "p", SILENCE)
     assert [joined.speech.phones.phones[word.first] for word in joined.speech.words] == ["p", "p"]

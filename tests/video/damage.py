@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from lexicon.errors import DataError
-from tts2face.video.media import media_facts, read_pictures, read_sound
+from tts2face.video.media import read_frames, read_media_info, read_sound
 
 MEMORY = 3 << 30  # bytes of addresses: libraries take half of it
 
@@ -46,8 +46,8 @@ def main(film: Path, folder: Path, n_copies: int, seed: int) -> None:
         path.write_bytes(damaged(film.read_bytes(), generator))
         outcome = []
         for read in (
-            lambda here=path: f"{media_facts(here).fps:.2f} fps",
-            lambda here=path: f"{sum(1 for _ in read_pictures(here))} pictures",
+            lambda here=path: f"{read_media_info(here).fps:.2f} fps",
+            lambda here=path: f"{sum(1 for _ in read_frames(here))} pictures",
             lambda here=path: f"{len(read_sound(here, 16_000).samples)} samples",
         ):
             try:

@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.video.camera import Camera
+from tts2face.video.camera import CaptureDevice
 
 pytest.importorskip("cv2", reason="needs `pip install 'tts2face[capture]'`")
 
 
 def test_pictures_come_as_they_are_filmed_and_end_with_the_film(make_video) -> None:
-    with Camera(str(make_video("grey.mkv", n_frames=10, fps=25, tone_s=0.4))) as camera:
+    with CaptureDevice(str(make_video("grey.mkv", n_frames=10, fps=25, tone_s=0.4))) as camera:
         pictures = list(camera.pictures())
     assert camera.fps == 25.0
     assert len(pictures) == 10
@@ -23,7 +23,7 @@ def test_pictures_come_as_they_are_filmed_and_end_with_the_film(make_video) -> N
 
 
 def test_who_is_slow_gets_the_newest_picture(make_video) -> None:
-    with Camera(str(make_video("grey.mkv", n_frames=25, fps=25, tone_s=1.0))) as camera:
+    with CaptureDevice(str(make_video("grey.mkv", n_frames=25, fps=25, tone_s=1.0))) as camera:
         pictures = camera.pictures()
         first = next(pictures)
         time.sleep(0.5)
@@ -32,13 +32,13 @@ def test_who_is_slow_gets_the_newest_picture(make_video) -> None:
 
 
 def test_leaving_early_lets_the_camera_go(make_video) -> None:
-    with Camera(str(make_video("grey.mkv", n_frames=25, fps=25, tone_s=1.0))) as camera:
+    with CaptureDevice(str(make_video("grey.mkv", n_frames=25, fps=25, tone_s=1.0))) as camera:
         next(camera.pictures())
-    assert not camera._filming.is_alive()
+    assert not camera._thread.is_alive()
 
 
 def test_where_nothing_films(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="nothing films at '97'"):
-        Camera("97")
+        CaptureDevice("97")
     with pytest.raises(InputError, match="give a camera's number"):
-        Camera(str(tmp_path / "none.mp4"))
+        CaptureDevice(str(tmp_path / "none.mp4"))

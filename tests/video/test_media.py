@@ -11,11 +11,11 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.films import joined
-from tts2face.video.media import _placed, _upright, media_facts, read_pictures, read_sound
+from tts2face.video.media import _shift_samples, _upright_pixels, read_frames, read_media_info, read_sound
 
 
 def test_pictures_come_in_order_with_their_times(make_video):
-    pictures = list(read_pictures(make_video("grey.mkv", n_frames=10, fps=25, tone_s=0.4)))
+    pictures = list(read_frames(make_video("grey.mkv", n_frames=10, fps=25, tone_s=0.4)))
     np.testing.assert_allclose([picture.time for picture in pictures], np.arange(10) / 25, atol=0.001)
     levels = [picture.pixels.mean() for picture in pictures]
     np.testing.assert_allclose(levels, 20 + 4 * np.arange(10), atol=2)  # of 255: 8-bit colour conversion
@@ -23,7 +23,7 @@ def test_pictures_come_in_order_with_their_times(make_video):
 
 
 def test_facts(make_video):
-    facts = media_facts(make_video("grey.mkv", n_frames=10, fps=25, tone_s=0.4))
+    facts = read_media_info(make_video("grey.mkv", n_frames=10, fps=25, tone_s=0.4))
     assert (facts.fps, facts.width, facts.height, facts.rate) == (25.0, 64, 48, 16000)
     assert facts.duration == pytest.approx(0.4, abs=0.01)
 
@@ -39,34 +39,34 @@ def test_a_tone_keeps_its_pitch_and_level_at_every_rate(make_video, rate):
 
 def test_sound_lies_on_the_clock_of_the_file():
     samples = np.arange(1, 4, dtype=np.float32)
-    np.testing.assert_array_equal(_placed(samples, 2), [0, 0, 1, 2, 3])
-    np.testing.assert_array_equal(_placed(samples, -1), [2, 3])
+    np.testing.assert_array_equal(_shift_samples(samples, 2), [0, 0, 1, 2, 3])
+    np.testing.assert_array_equal(_shift_samples(samples, -1), [2, 3])
 
 
 @pytest.mark.parametrize(("degrees", "corner"), [(0, (0, 0)), (90, (1, 0)), (180, (1, 2)), (-90, (0, 1))])
 def test_a_turned_film_is_put_upright(degrees, corner):
     pixels = np.zeros((2, 3, 3), np.uint8)
     pixels[0, 0] = 255
-    upright = _upright(SimpleNamespace(rotation=degrees, to_ndarray=lambda format: pixels))
+    upright = _upright_pixels(SimpleNamespace(rotation=degrees, to_ndarray=lambda format: pixels))
     turned = {0: (0, 0), 90: (2, 0), 180: (1, 2), -90: (0, 1)}[degrees]  # counter-clockwise, by hand
     assert upright[turned].tolist() == [255, 255, 255], corner
 
 
 def test_no_such_file(tmp_path):
     with pytest.raises(InputError, match="there is no recording"):
-        list(read_pictures(tmp_path / "none.mkv"))
+        list(read_frames(tmp_path / "none.mkv"))
 
 
 def test_empty_file(tmp_path):
     (tmp_path / "a.mkv").touch()
     with pytest.raises(DataError, match="is empty"):
-        list(read_pictures(tmp_path / "a.mkv"))
+        list(read_frames(tmp_path / "a.mkv"))
 
 
 def test_text_that_calls_itself_a_film(tmp_path):
     (tmp_path / "a.mkv").write_text("no film at all\n" * 100)
     with pytest.raises(DataError, match="cannot be read as video or sound"):
-        list(read_pictures(tmp_path / "a.mkv"))
+        list(read_frames(tmp_path / "a.mkv"))
 
 
 def test_truncated_film(make_video, tmp_path: Path):
@@ -74,12 +74,12 @@ def test_truncated_film(make_video, tmp_path: Path):
     cut = tmp_path / "cut.mkv"
     cut.write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
     with pytest.raises(DataError, match="truncated"):
-        list(read_pictures(cut))
+        list(read_frames(cut))
 
 
 def test_no_pictures(make_video):
     with pytest.raises(DataError, match="holds no video"):
-        list(read_pictures(make_video("sound.mkv", n_frames=0, tone_s=1.0)))
+        list(read_frames(make_video("sound.mkv", n_frames=0, tone_s=1.0)))
 
 
 def test_no_sound(make_video):
@@ -97,7 +97,7 @@ def test_a_rate_that_counts_ticks_is_read_from_the_frames(tmp_path):
             frame.pts, frame.time_base = 40 * number, Fraction(1, 1000)
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
-    assert media_facts(path).fps == pytest.approx(25.0, rel=0.01)
+    assert read_media_info(path).fps == pytest.approx(25.0, rel=0.01)
 
 
 @pytest.mark.parametrize("name", ["bbaf2n.mkv", "copy.mp4"])

@@ -2,8 +2,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tts2face.video.media import Picture, media_facts, read_pictures
-from tts2face.video.streaming_tracker import FilmReader
+from tts2face.video.media import TimedFrame, read_frames, read_media_info
+from tts2face.video.streaming_tracker import StreamingTracker
 from tts2face.video.track import FaceTracker
 
 CLIP = "grid_s1/clips/bbaf2n.mkv"
@@ -11,24 +11,24 @@ CLIP = "grid_s1/clips/bbaf2n.mkv"
 
 def test_one_pass_reads_what_two_passes_read(shared_recordings: Path, face_model: Path) -> None:
     film = shared_recordings / CLIP
-    fps = media_facts(film).fps
-    twice = FaceTracker(face_model).track(lambda: (picture.pixels for picture in read_pictures(film)), fps)
-    once = list(FilmReader(face_model).sights(read_pictures(film), fps))
-    assert [sight.time for sight in once] == [picture.time for picture in read_pictures(film)]
+    fps = read_media_info(film).fps
+    twice = FaceTracker(face_model).track(lambda: (picture.pixels for picture in read_frames(film)), fps)
+    once = list(StreamingTracker(face_model).track(read_frames(film), fps))
+    assert [sight.time for sight in once] == [picture.time for picture in read_frames(film)]
     np.testing.assert_allclose([sight.points for sight in once], twice.points, atol=1e-3)  # pixels
 
 
 def test_blank_pictures_hold_no_face(face_model: Path) -> None:
-    blank = (Picture(i / 25, np.full((64, 64, 3), 90, np.uint8)) for i in range(3))
-    assert all(np.isnan(sight.points).all() for sight in FilmReader(face_model).sights(blank, 25.0))
+    blank = (TimedFrame(i / 25, np.full((64, 64, 3), 90, np.uint8)) for i in range(3))
+    assert all(np.isnan(sight.points).all() for sight in StreamingTracker(face_model).track(blank, 25.0))
 
 
 def test_faces_are_counted_and_changes_measured(shared_recordings: Path, face_model: Path) -> None:
-    plain = [picture.pixels for picture in read_pictures(shared_recordings / CLIP)][:26]
+    plain = [picture.pixels for picture in read_frames(shared_recordings / CLIP)][:26]
     plain[5] = plain[4]
     both = [np.concatenate([pixels, pixels[:, ::-1]], axis=1) for pixels in plain]
-    alone = list(FilmReader(face_model).sights(_film(plain), 25.0))
-    crowd = list(FilmReader(face_model).sights(_film(both), 25.0))
+    alone = list(StreamingTracker(face_model).track(_film(plain), 25.0))
+    crowd = list(StreamingTracker(face_model).track(_film(both), 25.0))
     assert [sight.n_faces for sight in alone if sight.n_faces is not None] == [1, 1, 1]
     assert [sight.n_faces for sight in crowd if sight.n_faces is not None] == [2, 2, 2]
     assert [number for number, sight in enumerate(alone) if sight.n_faces is not None] == [0, 12, 24]
@@ -40,12 +40,12 @@ def test_faces_are_counted_and_changes_measured(shared_recordings: Path, face_mo
 def test_landmarks_of_a_large_picture_lie_where_they_lie_in_a_small_one(
     shared_recordings: Path, face_model: Path
 ) -> None:
-    plain = [picture.pixels for picture in read_pictures(shared_recordings / CLIP)][:3]
+    plain = [picture.pixels for picture in read_frames(shared_recordings / CLIP)][:3]
     large = [pixels.repeat(8, axis=0).repeat(8, axis=1) for pixels in plain]
-    small, grown = (list(FilmReader(face_model).sights(_film(pictures), 25.0)) for pictures in (plain, large))
+    small, grown = (list(StreamingTracker(face_model).track(_film(pictures), 25.0)) for pictures in (plain, large))
     wanted = (small[1].points[:, :2] + 0.5) * 8 - 0.5
     np.testing.assert_allclose(grown[1].points[:, :2], wanted, atol=8 * 0.5)  # half a pixel of the small picture
 
 
-def _film(pictures: list[np.ndarray]) -> list[Picture]:
-    return [Picture(number / 25, pixels) for number, pixels in enumerate(pictures)]
+def _film(pictures: list[np.ndarray]) -> list[TimedFrame]:
+    return [TimedFrame(number / 25, pixels) for number, pixels in enumerate(pictures)]

@@ -6,13 +6,13 @@ import pytest
 from lexicon.errors import BackendError, DataError, InputError
 from tts2face.video import landmark_models as model
 from tts2face.video.blendshapes import BLENDSHAPES, READ_LANDMARKS, BlendshapeReader
-from tts2face.video.media import read_pictures
-from tts2face.video.track import Crop, FaceTracker, crop_around, smoothed_crops
+from tts2face.video.media import read_frames
+from tts2face.video.track import Crop, FaceTracker, crop_around, smooth_crops
 
 
 @pytest.fixture(scope="module")
 def clip(shared_recordings: Path) -> list[np.ndarray]:
-    return [picture.pixels for picture in read_pictures(shared_recordings / "grid_s1" / "clips" / "bbaf2n.mkv")]
+    return [picture.pixels for picture in read_frames(shared_recordings / "grid_s1" / "clips" / "bbaf2n.mkv")]
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +80,7 @@ def test_tables_of_the_blendshape_network():
 
 def test_squares_are_smoothed_without_lag_and_never_across_a_gap():
     line = [Crop(10.0 + i, 20.0, 100.0, 0.1) for i in range(40)]
-    smooth = smoothed_crops([*line, None, *line], 25.0)
+    smooth = smooth_crops([*line, None, *line], 25.0)
     assert smooth[40] is None
     inner = [crop.x for crop in smooth[15:25] if crop]
     np.testing.assert_allclose(
@@ -91,7 +91,7 @@ def test_squares_are_smoothed_without_lag_and_never_across_a_gap():
 
 def test_a_turn_through_half_a_circle_is_smooth():
     crops = [Crop(0.0, 0.0, 1.0, np.pi - 0.05), Crop(0.0, 0.0, 1.0, -np.pi + 0.05)] * 10
-    assert all(abs(crop.angle - np.pi) < 0.06 for crop in smoothed_crops(crops, 25.0) if crop)
+    assert all(abs(crop.angle - np.pi) < 0.06 for crop in smooth_crops(crops, 25.0) if crop)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.3, -1.2])

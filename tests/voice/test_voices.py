@@ -9,7 +9,7 @@ from lexicon.ipa import Segment, parse_ipa
 from lexicon.phones import PHONES
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.types import Speech, Waveform
-from tts2face.voice.engine import SpokenWord, Voice, at_volume, load_voice
+from tts2face.voice.engine import SpokenWord, Voice, apply_volume, load_voice
 from tts2face.voice.resample import resampled_speech
 
 SENTENCE = "Bob may move five big maps."
@@ -217,6 +217,6 @@ def test_a_piper_voice_without_settings_is_refused(tmp_path) -> None:
 
 
 def test_loud_sound_is_turned_down_as_a_whole() -> None:
-    loud = at_volume(np.array([0.5, -1.0, 0.25]), 2.0)
+    loud = apply_volume(np.array([0.5, -1.0, 0.25]), 2.0)
     assert loud == pytest.approx([0.5, -1.0, 0.25])
-    assert at_volume(np.array([0.25, -0.5]), 2.0) == pytest.approx([0.5, -1.0])
+    assert apply_volume(np.array([0.25, -0.5]), 2.0) == pytest.approx([0.5, -1.0])

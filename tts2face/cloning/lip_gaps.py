@@ -22,7 +22,7 @@ def facing_gaps(model: ShapeModel) -> FloatArray:
     return np.column_stack([per_mode, (model.mean[UPPER, 1] - model.mean[LOWER, 1]).astype(np.float64)])
 
 
-def parted_rest(model: ShapeModel, limits: NDArray[np.floating]) -> FloatArray:
+def rest_with_open_lips(model: ShapeModel, limits: NDArray[np.floating]) -> FloatArray:
     """(M,) parameters at rest; where tracked lips overlap there, as they may by some 0.1 mm, the nearest that do not.
 
     Raises
@@ -34,7 +34,7 @@ def parted_rest(model: ShapeModel, limits: NDArray[np.floating]) -> FloatArray:
     if (np.einsum("pm,m->p", gaps[:, :-1], rest) + gaps[:, -1] >= LEAST_GAP_MM).all():
         return rest
     any_gap = np.full((1, len(gaps)), UNBOUNDED_MM)
-    parted: FloatArray = nearest_allowed(rest[None], limits.astype(np.float64), gaps, any_gap)[0]
+    parted: FloatArray = nearest_valid_parameters(rest[None], limits.astype(np.float64), gaps, any_gap)[0]
     return parted
 
 
@@ -43,7 +43,7 @@ def contact_mm(model: ShapeModel) -> float:
     return CONTACT * float(np.linalg.norm(model.mean[EYE_OUTER_LEFT] - model.mean[EYE_OUTER_RIGHT]))
 
 
-def largest_gaps(seen: FloatArray, contact: float, at_rest: FloatArray) -> FloatArray:
+def gap_limits(seen: FloatArray, contact: float, at_rest: FloatArray) -> FloatArray:
     """(T, P) gaps that may not be exceeded, for the gaps (T, P) of a source brought to the same size.
 
     Lips that touch on the source, which is up to `contact` apart, are no further apart, or as at rest.
@@ -51,7 +51,7 @@ def largest_gaps(seen: FloatArray, contact: float, at_rest: FloatArray) -> Float
     return np.maximum(seen + STEEP * np.maximum(seen - contact, 0.0), at_rest)
 
 
-def nearest_allowed(wanted: FloatArray, limits: FloatArray, gaps: FloatArray, most: FloatArray) -> FloatArray:
+def nearest_valid_parameters(wanted: FloatArray, limits: FloatArray, gaps: FloatArray, most: FloatArray) -> FloatArray:
     """(T, M) parameters nearest to `wanted` within limits, with lips that do not cross and are not too far apart.
 
     Parameters

@@ -15,9 +15,9 @@ from tts2face.cloning.lip_gaps import (
     LEAST_GAP_MM,
     contact_mm,
     facing_gaps,
-    largest_gaps,
-    nearest_allowed,
-    parted_rest,
+    gap_limits,
+    nearest_valid_parameters,
+    rest_with_open_lips,
 )
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.talker import ShapeModel, Talker
@@ -35,7 +35,7 @@ ROUNDING = 1e-12  # an entry of a unit vector below this is a rounding error of 
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Cloning:
+class ParameterTransfer:
     """The prepared way from a source talker's shape parameters to a target's.
 
     Parameters
@@ -93,29 +93,29 @@ class Cloning:
         Each frame is the nearest to eq. 5 that keeps the limits, whose lips do not cross, and whose lips touch where
         the source's do; it does not depend on other frames.
         """
-        wanted = self.unlimited(source)
+        wanted = self.clone_unlimited(source)
         limits = self.limits.astype(np.float64)
         held = np.clip(wanted, -limits, limits)
-        most = largest_gaps(self._seen_gaps(source), self.contact, self.resting_gaps)
+        most = gap_limits(self._scaled_source_gaps(source), self.contact, self.resting_gaps)
         gaps = ordered_product(held, self.target_gaps[:, :-1].T) + self.target_gaps[:, -1]
         wrong = np.flatnonzero(((gaps < LEAST_GAP_MM) | (gaps > most)).any(axis=1))
-        held[wrong] = nearest_allowed(wanted[wrong], limits, self.target_gaps, most[wrong])
+        held[wrong] = nearest_valid_parameters(wanted[wrong], limits, self.target_gaps, most[wrong])
         return np.clip(held.astype(np.float32), -self.limits, self.limits)
 
-    def unlimited(self, source: NDArray[np.floating]) -> FloatArray:
+    def clone_unlimited(self, source: NDArray[np.floating]) -> FloatArray:
         """(T, q) parameters by eq. 5 alone, for (T, m) of the source's first m modes."""
         n_modes = source.shape[1]
         moved = source.astype(np.float64) - self.source_rest[:n_modes]
         return self.target_rest + ordered_product(moved, self.relation[:, :n_modes].T)
 
-    def _seen_gaps(self, source: NDArray[np.floating]) -> FloatArray:
+    def _scaled_source_gaps(self, source: NDArray[np.floating]) -> FloatArray:
         """(T, P) gaps of the source in the target's size."""
         n_modes = source.shape[1]
         others = ordered_product(self.source_gaps[:, n_modes:-1], self.source_rest[n_modes:]) + self.source_gaps[:, -1]
         return ordered_product(source.astype(np.float64), self.source_gaps[:, :n_modes].T) + others
 
 
-def cloning(source: ShapeModel, target: ShapeModel, *, gain: float = 1.0) -> Cloning:
+def build_parameter_transfer(source: ShapeModel, target: ShapeModel, *, gain: float = 1.0) -> ParameterTransfer:
     """Prepare the way from a source talker to a target.
 
     Parameters
@@ -133,16 +133,18 @@ def cloning(source: ShapeModel, target: ShapeModel, *, gain: float = 1.0) -> Clo
     if not (math.isfinite(gain) and gain >= 0.0):
         raise InputError(f"the gain must be 0 or more, not {gain}; 1 leaves the motion as large as it is")
     size = face_size(target) / face_size(source)
-    rests, target_gaps = (_rest(source), _rest(target)), facing_gaps(target)
-    relation = np.round(inner_product_map(_rows(source), _rows(target)), 9)  # last bits depend on the threads of BLAS
-    return Cloning(
+    rests, target_gaps = (_rest_of_model(source), _rest_of_model(target)), facing_gaps(target)
+    relation = np.round(
+        inner_product_map(_flat_basis(source), _flat_basis(target)), 9
+    )  # last bits depend on the threads of BLAS
+    return ParameterTransfer(
         relation=gain * size * relation,
         size=size,
         source_rest=rests[0],
         target_rest=rests[1],
         n_source=source.n_speech,
         n_target=target.n_speech,
-        limits=largest_parameters(target),
+        limits=parameter_limits(target),
         source_gaps=size * facing_gaps(source),
         target_gaps=target_gaps,
         resting_gaps=ordered_product(target_gaps[:, :-1], rests[1]) + target_gaps[:, -1],
@@ -150,7 +152,7 @@ def cloning(source: ShapeModel, target: ShapeModel, *, gain: float = 1.0) -> Clo
     )
 
 
-def append_missing(source: ShapeModel, target: ShapeModel, n: int | None = None) -> ShapeModel:
+def append_missing_components(source: ShapeModel, target: ShapeModel, n: int | None = None) -> ShapeModel:
     """The target's model with the components that the source moves and the target cannot.
 
     Parameters
@@ -176,9 +178,9 @@ def append_missing(source: ShapeModel, target: ShapeModel, n: int | None = None)
     -----
     Principal components of what is lost, weighted with the source's spread. Source: T07, section 3.1, last paragraph.
     """
-    size, own, speech = face_size(target) / face_size(source), _rows(target), source.n_speech
-    mouth, mouth_spread = _lost(source, slice(None, speech), own)
-    other, other_spread = _lost(source, slice(speech, None), np.concatenate([own, mouth]))
+    size, own, speech = face_size(target) / face_size(source), _flat_basis(target), source.n_speech
+    mouth, mouth_spread = _missing_components(source, slice(None, speech), own)
+    other, other_spread = _missing_components(source, slice(speech, None), np.concatenate([own, mouth]))
     found = size * np.concatenate([mouth_spread, other_spread])
     if n is not None and not 0 <= n <= len(found):
         raise InputError(f"{len(found)} components of the source are missing in the target, not {n}; ask for fewer")
@@ -196,7 +198,7 @@ def append_missing(source: ShapeModel, target: ShapeModel, n: int | None = None)
     return ShapeModel(target.mean, basis, joined(target.spread, found), target.n_speech + len(of_mouth), rest)
 
 
-def with_missing(source: ShapeModel, target: Talker) -> Talker:
+def extend_talker(source: ShapeModel, target: Talker) -> Talker:
     """The target with the components that the source moves and it cannot; its own utterances and plate leave them at 0.
 
     Raises
@@ -204,7 +206,7 @@ def with_missing(source: ShapeModel, target: Talker) -> Talker:
     DataError
         A model does not have the 478 landmarks.
     """
-    model, before = append_missing(source, target.model), target.model
+    model, before = append_missing_components(source, target.model), target.model
     n_mouth = model.n_speech - before.n_speech
     n_other = len(model.spread) - len(before.spread) - n_mouth
 
@@ -216,7 +218,7 @@ def with_missing(source: ShapeModel, target: Talker) -> Talker:
     appearance = target.appearance
     if appearance is not None:
         appearance = replace(appearance, plate=replace(appearance.plate, shape=widened(appearance.plate.shape)))
-    return replace(target, model=model, utterances=utterances, appearance=appearance, network=None, drives={})
+    return replace(target, model=model, utterances=utterances, appearance=appearance, network=None, audio_maps={})
 
 
 def face_size(model: ShapeModel) -> float:
@@ -233,36 +235,36 @@ def face_size(model: ShapeModel) -> float:
     return float(np.sqrt(((shape - shape.mean(axis=0)) ** 2).sum(axis=1).mean()))
 
 
-def largest_parameters(model: ShapeModel) -> NDArray[np.float32]:
+def parameter_limits(model: ShapeModel) -> NDArray[np.float32]:
     """(M,) largest numbers that are not above `SPREADS` times the spread."""
     exact = SPREADS * model.spread.astype(np.float64)
     rounded = exact.astype(np.float32)
     return np.where(rounded > exact, np.nextafter(rounded, np.float32(0)), rounded)
 
 
-def _rest(model: ShapeModel) -> FloatArray:
-    limits = largest_parameters(model)
+def _rest_of_model(model: ShapeModel) -> FloatArray:
+    limits = parameter_limits(model)
     beyond = np.flatnonzero(np.abs(model.rest) > limits)
     if len(beyond):
         raise DataError(f"a talker rests beyond {SPREADS:g} spreads in mode {beyond[0]}; build it again")
-    return parted_rest(model, limits)
+    return rest_with_open_lips(model, limits)
 
 
 def _channels(n_modes: int) -> tuple[str, ...]:
     return tuple(f"shape{i}" for i in range(n_modes))
 
 
-def _rows(model: ShapeModel) -> FloatArray:
+def _flat_basis(model: ShapeModel) -> FloatArray:
     """(M, 3 L) basis vectors."""
     return model.basis.reshape(len(model.basis), -1).astype(np.float64)
 
 
-def _lost(source: ShapeModel, block: slice, span: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _missing_components(source: ShapeModel, block: slice, span: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(k, 3 L) orthonormal components of some of the source's modes outside `span`, and how far it moves along them.
 
     The distances are root mean squares from the source's rest. The largest entry of each component is positive.
     """
-    modes = _rows(source)[block]
+    modes = _flat_basis(source)[block]
     for _ in range(2):  # once leaves rounding errors, twice is enough
         modes = modes - (modes @ span.T) @ span
     moved = np.concatenate([source.spread[block, None] * modes, source.rest[None, block] @ modes])

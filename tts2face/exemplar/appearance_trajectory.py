@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar import blending
-from tts2face.exemplar.synthesis import TokenSelection, VisualVoice, read_at_frames
-from tts2face.exemplar.token_search import Found
+from tts2face.exemplar.synthesis import ExemplarModel, TokenSelection, read_at_frames
+from tts2face.exemplar.token_search import TokenRanking
 from tts2face.exemplar.tokens import Tokens
 from tts2face.models.talker import Talker, require_appearance
 from tts2face.types import Trajectory
@@ -17,7 +17,7 @@ LOOKS_BLENDED = 3  # exemplars; more of them blur teeth and tongue (docs/decisio
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Looks:
+class AppearanceExemplars:
     """A talker's recorded looks, ready for synthesis.
 
     The `frames` of ``tokens`` are looks (F, A); ``rest`` (A,) are those of silence, ``spread`` (A,) their deviations.
@@ -29,7 +29,7 @@ class Looks:
     channels: tuple[str, ...]
 
 
-def looks_of(talker: Talker, voice: VisualVoice) -> Looks:
+def build_appearance_exemplars(talker: Talker, voice: ExemplarModel) -> AppearanceExemplars:
     """Index the looks of a talker who has an appearance.
 
     Raises
@@ -40,28 +40,34 @@ def looks_of(talker: Talker, voice: VisualVoice) -> Looks:
     appearance = require_appearance(talker)
     frames = np.concatenate([spoken.looks for spoken in talker.utterances if spoken.looks is not None])
     spread = np.maximum(appearance.spread, 1e-6).astype(np.float32)
-    silent = np.concatenate([_silent(spoken.phones, len(spoken.shape), talker.fps) for spoken in talker.utterances])
+    silent = np.concatenate(
+        [_silent_frames(spoken.phones, len(spoken.shape), talker.fps) for spoken in talker.utterances]
+    )
     still = frames[silent] if silent.any() else frames
     rest = np.median(still, axis=0).astype(np.float32)
-    return Looks(replace(voice.tokens, frames=frames.astype(np.float32)), spread, rest, appearance.channels)
+    return AppearanceExemplars(
+        replace(voice.tokens, frames=frames.astype(np.float32)), spread, rest, appearance.channels
+    )
 
 
-def looks_trajectory(selection: TokenSelection, looks: Looks, *, fps: float, n_frames: int) -> Trajectory:
+def appearance_trajectory(
+    selection: TokenSelection, looks: AppearanceExemplars, *, fps: float, n_frames: int
+) -> Trajectory:
     """Looks for phones in time, from the very tokens that move the lips; arguments as `blend_trajectory`."""
     phones, targets = selection.phones, selection.targets
     options = replace(selection.options, k=min(selection.options.k, LOOKS_BLENDED), contacts=False)
-    found = Found(selection.found.tokens[:, : options.k], selection.found.scores[:, : options.k])
+    found = TokenRanking(selection.found.tokens[:, : options.k], selection.found.scores[:, : options.k])
     frame_times = np.arange(n_frames) / fps
     n_instants = int(np.ceil(max(phones.end, frame_times[-1]) * blending.CLOCK_HZ)) + 2
     weights = blending.exemplar_weights(found.scores, options.sharpness)
-    pieces = blending.averaged_pieces(looks.tokens, found.tokens, weights, looks.spread, options)
-    joined, told = blending.joined_pieces(pieces, targets, n_instants, options)
+    pieces = blending.average_tokens(looks.tokens, found.tokens, weights, looks.spread, options)
+    joined, told = blending.join_averages(pieces, targets, n_instants, options)
     made = np.where(told[:, None], joined * looks.spread, looks.rest)
-    made = blending.smoothed(made, options.smoothing_s, blending.CLOCK_HZ)
+    made = blending.gaussian_smooth(made, options.smoothing_s, blending.CLOCK_HZ)
     return Trajectory(looks.channels, read_at_frames(made, phones, frame_times, looks.rest), fps)
 
 
-def _silent(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.bool_]:
+def _silent_frames(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.bool_]:
     """(T,) frames within silence."""
     at = np.searchsorted(phones.edges, np.arange(n_frames) / fps, side="right") - 1
     labels = np.array([label == SILENCE for label in phones.phones])

@@ -9,7 +9,7 @@ from tts2face.compilation import kernel
 from tts2face.exemplar.options import SynthesisOptions
 from tts2face.exemplar.phone_substitution import Targets
 from tts2face.exemplar.recorded_motion import read_motion
-from tts2face.exemplar.time_warping import lay_over
+from tts2face.exemplar.time_warping import warp_to_reference
 from tts2face.exemplar.tokens import Tokens
 
 CLOCK_HZ = 100.0  # instants at which motion is made; lips move below 15 Hz, so nothing is lost
@@ -19,7 +19,7 @@ LEAST_SPREAD = 0.15  # of a parameter's spread: exemplars that happen to agree a
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pieces:
+class AveragedTokens:
     """Averaged exemplars of N targets at S knots: mean and variance (N, S, D), both in units of the spread."""
 
     mean: NDArray[np.float32]
@@ -34,13 +34,13 @@ def exemplar_weights(scores: NDArray[np.float64], sharpness: float) -> NDArray[n
     return np.asarray(weights / weights.sum(1, keepdims=True))
 
 
-def averaged_pieces(
+def average_tokens(
     tokens: Tokens,
     chosen: NDArray[np.int32],
     weights: NDArray[np.float64],
     spread: NDArray[np.float32],
     options: SynthesisOptions,
-) -> Pieces:
+) -> AveragedTokens:
     """Average of the chosen tokens of each target, laid knot on knot.
 
     Parameters
@@ -59,31 +59,31 @@ def averaged_pieces(
     knots = np.concatenate([part + np.arange(KNOTS) / KNOTS for part in parts] + [[parts[-1] + 1.0]])
     shape = (len(chosen), len(knots), tokens.frames.shape[1])
     mean, square = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
-    _average(
+    _accumulate_average(
         (tokens.frames, tokens.first_frame, tokens.utterance, tokens.spans, tokens.fps),
         (chosen, weights, knots, 1.0 / spread, ALIGN_BAND if options.align else 0),
         mean,
         square,
     )
-    return Pieces(mean, np.maximum(square - np.square(mean), np.float32(0.0)))
+    return AveragedTokens(mean, np.maximum(square - np.square(mean), np.float32(0.0)))
 
 
 @kernel
-def _average(corpus, plan, mean, square):  # type: ignore[no-untyped-def]
+def _accumulate_average(corpus, plan, mean, square):  # type: ignore[no-untyped-def]
     chosen, weights, knots, scale, band = plan
     best, piece, laid = np.zeros_like(mean[0]), np.zeros_like(mean[0]), np.zeros_like(mean[0])
     for n in range(len(chosen)):
         for e in range(chosen.shape[1]):
             if chosen[n, e] < 0 or weights[n, e] == 0.0:
                 continue
-            _read_piece(corpus, chosen[n, e], knots, scale, best if e == 0 else piece)
+            _sample_token(corpus, chosen[n, e], knots, scale, best if e == 0 else piece)
             if e > 0 and band > 0:
-                lay_over(piece, best, scale, band, laid)
-            _add(best if e == 0 else (laid if band > 0 else piece), weights[n, e], mean[n], square[n])
+                warp_to_reference(piece, best, scale, band, laid)
+            _add_weighted(best if e == 0 else (laid if band > 0 else piece), weights[n, e], mean[n], square[n])
 
 
 @kernel
-def _read_piece(corpus, token, knots, scale, piece):  # type: ignore[no-untyped-def]
+def _sample_token(corpus, token, knots, scale, piece):  # type: ignore[no-untyped-def]
     """Write a token's motion at the knots, in units of the spread, into (S, D) `piece`."""
     frames, first_frame, utterance, spans, fps = corpus
     first, last = first_frame[utterance[token]], first_frame[utterance[token] + 1]
@@ -96,15 +96,15 @@ def _read_piece(corpus, token, knots, scale, piece):  # type: ignore[no-untyped-
 
 
 @kernel
-def _add(piece, weight, mean, square):  # type: ignore[no-untyped-def]
+def _add_weighted(piece, weight, mean, square):  # type: ignore[no-untyped-def]
     for s in range(piece.shape[0]):
         for d in range(piece.shape[1]):
             mean[s, d] += weight * piece[s, d]
             square[s, d] += weight * piece[s, d] * piece[s, d]
 
 
-def joined_pieces(
-    pieces: Pieces, targets: Targets, n_instants: int, options: SynthesisOptions
+def join_averages(
+    pieces: AveragedTokens, targets: Targets, n_instants: int, options: SynthesisOptions
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """(n, D) motion at the instants ``i / CLOCK_HZ`` in units of the spread, and (n,) whether any piece tells it.
 
@@ -113,13 +113,13 @@ def joined_pieces(
     """
     total = np.zeros((n_instants, pieces.mean.shape[2]), np.float32)
     weight = np.zeros_like(total)
-    _join((pieces.mean, pieces.variance, targets.spans), options.overlap, options.precision, total, weight)
+    _overlap_add((pieces.mean, pieces.variance, targets.spans), options.overlap, options.precision, total, weight)
     told = weight[:, 0] > 0
     return np.where(told[:, None], total / np.where(told[:, None], weight, 1.0), 0.0).astype(np.float32), told
 
 
 @kernel
-def _join(pieces, overlap, precision, total, weight):  # type: ignore[no-untyped-def]
+def _overlap_add(pieces, overlap, precision, total, weight):  # type: ignore[no-untyped-def]
     mean, variance, spans = pieces
     n_knots, n_dims = mean.shape[1:]
     n_parts = 3 if overlap else 1
@@ -144,7 +144,7 @@ def _join(pieces, overlap, precision, total, weight):  # type: ignore[no-untyped
                 weight[i, d] += w
 
 
-def smoothed(values: NDArray[np.floating], sigma_s: float, rate_hz: float) -> NDArray[np.float32]:
+def gaussian_smooth(values: NDArray[np.floating], sigma_s: float, rate_hz: float) -> NDArray[np.float32]:
     """(T, D) values at `rate_hz`, smoothed by a Gaussian of `sigma_s` seconds; beyond the ends they stand still.
 
     The width is in seconds, so the same motion at another rate is smoothed alike.

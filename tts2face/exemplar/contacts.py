@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.phones import phone_of
+from lexicon.phones import look_up_phone
 from tts2face.compilation import kernel
 from tts2face.exemplar.tokens import Tokens
 
@@ -19,13 +19,13 @@ class ContactRule:
     is gap enough: only a motion that stays farther apart is drawn to the pose.
     """
 
-    closer: float
+    pose_share: float
     enough: float
 
 
 # As many lips touch as in recordings (docs/decisions.md). Some bilabials close between two frames, so not all exemplars
 # tell the pose. Labiodentals leave a gap that varies: drawing each to the mean closes those that were recorded open.
-RULES = {"bilabial": ContactRule(closer=0.7, enough=0.0), "labiodental": ContactRule(closer=1.0, enough=0.75)}
+RULES = {"bilabial": ContactRule(pose_share=0.7, enough=0.0), "labiodental": ContactRule(pose_share=1.0, enough=0.75)}
 NON_CONTACTS = frozenset({"approximant"})  # narrowed, not closed
 WINDOW_S = 0.03  # a closure may lie this far outside its phone's edges (video frames are 40 ms, edges +- 10 ms)
 HOLD_S = 0.03  # lips stay together at least this long: shorter, and the touch falls between two frames at 30 fps
@@ -33,7 +33,7 @@ EASE_S = 0.05  # way into and out of it; longer eats into the vowels (0.06: r of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Gap:
+class LipGap:
     """Distance between two landmarks as a linear model sees it: ``|rest + parameters @ basis|``, (3,) and (D, 3)."""
 
     rest: NDArray[np.float32]
@@ -46,7 +46,7 @@ class Gap:
 
 def contact_rule(label: str) -> ContactRule | None:
     """What counts as a phone's contact; None for a phone without one."""
-    phone = phone_of(label)
+    phone = look_up_phone(label)
     return None if phone.manner in NON_CONTACTS else RULES.get(phone.place)
 
 
@@ -63,7 +63,7 @@ class Contacts:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Exemplars:
+class ChosenExemplars:
     """The tokens (N, k) of a talker that were chosen for N phones, and their weights (N, k)."""
 
     tokens: Tokens
@@ -71,7 +71,9 @@ class Exemplars:
     weights: NDArray[np.float64]
 
 
-def contacts_told(exemplars: Exemplars, gap: Gap, spans: NDArray[np.float64], rules: Sequence[ContactRule]) -> Contacts:
+def find_contacts(
+    exemplars: ChosenExemplars, gap: LipGap, spans: NDArray[np.float64], rules: Sequence[ContactRule]
+) -> Contacts:
     """The contacts of N phones with spans (N, 2) in seconds, by a rule for each.
 
     A pose is the average of the closer exemplars, each at the frame where its own lips are closest: a tenth of the
@@ -85,7 +87,7 @@ def contacts_told(exemplars: Exemplars, gap: Gap, spans: NDArray[np.float64], ru
     sorted_weights = np.take_along_axis(weights, order, axis=1)
     closer_than = np.cumsum(sorted_weights, axis=1) - sorted_weights
     kept = np.zeros_like(weights)
-    tells = closer_than < np.array([rule.closer for rule in rules])[:, None]
+    tells = closer_than < np.array([rule.pose_share for rule in rules])[:, None]
     np.put_along_axis(kept, order, np.where(tells, sorted_weights, 0.0), axis=1)
     kept /= kept.sum(axis=1, keepdims=True)
     poses = np.asarray(np.einsum("nk,nkd->nd", kept, tokens.frames[rows]), np.float32)
@@ -128,7 +130,9 @@ def _closest_row(frames, low, high, gap):  # type: ignore[no-untyped-def]
     return closest, least
 
 
-def with_contacts(values: NDArray[np.float32], contacts: Contacts, gap: Gap, rate_hz: float) -> NDArray[np.float32]:
+def enforce_contacts(
+    values: NDArray[np.float32], contacts: Contacts, gap: LipGap, rate_hz: float
+) -> NDArray[np.float32]:
     """(T, D) values at `rate_hz` whose lips come close enough in every contact.
 
     Where the lips are closest already, the motion is drawn to the exemplars' pose: fully for `HOLD_S`, easing in and

@@ -7,7 +7,7 @@ import numpy as np
 
 from lexicon.sequence import SILENCE
 from tts2face.exemplar.blending import exemplar_weights
-from tts2face.exemplar.synthesis import TokenSelection, VisualVoice
+from tts2face.exemplar.synthesis import ExemplarModel, TokenSelection
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class UsedToken:
 
 
 @dataclass(frozen=True, slots=True)
-class ShownPhone:
+class PhoneExplanation:
     """A phone, what was shown for it, in which context, and the tokens used, best first.
 
     ``shown`` differs from ``phone`` where the talker never said it. A phone without a shape of its own (h) and silence
@@ -44,7 +44,7 @@ class ShownPhone:
     tokens: tuple[UsedToken, ...]
 
 
-def explain_selection(selection: TokenSelection, voice: VisualVoice) -> tuple[ShownPhone, ...]:
+def explain_selection(selection: TokenSelection, voice: ExemplarModel) -> tuple[PhoneExplanation, ...]:
     """For each phone of a selection, the recorded tokens that move the lips."""
     phones, targets, found, options = selection.phones, selection.targets, selection.found, selection.options
     weights = exemplar_weights(found.scores, options.sharpness)
@@ -53,17 +53,17 @@ def explain_selection(selection: TokenSelection, voice: VisualVoice) -> tuple[Sh
     for at, (label, source) in enumerate(zip(targets.labels, targets.source, strict=True)):
         here = at + options.context
         used = tuple(
-            _used(voice, int(token), float(score), float(weight), options.context)
+            _token_record(voice, int(token), float(score), float(weight), options.context)
             for token, score, weight in zip(found.tokens[at], found.scores[at], weights[at], strict=True)
             if token >= 0
         )
         start, end = float(targets.spans[at, 1]), float(targets.spans[at, 2])
         left, right = padded[at:here], padded[here + 1 : here + 1 + options.context]
-        shown.append(ShownPhone(phones.phones[source], start, end, label, left, right, used))
+        shown.append(PhoneExplanation(phones.phones[source], start, end, label, left, right, used))
     return tuple(shown)
 
 
-def _used(voice: VisualVoice, token: int, score: float, weight: float, n_context: int) -> UsedToken:
+def _token_record(voice: ExemplarModel, token: int, score: float, weight: float, n_context: int) -> UsedToken:
     tokens = voice.tokens
     around = [tokens.inventory[number] for number in tokens.context[token, : 2 * n_context]]
     _, start, end, _ = np.round(tokens.spans[token], 4).tolist()
@@ -71,12 +71,12 @@ def _used(voice: VisualVoice, token: int, score: float, weight: float, n_context
     return UsedToken(name, start, end, tuple(around[0::2][::-1]), tuple(around[1::2]), score, weight)
 
 
-def explanation_json(shown: tuple[ShownPhone, ...]) -> list[dict[str, Any]]:
+def explanation_json(shown: tuple[PhoneExplanation, ...]) -> list[dict[str, Any]]:
     """Plain lists and dictionaries."""
     return [asdict(phone) for phone in shown]
 
 
-def explanation_text(shown: tuple[ShownPhone, ...], *, n_tokens: int = 5) -> str:
+def explanation_text(shown: tuple[PhoneExplanation, ...], *, n_tokens: int = 5) -> str:
     """One paragraph a phone with its best tokens, for people."""
     lines = []
     for phone in shown:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lexicon.phones import nearest_phones
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.exemplar.tokens import PAUSE_REACH_S, reaching_spans
+from tts2face.exemplar.tokens import PAUSE_REACH_S, spans_with_reach
 
 # Sounds of the throat have no shape of their own: lips and tongue already stand as for what follows.
 TRANSPARENT = frozenset({"h", "ɦ", "ʔ"})
@@ -36,7 +36,7 @@ class Targets:
 
 
 @functools.lru_cache(maxsize=4096)
-def stand_ins(label: str, inventory: tuple[str, ...]) -> tuple[str, ...]:
+def substitute_phones(label: str, inventory: tuple[str, ...]) -> tuple[str, ...]:
     """What the talker shows for a phone: itself, its nearest, its parts' nearest; nothing for a transparent one.
 
     Raises
@@ -49,7 +49,7 @@ def stand_ins(label: str, inventory: tuple[str, ...]) -> tuple[str, ...]:
     return nearest_phones(label, inventory)
 
 
-def targets_of(phones: PhoneSequence, inventory: tuple[str, ...]) -> Targets:
+def build_targets(phones: PhoneSequence, inventory: tuple[str, ...]) -> Targets:
     """Targets of a phone sequence.
 
     The time of a transparent phone goes to the next phone, or before silence to the last one. A silence between speech
@@ -60,15 +60,15 @@ def targets_of(phones: PhoneSequence, inventory: tuple[str, ...]) -> Targets:
     InputError
         A label is not in the phone table, or the inventory has no phone but silence.
     """
-    rows = _stand_in_rows(phones, inventory)
-    rows = [part for at, row in enumerate(rows) for part in _near_speech(row, at > 0, at + 1 < len(rows))]
+    rows = _substitution_rows(phones, inventory)
+    rows = [part for at, row in enumerate(rows) for part in _cut_to_speech(row, at > 0, at + 1 < len(rows))]
     starts, ends = np.array([row[1] for row in rows]), np.array([row[2] for row in rows])
     return Targets(
-        tuple(row[0] for row in rows), reaching_spans(starts, ends), np.array([row[3] for row in rows], np.int64)
+        tuple(row[0] for row in rows), spans_with_reach(starts, ends), np.array([row[3] for row in rows], np.int64)
     )
 
 
-def shown_phones(targets: Targets) -> PhoneSequence:
+def target_phones(targets: Targets) -> PhoneSequence:
     """The targets as phones in time from 0 s on, with silence where there is none."""
     labels: list[str] = []
     edges = [0.0]
@@ -84,12 +84,12 @@ def shown_phones(targets: Targets) -> PhoneSequence:
 Row = tuple[str, float, float, int]  # label, start, end, index of the wanted phone
 
 
-def _stand_in_rows(phones: PhoneSequence, inventory: tuple[str, ...]) -> list[Row]:
+def _substitution_rows(phones: PhoneSequence, inventory: tuple[str, ...]) -> list[Row]:
     rows: list[Row] = []
     waiting: float | None = None  # onset of a transparent phone
     for at, label in enumerate(phones.phones):
         start, end = float(phones.edges[at]), float(phones.edges[at + 1])
-        shown = stand_ins(label, inventory)
+        shown = substitute_phones(label, inventory)
         if not shown:
             waiting = start if waiting is None else waiting
             continue
@@ -105,7 +105,7 @@ def _stand_in_rows(phones: PhoneSequence, inventory: tuple[str, ...]) -> list[Ro
     return rows
 
 
-def _near_speech(row: Row, behind_speech: bool, before_speech: bool) -> list[Row]:
+def _cut_to_speech(row: Row, behind_speech: bool, before_speech: bool) -> list[Row]:
     label, start, end, source = row
     if label != SILENCE or end - start <= PAUSE_REACH_S:
         return [row]

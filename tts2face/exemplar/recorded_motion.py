@@ -30,9 +30,7 @@ def read_motion(frames: FloatArray, first: int, last: int, at: float, out: Float
 
 
 @kernel
-def sampled_tokens(
-    frames: FloatArray, bounds: NDArray[np.int64], positions: NDArray[np.float64]
-) -> NDArray[np.float32]:
+def sample_tokens(frames: FloatArray, bounds: NDArray[np.int64], positions: NDArray[np.float64]) -> NDArray[np.float32]:
     """(N, S, D) recorded motion of N tokens at S frame positions each.
 
     Parameters

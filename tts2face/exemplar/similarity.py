@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.exemplar.recorded_motion import sampled_tokens
+from tts2face.exemplar.recorded_motion import sample_tokens
 from tts2face.exemplar.tokens import Tokens
 
 N_SAMPLES = 5  # per token
@@ -16,7 +16,7 @@ SHARPNESS = 1.4  # similarity at the mean distance between phones is exp(-SHARPN
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Similarity:
+class PhoneSimilarity:
     """How alike P phones look: `matrix` (P, P) in [0, 1], symmetric, 1 on the diagonal."""
 
     phones: tuple[str, ...]
@@ -35,12 +35,12 @@ def token_samples(tokens: Tokens, n_samples: int = N_SAMPLES) -> NDArray[np.floa
     starts, ends = tokens.spans[:, 1:2], tokens.spans[:, 2:3]
     positions = (starts + (ends - starts) * steps) * tokens.fps
     bounds = np.stack([tokens.first_frame[tokens.utterance], tokens.first_frame[tokens.utterance + 1]], axis=1)
-    return np.asarray(sampled_tokens(tokens.frames, bounds, positions))
+    return np.asarray(sample_tokens(tokens.frames, bounds, positions))
 
 
 def phone_similarity(
     samples: NDArray[np.floating], phone: NDArray[np.integer], phones: tuple[str, ...], spread: NDArray[np.floating]
-) -> Similarity:
+) -> PhoneSimilarity:
     """Similarity of phones from their tokens' trajectories.
 
     Parameters
@@ -73,7 +73,7 @@ def phone_similarity(
     if not (spread > 0).all():
         raise InputError(f"every parameter's spread must be above 0; number {int(np.argmin(spread))} is not")
     counts = np.bincount(phone, minlength=len(phones)).astype(np.float64)
-    mean, variance = _statistics(samples / spread, phone, counts)
+    mean, variance = _phone_statistics(samples / spread, phone, counts)
     share = np.square(spread.astype(np.float64))
     consistency = 2.0 / (variance[:, None] + variance[None, :])
     weight = share * consistency
@@ -84,10 +84,10 @@ def phone_similarity(
     scale = between.sum() / max(1, said.sum() * (said.sum() - 1))
     matrix = np.where(np.outer(said, said), np.exp(-SHARPNESS * distance / (scale if scale > 0 else 1.0)), 0.0)
     np.fill_diagonal(matrix, 1.0)
-    return Similarity(phones, matrix)
+    return PhoneSimilarity(phones, matrix)
 
 
-def _statistics(
+def _phone_statistics(
     z: NDArray[np.floating], phone: NDArray[np.integer], counts: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(P, S, D) mean and variance of the tokens of each phone; few tokens borrow the variance within all phones."""

@@ -8,14 +8,21 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar import blending
-from tts2face.exemplar.contacts import Exemplars, Gap, contact_rule, contacts_told, with_contacts
+from tts2face.exemplar.contacts import ChosenExemplars, LipGap, contact_rule, enforce_contacts, find_contacts
 from tts2face.exemplar.options import SynthesisOptions
-from tts2face.exemplar.phone_substitution import Targets, shown_phones, targets_of
-from tts2face.exemplar.similarity import Similarity, phone_similarity, token_samples
-from tts2face.exemplar.token_search import ContextIndex, Found, Wanted, best_tokens, context_index, log_durations
-from tts2face.exemplar.tokens import Tokens, contexts, tokens_of
+from tts2face.exemplar.phone_substitution import Targets, build_targets, target_phones
+from tts2face.exemplar.similarity import PhoneSimilarity, phone_similarity, token_samples
+from tts2face.exemplar.token_search import (
+    ContextIndex,
+    TokenQuery,
+    TokenRanking,
+    best_tokens,
+    context_index,
+    log_durations,
+)
+from tts2face.exemplar.tokens import Tokens, collect_tokens, phone_contexts
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
-from tts2face.models.phone_network import WindowNetwork
+from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker, speech_channels
 from tts2face.types import Trajectory
 
@@ -26,7 +33,7 @@ DEFAULT_OPTIONS = SynthesisOptions()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class VisualVoice:
+class ExemplarModel:
     """A talker made ready for synthesis: tokens, their index, the similarity of phones, the pose at rest.
 
     ``spread``, ``rest`` and ``speaking``, the mean pose while speaking, are (D,), of the speech parameters; ``names``
@@ -35,31 +42,31 @@ class VisualVoice:
 
     tokens: Tokens
     index: ContextIndex
-    similarity: Similarity
+    similarity: PhoneSimilarity
     spread: NDArray[np.float32]
     rest: NDArray[np.float32]
-    speaking: NDArray[np.float32]
-    lip_gap: Gap
+    mean_speaking_pose: NDArray[np.float32]
+    lip_gap: LipGap
     channels: tuple[str, ...]
     names: tuple[str, ...]
-    network: WindowNetwork | None
+    network: PhoneNetwork | None
 
 
-def visual_voice(talker: Talker) -> VisualVoice:
+def build_exemplar_model(talker: Talker) -> ExemplarModel:
     """Index a talker's tokens and measure the similarity of the phones; once for any number of texts."""
     model, n_speech = talker.model, talker.model.n_speech
-    tokens = tokens_of(talker)
+    tokens = collect_tokens(talker)
     spread = np.maximum(model.spread[:n_speech], 1e-6).astype(np.float32)
     upper, lower = UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID
     similarity = phone_similarity(token_samples(tokens), tokens.phone, tokens.inventory, spread)
-    return VisualVoice(
+    return ExemplarModel(
         tokens,
         context_index(tokens, similarity.matrix),
         similarity,
         spread,
         model.rest[:n_speech].astype(np.float32),
         mean_speaking_pose(talker),
-        Gap(
+        LipGap(
             np.ascontiguousarray(model.mean[upper] - model.mean[lower]),
             np.ascontiguousarray(model.basis[:n_speech, upper] - model.basis[:n_speech, lower]),
         ),
@@ -91,12 +98,12 @@ class TokenSelection:
 
     phones: PhoneSequence
     targets: Targets
-    found: Found
+    found: TokenRanking
     options: SynthesisOptions
 
 
 def select_tokens(
-    phones: PhoneSequence, voice: VisualVoice, options: SynthesisOptions = DEFAULT_OPTIONS
+    phones: PhoneSequence, voice: ExemplarModel, options: SynthesisOptions = DEFAULT_OPTIONS
 ) -> TokenSelection:
     """Search the recorded tokens for each phone.
 
@@ -109,10 +116,10 @@ def select_tokens(
         raise InputError(f"phones to be animated begin at 0 s, not at {phones.start} s; shift them first")
     tokens = voice.tokens
     number = {label: at for at, label in enumerate(tokens.inventory)}
-    targets = targets_of(phones, tokens.inventory)
+    targets = build_targets(phones, tokens.inventory)
     labels = np.array([number[label] for label in targets.labels], np.int32)
-    around = contexts(labels, np.zeros(len(labels), np.int32), number[SILENCE])
-    wanted = Wanted(labels, around, log_durations(targets.spans))
+    around = phone_contexts(labels, np.zeros(len(labels), np.int32), number[SILENCE])
+    wanted = TokenQuery(labels, around, log_durations(targets.spans))
     found = best_tokens(
         wanted,
         voice.index,
@@ -125,7 +132,7 @@ def select_tokens(
 
 def speech_trajectory(
     phones: PhoneSequence,
-    voice: VisualVoice,
+    voice: ExemplarModel,
     *,
     fps: float,
     n_frames: int,
@@ -135,7 +142,7 @@ def speech_trajectory(
     return blend_trajectory(select_tokens(phones, voice, options), voice, fps=fps, n_frames=n_frames)
 
 
-def blend_trajectory(selection: TokenSelection, voice: VisualVoice, *, fps: float, n_frames: int) -> Trajectory:
+def blend_trajectory(selection: TokenSelection, voice: ExemplarModel, *, fps: float, n_frames: int) -> Trajectory:
     """Motion of the talker's speech parameters from selected tokens; the first and the last frame are at rest.
 
     Notes
@@ -145,7 +152,7 @@ def blend_trajectory(selection: TokenSelection, voice: VisualVoice, *, fps: floa
     """
     frame_times = np.arange(n_frames) / fps
     n_instants = int(np.ceil(max(selection.phones.end, frame_times[-1]) * blending.CLOCK_HZ)) + 2
-    made = _motion(selection.targets, selection.found, voice, n_instants, selection.options)
+    made = _blend_motion(selection.targets, selection.found, voice, n_instants, selection.options)
     return Trajectory(voice.channels, read_at_frames(made, selection.phones, frame_times, voice.rest), fps)
 
 
@@ -157,37 +164,37 @@ def read_at_frames(
     low = at.astype(np.int64)
     part = (at - low)[:, None].astype(np.float32)
     values = (1 - part) * made[low] + part * made[low + 1]
-    pull = stillness(phones, times)[:, None].astype(np.float32)
+    pull = rest_weights(phones, times)[:, None].astype(np.float32)
     drawn: NDArray[np.float32] = (1 - pull) * values + pull * rest
     return drawn
 
 
-def _motion(
-    targets: Targets, found: Found, voice: VisualVoice, n_instants: int, options: SynthesisOptions
+def _blend_motion(
+    targets: Targets, found: TokenRanking, voice: ExemplarModel, n_instants: int, options: SynthesisOptions
 ) -> NDArray[np.float32]:
     """(n, D) motion at the instants of the clock."""
     weights = blending.exemplar_weights(found.scores, options.sharpness)
-    pieces = blending.averaged_pieces(voice.tokens, found.tokens, weights, voice.spread, options)
-    joined, told = blending.joined_pieces(pieces, targets, n_instants, options)
+    pieces = blending.average_tokens(voice.tokens, found.tokens, weights, voice.spread, options)
+    joined, told = blending.join_averages(pieces, targets, n_instants, options)
     said = joined * voice.spread
     if voice.network is not None and options.network > 0:
         instants = np.arange(n_instants) / blending.CLOCK_HZ
-        told_by_network = voice.network.parameters(shown_phones(targets), instants)
+        told_by_network = voice.network.parameters(target_phones(targets), instants)
         said = (1 - options.network) * said + options.network * told_by_network
-    said = voice.speaking + options.articulation * (said - voice.speaking)
+    said = voice.mean_speaking_pose + options.articulation * (said - voice.mean_speaking_pose)
     motion = np.where(told[:, None], said, voice.rest).astype(np.float32)
-    motion = blending.smoothed(motion, options.smoothing_s, blending.CLOCK_HZ)
+    motion = blending.gaussian_smooth(motion, options.smoothing_s, blending.CLOCK_HZ)
     if not options.contacts:
         return motion
     rules = [contact_rule(label) for label in targets.labels]
     touching = np.array([rule is not None for rule in rules])
-    exemplars = Exemplars(voice.tokens, found.tokens[touching], weights[touching])
+    exemplars = ChosenExemplars(voice.tokens, found.tokens[touching], weights[touching])
     kept = [rule for rule in rules if rule is not None]
-    contacts = contacts_told(exemplars, voice.lip_gap, targets.spans[touching, 1:3], kept)
-    return with_contacts(motion, contacts, voice.lip_gap, blending.CLOCK_HZ)
+    contacts = find_contacts(exemplars, voice.lip_gap, targets.spans[touching, 1:3], kept)
+    return enforce_contacts(motion, contacts, voice.lip_gap, blending.CLOCK_HZ)
 
 
-def stillness(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[np.float64]:
+def rest_weights(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[np.float64]:
     """(T,) how far the face is drawn to its rest at each of T instants: 0 in speech, 1 in silence, 1 at both ends."""
     sounding = np.array([label != SILENCE for label in phones.phones])
     if not sounding.any():
@@ -197,18 +204,18 @@ def stillness(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[np.f
     ahead = np.append(starts, np.inf)[next_start] - times
     behind = times - np.concatenate([[-np.inf], ends])[next_start]
     away = np.minimum(ahead, np.maximum(behind, 0.0))
-    pull = _ease((away - RELEASE_FROM_S) / (REST_FROM_S - RELEASE_FROM_S))
+    pull = _smoothstep((away - RELEASE_FROM_S) / (REST_FROM_S - RELEASE_FROM_S))
     last = times[-1]
     onset = np.clip(starts[0], LEAST_EASE_S, REST_FROM_S)
     offset = np.clip(last - ends[-1], LEAST_EASE_S, REST_FROM_S)
     if onset < REST_FROM_S:
-        pull = np.maximum(pull, 1.0 - _ease(times / onset))
+        pull = np.maximum(pull, 1.0 - _smoothstep(times / onset))
     if offset < REST_FROM_S:
-        pull = np.maximum(pull, 1.0 - _ease((last - times) / offset))
+        pull = np.maximum(pull, 1.0 - _smoothstep((last - times) / offset))
     return pull
 
 
-def _ease(part: NDArray[np.float64]) -> NDArray[np.float64]:
+def _smoothstep(part: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rise from 0 to 1 without a corner."""
     part = np.clip(part, 0.0, 1.0)
     return np.asarray(part * part * (3.0 - 2.0 * part))

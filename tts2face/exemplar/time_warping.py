@@ -52,7 +52,7 @@ def path_cost(cost: NDArray[np.floating], path: IntArray) -> float:
     return float(cost[path[:, 0], path[:, 1]].sum())
 
 
-def distances(source: NDArray[np.floating], target: NDArray[np.floating]) -> FloatArray:
+def frame_distances(source: NDArray[np.floating], target: NDArray[np.floating]) -> FloatArray:
     """(N, M) Euclidean distances of (N, D) source frames from (M, D) target frames."""
     apart = source[:, None, :].astype(np.float64) - target[None, :, :]
     return np.asarray(np.sqrt(np.square(apart).sum(-1)))
@@ -91,7 +91,7 @@ def _cheapest_path(cost, band):  # type: ignore[no-untyped-def]
     return path, n + m - 1 - at
 
 
-def warped_times(path: IntArray, n_target: int) -> FloatArray:
+def warp_times(path: IntArray, n_target: int) -> FloatArray:
     """(n_target,) source frame, whole or between two, that lies over each target frame.
 
     A target frame that meets several source frames takes their mean, so that the map rises and joins the ends.
@@ -103,7 +103,7 @@ def warped_times(path: IntArray, n_target: int) -> FloatArray:
 
 
 @kernel
-def lay_over(source, reference, scale, band, out):  # type: ignore[no-untyped-def]
+def warp_to_reference(source, reference, scale, band, out):  # type: ignore[no-untyped-def]
     """Write (S, D) source into `out`, resampled so that its events fall on those of an (S, D) reference.
 
     The arrays are in units that `scale` (D,) made out of millimetres; frames are compared in millimetres. The path

@@ -14,7 +14,7 @@ _ROUNDING = 1e-9  # a bound may fall below the score it bounds by rounding; scor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Wanted:
+class TokenQuery:
     """N phones to be found: labels (N,), contexts (N, 2 `MAX_CONTEXT`) and log durations (N, 3).
 
     Columns of `log_durations`: the phone before, the phone itself, the phone behind, each as far as it is reached into.
@@ -45,7 +45,7 @@ class ContextIndex:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
+class TokenRanking:
     """Best tokens of N phones: `tokens` and `scores` (N, k), best first; -1 and -inf where there are fewer."""
 
     tokens: NDArray[np.int32]
@@ -81,7 +81,7 @@ def context_weights(n_context: int) -> NDArray[np.float64]:
     return np.asarray(1.0 / (np.arange(1, n_context + 1) + 1.0))
 
 
-def best_tokens(wanted: Wanted, index: ContextIndex, *, context: int, k: int, duration: float) -> Found:
+def best_tokens(wanted: TokenQuery, index: ContextIndex, *, context: int, k: int, duration: float) -> TokenRanking:
     """The k tokens of each wanted phone that lie in the most similar surroundings.
 
     Score = sum over d = 1..context of [S(left_d, its left_d) + S(right_d, its right_d)] / (d + 1), less, where
@@ -107,7 +107,7 @@ def best_tokens(wanted: Wanted, index: ContextIndex, *, context: int, k: int, du
         raise InputError(f"the weight of durations must be 0 or more, not {duration}")
     tokens = np.full((len(wanted.phone), k), -1, np.int32)
     scores = np.full((len(wanted.phone), k), -np.inf)
-    _search(
+    _search_groups(
         (wanted.phone, wanted.context, wanted.log_durations),
         (index.order, index.group_first, index.phone_first, index.context, index.log_durations),
         index.likeness,
@@ -115,7 +115,7 @@ def best_tokens(wanted: Wanted, index: ContextIndex, *, context: int, k: int, du
         tokens,
         scores,
     )
-    return Found(tokens, scores)
+    return TokenRanking(tokens, scores)
 
 
 @kernel
@@ -133,7 +133,7 @@ def _score(target, target_durations, token, token_durations, rule):  # type: ign
 
 
 @kernel
-def _insert(tokens, scores, token, score):  # type: ignore[no-untyped-def]
+def _insert_token(tokens, scores, token, score):  # type: ignore[no-untyped-def]
     """Put a token into the ranking if it belongs there: higher score first, then lower token."""
     k = len(tokens)
     if score < scores[k - 1] or (score == scores[k - 1] and token > tokens[k - 1] >= 0):
@@ -146,7 +146,7 @@ def _insert(tokens, scores, token, score):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _bound(target, likeness, rule):  # type: ignore[no-untyped-def]
+def _score_bound(target, likeness, rule):  # type: ignore[no-untyped-def]
     """Score that no token of a group exceeds."""
     _, weights, _ = rule
     total = _ROUNDING
@@ -157,16 +157,16 @@ def _bound(target, likeness, rule):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _search(wanted, index, likeness, rule, tokens, scores):  # type: ignore[no-untyped-def]
+def _search_groups(wanted, index, likeness, rule, tokens, scores):  # type: ignore[no-untyped-def]
     phone, contexts, durations = wanted
     order, group_first, phone_first, token_contexts, token_durations = index
     for n in range(len(phone)):
         first, last = phone_first[phone[n]], phone_first[phone[n] + 1]
         bounds = np.zeros(last - first)
         for g in range(first, last):
-            bounds[g - first] = _bound(contexts[n], likeness[g], rule)
+            bounds[g - first] = _score_bound(contexts[n], likeness[g], rule)
         for _ in range(last - first):
-            g = _highest(bounds)
+            g = _argmax(bounds)
             bound = bounds[g]
             if bound < scores[n, -1]:
                 break
@@ -196,12 +196,12 @@ def _search_group(target, group, corpus, rule, found):  # type: ignore[no-untype
             if bound - rule[2] * abs(token_durations[token, 1] - durations[1]) < scores[-1]:
                 break
             score = _score(context, durations, token_contexts[token], token_durations[token], rule)
-            _insert(tokens, scores, token, score)
+            _insert_token(tokens, scores, token, score)
             at += step
 
 
 @kernel
-def _highest(values):  # type: ignore[no-untyped-def]
+def _argmax(values):  # type: ignore[no-untyped-def]
     """Index of the first highest value; `numpy.argmax` takes seconds to compile."""
     at = 0
     for i in range(1, len(values)):

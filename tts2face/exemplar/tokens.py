@@ -47,7 +47,7 @@ class Tokens:
         return len(self.phone)
 
 
-def tokens_of(talker: Talker) -> Tokens:
+def collect_tokens(talker: Talker) -> Tokens:
     """Tokens of all utterances of a talker, in the talker's order."""
     n_speech = talker.model.n_speech
     labels = [phone for spoken in talker.utterances for phone in spoken.phones.phones]
@@ -62,14 +62,14 @@ def tokens_of(talker: Talker) -> Tokens:
         phone,
         utterance,
         np.concatenate([spoken_spans(spoken.phones.phones, spoken.phones.edges) for spoken in talker.utterances]),
-        contexts(phone, utterance, number[SILENCE]),
+        phone_contexts(phone, utterance, number[SILENCE]),
         np.concatenate([spoken.shape[:, :n_speech] for spoken in talker.utterances]).astype(np.float32),
         np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
         talker.fps,
     )
 
 
-def contexts(phone: NDArray[np.int32], utterance: NDArray[np.int32], silence: int) -> NDArray[np.int32]:
+def phone_contexts(phone: NDArray[np.int32], utterance: NDArray[np.int32], silence: int) -> NDArray[np.int32]:
     """(N, 2 `MAX_CONTEXT`) labels left and right of each of N phones, nearest first; `silence` beyond an utterance."""
     n = len(phone)
     around = np.full((n, 2 * MAX_CONTEXT), silence, np.int32)
@@ -92,10 +92,10 @@ def spoken_spans(phones: tuple[str, ...], edges: NDArray[np.float64]) -> NDArray
             starts[0] = max(starts[0], ends[0] - PAUSE_REACH_S)
         if phones[-1] == SILENCE:
             ends[-1] = min(ends[-1], starts[-1] + PAUSE_REACH_S)
-    return reaching_spans(starts, ends)
+    return spans_with_reach(starts, ends)
 
 
-def reaching_spans(starts: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
+def spans_with_reach(starts: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N, 4): starts and ends, with the reach into the neighbours before and behind them."""
     before = np.concatenate([[starts[0] - PAUSE_REACH_S], starts[:-1]])
     behind = np.concatenate([ends[1:], [ends[-1] + PAUSE_REACH_S]])

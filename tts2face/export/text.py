@@ -47,9 +47,9 @@ def pronunciation_json(spoken: "Pronunciation") -> str:
 
 def pronunciation_textgrid(spoken: "Pronunciation") -> str:
     """A TextGrid of a text that no voice has spoken: nominal durations, and a tier that says so."""
-    from lexicon.nominal_durations import nominal_sequence
+    from lexicon.nominal_durations import nominal_phones
 
-    phones, words = nominal_sequence(spoken)
+    phones, words = nominal_phones(spoken)
     return textgrid(phones, words, note=NOMINAL_NOTE)
 
 
@@ -58,13 +58,13 @@ FORMATS: Mapping[str, Callable[["Pronunciation"], str]] = MappingProxyType(
 )
 
 
-def _word_of(words: Sequence["WordSpan"]) -> dict[int, str]:
+def _word_at_phone(words: Sequence["WordSpan"]) -> dict[int, str]:
     return {at: word.text for word in words for at in range(word.first, word.last)}
 
 
 def timed_table(phones: "PhoneSequence", words: Sequence["WordSpan"]) -> str:
     """One line a phone: start and end in seconds, phone, word; between tabs, with a header."""
-    word_of = _word_of(words)
+    word_of = _word_at_phone(words)
     lines = ["start_s\tend_s\tphone\tword"]
     for at, phone in enumerate(phones.phones):
         lines.append(f"{phones.edges[at]:.6f}\t{phones.edges[at + 1]:.6f}\t{phone}\t{word_of.get(at, '')}")

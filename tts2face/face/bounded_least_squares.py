@@ -72,12 +72,12 @@ def _solve_all(curvature, linear, bounds, weights):  # type: ignore[no-untyped-d
                     free[n_free] = i
                     n_free += 1
             _solve_free(curvature, linear[t], free[:n_free], room, weights[t])
-            n_wrong = _judge(curvature, linear[t], bounds, weights[t], (state, belongs))
+            n_wrong = _classify_weights(curvature, linear[t], bounds, weights[t], (state, belongs))
             if n_wrong == 0:
                 break
             patience = PATIENCE if n_wrong < fewest else patience - 1
             fewest = min(fewest, n_wrong)
-            _exchange(state, belongs, patience < 0)
+            _pivot_states(state, belongs, patience < 0)
         longest = max(longest, rounds)
         if rounds >= MOST_ROUNDS:  # no answer: the other frames have none either
             break
@@ -85,7 +85,7 @@ def _solve_all(curvature, linear, bounds, weights):  # type: ignore[no-untyped-d
 
 
 @kernel
-def _exchange(state, belongs, only_last):  # type: ignore[no-untyped-def]
+def _pivot_states(state, belongs, only_last):  # type: ignore[no-untyped-def]
     """Put weights where they belong: all of them, or only the last that is elsewhere."""
     for i in range(len(state) - 1, -1, -1):
         if state[i] != belongs[i]:
@@ -103,7 +103,7 @@ def _dot(a, b):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _judge(curvature, linear, bounds, weights, states):  # type: ignore[no-untyped-def]
+def _classify_weights(curvature, linear, bounds, weights, states):  # type: ignore[no-untyped-def]
     """Write where each weight belongs, as things stand; returns how many are elsewhere."""
     low, high, slack = bounds
     state, belongs = states

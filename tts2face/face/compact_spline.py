@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.rbf import checked_centres
+from tts2face.face.rbf import check_centres
 
 FloatArray = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ AT_ONCE = 4096  # places evaluated at once, to bound memory
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalInterpolant:
-    """``sum_i phi(x - c_i) a_i`` with phi the product of `bell` along the axes.
+    """``sum_i phi(x - c_i) a_i`` with phi the product of `cubic_bspline` along the axes.
 
     Parameters
     ----------
@@ -43,11 +43,11 @@ class LocalInterpolant:
         found = np.zeros((len(places), self.coefficients.shape[1]))
         for first in range(0, len(places), AT_ONCE):
             span = slice(first, first + AT_ONCE)
-            found[span] = _bells(places[span], self.centres, self.support) @ self.coefficients
+            found[span] = _basis_values(places[span], self.centres, self.support) @ self.coefficients
         return found
 
 
-def local_interpolant(
+def fit_local_interpolant(
     centres: NDArray[np.floating], displacements: NDArray[np.floating], support: float
 ) -> LocalInterpolant:
     """The local function that takes the given displacements at the centres exactly.
@@ -73,26 +73,26 @@ def local_interpolant(
     >>> moved(np.array([[0.0], [5.0], [25.0]])).round(9).ravel().tolist()
     [1.0, 2.0, 0.0]
     """
-    places, wanted = checked_centres(centres, displacements)
+    places, wanted = check_centres(centres, displacements)
     if not support > 0:
         raise InputError(f"the support must be above 0, not {support}")
-    matrix = _bells(places, places, support)
+    matrix = _basis_values(places, places, support)
     if np.linalg.cond(matrix) > WORST_CONDITION:
         raise DataError("centres lie too near to each other for their support; leave some out, or make it smaller")
     coefficients: FloatArray = np.linalg.solve(matrix, wanted).astype(np.float64)
     return LocalInterpolant(places, coefficients, float(support))
 
 
-def bell(share: NDArray[np.floating]) -> FloatArray:
+def cubic_bspline(share: NDArray[np.floating]) -> FloatArray:
     """Cubic B-spline of a distance as a share of the support: 1 at 0, 1/4 at a half, 0 from 1 on, smooth throughout."""
     twice = 2.0 * np.asarray(share, np.float64)
     values: FloatArray = np.maximum(2.0 - twice, 0.0) ** 3 / 4.0 - np.maximum(1.0 - twice, 0.0) ** 3
     return values
 
 
-def _bells(places: NDArray[np.floating], centres: FloatArray, support: float) -> FloatArray:
+def _basis_values(places: NDArray[np.floating], centres: FloatArray, support: float) -> FloatArray:
     """(P, N) values of every centre's function at places (P, D)."""
     values: FloatArray = np.ones((len(places), len(centres)))
     for axis in range(centres.shape[1]):
-        values *= bell(np.abs(np.subtract.outer(places[:, axis], centres[:, axis])) / support)
+        values *= cubic_bspline(np.abs(np.subtract.outer(places[:, axis], centres[:, axis])) / support)
     return values

@@ -45,19 +45,19 @@ class FaceRig:
     pivot: NDArray[np.float32]
     follow: NDArray[np.float32]
 
-    def posed(self, weights: NDArray[np.floating], head: NDArray[np.floating] = REST_HEAD) -> NDArray[np.float32]:
+    def pose(self, weights: NDArray[np.floating], head: NDArray[np.floating] = REST_HEAD) -> NDArray[np.float32]:
         """(V, 3) vertices for (K,) weights and a (6,) head pose of `HEAD_CHANNELS`."""
         vertices = np.zeros_like(self.rest)
         moved = head_transform(head, self.pivot)
         eyes = eye_rotations(self.eye_turns, np.asarray(weights))
-        _pose(self.rest, self.starts, self.indices, self.deltas, np.asarray(weights, np.float32), vertices)
+        _apply_shapes(self.rest, self.starts, self.indices, self.deltas, np.asarray(weights, np.float32), vertices)
         _turn_eyes(self.eye_spans, self.eye_centres, eyes, vertices)
         if np.asarray(head).any():
             _move_head(moved, self.follow, vertices)
         return vertices
 
 
-def rigged(face: Face) -> FaceRig:
+def build_rig(face: Face) -> FaceRig:
     """The rig of a face; only the vertices that a shape moves are kept."""
     moved = [np.flatnonzero(np.any(shape != 0, axis=1)).astype(np.int32) for shape in face.shapes]
     starts = np.concatenate([[0], np.cumsum([len(indices) for indices in moved])]).astype(np.int64)
@@ -148,7 +148,7 @@ def eye_rotations(turns: NDArray[np.float32], weights: NDArray[np.floating]) -> 
 
 
 @kernel
-def _pose(rest, starts, indices, deltas, weights, vertices):  # type: ignore[no-untyped-def]
+def _apply_shapes(rest, starts, indices, deltas, weights, vertices):  # type: ignore[no-untyped-def]
     for v in range(len(rest)):
         vertices[v, 0], vertices[v, 1], vertices[v, 2] = rest[v, 0], rest[v, 1], rest[v, 2]
     for k in range(len(weights)):

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.face.eyelids import BLINK, WIDE, lids_of
-from tts2face.face.landmark_fit import N_SKIN, all_landmarks, landmark_motion
-from tts2face.face.lip_constraints import Mouth, mouth_of
-from tts2face.face.shape_transfer import completed
+from tts2face.face.eyelids import BLINK, WIDE, build_eyelid_model
+from tts2face.face.landmark_fit import N_SKIN, landmark_motion, scatter_landmarks
+from tts2face.face.lip_constraints import LipConstraints, build_lip_constraints
+from tts2face.face.shape_transfer import add_missing_shapes
 from tts2face.models.face import Face
 from tts2face.models.palette import EXPRESSIONS
 
@@ -50,18 +50,18 @@ def expression_table() -> Mapping[str, tuple[float, ...]]:
     return table
 
 
-def expressive(face: Face) -> Face:
+def add_expression_shapes(face: Face) -> Face:
     """A face with every shape of expressions, lids and gaze: those that it lacks are carried from the default head."""
-    return completed(face, (*expression_table(), *BLINK, *WIDE, *GAZE))
+    return add_missing_shapes(face, (*expression_table(), *BLINK, *WIDE, *GAZE))
 
 
-def expression_weights(face: Face, mouth: Mouth) -> FloatArray:
-    """(5, K) weights of `EXPRESSIONS` on an `expressive` face; lips that rest closed stay so, lids stay apart."""
+def expression_weights(face: Face, mouth: LipConstraints) -> FloatArray:
+    """(5, K) weights of `EXPRESSIONS` on a face of `add_expression_shapes`; closed lips stay closed."""
     table = expression_table()
     none = (0.0,) * len(EXPRESSIONS)
     drawn = np.array([table.get(name, none) for name in face.shape_names]).T
     held = mouth.held(np.zeros_like(drawn), drawn)
-    return lids_of(face).shut(held, np.zeros((len(held), 2)))
+    return build_eyelid_model(face).close(held, np.zeros((len(held), 2)))
 
 
 def expression_landmarks(face: Face) -> FloatArray:
@@ -72,9 +72,9 @@ def expression_landmarks(face: Face) -> FloatArray:
     DataError
         The face lacks the landmarks of lips or lids.
     """
-    whole = expressive(face)
-    weights = expression_weights(whole, mouth_of(whole))
-    motion = all_landmarks(whole, landmark_motion(whole, np.arange(len(whole.shape_names))))
+    whole = add_expression_shapes(face)
+    weights = expression_weights(whole, build_lip_constraints(whole))
+    motion = scatter_landmarks(whole, landmark_motion(whole, np.arange(len(whole.shape_names))))
     moved: FloatArray = np.nan_to_num(np.einsum("lck,ek->elc", motion, weights))
     moved[:, N_SKIN:] = 0.0
     return moved

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.face.landmark_fit import all_landmarks, landmark_motion, landmark_places
+from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.models.face import Face
 from tts2face.numeric import ordered_product
 
@@ -25,7 +25,7 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lids:
+class EyelidModel:
     """What lids do for weights of a face's shapes.
 
     Parameters
@@ -48,14 +48,14 @@ class Lids:
     narrowing: NDArray[np.int64]
     limits: FloatArray
 
-    def shut(self, weights: FloatArray, shares: FloatArray) -> FloatArray:
+    def close(self, weights: FloatArray, shares: FloatArray) -> FloatArray:
         """(T, K) weights with the lids shut by (T, 2) shares of their opening: 0 as the weights leave them, 1 shut.
 
         What squints or widens an eye gives way as it shuts.
         """
         lids = weights.copy()
         for eye in range(len(SIDES)):
-            self._narrow(lids, eye)
+            self._limit_narrowing(lids, eye)
             lids[:, [self.wide[eye], *self.narrowing[eye]]] *= 1.0 - np.clip(shares[:, eye : eye + 1], 0.0, 1.0)
             opening = np.maximum(self.opening[eye] + ordered_product(lids, self.per_weight[eye]), 0.0)
             for column, share in ((self.blink[eye], shares[:, eye]), (self.wide[eye], shares[:, eye])):
@@ -64,7 +64,7 @@ class Lids:
                 lids[:, column] = np.clip(lids[:, column] + moved, *self.limits[column])
         return lids
 
-    def _narrow(self, lids: FloatArray, eye: int) -> None:
+    def _limit_narrowing(self, lids: FloatArray, eye: int) -> None:
         """Hold squinting within what is open, in place."""
         columns = self.narrowing[eye]
         taken = -ordered_product(lids[:, columns], self.per_weight[eye, columns])
@@ -73,7 +73,7 @@ class Lids:
         lids[:, columns] *= np.where(taken > most, most / np.maximum(taken, 1e-9), 1.0)[:, None]
 
 
-def lids_of(face: Face) -> Lids:
+def build_eyelid_model(face: Face) -> EyelidModel:
     """The lids of a face that has the shapes `BLINK`, `WIDE` and `NARROWING`.
 
     Raises
@@ -81,8 +81,8 @@ def lids_of(face: Face) -> Lids:
     DataError
         It lacks their landmarks, or its shapes do not move them.
     """
-    places = all_landmarks(face, landmark_places(face))[:, 1]
-    motion = all_landmarks(face, landmark_motion(face, np.arange(len(face.shape_names))))[:, 1]
+    places = scatter_landmarks(face, landmark_positions(face))[:, 1]
+    motion = scatter_landmarks(face, landmark_motion(face, np.arange(len(face.shape_names))))[:, 1]
     opening = np.array([(places[list(upper)] - places[list(lower)]).mean() for upper, lower in LIDS])
     per_weight = np.stack([(motion[list(upper)] - motion[list(lower)]).mean(axis=0) for upper, lower in LIDS])
     number = {name: column for column, name in enumerate(face.shape_names)}
@@ -91,7 +91,7 @@ def lids_of(face: Face) -> Lids:
         raise DataError("the face lacks landmarks of its lids; build it with its landmark table")
     if not all((per_weight[eye, blink[eye]] < 0) and (per_weight[eye, wide[eye]] > 0) for eye in range(len(SIDES))):
         raise DataError(f"{BLINK[0]} does not shut the face's lids, or {WIDE[0]} does not open them; build it again")
-    return Lids(
+    return EyelidModel(
         opening=opening,
         per_weight=per_weight,
         blink=blink,

@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.face.expressions import GAZE, expression_weights, expressive
-from tts2face.face.eyelids import Lids, lids_of
-from tts2face.face.landmark_fit import N_SKIN, all_landmarks, axis_scales, landmark_places, turn_onto
-from tts2face.face.lip_constraints import Mouth, mouth_of
+from tts2face.face.expressions import GAZE, add_expression_shapes, expression_weights
+from tts2face.face.eyelids import EyelidModel, build_eyelid_model
+from tts2face.face.landmark_fit import N_SKIN, axis_scales, landmark_positions, procrustes_rotation, scatter_landmarks
+from tts2face.face.lip_constraints import LipConstraints, build_lip_constraints
 from tts2face.face.mouth_model import SPEECH_SHAPES
-from tts2face.face.shape_transfer import SIZES, appended, spread
+from tts2face.face.shape_transfer import SIZES, append_shapes, spread_landmark_motion
 from tts2face.models.face import Face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, OUTER_LIP_LOWER, OUTER_LIP_UPPER
-from tts2face.models.palette import FEATURES, FIXED_CHANNELS, REGION_FEATURES, Palette, Region
+from tts2face.models.palette import FEATURES, FIXED_CHANNELS, REGION_FEATURES, FaceRegion, Palette
 from tts2face.numeric import ordered_product
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
@@ -46,7 +46,7 @@ NO_GAINS: Mapping[str, float] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Performance:
+class FaceMotion:
     """A face that speaks and moves: weights (T, K) of the shapes of `GestureFace.face`, and its head (T, 6)."""
 
     motion: Trajectory
@@ -74,16 +74,16 @@ class GestureFace:
     """
 
     face: Face
-    n_own: int
+    n_speech_shapes: int
     expressions: FloatArray
     regions: Mapping[str, slice]
     gaze: FloatArray
-    mouth: Mouth
-    lids: Lids
+    mouth: LipConstraints
+    lids: EyelidModel
 
     def perform(
         self, speech: Trajectory, gestures: Mapping[str, Floats], gains: Mapping[str, float] = NO_GAINS
-    ) -> Performance:
+    ) -> FaceMotion:
         """Speech with gestures.
 
         Parameters
@@ -104,12 +104,12 @@ class GestureFace:
         """
         self._check(speech, gestures, gains)
         spoken = np.zeros((len(speech), len(self.face.shape_names)))
-        spoken[:, : self.n_own] = speech.values
+        spoken[:, : self.n_speech_shapes] = speech.values
         felt = {name: gains.get(name, 1.0) * values.astype(np.float64) for name, values in gestures.items()}
-        spoken = self._louder(spoken, gains)
-        added = self._added(spoken, felt)
+        spoken = self._scale_speech(spoken, gains)
+        added = self._gesture_weights(spoken, felt)
         shares = felt.get("blink", np.zeros((len(speech), 2)))
-        added = self.lids.shut(spoken + added, shares) - spoken
+        added = self.lids.close(spoken + added, shares) - spoken
         weights = self.mouth.held(spoken, added)
         for (
             name,
@@ -118,26 +118,26 @@ class GestureFace:
             if name in felt:
                 weights[:, columns] = np.clip(felt[name], *self.face.limits[columns].T.astype(np.float64))
         head = felt.get("head", np.zeros((len(speech), len(HEAD_CHANNELS))))
-        return Performance(
+        return FaceMotion(
             Trajectory(self.face.shape_names, weights, speech.fps), Trajectory(HEAD_CHANNELS, head, speech.fps)
         )
 
-    def _louder(self, spoken: FloatArray, gains: Mapping[str, float]) -> FloatArray:
+    def _scale_speech(self, spoken: FloatArray, gains: Mapping[str, float]) -> FloatArray:
         """Speech with its jaw and lips multiplied."""
         jaw, lips = (
             np.where([shape.startswith(prefix) for shape in self.face.shape_names], gains.get(name, 1.0), 1.0)
             for name, prefix in zip(SPEECH_GAINS, SPEECH_SHAPES, strict=True)
         )
-        return self.mouth.louder(spoken, jaw, lips)
+        return self.mouth.amplify(spoken, jaw, lips)
 
-    def _added(self, spoken: FloatArray, felt: Mapping[str, FloatArray]) -> FloatArray:
+    def _gesture_weights(self, spoken: FloatArray, felt: Mapping[str, FloatArray]) -> FloatArray:
         """(T, K) what expression and gaze add to speech; apart from the mouth within the shapes' limits."""
         added = np.zeros_like(spoken)
         if "expression" in felt:
             added += ordered_product(felt["expression"], self.expressions)
             lips = self.mouth.moving
-            added[:, lips] = ordered_product(answered(felt["expression"]), self.expressions[:, lips])
-            added = self.mouth.softened(spoken, added)
+            added[:, lips] = ordered_product(mouth_response(felt["expression"]), self.expressions[:, lips])
+            added = self.mouth.attenuate_on_rounded_lips(spoken, added)
         if "gaze" in felt:
             down, left = felt["gaze"].T
             turned = np.stack([np.maximum(down, 0), np.maximum(-down, 0), np.maximum(left, 0), np.maximum(-left, 0)])
@@ -148,13 +148,13 @@ class GestureFace:
         return added
 
     def _check(self, speech: Trajectory, gestures: Mapping[str, Floats], gains: Mapping[str, float]) -> None:
-        if speech.channels != self.face.shape_names[: self.n_own]:
+        if speech.channels != self.face.shape_names[: self.n_speech_shapes]:
             raise InputError("the speech is not in the shapes of this face; retarget it to the face first")
         widths = {name: columns.stop - columns.start for name, columns in self.regions.items()}
         check_gestures(gestures, gains, len(speech), widths)
 
 
-def answered(expression: FloatArray) -> FloatArray:
+def mouth_response(expression: FloatArray) -> FloatArray:
     """Weights of expressions (T, 5) as the mouth answers them, whose motion in a neutral face is speech already."""
     low, high = ANSWERED
     share = np.clip((np.abs(expression) - low) / (high - low), 0.0, 1.0)
@@ -196,8 +196,8 @@ def gesture_face(face: Face, palette: Palette) -> GestureFace:
     DataError
         The face lacks landmarks of the eyes or lips, or a shape that speech could move.
     """
-    mouth_of(face)  # refuses a face without lips before anything is carried to it
-    whole = expressive(face)
+    build_lip_constraints(face)  # refuses a face without lips before anything is carried to it
+    whole = add_expression_shapes(face)
     regions: dict[str, slice] = {}
     for name in REGION_FEATURES:
         shapes = region_shapes(whole, palette.neutral.astype(np.float64), palette.regions[name])
@@ -205,20 +205,20 @@ def gesture_face(face: Face, palette: Palette) -> GestureFace:
         regions[name] = slice(first, first + len(shapes))
         size = np.linalg.norm(palette.regions[name].modes, axis=2).max(axis=1)
         most = MOST_MOVED_MM / np.maximum(size.astype(np.float64), 1e-6)
-        whole = appended(whole, palette.channels(name), shapes, np.column_stack([-most, most]))
-    mouth = mouth_of(whole)
+        whole = append_shapes(whole, palette.channels(name), shapes, np.column_stack([-most, most]))
+    mouth = build_lip_constraints(whole)
     return GestureFace(
         face=whole,
-        n_own=len(face.shape_names),
+        n_speech_shapes=len(face.shape_names),
         expressions=expression_weights(whole, mouth),
         regions=regions,
         gaze=gaze_weights(whole),
         mouth=mouth,
-        lids=lids_of(whole),
+        lids=build_eyelid_model(whole),
     )
 
 
-def region_shapes(face: Face, neutral: FloatArray, region: Region) -> Floats:
+def region_shapes(face: Face, neutral: FloatArray, region: FaceRegion) -> Floats:
     """(k, V, 3) shapes of a region's modes on a face, mm per mm.
 
     Notes
@@ -226,17 +226,17 @@ def region_shapes(face: Face, neutral: FloatArray, region: Region) -> Floats:
     The modes are turned as the face lies to `neutral` (478, 3), scaled by an affine fit of each axis on the region and
     its frame of eye corners and nose, and spread by compact cubic B-splines.
     """
-    places = all_landmarks(face, landmark_places(face))
+    places = scatter_landmarks(face, landmark_positions(face))
     own = {*region.landmarks.tolist()}
     still = [number for number in (*LID_RIMS, *LIPS) if number not in own]
-    return spread(face, region.landmarks, fitted_modes(places, neutral, region), still)
+    return spread_landmark_motion(face, region.landmarks, fit_modes(places, neutral, region), still)
 
 
-def fitted_modes(places: FloatArray, neutral: FloatArray, region: Region) -> FloatArray:
+def fit_modes(places: FloatArray, neutral: FloatArray, region: FaceRegion) -> FloatArray:
     """(k, L, 3) a region's modes in the size of landmarks (478, 3), of which some may be NaN."""
     seen: NDArray[np.bool_] = np.isfinite(places[:, 0])
     skin = np.flatnonzero(seen[:N_SKIN])
-    turn = turn_onto(neutral[skin], places[skin])
+    turn = procrustes_rotation(neutral[skin], places[skin])
     fitted = np.array([number for number in (*region.landmarks, *FRAME) if seen[number]])
     sizes = axis_scales(ordered_product(neutral[fitted], turn.T), places[fitted], SIZES)
     return ordered_product(region.modes.astype(np.float64), turn.T) * sizes
@@ -251,14 +251,14 @@ def gaze_weights(face: Face) -> FloatArray:
     weights = np.zeros((4, len(face.shape_names)))
     turns = {name: turn for eye in face.eyes for name, turn in eye.turns.items()}
     for name in GAZE:
-        turn = np.asarray(turns.get(name, USUAL_TURN * _usual_axis(name)), np.float64)[:2]
+        turn = np.asarray(turns.get(name, USUAL_TURN * _default_gaze_axis(name)), np.float64)[:2]
         main = int(np.abs(turn).argmax())
         along = directions[:, main] * turn[main]
         weights[:, face.shape_names.index(name)] = np.where(along > 0, 1.0 / np.maximum(along, 1e-6), 0.0)
     return weights
 
 
-def _usual_axis(name: str) -> FloatArray:
+def _default_gaze_axis(name: str) -> FloatArray:
     """Rotation axis (3,) of a gaze shape by its name."""
     if "Up" in name or "Down" in name:
         return np.array([1.0 if "Down" in name else -1.0, 0.0, 0.0])

@@ -12,7 +12,7 @@ N_SKIN = 468  # landmarks from here on lie on the irises
 DIGITS = 9  # the last bits of LAPACK's results depend on its threads
 
 
-def landmark_places(face: Face) -> FloatArray:
+def landmark_positions(face: Face) -> FloatArray:
     """(L, 3) landmarks of a face at rest, mm, in the order of `Face.landmarks`."""
     mixed = face.landmark_weights.astype(np.float64)[..., None]
     places: FloatArray = (face.vertices[face.landmark_vertices] * mixed).sum(axis=1)
@@ -25,14 +25,14 @@ def landmark_motion(face: Face, shapes: NDArray[np.integer]) -> FloatArray:
     return np.stack([(face.shapes[k][face.landmark_vertices] * mixed).sum(axis=1) for k in shapes], axis=-1)
 
 
-def all_landmarks(face: Face, values: FloatArray) -> FloatArray:
+def scatter_landmarks(face: Face, values: FloatArray) -> FloatArray:
     """(478, ...) values (L, ...) of a face's landmarks by their numbers; NaN where the face lacks one."""
     spread: FloatArray = np.full((N_LANDMARKS, *values.shape[1:]), np.nan)
     spread[face.landmarks] = values
     return spread
 
 
-def turn_onto(source: FloatArray, target: FloatArray) -> FloatArray:
+def procrustes_rotation(source: FloatArray, target: FloatArray) -> FloatArray:
     """(3, 3) rotation that brings places (N, 3) nearest to others, up to shift and size (orthogonal Procrustes)."""
     inertia = np.einsum("nc,nd->cd", source - source.mean(axis=0), target - target.mean(axis=0))
     left, _, right = np.linalg.svd(inertia)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.face.bounded_least_squares import bounded_least_squares
-from tts2face.face.landmark_fit import all_landmarks, landmark_motion
+from tts2face.face.landmark_fit import landmark_motion, scatter_landmarks
 from tts2face.face.mouth_model import MIDDLE_PAIR, SPEECH_SHAPES, mouth_curvature, require_lips
 from tts2face.models.face import Face
 from tts2face.models.landmarks import (
@@ -34,7 +34,7 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Mouth:
+class LipConstraints:
     """What lips do for weights of a face's shapes.
 
     Parameters
@@ -63,10 +63,10 @@ class Mouth:
         half of it stays. Frames to which nothing is added are as they were.
         """
         gaps, widened = ordered_product(spoken, self.gaps.T), ordered_product(added, self.gaps.T)
-        wanted = gaps + _eased(gaps / FREE_MM) * widened
-        return self._solved(spoken, added, np.maximum(wanted, np.where(gaps > 0, LEAST_SHARE * gaps, gaps)))
+        wanted = gaps + _smoothstep(gaps / FREE_MM) * widened
+        return self._solve(spoken, added, np.maximum(wanted, np.where(gaps > 0, LEAST_SHARE * gaps, gaps)))
 
-    def _solved(self, spoken: FloatArray, added: FloatArray, wanted: FloatArray) -> FloatArray:
+    def _solve(self, spoken: FloatArray, added: FloatArray, wanted: FloatArray) -> FloatArray:
         """(T, K) weights nearest to the sum with gaps (T, P) as wanted, beyond those at rest."""
         total = spoken + added
         moving = np.isin(np.arange(total.shape[1]), self.moving)
@@ -78,7 +78,7 @@ class Mouth:
         total[np.ix_(changed, moving)] = bounded_least_squares(curvature, linear[changed], self.limits)
         return np.asarray(total, np.float64)
 
-    def louder(self, spoken: FloatArray, jaw: FloatArray, lips: FloatArray) -> FloatArray:
+    def amplify(self, spoken: FloatArray, jaw: FloatArray, lips: FloatArray) -> FloatArray:
         """(T, K) weights of speech with the motion of jaw and lips multiplied by factors (K,), 1 for other shapes.
 
         All gaps grow by one share, so that those that are closed stay closed. Behind lips that hold together what the
@@ -90,13 +90,13 @@ class Mouth:
         most = max(float(jaw.max()), float(lips.max()))
         grown = np.clip(ordered_product(added, self.gaps[MIDDLE_PAIR]) / np.maximum(gap, LEAST_MM), -1.0, most - 1.0)
         gaps = ordered_product(spoken, self.gaps.T)
-        return self._solved(spoken, added, gaps + grown[:, None] * _eased(gaps / PARTED_MM) * np.maximum(gaps, 0.0))
+        return self._solve(spoken, added, gaps + grown[:, None] * _smoothstep(gaps / PARTED_MM) * np.maximum(gaps, 0.0))
 
     def rounded(self, spoken: FloatArray) -> FloatArray:
         """(T,) how far the mouth is rounded: 0 as wide as at rest, 1 by `ROUND_MM` narrower."""
-        return _eased(-ordered_product(spoken, self.width) / ROUND_MM)
+        return _smoothstep(-ordered_product(spoken, self.width) / ROUND_MM)
 
-    def softened(self, spoken: FloatArray, added: FloatArray) -> FloatArray:
+    def attenuate_on_rounded_lips(self, spoken: FloatArray, added: FloatArray) -> FloatArray:
         """(T, K) what is laid over speech, less of it on rounded lips."""
         kept = 1.0 - ROUND_KEPT * self.rounded(spoken)
         softened = added.copy()
@@ -104,7 +104,7 @@ class Mouth:
         return softened
 
 
-def mouth_of(face: Face) -> Mouth:
+def build_lip_constraints(face: Face) -> LipConstraints:
     """The mouth of a face.
 
     Raises
@@ -114,9 +114,9 @@ def mouth_of(face: Face) -> Mouth:
     """
     moving = np.array([i for i, name in enumerate(face.shape_names) if name.startswith(SPEECH_SHAPES)], np.int64)
     require_lips(face, moving)
-    motion = all_landmarks(face, landmark_motion(face, np.arange(len(face.shape_names))))
+    motion = scatter_landmarks(face, landmark_motion(face, np.arange(len(face.shape_names))))
     common = [landmark for landmark in MOUTH_REGION if np.isfinite(motion[landmark]).all()]
-    return Mouth(
+    return LipConstraints(
         moving=moving,
         curvature=mouth_curvature(motion[common][:, :, moving], common),
         gaps=motion[list(INNER_LIP_UPPER), 1] - motion[list(INNER_LIP_LOWER), 1],
@@ -125,7 +125,7 @@ def mouth_of(face: Face) -> Mouth:
     )
 
 
-def _eased(share: FloatArray) -> FloatArray:
+def _smoothstep(share: FloatArray) -> FloatArray:
     held = np.clip(share, 0.0, 1.0)
     eased: FloatArray = held * held * (3.0 - 2.0 * held)
     return eased

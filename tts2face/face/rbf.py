@@ -35,18 +35,20 @@ class Interpolant:
 
     centres: FloatArray
     coefficients: FloatArray
-    reach: float
+    decay_length: float
 
     def __call__(self, places: NDArray[np.floating]) -> FloatArray:
         """(P, E) displacements at places (P, D)."""
         found = np.zeros((len(places), self.coefficients.shape[1]))
         for first in range(0, len(places), AT_ONCE):
             span = slice(first, first + AT_ONCE)
-            found[span] = basis(places[span], self.centres, self.reach) @ self.coefficients
+            found[span] = rbf_values(places[span], self.centres, self.decay_length) @ self.coefficients
         return found
 
 
-def interpolant(centres: NDArray[np.floating], displacements: NDArray[np.floating], face_width: float) -> Interpolant:
+def fit_interpolant(
+    centres: NDArray[np.floating], displacements: NDArray[np.floating], face_width: float
+) -> Interpolant:
     """The function that takes the given displacements at the centres exactly (eqs 3 and 4).
 
     Parameters
@@ -75,19 +77,17 @@ def interpolant(centres: NDArray[np.floating], displacements: NDArray[np.floatin
     from scipy.linalg import solve
     from scipy.spatial.distance import pdist
 
-    places, wanted = checked_centres(centres, displacements)
+    places, wanted = check_centres(centres, displacements)
     if not face_width > 0:
         raise InputError(f"the face's width must be above 0, not {face_width}")
     reach = REACH / FACE_WIDTH * face_width
     if len(places) > 1 and float(pdist(places).min()) < LEAST_APART * reach:
         raise DataError("two centres lie in one place; give each place one displacement")
-    coefficients = solve(basis(places, places, reach), wanted, assume_a="pos")
+    coefficients = solve(rbf_values(places, places, reach), wanted, assume_a="pos")
     return Interpolant(places, coefficients, reach)
 
 
-def checked_centres(
-    centres: NDArray[np.floating], displacements: NDArray[np.floating]
-) -> tuple[FloatArray, FloatArray]:
+def check_centres(centres: NDArray[np.floating], displacements: NDArray[np.floating]) -> tuple[FloatArray, FloatArray]:
     """Places (N, D) and what is known there (N, E), if they are finite and as many, and at least one; InputError."""
     places, wanted = np.asarray(centres, np.float64), np.asarray(displacements, np.float64)
     if places.ndim != 2 or wanted.ndim != 2 or len(places) != len(wanted) or not len(places):
@@ -97,7 +97,7 @@ def checked_centres(
     return places, wanted
 
 
-def basis(places: NDArray[np.floating], centres: NDArray[np.floating], reach: float) -> FloatArray:
+def rbf_values(places: NDArray[np.floating], centres: NDArray[np.floating], reach: float) -> FloatArray:
     """(P, N) values of exp(-r / reach) for the distances of places (P, D) from centres (N, D)."""
     from scipy.spatial.distance import cdist
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.face.compact_spline import local_interpolant
-from tts2face.face.landmark_fit import N_SKIN, all_landmarks, axis_scales, landmark_motion, landmark_places
+from tts2face.face.compact_spline import fit_local_interpolant
+from tts2face.face.landmark_fit import N_SKIN, axis_scales, landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.models.face import Eye, Face
 from tts2face.models.face_file import load_face
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS
@@ -35,7 +35,7 @@ def eye_distance(face: Face) -> float:
     DataError
         The face lacks their landmarks.
     """
-    places = all_landmarks(face, landmark_places(face))
+    places = scatter_landmarks(face, landmark_positions(face))
     distance = float(np.linalg.norm(places[EYE_OUTER_LEFT] - places[EYE_OUTER_RIGHT]))
     if not distance > 0:
         raise DataError("the face lacks landmarks 33 and 263 of the eye corners; build it with its landmark table")
@@ -56,12 +56,14 @@ def soft_vertices(face: Face) -> NDArray[np.int64]:
     return np.flatnonzero(soft)
 
 
-def spread(face: Face, landmarks: NDArray[np.integer], motion: FloatArray, still: Sequence[int] = ()) -> Floats:
+def spread_landmark_motion(
+    face: Face, landmarks: NDArray[np.integer], motion: FloatArray, still: Sequence[int] = ()
+) -> Floats:
     """(k, V, 3) displacement of the vertices for k motions (k, L, 3) of landmarks, mm.
 
     Landmarks that the face lacks are left out; those of `still` stay where they are.
     """
-    places = all_landmarks(face, landmark_places(face))
+    places = scatter_landmarks(face, landmark_positions(face))
     wanted = np.zeros((N_LANDMARKS, *motion.transpose(1, 0, 2).shape[1:]))
     wanted[landmarks] = motion.transpose(1, 0, 2)
     numbers = [int(number) for number in (*landmarks, *still) if np.isfinite(places[number]).all()]
@@ -69,14 +71,14 @@ def spread(face: Face, landmarks: NDArray[np.integer], motion: FloatArray, still
     if not numbers:
         return shapes
     size = eye_distance(face)
-    centres, moved = _merged(places[numbers], wanted[numbers].reshape(len(numbers), -1), ONE_PLACE * size)
+    centres, moved = _merge_places(places[numbers], wanted[numbers].reshape(len(numbers), -1), ONE_PLACE * size)
     soft = soft_vertices(face)
-    carried = local_interpolant(centres, moved, SUPPORT * size)(face.vertices[soft])
+    carried = fit_local_interpolant(centres, moved, SUPPORT * size)(face.vertices[soft])
     shapes[:, soft] = np.round(carried, DIGITS).reshape(len(soft), -1, 3).transpose(1, 0, 2)
     return shapes
 
 
-def appended(face: Face, names: Sequence[str], shapes: Floats, limits: NDArray[np.floating]) -> Face:
+def append_shapes(face: Face, names: Sequence[str], shapes: Floats, limits: NDArray[np.floating]) -> Face:
     """A face with more shapes (k, V, 3), and their limits (k, 2)."""
     return replace(
         face,
@@ -86,7 +88,7 @@ def appended(face: Face, names: Sequence[str], shapes: Floats, limits: NDArray[n
     )
 
 
-def completed(face: Face, names: Sequence[str]) -> Face:
+def add_missing_shapes(face: Face, names: Sequence[str]) -> Face:
     """A face with all the named ARKit shapes: those that it lacks move its landmarks as on the default head.
 
     Sizes are fitted axis by axis. Eyeballs that nothing turns turn with the carried gaze shapes.
@@ -96,17 +98,21 @@ def completed(face: Face, names: Sequence[str]) -> Face:
         return face
     head = default_head()
     common = np.intersect1d(face.landmarks[face.landmarks < N_SKIN], head.landmarks)
-    here, there = (all_landmarks(one, landmark_places(one)) for one in (face, head))
+    here, there = (scatter_landmarks(one, landmark_positions(one)) for one in (face, head))
     sizes = axis_scales(there[common], here[common], SIZES)
-    motion = all_landmarks(head, landmark_motion(head, np.array([head.shape_names.index(name) for name in missing])))
-    shapes = spread(face, common, motion[common].transpose(2, 0, 1) * sizes)
+    motion = scatter_landmarks(
+        head, landmark_motion(head, np.array([head.shape_names.index(name) for name in missing]))
+    )
+    shapes = spread_landmark_motion(face, common, motion[common].transpose(2, 0, 1) * sizes)
     for eye in face.eyes:
-        shapes[:, eye.first : eye.first + eye.count] = _eyes_drawn_in(eye, missing)[:, None] * sizes
+        shapes[:, eye.first : eye.first + eye.count] = _eyeball_retraction(eye, missing)[:, None] * sizes
     limits = np.tile([0.0, MOST_CARRIED], (len(missing), 1))
-    return replace(appended(face, missing, shapes, limits), eyes=tuple(_turning(eye, missing) for eye in face.eyes))
+    return replace(
+        append_shapes(face, missing, shapes, limits), eyes=tuple(_add_eye_turns(eye, missing) for eye in face.eyes)
+    )
 
 
-def _merged(places: FloatArray, values: FloatArray, apart: float) -> tuple[FloatArray, FloatArray]:
+def _merge_places(places: FloatArray, values: FloatArray, apart: float) -> tuple[FloatArray, FloatArray]:
     """Places no two of which are nearer than `apart`, and the mean values of those that each stands for."""
     kept: list[int] = []
     member = np.zeros(len(places), np.int64)
@@ -123,19 +129,21 @@ def _merged(places: FloatArray, values: FloatArray, apart: float) -> tuple[Float
     return places[kept], sums / np.bincount(member)[:, None]
 
 
-def _eyes_drawn_in(eye: Eye, names: Sequence[str]) -> FloatArray:
+def _eyeball_retraction(eye: Eye, names: Sequence[str]) -> FloatArray:
     """(k, 3) how far the default head's shapes shift the eyeball of this side, mm: lids that shut slide over it."""
-    head, model = default_head(), _model_eye(eye)
+    head, model = default_head(), _default_head_eye(eye)
     shifts = [head.shapes[head.shape_names.index(name), model.first : model.first + model.count] for name in names]
     return DRAWN_IN * np.stack([shift.mean(axis=0, dtype=np.float64) for shift in shifts])
 
 
-def _turning(eye: Eye, missing: Sequence[str]) -> Eye:
-    added = {name: turn for name, turn in _model_eye(eye).turns.items() if name in missing and name not in eye.turns}
+def _add_eye_turns(eye: Eye, missing: Sequence[str]) -> Eye:
+    added = {
+        name: turn for name, turn in _default_head_eye(eye).turns.items() if name in missing and name not in eye.turns
+    }
     return replace(eye, turns={**eye.turns, **added})
 
 
-def _model_eye(eye: Eye) -> Eye:
+def _default_head_eye(eye: Eye) -> Eye:
     return min(default_head().eyes, key=lambda other: abs(float(other.centre[0] - eye.centre[0])))
 
 

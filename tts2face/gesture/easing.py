@@ -8,25 +8,25 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 
 
-def presence(times: ArrayLike, start: float, end: float, ease_s: float) -> Floats:
+def span_weights(times: ArrayLike, start: float, end: float, ease_s: float) -> Floats:
     """Share (T,) of a span that is on at each of T times: 0 outside, 1 inside, half at its edges.
 
     The span's step smoothed by a raised cosine `ease_s` wide, so that the shares of spans that meet add up to 1. A span
     from 0 s or before has been on all along, one until infinity stays.
     """
     seconds = np.asarray(times, np.float64)
-    begun = np.ones(seconds.shape) if start <= 0.0 else _risen((seconds - start) / ease_s)
-    ended = np.zeros(seconds.shape) if np.isinf(end) else _risen((seconds - end) / ease_s)
+    begun = np.ones(seconds.shape) if start <= 0.0 else _raised_cosine_integral((seconds - start) / ease_s)
+    ended = np.zeros(seconds.shape) if np.isinf(end) else _raised_cosine_integral((seconds - end) / ease_s)
     return begun - ended
 
 
-def _risen(share: Floats) -> Floats:
+def _raised_cosine_integral(share: Floats) -> Floats:
     """From 0 at -1/2 to 1 at 1/2: the integral of a raised cosine."""
     at = np.clip(2 * share, -1.0, 1.0)
     return 0.5 * (1 + at + np.sin(np.pi * at) / np.pi)
 
 
-def between_keys(times: ArrayLike, keys: tuple[tuple[float, float], ...]) -> Floats:
+def interpolate_keys(times: ArrayLike, keys: tuple[tuple[float, float], ...]) -> Floats:
     """Values (T,) on a curve through (time, value) keys that stands still at each; constant outside them."""
     seconds = np.asarray(times, np.float64)
     curve = np.full(seconds.shape, keys[0][1])

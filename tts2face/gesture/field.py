@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture.field_kernels import APART, SLACK, nearest, walk
-from tts2face.gesture.kd_tree import Tree, tree_of
+from tts2face.gesture.field_kernels import APART, SLACK, generate_frames, nearest_distances
+from tts2face.gesture.kd_tree import KdTree, build_tree
 from tts2face.models.palette import GESTURE_FPS
 
 DIMENSIONS = 8  # of the search: the windows' principal axes
@@ -110,10 +110,10 @@ class Field:
     heard: Floats
     starts: NDArray[np.int32]
     axes: Floats
-    tree: Tree
+    tree: KdTree
     scale: float
     weights: Floats
-    nearness: float
+    median_distance: float
     options: FieldOptions
 
 
@@ -139,12 +139,12 @@ class FieldState:
     heard: Floats
     moment: int
     offset: Floats
-    recent: NDArray[np.int64]
+    recent_jumps: NDArray[np.int64]
     n_frames: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Walk:
+class FieldSample:
     """Frames (n, D) in the units of the recordings, the recorded moment (n,) of each, and the state behind them."""
 
     values: Floats
@@ -152,7 +152,7 @@ class Walk:
     state: FieldState
 
 
-def field_of(values: Floats, heard: Floats, lengths: NDArray[np.int32], options: FieldOptions) -> Field:
+def build_field(values: Floats, heard: Floats, lengths: NDArray[np.int32], options: FieldOptions) -> Field:
     """Index recorded motion (T, D) with the sound (T, E) that went with it; recordings of `lengths` (R,) frames.
 
     Raises
@@ -178,29 +178,29 @@ def field_of(values: Floats, heard: Floats, lengths: NDArray[np.int32], options:
     weights = (np.sqrt(np.array(options.alpha[: heard.shape[1]])) / spread).astype(np.float32)
     scaled = np.ascontiguousarray(values / np.float32(scale), np.float32)
     weighted = np.ascontiguousarray(heard * weights, np.float32)
-    axes = _principal_axes(_windows(scaled, weighted, usable[::SAMPLED], options.history))
-    tree = tree_of(_windows(scaled, weighted, usable, options.history) @ axes.T)
+    axes = _principal_axes(_history_windows(scaled, weighted, usable[::SAMPLED], options.history))
+    tree = build_tree(_history_windows(scaled, weighted, usable, options.history) @ axes.T)
     tree.order[:] = usable[tree.order]
     made = Field(scaled, weighted, starts, axes, tree, scale, weights, 1.0, options)
-    return replace(made, nearness=_nearness(made, usable))
+    return replace(made, median_distance=_median_nearest_distance(made, usable))
 
 
-def _nearness(made: Field, usable: NDArray[np.int64]) -> float:
+def _median_nearest_distance(made: Field, usable: NDArray[np.int64]) -> float:
     moments = usable[np.linspace(0, len(usable) - 1, min(ASKED, len(usable))).astype(int)]
     away = np.zeros(len(moments))
-    nearest(_corpus(made), _flat(made.tree), made.axes, made.options.history, (moments, away))
+    nearest_distances(_field_arrays(made), _tree_arrays(made.tree), made.axes, made.options.history, (moments, away))
     return max(float(np.median(away[np.isfinite(away)])) if np.isfinite(away).any() else 1.0, 1e-9)
 
 
-def _corpus(made: Field) -> tuple[Floats, Floats, NDArray[np.int32]]:
+def _field_arrays(made: Field) -> tuple[Floats, Floats, NDArray[np.int32]]:
     return made.values, made.heard, made.starts
 
 
-def _flat(tree: Tree) -> tuple[NDArray[Any], ...]:
+def _tree_arrays(tree: KdTree) -> tuple[NDArray[Any], ...]:
     return tree.places, tree.order, tree.spans, tree.axes, tree.cuts
 
 
-def _windows(values: Floats, heard: Floats, frames: NDArray[np.int64], history: int) -> Floats:
+def _history_windows(values: Floats, heard: Floats, frames: NDArray[np.int64], history: int) -> Floats:
     """(N, h (E + D)) what was heard and shown before each of N frames."""
     rows = frames[:, None] + np.arange(-history, 0)
     return np.concatenate([heard[rows].reshape(len(rows), -1), values[rows].reshape(len(rows), -1)], axis=1)
@@ -212,7 +212,7 @@ def _principal_axes(windows: Floats) -> Floats:
     return np.ascontiguousarray(vectors[:, ::-1][:, :DIMENSIONS].T, np.float32)
 
 
-def _none(made: Field) -> NDArray[np.int64]:
+def _no_recent_jumps(made: Field) -> NDArray[np.int64]:
     """No leaps to remember; of few recordings fewer, so that some moment is always left."""
     return np.full(min(made.options.memory, len(made.tree.order) // (8 * APART)), -APART, np.int64)
 
@@ -225,25 +225,27 @@ def _spring(settle_s: float) -> tuple[np.float32, np.float32]:
     return stiffness, np.exp(-stiffness)
 
 
-def begun(field: Field, chance: float) -> FieldState:
+def initial_state(field: Field, chance: float) -> FieldState:
     """The state after the first frames of one of the recordings; `chance` in [0, 1) tells which."""
     history = field.options.history
     first = np.sort(field.tree.order[field.tree.order - field.starts[field.tree.order] == history])
     moment = int(first[int(chance * len(first))])
     rows = slice(moment - history, moment)
     nothing = np.zeros((2, field.values.shape[1]), np.float32)
-    return FieldState(field.values[rows].copy(), field.heard[rows].copy(), moment - 1, nothing, _none(field), 0)
+    return FieldState(
+        field.values[rows].copy(), field.heard[rows].copy(), moment - 1, nothing, _no_recent_jumps(field), 0
+    )
 
 
-def taken_over(state: FieldState, before: Field, after: Field) -> FieldState:
+def transfer_state(state: FieldState, before: Field, after: Field) -> FieldState:
     """The state of one style's field, from which another style's field of the same feature goes on."""
     shown = state.shown * np.float32(before.scale / after.scale)
     heard = state.heard / np.maximum(before.weights, np.float32(1e-9)) * after.weights
-    recent = _none(after)
+    recent = _no_recent_jumps(after)
     return FieldState(shown, heard.astype(np.float32), -1, np.zeros_like(state.offset), recent, state.n_frames)
 
 
-def continued(
+def sample_field(
     field: Field, state: FieldState, heard: Floats, chances: NDArray[np.float64]
 ) -> tuple[Floats, FieldState]:
     """The next n frames (n, D), in the units of the recordings, and the state behind them; in parts as at once.
@@ -255,27 +257,27 @@ def continued(
     chances : (n,)
         Uniform in [0, 1), one for each frame.
     """
-    made = walked(field, state, heard, chances)
+    made = sample_field_moments(field, state, heard, chances)
     return made.values, made.state
 
 
-def walked(field: Field, state: FieldState, heard: Floats, chances: NDArray[np.float64]) -> Walk:
-    """As `continued`, with the recorded moments that were shown."""
+def sample_field_moments(field: Field, state: FieldState, heard: Floats, chances: NDArray[np.float64]) -> FieldSample:
+    """As `sample_field`, with the recorded moments that were shown."""
     if not len(chances):
-        return Walk(np.zeros((0, state.offset.shape[1]), np.float32), np.zeros(0, np.int64), state)
+        return FieldSample(np.zeros((0, state.offset.shape[1]), np.float32), np.zeros(0, np.int64), state)
     options, history = field.options, field.options.history
     shown = np.concatenate([state.shown, np.zeros((len(chances), state.offset.shape[1]), np.float32)])
     sound = np.concatenate([state.heard, (heard * field.weights).astype(np.float32)])
-    moments, offset, recent = np.zeros(len(chances), np.int64), state.offset.copy(), state.recent.copy()
+    moments, offset, recent = np.zeros(len(chances), np.int64), state.offset.copy(), state.recent_jumps.copy()
     stiffness, fade = _spring(options.settle_s)
-    walk(
-        _corpus(field),
-        _flat(field.tree),
+    generate_frames(
+        _field_arrays(field),
+        _tree_arrays(field.tree),
         field.axes,
         (
             history,
             options.candidates,
-            options.sigma * field.nearness,
+            options.sigma * field.median_distance,
             options.stride,
             options.continuity,
             stiffness,
@@ -286,4 +288,4 @@ def walked(field: Field, state: FieldState, heard: Floats, chances: NDArray[np.f
     )
     behind = shown[-history:].copy(), sound[-history:].copy(), int(moments[-1]), offset, recent
     after = FieldState(*behind, state.n_frames + len(chances))
-    return Walk(shown[history:] * np.float32(field.scale), moments, after)
+    return FieldSample(shown[history:] * np.float32(field.scale), moments, after)

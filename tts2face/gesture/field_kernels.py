@@ -9,7 +9,7 @@ APART = 10  # default least number of frames between two moments that count as d
 
 
 @kernel
-def nearest(corpus, tree, axes, history, asked):  # type: ignore[no-untyped-def]
+def nearest_distances(corpus, tree, axes, history, asked):  # type: ignore[no-untyped-def]
     """Write how far the nearest different moment lies from each of some."""
     values, recorded, _ = corpus
     moments, away = asked
@@ -19,13 +19,13 @@ def nearest(corpus, tree, axes, history, asked):  # type: ignore[no-untyped-def]
     for n in range(len(moments)):
         best[:], distance[:] = -1, np.inf
         window = (values[moments[n] - history : moments[n]], recorded[moments[n] - history : moments[n]], 0, history)
-        _project(window, axes, query)
-        _search(corpus, tree, window, query, (best[:0], best, distance, (APART, SLACK), stack, bounds))
+        _project_window(window, axes, query)
+        _search_tree(corpus, tree, window, query, (best[:0], best, distance, (APART, SLACK), stack, bounds))
         away[n] = distance[1]
 
 
 @kernel
-def walk(corpus, tree, axes, options, track):  # type: ignore[no-untyped-def]
+def generate_frames(corpus, tree, axes, options, track):  # type: ignore[no-untyped-def]
     """Write the frames shown and the moments they come from.
 
     What is left of a leap goes as a critically damped spring, so that neither place nor speed jumps (Bollo 2018).
@@ -44,11 +44,11 @@ def walk(corpus, tree, axes, options, track):  # type: ignore[no-untyped-def]
         if not goes_on or (n_before + i) % stride == 0:
             best[:], distance[:] = -1, np.inf
             if goes_on:
-                away = continuity * _apart(corpus, (shown, heard, i, history), following, np.inf)
-                _offer(following, away, (starts, none, rule[0]), (best, distance))
-            _project((shown, heard, i, history), axes, query)
-            _search(corpus, tree, (shown, heard, i, history), query, (recent, best, distance, rule, stack, bounds))
-            chosen = _drawn(best, distance, sigma, chances[i])
+                away = continuity * _window_distance(corpus, (shown, heard, i, history), following, np.inf)
+                _insert_moment(following, away, (starts, none, rule[0]), (best, distance))
+            _project_window((shown, heard, i, history), axes, query)
+            _search_tree(corpus, tree, (shown, heard, i, history), query, (recent, best, distance, rule, stack, bounds))
+            chosen = _draw_pose(best, distance, sigma, chances[i])
         last = i + history - 1
         for d in range(values.shape[1]):
             if not goes_on or chosen != following:
@@ -65,7 +65,7 @@ def walk(corpus, tree, axes, options, track):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _drawn(best, distance, sigma, chance):  # type: ignore[no-untyped-def]
+def _draw_pose(best, distance, sigma, chance):  # type: ignore[no-untyped-def]
     """One of the moments found, by the chance."""
     total = 0.0
     for c in range(len(best)):
@@ -82,7 +82,7 @@ def _drawn(best, distance, sigma, chance):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _offer(moment, away, known, found):  # type: ignore[no-untyped-def]
+def _insert_moment(moment, away, known, found):  # type: ignore[no-untyped-def]
     """Keep a moment among the best ones if it is nearer than those within `apart` frames of it, and not recent."""
     starts, recent, apart = known
     best, distance = found
@@ -105,7 +105,7 @@ def _offer(moment, away, known, found):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _apart(corpus, window, moment, limit):  # type: ignore[no-untyped-def]
+def _window_distance(corpus, window, moment, limit):  # type: ignore[no-untyped-def]
     """Mean squared distance of what was shown and heard from what came before a moment; any number above `limit`."""
     values, recorded, _ = corpus
     shown, heard, i, history = window
@@ -124,7 +124,7 @@ def _apart(corpus, window, moment, limit):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _project(window, axes, query):  # type: ignore[no-untyped-def]
+def _project_window(window, axes, query):  # type: ignore[no-untyped-def]
     shown, heard, i, history = window
     n_heard, n_shown = heard.shape[1], shown.shape[1]
     for p in range(len(axes)):
@@ -138,7 +138,7 @@ def _project(window, axes, query):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _search(corpus, tree, window, query, found):  # type: ignore[no-untyped-def]
+def _search_tree(corpus, tree, window, query, found):  # type: ignore[no-untyped-def]
     """Offer every moment that may be among the best ones; the nearer half of each node first.
 
     A place's distance from the query is at most that of the windows: the axes are orthonormal.
@@ -166,5 +166,5 @@ def _search(corpus, tree, window, query, found):  # type: ignore[no-untyped-def]
                 squared += (query[p] - places[at, p]) ** 2
             if squared < distance[-1] * history:
                 moment = np.int64(order[at])
-                away = _apart(corpus, window, moment, distance[-1])
-                _offer(moment, away, (corpus[2], recent, apart), (best, distance))
+                away = _window_distance(corpus, window, moment, distance[-1])
+                _insert_moment(moment, away, (corpus[2], recent, apart), (best, distance))

@@ -10,15 +10,15 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.gesture.field import Field, FieldOptions, begun, continued, field_of, taken_over
-from tts2face.gesture.prosody import drivers
+from tts2face.gesture.field import Field, FieldOptions, build_field, initial_state, sample_field, transfer_state
+from tts2face.gesture.prosody import prosody_features
 from tts2face.gesture.timeline import Timeline
-from tts2face.interpolation import cubic_at
-from tts2face.models.palette import FEATURES, GESTURE_FPS, Change, Palette, Style
+from tts2face.interpolation import interpolate_cubic
+from tts2face.models.palette import FEATURES, GESTURE_FPS, FeatureChange, Palette, Style
 from tts2face.types import Waveform
 
 BEYOND = 2  # frames of a field behind an instant, which its cubic needs
-UNCHANGED = Change()
+UNCHANGED = FeatureChange()
 # Chosen within three quarters of the recordings of GRID s1 (docs/gestures.md); the others take the options of brows.
 OPTIONS: Mapping[str, FieldOptions] = MappingProxyType(
     {
@@ -41,7 +41,7 @@ Gestures = Mapping[str, Floats]  # (T, k) values of each feature
 
 
 @dataclass(slots=True, eq=False)
-class Fields:
+class GestureFields:
     """Fields of a palette, made when they are first needed; serves any number of clips."""
 
     palette: Palette
@@ -55,7 +55,7 @@ class Fields:
             style = self.palette.styles[source]
             heard = np.stack([style.intensity, style.pitch], axis=1)[:, : 2 if self.with_pitch else 1]
             options = self.options.get(feature, FieldOptions())
-            self._made[source, feature] = field_of(style.motion[feature], heard, style.lengths, options)
+            self._made[source, feature] = build_field(style.motion[feature], heard, style.lengths, options)
         return self._made[source, feature]
 
     def source(self, style: str, feature: str) -> str:
@@ -66,15 +66,15 @@ class Fields:
             return name
         return next(other for other, recorded in styles.items() if feature in recorded.motion)
 
-    def change(self, style: str, feature: str) -> Change:
+    def change(self, style: str, feature: str) -> FeatureChange:
         """What a style does to the feature of its source."""
         derived = self.palette.derivations.get(style)
         return UNCHANGED if derived is None else derived.changes.get(feature, UNCHANGED)
 
-    def changed(self, style: str, feature: str, values: Floats) -> Floats:
+    def apply_change(self, style: str, feature: str, values: Floats) -> Floats:
         """Values (T, k) of a feature's source with the gain and offset of a style."""
         change = self.change(style, feature)
-        middle = middle_of(self.palette.styles[self.source(style, feature)], feature)
+        middle = style_median(self.palette.styles[self.source(style, feature)], feature)
         offset = np.array([change.offset.get(channel, 0.0) for channel in self.palette.channels(feature)], np.float32)
         return np.asarray(middle + np.float32(change.gain) * (values - middle) + offset, np.float32)
 
@@ -91,10 +91,10 @@ class GestureStream:
     style changes no other.
     """
 
-    def __init__(self, fields: Fields, *, style: str, seed: int, fps: float) -> None:
+    def __init__(self, fields: GestureFields, *, style: str, seed: int, fps: float) -> None:
         fields.palette.require(style)
         self._fields, self._fps = fields, fps
-        self._tracks = {name: _Track(fields, name, style, seed) for name in fields.features}
+        self._tracks = {name: _FeatureTrack(fields, name, style, seed) for name in fields.features}
         self._n_frames = 0
 
     def next(self, sound: Waveform, n_frames: int, timeline: Timeline) -> Gestures:
@@ -105,14 +105,14 @@ class GestureStream:
         begin = self._n_frames / self._fps
         times = (self._n_frames + np.arange(n_frames)) / self._fps
         self._n_frames += n_frames
-        made, heard = {}, _Heard(sound, begin, with_pitch=self._fields.with_pitch)
+        made, heard = {}, _SoundFeatures(sound, begin, with_pitch=self._fields.with_pitch)
         for name, track in self._tracks.items():
-            track.go_on(heard, float(times[-1]), timeline)
-            made[name] = painted(name, track.at(times, timeline), times, timeline)
+            track.extend(heard, float(times[-1]), timeline)
+            made[name] = apply_timeline(name, track.at(times, timeline), times, timeline)
         return made
 
 
-def painted(feature: str, values: Floats, times: NDArray[np.float64], timeline: Timeline) -> Floats:
+def apply_timeline(feature: str, values: Floats, times: NDArray[np.float64], timeline: Timeline) -> Floats:
     """Values (T, k) of a feature with the gain, expressions and nods of a timeline."""
     values = np.asarray(values * np.float32(timeline.gains.of(feature)), np.float32)
     if feature == "expression":
@@ -122,7 +122,7 @@ def painted(feature: str, values: Floats, times: NDArray[np.float64], timeline: 
     return values
 
 
-class _Heard:
+class _SoundFeatures:
     """What a sound that begins at an instant tells; features on the same clock measure it once."""
 
     def __init__(self, sound: Waveform, begin: float, *, with_pitch: bool) -> None:
@@ -130,26 +130,26 @@ class _Heard:
         self._found: dict[bytes, Floats] = {}
 
     def at(self, times: NDArray[np.float64]) -> Floats:
-        """(T, 1 or 2) as `drivers`."""
+        """(T, 1 or 2) as `prosody_features`."""
         key = times.tobytes()
         if key not in self._found:
-            self._found[key] = drivers(self._sound, times - self._begin, with_pitch=self._with_pitch)
+            self._found[key] = prosody_features(self._sound, times - self._begin, with_pitch=self._with_pitch)
         return self._found[key]
 
 
-class _Track:
+class _FeatureTrack:
     """One feature of a clip: frames of its fields on a clock that runs at the style's tempo."""
 
-    def __init__(self, fields: Fields, feature: str, style: str, seed: int) -> None:
+    def __init__(self, fields: GestureFields, feature: str, style: str, seed: int) -> None:
         self._fields, self._feature, self._style = fields, feature, style
-        self._chances = np.random.default_rng([seed, crc32(feature.encode())])
+        self._generator = np.random.default_rng([seed, crc32(feature.encode())])
         self._source = fields.source(style, feature)
         made = fields.of(self._source, feature)
-        self._state = begun(made, self._chances.random())
+        self._state = initial_state(made, self._generator.random())
         self._times: list[float] = []
         self._values = np.zeros((0, made.values.shape[1]), np.float32)
 
-    def go_on(self, sound: "_Heard", end: float, timeline: Timeline) -> None:
+    def extend(self, sound: "_SoundFeatures", end: float, timeline: Timeline) -> None:
         """Add frames up to `BEYOND` an instant."""
         first = len(self._times)
         while len(self._times) <= BEYOND or self._times[-1 - BEYOND] <= end:
@@ -166,32 +166,32 @@ class _Track:
             for style in timeline.style_at(self._feature, new, default=self._style)
         ]
         heard = sound.at(new)
-        chances = self._chances.random(len(new))
+        chances = self._generator.random(len(new))
         borders = [0, *(i for i in range(1, len(new)) if styles[i] != styles[i - 1]), len(new)]
-        parts = [self._drawn(styles[low], heard[low:high], chances[low:high]) for low, high in pairwise(borders)]
+        parts = [self._sample(styles[low], heard[low:high], chances[low:high]) for low, high in pairwise(borders)]
         self._values = np.concatenate([self._values, *parts])
 
-    def _drawn(self, source: str, heard: Floats, chances: NDArray[np.float64]) -> Floats:
+    def _sample(self, source: str, heard: Floats, chances: NDArray[np.float64]) -> Floats:
         made = self._fields.of(source, self._feature)
         if source != self._source:
-            self._state = taken_over(self._state, self._fields.of(self._source, self._feature), made)
+            self._state = transfer_state(self._state, self._fields.of(self._source, self._feature), made)
             self._source = source
-        values, self._state = continued(made, self._state, heard, chances)
+        values, self._state = sample_field(made, self._state, heard, chances)
         return values
 
     def at(self, times: NDArray[np.float64], timeline: Timeline) -> Floats:
         """(T, k) values at instants, changed as the styles state; older frames are forgotten."""
         clock = np.array(self._times)
-        values = cubic_at(self._values, np.interp(times, clock, np.arange(len(clock))))
+        values = interpolate_cubic(self._values, np.interp(times, clock, np.arange(len(clock))))
         shares = timeline.style_shares(self._feature, times, default=self._style)
         changed = np.zeros_like(values)
         for style, share in shares.items():
-            changed += share.astype(np.float32)[:, None] * self._fields.changed(style, self._feature, values)
+            changed += share.astype(np.float32)[:, None] * self._fields.apply_change(style, self._feature, values)
         passed = max(0, bisect_right(self._times, times[-1]) - 1 - BEYOND)
         self._times, self._values = self._times[passed:], self._values[passed:]
         return changed
 
 
-def middle_of(style: Style, feature: str) -> Floats:
+def style_median(style: Style, feature: str) -> Floats:
     """(k,) median of a style's feature: where the face mostly is."""
     return np.asarray(np.median(style.motion[feature], axis=0), np.float32)

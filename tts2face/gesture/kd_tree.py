@@ -14,7 +14,7 @@ LEAF = 32  # places in a leaf at most; 16 to 96 are as fast within a tenth
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tree:
+class KdTree:
     """Places in nodes; node i has the children 2 i + 1 and 2 i + 2.
 
     Parameters
@@ -36,7 +36,7 @@ class Tree:
     cuts: NDArray[np.float32]
 
 
-def tree_of(places: NDArray[np.float32]) -> Tree:
+def build_tree(places: NDArray[np.float32]) -> KdTree:
     """The tree of (N, p) places, N at least 1. O(N log N) time, O(N p) memory."""
     n_levels = max(0, int(np.ceil(np.log2(max(len(places) / LEAF, 1.0)))))
     n_nodes = 2 ** (n_levels + 1) - 1
@@ -44,25 +44,25 @@ def tree_of(places: NDArray[np.float32]) -> Tree:
     spans = np.zeros((n_nodes, 2), np.int32)
     axes, cuts = np.full(n_nodes, -1, np.int32), np.zeros(n_nodes, np.float32)
     spans[0] = 0, len(places)
-    _grow(np.ascontiguousarray(places), order, spans, axes, cuts)
-    return Tree(np.ascontiguousarray(places[order]), order, spans, axes, cuts)
+    _split_nodes(np.ascontiguousarray(places), order, spans, axes, cuts)
+    return KdTree(np.ascontiguousarray(places[order]), order, spans, axes, cuts)
 
 
 @kernel
-def _grow(places, order, spans, axes, cuts):  # type: ignore[no-untyped-def]
+def _split_nodes(places, order, spans, axes, cuts):  # type: ignore[no-untyped-def]
     """Split every node but the leaves, and put the places in their order."""
     for node in range(len(axes) // 2):
         low, high = spans[node]
-        axis = _longest(places, order, low, high)
+        axis = _longest_axis(places, order, low, high)
         middle = low + (high - low) // 2
-        _select(places, order, axis, (low, high - 1, middle))
+        _partition(places, order, axis, (low, high - 1, middle))
         axes[node], cuts[node] = axis, places[order[middle], axis]
         spans[2 * node + 1, 0], spans[2 * node + 1, 1] = low, middle
         spans[2 * node + 2, 0], spans[2 * node + 2, 1] = middle, high
 
 
 @kernel
-def _longest(places, order, low, high):  # type: ignore[no-untyped-def]
+def _longest_axis(places, order, low, high):  # type: ignore[no-untyped-def]
     """The axis along which some places lie farthest apart."""
     best, widest = 0, np.float32(-1.0)
     for axis in range(places.shape[1]):
@@ -76,7 +76,7 @@ def _longest(places, order, low, high):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _select(places, order, axis, wanted):  # type: ignore[no-untyped-def]
+def _partition(places, order, axis, wanted):  # type: ignore[no-untyped-def]
     """Put in order so far that no value before the middle is larger, and none behind it smaller (Hoare 1961)."""
     low, high, middle = wanted
     while low < high:

@@ -10,12 +10,12 @@ from tts2face.models.palette import FEATURES
 ALL = "all"  # every feature
 
 
-def features_of(name: str) -> tuple[str, ...]:
+def expand_feature(name: str) -> tuple[str, ...]:
     """The features that a name stands for: itself, or every one of them for ``all``."""
     return FEATURES if name == ALL else (check_feature(name),)
 
 
-def style_of(written: str) -> Mapping[str, str]:
+def parse_style(written: str) -> Mapping[str, str]:
     """Style of each feature from ``delighted``, ``brows=annoyed,head=delighted`` or ``delighted,brows=annoyed``.
 
     A name without feature counts for all that have none of their own.
@@ -27,7 +27,7 @@ def style_of(written: str) -> Mapping[str, str]:
     """
     chosen: dict[str, str] = {}
     hint = "a style is a name, or features with styles such as brows=annoyed,head=delighted"
-    for name, style in _pairs(written, hint, is_named=False):
+    for name, style in _parse_pairs(written, hint, is_named=False):
         if (name or ALL) in chosen:
             raise InputError(f"{written!r} chooses a style for {name or ALL} twice; keep one")
         if name not in {"", ALL}:
@@ -37,7 +37,7 @@ def style_of(written: str) -> Mapping[str, str]:
     return (dict.fromkeys(FEATURES, base) if base is not None else {}) | chosen
 
 
-def gains_of(written: str) -> Gains:
+def parse_gains(written: str) -> Gains:
     """Gains from ``head=1.5,blink=0.8,jaw=1.2``; ``all=0.5`` counts for all gestures that have none of their own.
 
     Raises
@@ -47,17 +47,17 @@ def gains_of(written: str) -> Gains:
     """
     hint = "gains are written as head=1.5,blink=0.8"
     chosen: dict[str, float] = {}
-    for name, number in _pairs(written, hint):
+    for name, number in _parse_pairs(written, hint):
         if name in chosen:
             raise InputError(f"{written!r} chooses a gain for {name} twice; keep one")
         if name != ALL:
             check_feature(name, GAINED)
-        chosen[name] = _number(number, hint)
+        chosen[name] = _parse_number(number, hint)
     base = chosen.pop(ALL, None)
     return Gains((dict.fromkeys(FEATURES, base) if base is not None else {}) | chosen)
 
 
-def expressions_of(written: str) -> tuple[ExpressionSpan, ...]:
+def parse_expressions(written: str) -> tuple[ExpressionSpan, ...]:
     """Expressions from ``happy=0.6@1.2-3.4,sad=0.3``: weight, and seconds from and to; without times the whole clip.
 
     ``@1.2`` or ``@1.2-`` lasts to the end.
@@ -69,21 +69,21 @@ def expressions_of(written: str) -> tuple[ExpressionSpan, ...]:
     """
     hint = "an expression is written as happy=0.6, or with seconds as happy=0.6@1.2-3.4"
     spans = []
-    for name, value in _pairs(written, hint):
+    for name, value in _parse_pairs(written, hint):
         weight, has_times, times = value.partition("@")
         start, _, end = times.partition("-")
         spans.append(
             ExpressionSpan(
                 name,
-                _number(weight, hint),
-                _number(start, hint) if has_times else 0.0,
-                _number(end, hint) if end.strip() else math.inf,
+                _parse_number(weight, hint),
+                _parse_number(start, hint) if has_times else 0.0,
+                _parse_number(end, hint) if end.strip() else math.inf,
             )
         )
     return tuple(spans)
 
 
-def _pairs(written: str, hint: str, *, is_named: bool = True) -> Iterator[tuple[str, str]]:
+def _parse_pairs(written: str, hint: str, *, is_named: bool = True) -> Iterator[tuple[str, str]]:
     for part in written.split(","):
         name, is_pair, value = (piece.strip() for piece in part.rpartition("="))
         if not value or "=" in name or bool(is_pair) != bool(name) or (is_named and not name):
@@ -91,7 +91,7 @@ def _pairs(written: str, hint: str, *, is_named: bool = True) -> Iterator[tuple[
         yield name, value
 
 
-def _number(written: str, hint: str) -> float:
+def _parse_number(written: str, hint: str) -> float:
     try:
         number = float(written)
     except ValueError as wrong:

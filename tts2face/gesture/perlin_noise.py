@@ -8,7 +8,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.gesture.gesture_stream import Fields, Gestures, middle_of, painted
+from tts2face.gesture.gesture_stream import GestureFields, Gestures, apply_timeline, style_median
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.types import Waveform
@@ -23,7 +23,7 @@ Floats = NDArray[np.float32]
 class NoiseStream:
     """Gestures of one clip from noise, piece by piece, as `GestureStream` gives them."""
 
-    def __init__(self, fields: Fields, *, style: str, seed: int, fps: float) -> None:
+    def __init__(self, fields: GestureFields, *, style: str, seed: int, fps: float) -> None:
         self._fields, self._style, self._seed, self._fps = fields, fields.palette.require(style), seed, fps
         self._n_frames = 0
 
@@ -31,19 +31,21 @@ class NoiseStream:
         """Values of every feature for the next n frames; the sound changes nothing."""
         times = (self._n_frames + np.arange(n_frames)) / self._fps
         self._n_frames += n_frames
-        return {name: painted(name, self._values(name, times), times, timeline) for name in self._fields.features}
+        return {
+            name: apply_timeline(name, self._values(name, times), times, timeline) for name in self._fields.features
+        }
 
     def _values(self, feature: str, times: NDArray[np.float64]) -> Floats:
         style = self._fields.palette.styles[self._fields.source(self._style, feature)]
         motion, key = style.motion[feature], (self._seed << 32) + crc32(feature.encode())
         if feature == "blink":
-            shut = blinks(times, blinks_per_second(motion), key)
+            shut = blink_closure(times, blinks_per_second(motion), key)
             return np.repeat(shut[:, None], motion.shape[1], axis=1).astype(np.float32)
-        noise = np.stack([perlin(times, key + channel) for channel in range(motion.shape[1])], axis=1)
-        return np.asarray(middle_of(style, feature) + motion.std(axis=0) * noise, np.float32)
+        noise = np.stack([perlin_noise(times, key + channel) for channel in range(motion.shape[1])], axis=1)
+        return np.asarray(style_median(style, feature) + motion.std(axis=0) * noise, np.float32)
 
 
-def perlin(times: NDArray[np.float64], key: int) -> NDArray[np.float64]:
+def perlin_noise(times: NDArray[np.float64], key: int) -> NDArray[np.float64]:
     """(T,) gradient noise at instants, octaves added, standard deviation 1; the same for the same key.
 
     Between whole numbers of a clock two random slopes are blended by 6 t^5 - 15 t^4 + 10 t^3 (Perlin 2002).
@@ -54,17 +56,17 @@ def perlin(times: NDArray[np.float64], key: int) -> NDArray[np.float64]:
         low = np.floor(at).astype(np.int64)
         part = at - low
         blend = part**3 * (part * (6 * part - 15) + 10)
-        left, right = _chance(low, key, octave) * part, _chance(low + 1, key, octave) * (part - 1)
+        left, right = _hash_noise(low, key, octave) * part, _hash_noise(low + 1, key, octave) * (part - 1)
         total += 0.5**octave * ((1 - blend) * left + blend * right)
     return total / NOISE_SPREAD
 
 
-def blinks(times: NDArray[np.float64], rate: float, key: int) -> NDArray[np.float64]:
+def blink_closure(times: NDArray[np.float64], rate: float, key: int) -> NDArray[np.float64]:
     """(T,) share by which lids are shut: raised cosines that begin at random, `rate` a second in the mean."""
     cell = BLINK_S / 2
     first = int(np.floor(times[0] / cell)) - 2
     numbers = np.arange(first, int(np.floor(times[-1] / cell)) + 1)
-    begins = numbers[(_chance(numbers, key, 0) + 1) / 2 < rate * cell] * cell
+    begins = numbers[(_hash_noise(numbers, key, 0) + 1) / 2 < rate * cell] * cell
     shut = np.zeros(len(times))
     for begin in begins:
         away = np.abs(times - begin - BLINK_S / 2) / (BLINK_S / 2)
@@ -78,7 +80,7 @@ def blinks_per_second(shut: Floats) -> float:
     return float((np.diff(is_shut.astype(np.int8)) > 0).sum()) * GESTURE_FPS / max(len(shut), 1)
 
 
-def _chance(numbers: NDArray[np.int64], key: int, octave: int) -> NDArray[np.float64]:
+def _hash_noise(numbers: NDArray[np.int64], key: int, octave: int) -> NDArray[np.float64]:
     """(N,) numbers in [-1, 1) that a whole number always gets again (SplitMix64; Steele, Lea and Flood 2014)."""
     mixed = numbers.astype(np.uint64) * np.uint64(3) + np.uint64(octave) + np.uint64((key * 0x9E3779B97F4A7C15) % 2**64)
     for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB), (31, 1)):

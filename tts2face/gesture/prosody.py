@@ -16,7 +16,7 @@ LEAST_S = 0.1  # shorter sounds have no pitch
 Floats = NDArray[np.float32]
 
 
-def drivers(sound: Waveform, times: NDArray[np.float64], *, with_pitch: bool) -> Floats:
+def prosody_features(sound: Waveform, times: NDArray[np.float64], *, with_pitch: bool) -> Floats:
     """(T, 1 or 2) intensity in dB against the sound's speech, and pitch in semitones against its median.
 
     Instants beyond the sound are silent.

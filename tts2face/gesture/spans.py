@@ -131,7 +131,7 @@ def _check_span(what: str, start: float, end: float) -> None:
         raise InputError(f"{what} must end after it begins, not run from {start:g} to {end:g} s")
 
 
-def in_order(spans: Iterable[AnySpan]) -> tuple[AnySpan, ...]:
+def sort_spans(spans: Iterable[AnySpan]) -> tuple[AnySpan, ...]:
     """Spans by time.
 
     Raises
@@ -153,12 +153,12 @@ def in_order(spans: Iterable[AnySpan]) -> tuple[AnySpan, ...]:
     return ordered
 
 
-def moved(span: AnySpan, seconds: float) -> AnySpan:
+def shift_span(span: AnySpan, seconds: float) -> AnySpan:
     """The same span, so many seconds later."""
     return replace(span, start=span.start + seconds, end=span.end + seconds)
 
 
-def cut(spans: Iterable[AnySpan], start: float, end: float) -> tuple[AnySpan, ...]:
+def cut_spans(spans: Iterable[AnySpan], start: float, end: float) -> tuple[AnySpan, ...]:
     """What of some spans lies in [start, end)."""
     return tuple(
         replace(span, start=max(span.start, start), end=min(span.end, end))
@@ -167,13 +167,13 @@ def cut(spans: Iterable[AnySpan], start: float, end: float) -> tuple[AnySpan, ..
     )
 
 
-def painted(under: Sequence[AnySpan], over: Sequence[AnySpan]) -> tuple[AnySpan, ...]:
+def overlay_spans(under: Sequence[AnySpan], over: Sequence[AnySpan]) -> tuple[AnySpan, ...]:
     """Spans with others painted over them."""
     left = list(under)
     for top in over:
         mine = [span for span in left if span.lane == top.lane]
         left = [span for span in left if span.lane != top.lane]
-        left.extend(cut(mine, -1.0, top.start))
-        left.extend(cut(mine, top.end, math.inf))
+        left.extend(cut_spans(mine, -1.0, top.start))
+        left.extend(cut_spans(mine, top.end, math.inf))
     left.extend(over)
     return tuple(left)

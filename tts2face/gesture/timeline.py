@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lexicon.errors import InputError
-from tts2face.gesture.easing import Floats, between_keys, presence
+from tts2face.gesture.easing import Floats, interpolate_keys, span_weights
 from tts2face.gesture.spans import (
     ExpressionSpan,
     Gains,
@@ -20,10 +20,10 @@ from tts2face.gesture.spans import (
     StyleSpan,
     check_feature,
     check_style,
-    cut,
-    in_order,
-    moved,
-    painted,
+    cut_spans,
+    overlay_spans,
+    shift_span,
+    sort_spans,
 )
 from tts2face.models.palette import EXPRESSIONS, Palette
 
@@ -62,8 +62,8 @@ class Timeline:
             check_feature(feature)
             check_style(style)
         object.__setattr__(self, "style", MappingProxyType(dict(self.style)))
-        object.__setattr__(self, "spans", in_order(self.spans))
-        object.__setattr__(self, "expressions", in_order(self.expressions))
+        object.__setattr__(self, "spans", sort_spans(self.spans))
+        object.__setattr__(self, "expressions", sort_spans(self.expressions))
         object.__setattr__(self, "nods", tuple(sorted(self.nods, key=lambda nod: nod.time)))
 
     @property
@@ -102,7 +102,7 @@ class Timeline:
         shares = {base: np.ones(len(seconds))}
         for span in self.spans:
             if span.feature == feature:
-                share = presence(seconds, span.start, span.end, ONSET_S if feature == "expression" else BLEND_S)
+                share = span_weights(seconds, span.start, span.end, ONSET_S if feature == "expression" else BLEND_S)
                 shares[base] = shares[base] - share
                 shares[span.style] = shares.get(span.style, np.zeros(len(seconds))) + share
         return {style: np.clip(share, 0.0, 1.0) for style, share in shares.items()}
@@ -113,7 +113,7 @@ class Timeline:
         weights = np.zeros((len(seconds), len(EXPRESSIONS)))
         for span in self.expressions:
             column = EXPRESSIONS.index(span.expression)
-            weights[:, column] += span.weight * presence(seconds, span.start, span.end, ONSET_S)
+            weights[:, column] += span.weight * span_weights(seconds, span.start, span.end, ONSET_S)
         return weights
 
     def nod_pitch(self, times: ArrayLike) -> Floats:
@@ -121,17 +121,17 @@ class Timeline:
         seconds = np.atleast_1d(np.asarray(times, np.float64))
         down, up = np.zeros(len(seconds)), np.zeros(len(seconds))
         for nod in self.nods:
-            pitch = nod.size * NOD_RAD * between_keys(seconds - nod.time, NOD_KEYS)
+            pitch = nod.size * NOD_RAD * interpolate_keys(seconds - nod.time, NOD_KEYS)
             down, up = np.maximum(down, pitch), np.minimum(up, pitch)
         return down + up
 
-    def merged(self, other: "Timeline", shift: float = 0.0) -> "Timeline":
+    def merge(self, other: "Timeline", shift: float = 0.0) -> "Timeline":
         """Both, the other `shift` seconds later; where they name one thing twice the other wins."""
         later = other.shifted(shift)
         return Timeline(
             {**self.style, **later.style},
-            painted(self.spans, later.spans),
-            painted(self.expressions, later.expressions),
+            overlay_spans(self.spans, later.spans),
+            overlay_spans(self.expressions, later.expressions),
             self.nods + later.nods,
             Gains({**self.gains.factors, **later.gains.factors}),
         )
@@ -140,17 +140,17 @@ class Timeline:
         """The same, so many seconds later."""
         return replace(
             self,
-            spans=tuple(moved(span, seconds) for span in self.spans),
-            expressions=tuple(moved(span, seconds) for span in self.expressions),
+            spans=tuple(shift_span(span, seconds) for span in self.spans),
+            expressions=tuple(shift_span(span, seconds) for span in self.expressions),
             nods=tuple(replace(nod, time=nod.time + seconds) for nod in self.nods),
         )
 
-    def within(self, start: float, end: float) -> "Timeline":
+    def restrict(self, start: float, end: float) -> "Timeline":
         """What is asked for in [start, end), spans cut to it; on the same clock."""
         return replace(
             self,
-            spans=cut(self.spans, start, end),
-            expressions=cut(self.expressions, start, end),
+            spans=cut_spans(self.spans, start, end),
+            expressions=cut_spans(self.expressions, start, end),
             nods=tuple(nod for nod in self.nods if start <= nod.time < end),
         )
 

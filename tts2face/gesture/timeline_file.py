@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
-from tts2face.gesture.notation import ALL, features_of, style_of
+from tts2face.gesture.notation import ALL, expand_feature, parse_style
 from tts2face.gesture.spans import ExpressionSpan, Gains, Nod, StyleSpan, check_feature
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import FEATURES
@@ -40,89 +40,95 @@ def read_timeline(path: Path) -> Timeline:
 def parse_timeline(content: str, name: str = "timeline") -> Timeline:
     """A timeline from the text of a JSON file; errors as `read_timeline`."""
     told = parse_json(content, name)
-    parts = _at(name, lambda: _object(told, {}, dict.fromkeys(KEYS)))
-    spans = _each(f"{name}, spans", parts["spans"], _spans)
-    expressions = _each(f"{name}, expressions", parts["expressions"], _expression)
-    nods = _each(f"{name}, nods", parts["nods"], _nod)
-    style = _at(f"{name}, style", lambda: _style(parts["style"]))
-    gains = _at(f"{name}, gains", lambda: _gains(parts["gains"]))
-    return _at(name, lambda: Timeline(style, tuple(chain(*spans)), tuple(expressions), tuple(nods), gains))
+    parts = _add_place_to_errors(name, lambda: _check_object(told, {}, dict.fromkeys(KEYS)))
+    spans = _parse_each(f"{name}, spans", parts["spans"], _parse_spans)
+    expressions = _parse_each(f"{name}, expressions", parts["expressions"], _parse_expression)
+    nods = _parse_each(f"{name}, nods", parts["nods"], _parse_nod)
+    style = _add_place_to_errors(f"{name}, style", lambda: _parse_styles(parts["style"]))
+    gains = _add_place_to_errors(f"{name}, gains", lambda: _parse_gains(parts["gains"]))
+    return _add_place_to_errors(
+        name, lambda: Timeline(style, tuple(chain(*spans)), tuple(expressions), tuple(nods), gains)
+    )
 
 
-def _at(place: str, make: Callable[[], Made]) -> Made:
+def _add_place_to_errors(place: str, make: Callable[[], Made]) -> Made:
     try:
         return make()
     except InputError as wrong:
         raise DataError(f"{place}: {wrong}") from wrong
 
 
-def _each(place: str, told: Any, make: Callable[[Any], Made]) -> list[Made]:
+def _parse_each(place: str, told: Any, make: Callable[[Any], Made]) -> list[Made]:
     if told is None:
         return []
     if not isinstance(told, list):
-        raise DataError(f"{place} must be a list in square brackets, not {_shown(told)}")
-    return [_at(f"{place}[{number}]", partial(make, one)) for number, one in enumerate(told)]
+        raise DataError(f"{place} must be a list in square brackets, not {_format_value(told)}")
+    return [_add_place_to_errors(f"{place}[{number}]", partial(make, one)) for number, one in enumerate(told)]
 
 
-def _spans(told: Any) -> tuple[StyleSpan, ...]:
-    parts = _object(told, {"feature": str, "style": str, "start": float}, {"end": math.inf})
-    end = _typed("end", parts["end"], float)
-    return tuple(StyleSpan(feature, parts["style"], parts["start"], end) for feature in features_of(parts["feature"]))
+def _parse_spans(told: Any) -> tuple[StyleSpan, ...]:
+    parts = _check_object(told, {"feature": str, "style": str, "start": float}, {"end": math.inf})
+    end = _check_type("end", parts["end"], float)
+    return tuple(
+        StyleSpan(feature, parts["style"], parts["start"], end) for feature in expand_feature(parts["feature"])
+    )
 
 
-def _expression(told: Any) -> ExpressionSpan:
-    parts = _object(told, {"expression": str, "weight": float}, {"start": 0.0, "end": math.inf})
-    start, end = (_typed(name, parts[name], float) for name in ("start", "end"))
+def _parse_expression(told: Any) -> ExpressionSpan:
+    parts = _check_object(told, {"expression": str, "weight": float}, {"start": 0.0, "end": math.inf})
+    start, end = (_check_type(name, parts[name], float) for name in ("start", "end"))
     return ExpressionSpan(parts["expression"], parts["weight"], start, end)
 
 
-def _nod(told: Any) -> Nod:
-    parts = _object(told, {"time": float}, {"size": 1.0})
-    return Nod(parts["time"], _typed("size", parts["size"], float))
+def _parse_nod(told: Any) -> Nod:
+    parts = _check_object(told, {"time": float}, {"size": 1.0})
+    return Nod(parts["time"], _check_type("size", parts["size"], float))
 
 
-def _style(told: Any) -> Mapping[str, str]:
+def _parse_styles(told: Any) -> Mapping[str, str]:
     if told is None:
         return {}
     if isinstance(told, str):
-        return style_of(told)
+        return parse_style(told)
     if not isinstance(told, dict):
-        raise InputError(f"give a name, or a style for each feature, not {_shown(told)}")
-    named = {name: _typed(name, style, str) for name, style in told.items()}
+        raise InputError(f"give a name, or a style for each feature, not {_format_value(told)}")
+    named = {name: _check_type(name, style, str) for name, style in told.items()}
     base = named.pop(ALL, None)
     return {**(dict.fromkeys(FEATURES, base) if base else {}), **{check_feature(name): named[name] for name in named}}
 
 
-def _gains(told: Any) -> Gains:
+def _parse_gains(told: Any) -> Gains:
     if told is None:
         return Gains()
     if not isinstance(told, dict):
-        raise InputError(f"give a factor for each feature, not {_shown(told)}")
-    return Gains({name: _typed(name, factor, float) for name, factor in told.items()})
+        raise InputError(f"give a factor for each feature, not {_format_value(told)}")
+    return Gains({name: _check_type(name, factor, float) for name, factor in told.items()})
 
 
-def _object(told: Any, required: Mapping[str, type], optional: Mapping[str, Any]) -> dict[str, Any]:
+def _check_object(told: Any, required: Mapping[str, type], optional: Mapping[str, Any]) -> dict[str, Any]:
     """The parts of a JSON object: all that are required, of their type, and no unknown one."""
     if not isinstance(told, dict):
-        raise InputError(f"give an object in curly brackets, not {_shown(told)}")
+        raise InputError(f"give an object in curly brackets, not {_format_value(told)}")
     for name in told:
         if name not in required and name not in optional:
             raise InputError(f"there is no {name!r} here; choose {', '.join([*required, *optional])}")
     for name in required:
         if name not in told:
             raise InputError(f"{name} is missing")
-    return {**optional, **told, **{name: _typed(name, told[name], kind) for name, kind in required.items()}}
+    return {**optional, **told, **{name: _check_type(name, told[name], kind) for name, kind in required.items()}}
 
 
-def _typed(name: str, value: Any, kind: type) -> Any:
+def _check_type(name: str, value: Any, kind: type) -> Any:
     if kind is float and isinstance(value, int | float) and not isinstance(value, bool):
-        return _finite(name, value)
+        return _check_finite(name, value)
     if kind is str and isinstance(value, str):
         return value
-    raise InputError(f"{name} must be {'a number' if kind is float else 'a text in quotes'}, not {_shown(value)}")
+    raise InputError(
+        f"{name} must be {'a number' if kind is float else 'a text in quotes'}, not {_format_value(value)}"
+    )
 
 
-def _finite(name: str, value: float) -> float:
+def _check_finite(name: str, value: float) -> float:
     """A number as JSON has them; infinity is only ever our own default."""
     try:
         return float(value)
@@ -130,5 +136,5 @@ def _finite(name: str, value: float) -> float:
         raise InputError(f"{name} is too large a number") from huge
 
 
-def _shown(value: Any) -> str:
+def _format_value(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False)[:40]

@@ -146,7 +146,7 @@ def nearest_pixels(model: TextureModel) -> NDArray[np.int64]:
 
 
 def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
-    """The appearance as arrays of a talker's file; `appearance_of` reads them."""
+    """The appearance as arrays of a talker's file; `appearance_from_arrays` reads them."""
     arrays: dict[str, NDArray[Any]] = {
         "appearance.mouth_points": appearance.mouth_points,
         "appearance.moved_by_speech": appearance.moved_by_speech.astype(np.float16),
@@ -166,7 +166,7 @@ def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def appearance_of(arrays: Mapping[str, NDArray[Any]]) -> Appearance | None:
+def appearance_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Appearance | None:
     """The appearance in a talker's file, None where the talker has motion only.
 
     Raises

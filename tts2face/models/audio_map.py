@@ -23,7 +23,7 @@ Values = NDArray[np.floating]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Drive:
+class AudioMap:
     """A map of three layers: features of neighbouring frames -> factors or hidden units -> shape parameters.
 
     Parameters
@@ -55,7 +55,7 @@ class Drive:
     bias: NDArray[np.float32]
     outer: NDArray[np.float32]
     offset: NDArray[np.float32]
-    bends: bool
+    is_nonlinear: bool
     loudness: float = math.nan
 
     def __post_init__(self) -> None:
@@ -90,11 +90,11 @@ class Drive:
 
     def inside(self, features: Values) -> NDArray[np.float32]:
         """(T - before - after, S) shape parameters of the frames of (T, D) features that have all their context."""
-        heard = windows((features - self.mean) / self.spread, self.before, self.after).astype(np.float32)
+        heard = context_windows((features - self.mean) / self.spread, self.before, self.after).astype(np.float32)
         units = np.zeros((len(heard), len(self.bias)), np.float32) + self.bias
         for unit, weights in enumerate(self.inner):  # one row at a time: the same bytes at any number of frames
             units[:, unit] += (heard * weights).sum(axis=1)
-        if self.bends:
+        if self.is_nonlinear:
             units = np.tanh(units)
         made = np.zeros((len(heard), len(self.offset)), np.float32) + self.offset
         for hidden in range(units.shape[1]):
@@ -102,26 +102,26 @@ class Drive:
         return made
 
 
-def windows(features: Values, before: int, after: int) -> Values:
+def context_windows(features: Values, before: int, after: int) -> Values:
     """(T - before - after, (before + 1 + after) D) frames of (T, D) with their neighbours, earliest first."""
     width = before + 1 + after
     n_frames = max(len(features) - width + 1, 0)
     return np.concatenate([features[at : at + n_frames] for at in range(width)], axis=1)
 
 
-def drive_arrays(drives: Mapping[str, Drive]) -> dict[str, NDArray[Any]]:
-    """Drives as arrays of a talker's file; `drives_of` reads them."""
+def audio_map_arrays(drives: Mapping[str, AudioMap]) -> dict[str, NDArray[Any]]:
+    """Drives as arrays of a talker's file; `audio_maps_from_arrays` reads them."""
     arrays: dict[str, NDArray[Any]] = {}
     for name, drive in drives.items():
         for part in ("mean", "spread", "inner", "bias", "outer", "offset"):
             arrays[f"{PREFIX}{name}.{part}"] = getattr(drive, part)
-        arrays[f"{PREFIX}{name}.context"] = np.array([drive.before, drive.after, drive.bends], np.int32)
+        arrays[f"{PREFIX}{name}.context"] = np.array([drive.before, drive.after, drive.is_nonlinear], np.int32)
         arrays[f"{PREFIX}{name}.loudness"] = np.array([drive.loudness], np.float32)
         arrays[f"{PREFIX}{name}.feature"] = np.frombuffer(drive.feature.encode(), np.uint8)
     return arrays
 
 
-def drives_of(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Drive]:
+def audio_maps_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, AudioMap]:
     """The drives in a talker's file by name; none in a file without.
 
     Raises
@@ -138,5 +138,5 @@ def drives_of(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Drive]:
         }
         feature = arrays[f"{PREFIX}{name}.feature"].tobytes().decode()
         loudness = float(arrays[f"{PREFIX}{name}.loudness"][0])
-        found[name] = Drive(feature, before, after, **parts, bends=bool(bends), loudness=loudness)
+        found[name] = AudioMap(feature, before, after, **parts, is_nonlinear=bool(bends), loudness=loudness)
     return found

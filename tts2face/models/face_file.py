@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError, InputError
 from tts2face.models.face import Eye, Face, Part
 from tts2face.models.face_layout import check_face
-from tts2face.storage.files import named_file
+from tts2face.storage.files import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 KIND = "face"
@@ -54,13 +54,13 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
         "landmark_weights": face.landmark_weights.astype(np.float32),
         "pivot": face.pivot.astype(np.float32),
     }
-    arrays |= _sparse(face.shapes)
+    arrays |= _pack_shapes(face.shapes)
     if face.uv is not None and face.texture is not None:
         arrays["uv"] = np.rint(np.clip(face.uv, 0, 1) * 65535).astype(np.uint16)
-        arrays["texture"] = _jpeg(face.texture)
+        arrays["texture"] = _encode_jpeg(face.texture)
     presets = dict(identities or {})
     for number, preset in enumerate(presets.values()):
-        steps, step = _steps(preset.displacement)
+        steps, step = _quantise(preset.displacement)
         arrays[f"identity{number}"] = steps
         arrays[f"identity{number}_step"] = np.array([step], np.float32)
     header = {
@@ -97,11 +97,11 @@ def read_face(path: Path, identity: str | None = None) -> Face:
     if identity is not None and identity not in names:
         offered = ", ".join(names) or "none"
         raise InputError(f"the face {path.stem} has no identity {identity!r}; it has: {offered}")
-    face = _assembled(arrays, header, path)
-    return face if identity is None else _identified(face, arrays, header, names.index(identity))
+    face = _face_from_arrays(arrays, header, path)
+    return face if identity is None else _apply_identity(face, arrays, header, names.index(identity))
 
 
-def identities_of(path: Path) -> dict[str, str]:
+def list_identities(path: Path) -> dict[str, str]:
     """Names and summaries of a face file's identity presets."""
     arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
     check_face(path, arrays, header)
@@ -109,19 +109,19 @@ def identities_of(path: Path) -> dict[str, str]:
 
 
 def load_face(name: str, identity: str | None = None) -> Face:
-    """A shipped face by name (head, cartoon), or one from a file; errors as `named_file` and `read_face`."""
-    return read_face(named_file(name, KIND), identity)
+    """A shipped face by name (head, cartoon), or one from a file; errors as `find_file` and `read_face`."""
+    return read_face(find_file(name, KIND), identity)
 
 
-def _steps(values: NDArray[np.floating]) -> tuple[NDArray[np.int16], float]:
+def _quantise(values: NDArray[np.floating]) -> tuple[NDArray[np.int16], float]:
     step = max(float(np.abs(values).max(initial=0.0)) / STEPS_PER_SHAPE, 1e-9)
     return np.rint(values / step).astype(np.int16), step
 
 
-def _sparse(shapes: NDArray[np.floating]) -> dict[str, NDArray[Any]]:
+def _pack_shapes(shapes: NDArray[np.floating]) -> dict[str, NDArray[Any]]:
     steps, sizes, moved = [], [], []
     for shape in shapes:
-        quantised, step = _steps(shape)
+        quantised, step = _quantise(shape)
         here = np.flatnonzero(quantised.any(axis=1))
         steps.append(quantised[here])
         sizes.append(step)
@@ -134,7 +134,7 @@ def _sparse(shapes: NDArray[np.floating]) -> dict[str, NDArray[Any]]:
     }
 
 
-def _dense(arrays: Mapping[str, NDArray[Any]], n_vertices: int) -> NDArray[np.float32]:
+def _unpack_shapes(arrays: Mapping[str, NDArray[Any]], n_vertices: int) -> NDArray[np.float32]:
     counts, steps = arrays["shape_counts"], arrays["shape_steps"]
     shapes = np.zeros((len(counts), n_vertices, 3), np.float32)
     bounds = np.concatenate([[0], np.cumsum(counts)])
@@ -144,7 +144,7 @@ def _dense(arrays: Mapping[str, NDArray[Any]], n_vertices: int) -> NDArray[np.fl
     return shapes
 
 
-def _jpeg(texture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _encode_jpeg(texture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     from PIL import Image
 
     content = io.BytesIO()
@@ -152,7 +152,7 @@ def _jpeg(texture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.frombuffer(content.getvalue(), np.uint8)
 
 
-def _pixels(content: NDArray[np.uint8], path: Path) -> NDArray[np.uint8]:
+def _decode_jpeg(content: NDArray[np.uint8], path: Path) -> NDArray[np.uint8]:
     from PIL import Image
 
     try:
@@ -164,7 +164,7 @@ def _pixels(content: NDArray[np.uint8], path: Path) -> NDArray[np.uint8]:
         raise DataError(f"{path}: the texture cannot be decoded ({broken}); build or copy the face again") from broken
 
 
-def _assembled(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> Face:
+def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> Face:
     eyes = [
         Eye(
             eye["first"],
@@ -179,12 +179,12 @@ def _assembled(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], pa
         triangles=arrays["triangles"],
         parts=tuple(Part(**part) for part in header["parts"]),
         shape_names=tuple(header["shape_names"]),
-        shapes=_dense(arrays, len(arrays["vertices"])),
+        shapes=_unpack_shapes(arrays, len(arrays["vertices"])),
         limits=arrays["limits"],
         eyes=tuple(eyes),
         colours=arrays["colours"],
         uv=(arrays["uv"] / 65535).astype(np.float32) if "uv" in arrays else None,
-        texture=_pixels(arrays["texture"], path) if "texture" in arrays else None,
+        texture=_decode_jpeg(arrays["texture"], path) if "texture" in arrays else None,
         landmarks=arrays["landmarks"],
         landmark_vertices=arrays["landmark_vertices"],
         landmark_weights=arrays["landmark_weights"],
@@ -193,7 +193,7 @@ def _assembled(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], pa
     )
 
 
-def _texel_share(face: Face, part: Part, shape: tuple[int, ...]) -> NDArray[np.float32]:
+def _part_texel_weights(face: Face, part: Part, shape: tuple[int, ...]) -> NDArray[np.float32]:
     """(H, W) 1 on the texels of a part, a little less across its edge, 0 elsewhere."""
     from PIL import Image, ImageDraw, ImageFilter
 
@@ -207,7 +207,7 @@ def _texel_share(face: Face, part: Part, shape: tuple[int, ...]) -> NDArray[np.f
     return share
 
 
-def _identified(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], number: int) -> Face:
+def _apply_identity(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], number: int) -> Face:
     moved = arrays[f"identity{number}"] * arrays[f"identity{number}_step"][0]
     name, tints, _ = header["identities"][number]
     colours, texture = face.colours.copy(), None if face.texture is None else face.texture.copy()
@@ -216,7 +216,7 @@ def _identified(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapping[
         used = np.unique(face.triangles[part.first : part.first + part.count])
         colours[used] = np.clip(face.colours[used] * tint, 0, 255).astype(np.uint8)
         if part.textured and texture is not None and not np.all(tint == 1):
-            share = _texel_share(face, part, texture.shape)[:, :, None]
+            share = _part_texel_weights(face, part, texture.shape)[:, :, None]
             tinted = texture * (1 + share * (tint - 1))
             texture = np.clip(tinted, 0, np.maximum(texture, LIGHTENED)).astype(np.uint8)
     eyes = [

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.palette_layout import check_palette
-from tts2face.storage.files import named_file
+from tts2face.storage.files import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import HEAD_CHANNELS
 
@@ -39,7 +39,7 @@ Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Region:
+class FaceRegion:
     """Independent motion D_j of a region of the face: ``displacement = sum_i d_i modes_i``.
 
     Parameters
@@ -94,7 +94,7 @@ class Style:
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class FeatureChange:
     """What is done to a feature of a measured style.
 
     ``gain`` multiplies the motion about its mean, ``offset`` is added to channels by name, ``tempo`` above 1 plays
@@ -111,7 +111,7 @@ class Derivation:
     """A style that nobody recorded: a measured one, changed as stated."""
 
     source: str
-    changes: Mapping[str, Change]
+    changes: Mapping[str, FeatureChange]
     summary: str
 
 
@@ -130,7 +130,7 @@ class Palette:
     """
 
     neutral: Floats
-    regions: Mapping[str, Region]
+    regions: Mapping[str, FaceRegion]
     styles: Mapping[str, Style]
     derivations: Mapping[str, Derivation]
     metadata: Mapping[str, Any] = field(default_factory=dict)
@@ -220,26 +220,26 @@ def read_palette(path: Path) -> Palette:
     check_palette(path, arrays, header, {name: FIXED_CHANNELS.get(name) for name in FEATURES})
     if header["fps"] != GESTURE_FPS:
         raise DataError(f"{path} was recorded at {header['fps']:g} frames/s, not {GESTURE_FPS:g}; build it again")
-    return _assembled(arrays, header)
+    return _palette_from_arrays(arrays, header)
 
 
 def load_palette(name: str) -> Palette:
-    """A shipped palette by name, or one from a ``.palette`` file; errors as `named_file` and `read_palette`."""
-    return read_palette(named_file(name, KIND))
+    """A shipped palette by name, or one from a ``.palette`` file; errors as `find_file` and `read_palette`."""
+    return read_palette(find_file(name, KIND))
 
 
-def _assembled(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> Palette:
+def _palette_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> Palette:
     regions = {
-        name: Region(arrays[f"region.{name}.landmarks"], arrays[f"region.{name}.modes"]) for name in REGION_FEATURES
+        name: FaceRegion(arrays[f"region.{name}.landmarks"], arrays[f"region.{name}.modes"]) for name in REGION_FEATURES
     }
     return Palette(
         neutral=arrays["neutral"],
         regions=regions,
-        styles={name: _style(name, arrays, metadata) for name, metadata in header["styles"].items()},
+        styles={name: _style_from_arrays(name, arrays, metadata) for name, metadata in header["styles"].items()},
         derivations={
             name: Derivation(
                 told["source"],
-                {feature: Change(**change) for feature, change in told["changes"].items()},
+                {feature: FeatureChange(**change) for feature, change in told["changes"].items()},
                 told["summary"],
             )
             for name, told in header["derivations"].items()
@@ -248,7 +248,7 @@ def _assembled(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) ->
     )
 
 
-def _style(name: str, arrays: Mapping[str, NDArray[Any]], metadata: Mapping[str, Any]) -> Style:
+def _style_from_arrays(name: str, arrays: Mapping[str, NDArray[Any]], metadata: Mapping[str, Any]) -> Style:
     motion = {
         feature: arrays[f"style.{name}.{feature}"] * arrays[f"style.{name}.{feature}.step"]
         for feature in FEATURES

@@ -25,7 +25,7 @@ N_PLACE = 4  # numbers of the place within the present phone
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WindowNetwork:
+class PhoneNetwork:
     """Networks of the same size, whose answers are averaged.
 
     Parameters
@@ -52,8 +52,8 @@ class WindowNetwork:
             weights, biases = (tuple(layer[member] for layer in layers) for layers in (self.weights, self.biases))
             hidden = np.maximum(_first_layer(rows, place, weights[0], biases[0]), np.float32(0.0))
             for inner, bias in zip(weights[1:-1], biases[1:-1], strict=True):
-                hidden = np.maximum(_layer(hidden, inner, bias), np.float32(0.0))
-            told += _layer(hidden, weights[-1], biases[-1])
+                hidden = np.maximum(_hidden_layer(hidden, inner, bias), np.float32(0.0))
+            told += _hidden_layer(hidden, weights[-1], biases[-1])
         return told / np.float32(len(range(len(self.weights[0]))[members]))
 
 
@@ -75,7 +75,7 @@ def _first_layer(rows, place, weights, biases):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _layer(seen, weights, biases):  # type: ignore[no-untyped-def]
+def _hidden_layer(seen, weights, biases):  # type: ignore[no-untyped-def]
     """(T, H') of inputs (T, H), summed in one order."""
     told = np.zeros((len(seen), weights.shape[1]), np.float32)
     for t in range(len(seen)):
@@ -116,8 +116,8 @@ def window_features(
     return np.stack(shown, axis=1), place.astype(np.float32)
 
 
-def network_arrays(network: WindowNetwork) -> dict[str, NDArray[Any]]:
-    """The networks as arrays of a talker's file, in 16 bits; `network_of` reads them."""
+def network_arrays(network: PhoneNetwork) -> dict[str, NDArray[Any]]:
+    """The networks as arrays of a talker's file, in 16 bits; `network_from_arrays` reads them."""
     arrays: dict[str, NDArray[Any]] = {}
     for at, (weights, biases) in enumerate(zip(network.weights, network.biases, strict=True)):
         arrays[f"{PREFIX}weights{at}"] = weights.astype(np.float16)
@@ -125,7 +125,7 @@ def network_arrays(network: WindowNetwork) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def network_of(arrays: Mapping[str, NDArray[Any]], inventory: Sequence[str]) -> WindowNetwork | None:
+def network_from_arrays(arrays: Mapping[str, NDArray[Any]], inventory: Sequence[str]) -> PhoneNetwork | None:
     """The networks in a talker's file, None where it has none.
 
     Raises
@@ -137,4 +137,4 @@ def network_of(arrays: Mapping[str, NDArray[Any]], inventory: Sequence[str]) -> 
     if not n_layers:
         return None
     weights = tuple(arrays[f"{PREFIX}weights{at}"].astype(np.float32) for at in range(n_layers))
-    return WindowNetwork(tuple(inventory), weights, tuple(arrays[f"{PREFIX}biases{at}"] for at in range(n_layers)))
+    return PhoneNetwork(tuple(inventory), weights, tuple(arrays[f"{PREFIX}biases{at}"] for at in range(n_layers)))

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence, WordSpan
-from tts2face.models.appearance import STEPS_PER_LOOK, Appearance, appearance_arrays, appearance_of
-from tts2face.models.audio_map import Drive, drive_arrays, drives_of
-from tts2face.models.phone_network import WindowNetwork, network_arrays, network_of
+from tts2face.models.appearance import STEPS_PER_LOOK, Appearance, appearance_arrays, appearance_from_arrays
+from tts2face.models.audio_map import AudioMap, audio_map_arrays, audio_maps_from_arrays
+from tts2face.models.phone_network import PhoneNetwork, network_arrays, network_from_arrays
 from tts2face.models.talker_layout import check_talker
-from tts2face.storage.files import named_file
+from tts2face.storage.files import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
@@ -102,8 +102,8 @@ class Talker:
     utterances: tuple[Utterance, ...]
     metadata: Mapping[str, Any]
     appearance: Appearance | None = None
-    network: WindowNetwork | None = None
-    drives: Mapping[str, Drive] = field(default_factory=dict)
+    network: PhoneNetwork | None = None
+    audio_maps: Mapping[str, AudioMap] = field(default_factory=dict)
 
     def speech_trajectory(self, utterance: Utterance) -> Trajectory:
         """Speech parameters of a recorded utterance."""
@@ -159,7 +159,7 @@ def write_talker(path: Path, talker: Talker) -> None:
         arrays |= appearance_arrays(talker.appearance)
     if talker.network is not None:
         arrays |= network_arrays(talker.network)
-    arrays |= drive_arrays(talker.drives)
+    arrays |= audio_map_arrays(talker.audio_maps)
     header = {
         **talker.metadata,
         "fps": talker.fps,
@@ -187,15 +187,15 @@ def read_talker(path: Path) -> Talker:
     """
     arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
     check_talker(path, arrays, header)
-    return _assembled(arrays, header)
+    return _talker_from_arrays(arrays, header)
 
 
 def load_talker(name: str) -> Talker:
-    """A shipped talker by name, or one from a ``.talker`` file; errors as `named_file` and `read_talker`."""
-    return read_talker(named_file(name, KIND))
+    """A shipped talker by name, or one from a ``.talker`` file; errors as `find_file` and `read_talker`."""
+    return read_talker(find_file(name, KIND))
 
 
-def _assembled(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> Talker:
+def _talker_from_arrays(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> Talker:
     n_speech = int(header.pop("n_speech"))
     model = ShapeModel(arrays["mean"], arrays["basis"], arrays["spread"], n_speech, arrays["rest"])
     inventory, fps = header.pop("inventory"), float(header.pop("fps"))
@@ -204,8 +204,8 @@ def _assembled(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> Talke
     phones = np.concatenate([[0], np.cumsum(arrays["n_phones"])])
     shape = arrays["shape"].astype(np.float32) * (model.spread / STEPS_PER_SPREAD)
     head, intensity = arrays["head"].astype(np.float32), arrays["intensity"].astype(np.float32)
-    appearance = appearance_of(arrays)
-    network = network_of(arrays, header.pop("network_inventory", ()))
+    appearance = appearance_from_arrays(arrays)
+    network = network_from_arrays(arrays, header.pop("network_inventory", ()))
     looks = arrays["looks"] * (appearance.spread / STEPS_PER_LOOK) if appearance is not None else None
     utterances = []
     for i, (name, words) in enumerate(header.pop("utterances")):
@@ -215,4 +215,4 @@ def _assembled(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> Talke
         here = slice(frames[i], frames[i + 1])
         seen = None if looks is None else looks[here]
         utterances.append(Utterance(name, sequence, spans, shape[here], head[here], intensity[here], seen))
-    return Talker(fps, model, tuple(utterances), header, appearance, network, drives_of(arrays))
+    return Talker(fps, model, tuple(utterances), header, appearance, network, audio_maps_from_arrays(arrays))

@@ -13,7 +13,7 @@ RIDGE = 0.003  # of the mean variance of the terms
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OwnFace:
+class AppearanceRegression:
     """Looks as linear functions of a talker's speech parameters; squares would fit the inner mouth worse (held out).
 
     ``scale`` (S,) divides the parameters before their ``terms``; ``weights`` (1 + S, A) carry the terms to the looks.
@@ -34,11 +34,11 @@ class OwnFace:
         """
         if speech.channels != self.speech:
             raise InputError("the motion is not in the speech parameters of this talker; clone it to her first")
-        looks = _terms(speech.values / self.scale) @ self.weights
+        looks = _regression_terms(speech.values / self.scale) @ self.weights
         return Trajectory(self.speech + self.looks, np.concatenate([speech.values, looks], axis=1), speech.fps)
 
 
-def own_face(talker: Talker) -> OwnFace:
+def fit_appearance_regression(talker: Talker) -> AppearanceRegression:
     """The looks that go with a talker's lips: ridge regression on her recorded frames.
 
     Raises
@@ -50,19 +50,19 @@ def own_face(talker: Talker) -> OwnFace:
     n_speech = talker.model.n_speech
     scale = np.maximum(talker.model.spread[:n_speech], 1e-6).astype(np.float32)
     n_looks = len(appearance.channels)
-    first = _terms(np.zeros((1, n_speech), np.float32)).shape[1]
+    first = _regression_terms(np.zeros((1, n_speech), np.float32)).shape[1]
     normal, right = np.zeros((first, first)), np.zeros((first, n_looks))
     for spoken in talker.utterances:
         if spoken.looks is not None:
-            terms = _terms(spoken.shape[:, :n_speech] / scale).astype(np.float64)
+            terms = _regression_terms(spoken.shape[:, :n_speech] / scale).astype(np.float64)
             normal += terms.T @ terms
             right += terms.T @ spoken.looks
     effort = RIDGE * np.trace(normal) / first
     weights = np.linalg.solve(normal + effort * np.eye(first), right)
-    return OwnFace(scale, weights.astype(np.float32), speech_channels(talker.model), appearance.channels)
+    return AppearanceRegression(scale, weights.astype(np.float32), speech_channels(talker.model), appearance.channels)
 
 
-def _terms(values: NDArray[np.floating]) -> NDArray[np.float32]:
+def _regression_terms(values: NDArray[np.floating]) -> NDArray[np.float32]:
     """(T, 1 + S) one, and every value held within four spreads."""
     held = np.clip(values, -4.0, 4.0).astype(np.float32)
     return np.concatenate([np.ones((len(held), 1), np.float32), held], axis=1)

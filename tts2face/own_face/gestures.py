@@ -9,17 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.face.compact_spline import local_interpolant
+from tts2face.face.compact_spline import fit_local_interpolant
 from tts2face.face.expressions import expression_landmarks
-from tts2face.face.gesture_transfer import LID_RIMS, LIPS, NO_GAINS, check_gestures, fitted_modes
-from tts2face.face.landmark_fit import all_landmarks, axis_scales, landmark_places, turn_onto
+from tts2face.face.gesture_transfer import LID_RIMS, LIPS, NO_GAINS, check_gestures, fit_modes
+from tts2face.face.landmark_fit import axis_scales, landmark_positions, procrustes_rotation, scatter_landmarks
 from tts2face.face.shape_transfer import SIZES, SUPPORT, default_head
 from tts2face.models.appearance import Appearance
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
 from tts2face.models.palette import EXPRESSIONS, REGION_FEATURES, Palette
 from tts2face.models.talker import ShapeModel, Talker, require_appearance
 from tts2face.numeric import ordered_product
-from tts2face.retargeting.performer import LIDS, aperture
+from tts2face.retargeting.performer import LIDS, eye_aperture
 from tts2face.types import Trajectory
 
 LIDS_CHANNEL = "lids"
@@ -35,7 +35,7 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OwnGestures:
+class OwnFaceGestures:
     """What gestures do to a talker's own face; N points of her mesh.
 
     Parameters
@@ -58,9 +58,9 @@ class OwnGestures:
     regions: Mapping[str, int]
     modes: Floats
     lids: Floats
-    lid_looks: Floats
+    lid_appearance: Floats
     lid_pixels: Floats
-    plate_shares: Floats
+    plate_lid_closure: Floats
 
     def motion(
         self, own: Trajectory, gestures: Mapping[str, Floats], gains: Mapping[str, float] = NO_GAINS
@@ -92,16 +92,16 @@ class OwnGestures:
             felt[:, -1] = np.clip(gains.get("blink", 1.0) * gestures["blink"].mean(axis=1), 0.0, 1.0)
         return Trajectory(own.channels + self.channels, np.concatenate([own.values, felt], axis=1), own.fps)
 
-    def moved(self, felt: NDArray[np.floating], number: int) -> tuple[Floats, Floats]:
+    def displacements(self, felt: NDArray[np.floating], number: int) -> tuple[Floats, Floats]:
         """Motion of the points (N, 3), mm, and change of the face's looks (A,), on a frame of the plate."""
-        before = float(self.plate_shares[number])
+        before = float(self.plate_lid_closure[number])
         after = before + float(felt[-1]) * (1.0 - before)
         powers = np.array([after - before, after**2 - before**2], np.float32)
         points = np.tensordot(felt[:-1].astype(np.float32), self.modes, axes=1)
-        return points + np.tensordot(powers, self.lids, axes=1), powers @ self.lid_looks
+        return points + np.tensordot(powers, self.lids, axes=1), powers @ self.lid_appearance
 
 
-def own_gestures(talker: Talker, palette: Palette) -> OwnGestures:
+def build_own_face_gestures(talker: Talker, palette: Palette) -> OwnFaceGestures:
     """Prepare a talker's own face for the gestures of a palette.
 
     Raises
@@ -112,51 +112,51 @@ def own_gestures(talker: Talker, palette: Palette) -> OwnGestures:
     appearance, model = require_appearance(talker), talker.model
     rest = (model.mean + np.einsum("m,mld->ld", model.rest, model.basis)).astype(np.float64)
     n_mesh = len(appearance.face.reference)
-    expressions = _expressions(rest)
-    regions = [_spread(rest, palette, name) for name in REGION_FEATURES]
-    lids, looks, plate_shares = _lids(talker, appearance)
-    return OwnGestures(
+    expressions = _expression_modes(rest)
+    regions = [_region_modes(rest, palette, name) for name in REGION_FEATURES]
+    lids, looks, plate_shares = _lid_model(talker, appearance)
+    return OwnFaceGestures(
         channels=(*EXPRESSIONS, *(c for name in REGION_FEATURES for c in palette.channels(name)), LIDS_CHANNEL),
         regions={name: len(palette.regions[name].modes) for name in REGION_FEATURES},
         modes=np.concatenate([expressions, *regions])[:, :n_mesh].astype(np.float32),
         lids=lids[:, :n_mesh].astype(np.float32),
-        lid_looks=looks.astype(np.float32),
-        lid_pixels=_lid_pixels(appearance),
-        plate_shares=plate_shares.astype(np.float32),
+        lid_appearance=looks.astype(np.float32),
+        lid_pixels=_lid_pixel_weights(appearance),
+        plate_lid_closure=plate_shares.astype(np.float32),
     )
 
 
-def _expressions(rest: FloatArray) -> FloatArray:
+def _expression_modes(rest: FloatArray) -> FloatArray:
     """(5, 478, 3) the default head's basis expressions in the size of a talker, who rests so."""
     head = default_head()
-    places = all_landmarks(head, landmark_places(head))
-    turn = turn_onto(places, rest)
+    places = scatter_landmarks(head, landmark_positions(head))
+    turn = procrustes_rotation(places, rest)
     return ordered_product(expression_landmarks(head), turn.T) * axis_scales(
         ordered_product(places, turn.T), rest, SIZES
     )
 
 
-def _spread(rest: FloatArray, palette: Palette, name: str) -> FloatArray:
+def _region_modes(rest: FloatArray, palette: Palette, name: str) -> FloatArray:
     """(k, 478, 3) a region's modes on all landmarks; rims of the lids and lips stay."""
     region = palette.regions[name]
-    modes = fitted_modes(rest, palette.neutral.astype(np.float64), region)
+    modes = fit_modes(rest, palette.neutral.astype(np.float64), region)
     still = [number for number in sorted({*LID_RIMS, *LIPS}) if number not in region.landmarks]
     moved = np.concatenate([modes, np.zeros((len(modes), len(still), 3))], axis=1)
     size = float(np.linalg.norm(rest[EYE_OUTER_LEFT] - rest[EYE_OUTER_RIGHT]))
     flat = moved.transpose(1, 0, 2).reshape(-1, 3 * len(modes))
-    field = local_interpolant(rest[[*region.landmarks, *still]], flat, SUPPORT * size)
+    field = fit_local_interpolant(rest[[*region.landmarks, *still]], flat, SUPPORT * size)
     return field(rest).reshape(len(rest), -1, 3).transpose(1, 0, 2)
 
 
-def _lids(talker: Talker, appearance: Appearance) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _lid_model(talker: Talker, appearance: Appearance) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Lids' motion (2, 478, 3) and looks (2, A) by share and its square, and shares on the plate (T,)."""
     model, n_face = talker.model, appearance.face.n_modes
     seen = [spoken for spoken in talker.utterances if spoken.looks is not None]
     shapes = np.concatenate([spoken.shape for spoken in seen])
     looks = np.concatenate([spoken.looks[:, :n_face] for spoken in seen if spoken.looks is not None])
-    openings = _openings(model, shapes)
+    openings = _mean_eye_openings(model, shapes)
     opened, shut = np.quantile(openings, [OPEN, SHUT])
-    still, plate = model.basis[model.n_speech :].astype(np.float64), _openings(model, appearance.plate.shape)
+    still, plate = model.basis[model.n_speech :].astype(np.float64), _mean_eye_openings(model, appearance.plate.shape)
     if shut > (1.0 - LEAST_BLINK) * opened:
         return np.zeros((2, len(model.mean), 3)), np.zeros((2, n_face)), np.zeros(len(plate))
     shares, on_plate = (np.clip((opened - values) / (opened - shut), WIDEST, 1.0) for values in (openings, plate))
@@ -169,14 +169,14 @@ def _lids(talker: Talker, appearance: Appearance) -> tuple[FloatArray, FloatArra
     return ordered_product(motion, still.reshape(len(still), -1)).reshape(2, -1, 3), change.astype(np.float64), on_plate
 
 
-def _openings(model: ShapeModel, shapes: Floats) -> FloatArray:
+def _mean_eye_openings(model: ShapeModel, shapes: Floats) -> FloatArray:
     """(T,) mean opening of both eyes over their width."""
     landmarks = model.shapes(shapes)
-    left, right = (aperture(landmarks, side) for side in LIDS)
+    left, right = (eye_aperture(landmarks, side) for side in LIDS)
     return (left + right) / 2
 
 
-def _lid_pixels(appearance: Appearance) -> Floats:
+def _lid_pixel_weights(appearance: Appearance) -> Floats:
     """(P,) where lids change the picture of a face, fading outwards."""
     width = appearance.face.size[0]
     places = np.stack([appearance.face.pixels % width, appearance.face.pixels // width], axis=1)

@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.render.picture import STUDIO, Picture, background_kind
+from tts2face.render.picture import STUDIO, Picture, parse_background
 from tts2face.storage.picture_files import opened_picture
 
 STUDIO_BRIGHT, STUDIO_DARK = (128.0, 137.0, 148.0), (52.0, 58.0, 67.0)  # sRGB: the pool of light, and the corners
 STUDIO_MIDDLE = (0.5, 0.42)  # of the pool, in shares of width and height
 
 
-def background(picture: Picture) -> NDArray[np.uint8]:
+def draw_background(picture: Picture) -> NDArray[np.uint8]:
     """(H, W, 3) sRGB pixels behind the head; black where the picture is transparent.
 
     Raises
@@ -20,18 +20,18 @@ def background(picture: Picture) -> NDArray[np.uint8]:
     DataError
         The image cannot be read, or is too large.
     """
-    kind = background_kind(picture.background)
+    kind = parse_background(picture.background)
     if isinstance(kind, Path):
-        return _image(kind, picture.width, picture.height)
+        return _load_image(kind, picture.width, picture.height)
     plain = np.zeros((picture.height, picture.width, 3), np.uint8)
     if kind == STUDIO:
-        return _studio(picture.width, picture.height)
+        return _draw_studio(picture.width, picture.height)
     if isinstance(kind, tuple):
         plain[:] = kind
     return plain
 
 
-def _studio(width: int, height: int) -> NDArray[np.uint8]:
+def _draw_studio(width: int, height: int) -> NDArray[np.uint8]:
     """A wall with a soft pool of light; ordered dither keeps its gradient free from steps."""
     across = ((np.arange(width) + 0.5) / width - STUDIO_MIDDLE[0])[None, :] * min(1.6, max(1.0, width / height))
     along = ((np.arange(height) + 0.5) / height - STUDIO_MIDDLE[1])[:, None]
@@ -42,7 +42,7 @@ def _studio(width: int, height: int) -> NDArray[np.uint8]:
     return np.floor(wall + dither).astype(np.uint8)
 
 
-def _image(path: Path, width: int, height: int) -> NDArray[np.uint8]:
+def _load_image(path: Path, width: int, height: int) -> NDArray[np.uint8]:
     """An image scaled and cut so that it fills the picture."""
     from PIL import Image, ImageOps
 

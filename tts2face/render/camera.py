@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tts2face.models.face import Face
 from tts2face.models.landmarks import CHIN
-from tts2face.render.camera_views import Camera
+from tts2face.render.camera_views import CameraView
 
 FIELD_RAD = math.radians(22.0)  # opening angle across the frame: a portrait lens, which keeps the nose small
 AIR = 0.06  # free space on each side, of the head's size
@@ -16,7 +16,7 @@ NECK = 0.28  # of the head's height, shown under the chin
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Optics:
+class CameraMatrices:
     """The camera as the kernels take it.
 
     `view` (3, 4) brings the world to camera space (x right, y down, z ahead, mm); `lens` (4,) is focal length in
@@ -27,9 +27,9 @@ class Optics:
     lens: NDArray[np.float64]
 
 
-def optics(camera: Camera, face: Face, size: tuple[int, int]) -> Optics:
+def camera_matrices(camera: CameraView, face: Face, size: tuple[int, int]) -> CameraMatrices:
     """The camera set up for a face and a picture of `size` (width, height) in samples."""
-    low, high = framed_box(face)
+    low, high = framing_box(face)
     yaw, pitch = math.radians(camera.yaw_deg), math.radians(camera.pitch_deg)
     ahead = -np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)])
     right = np.array([math.cos(yaw), 0.0, -math.sin(yaw)])
@@ -42,10 +42,10 @@ def optics(camera: Camera, face: Face, size: tuple[int, int]) -> Optics:
     view = np.column_stack([turned, -turned @ ((low + high) / 2 - distance * ahead)])
     extent = float(np.abs(face.vertices).max()) + distance
     near = max(distance / 50, extent * focal * 256 / 2**29)  # keeps places on the grid far from overflow
-    return Optics(view, np.array([focal, size[0] / 2, size[1] / 2, near]))
+    return CameraMatrices(view, np.array([focal, size[0] / 2, size[1] / 2, near]))
 
 
-def framed_box(face: Face) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def framing_box(face: Face) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Lowest and highest corner, mm, of what shall be in the picture: the head with a piece of neck, and air."""
     rest = face.vertices.astype(np.float64)
     low, high = rest.min(axis=0), rest.max(axis=0)

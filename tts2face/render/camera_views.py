@@ -7,7 +7,7 @@ from lexicon.errors import InputError
 
 
 @dataclass(frozen=True, slots=True)
-class Camera:
+class CameraView:
     """A view of the head.
 
     Degrees towards the face's own left and from above; mm from its middle (0: as far as frames it well); share of the
@@ -21,16 +21,16 @@ class Camera:
 
 
 NAMED = {
-    "front": Camera(0.0, 3.0),
-    "three-quarter": Camera(38.0, 4.0),
-    "profile": Camera(88.0, 2.0),
-    "close": Camera(0.0, 2.0, share=0.62),
+    "front": CameraView(0.0, 3.0),
+    "three-quarter": CameraView(38.0, 4.0),
+    "profile": CameraView(88.0, 2.0),
+    "close": CameraView(0.0, 2.0, share=0.62),
 }
 FURTHEST_MM = 100_000.0
 NEAREST_MM = 50.0
 
 
-def camera_named(text: str) -> Camera:
+def parse_camera(text: str) -> CameraView:
     """The camera of a name, or of ``yaw,pitch`` or ``yaw,pitch,distance`` in degrees and mm.
 
     Raises
@@ -54,4 +54,4 @@ def camera_named(text: str) -> Camera:
         raise InputError(
             f"camera {text!r} is out of range; yaw is -180 to 180 and pitch -85 to 85 degrees, distance 50 to 100000 mm"
         )
-    return Camera(yaw, pitch, distance)
+    return CameraView(yaw, pitch, distance)

@@ -13,7 +13,7 @@ from tts2face.models.face import Face
 from tts2face.prefetch import map_in_order
 from tts2face.render import vtk_renderer
 from tts2face.render.picture import PYVISTA, Picture
-from tts2face.render.picture_kernels import Room, paint, room_for
+from tts2face.render.picture_kernels import DrawingBuffers, allocate_buffers, draw_surface
 from tts2face.render.renderer import SYNTHETIC
 from tts2face.render.scene import Scene, available_cores, build_scene
 from tts2face.types import Clip
@@ -42,7 +42,7 @@ class MeshRenderer:
         values = self._weights(clip)
         poses = zip(values, clip.head.values, strict=True)
         if self.picture.renderer == PYVISTA:
-            yield from vtk_renderer.frames(self.scene, poses)
+            yield from vtk_renderer.render_frames(self.scene, poses)
             return
         n_threads = threads or available_cores()
         rooms = deque(self._room() for _ in range(n_threads))
@@ -67,7 +67,7 @@ class MeshRenderer:
             raise InputError(f"the face has {n_shapes} shapes, not weights of shape {np.shape(weights)}")
         pose = np.asarray(weights, np.float32), np.asarray(head, np.float32)
         if self.picture.renderer == PYVISTA:
-            (drawn,) = vtk_renderer.frames(self.scene, [pose])
+            (drawn,) = vtk_renderer.render_frames(self.scene, [pose])
             return drawn
         return self._draw(*pose, self._room())
 
@@ -82,16 +82,16 @@ class MeshRenderer:
             return clip.motion.values
         return np.pad(clip.motion.values, ((0, 0), (0, len(names) - n_moved)))
 
-    def _room(self) -> Room:
+    def _room(self) -> DrawingBuffers:
         picture = self.picture
-        return room_for(self.scene.surface, (picture.width, picture.height), picture.supersampling)
+        return allocate_buffers(self.scene.surface, (picture.width, picture.height), picture.supersampling)
 
-    def _draw(self, weights: NDArray[np.float32], head: NDArray[np.float32], room: Room) -> NDArray[np.uint8]:
+    def _draw(self, weights: NDArray[np.float32], head: NDArray[np.float32], room: DrawingBuffers) -> NDArray[np.uint8]:
         scene, picture = self.scene, self.picture
         drawn = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
-        drawn[:, :, :3] = scene.behind
-        points = scene.surface.rig.posed(weights, head)
-        paint(points, scene.surface, scene.optics, (scene.lights, scene.exposure.at(weights)), room, drawn)
+        drawn[:, :, :3] = scene.background
+        points = scene.surface.rig.pose(weights, head)
+        draw_surface(points, scene.surface, scene.optics, (scene.lights, scene.exposure.at(weights)), room, drawn)
         return drawn
 
 

@@ -9,20 +9,20 @@ import numpy as np
 
 from lexicon.errors import InputError
 from tts2face.clock import exact_rate, first_sample
-from tts2face.render.encoder_thread import Lane, Sink
-from tts2face.render.gif import Gif
-from tts2face.render.movie import MP4_MOVIE, WEBM_MOVIE, Movie
+from tts2face.render.encoder_thread import EncoderThread, Sink
+from tts2face.render.gif import GifWriter
+from tts2face.render.movie import MP4_MOVIE, WEBM_MOVIE, MovieWriter
 from tts2face.render.output_path import (
     FOLDER,
     GIF,
     WEBM,
-    checked_output,
-    kind_of,
-    place_beside,
-    put_in_place,
-    refusals,
+    check_output,
+    make_temporary,
+    move_into_place,
+    output_kind,
+    translate_disk_errors,
 )
-from tts2face.render.png_folder import Stills
+from tts2face.render.png_folder import PngFolderWriter
 from tts2face.render.renderer import FrameRenderer
 from tts2face.storage.temporary import Temporary
 from tts2face.types import Clip
@@ -72,17 +72,17 @@ class ClipWriter:
         on_progress: Progress | None = None,
         threads: int | None = None,
     ) -> None:
-        self.path, self._kind = checked_output(path), kind_of(path)
+        self.path, self._kind = check_output(path), output_kind(path)
         self._renderer = renderer
         self._on_progress, self._threads = on_progress, threads
         self._n_frames = self._n_given = self._n_samples = 0
         self._clock: tuple[float, int] | None = None
-        self._lane: Lane | None = None
+        self._encoder: EncoderThread | None = None
         self._beside: Temporary | None = None
 
     def __enter__(self) -> "ClipWriter":
         """Take a place on the disk."""
-        self._beside = place_beside(self.path, self._kind)
+        self._beside = make_temporary(self.path, self._kind)
         return self
 
     def __exit__(
@@ -97,44 +97,44 @@ class ClipWriter:
 
     def add(self, clip: Clip) -> None:
         """Draw and encode one more clip."""
-        with refusals(self.path):
-            lane = self._lane or self._opened(clip)
+        with translate_disk_errors(self.path):
+            lane = self._encoder or self._open_encoder(clip)
             if self._clock != (clip.fps, clip.speech.waveform.rate):
                 raise InputError(f"clips of one file must share fps and sound rate; this one has {clip.fps:g} fps")
-            begin = self._sample_of(self._n_frames)
+            begin = self._first_sample(self._n_frames)
             lane.put(samples=np.zeros(begin - self._n_samples, np.float32))  # the clip before ended within a frame
             self._n_given += len(clip.motion)
             at, samples = 0, clip.speech.waveform.samples
             for pixels in self._renderer.frames(clip, threads=self._threads, first=self._n_frames):
                 self._n_frames += 1
-                until = min(self._sample_of(self._n_frames) - begin, len(samples))
+                until = min(self._first_sample(self._n_frames) - begin, len(samples))
                 lane.put(pixels, samples[at:until])
                 at = until
                 if self._on_progress:
                     self._on_progress(self._n_frames, self._n_given)
             self._n_samples = begin + at
 
-    def _sample_of(self, frame: int) -> int:
+    def _first_sample(self, frame: int) -> int:
         fps, rate = self._clock or (1.0, 1)
         return first_sample(frame, rate, exact_rate(fps))
 
-    def _opened(self, clip: Clip) -> Lane:
+    def _open_encoder(self, clip: Clip) -> EncoderThread:
         self._clock = (clip.fps, clip.speech.waveform.rate)
-        self._lane = Lane(self._sink(clip))
-        return self._lane
+        self._encoder = EncoderThread(self._sink(clip))
+        return self._encoder
 
     def _sink(self, clip: Clip) -> Sink:
         if self._beside is None:
             raise InputError("a clip writer is used in a with statement")
         fps, rate, picture = exact_rate(clip.fps), clip.speech.waveform.rate, self._renderer.picture
         if self._kind == FOLDER:
-            return Stills(self._beside.path, rate, self._renderer.notice)
+            return PngFolderWriter(self._beside.path, rate, self._renderer.notice)
         if self._kind == GIF:
             chosen = np.linspace(0, len(clip.motion) - 1, N_SWATCHES).astype(int)
             pictures = [self._renderer.frame(clip, int(i)) for i in chosen]
-            return Gif(self._beside.path, pictures, fps, self._renderer.notice)
+            return GifWriter(self._beside.path, pictures, fps, self._renderer.notice)
         shape = (picture.height, picture.width, picture.channels)
-        return Movie(
+        return MovieWriter(
             self._beside.path,
             WEBM_MOVIE if self._kind == WEBM else MP4_MOVIE,
             shape,
@@ -143,19 +143,19 @@ class ClipWriter:
         )
 
     def _complete(self) -> None:
-        if self._lane is None or self._beside is None:
+        if self._encoder is None or self._beside is None:
             raise InputError(f"there is no clip to write to {self.path}")
-        with refusals(self.path):
-            self._lane.finish()
-        self._lane = None
-        put_in_place(self._beside, self.path)
+        with translate_disk_errors(self.path):
+            self._encoder.finish()
+        self._encoder = None
+        move_into_place(self._beside, self.path)
         self._beside = None
 
     def _clear(self) -> None:
-        if self._lane is not None:
+        if self._encoder is not None:
             with contextlib.suppress(OSError):  # the file goes anyway
-                self._lane.abandon()
-            self._lane = None
+                self._encoder.abandon()
+            self._encoder = None
         if self._beside is not None:
             self._beside.remove()
             self._beside = None

@@ -31,7 +31,7 @@ class Sink(Protocol):
         """Let go of what is written so far."""
 
 
-class Lane:
+class EncoderThread:
     """Feeds a sink from a thread; what goes wrong there is raised by the next call here."""
 
     def __init__(self, sink: Sink) -> None:

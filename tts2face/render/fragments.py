@@ -49,7 +49,7 @@ def vertex_normals(flat: Array, starts: Array, members: Array, vertex: Array) ->
 
 
 @kernel
-def is_alike(number: int, other: int, flat: Array, part_of: Array) -> bool:
+def is_same_surface(number: int, other: int, flat: Array, part_of: Array) -> bool:
     """Whether two seen triangles lie on one smooth surface: the same part, the same side of it, near normals."""
     if (number < 0) != (other < 0):
         return number == other
@@ -112,7 +112,7 @@ def find_fragments(
                             continue
                         if number != last:
                             last, g = number, first
-                            while g < n_fragments and not is_alike(number, number_of[g], flat, part_of):
+                            while g < n_fragments and not is_same_surface(number, number_of[g], flat, part_of):
                                 g += 1
                         if g == n_fragments:
                             n_fragments += 1
@@ -145,7 +145,7 @@ def texel(texture: Array, linear: Array, u: float, v: float, c: int) -> Any:
 
 
 @kernel
-def evaluate(found: Any, n_fragments: int, vertex: Array, scene: Any, lens: Array, table: Array) -> None:
+def evaluate_fragments(found: Any, n_fragments: int, vertex: Array, scene: Any, lens: Array, table: Array) -> None:
     """Write what each fragment's first triangle is like at the middle of its samples (Moeller and Trumbore 1997).
 
     Parameters

@@ -16,7 +16,7 @@ DITHER = 10  # 8-bit steps between the extremes of the ordered dither: still whe
 SOLID = 128  # coverage from which a pixel is drawn
 
 
-class Gif:
+class GifWriter:
     """A GIF being written."""
 
     def __init__(self, path: Path, swatches: Sequence[NDArray[np.uint8]], fps: Fraction, notice: str = "") -> None:
@@ -26,7 +26,7 @@ class Gif:
         self._path, self._notice = path, notice
         self._fps, self._n_frames, self._last = fps, 0, -LEAST_TICKS
         height, width, channels = swatches[0].shape
-        self._palette, self._nearest = _palette(swatches, 256 if channels == 3 else 255)
+        self._palette, self._nearest = _colour_table(swatches, 256 if channels == 3 else 255)
         pattern = np.tile(BAYER, (-(-height // 4), -(-width // 4)))[:height, :width, None]
         self._dither = (pattern * DITHER // 16 - DITHER // 2).astype(np.int16)
         stay = max(LEAST_TICKS, round(TICKS / fps))  # of the last picture
@@ -62,14 +62,14 @@ class Gif:
         self._container.mux(self._video.encode(None))
         self._container.close()
         if self._notice:
-            _say(self._path, self._notice)
+            _write_comment(self._path, self._notice)
 
     def abandon(self) -> None:
         """Close the file unfinished."""
         self._container.close()
 
 
-def _say(path: Path, notice: str) -> None:
+def _write_comment(path: Path, notice: str) -> None:
     """Put a comment (GIF89a, section 24) before the last byte of a file, the trailer; the muxer writes none."""
     said = notice.encode("ascii", "replace")[:255]
     with path.open("r+b") as file:
@@ -79,7 +79,7 @@ def _say(path: Path, notice: str) -> None:
         file.write(b"\x21\xfe" + bytes([len(said)]) + said + b"\x00" + trailer)
 
 
-def _palette(swatches: Sequence[NDArray[np.uint8]], n_colours: int) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+def _colour_table(swatches: Sequence[NDArray[np.uint8]], n_colours: int) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """(256, 4) alpha, red, green, blue by median cut, and the nearest entry for every colour of `BITS` bits."""
     from PIL import Image
     from scipy.spatial import cKDTree

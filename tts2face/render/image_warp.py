@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.compilation import inlined_kernel, kernel
-from tts2face.interpolation import bilinear
+from tts2face.interpolation import interpolate_bilinear
 
 Array = NDArray[Any]
 
@@ -17,13 +17,15 @@ EDGE = -1e-6  # barycentric coordinates down to here belong to a triangle, so th
 
 
 @inlined_kernel
-def corner(points: Array, triangle: Array, k: int) -> tuple[float, float]:
+def triangle_corner(points: Array, triangle: Array, k: int) -> tuple[float, float]:
     """Place of a triangle's corner."""
     return points[triangle[k], 0], points[triangle[k], 1]
 
 
 @kernel
-def bend(triangles: Array, target: Array, source: Array, plate: Array, change: tuple[Any, Any], frame: Array) -> None:
+def warp_image(
+    triangles: Array, target: Array, source: Array, plate: Array, change: tuple[Any, Any], frame: Array
+) -> None:
     """Draw the plate's triangles at new places.
 
     Parameters
@@ -43,9 +45,9 @@ def bend(triangles: Array, target: Array, source: Array, plate: Array, change: t
     height, width = frame.shape[0], frame.shape[1]
     for f in range(len(triangles)):
         triangle = triangles[f]
-        x0, y0 = corner(target, triangle, 0)
-        x1, y1 = corner(target, triangle, 1)
-        x2, y2 = corner(target, triangle, 2)
+        x0, y0 = triangle_corner(target, triangle, 0)
+        x1, y1 = triangle_corner(target, triangle, 1)
+        x2, y2 = triangle_corner(target, triangle, 2)
         area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
         if abs(area) < 1e-9:
             continue
@@ -62,23 +64,23 @@ def bend(triangles: Array, target: Array, source: Array, plate: Array, change: t
                 u = a * source[triangle[0], 0] + b * source[triangle[1], 0] + c * source[triangle[2], 0]
                 v = a * source[triangle[0], 1] + b * source[triangle[1], 1] + c * source[triangle[2], 1]
                 for k in range(3):
-                    frame[y, x, k] = bilinear(plate, u, v, k)
+                    frame[y, x, k] = interpolate_bilinear(plate, u, v, k)
                 if is_face:
                     u = a * places[triangle[0], 0] + b * places[triangle[1], 0] + c * places[triangle[2], 0]
                     v = a * places[triangle[0], 1] + b * places[triangle[1], 1] + c * places[triangle[2], 1]
                     for k in range(3):
-                        frame[y, x, k] += bilinear(texture, u, v, k)
+                        frame[y, x, k] += interpolate_bilinear(texture, u, v, k)
 
 
 @kernel
-def lay(triangles: Array, target: Array, texture: Array, places: Array, frame: Array) -> None:
-    """Draw a texture's triangles, at `places` in the texture and `target` in the frame; arguments as in `bend`."""
+def draw_texture(triangles: Array, target: Array, texture: Array, places: Array, frame: Array) -> None:
+    """Draw a texture's triangles, at `places` in the texture and `target` in the frame; see `warp_image`."""
     height, width = frame.shape[0], frame.shape[1]
     for f in range(len(triangles)):
         triangle = triangles[f]
-        x0, y0 = corner(target, triangle, 0)
-        x1, y1 = corner(target, triangle, 1)
-        x2, y2 = corner(target, triangle, 2)
+        x0, y0 = triangle_corner(target, triangle, 0)
+        x1, y1 = triangle_corner(target, triangle, 1)
+        x2, y2 = triangle_corner(target, triangle, 2)
         area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
         if abs(area) < 1e-9:
             continue
@@ -94,4 +96,4 @@ def lay(triangles: Array, target: Array, texture: Array, places: Array, frame: A
                 u = a * places[triangle[0], 0] + b * places[triangle[1], 0] + c * places[triangle[2], 0]
                 v = a * places[triangle[0], 1] + b * places[triangle[1], 1] + c * places[triangle[2], 1]
                 for k in range(3):
-                    frame[y, x, k] = bilinear(texture, u, v, k)
+                    frame[y, x, k] = interpolate_bilinear(texture, u, v, k)

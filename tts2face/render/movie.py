@@ -39,7 +39,7 @@ WEBM_MOVIE = MovieKind(
 )  # fmt: skip
 
 
-class Movie:
+class MovieWriter:
     """A movie being written: pictures and sound in, a finished file after `finish`."""
 
     def __init__(
@@ -52,7 +52,7 @@ class Movie:
         self._fps, self._rate = clock
         fps = self._fps
         self._n_frames = self._n_samples = 0
-        self._filling: NDArray[np.uint8] | None = None
+        self._fill_colour: NDArray[np.uint8] | None = None
         self._container: Any = av.open(str(path), "w", format=kind.container, options=dict(kind.container_options))
         if notice:
             self._container.metadata["comment"] = notice
@@ -75,7 +75,7 @@ class Movie:
         import av
 
         if self._has_alpha:
-            pixels = self._filled(pixels)
+            pixels = self._fill_transparent(pixels)
         frame = av.VideoFrame.from_ndarray(pixels, format="rgba" if self._has_alpha else "rgb24")
         frame = frame.reformat(
             format=self._video.pix_fmt, dst_colorspace="ITU709", src_color_range="JPEG", dst_color_range="MPEG"
@@ -84,14 +84,14 @@ class Movie:
         self._n_frames += 1
         self._container.mux(self._video.encode(frame))
 
-    def _filled(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def _fill_transparent(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Pixels whose empty places have a colour of the head, so that coding does not darken its outline."""
         empty = pixels[:, :, 3] == 0
-        if self._filling is None and not empty.all():
-            self._filling = pixels[~empty][:, :3].mean(axis=0).astype(np.uint8)
+        if self._fill_colour is None and not empty.all():
+            self._fill_colour = pixels[~empty][:, :3].mean(axis=0).astype(np.uint8)
         filled = pixels.copy()
-        if self._filling is not None:
-            filled[empty, :3] = self._filling
+        if self._fill_colour is not None:
+            filled[empty, :3] = self._fill_colour
         return filled
 
     def sound(self, samples: NDArray[np.float32]) -> None:

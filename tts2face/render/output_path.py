@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lexicon.errors import BackendError, InputError
-from tts2face.render.png_folder import is_stills_folder
+from tts2face.render.png_folder import is_png_folder
 from tts2face.storage.output_names import check_name
 from tts2face.storage.temporary import Temporary
 
@@ -14,7 +14,7 @@ MP4, WEBM, GIF, FOLDER = ".mp4", ".webm", ".gif", ""
 KINDS = (MP4, WEBM, GIF)
 
 
-def kind_of(path: Path | str) -> str:
+def output_kind(path: Path | str) -> str:
     """What a path asks for: one of `KINDS`, or `FOLDER`.
 
     Raises
@@ -33,7 +33,7 @@ def kind_of(path: Path | str) -> str:
     return suffix
 
 
-def checked_output(path: Path | str) -> Path:
+def check_output(path: Path | str) -> Path:
     """The path of what shall be written.
 
     Raises
@@ -46,15 +46,15 @@ def checked_output(path: Path | str) -> Path:
     """
     where = Path(path)
     check_name(where)
-    kind = kind_of(path)
-    if kind == FOLDER and where.exists() and not (where.is_dir() and is_stills_folder(where)):
+    kind = output_kind(path)
+    if kind == FOLDER and where.exists() and not (where.is_dir() and is_png_folder(where)):
         raise InputError(f"{where} holds other things than pictures of a clip; choose another folder")
     if kind != FOLDER and where.is_dir():
         raise InputError(f"{where} is a folder; choose another name")
     return where
 
 
-def place_beside(path: Path, kind: str) -> Temporary:
+def make_temporary(path: Path, kind: str) -> Temporary:
     """A new, empty, hidden file or folder beside a path.
 
     Raises
@@ -62,18 +62,18 @@ def place_beside(path: Path, kind: str) -> Temporary:
     BackendError
         The folder cannot be written.
     """
-    with refusals(path):
+    with translate_disk_errors(path):
         return Temporary(path, is_folder=kind == FOLDER)
 
 
-def put_in_place(beside: Temporary, path: Path) -> None:
+def move_into_place(beside: Temporary, path: Path) -> None:
     """Let what was written beside appear under its name, in place of what was there."""
-    with refusals(path):
+    with translate_disk_errors(path):
         beside.replace(path)
 
 
 @contextlib.contextmanager
-def refusals(path: Path) -> Iterator[None]:
+def translate_disk_errors(path: Path) -> Iterator[None]:
     """Say in one sentence why the disk refused.
 
     Raises

@@ -17,11 +17,11 @@ from lexicon.errors import DataError, InputError
 from tts2face.models.appearance import Appearance, Plate, nearest_pixels
 from tts2face.models.landmarks import FACE_OVAL
 from tts2face.models.talker import ShapeModel, Talker
-from tts2face.own_face.gestures import OwnGestures
+from tts2face.own_face.gestures import OwnFaceGestures
 from tts2face.prefetch import map_in_order
-from tts2face.render.image_warp import bend, lay
+from tts2face.render.image_warp import draw_texture, warp_image
 from tts2face.render.picture import AUTO, SIDES, Picture
-from tts2face.render.plate_sampling import Samples, samples
+from tts2face.render.plate_sampling import TextureSamples, texture_samples
 from tts2face.render.renderer import SYNTHETIC
 from tts2face.render.scene import available_cores
 from tts2face.types import Clip
@@ -50,14 +50,14 @@ class OwnFaceRenderer:
     name: str
     fps: float
     picture: Picture
-    plate: "Frames"
+    plate: "FrameStore"
     points: Floats
     scale: float
     triangles: NDArray[np.int32]
     face_fill: NDArray[np.int64]
     mouth_fill: NDArray[np.int64]
-    gestures: OwnGestures | None = None
-    eyes: Samples | None = None
+    gestures: OwnFaceGestures | None = None
+    eyes: TextureSamples | None = None
 
     @property
     def notice(self) -> str:
@@ -81,13 +81,13 @@ class OwnFaceRenderer:
         instants = (first + np.arange(len(values))) / clip.fps
 
         def draw_one(number: int) -> NDArray[np.uint8]:
-            return plate_drawn(self, values[number], self.plate_frame(float(instants[number])))
+            return draw_video_frame(self, values[number], self.plate_frame(float(instants[number])))
 
         yield from map_in_order(draw_one, range(len(instants)), threads or available_cores())
 
     def frame(self, clip: Clip, number: int) -> NDArray[np.uint8]:
         """The picture of one frame of a clip."""
-        return plate_drawn(self, self._motion(clip)[number], self.plate_frame(number / clip.fps))
+        return draw_video_frame(self, self._motion(clip)[number], self.plate_frame(number / clip.fps))
 
     def plate_frame(self, instant: float) -> int:
         """The plate's frame at an instant in seconds: to the end, back to the beginning, and again."""
@@ -104,7 +104,7 @@ class OwnFaceRenderer:
         return np.pad(clip.motion.values, ((0, 0), (0, len(self.channels) - n_moved)))
 
 
-def own_face_renderer(talker: Talker, picture: Picture, gestures: OwnGestures | None = None) -> OwnFaceRenderer:
+def own_face_renderer(talker: Talker, picture: Picture, gestures: OwnFaceGestures | None = None) -> OwnFaceRenderer:
     """The renderer of a talker's own face; with `gestures` it draws theirs too.
 
     Raises
@@ -123,8 +123,8 @@ def own_face_renderer(talker: Talker, picture: Picture, gestures: OwnGestures | 
             "a talker's own face is drawn on her own video; choose a face file for a transparent background"
         )
     if picture.size == AUTO:
-        picture = replace(picture, size=_own_size(appearance))
-    plate, scale, shift = _fitted(appearance, picture)
+        picture = replace(picture, size=_background_video_size(appearance))
+    plate, scale, shift = _fit_background_video(appearance, picture)
     points = ((appearance.plate.points + 0.5) * scale - 0.5 - shift).astype(np.float32)
     return OwnFaceRenderer(
         appearance=appearance,
@@ -139,11 +139,11 @@ def own_face_renderer(talker: Talker, picture: Picture, gestures: OwnGestures | 
         face_fill=nearest_pixels(appearance.face),
         mouth_fill=nearest_pixels(appearance.mouth),
         gestures=gestures,
-        eyes=None if gestures is None else samples(appearance.face, gestures.lid_pixels > 0),
+        eyes=None if gestures is None else texture_samples(appearance.face, gestures.lid_pixels > 0),
     )
 
 
-def plate_drawn(stage: OwnFaceRenderer, motion: NDArray[np.floating], number: int) -> NDArray[np.uint8]:
+def draw_video_frame(stage: OwnFaceRenderer, motion: NDArray[np.floating], number: int) -> NDArray[np.uint8]:
     """One picture (H, W, 3): speech parameters, looks and gestures (D,) on a frame of the plate."""
     appearance, n_speech = stage.appearance, stage.shapes.n_speech
     n_face, n_spoken = appearance.face.n_modes, stage.n_spoken
@@ -156,24 +156,24 @@ def plate_drawn(stage: OwnFaceRenderer, motion: NDArray[np.floating], number: in
     )
     change *= appearance.moved_by_speech[:, None]
     if stage.gestures is not None:
-        felt, looks = stage.gestures.moved(motion[n_spoken:], number)
+        felt, looks = stage.gestures.displacements(motion[n_spoken:], number)
         moved += felt
-        change += _lids(stage, number, looks, float(motion[-1]))
+        change += _lid_texture_change(stage, number, looks, float(motion[-1]))
     target = stage.points[number].astype(np.float64)
     target[:n_mesh] += stage.scale * (moved @ plate.axes[number].T)
     mouth = appearance.mouth.textures(motion[None, n_speech + n_face : n_spoken])[0]
     textures = (
-        _filled(change, stage.face_fill, appearance.face.size),
-        _filled(mouth, stage.mouth_fill, appearance.mouth.size),
+        _fill_texture(change, stage.face_fill, appearance.face.size),
+        _fill_texture(mouth, stage.mouth_fill, appearance.mouth.size),
     )
     frame = stage.plate[number].astype(np.float32)
-    _draw(stage, number, target, textures, frame)
+    _draw_mouth_and_face(stage, number, target, textures, frame)
     _draw_mouth_finely(stage, number, target, textures, frame)
     drawn: NDArray[np.uint8] = np.clip(frame + 0.5, 0, 255).astype(np.uint8)
     return drawn
 
 
-def _lids(stage: OwnFaceRenderer, number: int, looks: Floats, share: float) -> Floats:
+def _lid_texture_change(stage: OwnFaceRenderer, number: int, looks: Floats, share: float) -> Floats:
     """(P, 3) change of the face's texture by lids shut by a share: what the model does not know of the eye fades."""
     face = stage.appearance.face
     change = np.zeros((len(face.pixels), 3), np.float32)
@@ -187,14 +187,14 @@ def _lids(stage: OwnFaceRenderer, number: int, looks: Floats, share: float) -> F
     return change
 
 
-def _draw(
+def _draw_mouth_and_face(
     stage: OwnFaceRenderer, number: int, target: NDArray[np.float64], textures: tuple[Floats, Floats], frame: Floats
 ) -> None:
     appearance, (change, mouth) = stage.appearance, textures
     source = stage.points[number].astype(np.float64)
     places = appearance.face.reference.astype(np.float64)
-    lay(appearance.mouth.triangles, target[appearance.mouth_points], mouth, appearance.mouth.reference, frame)
-    bend(stage.triangles, target, source, stage.plate[number], (change, places), frame)
+    draw_texture(appearance.mouth.triangles, target[appearance.mouth_points], mouth, appearance.mouth.reference, frame)
+    warp_image(stage.triangles, target, source, stage.plate[number], (change, places), frame)
 
 
 def _draw_mouth_finely(
@@ -208,12 +208,12 @@ def _draw_mouth_finely(
         return
     box = np.s_[low[1] : high[1], low[0] : high[0]]
     fine = np.repeat(np.repeat(frame[box], FINE, axis=0), FINE, axis=1)
-    _draw(stage, number, (target - low + 0.5) * FINE - 0.5, textures, fine)
+    _draw_mouth_and_face(stage, number, (target - low + 0.5) * FINE - 0.5, textures, fine)
     height, width = frame[box].shape[:2]
     frame[box] = fine.reshape(height, FINE, width, FINE, 3).mean(axis=(1, 3))
 
 
-class Frames:
+class FrameStore:
     """Pictures (H, W, 3) by number; as JPEG files where they would take much memory."""
 
     def __init__(self, pictures: "Iterable[Drawn]") -> None:
@@ -240,21 +240,21 @@ class Frames:
         return np.asarray(Image.open(io.BytesIO(self._packed[number - len(self._raw)])))
 
 
-def _own_size(appearance: Appearance) -> str:
+def _background_video_size(appearance: Appearance) -> str:
     """The size of the talker's video, within what can be drawn."""
-    height, width = next(_decoded(appearance.plate)).shape[:2]
+    height, width = next(_decode_video(appearance.plate)).shape[:2]
     scale = min(1.0, SIDES[1] / max(height, width))
     return "x".join(str(max(int(side * scale) // 2 * 2, SIDES[0])) for side in (width, height))
 
 
-def _fitted(appearance: Appearance, picture: Picture) -> tuple[Frames, float, NDArray[np.float64]]:
+def _fit_background_video(appearance: Appearance, picture: Picture) -> tuple[FrameStore, float, NDArray[np.float64]]:
     """The plate's frames scaled to fill the picture, the face in its middle where the video reaches so far.
 
     Returns the frames, the scale, and the scaled place of their left top corner.
     """
     from PIL import Image
 
-    height, width = next(_decoded(appearance.plate)).shape[:2]
+    height, width = next(_decode_video(appearance.plate)).shape[:2]
     scale = max(picture.width / width, picture.height / height)
     middle = (appearance.plate.points.mean(axis=(0, 1)) + 0.5) * scale
     room = np.array([width * scale - picture.width, height * scale - picture.height])
@@ -262,11 +262,11 @@ def _fitted(appearance: Appearance, picture: Picture) -> tuple[Frames, float, ND
     sides = picture.width, picture.height
     left, top = (float(at) for at in shift / scale)
     box = left, top, min(left + sides[0] / scale, float(width)), min(top + sides[1] / scale, float(height))
-    frames = (Image.fromarray(pixels) for pixels in _decoded(appearance.plate))
-    return Frames(frame.resize(sides, Image.Resampling.BICUBIC, box=box) for frame in frames), scale, shift
+    frames = (Image.fromarray(pixels) for pixels in _decode_video(appearance.plate))
+    return FrameStore(frame.resize(sides, Image.Resampling.BICUBIC, box=box) for frame in frames), scale, shift
 
 
-def _decoded(plate: Plate) -> Iterator[NDArray[np.uint8]]:
+def _decode_video(plate: Plate) -> Iterator[NDArray[np.uint8]]:
     """Pictures of a plate's video, one for each row of its points.
 
     Raises
@@ -305,5 +305,5 @@ def ring_triangles(n_mesh: int) -> NDArray[np.int32]:
     return np.array(rows, np.int32)
 
 
-def _filled(texture: Floats, fill: NDArray[np.int64], size: tuple[int, int]) -> Floats:
+def _fill_texture(texture: Floats, fill: NDArray[np.int64], size: tuple[int, int]) -> Floats:
     return np.ascontiguousarray(texture[fill].reshape(size[1], size[0], 3), np.float32)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lexicon.errors import InputError
-from tts2face.render.camera_views import Camera, camera_named
+from tts2face.render.camera_views import CameraView, parse_camera
 from tts2face.request import option
 
 SIDES = (16, 4096)  # px
@@ -42,9 +42,9 @@ class Picture:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be drawn."""
-        sides_of(self.size)
-        camera_named(self.camera)
-        background_kind(self.background)
+        parse_size(self.size)
+        parse_camera(self.camera)
+        parse_background(self.background)
         if self.supersampling not in SUPERSAMPLING:
             raise InputError(f"supersampling must be 1, 2 or 3, not {self.supersampling}")
         if self.renderer not in RENDERERS:
@@ -53,17 +53,17 @@ class Picture:
     @property
     def width(self) -> int:
         """Pixels across."""
-        return sides_of(self.size)[0]
+        return parse_size(self.size)[0]
 
     @property
     def height(self) -> int:
         """Pixels down."""
-        return sides_of(self.size)[1]
+        return parse_size(self.size)[1]
 
     @property
-    def view(self) -> Camera:
+    def view(self) -> CameraView:
         """The camera that `camera` names."""
-        return camera_named(self.camera)
+        return parse_camera(self.camera)
 
     @property
     def is_transparent(self) -> bool:
@@ -76,7 +76,7 @@ class Picture:
         return 4 if self.is_transparent else 3
 
 
-def sides_of(size: str) -> tuple[int, int]:
+def parse_size(size: str) -> tuple[int, int]:
     """Width and height of a size such as ``640x480`` or ``512``; those of ``auto`` are `USUAL`.
 
     Raises
@@ -96,7 +96,7 @@ def sides_of(size: str) -> tuple[int, int]:
     return width, height
 
 
-def background_kind(background: str) -> tuple[int, int, int] | Path | str:
+def parse_background(background: str) -> tuple[int, int, int] | Path | str:
     """Colour (sRGB, 0-255), image path, or the word ``studio`` or ``transparent``.
 
     Raises

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.render.camera import Optics
+from tts2face.render.camera import CameraMatrices
 from tts2face.render.fragments import (
     COLOUR,
     EXPOSURE,
@@ -14,14 +14,14 @@ from tts2face.render.fragments import (
     N_VERTEX_COLUMNS,
     PIXEL_ENDS,
     UV,
-    evaluate,
+    evaluate_fragments,
     face_normals,
     find_fragments,
     vertex_normals,
 )
-from tts2face.render.raster import N_LAYERS, draw_band, gather, sort_into_bands, to_camera
-from tts2face.render.resolve import compose
-from tts2face.render.shade import N_SCRATCH_ROWS, light
+from tts2face.render.raster import N_LAYERS, draw_band, gather_triangles, sort_into_bands, transform_to_camera
+from tts2face.render.resolve import compose_band
+from tts2face.render.shade import N_SCRATCH_ROWS, shade_fragments
 from tts2face.render.surface import Surface, encoding_table, linear_table
 
 BAND_SAMPLES = 65_536  # of a band of rows that is drawn, then lit; from 16,384 to 262,144 the time is the same
@@ -31,7 +31,7 @@ TABLES = (linear_table(), encoding_table(TONE_STEPS))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Room:
+class DrawingBuffers:
     """What one picture at a time needs while it is drawn; `tts2face.render.raster` and its neighbours name the parts.
 
     ``vertex`` holds colour and uv from the start.
@@ -53,7 +53,7 @@ class Room:
     pixels: NDArray[np.int32]
 
 
-def room_for(surface: Surface, size: tuple[int, int], side: int) -> Room:
+def allocate_buffers(surface: Surface, size: tuple[int, int], side: int) -> DrawingBuffers:
     """Room to draw a surface into pictures of `size` (width, height) px with side x side samples in a pixel."""
     n_vertices, n_triangles = len(surface.rig.rest), len(surface.triangles)
     width, height = size[0] * side, size[1] * side
@@ -62,7 +62,7 @@ def room_for(surface: Surface, size: tuple[int, int], side: int) -> Room:
     vertex = np.zeros((n_vertices, N_VERTEX_COLUMNS), np.float32)
     vertex[:, COLOUR : COLOUR + 3] = surface.colours
     vertex[:, UV : UV + 2] = surface.uv
-    return Room(
+    return DrawingBuffers(
         side=side,
         vertex=vertex,
         grid=np.zeros((n_vertices, 2), np.int32),
@@ -80,22 +80,22 @@ def room_for(surface: Surface, size: tuple[int, int], side: int) -> Room:
     )
 
 
-def paint(
+def draw_surface(
     points: NDArray[np.float32],
     surface: Surface,
-    optics: Optics,
+    optics: CameraMatrices,
     lights: tuple[NDArray[np.float32], NDArray[np.float32]],
-    room: Room,
+    room: DrawingBuffers,
     picture: NDArray[np.uint8],
 ) -> None:
     """Draw the surface, its vertices (V, 3) in the world, over the background that the picture holds.
 
-    `lights` are the table of `tts2face.render.shade.light` and how much of each reaches every vertex (V, 4).
+    `lights` are the table of `tts2face.render.shade.shade_fragments` and how much of each reaches every vertex (V, 4).
     """
     room.vertex[:, EXPOSURE : EXPOSURE + 4] = lights[1]
     lens, side = optics.lens, room.side
     height, width = picture.shape[0] * side, picture.shape[1] * side
-    batch = project(points, surface, (optics.view, optics.lens), room, (width, height))
+    batch = project_surface(points, surface, (optics.view, optics.lens), room, (width, height))
     face_normals(room.vertex, surface.triangles, room.flat)
     vertex_normals(room.flat, surface.starts, surface.members, room.vertex)
     geometry = (room.vertex, surface.triangles, surface.translucent, lens)
@@ -113,19 +113,19 @@ def paint(
         if n_pixels == 0:
             continue
         n_fragments = int(room.pixels[n_pixels - 1, PIXEL_ENDS + N_LAYERS])
-        evaluate(room.found, n_fragments, room.vertex, scene, lens, room.fragments)
-        light(room.fragments, n_fragments, lights[0], room.scratch, room.colour)
+        evaluate_fragments(room.found, n_fragments, room.vertex, scene, lens, room.fragments)
+        shade_fragments(room.fragments, n_fragments, lights[0], room.scratch, room.colour)
         shown = (room.fragments, room.colour)
-        compose(room.owner, place, (room.pixels, n_pixels), (room.found[0], *facets), shown, (picture, TABLES))
+        compose_band(room.owner, place, (room.pixels, n_pixels), (room.found[0], *facets), shown, (picture, TABLES))
 
 
-def project(
-    points: NDArray[np.float32], surface: Surface, optics: tuple[Any, Any], room: Room, size: tuple[int, int]
+def project_surface(
+    points: NDArray[np.float32], surface: Surface, optics: tuple[Any, Any], room: DrawingBuffers, size: tuple[int, int]
 ) -> NDArray[np.int32]:
     """Bring the surface before a camera (view, lens); returns the triangles of all bands, one band behind the other."""
     view, lens = optics
-    to_camera(points, view, lens, room.vertex, room.grid)
-    count = gather(room.vertex, room.grid, surface.triangles, (lens, size), room.corners, room.source)
+    transform_to_camera(points, view, lens, room.vertex, room.grid)
+    count = gather_triangles(room.vertex, room.grid, surface.triangles, (lens, size), room.corners, room.source)
     n_rows = room.depth.shape[1]
     members = np.zeros(2 * len(surface.triangles), np.int32)
     sort_into_bands(room.corners, count, n_rows, room.band_starts, members)

@@ -11,7 +11,7 @@ Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Samples:
+class TextureSamples:
     """Some pixels of a texture: where each lies in the mesh.
 
     ``pixels`` (Q,) are places in `TextureModel.pixels`; pixel q lies at the ``weights`` (Q, 3) of the mesh's points
@@ -34,7 +34,7 @@ class Samples:
         return np.asarray(above * (1 - low) + below * low, np.float32)
 
 
-def samples(model: TextureModel, chosen: NDArray[np.bool_]) -> Samples:
+def texture_samples(model: TextureModel, chosen: NDArray[np.bool_]) -> TextureSamples:
     """Where the chosen (P,) pixels of a texture lie in its mesh; those between its triangles are left out."""
     pixels = np.flatnonzero(chosen)
     width = model.size[0]
@@ -51,4 +51,4 @@ def samples(model: TextureModel, chosen: NDArray[np.bool_]) -> Samples:
         better = found.min(axis=1) > weights.min(axis=1)
         corners[better], weights[better] = triangle, found[better]
     inside = weights.min(axis=1) > -1e-3
-    return Samples(pixels[inside], corners[inside], weights[inside].astype(np.float32))
+    return TextureSamples(pixels[inside], corners[inside], weights[inside].astype(np.float32))

@@ -11,7 +11,7 @@ DIGITS = 6
 COMPRESSION = 3  # of zlib: twice as fast as the usual 6, 4 % larger
 
 
-class Stills:
+class PngFolderWriter:
     """Pictures being written to a folder."""
 
     def __init__(self, folder: Path, sound_rate: int, notice: str = "") -> None:
@@ -44,8 +44,8 @@ class Stills:
         self._sound.close()
 
 
-def is_stills_folder(folder: Path) -> bool:
-    """Whether a folder holds nothing but what `Stills` writes."""
+def is_png_folder(folder: Path) -> bool:
+    """Whether a folder holds nothing but what `PngFolderWriter` writes."""
     return all(
         path.name == SOUND_NAME or (path.suffix == ".png" and path.stem.isdigit() and len(path.stem) >= DIGITS)
         for path in folder.iterdir()

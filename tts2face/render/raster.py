@@ -26,7 +26,7 @@ N_LAYERS = 3  # the opaque surface and the two nearest translucent ones before i
 
 
 @kernel
-def to_camera(points: Array, view: Array, lens: Array, camera: Array, grid: Array) -> None:
+def transform_to_camera(points: Array, view: Array, lens: Array, camera: Array, grid: Array) -> None:
     """Write camera space and snapped picture place of (V, 3) world points; the latter only beyond the near plane.
 
     `view` (3, 4) brings the world to camera space; `lens` is (focal length in samples, centre x, centre y, near plane).
@@ -45,7 +45,7 @@ def to_camera(points: Array, view: Array, lens: Array, camera: Array, grid: Arra
 
 
 @kernel
-def near_cut(camera: Array, grid: Array, triangle: Array, lens: Array, polygon: Array) -> int:
+def clip_to_near_plane(camera: Array, grid: Array, triangle: Array, lens: Array, polygon: Array) -> int:
     """Snapped corners of the part of a triangle beyond the near plane; returns how many (0, 3 or 4)."""
     near = lens[3]
     n_corners = 0
@@ -75,7 +75,9 @@ def may_be_seen(low: int, high: int, n_samples: int) -> bool:
 
 
 @kernel
-def gather(camera: Array, grid: Array, triangles: Array, optics: tuple[Any, Any], corners: Array, source: Array) -> int:
+def gather_triangles(
+    camera: Array, grid: Array, triangles: Array, optics: tuple[Any, Any], corners: Array, source: Array
+) -> int:
     """Triangles that may be seen, as snapped corners in one winding; returns how many.
 
     Parameters
@@ -96,7 +98,7 @@ def gather(camera: Array, grid: Array, triangles: Array, optics: tuple[Any, Any]
             for c in range(3):
                 polygon[c, 0], polygon[c, 1] = grid[triangles[t, c], 0], grid[triangles[t, c], 1]
         else:
-            n_corners = near_cut(camera, grid, triangles[t], lens, polygon)
+            n_corners = clip_to_near_plane(camera, grid, triangles[t], lens, polygon)
         for c in range(1, n_corners - 1):
             x0, y0, x1, y1 = polygon[0, 0], polygon[0, 1], polygon[c, 0], polygon[c, 1]
             x2, y2 = polygon[c + 1, 0], polygon[c + 1, 1]
@@ -146,7 +148,7 @@ def sort_into_bands(corners: Array, count: int, band_rows: int, starts: Array, m
 
 
 @inlined_kernel
-def edge(ax: int, ay: int, bx: int, by: int, px: int, py: int) -> int:
+def edge_function(ax: int, ay: int, bx: int, by: int, px: int, py: int) -> int:
     """Edge function of a directed edge at a point, lowered by one where the edge does not own its samples."""
     owns = (by < ay) | ((by == ay) & (bx > ax))  # left edges and top edges
     return (bx - ax) * (py - ay) - (by - ay) * (px - ax) - (0 if owns else 1)
@@ -171,7 +173,7 @@ def depth_plane(camera: Array, triangles: Array, t: int, lens: Array) -> tuple[f
 
 
 @kernel
-def covered_depth(depth: Array, tiles: Array) -> None:
+def tile_depths(depth: Array, tiles: Array) -> None:
     """Write for each tile of samples the 1/z before which everything in it lies; 0 where a sample is still free."""
     for r in range(tiles.shape[0]):
         for x in range(tiles.shape[1]):
@@ -183,7 +185,7 @@ def covered_depth(depth: Array, tiles: Array) -> None:
 
 
 @kernel
-def clear(depth: Array, owner: Array, layer: int) -> None:
+def clear_layer(depth: Array, owner: Array, layer: int) -> None:
     """Empty a layer of a band."""
     for r in range(depth.shape[1]):
         for x in range(depth.shape[2]):
@@ -208,15 +210,15 @@ def draw_band(geometry: Any, batch: Any, first_row: int, depth: Array, owner: Ar
     camera, triangles, translucent, lens = geometry
     corners, source, members = batch
     n_rows, width = depth.shape[1], depth.shape[2]
-    clear(depth, owner, 0)
+    clear_layer(depth, owner, 0)
     tiles = np.zeros(((n_rows + TILE - 1) // TILE, (width + TILE - 1) // TILE), np.float32)
     n_translucent = 0
     for turn in range(3):
         if turn == 1:
-            covered_depth(depth[0], tiles)
+            tile_depths(depth[0], tiles)
         if turn == 2 and n_translucent:
-            clear(depth, owner, 1)
-            clear(depth, owner, 2)
+            clear_layer(depth, owner, 1)
+            clear_layer(depth, owner, 2)
         for i in members:
             number = source[i]
             t = number if number >= 0 else ~number
@@ -241,8 +243,8 @@ def draw_band(geometry: Any, batch: Any, first_row: int, depth: Array, owner: Ar
             across, along, origin, least, most = depth_plane(camera, triangles, t, lens)
             bias = np.float32(1) if number >= 0 else BACK_BIAS
             px, py = (left << SHIFT) + HALF, ((top + first_row) << SHIFT) + HALF
-            row_0, row_1 = edge(x1, y1, x2, y2, px, py), edge(x2, y2, x0, y0, px, py)
-            row_2 = edge(x0, y0, x1, y1, px, py)
+            row_0, row_1 = edge_function(x1, y1, x2, y2, px, py), edge_function(x2, y2, x0, y0, px, py)
+            row_2 = edge_function(x0, y0, x1, y1, px, py)
             right_0, right_1, right_2 = (y1 - y2) << SHIFT, (y2 - y0) << SHIFT, (y0 - y1) << SHIFT
             base = origin + along * (top + first_row + 0.5) + across * (left + 0.5)
             for r in range(top, bottom + 1):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.compilation import kernel
-from tts2face.render.fragments import AT_OPACITY, AT_SHARE, PIXEL_ENDS, PIXEL_X, PIXEL_Y, is_alike
+from tts2face.render.fragments import AT_OPACITY, AT_SHARE, PIXEL_ENDS, PIXEL_X, PIXEL_Y, is_same_surface
 from tts2face.render.raster import NOTHING
 
 Array = NDArray[Any]
@@ -56,7 +56,7 @@ def mix_samples(
             if number == NOTHING:
                 continue
             g = begins[layer]
-            while not is_alike(number, number_of[g], flat, part_of):
+            while not is_same_surface(number, number_of[g], flat, part_of):
                 g += 1
             through = one - table[AT_OPACITY, g]
             red, green, blue = (
@@ -71,7 +71,7 @@ def mix_samples(
 
 
 @kernel
-def compose(
+def compose_band(
     owner: Array,
     place: tuple[int, int, int],
     pixels: tuple[Any, int],

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.face import Face
-from tts2face.render.background import background
-from tts2face.render.camera import Optics, optics
+from tts2face.render.background import draw_background
+from tts2face.render.camera import CameraMatrices, camera_matrices
 from tts2face.render.picture import Picture
-from tts2face.render.soft_shadows import Exposure, exposed
-from tts2face.render.studio_light import lamps, light_table
-from tts2face.render.surface import Surface, surfaced
+from tts2face.render.soft_shadows import Exposure, compute_exposure
+from tts2face.render.studio_light import lamp_directions, light_table
+from tts2face.render.surface import Surface, build_surface
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,19 +22,19 @@ class Scene:
     face: Face
     picture: Picture
     surface: Surface
-    optics: Optics
+    optics: CameraMatrices
     lights: NDArray[np.float32]
     exposure: Exposure
-    behind: NDArray[np.uint8]
+    background: NDArray[np.uint8]
 
 
 def build_scene(face: Face, picture: Picture) -> Scene:
     """The scene of a face and a picture; its soft shadows take most of a second."""
     side = picture.supersampling
-    surface, towards = surfaced(face), lamps(picture.view)
-    camera = optics(picture.view, face, (picture.width * side, picture.height * side))
-    exposure = exposed(face, surface, towards, available_cores())
-    return Scene(face, picture, surface, camera, light_table(towards, camera), exposure, background(picture))
+    surface, towards = build_surface(face), lamp_directions(picture.view)
+    camera = camera_matrices(picture.view, face, (picture.width * side, picture.height * side))
+    exposure = compute_exposure(face, surface, towards, available_cores())
+    return Scene(face, picture, surface, camera, light_table(towards, camera), exposure, draw_background(picture))
 
 
 def available_cores() -> int:

@@ -28,7 +28,7 @@ SKY, FLOOR, UP, LIGHTS = 0, 1, 2, 3  # rows of the table of lights; a light has 
 
 
 @vectorized_kernel
-def light(table: Array, n: int, lights: Array, scratch: Array, colour: Array) -> None:
+def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour: Array) -> None:
     """Write the light of n fragments.
 
     Parameters

@@ -17,8 +17,8 @@ from tts2face.compilation import kernel
 from tts2face.models.face import Face
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.render.fragments import NORMAL, face_normals, vertex_normals
-from tts2face.render.picture_kernels import project, room_for
-from tts2face.render.raster import SHIFT, draw_band, to_camera
+from tts2face.render.picture_kernels import allocate_buffers, project_surface
+from tts2face.render.raster import SHIFT, draw_band, transform_to_camera
 from tts2face.render.studio_light import LAMP_RADIUS_RAD
 from tts2face.render.surface import Surface
 
@@ -49,13 +49,13 @@ class Exposure:
         return self.rest + np.float32(math.sqrt(opened)) * self.gain
 
 
-def exposed(face: Face, surface: Surface, lamps: NDArray[np.float64], threads: int) -> Exposure:
+def compute_exposure(face: Face, surface: Surface, lamps: NDArray[np.float64], threads: int) -> Exposure:
     """Exposure of a face to the sky and to lamps in the directions (3, 3) of the world."""
     jaw = face.shape_names.index("jawOpen") if "jawOpen" in face.shape_names else -1
     poses = np.zeros((1 if jaw < 0 else 2, len(face.shape_names)), np.float32)
     if jaw >= 0:
         poses[1, jaw] = OPEN_JAW
-    baked = [_exposure(surface, surface.rig.posed(pose), lamps, threads) for pose in poses]
+    baked = [_rest_exposure(surface, surface.rig.pose(pose), lamps, threads) for pose in poses]
     for part in face.parts:
         if part.name.startswith("teeth"):
             teeth = np.unique(face.triangles[part.first : part.first + part.count])
@@ -83,7 +83,7 @@ def lip_opening(face: Face, jaw: int) -> NDArray[np.float32]:
     return (parted / (OPEN_JAW * parted[jaw])).astype(np.float32) if parted[jaw] > 0 else opening
 
 
-def sphere(n: int) -> NDArray[np.float64]:
+def sphere_directions(n: int) -> NDArray[np.float64]:
     """(n, 3) directions spread evenly (Fibonacci lattice; Gonzalez 2010)."""
     height = 1 - (2 * np.arange(n) + 1) / n
     around = np.arange(n) * math.pi * (3 - math.sqrt(5))
@@ -91,7 +91,7 @@ def sphere(n: int) -> NDArray[np.float64]:
     return np.column_stack([level * np.cos(around), height, level * np.sin(around)])
 
 
-def cone(axis: NDArray[np.float64], n: int, radius: float) -> NDArray[np.float64]:
+def cone_directions(axis: NDArray[np.float64], n: int, radius: float) -> NDArray[np.float64]:
     """(n, 3) directions spread over a disc of a radius (rad) about an axis."""
     side = np.cross(axis, [0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [1.0, 0.0, 0.0])
     side /= np.linalg.norm(side)
@@ -103,12 +103,14 @@ def cone(axis: NDArray[np.float64], n: int, radius: float) -> NDArray[np.float64
     return unit
 
 
-def _exposure(
+def _rest_exposure(
     surface: Surface, points: NDArray[np.float32], lamps: NDArray[np.float64], threads: int
 ) -> NDArray[np.float32]:
     normals = _normals(surface, points)
-    directions = np.concatenate([sphere(N_SKY), *(cone(lamp, N_LAMP, LAMP_RADIUS_RAD) for lamp in lamps)])
-    seen = _seen_from(surface, points, normals, directions, threads)
+    directions = np.concatenate(
+        [sphere_directions(N_SKY), *(cone_directions(lamp, N_LAMP, LAMP_RADIUS_RAD) for lamp in lamps)]
+    )
+    seen = _visibility(surface, points, normals, directions, threads)
     weights = np.maximum(directions[:N_SKY] @ normals.T, 0.02)
     exposure = np.ones((len(points), 1 + len(lamps)), np.float32)
     exposure[:, 0] = (weights * seen[:N_SKY]).sum(axis=0) / weights.sum(axis=0)
@@ -116,7 +118,7 @@ def _exposure(
         of_lamp = slice(N_SKY + k * N_LAMP, N_SKY + (k + 1) * N_LAMP)
         turned = np.clip((normals @ lamp + 0.15) / 0.4, 0.0, 1.0)  # turning away is no shadow
         exposure[:, 1 + k] = 1 - turned + turned * seen[of_lamp].mean(axis=0)
-    smooth = _smoothed(surface, exposure)
+    smooth = _smooth_values(surface, exposure)
     for first, end in surface.rig.eye_spans:
         ball = smooth[first:end]
         np.maximum(ball, HIDDEN_EYE * np.percentile(ball, 85, axis=0), out=ball)
@@ -132,7 +134,7 @@ def _normals(surface: Surface, points: NDArray[np.float32]) -> NDArray[np.float3
     return table[:, NORMAL:]
 
 
-def _seen_from(
+def _visibility(
     surface: Surface, points: Any, normals: Any, directions: NDArray[np.float64], threads: int
 ) -> NDArray[np.float32]:
     """(D, V) 1 where a vertex is seen from a direction."""
@@ -142,22 +144,22 @@ def _seen_from(
     seen = np.zeros((len(directions), len(points)), np.float32)
 
     def look(share: range) -> None:
-        room = room_for(surface, (SIDE, SIDE), 1)
+        room = allocate_buffers(surface, (SIDE, SIDE), 1)
         grid, camera = np.zeros_like(room.grid), np.zeros((len(points), 3), np.float32)
         for d in share:
-            view, lens = _view(directions[d], middle, radius)
-            members = project(points, surface, (view, lens), room, (SIDE, SIDE))
+            view, lens = _shadow_view(directions[d], middle, radius)
+            members = project_surface(points, surface, (view, lens), room, (SIDE, SIDE))
             geometry = (room.vertex, surface.triangles, surface.translucent, lens)
             draw_band(geometry, (room.corners, room.source, members), 0, room.depth, room.owner)
-            to_camera(lifted, view, lens, camera, grid)
-            mark_seen(camera, grid, room.depth, np.float32(SLACK_MM), seen[d])
+            transform_to_camera(lifted, view, lens, camera, grid)
+            mark_visible(camera, grid, room.depth, np.float32(SLACK_MM), seen[d])
 
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(look, [range(i, len(directions), threads) for i in range(threads)]))
     return seen
 
 
-def _view(direction: NDArray[np.float64], middle: Any, radius: float) -> tuple[NDArray[np.float64], Any]:
+def _shadow_view(direction: NDArray[np.float64], middle: Any, radius: float) -> tuple[NDArray[np.float64], Any]:
     ahead = -direction
     right = np.cross(ahead, [0.0, 1.0, 0.0] if abs(direction[1]) < 0.99 else [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
@@ -167,7 +169,7 @@ def _view(direction: NDArray[np.float64], middle: Any, radius: float) -> tuple[N
 
 
 @kernel
-def mark_seen(camera: Any, grid: Any, depth: Any, slack: Any, seen: Any) -> None:
+def mark_visible(camera: Any, grid: Any, depth: Any, slack: Any, seen: Any) -> None:
     """Mark in `seen` (V,) the vertices before which nothing nearer than `slack` mm lies."""
     for v in range(len(camera)):
         x = min(max(grid[v, 0] >> SHIFT, 0), depth.shape[2] - 1)
@@ -176,7 +178,7 @@ def mark_seen(camera: Any, grid: Any, depth: Any, slack: Any, seen: Any) -> None
             seen[v] = np.float32(1)
 
 
-def _smoothed(surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
+def _smooth_values(surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Values at vertices, each replaced by the mean over its triangles, a few times."""
     n_around = np.diff(surface.starts)
     inner = np.flatnonzero(n_around > 0)

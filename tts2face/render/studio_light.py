@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.render.camera import Optics
-from tts2face.render.camera_views import Camera
+from tts2face.render.camera import CameraMatrices
+from tts2face.render.camera_views import CameraView
 
 # Sky, floor: colour. Lamps: yaw and pitch in degrees as the camera's, then colour; linear light.
 SKY, FLOOR = (0.26, 0.265, 0.285), (0.13, 0.105, 0.095)
@@ -16,19 +16,19 @@ RIM = (148.0, 36.0, (0.75, 0.84, 1.0))
 LAMP_RADIUS_RAD = math.radians(13.0)  # the lamps are large: their shadows have soft edges
 
 
-def direction(yaw_deg: float, pitch_deg: float) -> NDArray[np.float64]:
+def lamp_direction(yaw_deg: float, pitch_deg: float) -> NDArray[np.float64]:
     """(3,) unit vector towards a lamp, from a head that a level camera looks at: x right, y up, z to the camera."""
     yaw, pitch = math.radians(yaw_deg), math.radians(pitch_deg)
     return np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)])
 
 
-def lamps(camera: Camera) -> NDArray[np.float64]:
+def lamp_directions(camera: CameraView) -> NDArray[np.float64]:
     """(3, 3) directions of the lamps in the world; they go around the head with the camera."""
-    return np.array([direction(yaw + camera.yaw_deg, pitch) for yaw, pitch, _ in (KEY, FILL, RIM)])
+    return np.array([lamp_direction(yaw + camera.yaw_deg, pitch) for yaw, pitch, _ in (KEY, FILL, RIM)])
 
 
-def light_table(directions: NDArray[np.float64], optics: Optics) -> NDArray[np.float32]:
-    """(6, 6) lights for `tts2face.render.shade.light`: sky, floor, up, and three lamps, in camera space."""
+def light_table(directions: NDArray[np.float64], optics: CameraMatrices) -> NDArray[np.float32]:
+    """(6, 6) lights for `tts2face.render.shade.shade_fragments`: sky, floor, up, and three lamps, in camera space."""
     turn = optics.view[:, :3]
     rows = np.zeros((6, 6))
     rows[0, :3], rows[1, :3], rows[2, :3] = SKY, FLOOR, turn @ [0.0, 1.0, 0.0]

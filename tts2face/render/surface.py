@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.face.deformation import FaceRig, rigged
+from tts2face.face.deformation import FaceRig, build_rig
 from tts2face.models.face import Face
 
 OPEN_SHARE = 0.05  # parts with more than this share of free edges are sheets that both sides of are lit
@@ -34,16 +34,16 @@ class Surface:
     members: NDArray[np.int32]
 
 
-def surfaced(face: Face) -> Surface:
+def build_surface(face: Face) -> Surface:
     """The surface of a face."""
     parts = face.parts
     counts = [part.count for part in parts]
     part_of = np.repeat(np.arange(len(parts), dtype=np.int32), counts)
     translucent = np.repeat([part.opacity < 1 for part in parts], counts)
     triangles = np.array(face.triangles, np.int32)
-    starts, members = _neighbours(face, triangles, part_of)
+    starts, members = _triangles_by_vertex(face, triangles, part_of)
     return Surface(
-        rig=rigged(face),
+        rig=build_rig(face),
         triangles=triangles,
         colours=linear_light(face.colours),
         uv=np.array(face.uv, np.float32) if face.uv is not None else np.zeros((1, 2), np.float32),
@@ -94,7 +94,7 @@ def _free_edge_share(triangles: NDArray[np.int32]) -> float:
     return float((uses == 1).mean())
 
 
-def _neighbours(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> tuple[Any, Any]:
+def _triangles_by_vertex(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> tuple[Any, Any]:
     """Triangles around each vertex, vertices welded that lie and move together in one part."""
     n_vertices = len(face.vertices)
     vertex_part = np.full(n_vertices, -1)

@@ -23,7 +23,7 @@ from tts2face.render.fragments import (
     texel,
     vertex_normals,
 )
-from tts2face.render.shade import N_SCRATCH_ROWS, light
+from tts2face.render.shade import N_SCRATCH_ROWS, shade_fragments
 from tts2face.render.surface import Surface, encoding_table, linear_table
 
 ENCODED = (encoding_table(4096) / 255.0).astype(np.float32)  # sRGB in [0, 1] of linear light in equal steps
@@ -49,12 +49,12 @@ class VertexLight:
     front: NDArray[np.float32]
     back: NDArray[np.float32]
 
-    def lit(
+    def update(
         self, points: NDArray[np.float32], view: NDArray[np.floating], lights: tuple[NDArray[Any], NDArray[Any]]
     ) -> None:
         """Light the vertices (V, 3) of the world for a camera `view` (3, 4); writes ``front`` and ``back``.
 
-        `lights` are the table of `tts2face.render.shade.light` in camera space and the exposure (V, 4).
+        `lights` are the table of `tts2face.render.shade.shade_fragments` in camera space and the exposure (V, 4).
         """
         self.camera[:, :3] = points @ view[:, :3].T.astype(np.float32) + view[:, 3].astype(np.float32)
         face_normals(self.camera, self.surface.triangles, self.flat)
@@ -68,11 +68,11 @@ class VertexLight:
         table[AT_EXPOSURE : AT_EXPOSURE + 4] = lights[1].T * (np.float32(1) if side > 0 else self.inside)
         table[AT_RAY : AT_RAY + 2] = (self.camera[:, :2] / np.maximum(self.camera[:, 2:3], np.float32(1))).T
         light_of = np.zeros((3, n_vertices), np.float32)
-        light(table, n_vertices, lights[0], np.zeros((N_SCRATCH_ROWS, n_vertices), np.float32), light_of)
-        colours[:] = encoded(light_of.T) / self.divisor
+        shade_fragments(table, n_vertices, lights[0], np.zeros((N_SCRATCH_ROWS, n_vertices), np.float32), light_of)
+        colours[:] = encode_srgb(light_of.T) / self.divisor
 
 
-def vertex_light(surface: Surface) -> VertexLight:
+def build_vertex_light(surface: Surface) -> VertexLight:
     """Room to light a surface's vertices."""
     n_vertices = len(surface.rig.rest)
     part_of = np.zeros(n_vertices, np.int32)
@@ -80,12 +80,12 @@ def vertex_light(surface: Surface) -> VertexLight:
     material = surface.materials[part_of]
     textured = material[:, TEXTURED] > 0
     linear = surface.colours.copy()
-    sample(surface.texture, linear_table(), surface.uv, textured, linear)
+    sample_texture(surface.texture, linear_table(), surface.uv, textured, linear)
     table = np.zeros((N_ROWS, n_vertices), np.float32)
     table[AT_ALBEDO : AT_ALBEDO + 3] = linear.T
     table[AT_SPECULAR : AT_SPECULAR + 4] = material[:, :4].T
     table[AT_SHARE] = 1
-    albedo = np.maximum(encoded(linear), np.float32(1 / 255))
+    albedo = np.maximum(encode_srgb(linear), np.float32(1 / 255))
     light_of = np.zeros((2, n_vertices, 3), np.float32)
     return VertexLight(
         surface=surface,
@@ -100,20 +100,20 @@ def vertex_light(surface: Surface) -> VertexLight:
     )
 
 
-def encoded(linear: NDArray[np.float32]) -> NDArray[np.float32]:
+def encode_srgb(linear: NDArray[np.float32]) -> NDArray[np.float32]:
     """Linear light as sRGB in [0, 1]."""
     steps = np.clip(linear, 0.0, 1.0) * np.float32(len(ENCODED) - 1) + np.float32(0.5)
     srgb: NDArray[np.float32] = ENCODED[steps.astype(np.intp)]
     return srgb
 
 
-def brightened(texture: NDArray[np.uint8], peak: NDArray[np.floating]) -> NDArray[np.uint8]:
+def brighten(texture: NDArray[np.uint8], peak: NDArray[np.floating]) -> NDArray[np.uint8]:
     """A texture (H, W, 3) in which `peak` (3,), sRGB in [0, 1], is full brightness."""
     scaled: NDArray[np.uint8] = np.rint(np.minimum(texture / peak, 255.0)).astype(np.uint8)
     return scaled
 
 
-def shades(light_of: VertexLight) -> NDArray[np.int64]:
+def triangle_shades(light_of: VertexLight) -> NDArray[np.int64]:
     """(F,) shade of each triangle: 0 the brightest, each next one darker by a factor; -1 where no texture is drawn.
 
     A texture can only be darkened by the light that multiplies it, so each shade takes a texture brightened for it.
@@ -126,7 +126,7 @@ def shades(light_of: VertexLight) -> NDArray[np.int64]:
 
 
 @kernel
-def sample(texture: Any, linear: Any, uv: Any, textured: Any, albedo: Any) -> None:
+def sample_texture(texture: Any, linear: Any, uv: Any, textured: Any, albedo: Any) -> None:
     """Write the texture's linear colour at the vertices that are textured."""
     for v in range(len(textured)):
         if textured[v]:

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from lexicon.errors import BackendError
 from tts2face.compilation import kernel
-from tts2face.render.camera import Optics
+from tts2face.render.camera import CameraMatrices
 from tts2face.render.fragments import OPACITY
 from tts2face.render.scene import Scene
 from tts2face.render.surface import Surface, encoding_table, linear_table
-from tts2face.render.vertices import VertexLight, brightened, shades, vertex_light
+from tts2face.render.vertices import VertexLight, brighten, build_vertex_light, triangle_shades
 
 OFF_SCREEN, ON_SCREEN = "vtkEGLRenderWindow", "vtkXOpenGLRenderWindow"  # the first falls back to OSMesa by itself
 UNSEEN = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
@@ -48,7 +48,7 @@ def require_gl() -> None:
         pyvista is not installed, or neither a GPU nor software GL is there.
     """
     require_pyvista("--renderer pyvista")
-    if not probe(OFF_SCREEN):
+    if not can_draw_with(OFF_SCREEN):
         raise BackendError(
             "VTK finds neither a GPU nor software GL on this machine; draw with --renderer numba, or install one "
             "(on Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri)"
@@ -70,11 +70,11 @@ def require_pyvista(purpose: str) -> None:
 
 
 @cache
-def probe(window: str) -> bool:
+def can_draw_with(window: str) -> bool:
     """Whether a child process can draw with VTK in a window of a class; it is what crashes if VTK does."""
     is_off_screen = window == OFF_SCREEN  # without a display VTK falls back to a window that nobody sees
     code = PROBE.format(off_screen=is_off_screen, refused=() if is_off_screen else UNSEEN)
-    environment = os.environ | window_choice(window)
+    environment = os.environ | window_environment(window)
     try:
         done = subprocess.run(
             [sys.executable, "-c", code], env=environment, capture_output=True, timeout=PROBE_SECONDS, check=False
@@ -84,15 +84,15 @@ def probe(window: str) -> bool:
     return done.returncode == 0
 
 
-def window_choice(window: str) -> dict[str, str]:
+def window_environment(window: str) -> dict[str, str]:
     """The environment by which VTK makes windows of a class; elsewhere than on Linux it has but one."""
     return {"VTK_DEFAULT_OPENGL_WINDOW": window} if sys.platform.startswith("linux") else {}
 
 
 @contextmanager
-def windows_of(window: str) -> Iterator[None]:
+def use_window_class(window: str) -> Iterator[None]:
     """Make VTK's windows of a class within this context."""
-    choice = window_choice(window)
+    choice = window_environment(window)
     before = {name: os.environ.get(name) for name in choice}
     os.environ.update(choice)
     try:
@@ -105,7 +105,7 @@ def windows_of(window: str) -> Iterator[None]:
                 os.environ[name] = value
 
 
-def frames(
+def render_frames(
     scene: Scene, poses: Iterable[tuple[NDArray[np.float32], NDArray[np.float32]]]
 ) -> Iterator[NDArray[np.uint8]]:
     """Pictures (H, W, 3 or 4) of a scene's face for weights (K,) and head poses (6,), one after the other.
@@ -122,23 +122,23 @@ def frames(
     side = picture.supersampling
     plotter = _plotter((picture.width * side, picture.height * side), scene)
     try:
-        actors = Puppet(scene.surface, plotter)
+        actors = PlottedFace(scene.surface, plotter)
         for weights, head in poses:
-            points = scene.surface.rig.posed(weights, head)
+            points = scene.surface.rig.pose(weights, head)
             actors.show(points, scene.optics.view, (scene.lights, scene.exposure.at(weights)))
             plotter.renderer.ResetCameraClippingRange()
             plotter.render()
             samples = np.asarray(plotter.screenshot(None, transparent_background=True, return_img=True))
             drawn = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
-            drawn[:, :, :3] = scene.behind
-            average(samples, side, TONE, drawn)
+            drawn[:, :, :3] = scene.background
+            average_samples(samples, side, TONE, drawn)
             yield drawn
     finally:
         plotter.close()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sheet:
+class PlottedMesh:
     """One mesh of a puppet: the vertices that it takes, the light that they show and how that is scaled."""
 
     mesh: Any
@@ -156,14 +156,14 @@ class Sheet:
         self.mesh.Modified()
 
 
-class Puppet:
+class PlottedFace:
     """A face's meshes in a plotter: textured, plain and translucent ones, each with an outer and an inner side."""
 
     def __init__(self, surface: Surface, plotter: Any) -> None:
         self._plotter, self._surface = plotter, surface
-        self._light: VertexLight = vertex_light(surface)
-        self._sheets: list[Sheet] = []
-        shade = shades(self._light)
+        self._light: VertexLight = build_vertex_light(surface)
+        self._meshes: list[PlottedMesh] = []
+        shade = triangle_shades(self._light)
         opacity = surface.materials[surface.part_of, OPACITY]
         for share in np.unique(opacity)[::-1]:
             for number in np.unique(shade):
@@ -173,8 +173,8 @@ class Puppet:
         self, points: NDArray[np.float32], view: NDArray[np.floating], lights: tuple[NDArray[Any], NDArray[Any]]
     ) -> None:
         """Move the vertices and light them for a camera."""
-        self._light.lit(points, view, lights)
-        for sheet in self._sheets:
+        self._light.update(points, view, lights)
+        for sheet in self._meshes:
             sheet.show(points)
 
     def _add(self, chosen: NDArray[np.bool_], opacity: float, is_textured: bool) -> None:
@@ -186,7 +186,7 @@ class Puppet:
         scale, options = np.ones(3, np.float32), {"opacity": opacity}
         if is_textured:
             scale = self._light.albedo[used].max(axis=0)
-            options["texture"] = pyvista.Texture(brightened(self._surface.texture, scale))
+            options["texture"] = pyvista.Texture(brighten(self._surface.texture, scale))
         for culling, light_of in (("front", self._light.back), ("back", self._light.front)):
             mesh = pyvista.PolyData.from_regular_faces(self._surface.rig.rest[used].copy(), places.reshape(-1, 3))
             mesh.point_data["light"] = np.zeros((len(used), 3), np.uint8)
@@ -195,10 +195,10 @@ class Puppet:
             self._plotter.add_mesh(
                 mesh, scalars="light", rgb=True, lighting=False, culling=culling, show_scalar_bar=False, **options
             )
-            self._sheets.append(Sheet(mesh, used, light_of, scale))
+            self._meshes.append(PlottedMesh(mesh, used, light_of, scale))
 
 
-def aim(plotter: Any, optics: Optics, height: int) -> None:
+def aim_camera(plotter: Any, optics: CameraMatrices, height: int) -> None:
     """Set a plotter's camera up as a camera whose pictures are `height` samples high."""
     view = optics.view
     place = -view[:, :3].T @ view[:, 3]
@@ -212,16 +212,16 @@ def aim(plotter: Any, optics: Optics, height: int) -> None:
 def _plotter(size: tuple[int, int], scene: Scene) -> Any:
     import pyvista
 
-    with windows_of(OFF_SCREEN):
+    with use_window_class(OFF_SCREEN):
         plotter = pyvista.Plotter(off_screen=True, window_size=list(size), lighting="none")
     plotter.disable_anti_aliasing()
     plotter.set_background("black")
-    aim(plotter, scene.optics, size[1])
+    aim_camera(plotter, scene.optics, size[1])
     return plotter
 
 
 @kernel
-def pool(samples: Any, place: tuple[int, int], side: int, linear: Any, total: Any) -> None:
+def sum_samples(samples: Any, place: tuple[int, int], side: int, linear: Any, total: Any) -> None:
     """Write the sums of linear light and coverage (4,) of the samples from a row and a column on."""
     total[:] = np.float32(0)
     for row in range(place[0], place[0] + side):
@@ -232,13 +232,13 @@ def pool(samples: Any, place: tuple[int, int], side: int, linear: Any, total: An
 
 
 @kernel
-def average(samples: Any, side: int, tables: Any, picture: Any) -> None:
+def average_samples(samples: Any, side: int, tables: Any, picture: Any) -> None:
     """Lay the mean of side x side samples (premultiplied sRGB and coverage) over the background in the picture."""
     one, half, share = np.float32(1), np.float32(0.5), np.float32(1.0 / (side * side))
     total = np.zeros(4, np.float32)
     for y in range(picture.shape[0]):
         for x in range(picture.shape[1]):
-            pool(samples, (y * side, x * side), side, tables[0], total)
+            sum_samples(samples, (y * side, x * side), side, tables[0], total)
             cover = total[3] * share
             if cover <= np.float32(0):
                 continue

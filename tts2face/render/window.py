@@ -12,20 +12,27 @@ from numpy.typing import NDArray
 
 from lexicon.errors import BackendError
 from tts2face.models.face import Face
-from tts2face.render.camera import Optics, optics
-from tts2face.render.picture import Picture, background_kind
+from tts2face.render.camera import CameraMatrices, camera_matrices
+from tts2face.render.picture import Picture, parse_background
 from tts2face.render.scene import available_cores
-from tts2face.render.soft_shadows import exposed
-from tts2face.render.studio_light import lamps, light_table
-from tts2face.render.surface import surfaced
-from tts2face.render.vtk_renderer import ON_SCREEN, Puppet, aim, probe, require_pyvista, windows_of
+from tts2face.render.soft_shadows import compute_exposure
+from tts2face.render.studio_light import lamp_directions, light_table
+from tts2face.render.surface import build_surface
+from tts2face.render.vtk_renderer import (
+    ON_SCREEN,
+    PlottedFace,
+    aim_camera,
+    can_draw_with,
+    require_pyvista,
+    use_window_class,
+)
 from tts2face.types import HEAD_CHANNELS, Clip
 
 WALL, WALL_TOP = "#3a4049", "#7d8793"  # behind the head, unless the picture names a colour
 TICK_MS = 10  # between looks at the clock
 
 
-def view(clip: Clip, face: Face, picture: Picture) -> None:
+def show_clip(clip: Clip, face: Face, picture: Picture) -> None:
     """Play a clip's head in a window, without sound, until the window is closed.
 
     Raises
@@ -34,7 +41,7 @@ def view(clip: Clip, face: Face, picture: Picture) -> None:
         pyvista is not installed, or there is no display or no GL for it.
     """
     require_display("--view")
-    player = Player(clip, face, picture)
+    player = ClipPlayer(clip, face, picture)
     try:
         player.run()
     finally:
@@ -55,7 +62,7 @@ def require_display(purpose: str) -> None:
         raise BackendError(
             f"{purpose} opens a window, and this machine has no display; write a file with --out clip.mp4"
         )
-    if not probe(ON_SCREEN):
+    if not can_draw_with(ON_SCREEN):
         raise BackendError(
             "VTK cannot open a window on this display (it needs X11 or XWayland, and OpenGL 3.2); "
             "write a file with --out clip.mp4"
@@ -63,28 +70,28 @@ def require_display(purpose: str) -> None:
 
 
 def camera_matrix(camera: Any) -> NDArray[np.float64]:
-    """(3, 4) view of a pyvista camera as `tts2face.render.camera.Optics` has it: x right, y down, z ahead."""
+    """(3, 4) view of a pyvista camera as `tts2face.render.camera.CameraMatrices` has it: x right, y down, z ahead."""
     matrix = camera.GetModelViewTransformMatrix()
     rows = np.array([[matrix.GetElement(row, column) for column in range(4)] for row in range(3)])
     return rows * [[1.0], [-1.0], [-1.0]]
 
 
-class Window(ABC):
+class HeadWindow(ABC):
     """The window and the head in it."""
 
     def __init__(self, face: Face, picture: Picture) -> None:
         import pyvista
 
-        self._surface, self._towards = surfaced(face), lamps(picture.view)
-        self._exposure = exposed(face, self._surface, self._towards, available_cores())
-        self._optics = optics(picture.view, face, (picture.width, picture.height))
-        with windows_of(ON_SCREEN):
+        self._surface, self._lamps = build_surface(face), lamp_directions(picture.view)
+        self._exposure = compute_exposure(face, self._surface, self._lamps, available_cores())
+        self._optics = camera_matrices(picture.view, face, (picture.width, picture.height))
+        with use_window_class(ON_SCREEN):
             self.plotter: Any = pyvista.Plotter(
                 window_size=[picture.width, picture.height], lighting="none", title="tts2face"
             )
         self._paint_wall(picture)
-        self._puppet = Puppet(self._surface, self.plotter)
-        aim(self.plotter, self._optics, picture.height)
+        self._head = PlottedFace(self._surface, self.plotter)
+        aim_camera(self.plotter, self._optics, picture.height)
 
     def run(self) -> None:
         """Show what `tick` moves until the window is closed; the last picture stays."""
@@ -98,8 +105,8 @@ class Window(ABC):
     def pose(self, weights: NDArray[np.floating], head: NDArray[np.floating]) -> None:
         """Move the head, lit for where the camera is now."""
         view = camera_matrix(self.plotter.camera)
-        lights = light_table(self._towards, Optics(view, self._optics.lens))
-        self._puppet.show(self._surface.rig.posed(weights, head), view, (lights, self._exposure.at(weights)))
+        lights = light_table(self._lamps, CameraMatrices(view, self._optics.lens))
+        self._head.show(self._surface.rig.pose(weights, head), view, (lights, self._exposure.at(weights)))
 
     def close(self) -> None:
         """Close the window."""
@@ -111,14 +118,14 @@ class Window(ABC):
 
     def _paint_wall(self, picture: Picture) -> None:
         self.plotter.enable_anti_aliasing("msaa", multi_samples=4)
-        kind = background_kind(picture.background)
+        kind = parse_background(picture.background)
         if isinstance(kind, tuple):
             self.plotter.set_background(tuple(value / 255 for value in kind))
         else:
             self.plotter.set_background(WALL, top=WALL_TOP)
 
 
-class Player(Window):
+class ClipPlayer(HeadWindow):
     """The clock that plays a clip."""
 
     def __init__(self, clip: Clip, face: Face, picture: Picture) -> None:
@@ -153,7 +160,7 @@ class Player(Window):
         return True
 
 
-class Mirror(Window):
+class LiveWindow(HeadWindow):
     """A head that shows what somebody does now.
 
     Parameters

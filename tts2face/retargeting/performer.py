@@ -10,7 +10,7 @@ from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, MOUTH_REGION, N_LANDMARKS
 from tts2face.models.talker import ShapeModel, Talker, speech_channels
-from tts2face.retargeting.to_face import Retargeter, retargeter
+from tts2face.retargeting.to_face import Retargeter, build_retargeter
 from tts2face.types import Trajectory
 
 MOUTH_MODES = 20
@@ -26,14 +26,14 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Performer:
+class PerformerRetargeter:
     """The prepared way from one performer to one face."""
 
     model: ShapeModel
     lips: Retargeter
     face: Face
-    open_lids: dict[str, float]
-    calm_scores: NDArray[np.float32]
+    open_apertures: dict[str, float]
+    neutral_scores: NDArray[np.float32]
 
     def weights(self, landmarks: NDArray[np.floating], scores: Trajectory, *, gain: float = 1.0) -> Trajectory:
         """Weights of the face's shapes (T, K).
@@ -49,12 +49,12 @@ class Performer:
         """
         speech = self.lip_motion(landmarks, scores.fps, gain=gain)
         weights = np.array(self.lips.retarget(speech).values)
-        lids = {side: self._shut(landmarks, side) for side in LIDS}
+        lids = {side: self._lid_closure(landmarks, side) for side in LIDS}
         for column, name in enumerate(self.face.shape_names):
             if not name.startswith(SCORED) or name not in scores.channels:
                 continue
             at = scores.channels.index(name)
-            moved = np.maximum(scores.values[:, at] - self.calm_scores[at] - CALM, 0.0)
+            moved = np.maximum(scores.values[:, at] - self.neutral_scores[at] - CALM, 0.0)
             if name.startswith("eyeBlink"):
                 moved = lids[name.removeprefix("eyeBlink")]
             elif not name.startswith("eye"):
@@ -68,12 +68,12 @@ class Performer:
         values = rest + gain * (self.model.parameters(landmarks) - rest)
         return Trajectory(speech_channels(self.model), values, fps)
 
-    def _shut(self, landmarks: NDArray[np.floating], side: str) -> Floats:
-        opened = self.open_lids[side]
-        return np.clip((opened - aperture(landmarks, side)) / (opened * (1.0 - LID_SHUT)), 0.0, 1.0)
+    def _lid_closure(self, landmarks: NDArray[np.floating], side: str) -> Floats:
+        opened = self.open_apertures[side]
+        return np.clip((opened - eye_aperture(landmarks, side)) / (opened * (1.0 - LID_SHUT)), 0.0, 1.0)
 
 
-def performer(landmarks: NDArray[np.floating], scores: Trajectory, face: Face) -> Performer:
+def build_performer_retargeter(landmarks: NDArray[np.floating], scores: Trajectory, face: Face) -> PerformerRetargeter:
     """Prepare the way from a performer, known from some seconds of her face, to a face.
 
     Parameters
@@ -91,12 +91,12 @@ def performer(landmarks: NDArray[np.floating], scores: Trajectory, face: Face) -
     closed = gaps[np.argsort(gaps[:, MIDDLE_PAIR], kind="stable")[: max(1, int(CLOSED_SHARE * len(gaps)))]]
     contact = np.clip(np.percentile(closed, 50, axis=0), 0.0, MOST_CONTACT_MM)
     talker = Talker(scores.fps, model, (), {"name": "performer"})
-    return Performer(
+    return PerformerRetargeter(
         model=model,
-        lips=retargeter(talker, face, contact=contact),
+        lips=build_retargeter(talker, face, contact=contact),
         face=face,
-        open_lids={side: float(np.quantile(aperture(landmarks, side), LID_OPEN)) for side in LIDS},
-        calm_scores=np.median(scores.values, axis=0),
+        open_apertures={side: float(np.quantile(eye_aperture(landmarks, side), LID_OPEN)) for side in LIDS},
+        neutral_scores=np.median(scores.values, axis=0),
     )
 
 
@@ -152,7 +152,7 @@ def lip_gaps(landmarks: NDArray[np.floating]) -> Floats:
     return np.asarray(upper - lower, np.float64)
 
 
-def aperture(landmarks: NDArray[np.floating], side: str) -> Floats:
+def eye_aperture(landmarks: NDArray[np.floating], side: str) -> Floats:
     """(T,) distance of the lids over the width of an eye, ``Left`` or ``Right``."""
     upper, lower, outer, inner = LIDS[side]
     height = np.linalg.norm(landmarks[:, list(upper)] - landmarks[:, list(lower)], axis=2).mean(axis=1)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence
 from tts2face.face.bounded_least_squares import bounded_least_squares
-from tts2face.face.landmark_fit import landmark_motion, landmark_places, turn_onto
+from tts2face.face.landmark_fit import landmark_motion, landmark_positions, procrustes_rotation
 from tts2face.face.mouth_model import (
     CHIN_POINTS,
     CHIN_WEIGHT,
@@ -71,12 +71,12 @@ class Retargeter:
     moving: NDArray[np.int64]
     limits: FloatArray
     curvature: FloatArray
-    pull: FloatArray
+    linear_term: FloatArray
     gaps: FloatArray
     contact: FloatArray
     gap_rest: FloatArray
-    gap_pull: FloatArray
-    lip_pull: FloatArray
+    gap_linear_term: FloatArray
+    lip_linear_term: FloatArray
 
     def retarget(self, speech: Trajectory) -> Trajectory:
         """Weights of all shapes of the face, (T, K), for a trajectory of speech parameters, (T, S).
@@ -87,9 +87,9 @@ class Retargeter:
         read = ordered_product(parameters, self.gaps[:, :-1].T) + self.gaps[:, -1]
         over = np.maximum(read, 0.0)  # a face rests with its lips closed: its gaps are counted from there
         shown = over + self.contact * np.minimum(over / CLEAR_MM, 1.0)
-        linear = ordered_product(parameters, self.pull[:, :-1].T) + self.pull[:, -1]
-        linear += ordered_product(shown, self.gap_pull.T) + ordered_product(
-            shown - read + self.gap_rest, self.lip_pull.T
+        linear = ordered_product(parameters, self.linear_term[:, :-1].T) + self.linear_term[:, -1]
+        linear += ordered_product(shown, self.gap_linear_term.T) + ordered_product(
+            shown - read + self.gap_rest, self.lip_linear_term.T
         )
         solved = bounded_least_squares(self.curvature, linear, self.limits)
         weights = np.zeros((len(parameters), len(self.shape_names)), np.float32)
@@ -97,7 +97,7 @@ class Retargeter:
         return Trajectory(self.shape_names, weights, speech.fps)
 
 
-def retargeter(talker: Talker, face: Face, *, contact: FloatArray | None = None) -> Retargeter:
+def build_retargeter(talker: Talker, face: Face, *, contact: FloatArray | None = None) -> Retargeter:
     """Prepare the way from a talker to a face.
 
     Parameters
@@ -114,8 +114,8 @@ def retargeter(talker: Talker, face: Face, *, contact: FloatArray | None = None)
     require_lips(face, moving)
     common = [landmark for landmark in MOUTH_REGION if landmark in set(face.landmarks.tolist())]
     at = {landmark: row for row, landmark in enumerate(common)}
-    rest, per_weight = landmark_places(face), landmark_motion(face, moving)
-    turn, scale = _onto_face(talker, face, rest)
+    rest, per_weight = landmark_positions(face), landmark_motion(face, moving)
+    turn, scale = _fit_face_axes(talker, face, rest)
     moved = per_weight[[int(np.flatnonzero(face.landmarks == landmark)[0]) for landmark in common]]
     wanted = _displacements(talker, common, scale * turn)
     weighted = moved * landmark_weights(common)[..., None]
@@ -134,12 +134,12 @@ def retargeter(talker: Talker, face: Face, *, contact: FloatArray | None = None)
         moving=moving,
         limits=face.limits[moving].astype(np.float64),
         curvature=mouth_curvature(moved, common) + GAP_WEIGHT * ordered_product(opened.T, opened),
-        pull=pull,
+        linear_term=pull,
         gaps=gaps,
         contact=contact,
         gap_rest=ordered_product(gaps[:, :-1], talker.model.rest[: talker.model.n_speech]) + gaps[:, -1],
-        gap_pull=GAP_WEIGHT * opened.T,
-        lip_pull=(weighted[upper, 1] - weighted[lower, 1]).T / 2,
+        gap_linear_term=GAP_WEIGHT * opened.T,
+        lip_linear_term=(weighted[upper, 1] - weighted[lower, 1]).T / 2,
     )
 
 
@@ -162,7 +162,7 @@ def _displacements(talker: Talker, common: list[int], onto_face: FloatArray) -> 
     return np.concatenate([wanted, -at_rest[..., None]], axis=2)
 
 
-def _onto_face(talker: Talker, face: Face, rest: FloatArray) -> tuple[FloatArray, float]:
+def _fit_face_axes(talker: Talker, face: Face, rest: FloatArray) -> tuple[FloatArray, float]:
     """Rotation (3, 3) of the talker's axes into the face's, and the face's size over the talker's at the mouth."""
     model = talker.model
     own = (model.mean + np.einsum("m,mld->ld", model.rest, model.basis)).astype(np.float64)
@@ -172,7 +172,7 @@ def _onto_face(talker: Talker, face: Face, rest: FloatArray) -> tuple[FloatArray
     if not min(width, own_width) > 0:
         which = "face" if own_width > 0 else "talker"
         raise DataError(f"the corners of the {which}'s mouth lie at one place; build the {which} again")
-    return turn_onto(own[face.landmarks], rest), float(width / own_width)
+    return procrustes_rotation(own[face.landmarks], rest), float(width / own_width)
 
 
 def _talker_gaps(talker: Talker, up: FloatArray, contact: FloatArray) -> FloatArray:
@@ -195,14 +195,14 @@ def contact_gaps(talker: Talker) -> FloatArray:
     least = [np.zeros((0, len(mean)))]
     for utterance in talker.utterances:
         gaps = ordered_product(utterance.shape[:, :n_speech].astype(np.float64), apart) + mean
-        least.append(_least_in_bilabials(gaps, utterance.phones, talker.fps))
+        least.append(_bilabial_minima(gaps, utterance.phones, talker.fps))
     found = np.concatenate(least)
     return (
         np.clip(np.percentile(found, SURE_CONTACT, axis=0), 0.0, MOST_CONTACT_MM) if len(found) else np.zeros(len(mean))
     )
 
 
-def _least_in_bilabials(gaps: FloatArray, phones: PhoneSequence, fps: float) -> FloatArray:
+def _bilabial_minima(gaps: FloatArray, phones: PhoneSequence, fps: float) -> FloatArray:
     """(B, P) gaps of (T, P) at the frame of each bilabial where the middle pair is nearest."""
     rows = []
     for phone, start, end in zip(phones.phones, phones.edges[:-1], phones.edges[1:], strict=True):

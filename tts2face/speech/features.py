@@ -49,19 +49,19 @@ def speech_features(sound: Waveform, kind: str, *, fps: float, n_frames: int, st
     InputError
         The kind does not exist, or the sound has another rate.
     """
-    measures = measures_of(kind)
+    measures = feature_measures(kind)
     if sound.rate != FEATURE_RATE:
         raise InputError(f"features are measured at {FEATURE_RATE} Hz, not {sound.rate}; resample the sound")
     centres = np.rint((start + np.arange(n_frames) / fps) * FEATURE_RATE).astype(np.int64)
     parts = [
-        measured(cells(sound.samples, centres[at : at + CELLS_AT_ONCE]), measures)
+        measure_windows(analysis_windows(sound.samples, centres[at : at + CELLS_AT_ONCE]), measures)
         for at in range(0, n_frames, CELLS_AT_ONCE)
     ]
     values = np.concatenate(parts)
     return Trajectory([f"{kind}.{i}" for i in range(values.shape[1])], values, fps)
 
 
-def measures_of(kind: str) -> tuple[Measure, ...]:
+def feature_measures(kind: str) -> tuple[Measure, ...]:
     """What measures a kind of feature, or several joined by ``+``.
 
     Raises
@@ -76,14 +76,14 @@ def measures_of(kind: str) -> tuple[Measure, ...]:
     return tuple(MEASURES[name] for name in names)
 
 
-def measured(windows: Cells, measures: tuple[Measure, ...]) -> NDArray[np.float32]:
+def measure_windows(windows: Cells, measures: tuple[Measure, ...]) -> NDArray[np.float32]:
     """(T, D) features of cells, one kind beside the other."""
     if not len(windows):  # Praat knows no sound without samples
-        return measured(np.zeros((1, CELL)) + NOISE, measures)[:0]
+        return measure_windows(np.zeros((1, CELL)) + NOISE, measures)[:0]
     return np.concatenate([measure(windows) for measure in measures], axis=1).astype(np.float32)
 
 
-def cells(samples: NDArray[np.float32], centres: NDArray[np.int64]) -> Cells:
+def analysis_windows(samples: NDArray[np.float32], centres: NDArray[np.int64]) -> Cells:
     """(T, `CELL`) samples about each of T places, zeros beyond the ends, with the same faint noise in each cell."""
     first = max(int(centres.min(initial=len(samples))) - HALF_CELL, 0)
     last = max(int(centres.max(initial=0)) + HALF_CELL + 1, first)
@@ -97,8 +97,10 @@ def cells(samples: NDArray[np.float32], centres: NDArray[np.int64]) -> Cells:
 
 def mfcc(windows: Cells) -> NDArray[np.float64]:
     """(T, 13) mel-frequency cepstral coefficients of cells; the first is the level."""
-    sound = _end_to_end(np.concatenate([windows, windows[-1:]]))  # of a single frame Praat gives the level alone
-    found = sound.to_mfcc(number_of_coefficients=N_MFCC, window_length=WINDOW_S, time_step=_step(windows))
+    sound = _concatenate_windows(
+        np.concatenate([windows, windows[-1:]])
+    )  # of a single frame Praat gives the level alone
+    found = sound.to_mfcc(number_of_coefficients=N_MFCC, window_length=WINDOW_S, time_step=_sample_step(windows))
     return np.asarray(found.to_array().T[: len(windows)], np.float64)
 
 
@@ -106,8 +108,8 @@ def lpc(windows: Cells) -> NDArray[np.float64]:
     """(T, 16) linear prediction coefficients of cells, by autocorrelation."""
     from parselmouth.praat import call
 
-    analysis = ("To LPC (autocorrelation)...", LPC_ORDER, WINDOW_S, _step(windows), PRE_EMPHASIS_HZ)
-    found = call(call(_end_to_end(windows), *analysis), "Down to Matrix (lpc)")
+    analysis = ("To LPC (autocorrelation)...", LPC_ORDER, WINDOW_S, _sample_step(windows), PRE_EMPHASIS_HZ)
+    found = call(call(_concatenate_windows(windows), *analysis), "Down to Matrix (lpc)")
     return np.asarray(found.values.T, np.float64)
 
 
@@ -119,8 +121,8 @@ def lsf(windows: Cells) -> NDArray[np.float64]:
 def formants(windows: Cells) -> NDArray[np.float64]:
     """(T, 4) first formants of cells, Hz; those of a neutral tube where none is found."""
     even = windows[:, :-1]  # Praat takes the sample before the middle of a window: let none lie on the middle
-    found = _end_to_end(even).to_formant_burg(
-        time_step=_step(even),
+    found = _concatenate_windows(even).to_formant_burg(
+        time_step=_sample_step(even),
         max_number_of_formants=POLES,
         maximum_formant=FEATURE_RATE / 2,
         window_length=WINDOW_S,
@@ -148,11 +150,11 @@ def speech_level(levels: NDArray[np.floating]) -> float:
 MEASURES: Mapping[str, Measure] = MappingProxyType(dict(zip(FEATURES, (formants, mfcc, lpc, lsf, level), strict=True)))
 
 
-def _step(windows: Cells) -> float:
+def _sample_step(windows: Cells) -> float:
     return float(windows.shape[1] / FEATURE_RATE)
 
 
-def _end_to_end(windows: Cells) -> Any:
+def _concatenate_windows(windows: Cells) -> Any:
     import parselmouth
 
     return parselmouth.Sound(windows.ravel(), sampling_frequency=FEATURE_RATE)

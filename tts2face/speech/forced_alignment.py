@@ -74,15 +74,15 @@ class Aligner:
         """
         if not words:
             raise DataError("there is no word to align; give a transcript")
-        names = [self._name(tuple(tuple(way) for way in ways)) for _, ways in words]
-        part, begin = _audible(sound)
-        entries = self._decoded(_heard(part), " ".join(names))
+        names = [self._word_name(tuple(tuple(way) for way in ways)) for _, ways in words]
+        part, begin = _trim_to_audible(sound)
+        entries = self._decode(_pcm_bytes(part), " ".join(names))
         if [entry.name.split("(")[0] for entry in entries] != names:
             found = len(entries)
             raise DataError(f"only {found} of {len(names)} words could be aligned; check the transcript")
-        return _alignment(entries, words, sound.duration, begin)
+        return _build_alignment(entries, words, sound.duration, begin)
 
-    def _name(self, ways: tuple[tuple[str, ...], ...]) -> str:
+    def _word_name(self, ways: tuple[tuple[str, ...], ...]) -> str:
         """The decoder's name of a word with these pronunciations."""
         if ways not in self._known:
             name = f"w{len(self._known)}x"
@@ -92,7 +92,7 @@ class Aligner:
             self._known[ways] = name
         return self._known[ways]
 
-    def _decoded(self, pcm: bytes, text: str) -> "list[_Entry]":
+    def _decode(self, pcm: bytes, text: str) -> "list[_DecodedWord]":
         decoder = self._decoder
         decoder.reinit_feat()  # forgets the level of what was heard before: the same sound gives the same edges
         decoder.set_align_text(text)
@@ -112,12 +112,12 @@ class Aligner:
         for word in found:
             phones = [(phone.name, phone.start, phone.duration, phone.score) for phone in word]
             if not word.name.startswith(("<", "[")):
-                entries.append(_Entry(word.name, phones))
+                entries.append(_DecodedWord(word.name, phones))
         return entries
 
 
 @dataclass(frozen=True, slots=True)
-class _Entry:
+class _DecodedWord:
     """A word as the decoder found it: phone names, first frame, frames, score."""
 
     name: str
@@ -141,7 +141,7 @@ def acoustic_phones(phones: Sequence[str]) -> list[str]:
 _MODELLED = frozenset(ARPABET.values())
 
 
-def _audible(sound: Waveform) -> tuple[Waveform, float]:
+def _trim_to_audible(sound: Waveform) -> tuple[Waveform, float]:
     """The part of a sound from a margin before to a margin behind what can be heard, and the second it begins at."""
     window = max(1, round(WINDOW_S * sound.rate))
     n_windows = len(sound.samples) // window
@@ -155,7 +155,7 @@ def _audible(sound: Waveform) -> tuple[Waveform, float]:
     return Waveform(sound.samples[first:last], sound.rate), first / sound.rate
 
 
-def _heard(sound: Waveform) -> bytes:
+def _pcm_bytes(sound: Waveform) -> bytes:
     """16-bit samples for the acoustic model, padded and at one level."""
     import soxr
 
@@ -170,8 +170,8 @@ def _heard(sound: Waveform) -> bytes:
     return pcm.tobytes()
 
 
-def _alignment(
-    entries: Sequence[_Entry], words: Sequence[tuple[str, Pronunciations]], duration: float, begin: float
+def _build_alignment(
+    entries: Sequence[_DecodedWord], words: Sequence[tuple[str, Pronunciations]], duration: float, begin: float
 ) -> Alignment:
     """Edges on the clock of a whole sound, of which the decoder heard what begins at `begin`."""
     labels: list[str] = []
@@ -181,7 +181,7 @@ def _alignment(
     scores: dict[int, float] = {}  # by phone
     n_frames = 0
     for entry, (text, ways) in zip(entries, words, strict=True):
-        onset = begin + _seconds(entry.phones[0][1])
+        onset = begin + _frame_to_seconds(entry.phones[0][1])
         if onset - end >= SHORTEST_S:  # silence, at the beginning too
             labels.append(SILENCE)
             starts.append(end)
@@ -189,8 +189,8 @@ def _alignment(
         for phone, (_, first, count, fit) in zip(ways[entry.way], entry.phones, strict=True):
             scores[len(labels)] = float(fit)
             labels.append(phone)
-            starts.append(begin + _seconds(first))
-            end = begin + _seconds(first + count)
+            starts.append(begin + _frame_to_seconds(first))
+            end = begin + _frame_to_seconds(first + count)
             n_frames += count
     if duration - end >= SHORTEST_S:
         labels.append(SILENCE)
@@ -199,14 +199,14 @@ def _alignment(
     edges[0] = 0.0
     confidence = sum(scores.values()) / max(n_frames, 1) * FRAME_RATE
     by_phone = np.array([scores.get(at, 0.0) for at in range(len(labels))])
-    return Alignment(PhoneSequence(labels, increasing(edges)), tuple(spans), confidence, by_phone)
+    return Alignment(PhoneSequence(labels, enforce_increasing(edges)), tuple(spans), confidence, by_phone)
 
 
-def _seconds(frame: int) -> float:
+def _frame_to_seconds(frame: int) -> float:
     return frame / FRAME_RATE + DELAY_S - PADDING_S
 
 
-def increasing(edges: NDArray[np.float64], least: float = SHORTEST_S) -> NDArray[np.float64]:
+def enforce_increasing(edges: NDArray[np.float64], least: float = SHORTEST_S) -> NDArray[np.float64]:
     """Edges of which each lies at least `least` seconds behind the one before; first and last stay.
 
     Shorter phones borrow from their neighbours; where the whole is too short, all phones share it equally.

@@ -23,7 +23,7 @@ def intensity(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32
     import parselmouth
 
     try:
-        levels = _praat(sound).to_intensity(minimum_pitch=LOWEST_PITCH_HZ, subtract_mean=True)
+        levels = _praat_sound(sound).to_intensity(minimum_pitch=LOWEST_PITCH_HZ, subtract_mean=True)
     except parselmouth.PraatError as refused:
         raise DataError(
             f"a sound of {sound.duration:.3f} s is too short to measure; give a longer recording"
@@ -45,7 +45,7 @@ def pitch(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32]:
 
     low, high = PITCH_RANGE_HZ
     try:
-        found = _praat(sound).to_pitch_ac(pitch_floor=low, pitch_ceiling=high)
+        found = _praat_sound(sound).to_pitch_ac(pitch_floor=low, pitch_ceiling=high)
     except parselmouth.PraatError as refused:
         raise DataError(
             f"a sound of {sound.duration:.3f} s is too short to have a pitch; give a longer one"
@@ -60,7 +60,7 @@ def pitch(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32]:
     return np.where(voiced, semitones, 0.0).astype(np.float32)
 
 
-def _praat(sound: Waveform):  # type: ignore[no-untyped-def] # parselmouth has no types
+def _praat_sound(sound: Waveform):  # type: ignore[no-untyped-def] # parselmouth has no types
     import parselmouth
 
     return parselmouth.Sound(sound.samples.astype(np.float64), sampling_frequency=sound.rate)

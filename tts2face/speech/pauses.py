@@ -19,9 +19,9 @@ LEAST_SHARE = 0.5  # of the longest stretch: none is shorter, but for the last
 Span = tuple[float, float]
 
 
-def pauses(sound: Waveform) -> tuple[Span, ...]:
+def find_pauses(sound: Waveform) -> tuple[Span, ...]:
     """Spans in seconds in which nobody speaks, each of `SHORTEST_PAUSE_S` or more."""
-    levels = _levels(sound)
+    levels = _window_levels(sound)
     if not len(levels):
         return ()
     noise, speech = np.quantile(levels, NOISE_QUANTILE), np.quantile(levels, SPEECH_QUANTILE)
@@ -33,7 +33,7 @@ def pauses(sound: Waveform) -> tuple[Span, ...]:
     return tuple((begin, end) for begin, end in spans if end - begin >= SHORTEST_PAUSE_S)
 
 
-def stretches(sound: Waveform, longest: float) -> tuple[Span, ...]:
+def cut_at_pauses(sound: Waveform, longest: float) -> tuple[Span, ...]:
     """Spans in seconds that cover a sound, none longer than `longest`, cut in the middle of long pauses.
 
     Where somebody speaks on without a pause the cut falls into the quietest moment.
@@ -45,21 +45,21 @@ def stretches(sound: Waveform, longest: float) -> tuple[Span, ...]:
     """
     if longest <= 0:
         raise InputError(f"a stretch of sound must be longer than {longest} s")
-    found, levels, cuts = pauses(sound), _levels(sound), [0.0]
+    found, levels, cuts = find_pauses(sound), _window_levels(sound), [0.0]
     while sound.duration - cuts[-1] > longest:
         earliest, latest = cuts[-1] + LEAST_SHARE * longest, cuts[-1] + longest
         middles = [(end - begin, (begin + end) / 2) for begin, end in found if earliest <= (begin + end) / 2 <= latest]
-        cuts.append(max(middles)[1] if middles else _quietest(levels, earliest, latest))
+        cuts.append(max(middles)[1] if middles else _quietest_instant(levels, earliest, latest))
     cuts.append(sound.duration)
     return tuple(pairwise(cuts))
 
 
-def _quietest(levels: NDArray[np.float64], earliest: float, latest: float) -> float:
+def _quietest_instant(levels: NDArray[np.float64], earliest: float, latest: float) -> float:
     first, last = int(np.ceil(earliest / WINDOW_S)), int(latest / WINDOW_S)
     return (first + int(levels[first:last].argmin()) + 0.5) * WINDOW_S
 
 
-def _levels(sound: Waveform) -> NDArray[np.float64]:
+def _window_levels(sound: Waveform) -> NDArray[np.float64]:
     """(T,) dB of full scale in windows of `WINDOW_S`."""
     from scipy.ndimage import uniform_filter1d
 

@@ -36,7 +36,7 @@ class PhoneRecogniser:
                 "recordings without a transcript need the package hama (Linux or macOS): "
                 "pip install 'tts2face[capture]', or write what is said into a .txt beside the video"
             ) from missing
-        self._spelt: dict[str, Phones] = {}
+        self._spellings: dict[str, Phones] = {}
 
     def words(self, sound: Waveform) -> tuple[Phones, ...]:
         """Phones of each word heard in a sound of at most `LONGEST_S`.
@@ -58,9 +58,9 @@ class PhoneRecogniser:
 
     def _phones(self, token: str) -> Phones:
         """Phones of the table for one of the network's; none for signs that are no sound."""
-        if token not in self._spelt:
+        if token not in self._spellings:
             try:
-                self._spelt[token] = tuple(segment.phone for segment in parse_ipa(token))
+                self._spellings[token] = tuple(segment.phone for segment in parse_ipa(token))
             except InputError:
-                self._spelt[token] = ()
-        return self._spelt[token]
+                self._spellings[token] = ()
+        return self._spellings[token]

@@ -6,9 +6,9 @@ from itertools import count
 from lexicon.dictionary import Dictionary, cmudict_lookup
 from lexicon.errors import DataError
 from lexicon.pronounce import Word, pronounce
-from lexicon.sequence import PhoneSequence, WordSpan, concatenated
+from lexicon.sequence import PhoneSequence, WordSpan, concatenate_phones
 from tts2face.speech.forced_alignment import Aligner, Alignment
-from tts2face.speech.pauses import stretches
+from tts2face.speech.pauses import cut_at_pauses
 from tts2face.speech.text_fit import TextMismatch, find_misfits, mismatch_of, surrounded
 from tts2face.types import Waveform
 
@@ -19,7 +19,7 @@ LONGEST_AT_ONCE_S = 60.0  # alignment takes memory with the square of the length
 LONGEST_STRETCH_S = 20.0  # of the parts into which longer recordings are cut
 
 
-def script(text: str, language: str, own: Dictionary | None = None) -> Script:
+def pronounce_transcript(text: str, language: str, own: Dictionary | None = None) -> Script:
     """The words of a text with their pronunciations; English ones with all that the dictionary knows.
 
     Raises
@@ -30,10 +30,10 @@ def script(text: str, language: str, own: Dictionary | None = None) -> Script:
         A word needs espeak-ng, which is not installed.
     """
     said = pronounce(text, language, own).words
-    return tuple((word.text, _ways(word, language, own)) for word in said)
+    return tuple((word.text, _pronunciations(word, language, own)) for word in said)
 
 
-def _ways(word: Word, language: str, own: Dictionary | None) -> Ways:
+def _pronunciations(word: Word, language: str, own: Dictionary | None) -> Ways:
     if not language.startswith("en") or (own is not None and own.lookup(word.text) is not None):
         return (word.phones,)
     ways = [word.phones]
@@ -45,7 +45,7 @@ def _ways(word: Word, language: str, own: Dictionary | None) -> Ways:
     return tuple(dict.fromkeys(ways))
 
 
-def phones_in(
+def align_recording(
     sound: Waveform, words: Script, *, is_english: bool = True
 ) -> tuple[PhoneSequence, tuple[WordSpan, ...], tuple[TextMismatch, ...]]:
     """Phones and words on the clock of a sound, from 0 s to its end, and where the words do not fit it.
@@ -61,12 +61,12 @@ def phones_in(
     if sound.duration <= LONGEST_AT_ONCE_S:
         found = aligner.align(sound, words)
         return found.phones, found.words, _mismatches(aligner, sound, words, found, is_english=is_english)
-    parts = [_part(sound, span) for span in stretches(sound, LONGEST_STRETCH_S)]
+    parts = [_cut_sound(sound, span) for span in cut_at_pauses(sound, LONGEST_STRETCH_S)]
     phones: list[PhoneSequence] = []
     spans: list[tuple[WordSpan, ...]] = []
     mismatches: list[TextMismatch] = []
     begin = 0.0
-    for part, said in zip(parts, _placed(parts, words), strict=True):
+    for part, said in zip(parts, _words_by_part(parts, words), strict=True):
         if said:
             found = aligner.align(part, said)
             phones.append(found.phones)
@@ -77,7 +77,7 @@ def phones_in(
             phones.append(PhoneSequence(["sil"], [0.0, part.duration]))
             spans.append(())
         begin += part.duration
-    return *concatenated(phones, spans), tuple(mismatches)
+    return *concatenate_phones(phones, spans), tuple(mismatches)
 
 
 def _mismatches(
@@ -95,7 +95,7 @@ def _mismatches(
         if last - first == len(words):  # there is nothing else to compare with
             return (mismatch_of(found, *misfit),)
         try:
-            again = aligner.align(_part(sound, (begin, end)), words[first:last])
+            again = aligner.align(_cut_sound(sound, (begin, end)), words[first:last])
         except DataError:  # not even found there
             here = [mismatch_of(found, *misfit)]
         else:
@@ -106,19 +106,19 @@ def _mismatches(
     return tuple(confirmed)
 
 
-def _placed(parts: Sequence[Waveform], words: Script) -> list[Script]:
+def _words_by_part(parts: Sequence[Waveform], words: Script) -> list[Script]:
     """The words that are said in each part."""
     from tts2face.speech.phone_recognition import PhoneRecogniser
-    from tts2face.speech.transcript_placement import stretch_of_words
+    from tts2face.speech.transcript_placement import assign_words
 
     recogniser = PhoneRecogniser()
     heard = [[phone for word in recogniser.words(part) for phone in word] for part in parts]
     if not any(heard):
         raise DataError("no speech is heard; give a recording of somebody who speaks")
-    places = stretch_of_words([ways[0] for _, ways in words], heard)
+    places = assign_words([ways[0] for _, ways in words], heard)
     return [tuple(word for word, place in zip(words, places, strict=True) if place == at) for at in range(len(parts))]
 
 
-def _part(sound: Waveform, span: tuple[float, float]) -> Waveform:
+def _cut_sound(sound: Waveform, span: tuple[float, float]) -> Waveform:
     first, last = (round(second * sound.rate) for second in span)
     return Waveform(sound.samples[first:last], sound.rate)

@@ -20,7 +20,7 @@ SAID, MISHEARD, SKIPPED = 0, 1, 2  # steps back: both sequences, the heard one, 
 Phones = Sequence[str]
 
 
-def stretch_of_words(words: Sequence[Phones], heard: Sequence[Phones]) -> NDArray[np.int64]:
+def assign_words(words: Sequence[Phones], heard: Sequence[Phones]) -> NDArray[np.int64]:
     """(W,) the stretch in which each word is said; they do not fall.
 
     Parameters
@@ -43,7 +43,7 @@ def stretch_of_words(words: Sequence[Phones], heard: Sequence[Phones]) -> NDArra
     stretch_of_sounded = np.repeat(np.arange(len(heard)), [len(phones) for phones in heard])
     if not len(sounded) or not len(written):
         return np.zeros(len(words), np.int64)
-    partner = _partners(written, sounded, max(BAND, abs(len(written) - len(sounded)) + BAND // 4))
+    partner = _match_phones(written, sounded, max(BAND, abs(len(written) - len(sounded)) + BAND // 4))
     places = stretch_of_sounded[np.clip(partner, 0, len(sounded) - 1)]
     ends = np.cumsum([len(word) for word in words])
     found = [
@@ -54,7 +54,7 @@ def stretch_of_words(words: Sequence[Phones], heard: Sequence[Phones]) -> NDArra
 
 
 @kernel
-def _partners(written: NDArray[np.int64], sounded: NDArray[np.int64], band: int) -> NDArray[np.int64]:
+def _match_phones(written: NDArray[np.int64], sounded: NDArray[np.int64], band: int) -> NDArray[np.int64]:
     """(N,) index of the sounded phone that each written one is matched with, or of the one before it."""
     n, m, width = len(written), len(sounded), 2 * band + 1
     steps = np.full((n + 1, width), SKIPPED, np.uint8)
@@ -64,13 +64,13 @@ def _partners(written: NDArray[np.int64], sounded: NDArray[np.int64], band: int)
         steps[0, j + band] = MISHEARD
     for i in range(1, n + 1):
         low, low_before = i * m // n - band, (i - 1) * m // n - band
-        before = _row(written[i - 1], sounded, before, (low, low_before), steps[i])
-    partners: NDArray[np.int64] = _traced(steps, m, band)
+        before = _cost_row(written[i - 1], sounded, before, (low, low_before), steps[i])
+    partners: NDArray[np.int64] = _trace_back(steps, m, band)
     return partners
 
 
 @kernel
-def _row(
+def _cost_row(
     phone: int,
     sounded: NDArray[np.int64],
     before: NDArray[np.float32],
@@ -96,7 +96,7 @@ def _row(
 
 
 @kernel
-def _traced(steps: NDArray[np.uint8], m: int, band: int) -> NDArray[np.int64]:
+def _trace_back(steps: NDArray[np.uint8], m: int, band: int) -> NDArray[np.int64]:
     n = len(steps) - 1
     partner = np.zeros(n, np.int64)
     i, j = n, m

@@ -8,7 +8,7 @@ from tts2face.storage.temporary import Temporary
 SHIPPED = Path(__file__).parents[1] / "data"
 
 
-def write_whole(path: Path, content: bytes) -> None:
+def write_atomically(path: Path, content: bytes) -> None:
     """Write a file beside `path`, then rename it, so that no half file is ever seen.
 
     Raises
@@ -26,7 +26,7 @@ def write_whole(path: Path, content: bytes) -> None:
         ) from refused
 
 
-def named_file(name: str, kind: str) -> Path:
+def find_file(name: str, kind: str) -> Path:
     """Where a talker, face or palette lies: a shipped one by name, or a path.
 
     Raises

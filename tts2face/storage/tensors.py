@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import parse_json
-from tts2face.storage.files import write_whole
+from tts2face.storage.files import write_atomically
 
 MOST_METADATA = 32_000_000  # characters; 800 utterances with their words take 150,000
 Arrays = Mapping[str, NDArray[Any]]
@@ -27,11 +27,11 @@ def write_tensors(path: Path, kind: str, version: int, arrays: Arrays, metadata:
     from safetensors.numpy import save
 
     header = {"kind": kind, "version": str(version), "metadata": json.dumps(metadata, ensure_ascii=False)}
-    content = _ordered(save({name: np.ascontiguousarray(array) for name, array in arrays.items()}, header))
-    write_whole(path, content)
+    content = _sort_header(save({name: np.ascontiguousarray(array) for name, array in arrays.items()}, header))
+    write_atomically(path, content)
 
 
-def _ordered(content: bytes) -> bytes:
+def _sort_header(content: bytes) -> bytes:
     """The same file with its header's keys in order: the library shuffles them, and equal talkers are equal bytes."""
     start = 8 + int.from_bytes(content[:8], "little")
     text = json.dumps(json.loads(content[8:start]), ensure_ascii=False, sort_keys=True, separators=(",", ":"))

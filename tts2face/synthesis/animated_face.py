@@ -12,23 +12,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.cloning.parameter_transfer import cloning, with_missing
-from tts2face.exemplar.appearance_trajectory import Looks, looks_of, looks_trajectory
-from tts2face.exemplar.synthesis import TokenSelection, VisualVoice, blend_trajectory
+from tts2face.cloning.parameter_transfer import build_parameter_transfer, extend_talker
+from tts2face.exemplar.appearance_trajectory import (
+    AppearanceExemplars,
+    appearance_trajectory,
+    build_appearance_exemplars,
+)
+from tts2face.exemplar.synthesis import ExemplarModel, TokenSelection, blend_trajectory
 from tts2face.face.gesture_transfer import SPEECH_GAINS, GestureFace, gesture_face
 from tts2face.models.face import Face
 from tts2face.models.palette import Palette
 from tts2face.models.talker import Talker
-from tts2face.own_face.appearance_regression import OwnFace, own_face
-from tts2face.own_face.gestures import OwnGestures, own_gestures
+from tts2face.own_face.appearance_regression import AppearanceRegression, fit_appearance_regression
+from tts2face.own_face.gestures import OwnFaceGestures, build_own_face_gestures
 from tts2face.render.draw import mesh_renderer
 from tts2face.render.own_face import own_face_renderer
 from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
-from tts2face.retargeting.performer import lip_model, match_shapes, performer
-from tts2face.retargeting.to_face import Retargeter, retargeter
+from tts2face.retargeting.performer import build_performer_retargeter, lip_model, match_shapes
+from tts2face.retargeting.to_face import Retargeter, build_retargeter
 from tts2face.types import HEAD_CHANNELS, Trajectory
-from tts2face.video.livelink import Capture
+from tts2face.video.livelink import FaceCapture
 from tts2face.video.take import Take
 
 FIXED_FEATURES = ("gaze", "head", *SPEECH_GAINS)  # on a talker's own video they cannot be moved
@@ -70,7 +74,7 @@ class AnimatedFace(Protocol):
             The take is too short, or the face lacks landmarks or shapes.
         """
 
-    def motion_of_capture(self, capture: Capture, *, gain: float = 1.0) -> Trajectory:
+    def motion_of_capture(self, capture: FaceCapture, *, gain: float = 1.0) -> Trajectory:
         """Motion of an ARKit capture: shapes of the same name take its weights, within their limits.
 
         Raises
@@ -122,7 +126,7 @@ class MeshFace:
     """A mesh face: the talker's motion is retargeted to its shapes. Without a palette it has no gestures."""
 
     face: Face
-    voice: VisualVoice
+    voice: ExemplarModel
     retargeter: Retargeter
     gestures: GestureFace | None
 
@@ -146,9 +150,11 @@ class MeshFace:
 
     def motion_of_take(self, take: Take, *, gain: float = 1.0) -> Trajectory:
         """Motion of a performer in a video: lips by least squares on landmarks, eyes and brows by their scores."""
-        return performer(take.landmarks, take.scores, self.face).weights(take.landmarks, take.scores, gain=gain)
+        return build_performer_retargeter(take.landmarks, take.scores, self.face).weights(
+            take.landmarks, take.scores, gain=gain
+        )
 
-    def motion_of_capture(self, capture: Capture, *, gain: float = 1.0) -> Trajectory:
+    def motion_of_capture(self, capture: FaceCapture, *, gain: float = 1.0) -> Trajectory:
         """Motion of an ARKit capture, by the names of shapes; eyes turn as captured, whatever the gain."""
         return match_shapes(capture.weights, self.face, gain=gain)
 
@@ -177,10 +183,10 @@ class OwnAppearanceFace:
     """A talker's own face, drawn on the talker's own video; gaze and head move as in that video."""
 
     talker: Talker
-    voice: VisualVoice
-    looks: Looks
-    regression: OwnFace
-    gestures: OwnGestures | None
+    voice: ExemplarModel
+    looks: AppearanceExemplars
+    regression: AppearanceRegression
+    gestures: OwnFaceGestures | None
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -196,7 +202,7 @@ class OwnAppearanceFace:
     def motion_of_tokens(self, selection: TokenSelection, *, fps: float, n_frames: int) -> Trajectory:
         """Motion of speech, and the appearance of the very tokens that move the lips."""
         lips = blend_trajectory(selection, self.voice, fps=fps, n_frames=n_frames)
-        looks = looks_trajectory(selection, self.looks, fps=fps, n_frames=n_frames)
+        looks = appearance_trajectory(selection, self.looks, fps=fps, n_frames=n_frames)
         return Trajectory(lips.channels + looks.channels, np.concatenate([lips.values, looks.values], axis=1), fps)
 
     def motion_of_parameters(self, speech: Trajectory) -> Trajectory:
@@ -208,9 +214,9 @@ class OwnAppearanceFace:
         model = lip_model(take.landmarks)
         names = tuple(f"shape{i}" for i in range(model.n_speech))
         speech = Trajectory(names, model.parameters(take.landmarks), take.fps)
-        return self.regression.motion(cloning(model, self.talker.model, gain=gain).clone(speech))
+        return self.regression.motion(build_parameter_transfer(model, self.talker.model, gain=gain).clone(speech))
 
-    def motion_of_capture(self, capture: Capture, *, gain: float = 1.0) -> Trajectory:
+    def motion_of_capture(self, capture: FaceCapture, *, gain: float = 1.0) -> Trajectory:
         """A capture has no landmarks to clone (InputError)."""
         del capture, gain
         raise InputError(
@@ -220,8 +226,8 @@ class OwnAppearanceFace:
 
     def with_motion_of(self, take: Take) -> "AnimatedFace":
         """The talker's own face, with more modes of its shape model."""
-        talker = with_missing(lip_model(take.landmarks), self.talker)
-        return replace(self, talker=talker, regression=own_face(talker))
+        talker = extend_talker(lip_model(take.landmarks), self.talker)
+        return replace(self, talker=talker, regression=fit_appearance_regression(talker))
 
     def check_gains(self, gains: Mapping[str, float]) -> None:
         """Refuse gains of what the talker's video shows as it is."""
@@ -243,7 +249,7 @@ class OwnAppearanceFace:
         return own_face_renderer(self.talker, picture, self.gestures)
 
 
-def mesh_face(talker: Talker, voice: VisualVoice, face: Face, palette: Palette | None) -> MeshFace:
+def mesh_face(talker: Talker, voice: ExemplarModel, face: Face, palette: Palette | None) -> MeshFace:
     """Prepare a mesh face for a talker, and for the gestures of a palette.
 
     Raises
@@ -252,10 +258,10 @@ def mesh_face(talker: Talker, voice: VisualVoice, face: Face, palette: Palette |
         The face lacks landmarks of the lips or eyes, or shapes that speech could move.
     """
     gestures = None if palette is None else gesture_face(face, palette)
-    return MeshFace(face, voice, retargeter(talker, face), gestures)
+    return MeshFace(face, voice, build_retargeter(talker, face), gestures)
 
 
-def own_appearance_face(talker: Talker, voice: VisualVoice, palette: Palette | None) -> OwnAppearanceFace:
+def own_appearance_face(talker: Talker, voice: ExemplarModel, palette: Palette | None) -> OwnAppearanceFace:
     """Prepare a talker's own face, and for the gestures of a palette.
 
     Raises
@@ -263,8 +269,10 @@ def own_appearance_face(talker: Talker, voice: VisualVoice, palette: Palette | N
     InputError
         The talker has motion only.
     """
-    gestures = None if palette is None else own_gestures(talker, palette)
-    return OwnAppearanceFace(talker, voice, looks_of(talker, voice), own_face(talker), gestures)
+    gestures = None if palette is None else build_own_face_gestures(talker, palette)
+    return OwnAppearanceFace(
+        talker, voice, build_appearance_exemplars(talker, voice), fit_appearance_regression(talker), gestures
+    )
 
 
 def resting_head(n_frames: int, fps: float) -> Trajectory:

@@ -16,14 +16,14 @@ from lexicon.dictionary import read_dictionary
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.clock import exact_rate, first_sample
-from tts2face.interpolation import cubic_at
-from tts2face.models.audio_map import Drive
+from tts2face.interpolation import interpolate_cubic
+from tts2face.models.audio_map import AudioMap
 from tts2face.models.talker import Talker, speech_channels
 from tts2face.request import Request
 from tts2face.speech.features import FEATURE_RATE, speech_level
-from tts2face.speech.streaming_listener import Ear
+from tts2face.speech.streaming_listener import StreamingFeatures
 from tts2face.speech.text_fit import TextMismatch
-from tts2face.speech.transcript_alignment import phones_in, script
+from tts2face.speech.transcript_alignment import align_recording, pronounce_transcript
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, frame_count
 from tts2face.video.media import sound_blocks
 
@@ -35,7 +35,7 @@ BEST_DRIVE = "network"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Heard:
+class TimedTranscript:
     """What a recording says: its phones and words on its own clock; one silence where the words are not known.
 
     ``mismatches`` are the spans in which it probably says something else.
@@ -51,7 +51,7 @@ class Heard:
         return self.phones.end
 
 
-def drive_of(request: Request, talker: Talker) -> Drive:
+def select_audio_map(request: Request, talker: Talker) -> AudioMap:
     """The drive that a request asks for, the talker's best by default.
 
     Raises
@@ -60,15 +60,15 @@ def drive_of(request: Request, talker: Talker) -> Drive:
         The talker was learnt without it.
     """
     name = request.drive or BEST_DRIVE
-    if name not in talker.drives:
+    if name not in talker.audio_maps:
         raise InputError(
             f"the talker {talker.metadata.get('name', '')} has no {name} drive, for it was learnt with too little "
             "sound; say what is spoken with --text, or choose another talker"
         )
-    return talker.drives[name]
+    return talker.audio_maps[name]
 
 
-def heard(request: Request, path: Path) -> Heard:
+def align_transcript(request: Request, path: Path) -> TimedTranscript:
     """Phones and words of a recording whose words are in the request.
 
     Raises
@@ -79,12 +79,12 @@ def heard(request: Request, path: Path) -> Heard:
         It is longer than a minute, and nothing on this machine recognises phones.
     """
     own = read_dictionary(request.dictionary) if request.dictionary else None
-    words = script(request.text, request.language, own)
-    sound = Waveform(np.concatenate(list(_audible(path))), FEATURE_RATE)
-    return Heard(*phones_in(sound, words, is_english=request.language.startswith("en")))
+    words = pronounce_transcript(request.text, request.language, own)
+    sound = Waveform(np.concatenate(list(_read_audible_blocks(path))), FEATURE_RATE)
+    return TimedTranscript(*align_recording(sound, words, is_english=request.language.startswith("en")))
 
 
-def driven(path: Path, drive: Drive, talker: Talker, fps: float) -> tuple[Heard, Trajectory]:
+def map_audio_to_motion(path: Path, drive: AudioMap, talker: Talker, fps: float) -> tuple[TimedTranscript, Trajectory]:
     """A recording whose words are not known, and the lips that go with its sound, at any frame rate.
 
     Raises
@@ -95,27 +95,27 @@ def driven(path: Path, drive: Drive, talker: Talker, fps: float) -> tuple[Heard,
     levels, _ = _features(path, "level", talker.fps, 1.0)
     gain = drive.gain_for(speech_level(levels))
     features, duration = _features(path, drive.feature, talker.fps, gain)
-    lips = between(drive.parameters(features), talker.fps, fps, frame_count(duration, fps))
+    lips = resample_motion(drive.parameters(features), talker.fps, fps, frame_count(duration, fps))
     phones = PhoneSequence([SILENCE], [0.0, duration])
-    return Heard(phones, ()), Trajectory(speech_channels(talker.model), lips, fps)
+    return TimedTranscript(phones, ()), Trajectory(speech_channels(talker.model), lips, fps)
 
 
 def _features(path: Path, kind: str, fps: float, gain: float) -> tuple[NDArray[np.float32], float]:
     """(T, D) features of a recording made louder by a factor, and its seconds."""
-    ear = Ear(kind, fps)
-    found = [ear.hear(np.clip(gain * block, -1.0, 1.0)) for block in _audible(path)]
+    ear = StreamingFeatures(kind, fps)
+    found = [ear.hear(np.clip(gain * block, -1.0, 1.0)) for block in _read_audible_blocks(path)]
     return np.concatenate([*found, ear.finish()]), ear.n_samples / FEATURE_RATE
 
 
-def between(values: NDArray[np.float32], rate: float, fps: float, n_frames: int) -> NDArray[np.float32]:
+def resample_motion(values: NDArray[np.float32], rate: float, fps: float, n_frames: int) -> NDArray[np.float32]:
     """(n_frames, D) values at another rate than (T, D) ones."""
-    return cubic_at(values, np.minimum(np.arange(n_frames) / fps * rate, len(values) - 1))
+    return interpolate_cubic(values, np.minimum(np.arange(n_frames) / fps * rate, len(values) - 1))
 
 
-def clips_in(path: Path, said: Heard, motion: Trajectory, *, volume: float) -> Iterator[Clip]:
+def recording_clips(path: Path, said: TimedTranscript, motion: Trajectory, *, volume: float) -> Iterator[Clip]:
     """A recording's motion and sound as clips of at most `PIECE_FRAMES` frames, each with the phones that it holds."""
     fps = exact_rate(motion.fps)
-    sound = _Tape(sound_blocks(path, CLIP_RATE))
+    sound = _SampleReader(sound_blocks(path, CLIP_RATE))
     for first in range(0, len(motion), PIECE_FRAMES):
         last = min(first + PIECE_FRAMES, len(motion))
         begin, end = (first_sample(frame, CLIP_RATE, fps) for frame in (first, last))
@@ -130,7 +130,7 @@ def clips_in(path: Path, said: Heard, motion: Trajectory, *, volume: float) -> I
         )
 
 
-def _phones_within(said: Heard, begin: float, duration: float) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+def _phones_within(said: TimedTranscript, begin: float, duration: float) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
     """Phones of a span of seconds, on its own clock, and the words that lie in it with their first phone."""
     edges = said.phones.edges - begin
     inside = [at for at in range(len(said.phones)) if edges[at] < duration - 1e-6 and edges[at + 1] > 1e-6]
@@ -147,7 +147,7 @@ def _phones_within(said: Heard, begin: float, duration: float) -> tuple[PhoneSeq
     return PhoneSequence(said.phones.phones[first:last], cut), words
 
 
-class _Tape:
+class _SampleReader:
     """Sound that is read on and on; silence behind its end."""
 
     def __init__(self, blocks: Iterator[NDArray[np.float32]]) -> None:
@@ -164,7 +164,7 @@ class _Tape:
         return whole[:n_samples]
 
 
-def _audible(path: Path) -> Iterator[NDArray[np.float32]]:
+def _read_audible_blocks(path: Path) -> Iterator[NDArray[np.float32]]:
     """Blocks of a recording at `FEATURE_RATE`; refused at its end when nobody could be heard."""
     n_samples, peak = 0, 0.0
     for block in sound_blocks(path, FEATURE_RATE):

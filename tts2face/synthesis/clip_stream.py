@@ -8,16 +8,28 @@ from pathlib import Path
 
 import numpy as np
 
-from tts2face.clock import on_frames
-from tts2face.exemplar.explanation import ShownPhone, explain_selection
-from tts2face.exemplar.synthesis import TokenSelection, VisualVoice, select_tokens
+from tts2face.clock import pad_to_frame
+from tts2face.exemplar.explanation import PhoneExplanation, explain_selection
+from tts2face.exemplar.synthesis import ExemplarModel, TokenSelection, select_tokens
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.talker import Talker
 from tts2face.speech.text_fit import TextMismatch
 from tts2face.synthesis.animated_face import AnimatedFace, resting_head
-from tts2face.synthesis.audio_input import Heard, clips_in, drive_of, driven, heard
+from tts2face.synthesis.audio_input import (
+    TimedTranscript,
+    align_transcript,
+    map_audio_to_motion,
+    recording_clips,
+    select_audio_map,
+)
 from tts2face.synthesis.gesture_layer import GestureLayer
-from tts2face.synthesis.marked_speech import Reached, Said, reached_in, say, silent
+from tts2face.synthesis.marked_speech import (
+    MarkTime,
+    SpokenSentence,
+    resolve_recording_marks,
+    silent_sentences,
+    speak_sentence,
+)
 from tts2face.synthesis.prepared_request import IDLE_STEPS, RECORDING_STEPS, PreparedRequest
 from tts2face.types import Clip, Speech, Trajectory, Waveform, frame_count
 from tts2face.voice.engine import Voice
@@ -48,8 +60,8 @@ class Piece:
     begin: float
     n_steps: int
     timeline: Timeline = field(default_factory=Timeline)
-    marks: tuple[Reached, ...] = ()
-    shown: Callable[[], tuple[ShownPhone, ...]] = tuple
+    marks: tuple[MarkTime, ...] = ()
+    shown: Callable[[], tuple[PhoneExplanation, ...]] = tuple
     mismatches: tuple[TextMismatch, ...] = ()
 
 
@@ -61,7 +73,7 @@ class Performers:
     """
 
     talker: Talker
-    exemplars: VisualVoice
+    exemplars: ExemplarModel
     face: AnimatedFace
     voice: Callable[[str | None, str], AbstractContextManager[Voice]]
 
@@ -88,8 +100,8 @@ def pieces(prepared: PreparedRequest, performers: Performers, layer: GestureLaye
 def _spoken_pieces(prepared: PreparedRequest, performers: Performers, layer: GestureLayer | None) -> Iterator[Piece]:
     fps, first_frame = prepared.fps, 0
     for said, n_steps in _sentences(prepared, performers):
-        speech, begin = on_frames(said.speech, first_frame, fps), float(first_frame / fps)
-        timeline = said.timeline.within(0.0, speech.waveform.duration).shifted(begin)
+        speech, begin = pad_to_frame(said.speech, first_frame, fps), float(first_frame / fps)
+        timeline = said.timeline.restrict(0.0, speech.waveform.duration).shifted(begin)
         n_frames = frame_count(speech.waveform.duration, float(fps))
         selection = select_tokens(speech.phones, performers.exemplars, prepared.options)
         lips = performers.face.motion_of_tokens(selection, fps=float(fps), n_frames=n_frames)
@@ -99,11 +111,11 @@ def _spoken_pieces(prepared: PreparedRequest, performers: Performers, layer: Ges
         yield Piece(clip, begin, n_steps, timeline, marks, _explanation(selection, performers.exemplars, begin))
 
 
-def _sentences(prepared: PreparedRequest, performers: Performers) -> Iterator[tuple[Said, int]]:
+def _sentences(prepared: PreparedRequest, performers: Performers) -> Iterator[tuple[SpokenSentence, int]]:
     """Sentences of a text, and the characters of each; parts of an idle clip."""
     request = prepared.request
     if request.idle is not None:
-        yield from silent(request.idle, prepared.fps, IDLE_STEPS)
+        yield from silent_sentences(request.idle, prepared.fps, IDLE_STEPS)
         return
     with ExitStack() as held:
 
@@ -113,7 +125,7 @@ def _sentences(prepared: PreparedRequest, performers: Performers) -> Iterator[tu
 
         voice = voice_of(request.voice, request.language)
         for sentence in prepared.sentences():
-            yield say(voice, sentence, request, voice_of), sentence.n_characters
+            yield speak_sentence(voice, sentence, request, voice_of), sentence.n_characters
 
 
 def _recording_pieces(
@@ -121,13 +133,13 @@ def _recording_pieces(
 ) -> Iterator[Piece]:
     """A recording in pieces: lips by examples where its words are known, else by an audio map."""
     said, motion, shown = _recording_motion(prepared, audio, performers)
-    timeline, marks = reached_in(prepared.text, said.phones, said.words, prepared.request.language)
+    timeline, marks = resolve_recording_marks(prepared.text, said.phones, said.words, prepared.request.language)
     fps, before = float(prepared.fps), 0
-    for clip in clips_in(audio, said, motion, volume=prepared.request.volume):
+    for clip in recording_clips(audio, said, motion, volume=prepared.request.volume):
         after = before + len(clip.motion)
         n_steps = RECORDING_STEPS * after // len(motion) - RECORDING_STEPS * before // len(motion)
         begin, end = before / fps, after / fps
-        marked = timeline.within(begin, end)
+        marked = timeline.restrict(begin, end)
         yield Piece(
             _with_gestures(clip.speech, clip.motion, marked, layer),
             begin,
@@ -142,12 +154,12 @@ def _recording_pieces(
 
 def _recording_motion(
     prepared: PreparedRequest, audio: Path, performers: Performers
-) -> tuple[Heard, Trajectory, Callable[[], tuple[ShownPhone, ...]]]:
+) -> tuple[TimedTranscript, Trajectory, Callable[[], tuple[PhoneExplanation, ...]]]:
     fps, request = float(prepared.fps), prepared.request
     if not request.text.strip():
-        said, lips = driven(audio, drive_of(request, performers.talker), performers.talker, fps)
+        said, lips = map_audio_to_motion(audio, select_audio_map(request, performers.talker), performers.talker, fps)
         return said, performers.face.motion_of_parameters(lips), tuple
-    said = heard(replace(request, text=prepared.text.text), audio)
+    said = align_transcript(replace(request, text=prepared.text.text), audio)
     selection = select_tokens(said.phones, performers.exemplars, prepared.options)
     motion = performers.face.motion_of_tokens(selection, fps=fps, n_frames=frame_count(said.duration, fps))
     return said, motion, _explanation(selection, performers.exemplars, 0.0)
@@ -169,11 +181,11 @@ def _with_sound(clip: Clip, sound: Waveform) -> Clip:
 
 
 def _explanation(
-    selection: TokenSelection, exemplars: VisualVoice, begin: float
-) -> Callable[[], tuple[ShownPhone, ...]]:
+    selection: TokenSelection, exemplars: ExemplarModel, begin: float
+) -> Callable[[], tuple[PhoneExplanation, ...]]:
     """The explanation of a selection on the clock of the whole clip, made when it is called for."""
 
-    def shown() -> tuple[ShownPhone, ...]:
+    def shown() -> tuple[PhoneExplanation, ...]:
         phones = explain_selection(selection, exemplars)
         return tuple(replace(phone, start=phone.start + begin, end=phone.end + begin) for phone in phones)
 

@@ -5,7 +5,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import numpy as np
 
 from tts2face.face.gesture_transfer import SPEECH_GAINS
-from tts2face.gesture.gesture_stream import Fields, Gestures, GestureStream
+from tts2face.gesture.gesture_stream import GestureFields, Gestures, GestureStream
 from tts2face.gesture.perlin_noise import NoiseStream
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import Palette
@@ -17,7 +17,7 @@ from tts2face.types import Clip, Speech, Trajectory
 USUAL_STYLE = "neutral"
 
 
-def usual_style(palette: Palette) -> str:
+def default_style(palette: Palette) -> str:
     """The style of a clip for which none was chosen."""
     return USUAL_STYLE if USUAL_STYLE in palette.names else next(iter(palette.styles))
 
@@ -31,7 +31,7 @@ class GestureLayer:
         The palette lacks a style that the request names, or the face cannot move what a gain asks for.
     """
 
-    def __init__(self, prepared: PreparedRequest, fields: Fields, face: AnimatedFace) -> None:
+    def __init__(self, prepared: PreparedRequest, fields: GestureFields, face: AnimatedFace) -> None:
         self._requested, self._face = prepared.timeline, face
         palette, request = fields.palette, prepared.request
         self._requested.check_styles(palette)
@@ -41,7 +41,7 @@ class GestureLayer:
         kind: type[NoiseStream] | type[GestureStream] = NoiseStream if request.gestures == "noise" else GestureStream
         starter = ThreadPoolExecutor(1)  # fields take half a second to make, in which a voice can be loaded and speak
         self._stream: Future[GestureStream | NoiseStream] = starter.submit(
-            kind, fields, style=usual_style(palette), seed=request.seed, fps=float(prepared.fps)
+            kind, fields, style=default_style(palette), seed=request.seed, fps=float(prepared.fps)
         )
         starter.shutdown(wait=False)
         self._marked = Timeline()
@@ -57,10 +57,12 @@ class GestureLayer:
         marks
             What the piece's text asks for, on the clock of the whole clip.
         """
-        self._marked = self._marked.within(self._seconds - 1.0, np.inf).merged(marks)  # a nod runs on for half a second
-        timeline = self._requested.merged(self._marked)
+        self._marked = self._marked.restrict(self._seconds - 1.0, np.inf).merge(
+            marks
+        )  # a nod runs on for half a second
+        timeline = self._requested.merge(self._marked)
         self._seconds += len(lips) / lips.fps
-        gestures = _seen_from_the_head(self._stream.result().next(speech.waveform, len(lips), timeline))
+        gestures = _gaze_relative_to_head(self._stream.result().next(speech.waveform, len(lips), timeline))
         gains = {name: timeline.gains.of(name) for name in SPEECH_GAINS}
         moved = self._face.add_gestures(lips, gestures, gains)
         return Clip(moved.face, moved.head, speech)
@@ -76,7 +78,7 @@ class GestureLayer:
         self._requested.check_duration(self._seconds)
 
 
-def _seen_from_the_head(gestures: Gestures) -> Gestures:
+def _gaze_relative_to_head(gestures: Gestures) -> Gestures:
     """Gestures with the line of sight as the eyes must turn: they hold what they look at while the head moves."""
     if "gaze" not in gestures or "head" not in gestures:
         return gestures

@@ -12,23 +12,23 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.cleaning import plain
+from lexicon.cleaning import canonical_text
 from lexicon.errors import InputError
 from lexicon.languages import language_code
-from lexicon.marked_text import Mark, MarkedText, NameMark, NodMark, Run
+from lexicon.marked_text import Mark, MarkedText, NameMark, NodMark, StyleRun
 from lexicon.pronounce import PAUSES_S
 from lexicon.said import as_said
-from lexicon.sentences import Sentence, Utterance, by_letters, n_letters, up_to
+from lexicon.sentences import Phrase, Sentence, index_by_letters, n_letters, text_prefix
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.clock import first_sample
-from tts2face.gesture.easing import presence
-from tts2face.gesture.notation import style_of
+from tts2face.gesture.easing import span_weights
+from tts2face.gesture.notation import parse_style
 from tts2face.gesture.spans import Nod, StyleSpan
 from tts2face.gesture.timeline import Timeline
 from tts2face.request import RATES, VOLUMES, Request
-from tts2face.synthesis.speech_joining import joined, silence
-from tts2face.types import Speech, Waveform, frame_count, joined_speech
-from tts2face.voice.engine import SpokenWord, Voice, at_volume
+from tts2face.synthesis.speech_joining import join_utterances, silent_speech
+from tts2face.types import Speech, Waveform, concatenate_speech, frame_count
+from tts2face.voice.engine import SpokenWord, Voice, apply_volume
 from tts2face.voice.level import level_speech
 from tts2face.voice.resample import resampled_speech
 from tts2face.voice.spans import Voices, speaker_of
@@ -43,7 +43,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Reached:
+class MarkTime:
     """A named mark, and the second at which it is reached."""
 
     name: str
@@ -51,7 +51,7 @@ class Reached:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Said:
+class SpokenSentence:
     """A sentence's sound, and what its marks ask for, on its own clock.
 
     ``speech`` is as the voice gives it, which motion is computed from; ``sound`` the same at the loudness of the clip.
@@ -59,7 +59,7 @@ class Said:
 
     speech: Speech
     timeline: Timeline
-    marks: tuple[Reached, ...]
+    marks: tuple[MarkTime, ...]
     sound: Waveform
 
 
@@ -82,7 +82,7 @@ class WordTimes:
         self._n_letters = max(n_letters(written), 1)
         self._onsets = [float(phones.edges[word.first]) for word in words] or [phones.start]
         self._ends = [float(phones.edges[word.last]) for word in words] or [phones.end]
-        self._are_counted = self._count(written) == len(self._onsets)
+        self._are_counted = self._count_words(written) == len(self._onsets)
         lengths = [max(n_letters(word.text), 1) for word in words] or [1]
         self._found: dict[int, int] = {}
         self._shares = np.concatenate([[0.0], np.cumsum(lengths) / sum(lengths)])
@@ -99,25 +99,25 @@ class WordTimes:
 
     def _words_before(self, letter: int) -> int:
         if letter not in self._found:
-            self._found[letter] = self._searched(min(max(letter - self._first, 0), self._n_letters))
+            self._found[letter] = self._search_word(min(max(letter - self._first, 0), self._n_letters))
         return self._found[letter]
 
-    def _searched(self, at: int) -> int:
+    def _search_word(self, at: int) -> int:
         if not self._are_counted:
             return int(np.abs(self._shares - at / self._n_letters).argmin())
-        before = up_to(self._written, at).rstrip()
+        before = text_prefix(self._written, at).rstrip()
         rest = self._written[len(before) :]
         is_inside = before[-1:].isalnum() and rest[:1].isalnum()
-        return min(self._count(before) - is_inside, len(self._onsets))
+        return min(self._count_words(before) - is_inside, len(self._onsets))
 
-    def _count(self, written: str) -> int:
+    def _count_words(self, written: str) -> int:
         said = as_said(written, self._language)
         if not self._language.startswith("en"):
-            said = plain(said, keep_marks=True)
+            said = canonical_text(said, keep_marks=True)
         return sum(any(letter.isalnum() for letter in word) for word in said.split())
 
 
-class _Clock(Protocol):
+class _LetterTimes(Protocol):
     def onset(self, letter: int) -> float: ...
 
     def end(self, letter: int) -> float: ...
@@ -140,7 +140,7 @@ class _SentenceTimes:
         return self.begins[at] + self.clocks[at].end(letter)
 
 
-def say(voice: Voice, sentence: Sentence, request: Request, voices: Voices | None = None) -> Said:
+def speak_sentence(voice: Voice, sentence: Sentence, request: Request, voices: Voices | None = None) -> SpokenSentence:
     """Speak a sentence with its pauses, speeds and loudness, and find when its marks are reached.
 
     The speech of a sentence in which nothing is marked is what the voice makes of it, byte for byte; its sound is
@@ -165,7 +165,7 @@ def say(voice: Voice, sentence: Sentence, request: Request, voices: Voices | Non
         speech = speaker.speak(given, rate=request.rate * part.rate, seed=request.seed)
         speech = resampled_speech(speech, voice.sample_rate)
         language = part.language or request.language
-        clock = WordTimes(part.written, speech.phones, speech.words, language=language, first=part.first)
+        clock = WordTimes(part.source, speech.phones, speech.words, language=language, first=part.first)
         spoken.append(speech)
         clocks.append(clock)
         gains.append(_gain(speech.waveform, sentence.runs, part, clock))
@@ -174,34 +174,36 @@ def say(voice: Voice, sentence: Sentence, request: Request, voices: Voices | Non
     levelled = level_speech(spoken, [request.volume * gain for gain in gains])
     sound = _joined_sentence(levelled, sentence, voice.sample_rate)[0].waveform
     times = _SentenceTimes(tuple(part.first for part in sentence.utterances), tuple(clocks), tuple(begins))
-    return Said(speech, *reached(sentence.runs, sentence.marks, times, (sentence.first, sentence.last)), sound)
+    return SpokenSentence(
+        speech, *resolve_marks(sentence.runs, sentence.marks, times, (sentence.first, sentence.last)), sound
+    )
 
 
 def _joined_sentence(speeches: Sequence[Speech], sentence: Sentence, rate: int) -> tuple[Speech, list[float]]:
     """Utterances of a sentence with its silences, and the second that is now each one's 0."""
-    speech, begins = joined(speeches, [_gap(part) for part in sentence.utterances[:-1]])
-    if sentence.lead > 0:
-        before = silence(sentence.lead, rate)
-        speech, begins = joined_speech([before, speech]), [second + before.waveform.duration for second in begins]
+    speech, begins = join_utterances(speeches, [_pause_after(part) for part in sentence.utterances[:-1]])
+    if sentence.leading_pause > 0:
+        before = silent_speech(sentence.leading_pause, rate)
+        speech, begins = concatenate_speech([before, speech]), [second + before.waveform.duration for second in begins]
     if pause := sentence.utterances[-1].pause:
-        speech = joined_speech([speech, silence(pause, rate)])
+        speech = concatenate_speech([speech, silent_speech(pause, rate)])
     return speech, begins
 
 
-def silent(seconds: float, fps: Fraction, n_steps: int) -> Iterator[tuple[Said, int]]:
+def silent_sentences(seconds: float, fps: Fraction, n_steps: int) -> Iterator[tuple[SpokenSentence, int]]:
     """Seconds in which nothing is said, in parts that end on frames, and the share of each in so many steps."""
     n_frames = frame_count(seconds, float(fps))
     bounds = [*range(0, n_frames, max(round(IDLE_PART_S * fps), 1)), n_frames]
     for first, last in pairwise(bounds):
         n_samples = first_sample(last, IDLE_RATE, fps) - first_sample(first, IDLE_RATE, fps)
         steps = n_steps * last // n_frames - n_steps * first // n_frames
-        quiet = silence(n_samples / IDLE_RATE, IDLE_RATE)
-        yield Said(quiet, Timeline(), (), quiet.waveform), steps
+        quiet = silent_speech(n_samples / IDLE_RATE, IDLE_RATE)
+        yield SpokenSentence(quiet, Timeline(), (), quiet.waveform), steps
 
 
-def reached(
-    runs: Sequence[Run], marks: Sequence[Mark], times: _Clock, letters: tuple[int, int]
-) -> tuple[Timeline, tuple[Reached, ...]]:
+def resolve_marks(
+    runs: Sequence[StyleRun], marks: Sequence[Mark], times: _LetterTimes, letters: tuple[int, int]
+) -> tuple[Timeline, tuple[MarkTime, ...]]:
     """What marks ask for in a stretch of letters, on the clock that tells when these are spoken.
 
     A style from the first letter on holds from 0 s, one to the last letter without end; between them it begins with its
@@ -218,36 +220,36 @@ def reached(
             end = times.onset(following.start) if following.styles else times.end(following.start)
         behind = max(end, behind)
         if start < end:
-            spans += [StyleSpan(feature, style, start, end) for feature, style in styles_of(run.styles).items()]
+            spans += [StyleSpan(feature, style, start, end) for feature, style in innermost_styles(run.styles).items()]
     nods = tuple(Nod(times.onset(mark.at), mark.size) for mark in marks if isinstance(mark, NodMark))
-    names = tuple(Reached(mark.name, times.onset(mark.at)) for mark in marks if isinstance(mark, NameMark))
+    names = tuple(MarkTime(mark.name, times.onset(mark.at)) for mark in marks if isinstance(mark, NameMark))
     return Timeline(spans=tuple(spans), nods=nods), names
 
 
-def reached_in(
+def resolve_recording_marks(
     text: MarkedText, phones: PhoneSequence, words: Sequence[WordSpan], language: str
-) -> tuple[Timeline, tuple[Reached, ...]]:
-    """What marks ask for in a recording whose words are known, as `reached`; nothing where there are no words."""
+) -> tuple[Timeline, tuple[MarkTime, ...]]:
+    """What marks ask for in a recording whose words are known, as `resolve_marks`; nothing where there are no words."""
     if not words:
         return Timeline(), ()
-    placed = by_letters(text)
+    placed = index_by_letters(text)
     times = WordTimes(text.text, phones, words, language=language)
-    return reached(placed.runs, placed.marks, times, (0, n_letters(text.text)))
+    return resolve_marks(placed.runs, placed.marks, times, (0, n_letters(text.text)))
 
 
 @lru_cache(maxsize=1000)
-def styles_of(nested: tuple[str, ...]) -> Mapping[str, str]:
+def innermost_styles(nested: tuple[str, ...]) -> Mapping[str, str]:
     """Style of each feature under nested marks, the innermost of which counts."""
     chosen: dict[str, str] = {}
     for written in nested:
-        chosen |= style_of(written)
+        chosen |= parse_style(written)
     return chosen
 
 
 def marked_styles(text: MarkedText) -> tuple[str, ...]:
     """Names of all styles that a text asks for, in order of first use; errors as `check_marks`."""
     runs = dict.fromkeys(run.styles for run in text.runs)
-    return tuple(dict.fromkeys(style for styles in runs for style in styles_of(styles).values()))
+    return tuple(dict.fromkeys(style for styles in runs for style in innermost_styles(styles).values()))
 
 
 def check_marks(text: MarkedText, request: Request) -> None:
@@ -259,7 +261,7 @@ def check_marks(text: MarkedText, request: Request) -> None:
         A style is written wrongly, speed or loudness are out of range together with the request's, the text names
         another language, or a recording is to pause or to change its voice.
     """
-    if request.audio is not None and text.changes_voice:
+    if request.audio is not None and text.has_voice_changes:
         raise InputError(
             "a recording keeps its own pauses, speed, loudness and voice; "
             "leave [pause], <break>, <prosody>, <emphasis>, <voice> and <lang> away"
@@ -284,14 +286,14 @@ def _primary(language: str) -> str:
     return language.partition("-")[0]
 
 
-def _gap(utterance: Utterance) -> float:
+def _pause_after(utterance: Phrase) -> float:
     """Seconds of silence between an utterance and the next one of its sentence."""
     if utterance.pause is not None:
         return max(utterance.pause, LEAST_GAP_S)
-    return max(PAUSES_S.get(utterance.written[-1:], 0.0), JOINT_S)
+    return max(PAUSES_S.get(utterance.source[-1:], 0.0), JOINT_S)
 
 
-def _gain(sound: Waveform, runs: Sequence[Run], part: Utterance, times: WordTimes) -> Floats:
+def _gain(sound: Waveform, runs: Sequence[StyleRun], part: Phrase, times: WordTimes) -> Floats:
     """(n,) or (1,) factor of an utterance's samples: the loudness of its runs."""
     mine = [
         (run.volume, max(run.start, part.first), end)
@@ -306,13 +308,13 @@ def _gain(sound: Waveform, runs: Sequence[Run], part: Utterance, times: WordTime
         start = times.onset(first) if first > part.first else 0.0
         end = times.end(last) if last < part.last else math.inf
         if start < end:
-            gain += (volume - 1.0) * presence(seconds, start, end, RAMP_S)
+            gain += (volume - 1.0) * span_weights(seconds, start, end, RAMP_S)
     factors: Floats = np.maximum(gain, 0.0)
     return factors
 
 
 def _turned_down(speech: Speech, volume: float, gain: Floats) -> Speech:
     """An utterance at a loudness, turned down where it would exceed full scale: what motion is computed from."""
-    samples = at_volume(speech.waveform.samples, volume)
-    louder = samples if len(gain) == 1 else at_volume(samples * gain, 1.0)
+    samples = apply_volume(speech.waveform.samples, volume)
+    louder = samples if len(gain) == 1 else apply_volume(samples * gain, 1.0)
     return replace(speech, waveform=Waveform(louder, speech.waveform.rate))

@@ -13,8 +13,8 @@ from tts2face.synthesis.animated_face import AnimatedFace, FaceMotion
 from tts2face.types import Clip, Speech, Trajectory, Waveform
 from tts2face.video.blendshapes import BlendshapeReader
 from tts2face.video.livelink import read_livelink
-from tts2face.video.media import media_facts, read_sound
-from tts2face.video.streaming_tracker import FilmReader
+from tts2face.video.media import read_media_info, read_sound
+from tts2face.video.streaming_tracker import StreamingTracker
 from tts2face.video.take import Take, read_take
 
 CAPTURE_SUFFIX = ".csv"
@@ -101,14 +101,14 @@ def perform(
     take = performance.take
     sound = sound_of_take(take) if performance.audio is None else read_sound(performance.audio, SOUND_RATE)
     if is_capture(take):
-        motion = motion_of_capture(take, face, gain=performance.gain)
+        motion = retarget_capture(take, face, gain=performance.gain)
         fps = performance.fps or min(motion.face.fps, CAPTURE_FPS)
-        return PerformedTake(face, at_rate(motion, fps), sound)
+        return PerformedTake(face, resample_take(motion, fps), sound)
     seen = read_video_take(take, performance.model, on_progress=on_progress)
     if performance.append_missing:
         face = face.with_motion_of(seen)
-    motion = motion_of_take(seen, face, gain=performance.gain)
-    return PerformedTake(face, motion if performance.fps is None else at_rate(motion, performance.fps), sound)
+    motion = retarget_take(seen, face, gain=performance.gain)
+    return PerformedTake(face, motion if performance.fps is None else resample_take(motion, performance.fps), sound)
 
 
 def is_capture(take: Path) -> bool:
@@ -128,15 +128,15 @@ def read_video_take(
     BackendError
         LiteRT, OpenCV or the landmark models are missing.
     """
-    return read_take(video, FilmReader(model), BlendshapeReader(model), on_progress=on_progress)
+    return read_take(video, StreamingTracker(model), BlendshapeReader(model), on_progress=on_progress)
 
 
-def motion_of_take(take: Take, face: AnimatedFace, *, gain: float = 1.0) -> FaceMotion:
+def retarget_take(take: Take, face: AnimatedFace, *, gain: float = 1.0) -> FaceMotion:
     """The motion of a video take on a face."""
     return FaceMotion(face.motion_of_take(take, gain=gain), take.head)
 
 
-def motion_of_capture(table: Path, face: AnimatedFace, *, gain: float = 1.0) -> FaceMotion:
+def retarget_capture(table: Path, face: AnimatedFace, *, gain: float = 1.0) -> FaceMotion:
     """The motion of a Live Link Face capture on a face."""
     capture = read_livelink(table)
     return FaceMotion(face.motion_of_capture(capture, gain=gain), capture.head)
@@ -144,12 +144,12 @@ def motion_of_capture(table: Path, face: AnimatedFace, *, gain: float = 1.0) -> 
 
 def sound_of_take(take: Path) -> Waveform:
     """The sound of a video; none where the file holds no sound."""
-    if not is_capture(take) and media_facts(take).rate:
+    if not is_capture(take) and read_media_info(take).rate:
         return read_sound(take, SOUND_RATE)
     return Waveform(np.zeros(0, np.float32), SOUND_RATE)
 
 
-def at_rate(motion: FaceMotion, fps: float) -> FaceMotion:
+def resample_take(motion: FaceMotion, fps: float) -> FaceMotion:
     """Motion read at another frame rate, straight between its frames."""
     old = motion.face.fps
     if exact_rate(fps) == exact_rate(old):
@@ -168,7 +168,7 @@ def at_rate(motion: FaceMotion, fps: float) -> FaceMotion:
     return FaceMotion(read(motion.face), read(motion.head))
 
 
-def clips_of(motion: FaceMotion, sound: Waveform) -> Iterator[Clip]:
+def take_clips(motion: FaceMotion, sound: Waveform) -> Iterator[Clip]:
     """Motion and its sound as clips of at most `PIECE_FRAMES` frames; sound that is too short ends in silence."""
     fps = exact_rate(motion.face.fps)
     for first in range(0, len(motion.face), PIECE_FRAMES):
@@ -179,8 +179,8 @@ def clips_of(motion: FaceMotion, sound: Waveform) -> Iterator[Clip]:
         samples[: len(heard)] = heard
         speech = Speech(Waveform(samples, sound.rate), PhoneSequence([SILENCE], [0.0, len(samples) / sound.rate]), ())
         here = slice(first, last)
-        yield Clip(_part(motion.face, here), _part(motion.head, here), speech)
+        yield Clip(_cut_trajectory(motion.face, here), _cut_trajectory(motion.head, here), speech)
 
 
-def _part(trajectory: Trajectory, frames: slice) -> Trajectory:
+def _cut_trajectory(trajectory: Trajectory, frames: slice) -> Trajectory:
     return Trajectory(trajectory.channels, trajectory.values[frames], trajectory.fps)

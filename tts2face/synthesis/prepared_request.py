@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from lexicon.errors import InputError
-from lexicon.mark_parser import marked
+from lexicon.mark_parser import parse_marks
 from lexicon.marked_text import MarkedText
 from lexicon.readable import check_readable
-from lexicon.sentences import Sentence, sentences
+from lexicon.sentences import Sentence, split_sentences
 from tts2face.clock import exact_rate
 from tts2face.exemplar.options import METHODS, SynthesisOptions
-from tts2face.gesture.request_timeline import asked
+from tts2face.gesture.request_timeline import build_request_timeline
 from tts2face.gesture.timeline import Timeline
 from tts2face.render.picture import Picture
 from tts2face.request import Request
@@ -55,7 +55,7 @@ class PreparedRequest:
 
     def sentences(self) -> Iterator[Sentence]:
         """The sentences that a voice speaks one by one."""
-        return sentences(self.text, self.request.language)
+        return split_sentences(self.text, self.request.language)
 
 
 def prepare(request: Request) -> PreparedRequest:
@@ -72,7 +72,10 @@ def prepare(request: Request) -> PreparedRequest:
     if request.audio is not None and not request.audio.is_file():
         raise InputError(f"there is no recording {request.audio}; check the path")
     prepared = PreparedRequest(
-        request, marked(request.text, request.language), asked(request), synthesis_options(request)
+        request,
+        parse_marks(request.text, request.language),
+        build_request_timeline(request),
+        synthesis_options(request),
     )
     if not request.text.strip() and (request.audio is not None or request.idle is not None):
         return prepared

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.types import Speech, Waveform, joined_speech
+from tts2face.types import Speech, Waveform, concatenate_speech
 
 FADE_S = 0.005  # at each end of a cut sound: none clicks
 
 
-def joined(speeches: Sequence[Speech], gaps: Sequence[float]) -> tuple[Speech, list[float]]:
+def join_utterances(speeches: Sequence[Speech], gaps: Sequence[float]) -> tuple[Speech, list[float]]:
     """Utterances with so many seconds of silence between them, and the second that is now each one's 0."""
     parts: list[Speech] = []
     begins: list[float] = []
@@ -20,47 +20,47 @@ def joined(speeches: Sequence[Speech], gaps: Sequence[float]) -> tuple[Speech, l
     for number, speech in enumerate(speeches):
         before = gaps[number - 1] if number > 0 else math.inf
         behind = gaps[number] if number < len(gaps) else math.inf
-        short, cut = shortened(speech, before=before / 2, behind=behind / 2)
+        short, cut = trim_silence(speech, before=before / 2, behind=behind / 2)
         if parts:
-            missing = before - _quiet_ends(parts[-1])[1] - _quiet_ends(short)[0]
+            missing = before - _silence_at_ends(parts[-1])[1] - _silence_at_ends(short)[0]
             if round(missing * speech.waveform.rate) > 0:
-                parts.append(silence(missing, speech.waveform.rate))
+                parts.append(silent_speech(missing, speech.waveform.rate))
                 at += parts[-1].waveform.duration
         parts.append(short)
         begins.append(at - cut)
         at += short.waveform.duration
-    return (joined_speech(parts) if len(parts) > 1 else parts[0]), begins
+    return (concatenate_speech(parts) if len(parts) > 1 else parts[0]), begins
 
 
-def shortened(speech: Speech, *, before: float, behind: float) -> tuple[Speech, float]:
+def trim_silence(speech: Speech, *, before: float, behind: float) -> tuple[Speech, float]:
     """Speech with at most so many seconds of silence at its ends, and the seconds taken from its beginning."""
     sound, phones = speech.waveform, speech.phones
-    lead, trail = _quiet_ends(speech)
+    lead, trail = _silence_at_ends(speech)
     begin = round(max(lead - before, 0.0) * sound.rate)
     end = len(sound.samples) - round(max(trail - behind, 0.0) * sound.rate)
     if (begin, end) == (0, len(sound.samples)):
         return speech, 0.0
-    samples = sound.samples[begin:end] * _fades(end - begin, sound.rate, begin > 0, end < len(sound.samples))
+    samples = sound.samples[begin:end] * _fade_gains(end - begin, sound.rate, begin > 0, end < len(sound.samples))
     edges = phones.edges - begin / sound.rate
     edges[0], edges[-1] = 0.0, len(samples) / sound.rate
     return Speech(Waveform(samples, sound.rate), PhoneSequence(phones.phones, edges), speech.words), begin / sound.rate
 
 
-def silence(seconds: float, rate: int) -> Speech:
+def silent_speech(seconds: float, rate: int) -> Speech:
     """Speech in which nothing is said."""
     n_samples = max(round(seconds * rate), 1)
     phones = PhoneSequence([SILENCE], [0.0, n_samples / rate])
     return Speech(Waveform(np.zeros(n_samples, np.float32), rate), phones, ())
 
 
-def _quiet_ends(speech: Speech) -> tuple[float, float]:
+def _silence_at_ends(speech: Speech) -> tuple[float, float]:
     """Seconds of silence at both ends."""
     labels, edges = speech.phones.phones, speech.phones.edges
     lead = float(edges[1]) if labels[0] == SILENCE else 0.0
     return lead, float(edges[-1] - edges[-2]) if labels[-1] == SILENCE else 0.0
 
 
-def _fades(n_samples: int, rate: int, begins: bool, ends: bool) -> NDArray[np.float32]:
+def _fade_gains(n_samples: int, rate: int, begins: bool, ends: bool) -> NDArray[np.float32]:
     ramp = np.linspace(0.0, 1.0, min(round(FADE_S * rate), n_samples // 2), endpoint=False, dtype=np.float32)
     gain = np.ones(n_samples, np.float32)
     if begins:

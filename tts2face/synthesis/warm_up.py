@@ -58,17 +58,17 @@ def compile_kernels() -> None:
 
 def compile_motion() -> None:
     """Compile what turns phones into a face's weights and adds gestures, by moving the shipped faces a little."""
-    from tts2face.exemplar.synthesis import speech_trajectory, visual_voice
-    from tts2face.gesture.gesture_stream import Fields, GestureStream
+    from tts2face.exemplar.synthesis import build_exemplar_model, speech_trajectory
+    from tts2face.gesture.gesture_stream import GestureFields, GestureStream
     from tts2face.gesture.timeline import Timeline
     from tts2face.models.palette import load_palette
     from tts2face.models.talker import load_talker
-    from tts2face.retargeting.to_face import retargeter
+    from tts2face.retargeting.to_face import build_retargeter
     from tts2face.types import Waveform
 
     talker: Talker = load_talker("grid_s1")
-    way = retargeter(talker, load_face("head"))
+    way = build_retargeter(talker, load_face("head"))
     phones = PhoneSequence([SILENCE, "p", "f", "ɑ", SILENCE], [0.0, 0.3, 0.4, 0.5, 0.7, 1.0])
-    way.retarget(speech_trajectory(phones, visual_voice(talker), fps=30.0, n_frames=30))
-    gestures = GestureStream(Fields(load_palette("starter")), style="grid_s1", seed=0, fps=30.0)
+    way.retarget(speech_trajectory(phones, build_exemplar_model(talker), fps=30.0, n_frames=30))
+    gestures = GestureStream(GestureFields(load_palette("starter")), style="grid_s1", seed=0, fps=30.0)
     gestures.next(Waveform(np.zeros(1600), 16_000), 3, Timeline())

@@ -7,12 +7,12 @@ from types import TracebackType
 from typing import Any
 
 from lexicon.errors import BackendError, InputError
-from tts2face.video.media import Picture
+from tts2face.video.media import TimedFrame
 
 PATIENCE_S = 10.0  # without a picture the camera is gone
 
 
-class Camera:
+class CaptureDevice:
     """Pictures of a camera by number, of an address that sends video, or of a file at its own pace.
 
     Raises
@@ -35,15 +35,15 @@ class Camera:
         stated = float(self._device.get(cv2.CAP_PROP_FPS) or 0.0)
         self.fps = stated if 0 < stated <= 120 else 30.0
         self._pace = 0.0 if source.isdecimal() or "://" in source else 1.0 / self.fps
-        self._newest: Picture | None = None
-        self._came = threading.Condition()
+        self._newest: TimedFrame | None = None
+        self._frame_arrived = threading.Condition()
         self._ended = False
-        self._filming = threading.Thread(target=self._film, name="camera", daemon=True)
+        self._thread = threading.Thread(target=self._read_frames, name="camera", daemon=True)
 
-    def __enter__(self) -> "Camera":
+    def __enter__(self) -> "CaptureDevice":
         """Begin to film."""
         self._began = time.monotonic()
-        self._filming.start()
+        self._thread.start()
         return self
 
     def __exit__(
@@ -51,20 +51,20 @@ class Camera:
     ) -> None:
         """Stop and let the camera go."""
         self._ended = True
-        self._filming.join()
+        self._thread.join()
         self._device.release()
 
-    def pictures(self) -> Iterator[Picture]:
+    def pictures(self) -> Iterator[TimedFrame]:
         """The newest picture each time one is asked for, with the seconds since the beginning; until filming ends."""
         while True:
-            with self._came:
-                self._came.wait_for(lambda: self._newest is not None or self._ended, PATIENCE_S)
+            with self._frame_arrived:
+                self._frame_arrived.wait_for(lambda: self._newest is not None or self._ended, PATIENCE_S)
                 picture, self._newest = self._newest, None
             if picture is None:
                 return
             yield picture
 
-    def _film(self) -> None:
+    def _read_frames(self) -> None:
         import cv2
 
         n_read = 0
@@ -75,9 +75,9 @@ class Camera:
             n_read += 1
             time.sleep(max(0.0, self._began + n_read * self._pace - time.monotonic()) if self._pace else 0.0)
             upright = cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB)
-            with self._came:
-                self._newest = Picture(time.monotonic() - self._began, upright)
-                self._came.notify()
-        with self._came:
+            with self._frame_arrived:
+                self._newest = TimedFrame(time.monotonic() - self._began, upright)
+                self._frame_arrived.notify()
+        with self._frame_arrived:
             self._ended = True
-            self._came.notify()
+            self._frame_arrived.notify()

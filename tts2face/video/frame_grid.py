@@ -9,7 +9,9 @@ LONGEST_GAP_S = 0.12  # frames without a face that are filled in; lips make no f
 SAME_INSTANT_S = 0.001  # times in a file are rounded to milliseconds
 
 
-def on_grid(points: NDArray[np.float32], times: NDArray[np.float64], fps: float) -> tuple[NDArray[np.float32], int]:
+def resample_to_grid(
+    points: NDArray[np.float32], times: NDArray[np.float64], fps: float
+) -> tuple[NDArray[np.float32], int]:
     """Points at the instants i / fps between the first time and the last, and the first i.
 
     Parameters
@@ -44,7 +46,7 @@ def face_span(points: NDArray[np.float32]) -> tuple[int, int]:
     return int(present[0]), int(present[-1]) + 1
 
 
-def filled_gaps(points: NDArray[np.float32], fps: float) -> tuple[NDArray[np.float32], int]:
+def fill_gaps(points: NDArray[np.float32], fps: float) -> tuple[NDArray[np.float32], int]:
     """Points with short gaps bridged by straight lines, and the number of frames filled.
 
     Raises
@@ -59,5 +61,5 @@ def filled_gaps(points: NDArray[np.float32], fps: float) -> tuple[NDArray[np.flo
     longest = int(np.diff(present).max()) - 1
     if longest > round(LONGEST_GAP_S * fps):
         raise DataError(f"the face is out of sight for {longest / fps:.2f} s")
-    grid, _ = on_grid(points[present], present / fps, fps)
+    grid, _ = resample_to_grid(points[present], present / fps, fps)
     return grid, int(missing.sum())

@@ -62,7 +62,7 @@ def find_bundle(path: Path | None = None) -> Path:
                 f"{named} is not the {MODEL_NAME} that tracking was measured with; run `tts2face corpus setup`"
             )
         return named
-    for candidate in (user_cache() / MODEL_NAME, *_carried()):
+    for candidate in (user_cache() / MODEL_NAME, *_packaged_bundles()):
         if is_bundle(candidate):
             return candidate
     raise BackendError(
@@ -75,7 +75,7 @@ def is_bundle(path: Path) -> bool:
     return path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == MODEL_SHA256
 
 
-def _carried() -> list[Path]:
+def _packaged_bundles() -> list[Path]:
     found: list[Path] = []
     for package in CARRIERS:
         spec = find_spec(package)
@@ -84,7 +84,7 @@ def _carried() -> list[Path]:
     return found
 
 
-class Network:
+class LandmarkNetwork:
     """One network of the bundle, run by LiteRT on one thread; a call gives its output arrays.
 
     Raises
@@ -94,7 +94,7 @@ class Network:
     """
 
     def __init__(self, content: bytes) -> None:
-        with _without_chatter():
+        with _silence_stderr():
             interpreter = _interpreter_class()(model_content=content, num_threads=1)
             interpreter.allocate_tensors()
         self._content = content  # the interpreter reads from it
@@ -109,10 +109,10 @@ class Network:
         return [self._interpreter.get_tensor(index) for index in self._outputs]
 
 
-def load_network(bundle: Path, name: str) -> Network:
+def load_network(bundle: Path, name: str) -> LandmarkNetwork:
     """One network of the bundle by name: ``face_detector``, ``face_landmarks_detector``, ``face_blendshapes``."""
     with zipfile.ZipFile(BytesIO(bundle.read_bytes())) as archive:
-        return Network(archive.read(f"{name}.tflite"))
+        return LandmarkNetwork(archive.read(f"{name}.tflite"))
 
 
 def _interpreter_class() -> Any:
@@ -126,7 +126,7 @@ def _interpreter_class() -> Any:
 
 
 @contextlib.contextmanager
-def _without_chatter() -> Iterator[None]:
+def _silence_stderr() -> Iterator[None]:
     """Keep what native code writes to standard error (LiteRT says that it is there) from the user's screen."""
     sys.stderr.flush()
     kept = os.dup(2)

@@ -18,14 +18,14 @@ SIGNS = np.array([1.0, -1.0, 1.0])  # as of its eyes: pitch down (EyePitch follo
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Capture:
+class FaceCapture:
     """Weights (T, 52) by ARKit name and the head's pose (T, 6), its place unknown, at an even rate."""
 
     weights: Trajectory
     head: Trajectory
 
 
-def read_livelink(path: Path) -> Capture:
+def read_livelink(path: Path) -> FaceCapture:
     """The capture in a Live Link Face file.
 
     Raises
@@ -44,8 +44,8 @@ def read_livelink(path: Path) -> Capture:
         raise DataError(f"{path} is not a CSV file of Live Link Face ({broken})") from broken
     if not rows or rows[0][:1] != ["Timecode"] or "JawOpen" not in rows[0] or len(rows) < 3:
         raise DataError(f"{path} is not a CSV file of Live Link Face: it needs the columns Timecode, JawOpen, ...")
-    names, times, values = _numbers(path, rows)
-    fps = _rate(path, times)
+    names, times, values = _parse_rows(path, rows)
+    fps = _frame_rate(path, times)
     n_frames = int(np.floor((times[-1] - times[0]) * fps + 0.5)) + 1
     even = times[0] + np.arange(n_frames) / fps
     read = np.stack([np.interp(even, times, column) for column in values.T], axis=1)
@@ -55,17 +55,17 @@ def read_livelink(path: Path) -> Capture:
     if all(name in names for name in HEAD):
         turns = read[:, [names.index(name) for name in HEAD]]
         head[:, :3] = SIGNS * (turns - np.median(turns, axis=0))
-    return Capture(Trajectory(channels, read[:, shapes], fps), Trajectory(HEAD_CHANNELS, head, fps))
+    return FaceCapture(Trajectory(channels, read[:, shapes], fps), Trajectory(HEAD_CHANNELS, head, fps))
 
 
-def _numbers(path: Path, rows: list[list[str]]) -> tuple[list[str], NDArray[np.float64], NDArray[np.float64]]:
+def _parse_rows(path: Path, rows: list[list[str]]) -> tuple[list[str], NDArray[np.float64], NDArray[np.float64]]:
     names = rows[0][2:]
     times, values = [], []
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(rows[0]):
             raise DataError(f"line {number} of {path} has {len(row)} columns, not {len(rows[0])}; export it again")
         try:
-            times.append(_timecode(row[0]))
+            times.append(_parse_timecode(row[0]))
             values.append([float(cell) for cell in row[2:]])
         except ValueError as broken:
             raise DataError(f"line {number} of {path} cannot be read ({broken}); export it again") from broken
@@ -76,13 +76,13 @@ def _numbers(path: Path, rows: list[list[str]]) -> tuple[list[str], NDArray[np.f
     return names, seconds + frames / counted, np.array(values)
 
 
-def _timecode(text: str) -> tuple[float, float]:
+def _parse_timecode(text: str) -> tuple[float, float]:
     """Seconds and frames of ``hours:minutes:seconds:frames``."""
     hours, minutes, seconds, frames = text.split(":")
     return int(hours) * 3600.0 + int(minutes) * 60.0 + float(seconds), float(frames)
 
 
-def _rate(path: Path, times: NDArray[np.float64]) -> float:
+def _frame_rate(path: Path, times: NDArray[np.float64]) -> float:
     steps = np.diff(times)
     if (steps <= 0).any() or steps.max() > MOST_GAP_S:
         raise DataError(f"the times of {path} do not run evenly from row to row; export it again")

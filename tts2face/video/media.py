@@ -33,7 +33,7 @@ QUARTER_TURN_DEG = 90
 
 
 @dataclass(frozen=True, slots=True)
-class Facts:
+class MediaInfo:
     """What a file says about itself; `rate` is the sound's in Hz, 0 without sound. `duration` in seconds."""
 
     duration: float
@@ -44,14 +44,14 @@ class Facts:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Picture:
+class TimedFrame:
     """One frame upright: `pixels` (H, W, 3) sRGB uint8, shown from `time` seconds on."""
 
     time: float
     pixels: NDArray[np.uint8]
 
 
-def media_facts(path: Path) -> Facts:
+def read_media_info(path: Path) -> MediaInfo:
     """What a file says about itself, without decoding it.
 
     Raises
@@ -61,20 +61,20 @@ def media_facts(path: Path) -> Facts:
     DataError
         It is damaged or holds no video.
     """
-    with _opened(path) as container:
-        stream = _video(container, path)
+    with _open_container(path) as container:
+        stream = _video_stream(container, path)
         context = stream.codec_context
-        sound = _decodable(container.streams.audio)
-        return Facts(
+        sound = _first_decodable(container.streams.audio)
+        return MediaInfo(
             (container.duration or 0) / 1e6,
-            _rate(container, stream, path),
+            _frame_rate(container, stream, path),
             context.width,
             context.height,
             sound.rate if sound else 0,
         )
 
 
-def read_pictures(path: Path) -> Iterator[Picture]:
+def read_frames(path: Path) -> Iterator[TimedFrame]:
     """Yield every frame of the first video stream, upright, one at a time.
 
     Raises
@@ -84,13 +84,13 @@ def read_pictures(path: Path) -> Iterator[Picture]:
     DataError
         It holds no video, a frame cannot be decoded, or the file ends before the time that it states.
     """
-    with _opened(path) as container:
-        stream = _video(container, path)
+    with _open_container(path) as container:
+        stream = _video_stream(container, path)
         stream.thread_type = "NONE"  # recordings are read in parallel, one process each
-        for frame in _decoded(container, stream, path):
+        for frame in _decode_frames(container, stream, path):
             if frame.is_corrupt:
                 raise DataError(f"{path} is damaged at {frame.time or 0:.2f} s; copy or record it again")
-            yield Picture(_instant(frame, path), _upright(frame))
+            yield TimedFrame(_presentation_time(frame, path), _upright_pixels(frame))
 
 
 def read_sound(path: Path, rate: int) -> Waveform:
@@ -106,17 +106,17 @@ def read_sound(path: Path, rate: int) -> Waveform:
     import soxr
 
     blocks: list[NDArray[np.float32]] = []
-    with _opened(path) as container:
-        stream = _decodable(container.streams.audio)
+    with _open_container(path) as container:
+        stream = _first_decodable(container.streams.audio)
         if stream is None:
             raise DataError(f"{path} holds no sound; give a recording with its sound track")
         start = 0.0
-        for frame in _decoded(container, stream, path):
+        for frame in _decode_frames(container, stream, path):
             if not blocks:
-                start = _sound_start(frame, path)
-            blocks.append(_mono(frame))
+                start = _first_sample_time(frame, path)
+            blocks.append(_mix_to_mono(frame))
         source_rate = stream.rate
-    sound = _placed(np.concatenate(blocks), round(start * source_rate))
+    sound = _shift_samples(np.concatenate(blocks), round(start * source_rate))
     return Waveform(np.clip(soxr.resample(sound, source_rate, rate), -1.0, 1.0), rate)
 
 
@@ -130,24 +130,24 @@ def sound_blocks(path: Path, rate: int) -> Iterator[NDArray[np.float32]]:
     """
     import soxr
 
-    with _opened(path) as container:
-        stream = _decodable(container.streams.audio)
+    with _open_container(path) as container:
+        stream = _first_decodable(container.streams.audio)
         if stream is None:
             raise DataError(f"{path} holds no sound; give a recording with its sound track")
         resampler = soxr.ResampleStream(stream.rate, rate, 1, dtype="float32")
         n_early: int | None = None  # samples before the file's time 0 that are still to be left out
-        for frame in _decoded(container, stream, path):
-            samples = _mono(frame)
+        for frame in _decode_frames(container, stream, path):
+            samples = _mix_to_mono(frame)
             if n_early is None:
-                offset = round(_sound_start(frame, path) * stream.rate)
-                samples, n_early = _placed(samples, max(offset, 0)), max(-offset, 0)
+                offset = round(_first_sample_time(frame, path) * stream.rate)
+                samples, n_early = _shift_samples(samples, max(offset, 0)), max(-offset, 0)
             cut = min(n_early, len(samples))
             n_early -= cut
             yield np.clip(resampler.resample_chunk(samples[cut:]), -1.0, 1.0)
         yield np.clip(resampler.resample_chunk(np.zeros(0, np.float32), last=True), -1.0, 1.0)
 
 
-def _sound_start(frame: "AudioFrame", path: Path) -> float:
+def _first_sample_time(frame: "AudioFrame", path: Path) -> float:
     start = float(frame.time or 0.0)
     if abs(start) > LONGEST_DELAY_S:
         raise DataError(f"{path} says that its sound begins at {start:.0f} s; it is damaged: copy or convert it")
@@ -155,7 +155,7 @@ def _sound_start(frame: "AudioFrame", path: Path) -> float:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator["InputContainer"]:
+def _open_container(path: Path) -> Iterator["InputContainer"]:
     import av
 
     if not os.path.lexists(path):
@@ -171,19 +171,19 @@ def _opened(path: Path) -> Iterator["InputContainer"]:
         raise DataError(f"{path} cannot be read as video or sound ({reason}); copy or convert it") from broken
 
 
-def _video(container: "InputContainer", path: Path) -> "VideoStream":
-    stream = _decodable(container.streams.video)
+def _video_stream(container: "InputContainer", path: Path) -> "VideoStream":
+    stream = _first_decodable(container.streams.video)
     if stream is None:
         raise DataError(f"{path} holds no video; give a recording with pictures")
     return stream
 
 
-def _decodable(streams: Sequence[Stream]) -> Stream | None:
+def _first_decodable(streams: Sequence[Stream]) -> Stream | None:
     """The first stream that can be decoded; damage may leave streams of unknown kinds."""
     return next((stream for stream in streams if stream.codec_context is not None), None)
 
 
-def _rate(container: "InputContainer", stream: "VideoStream", path: Path) -> float:
+def _frame_rate(container: "InputContainer", stream: "VideoStream", path: Path) -> float:
     """Frames per second as the file states them; counted where it states none, or the ticks of its clock."""
     stated = float(stream.average_rate or stream.guessed_rate or 0)
     if 0 < stated <= MOST_FPS:
@@ -195,19 +195,19 @@ def _rate(container: "InputContainer", stream: "VideoStream", path: Path) -> flo
     return counted
 
 
-def _instant(frame: "VideoFrame", path: Path) -> float:
+def _presentation_time(frame: "VideoFrame", path: Path) -> float:
     if frame.time is None:
         raise DataError(f"{path} has frames without a time; convert it with ffmpeg")
     return float(frame.time)
 
 
-def _upright(frame: "VideoFrame") -> NDArray[np.uint8]:
+def _upright_pixels(frame: "VideoFrame") -> NDArray[np.uint8]:
     pixels = frame.to_ndarray(format="rgb24").astype(np.uint8, copy=False)
     turns = round(frame.rotation / QUARTER_TURN_DEG) % 4
     return np.ascontiguousarray(np.rot90(pixels, turns)) if turns else pixels
 
 
-def _decoded(container: "InputContainer", stream: Any, path: Path) -> Iterator[Any]:
+def _decode_frames(container: "InputContainer", stream: Any, path: Path) -> Iterator[Any]:
     """Frames of one stream; the end of all streams tells whether the file is whole."""
     n_frames, end = 0, 0.0
     for packet in container.demux():
@@ -224,7 +224,7 @@ def _decoded(container: "InputContainer", stream: Any, path: Path) -> Iterator[A
         raise DataError(f"{path} is truncated: it ends at {end:.2f} s of {stated:.2f} s; copy it again")
 
 
-def _mono(frame: "AudioFrame") -> NDArray[np.float32]:
+def _mix_to_mono(frame: "AudioFrame") -> NDArray[np.float32]:
     samples: NDArray[Any] = frame.to_ndarray()
     channels = frame.layout.nb_channels
     if not frame.format.is_planar:
@@ -237,7 +237,7 @@ def _mono(frame: "AudioFrame") -> NDArray[np.float32]:
     return mean.astype(np.float32)
 
 
-def _placed(samples: NDArray[np.float32], offset: int) -> NDArray[np.float32]:
+def _shift_samples(samples: NDArray[np.float32], offset: int) -> NDArray[np.float32]:
     """Samples on a clock on which they begin `offset` samples after 0."""
     if offset >= 0:
         return np.concatenate([np.zeros(offset, np.float32), samples])

@@ -40,7 +40,7 @@ CAMERA_DISTANCE_MM = 1000.0  # supposed, to turn a change of size into a movemen
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Posed:
+class PoseFreeLandmarks:
     """Landmarks without head pose, and the pose.
 
     Parameters
@@ -55,10 +55,10 @@ class Posed:
 
     landmarks: NDArray[np.float32]
     rotations: NDArray[np.float64]
-    shifts: NDArray[np.float64]
+    translations: NDArray[np.float64]
 
 
-def remove_pose(points: NDArray[np.floating], fps: float) -> Posed:
+def remove_pose(points: NDArray[np.floating], fps: float) -> PoseFreeLandmarks:
     """Landmarks without head pose.
 
     Parameters
@@ -87,15 +87,19 @@ def remove_pose(points: NDArray[np.floating], fps: float) -> Posed:
         raise DataError("no frame shows a face; check that the camera sees it")
     indices, canonical, weights = rigid_points()
     seen = points[present].astype(np.float64) * (1.0, -1.0, -1.0)
-    turns, scales = similarity(seen[:, indices], canonical, weights)
-    scales = _steady(scales, present, fps)
+    turns, scales = similarity_transforms(seen[:, indices], canonical, weights)
+    scales = _smooth_scales(scales, present, fps)
     centres = np.einsum("n,tni->ti", weights, seen[:, indices])
     anchor = weights @ canonical
     local = np.einsum("tij,tnj->tni", turns, seen - centres[:, None]) * scales[:, None, None] + anchor
     rotations = np.swapaxes(turns, 1, 2)
     shifts = centres * scales[:, None] + rotations @ (np.array(PIVOT) - anchor)
     shifts[:, 2] = CAMERA_DISTANCE_MM * (1.0 - scales / np.median(scales))
-    return Posed(_spread(local, present).astype(np.float32), _spread(rotations, present), _spread(shifts, present))
+    return PoseFreeLandmarks(
+        _scatter_rows(local, present).astype(np.float32),
+        _scatter_rows(rotations, present),
+        _scatter_rows(shifts, present),
+    )
 
 
 def rigid_points() -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
@@ -106,7 +110,7 @@ def rigid_points() -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.f
     return np.array(indices), np.array(places), np.array(weights) / sum(weights)
 
 
-def similarity(
+def similarity_transforms(
     source: NDArray[np.float64], target: NDArray[np.float64], weights: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(T, 3, 3) rotations and (T,) scales that bring (T, N, 3) points nearest to (N, 3) ones, weights (N,) of sum 1.
@@ -132,7 +136,7 @@ def head_angles(rotations: NDArray[np.floating]) -> NDArray[np.float64]:
     return np.column_stack([pitch, yaw, roll])
 
 
-def _steady(scales: NDArray[np.float64], present: NDArray[np.bool_], fps: float) -> NDArray[np.float64]:
+def _smooth_scales(scales: NDArray[np.float64], present: NDArray[np.bool_], fps: float) -> NDArray[np.float64]:
     """Scales of the frames with a face, smoothed over all frames."""
     from scipy.ndimage import gaussian_filter1d
 
@@ -142,7 +146,7 @@ def _steady(scales: NDArray[np.float64], present: NDArray[np.bool_], fps: float)
     return np.exp(smooth[frames])
 
 
-def _spread(values: NDArray[np.float64], present: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _scatter_rows(values: NDArray[np.float64], present: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Rows of the frames with a face put in their places, NaN in the others."""
     rows = np.full((len(present), *values.shape[1:]), np.nan)
     rows[present] = values

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.prefetch import Prefetch
-from tts2face.video.media import Picture
-from tts2face.video.track import CROP_SMOOTHING_S, LEAST_SCORE, Crop, FaceTracker, moved, smoothed_crops
+from tts2face.video.media import TimedFrame
+from tts2face.video.track import CROP_SMOOTHING_S, LEAST_SCORE, Crop, FaceTracker, jittered_crops, smooth_crops
 
 MOST_PIXELS = 1280  # along the longer side; a face in a larger picture is larger than the networks' input anyway
 REACH = 4.0  # standard deviations over which squares are smoothed
@@ -22,7 +22,7 @@ ROOM = 4  # pictures that are decoded and followed ahead
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sight:
+class TrackedFrame:
     """What one picture shows, at `time` seconds.
 
     Parameters
@@ -45,17 +45,17 @@ class Sight:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Followed:
+class _CroppedFrame:
     """A picture of at most `MOST_PIXELS`, `scale` of the one it was made from, and the face's square in it."""
 
-    picture: Picture
+    picture: TimedFrame
     scale: float
     n_faces: int | None
     change: float
     crop: Crop | None = None
 
 
-class FilmReader:
+class StreamingTracker:
     """Reads the landmarks of films; needs two sets of networks, for following and reading go side by side.
 
     Raises
@@ -67,12 +67,12 @@ class FilmReader:
     def __init__(self, model: Path | None = None) -> None:
         self._follower, self._reader = FaceTracker(model), FaceTracker(model)
 
-    def sights(self, pictures: Iterable[Picture], fps: float) -> Iterator[Sight]:
+    def track(self, pictures: Iterable[TimedFrame], fps: float) -> Iterator[TrackedFrame]:
         """What each picture shows in turn, some 0.6 s behind, in memory that does not grow."""
         reach = int(REACH * CROP_SMOOTHING_S * fps + 0.5)
-        window: deque[_Followed] = deque()
+        window: deque[_CroppedFrame] = deque()
         at = 0  # place in the window of the picture to read next
-        with Prefetch(self._followed(pictures, fps), ROOM) as followed:
+        with Prefetch(self._crop_frames(pictures, fps), ROOM) as followed:
             for found in followed:
                 window.append(found)
                 if len(window) > at + reach:
@@ -85,43 +85,43 @@ class FilmReader:
                 yield self._read(window, at, fps)
                 at += 1
 
-    def _followed(self, pictures: Iterable[Picture], fps: float) -> Iterator[_Followed]:
-        waiting: deque[_Followed] = deque()
+    def _crop_frames(self, pictures: Iterable[TimedFrame], fps: float) -> Iterator[_CroppedFrame]:
+        waiting: deque[_CroppedFrame] = deque()
 
         def shrunk() -> Iterator[NDArray[np.uint8]]:
-            for found in self._glanced(pictures, max(1, round(LOOK_S * fps))):
+            for found in self._inspect_frames(pictures, max(1, round(LOOK_S * fps))):
                 waiting.append(found)
                 yield found.picture.pixels
 
         for _, crop in self._follower.follow(shrunk()):
             yield replace(waiting.popleft(), crop=crop)
 
-    def _glanced(self, pictures: Iterable[Picture], every: int) -> Iterator[_Followed]:
+    def _inspect_frames(self, pictures: Iterable[TimedFrame], every: int) -> Iterator[_CroppedFrame]:
         before = None
         for number, picture in enumerate(pictures):
-            small, scale = _shrunk(picture.pixels)
+            small, scale = _shrink(picture.pixels)
             n_faces = self._follower.count(small) if number % every == 0 else None
             grey = small[::CHANGE_STEP, ::CHANGE_STEP, 1].astype(np.int16)
             change = (
                 float(np.abs(grey - before).mean()) if before is not None and before.shape == grey.shape else np.inf
             )
             before = grey
-            yield _Followed(Picture(picture.time, small), scale, n_faces, change)
+            yield _CroppedFrame(TimedFrame(picture.time, small), scale, n_faces, change)
 
-    def _read(self, window: "deque[_Followed]", at: int, fps: float) -> Sight:
+    def _read(self, window: "deque[_CroppedFrame]", at: int, fps: float) -> TrackedFrame:
         here = window[at]
-        crop = smoothed_crops([found.crop for found in window], fps)[at]
+        crop = smooth_crops([found.crop for found in window], fps)[at]
         points, score = np.full((N_LANDMARKS, 3), np.nan, np.float32), 0.0
         if crop is not None:
-            readings = [self._reader.read_crop(here.picture.pixels, near) for near in moved(crop)]
+            readings = [self._reader.read_crop(here.picture.pixels, near) for near in jittered_crops(crop)]
             score = float(np.mean([score for _, score in readings]))
             if score >= LEAST_SCORE:
                 points = np.mean([points for points, _ in readings], axis=0, dtype=np.float32)
-                points = _enlarged(points, here.scale)
-        return Sight(here.picture.time, points, score, here.n_faces, here.change)
+                points = _enlarge(points, here.scale)
+        return TrackedFrame(here.picture.time, points, score, here.n_faces, here.change)
 
 
-def _shrunk(pixels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float]:
+def _shrink(pixels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float]:
     """A picture of at most `MOST_PIXELS` along its longer side, and its size over that of the picture given."""
     height, width = pixels.shape[:2]
     if max(height, width) <= MOST_PIXELS:
@@ -134,7 +134,7 @@ def _shrunk(pixels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float]:
     return small.astype(np.uint8, copy=False), scale
 
 
-def _enlarged(points: NDArray[np.float32], scale: float) -> NDArray[np.float32]:
+def _enlarge(points: NDArray[np.float32], scale: float) -> NDArray[np.float32]:
     """Points of a shrunk picture in the picture that it was made from; pixel centres lie at whole numbers."""
     if scale == 1.0:
         return points

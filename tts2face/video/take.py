@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from tts2face.types import HEAD_CHANNELS, Trajectory
 from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
-from tts2face.video.frame_grid import on_grid
-from tts2face.video.media import media_facts, read_pictures
+from tts2face.video.frame_grid import resample_to_grid
+from tts2face.video.media import read_frames, read_media_info
 from tts2face.video.pose import head_angles, remove_pose
-from tts2face.video.streaming_tracker import FilmReader, Sight
+from tts2face.video.streaming_tracker import StreamingTracker, TrackedFrame
 
 MOST_LOOKS_WITH_TWO = 1  # a picture on the wall may be taken for a face once
 LEAST_SEEN = 0.5  # of the frames must show a face
@@ -41,7 +41,7 @@ class Take:
     landmarks: NDArray[np.float32]
     head: Trajectory
     scores: Trajectory
-    n_guessed: int
+    n_interpolated: int
 
     @property
     def fps(self) -> float:
@@ -49,7 +49,9 @@ class Take:
         return self.head.fps
 
 
-def read_take(video: Path, film: FilmReader, reader: BlendshapeReader, *, on_progress: Progress | None = None) -> Take:
+def read_take(
+    video: Path, film: StreamingTracker, reader: BlendshapeReader, *, on_progress: Progress | None = None
+) -> Take:
     """The take in a video.
 
     Parameters
@@ -64,11 +66,11 @@ def read_take(video: Path, film: FilmReader, reader: BlendshapeReader, *, on_pro
     DataError
         It cannot be read as video, or shows no face, several faces, or one in profile.
     """
-    facts = media_facts(video)
+    facts = read_media_info(video)
     fps, of = facts.fps, max(1, round(facts.duration * facts.fps))
-    found: list[Sight] = []
+    found: list[TrackedFrame] = []
     n_crowded = 0
-    for sight in film.sights(read_pictures(video), fps):
+    for sight in film.track(read_frames(video), fps):
         found.append(sight)
         n_crowded += sight.n_faces is not None and sight.n_faces > 1
         if n_crowded > MOST_LOOKS_WITH_TWO:
@@ -82,20 +84,20 @@ def read_take(video: Path, film: FilmReader, reader: BlendshapeReader, *, on_pro
     if seen.mean() < LEAST_SEEN:
         raise DataError(f"{video} shows a face in {seen.sum()} of {len(seen)} frames; film it from the front")
     scores = np.array([reader.blendshape_scores(points) for points in pixels[seen]])
-    points, first = on_grid(_bridged(pixels[seen], times[seen], times), times, fps)
-    read, _ = on_grid(_bridged(scores, times[seen], times), times, fps)
-    points, read = _from_the_start(points, first), _from_the_start(read, first)
+    points, first = resample_to_grid(_interpolate_frames(pixels[seen], times[seen], times), times, fps)
+    read, _ = resample_to_grid(_interpolate_frames(scores, times[seen], times), times, fps)
+    points, read = _align_to_start(points, first), _align_to_start(read, first)
     posed = remove_pose(points, fps)
     angles = head_angles(posed.rotations)
     if abs(float(np.median(angles[:, 1]))) > PROFILE_RAD:
         raise DataError(f"{video} shows the face in profile; film it from the front")
-    head = np.column_stack([angles, posed.shifts])
+    head = np.column_stack([angles, posed.translations])
     head -= np.median(head, axis=0)
     n_guessed = int((~seen).sum())
     return Take(posed.landmarks, Trajectory(HEAD_CHANNELS, head, fps), Trajectory(BLENDSHAPES, read, fps), n_guessed)
 
 
-def _bridged(
+def _interpolate_frames(
     values: NDArray[np.float32], known: NDArray[np.float64], times: NDArray[np.float64]
 ) -> NDArray[np.float32]:
     """Values at `times` from those at `known` times: straight lines between, held at the ends."""
@@ -107,7 +109,7 @@ def _bridged(
     return np.asarray(values[after - 1] * (1 - share) + values[after] * share, np.float32)
 
 
-def _from_the_start(values: NDArray[np.float32], first: int) -> NDArray[np.float32]:
+def _align_to_start(values: NDArray[np.float32], first: int) -> NDArray[np.float32]:
     """Rows on the video's clock: those before its first picture repeat it, those before 0 are left out."""
     if first >= 0:
         return np.concatenate([np.repeat(values[:1], first, axis=0), values])

@@ -110,9 +110,9 @@ class FaceTracker:
             raise DataError("there is no picture to track a face in; check the recording")
         points = np.full((len(followed), N_LANDMARKS, 3), np.nan, np.float32)
         scores = np.zeros(len(followed), np.float32)
-        for at, (pixels, crop) in enumerate(zip(pictures(), smoothed_crops(followed, fps), strict=False)):
+        for at, (pixels, crop) in enumerate(zip(pictures(), smooth_crops(followed, fps), strict=False)):
             if crop is not None:
-                readings = [self.read_crop(pixels, near) for near in moved(crop)]
+                readings = [self.read_crop(pixels, near) for near in jittered_crops(crop)]
                 scores[at] = np.mean([score for _, score in readings])
                 if scores[at] >= LEAST_SCORE:
                     points[at] = np.mean([found for found, _ in readings], axis=0)
@@ -122,7 +122,7 @@ class FaceTracker:
         """(478, 3) landmarks of one picture and their score; NaN and 0 where there is no face."""
         return next((found, score) for (found, score), _ in self.follow([pixels]))
 
-    def detect(self, pixels: NDArray[np.uint8]) -> Crop | None:
+    def detect_face(self, pixels: NDArray[np.uint8]) -> Crop | None:
         """Square around the most prominent face, or None."""
         boxes, scores, shift, scale = self._detections(pixels)
         best = int(scores.argmax())
@@ -196,7 +196,7 @@ class FaceTracker:
             yield (points, score), crop
 
     def _found(self, pixels: NDArray[np.uint8]) -> Crop | None:
-        coarse = self.detect(pixels)
+        coarse = self.detect_face(pixels)
         return crop_around(self.read_crop(pixels, coarse)[0]) if coarse else None
 
 
@@ -211,7 +211,7 @@ def crop_around(points: NDArray[np.floating]) -> Crop:
     return Crop(float(centre[0]), float(centre[1]), CROP_SCALE * float((high - low).max()), angle)
 
 
-def smoothed_crops(crops: Sequence[Crop | None], fps: float) -> list[Crop | None]:
+def smooth_crops(crops: Sequence[Crop | None], fps: float) -> list[Crop | None]:
     """Squares smoothed over time without lag, each run of pictures with a face by itself."""
     from scipy.ndimage import gaussian_filter1d
 
@@ -226,7 +226,7 @@ def smoothed_crops(crops: Sequence[Crop | None], fps: float) -> list[Crop | None
     return smooth
 
 
-def moved(crop: Crop) -> Iterator[Crop]:
+def jittered_crops(crop: Crop) -> Iterator[Crop]:
     """The two squares, a little either side of a crop, from which a picture is read."""
     for sign in (1.0, -1.0):
         step = sign * CROP_STEP * crop.side

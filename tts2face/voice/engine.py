@@ -94,7 +94,7 @@ def load_voice(name: str | None, language: str, own_words: Pronouncing | None = 
     raise InputError(f"there is no voice {chosen!r}; give {', '.join(NAMES)}, or the path of a Piper voice (.onnx)")
 
 
-def at_volume(samples: NDArray[np.floating], volume: float) -> NDArray[np.float32]:
+def apply_volume(samples: NDArray[np.floating], volume: float) -> NDArray[np.float32]:
     """Samples times a factor, turned down as a whole where they would exceed full scale."""
     louder = np.asarray(samples, np.float32) * np.float32(volume)
     peak = float(np.abs(louder).max(initial=0.0))

@@ -16,16 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, InputError
-from lexicon.g2p import segments_of
+from lexicon.g2p import parse_espeak_word
 from lexicon.ipa import Segment
 from lexicon.japanese import has_kanji, with_kana
 from lexicon.languages import language_code
 from lexicon.phones import PHONES, nearest_phones
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from lexicon.writing_systems import check_script
-from tts2face.speech.forced_alignment import increasing
+from tts2face.speech.forced_alignment import enforce_increasing
 from tts2face.types import Speech, Waveform
-from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, at_volume
+from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, apply_volume
 
 CHILD = Path(__file__).with_name("espeak_child.py")
 WORD_EVENT, PHONEME_EVENT = 1, 7
@@ -50,7 +50,7 @@ STRESS_MARKS = MappingProxyType({1: "'", 2: ","})
 
 
 @dataclass(frozen=True, slots=True)
-class _Sounded:
+class _PhonemeEvent:
     """What one phoneme event says: phones, where they begin, and the word they belong to."""
 
     phones: tuple[str, ...]
@@ -74,18 +74,18 @@ class EspeakVoice:
     def speak(self, spoken: Spoken, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
         """Speech of a sentence; see `tts2face.voice.engine.Voice`. Nothing is random: `seed` changes nothing."""
         text, words = self._written(spoken)
-        header, samples = _ask({
+        header, samples = _run_child({
             "text": text, "language": self._language, "gender": self._gender, "has_phonemes": bool(words),
             "words_per_minute": round(USUAL_WORDS_PER_MINUTE * rate), "parent": os.getpid(),
         })  # fmt: skip
         sound = np.pad(samples / np.float32(32768), round(QUIET_S * self._rate)).astype(np.float32)
-        sounded, names = self._sounded(header, text, sound)
+        sounded, names = self._phoneme_events(header, text, sound)
         if words:
             sounded = _by_written_words(sounded, header, text)
         if not any(phone != SILENCE for event in sounded for phone in event.phones):
             raise InputError(f"there is nothing to say in {text[:40]!r}; give at least one word")
-        phones, spans = _sequence(sounded, words or names, len(sound) / self._rate)
-        return Speech(Waveform(at_volume(sound, volume), self._rate), phones, spans)
+        phones, spans = _phone_sequence(sounded, words or names, len(sound) / self._rate)
+        return Speech(Waveform(apply_volume(sound, volume), self._rate), phones, spans)
 
     def _written(self, spoken: Spoken) -> tuple[str, list[str]]:
         """Text for espeak-ng; and the words, where they are given as phones."""
@@ -98,7 +98,7 @@ class EspeakVoice:
                 return plain, []
             spoken = [SpokenWord(word, ()) for word in plain.split()]
         words = [word if word.segments else self._read(word) for word in spoken]
-        return " ".join(_mnemonic(word) for word in words), [word.text for word in words]
+        return " ".join(_word_mnemonic(word) for word in words), [word.text for word in words]
 
     def _own(self, word: str) -> tuple[Segment, ...] | None:
         return self._own_words.get(word.strip(".,;:!?\"'()").lower())
@@ -109,33 +109,33 @@ class EspeakVoice:
         text = "".join(_without_brackets(word.text).split())
         return SpokenWord(text, self._own(text) or (), word.after)
 
-    def _sounded(
+    def _phoneme_events(
         self, header: dict[str, Any], text: str, sound: NDArray[np.float32]
-    ) -> tuple[list[_Sounded], list[str]]:
-        found: list[_Sounded] = []
+    ) -> tuple[list[_PhonemeEvent], list[str]]:
+        found: list[_PhonemeEvent] = []
         names: list[str] = []
         for kind, sample, value in header["events"]:
             if kind == WORD_EVENT:
                 names.append(text[value[0] : value[0] + value[1]])
                 continue
             written = SWITCH.sub("", value)
-            phones = tuple(segment.phone for segment in segments_of(written, self._language)) if written else ()
+            phones = tuple(segment.phone for segment in parse_espeak_word(written, self._language)) if written else ()
             at = sample + round(QUIET_S * self._rate)
             start = at / self._rate
             if phones and PHONES[phones[0]].kind in {"stop", "affricate"}:
                 start = _closure_start(sound, at, self._rate)
-            found.append(_Sounded(phones or (SILENCE,), start, len(names) - 1))
-        return _true_silences(found, sound, self._rate), names
+            found.append(_PhonemeEvent(phones or (SILENCE,), start, len(names) - 1))
+        return _drop_false_silences(found, sound, self._rate), names
 
 
-def _by_written_words(found: Sequence[_Sounded], header: Mapping[str, Any], text: str) -> list[_Sounded]:
+def _by_written_words(found: Sequence[_PhonemeEvent], header: Mapping[str, Any], text: str) -> list[_PhonemeEvent]:
     """Events with the words between spaces in place of espeak-ng's own, which splits and joins words."""
     starts = [0, *(match.end() for match in re.finditer(" ", text))]
     owners = [bisect_right(starts, value[0]) - 1 for kind, _, value in header["events"] if kind == WORD_EVENT]
     return [replace(event, word=owners[event.word] if event.word >= 0 else -1) for event in found]
 
 
-def _true_silences(found: Sequence[_Sounded], sound: NDArray[np.float32], rate: int) -> list[_Sounded]:
+def _drop_false_silences(found: Sequence[_PhonemeEvent], sound: NDArray[np.float32], rate: int) -> list[_PhonemeEvent]:
     """Events less those that name no phone though something sounds (a mark of the phone before, such as ʲ)."""
     ends = [event.start for event in found[1:]] + [len(sound) / rate]
     return [
@@ -150,18 +150,18 @@ def _without_brackets(text: str) -> str:
     return text.replace("[[", " ").replace("]]", " ")
 
 
-def _mnemonic(word: SpokenWord) -> str:
+def _word_mnemonic(word: SpokenWord) -> str:
     if not word.segments:
         return word.text + word.after
-    return f"[[{''.join(_mnemonics(segment) for segment in word.segments)}]]{word.after}"
+    return f"[[{''.join(_segment_mnemonic(segment) for segment in word.segments)}]]{word.after}"
 
 
-def _mnemonics(segment: Segment) -> str:
+def _segment_mnemonic(segment: Segment) -> str:
     phones = nearest_phones(segment.phone, MNEMONICS.keys())
     return STRESS_MARKS.get(segment.stress, "") + "".join(MNEMONICS[phone] for phone in phones)
 
 
-def _ask(request: Mapping[str, Any]) -> tuple[dict[str, Any], NDArray[np.int16]]:
+def _run_child(request: Mapping[str, Any]) -> tuple[dict[str, Any], NDArray[np.int16]]:
     try:
         answer = subprocess.run(
             [sys.executable, "-I", str(CHILD)],
@@ -197,8 +197,8 @@ def _closure_start(sound: NDArray[np.float32], burst: int, rate: int) -> float:
     return at / rate
 
 
-def _sequence(
-    sounded: Sequence[_Sounded], words: Sequence[str], duration: float
+def _phone_sequence(
+    sounded: Sequence[_PhonemeEvent], words: Sequence[str], duration: float
 ) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
     """Events to phones without gap; an event of several phones is shared equally among them."""
     ends = [event.start for event in sounded[1:]] + [duration]
@@ -221,4 +221,4 @@ def _sequence(
     for word in sorted(set(owners) - {-1}):
         mine = [at for at, owner in enumerate(owners) if owner == word]
         spans.append(WordSpan(words[min(word, len(words) - 1)], mine[0], mine[-1] + 1))
-    return PhoneSequence(labels, increasing(edges)), tuple(spans)
+    return PhoneSequence(labels, enforce_increasing(edges)), tuple(spans)

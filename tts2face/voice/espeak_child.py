@@ -57,7 +57,7 @@ class _Voice(ctypes.Structure):
     )
 
 
-def _library() -> tuple[Any, int]:
+def _start_library() -> tuple[Any, int]:
     """espeak-ng ready to speak, and its sample rate."""
     import espeakng_loader
 
@@ -71,7 +71,7 @@ def _library() -> tuple[Any, int]:
     return library, library.espeak_Initialize(SYNCHRONOUS, USUAL_BUFFER_MS, data, options)
 
 
-def _event(event: _Event) -> tuple[int, int, Any] | None:
+def _decode_event(event: _Event) -> tuple[int, int, Any] | None:
     if event.type == PHONEME_EVENT:
         return PHONEME_EVENT, event.sample, bytes(event.name.string).split(b"\0")[0].decode("utf-8", "replace")
     if event.type == WORD_EVENT:
@@ -81,7 +81,7 @@ def _event(event: _Event) -> tuple[int, int, Any] | None:
 
 def speak(request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
     """Header and samples for a request: text, language, gender, words_per_minute; has_phonemes: [[...]] holds some."""
-    library, rate = _library()
+    library, rate = _start_library()
     chunks: list[bytes] = []
     events: list[tuple[int, int, Any]] = []
 
@@ -90,7 +90,7 @@ def speak(request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
             chunks.append(ctypes.string_at(samples, 2 * count))
         at = 0
         while found[at].type != 0:
-            event = _event(found[at])
+            event = _decode_event(found[at])
             if event:
                 events.append(event)
             at += 1

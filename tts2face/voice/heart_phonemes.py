@@ -26,7 +26,7 @@ VOWELS = frozenset(phone for letter, phone in PHONE_OF_LETTER.items() if letter 
 STRESS_MARKS = MappingProxyType({1: "ˈ", 2: "ˌ"})
 
 
-def phones_of(letters: str) -> tuple[tuple[str, ...], tuple[int, ...]]:
+def letters_to_phones(letters: str) -> tuple[tuple[str, ...], tuple[int, ...]]:
     """Phones that a word's letters spell, and for each the position of its first letter.
 
     əɹ is one phone (ɚ) unless a vowel follows, ɜɹ always (ɝ). Stress marks and length signs spell nothing.
@@ -45,7 +45,7 @@ def phones_of(letters: str) -> tuple[tuple[str, ...], tuple[int, ...]]:
     return tuple(phones), tuple(places)
 
 
-def letters_of(segments: Sequence[Segment]) -> str:
+def segments_to_letters(segments: Sequence[Segment]) -> str:
     """The letters that make the voice say these phones; a phone it lacks is said as the nearest one.
 
     Raises

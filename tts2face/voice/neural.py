@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError, InputError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tts2face.speech.forced_alignment import Aligner, increasing
+from tts2face.speech.forced_alignment import Aligner, enforce_increasing
 from tts2face.telemetry import disable_telemetry
-from tts2face.types import Speech, Waveform, joined_speech
-from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, at_volume
-from tts2face.voice.heart_phonemes import letters_of, phones_of
+from tts2face.types import Speech, Waveform, concatenate_speech
+from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, apply_volume
+from tts2face.voice.heart_phonemes import letters_to_phones, segments_to_letters
 
 MOST_LETTERS = 400  # the model hears at most this many letters at once
 UNIT_S = 0.025  # length of one step of the model's durations
@@ -39,7 +39,7 @@ class NeuralVoice:
     """The voice ``heart``: American English, 24 kHz. One thread at a time."""
 
     def __init__(self, own_words: Pronouncing) -> None:
-        self._own_words = {word: letters_of(segments) for word, segments in own_words.items()}
+        self._own_words = {word: segments_to_letters(segments) for word, segments in own_words.items()}
         disable_telemetry()
         try:
             from hibari import Hibari
@@ -57,20 +57,20 @@ class NeuralVoice:
     def speak(self, spoken: Spoken, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
         """Speech of a sentence; see `tts2face.voice.engine.Voice`."""
         parts = list(self._parts(spoken))
-        if not any(phones_of(token.letters)[0] for part in parts for token in part):
+        if not any(letters_to_phones(token.letters)[0] for part in parts for token in part):
             raise InputError("there is nothing to say in the text; give at least one word")
-        return joined_speech([self._said(part, rate, volume, seed) for part in parts])
+        return concatenate_speech([self._speak_tokens(part, rate, volume, seed) for part in parts])
 
     def _parts(self, spoken: Spoken) -> Iterator[list[_Token]]:
         if isinstance(spoken, str):
             split = self._model.split_sentences(spoken)
-            sentences = [self._tokens(self._with_own_words(sentence)) for sentence in split]
+            sentences = [self._tokens(self._insert_own_words(sentence)) for sentence in split]
         elif all(word.segments for word in spoken):
-            sentences = [[_given(word) for word in spoken]]
+            sentences = [[_token_from_word(word) for word in spoken]]
         else:
             sentences = [self._tokens(" ".join(self._in_text(word) for word in spoken))]
         for sentence in sentences:
-            for part in _cut(sentence):
+            for part in _cut_tokens(sentence):
                 if any(token.letters.strip() for token in part):
                     yield part
 
@@ -80,12 +80,14 @@ class NeuralVoice:
         reader = self._model.g2p
         read = reader.phonemize_tokens(reader.tokenize(normalize(sentence)))
         tokens = [_Token(token.text, self._known(token.phonemes), bool(token.whitespace)) for token in read]
-        unsaid = [token.text for token in tokens if SAYABLE.search(token.text) and not phones_of(token.letters)[0]]
+        unsaid = [
+            token.text for token in tokens if SAYABLE.search(token.text) and not letters_to_phones(token.letters)[0]
+        ]
         if unsaid:
             raise InputError(f"the voice heart cannot say {unsaid[0]!r}; write it in English words, or choose a voice")
         return tokens
 
-    def _with_own_words(self, sentence: str) -> str:
+    def _insert_own_words(self, sentence: str) -> str:
         """The sentence with a user's words as ``[word](/letters/)``, which the reader takes as they are."""
 
         def marked(match: "re.Match[str]") -> str:
@@ -98,29 +100,29 @@ class NeuralVoice:
     def _in_text(self, word: SpokenWord) -> str:
         """A word as the reader takes it: with its phones where they are given."""
         if not word.segments:
-            return self._with_own_words(word.text) + word.after
+            return self._insert_own_words(word.text) + word.after
         shown = NO_LETTER.sub("", word.text) or "word"
-        return f"[{shown}](/{letters_of(word.segments)}/){word.after}"
+        return f"[{shown}](/{segments_to_letters(word.segments)}/){word.after}"
 
     def _known(self, letters: str | None) -> str:
         return "".join(letter for letter in letters or "" if letter in self._model.vocab)
 
-    def _said(self, tokens: Sequence[_Token], rate: float, volume: float, seed: int) -> Speech:
+    def _speak_tokens(self, tokens: Sequence[_Token], rate: float, volume: float, seed: int) -> Speech:
         letters = "".join(token.letters + " " * token.has_space for token in tokens).strip()
         samples = self._model.from_phonemes(letters, speed=rate, seed=seed)
-        sound = Waveform(at_volume(samples, 1.0), self.sample_rate)
+        sound = Waveform(apply_volume(samples, 1.0), self.sample_rate)
         try:
             phones, spans = self._aligned(tokens, sound)
         except DataError:
-            phones, spans = self._predicted(tokens, letters, rate, sound)
-        return Speech(Waveform(at_volume(samples, volume), self.sample_rate), phones, spans)
+            phones, spans = self._predict_phones(tokens, letters, rate, sound)
+        return Speech(Waveform(apply_volume(samples, volume), self.sample_rate), phones, spans)
 
     def _aligned(self, tokens: Sequence[_Token], sound: Waveform) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
         words = [(str(owner), [phones]) for owner, phones, _ in _spoken_words(tokens)]
         found = self._aligner.align(sound, words)
         return found.phones, _token_spans(found.words, tokens)
 
-    def _predicted(
+    def _predict_phones(
         self, tokens: Sequence[_Token], letters: str, rate: float, sound: Waveform
     ) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
         """Phones where the model meant to put them, less its lateness: for sound that cannot be aligned."""
@@ -132,7 +134,7 @@ class NeuralVoice:
             starts += [float(begins[place]) - LATE_S for place in places]
         labels.append(SILENCE)
         starts.append(min(float(begins[len(letters)]) - LATE_S, sound.duration))
-        edges = increasing(np.array([*starts, sound.duration]))
+        edges = enforce_increasing(np.array([*starts, sound.duration]))
         return PhoneSequence(labels, edges), _token_spans(spans, tokens)
 
     def _durations(self, letters: str, rate: float) -> NDArray[np.float64]:
@@ -140,7 +142,7 @@ class NeuralVoice:
         disable_telemetry()
         import onnxruntime
 
-        graph = with_output(Path(self._model.model_path).read_bytes(), DURATIONS)
+        graph = add_graph_output(Path(self._model.model_path).read_bytes(), DURATIONS)
         session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
         given = {
             "ids": np.array([self._model.ids(letters)], np.int64),
@@ -161,11 +163,11 @@ def _session_without_arena(path: str) -> Any:
     return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
 
 
-def _given(word: SpokenWord) -> _Token:
-    return _Token(word.text, letters_of(word.segments) + word.after, True)
+def _token_from_word(word: SpokenWord) -> _Token:
+    return _Token(word.text, segments_to_letters(word.segments) + word.after, True)
 
 
-def _cut(tokens: Sequence[_Token]) -> Iterator[list[_Token]]:
+def _cut_tokens(tokens: Sequence[_Token]) -> Iterator[list[_Token]]:
     """Stretches of at most `MOST_LETTERS` letters, cut behind a clause mark where there is one."""
     part: list[_Token] = []
     length = 0
@@ -190,7 +192,7 @@ def _spoken_words(tokens: Sequence[_Token]) -> Iterator[tuple[int, tuple[str, ..
     at = 0
     for number, token in enumerate(tokens):
         for word in re.finditer(r"\S+", token.letters):
-            phones, places = phones_of(word[0])
+            phones, places = letters_to_phones(word[0])
             if phones:
                 yield number, phones, tuple(at + word.start() + place for place in places)
         at += len(token.letters) + token.has_space
@@ -205,17 +207,17 @@ def _token_spans(spans: Sequence[WordSpan], tokens: Sequence[_Token]) -> tuple[W
     return tuple(WordSpan(tokens[int(span.text)].text, span.first, span.last) for span in joined.values())
 
 
-def with_output(model: bytes, tensor: str) -> bytes:
+def add_graph_output(model: bytes, tensor: str) -> bytes:
     """An ONNX model with one more output: protocol buffers merge what is appended (ONNX IR, ``GraphProto.output``)."""
     graph_field, output_field, name_field = 7, 12, 1
-    message = _delimited(name_field, tensor.encode())
-    return model + _delimited(graph_field, _delimited(output_field, message))
+    message = _length_delimited(name_field, tensor.encode())
+    return model + _length_delimited(graph_field, _length_delimited(output_field, message))
 
 
-def _delimited(field: int, content: bytes) -> bytes:
-    return _varint(field << 3 | 2) + _varint(len(content)) + content
+def _length_delimited(field: int, content: bytes) -> bytes:
+    return _encode_varint(field << 3 | 2) + _encode_varint(len(content)) + content
 
 
-def _varint(number: int) -> bytes:
+def _encode_varint(number: int) -> bytes:
     low, rest = number & 0x7F, number >> 7
-    return bytes([low | 0x80]) + _varint(rest) if rest else bytes([low])
+    return bytes([low | 0x80]) + _encode_varint(rest) if rest else bytes([low])

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError, InputError
-from lexicon.g2p import phonemize, segments_of
+from lexicon.g2p import parse_espeak_word, phonemize
 from lexicon.inputs import read_json
 from lexicon.writing_systems import check_script
 from tts2face.speech.forced_alignment import Aligner
 from tts2face.telemetry import disable_telemetry
 from tts2face.types import Speech, Waveform
-from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, at_volume
+from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, apply_volume
 
 WORD = re.compile(r"[^\W_]+(?:['’-][^\W_]+)*")
 STRESS_MARKS = MappingProxyType({1: "ˈ", 2: "ˌ"})
@@ -56,11 +56,11 @@ class PiperVoice:
         words = self._words(spoken)
         if not words:
             raise InputError("there is nothing to say in the text; give at least one word")
-        text = self._marked(spoken) if isinstance(spoken, str) else " ".join(_in_brackets(word) for word in words)
-        sound = Waveform(at_volume(self._sound(text, rate), 1.0), self.sample_rate)
+        text = self._marked(spoken) if isinstance(spoken, str) else " ".join(_bracketed_ipa(word) for word in words)
+        sound = Waveform(apply_volume(self._sound(text, rate), 1.0), self.sample_rate)
         ways = [(word.text, [tuple(segment.phone for segment in word.segments)]) for word in words]
         found = self._aligner.align(sound, ways)
-        return Speech(Waveform(at_volume(sound.samples, volume), self.sample_rate), found.phones, found.words)
+        return Speech(Waveform(apply_volume(sound.samples, volume), self.sample_rate), found.phones, found.words)
 
     def _words(self, spoken: Spoken) -> list[SpokenWord]:
         if not isinstance(spoken, str):
@@ -70,7 +70,7 @@ class PiperVoice:
         own = {word: self._own_words.get(word.lower()) for word in written}
         words = []
         for text, spoken_parts in zip(written, phonemize(written, self._language), strict=True):
-            read = [segment for part in spoken_parts for segment in segments_of(part, self._language)]
+            read = [segment for part in spoken_parts for segment in parse_espeak_word(part, self._language)]
             words.append(SpokenWord(text, own[text] or tuple(read)))
         return [word for word in words if word.segments]
 
@@ -85,7 +85,7 @@ class PiperVoice:
 
         def marked(match: "re.Match[str]") -> str:
             segments = self._own_words.get(match[0].lower())
-            return match[0] if segments is None else _in_brackets(SpokenWord(match[0], segments))
+            return match[0] if segments is None else _bracketed_ipa(SpokenWord(match[0], segments))
 
         return WORD.sub(marked, text)
 
@@ -97,6 +97,6 @@ class PiperVoice:
         return np.concatenate([np.zeros(0), *chunks]).astype(np.float32)
 
 
-def _in_brackets(word: SpokenWord) -> str:
+def _bracketed_ipa(word: SpokenWord) -> str:
     phones = "".join(STRESS_MARKS.get(segment.stress, "") + segment.phone for segment in word.segments)
     return f"[[{phones}]]{word.after}"

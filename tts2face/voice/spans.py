@@ -3,14 +3,14 @@
 from collections.abc import Callable
 
 from lexicon.errors import InputError
-from lexicon.sentences import Utterance
+from lexicon.sentences import Phrase
 from tts2face.request import Request
 from tts2face.voice.engine import ENGLISH, NAMES, Voice
 
 Voices = Callable[[str | None, str], Voice]  # a voice by name (None: the best one) and language
 
 
-def speaker_of(part: Utterance, voice: Voice, request: Request, voices: Voices | None) -> Voice:
+def speaker_of(part: Phrase, voice: Voice, request: Request, voices: Voices | None) -> Voice:
     """The request's voice; for a span the voice that it names, or one that speaks its language.
 
     Raises

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.decomposition.basis_expressions import captured_basis, carried_basis
+from corpus_tools.decomposition.basis_expressions import basis_from_stills, transfer_basis
 from corpus_tools.decomposition.face_motion import moved_landmarks, rest_landmarks
 from corpus_tools.decomposition.marker_set import MarkerSet
-from corpus_tools.decomposition.markers import marker_face
-from corpus_tools.decomposition.stills import PictureReader, Still, marker_reader, named_stills, stills_in
+from corpus_tools.decomposition.markers import read_marker_face
+from corpus_tools.decomposition.stills import PictureReader, Still, build_marker_reader, find_stills, parse_stills
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.decomposition.made_markers import SIZE, made_take, write_table
 from tts2face.models.face import Face
@@ -29,31 +29,31 @@ def random_faces() -> tuple[np.ndarray, np.ndarray]:
 def test_expressions_are_carried_by_the_map_between_faces_at_rest() -> None:
     expressions, rest = random_faces()
     affine = np.diag([0.9, 1.1, 1.2]) + 0.05
-    found = carried_basis(expressions, rest, rest @ affine + [5.0, 60.0, -3.0])
+    found = transfer_basis(expressions, rest, rest @ affine + [5.0, 60.0, -3.0])
     np.testing.assert_allclose(found.expressions, expressions @ affine, atol=1e-9)
 
 
 def test_a_face_s_own_expressions_stay() -> None:
     expressions, rest = random_faces()
-    np.testing.assert_allclose(carried_basis(expressions, rest, rest).expressions, expressions, atol=1e-9)
+    np.testing.assert_allclose(transfer_basis(expressions, rest, rest).expressions, expressions, atol=1e-9)
 
 
 def test_expressions_of_another_number_are_refused() -> None:
     expressions, rest = random_faces()
     with pytest.raises(InputError, match="478 landmarks"):
-        carried_basis(expressions[:4], rest, rest)
+        transfer_basis(expressions[:4], rest, rest)
 
 
 def stills_at(folder: Path, suffix: str = ".png") -> dict[str, Still]:
     for name in ("neutral", *EXPRESSIONS):
         (folder / f"{name}{suffix}").write_bytes(b"made")
-    return stills_in(folder)
+    return find_stills(folder)
 
 
 def test_captured_expressions_are_what_differs_from_neutral(tmp_path: Path) -> None:
     expressions, rest = random_faces()
     shown = {"neutral": rest} | {name: rest + move for name, move in zip(EXPRESSIONS, expressions, strict=True)}
-    found = captured_basis(stills_at(tmp_path), lambda still: shown[still.path.stem])
+    found = basis_from_stills(stills_at(tmp_path), lambda still: shown[still.path.stem])
     np.testing.assert_array_equal(found.rest, rest)
     np.testing.assert_allclose(found.expressions[:, :468], expressions[:, :468], atol=1e-12)
     assert not found.expressions[:, 468:].any()
@@ -64,8 +64,8 @@ def test_a_recording_s_rest_stands_for_a_neutral_still(tmp_path: Path) -> None:
     stills = stills_at(tmp_path)
     del stills["neutral"]
     with pytest.raises(InputError, match="no still for neutral"):
-        captured_basis(stills, lambda still: rest)
-    found = captured_basis(stills, lambda still: rest + expressions[EXPRESSIONS.index(still.path.stem)], rest=rest)
+        basis_from_stills(stills, lambda still: rest)
+    found = basis_from_stills(stills, lambda still: rest + expressions[EXPRESSIONS.index(still.path.stem)], rest=rest)
     np.testing.assert_allclose(found.expressions[:, :468], expressions[:, :468], atol=1e-12)
 
 
@@ -73,7 +73,7 @@ def test_a_missing_still_is_refused(tmp_path: Path) -> None:
     stills = stills_at(tmp_path)
     del stills["angry"]
     with pytest.raises(InputError, match="no still for angry; a basis takes neutral, sad"):
-        captured_basis(stills, lambda still: np.zeros((N_LANDMARKS, 3)))
+        basis_from_stills(stills, lambda still: np.zeros((N_LANDMARKS, 3)))
 
 
 def test_an_expression_like_the_face_at_rest_is_refused(tmp_path: Path) -> None:
@@ -81,7 +81,7 @@ def test_an_expression_like_the_face_at_rest_is_refused(tmp_path: Path) -> None:
     shown = {"neutral": rest} | {name: rest + move for name, move in zip(EXPRESSIONS, expressions, strict=True)}
     shown["afraid"] = rest + 0.01
     with pytest.raises(DataError, match=r"afraid\.png shows afraid as the face at rest"):
-        captured_basis(stills_at(tmp_path), lambda still: shown[still.path.stem])
+        basis_from_stills(stills_at(tmp_path), lambda still: shown[still.path.stem])
 
 
 @pytest.mark.parametrize(
@@ -103,16 +103,16 @@ def test_a_wrong_still_is_refused(
     for name in ("a.png", "a.mp4", "a.txt"):
         (tmp_path / name).write_bytes(b"made")
     with pytest.raises(InputError, match=reason):
-        named_stills(named)
+        parse_stills(named)
 
 
 def test_two_files_of_one_expression_and_a_folder_that_is_none_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="there is no folder"):
-        stills_in(tmp_path / "none")
+        find_stills(tmp_path / "none")
     stills_at(tmp_path)
     (tmp_path / "sad.jpg").write_bytes(b"made")
     with pytest.raises(InputError, match="two stills for sad"):
-        stills_in(tmp_path)
+        find_stills(tmp_path)
 
 
 def test_pictures_and_instants_are_read_by_the_tracker(
@@ -120,10 +120,10 @@ def test_pictures_and_instants_are_read_by_the_tracker(
 ) -> None:
     from PIL import Image
 
-    from tts2face.video.media import read_pictures
+    from tts2face.video.media import read_frames
 
     film = shared_recordings / "grid_s1" / "clips" / "bbaf2n.mkv"
-    pictures = list(read_pictures(film))
+    pictures = list(read_frames(film))
     path = tmp_path / "sad.png"
     Image.fromarray(pictures[30].pixels).save(path)
     read = PictureReader(face_model)
@@ -149,8 +149,8 @@ def test_marker_stills_make_a_basis_in_the_person_s_own_size(face: Face, worn: M
     take = made_take(shown, np.linspace(0, 0.3, 36).reshape(6, 6), face, worn)
     for row, name in enumerate(("neutral", *EXPRESSIONS)):
         write_table(tmp_path / f"{name}.csv", take.names, take.points[row : row + 1].repeat(3, axis=0))
-    rest = marker_face(tmp_path / "neutral.csv", face, worn)
-    found = captured_basis(stills_in(tmp_path), marker_reader(rest))
+    rest = read_marker_face(tmp_path / "neutral.csv", face, worn)
+    found = basis_from_stills(find_stills(tmp_path), build_marker_reader(rest))
     worn_at = list(worn.landmarks.values())
     expected = (shown[1:] - rest_landmarks(face))[:, worn_at] * SIZE
     assert np.abs(found.expressions[:, worn_at] - expected).max() < 0.2  # mm; axes found from the markers

@@ -6,28 +6,34 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.decomposition.capture import Captured, at_gesture_rate, resampled, sound_beside, sound_of
+from corpus_tools.decomposition.capture import (
+    FaceRecording,
+    find_capture_sound,
+    read_capture_sound,
+    resample,
+    resample_to_gesture_rate,
+)
 from corpus_tools.decomposition.face_motion import moved_landmarks, rest_landmarks
-from corpus_tools.decomposition.livelink import captured_livelink
-from corpus_tools.decomposition.video import sound_from
+from corpus_tools.decomposition.livelink import read_livelink_recording
+from corpus_tools.decomposition.video import read_sound_span
 from lexicon.errors import DataError, InputError
 from tts2face.face.deformation import posed_vertices
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_LANDMARKS
-from tts2face.synthesis.performance import motion_of_capture
+from tts2face.synthesis.performance import retarget_capture
 from tts2face.types import Trajectory, Waveform
 from tts2face.video.livelink import read_livelink
 
 
-def still(n_frames: int, fps: float) -> Captured:
+def still(n_frames: int, fps: float) -> FaceRecording:
     wave = np.sin(2 * np.pi * 2.0 * np.arange(n_frames) / fps)
     landmarks = np.ones((n_frames, N_LANDMARKS, 3), np.float32) * wave[:, None, None]
-    return Captured("made", fps, landmarks.astype(np.float32), np.zeros((n_frames, 6), np.float32))
+    return FaceRecording("made", fps, landmarks.astype(np.float32), np.zeros((n_frames, 6), np.float32))
 
 
 @pytest.mark.parametrize("fps", [24.0, 25.0, 30.0, 60.0, 120.0])
 def test_a_movement_keeps_its_time_and_size_at_thirty_frames(fps: float) -> None:
-    read = at_gesture_rate(still(round(fps * 4), fps))
+    read = resample_to_gesture_rate(still(round(fps * 4), fps))
     assert read.fps == 30.0
     expected = np.sin(2 * np.pi * 2.0 * np.arange(len(read.landmarks)) / 30.0)
     # A frame's mean of a 2 Hz movement is 0.7 % smaller than its middle; splines of 24 frames are nearer.
@@ -39,18 +45,18 @@ def test_what_is_too_fast_does_not_come_back_as_something_slow() -> None:
     fps = 120.0
     fast = np.cos(2 * np.pi * 29.0 * np.arange(480) / fps)[:, None]  # every fourth frame of it: a movement at 1 Hz
     assert np.abs(fast[::4]).max() == 1.0
-    assert np.abs(resampled(fast, fps, 30.0)[2:-2]).max() < 0.05
+    assert np.abs(resample(fast, fps, 30.0)[2:-2]).max() < 0.05
 
 
 def test_the_same_rate_changes_nothing_and_one_frame_stays_one() -> None:
     values = np.random.default_rng(1).normal(size=(20, 2, 3))
-    np.testing.assert_allclose(resampled(values, 25.0, 25.0), values, atol=1e-12)
-    np.testing.assert_array_equal(resampled(values[:1], 25.0, 30.0), values[:1])
+    np.testing.assert_allclose(resample(values, 25.0, 25.0), values, atol=1e-12)
+    np.testing.assert_array_equal(resample(values[:1], 25.0, 30.0), values[:1])
 
 
 def test_a_rate_of_nothing_is_refused() -> None:
     with pytest.raises(InputError, match="above 0"):
-        resampled(np.zeros((3, 2)), 25.0, 0.0)
+        resample(np.zeros((3, 2)), 25.0, 0.0)
 
 
 def test_frames_without_a_face_are_refused() -> None:
@@ -68,7 +74,7 @@ def test_head_poses_of_another_length_are_refused() -> None:
 
 def test_an_unknown_feature_is_refused() -> None:
     with pytest.raises(InputError, match="no feature 'ears'"):
-        replace(still(5, 30.0), missing=frozenset({"ears"}))
+        replace(still(5, 30.0), missing_features=frozenset({"ears"}))
 
 
 def test_landmarks_follow_the_face_s_own_posing(face: Face) -> None:
@@ -100,24 +106,24 @@ def test_a_face_without_all_landmarks_is_refused(face: Face) -> None:
 def test_a_live_link_capture_moves_the_face_with_its_head_and_sound(shared_recordings: Path, face: Face) -> None:
     folder = shared_recordings / "livelink"
     path = folder / "testset_arkit61_60fps.csv"
-    found = captured_livelink(path, face, sound=folder / "testset_audio.flac")
+    found = read_livelink_recording(path, face, sound=folder / "testset_audio.flac")
     assert found.fps == 60.0
-    assert found.missing == frozenset()
+    assert found.missing_features == frozenset()
     assert found.sound is not None
     assert found.sound.duration == pytest.approx(len(found.landmarks) / found.fps, abs=0.3)
-    weights = motion_of_capture(read_livelink(path), face).face.values
+    weights = retarget_capture(read_livelink(path), face).face.values
     np.testing.assert_allclose(found.rest, rest_landmarks(face), atol=1e-4)
     jaw = weights[:, face.shape_names.index("jawOpen")]
     assert np.corrcoef(jaw, -found.landmarks[:, 152, 1])[0, 1] > 0.95
-    read = at_gesture_rate(found)
+    read = resample_to_gesture_rate(found)
     assert len(read.landmarks) == (len(found.landmarks) + 1) // 2
 
 
 def test_sound_of_the_same_name_is_found(shared_recordings: Path, tmp_path: Path) -> None:
     capture = tmp_path / "take.csv"
-    assert sound_of(capture) is None
+    assert read_capture_sound(capture) is None
     (tmp_path / "take.flac").write_bytes((shared_recordings / "livelink" / "testset_audio.flac").read_bytes())
-    found = sound_of(capture)
+    found = read_capture_sound(capture)
     assert found is not None
     assert found.rate == 16_000
 
@@ -126,7 +132,7 @@ def test_sound_of_the_same_name_is_found(shared_recordings: Path, tmp_path: Path
 def test_a_film_brings_its_sound_on_the_clock_of_its_frames(begin: float, monkeypatch: pytest.MonkeyPatch) -> None:
     ramp = np.arange(64_000, dtype=np.float32) / 64_000
     monkeypatch.setattr("corpus_tools.decomposition.video.read_sound", lambda path, rate: Waveform(ramp, rate))
-    sound = sound_from(Path("film.mp4"), begin, 2.0)
+    sound = read_sound_span(Path("film.mp4"), begin, 2.0)
     assert sound.duration == 2.0
     at = np.arange(len(sound.samples)) + round(begin * 16_000)
     np.testing.assert_array_equal(sound.samples, np.where(at < 0, 0.0, ramp[np.maximum(at, 0)]))
@@ -135,9 +141,9 @@ def test_a_film_brings_its_sound_on_the_clock_of_its_frames(begin: float, monkey
 def test_one_sound_of_another_name_is_the_capture_s(tmp_path: Path) -> None:
     capture = tmp_path / "take.csv"
     (tmp_path / "room.wav").write_bytes(b"")
-    assert sound_beside(capture) == tmp_path / "room.wav"
+    assert find_capture_sound(capture) == tmp_path / "room.wav"
     (tmp_path / "lapel.wav").write_bytes(b"")
     with pytest.raises(InputError, match=r"beside take\.csv lie 2 sound files; name one as the capture"):
-        sound_beside(capture)
+        find_capture_sound(capture)
     (tmp_path / "take.wav").write_bytes(b"")
-    assert sound_beside(capture) == tmp_path / "take.wav"
+    assert find_capture_sound(capture) == tmp_path / "take.wav"

@@ -5,15 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.decomposition.basis_expressions import Basis, carried_basis
-from corpus_tools.decomposition.blend_weights import least_squares
-from corpus_tools.decomposition.capture import Captured
-from corpus_tools.decomposition.decompose import IRIS, IRIS_PER_RAD, Parts, as_counted, line_of_sight, taken_apart
-from corpus_tools.decomposition.derived_styles import derived_styles
+from corpus_tools.decomposition.basis_expressions import ExpressionBasis, transfer_basis
+from corpus_tools.decomposition.blend_weights import build_least_squares_estimator
+from corpus_tools.decomposition.capture import FaceRecording
+from corpus_tools.decomposition.decompose import (
+    IRIS,
+    IRIS_PER_RAD,
+    Decomposition,
+    decompose,
+    gaze_angles,
+    weight_displacements,
+)
+from corpus_tools.decomposition.derived_styles import read_derived_styles
 from corpus_tools.decomposition.face_motion import moved_landmarks, rest_landmarks
-from corpus_tools.decomposition.livelink import eyes_of
+from corpus_tools.decomposition.livelink import eye_motion
 from corpus_tools.decomposition.regions import feature_landmarks, region_landmarks
-from corpus_tools.decomposition.style import sizes_of, with_style
+from corpus_tools.decomposition.style import add_style, size_ratios
 from lexicon.errors import DataError, InputError
 from tts2face.face.expressions import expression_landmarks
 from tts2face.models.face import Face
@@ -27,8 +34,8 @@ TIMES = np.arange(round(FPS * SECONDS)) / FPS
 
 
 @pytest.fixture(scope="module")
-def basis(face: Face) -> Basis:
-    return carried_basis(expression_landmarks(face), rest_landmarks(face), rest_landmarks(face))
+def basis(face: Face) -> ExpressionBasis:
+    return transfer_basis(expression_landmarks(face), rest_landmarks(face), rest_landmarks(face))
 
 
 def _weights(face: Face, **shown: np.ndarray) -> Trajectory:
@@ -38,14 +45,16 @@ def _weights(face: Face, **shown: np.ndarray) -> Trajectory:
     return Trajectory(face.shape_names, values, FPS)
 
 
-def _captured(landmarks: np.ndarray, head: np.ndarray | None = None) -> Captured:
+def _captured(landmarks: np.ndarray, head: np.ndarray | None = None) -> FaceRecording:
     poses = np.zeros((len(TIMES), 6), np.float32) if head is None else head.astype(np.float32)
     sound = Waveform(np.zeros(round(SECONDS * 16_000)), 16_000)
-    return Captured("made", FPS, landmarks.astype(np.float32), poses, sound)
+    return FaceRecording("made", FPS, landmarks.astype(np.float32), poses, sound)
 
 
-def _parts(landmarks: np.ndarray, basis: Basis, head: np.ndarray | None = None) -> Parts:
-    return taken_apart(_captured(landmarks, head), basis, least_squares(as_counted(basis.expressions)))
+def _parts(landmarks: np.ndarray, basis: ExpressionBasis, head: np.ndarray | None = None) -> Decomposition:
+    return decompose(
+        _captured(landmarks, head), basis, build_least_squares_estimator(weight_displacements(basis.expressions))
+    )
 
 
 def test_no_landmark_lies_in_two_regions_or_in_the_lips() -> None:
@@ -57,7 +66,7 @@ def test_no_landmark_lies_in_two_regions_or_in_the_lips() -> None:
     assert feature_landmarks("brows").tolist() == [*found["brow_left"], *found["brow_right"]]
 
 
-def test_a_slow_expression_is_told_by_its_weight(basis: Basis) -> None:
+def test_a_slow_expression_is_told_by_its_weight(basis: ExpressionBasis) -> None:
     slow = 0.5 - 0.5 * np.cos(2 * np.pi * TIMES / SECONDS)
     happy = EXPRESSIONS.index("happy")
     moved = basis.rest + slow[:, None, None] * basis.expressions[happy]
@@ -69,7 +78,7 @@ def test_a_slow_expression_is_told_by_its_weight(basis: Basis) -> None:
     assert np.abs(made.motion["brows"][inner]).max() < 0.3  # mm; the expression moves brows by up to 1 mm
 
 
-def test_quick_brows_are_independent_motion_and_no_expression(basis: Basis) -> None:
+def test_quick_brows_are_independent_motion_and_no_expression(basis: ExpressionBasis) -> None:
     brows = feature_landmarks("brows")
     raised = 2.0 * np.sin(2 * np.pi * 1.5 * TIMES)
     moved = np.tile(basis.rest, (len(TIMES), 1, 1))
@@ -82,7 +91,7 @@ def test_quick_brows_are_independent_motion_and_no_expression(basis: Basis) -> N
     assert np.abs(made.motion["cheeks"]).max() < 0.3
 
 
-def test_speech_is_left_in_the_lips(basis: Basis) -> None:
+def test_speech_is_left_in_the_lips(basis: ExpressionBasis) -> None:
     opened = 4.0 * np.maximum(np.sin(2 * np.pi * 4 * TIMES), 0)
     moved = np.tile(basis.rest, (len(TIMES), 1, 1))
     moved[:, 14, 1] -= opened
@@ -92,7 +101,7 @@ def test_speech_is_left_in_the_lips(basis: Basis) -> None:
     assert np.abs(made.motion["brows"]).max() < 0.2
 
 
-def test_lids_of_a_face_that_blinks(face: Face, basis: Basis) -> None:
+def test_lids_of_a_face_that_blinks(face: Face, basis: ExpressionBasis) -> None:
     shut = np.clip(np.sin(2 * np.pi * 0.5 * TIMES), 0, 1)
     meet = 0.75  # of the head's shape: there its lids meet
     made = _parts(moved_landmarks(face, _weights(face, eyeBlinkLeft=meet * shut, eyeBlinkRight=meet * shut)), basis)
@@ -102,7 +111,7 @@ def test_lids_of_a_face_that_blinks(face: Face, basis: Basis) -> None:
     assert found[shut > 0.99].min() > 0.95
 
 
-def test_the_line_of_sight_is_the_eyes_and_the_head_s(basis: Basis) -> None:
+def test_the_line_of_sight_is_the_eyes_and_the_head_s(basis: ExpressionBasis) -> None:
     looking = 0.2 * np.sin(2 * np.pi * 0.5 * TIMES)
     moved = np.tile(basis.rest, (len(TIMES), 1, 1))
     for side, iris in IRIS.items():
@@ -117,24 +126,24 @@ def test_the_line_of_sight_is_the_eyes_and_the_head_s(basis: Basis) -> None:
     assert np.abs(held[:, 1]).max() < 0.01
 
 
-def test_a_capture_tells_its_eyes_itself(face: Face, basis: Basis) -> None:
+def test_a_capture_tells_its_eyes_itself(face: Face, basis: ExpressionBasis) -> None:
     looking = 0.5 + 0.5 * np.sin(2 * np.pi * 0.4 * TIMES)
     weights = _weights(face, eyeLookOutLeft=looking, eyeLookInRight=looking, eyeBlinkLeft=0.3 * looking)
-    told = replace(_captured(moved_landmarks(face, weights)), eyes=eyes_of(face, weights))
-    made = taken_apart(told, basis, least_squares(as_counted(basis.expressions)))
+    told = replace(_captured(moved_landmarks(face, weights)), eyes=eye_motion(face, weights))
+    made = decompose(told, basis, build_least_squares_estimator(weight_displacements(basis.expressions)))
     assert np.ptp(made.motion["gaze"][:, 1]) == pytest.approx(0.436, abs=0.005)  # rad of that shape (25 degrees)
     np.testing.assert_allclose(made.motion["blink"][:, 0], 0.3 * looking, atol=1e-6)
 
 
-def test_irises_behind_lids_are_not_believed(basis: Basis) -> None:
+def test_irises_behind_lids_are_not_believed(basis: ExpressionBasis) -> None:
     shut = np.zeros((len(TIMES), 2), np.float32)
     shut[100:110] = 1.0
     turned = np.zeros((len(TIMES), 2))
     turned[101:109] = 0.5
-    assert not line_of_sight(turned, np.zeros((len(TIMES), 6)), shut).any()
+    assert not gaze_angles(turned, np.zeros((len(TIMES), 6)), shut).any()
 
 
-def test_the_head_is_centred(basis: Basis) -> None:
+def test_the_head_is_centred(basis: ExpressionBasis) -> None:
     head = np.zeros((len(TIMES), 6))
     head[:, 0], head[:, 3] = 0.3 + 0.02 * np.sin(TIMES), 40.0
     made = _parts(np.tile(basis.rest, (len(TIMES), 1, 1)), basis, head)
@@ -142,7 +151,7 @@ def test_the_head_is_centred(basis: Basis) -> None:
     np.testing.assert_allclose(made.motion["head"][:, 3], 0, atol=1e-4)
 
 
-def _style(basis: Basis, seed: int, size: float = 1.0) -> list[Parts]:
+def _style(basis: ExpressionBasis, seed: int, size: float = 1.0) -> list[Decomposition]:
     generator = np.random.default_rng(seed)
     moved = np.tile(size * basis.rest, (len(TIMES), 1, 1))
     tracks = [np.convolve(generator.normal(size=len(TIMES)), np.hanning(25), "same") for _ in range(4)]
@@ -150,48 +159,50 @@ def _style(basis: Basis, seed: int, size: float = 1.0) -> list[Parts]:
         numbers = feature_landmarks(feature)
         moved[:, numbers, 1] += size * tracks[0][:, None]
         moved[:, numbers[::2], 0] += size * 0.5 * tracks[1][:, None]
-    scaled = Basis(size * basis.rest, size * basis.expressions)
-    return [taken_apart(_captured(moved), scaled, least_squares(as_counted(scaled.expressions)))]
+    scaled = ExpressionBasis(size * basis.rest, size * basis.expressions)
+    return [
+        decompose(_captured(moved), scaled, build_least_squares_estimator(weight_displacements(scaled.expressions)))
+    ]
 
 
-def test_a_person_of_another_size_moves_the_common_face_alike(basis: Basis) -> None:
-    first = with_style(None, "small", _style(basis, 1), basis.rest, {})
+def test_a_person_of_another_size_moves_the_common_face_alike(basis: ExpressionBasis) -> None:
+    first = add_style(None, "small", _style(basis, 1), basis.rest, {})
     assert min(first.kept.values()) > 0.95
-    second = with_style(first.palette, "large", _style(basis, 1, 1.3), 1.3 * basis.rest, {})
+    second = add_style(first.palette, "large", _style(basis, 1, 1.3), 1.3 * basis.rest, {})
     assert second.palette.names == ("small", "large")
     for feature in REGION_FEATURES:
         small, large = (second.palette.styles[name].motion[feature] for name in ("small", "large"))
         np.testing.assert_allclose(large, small, atol=0.02 * np.abs(small).max())
-    np.testing.assert_allclose(sizes_of(1.3 * basis.rest, basis.rest), 1 / 1.3, rtol=1e-12)
+    np.testing.assert_allclose(size_ratios(1.3 * basis.rest, basis.rest), 1 / 1.3, rtol=1e-12)
 
 
-def test_modes_are_orthonormal(basis: Basis) -> None:
-    palette = with_style(None, "one", _style(basis, 2), basis.rest, {}).palette
+def test_modes_are_orthonormal(basis: ExpressionBasis) -> None:
+    palette = add_style(None, "one", _style(basis, 2), basis.rest, {}).palette
     for region in palette.regions.values():
         flat = region.modes.reshape(len(region.modes), -1)
         np.testing.assert_allclose(flat @ flat.T, np.eye(len(flat)), atol=1e-5)
 
 
-def test_a_style_that_is_there_already(basis: Basis) -> None:
-    palette = with_style(None, "one", _style(basis, 2), basis.rest, {}).palette
+def test_a_style_that_is_there_already(basis: ExpressionBasis) -> None:
+    palette = add_style(None, "one", _style(basis, 2), basis.rest, {}).palette
     with pytest.raises(InputError, match="the palette has a style one already"):
-        with_style(palette, "one", _style(basis, 2), basis.rest, {})
+        add_style(palette, "one", _style(basis, 2), basis.rest, {})
 
 
-def test_no_recording(basis: Basis) -> None:
+def test_no_recording(basis: ExpressionBasis) -> None:
     with pytest.raises(InputError, match="no recording could be used"):
-        with_style(None, "one", [], basis.rest, {})
+        add_style(None, "one", [], basis.rest, {})
 
 
-def test_a_first_style_without_cheeks(basis: Basis) -> None:
+def test_a_first_style_without_cheeks(basis: ExpressionBasis) -> None:
     (part,) = _style(basis, 3)
     del part.motion["cheeks"]
     with pytest.raises(InputError, match="the recordings do not show cheeks; a palette begins with"):
-        with_style(None, "one", [part], basis.rest, {})
+        add_style(None, "one", [part], basis.rest, {})
 
 
 def test_the_paper_s_six_moods_are_derived() -> None:
-    made = derived_styles("someone")
+    made = read_derived_styles("someone")
     assert list(made) == ["neutral", "depressed", "delighted", "annoyed", "exaggerated", "exasperated"]
     assert all(derived.source == "someone" and derived.summary for derived in made.values())
     assert made["depressed"].changes["expression"].offset == {"sad": 0.5}
@@ -209,4 +220,4 @@ def test_a_wrong_line_of_the_table(line: str, reason: str, tmp_path) -> None:
     table = tmp_path / "styles.tsv"
     table.write_text(f"style\tfeature\tgain\ttempo\toffsets\twhy\n{line}\n")
     with pytest.raises(DataError, match=reason):
-        derived_styles("someone", table)
+        read_derived_styles("someone", table)

@@ -6,26 +6,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.build_palette import Recorded, build_style
-from corpus_tools.decomposition.capture_files import Worn
+from corpus_tools.build_palette import StyleSource, build_style
+from corpus_tools.decomposition.capture_files import MarkerOptions
 from corpus_tools.decomposition.face_motion import moved_landmarks
 from corpus_tools.decomposition.marker_set import MarkerSet
-from corpus_tools.decomposition.stills import Still, stills_in
-from corpus_tools.run_options import Effort
+from corpus_tools.decomposition.stills import Still, find_stills
+from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
 from tests.corpus_tools.decomposition.made_markers import Made, made_take, write_c3d, write_table
-from tts2face.face.expressions import expression_weights, expressive
-from tts2face.face.lip_constraints import mouth_of
+from tts2face.face.expressions import add_expression_shapes, expression_weights
+from tts2face.face.lip_constraints import build_lip_constraints
 from tts2face.models.face import Face
 from tts2face.models.palette import EXPRESSIONS, load_palette, read_palette
 from tts2face.types import Trajectory
 
 
 @pytest.fixture
-def recorded(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> Recorded:
+def recorded(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> StyleSource:
     """Four seconds of markers at 120 frames a second with sound, and a folder of static captures."""
-    whole = expressive(face)
-    shown = expression_weights(whole, mouth_of(whole))[:, : len(face.shape_names)]
+    whole = add_expression_shapes(face)
+    shown = expression_weights(whole, build_lip_constraints(whole))[:, : len(face.shape_names)]
     weights = np.concatenate([np.zeros((1, shown.shape[1])), shown])
     stills = made_take(moved_landmarks(face, Trajectory(face.shape_names, weights, 30.0)), np.zeros((6, 6)), face, worn)
     folder = tmp_path / "stills"
@@ -35,13 +35,13 @@ def recorded(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> Recorde
     pytest.importorskip("ezc3d", reason="needs the extra [capture]")
     sound = 0.2 * np.sin(np.arange(len(made.points) * 100) / 8.0)
     write_c3d(tmp_path / "take.c3d", made.names, made.points, sound=sound)
-    worn_how = Worn(neutral=folder / "neutral.csv")
-    return Recorded(recordings=tmp_path / "take.c3d", stills=stills_in(folder), worn=worn_how)
+    worn_how = MarkerOptions(neutral=folder / "neutral.csv")
+    return StyleSource(recordings=tmp_path / "take.c3d", stills=find_stills(folder), worn=worn_how)
 
 
-def test_markers_and_their_stills_become_a_style(recorded: Recorded, made: Made, tmp_path: Path) -> None:
+def test_markers_and_their_stills_become_a_style(recorded: StyleSource, made: Made, tmp_path: Path) -> None:
     out = tmp_path / "worn.palette"
-    built = build_style(recorded, "worn", out, base=load_palette("starter"), effort=Effort(tmp_path / "cache", 1))
+    built = build_style(recorded, "worn", out, base=load_palette("starter"), effort=RunOptions(tmp_path / "cache", 1))
     style = read_palette(out).styles["worn"]
     assert (built.n_kept, int(style.lengths.sum())) == (1, 120)
     assert "gaze" not in style.motion
@@ -54,11 +54,11 @@ def test_markers_and_their_stills_become_a_style(recorded: Recorded, made: Made,
     assert np.corrcoef(moved[10:-10], raised[10:-10])[0, 1] > 0.6  # the rest is in the expressions
 
 
-def test_epsilon_widens_the_limits_of_the_weights(recorded: Recorded, tmp_path: Path) -> None:
+def test_epsilon_widens_the_limits_of_the_weights(recorded: StyleSource, tmp_path: Path) -> None:
     weights = {}
     for epsilon in (0.0, 0.5):
         out = tmp_path / f"{epsilon}.palette"
-        build_style(recorded, "worn", out, base=None, epsilon=epsilon, effort=Effort(tmp_path / "cache", 1))
+        build_style(recorded, "worn", out, base=None, epsilon=epsilon, effort=RunOptions(tmp_path / "cache", 1))
         style = read_palette(out).styles["worn"]
         weights[epsilon] = style.motion["expression"]
         assert ("--epsilon 0.5" in style.metadata["command"]) == (epsilon == 0.5)
@@ -68,8 +68,10 @@ def test_epsilon_widens_the_limits_of_the_weights(recorded: Recorded, tmp_path: 
         build_style(recorded, "x", tmp_path / "x.palette", base=None, epsilon=1.1)
 
 
-def test_stills_of_two_kinds(recorded: Recorded, tmp_path: Path) -> None:
+def test_stills_of_two_kinds(recorded: StyleSource, tmp_path: Path) -> None:
     mixed = {**recorded.stills, "sad": Still(tmp_path / "sad.png")}
     with pytest.raises(InputError, match="stills of markers need each other and the person at rest"):
-        build_style(replace(recorded, stills=mixed), "x", tmp_path / "x.palette", base=None, effort=Effort(tmp_path, 1))
+        build_style(
+            replace(recorded, stills=mixed), "x", tmp_path / "x.palette", base=None, effort=RunOptions(tmp_path, 1)
+        )
     assert not (tmp_path / "x.palette").exists()

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from corpus_tools.decomposition.marker_files import read_c3d, read_markers
-from corpus_tools.decomposition.marker_gaps import LONGEST_GAP_S, filled, gaps_of
+from corpus_tools.decomposition.marker_gaps import LONGEST_GAP_S, fill_marker_gaps, find_gaps
 from corpus_tools.decomposition.marker_set import SHIPPED, MarkerSet, read_marker_set
-from corpus_tools.decomposition.markers import captured_markers, marker_face, still_of_markers
+from corpus_tools.decomposition.markers import read_marker_face, read_marker_recording, read_marker_still
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.decomposition.made_markers import FPS, SIZE, Made, write_c3d, write_table
 from tts2face.models.face import Face
@@ -34,9 +34,9 @@ def gap(landmarks: np.ndarray) -> np.ndarray:
 def test_a_c3d_file_gives_head_face_and_sound_again(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
     sound = np.sin(np.arange(len(made.points) * 100) * 0.1) * 3.0
     path = write_c3d(tmp_path / "take.c3d", made.names, made.points / 1000, units="m", sound=sound)
-    found = captured_markers(path, face, worn, neutral=at_rest(made, tmp_path / "rest.csv"))
+    found = read_marker_recording(path, face, worn, neutral=at_rest(made, tmp_path / "rest.csv"))
     assert found.fps == FPS
-    assert found.missing == {"gaze"}
+    assert found.missing_features == {"gaze"}
     assert found.notes == ()
     assert found.sound is not None
     assert found.sound.duration == pytest.approx(len(made.points) / FPS, abs=0.001)
@@ -56,11 +56,11 @@ def test_a_c3d_file_gives_head_face_and_sound_again(made: Made, face: Face, worn
 
 
 def test_rest_is_the_person_s_own_size(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
-    rest = marker_face(at_rest(made, tmp_path / "rest.csv"), face, worn)
+    rest = read_marker_face(at_rest(made, tmp_path / "rest.csv"), face, worn)
     eyes = np.linalg.norm(rest.spread.rest[33] - rest.spread.rest[263])
     assert eyes == pytest.approx(np.linalg.norm(made.landmarks[0, 33] - made.landmarks[0, 263]), abs=0.1)
     assert rest.spread.size == pytest.approx(1 / SIZE, rel=0.01)
-    still = still_of_markers(write_table(tmp_path / "still.csv", made.names, made.points[200:201].repeat(5, 0)), rest)
+    still = read_marker_still(write_table(tmp_path / "still.csv", made.names, made.points[200:201].repeat(5, 0)), rest)
     np.testing.assert_allclose(
         still[70] - rest.spread.rest[70], made.landmarks[200, 70] - made.landmarks[0, 70], atol=0.1
     )
@@ -70,7 +70,7 @@ def test_lips_open_and_lids_close_although_no_marker_lies_inside_them(
     made: Made, face: Face, worn: MarkerSet, tmp_path: Path
 ) -> None:
     path = write_table(tmp_path / "take.csv", made.names, made.points)
-    found = captured_markers(path, face, worn)
+    found = read_marker_recording(path, face, worn)
     assert np.corrcoef(gap(found.landmarks), gap(made.landmarks))[0, 1] > 0.95
     lids = [take[:, 159, 1] - take[:, 145, 1] for take in (found.landmarks, made.landmarks)]
     assert np.corrcoef(lids)[0, 1] > 0.95
@@ -79,12 +79,12 @@ def test_lips_open_and_lids_close_although_no_marker_lies_inside_them(
 
 
 def test_gaps_are_filled_and_told(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
-    whole = captured_markers(write_table(tmp_path / "whole.csv", made.names, made.points), face, worn)
+    whole = read_marker_recording(write_table(tmp_path / "whole.csv", made.names, made.points), face, worn)
     points = made.points.copy()
     points[100:115, made.names.index("LBRO2")] = np.nan
     points[:5, made.names.index("JAW1")] = np.nan
     points[200:230, made.names.index("HED3")] = np.nan  # four others show the pose
-    found = captured_markers(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+    found = read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, worn)
     assert "gaps were filled in LBRO2 (15 frames), JAW1 (5 frames)" in found.notes
     assert np.abs(found.landmarks - whole.landmarks).max() < 0.5
     np.testing.assert_allclose(found.head, whole.head, atol=1e-3)
@@ -94,28 +94,28 @@ def test_a_long_gap_is_refused_with_its_time(made: Made, face: Face, worn: Marke
     points = made.points.copy()
     points[120:150, made.names.index("LBRO2")] = np.nan
     with pytest.raises(DataError, match=r"take\.csv: the marker LBRO2 is out of sight for 0\.25 s from 1\.00 s on"):
-        captured_markers(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, worn)
 
 
 def test_a_marker_never_seen_is_refused(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
     points = made.points.copy()
     points[:, made.names.index("LBRO2")] = np.nan
     with pytest.raises(DataError, match="LBRO2 is never seen"):
-        captured_markers(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, worn)
 
 
 def test_a_missing_marker_is_told_and_a_missing_region_refused(
     made: Made, face: Face, worn: MarkerSet, tmp_path: Path
 ) -> None:
     one = [number for number, name in enumerate(made.names) if name != "LIP3"]
-    found = captured_markers(
+    found = read_marker_recording(
         write_table(tmp_path / "one.csv", tuple(made.names[k] for k in one), made.points[:, one]), face, worn
     )
     assert "the file has no marker LIP3; its region goes by the others" in found.notes
     none = [number for number, name in enumerate(made.names) if not name.startswith("LBRO")]
     path = write_table(tmp_path / "none.csv", tuple(made.names[k] for k in none), made.points[:, none])
     with pytest.raises(DataError, match=r"no marker of the region brow_left \(LBRO1, LBRO2"):
-        captured_markers(path, face, worn)
+        read_marker_recording(path, face, worn)
 
 
 def test_a_set_without_brows_tells_nothing_of_them(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
@@ -124,49 +124,49 @@ def test_a_set_without_brows_tells_nothing_of_them(made: Made, face: Face, worn:
     table.write_text("# no brows\n" + "\n".join(line for line in lines if "brow" not in line) + "\n")
     fewer = read_marker_set(table)
     path = write_table(tmp_path / "take.csv", made.names, made.points)
-    assert captured_markers(path, face, fewer).missing == {"gaze", "brows", "expression"}
+    assert read_marker_recording(path, face, fewer).missing_features == {"gaze", "brows", "expression"}
 
 
 def test_a_file_of_other_markers_is_refused(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
     path = write_table(tmp_path / "take.csv", tuple(f"m{k}" for k in range(len(made.names))), made.points)
     with pytest.raises(DataError, match="none of the set's markers; it has m0, m1"):
-        captured_markers(path, face, worn)
+        read_marker_recording(path, face, worn)
 
 
 def test_a_wrong_unit_is_refused(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
     path = write_table(tmp_path / "take.csv", made.names, made.points / 10)
     with pytest.raises(DataError, match=r"0\.09\d+ times as far apart as on a face"):
-        captured_markers(path, face, worn)
+        read_marker_recording(path, face, worn)
 
 
 def test_a_head_that_is_not_rigid_is_refused(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
     points = made.points.copy()
     points[:, made.names.index("HED2")] += 80 * np.sin(np.arange(len(points)) / 20)[:, None]
     with pytest.raises(DataError, match="do not move as one"):
-        captured_markers(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, worn)
 
 
 def test_a_pose_that_no_three_markers_show_is_filled_in_and_told(
     made: Made, face: Face, worn: MarkerSet, tmp_path: Path
 ) -> None:
-    whole = captured_markers(write_table(tmp_path / "whole.csv", made.names, made.points), face, worn)
+    whole = read_marker_recording(write_table(tmp_path / "whole.csv", made.names, made.points), face, worn)
     points = made.points.copy()
     head = [made.names.index(name) for name in worn.head]
     points[200:210, head[:5]] = np.nan
     points[300:, head[6]] = np.nan
-    found = captured_markers(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+    found = read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, worn)
     assert "the head's pose was filled in in 10 frames" in found.notes
     assert np.degrees(np.abs(found.head - whole.head)[:, :3]).max() < 0.2  # over 0.08 s
     points[200:240, head[:5]] = np.nan
     with pytest.raises(DataError, match=r"the head's pose is out of sight for 0\.33 s from 1\.67 s on"):
-        captured_markers(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, worn)
 
 
 def test_two_markers_show_no_head(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
     kept = [k for k, name in enumerate(made.names) if name not in worn.head[2:]]
     path = write_table(tmp_path / "take.csv", tuple(made.names[k] for k in kept), made.points[:, kept])
     with pytest.raises(DataError, match="2 markers of the head are there"):
-        captured_markers(path, face, worn)
+        read_marker_recording(path, face, worn)
 
 
 def test_three_markers_show_no_face(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
@@ -177,7 +177,7 @@ def test_three_markers_show_no_face(made: Made, face: Face, worn: MarkerSet, tmp
     kept = [made.names.index(name) for name in names]
     path = write_table(tmp_path / "take.csv", names, made.points[:, kept])
     with pytest.raises(DataError, match="3 of the set's markers of the face; it takes at least 4"):
-        captured_markers(path, face, read_marker_set(table))
+        read_marker_recording(path, face, read_marker_set(table))
 
 
 @pytest.mark.usefixtures("c3d")
@@ -198,7 +198,7 @@ def test_head_markers_on_a_line_are_refused(made: Made, face: Face, worn: Marker
     head = [made.names.index(name) for name in worn.head]
     points[:, head] = points[:, head[:1]] + np.arange(len(head))[:, None] * [10.0, 0.0, 0.0]
     with pytest.raises(DataError, match="on a line"):
-        captured_markers(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, worn)
 
 
 @pytest.mark.usefixtures("c3d")
@@ -286,7 +286,7 @@ def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
 def test_the_shipped_set_is_the_paper_s_number_of_markers(worn: MarkerSet) -> None:
     assert len(worn.face) == 68
     assert len(worn.head) == 7
-    assert worn.untold == {"gaze"}
+    assert worn.missing_features == {"gaze"}
 
 
 @pytest.mark.parametrize(
@@ -319,9 +319,9 @@ def test_a_gap_is_bridged_without_overshoot() -> None:
     track = np.zeros((40, 1, 3))
     track[20:] = 1.0
     track[15:25] = np.nan
-    whole, notes = filled(track, ("A",), 100.0)
+    whole, notes = fill_marker_gaps(track, ("A",), 100.0)
     assert whole.min() >= 0.0
     assert whole.max() <= 1.0
     assert notes == ("gaps were filled in A (10 frames)",)
-    assert gaps_of(np.isnan(track[:, 0, 0])).tolist() == [[15, 25]]
+    assert find_gaps(np.isnan(track[:, 0, 0])).tolist() == [[15, 25]]
     assert LONGEST_GAP_S * 100.0 > 10

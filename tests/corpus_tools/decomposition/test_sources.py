@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from corpus_tools.decomposition.capture_files import Worn, captured_file
+from corpus_tools.decomposition.capture_files import MarkerOptions, read_capture_file
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.decomposition.made_markers import Made, write_table
 from tts2face.models.face import Face
@@ -13,19 +13,19 @@ from tts2face.models.face import Face
 def test_a_live_link_table_and_a_marker_table_are_told_apart(
     shared_recordings: Path, made: Made, face: Face, tmp_path: Path
 ) -> None:
-    arkit = captured_file(shared_recordings / "livelink" / "testset_arkit61_60fps.csv", face)
-    assert arkit.missing == frozenset()
+    arkit = read_capture_file(shared_recordings / "livelink" / "testset_arkit61_60fps.csv", face)
+    assert arkit.missing_features == frozenset()
     worn = write_table(tmp_path / "take.csv", made.names, made.points, first="frame")
     with pytest.raises(InputError, match="counts frames"):
-        captured_file(worn, face)
-    assert captured_file(worn, face, worn=Worn(neutral=worn, fps=120.0)).missing == {"gaze"}
+        read_capture_file(worn, face)
+    assert read_capture_file(worn, face, worn=MarkerOptions(neutral=worn, fps=120.0)).missing_features == {"gaze"}
 
 
 def test_what_is_neither_is_refused(face: Face, tmp_path: Path) -> None:
     (tmp_path / "take.csv").write_text("a,b\n1,2\n3,4\n")
     with pytest.raises(DataError, match="needs the columns time or frame"):
-        captured_file(tmp_path / "take.csv", face)
+        read_capture_file(tmp_path / "take.csv", face)
     with pytest.raises(InputError, match=r"take\.bvh is no facial capture"):
-        captured_file(tmp_path / "take.bvh", face)
+        read_capture_file(tmp_path / "take.bvh", face)
     with pytest.raises(InputError, match="there is no capture"):
-        captured_file(tmp_path / "none.csv", face)
+        read_capture_file(tmp_path / "none.csv", face)

@@ -9,9 +9,9 @@ from scipy.optimize import lsq_linear
 from corpus_tools.decomposition.blend_weights import (
     N_AVERAGED,
     approximation_error,
-    averaged,
-    least_squares,
-    nearest_samples,
+    build_least_squares_estimator,
+    build_nearest_samples_estimator,
+    moving_average,
 )
 from lexicon.errors import DataError, InputError
 
@@ -28,13 +28,13 @@ def made(n_frames: int = 40, *, noise: float = 0.0, low: float = 0.0, high: floa
 
 def test_least_squares_finds_the_weights_that_made_a_face() -> None:
     basis, weights, seen = made()
-    np.testing.assert_allclose(least_squares(basis).weights(seen), weights, atol=1e-9)
+    np.testing.assert_allclose(build_least_squares_estimator(basis).weights(seen), weights, atol=1e-9)
 
 
 @pytest.mark.parametrize("slack", [0.0, 0.3, 1.0])
 def test_least_squares_agrees_with_scipy_s_where_limits_bind(slack: float) -> None:
     basis, _, seen = made(noise=3.0, low=-1.5, high=2.5)
-    found = least_squares(basis, slack).weights(seen)
+    found = build_least_squares_estimator(basis, slack).weights(seen)
     design = basis.reshape(5, -1).T
     expected = [lsq_linear(design, row.ravel(), (-slack, 1 + slack), tol=1e-14).x for row in seen]
     np.testing.assert_allclose(found, expected, atol=1e-6)  # 10 x the other's stop criterion, on weights
@@ -57,14 +57,16 @@ def brute_force(basis: np.ndarray, samples: np.ndarray, seen: np.ndarray, n_near
 @pytest.mark.parametrize("n_nearest", [1, 2, 60])
 def test_the_tree_in_the_basis_span_equals_a_search_in_all_coordinates(n_nearest: int) -> None:
     basis, _, seen = made(noise=2.0)
-    ready = nearest_samples(basis, np.random.default_rng(5), slack=0.2, n_samples=500, n_nearest=n_nearest)
+    ready = build_nearest_samples_estimator(
+        basis, np.random.default_rng(5), slack=0.2, n_samples=500, n_nearest=n_nearest
+    )
     expected = brute_force(basis, ready.samples, seen, n_nearest)
     np.testing.assert_allclose(ready.weights(seen), expected, rtol=1e-9, atol=1e-12)
 
 
 def test_samples_stay_within_the_limits_and_reach_them() -> None:
     basis, _, seen = made(noise=5.0, low=-3, high=4)
-    ready = nearest_samples(basis, np.random.default_rng(5), slack=0.5)
+    ready = build_nearest_samples_estimator(basis, np.random.default_rng(5), slack=0.5)
     assert ready.samples.min() == pytest.approx(-0.5, abs=0.01)
     assert ready.samples.max() == pytest.approx(1.5, abs=0.01)
     found = ready.weights(seen)
@@ -74,7 +76,7 @@ def test_samples_stay_within_the_limits_and_reach_them() -> None:
 
 def test_a_face_that_is_a_sample_has_its_weights() -> None:
     basis, _, _ = made()
-    ready = nearest_samples(basis, np.random.default_rng(5))
+    ready = build_nearest_samples_estimator(basis, np.random.default_rng(5))
     seen = np.tensordot(ready.samples[:3], basis, axes=1)
     np.testing.assert_allclose(ready.weights(seen), ready.samples[:3], atol=1e-4)  # rounding stands for distance 0
 
@@ -83,15 +85,15 @@ def test_the_error_falls_with_the_number_of_samples_and_never_below_least_square
     basis, _, seen = made(200, noise=0.5)
     errors = []
     for n_samples in (20, 200, 2000, 20_000):
-        ready = nearest_samples(basis, np.random.default_rng(5), n_samples=n_samples, n_nearest=10)
+        ready = build_nearest_samples_estimator(basis, np.random.default_rng(5), n_samples=n_samples, n_nearest=10)
         errors.append(approximation_error(seen, basis, ready.weights(seen)).mean())
     assert (np.diff(errors) < 0).all()
-    assert approximation_error(seen, basis, least_squares(basis).weights(seen)).mean() <= errors[-1]
+    assert approximation_error(seen, basis, build_least_squares_estimator(basis).weights(seen)).mean() <= errors[-1]
 
 
 def test_the_same_seed_gives_the_same_weights() -> None:
     basis, _, seen = made()
-    first, second = (nearest_samples(basis, np.random.default_rng(9)).weights(seen) for _ in range(2))
+    first, second = (build_nearest_samples_estimator(basis, np.random.default_rng(9)).weights(seen) for _ in range(2))
     np.testing.assert_array_equal(first, second)
 
 
@@ -114,44 +116,44 @@ def plain_average(motion: np.ndarray, n_frames: int) -> np.ndarray:
 @given(st.integers(1, 120), st.sampled_from([1, 3, 41]))
 def test_the_average_is_the_mean_of_its_frames(n: int, n_frames: int) -> None:
     motion = np.random.default_rng(n).normal(size=(n, 2, 3))
-    np.testing.assert_allclose(averaged(motion, n_frames), plain_average(motion, n_frames), atol=1e-12)
+    np.testing.assert_allclose(moving_average(motion, n_frames), plain_average(motion, n_frames), atol=1e-12)
 
 
 def test_the_average_keeps_what_stands_still_and_removes_a_period_of_its_length() -> None:
     wave = np.sin(2 * np.pi * np.arange(200) / N_AVERAGED)[:, None]
-    np.testing.assert_allclose(averaged(wave + 7.0)[40:-40], 7.0, atol=1e-12)
+    np.testing.assert_allclose(moving_average(wave + 7.0)[40:-40], 7.0, atol=1e-12)
 
 
 def test_an_even_average_is_refused() -> None:
     with pytest.raises(InputError, match="odd number"):
-        averaged(np.zeros((50, 3)), 40)
+        moving_average(np.zeros((50, 3)), 40)
 
 
 def test_more_neighbours_than_samples_are_refused() -> None:
     with pytest.raises(InputError, match="60 nearest of 50"):
-        nearest_samples(made()[0], np.random.default_rng(1), n_samples=50)
+        build_nearest_samples_estimator(made()[0], np.random.default_rng(1), n_samples=50)
 
 
 def test_a_slack_above_one_is_refused() -> None:
     with pytest.raises(InputError, match=r"0 to 1, not by 1\.5"):
-        least_squares(made()[0], 1.5)
+        build_least_squares_estimator(made()[0], 1.5)
 
 
 def test_expressions_that_depend_on_each_other_are_refused() -> None:
     basis = made()[0].copy()
     basis[4] = basis[0] + basis[1]
     with pytest.raises(DataError, match="depend on each other"):
-        least_squares(basis)
+        build_least_squares_estimator(basis)
 
 
 def test_an_expression_with_a_gap_is_refused() -> None:
     basis = made()[0].copy()
     basis[2, 0] = np.nan
     with pytest.raises(DataError, match="no numbers"):
-        least_squares(basis)
+        build_least_squares_estimator(basis)
 
 
 def test_displacements_of_other_landmarks_are_refused() -> None:
     basis, _, seen = made()
     with pytest.raises(InputError, match="87 coordinates"):
-        least_squares(basis).weights(seen[:, 1:])
+        build_least_squares_estimator(basis).weights(seen[:, 1:])

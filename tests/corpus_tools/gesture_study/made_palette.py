@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tts2face.models.palette import Change, Derivation, Palette, Region, Style
+from tts2face.models.palette import Derivation, FaceRegion, FeatureChange, Palette, Style
 
 N_RECORDINGS, N_FRAMES = 60, 90
 BLINK = np.array([0.25, 0.9, 1.0, 0.6, 0.25], np.float32)
@@ -34,7 +34,11 @@ def made_palette(n: int = N_RECORDINGS) -> Palette:
     modes = np.zeros((2, 2, 3), np.float32)
     modes[0, :, 1] = np.sqrt(0.5)
     modes[1, :, 0] = np.sqrt(0.5), -np.sqrt(0.5)
-    regions = dict.fromkeys(("brows", "cheeks"), Region(np.array([70, 300], np.int32), modes))
-    changes = {"head": Change(gain=2.0), "blink": Change(tempo=1.5), "brows": Change(offset={"brows0": 1.0})}
+    regions = dict.fromkeys(("brows", "cheeks"), FaceRegion(np.array([70, 300], np.int32), modes))
+    changes = {
+        "head": FeatureChange(gain=2.0),
+        "blink": FeatureChange(tempo=1.5),
+        "brows": FeatureChange(offset={"brows0": 1.0}),
+    }
     quick = Derivation("calm", changes, "calm with a larger head and faster blinks")
     return Palette(np.zeros((478, 3), np.float32), regions, {"calm": made_style(n=n)}, {"quick": quick})

@@ -9,7 +9,7 @@ from corpus_tools.gesture_study.measures import split_recordings
 from corpus_tools.gesture_study.traits import brow_lift, traits_of
 from lexicon.errors import InputError
 from tests.corpus_tools.gesture_study.made_palette import BLINK, N_FRAMES, made_palette, made_style
-from tts2face.gesture.gesture_stream import Fields, GestureStream, middle_of
+from tts2face.gesture.gesture_stream import GestureFields, GestureStream, style_median
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.types import Waveform
@@ -44,7 +44,7 @@ def test_too_few_to_hold_out():
 
 
 def test_a_field_in_silence_does_what_a_stream_does():
-    fields = Fields(made_palette())
+    fields = GestureFields(made_palette())
     quiet = np.full(200, -35.0, np.float32)
     stream = GestureStream(fields, style="quick", seed=3, fps=GESTURE_FPS)
     streamed = stream.next(Waveform(np.zeros(2, np.float32), 16000), 200, Timeline())
@@ -55,15 +55,15 @@ def test_a_field_in_silence_does_what_a_stream_does():
 
 def test_a_derived_style_is_the_changed_clip_of_its_source():
     palette = made_palette()
-    fields = Fields(palette)
+    fields = GestureFields(palette)
     heard = palette.styles["calm"].intensity[:300]
     plain, larger = (field_clip(fields, style, "head", heard, 1).values for style in ("calm", "quick"))
-    middle = middle_of(palette.styles["calm"], "head")
+    middle = style_median(palette.styles["calm"], "head")
     np.testing.assert_allclose(larger - middle, 2 * (plain - middle), atol=1e-5)
 
 
 def test_noise_hears_nothing_and_differs_by_seed():
-    fields = Fields(made_palette())
+    fields = GestureFields(made_palette())
     one, same, other = (noise_clip(fields, "calm", 100, seed)["head"] for seed in (1, 1, 2))
     np.testing.assert_array_equal(one, same)
     assert not np.array_equal(one, other)

@@ -14,7 +14,7 @@ from corpus_tools.similarity.text import analysis_json
 from corpus_tools.similarity.tokens import NO_WORD, SimilarityTable, similarity_table, spoken_tokens
 from lexicon.errors import InputError
 from tests.corpus_tools.similarity.steady_talker import BLOCKS, POSES, made_model, made_talker
-from tts2face.exemplar.synthesis import visual_voice
+from tts2face.exemplar.synthesis import build_exemplar_model
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def found(talker):
 
 
 def test_the_table_is_the_one_that_synthesis_uses_without_silence(talker, spoken):
-    table, used = similarity_table(spoken), visual_voice(talker).similarity
+    table, used = similarity_table(spoken), build_exemplar_model(talker).similarity
     assert "sil" not in table.phones
     for i, a in enumerate(table.phones):
         assert table.silence[i] == used.matrix[used.phones.index(a), used.phones.index("sil")]
