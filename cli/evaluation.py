@@ -13,13 +13,13 @@ from tts2face.storage.output_names import check_file_name
 
 if TYPE_CHECKING:
     from corpus_tools.evaluation.evaluate import SplitResult
-    from corpus_tools.evaluation.splits import Parts
+    from corpus_tools.evaluation.splits import Split
     from corpus_tools.evaluation.tables import Evaluation
     from corpus_tools.recordings.observation import Observation
     from corpus_tools.run_options import RunOptions
     from tts2face.voice.engine import Voice
 
-SUFFIXES = (".html", ".json", ".csv")
+OUTPUT_SUFFIXES = (".html", ".json", ".csv")
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ def run_evaluation(
     if asked.cross_talker is not None and (beside.tracks is not None or beside.own_durations):
         raise InputError("--cross-talker takes no --tracks and no --own-durations; measure them on the talker's own")
     if out is not None:
-        check_file_name(out, "an evaluation", SUFFIXES)
+        check_file_name(out, "an evaluation", OUTPUT_SUFFIXES)
     from corpus_tools.report.drawing import load_matplotlib
     from corpus_tools.run_options import RunOptions
 
@@ -109,14 +109,16 @@ def _load_default_voice() -> "Voice":
 
 
 def _observe_other_talker(recordings: Path, effort: "RunOptions") -> "tuple[Observation, ...]":
-    from corpus_tools.evaluation.livelink_reference import SUFFIX, observe_livelink
+    from corpus_tools.evaluation.livelink_reference import LIVELINK_SUFFIX, observe_livelink
 
     return (
-        observe_livelink(recordings, effort) if recordings.suffix == SUFFIX else _read_observations(recordings, effort)
+        observe_livelink(recordings, effort)
+        if recordings.suffix == LIVELINK_SUFFIX
+        else _read_observations(recordings, effort)
     )
 
 
-def _make_splits(asked: SplitFlags, effort: "RunOptions") -> "tuple[Parts, ...]":
+def _make_splits(asked: SplitFlags, effort: "RunOptions") -> "tuple[Split, ...]":
     from corpus_tools.evaluation.splits import split, split_by_words, split_into_folds
 
     if asked.train is not None and asked.test is not None:

@@ -50,13 +50,13 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
     refuse_overwriting({"--out": out}, given | {"--palette": palette, "--provenance": provenance, "--model": model})
     from corpus_tools.build_palette import StyleSource, build_style
     from corpus_tools.decomposition.capture_files import MarkerOptions
-    from corpus_tools.decomposition.marker_set import SHIPPED
+    from corpus_tools.decomposition.marker_set import DEFAULT_MARKER_TABLE
     from corpus_tools.decomposition.stills import find_stills, parse_stills
     from corpus_tools.run_options import RunOptions, ignore_stage
     from tts2face.models.palette import load_palette
 
     shown = (find_stills(stills) if stills is not None else {}) | parse_stills(still or [])
-    worn = MarkerOptions(markers or SHIPPED, neutral, marker_rate)
+    worn = MarkerOptions(markers or DEFAULT_MARKER_TABLE, neutral, marker_rate)
     recorded = StyleSource(recordings=recordings, stills=shown, worn=worn, provenance=provenance)
     base = None if alone else load_palette(palette)
     with stage_bar() as stages:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 AsJson = Annotated[bool, Parameter(help="Print JSON instead of a table.", name="--json", negative="")]
-NONE = "-"
+EMPTY_CELL = "-"
 
 
 def voices(*, as_json: AsJson = False) -> None:
@@ -62,7 +62,7 @@ def styles(
     from tts2face.catalogue import styles
 
     entries = styles(palette)
-    rows = ((one.name, one.source or NONE, one.summary) for one in entries)
+    rows = ((one.name, one.source or EMPTY_CELL, one.summary) for one in entries)
     _print(entries, ("style", "derived from", "summary"), rows, as_json)
 
 

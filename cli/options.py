@@ -8,8 +8,8 @@ from cyclopts import App
 
 from lexicon.errors import InputError
 
-END = "--"  # what follows is text or a path, whatever it begins with
-_SHORT = re.compile(r"-[A-Za-z]")
+END_OF_OPTIONS = "--"  # what follows is text or a path, whatever it begins with
+_SHORT_OPTION = re.compile(r"-[A-Za-z]")
 
 
 def check_options(app: App, arguments: Sequence[str]) -> None:
@@ -20,7 +20,7 @@ def check_options(app: App, arguments: Sequence[str]) -> None:
     InputError
         There is such a one; the message names the nearest option.
     """
-    given = list(arguments[: arguments.index(END)] if END in arguments else arguments)
+    given = list(arguments[: arguments.index(END_OF_OPTIONS)] if END_OF_OPTIONS in arguments else arguments)
     written = [argument.partition("=")[0] for argument in given if is_option(argument)]
     flags = {*app.help_flags, *app.version_flags}
     if not written or flags & set(given):
@@ -33,12 +33,14 @@ def check_options(app: App, arguments: Sequence[str]) -> None:
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1, cutoff=0.6) if " " not in name else []
             hint = f"did you mean {near[0]}? " if near else ""
-            raise InputError(f"there is no option {name[:40]}; {hint}Text that begins with a dash goes after {END}")
+            raise InputError(
+                f"there is no option {name[:40]}; {hint}Text that begins with a dash goes after {END_OF_OPTIONS}"
+            )
 
 
 def is_option(argument: str) -> bool:
     """Whether an argument can only be an option."""
-    return argument.startswith(END) or _SHORT.fullmatch(argument) is not None
+    return argument.startswith(END_OF_OPTIONS) or _SHORT_OPTION.fullmatch(argument) is not None
 
 
 def option_names(command: App) -> list[str]:

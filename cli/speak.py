@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tts2face.synthesis.clip_stream import Piece
 
 OWN_FACE = "self"
-EXPLANATIONS = (".json", ".txt")
+EXPLANATION_SUFFIXES = (".json", ".txt")
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ def _check_options(request: Request, picture: Picture, options: SpeakOptions) ->
     if options.out is None and options.explain is None and not options.view:
         raise InputError("there is no output; add --out clip.mp4 (or .webm, .gif, or a folder for .png files)")
     if options.explain is not None:
-        check_file_name(options.explain, "an explanation", EXPLANATIONS)
+        check_file_name(options.explain, "an explanation", EXPLANATION_SUFFIXES)
     _check_overwriting(request, picture, options)
     is_silent = request.audio is not None or request.idle is not None
     if not request.text.strip() and (not is_silent or options.explain is not None):

@@ -6,7 +6,7 @@ import os
 import sys
 from io import TextIOWrapper
 
-ESCAPES = "tts2face.escapes"  # how characters are written that the terminal cannot show
+ESCAPE_HANDLER = "tts2face.escapes"  # how characters are written that the terminal cannot show
 
 
 def repair_streams() -> None:
@@ -19,9 +19,9 @@ def repair_streams() -> None:
     sys.stdin = sys.stdin or open(0, encoding="utf-8", closefd=False)  # noqa: SIM115 - for the whole process
     sys.stdout = sys.stdout or open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115 - as above
     sys.stderr = sys.stderr or open(2, "w", encoding="utf-8", closefd=False)  # noqa: SIM115 - as above
-    codecs.register_error(ESCAPES, _escape_characters)
+    codecs.register_error(ESCAPE_HANDLER, _escape_characters)
     if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
-        sys.stdout.reconfigure(errors=ESCAPES)
+        sys.stdout.reconfigure(errors=ESCAPE_HANDLER)
 
 
 def discard_output() -> None:

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.build_talker import PROVENANCE, PROVENANCE_FIELDS, UNSTATED, read_provenance
+from corpus_tools.build_talker import NOT_STATED, PROVENANCE, PROVENANCE_FIELDS, read_provenance
 from corpus_tools.decomposition.basis_expressions import ExpressionBasis, basis_from_stills, transfer_basis
 from corpus_tools.decomposition.blend_weights import (
-    MOST_SLACK,
+    MAX_SLACK,
     Estimator,
     build_least_squares_estimator,
     build_nearest_samples_estimator,
@@ -32,7 +32,7 @@ from corpus_tools.process_pool import map_unordered
 from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.folder import MANIFEST, VIDEO_SUFFIXES
 from corpus_tools.recordings.observe import Refusal
-from corpus_tools.run_options import Progress, RunOptions, Stages, ignore_stage
+from corpus_tools.run_options import Progress, RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.pose_correction import fit_pose_correction
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import check_regular_file
@@ -41,13 +41,13 @@ from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
 from tts2face.models.palette import Palette, write_palette
-from tts2face.retargeting.performer import CLOSED_SHARE, eye_aperture, lip_gaps
+from tts2face.retargeting.performer import CLOSED_FRAME_SHARE, eye_aperture, lip_gaps
 from tts2face.video.landmark_models import find_bundle
 
 ESTIMATORS = ("least-squares", "samples")
 SAMPLES_SEED = 2008
-AWAKE = 0.85  # of the usual opening of the lids: frames with less show a blink
-RESTING_FRAMES = 3000  # are enough to know a face at rest
+MIN_OPEN_LIDS = 0.85  # of the usual opening of the lids: frames with less show a blink
+N_REST_FRAMES = 3000  # are enough to know a face at rest
 CONTENT = "expression, brows, lids, cheeks, gaze, head pose, loudness and pitch; no image, no sound, no lips"
 
 
@@ -93,7 +93,7 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
     estimator: str = ESTIMATORS[0],
     epsilon: float = 0.0,
     effort: RunOptions | None = None,
-    stages: Stages = ignore_stage,
+    stages: StageCallback = ignore_stage,
 ) -> BuiltStyle:
     """Learn a style from recordings and write a palette: `base` with it, or it alone with the styles derived from it.
 
@@ -110,8 +110,8 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
     """
     if estimator not in ESTIMATORS:
         raise InputError(f"there is no estimator {estimator!r}; choose {' or '.join(ESTIMATORS)}")
-    if not 0.0 <= epsilon <= MOST_SLACK:
-        raise InputError(f"epsilon must lie between 0 and {MOST_SLACK:g}, not {epsilon:g}")
+    if not 0.0 <= epsilon <= MAX_SLACK:
+        raise InputError(f"epsilon must lie between 0 and {MAX_SLACK:g}, not {epsilon:g}")
     if base is not None and style in base.names:
         raise InputError(f"the palette has a style {style} already; choose another name")
     stated = read_provenance(
@@ -196,11 +196,11 @@ def person_at_rest(captured: Sequence[FaceRecording]) -> NDArray[np.float64]:
     if known is not None:
         return np.asarray(known, np.float64)
     frames = np.concatenate([one.landmarks for one in captured])
-    frames = frames[:: max(1, len(frames) // RESTING_FRAMES)]
+    frames = frames[:: max(1, len(frames) // N_REST_FRAMES)]
     opened = np.minimum(eye_aperture(frames, "Left"), eye_aperture(frames, "Right"))
-    awake = opened >= AWAKE * np.median(opened)
+    awake = opened >= MIN_OPEN_LIDS * np.median(opened)
     gaps = lip_gaps(frames)[:, MIDDLE_PAIR]
-    closed = gaps <= np.quantile(gaps[awake], CLOSED_SHARE)
+    closed = gaps <= np.quantile(gaps[awake], CLOSED_FRAME_SHARE)
     return np.asarray(np.median(frames[awake & closed], axis=0), np.float64)
 
 
@@ -252,11 +252,11 @@ def find_recording_files(recordings: Path) -> list[Path]:
     return sorted(file for file in found if file.name != MANIFEST)
 
 
-Ready = tuple[Path, Path | None, Face, MarkerOptions]
-Outcome = FaceRecording | Refusal
+WorkerInputs = tuple[Path, Path | None, Face, MarkerOptions]
+FileOutcome = FaceRecording | Refusal
 
 
-def _read_files(files: Sequence[Path], ready: Ready, jobs: int) -> Iterator[Outcome]:
+def _read_files(files: Sequence[Path], ready: WorkerInputs, jobs: int) -> Iterator[FileOutcome]:
     if jobs > 1:
         yield from (outcome for _, outcome in map_unordered(files, _read_file, _start_worker, ready, jobs))
         return
@@ -270,7 +270,7 @@ class _FileReader:
         self._tracker = CachedTracker(cache, model) if model is not None else None
         self._face, self._marker_options = face, worn
 
-    def read(self, file: Path) -> Outcome:
+    def read(self, file: Path) -> FileOutcome:
         """A recording, or why it cannot serve."""
         try:
             check_regular_file(file)
@@ -288,7 +288,7 @@ def _start_worker(*ready: Any) -> None:
     _worker.append(_FileReader(*ready))
 
 
-def _read_file(file: Path) -> Outcome:
+def _read_file(file: Path) -> FileOutcome:
     return _worker[0].read(file)
 
 
@@ -302,7 +302,7 @@ def _words(recorded: StyleSource, style: str, out: Path, is_alone: bool, epsilon
 
 def _metadata(recorded: StyleSource, stated: Mapping[str, Any], words: Sequence[str]) -> dict[str, Any]:
     return {
-        **dict.fromkeys(PROVENANCE_FIELDS, UNSTATED),
+        **dict.fromkeys(PROVENANCE_FIELDS, NOT_STATED),
         **stated,
         "command": shlex.join(words),
         "created": datetime.now(UTC).date().isoformat(),

@@ -11,7 +11,7 @@ from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import Refusal, check_any_kept, observe
 from corpus_tools.report.drawing import load_matplotlib
 from corpus_tools.report.recordings import recordings_page
-from corpus_tools.run_options import RunOptions, Stages, ignore_stage
+from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.pose_correction import correct_pose
 from corpus_tools.training.train_audio_map import learn_audio_maps
 from corpus_tools.training.train_phone_network import add_phone_network
@@ -23,8 +23,8 @@ from tts2face.storage.files import write_atomically
 
 PROVENANCE = "provenance.json"  # in the folder of recordings: where they come from and how they may be used
 PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
-UNSTATED = "not stated"
-READING = "reading recordings"  # the first stage
+NOT_STATED = "not stated"
+READING_STAGE = "reading recordings"  # the first stage
 CONTENT_WITH_PICTURES = (
     "landmark shapes, head pose, phones, loudness, and with the stated consent pictures of the person's face; no sound"
 )
@@ -50,7 +50,7 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
     created: str | None = None,
     consent: Mapping[str, str] | None = None,
     report: Path | None = None,
-    stages: Stages = ignore_stage,
+    stages: StageCallback = ignore_stage,
 ) -> BuiltTalker:
     """Observe recordings, learn their talker, and write it; the same recordings give the same bytes but for `created`.
 
@@ -81,13 +81,13 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
     if report is not None:
         load_matplotlib()  # a missing package is reported before hours of work
     stated = read_provenance(provenance or recordings / PROVENANCE, must_exist=provenance is not None)
-    observations = observe(recordings, effort=effort, on_progress=stages(READING))
+    observations = observe(recordings, effort=effort, on_progress=stages(READING_STAGE))
     called = name or stated.get("name") or recordings.resolve().stem
     if report is not None:
         write_atomically(report, recordings_page(called, observations).encode())
     check_any_kept(observations)
     metadata = {
-        **dict.fromkeys(PROVENANCE_FIELDS, UNSTATED),
+        **dict.fromkeys(PROVENANCE_FIELDS, NOT_STATED),
         **stated,
         "name": called,
         "command": _command_line(recordings, out, name, provenance),
@@ -111,7 +111,12 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
 
 
 def add_audio_maps(
-    recordings: Path, talker: Talker, out: Path, *, effort: RunOptions | None = None, stages: Stages = ignore_stage
+    recordings: Path,
+    talker: Talker,
+    out: Path,
+    *,
+    effort: RunOptions | None = None,
+    stages: StageCallback = ignore_stage,
 ) -> Talker:
     """Learn the drives of a talker from the recordings that she was learnt from, and write her with them.
 
@@ -122,7 +127,7 @@ def add_audio_maps(
     DataError
         A recording holds no sound, or its frame rate is not the talker's.
     """
-    kept = correct_pose(check_any_kept(observe(recordings, effort=effort, on_progress=stages(READING))))
+    kept = correct_pose(check_any_kept(observe(recordings, effort=effort, on_progress=stages(READING_STAGE))))
     if any(one.fps != talker.fps for one in kept):
         raise DataError(f"the recordings do not have the talker's {talker.fps:g} frames per second; convert them")
     drives = learn_audio_maps(kept, talker, stages=stages)

@@ -21,8 +21,8 @@ CONTENT = "motion only: one talker's recorded motion carried to the shape model 
 CONTENT_WITH_PICTURES = (
     "one talker's recorded motion carried to another's face, with pictures of that face, agreed to; no sound"
 )
-STATED = ("sources", "licence", "attribution")  # these bind whoever uses the clone, for both talkers
-UNSTATED = "not stated"
+LICENCE_FIELDS = ("sources", "licence", "attribution")  # these bind whoever uses the clone, for both talkers
+NOT_STATED = "not stated"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,10 +102,10 @@ def transfer_talker(source: Talker, target: Talker, *, gain: float = 1.0, append
     return ClonedTalker(talker, n_appended, at_limits, source.appearance is not None and target.appearance is None)
 
 
-Looks = Callable[[Utterance, NDArray[np.float32]], NDArray[np.float32] | None]
+AppearanceFunction = Callable[[Utterance, NDArray[np.float32]], NDArray[np.float32] | None]
 
 
-def _appearance_function(source: Talker, target: Talker, gain: float) -> Looks:
+def _appearance_function(source: Talker, target: Talker, gain: float) -> AppearanceFunction:
     """The looks of an utterance of the source on the target, given its shape there; none without pictures."""
     if target.appearance is None:
         return lambda spoken, shape: None
@@ -121,7 +121,7 @@ def _appearance_function(source: Talker, target: Talker, gain: float) -> Looks:
     return with_lips
 
 
-def _transfer_utterance(utterance: Utterance, ready: ParameterTransfer, looks: Looks) -> Utterance:
+def _transfer_utterance(utterance: Utterance, ready: ParameterTransfer, looks: AppearanceFunction) -> Utterance:
     head = utterance.head.copy()
     head[:, 3:] *= ready.size
     shape = ready.parameters(utterance.shape)
@@ -137,9 +137,9 @@ def _metadata(
         for role, stated in (("speech", source), ("face", target))
     }
     return {
-        "name": f"{target.get('name', UNSTATED)} with the speech of {source.get('name', UNSTATED)}",
-        "language": source.get("language", UNSTATED),
-        **{key: _merge_statements(source.get(key, UNSTATED), target.get(key, UNSTATED)) for key in STATED},
+        "name": f"{target.get('name', NOT_STATED)} with the speech of {source.get('name', NOT_STATED)}",
+        "language": source.get("language", NOT_STATED),
+        **{key: _merge_statements(source.get(key, NOT_STATED), target.get(key, NOT_STATED)) for key in LICENCE_FIELDS},
         "content": CONTENT_WITH_PICTURES if has_pictures else CONTENT,
         **({"consent": target["consent"]} if has_pictures and "consent" in target else {}),
         "cloning": {**about, **origins},

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 
 from lexicon.errors import InputError
 
-LEAST_WORDS = 3  # shorter is a slip of the keyboard, not a statement
+MIN_STATEMENT_WORDS = 3  # shorter is a slip of the keyboard, not a statement
 
 
 def consent_record(name: str, statement: str | None, *, date: str | None = None) -> Mapping[str, str]:
@@ -16,7 +16,7 @@ def consent_record(name: str, statement: str | None, *, date: str | None = None)
     InputError
         There is no statement, or none that says anything.
     """
-    if statement is None or len(statement.split()) < LEAST_WORDS:
+    if statement is None or len(statement.split()) < MIN_STATEMENT_WORDS:
         raise InputError(
             f"the file will carry pictures of {name}'s face; state the consent: "
             '--consent "I, NAME, agree that my face is used for ..."'

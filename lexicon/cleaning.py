@@ -14,11 +14,11 @@ _SINGLE_QUOTES = "‘’‚‛′`´ʹʻʼʽˈ"
 _DOUBLE_QUOTES = '“”„‟«»″‹›"「」『』〈〉《》'
 _BRACKETS = "()[]{}"
 _DASHES = "–—―‐‑‒−⁃"
-_DROPPED = "™®*_~|\\•·●○◦▪▫■□★☆◆◇►▶◀»※†‡\u20e3"
+_DROPPED_CHARACTERS = "™®*_~|\\•·●○◦▪▫■□★☆◆◇►▶◀»※†‡\u20e3"
 _FULL_STOPS = "。｡।॥۔።"
 _TRANSLATION = (
     {ord(c): "'" for c in _SINGLE_QUOTES}
-    | {ord(c): " " for c in _DOUBLE_QUOTES + _DROPPED}
+    | {ord(c): " " for c in _DOUBLE_QUOTES + _DROPPED_CHARACTERS}
     | {ord(c): ", " for c in _BRACKETS}
     | {ord(c): "-" for c in "‐‑‒"}
     | {ord(c): "–" for c in "–—―"}

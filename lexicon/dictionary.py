@@ -21,7 +21,7 @@ from lexicon.inputs import read_text
 from lexicon.ipa import Segment, parse_ipa
 from lexicon.phones import PHONES, arpabet_to_ipa
 
-SCANNED_WORDS = 40  # looked up by scanning the file (about 1 ms each) before all of it is split (about 100 ms)
+MAX_SCANNED_WORDS = 40  # looked up by scanning the file (about 1 ms each) before all of it is split (about 100 ms)
 # Phones of a word. CMUdict's longest has 28. espeak-ng keeps a word in 200 bytes without a check of its length; a phone
 # takes up to five of them (two vowels with their lengths, and the stress).
 MOST_PHONES = 40
@@ -141,7 +141,7 @@ def _scan_cmudict(word: str) -> str | None:
 
 @functools.lru_cache(maxsize=50_000)
 def _cmudict_names(word: str) -> str | None:
-    if _cmudict_names.cache_info().currsize < SCANNED_WORDS:
+    if _cmudict_names.cache_info().currsize < MAX_SCANNED_WORDS:
         return _scan_cmudict(word)
     return _cmudict_table().get(word)
 

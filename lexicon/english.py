@@ -9,16 +9,16 @@ from lexicon.phones import ARPABET, PHONES, nearest_phones
 
 _INVENTORY = frozenset(ARPABET.values())
 # espeak-ng's finer English phones in the phones that CMUdict knows; whatever is not listed goes to its nearest.
-_FOLDED = MappingProxyType({
+_FOLDED_PHONES = MappingProxyType({
     "ɜ": ("ɝ",), "ɐ": ("ə",), "ɾ": ("t",), "ʔ": ("t",), "ɒ": ("ɑ",), "a": ("æ",), "e": ("ɛ",), "o": ("oʊ",),
     "r": ("ɹ",), "ɫ": ("l",), "x": ("k",), "əʊ": ("oʊ",), "iə": ("i", "ə"), "ɪə": ("ɪ", "ə"), "eə": ("ɛ", "ə"),
     "ʊə": ("ʊ", "ə"),
 })  # fmt: skip
-_REDUCED = MappingProxyType({"ʌ": "ə", "ɝ": "ɚ"})
-_FULL = MappingProxyType({reduced: full for full, reduced in _REDUCED.items()})
-SPELLED_LENGTH = 3  # letters; longer capitals are a word (NASA) where CMUdict or its vowels say so
-_SAID_AS_WORDS = frozenset({"AIDS", "SIM", "RAM", "ROM", "PIN", "GIF", "LED", "ZIP", "LAN", "WAN", "NATO", "NASA"})
-SHOUTED = frozenset({
+_REDUCED_VOWELS = MappingProxyType({"ʌ": "ə", "ɝ": "ɚ"})
+_FULL_VOWELS = MappingProxyType({reduced: full for full, reduced in _REDUCED_VOWELS.items()})
+MAX_SPELLED_LETTERS = 3  # letters; longer capitals are a word (NASA) where CMUdict or its vowels say so
+_ACRONYMS = frozenset({"AIDS", "SIM", "RAM", "ROM", "PIN", "GIF", "LED", "ZIP", "LAN", "WAN", "NATO", "NASA"})
+CAPITALISED_WORDS = frozenset({
     "THE", "AND", "NOT", "YOU", "ARE", "FOR", "BUT", "ALL", "NO", "YES", "SO", "GO", "OF", "TO", "IN", "ON", "IS", "BE",
     "AT", "AN", "AS", "BY", "DO", "HE", "ME", "MY", "WE", "IF", "UP", "WAS", "CAN", "HIS", "HER", "OUR", "NEW", "NOW",
 })  # fmt: skip  # short words that are never initialisms: where they stand in capitals, so do their neighbours
@@ -33,14 +33,14 @@ def fold_to_arpabet(segments: tuple[Segment, ...]) -> tuple[Segment, ...]:
         phone, stress = segment.phone, segment.stress
         if phone == "ɹ" and result and result[-1].phone == "ɹ":
             continue  # espeak-ng writes a linking r twice: ɑːɹ ɹ
-        phones = (phone,) if phone in _INVENTORY else _FOLDED.get(phone) or nearest_phones(phone, _INVENTORY)
+        phones = (phone,) if phone in _INVENTORY else _FOLDED_PHONES.get(phone) or nearest_phones(phone, _INVENTORY)
         if segment.is_syllabic and not PHONES[phone].is_vowel:
             result.append(Segment("ə", stress, is_syllabic=True))
             stress = 0
         for at, one in enumerate(phones):
             is_vowel = PHONES[one].is_vowel
             own_stress = stress if is_vowel and at == 0 else 0
-            by_stress = _FULL.get(one, one) if own_stress else _REDUCED.get(one, one)
+            by_stress = _FULL_VOWELS.get(one, one) if own_stress else _REDUCED_VOWELS.get(one, one)
             result.append(Segment(by_stress, own_stress, is_syllabic=is_vowel))
     return tuple(result)
 
@@ -64,9 +64,9 @@ def _add_s(base: tuple[Segment, ...]) -> tuple[Segment, ...]:
 
 
 def _is_initialism(word: str) -> bool:
-    if not (word.isascii() and word.isalpha() and word.isupper()) or word in _SAID_AS_WORDS:
+    if not (word.isascii() and word.isalpha() and word.isupper()) or word in _ACRONYMS:
         return False
-    return len(word) <= SPELLED_LENGTH or (cmudict_lookup(word) is None and not set(word) & set("AEIOUY"))
+    return len(word) <= MAX_SPELLED_LETTERS or (cmudict_lookup(word) is None and not set(word) & set("AEIOUY"))
 
 
 Lookup = Callable[[str], tuple[Segment, ...] | None]

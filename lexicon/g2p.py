@@ -15,9 +15,11 @@ from lexicon.errors import BackendError, InputError
 from lexicon.ipa import Segment, parse_ipa
 
 DEFAULT_LANGUAGE = "en-us"
-LONGEST_DATA_PATH = 150  # characters; espeak-ng cuts longer paths off (its buffer holds 160)
+MAX_DATA_PATH = 150  # characters; espeak-ng cuts longer paths off (its buffer holds 160)
 _LOCK = threading.RLock()
-_SWITCH = re.compile(r"\([a-z0-9-]+\)")  # espeak-ng marks a foreign word: (en)...(fr); its phones are read as well
+_LANGUAGE_SWITCH = re.compile(
+    r"\([a-z0-9-]+\)"
+)  # espeak-ng marks a foreign word: (en)...(fr); its phones are read as well
 
 # What espeak-ng writes in a tone language is partly no IPA: tones as digits and as ɜ (a "3"), retroflexes with a dot.
 _TONE_LANGUAGES = frozenset({"cmn", "hak", "yue", "vi", "th", "my", "shn"})
@@ -46,9 +48,9 @@ def _espeak_wrapper() -> Any:
     except ImportError as missing:
         raise BackendError(f"{missing.name} is missing; install it with `pip install tts2face`") from missing
     data = str(espeakng_loader.get_data_path())
-    if len(data) > LONGEST_DATA_PATH:
+    if len(data) > MAX_DATA_PATH:
         raise BackendError(
-            f"espeak-ng cannot read data under a path of more than {LONGEST_DATA_PATH} characters ({data}); "
+            f"espeak-ng cannot read data under a path of more than {MAX_DATA_PATH} characters ({data}); "
             "install tts2face in a folder nearer to the root"
         )
     EspeakWrapper.set_library(espeakng_loader.get_library_path())
@@ -123,7 +125,7 @@ def phonemize(lines: Sequence[str], language: str) -> tuple[tuple[str, ...], ...
         spoken = backend.phonemize([flat[at] for at in kept], separator=Separator(phone="_", word=" "), strip=True)
     written: list[tuple[str, ...]] = [()] * len(flat)
     for at, line in zip(kept, spoken, strict=True):
-        words = (_SWITCH.sub("", word).strip("_") for word in line.split())
+        words = (_LANGUAGE_SWITCH.sub("", word).strip("_") for word in line.split())
         written[at] = tuple(word for word in words if word)
     return tuple(written)
 

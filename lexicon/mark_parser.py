@@ -12,8 +12,8 @@ from lexicon.ssml import is_ssml, parse_ssml
 
 # A bracket, one of the three words, and what follows up to the closing bracket, which a mark must have. Each part ends
 # where the next begins, so that the scan is linear.
-MARK = re.compile(r"\[(?P<name>/?(?:style|nod|pause)\b)(?P<rest>[^\[\]]*)(?P<end>\]?)")
-SHOWN_CHARACTERS = 40
+MARK_PATTERN = re.compile(r"\[(?P<name>/?(?:style|nod|pause)\b)(?P<rest>[^\[\]]*)(?P<end>\]?)")
+MAX_QUOTED_CHARACTERS = 40
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
 
 
@@ -35,7 +35,7 @@ def parse_marks(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
         return parse_ssml(text, language)
     gathering = MarkedTextBuilder()
     behind = 0
-    for match in MARK.finditer(text):
+    for match in MARK_PATTERN.finditer(text):
         gathering.add_text(text[behind : match.start()])
         behind = match.end()
         _read_mark(gathering, match)
@@ -44,7 +44,7 @@ def parse_marks(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
 
 
 def _read_mark(gathering: MarkedTextBuilder, match: "re.Match[str]") -> None:
-    shown = " ".join(match.group()[:SHOWN_CHARACTERS].split())
+    shown = " ".join(match.group()[:MAX_QUOTED_CHARACTERS].split())
     name, rest = match["name"], match["rest"].strip()
     if not match["end"]:
         raise InputError(f"the mark {shown!r} lacks its closing bracket; write {_mark_syntax(name)}")

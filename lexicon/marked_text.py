@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from lexicon.errors import InputError
 from lexicon.ipa import Segment
 
-RATES = (0.5, 2.0)  # speed of marked words, as of a whole request
-VOLUMES = (0.0, 2.0)
-NOD_SIZES = (0.1, 2.0)
-LONGEST_PAUSE_S = 10.0  # at one place; speech services allow 10 to 20
-DEEPEST = 16  # marks within marks; nobody reads more
+RATE_LIMITS = (0.5, 2.0)  # speed of marked words, as of a whole request
+VOLUME_LIMITS = (0.0, 2.0)
+NOD_SIZE_LIMITS = (0.1, 2.0)
+MAX_PAUSE_S = 10.0  # at one place; speech services allow 10 to 20
+MAX_NESTING = 16  # marks within marks; nobody reads more
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class PauseMark:
 
     def __post_init__(self) -> None:
         """Refuse lengths out of range."""
-        _check_range("a pause", self.seconds, (0.0, LONGEST_PAUSE_S), " s")
+        _check_range("a pause", self.seconds, (0.0, MAX_PAUSE_S), " s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class NodMark:
 
     def __post_init__(self) -> None:
         """Refuse sizes out of range."""
-        _check_range("the size of a nod", self.size, NOD_SIZES)
+        _check_range("the size of a nod", self.size, NOD_SIZE_LIMITS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,8 +162,8 @@ class MarkedTextBuilder:
             Spans are nested too deep, or together too fast, slow or loud.
         """
         before = self._begin(kind, shown)
-        _check_range(f"the speed within {shown}", before.rate * rate, RATES)
-        _check_range(f"the loudness within {shown}", before.volume * volume, VOLUMES)
+        _check_range(f"the speed within {shown}", before.rate * rate, RATE_LIMITS)
+        _check_range(f"the loudness within {shown}", before.volume * volume, VOLUME_LIMITS)
         styles = (*before.styles, style) if style is not None else before.styles
         self._start_run(
             replace(before, start=self._length, styles=styles, rate=before.rate * rate, volume=before.volume * volume)
@@ -223,8 +223,8 @@ class MarkedTextBuilder:
 
     def _begin(self, kind: str, shown: str) -> StyleRun:
         """Note a span that opens here; the run before it."""
-        if len(self._open_spans) >= DEEPEST:
-            raise InputError(f"{shown} stands within {DEEPEST} other marks; nest them less deep")
+        if len(self._open_spans) >= MAX_NESTING:
+            raise InputError(f"{shown} stands within {MAX_NESTING} other marks; nest them less deep")
         before = self._runs[-1]
         self._open_spans.append(_OpenSpan(kind, shown, self._length, before))
         return before

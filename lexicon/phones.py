@@ -15,7 +15,7 @@ from lexicon.phone_table import BACKNESSES, HEIGHTS, PLACES, ROUNDINGS, Phone, r
 
 # Weight of each feature in `phone_distance`. Lips and jaw first: the distance serves faces, so that what a viewer sees
 # counts more than what a listener hears (order of Fisher 1968's viseme classes: lips, rounding, opening, teeth, rest).
-WEIGHTS = MappingProxyType({
+ARTICULATORY_WEIGHTS = MappingProxyType({
     "silence": 10.0,  # nothing that sounds is like a pause
     "vowel": 2.0,  # a vowel stands in for a vowel, a consonant for a consonant
     "labial": 2.5,  # the lips make the sound
@@ -127,7 +127,9 @@ def _articulatory_features(phone: Phone) -> dict[str, float]:
 
 @functools.cache
 def phone_features(label: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Articulatory features (`WEIGHTS` names them) of a phone's first and last half; those of a simple phone are equal.
+    """Articulatory features, named by `ARTICULATORY_WEIGHTS`, of a phone's first and last half.
+
+    Both halves of a simple phone are equal.
 
     Raises
     ------
@@ -137,13 +139,13 @@ def phone_features(label: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
     phone = look_up_phone(label)
     parts = phone.parts or (label,)
     first, last = (_articulatory_features(PHONES[part]) for part in (parts[0], parts[-1]))
-    return tuple(first[name] for name in WEIGHTS), tuple(last[name] for name in WEIGHTS)
+    return tuple(first[name] for name in ARTICULATORY_WEIGHTS), tuple(last[name] for name in ARTICULATORY_WEIGHTS)
 
 
 @functools.cache
 def _weighted_halves(label: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Weighted features of a phone's first and last half."""
-    first, last = (tuple(map(operator.mul, half, WEIGHTS.values())) for half in phone_features(label))
+    first, last = (tuple(map(operator.mul, half, ARTICULATORY_WEIGHTS.values())) for half in phone_features(label))
     return first, last
 
 
@@ -157,8 +159,8 @@ def phone_distance(a: str, b: str) -> float:
 
     Notes
     -----
-    Euclidean over the features times `WEIGHTS`, averaged over first and last half (a diphthong's vowels, an affricate's
-    stop and fricative), hence symmetric and within the triangle inequality.
+    Euclidean over the features times `ARTICULATORY_WEIGHTS`, averaged over first and last half (a
+    diphthong's vowels, an affricate's stop and fricative), hence symmetric and within the triangle inequality.
     """
     (first_a, last_a), (first_b, last_b) = _weighted_halves(a), _weighted_halves(b)
     return math.sqrt((math.dist(first_a, first_b) ** 2 + math.dist(last_a, last_b) ** 2) / 2)

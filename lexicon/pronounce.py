@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from lexicon.cleaning import canonical_text
 from lexicon.dictionary import Dictionary
-from lexicon.english import SHOUTED, fold_to_arpabet, look_up_word
+from lexicon.english import CAPITALISED_WORDS, fold_to_arpabet, look_up_word
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word, phonemize
 from lexicon.ipa import Segment
@@ -20,7 +20,7 @@ from lexicon.syllables import split_syllables
 from lexicon.writing_systems import check_script
 
 PAUSES_S = MappingProxyType({"": 0.0, ",": 0.2, ";": 0.3, ":": 0.3, ".": 0.5, "!": 0.5, "?": 0.5})  # nominal
-_STRENGTH = tuple(PAUSES_S)  # of two marks that meet, the later one here stays
+_MARKS_BY_STRENGTH = tuple(PAUSES_S)  # of two marks that meet, the later one here stays
 _PIECE = re.compile(r"[^\s.,;:!?]+|[.,;:!?]")
 
 
@@ -98,7 +98,7 @@ def _split_words(forms: Iterator[tuple[str, str]]) -> list[_WordDraft]:
             if piece not in MARKS:
                 words.append(_WordDraft(piece, written.strip(" .,;:!?") or piece))
             elif words:
-                words[-1].mark = max(words[-1].mark, piece, key=_STRENGTH.index)
+                words[-1].mark = max(words[-1].mark, piece, key=_MARKS_BY_STRENGTH.index)
     return words
 
 
@@ -114,7 +114,7 @@ def _lookup_forms(words: Sequence[_WordDraft]) -> list[str]:
     if _are_all_capitals(words):
         return [text.lower() for text in texts[1:-1]]
     return [
-        text.lower() if len(text) > 1 and SHOUTED & {before, text, after} and text.isupper() else text
+        text.lower() if len(text) > 1 and CAPITALISED_WORDS & {before, text, after} and text.isupper() else text
         for before, text, after in zip(texts, texts[1:], texts[2:], strict=False)
     ]
 

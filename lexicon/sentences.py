@@ -14,7 +14,7 @@ from lexicon.given import GivenWord, given_words
 from lexicon.marked_text import Mark, MarkedText, NodMark, PauseMark, PhoneMark, StyleRun
 from lexicon.said import as_said
 
-LONGEST = 300  # characters; a sentence that is longer is cut at a clause mark or a space
+MAX_SENTENCE_CHARACTERS = 300  # characters; a sentence that is longer is cut at a clause mark or a space
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +94,7 @@ def split_sentences(text: MarkedText, language: str) -> Iterator[Sentence]:
     others = [mark for mark in placed.marks if not isinstance(mark, PauseMark | PhoneMark)]
     held: Sentence | None = None
     lead, done, told = sum(mark.seconds for mark in pauses[:1] if mark.at == 0), 0, 0
-    for chunk in split_chunks(text.text, LONGEST, language):
+    for chunk in split_chunks(text.text, MAX_SENTENCE_CHARACTERS, language):
         begin, done = done, done + n_letters(chunk)
         runs = _overlapping_runs(placed.runs, starts, begin, done)
         inside = pauses[bisect_right(silent, begin) : bisect_right(silent, done)]

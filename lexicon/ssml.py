@@ -26,7 +26,7 @@ from xml.parsers import expat
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.languages import language_code
-from lexicon.marked_text import DEEPEST, MarkedText, MarkedTextBuilder, NameMark, NodMark, PauseMark, PhoneMark
+from lexicon.marked_text import MAX_NESTING, MarkedText, MarkedTextBuilder, NameMark, NodMark, PauseMark, PhoneMark
 from lexicon.say_as import say_as
 from lexicon.ssml_speech import named_voice, phoned_words
 from lexicon.ssml_values import BREAKS_S, check_lengths, choice, loudness, only, primary_of, speed
@@ -132,7 +132,7 @@ class _SsmlReader:
             raise InputError(f"there is no <{tag[:40]}> here; choose {', '.join(self._starts)}")
         if (name == "speak") != (not self._elements):
             raise InputError("<speak> holds all the rest, once; put everything into one")
-        if len(self._elements) > 2 * DEEPEST:
+        if len(self._elements) > 2 * MAX_NESTING:
             raise InputError(f"<{tag}> stands within {len(self._elements)} others; nest them less deep")
         if self._elements and self._elements[-1] in CLOSED_KINDS:
             raise InputError(f"<{self._elements[-1]}> holds no elements, and this one a <{tag}>; close it before")

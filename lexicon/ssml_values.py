@@ -13,8 +13,8 @@ _FACTOR = re.compile(r"[0-9]{1,6}(?:\.[0-9]{1,9})?")
 _DECIBEL = re.compile(r"([+-]?[0-9]{1,6}(?:\.[0-9]{1,9})?)\s*dB", re.IGNORECASE)
 # Strengths in seconds: from a pause of read speech at a comma (0.2-0.4 s) to one between paragraphs (1 s).
 BREAKS_S = MappingProxyType({"none": 0.0, "x-weak": 0.1, "weak": 0.2, "medium": 0.4, "strong": 0.7, "x-strong": 1.0})
-SPEEDS = MappingProxyType({"x-slow": 0.5, "slow": 0.75, "medium": 1.0, "default": 1.0, "fast": 1.3, "x-fast": 1.7})
-LOUDNESSES = MappingProxyType(
+NAMED_RATES = MappingProxyType({"x-slow": 0.5, "slow": 0.75, "medium": 1.0, "default": 1.0, "fast": 1.3, "x-fast": 1.7})
+NAMED_VOLUMES = MappingProxyType(
     {"silent": 0.0, "x-soft": 0.35, "soft": 0.6, "medium": 1.0, "default": 1.0, "loud": 1.4, "x-loud": 2.0}
 )
 
@@ -75,13 +75,13 @@ def speed(written: str) -> float:
         return {"": share, "+": 1 + share, "-": 1 - share}[match[1]]
     if _FACTOR.fullmatch(value):
         return float(value)
-    return choice("rate", value, SPEEDS)
+    return choice("rate", value, NAMED_RATES)
 
 
 def loudness(written: str) -> float:
     """A factor of loudness: a word, or decibels (+6dB)."""
     if match := _DECIBEL.fullmatch(written.strip()):
         return float(10.0 ** (min(float(match[1]), 1e3) / 20))
-    if written.strip() not in LOUDNESSES:
-        raise InputError(f"cannot read the volume {written[:40]!r}; write +6dB, or one of {', '.join(LOUDNESSES)}")
-    return LOUDNESSES[written.strip()]
+    if written.strip() not in NAMED_VOLUMES:
+        raise InputError(f"cannot read the volume {written[:40]!r}; write +6dB, or one of {', '.join(NAMED_VOLUMES)}")
+    return NAMED_VOLUMES[written.strip()]

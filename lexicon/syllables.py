@@ -8,12 +8,12 @@ from lexicon.ipa import Segment
 from lexicon.phones import PHONES
 
 # English onsets of two and three consonants (Cruttenden, Gimson's Pronunciation of English, chapter on clusters).
-_PAIRS = MappingProxyType({
+_ONSET_PAIRS = MappingProxyType({
     "ɹ": "p b t d k ɡ f θ ʃ", "l": "p b k ɡ f s", "w": "t d k ɡ θ s h", "j": "p b k ɡ f v m n h s l t d θ",
     "p": "s", "t": "s", "k": "s", "m": "s", "n": "s", "f": "s",
 })  # fmt: skip
 ENGLISH_ONSETS = frozenset(
-    {(first, second) for second, firsts in _PAIRS.items() for first in firsts.split()}
+    {(first, second) for second, firsts in _ONSET_PAIRS.items() for first in firsts.split()}
     | {("s", "p", "ɹ"), ("s", "p", "l"), ("s", "p", "j"), ("s", "t", "ɹ"), ("s", "t", "j"), ("s", "k", "ɹ")}
     | {("s", "k", "l"), ("s", "k", "w"), ("s", "k", "j")}
 )

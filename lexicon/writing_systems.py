@@ -35,7 +35,7 @@ SCRIPTS = MappingProxyType({
     "th": frozenset({"THAI"}), "ti": frozenset({"ETHIOPIC"}), "tt": _CYRILLIC, "ug": _ARABIC, "uk": _CYRILLIC,
     "ur": _ARABIC, "yue": _HAN, "en-shaw": frozenset({"SHAVIAN"}),
 })  # fmt: skip
-_EVERYWHERE = frozenset({"LATIN", "MODIFIER", "MASCULINE", "FEMININE", "KATAKANA-HIRAGANA", "VULGAR"})
+_COMMON_SCRIPTS = frozenset({"LATIN", "MODIFIER", "MASCULINE", "FEMININE", "KATAKANA-HIRAGANA", "VULGAR"})
 _NAMES = MappingProxyType({"CJK": "Chinese"})
 SHOWN_WORDS, SHOWN_CHARACTERS = 3, 24  # that a refusal names, of each at most so many characters
 # Combining marks that no script needs to tell its words apart: accents, enclosing marks.
@@ -53,7 +53,7 @@ def letter_script(letter: str) -> str:
 def language_scripts(language: str) -> frozenset[str]:
     """Writing systems that a language is read in, Latin included."""
     own = SCRIPTS.get(language, SCRIPTS.get(language.partition("-")[0], frozenset()))
-    return own | _EVERYWHERE
+    return own | _COMMON_SCRIPTS
 
 
 class _Kinds(dict[int, str]):

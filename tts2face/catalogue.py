@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError
-from tts2face.storage.files import SHIPPED, find_file
+from tts2face.storage.files import SHIPPED_FOLDER, find_file
 
 OWN_FACE = "self"
 
@@ -82,13 +82,13 @@ def voices() -> tuple[VoiceEntry, ...]:
     BackendError
         espeak-ng does not start.
     """
-    from tts2face.voice.engine import ENGLISH, NAMES
+    from tts2face.voice.engine import ENGLISH_CODES, VOICE_NAMES
 
     codes = tuple(language.code for language in languages())
-    english = tuple(code for code in codes if code in ENGLISH)
+    english = tuple(code for code in codes if code in ENGLISH_CODES)
     return (
-        VoiceEntry("heart", "hibari", english, _is_installed("hibari"), NAMES["heart"]),
-        VoiceEntry("espeak", "espeak-ng", codes, _is_installed("espeakng_loader"), NAMES["espeak"]),
+        VoiceEntry("heart", "hibari", english, _is_installed("hibari"), VOICE_NAMES["heart"]),
+        VoiceEntry("espeak", "espeak-ng", codes, _is_installed("espeakng_loader"), VOICE_NAMES["espeak"]),
         VoiceEntry("FILE.onnx", "piper", (), _is_installed("piper"), "any Piper voice by its path (extra [piper])"),
     )
 
@@ -175,7 +175,7 @@ def talkers() -> tuple[TalkerEntry, ...]:
 
 
 def _shipped(kind: str) -> list[Path]:
-    return sorted(SHIPPED.glob(f"*.{kind}"))
+    return sorted(SHIPPED_FOLDER.glob(f"*.{kind}"))
 
 
 def _read(path: Path, kind: str) -> tuple[Mapping[str, Any], Mapping[str, Any]]:

@@ -6,10 +6,10 @@ import numpy as np
 
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.request import FRAMES_PER_SECOND
+from tts2face.request import FPS_LIMITS
 from tts2face.types import Speech, Waveform, frame_count
 
-BROADCAST = (24, 30, 48, 60, 120)  # nominal rates whose broadcast form is 1000/1001 of them (SMPTE 12M)
+NTSC_NOMINAL_RATES = (24, 30, 48, 60, 120)  # nominal rates whose broadcast form is 1000/1001 of them (SMPTE 12M)
 
 
 def exact_rate(fps: float) -> Fraction:
@@ -20,10 +20,10 @@ def exact_rate(fps: float) -> Fraction:
     InputError
         The rate is out of range.
     """
-    low, high = FRAMES_PER_SECOND
+    low, high = FPS_LIMITS
     if not low <= fps <= high:
         raise InputError(f"fps must lie between {low:g} and {high:g}, not {fps:g}")
-    for nominal in BROADCAST:
+    for nominal in NTSC_NOMINAL_RATES:
         if abs(fps - nominal * 1000 / 1001) < 0.006:
             return Fraction(nominal * 1000, 1001)
     return Fraction(fps).limit_denominator(1000)

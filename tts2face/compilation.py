@@ -15,7 +15,7 @@ import numba
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
-VARIABLE = "NUMBA_CACHE_DIR"  # where the user wants compiled kernels; numba reads it itself
+CACHE_VARIABLE = "NUMBA_CACHE_DIR"  # where the user wants compiled kernels; numba reads it itself
 
 
 def kernel(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
@@ -40,7 +40,7 @@ def inlined_kernel(function: Callable[Arguments, Result]) -> Callable[Arguments,
 
 def cache_folder(package: Path) -> Path | None:
     """A private folder for compiled kernels; None where numba's own choice can be written."""
-    if VARIABLE in os.environ or _can_write(package / "__pycache__") or _can_write(_user_cache_folder()):
+    if CACHE_VARIABLE in os.environ or _can_write(package / "__pycache__") or _can_write(_user_cache_folder()):
         return None
     return _private_folder()
 

@@ -11,8 +11,8 @@ from typing import Any, Generic, TypeVar
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-Offer = tuple[Any, BaseException | None]
-PATIENCE_S = 0.1  # how soon the maker notices that nobody wants its items any more
+ItemOrError = tuple[Any, BaseException | None]
+POLL_INTERVAL_S = 0.1  # how soon the maker notices that nobody wants its items any more
 
 
 class Prefetch(Generic[Item]):
@@ -23,7 +23,7 @@ class Prefetch(Generic[Item]):
 
     def __init__(self, source: Iterable[Item], room: int) -> None:
         self._source = source
-        self._made: queue.Queue[Offer] = queue.Queue(room)
+        self._made: queue.Queue[ItemOrError] = queue.Queue(room)
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._fill, name="prefetch", daemon=True)
         self._thread.start()
@@ -59,10 +59,10 @@ class Prefetch(Generic[Item]):
         except BaseException as error:  # noqa: BLE001 - raised again in the thread that asked
             self._put((None, error))
 
-    def _put(self, item: Offer) -> None:
+    def _put(self, item: ItemOrError) -> None:
         while not self._stopped.is_set():
             with contextlib.suppress(queue.Full):
-                return self._made.put(item, timeout=PATIENCE_S)
+                return self._made.put(item, timeout=POLL_INTERVAL_S)
 
 
 def map_in_order(function: Callable[[Item], Result], items: Iterable[Item], threads: int) -> Iterator[Result]:

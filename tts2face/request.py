@@ -9,13 +9,13 @@ from typing import Any
 
 from lexicon.errors import InputError
 
-RATES = (0.5, 2.0)
-VOLUMES = (0.0, 2.0)
-FRAMES_PER_SECOND = (1.0, 120.0)
-DRIVES = ("linear", "network")
-SYNTHESES = ("exemplar", "theobald2007")
+RATE_LIMITS = (0.5, 2.0)
+VOLUME_LIMITS = (0.0, 2.0)
+FPS_LIMITS = (1.0, 120.0)
+AUDIO_MAP_NAMES = ("linear", "network")
+SYNTHESIS_METHODS = ("exemplar", "theobald2007")
 GESTURES = ("fields", "ju2008", "noise", "none")
-IDLE_S = (0.1, 3600.0)
+IDLE_LIMITS_S = (0.1, 3600.0)
 
 
 def option(default: Any, help_text: str) -> Any:
@@ -91,11 +91,11 @@ class Request:
         from lexicon.languages import language_code
 
         object.__setattr__(self, "language", language_code(self.language))
-        _check_limits("rate", self.rate, RATES)
-        _check_limits("volume", self.volume, VOLUMES)
-        _check_limits("fps", self.fps, FRAMES_PER_SECOND)
-        if self.synthesis not in SYNTHESES:
-            raise InputError(f"there is no synthesis {self.synthesis!r}; choose {' or '.join(SYNTHESES)}")
+        _check_limits("rate", self.rate, RATE_LIMITS)
+        _check_limits("volume", self.volume, VOLUME_LIMITS)
+        _check_limits("fps", self.fps, FPS_LIMITS)
+        if self.synthesis not in SYNTHESIS_METHODS:
+            raise InputError(f"there is no synthesis {self.synthesis!r}; choose {' or '.join(SYNTHESIS_METHODS)}")
         if self.seed < 0:
             raise InputError(f"seed must be 0 or more, not {self.seed}")
         if self.drive is not None:
@@ -103,14 +103,14 @@ class Request:
         if self.audio is not None and (self.voice is not None or self.rate != 1.0):
             raise InputError("a recording keeps its own voice and speed; leave --voice and --rate away")
         if self.idle is not None:
-            _check_limits("idle", self.idle, IDLE_S)
+            _check_limits("idle", self.idle, IDLE_LIMITS_S)
             _check_idle(self)
         _check_gestures(self)
 
 
 def _check_audio_map(request: Request) -> None:
-    if request.drive not in DRIVES:
-        raise InputError(f"there is no drive {request.drive!r}; choose {' or '.join(DRIVES)}")
+    if request.drive not in AUDIO_MAP_NAMES:
+        raise InputError(f"there is no drive {request.drive!r}; choose {' or '.join(AUDIO_MAP_NAMES)}")
     if request.audio is None:
         raise InputError("a drive follows a recording; give one with --audio, or leave --drive away")
     if request.text.strip():

@@ -32,11 +32,11 @@ from tts2face.synthesis.marked_speech import MarkTime
 from tts2face.synthesis.performance import Performance, perform, take_clips
 from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, prepare
 from tts2face.types import Clip, concatenate_clips
-from tts2face.voice.engine import Pronouncing, Voice, load_voice
+from tts2face.voice.engine import PronunciationMap, Voice, load_voice
 
 DEFAULT_FIELDS = "fields"
 OWN_FACE = "self"  # the face that the talker's own video shows
-VOICES_KEPT = 2  # idle voices by name and language; each keeps some 100 MB
+MAX_VOICES = 2  # idle voices by name and language; each keeps some 100 MB
 RENDERERS_KEPT = 2  # by picture; each keeps some 30 MB
 PIECES_AHEAD = 2  # pieces that may wait to be drawn while the next is spoken
 
@@ -300,7 +300,7 @@ class Session:
             return kept
 
     @contextmanager
-    def _lent_voice(self, name: str | None, language: str, own: Pronouncing) -> Iterator[Voice]:
+    def _lent_voice(self, name: str | None, language: str, own: PronunciationMap) -> Iterator[Voice]:
         """A voice for the time of a request, used by nobody else; loading one takes half a second."""
         key = (name, language, frozenset(own.items()))
         with self._lock:
@@ -313,7 +313,7 @@ class Session:
             with self._lock:
                 self._voices.setdefault(key, []).append(voice)
                 self._voices.move_to_end(key)
-                while sum(map(len, self._voices.values())) > VOICES_KEPT:
+                while sum(map(len, self._voices.values())) > MAX_VOICES:
                     oldest = next(iter(self._voices))
                     self._voices[oldest].pop()
                     if not self._voices[oldest]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.aam.reference_frame import rasterise_triangles
-from tts2face.cloning.parameter_transfer import SPREADS
+from tts2face.cloning.parameter_transfer import MAX_STANDARD_DEVIATIONS
 from tts2face.interpolation import sample_triangles
 from tts2face.models.appearance import Appearance, TextureModel, nearest_pixels
 
@@ -42,7 +42,7 @@ def build_appearance_transfer(source: Appearance, target: Appearance) -> Appeara
     (n_target, n_source), (face, mouth) = blocks[0].shape, blocks
     relation[:n_target, :n_source] = face
     relation[n_target:, n_source:] = mouth
-    return AppearanceTransfer(relation, SPREADS * target.spread.astype(np.float64))
+    return AppearanceTransfer(relation, MAX_STANDARD_DEVIATIONS * target.spread.astype(np.float64))
 
 
 def _basis_products(source: TextureModel, target: TextureModel) -> Floats:

@@ -7,19 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.aam.block_pca import IncrementalPca
-from corpus_tools.aam.mesh import MOUTH_POINTS, N_MESH
+from corpus_tools.aam.mesh import MOUTH_LANDMARKS, N_MESH_LANDMARKS
 from corpus_tools.aam.procrustes import align_shapes, apply_similarities, fit_similarities
 from corpus_tools.aam.source_videos import AppearanceRecording
 from corpus_tools.aam.train_appearance import LearnedAppearance
-from corpus_tools.recordings.audio_video_sync import LEAD_S, estimate_sync
+from corpus_tools.recordings.audio_video_sync import LIP_LEAD_S, estimate_sync
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.training.train_talker import CLOSED
+from corpus_tools.training.train_talker import CLOSED_GAP
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 
-SHAPE_MODES = 20
-TEXTURES_READ = 1000  # frames from which the number of texture modes is read
+N_SHAPE_MODES = 20
+N_SAMPLED_TEXTURES = 1000  # frames from which the number of texture modes is read
 BILABIALS = frozenset({"p", "b", "m"})
-REACH_S = 0.03  # either side of a phone in which its closure may lie
+CLOSURE_MARGIN_S = 0.03  # either side of a phone in which its closure may lie
 INNER_LIPS = (*INNER_LIP_UPPER, *INNER_LIP_LOWER)
 
 
@@ -67,13 +67,13 @@ def measure_appearance(
         held_out_texture_db=texture,
         held_out_mouth_db=mouth,
         closed=bilabial_closure_share(observations),
-        lag_ms=1000 * (estimate_sync(observations).lag + LEAD_S),
+        lag_ms=1000 * (estimate_sync(observations).lag + LIP_LEAD_S),
     )
 
 
 def shape_components(recordings: Sequence[AppearanceRecording]) -> tuple[IncrementalPca, NDArray[np.float64]]:
     """Components of the aligned shapes (eq. 1), and the mean shape (468, 2) that they are aligned with."""
-    shapes, mean = align_shapes(np.concatenate([recording.points[:, :N_MESH] for recording in recordings]))
+    shapes, mean = align_shapes(np.concatenate([recording.points[:, :N_MESH_LANDMARKS] for recording in recordings]))
     grown = IncrementalPca(60)
     for block in np.array_split(shapes.reshape(len(shapes), -1), max(1, len(shapes) // 500)):
         grown.add(block)
@@ -85,9 +85,9 @@ def shape_errors(
 ) -> tuple[float, float, float]:
     """Mean distance in pixels of all landmarks, of the inner lips, and mean error of the inner gap, with 20 modes."""
     everywhere, lips, gaps = [], [], []
-    basis = components.basis[:SHAPE_MODES].astype(np.float64)
+    basis = components.basis[:N_SHAPE_MODES].astype(np.float64)
     for recording in recordings:
-        points = recording.points[:, :N_MESH].astype(np.float64)
+        points = recording.points[:, :N_MESH_LANDMARKS].astype(np.float64)
         turns, shifts = fit_similarities(points, mean)
         flat = apply_similarities(points, turns, shifts).reshape(len(points), -1) - components.mean
         modelled = ((flat @ basis.T) @ basis + components.mean).reshape(points.shape)
@@ -104,7 +104,7 @@ def texture_variance(recordings: Sequence[AppearanceRecording], learnt: LearnedA
     """Share of the face texture's variance in the first 1, 2, ... components of a sample of frames."""
     frame, light_of = learnt.frames[0], learnt.lights.of
     n_frames = sum(len(recording.points) for recording in recordings)
-    every, rows = max(1, n_frames // TEXTURES_READ), []
+    every, rows = max(1, n_frames // N_SAMPLED_TEXTURES), []
     for recording in recordings:
         light = light_of(recording)
         for number, picture in enumerate(recording.pictures()):
@@ -128,23 +128,23 @@ def texture_quality(recordings: Sequence[AppearanceRecording], learnt: LearnedAp
             seen = light.removed(face.texture(picture, points))[None]
             face_errors.append(_mean_square(seen, appearance.face.textures(appearance.face.parameters(seen))))
             if gaps[number] >= np.median(gaps):
-                seen = light.removed(mouth.texture(picture, points[list(MOUTH_POINTS)]))[None]
+                seen = light.removed(mouth.texture(picture, points[list(MOUTH_LANDMARKS)]))[None]
                 mouth_errors.append(_mean_square(seen, appearance.mouth.textures(appearance.mouth.parameters(seen))))
     return _peak_snr_db(face_errors), _peak_snr_db(mouth_errors)
 
 
 def bilabial_closure_share(observations: Sequence[Observation]) -> float:
-    """Share of /p b m/ in whose time, with `REACH_S` either side, the inner lips were seen to close."""
+    """Share of /p b m/ in whose time, with `CLOSURE_MARGIN_S` either side, the inner lips were seen to close."""
     least = []
     for seen in observations:
         gap = np.linalg.norm(seen.landmarks[:, UPPER_LIP_INNER_MID] - seen.landmarks[:, LOWER_LIP_INNER_MID], axis=1)
         relative = gap / np.linalg.norm(seen.landmarks[:, 33] - seen.landmarks[:, 263], axis=1)
         times = np.arange(len(gap)) / seen.fps
         for phone, start, end in zip(seen.phones.phones, seen.phones.edges, seen.phones.edges[1:], strict=False):
-            here = (times >= start - REACH_S) & (times <= end + REACH_S)
+            here = (times >= start - CLOSURE_MARGIN_S) & (times <= end + CLOSURE_MARGIN_S)
             if phone in BILABIALS and here.any():
                 least.append(relative[here].min())
-    return float(np.mean(np.array(least) < CLOSED)) if least else float("nan")
+    return float(np.mean(np.array(least) < CLOSED_GAP)) if least else float("nan")
 
 
 def n_modes_for_variance(explained: NDArray[np.float64]) -> tuple[int, int]:

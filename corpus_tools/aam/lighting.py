@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-GAINS = (0.5, 2.0)  # beyond them it is another scene, not another light
+GAIN_LIMITS = (0.5, 2.0)  # beyond them it is another scene, not another light
 Floats = NDArray[np.float32]
 
 
@@ -36,6 +36,6 @@ def fit_lighting(texture: Floats, reference: Floats, still: NDArray[np.bool_]) -
     here, there = texture[still].astype(np.float64), reference[still].astype(np.float64)
     centred = here - here.mean(axis=0)
     gain = (centred * (there - there.mean(axis=0))).sum(axis=0) / np.maximum((centred**2).sum(axis=0), 1e-9)
-    gain = np.clip(gain, *GAINS)
+    gain = np.clip(gain, *GAIN_LIMITS)
     offset = there.mean(axis=0) - gain * here.mean(axis=0)
     return LightingCorrection(gain.astype(np.float32), offset.astype(np.float32))

@@ -5,23 +5,25 @@ from numpy.typing import NDArray
 
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
 
-N_MESH = 468  # the iris points behind them lie on the eyeballs
+N_MESH_LANDMARKS = 468  # the iris points behind them lie on the eyeballs
 RING_SCALE = 1.35  # the ring around the face, of the oval about its middle: the skin that gives way to the chin
-MOUTH_POINTS = (*INNER_LIP_UPPER, *INNER_LIP_LOWER[-2:0:-1])  # once around the inner lips
+MOUTH_LANDMARKS = (*INNER_LIP_UPPER, *INNER_LIP_LOWER[-2:0:-1])  # once around the inner lips
 
 
 def face_triangles(shape: NDArray[np.floating]) -> NDArray[np.int32]:
     """(F, 3) triangles of the face but for the inside of the mouth: Delaunay's on (468, 2) points, lips apart."""
     from scipy.spatial import Delaunay
 
-    triangles = np.asarray(Delaunay(shape[:N_MESH]).simplices)
+    triangles = np.asarray(Delaunay(shape[:N_MESH_LANDMARKS]).simplices)
     middles = shape[triangles].mean(axis=1)
-    kept = points_in_polygon(middles, shape[list(FACE_OVAL)]) & ~points_in_polygon(middles, shape[list(MOUTH_POINTS)])
+    kept = points_in_polygon(middles, shape[list(FACE_OVAL)]) & ~points_in_polygon(
+        middles, shape[list(MOUTH_LANDMARKS)]
+    )
     return np.asarray(triangles[kept], np.int32)
 
 
 def mouth_triangles() -> NDArray[np.int32]:
-    """(G, 3) triangles between the inner lips, of `MOUTH_POINTS`: a strip from corner to corner."""
+    """(G, 3) triangles between the inner lips, of `MOUTH_LANDMARKS`: a strip from corner to corner."""
     n = len(INNER_LIP_UPPER)
     lower = [0, *range(2 * n - 3, n - 1, -1), n - 1]  # places of the lower lip's points in MOUTH_POINTS
     rows = []

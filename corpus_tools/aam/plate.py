@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tts2face.models.landmarks import CHIN, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 
-LONGEST = 250  # frames; a film that goes to and fro hides its length
+MAX_PLATE_FRAMES = 250  # frames; a film that goes to and fro hides its length
 NEAR_LOSSLESS = {"crf": "8", "preset": "slow"}
 
 
@@ -23,9 +23,9 @@ def choose_plate_frames(points: Sequence[NDArray[np.float32]]) -> tuple[int, int
         return float(gap.mean() + chin.std())
 
     longest = max(len(places) for places in points)
-    enough = [number for number, places in enumerate(points) if len(places) >= min(longest, LONGEST) // 2]
-    number = min(enough, key=lambda at: unrest(points[at][:LONGEST]))
-    return number, 0, min(len(points[number]), LONGEST)
+    enough = [number for number, places in enumerate(points) if len(places) >= min(longest, MAX_PLATE_FRAMES) // 2]
+    number = min(enough, key=lambda at: unrest(points[at][:MAX_PLATE_FRAMES]))
+    return number, 0, min(len(points[number]), MAX_PLATE_FRAMES)
 
 
 def encode_plate_video(pictures: Iterator[NDArray[np.uint8]]) -> NDArray[np.uint8]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.aam.block_pca import IncrementalPca
 from corpus_tools.aam.lighting import LightingCorrection, fit_lighting
-from corpus_tools.aam.mesh import MOUTH_POINTS, N_MESH, face_ring, face_triangles, mouth_triangles
+from corpus_tools.aam.mesh import MOUTH_LANDMARKS, N_MESH_LANDMARKS, face_ring, face_triangles, mouth_triangles
 from corpus_tools.aam.plate import choose_plate_frames, encode_plate_video
 from corpus_tools.aam.procrustes import align_shapes
 from corpus_tools.aam.reference_frame import ReferenceFrame, build_reference_frame
@@ -26,14 +26,14 @@ from tts2face.models.landmarks import (
     UPPER_LIP_INNER_MID,
 )
 
-SHAPES_READ = 4000  # frames from which the reference shape is made
-OPEN_SHARE = 0.9  # the reference is the mean of the frames whose lips stand further apart than in this share
-OPEN_GAP = 0.03  # of the eye distance: the inner mouth is seen from here on
-FRAMES_APART = 3  # of the frames from which textures are learnt; neighbours hardly differ
-BLOCK = 128  # frames that are learnt from at a time
-SPARE = 20  # components carried beyond those that are kept
-STILL = 0.02  # pixels that speech changes by less show the light
-LIGHT_FRAMES = 25  # from which a recording's light is read
+N_REFERENCE_SHAPES = 4000  # frames from which the reference shape is made
+OPEN_LIP_QUANTILE = 0.9  # the reference is the mean of the frames whose lips stand further apart than in this share
+MIN_OPEN_GAP = 0.03  # of the eye distance: the inner mouth is seen from here on
+TEXTURE_STRIDE = 3  # of the frames from which textures are learnt; neighbours hardly differ
+BLOCK_FRAMES = 128  # frames that are learnt from at a time
+N_SPARE_COMPONENTS = 20  # components carried beyond those that are kept
+MAX_STILL_WEIGHT = 0.02  # pixels that speech changes by less show the light
+N_LIGHTING_FRAMES = 25  # from which a recording's light is read
 N_SMOOTHINGS = 4  # rounds by which the edge of what speech changes is softened over the mesh
 
 
@@ -81,8 +81,8 @@ def learn_appearance(
     frames = reference_frames(recordings, options)
     moving = speech_weights(frames[0])
     stretch = choose_plate_frames([recording.points for recording in recordings])
-    lights = LightingReference(frames[0], mean_texture(recordings[stretch[0]], frames[0]), moving < STILL)
-    grown = IncrementalPca(options.modes + SPARE), IncrementalPca(options.mouth_modes + SPARE)
+    lights = LightingReference(frames[0], mean_texture(recordings[stretch[0]], frames[0]), moving < MAX_STILL_WEIGHT)
+    grown = IncrementalPca(options.modes + N_SPARE_COMPONENTS), IncrementalPca(options.mouth_modes + N_SPARE_COMPONENTS)
     steps, found = 2 * len(recordings), []
     for number, recording in enumerate(recordings):
         found.append(lights.of(recording))
@@ -99,7 +99,7 @@ def learn_appearance(
         if on_progress:
             on_progress(len(recordings) + number + 1, steps)
     plate = _build_plate(recordings, stretch, looks, models[0].n_modes)
-    appearance = Appearance(models[0], models[1], np.array(MOUTH_POINTS, np.int32), moving, plate)
+    appearance = Appearance(models[0], models[1], np.array(MOUTH_LANDMARKS, np.int32), moving, plate)
     return LearnedAppearance(appearance, frames, lights, tuple(looks), (grown[0].explained(), grown[1].explained()))
 
 
@@ -121,7 +121,7 @@ class LightingReference:
 
 def mean_texture(recording: AppearanceRecording, frame: ReferenceFrame) -> NDArray[np.float32]:
     """(P, 3) mean of the first textures of a recording."""
-    pictures = islice(recording.pictures(), LIGHT_FRAMES)
+    pictures = islice(recording.pictures(), N_LIGHTING_FRAMES)
     textures = [frame.texture(picture, points) for picture, points in zip(pictures, recording.points, strict=False)]
     return np.asarray(np.mean(textures, axis=0), np.float32)
 
@@ -131,13 +131,13 @@ def reference_frames(
 ) -> tuple[ReferenceFrame, ReferenceFrame]:
     """Reference frames of the face and of the inner mouth: the mean of the frames with lips well apart."""
     n_frames = sum(len(recording.points) for recording in recordings)
-    every = max(1, n_frames // SHAPES_READ)
+    every = max(1, n_frames // N_REFERENCE_SHAPES)
     points = np.concatenate([recording.points for recording in recordings])[::every]
-    shapes, _ = align_shapes(points[:, :N_MESH])
+    shapes, _ = align_shapes(points[:, :N_MESH_LANDMARKS])
     gaps = normalised_lip_gap(shapes)
-    opened = shapes[gaps >= np.quantile(gaps, OPEN_SHARE)].mean(axis=0)
+    opened = shapes[gaps >= np.quantile(gaps, OPEN_LIP_QUANTILE)].mean(axis=0)
     face = build_reference_frame(opened, face_triangles(opened), options.side)
-    return face, build_reference_frame(opened[list(MOUTH_POINTS)], mouth_triangles(), options.mouth_side_px)
+    return face, build_reference_frame(opened[list(MOUTH_LANDMARKS)], mouth_triangles(), options.mouth_side_px)
 
 
 def normalised_lip_gap(points: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -157,12 +157,12 @@ def _add_textures(
     faces, mouths = [], []
     for number, picture in enumerate(recording.pictures()):
         points = recording.points[number]
-        if number % FRAMES_APART == 0:
+        if number % TEXTURE_STRIDE == 0:
             faces.append(light.removed(frames[0].texture(picture, points)).ravel())
-        if gaps[number] >= OPEN_GAP:
-            mouths.append(light.removed(frames[1].texture(picture, points[list(MOUTH_POINTS)])).ravel())
+        if gaps[number] >= MIN_OPEN_GAP:
+            mouths.append(light.removed(frames[1].texture(picture, points[list(MOUTH_LANDMARKS)])).ravel())
         for rows, components in ((faces, grown[0]), (mouths, grown[1])):
-            if len(rows) >= BLOCK:
+            if len(rows) >= BLOCK_FRAMES:
                 components.add(np.array(rows))
                 rows.clear()
     for rows, components in ((faces, grown[0]), (mouths, grown[1])):
@@ -195,12 +195,12 @@ def appearance_parameters(
     face, mouth = frames
     n_frames, n_face = len(recording.points), models[0].n_modes
     looks = np.zeros((n_frames, n_face + models[1].n_modes), np.float32)
-    seen = normalised_lip_gap(recording.points) >= OPEN_GAP
+    seen = normalised_lip_gap(recording.points) >= MIN_OPEN_GAP
     for number, picture in enumerate(recording.pictures()):
         points = recording.points[number]
         looks[number, :n_face] = models[0].parameters(light.removed(face.texture(picture, points))[None])[0]
         if seen[number]:
-            inner = light.removed(mouth.texture(picture, points[list(MOUTH_POINTS)]))
+            inner = light.removed(mouth.texture(picture, points[list(MOUTH_LANDMARKS)]))
             looks[number, n_face:] = models[1].parameters(inner[None])[0]
     if seen.any():
         for column in range(n_face, looks.shape[1]):
@@ -210,17 +210,17 @@ def appearance_parameters(
 
 def speech_weights(face: ReferenceFrame) -> NDArray[np.float32]:
     """(P,) how far each pixel of the face's texture follows speech: 1 about the mouth, 0 on the oval and above."""
-    weight = np.isin(np.arange(N_MESH), MOUTH_REGION).astype(np.float64)
+    weight = np.isin(np.arange(N_MESH_LANDMARKS), MOUTH_REGION).astype(np.float64)
     weight[list(FACE_OVAL)] = 0.0
     ends = np.concatenate([face.triangles[:, [0, 1]], face.triangles[:, [1, 2]], face.triangles[:, [2, 0]]])
     for _ in range(N_SMOOTHINGS):
-        total, count = weight.copy(), np.ones(N_MESH)
+        total, count = weight.copy(), np.ones(N_MESH_LANDMARKS)
         for here, there in (ends.T, ends.T[::-1]):
             np.add.at(total, here, weight[there])
             np.add.at(count, here, 1.0)
         weight = total / count
         weight[list(FACE_OVAL)] = 0.0
-    weight = np.minimum(weight / np.quantile(weight[list(MOUTH_POINTS)], 0.1), 1.0)
+    weight = np.minimum(weight / np.quantile(weight[list(MOUTH_LANDMARKS)], 0.1), 1.0)
     spread: NDArray[np.float32] = (weight[face.corners] * face.weights).sum(axis=1).astype(np.float32)
     return spread
 
@@ -233,7 +233,7 @@ def _build_plate(
 ) -> Plate:
     number, first, last = stretch
     recording, here = recordings[number], slice(first, last)
-    points = recording.points[here, :N_MESH]
+    points = recording.points[here, :N_MESH_LANDMARKS]
     return Plate(
         video=encode_plate_video(islice(recording.pictures(), first, last)),
         points=np.concatenate([points, face_ring(points)], axis=1).astype(np.float32),

@@ -12,7 +12,7 @@ from tts2face.face.landmark_fit import N_SKIN
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.palette import EXPRESSIONS
 
-LEAST_MOTION_MM = 0.3  # root mean square over landmarks; trackers differ by half of it from still to still
+MIN_EXPRESSION_MM = 0.3  # root mean square over landmarks; trackers differ by half of it from still to still
 
 Floats = NDArray[np.float64]
 
@@ -92,6 +92,6 @@ def basis_from_stills(
     expressions[:, N_SKIN:] = 0.0
     sizes = np.sqrt(np.square(expressions[:, :N_SKIN]).sum(axis=2).mean(axis=1))
     for name, size in zip(EXPRESSIONS, sizes, strict=True):
-        if size < LEAST_MOTION_MM:
+        if size < MIN_EXPRESSION_MM:
             raise DataError(f"{stills[name]} shows {name} as the face at rest; capture it stronger")
     return ExpressionBasis(own, expressions)

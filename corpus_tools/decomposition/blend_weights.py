@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 N_AVERAGED = 41  # frames at 30 a second, 1.36 s: speech and small gestures average out (Ju and Lee 2008, section 4.1)
 N_SAMPLES, N_NEAREST = 1000, 60  # Ju and Lee 2008, section 4.1
-MOST_SLACK = 1.0  # Ju and Lee 2008, section 4.1
-LEAST_CONDITION = 1e-9  # of the largest singular value: expressions nearer to dependent have no weights of their own
-AT_ONCE = 4096  # frames asked at once, to bound memory
+MAX_SLACK = 1.0  # Ju and Lee 2008, section 4.1
+MIN_CONDITION = 1e-9  # of the largest singular value: expressions nearer to dependent have no weights of their own
+CHUNK_SIZE = 4096  # frames asked at once, to bound memory
 
 Floats = NDArray[np.float64]
 
@@ -104,8 +104,8 @@ class NearestSamplesEstimator:
         from every sample alike. The search is exact; the paper's is approximate within a small bound.
         """
         found = np.zeros((len(displacements), self.samples.shape[1]))
-        for first in range(0, len(displacements), AT_ONCE):
-            span = slice(first, first + AT_ONCE)
+        for first in range(0, len(displacements), CHUNK_SIZE):
+            span = slice(first, first + CHUNK_SIZE)
             found[span] = self._mix_samples(*self.basis.split(displacements[span]))
         return found
 
@@ -189,13 +189,13 @@ def reduce_basis(basis: NDArray[np.floating], slack: float = 0.0) -> ReducedBasi
     DataError
         The expressions depend on each other, so that weights are not unique, or are not finite.
     """
-    if not 0.0 <= slack <= MOST_SLACK:
-        raise InputError(f"weights may pass their limits by 0 to {MOST_SLACK:g}, not by {slack:g}")
+    if not 0.0 <= slack <= MAX_SLACK:
+        raise InputError(f"weights may pass their limits by 0 to {MAX_SLACK:g}, not by {slack:g}")
     flat = np.asarray(basis, np.float64).reshape(len(basis), -1)
     if not np.isfinite(flat).all():
         raise DataError("a basis expression holds values that are no numbers; capture it again")
     strengths = np.linalg.svd(flat, compute_uv=False)
-    if len(flat) > flat.shape[1] or strengths[-1] <= LEAST_CONDITION * strengths[0]:
+    if len(flat) > flat.shape[1] or strengths[-1] <= MIN_CONDITION * strengths[0]:
         raise DataError("the basis expressions depend on each other; capture each as a face of its own")
     axes, upper = np.linalg.qr(flat.T)
     return ReducedBasis(np.asarray(axes), np.asarray(upper).T, slack)

@@ -14,8 +14,8 @@ from tts2face.types import HEAD_CHANNELS, Waveform
 from tts2face.video.media import read_sound
 
 SOUND_SUFFIXES = (".wav", ".flac", ".m4a", ".mp3", ".ogg", ".opus", ".mov", ".mp4")  # looked for beside a capture
-AT_ONCE = 128  # coordinates resampled at once, to bound memory
-SAME_RATE = 1e-6  # frames a second
+CHUNK_SIZE = 128  # coordinates resampled at once, to bound memory
+RATE_TOLERANCE_FPS = 1e-6  # frames a second
 
 Floats = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ class FaceRecording:
 
 def resample_to_gesture_rate(captured: FaceRecording) -> FaceRecording:
     """The recording at `GESTURE_FPS` frames a second."""
-    if abs(captured.fps - GESTURE_FPS) < SAME_RATE:
+    if abs(captured.fps - GESTURE_FPS) < RATE_TOLERANCE_FPS:
         return captured
     return replace(
         captured,
@@ -95,10 +95,10 @@ def resample(values: NDArray[np.floating], fps: float, wanted: float) -> Floats:
     if not len(values) or not (fps > 0 and wanted > 0):
         raise InputError(f"frames at {fps:g} a second cannot be read at {wanted:g}; give rates above 0")
     flat = np.asarray(values, np.float64).reshape(len(values), -1)
-    n_frames = int(np.floor((len(values) - 1) / fps * wanted + SAME_RATE)) + 1
+    n_frames = int(np.floor((len(values) - 1) / fps * wanted + RATE_TOLERANCE_FPS)) + 1
     read = np.zeros((n_frames, flat.shape[1]))
-    for first in range(0, flat.shape[1], AT_ONCE):
-        columns = slice(first, first + AT_ONCE)
+    for first in range(0, flat.shape[1], CHUNK_SIZE):
+        columns = slice(first, first + CHUNK_SIZE)
         read[:, columns] = _interpolate_frames(flat[:, columns], fps, wanted, n_frames)
     return read.reshape(n_frames, *values.shape[1:])
 

@@ -5,20 +5,20 @@ from pathlib import Path
 
 from corpus_tools.decomposition.capture import FaceRecording
 from corpus_tools.decomposition.livelink import read_livelink_recording
-from corpus_tools.decomposition.marker_set import SHIPPED, read_marker_set
+from corpus_tools.decomposition.marker_set import DEFAULT_MARKER_TABLE, read_marker_set
 from corpus_tools.decomposition.markers import read_marker_recording
 from lexicon.errors import InputError
 from tts2face.models.face import Face
 
 CAPTURE_SUFFIXES = frozenset({".c3d", ".csv"})
-LIVELINK = "timecode"  # first column of a Live Link Face table
+LIVELINK_FIRST_COLUMN = "timecode"  # first column of a Live Link Face table
 
 
 @dataclass(frozen=True, slots=True)
 class MarkerOptions:
     """How markers are read: the table of their set, a recording of the person at rest, frames a second of tables."""
 
-    marker_table: Path = SHIPPED
+    marker_table: Path = DEFAULT_MARKER_TABLE
     neutral: Path | None = None
     fps: float | None = None
 
@@ -28,7 +28,7 @@ def is_livelink(path: Path) -> bool:
     if path.suffix.lower() != ".csv" or not path.is_file():
         return False
     with path.open("rb") as file:
-        return file.read(64).decode("utf-8-sig", errors="replace").lower().startswith(LIVELINK)
+        return file.read(64).decode("utf-8-sig", errors="replace").lower().startswith(LIVELINK_FIRST_COLUMN)
 
 
 def read_capture_file(

@@ -13,22 +13,26 @@ from corpus_tools.decomposition.basis_expressions import ExpressionBasis
 from corpus_tools.decomposition.blend_weights import Estimator, moving_average
 from corpus_tools.decomposition.capture import FaceRecording, resample_to_gesture_rate
 from corpus_tools.decomposition.regions import feature_landmarks
-from tts2face.gesture.prosody import SILENCE, prosody_features
+from tts2face.gesture.prosody import SILENT_PROSODY, prosody_features
 from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS
 from tts2face.models.palette import FEATURES, GESTURE_FPS, REGION_FEATURES
-from tts2face.retargeting.performer import LIDS, eye_aperture
+from tts2face.retargeting.performer import EYELID_LANDMARKS, eye_aperture
 
-STEADY_S = 0.03  # standard deviation of the Gaussian that takes the tracker's tremor from head, brows and cheeks
-SHUT_APERTURE = 0.055  # of tracked lids that touch; first percentile of 40 minutes of one person (docs/gestures.md)
-IRIS = {"Left": 473, "Right": 468}
+TREMOR_SMOOTHING_S = (
+    0.03  # standard deviation of the Gaussian that takes the tracker's tremor from head, brows and cheeks
+)
+CLOSED_LID_APERTURE = (
+    0.055  # of tracked lids that touch; first percentile of 40 minutes of one person (docs/gestures.md)
+)
+IRIS_LANDMARKS = {"Left": 473, "Right": 468}
 # A tracked iris moves so far, in widths of an eye, when the line of sight turns by a radian: down, to the left. From
 # one person who turns her head and looks into the camera (docs/gestures.md).
-IRIS_PER_RAD = (-0.23, 0.33)
+IRIS_SHIFT_PER_RAD = (-0.23, 0.33)
 # Of a landmark's displacement that counts when expressions are told, in the region of the lips. At full weight the jaw
 # of a speaker reads as surprise (mean weight .20 in neutral speech) and the rest of the face is described three times
 # worse than by no expression; without lips a smile is hard to see (docs/gestures.md).
-LIPS_COUNT = 0.1
-SEEN_SHUT = 0.35  # a lid that covers more of the eye hides the iris
+LIP_WEIGHT = 0.1
+MAX_GAZE_LID_CLOSURE = 0.35  # a lid that covers more of the eye hides the iris
 
 Floats = NDArray[np.float32]
 
@@ -82,7 +86,7 @@ def decompose(captured: FaceRecording, basis: ExpressionBasis, estimator: Estima
         "head": head,
     }
     times = np.arange(len(moved)) / GESTURE_FPS
-    heard = np.tile(SILENCE, (len(times), 1))
+    heard = np.tile(SILENT_PROSODY, (len(times), 1))
     if recorded.sound is not None:
         heard = prosody_features(recorded.sound, times, with_pitch=True)
     return Decomposition(
@@ -97,7 +101,7 @@ def decompose(captured: FaceRecording, basis: ExpressionBasis, estimator: Estima
 def weight_displacements(displacements: NDArray[np.floating]) -> NDArray[np.float64]:
     """Displacements (N, 478, 3) as they count for expressions: lips move for speech most of the time."""
     counts = np.ones((N_LANDMARKS, 1))
-    counts[list(MOUTH_REGION)] = LIPS_COUNT
+    counts[list(MOUTH_REGION)] = LIP_WEIGHT
     return np.asarray(displacements, np.float64) * counts
 
 
@@ -106,19 +110,19 @@ def lid_closure(landmarks: NDArray[np.floating], rest: NDArray[np.floating]) -> 
     columns = []
     for side in ("Left", "Right"):
         opened = float(eye_aperture(rest[None], side)[0])
-        columns.append((opened - eye_aperture(landmarks, side)) / (opened - SHUT_APERTURE))
+        columns.append((opened - eye_aperture(landmarks, side)) / (opened - CLOSED_LID_APERTURE))
     return np.stack(columns, axis=1).astype(np.float32)
 
 
 def eye_angles(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
     """(T, 2) pitch and yaw of the eyes in the head, of tracked landmarks (T, 478, 3): from where the irises stand."""
     turned = []
-    for side, iris in IRIS.items():
-        _, _, outer, inner = LIDS[side]
+    for side, iris in IRIS_LANDMARKS.items():
+        _, _, outer, inner = EYELID_LANDMARKS[side]
         corners = landmarks[:, [outer, inner]]
         width = np.linalg.norm(corners[:, 0] - corners[:, 1], axis=1)
         away = landmarks[:, iris] - corners.mean(axis=1)
-        turned.append(np.stack([away[:, 1], away[:, 0]], axis=1) / width[:, None] / IRIS_PER_RAD)
+        turned.append(np.stack([away[:, 1], away[:, 0]], axis=1) / width[:, None] / IRIS_SHIFT_PER_RAD)
     return np.asarray(np.mean(turned, axis=0), np.float64)
 
 
@@ -128,7 +132,7 @@ def gaze_angles(turned: NDArray[np.float64], head: NDArray[np.floating], shut: F
     Where lids hide the irises the line goes straight from before to behind.
     """
     sight = turned + head[:, :2]
-    seen = np.flatnonzero(shut.max(axis=1) < SEEN_SHUT)
+    seen = np.flatnonzero(shut.max(axis=1) < MAX_GAZE_LID_CLOSURE)
     if len(seen):
         frames = np.arange(len(sight))
         sight = np.stack([np.interp(frames, seen, sight[seen, axis]) for axis in range(2)], axis=1)
@@ -139,4 +143,4 @@ def gaze_angles(turned: NDArray[np.float64], head: NDArray[np.floating], shut: F
 def _smooth(values: NDArray[np.floating]) -> Floats:
     from scipy.ndimage import gaussian_filter1d
 
-    return np.asarray(gaussian_filter1d(values, STEADY_S * GESTURE_FPS, axis=0), np.float32)
+    return np.asarray(gaussian_filter1d(values, TREMOR_SMOOTHING_S * GESTURE_FPS, axis=0), np.float32)

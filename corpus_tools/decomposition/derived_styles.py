@@ -7,10 +7,10 @@ from pathlib import Path
 from lexicon.errors import DataError
 from tts2face.models.palette import FIXED_CHANNELS, REGION_FEATURES, Derivation, FeatureChange
 
-TABLE = Path(__file__).with_name("derived_styles.tsv")
+DERIVED_STYLE_TABLE = Path(__file__).with_name("derived_styles.tsv")
 
 
-def read_derived_styles(source: str, table: Path = TABLE) -> dict[str, Derivation]:
+def read_derived_styles(source: str, table: Path = DERIVED_STYLE_TABLE) -> dict[str, Derivation]:
     """Derivations from a measured style, by name.
 
     Raises

@@ -10,10 +10,10 @@ from corpus_tools.decomposition.marker_gaps import check_gap
 from lexicon.errors import DataError
 from tts2face.video.pose import similarity_transforms
 
-LEAST_SEEN = 3  # markers that show a pose
-MOST_MISFIT_MM = 5.0  # of the head's markers against a rigid head, root mean square; caps slip by less
+MIN_VISIBLE_MARKERS = 3  # markers that show a pose
+MAX_MISFIT_MM = 5.0  # of the head's markers against a rigid head, root mean square; caps slip by less
 N_ROUNDS = 3  # of reference and poses in turn; the reference moves by less than 0.01 mm from the second on
-LINE = 0.05  # second over first spread of markers that lie nearly on a line
+MAX_COLLINEAR_RATIO = 0.05  # second over first spread of markers that lie nearly on a line
 
 Floats = NDArray[np.float64]
 
@@ -65,14 +65,14 @@ def fit_head_poses(
     Kabsch 1976 on the markers that are seen; reference and poses are found in turn. Poses between frames that show
     them are filled in.
     """
-    if len(names) < LEAST_SEEN:
-        raise DataError(f"{len(names)} markers of the head are there; its pose takes at least {LEAST_SEEN}")
+    if len(names) < MIN_VISIBLE_MARKERS:
+        raise DataError(f"{len(names)} markers of the head are there; its pose takes at least {MIN_VISIBLE_MARKERS}")
     seen = np.asarray(np.isfinite(points).all(axis=2))
-    posed = np.asarray(seen.sum(axis=1) >= LEAST_SEEN)
+    posed = np.asarray(seen.sum(axis=1) >= MIN_VISIBLE_MARKERS)
     check_gap("head's pose", ~posed, fps)
     head = _first_reference(points, seen) if reference is None else reference
     spreads = np.linalg.svd(head - head.mean(axis=0), compute_uv=False)
-    if spreads[1] <= LINE * spreads[0]:
+    if spreads[1] <= MAX_COLLINEAR_RATIO * spreads[0]:
         raise DataError("the head's markers lie on a line, so that its pose is not known; wear them apart")
     shown, seen = points[posed], seen[posed]
     rotations, places = _fit_poses(shown, seen, head)
@@ -83,7 +83,7 @@ def fit_head_poses(
         rotations, places = _fit_poses(shown, seen, head)
     off = np.einsum("tij,mj->tmi", rotations, head) + places[:, None] - shown
     misfit = float(np.sqrt(np.square(off[seen]).sum(axis=1).mean()))
-    if misfit > MOST_MISFIT_MM:
+    if misfit > MAX_MISFIT_MM:
         raise DataError(
             f"the head's markers do not move as one ({misfit:.1f} mm apart); name only those on the skull as head"
         )

@@ -13,7 +13,7 @@ from tts2face.types import Trajectory
 from tts2face.video.livelink import FaceCapture, read_livelink
 
 # Channels without which a feature is not told.
-NEEDED = {"gaze": ("eyeLook",), "blink": ("eyeBlink",), "brows": ("brow",), "cheeks": ("cheek", "nose")}
+FEATURE_CHANNELS = {"gaze": ("eyeLook",), "blink": ("eyeBlink",), "brows": ("brow",), "cheeks": ("cheek", "nose")}
 
 
 def read_livelink_recording(path: Path, face: Face, *, sound: Path | None = None) -> FaceRecording:
@@ -59,7 +59,9 @@ def _missing_features(capture: FaceCapture) -> frozenset[str]:
     moving = [
         name for name, values in zip(capture.weights.channels, capture.weights.values.T, strict=True) if np.ptp(values)
     ]
-    untold = {feature for feature, begins in NEEDED.items() if not any(name.startswith(begins) for name in moving)}
+    untold = {
+        feature for feature, begins in FEATURE_CHANNELS.items() if not any(name.startswith(begins) for name in moving)
+    }
     if not capture.head.values.any():
         untold.add("head")
     return frozenset(untold)

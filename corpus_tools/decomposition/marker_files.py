@@ -17,11 +17,11 @@ from tts2face.types import Waveform
 
 MM_PER_UNIT = {"": 1.0, "mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "in": 25.4, "inch": 25.4, "ft": 304.8}
 SOUND_LABELS = ("audio", "sound", "voice", "speech", "mic")  # how analogue channels that hold sound are named
-LEAST_SOUND_HZ = 8000.0  # an analogue channel of fewer samples a second is no sound
-LEAST_FPS, MOST_FPS = 10.0, 1000.0
-UNEVEN = 0.25  # of a frame: times in a file are rounded, often to milliseconds
-GAP = 1.5  # of the usual step: a longer one leaves frames out
-BLOCK_BYTES, MOST_BLOCKS, BIG_ENDIAN = 512, 256, 86  # of a C3D file; its first byte counts blocks
+MIN_SOUND_HZ = 8000.0  # an analogue channel of fewer samples a second is no sound
+MIN_FPS, MAX_FPS = 10.0, 1000.0
+TIME_TOLERANCE_FRAMES = 0.25  # of a frame: times in a file are rounded, often to milliseconds
+MIN_GAP_STEPS = 1.5  # of the usual step: a longer one leaves frames out
+BLOCK_BYTES, MAX_BLOCKS, BIG_ENDIAN = 512, 256, 86  # of a C3D file; its first byte counts blocks
 AXES = ("x", "y", "z")
 
 Floats = NDArray[np.float64]
@@ -65,8 +65,8 @@ def read_markers(path: Path, fps: float | None = None) -> MarkerTake:
     twice = [name for name, count in Counter(take.names).items() if count > 1]
     if twice:
         raise DataError(f"{path} holds the marker {twice[0]} twice; export one person alone")
-    if not LEAST_FPS <= take.fps <= MOST_FPS:
-        raise DataError(f"{path} has {take.fps:g} frames a second; {LEAST_FPS:g} to {MOST_FPS:g} can be read")
+    if not MIN_FPS <= take.fps <= MAX_FPS:
+        raise DataError(f"{path} has {take.fps:g} frames a second; {MIN_FPS:g} to {MAX_FPS:g} can be read")
     return take
 
 
@@ -103,7 +103,7 @@ def _check_length(path: Path, n_frames: int) -> None:
     Source: the C3D file format, header words 4 and 5 (first and last frame, 16 bits) and the processor type.
     """
     with path.open("rb") as file:
-        content = file.read(BLOCK_BYTES * MOST_BLOCKS)
+        content = file.read(BLOCK_BYTES * MAX_BLOCKS)
     order = ">" if content[BLOCK_BYTES * (content[0] - 1) + 3] == BIG_ENDIAN else "<"
     first, last = struct.unpack_from(f"{order}HH", content, 6)
     if (last - first + 1 - n_frames) % 2**16:  # longer recordings count beyond 16 bits elsewhere
@@ -117,7 +117,7 @@ def _analogue_sound(file: Any) -> Waveform | None:
     about = file["parameters"]["ANALOG"]
     labels, rates = about["LABELS"]["value"], about["RATE"]["value"]
     named = [at for at, label in enumerate(labels) if any(word in label.lower() for word in SOUND_LABELS)]
-    if not named or not len(rates) or rates[0] < LEAST_SOUND_HZ:
+    if not named or not len(rates) or rates[0] < MIN_SOUND_HZ:
         return None
     samples = np.asarray(file["data"]["analogs"], np.float64)[0, named[0]]
     samples = np.nan_to_num(samples - np.nanmean(samples))
@@ -177,9 +177,9 @@ def _build_even_take(
     steps = np.diff(at)
     if not np.isfinite(at).all() or (steps <= 0).any():
         raise DataError(f"the column {what} of {path} must rise from row to row; export it again")
-    usual = 1.0 if what == "frame" else float(steps[steps < GAP * np.median(steps)].mean())
+    usual = 1.0 if what == "frame" else float(steps[steps < MIN_GAP_STEPS * np.median(steps)].mean())
     away = steps / usual
-    if np.abs(away - np.rint(away)).max() > UNEVEN:
+    if np.abs(away - np.rint(away)).max() > TIME_TOLERANCE_FRAMES:
         raise DataError(f"the column {what} of {path} does not run evenly from row to row; export it again")
     rows = np.concatenate([[0], np.cumsum(np.rint(away).astype(int))])
     found = np.full((rows[-1] + 1, len(names), 3), np.nan)

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 
-LONGEST_GAP_S = 0.2  # half a blink with its pause; what a face does in longer gaps nobody knows
-OTHERWISE = "give a marker set that does without it"
-MOST_NAMED = 4  # markers in a sentence
+MAX_MARKER_GAP_S = 0.2  # half a blink with its pause; what a face does in longer gaps nobody knows
+MARKER_SET_ADVICE = "give a marker set that does without it"
+MAX_QUOTED_MARKERS = 4  # markers in a sentence
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ def fill_marker_gaps(tracks: Floats, names: Sequence[str], fps: float) -> tuple[
     Raises
     ------
     DataError
-        A gap is longer than `LONGEST_GAP_S`; the sentence names the marker and the time.
+        A gap is longer than `MAX_MARKER_GAP_S`; the sentence names the marker and the time.
 
     Notes
     -----
@@ -41,8 +41,8 @@ def fill_marker_gaps(tracks: Floats, names: Sequence[str], fps: float) -> tuple[
         counts[name] = int(gone.sum())
     if not counts:
         return whole, ()
-    named = ", ".join(f"{name} ({count} frames)" for name, count in list(counts.items())[:MOST_NAMED])
-    more = f" and {len(counts) - MOST_NAMED} more" if len(counts) > MOST_NAMED else ""
+    named = ", ".join(f"{name} ({count} frames)" for name, count in list(counts.items())[:MAX_QUOTED_MARKERS])
+    more = f" and {len(counts) - MAX_QUOTED_MARKERS} more" if len(counts) > MAX_QUOTED_MARKERS else ""
     return whole, (f"gaps were filled in {named}{more}",)
 
 
@@ -55,12 +55,12 @@ def find_gaps(gone: NDArray[np.bool_]) -> NDArray[np.int64]:
 def check_gap(what: str, gone: NDArray[np.bool_], fps: float) -> None:
     """Refuse gaps, True in (T,), that are too long to be filled; errors as `fill_marker_gaps`."""
     if gone.all():
-        raise DataError(f"the {what} is never seen; {OTHERWISE}, or capture it again")
+        raise DataError(f"the {what} is never seen; {MARKER_SET_ADVICE}, or capture it again")
     begin, end = max(find_gaps(gone).tolist(), key=lambda gap: gap[1] - gap[0], default=(0, 0))
-    if (end - begin) / fps > LONGEST_GAP_S:
+    if (end - begin) / fps > MAX_MARKER_GAP_S:
         raise DataError(
             f"the {what} is out of sight for {(end - begin) / fps:.2f} s from {begin / fps:.2f} s on, and gaps up to "
-            f"{LONGEST_GAP_S:g} s can be filled; fill it where it was captured, or {OTHERWISE}"
+            f"{MAX_MARKER_GAP_S:g} s can be filled; fill it where it was captured, or {MARKER_SET_ADVICE}"
         )
 
 

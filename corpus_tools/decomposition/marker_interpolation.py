@@ -18,8 +18,8 @@ from tts2face.models.landmarks import (
 )
 from tts2face.video.pose import similarity_transforms
 
-FACE_SIDES = (234, 454)  # landmarks as far apart as the face is wide
-LEAST_SIZE, MOST_SIZE = 0.6, 1.7  # of the common face over the person's; beyond it the unit is wrong
+FACE_WIDTH_LANDMARKS = (234, 454)  # landmarks as far apart as the face is wide
+MIN_SIZE_RATIO, MAX_SIZE_RATIO = 0.6, 1.7  # of the common face over the person's; beyond it the unit is wrong
 # Lines of each lip between the outer and the inner one, from the right corner to the left: entry k of each lies behind
 # entry k of the outer line. Then the landmarks of upper lids and of lower lids.
 UPPER_LIP_LINES = (
@@ -98,11 +98,11 @@ def build_marker_interpolator(markers: Floats, at: Sequence[int], common: Floats
     weights = np.full(len(at), 1.0 / len(at))
     turns, sizes = similarity_transforms(markers[None], places, weights)
     turn, size = turns[0], float(sizes[0])
-    if not LEAST_SIZE <= size <= MOST_SIZE:
+    if not MIN_SIZE_RATIO <= size <= MAX_SIZE_RATIO:
         raise DataError(f"the markers lie {1 / size:.3g} times as far apart as on a face; check the file's unit")
     shift = weights @ places / size - turn @ (weights @ markers)
     own = common / size
-    width = float(np.linalg.norm(own[FACE_SIDES[0]] - own[FACE_SIDES[1]]))
+    width = float(np.linalg.norm(own[FACE_WIDTH_LANDMARKS[0]] - own[FACE_WIDTH_LANDMARKS[1]]))
     bent = fit_interpolant(own[list(at)], markers @ turn.T + shift - own[list(at)], width)
     rest = own + bent(own)
     shares = np.zeros((len(common), len(at)))

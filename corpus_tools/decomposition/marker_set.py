@@ -10,16 +10,16 @@ from tts2face.models.landmarks import N_LANDMARKS
 
 # 68 markers of the face and 7 of the head, as many as Ju and Lee 2008, section 3, has. The paper shows its layout in a
 # picture only (Fig. 2): names and places here are this project's.
-SHIPPED = Path(__file__).with_name("markers_68.tsv")
+DEFAULT_MARKER_TABLE = Path(__file__).with_name("markers_68.tsv")
 COLUMNS = ("marker", "region", "landmark")
-HEAD = "head"  # region of the markers that the face does not move
-LEAST_HEAD = 3  # markers that a head's pose takes
-LEAST_FACE = 4  # markers that show which way a face looks
+HEAD_REGION = "head"  # region of the markers that the face does not move
+MIN_HEAD_MARKERS = 3  # markers that a head's pose takes
+MIN_FACE_MARKERS = 4  # markers that show which way a face looks
 # Regions of the face (Ju and Lee 2008, Fig. 5, by sides), and those that a feature of a palette is read from.
 REGIONS = (
     "brow_left", "brow_right", "lid_left", "lid_right", "nose", "cheek_left", "cheek_right", "lips", "jaw", "forehead",
 )  # fmt: skip
-NEEDED: Mapping[str, tuple[str, ...]] = {
+FEATURE_REGIONS: Mapping[str, tuple[str, ...]] = {
     "expression": ("brow_left", "brow_right", "lips"),
     "brows": ("brow_left", "brow_right"),
     "blink": ("lid_left", "lid_right"),
@@ -37,7 +37,7 @@ class MarkerSet:
     @property
     def head(self) -> tuple[str, ...]:
         """Markers of the head."""
-        return tuple(name for name, region in self.regions.items() if region == HEAD)
+        return tuple(name for name, region in self.regions.items() if region == HEAD_REGION)
 
     @property
     def face(self) -> tuple[str, ...]:
@@ -48,10 +48,12 @@ class MarkerSet:
     def missing_features(self) -> frozenset[str]:
         """Features of a palette that these markers cannot tell; no marker lies on an eyeball."""
         there = set(self.regions.values())
-        return frozenset({"gaze"} | {feature for feature, regions in NEEDED.items() if not there.issuperset(regions)})
+        return frozenset(
+            {"gaze"} | {feature for feature, regions in FEATURE_REGIONS.items() if not there.issuperset(regions)}
+        )
 
 
-def read_marker_set(path: Path = SHIPPED) -> MarkerSet:
+def read_marker_set(path: Path = DEFAULT_MARKER_TABLE) -> MarkerSet:
     """A marker set from a table of tab-separated columns marker, region, landmark; ``#`` begins a comment.
 
     Raises
@@ -77,13 +79,13 @@ def read_marker_set(path: Path = SHIPPED) -> MarkerSet:
     for row in rows[1:]:
         _add_row(path, row, regions, landmarks)
     n_head = len(regions) - len(landmarks)
-    if n_head < LEAST_HEAD:
+    if n_head < MIN_HEAD_MARKERS:
         raise DataError(
-            f"{path} has {n_head} markers of the region head; a head's pose takes at least {LEAST_HEAD} that the face "
-            "does not move, on a cap or a band"
+            f"{path} has {n_head} markers of the region head; head pose needs at least {MIN_HEAD_MARKERS} that the "
+            "face does not move, on a cap or a band"
         )
-    if len(landmarks) < LEAST_FACE:
-        raise DataError(f"{path} has {len(landmarks)} markers of the face; it takes at least {LEAST_FACE}")
+    if len(landmarks) < MIN_FACE_MARKERS:
+        raise DataError(f"{path} has {len(landmarks)} markers of the face; it takes at least {MIN_FACE_MARKERS}")
     return MarkerSet(regions, landmarks)
 
 
@@ -94,10 +96,12 @@ def _add_row(path: Path, row: list[str], regions: dict[str, str], landmarks: dic
     marker, region, landmark = row
     if marker in regions:
         raise DataError(f"{path} names the marker {marker} twice; give each one row")
-    if region not in (*REGIONS, HEAD):
-        raise DataError(f"{path} puts {marker} into the region {region!r}; regions are {', '.join(REGIONS)} and {HEAD}")
+    if region not in (*REGIONS, HEAD_REGION):
+        raise DataError(
+            f"{path} puts {marker} into the region {region!r}; regions are {', '.join(REGIONS)} and {HEAD_REGION}"
+        )
     regions[marker] = region
-    if region == HEAD:
+    if region == HEAD_REGION:
         return
     if not landmark.isdecimal() or int(landmark) >= N_LANDMARKS:
         raise DataError(f"{path} puts {marker} at the landmark {landmark!r}; landmarks are 0 to {N_LANDMARKS - 1}")

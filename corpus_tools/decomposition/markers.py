@@ -12,12 +12,12 @@ from corpus_tools.decomposition.head_markers import HeadPoses, fit_head_poses
 from corpus_tools.decomposition.marker_files import MarkerTake, read_markers
 from corpus_tools.decomposition.marker_gaps import fill_marker_gaps
 from corpus_tools.decomposition.marker_interpolation import MarkerInterpolator, build_marker_interpolator
-from corpus_tools.decomposition.marker_set import LEAST_FACE, MarkerSet
+from corpus_tools.decomposition.marker_set import MIN_FACE_MARKERS, MarkerSet
 from lexicon.errors import DataError
 from tts2face.models.face import Face
 from tts2face.video.pose import head_angles
 
-MOST_NAMED = 6  # markers in a sentence
+MAX_QUOTED_MARKERS = 6  # markers in a sentence
 
 Floats = NDArray[np.float64]
 
@@ -94,8 +94,10 @@ def read_marker_face(path: Path, face: Face, worn: MarkerSet, *, fps: float | No
     check_regions(path, take, worn)
     there = set(take.names)
     names = tuple(name for name in worn.face if name in there)
-    if len(names) < LEAST_FACE:
-        raise DataError(f"{path} has {len(names)} of the set's markers of the face; it takes at least {LEAST_FACE}")
+    if len(names) < MIN_FACE_MARKERS:
+        raise DataError(
+            f"{path} has {len(names)} of the set's markers of the face; it takes at least {MIN_FACE_MARKERS}"
+        )
     head_names = tuple(name for name in worn.head if name in there)
     points, poses, _ = _face_in_head_axes(path, take, names, head_names, None)
     rest = np.median(points, axis=0)
@@ -120,12 +122,12 @@ def check_regions(path: Path, take: MarkerTake, worn: MarkerSet) -> None:
     """
     there = set(take.names)
     if not there & set(worn.regions):
-        shown = ", ".join(take.names[:MOST_NAMED])
+        shown = ", ".join(take.names[:MAX_QUOTED_MARKERS])
         raise DataError(f"{path} holds none of the set's markers; it has {shown}. Give its marker set with --markers")
     for region in dict.fromkeys(worn.regions.values()):
         names = [name for name, of in worn.regions.items() if of == region]
         if not there.intersection(names):
-            shown = ", ".join(names[:MOST_NAMED])
+            shown = ", ".join(names[:MAX_QUOTED_MARKERS])
             raise DataError(
                 f"{path} has no marker of the region {region} ({shown}); capture them, or give a marker set without "
                 "this region with --markers"

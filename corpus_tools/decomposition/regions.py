@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-TABLE = Path(__file__).with_name("regions.tsv")
+REGION_TABLE = Path(__file__).with_name("regions.tsv")
 
 
 def region_landmarks() -> dict[str, NDArray[np.int32]]:
@@ -21,5 +21,5 @@ def feature_landmarks(feature: str) -> NDArray[np.int32]:
 
 
 def _read_rows() -> list[dict[str, str]]:
-    lines = [line for line in TABLE.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    lines = [line for line in REGION_TABLE.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     return list(csv.DictReader(lines, delimiter="\t"))

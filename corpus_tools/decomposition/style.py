@@ -12,8 +12,8 @@ from corpus_tools.decomposition.regions import feature_landmarks
 from lexicon.errors import InputError
 from tts2face.models.palette import FEATURES, REGION_FEATURES, FaceRegion, Palette, Style
 
-VARIANCE = 0.95  # of a region's motion that its modes keep: the rest is the tracker's
-MOST_MODES = 10
+KEPT_VARIANCE = 0.95  # of a region's motion that its modes keep: the rest is the tracker's
+MAX_MODES = 10
 
 Floats = NDArray[np.float32]
 
@@ -96,7 +96,7 @@ def _build_region(feature: str, displaced: NDArray[np.floating]) -> FaceRegion:
     variances, vectors = np.linalg.eigh(np.einsum("ti,tj->ij", flat, flat))
     variances, vectors = np.maximum(variances[::-1], 0.0), vectors[:, ::-1].T
     share = np.cumsum(variances) / max(float(variances.sum()), 1e-12)
-    n_modes = min(int(np.searchsorted(share, VARIANCE)) + 1, MOST_MODES)
+    n_modes = min(int(np.searchsorted(share, KEPT_VARIANCE)) + 1, MAX_MODES)
     modes = vectors[:n_modes]
     modes = modes * np.sign(modes[np.arange(n_modes), np.abs(modes).argmax(axis=1)])[:, None]
     return FaceRegion(feature_landmarks(feature), modes.reshape(n_modes, -1, 3).astype(np.float32))

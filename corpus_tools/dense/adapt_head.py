@@ -12,9 +12,9 @@ from tts2face.video.pose import similarity_transforms
 
 Floats = NDArray[np.float64]
 
-MOUTH_PARTS = ("teeth", "gums", "tongue")  # bone and what hangs on it: moved and scaled as one, never bent
+RIGID_MOUTH_PARTS = ("teeth", "gums", "tongue")  # bone and what hangs on it: moved and scaled as one, never bent
 EYE_PARTS = ("sclera", "iris")
-MOVED_MM = 1e-4  # a shape that moves a vertex less does not move it
+MIN_SHAPE_MOTION_MM = 1e-4  # a shape that moves a vertex less does not move it
 
 
 def adapt_head(face: Face, talker: NDArray[np.floating]) -> Face:
@@ -29,7 +29,7 @@ def adapt_head(face: Face, talker: NDArray[np.floating]) -> Face:
     """
     warp = fit_head_warp(face, talker)
     rest = face.vertices.astype(np.float64)
-    bone, balls = part_vertices(face, MOUTH_PARTS), part_vertices(face, EYE_PARTS)
+    bone, balls = part_vertices(face, RIGID_MOUTH_PARTS), part_vertices(face, EYE_PARTS)
     soft = np.setdiff1d(np.arange(len(rest)), np.concatenate([bone, balls]))
     moved = rest.copy()
     moved[soft] = warp.carried(rest[soft], soft)
@@ -87,7 +87,7 @@ def _warp_shapes(face: Face, warp: HeadWarp, soft: NDArray[np.int64], moved: Flo
     jaw = face.shapes[face.shape_names.index("jawOpen")].astype(np.float64)
     for number, name in enumerate(face.shape_names):
         shape = face.shapes[number].astype(np.float64)
-        rows = soft[np.abs(shape[soft]).max(axis=1) > MOVED_MM]
+        rows = soft[np.abs(shape[soft]).max(axis=1) > MIN_SHAPE_MOTION_MM]
         if name == "mouthClose":
             before = rest[rows] + jaw[rows]
             shapes[number, rows] = warp.carried(before + shape[rows], rows) - warp.carried(before, rows)

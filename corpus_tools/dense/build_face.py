@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.build_talker import PROVENANCE, UNSTATED, read_provenance
+from corpus_tools.build_talker import NOT_STATED, PROVENANCE, read_provenance
 from corpus_tools.dense.adapt_head import adapt_head
 from corpus_tools.dense.mesh_fit import (
-    N_MESH,
+    N_MESH_LANDMARKS,
     align_to_head,
     correct_lips_and_lids,
     face_landmarks,
@@ -29,7 +29,7 @@ from tts2face.models.face_file import read_face, write_face
 from tts2face.storage.files import find_file
 from tts2face.video.landmark_models import find_bundle
 
-HEAD = "head"  # the shipped face that is adapted
+SOURCE_FACE = "head"  # the shipped face that is adapted
 CONTENT = "a head with the shape and, with the stated consent, the skin of a real person"
 
 
@@ -85,9 +85,9 @@ def build_face(
     eyes = CachedTracker(effort.folder(), find_bundle(effort.model))
     report = on_progress or (lambda done, of: None)
     seen = track_videos(videos, eyes, lambda done, of: report(done, 2 * of))
-    head = read_face(find_file(HEAD, "face"))
+    head = read_face(find_file(SOURCE_FACE, "face"))
     talker = resting_landmarks(seen)
-    rest = face_landmarks(head, head.vertices)[:N_MESH]
+    rest = face_landmarks(head, head.vertices)[:N_MESH_LANDMARKS]
     target = align_to_head(talker, rest)
     used = np.flatnonzero(select_consistent_landmarks(rest, correct_lips_and_lids(rest, target)))
     shaped = adapt_head(head, talker)
@@ -106,7 +106,7 @@ def build_face(
     metadata = {
         **head.metadata,
         "name": consent["name"],
-        "licence": f"mesh: {head.metadata['licence']}; likeness of the person: {stated.get('licence', UNSTATED)}",
+        "licence": f"mesh: {head.metadata['licence']}; likeness of the person: {stated.get('licence', NOT_STATED)}",
         "attribution": "; ".join(filter(None, [head.metadata["attribution"], stated.get("attribution")])),
         "content": CONTENT,
         "consent": dict(consent),
@@ -116,6 +116,6 @@ def build_face(
     if model is not None:
         face, metadata = with_modes(face, model), {**metadata, "dense": model.summary()}
     write_face(out, replace(face, metadata=metadata))
-    reached = face_landmarks(shaped, shaped.vertices)[:N_MESH]
+    reached = face_landmarks(shaped, shaped.vertices)[:N_MESH_LANDMARKS]
     again = align_to_head(talker, reached)
     return BuiltFace(len(seen), len(videos), float(np.linalg.norm(again - reached, axis=1)[used].mean()), model)

@@ -12,19 +12,26 @@ from tts2face.video.pose import similarity_transforms
 
 Floats = NDArray[np.float64]
 
-N_MESH = 468  # the iris points behind them follow the gaze and say nothing about the shape of the face
-OPEN_JAW = 0.12  # weight of jawOpen in whose space the lips lie apart; a closed mouth would be torn, a wide one gape
+N_MESH_LANDMARKS = 468  # the iris points behind them follow the gaze and say nothing about the shape of the face
+OPEN_JAW_WEIGHT = (
+    0.12  # weight of jawOpen in whose space the lips lie apart; a closed mouth would be torn, a wide one gape
+)
 # The edge of the lids, once around, from the outer corner; the person's right eye, then the left.
-LIDS = (
+LID_LANDMARKS = (
     (33, 246, 161, 160, 159, 158, 157, 173, 133, 155, 154, 153, 145, 144, 163, 7),
     (263, 466, 388, 387, 386, 385, 384, 398, 362, 382, 381, 380, 374, 373, 390, 249),
 )
-CORNERS = ((33, 133), (263, 362))
-EYE_SCALE = (0.92, 1.08)  # eyeballs of adults differ in size by less than this
-ROUND_MM, LOOSE_MM = 2.0, 11.0  # off an eyeball: skin so near keeps its distance from it; beyond, it is free
-NEIGHBOURS = 10  # landmarks on the head whose motion tells what a landmark's own should be like
-STRAY_MM = 4.0  # off its neighbours' motion: its place on the head is another than the tracker's, along the face's rim
-ROUNDS = 3  # a landmark lies within a triangle whose corners move each by itself: the rest is removed again
+EYE_CORNERS = ((33, 133), (263, 362))
+EYE_SCALE_LIMITS = (0.92, 1.08)  # eyeballs of adults differ in size by less than this
+FULL_EYE_DISTANCE_MM, FREE_SKIN_DISTANCE_MM = (
+    2.0,
+    11.0,
+)  # off an eyeball: skin so near keeps its distance from it; beyond, it is free
+N_NEIGHBOURS = 10  # landmarks on the head whose motion tells what a landmark's own should be like
+MAX_STRAY_MM = (
+    4.0  # off its neighbours' motion: its place on the head is another than the tracker's, along the face's rim
+)
+N_ROUNDS = 3  # a landmark lies within a triangle whose corners move each by itself: the rest is removed again
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +46,9 @@ class EyeSocket:
     def keep_distance(self, places: Floats, moved: Floats) -> Floats:
         """(P, 3) moved places whose distance from the eyeball is as it was at places (P, 3) near it, but for scale."""
         off = np.linalg.norm(places - self.before, axis=1)
-        share = np.clip((self.radius + LOOSE_MM - off) / (LOOSE_MM - ROUND_MM), 0.0, 1.0)
+        share = np.clip(
+            (self.radius + FREE_SKIN_DISTANCE_MM - off) / (FREE_SKIN_DISTANCE_MM - FULL_EYE_DISTANCE_MM), 0.0, 1.0
+        )
         share = share * share * (3.0 - 2.0 * share)
         towards = moved - self.after
         length = np.maximum(np.linalg.norm(towards, axis=1), 1e-9)
@@ -71,17 +80,17 @@ class HeadWarp:
 
 def fit_head_warp(face: Face, talker: NDArray[np.floating]) -> HeadWarp:
     """The warp onto resting landmarks (478, 3) of a talker with closed lips, in the place and size of the head."""
-    opened = OPEN_JAW * face.shapes[face.shape_names.index("jawOpen")].astype(np.float64)
-    rest = face_landmarks(face, face.vertices)[:N_MESH]
+    opened = OPEN_JAW_WEIGHT * face.shapes[face.shape_names.index("jawOpen")].astype(np.float64)
+    rest = face_landmarks(face, face.vertices)[:N_MESH_LANDMARKS]
     target = correct_lips_and_lids(rest, align_to_head(talker, rest))
     used = np.flatnonzero(select_consistent_landmarks(rest, target))
-    centres = (rest + face_landmarks(face, opened)[:N_MESH])[used]
+    centres = (rest + face_landmarks(face, opened)[:N_MESH_LANDMARKS])[used]
     width = face_width(rest)
     missing = (target - rest)[used]
     warp = HeadWarp(fit_interpolant(centres, missing, width), opened, fit_eye_sockets(face, rest, target), used)
-    for _ in range(ROUNDS - 1):
+    for _ in range(N_ROUNDS - 1):
         reached = face.vertices + warp.field(face.vertices + opened)
-        missing = missing + (target - face_landmarks(face, reached)[:N_MESH])[used]
+        missing = missing + (target - face_landmarks(face, reached)[:N_MESH_LANDMARKS])[used]
         warp = HeadWarp(fit_interpolant(centres, missing, width), opened, warp.sockets, used)
     return warp
 
@@ -101,8 +110,8 @@ def face_width(landmarks: Floats) -> float:
 
 def align_to_head(talker: NDArray[np.floating], rest: Floats) -> Floats:
     """(468, 3) landmarks of the talker brought to the head's by the nearest similarity: a camera shows no size."""
-    own = np.asarray(talker, np.float64)[:N_MESH]
-    weights = np.full(N_MESH, 1.0 / N_MESH)
+    own = np.asarray(talker, np.float64)[:N_MESH_LANDMARKS]
+    weights = np.full(N_MESH_LANDMARKS, 1.0 / N_MESH_LANDMARKS)
     turns, scales = similarity_transforms(own[None], rest, weights)
     brought: Floats = scales[0] * (own - own.mean(axis=0)) @ turns[0].T + rest.mean(axis=0)
     return brought
@@ -115,7 +124,7 @@ def correct_lips_and_lids(rest: Floats, target: Floats) -> Floats:
     middle = (target[upper] + target[lower]) / 2
     half = (rest[upper] - rest[lower]) / 2
     placed[upper], placed[lower] = middle + half, middle - half
-    for lids in LIDS:
+    for lids in LID_LANDMARKS:
         edge = list(lids)
         placed[edge, 2] = rest[edge, 2] + (target[edge, 2] - rest[edge, 2]).mean()
     return placed
@@ -124,20 +133,20 @@ def correct_lips_and_lids(rest: Floats, target: Floats) -> Floats:
 def select_consistent_landmarks(rest: Floats, target: Floats) -> NDArray[np.bool_]:
     """(468,) landmarks that move as their neighbours do."""
     apart = np.linalg.norm(rest[:, None] - rest[None], axis=2)
-    nearest = np.argsort(apart, axis=1)[:, : NEIGHBOURS + 1]
+    nearest = np.argsort(apart, axis=1)[:, : N_NEIGHBOURS + 1]
     moved = target - rest
     usual = np.median(moved[nearest], axis=1)
-    fits: NDArray[np.bool_] = np.linalg.norm(moved - usual, axis=1) < STRAY_MM
+    fits: NDArray[np.bool_] = np.linalg.norm(moved - usual, axis=1) < MAX_STRAY_MM
     return fits
 
 
 def fit_eye_sockets(face: Face, rest: Floats, target: Floats) -> tuple[EyeSocket, ...]:
     """Where the eyeballs go: with the middle of their lids, as much larger as the eye is longer."""
     found = []
-    for eye, lids, (outer, inner) in zip(eyes_from_right(face), LIDS, CORNERS, strict=True):
+    for eye, lids, (outer, inner) in zip(eyes_from_right(face), LID_LANDMARKS, EYE_CORNERS, strict=True):
         edge = list(lids)
         longer = np.linalg.norm(target[outer] - target[inner]) / np.linalg.norm(rest[outer] - rest[inner])
-        scale = float(np.clip(longer, *EYE_SCALE))
+        scale = float(np.clip(longer, *EYE_SCALE_LIMITS))
         centre = np.asarray(eye.centre, np.float64)
         after = target[edge].mean(axis=0) + scale * (centre - rest[edge].mean(axis=0))
         around = face.vertices[eye.first : eye.first + eye.count].astype(np.float64) - centre

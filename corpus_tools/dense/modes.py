@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.adapt_head import EYE_PARTS, MOUTH_PARTS
-from corpus_tools.dense.mesh_fit import N_MESH, face_landmarks, part_vertices
+from corpus_tools.dense.adapt_head import EYE_PARTS, RIGID_MOUTH_PARTS
+from corpus_tools.dense.mesh_fit import N_MESH_LANDMARKS, face_landmarks, part_vertices
 from corpus_tools.dense.skin_colour import PictureFitter, build_picture_fitter
 from corpus_tools.dense.video_landmarks import VideoLandmarks
 from lexicon.errors import InputError
-from tts2face.face.mouth_model import CHIN_POINTS
+from tts2face.face.mouth_model import CHIN_LANDMARKS
 from tts2face.face.shape_transfer import append_shapes
 from tts2face.models.face import Face
 from tts2face.video.pose import similarity_transforms
@@ -181,8 +181,8 @@ def displacements(fit: PictureFitter, landmarks: NDArray[np.floating], talker: N
 
     Landmarks (T, 478, 3) are without head pose; those of a frame without a face are NaN, and it is left out.
     """
-    rest = np.asarray(talker, np.float64)[:N_MESH]
-    turns, scales = similarity_transforms(rest[None], fit.marks, np.full(N_MESH, 1.0 / N_MESH))
+    rest = np.asarray(talker, np.float64)[:N_MESH_LANDMARKS]
+    turns, scales = similarity_transforms(rest[None], fit.marks, np.full(N_MESH_LANDMARKS, 1.0 / N_MESH_LANDMARKS))
     known = landmarks[np.isfinite(landmarks[:, 0, 0])].astype(np.float64)
     moved: Floats = (known[:, fit.used] - rest[fit.used]) @ (scales[0] * turns[0]).T
     return moved
@@ -216,10 +216,10 @@ def spread_shapes(face: Face, fit: PictureFitter, moved: Floats) -> Floats:
     shapes: Floats = _times(fit.spread, moved)
     shapes[:, part_vertices(face, EYE_PARTS)] = 0.0
     numbers = [face.shape_names.index(name) for name in JAW]
-    chin = [row for row, landmark in enumerate(fit.used) if landmark in CHIN_POINTS]
+    chin = [row for row, landmark in enumerate(fit.used) if landmark in CHIN_LANDMARKS]
     own = np.stack([face_landmarks(face, face.shapes[number])[fit.used[chin]].ravel() for number in numbers], axis=1)
     opened = np.linalg.lstsq(own, moved[:, chin].reshape(len(moved), -1).T, rcond=None)[0]
-    bone = part_vertices(face, MOUTH_PARTS)
+    bone = part_vertices(face, RIGID_MOUTH_PARTS)
     shapes[:, bone] = np.einsum("jk,jvc->kvc", opened, face.shapes[numbers][:, bone].astype(np.float64))
     return shapes
 

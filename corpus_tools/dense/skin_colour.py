@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.mesh_fit import N_MESH, face_landmarks, face_width
+from corpus_tools.dense.mesh_fit import N_MESH_LANDMARKS, face_landmarks, face_width
 from corpus_tools.dense.video_landmarks import VideoLandmarks, eye_opening
 from corpus_tools.dense.visible_texels import SkinCanvas, smooth_step
 from corpus_tools.run_options import Progress
 from lexicon.errors import DataError
-from tts2face.face.rbf import FACE_WIDTH, REACH, rbf_values
+from tts2face.face.rbf import DECAY_LENGTH, FACE_WIDTH, rbf_values
 from tts2face.models.face import Face
 from tts2face.video.media import read_frames
 from tts2face.video.pose import similarity_transforms
@@ -19,10 +19,13 @@ from tts2face.video.pose import similarity_transforms
 Floats = NDArray[np.float64]
 
 N_FRAMES = 160  # averaged; noise of the picture is gone after some dozens
-FACING = (0.15, 0.75)  # cosine to the camera: where a texel begins to count, and where it counts in full
-BLINKING = 0.8  # of the median opening of the eyes: frames with less show lids where the skin's lids are open
+FACING_COSINES = (0.15, 0.75)  # cosine to the camera: where a texel begins to count, and where it counts in full
+MIN_EYE_OPENING = 0.8  # of the median opening of the eyes: frames with less show lids where the skin's lids are open
 REMAP_COLUMNS = 1024  # OpenCV maps pictures, not lists
-CROWN, HAIR_MM = 10, (10.0, 28.0, 32.0)  # landmark at the top of the forehead; hair above it: from, to, half width
+FOREHEAD_TOP, HAIR_REGION_MM = (
+    10,
+    (10.0, 28.0, 32.0),
+)  # landmark at the top of the forehead; hair above it: from, to, half width
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,8 +63,8 @@ def build_picture_fitter(face: Face, opened: Floats, used: NDArray[np.int64]) ->
     from scipy.linalg import solve
 
     centres = face_landmarks(face, opened)[used]
-    marks = face_landmarks(face, face.vertices.astype(np.float64))[:N_MESH]
-    reach = REACH / FACE_WIDTH * face_width(marks)
+    marks = face_landmarks(face, face.vertices.astype(np.float64))[:N_MESH_LANDMARKS]
+    reach = DECAY_LENGTH / FACE_WIDTH * face_width(marks)
     matrix = rbf_values(centres, centres, reach)
     spread = solve(matrix, rbf_values(opened, centres, reach).T, assume_a="pos").T
     return PictureFitter(face.vertices.astype(np.float64), marks, used, spread)
@@ -88,7 +91,7 @@ def average_skin_colours(
         placed, turn = fit.fit(points)
         flat = placed[:, :2] * (1.0, -1.0)
         colour, inside = sample_picture(picture, np.einsum("pk,pkd->pd", weights, flat[corners]))
-        facing = smooth_step(own_normals @ turn[2], *FACING) * inside
+        facing = smooth_step(own_normals @ turn[2], *FACING_COSINES) * inside
         total += facing[:, None] * colour
         weight += facing
         found, is_inside = sample_picture(picture, flat[crown])
@@ -109,7 +112,7 @@ def select_frames(
     per_video = int(np.ceil(N_FRAMES / len(seen)))
     usual = float(np.nanmedian(np.concatenate([eye_opening(one.landmarks) for one in seen])))
     for number, one in enumerate(seen):
-        awake = np.flatnonzero(np.nan_to_num(eye_opening(one.landmarks)) > BLINKING * usual)
+        awake = np.flatnonzero(np.nan_to_num(eye_opening(one.landmarks)) > MIN_EYE_OPENING * usual)
         if len(awake):
             wanted = set(awake[np.linspace(0, len(awake) - 1, per_video).round().astype(int)].tolist())
             for at, picture in enumerate(read_frames(one.video)):
@@ -133,9 +136,11 @@ def sample_picture(picture: NDArray[np.uint8], places: Floats) -> tuple[Floats, 
 
 def hair_vertices(face: Face, fit: PictureFitter, normals: Floats) -> NDArray[np.int64]:
     """Vertices in the hair above the forehead, in sight from the front."""
-    away = face.vertices - fit.marks[CROWN]
-    low, high, half = HAIR_MM
-    is_hair = (away[:, 1] > low) & (away[:, 1] < high) & (np.abs(away[:, 0]) < half) & (normals[:, 2] > FACING[0])
+    away = face.vertices - fit.marks[FOREHEAD_TOP]
+    low, high, half = HAIR_REGION_MM
+    is_hair = (
+        (away[:, 1] > low) & (away[:, 1] < high) & (np.abs(away[:, 0]) < half) & (normals[:, 2] > FACING_COSINES[0])
+    )
     return np.flatnonzero(is_hair)
 
 

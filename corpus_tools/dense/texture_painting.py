@@ -16,23 +16,23 @@ Floats = NDArray[np.float64]
 LUMA = np.array([0.299, 0.587, 0.114])  # ITU-R BT.601
 SKIN_LUMA = 0.72  # of the head's usual skin: darker texels are brows, lashes, nostrils, hair, and tell no tint
 HAIR_LUMA = (55.0, 115.0)  # of the head's texture: hair alone, and skin alone
-NEAR_MM = 14.0  # reach over which unseen skin takes the tint of the seen skin beside it
+TINT_REACH_MM = 14.0  # reach over which unseen skin takes the tint of the seen skin beside it
 TINT_BOUNDS = (0.35, 1.6)
 SHADE_BOUNDS = (0.75, 1.35)  # a lamp's shading that is taken out; more would amplify noise at the rim
-BROWS = (105, 66, 334, 296)  # upper edges
+BROW_LANDMARKS = (105, 66, 334, 296)  # upper edges
 FRINGE_MM = (2.0, 7.0)  # above the brows: where dark texels begin to be taken for hair, and where they surely are
 STRAND_TEXELS = 25  # about 4 mm of the forehead: around a strand its shadow is not skin either
 FRINGE_LUMA = (0.78, 0.95)  # of the usual skin: hair, and skin
 N_SAMPLES = 1500  # seen texels that stand for all of them
 SHARP_TEXELS, SHARP_GAIN = 4.0, 0.7  # unsharp masking, Gaussian of this deviation
-LEAST_WEIGHT = 0.02  # of the largest: texels seen less count less than in full
+MIN_TEXEL_WEIGHT = 0.02  # of the largest: texels seen less count less than in full
 
 
 def paint_skin(face: Face, canvas: SkinCanvas, seen: SkinColours) -> Face:
     """The face with the talker's texture and hair colour."""
     texels = canvas.texels
     base = canvas.texture[texels.rows, texels.columns].astype(np.float64)
-    share = canvas.share * smooth_step(seen.weight / seen.weight.max(), 0.0, LEAST_WEIGHT)
+    share = canvas.share * smooth_step(seen.weight / seen.weight.max(), 0.0, MIN_TEXEL_WEIGHT)
     own = _remove_shading(canvas.texels.carried(vertex_normals(face)), seen.colour, share)
     share = soften_edges(_remove_fringe(face, canvas, own, share), texels, len(canvas.texture))
     hair = 1.0 - smooth_step(base @ LUMA, *HAIR_LUMA)
@@ -81,7 +81,7 @@ def _remove_fringe(face: Face, canvas: SkinCanvas, own: Floats, share: Floats) -
     from scipy.ndimage import gaussian_filter, minimum_filter
 
     marks = face_landmarks(face, face.vertices)
-    above = canvas.texels.carried(face.vertices.astype(np.float64))[:, 1] - float(marks[list(BROWS), 1].max())
+    above = canvas.texels.carried(face.vertices.astype(np.float64))[:, 1] - float(marks[list(BROW_LANDMARKS), 1].max())
     luma = own @ LUMA
     usual = float(np.median(luma[share > 0.5]))
     clear = smooth_step(luma / usual, *FRINGE_LUMA)
@@ -105,7 +105,7 @@ def _skin_tint(face: Face, canvas: SkinCanvas, ratio: Floats, told: tuple[Floats
     logs = np.clip(logs, usual - 0.35, usual + 0.35)
     places = np.einsum("pk,pkd->pd", canvas.texels.weights[chosen], face.vertices[canvas.texels.corners[chosen]])
     used = np.unique(canvas.texels.corners)
-    near = np.exp(-((cdist(face.vertices[used], places) / NEAR_MM) ** 2))
+    near = np.exp(-((cdist(face.vertices[used], places) / TINT_REACH_MM) ** 2))
     mixed = (near @ logs + 0.5 * usual) / (near.sum(axis=1, keepdims=True) + 0.5)
     of_vertices = np.zeros((len(face.vertices), 3))
     of_vertices[used] = mixed

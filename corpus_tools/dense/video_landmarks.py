@@ -21,10 +21,10 @@ from tts2face.video.pose import remove_pose
 
 Floats = NDArray[np.float64]
 
-MOST_VIDEOS = 40  # evenly out of more; of GRID's s1, the mean of 201 lies 0.05 mm from that of 40
-CLOSED = 0.02  # gap of the inner lips over the distance of the eyes up to which lips are closed at rest
-LEAST_CLOSED = 10  # frames; with fewer, the frames with the smallest gaps serve
-EYES_OPEN_PERCENTILE = 50  # lids at rest are those of the frames whose eyes are open at least so far
+MAX_VIDEOS = 40  # evenly out of more; of GRID's s1, the mean of 201 lies 0.05 mm from that of 40
+MAX_CLOSED_GAP = 0.02  # gap of the inner lips over the distance of the eyes up to which lips are closed at rest
+MIN_CLOSED_FRAMES = 10  # frames; with fewer, the frames with the smallest gaps serve
+OPEN_EYES_PERCENTILE = 50  # lids at rest are those of the frames whose eyes are open at least so far
 RIGHT_LIDS, LEFT_LIDS = (159, 145), (386, 374)  # upper and lower, in the middle of each eye
 
 
@@ -41,7 +41,7 @@ class VideoLandmarks:
 
 
 def find_videos(recordings: Path) -> tuple[Path, ...]:
-    """The videos of a folder of recordings, or the one video; not more than `MOST_VIDEOS`, evenly chosen.
+    """The videos of a folder of recordings, or the one video; not more than `MAX_VIDEOS`, evenly chosen.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def find_videos(recordings: Path) -> tuple[Path, ...]:
     if recordings.is_file():
         return (recordings,)
     found = [recording.video for recording in find_recordings(recordings)]
-    rows = np.unique(np.linspace(0, len(found) - 1, min(MOST_VIDEOS, len(found))).round().astype(int))
+    rows = np.unique(np.linspace(0, len(found) - 1, min(MAX_VIDEOS, len(found))).round().astype(int))
     return tuple(found[row] for row in rows)
 
 
@@ -85,10 +85,10 @@ def resting_landmarks(seen: Sequence[VideoLandmarks]) -> Floats:
     landmarks = landmarks[np.isfinite(landmarks[:, 0, 0])].astype(np.float64)
     eyes = np.linalg.norm(landmarks[:, EYE_OUTER_LEFT] - landmarks[:, EYE_OUTER_RIGHT], axis=1)
     gaps = np.linalg.norm(landmarks[:, UPPER_LIP_INNER_MID] - landmarks[:, LOWER_LIP_INNER_MID], axis=1) / eyes
-    limit = max(CLOSED, float(np.sort(gaps)[min(LEAST_CLOSED, len(gaps)) - 1]))
+    limit = max(MAX_CLOSED_GAP, float(np.sort(gaps)[min(MIN_CLOSED_FRAMES, len(gaps)) - 1]))
     open_eyes = eye_opening(landmarks)
     still = gaps <= limit
-    wide = still & (open_eyes >= np.percentile(open_eyes[still], EYES_OPEN_PERCENTILE))
+    wide = still & (open_eyes >= np.percentile(open_eyes[still], OPEN_EYES_PERCENTILE))
     mean: Floats = landmarks[wide].mean(axis=0)
     return mean
 

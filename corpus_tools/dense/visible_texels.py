@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.mesh_fit import LIDS, N_MESH, OPEN_JAW, face_landmarks
+from corpus_tools.dense.mesh_fit import LID_LANDMARKS, N_MESH_LANDMARKS, OPEN_JAW_WEIGHT, face_landmarks
 from corpus_tools.head.layout import BELOW, Texels, texels_of
 from lexicon.errors import DataError
 from tts2face.models.face import Face
@@ -62,7 +62,7 @@ def build_canvas(face: Face) -> SkinCanvas:
     side = len(face.texture)
     texels = texels_of(face.uv.astype(np.float64), triangles, side)
     jaw = face.shapes[face.shape_names.index("jawOpen")]
-    opened = face.vertices.astype(np.float64) + OPEN_JAW * jaw
+    opened = face.vertices.astype(np.float64) + OPEN_JAW_WEIGHT * jaw
     island = texels.rows > BELOW * side - 1
     share = _front_share(face, texels, opened)
     share[island] = 0.0
@@ -72,12 +72,12 @@ def build_canvas(face: Face) -> SkinCanvas:
 
 def _front_share(face: Face, texels: Texels, opened: Floats) -> Floats:
     place = texels.carried(opened)
-    marks = face_landmarks(face, opened)[:N_MESH]
+    marks = face_landmarks(face, opened)[:N_MESH_LANDMARKS]
     share = smooth_step(polygon_depth(place[:, :2], marks[list(FACE_OVAL), :2], RIM_MM[1] + 1), *RIM_MM)
     share[place[:, 2] < float(marks[list(FACE_OVAL), 2].min())] = 0.0
     share[_is_hidden(place)] = 0.0
     share *= smooth_step(-polygon_depth(place[:, :2], marks[list(INNER_LIPS), :2], LIP_MM[1] + 1), *LIP_MM)
-    for lids in LIDS:
+    for lids in LID_LANDMARKS:
         share *= smooth_step(-polygon_depth(place[:, :2], marks[list(lids), :2], LID_MM[1] + 1), *LID_MM)
     return share
 

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.evaluation.cross_talker import SpeakerScale, compare_across_talkers, standardise_reference
-from corpus_tools.evaluation.methods import Method, build_methods
+from corpus_tools.evaluation.methods import SynthesisMethod, build_methods
 from corpus_tools.evaluation.own_durations import VoicedUtterance, compare_own_durations, speak_references
 from corpus_tools.evaluation.reference import LipCurves, ReferenceUtterance, Thresholds
 from corpus_tools.evaluation.scores import Scores, UtteranceComparison, compute_scores, score_splits
-from corpus_tools.evaluation.splits import Parts, check_disjoint
+from corpus_tools.evaluation.splits import Split, check_disjoint
 from corpus_tools.evaluation.tables import Evaluation, Fold
 from corpus_tools.evaluation.tracks import ExternalTrack, map_tracks
 from corpus_tools.recordings.observation import Observation
@@ -24,10 +24,10 @@ from tts2face.exemplar.options import SynthesisOptions
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.voice.engine import Voice
 
-LEARNT_FOR_EVALUATION = {
+EVALUATION_METADATA = {
     "name": "evaluation", "language": "", "sources": "", "licence": "", "attribution": "", "command": "", "created": "",
 }  # fmt: skip
-TRACKS, CEILING = "tracks", "real, through the model"
+TRACKS_METHOD, CEILING_METHOD = "tracks", "real, through the model"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +56,7 @@ class SplitResult:
 
 
 def evaluate(
-    parts: Sequence[Parts],
+    parts: Sequence[Split],
     *,
     options: Mapping[str, SynthesisOptions] | None = None,
     tracks: Mapping[str, ExternalTrack] | None = None,
@@ -126,8 +126,8 @@ def evaluate_split(
         if on_progress:
             on_progress(number + 1, len(methods))
     if tracks is not None:
-        made[TRACKS], spent[TRACKS] = map_tracks(tracks, talker, real), 0.0
-    made[CEILING], spent[CEILING] = tuple(one.parameters for one in real), 0.0
+        made[TRACKS_METHOD], spent[TRACKS_METHOD] = map_tracks(tracks, talker, real), 0.0
+    made[CEILING_METHOD], spent[CEILING_METHOD] = tuple(one.parameters for one in real), 0.0
     return SplitResult(talker, real, made, spent, own)
 
 
@@ -178,17 +178,22 @@ def evaluate_across_talkers(
 
 
 def _train_talker(train: Sequence[Observation]) -> Talker:
-    return add_phone_network(learn_talker(train, metadata=LEARNT_FOR_EVALUATION))
+    return add_phone_network(learn_talker(train, metadata=EVALUATION_METADATA))
 
 
-def _synthesise(method: Method, real: Sequence[ReferenceUtterance]) -> tuple[tuple[NDArray[np.float32], ...], float]:
+def _synthesise(
+    method: SynthesisMethod, real: Sequence[ReferenceUtterance]
+) -> tuple[tuple[NDArray[np.float32], ...], float]:
     began = time.perf_counter()
     made = tuple(method(one.observation.phones, len(one.parameters), one.observation.fps) for one in real)
     return made, time.perf_counter() - began
 
 
 def _synthesise_own_durations(
-    method: Method, real: Sequence[ReferenceUtterance], said: Sequence[VoicedUtterance | None], model: ShapeModel
+    method: SynthesisMethod,
+    real: Sequence[ReferenceUtterance],
+    said: Sequence[VoicedUtterance | None],
+    model: ShapeModel,
 ) -> tuple[UtteranceComparison, ...]:
     pairs = zip(real, said, strict=True)
     return tuple(compare_own_durations(method, one, spoken, model) for one, spoken in pairs if spoken is not None)
@@ -213,7 +218,7 @@ def _pooled_own_scores(runs: Sequence[SplitResult], limits: Thresholds) -> tuple
     )
 
 
-def _score_folds(parts: Sequence[Parts], runs: Sequence[SplitResult], limits: Thresholds) -> tuple[Fold, ...]:
+def _score_folds(parts: Sequence[Split], runs: Sequence[SplitResult], limits: Thresholds) -> tuple[Fold, ...]:
     """Figures of every run alone; thresholds are those of all."""
     return tuple(
         Fold(len(train), len(test), {one.method: one.values() for one in _pooled_scores([each], limits)})

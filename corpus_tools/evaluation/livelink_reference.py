@@ -18,8 +18,8 @@ from tts2face.speech.pauses import cut_at_pauses
 from tts2face.types import Trajectory
 from tts2face.video.livelink import read_livelink
 
-SUFFIX = ".csv"
-LONGEST_S = 6.0  # cut at pauses into utterances of about a sentence: intervals come from drawing utterances again
+LIVELINK_SUFFIX = ".csv"
+MAX_UTTERANCE_S = 6.0  # cut at pauses into utterances of about a sentence: intervals come from drawing utterances again
 
 
 def observe_livelink(path: Path, effort: RunOptions) -> tuple[Observation, ...]:
@@ -42,7 +42,7 @@ def observe_livelink(path: Path, effort: RunOptions) -> tuple[Observation, ...]:
     motion = match_shapes(capture.weights, face)
     ears = CachedAligner(effort.folder())
     found = []
-    for number, span in enumerate(cut_at_pauses(ears.sound(sound), LONGEST_S), start=1):
+    for number, span in enumerate(cut_at_pauses(ears.sound(sound), MAX_UTTERANCE_S), start=1):
         begin, end = (round(second * motion.fps) for second in span)
         part = Trajectory(motion.channels, motion.values[begin:end], motion.fps)
         landmarks = moved_landmarks(face, part)

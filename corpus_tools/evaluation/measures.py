@@ -24,10 +24,10 @@ from tts2face.models.landmarks import (
 
 SPEECH_MARGIN_S = 0.1  # judged from this long before the first phone to this long behind the last
 CLOSURE_MARGIN_S = 0.03  # a closure may lie this far outside its phone's edges: frames are 40 ms, edges good to 10 ms
-CLOSURE_SHARE = 0.9  # of the real closures count as closed: the threshold is this quantile of their least openings
+CLOSURE_QUANTILE = 0.9  # of the real closures count as closed: the threshold is this quantile of their least openings
 DTW_BAND_S = 0.12  # of time by which synthesis may lead or lag unpunished by the warping cost
-DTW_PARAMETERS = 6  # shape parameters that the warping cost compares: 95 % of the motion
-ROUNDING_S = 1e-6  # a frame that falls on an edge counts, whatever the sum of floats says
+N_DTW_PARAMETERS = 6  # shape parameters that the warping cost compares: 95 % of the motion
+TIME_TOLERANCE_S = 1e-6  # a frame that falls on an edge counts, whatever the sum of floats says
 PEAK_MARGIN_S = 0.06  # the widest opening of a vowel may lie this far outside its edges
 BILABIALS = ("p", "b", "m")
 OPEN_HEIGHTS = ("open", "near-open", "open-mid")
@@ -61,8 +61,8 @@ def speech_frames(phones: PhoneSequence, n_frames: int, fps: float) -> slice:
     sounding = [at for at, label in enumerate(phones.phones) if label != SILENCE]
     if not sounding:
         raise InputError("an utterance without speech cannot be judged; leave it out")
-    start = phones.edges[sounding[0]] - SPEECH_MARGIN_S - ROUNDING_S
-    end = phones.edges[sounding[-1] + 1] + SPEECH_MARGIN_S + ROUNDING_S
+    start = phones.edges[sounding[0]] - SPEECH_MARGIN_S - TIME_TOLERANCE_S
+    end = phones.edges[sounding[-1] + 1] + SPEECH_MARGIN_S + TIME_TOLERANCE_S
     times = np.arange(n_frames) / fps
     return slice(int(np.searchsorted(times, start)), int(np.searchsorted(times, end, side="right")))
 
@@ -128,8 +128,8 @@ def open_vowels() -> frozenset[str]:
 
 
 def closure_threshold(real_least: Values) -> float:
-    """Opening below which `CLOSURE_SHARE` of the real closures lie."""
-    return float(np.quantile(real_least, CLOSURE_SHARE)) if len(real_least) else 0.0
+    """Opening below which `CLOSURE_QUANTILE` of the real closures lie."""
+    return float(np.quantile(real_least, CLOSURE_QUANTILE)) if len(real_least) else 0.0
 
 
 def peak_times(opening: Values, phones: PhoneSequence, fps: float) -> NDArray[np.float64]:

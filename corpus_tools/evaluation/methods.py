@@ -6,31 +6,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.sequence import PhoneSequence
-from tts2face.exemplar.options import METHODS, SynthesisOptions
+from tts2face.exemplar.options import METHOD_OPTIONS, SynthesisOptions
 from tts2face.exemplar.phone_substitution import build_targets
 from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model, speech_trajectory
 from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker
 
-NETWORK = "sliding-window network"
+NETWORK_METHOD = "sliding-window network"
 
 # Speech parameters (T, D) for phones at T frames, from what the training part taught.
-Method = Callable[[PhoneSequence, int, float], NDArray[np.float32]]
+SynthesisMethod = Callable[[PhoneSequence, int, float], NDArray[np.float32]]
 
 
-def build_methods(talker: Talker, options: Mapping[str, SynthesisOptions] | None = None) -> dict[str, Method]:
-    """Baselines and exemplar methods by name; `METHODS` without options."""
+def build_methods(talker: Talker, options: Mapping[str, SynthesisOptions] | None = None) -> dict[str, SynthesisMethod]:
+    """Baselines and exemplar methods by name; `METHOD_OPTIONS` without options."""
     voice = build_exemplar_model(talker)
     n_speech = talker.model.n_speech
     return {
         "mean face": lambda _, n_frames, __: np.zeros((n_frames, n_speech), np.float32),
         "mean phone pose": mean_pose_method(talker, voice),
-        **({NETWORK: network_method(talker.network)} if talker.network is not None else {}),
-        **{name: exemplar_method(voice, chosen) for name, chosen in (options or METHODS).items()},
+        **({NETWORK_METHOD: network_method(talker.network)} if talker.network is not None else {}),
+        **{name: exemplar_method(voice, chosen) for name, chosen in (options or METHOD_OPTIONS).items()},
     }
 
 
-def network_method(network: PhoneNetwork) -> Method:
+def network_method(network: PhoneNetwork) -> SynthesisMethod:
     """The first of a talker's networks alone: what a plain sliding-window network makes of phones."""
 
     def made(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
@@ -39,7 +39,7 @@ def network_method(network: PhoneNetwork) -> Method:
     return made
 
 
-def exemplar_method(voice: ExemplarModel, options: SynthesisOptions) -> Method:
+def exemplar_method(voice: ExemplarModel, options: SynthesisOptions) -> SynthesisMethod:
     """Synthesis from exemplars."""
 
     def made(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
@@ -48,7 +48,7 @@ def exemplar_method(voice: ExemplarModel, options: SynthesisOptions) -> Method:
     return made
 
 
-def mean_pose_method(talker: Talker, voice: ExemplarModel) -> Method:
+def mean_pose_method(talker: Talker, voice: ExemplarModel) -> SynthesisMethod:
     """The simplest synthesis that knows phones: their mean poses, joined by straight lines from middle to middle."""
     n_speech, inventory = talker.model.n_speech, voice.tokens.inventory
     poses: dict[str, list[NDArray[np.float64]]] = {label: [] for label in inventory}

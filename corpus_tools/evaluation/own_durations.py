@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.evaluation.measures import speech_frames
-from corpus_tools.evaluation.methods import Method
+from corpus_tools.evaluation.methods import SynthesisMethod
 from corpus_tools.evaluation.reference import LipCurves, ReferenceUtterance
 from corpus_tools.evaluation.scores import OwnDurationMotion, UtteranceComparison, compared_spread
 from lexicon.errors import InputError
@@ -23,9 +23,11 @@ from tts2face.models.talker import ShapeModel
 from tts2face.types import Speech, frame_count
 from tts2face.voice.engine import Voice
 
-FINE = 4  # instants a frame at which motion is made before it is read between frames: lines across 10 ms cut no peak
-APART_S = 1e-6  # a word ends this long before the next begins, where the real one pauses less than that
-BEYOND_S = 60.0  # outside the words time runs evenly, this far
+OVERSAMPLING = (
+    4  # instants a frame at which motion is made before it is read between frames: lines across 10 ms cut no peak
+)
+MIN_WORD_GAP_S = 1e-6  # a word ends this long before the next begins, where the real one pauses less than that
+EXTRAPOLATION_S = 60.0  # outside the words time runs evenly, this far
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +74,7 @@ def _speak_reference(voice: Voice, one: ReferenceUtterance) -> VoicedUtterance |
 def map_word_times(speech: Speech, phones: PhoneSequence, words: Sequence[WordSpan], fps: float) -> VoicedUtterance:
     """Speech, and where its words lie among those of a recording."""
     ours, real = _word_edges(speech.phones, speech.words), _word_edges(phones, words)
-    outside = np.array([-BEYOND_S, BEYOND_S])
+    outside = np.array([-EXTRAPOLATION_S, EXTRAPOLATION_S])
     ours, real = (np.concatenate([each[:1] + outside[:1], each, each[-1:] + outside[1:]]) for each in (ours, real))
     return VoicedUtterance(speech.phones, frame_count(speech.waveform.duration, fps), ours, real)
 
@@ -81,19 +83,19 @@ def _word_edges(phones: PhoneSequence, words: Sequence[WordSpan]) -> NDArray[np.
     """(2 W,) seconds at which words begin and end, always rising."""
     begins = np.array([phones.edges[word.first] for word in words])
     ends = np.array([phones.edges[word.last] for word in words])
-    ends[:-1] = np.minimum(ends[:-1], begins[1:] - APART_S)
+    ends[:-1] = np.minimum(ends[:-1], begins[1:] - MIN_WORD_GAP_S)
     return np.stack([begins, ends], axis=1).ravel()
 
 
 def compare_own_durations(
-    method: Method, one: ReferenceUtterance, said: VoicedUtterance, model: ShapeModel
+    method: SynthesisMethod, one: ReferenceUtterance, said: VoicedUtterance, model: ShapeModel
 ) -> UtteranceComparison:
     """What a method makes of the voice's phones, beside the real utterance."""
-    fps, n_fine = one.observation.fps, FINE * (said.n_frames - 1) + 1
-    made = method(said.phones, n_fine, FINE * fps)
+    fps, n_fine = one.observation.fps, OVERSAMPLING * (said.n_frames - 1) + 1
+    made = method(said.phones, n_fine, OVERSAMPLING * fps)
     wanted = said.times(np.arange(len(one.parameters)) / fps)
-    columns = [np.interp(wanted, np.arange(n_fine) / (FINE * fps), column) for column in made.T]
-    there, ours = np.stack(columns, axis=1).astype(np.float32), made[::FINE]
+    columns = [np.interp(wanted, np.arange(n_fine) / (OVERSAMPLING * fps), column) for column in made.T]
+    there, ours = np.stack(columns, axis=1).astype(np.float32), made[::OVERSAMPLING]
     own = OwnDurationMotion(
         said.phones, speech_frames(said.phones, said.n_frames, fps), ours, LipCurves.of(model.shapes(ours))
     )

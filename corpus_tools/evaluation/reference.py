@@ -12,13 +12,13 @@ from lexicon.phones import PHONES
 from tts2face.models.talker import ShapeModel
 
 # Phones by what the lips do in them; a frame belongs to the phone that sounds, to one class only, the first that fits.
-CLASSES: dict[str, frozenset[str]] = {
+PHONE_CLASSES: dict[str, frozenset[str]] = {
     "bilabial": frozenset(measures.BILABIALS),
     "labiodental": frozenset({"f", "v"}),
     "rounded": frozenset(label for label, phone in PHONES.items() if phone.rounding == "rounded"),
     "open": measures.open_vowels(),
 }
-OTHER = "other"
+OTHER_CLASS = "other"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,15 +86,17 @@ class Thresholds:
             return measures.closure_threshold(np.concatenate(least))
 
         return cls(
-            threshold("opening", CLASSES["bilabial"]),
-            threshold("opening", CLASSES["labiodental"]),
-            threshold("width", CLASSES["rounded"]),
+            threshold("opening", PHONE_CLASSES["bilabial"]),
+            threshold("opening", PHONE_CLASSES["labiodental"]),
+            threshold("width", PHONE_CLASSES["rounded"]),
         )
 
 
 def frame_classes(labels: Sequence[str], edges: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.str_]:
     """(T,) class of the phone that sounds at each instant."""
-    of_phone = np.array([next((name for name, some in CLASSES.items() if label in some), OTHER) for label in labels])
+    of_phone = np.array(
+        [next((name for name, some in PHONE_CLASSES.items() if label in some), OTHER_CLASS) for label in labels]
+    )
     at = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(labels) - 1)
     classes: NDArray[np.str_] = of_phone[at]
     return classes

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.evaluation import measures
-from corpus_tools.evaluation.reference import CLASSES, OTHER, LipCurves, ReferenceUtterance, Thresholds
+from corpus_tools.evaluation.reference import OTHER_CLASS, PHONE_CLASSES, LipCurves, ReferenceUtterance, Thresholds
 from lexicon.sequence import PhoneSequence
 from tts2face.models.talker import ShapeModel
 
@@ -128,7 +128,7 @@ class UtteranceComparison:
     own: OwnDurationMotion | None = None
 
 
-Made = tuple[
+SplitMotion = tuple[
     ShapeModel, Sequence[ReferenceUtterance], Sequence[NDArray[np.float32]]
 ]  # of one split: (T, S) for each utterance
 
@@ -138,7 +138,7 @@ def available_figures(scores: Sequence[Scores]) -> tuple[tuple[str, str, int], .
     return tuple(figure for figure in FIGURES if all(figure[0] in one.figures for one in scores))
 
 
-def score_splits(method: str, splits: Sequence[Made], limits: Thresholds, spent: float = 0.0) -> Scores:
+def score_splits(method: str, splits: Sequence[SplitMotion], limits: Thresholds, spent: float = 0.0) -> Scores:
     """Figures of a method over the utterances of all splits; making them took `spent` seconds."""
     judged = [
         UtteranceComparison(one, values, LipCurves.of(model.shapes(values)), compared_spread(model))
@@ -150,7 +150,7 @@ def score_splits(method: str, splits: Sequence[Made], limits: Thresholds, spent:
 
 def compared_spread(model: ShapeModel) -> NDArray[np.float32]:
     """(D,) spread of the parameters that are compared."""
-    return model.spread[: min(measures.DTW_PARAMETERS, model.n_speech)]
+    return model.spread[: min(measures.N_DTW_PARAMETERS, model.n_speech)]
 
 
 def compute_scores(
@@ -199,7 +199,7 @@ def _event_counts(judged: UtteranceComparison, limits: Thresholds) -> Floats:
     phones, seen = (own.phones, own.curves) if own else (judged.real.observation.phones, judged.curves)
 
     def events(curve: NDArray[np.floating], labels: str, limit: float) -> tuple[float, float]:
-        least = measures.min_openings(curve, phones, fps, CLASSES[labels])
+        least = measures.min_openings(curve, phones, fps, PHONE_CLASSES[labels])
         return float((least <= limit).sum()), float(len(least))
 
     middles = measures.midpoint_openings(seen.opening, phones, fps)
@@ -276,7 +276,7 @@ def _class_scores(judged: Sequence[UtteranceComparison]) -> list[ClassScore]:
 
 def _score_classes(classes: NDArray[np.str_], away: NDArray[np.float32], opening: Floats) -> list[ClassScore]:
     found = []
-    for name in (*CLASSES, OTHER):
+    for name in (*PHONE_CLASSES, OTHER_CLASS):
         here = classes == name
         if here.any():
             rmse = float(np.sqrt(np.square(away[here]).mean()))

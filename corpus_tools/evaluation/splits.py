@@ -7,10 +7,10 @@ import numpy as np
 from corpus_tools.recordings.observation import Observation
 from lexicon.errors import InputError
 
-Parts = tuple[tuple[Observation, ...], tuple[Observation, ...]]  # learnt from, held out
+Split = tuple[tuple[Observation, ...], tuple[Observation, ...]]  # learnt from, held out
 
 
-def split(observations: Sequence[Observation], *, hold_out: int, seed: int) -> Parts:
+def split(observations: Sequence[Observation], *, hold_out: int, seed: int) -> Split:
     """Training and held-out utterances, drawn by a seed from the sorted names.
 
     Raises
@@ -27,7 +27,7 @@ def split(observations: Sequence[Observation], *, hold_out: int, seed: int) -> P
     return _split_at(ordered, held)
 
 
-def split_into_folds(observations: Sequence[Observation], *, n_folds: int, seed: int) -> tuple[Parts, ...]:
+def split_into_folds(observations: Sequence[Observation], *, n_folds: int, seed: int) -> tuple[Split, ...]:
     """As many splits as folds; every utterance is held out once.
 
     Raises
@@ -42,7 +42,7 @@ def split_into_folds(observations: Sequence[Observation], *, n_folds: int, seed:
     return tuple(_split_at(ordered, set(held.tolist())) for held in np.array_split(order, n_folds))
 
 
-def split_by_words(observations: Sequence[Observation], words: Collection[str]) -> Parts:
+def split_by_words(observations: Sequence[Observation], words: Collection[str]) -> Split:
     """Utterances without any of the words, and those with one: their contexts are never seen in training.
 
     Raises
@@ -87,6 +87,6 @@ def _sort_by_name(observations: Sequence[Observation]) -> list[Observation]:
     return sorted(observations, key=lambda one: one.name)
 
 
-def _split_at(ordered: Sequence[Observation], held: Collection[int]) -> Parts:
+def _split_at(ordered: Sequence[Observation], held: Collection[int]) -> Split:
     train = tuple(one for at, one in enumerate(ordered) if at not in held)
     return train, tuple(one for at, one in enumerate(ordered) if at in held)

@@ -8,7 +8,7 @@ import numpy as np
 
 from corpus_tools.evaluation.scores import FIGURES, Scores, available_figures
 
-TRUE, OWN, ACROSS = "true durations", "own durations", "another talker"
+TRUE_DURATIONS, OWN_DURATIONS, OTHER_TALKER = "true durations", "own durations", "another talker"
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,9 +41,9 @@ class Evaluation:
 
     def tables(self) -> Iterator[tuple[str, tuple[Scores, ...]]]:
         """The tables there are, by name."""
-        yield ACROSS if self.is_across else TRUE, self.scores
+        yield OTHER_TALKER if self.is_across else TRUE_DURATIONS, self.scores
         if self.own:
-            yield OWN, self.own
+            yield OWN_DURATIONS, self.own
 
     def table(self, *, intervals: bool = False) -> str:
         """Markdown tables, one method a line."""

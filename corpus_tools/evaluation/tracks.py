@@ -13,8 +13,8 @@ from corpus_tools.training.ridge import fit_ridge
 from lexicon.errors import DataError, InputError
 from tts2face.models.talker import Talker
 
-UTTERANCE, TIME = "utterance", "time"
-LEAST_TRAINING = 10  # sentences from which a map is fitted
+UTTERANCE_COLUMN, TIME_COLUMN = "utterance", "time"
+MIN_TRAINING_UTTERANCES = 10  # sentences from which a map is fitted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,7 +47,7 @@ def read_tracks(path: Path) -> Mapping[str, ExternalTrack]:
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file)
             head = next(reader, [])
-            if head[:2] != [UTTERANCE, TIME] or len(head) < 3:
+            if head[:2] != [UTTERANCE_COLUMN, TIME_COLUMN] or len(head) < 3:
                 raise DataError(f"{path} must begin with the columns utterance, time and a channel, not {head[:3]}")
             for number, row in enumerate(reader, start=2):
                 if len(row) != len(head):
@@ -85,9 +85,9 @@ def map_tracks(
     if missing := [one.observation.name for one in real if one.observation.name not in tracks]:
         raise InputError(f"the tracks lack {missing[0]} ({len(missing)} of {len(real)} held-out utterances); add them")
     known = [spoken for spoken in talker.utterances if spoken.name in tracks]
-    if len(known) < LEAST_TRAINING:
+    if len(known) < MIN_TRAINING_UTTERANCES:
         raise InputError(
-            f"the tracks hold {len(known)} training utterances; the map to our parameters needs {LEAST_TRAINING}"
+            f"the tracks hold {len(known)} training utterances; their linear map needs {MIN_TRAINING_UTTERANCES}"
         )
     n_speech = talker.model.n_speech
     terms = np.concatenate([tracks[one.name].at(np.arange(len(one.shape)) / talker.fps) for one in known])

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from corpus_tools.gesture_study.clips import field_clip
 from corpus_tools.gesture_study.measures import autocorrelation, coverage, split_recordings
-from tts2face.gesture.field_kernels import APART
+from tts2face.gesture.field_kernels import MIN_MOMENT_GAP
 from tts2face.gesture.gesture_stream import GestureFields
-from tts2face.gesture.prosody import SILENCE
+from tts2face.gesture.prosody import SILENT_PROSODY
 from tts2face.models.palette import GESTURE_FPS, Style
 
 MINUTES = 10
@@ -52,13 +52,13 @@ def long_run(fields: GestureFields, name: str, learnt: Style, held: Style, seed:
     n_frames = round(MINUTES * 60 * GESTURE_FPS)
     order = np.random.default_rng([seed, 3]).permutation(len(learnt.lengths))
     intensity = _shuffled(learnt.intensity, learnt.lengths, order, n_frames)
-    silence = np.full(n_frames, SILENCE[0], np.float32)
+    silence = np.full(n_frames, SILENT_PROSODY[0], np.float32)
     visited, repeating = {}, {}
     for feature in held.motion:
         speech = field_clip(fields, name, feature, intensity, seed)
         quiet = field_clip(fields, name, feature, silence, seed)
         visited[feature] = tuple(
-            coverage(speech.moments[: round(minutes * 60 * GESTURE_FPS)], learnt.lengths, APART)
+            coverage(speech.moments[: round(minutes * 60 * GESTURE_FPS)], learnt.lengths, MIN_MOMENT_GAP)
             for minutes in VISITED_AFTER
         )
         real = _shuffled(learnt.motion[feature], learnt.lengths, order, n_frames)

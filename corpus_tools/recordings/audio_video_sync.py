@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 from corpus_tools.recordings.observation import Observation, Timing
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 
-REACH_S = 0.3  # lags from minus to plus this are looked at
-STEP_S = 0.01
-LAGS = np.arange(-round(REACH_S / STEP_S), round(REACH_S / STEP_S) + 1) * STEP_S
-LEAST_FRAMES = 25  # that sound and picture must share
+MAX_LAG_S = 0.3  # lags from minus to plus this are looked at
+LAG_STEP_S = 0.01
+LAGS_S = np.arange(-round(MAX_LAG_S / LAG_STEP_S), round(MAX_LAG_S / LAG_STEP_S) + 1) * LAG_STEP_S
+MIN_FRAMES = 25  # that sound and picture must share
 # Lips open before they are heard: by this in GRID s1, whose sound and picture are taken to be together.
-LEAD_S = 0.01
+LIP_LEAD_S = 0.01
 # Of sentences of GRID s1 in a row, a lag read from 51 s is off by 15 ms (standard deviation), from 96 s by 14 ms.
-LEAST_S = 48.0
-LEAST_LAG_S = 0.045  # three deviations for `LEAST_S`; it falls with the square root of the time
+MIN_DURATION_S = 48.0
+MIN_LAG_S = 0.045  # three deviations for `MIN_DURATION_S`; it falls with the square root of the time
 # Of 400 samples of 51 s of GRID s1 1 % lie below .38; of its sounds on other sentences 1 % lie above .21.
-LEAST_CORRELATION = 0.28
+MIN_CORRELATION = 0.28
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,27 +39,27 @@ class SyncEstimate:
     @property
     def lag_correction_s(self) -> float:
         """The lag to take out: 0 where it cannot be told from none."""
-        least = LEAST_LAG_S * np.sqrt(LEAST_S / self.seconds) if self.seconds >= LEAST_S else np.inf
+        least = MIN_LAG_S * np.sqrt(MIN_DURATION_S / self.seconds) if self.seconds >= MIN_DURATION_S else np.inf
         return round(self.lag, 3) if abs(self.lag) >= least else 0.0
 
     @property
     def problem(self) -> str | None:
         """Why sound and picture do not belong together, None where they do or where too little tells."""
-        if self.seconds < LEAST_S:
+        if self.seconds < MIN_DURATION_S:
             return None
-        if self.correlation < LEAST_CORRELATION:
+        if self.correlation < MIN_CORRELATION:
             return f"the lips do not move with the sound (correlation {self.correlation:.2f}); give the original sound"
-        if abs(self.lag) > REACH_S - 2 * STEP_S:
-            return f"sound and picture are {REACH_S:g} s or more apart; put them together with an editor"
+        if abs(self.lag) > MAX_LAG_S - 2 * LAG_STEP_S:
+            return f"sound and picture are {MAX_LAG_S:g} s or more apart; put them together with an editor"
         return None
 
 
 def estimate_sync_by_video(observations: Sequence[Observation]) -> Mapping[Path, SyncEstimate]:
-    """How sound and picture of each video agree; videos of less than `LEAST_S` are taken together."""
+    """How sound and picture of each video agree; videos of less than `MIN_DURATION_S` are taken together."""
     together: dict[Path, list[Observation]] = {}
     for observation in observations:
         together.setdefault(observation.video, []).append(observation)
-    short = [video for video, group in together.items() if _total_duration(group) < LEAST_S]
+    short = [video for video, group in together.items() if _total_duration(group) < MIN_DURATION_S]
     of_short = estimate_sync([seen for video in short for seen in together[video]])
     return {video: of_short if video in short else estimate_sync(group) for video, group in together.items()}
 
@@ -87,27 +87,29 @@ def estimate_sync(observations: Iterable[Observation]) -> SyncEstimate:
     total = np.average([curve for curve, _ in found], axis=0, weights=lengths)
     at = int(total.argmax())
     offset = 0.0
-    if 0 < at < len(LAGS) - 1:
+    if 0 < at < len(LAGS_S) - 1:
         before, peak, behind = total[at - 1 : at + 2]
         bend = before - 2 * peak + behind
         offset = 0.5 * (before - behind) / bend if bend else 0.0
     return SyncEstimate(
-        float(LAGS[at] + offset * STEP_S - LEAD_S), float(total[at]), _total_duration([seen for _, seen in found])
+        float(LAGS_S[at] + offset * LAG_STEP_S - LIP_LEAD_S),
+        float(total[at]),
+        _total_duration([seen for _, seen in found]),
     )
 
 
 def lag_correlations(seen: Observation) -> NDArray[np.float64] | None:
-    """Correlations of the lips' speed with the rise of the loudness `LAGS` later; None with too little to compare."""
+    """Correlations of the lips' speed with the rise of the loudness `LAGS_S` later; None with too little to compare."""
     apart = seen.landmarks[:, UPPER_LIP_INNER_MID] - seen.landmarks[:, LOWER_LIP_INNER_MID]
     times = np.arange(len(apart)) / seen.fps
-    within = (times >= REACH_S) & (times <= times[-1] - REACH_S)
-    if within.sum() < LEAST_FRAMES:
+    within = (times >= MAX_LAG_S) & (times <= times[-1] - MAX_LAG_S)
+    if within.sum() < MIN_FRAMES:
         return None
     speed = np.gradient(np.linalg.norm(apart.astype(np.float64), axis=1))
     rise = np.gradient(seen.intensity.astype(np.float64))
     if speed[within].std() == 0:
         return None
-    rows = np.array([np.interp(times[within] + lag, times, rise) for lag in LAGS])
+    rows = np.array([np.interp(times[within] + lag, times, rise) for lag in LAGS_S])
     rows -= rows.mean(axis=1, keepdims=True)
     lips = speed[within] - speed[within].mean()
     size = np.linalg.norm(rows, axis=1) * np.linalg.norm(lips)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from corpus_tools.recordings.corpus_video import content_key
-from corpus_tools.recordings.folder import Spoken
+from corpus_tools.recordings.folder import PronouncedTranscript
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.speech.pauses import Span, cut_at_pauses
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from tts2face.speech.forced_alignment import Aligner
     from tts2face.speech.phone_recognition import PhoneRecogniser
 
-KIND = "alignment"
+ALIGNMENT_KIND = "alignment"
 ALIGNMENT_VERSION = 4  # rises when alignment gives other edges, so that cached ones are made again
-HEARING = "hearing"
-HEARING_VERSION = 1  # rises when other phones are recognised
+RECOGNITION_KIND = "hearing"
+RECOGNITION_VERSION = 1  # rises when other phones are recognised
 SOUND_RATE = 16_000  # Hz; what the aligner and the recogniser hear
-LONGEST_UTTERANCE_S = 20.0  # longer recordings are cut at pauses
+MAX_UTTERANCE_S = 20.0  # longer recordings are cut at pauses
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,7 +68,7 @@ class CachedAligner:
         whole = self._last[1]
         return whole if span is None else cut_sound(whole, span)
 
-    def heard(self, video: Path, words: Spoken | None, span: Span | None = None) -> AlignedSpeech:
+    def heard(self, video: Path, words: PronouncedTranscript | None, span: Span | None = None) -> AlignedSpeech:
         """Phones of a recording's sound, from the cache when the same sound and words were aligned before.
 
         Parameters
@@ -87,11 +87,13 @@ class CachedAligner:
         """
         sound = self.sound(video, span)
         asked = hashlib.sha256(json.dumps([words, span]).encode()).hexdigest()[:8]
-        kept = self._cache / f"{content_key(video)}-{asked}-{ALIGNMENT_VERSION}.{KIND}"
+        kept = self._cache / f"{content_key(video)}-{asked}-{ALIGNMENT_VERSION}.{ALIGNMENT_KIND}"
         found = _read_cached_alignment(kept, sound, is_recognised=words is None)
         return found or self._aligned(sound, words, kept)
 
-    def utterances(self, video: Path, words: Spoken | None) -> tuple[tuple[Span, Spoken | None], ...]:
+    def utterances(
+        self, video: Path, words: PronouncedTranscript | None
+    ) -> tuple[tuple[Span, PronouncedTranscript | None], ...]:
         """A long recording cut at pauses: spans of its seconds, and the words that are said in each.
 
         Raises
@@ -103,7 +105,7 @@ class CachedAligner:
         """
         from tts2face.speech.transcript_placement import assign_words
 
-        spans = cut_at_pauses(self.sound(video), LONGEST_UTTERANCE_S)
+        spans = cut_at_pauses(self.sound(video), MAX_UTTERANCE_S)
         if words is None:
             return tuple((span, None) for span in spans)
         heard = [[phone for word in said for phone in word] for said in self._recognise_spans(video, spans)]
@@ -113,7 +115,7 @@ class CachedAligner:
         ]
         return tuple((span, said) for span, said in zip(spans, said_in, strict=True) if said)
 
-    def _aligned(self, sound: Waveform, words: Spoken | None, kept: Path) -> AlignedSpeech:
+    def _aligned(self, sound: Waveform, words: PronouncedTranscript | None, kept: Path) -> AlignedSpeech:
         from tts2face.speech.forced_alignment import Aligner
 
         self._aligner = self._aligner or Aligner()
@@ -130,28 +132,28 @@ class CachedAligner:
             "words": [[word.text, word.first, word.last] for word in found.words],
             "confidence": found.confidence,
         }
-        write_tensors(kept, KIND, ALIGNMENT_VERSION, {"edges": found.phones.edges}, header)
+        write_tensors(kept, ALIGNMENT_KIND, ALIGNMENT_VERSION, {"edges": found.phones.edges}, header)
         return AlignedSpeech(found.phones, found.words, found.confidence, sound, words is None)
 
     def _recognise_spans(self, video: Path, spans: Sequence[Span]) -> list[list[tuple[str, ...]]]:
         """Phones of the words heard in each span, from the cache when they were recognised before."""
-        kept = self._cache / f"{content_key(video)}-{HEARING_VERSION}.{HEARING}"
+        kept = self._cache / f"{content_key(video)}-{RECOGNITION_VERSION}.{RECOGNITION_KIND}"
         if kept.is_file():
             try:
-                said = read_tensors(kept, HEARING, HEARING_VERSION)[1]["words"]
+                said = read_tensors(kept, RECOGNITION_KIND, RECOGNITION_VERSION)[1]["words"]
                 if len(said) == len(spans):
                     return [[tuple(word) for word in words] for words in said]
             except (DataError, KeyError):
                 pass  # damaged: made again
         found = [list(self._recognise_words(self.sound(video, span))) for span in spans]
-        write_tensors(kept, HEARING, HEARING_VERSION, {"spans": np.array(spans)}, {"words": found})
+        write_tensors(kept, RECOGNITION_KIND, RECOGNITION_VERSION, {"spans": np.array(spans)}, {"words": found})
         return found
 
     def _recognise_words(self, sound: Waveform) -> tuple[tuple[str, ...], ...]:
-        from tts2face.speech.phone_recognition import LONGEST_S, PhoneRecogniser
+        from tts2face.speech.phone_recognition import MAX_SOUND_S, PhoneRecogniser
 
         self._recogniser = self._recogniser or PhoneRecogniser()
-        parts = [cut_sound(sound, span) for span in cut_at_pauses(sound, LONGEST_S)]
+        parts = [cut_sound(sound, span) for span in cut_at_pauses(sound, MAX_SOUND_S)]
         return tuple(word for part in parts for word in self._recogniser.words(part))
 
 
@@ -166,7 +168,7 @@ def _read_cached_alignment(kept: Path, sound: Waveform, *, is_recognised: bool) 
     if not kept.is_file():
         return None
     try:
-        arrays, header = read_tensors(kept, KIND, ALIGNMENT_VERSION)
+        arrays, header = read_tensors(kept, ALIGNMENT_KIND, ALIGNMENT_VERSION)
         words = tuple(WordSpan(text, first, last) for text, first, last in header["words"])
         phones = PhoneSequence(header["phones"], arrays["edges"])
         return AlignedSpeech(phones, words, float(header["confidence"]), sound, is_recognised)

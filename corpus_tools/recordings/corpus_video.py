@@ -20,11 +20,11 @@ from tts2face.video.track import Tracking
 if TYPE_CHECKING:
     from tts2face.video.streaming_tracker import StreamingTracker
 
-KIND = "tracking"
+TRACKING_KIND = "tracking"
 TRACKING_VERSION = 2  # rises when tracking gives other numbers, so that cached ones are made again
 NOT_COUNTED = -1
 
-Tell = Callable[[float], None]  # told the share of a video that is done
+ShareCallback = Callable[[float], None]  # told the share of a video that is done
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +60,7 @@ class CachedTracker:
         self._reader: StreamingTracker | None = None
         self._last: tuple[Path, TrackedVideo] | None = None
 
-    def track(self, video: Path, tell: Tell | None = None) -> TrackedVideo:
+    def track(self, video: Path, tell: ShareCallback | None = None) -> TrackedVideo:
         """What a video shows, from the cache when its content was tracked before.
 
         Parameters
@@ -73,7 +73,7 @@ class CachedTracker:
         DataError
             The video cannot be read or holds no picture.
         """
-        kept = self._cache / f"{content_key(video)}-{MODEL_SHA256[:8]}-{TRACKING_VERSION}.{KIND}"
+        kept = self._cache / f"{content_key(video)}-{MODEL_SHA256[:8]}-{TRACKING_VERSION}.{TRACKING_KIND}"
         if self._last is None or self._last[0] != kept:
             self._last = None  # two long videos need not lie in memory together
             self._last = (
@@ -82,7 +82,7 @@ class CachedTracker:
             )
         return self._last[1]
 
-    def _track_and_cache(self, video: Path, kept: Path, tell: Tell) -> TrackedVideo:
+    def _track_and_cache(self, video: Path, kept: Path, tell: ShareCallback) -> TrackedVideo:
         from tts2face.video.streaming_tracker import StreamingTracker
 
         self._reader = self._reader or StreamingTracker(self._model)
@@ -100,7 +100,7 @@ class CachedTracker:
             "n_faces": np.array([_stored_face_count(sight.n_faces) for sight in sights], np.int8),
             "changes": np.array([sight.change for sight in sights], np.float32),
         }
-        write_tensors(kept, KIND, TRACKING_VERSION, arrays, {"fps": facts.fps})
+        write_tensors(kept, TRACKING_KIND, TRACKING_VERSION, arrays, {"fps": facts.fps})
         return _build_tracked_video(arrays, facts.fps)
 
 
@@ -128,7 +128,7 @@ def _read_cached_tracking(path: Path) -> TrackedVideo | None:
     if not path.is_file():
         return None
     try:
-        arrays, header = read_tensors(path, KIND, TRACKING_VERSION)
+        arrays, header = read_tensors(path, TRACKING_KIND, TRACKING_VERSION)
         return _build_tracked_video(arrays, float(header["fps"]))
     except (DataError, KeyError):
         return None

@@ -23,10 +23,10 @@ LETTER_NAMES = {
     "x": ("EH1 K S",), "y": ("W AY1",), "z": ("Z EH1 D", "Z IY1"),
 }  # fmt: skip
 # The older "hw" of "white" (Wells 1982, "glide cluster reduction"); aligned, it makes an h of the rounded lips of w.
-BREATHED_W = ("h", "w")
+HW_CLUSTER = ("h", "w")
 
-Ways = tuple[tuple[str, ...], ...]  # pronunciations of one word, each a row of phones
-Spoken = tuple[tuple[str, Ways], ...]  # words with their pronunciations
+Pronunciations = tuple[tuple[str, ...], ...]  # pronunciations of one word, each a row of phones
+PronouncedTranscript = tuple[tuple[str, Pronunciations], ...]  # words with their pronunciations
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class Recording:
     transcript: str | Path | None
     is_spelling: bool = False
     span: tuple[float, float] | None = None
-    words: Spoken | None = None
+    words: PronouncedTranscript | None = None
 
 
 def find_recordings(folder: Path) -> tuple[Recording, ...]:
@@ -71,7 +71,7 @@ def find_recordings(folder: Path) -> tuple[Recording, ...]:
     return found
 
 
-def pronounce_recording(recording: Recording) -> Spoken | None:
+def pronounce_recording(recording: Recording) -> PronouncedTranscript | None:
     """Each word of a transcript with its pronunciations; None without a transcript.
 
     Raises
@@ -91,7 +91,7 @@ def pronounce_recording(recording: Recording) -> Spoken | None:
     )
 
 
-def look_up_pronunciations(word: str, *, is_letter: bool) -> Ways:
+def look_up_pronunciations(word: str, *, is_letter: bool) -> Pronunciations:
     """All ways to say a word, in phones of the table; the letter's names if it stands for one.
 
     A word that the dictionary does not hold is said by rule.
@@ -112,7 +112,7 @@ def look_up_pronunciations(word: str, *, is_letter: bool) -> Ways:
     if not found:
         return (_pronounce_by_rule(word),)
     ways = dict.fromkeys(tuple(segment.phone for segment in segments) for segments in found)
-    plain = [way for way in ways if way[:2] != BREATHED_W]
+    plain = [way for way in ways if way[:2] != HW_CLUSTER]
     return tuple(plain or ways)
 
 

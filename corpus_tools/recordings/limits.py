@@ -15,8 +15,10 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.speech.text_fit import LEAST_CONFIDENCE
 from tts2face.types import Waveform
 
-FULL_SCALE = 0.999  # a sample from here on is taken for clipped
-UNCHANGED = 0.02  # of an 8-bit step: pictures that differ by less are one picture; a camera's own noise is above
+CLIPPED_LEVEL = 0.999  # a sample from here on is taken for clipped
+MIN_PICTURE_CHANGE = (
+    0.02  # of an 8-bit step: pictures that differ by less are one picture; a camera's own noise is above
+)
 LEVEL_WINDOW_S = 0.02
 NOISE_QUANTILE = 0.1  # of the windows without speech; steps and breaths are louder
 
@@ -84,7 +86,7 @@ def sound_measures(sound: Waveform, phones: PhoneSequence) -> dict[str, float]:
     is_speech = np.array([phone != SILENCE for phone in phones.phones])[at] if n_windows else np.zeros(0, bool)
     power = np.square(blocks, dtype=np.float64).mean(axis=1)
     spoken, quiet = power[is_speech], power[~is_speech]
-    clipped = float((np.abs(blocks[is_speech]) >= FULL_SCALE).mean()) if is_speech.any() else 0.0
+    clipped = float((np.abs(blocks[is_speech]) >= CLIPPED_LEVEL).mean()) if is_speech.any() else 0.0
     if not len(quiet) or not len(spoken):
         return {"clipped": clipped, "snr_db": np.inf}
     noise = max(float(np.quantile(quiet, NOISE_QUANTILE)), 1e-10)
@@ -103,7 +105,7 @@ def picture_measures(
     """
     counted = n_faces[n_faces != NOT_COUNTED]
     crowded = float((counted > 1).mean()) if len(counted) else 0.0
-    still = np.concatenate([[False], changes < UNCHANGED, [False]])
+    still = np.concatenate([[False], changes < MIN_PICTURE_CHANGE, [False]])
     borders = np.flatnonzero(np.diff(still.astype(np.int8))).reshape(-1, 2)
     frozen = max((float(times[last - 1] - times[max(first - 1, 0)]) for first, last in borders), default=0.0)
     return {"crowded": crowded, "frozen_s": frozen}

@@ -16,9 +16,9 @@ from tts2face.speech.loudness import intensity
 from tts2face.video.frame_grid import face_span, fill_gaps, resample_to_grid
 from tts2face.video.pose import PoseFreeLandmarks, head_angles, remove_pose
 
-ROUNDING = 1e-6  # seconds
-NEIGHBOURS = 2.0  # frames about a span, from which those in it are read
-LEAST_FRAMES = 2
+TIME_TOLERANCE_S = 1e-6  # seconds
+N_NEIGHBOUR_FRAMES = 2.0  # frames about a span, from which those in it are read
+MIN_FRAMES = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +98,7 @@ def observe_recording(recording: Recording, eyes: CachedTracker, ears: CachedAli
     start = begin + timing.lag - (recording.span[0] if recording.span else 0.0)  # on the clock of the sound
     phones, spans = trim_to_picture(sound, start, start + len(filled) / fps)
     posed = remove_pose(filled, fps)
-    here = (seen.times > begin - ROUNDING) & (seen.times < begin + len(filled) / fps - ROUNDING)
+    here = (seen.times > begin - TIME_TOLERANCE_S) & (seen.times < begin + len(filled) / fps - TIME_TOLERANCE_S)
     measures |= picture_measures(seen.n_faces[here], seen.changes[here], seen.times[here])
     measures["turn_deg"] = head_turn_deg(head_angles(posed.rotations))
     check_limits(measures)
@@ -135,13 +135,13 @@ def _span_landmarks(
     """
     fps = timing.fps or seen.fps
     begin, end = (0.0, np.inf) if span is None else (span[0] - timing.lag, span[1] - timing.lag)
-    near = (seen.times > begin - NEIGHBOURS / fps) & (seen.times < end + NEIGHBOURS / fps)
-    if near.sum() < LEAST_FRAMES:
+    near = (seen.times > begin - N_NEIGHBOUR_FRAMES / fps) & (seen.times < end + N_NEIGHBOUR_FRAMES / fps)
+    if near.sum() < MIN_FRAMES:
         where = "" if span is None else f" from {span[0]:.2f} s to {span[1]:.2f} s"
         raise DataError(f"the video shows nothing{where}; check its length and the times")
     points, first = resample_to_grid(seen.tracking.points[near], seen.times[near], fps)
     instants = (first + np.arange(len(points))) / fps
-    inside = (instants > begin - ROUNDING) & (instants < end + ROUNDING)
+    inside = (instants > begin - TIME_TOLERANCE_S) & (instants < end + TIME_TOLERANCE_S)
     points, first = points[inside], first + int(inside.argmax())
     if np.isnan(points).all():
         raise DataError("no frame shows a face")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from corpus_tools.process_pool import map_unordered
 from corpus_tools.recordings.audio_video_sync import corrected_timings, estimate_sync_by_video
-from corpus_tools.recordings.corpus_audio import LONGEST_UTTERANCE_S, CachedAligner
+from corpus_tools.recordings.corpus_audio import MAX_UTTERANCE_S, CachedAligner
 from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.folder import Recording, find_recordings, pronounce_recording
 from corpus_tools.recordings.observation import Observation, Timing, observe_recording
@@ -14,9 +14,9 @@ from corpus_tools.run_options import Progress, RunOptions
 from lexicon.errors import DataError, InputError
 from tts2face.video.landmark_models import find_bundle
 
-STEPS = 100  # of progress for each video
-WATCHING = 0.8  # of a video's work
-REASONS_SHOWN = 3  # of recordings, where none could be used
+STEPS_PER_VIDEO = 100  # of progress for each video
+TRACKING_SHARE = 0.8  # of a video's work
+MAX_QUOTED_REASONS = 3  # of recordings, where none could be used
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +50,8 @@ class VideoTask:
         return self.recordings[0].video
 
 
-Outcomes = list[Observation | Refusal]
-Tell = Callable[[float], None]  # told the share of a task that is done
+RecordingOutcomes = list[Observation | Refusal]
+ShareCallback = Callable[[float], None]  # told the share of a task that is done
 
 
 def observe(recordings: Path, *, effort: RunOptions | None = None, on_progress: Progress | None = None) -> Observations:
@@ -62,7 +62,7 @@ def observe(recordings: Path, *, effort: RunOptions | None = None, on_progress: 
     recordings
         A folder, or a video, as `corpus_tools.recordings.folder.find_recordings` reads it.
     on_progress
-        Called with steps done and of all, `STEPS` for each video.
+        Called with steps done and of all, `STEPS_PER_VIDEO` for each video.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def observe(recordings: Path, *, effort: RunOptions | None = None, on_progress: 
     processes, cache = effort.n_processes(), effort.folder()
     tasks = group_by_video(find_recordings(recordings))
     model = find_bundle(effort.model)
-    found: dict[Path, Outcomes] = {}
+    found: dict[Path, RecordingOutcomes] = {}
     for task, outcomes in _observe_tasks(tasks, cache, model, min(processes, len(tasks)), on_progress):
         found[task.video] = outcomes
     kept = _kept_observations(found)
@@ -100,17 +100,17 @@ def check_any_kept(observations: Observations) -> tuple[Observation, ...]:
     Raises
     ------
     InputError
-        None was; the message says why the first `REASONS_SHOWN` were refused.
+        None was; the message says why the first `MAX_QUOTED_REASONS` were refused.
     """
     refused = observations.refused
     if observations.kept:
         return observations.kept
-    reasons = "; ".join(f"{refusal.name}: {refusal.reason}" for refusal in refused[:REASONS_SHOWN])
-    more = f"; and {len(refused) - REASONS_SHOWN} more" if len(refused) > REASONS_SHOWN else ""
+    reasons = "; ".join(f"{refusal.name}: {refusal.reason}" for refusal in refused[:MAX_QUOTED_REASONS])
+    more = f"; and {len(refused) - MAX_QUOTED_REASONS} more" if len(refused) > MAX_QUOTED_REASONS else ""
     raise InputError(f"no recording could be used: {reasons}{more}")
 
 
-def _kept_observations(found: Mapping[Path, Outcomes]) -> list[Observation]:
+def _kept_observations(found: Mapping[Path, RecordingOutcomes]) -> list[Observation]:
     return [one for outcomes in found.values() for one in outcomes if isinstance(one, Observation)]
 
 
@@ -134,10 +134,10 @@ def group_by_video(recordings: Sequence[Recording]) -> list[VideoTask]:
 
 def _observe_tasks(
     tasks: Sequence[VideoTask], cache: Path, model: Path, jobs: int, on_progress: Progress | None
-) -> Iterator[tuple[VideoTask, Outcomes]]:
+) -> Iterator[tuple[VideoTask, RecordingOutcomes]]:
     """Tasks with their outcomes as they come, in no order."""
     tell = on_progress or (lambda done, of: None)
-    of = STEPS * len(tasks)
+    of = STEPS_PER_VIDEO * len(tasks)
     if jobs <= 1:
         worker = _VideoReader(cache, model)
         for number, task in enumerate(tasks):
@@ -145,11 +145,11 @@ def _observe_tasks(
         return
     for number, done in enumerate(map_unordered(tasks, _observe_task, _start_worker, (cache, model), jobs), start=1):
         yield done
-        tell(STEPS * number, of)
+        tell(STEPS_PER_VIDEO * number, of)
 
 
-def _task_share_callback(tell: Progress, number: int, of: int) -> Tell:
-    return lambda share: tell(int(STEPS * (number + share)), of)
+def _task_share_callback(tell: Progress, number: int, of: int) -> ShareCallback:
+    return lambda share: tell(int(STEPS_PER_VIDEO * (number + share)), of)
 
 
 class _VideoReader:
@@ -158,12 +158,12 @@ class _VideoReader:
     def __init__(self, cache: Path, model: Path) -> None:
         self._tracker, self._aligner = CachedTracker(cache, model), CachedAligner(cache)
 
-    def outcomes(self, task: VideoTask, tell: Tell) -> Outcomes:
+    def outcomes(self, task: VideoTask, tell: ShareCallback) -> RecordingOutcomes:
         """An observation, or why there is none, for each utterance of a video."""
-        found: Outcomes = []
+        found: RecordingOutcomes = []
         try:
             recordings = self._split_long_recording(task.recordings)
-            self._tracker.track(task.video, lambda share: tell(WATCHING * share))
+            self._tracker.track(task.video, lambda share: tell(TRACKING_SHARE * share))
         except DataError as reason:
             recordings = ()
             found = [_refusal(recording, reason) for recording in task.recordings]
@@ -172,14 +172,14 @@ class _VideoReader:
                 found.append(observe_recording(recording, self._tracker, self._aligner, task.timing))
             except DataError as reason:
                 found.append(_refusal(recording, reason))
-            tell(WATCHING + (1 - WATCHING) * number / len(recordings))
+            tell(TRACKING_SHARE + (1 - TRACKING_SHARE) * number / len(recordings))
         tell(1.0)
         return found
 
     def _split_long_recording(self, recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:
         """The recordings; where one takes the whole of a long video, its utterances, cut at pauses."""
         whole = recordings[0]
-        if whole.span is not None or self._aligner.sound(whole.video).duration <= LONGEST_UTTERANCE_S:
+        if whole.span is not None or self._aligner.sound(whole.video).duration <= MAX_UTTERANCE_S:
             return recordings
         said = self._aligner.utterances(whole.video, pronounce_recording(whole))
         return tuple(
@@ -195,5 +195,5 @@ def _start_worker(cache: Path, model: Path) -> None:
     _worker.append(_VideoReader(cache, model))
 
 
-def _observe_task(task: VideoTask) -> Outcomes:
+def _observe_task(task: VideoTask) -> RecordingOutcomes:
     return _worker[0].outcomes(task, lambda share: None)

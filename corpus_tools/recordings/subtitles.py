@@ -7,13 +7,13 @@ from pathlib import Path
 from corpus_tools.transcripts.decoding import read_text
 from lexicon.errors import BackendError, DataError
 
-FORMATS = {".srt": "srt", ".vtt": "vtt"}  # stated to the reader: it guesses wrongly for files without a header
+SUBTITLE_FORMATS = {".srt": "srt", ".vtt": "vtt"}  # stated to the reader: it guesses wrongly for files without a header
 # Blocks for people and for styling; the reader would take them for words of the cue before (W3C WebVTT, 4.1).
 _UNSPOKEN = re.compile(r"(?:(?<=\n\n)|^)(?:NOTE|STYLE|REGION)\b(?:.+\n?)*")
 # What subtitles for the deaf add: noises in brackets, sung lines between notes, who speaks, dashes between speakers.
 _NOISE = re.compile(r"\[[^\]]*\]|\([^)]*\)|\{[^}]*\}|♪[^♪]*(?:♪|$)")
 _SPEAKER = re.compile(r"(?m)^\s*(?:[-–—]\s*|>>\s*)?(?:[A-Z][A-Z0-9 .'’#-]*:(?=\s))?")
-MARGIN_S = 0.3  # before and behind a cue; subtitles are rarely nearer to the speech
+CUE_MARGIN_S = 0.3  # before and behind a cue; subtitles are rarely nearer to the speech
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,11 +27,11 @@ class Cue:
 
 def find_subtitles(video: Path) -> Path | None:
     """The file of subtitles of a video, if there is one."""
-    return next((path for suffix in FORMATS if (path := video.with_suffix(suffix)).is_file()), None)
+    return next((path for suffix in SUBTITLE_FORMATS if (path := video.with_suffix(suffix)).is_file()), None)
 
 
 def read_cues(path: Path) -> tuple[Cue, ...]:
-    """Cues in the order of time, each widened by `MARGIN_S` but not beyond the middle to its neighbour.
+    """Cues in the order of time, each widened by `CUE_MARGIN_S` but not beyond the middle to its neighbour.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def read_cues(path: Path) -> tuple[Cue, ...]:
     if path.suffix.lower() == ".vtt":
         text = _UNSPOKEN.sub("", text)
     try:
-        read = pysubs2.SSAFile.from_string(text, format_=FORMATS[path.suffix.lower()])
+        read = pysubs2.SSAFile.from_string(text, format_=SUBTITLE_FORMATS[path.suffix.lower()])
     except (pysubs2.exceptions.Pysubs2Error, ValueError, OverflowError) as broken:
         raise DataError(f"{path} cannot be read as subtitles ({broken}); export them again") from broken
     spoken = sorted((event.start / 1000, event.end / 1000, _spoken_text(event.plaintext)) for event in read)
@@ -58,9 +58,9 @@ def read_cues(path: Path) -> tuple[Cue, ...]:
     cues = []
     for number, (begin, end, text) in enumerate(spoken):
         before = spoken[number - 1][1] if number else 0.0
-        behind = spoken[number + 1][0] if number + 1 < len(spoken) else end + 2 * MARGIN_S
+        behind = spoken[number + 1][0] if number + 1 < len(spoken) else end + 2 * CUE_MARGIN_S
         earliest, latest = min((before + begin) / 2, begin), max((end + behind) / 2, end)
-        cues.append(Cue(max(begin - MARGIN_S, earliest, 0.0), min(end + MARGIN_S, latest), text))
+        cues.append(Cue(max(begin - CUE_MARGIN_S, earliest, 0.0), min(end + CUE_MARGIN_S, latest), text))
     return tuple(cues)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.evaluate import CEILING, SplitResult
+from corpus_tools.evaluation.evaluate import CEILING_METHOD, SplitResult
 from corpus_tools.evaluation.scores import CONFIDENCE, Scores, available_figures
 from corpus_tools.evaluation.tables import Evaluation, figure_text
 from corpus_tools.report.drawing import RULE, SERIES, draw_svg
@@ -38,7 +38,7 @@ ABOUT_OWN = (
 
 def evaluation_page(result: Evaluation, runs: Sequence[SplitResult]) -> str:
     """The page (HTML)."""
-    compared = [one.method for one in result.scores if one.method != CEILING]
+    compared = [one.method for one in result.scores if one.method != CEILING_METHOD]
     seen = SHOWN if SHOWN in compared else compared[-1]
     about = ABOUT[result.is_across].format(n_test=result.n_test, n_train=result.n_train)
     return page(
@@ -52,7 +52,11 @@ def evaluation_page(result: Evaluation, runs: Sequence[SplitResult]) -> str:
             _classes(result.scores),
             "<h2>DTW cost of the sentences</h2>",
             cost_histogram(
-                {one.method: [u.dtw_cost for u in one.utterances] for one in result.scores if one.method != CEILING}
+                {
+                    one.method: [u.dtw_cost for u in one.utterances]
+                    for one in result.scores
+                    if one.method != CEILING_METHOD
+                }
             ),
             *_sentences(result, runs, seen, PLAIN if PLAIN in compared and seen != PLAIN else None),
         ],
@@ -97,7 +101,7 @@ def _classes(scores: Sequence[Scores]) -> str:
         (one.method, some.phones, str(some.n_frames), f"{some.rmse_z:.3f}", f"{some.opening_error:.4f}",
          f"{some.opening_bias:+.4f}")
         for one in scores
-        if one.method != CEILING
+        if one.method != CEILING_METHOD
         for some in one.classes
     ]  # fmt: skip
     heads = ("method", "phones", "frames", "RMSE z", "error of opening", "bias of opening")

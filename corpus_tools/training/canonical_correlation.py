@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 
 Values = NDArray[np.floating]
-RANK = 1e-10  # singular values below this part of the largest belong to measurements that say nothing new
+RANK_TOLERANCE = 1e-10  # singular values below this part of the largest belong to measurements that say nothing new
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,7 +99,7 @@ def _orthonormal_basis(centred: NDArray[np.float64]) -> tuple[NDArray[np.float64
     scale = np.where(spread > 0.0, spread, 1.0)
     q, r = np.linalg.qr(centred / scale)
     left, sizes, right = np.linalg.svd(r)
-    kept = sizes > RANK * sizes[0]
+    kept = sizes > RANK_TOLERANCE * sizes[0]
     return q @ left[:, kept], (right[kept].T / sizes[kept]) / scale[:, None]
 
 

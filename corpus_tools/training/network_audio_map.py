@@ -18,7 +18,7 @@ from tts2face.models.audio_map import AudioMap
 
 VALIDATION_SHARE = 0.1  # of the utterances: they end the training before it learns the others by heart
 PATIENCE = 30  # steps without a better error on them
-MOST_STEPS = 600
+MAX_STEPS = 600
 Layers = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 
@@ -126,7 +126,7 @@ def _train_layers(
         jac=True,
         method="L-BFGS-B",
         callback=step,
-        options={"maxiter": MOST_STEPS, "maxcor": 20},
+        options={"maxiter": MAX_STEPS, "maxcor": 20},
     )
     return unpack_layers(best.weights, shapes)
 

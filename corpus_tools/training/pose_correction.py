@@ -16,7 +16,7 @@ from corpus_tools.training.ridge import fit_ridge
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 
 CHUNK_S = 3.0  # a sentence: long enough for speech to average out
-LEAST_CHUNKS = 12  # with fewer nothing is taken out
+MIN_CHUNKS = 12  # with fewer nothing is taken out
 Floats = NDArray[np.float64]
 
 
@@ -36,7 +36,7 @@ class PosedLandmarks(Protocol):
         """As `tts2face.types.HEAD_CHANNELS`."""
 
 
-AnySeen = TypeVar("AnySeen", bound=PosedLandmarks)
+AnyPosedLandmarks = TypeVar("AnyPosedLandmarks", bound=PosedLandmarks)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,7 +47,7 @@ class PoseCorrection:
     scale: Floats
     offsets: Floats
 
-    def removed(self, observation: AnySeen) -> AnySeen:
+    def removed(self, observation: AnyPosedLandmarks) -> AnyPosedLandmarks:
         """The observation with landmarks as if the head stood at the centre."""
         if not self.offsets.any():
             return observation
@@ -64,7 +64,7 @@ def fit_pose_correction(observations: Sequence[PosedLandmarks]) -> PoseCorrectio
     terms = angle_terms((angles - centre) / scale)
     away = landmarks.reshape(len(landmarks), -1) - landmarks.reshape(len(landmarks), -1).mean(axis=0)
     offsets = np.zeros((terms.shape[1], away.shape[1]))
-    if len(angles) >= LEAST_CHUNKS:
+    if len(angles) >= MIN_CHUNKS:
         fit = fit_ridge(terms, away)
         if fit.left_out_error < float(np.square(away).sum()):
             offsets = fit.weights
@@ -79,7 +79,7 @@ def _keep_lip_contact(offsets: Floats) -> Floats:
     return kept
 
 
-def correct_pose(observations: Sequence[AnySeen]) -> tuple[AnySeen, ...]:
+def correct_pose(observations: Sequence[AnyPosedLandmarks]) -> tuple[AnyPosedLandmarks, ...]:
     """Observations of one person without the leak that they show."""
     leak = fit_pose_correction(observations) if observations else None
     return tuple(leak.removed(seen) for seen in observations) if leak else ()

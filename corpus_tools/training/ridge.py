@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-EFFORTS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # for terms of unit spread
+REGULARISATIONS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # for terms of unit spread
 Floats = NDArray[np.float64]
 
 
@@ -19,7 +19,7 @@ class RidgeFit:
     left_out_error: float
 
 
-def fit_ridge(terms: Floats, wanted: Floats, efforts: Sequence[float] = EFFORTS) -> RidgeFit:
+def fit_ridge(terms: Floats, wanted: Floats, efforts: Sequence[float] = REGULARISATIONS) -> RidgeFit:
     """The best regression of (R, V) values, whose mean is 0, on (R, K) terms.
 
     Each row's error when it is left out follows from its leverage. Source: Allen 1974 (PRESS).

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.run_options import Progress, Stages, ignore_stage
+from corpus_tools.run_options import Progress, StageCallback, ignore_stage
 from corpus_tools.training.linear_audio_map import TrainingUtterance, learn_linear_map
 from corpus_tools.training.network_audio_map import NetworkMapOptions, learn_network_map
 from tts2face.models.audio_map import AudioMap
@@ -17,17 +17,17 @@ from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 
 # Chosen by inner cross-validation on the training utterances of GRID s1 (docs/accuracy.md, "Speech-driven").
-FEATURE = "mfcc+lsf"
-NETWORK = NetworkMapOptions(n_hidden=40)
-LEAST_UTTERANCES = 20  # a network sets a tenth of them aside
-LEAST_FRAMES = 1000  # below, canonical correlation feigns ties (docs/accuracy.md)
+AUDIO_MAP_FEATURES = "mfcc+lsf"
+TALKER_NETWORK_OPTIONS = NetworkMapOptions(n_hidden=40)
+MIN_UTTERANCES = 20  # a network sets a tenth of them aside
+MIN_FRAMES = 1000  # below, canonical correlation feigns ties (docs/accuracy.md)
 
-Heard = Mapping[str, NDArray[np.float32]]  # features of each utterance by its name
+UtteranceFeatures = Mapping[str, NDArray[np.float32]]  # features of each utterance by its name
 
 
 def sound_features(
     observations: Sequence[Observation], kinds: Sequence[str], *, on_progress: Progress | None = None
-) -> dict[str, Heard]:
+) -> dict[str, UtteranceFeatures]:
     """For each kind of feature, the (T, D) features of every utterance on the frames of its landmarks.
 
     Raises
@@ -52,7 +52,7 @@ def utterance_features(observation: Observation, sound: Waveform, kind: str) -> 
 
 
 def build_training_utterances(
-    observations: Sequence[Observation], model: ShapeModel, heard: Heard
+    observations: Sequence[Observation], model: ShapeModel, heard: UtteranceFeatures
 ) -> list[TrainingUtterance]:
     """What a drive learns from: features of utterances, and the speech parameters of their landmarks."""
     return [
@@ -64,8 +64,8 @@ def learn_audio_maps(
     observations: Sequence[Observation],
     talker: Talker,
     *,
-    network: NetworkMapOptions = NETWORK,
-    stages: Stages = ignore_stage,
+    network: NetworkMapOptions = TALKER_NETWORK_OPTIONS,
+    stages: StageCallback = ignore_stage,
 ) -> dict[str, AudioMap]:
     """The linear and the network drive of a talker; none where the recordings are too few to learn them.
 
@@ -74,15 +74,15 @@ def learn_audio_maps(
     DataError
         A recording holds no sound.
     """
-    if len(observations) < LEAST_UTTERANCES or sum(len(one.landmarks) for one in observations) < LEAST_FRAMES:
+    if len(observations) < MIN_UTTERANCES or sum(len(one.landmarks) for one in observations) < MIN_FRAMES:
         return {}
-    heard = sound_features(observations, (FEATURE, "level"), on_progress=stages("listening"))
-    lessons = build_training_utterances(observations, talker.model, heard[FEATURE])
+    heard = sound_features(observations, (AUDIO_MAP_FEATURES, "level"), on_progress=stages("listening"))
+    lessons = build_training_utterances(observations, talker.model, heard[AUDIO_MAP_FEATURES])
     loudness = speech_level(np.concatenate(list(heard["level"].values())))
     told = stages("learning drives")
-    linear = learn_linear_map(lessons, feature=FEATURE)
+    linear = learn_linear_map(lessons, feature=AUDIO_MAP_FEATURES)
     told(1, 2)
-    bent = learn_network_map(lessons, feature=FEATURE, options=network)
+    bent = learn_network_map(lessons, feature=AUDIO_MAP_FEATURES, options=network)
     told(2, 2)
     return {"linear": replace(linear, loudness=loudness), "network": replace(bent, loudness=loudness)}
 

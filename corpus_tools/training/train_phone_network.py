@@ -21,12 +21,12 @@ from lexicon.sequence import SILENCE
 from tts2face.models.phone_network import PhoneNetwork, window_features
 from tts2face.models.talker import Talker
 
-MARGIN_S = 0.2  # of silence that is learnt from
-UNITS = (128, 128)
-DECAY = 1e-3
-ROUNDS = 60
+SILENCE_MARGIN_S = 0.2  # of silence that is learnt from
+HIDDEN_UNITS = (128, 128)
+WEIGHT_DECAY = 1e-3
+MAX_EPOCHS = 60
 N_BY_LABEL, N_BY_FEATURES = 1, 3  # networks; features tell unheard words better, labels heard ones (accuracy.md)
-LEAST_FRAMES = 3000  # two minutes; from less a network learns nothing that examples do not show
+MIN_FRAMES = 3000  # two minutes; from less a network learns nothing that examples do not show
 Floats = NDArray[np.float32]
 
 
@@ -38,7 +38,7 @@ def add_phone_network(talker: Talker, *, on_progress: Progress | None = None) ->
     BackendError
         scikit-learn is missing.
     """
-    if sum(len(spoken.shape) for spoken in talker.utterances) < LEAST_FRAMES:
+    if sum(len(spoken.shape) for spoken in talker.utterances) < MIN_FRAMES:
         return talker
     inventory = tuple(sorted({label for spoken in talker.utterances for label in spoken.phones.phones} | {SILENCE}))
     n_speech = talker.model.n_speech
@@ -46,7 +46,9 @@ def add_phone_network(talker: Talker, *, on_progress: Progress | None = None) ->
     shown, place, wanted = [], [], []
     for spoken in talker.utterances:
         times = np.arange(len(spoken.shape)) / talker.fps
-        near = (times >= spoken.phones.edges[1] - MARGIN_S) & (times <= spoken.phones.edges[-2] + MARGIN_S)
+        near = (times >= spoken.phones.edges[1] - SILENCE_MARGIN_S) & (
+            times <= spoken.phones.edges[-2] + SILENCE_MARGIN_S
+        )
         labels, where = window_features(spoken.phones, times[near], inventory)
         shown.append(labels)
         place.append(where)
@@ -100,8 +102,13 @@ def _fit_regressor(inputs: Any, wanted: Any, seed: int) -> Any:
     except ImportError as missing:
         raise BackendError("learning from recordings needs scikit-learn: pip install 'tts2face[capture]'") from missing
     network = MLPRegressor(
-        hidden_layer_sizes=UNITS, alpha=DECAY, early_stopping=True, max_iter=ROUNDS, batch_size=256, random_state=seed
+        hidden_layer_sizes=HIDDEN_UNITS,
+        alpha=WEIGHT_DECAY,
+        early_stopping=True,
+        max_iter=MAX_EPOCHS,
+        batch_size=256,
+        random_state=seed,
     )
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)  # it stops after `ROUNDS`, converged or not
+        warnings.simplefilter("ignore", ConvergenceWarning)  # it stops after `MAX_EPOCHS`, converged or not
         return network.fit(inputs, wanted)

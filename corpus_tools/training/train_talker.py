@@ -21,7 +21,9 @@ from tts2face.models.talker import ShapeModel, Talker, Utterance
 from tts2face.video.pose import head_angles
 
 REST_MARGIN_S = 0.2  # lips begin to move this long before the first sound
-CLOSED = 0.01  # of the distance of the outer eye corners: the inner lips' gap below which the mouth counts as closed
+CLOSED_GAP = (
+    0.01  # of the distance of the outer eye corners: the inner lips' gap below which the mouth counts as closed
+)
 
 
 def learn_talker(
@@ -104,7 +106,9 @@ def resting_frames(observation: Observation) -> NDArray[np.bool_]:
     phones = observation.phones
     speech = phones.edges[1] if phones.phones[0] == SILENCE else phones.edges[0]
     times = np.arange(len(observation.landmarks)) / observation.fps
-    still: NDArray[np.bool_] = (times < speech - REST_MARGIN_S) & (normalised_lip_gap(observation.landmarks) < CLOSED)
+    still: NDArray[np.bool_] = (times < speech - REST_MARGIN_S) & (
+        normalised_lip_gap(observation.landmarks) < CLOSED_GAP
+    )
     return still
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 from lexicon.errors import DataError
 from lexicon.inputs import check_regular_file
 
-LARGEST_BYTES = 8 << 20  # 8 MiB; the words of a whole day of speech are below 1 MiB
-_MARKS = (
+MAX_BYTES = 8 << 20  # 8 MiB; the words of a whole day of speech are below 1 MiB
+_BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF8, "utf-8"),
     (codecs.BOM_UTF32_LE, "utf-32-le"),
     (codecs.BOM_UTF32_BE, "utf-32-be"),
@@ -27,11 +27,11 @@ def read_text(path: Path) -> str:
     check_regular_file(path)
     try:
         with path.open("rb") as file:
-            content = file.read(LARGEST_BYTES + 1)
+            content = file.read(MAX_BYTES + 1)
     except OSError as refused:
         raise DataError(f"{path} cannot be read ({refused.strerror}); check the file") from refused
-    if len(content) > LARGEST_BYTES:
-        raise DataError(f"{path} is larger than {LARGEST_BYTES >> 20} MiB; a transcript holds words only")
+    if len(content) > MAX_BYTES:
+        raise DataError(f"{path} is larger than {MAX_BYTES >> 20} MiB; a transcript holds words only")
     text = _decode(content, path)
     if "\0" in text:
         raise DataError(f"{path} is no text (it holds zero bytes); save it as UTF-8")
@@ -40,7 +40,7 @@ def read_text(path: Path) -> str:
 
 def _decode(content: bytes, path: Path) -> str:
     try:
-        for mark, encoding in _MARKS:
+        for mark, encoding in _BYTE_ORDER_MARKS:
             if content.startswith(mark):
                 return content[len(mark) :].decode(encoding)
         try:

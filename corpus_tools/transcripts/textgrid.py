@@ -11,7 +11,7 @@ from lexicon.errors import DataError
 SILENT_LABELS = frozenset({"", "sil", "sp", "spn", "<p:>", "<sil>", "pau", "#"})
 # Outside quotes only numbers count; names, brackets and comments are for people (Praat manual, "TextGrid file format").
 _TOKEN = re.compile(r'"(?P<label>(?:[^"]|"")*)"|\[[^\]\n]*\]|!.*|(?<![\w.])(?P<number>-?\d+(?:\.\d+)?)(?![\w.])')
-_KINDS = {"IntervalTier": 3, "TextTier": 2}  # entries of one interval or point
+_TIER_ENTRY_SIZES = {"IntervalTier": 3, "TextTier": 2}  # entries of one interval or point
 
 
 def read_textgrid(path: Path) -> tuple[Cue, ...]:
@@ -52,7 +52,7 @@ def _read_tiers(items: Iterator[str | float]) -> Iterator[tuple[str, tuple[Cue, 
     """Name and cues of each tier of intervals; tiers of points are read over."""
     for kind in items:
         name, _, _, size = (next(items) for _ in range(4))
-        rows = [[next(items) for _ in range(_KINDS[str(kind)])] for _ in range(int(size))]
+        rows = [[next(items) for _ in range(_TIER_ENTRY_SIZES[str(kind)])] for _ in range(int(size))]
         if kind == "IntervalTier":
             yield str(name), tuple(_parse_cue(*row) for row in rows)
 

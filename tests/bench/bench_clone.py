@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from corpus_tools.recordings.observation import Observation, Quality
 from corpus_tools.recordings.observe import observe
 from corpus_tools.run_options import RunOptions
-from corpus_tools.training.train_talker import CLOSED, learn_shapes, normalised_lip_gap
+from corpus_tools.training.train_talker import CLOSED_GAP, learn_shapes, normalised_lip_gap
 from tests.bench.bench_retarget import bilabial_frames, landmarks_of, opening
 from tts2face.cloning.lip_gaps import facing_gaps
 from tts2face.cloning.parameter_transfer import ParameterTransfer, append_missing_components, build_parameter_transfer
@@ -83,7 +83,7 @@ def closed(talker: Talker, shapes: list[NDArray[np.float32]], at: list[list[int]
     gaps = [
         normalised_lip_gap(one[frames]) * np.sign(opening(one[frames])) for one, frames in zip(shapes, at, strict=True)
     ]
-    return float((np.concatenate(gaps) < CLOSED).mean())
+    return float((np.concatenate(gaps) < CLOSED_GAP).mean())
 
 
 def there_and_back(

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from corpus_tools.evaluation import measures
-from corpus_tools.evaluation.evaluate import LEARNT_FOR_EVALUATION
+from corpus_tools.evaluation.evaluate import EVALUATION_METADATA
 from corpus_tools.evaluation.reference import ReferenceUtterance, Thresholds
 from corpus_tools.evaluation.scores import Scores, score_splits
 from corpus_tools.evaluation.splits import split, split_into_folds
@@ -23,8 +23,8 @@ from corpus_tools.training.linear_audio_map import learn_linear_map
 from corpus_tools.training.network_audio_map import NetworkMapOptions, learn_network_map
 from corpus_tools.training.pose_correction import fit_pose_correction
 from corpus_tools.training.train_audio_map import (
-    FEATURE,
-    NETWORK,
+    AUDIO_MAP_FEATURES,
+    TALKER_NETWORK_OPTIONS,
     build_training_utterances,
     sound_features,
     utterance_features,
@@ -89,7 +89,7 @@ class Bench:
 
     def ties(self, trials: int, seed: int) -> dict[str, np.ndarray]:
         """First canonical correlation of randomly selected frames, mean over trials."""
-        model = learn_talker(self.train, metadata=LEARNT_FOR_EVALUATION).model
+        model = learn_talker(self.train, metadata=EVALUATION_METADATA).model
         speech = [measures.speech_frames(one.phones, len(one.landmarks), one.fps) for one in self.train]
         seen = np.concatenate(
             [model.parameters(one.landmarks[here])[:, :20] for one, here in zip(self.train, speech, strict=True)]
@@ -127,7 +127,7 @@ class Bench:
     def methods(self) -> list[tuple[str, str, NetworkMapOptions | None, int]]:
         found: list = [(f"linear, {kind}", kind, None, 0) for kind in (*PLAIN, "mfcc+level", "lsf+level", "mfcc+lsf")]
         found += [(f"linear, {kind}, 5 frames either side", kind, None, 5) for kind in ("mfcc", "mfcc+lsf")]
-        plain = replace(NETWORK, n_hidden=10, articulation=0.0)
+        plain = replace(TALKER_NETWORK_OPTIONS, n_hidden=10, articulation=0.0)
         for kind in (*PLAIN, "lsf+level", "mfcc+lsf"):
             found.append((f"network, {kind}, 10 units, 5 frames", kind, plain, 0))
         for frames in (0, 1, 3, 4, 7):
@@ -143,16 +143,26 @@ class Bench:
 
     def compare(self) -> None:
         """The chosen drives and those of the paper on the utterances held out."""
-        talker = learn_talker(self.train, metadata=LEARNT_FOR_EVALUATION)
+        talker = learn_talker(self.train, metadata=EVALUATION_METADATA)
         head()
         chosen = (
             ("linear, mfcc (T07)", "mfcc", None, 0),
-            (f"linear, {FEATURE} (default `linear`)", FEATURE, None, 0),
-            (f"linear, {FEATURE}, 5 frames either side", FEATURE, None, 5),
-            ("network, mfcc, 10 units, 5 frames (T07)", "mfcc", replace(NETWORK, n_hidden=10, articulation=0.0), 0),
-            ("the same, articulation 0.5", "mfcc", replace(NETWORK, n_hidden=10), 0),
-            (f"network, {FEATURE}, 40 units, 5 frames", FEATURE, replace(NETWORK, articulation=0.0), 0),
-            ("the same, articulation 0.5 (default `network`)", FEATURE, NETWORK, 0),
+            (f"linear, {AUDIO_MAP_FEATURES} (default `linear`)", AUDIO_MAP_FEATURES, None, 0),
+            (f"linear, {AUDIO_MAP_FEATURES}, 5 frames either side", AUDIO_MAP_FEATURES, None, 5),
+            (
+                "network, mfcc, 10 units, 5 frames (T07)",
+                "mfcc",
+                replace(TALKER_NETWORK_OPTIONS, n_hidden=10, articulation=0.0),
+                0,
+            ),
+            ("the same, articulation 0.5", "mfcc", replace(TALKER_NETWORK_OPTIONS, n_hidden=10), 0),
+            (
+                f"network, {AUDIO_MAP_FEATURES}, 40 units, 5 frames",
+                AUDIO_MAP_FEATURES,
+                replace(TALKER_NETWORK_OPTIONS, articulation=0.0),
+                0,
+            ),
+            ("the same, articulation 0.5 (default `network`)", AUDIO_MAP_FEATURES, TALKER_NETWORK_OPTIONS, 0),
         )
         for name, kind, network, context in chosen:
             drive = self.learnt(kind, network, context, self.train, talker)
@@ -163,22 +173,22 @@ class Bench:
         """Every utterance made as loud as all together, as recordings of others are."""
         learnt = np.concatenate([self.of("level")[one.name] for one in self.train])
         drive = replace(drive, loudness=speech_level(learnt))
-        kept = self.heard[FEATURE]
+        kept = self.heard[AUDIO_MAP_FEATURES]
         louder = {}
         for one in self.test:
             sound = read_sound(one.video, FEATURE_RATE)
             gain = drive.gain_for(speech_level(self.of("level")[one.name]))
             louder[one.name] = utterance_features(
-                one, Waveform(np.clip(gain * sound.samples, -1, 1), FEATURE_RATE), FEATURE
+                one, Waveform(np.clip(gain * sound.samples, -1, 1), FEATURE_RATE), AUDIO_MAP_FEATURES
             )
-        self.heard[FEATURE] = louder
-        self.score("the same, each utterance made as loud as the talker", FEATURE, drive, self.test, talker)
-        self.heard[FEATURE] = kept
+        self.heard[AUDIO_MAP_FEATURES] = louder
+        self.score("the same, each utterance made as loud as the talker", AUDIO_MAP_FEATURES, drive, self.test, talker)
+        self.heard[AUDIO_MAP_FEATURES] = kept
 
     def choose(self) -> None:
         """Every method by three-fold cross-validation on the training utterances; means of the folds."""
         parts = split_into_folds(self.train, n_folds=3, seed=0)
-        talkers = [learn_talker(learn, metadata=LEARNT_FOR_EVALUATION) for learn, _ in parts]
+        talkers = [learn_talker(learn, metadata=EVALUATION_METADATA) for learn, _ in parts]
         rows = []
         for name, kind, network, context in self.methods():
             every = []

@@ -70,7 +70,7 @@ def main() -> None:
         letters = "".join(token.letters + " " * token.has_space for token in tokens).strip()
         shifted = sounding(voice._predict_phones(tokens, letters, 1.0, speech.waveform)[0])
         ways = {
-            "own": PhoneSequence(shifted.phones, shifted.edges + neural.LATE_S),
+            "own": PhoneSequence(shifted.phones, shifted.edges + neural.BOUNDARY_DELAY_S),
             "own less 45 ms": shifted,
             "aligned": sounding(speech.phones),
         }

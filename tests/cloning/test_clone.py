@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
 from lexicon.errors import DataError, InputError
-from tts2face.cloning.lip_gaps import LOWER, UPPER
+from tts2face.cloning.lip_gaps import INNER_LOWER_LIP, INNER_UPPER_LIP
 from tts2face.cloning.parameter_transfer import (
     append_missing_components,
     build_parameter_transfer,
@@ -36,7 +36,7 @@ MOUTH = np.isin(np.arange(N_LANDMARKS), MOUTH_REGION)
 def plate(gap: float = 0.4, size: float = 1.0) -> np.ndarray:
     """Landmarks of a face without features; facing inner lip points are `gap` mm apart."""
     shape = np.random.default_rng(1).uniform(-60, 60, (N_LANDMARKS, 3))
-    shape[UPPER], shape[LOWER] = (0, gap / 2, 0), (0, -gap / 2, 0)
+    shape[INNER_UPPER_LIP], shape[INNER_LOWER_LIP] = (0, gap / 2, 0), (0, -gap / 2, 0)
     shape[EYE_OUTER_RIGHT], shape[EYE_OUTER_LEFT] = (-45, 60, 0), (45, 60, 0)
     return shape * size
 
@@ -65,7 +65,7 @@ def motion_of(model: ShapeModel, seed: int = 3, n_frames: int = 20, spreads: flo
 def opening_model(gap: float = 0.4, second: float = 0.0) -> ShapeModel:
     """Two modes: one draws the lower lip down as a whole, one moves landmark 0 to the side; unit spread of 10 mm."""
     basis = np.zeros((2, N_LANDMARKS, 3), np.float32)
-    basis[0, LOWER, 1] = -1 / np.sqrt(len(LOWER))
+    basis[0, INNER_LOWER_LIP, 1] = -1 / np.sqrt(len(INNER_LOWER_LIP))
     basis[1, 0, 0] = 1
     rest = np.array([0.0, second], np.float32)
     return ShapeModel(plate(gap).astype(np.float32), basis, np.full(2, 10, np.float32), 2, rest)
@@ -73,7 +73,7 @@ def opening_model(gap: float = 0.4, second: float = 0.0) -> ShapeModel:
 
 def gaps_of(model: ShapeModel, parameters: np.ndarray) -> np.ndarray:
     shapes = model.shapes(parameters)
-    return shapes[:, UPPER, 1] - shapes[:, LOWER, 1]
+    return shapes[:, INNER_UPPER_LIP, 1] - shapes[:, INNER_LOWER_LIP, 1]
 
 
 @some
@@ -289,7 +289,7 @@ def test_a_real_talker_keeps_limits_and_lips_under_gain() -> None:
     mapped = ready.parameters(values)
     assert (np.abs(mapped) <= parameter_limits(half)).all()
     assert gaps_of(half, mapped).min() > 0
-    middle = [UPPER.index(UPPER_LIP_INNER_MID)]
-    assert LOWER[middle[0]] == LOWER_LIP_INNER_MID
+    middle = [INNER_UPPER_LIP.index(UPPER_LIP_INNER_MID)]
+    assert INNER_LOWER_LIP[middle[0]] == LOWER_LIP_INNER_MID
     opened = [gaps_of(model, frames)[:, middle[0]] for model, frames in ((own, values), (half, mapped))]
     assert np.corrcoef(*opened)[0, 1] > 0.98

@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 
 from lexicon.errors import DataError
 from tests.cloning.test_clone import gaps_of, opening_model, seeds, some
-from tts2face.cloning.lip_gaps import LEAST_GAP_MM, LOWER, nearest_valid_parameters
+from tts2face.cloning.lip_gaps import INNER_LOWER_LIP, MIN_LIP_GAP_MM, nearest_valid_parameters
 from tts2face.cloning.parameter_transfer import build_parameter_transfer
 from tts2face.face.bounded_least_squares import bounded_least_squares
 
@@ -17,7 +17,7 @@ from tts2face.face.bounded_least_squares import bounded_least_squares
 def test_crossing_lips_are_parted_and_no_more() -> None:
     """In closed form: a lower lip that would rise 2 mm stops where the lips are 0.01 mm apart."""
     model = opening_model()
-    values = np.array([[-2 * np.sqrt(len(LOWER)), 5.0], [6.0, 1.0]], np.float32)
+    values = np.array([[-2 * np.sqrt(len(INNER_LOWER_LIP)), 5.0], [6.0, 1.0]], np.float32)
     mapped = build_parameter_transfer(model, model).parameters(values)
     assert gaps_of(model, mapped)[0] == pytest.approx(0.01, abs=1e-4)
     assert mapped[0, 1] == 5.0
@@ -27,7 +27,7 @@ def test_crossing_lips_are_parted_and_no_more() -> None:
 def test_lips_that_overlap_at_rest_are_parted_there_too() -> None:
     """By 0.31 mm in closed form; other frames keep their displacement from there."""
     model = opening_model(gap=-0.3)
-    parted = 0.31 * np.sqrt(len(LOWER))
+    parted = 0.31 * np.sqrt(len(INNER_LOWER_LIP))
     mapped = build_parameter_transfer(model, model).parameters(np.array([[0, 0], [-9, 3], [4, 4]], np.float32))
     assert mapped == pytest.approx(np.array([[parted, 0], [parted, 3], [4, 4]]), abs=1e-4)
     assert gaps_of(model, mapped).min() == pytest.approx(0.01, abs=1e-4)
@@ -44,11 +44,14 @@ def test_lips_are_set_right_by_the_least_motion(seed: int) -> None:
     sides, heights = gaps[:, :-1], gaps[:, -1]
     found = nearest_valid_parameters(wanted, limits, gaps, most)
     reached = found @ sides.T + heights
-    assert (reached > LEAST_GAP_MM - 1e-8).all()
+    assert (reached > MIN_LIP_GAP_MM - 1e-8).all()
     assert (reached < most + 1e-8).all()
     assert (np.abs(found) < limits + 1e-8).all()
     for frame, start, highest in zip(found, wanted, most, strict=True):
-        rules = (lambda p: sides @ p + heights - LEAST_GAP_MM, lambda p, highest=highest: highest - sides @ p - heights)
+        rules = (
+            lambda p: sides @ p + heights - MIN_LIP_GAP_MM,
+            lambda p, highest=highest: highest - sides @ p - heights,
+        )
         known = minimize(
             lambda p, start=start: ((p - start) ** 2).sum(),
             np.zeros(5),
@@ -61,14 +64,14 @@ def test_lips_are_set_right_by_the_least_motion(seed: int) -> None:
         assert frame == pytest.approx(known.x, abs=1e-4)
     free = nearest_valid_parameters(wanted, np.full(5, 1e3), gaps, np.full((2, 3), 1e3))
     forces = bounded_least_squares(
-        sides @ sides.T, LEAST_GAP_MM - (wanted @ sides.T + heights), np.tile([0.0, 1e6], (3, 1))
+        sides @ sides.T, MIN_LIP_GAP_MM - (wanted @ sides.T + heights), np.tile([0.0, 1e6], (3, 1))
     )
     assert free == pytest.approx(wanted + forces @ sides, abs=1e-4)
 
 
 def test_lips_that_touch_on_the_source_touch_under_gain_and_open_lips_open_wide() -> None:
     """0.4 mm apart at rest; 0.8 mm, which is contact, stays 0.8 mm; 10 mm becomes 20 mm less the rest's 0.4."""
-    model, per_mm = opening_model(), np.sqrt(len(LOWER))
+    model, per_mm = opening_model(), np.sqrt(len(INNER_LOWER_LIP))
     values = np.array([[0.4 * per_mm, 2.0], [9.6 * per_mm, 2.0]], np.float32)
     mapped = build_parameter_transfer(model, replace(model, spread=np.full(2, 100, np.float32)), gain=2).parameters(
         values

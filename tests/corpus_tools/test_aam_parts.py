@@ -5,7 +5,7 @@ import pytest
 
 from corpus_tools.aam.block_pca import IncrementalPca
 from corpus_tools.aam.lighting import fit_lighting
-from corpus_tools.aam.mesh import MOUTH_POINTS, face_ring, face_triangles, mouth_triangles, points_in_polygon
+from corpus_tools.aam.mesh import MOUTH_LANDMARKS, face_ring, face_triangles, mouth_triangles, points_in_polygon
 from corpus_tools.aam.procrustes import align_shapes, apply_similarities, fit_similarities
 from corpus_tools.aam.reference_frame import barycentric_coordinates, build_reference_frame
 from corpus_tools.aam.source_videos import AppearanceRecording
@@ -87,7 +87,7 @@ def test_the_mouth_s_triangles_fill_the_inner_lips_and_no_more():
     angles = np.linspace(0, np.pi, 11)
     shape[list(INNER_LIP_UPPER)] = np.stack([-np.cos(angles), -np.sin(angles)], axis=1)
     shape[list(INNER_LIP_LOWER)] = np.stack([-np.cos(angles), np.sin(angles)], axis=1)
-    ring_of_lips = shape[list(MOUTH_POINTS)]
+    ring_of_lips = shape[list(MOUTH_LANDMARKS)]
     corners = ring_of_lips[mouth_triangles()]
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     areas = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2
@@ -122,8 +122,8 @@ def test_speech_changes_the_mouth_and_neither_forehead_nor_outline():
     shape = generator.uniform(-30, 30, (468, 2))
     angles = np.linspace(0, 2 * np.pi, len(FACE_OVAL), endpoint=False)
     shape[list(FACE_OVAL)] = 60 * np.stack([np.sin(angles), -np.cos(angles)], axis=1)
-    lips = np.linspace(0, 2 * np.pi, len(MOUTH_POINTS), endpoint=False)
-    shape[list(MOUTH_POINTS)] = np.stack([-8 * np.cos(lips), 20 - 4 * np.sin(lips)], axis=1)
+    lips = np.linspace(0, 2 * np.pi, len(MOUTH_LANDMARKS), endpoint=False)
+    shape[list(MOUTH_LANDMARKS)] = np.stack([-8 * np.cos(lips), 20 - 4 * np.sin(lips)], axis=1)
     frame = build_reference_frame(shape, face_triangles(shape), 64)
     weight = speech_weights(frame)
     assert 0 <= weight.min() <= weight.max() <= 1
@@ -131,7 +131,7 @@ def test_speech_changes_the_mouth_and_neither_forehead_nor_outline():
     at = frame.corners[np.arange(len(nearest)), nearest]
     sure = frame.weights.max(axis=1) > 0.95
     assert weight[sure & np.isin(at, FACE_OVAL)].max(initial=0) < 0.1
-    assert weight[sure & np.isin(at, MOUTH_POINTS)].min(initial=1) > 0.5
+    assert weight[sure & np.isin(at, MOUTH_LANDMARKS)].min(initial=1) > 0.5
 
 
 def test_picture_axes_are_those_of_the_camera():

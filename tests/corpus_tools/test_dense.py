@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from corpus_tools.consent import consent_record
-from corpus_tools.dense.adapt_head import MOUTH_PARTS, adapt_head
+from corpus_tools.dense.adapt_head import RIGID_MOUTH_PARTS, adapt_head
 from corpus_tools.dense.build_face import build_face
-from corpus_tools.dense.mesh_fit import N_MESH, OPEN_JAW, align_to_head, face_landmarks, part_vertices
+from corpus_tools.dense.mesh_fit import N_MESH_LANDMARKS, OPEN_JAW_WEIGHT, align_to_head, face_landmarks, part_vertices
 from corpus_tools.dense.skin_colour import build_picture_fitter, vertex_normals
 from corpus_tools.dense.video_landmarks import find_videos
 from corpus_tools.dense.visible_texels import build_canvas, polygon_depth
@@ -54,7 +54,7 @@ def lip_gaps(face: Face, **shown: float) -> np.ndarray:
 
 
 def test_landmarks_of_the_adapted_head_are_the_talkers(long_head: Face, long_face: np.ndarray) -> None:
-    reached = face_landmarks(long_head, long_head.vertices)[:N_MESH]
+    reached = face_landmarks(long_head, long_head.vertices)[:N_MESH_LANDMARKS]
     off = np.linalg.norm(align_to_head(long_face, reached) - reached, axis=1)
     assert np.median(off) < 0.3
     assert np.percentile(off, 95) < 1.5
@@ -90,7 +90,7 @@ def test_eyeballs_stay_round_and_the_lids_close_over_them(head: Face, long_head:
 
 
 def test_teeth_are_scaled_but_never_bent(head: Face, long_head: Face) -> None:
-    bone = part_vertices(head, MOUTH_PARTS)[::40]
+    bone = part_vertices(head, RIGID_MOUTH_PARTS)[::40]
     old = np.linalg.norm(head.vertices[bone][:, None] - head.vertices[bone], axis=2)
     new = np.linalg.norm(long_head.vertices[bone][:, None] - long_head.vertices[bone], axis=2)
     far = old > 5.0
@@ -107,8 +107,8 @@ def test_no_triangle_of_the_skin_is_torn_or_turned_over(head: Face, long_head: F
 
 
 def test_the_fitter_finds_a_posed_head_again(long_head: Face) -> None:
-    opened = long_head.vertices + OPEN_JAW * long_head.shapes[long_head.shape_names.index("jawOpen")]
-    fit = build_picture_fitter(long_head, opened, np.arange(N_MESH))
+    opened = long_head.vertices + OPEN_JAW_WEIGHT * long_head.shapes[long_head.shape_names.index("jawOpen")]
+    fit = build_picture_fitter(long_head, opened, np.arange(N_MESH_LANDMARKS))
     turn = np.array([[np.cos(0.3), 0, np.sin(0.3)], [0, 1, 0], [-np.sin(0.3), 0, np.cos(0.3)]])
     there = 2.0 * long_head.vertices.astype(np.float64) @ turn.T + (300, -200, 10)
     points = face_landmarks(long_head, there) * (1, -1, -1)

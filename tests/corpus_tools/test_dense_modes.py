@@ -7,7 +7,7 @@ import pytest
 
 from cli.main import run
 from corpus_tools.dense.adapt_head import EYE_PARTS
-from corpus_tools.dense.mesh_fit import N_MESH, face_landmarks, face_width, part_vertices
+from corpus_tools.dense.mesh_fit import N_MESH_LANDMARKS, face_landmarks, face_width, part_vertices
 from corpus_tools.dense.modes import (
     LIMIT,
     MEAN,
@@ -33,7 +33,7 @@ from tts2face.render.picture import Picture
 
 SHOWN = {"jawOpen": 0.3, "mouthSmileLeft": 0.3, "mouthSmileRight": 0.3, "browInnerUp": 0.4, "mouthPucker": 0.3}
 N_VIDEOS, N_FRAMES, N_MODES = 5, 12, 5
-USED = np.arange(0, N_MESH, 2)
+USED = np.arange(0, N_MESH_LANDMARKS, 2)
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +86,7 @@ def test_a_dense_fit_is_the_direct_solution_of_eqs_3_and_4(
     wanted = 2.0 * (seen[1].landmarks[:3] - talker)[:, USED]
     np.testing.assert_allclose(moved, wanted, atol=1e-4)
     places, centres = opened_of(head)[::97], face_landmarks(head, opened_of(head))[USED]
-    pixels = 200.0 / face_width(face_landmarks(head, head.vertices.astype(np.float64))[:N_MESH])
+    pixels = 200.0 / face_width(face_landmarks(head, head.vertices.astype(np.float64))[:N_MESH_LANDMARKS])
     between = np.linalg.norm(centres[:, None] - centres, axis=2)
     away = np.linalg.norm(places[:, None] - centres, axis=2)
     for frame in moved:
@@ -190,10 +190,10 @@ def test_the_edge_of_the_lower_lip_follows_the_jaw_evenly(head: Face) -> None:
     assert len(edge) > 20
     lags = {}
     for name, fit in (
-        ("open", mode_fitter(head, np.arange(N_MESH))),
-        ("closed", build_picture_fitter(head, opened_of(head, 0.12), np.arange(N_MESH))),
+        ("open", mode_fitter(head, np.arange(N_MESH_LANDMARKS))),
+        ("closed", build_picture_fitter(head, opened_of(head, 0.12), np.arange(N_MESH_LANDMARKS))),
     ):
-        lags[name] = float(np.abs(fit.spread[edge] @ moved[:N_MESH, 1] / jaw[edge, 1] - 1).mean())
+        lags[name] = float(np.abs(fit.spread[edge] @ moved[:N_MESH_LANDMARKS, 1] / jaw[edge, 1] - 1).mean())
     assert lags["open"] < 0.03
     assert lags["closed"] > 2 * lags["open"]
 

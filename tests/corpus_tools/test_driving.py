@@ -11,7 +11,12 @@ from cli.main import run
 from corpus_tools.build_talker import add_audio_maps
 from corpus_tools.recordings.observe import Observations
 from corpus_tools.training.network_audio_map import NetworkMapOptions
-from corpus_tools.training.train_audio_map import FEATURE, learn_audio_maps, sound_features, utterance_features
+from corpus_tools.training.train_audio_map import (
+    AUDIO_MAP_FEATURES,
+    learn_audio_maps,
+    sound_features,
+    utterance_features,
+)
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
 from tts2face.models.talker import read_talker, write_talker
@@ -73,9 +78,9 @@ def test_drives_follow_the_sound_that_they_were_taught(corpus: list) -> None:
         ("learning drives", [(1, 2), (2, 2)]),
     ]
     assert set(drives) == {"linear", "network"}
-    heard = sound_features(corpus[:3], (FEATURE,))[FEATURE]
+    heard = sound_features(corpus[:3], (AUDIO_MAP_FEATURES,))[AUDIO_MAP_FEATURES]
     for drive in drives.values():
-        assert drive.feature == FEATURE
+        assert drive.feature == AUDIO_MAP_FEATURES
         assert np.isfinite(drive.loudness)
         made = drive.parameters(heard["u01"])
         assert made.shape == (60, 2)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.evaluation.evaluate import CEILING, SplitResult, evaluate
+from corpus_tools.evaluation.evaluate import CEILING_METHOD, SplitResult, evaluate
 from corpus_tools.evaluation.scores import FIGURES
 from corpus_tools.evaluation.splits import split, split_by_words, split_into_folds
 from corpus_tools.evaluation.tables import Evaluation
@@ -31,13 +31,13 @@ def measured(observations: list[Observation]) -> tuple[Evaluation, tuple[SplitRe
 
 def test_a_face_that_follows_its_phones_is_predicted(measured: tuple[Evaluation, tuple[SplitResult, ...]]):
     scores = {one.method: one for one in measured[0].scores}
-    assert list(scores) == ["mean face", "mean phone pose", "exemplar", "theobald2007", CEILING]
+    assert list(scores) == ["mean face", "mean phone pose", "exemplar", "theobald2007", CEILING_METHOD]
     assert scores["mean face"]["r_opening"] == 0.0
     assert scores["exemplar"]["r_opening"] > 0.97
     assert scores["exemplar"]["dtw_cost"] < scores["mean face"]["dtw_cost"]  # most of the parameters are noise
-    assert scores[CEILING]["r_opening"] > 0.999
-    assert scores[CEILING]["dtw_cost"] == 0.0
-    assert scores[CEILING]["peak_offset_ms"] < 1.0
+    assert scores[CEILING_METHOD]["r_opening"] > 0.999
+    assert scores[CEILING_METHOD]["dtw_cost"] == 0.0
+    assert scores[CEILING_METHOD]["peak_offset_ms"] < 1.0
     assert all(len(one.utterances) == 8 for one in measured[0].scores)
 
 
@@ -154,7 +154,7 @@ def test_a_network_is_trained_and_compared_with_where_there_is_enough_to_learn(
     observations: list[Observation], monkeypatch: pytest.MonkeyPatch
 ):
     pytest.importorskip("sklearn", reason="needs `pip install 'tts2face[capture]'`")
-    monkeypatch.setattr("corpus_tools.training.train_phone_network.LEAST_FRAMES", 100)
+    monkeypatch.setattr("corpus_tools.training.train_phone_network.MIN_FRAMES", 100)
     result, _ = evaluate([split(observations, hold_out=8, seed=0)])
     scores = {one.method: one for one in result.scores}
     assert scores["sliding-window network"]["r_opening"] > 0.8  # of some 700 frames it cannot learn more

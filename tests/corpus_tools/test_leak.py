@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.training.pose_correction import LEAST_CHUNKS, angle_terms, correct_pose, fit_pose_correction
+from corpus_tools.training.pose_correction import MIN_CHUNKS, angle_terms, correct_pose, fit_pose_correction
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
 
 N = 40
@@ -54,7 +54,7 @@ def test_lips_that_touch_keep_touching(recorded: list[Observation]) -> None:
 
 
 def test_too_few_recordings_are_left_alone(recorded: list[Observation]) -> None:
-    few = leaking(recorded, np.ones((9, N_LANDMARKS, 3)))[: LEAST_CHUNKS - 1]
+    few = leaking(recorded, np.ones((9, N_LANDMARKS, 3)))[: MIN_CHUNKS - 1]
     assert not fit_pose_correction(few).offsets.any()
     for before, after in zip(few, correct_pose(few), strict=True):
         np.testing.assert_array_equal(before.landmarks, after.landmarks)

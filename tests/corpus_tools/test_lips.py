@@ -5,11 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from corpus_tools.evaluation.evaluate import LEARNT_FOR_EVALUATION
+from corpus_tools.evaluation.evaluate import EVALUATION_METADATA
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.training.train_phone_network import add_phone_network, encode_windows, expand_to_phones, feature_table
 from corpus_tools.training.train_talker import learn_talker
-from lexicon.phones import PHONES, WEIGHTS
+from lexicon.phones import ARTICULATORY_WEIGHTS, PHONES
 from lexicon.sequence import SILENCE
 
 KNOWN = ("b", "aɪ", "p", SILENCE)
@@ -23,14 +23,14 @@ def stream() -> np.random.Generator:
 
 def test_phones_are_told_by_what_the_mouth_does_first_and_last() -> None:
     b, diphthong, p, _ = feature_table(KNOWN)
-    names = [f"{name} {half}" for half in ("first", "last") for name in WEIGHTS]
+    names = [f"{name} {half}" for half in ("first", "last") for name in ARTICULATORY_WEIGHTS]
     assert [name for name, one, other in zip(names, b, p, strict=True) if one != other] == [
         "voicing first",
         "voicing last",
     ]
     told = dict(zip(names, diphthong, strict=True))
     assert told["opening first"] > told["opening last"] > 0
-    assert feature_table(PHONES).shape == (len(PHONES), 2 * len(WEIGHTS))
+    assert feature_table(PHONES).shape == (len(PHONES), 2 * len(ARTICULATORY_WEIGHTS))
 
 
 def test_inputs_are_the_lines_of_the_table_beside_each_other(stream: np.random.Generator) -> None:
@@ -53,5 +53,5 @@ def test_weights_by_phone_tell_what_weights_by_feature_do(stream: np.random.Gene
 
 
 def test_too_little_is_not_learnt_from(make_observation: Callable[..., Observation]) -> None:
-    talker = learn_talker([make_observation("u0", 0, 75)], n_speech=5, n_other=3, metadata=LEARNT_FOR_EVALUATION)
+    talker = learn_talker([make_observation("u0", 0, 75)], n_speech=5, n_other=3, metadata=EVALUATION_METADATA)
     assert add_phone_network(talker) is talker

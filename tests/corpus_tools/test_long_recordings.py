@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from corpus_tools.build_talker import build_talker
-from corpus_tools.recordings.corpus_audio import LONGEST_UTTERANCE_S
+from corpus_tools.recordings.corpus_audio import MAX_UTTERANCE_S
 from corpus_tools.recordings.observe import Observations, observe
 from corpus_tools.report.recordings import recordings_page
 from corpus_tools.run_options import RunOptions
@@ -53,7 +53,7 @@ def test_a_long_take_is_cut_at_pauses_and_every_word_lies_where_it_is_said(
 ) -> None:
     assert not read.refused
     assert [seen.name for seen in read.kept] == [f"take-{number:04d}" for number in range(1, len(read.kept) + 1)]
-    assert max(len(seen.landmarks) / seen.fps for seen in read.kept) <= LONGEST_UTTERANCE_S
+    assert max(len(seen.landmarks) / seen.fps for seen in read.kept) <= MAX_UTTERANCE_S
     onsets = [seen.quality.cut + seen.phones.edges[word.first] for seen in read.kept for word in seen.words]
     assert len(onsets) == sum(len(row["transcript"].split()) for row in rows)
     first_words = np.array(onsets[:: len(rows[0]["transcript"].split())])

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from corpus_tools.build_talker import build_talker, read_provenance
-from corpus_tools.recordings.observe import STEPS, observe
+from corpus_tools.recordings.observe import STEPS_PER_VIDEO, observe
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, InputError
 from tts2face.models.talker import read_talker
@@ -74,9 +74,9 @@ def test_good_recordings_are_kept_and_bad_ones_refused_with_their_reason(real_fo
     }
     assert set(reasons) == set(expected)
     assert [reasons[name] for name in expected if expected[name] not in reasons[name]] == []
-    assert {of for _, of in seen} == {9 * STEPS}
+    assert {of for _, of in seen} == {9 * STEPS_PER_VIDEO}
     assert [done for done, _ in seen] == sorted(done for done, _ in seen)
-    assert seen[-1] == (9 * STEPS, 9 * STEPS)
+    assert seen[-1] == (9 * STEPS_PER_VIDEO, 9 * STEPS_PER_VIDEO)
 
 
 def test_an_observation_is_on_one_clock(real_folder, cache, face_model):

@@ -6,7 +6,7 @@ import numpy as np
 
 import tts2face
 from corpus_tools.show_talker import describe
-from corpus_tools.training.train_talker import CLOSED, normalised_lip_gap
+from corpus_tools.training.train_talker import CLOSED_GAP, normalised_lip_gap
 from tts2face.models.talker import load_talker
 
 PATH = Path(tts2face.__file__).parent / "data" / "grid_s1.talker"
@@ -32,7 +32,7 @@ def test_it_holds_the_corpus():
 
 def test_its_lips_close_at_rest_and_at_most_bilabials():
     talker = load_talker("grid_s1")
-    assert normalised_lip_gap(talker.model.shapes(talker.model.rest[None]))[0] < CLOSED
+    assert normalised_lip_gap(talker.model.shapes(talker.model.rest[None]))[0] < CLOSED_GAP
     least = []
     for utterance in talker.utterances[::8]:
         shapes = talker.model.shapes(utterance.shape)
@@ -43,4 +43,4 @@ def test_its_lips_close_at_rest_and_at_most_bilabials():
             inside = (times >= start - 0.03) & (times <= end + 0.03)
             if phone in ("p", "b", "m") and inside.any():
                 least.append(gap[inside].min())
-    assert np.mean(np.array(least) < 1.5 * CLOSED) > 0.9
+    assert np.mean(np.array(least) < 1.5 * CLOSED_GAP) > 0.9

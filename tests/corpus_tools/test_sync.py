@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from corpus_tools.recordings.audio_video_sync import (
-    LEAD_S,
-    REACH_S,
+    LIP_LEAD_S,
+    MAX_LAG_S,
     corrected_timings,
     estimate_sync,
     estimate_sync_by_video,
@@ -30,7 +30,7 @@ def filmed(make_observation: Callable[..., Observation]) -> Callable[..., Observ
         landmarks = plain.landmarks.copy()
         landmarks[:, 14] = landmarks[:, 13]
         landmarks[:, 14, 1] -= np.interp(times, knots, heights)
-        loudness = 50 + np.interp(times - lag - LEAD_S, knots, heights)
+        loudness = 50 + np.interp(times - lag - LIP_LEAD_S, knots, heights)
         return replace(plain, fps=fps, landmarks=landmarks, intensity=loudness.astype(np.float32))
 
     return made
@@ -60,7 +60,7 @@ def test_another_sound_is_a_fault(filmed: Callable[..., Observation]) -> None:
 
 
 def test_a_lag_at_the_border_is_a_fault(filmed: Callable[..., Observation]) -> None:
-    fault = estimate_sync([filmed("a", REACH_S)]).problem
+    fault = estimate_sync([filmed("a", MAX_LAG_S)]).problem
     assert fault is not None
     assert "apart" in fault
 

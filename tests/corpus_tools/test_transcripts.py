@@ -7,7 +7,7 @@ import pytest
 
 from corpus_tools.recordings.folder import find_recordings, pronounce_recording
 from corpus_tools.recordings.subtitles import Cue, read_cues
-from corpus_tools.transcripts.decoding import LARGEST_BYTES, read_text
+from corpus_tools.transcripts.decoding import MAX_BYTES, read_text
 from corpus_tools.transcripts.find import READERS, find_transcript, read_transcript
 from lexicon.errors import DataError
 
@@ -147,7 +147,7 @@ def test_damaged_subtitles_refuse_their_video_alone(write, tmp_path):
     [
         (".txt", b"\x00\x01\x02" * 9, "holds zero bytes"),
         (".txt", b"\x81\xfe", "is no text in UTF-8"),
-        (".txt", b"a" * (LARGEST_BYTES + 1), "is larger than 8 MiB"),
+        (".txt", b"a" * (MAX_BYTES + 1), "is larger than 8 MiB"),
         (".srt", "Nothing here", "holds no subtitles"),
         (".TextGrid", "hello", "is no TextGrid"),
         (".TextGrid", LONG_GRID[:-30], "is a damaged TextGrid"),

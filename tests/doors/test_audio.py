@@ -17,7 +17,7 @@ from tts2face.models.talker import Talker, load_talker, write_talker
 from tts2face.request import Request
 from tts2face.session import Session
 from tts2face.speech.features import FEATURE_RATE, speech_features
-from tts2face.synthesis.audio_input import PIECE_FRAMES, map_audio_to_motion, resample_motion
+from tts2face.synthesis.audio_input import MAX_CLIP_FRAMES, map_audio_to_motion, resample_motion
 from tts2face.types import Trajectory, concatenate_clips, frame_count
 from tts2face.video.media import read_media_info, read_sound, sound_blocks
 
@@ -126,7 +126,7 @@ def test_sound_and_picture_are_equally_long(fps: float, film: Path, talker: Talk
 def test_a_long_recording_comes_in_pieces(text: str, film: Path, talker: Talker, face: Face, here: Path) -> None:
     sound = written(here / "long.wav", np.tile(read_sound(film, 16000).samples, 5))
     pieces = list(Session(talker, face).stream(Request(audio=sound, text=text, fps=60.0)))
-    assert [len(piece.clip.motion) for piece in pieces[:-1]] == [PIECE_FRAMES] * (len(pieces) - 1)
+    assert [len(piece.clip.motion) for piece in pieces[:-1]] == [MAX_CLIP_FRAMES] * (len(pieces) - 1)
     assert sum(piece.n_steps for piece in pieces) == 1000
     whole = concatenate_clips([piece.clip for piece in pieces])
     assert whole.speech.waveform.duration == pytest.approx(len(whole.motion) / 60.0, abs=1e-3)

@@ -151,12 +151,12 @@ def test_every_kind_of_error_has_an_exit_code() -> None:
 def test_bad_input_gets_one_sentence_and_leaves_nothing(
     arguments: list[str], code: int, reason: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from tts2face.storage.files import SHIPPED
+    from tts2face.storage.files import SHIPPED_FOLDER
     from tts2face.storage.tensors import write_tensors
 
     (here / "junk.talker").write_bytes(b"no talker at all")
-    (here / "face.talker").write_bytes((SHIPPED / "head.face").read_bytes())
-    (here / "half.face").write_bytes((SHIPPED / "head.face").read_bytes()[:100_000])
+    (here / "face.talker").write_bytes((SHIPPED_FOLDER / "head.face").read_bytes())
+    (here / "half.face").write_bytes((SHIPPED_FOLDER / "head.face").read_bytes()[:100_000])
     (here / "latin.txt").write_bytes(b"h\xe9llo")
     spans = [{"feature": "head", "style": "calm", "start": start} for start in (0, 1)]
     (here / "plan.json").write_text(json.dumps({"spans": spans}))

@@ -17,7 +17,7 @@ from tts2face.models.palette import FEATURES, load_palette, write_palette
 from tts2face.models.talker import Talker, load_talker
 from tts2face.request import Request
 from tts2face.session import Session
-from tts2face.storage.files import SHIPPED
+from tts2face.storage.files import SHIPPED_FOLDER
 from tts2face.types import Clip
 
 TEXT = "Bob may move five big maps, but we keep two."
@@ -157,7 +157,7 @@ def test_what_cannot_be_is_one_sentence_and_nothing_is_written(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "late.json").write_text(json.dumps({"nods": [{"time": 90}]}))
-    (tmp_path / "half.palette").write_bytes((SHIPPED / "starter.palette").read_bytes()[:100_000])
+    (tmp_path / "half.palette").write_bytes((SHIPPED_FOLDER / "starter.palette").read_bytes()[:100_000])
     before = set(tmp_path.iterdir())
     assert run(["Hi there.", *arguments, "--out", "x.mp4", *SMALL]) == code
     assert reason in capsys.readouterr().err

@@ -9,7 +9,7 @@ from cli.main import run
 from lexicon.errors import BackendError
 from tests.corpus_tools.films import joined
 from tts2face.models.face_file import load_face
-from tts2face.synthesis.live_capture import LEARNING_S, LiveCapture, LivePose, track_poses
+from tts2face.synthesis.live_capture import CALIBRATION_S, LiveCapture, LivePose, track_poses
 from tts2face.synthesis.performance import retarget_take
 from tts2face.video.blendshapes import BlendshapeReader
 from tts2face.video.landmark_models import find_bundle
@@ -46,7 +46,7 @@ def live(film: Path, bundle: Path) -> list[LivePose | None]:
 def test_a_person_is_learnt_and_then_followed(live: list[LivePose | None], film: Path, bundle: Path) -> None:
     """Against the take read as a whole, which knows the future and more of her."""
     head = load_face("head")
-    learnt = round(LEARNING_S * FPS)
+    learnt = round(CALIBRATION_S * FPS)
     assert all(pose is None for pose in live[:learnt])
     followed = live[learnt + 1 :]
     assert all(pose is not None for pose in followed)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar.explanation import explain_selection, explanation_json, explanation_text
-from tts2face.exemplar.options import METHODS, THEOBALD_2007, SynthesisOptions
+from tts2face.exemplar.options import METHOD_OPTIONS, THEOBALD_2007, SynthesisOptions
 from tts2face.exemplar.synthesis import (
     REST_FROM_S,
     ExemplarModel,
@@ -45,10 +45,12 @@ def spoken(draw):
 
 
 @settings(max_examples=60, deadline=None)
-@given(phones=spoken(), fps=st.sampled_from([12.5, 24.0, 25.0, 30.0, 60.0]), method=st.sampled_from(sorted(METHODS)))
+@given(
+    phones=spoken(), fps=st.sampled_from([12.5, 24.0, 25.0, 30.0, 60.0]), method=st.sampled_from(sorted(METHOD_OPTIONS))
+)
 def test_every_chunk_begins_and_ends_at_rest_and_stays_finite(voice: ExemplarModel, phones, fps, method):
     made = speech_trajectory(
-        phones, voice, fps=fps, n_frames=frame_count(phones.end, fps), options=METHODS[method]
+        phones, voice, fps=fps, n_frames=frame_count(phones.end, fps), options=METHOD_OPTIONS[method]
     ).values
     assert (made[0] == voice.rest).all()
     assert (made[-1] == voice.rest).all()
@@ -149,8 +151,8 @@ def test_every_option_matters(voice: ExemplarModel, name):
 
 
 def test_the_published_method_is_kept():
-    assert METHODS["theobald2007"] == THEOBALD_2007
-    assert METHODS["exemplar"] == SynthesisOptions()
+    assert METHOD_OPTIONS["theobald2007"] == THEOBALD_2007
+    assert METHOD_OPTIONS["exemplar"] == SynthesisOptions()
 
 
 def test_same_arguments_give_the_same_bytes(voice: ExemplarModel, talker: Talker):

@@ -5,7 +5,7 @@ import pytest
 
 from tts2face.exemplar.blending import AveragedTokens, average_tokens, exemplar_weights, gaussian_smooth, join_averages
 from tts2face.exemplar.contacts import (
-    RULES,
+    CONTACT_RULES,
     ChosenExemplars,
     ContactRule,
     Contacts,
@@ -103,8 +103,8 @@ def test_smoothing_is_a_gaussian_in_seconds():
 
 
 def test_knows_the_phones_that_bring_the_lips_together():
-    assert [contact_rule(label) for label in ("p", "b", "m")] == [RULES["bilabial"]] * 3
-    assert [contact_rule(label) for label in ("f", "v")] == [RULES["labiodental"]] * 2
+    assert [contact_rule(label) for label in ("p", "b", "m")] == [CONTACT_RULES["bilabial"]] * 3
+    assert [contact_rule(label) for label in ("f", "v")] == [CONTACT_RULES["labiodental"]] * 2
     assert not any(contact_rule(label) for label in ("w", "t", "u", "ɹ", "sil"))
 
 

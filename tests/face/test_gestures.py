@@ -11,7 +11,7 @@ from lexicon.errors import DataError, InputError
 from tests.face.gestures import BROWS, CHEEKS, palette, posed_landmarks
 from tts2face.face.deformation import build_rig
 from tts2face.face.expressions import add_expression_shapes, expression_landmarks, expression_table
-from tts2face.face.gesture_transfer import LID_RIMS, LIPS, GestureFace, gesture_face
+from tts2face.face.gesture_transfer import LID_LANDMARKS, LIP_LANDMARKS, GestureFace, gesture_face
 from tts2face.face.landmark_fit import landmark_positions
 from tts2face.face.shape_transfer import eye_distance
 from tts2face.models.face import Face
@@ -183,7 +183,9 @@ def test_regions_move_their_landmarks_and_leave_lips_and_lids(
     weights = face.perform(silence(load_face(name)), {feature: raised}).motion.values
     moved = (posed_landmarks(face.face, weights) - landmark_positions(face.face))[0]
     assert 2 < moved[at(face.face, landmarks), 1].mean() < 8
-    assert np.abs(moved[at(face.face, tuple({*LIPS, *LID_RIMS}))]).max() < 0.3  # mm; they lie inside triangles
+    assert (
+        np.abs(moved[at(face.face, tuple({*LIP_LANDMARKS, *LID_LANDMARKS}))]).max() < 0.3
+    )  # mm; they lie inside triangles
     shape = face.face.shapes[face.face.shape_names.index(f"{feature}0")]
     still = {
         "sclera",
@@ -202,7 +204,7 @@ def test_regions_move_their_landmarks_and_leave_lips_and_lids(
     support = 0.31 * eye_distance(face.face)
     moving, kept = (
         KDTree(landmark_positions(face.face)[at(face.face, some)]).query(face.face.vertices, p=np.inf)[0] > support
-        for some in (landmarks, (*landmarks, *LIPS, *LID_RIMS))
+        for some in (landmarks, (*landmarks, *LIP_LANDMARKS, *LID_LANDMARKS))
     )
     assert not shape[kept].any()
     assert np.abs(shape[moving]).max() < 0.05 * np.abs(shape).max()

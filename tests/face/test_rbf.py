@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.rbf import AT_ONCE, fit_interpolant
+from tts2face.face.rbf import CHUNK_SIZE, fit_interpolant
 
 WIDTH = 150.0
 REACH = 64.0 / 200.0 * WIDTH  # mm; eq. 4's 64 on a face 200 wide
@@ -59,7 +59,7 @@ def test_nothing_moves_far_from_the_face_for_there_is_no_affine_term() -> None:
 def test_many_places_are_those_one_by_one() -> None:
     centres, moved = scattered(5)
     field = fit_interpolant(centres, moved, WIDTH)
-    places = np.random.default_rng(6).uniform(-75, 75, (AT_ONCE + 3, 3))
+    places = np.random.default_rng(6).uniform(-75, 75, (CHUNK_SIZE + 3, 3))
     np.testing.assert_allclose(field(places)[[0, -1]], np.concatenate([field(places[:1]), field(places[-1:])]), 1e-12)
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import BSpline
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.compact_spline import AT_ONCE, cubic_bspline, fit_local_interpolant
+from tts2face.face.compact_spline import CHUNK_SIZE, cubic_bspline, fit_local_interpolant
 from tts2face.face.landmark_fit import landmark_motion, landmark_positions
 from tts2face.models.face_file import load_face
 
@@ -72,7 +72,7 @@ def test_stays_calm_between_the_landmarks_of_a_dense_mesh() -> None:
 
 def test_does_not_depend_on_the_unit_of_length_or_on_how_many_places_there_are() -> None:
     centres, moved = brows()
-    places = np.random.default_rng(6).uniform(-20, 40, (AT_ONCE + 3, 3))
+    places = np.random.default_rng(6).uniform(-20, 40, (CHUNK_SIZE + 3, 3))
     field = fit_local_interpolant(centres, moved, SUPPORT)
     in_metres = fit_local_interpolant(centres / 1000, moved / 1000, SUPPORT / 1000)(places / 1000)
     np.testing.assert_allclose(1000 * in_metres, field(places), atol=1e-9)

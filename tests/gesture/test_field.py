@@ -14,7 +14,7 @@ from tts2face.gesture.field import (
     sample_field_moments,
     transfer_state,
 )
-from tts2face.gesture.field_kernels import APART, SLACK
+from tts2face.gesture.field_kernels import MIN_MOMENT_GAP, SEARCH_SLACK
 from tts2face.gesture.kd_tree import build_tree
 
 OPTIONS = FieldOptions(history=5, candidates=3, future=4, alpha=(1.0,))
@@ -34,13 +34,13 @@ def resting(made: Field, rest: np.ndarray, silence: np.ndarray) -> FieldState:
     history = made.options.history
     shown = np.repeat((rest / np.float32(made.scale))[None], history, axis=0).astype(np.float32)
     heard = np.repeat((silence * made.weights)[None], history, axis=0).astype(np.float32)
-    n_leaps = min(made.options.memory, len(made.tree.order) // (8 * APART))
-    recent = np.full(n_leaps, -APART, np.int64)
+    n_leaps = min(made.options.memory, len(made.tree.order) // (8 * MIN_MOMENT_GAP))
+    recent = np.full(n_leaps, -MIN_MOMENT_GAP, np.int64)
     return FieldState(shown, heard, -1, np.zeros((2, len(rest)), np.float32), recent, 0)
 
 
 def _brute_force(made, state, n_best: int) -> list[int]:
-    """The nearest moments, by comparing with all of them, none within `APART` frames of a nearer one."""
+    """The nearest moments, by comparing with all of them, none within `MIN_MOMENT_GAP` frames of a nearer one."""
     history, future = made.options.history, made.options.future
     ends = np.append(np.unique(made.starts)[1:], len(made.values))
     found = []
@@ -54,7 +54,7 @@ def _brute_force(made, state, n_best: int) -> list[int]:
         found.append((float(away) / history, moment))
     best: list[int] = []
     for _, moment in sorted(found):
-        if all(made.starts[other] != made.starts[moment] or abs(other - moment) >= APART for other in best):
+        if all(made.starts[other] != made.starts[moment] or abs(other - moment) >= MIN_MOMENT_GAP for other in best):
             best.append(moment)
     return best[:n_best]
 
@@ -82,7 +82,7 @@ def test_the_search_finds_what_brute_force_finds(seed, monkeypatch):
     found += np.square(made.heard[behind.moment - 5 : behind.moment] - state.heard).sum()
     nearest = np.square(made.values[expected - 5 : expected] - state.shown).sum()
     nearest += np.square(made.heard[expected - 5 : expected] - state.heard).sum()
-    assert found <= SLACK**2 * nearest + 1e-6
+    assert found <= SEARCH_SLACK**2 * nearest + 1e-6
 
 
 def test_candidates_are_drawn_by_their_distance():

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from lexicon.errors import DataError, InputError
 from tts2face.gesture.notation import parse_expressions, parse_gains, parse_style
-from tts2face.gesture.spans import GAINED, ExpressionSpan, Gains, Nod, StyleSpan
+from tts2face.gesture.spans import GAIN_NAMES, ExpressionSpan, Gains, Nod, StyleSpan
 from tts2face.gesture.timeline import BLEND_S, ONSET_S, Timeline
 from tts2face.gesture.timeline_file import parse_timeline, read_timeline
 from tts2face.models.palette import EXPRESSIONS, FEATURES, Palette, Style
@@ -173,7 +173,7 @@ def test_styles_as_people_write_them(written: str, meant: dict) -> None:
     assert parse_style(written) == meant
 
 
-@given(st.dictionaries(st.sampled_from(GAINED), st.integers(0, 30).map(lambda n: n / 10), min_size=1))
+@given(st.dictionaries(st.sampled_from(GAIN_NAMES), st.integers(0, 30).map(lambda n: n / 10), min_size=1))
 def test_written_gains_are_read_back(factors: dict) -> None:
     assert parse_gains(",".join(f"{name}={factor:g}" for name, factor in factors.items())).factors == factors
 

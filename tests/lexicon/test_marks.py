@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from lexicon.errors import InputError
 from lexicon.mark_parser import parse_marks
-from lexicon.marked_text import DEEPEST, MarkedText, NameMark, NodMark, PauseMark, StyleRun
+from lexicon.marked_text import MAX_NESTING, MarkedText, NameMark, NodMark, PauseMark, StyleRun
 
 PLAIN = st.text(st.characters(blacklist_characters="[]<"))
 
@@ -81,7 +81,7 @@ def test_pauses_at_one_place_add_up() -> None:
         ("[style:a]b", r"\[style:a\] is never closed"),
         ("b[/style]", r"\[/style\] closes nothing"),
         ("[style:a][/style]", r"\[style:a\] holds no word"),
-        ("[style:a]" * (DEEPEST + 1), "stands within 16 other marks"),
+        ("[style:a]" * (MAX_NESTING + 1), "stands within 16 other marks"),
     ],
 )
 def test_marks_written_wrongly_are_refused(text: str, reason: str) -> None:

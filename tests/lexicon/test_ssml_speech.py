@@ -19,7 +19,7 @@ from lexicon.say_as import KINDS, say_as
 from lexicon.sentences import split_sentences
 from lexicon.ssml_speech import VOICES
 from lexicon.ssml_values import LONGEST_ATTRIBUTE
-from tts2face.voice.engine import NAMES
+from tts2face.voice.engine import VOICE_NAMES
 
 
 def ssml(inside: str, language: str = "en-us") -> MarkedText:
@@ -245,7 +245,7 @@ def test_language_tags(tag: str, code: str) -> None:
 
 
 def test_documents_may_name_the_voices_that_need_no_file() -> None:
-    assert tuple(NAMES) == VOICES
+    assert tuple(VOICE_NAMES) == VOICES
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from lexicon.errors import InputError
 from tts2face.speech import features
-from tts2face.speech.features import FEATURE_RATE, FEATURES, speech_features
+from tts2face.speech.features import FEATURE_KINDS, FEATURE_RATE, speech_features
 from tts2face.speech.line_spectral_frequencies import line_spectral_frequencies
 from tts2face.types import Waveform
 
@@ -71,15 +71,15 @@ def test_an_odd_number_of_coefficients_is_refused() -> None:
         line_spectral_frequencies(np.zeros((1, 3)))
 
 
-@pytest.mark.parametrize("kind", FEATURES)
+@pytest.mark.parametrize("kind", FEATURE_KINDS)
 @pytest.mark.parametrize("fps", [25.0, 29.97])
 def test_pieces_are_the_whole(kind: str, fps: float) -> None:
     sound = babble(3.0)
     whole = speech_features(sound, kind, fps=fps, n_frames=70).values
     assert np.isfinite(whole).all()
     for first, n in ((0, 1), (1, 30), (31, 39)):
-        cut = max(0, round(first / fps * FEATURE_RATE) - features.HALF_CELL)
-        rest = round((first + n) / fps * FEATURE_RATE) + features.HALF_CELL
+        cut = max(0, round(first / fps * FEATURE_RATE) - features.HALF_WINDOW_SAMPLES)
+        rest = round((first + n) / fps * FEATURE_RATE) + features.HALF_WINDOW_SAMPLES
         part = features.MEASURES[kind](
             features.analysis_windows(
                 sound.samples[cut:rest], np.rint((first + np.arange(n)) / fps * FEATURE_RATE).astype(int) - cut
@@ -88,7 +88,7 @@ def test_pieces_are_the_whole(kind: str, fps: float) -> None:
         np.testing.assert_array_equal(part.astype(np.float32), whole[first : first + n])
 
 
-@pytest.mark.parametrize("kind", FEATURES)
+@pytest.mark.parametrize("kind", FEATURE_KINDS)
 def test_silence_and_the_ends_of_a_sound_have_features(kind: str) -> None:
     values = speech_features(Waveform(np.zeros(1000), FEATURE_RATE), kind, fps=25, n_frames=50, start=-0.5).values
     assert np.isfinite(values).all()

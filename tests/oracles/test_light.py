@@ -13,7 +13,14 @@ from tts2face.render.fragments import (
     AT_WRAP,
     N_ROWS,
 )
-from tts2face.render.shade import BOUNCE, N_SCRATCH_ROWS, REACH, SHOULDER, SKY_GLOSS, shade_fragments
+from tts2face.render.shade import (
+    INTERREFLECTION,
+    N_SCRATCH_ROWS,
+    SKIN_SCATTERING,
+    SKY_GLOSS,
+    TONE_SHOULDER,
+    shade_fragments,
+)
 
 N = 200
 
@@ -26,11 +33,11 @@ def expected(row, lights):
     albedo, seen = row[AT_ALBEDO : AT_ALBEDO + 3], row[AT_EXPOSURE : AT_EXPOSURE + 4]
     sky_share = 0.5 + 0.5 * normal @ lights[2, :3]
     around = seen[0] * (sky_share * lights[0, :3] + (1 - sky_share) * lights[1, :3])
-    matt = around / (1 - (1 - seen[0]) * albedo * BOUNCE)
+    matt = around / (1 - (1 - seen[0]) * albedo * INTERREFLECTION)
     shine = SKY_GLOSS * around
     for lamp, reached in zip(lights[3:], seen[1:], strict=True):
         towards = normal @ lamp[:3]
-        reach = row[AT_WRAP] * REACH
+        reach = row[AT_WRAP] * SKIN_SCATTERING
         soaked = reached + reach * reached * (1 - reached)
         matt = matt + lamp[3:] * soaked * np.maximum(towards + reach, 0) / (1 + reach)
         halfway = (lamp[:3] + view) / np.linalg.norm(lamp[:3] + view)
@@ -39,8 +46,8 @@ def expected(row, lights):
         shine = shine + lamp[3:] * reached * lobe * np.clip(4 * towards, 0, 1)
     gloss = row[AT_SPECULAR] * (1 + 3 * (1 - max(normal @ view, 0)) ** 3)
     value = row[AT_OPACITY] * matt * albedo + gloss * shine
-    over = np.maximum(value - SHOULDER, 0) / (1 - SHOULDER)
-    return np.minimum(value, SHOULDER) + (1 - SHOULDER) * over / (1 + over)
+    over = np.maximum(value - TONE_SHOULDER, 0) / (1 - TONE_SHOULDER)
+    return np.minimum(value, TONE_SHOULDER) + (1 - TONE_SHOULDER) * over / (1 + over)
 
 
 def test_the_kernel_is_the_formula():

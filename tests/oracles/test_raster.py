@@ -9,7 +9,7 @@ from scipy.spatial import Delaunay
 from tts2face.render.raster import (
     BACK_BIAS,
     GRID,
-    NOTHING,
+    NO_TRIANGLE,
     draw_band,
     gather_triangles,
     sort_into_bands,
@@ -35,7 +35,10 @@ def rasterised(points, triangles, translucent=None, band_rows=SIZE[1]):
     marks = np.zeros(len(triangles), np.int8) if translucent is None else np.asarray(translucent, np.int8)
     owner, depth = [], []
     for band in range(n_bands):
-        near, who = np.zeros((3, band_rows, SIZE[0]), np.float32), np.full((3, band_rows, SIZE[0]), NOTHING, np.int32)
+        near, who = (
+            np.zeros((3, band_rows, SIZE[0]), np.float32),
+            np.full((3, band_rows, SIZE[0]), NO_TRIANGLE, np.int32),
+        )
         batch = (corners, source, members[starts[band] : starts[band + 1]])
         draw_band((camera, triangles, marks, LENS), batch, band * band_rows, near, who)
         owner.append(who)
@@ -96,7 +99,7 @@ def test_random_triangles_are_those_of_the_slow_rasteriser(seed):
             found.sort(reverse=True)
             if len(found) > 1 and found[0][0] - found[1][0] < 1e-6 * found[0][0]:
                 continue  # nearer to each other than single precision tells
-            assert owner[0, row, column] == (found[0][1] if found else NOTHING)
+            assert owner[0, row, column] == (found[0][1] if found else NO_TRIANGLE)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -106,7 +109,7 @@ def test_no_sample_of_a_mesh_is_drawn_twice_or_left_out(seed):
     places = np.unique(np.vstack([places, [[-5, -5], [60, -5], [60, 50], [-5, 50]]]), axis=0)
     points = np.column_stack([(places - LENS[1:3]) * 90 / LENS[0], np.full(len(places), 90.0)])
     triangles = Delaunay(places).simplices
-    drawn = sum((rasterised(points, [triangle])[0][0] != NOTHING).astype(int) for triangle in triangles)
+    drawn = sum((rasterised(points, [triangle])[0][0] != NO_TRIANGLE).astype(int) for triangle in triangles)
     np.testing.assert_array_equal(drawn, 1)
 
 
@@ -125,7 +128,7 @@ def test_the_near_plane_cuts_triangles_where_it_lies():
                 if min(*np.abs(weights), abs(z - LENS[3]) / 10) < 0.03:
                     continue  # on an edge, up to the snapping
                 inside = bool((weights > 0).all()) and z > LENS[3]
-                assert (owner[0, row, column] != NOTHING) == inside
+                assert (owner[0, row, column] != NO_TRIANGLE) == inside
                 if inside:
                     assert depth[0, row, column] == pytest.approx(1 / z, rel=1e-3)
 

@@ -10,14 +10,14 @@ from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.face.gestures import BROWS, neutral, palette
 from tests.render.test_plate import own_talker
-from tts2face.face.gesture_transfer import LID_RIMS
+from tts2face.face.gesture_transfer import LID_LANDMARKS
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.models.palette import EXPRESSIONS
 from tts2face.models.talker import ShapeModel, Talker, Utterance
 from tts2face.own_face.gestures import OwnFaceGestures, build_own_face_gestures
 from tts2face.render.own_face import draw_video_frame, own_face_renderer
 from tts2face.render.picture import Picture
-from tts2face.retargeting.performer import LIDS
+from tts2face.retargeting.performer import EYELID_LANDMARKS
 from tts2face.types import Trajectory
 
 N_FRAMES = 400
@@ -31,7 +31,7 @@ def blinker() -> Talker:
     rest = neutral().astype(np.float64)
     basis = np.zeros((3, 478, 3))
     basis[0, INNER_LIP_LOWER, 1], basis[1, 61, 0] = -1, -1
-    for upper, lower, *_ in LIDS.values():
+    for upper, lower, *_ in EYELID_LANDMARKS.values():
         basis[2, list(upper)] = rest[list(lower)] - rest[list(upper)]
     sizes = np.linalg.norm(basis.reshape(3, -1), axis=1)
     basis /= sizes[:, None, None]
@@ -88,7 +88,7 @@ def test_lids_that_are_shut_on_the_video_stay_so() -> None:
 def test_brows_rise_and_lids_and_lips_stay() -> None:
     moved, looks = ready().displacements(felt(brows=[4 * np.sqrt(len(BROWS)), 0]), 0)
     assert moved[list(BROWS), 1] == pytest.approx(np.full(len(BROWS), 4.0), abs=0.2)
-    assert np.abs(moved[[*LID_RIMS, *INNER_LIP_UPPER, *INNER_LIP_LOWER]]).max() < 1e-4
+    assert np.abs(moved[[*LID_LANDMARKS, *INNER_LIP_UPPER, *INNER_LIP_LOWER]]).max() < 1e-4
     assert not looks.any()
 
 

@@ -6,14 +6,14 @@ from types import SimpleNamespace
 import pytest
 
 from tts2face import compilation
-from tts2face.compilation import VARIABLE, cache_folder
+from tts2face.compilation import CACHE_VARIABLE, cache_folder
 from tts2face.render import raster
 from tts2face.synthesis.warm_up import kernels_are_compiled
 
 
 @pytest.fixture
 def _locked(monkeypatch, tmp_path):
-    monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.delenv(CACHE_VARIABLE, raising=False)
     monkeypatch.setattr(compilation, "_can_write", lambda folder: False)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
 
@@ -38,7 +38,7 @@ def test_a_folder_that_others_can_write_is_not_trusted(tmp_path):
 
 
 def test_a_package_that_can_be_written_keeps_its_kernels(tmp_path, monkeypatch):
-    monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.delenv(CACHE_VARIABLE, raising=False)
     assert cache_folder(tmp_path) is None
 
 
@@ -49,7 +49,7 @@ def test_a_folder_below_a_file_cannot_be_written(tmp_path):
 
 
 def test_the_users_own_choice_stays(tmp_path, monkeypatch):
-    monkeypatch.setenv(VARIABLE, "/chosen")
+    monkeypatch.setenv(CACHE_VARIABLE, "/chosen")
     monkeypatch.setattr(compilation, "_can_write", lambda folder: False)
     assert cache_folder(tmp_path) is None
 

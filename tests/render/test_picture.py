@@ -4,7 +4,7 @@ import pytest
 
 from lexicon.errors import InputError
 from tts2face.clock import exact_rate, first_sample
-from tts2face.render.camera_views import NAMED, parse_camera
+from tts2face.render.camera_views import NAMED_VIEWS, parse_camera
 from tts2face.render.picture import Picture, parse_background, parse_size
 
 
@@ -40,7 +40,7 @@ def test_cameras_out_of_range_are_refused(camera):
 
 
 def test_cameras_are_read():
-    assert parse_camera("front") is NAMED["front"]
+    assert parse_camera("front") is NAMED_VIEWS["front"]
     assert parse_camera("20,-5,900").distance == 900
     assert parse_camera("-20,5").yaw_deg == -20
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from corpus_tools.aam.mesh import MOUTH_POINTS
+from corpus_tools.aam.mesh import MOUTH_LANDMARKS
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_talker import SIZE, face_points, own_talker
@@ -65,7 +65,7 @@ def test_the_plate_s_own_parameters_leave_the_plate_alone_but_for_the_open_mouth
     drawn = draw_video_frame(stage, motion_of_plate(talker, 2), 2)
     changed = np.abs(drawn.astype(int) - stage.plate[2]).max(axis=2) > 1
     y, x = np.nonzero(changed)
-    lips = face_points()[list(MOUTH_POINTS)]
+    lips = face_points()[list(MOUTH_LANDMARKS)]
     assert changed.any()
     assert lips[:, 0].min() - 2 <= x.min() <= x.max() <= lips[:, 0].max() + 2
     assert lips[:, 1].min() - 2 <= y.min() <= y.max() <= lips[:, 1].max() + 2
@@ -106,7 +106,7 @@ def test_without_a_size_the_picture_is_as_large_as_the_video():
 
 def test_many_large_frames_are_packed_and_look_the_same(monkeypatch):
     raw = own_face_renderer(own_talker(), Picture()).plate
-    monkeypatch.setattr(plate, "MOST_RAW_BYTES", raw[0].size)
+    monkeypatch.setattr(plate, "MAX_RAW_BYTES", raw[0].size)
     packed = own_face_renderer(own_talker(), Picture()).plate
     assert len(packed) == len(raw)
     assert np.array_equal(packed[0], raw[0])

@@ -105,8 +105,8 @@ def test_without_gl_one_sentence_says_what_to_install(monkeypatch):
 @pytest.mark.usefixtures("_fresh_probe")
 @pytest.mark.parametrize("code", ["import os; os.abort()", "raise SystemExit(3)", "import time; time.sleep(60)"])
 def test_a_child_that_crashes_fails_or_hangs_means_no_gl(monkeypatch, code):
-    monkeypatch.setattr(vtk, "PROBE", code)
-    monkeypatch.setattr(vtk, "PROBE_SECONDS", 1.0)
+    monkeypatch.setattr(vtk, "PROBE_CODE", code)
+    monkeypatch.setattr(vtk, "PROBE_TIMEOUT_S", 1.0)
     assert not vtk.can_draw_with(vtk.OFF_SCREEN)
 
 

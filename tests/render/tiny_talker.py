@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from corpus_tools.aam.mesh import MOUTH_POINTS, N_MESH, face_ring, face_triangles, mouth_triangles
+from corpus_tools.aam.mesh import MOUTH_LANDMARKS, N_MESH_LANDMARKS, face_ring, face_triangles, mouth_triangles
 from corpus_tools.aam.plate import encode_plate_video
 from corpus_tools.aam.reference_frame import build_reference_frame
 from tts2face.models.appearance import Appearance, Plate, TextureModel
@@ -14,7 +14,7 @@ SIZE = 96
 
 def face_points() -> np.ndarray:
     """(468, 2) points in a picture of 96 x 96: an oval, lips apart, the rest anywhere between."""
-    shape = np.random.default_rng(3).uniform(-20, 20, (N_MESH, 2))
+    shape = np.random.default_rng(3).uniform(-20, 20, (N_MESH_LANDMARKS, 2))
     angles = np.linspace(0, 2 * np.pi, len(FACE_OVAL), endpoint=False)
     shape[list(FACE_OVAL)] = 30 * np.stack([np.sin(angles), -np.cos(angles)], axis=1)
     lips = np.linspace(0, np.pi, len(INNER_LIP_UPPER))
@@ -62,7 +62,7 @@ def own_talker(*, has_face: bool = True) -> Talker:
         shape=generator.normal(0, 1, (4, 3)).astype(np.float32),
         looks=generator.normal(0, 5, (4, 2)).astype(np.float32),
     )
-    mouth = texture_model(shape[list(MOUTH_POINTS)], mouth_triangles(), 24, 30.0)
+    mouth = texture_model(shape[list(MOUTH_LANDMARKS)], mouth_triangles(), 24, 30.0)
     changed = np.ones(len(face.pixels), np.float32)
-    appearance = Appearance(face, mouth, np.array(MOUTH_POINTS, np.int32), changed, plate)
+    appearance = Appearance(face, mouth, np.array(MOUTH_LANDMARKS, np.int32), changed, plate)
     return Talker(25.0, model, (), {"name": "Ada"}, appearance)

@@ -8,7 +8,7 @@ from corpus_tools.training.network_audio_map import NetworkMapOptions, learn_net
 from lexicon.errors import InputError
 from tests.oracles.test_features import babble
 from tts2face.models.audio_map import AudioMap
-from tts2face.speech.features import FEATURE_RATE, FEATURES, speech_features
+from tts2face.speech.features import FEATURE_KINDS, FEATURE_RATE, speech_features
 from tts2face.speech.streaming_listener import StreamingAudioMap, StreamingFeatures
 from tts2face.types import frame_count
 
@@ -37,7 +37,7 @@ def blocks(*sizes: int) -> list[np.ndarray]:
 
 @pytest.mark.parametrize("sizes", [(1600,), (7, 4001, 0, 350), (100_000,)])
 @pytest.mark.parametrize("fps", [25.0, 29.97])
-@pytest.mark.parametrize("kind", [*FEATURES, "mfcc+lsf"])
+@pytest.mark.parametrize("kind", [*FEATURE_KINDS, "mfcc+lsf"])
 def test_features_of_blocks_are_those_of_the_whole(kind: str, fps: float, sizes: tuple[int, ...]) -> None:
     ear = StreamingFeatures(kind, fps)
     found = np.concatenate([*(ear.hear(block) for block in blocks(*sizes)), ear.finish()])

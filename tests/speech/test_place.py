@@ -12,24 +12,24 @@ PHONES = "pbtdkgfvszmnlrwiuaeo"
 
 def edit_cost(written: str, sounded: str) -> float:
     """Cost of the cheapest edits: the whole table, in plain Python."""
-    row = [place.MISSED * number for number in range(len(sounded) + 1)]
+    row = [place.GAP_COST * number for number in range(len(sounded) + 1)]
     for phone in written:
-        before, row = row, [row[0] + place.MISSED]
+        before, row = row, [row[0] + place.GAP_COST]
         for number, other in enumerate(sounded):
-            said = before[number] + (0.0 if phone == other else place.OTHER)
-            row.append(min(said, before[number + 1] + place.MISSED, row[-1] + place.MISSED))
+            said = before[number] + (0.0 if phone == other else place.SUBSTITUTION_COST)
+            row.append(min(said, before[number + 1] + place.GAP_COST, row[-1] + place.GAP_COST))
     return row[-1]
 
 
 def cost_of(partners: np.ndarray, written: str, sounded: str, steps: list[int]) -> float:
     """Cost of the edits that a row of partners stands for."""
-    missed = len(sounded) - sum(step == place.SAID for step in steps)
+    missed = len(sounded) - sum(step == place.MATCHED for step in steps)
     said = sum(
-        place.OTHER * (written[number] != sounded[partner])
+        place.SUBSTITUTION_COST * (written[number] != sounded[partner])
         for number, (partner, step) in enumerate(zip(partners, steps, strict=True))
-        if step == place.SAID
+        if step == place.MATCHED
     )
-    return said + place.MISSED * (missed + sum(step == place.SKIPPED for step in steps))
+    return said + place.GAP_COST * (missed + sum(step == place.DELETED for step in steps))
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -43,7 +43,7 @@ def test_the_path_is_the_cheapest(seed: int) -> None:
     assert (np.diff(partners) >= 0).all()
     costs = []
     for flags in np.ndindex(*[2] * len(written)):  # which phones count as said: some choice gives the cheapest cost
-        steps = [place.SAID if flag else place.SKIPPED for flag in flags]
+        steps = [place.MATCHED if flag else place.DELETED for flag in flags]
         used = [int(partner) for partner, flag in zip(partners, flags, strict=True) if flag]
         if len(set(used)) == len(used):
             costs.append(cost_of(partners, written, sounded, steps))

@@ -9,7 +9,7 @@ import pytest
 from corpus_tools.recordings.folder import Recording, pronounce_recording
 from lexicon.errors import InputError
 from tts2face.speech.forced_alignment import acoustic_phones
-from tts2face.speech.phone_recognition import LONGEST_S, PhoneRecogniser
+from tts2face.speech.phone_recognition import MAX_SOUND_S, PhoneRecogniser
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 
@@ -53,4 +53,4 @@ def test_silence_holds_no_word(recogniser: PhoneRecogniser) -> None:
 
 def test_a_sound_that_is_too_long(recogniser: PhoneRecogniser) -> None:
     with pytest.raises(InputError, match="is heard in parts of at most 30 s"):
-        recogniser.words(Waveform(np.zeros(round((LONGEST_S + 1) * 16_000)), 16_000))
+        recogniser.words(Waveform(np.zeros(round((MAX_SOUND_S + 1) * 16_000)), 16_000))

@@ -42,8 +42,8 @@ def test_long_recordings_are_aligned_part_by_part(shared_recordings: Path, monke
     sound = Waveform(np.concatenate(sounds * 2), 16000)
     words = pronounce_transcript(". ".join([*names.values()] * 2), "en-us")
     whole, spans, _ = align_recording(sound, words)
-    monkeypatch.setattr(scripts, "LONGEST_AT_ONCE_S", 5.0)
-    monkeypatch.setattr(scripts, "LONGEST_STRETCH_S", 5.0)
+    monkeypatch.setattr(scripts, "MAX_ALIGNED_S", 5.0)
+    monkeypatch.setattr(scripts, "MAX_STRETCH_S", 5.0)
     cut, cut_spans, mismatches = align_recording(sound, words)
     assert mismatches == ()
     assert [word.text for word in cut_spans] == [word.text for word in spans]

@@ -5,7 +5,7 @@ import pytest
 
 from lexicon.errors import BackendError, DataError, InputError
 from tts2face.video import landmark_models as model
-from tts2face.video.blendshapes import BLENDSHAPES, READ_LANDMARKS, BlendshapeReader
+from tts2face.video.blendshapes import BLENDSHAPES, INPUT_LANDMARKS, BlendshapeReader
 from tts2face.video.media import read_frames
 from tts2face.video.track import Crop, FaceTracker, crop_around, smooth_crops
 
@@ -75,7 +75,7 @@ def test_blendshapes_of_half_a_face(face_model):
 
 def test_tables_of_the_blendshape_network():
     assert len(set(BLENDSHAPES)) == 52
-    assert len(set(READ_LANDMARKS)) == 146
+    assert len(set(INPUT_LANDMARKS)) == 146
 
 
 def test_squares_are_smoothed_without_lag_and_never_across_a_gap():
@@ -112,7 +112,7 @@ def test_the_square_turns_with_the_face(angle):
 def test_without_the_model_one_sentence_says_what_to_run(monkeypatch, tmp_path):
     monkeypatch.delenv(model.MODEL_VARIABLE, raising=False)
     monkeypatch.setattr(model, "user_cache", lambda: tmp_path)
-    monkeypatch.setattr(model, "CARRIERS", ("no_such_package",))
+    monkeypatch.setattr(model, "BUNDLING_PACKAGES", ("no_such_package",))
     with pytest.raises(BackendError, match="run `tts2face corpus setup`"):
         model.find_bundle()
 
@@ -136,5 +136,5 @@ def test_a_package_that_carries_the_model_is_found_without_importing_it(monkeypa
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.delenv(model.MODEL_VARIABLE, raising=False)
     monkeypatch.setattr(model, "user_cache", lambda: tmp_path / "cache")
-    monkeypatch.setattr(model, "CARRIERS", ("carrier_of_faces",))
+    monkeypatch.setattr(model, "BUNDLING_PACKAGES", ("carrier_of_faces",))
     assert model.find_bundle() == package / "face_landmarker_v2.task"

@@ -9,17 +9,22 @@ from tts2face.models.talker import ShapeModel
 
 FloatArray = NDArray[np.float64]
 
-UPPER, LOWER = list(INNER_LIP_UPPER[1:-1]), list(INNER_LIP_LOWER[1:-1])  # at the corners both lips are one point
-LEAST_GAP_MM = 0.01  # so that lips stay apart when parameters are rounded for a talker file
-CONTACT = 0.01  # of the distance of the outer eye corners: tracked lips that touch are up to so far apart
+INNER_UPPER_LIP, INNER_LOWER_LIP = (
+    list(INNER_LIP_UPPER[1:-1]),
+    list(INNER_LIP_LOWER[1:-1]),
+)  # at the corners both lips are one point
+MIN_LIP_GAP_MM = 0.01  # so that lips stay apart when parameters are rounded for a talker file
+CONTACT_SHARE = 0.01  # of the distance of the outer eye corners: tracked lips that touch are up to so far apart
 UNBOUNDED_MM = 1e3  # no lips are so far apart
-STEEP = 10.0  # how much faster than the source's the gap may open beyond contact: 1 mm on, nothing is held back
+MAX_GAP_SLOPE = 10.0  # how much faster than the source's the gap may open beyond contact: 1 mm on, nothing is held back
 
 
 def facing_gaps(model: ShapeModel) -> FloatArray:
     """(P, M + 1) heights of facing inner lip points over each other: ``gaps[:, :M] @ parameters + gaps[:, M]``, mm."""
-    per_mode = (model.basis[:, UPPER, 1] - model.basis[:, LOWER, 1]).astype(np.float64).T
-    return np.column_stack([per_mode, (model.mean[UPPER, 1] - model.mean[LOWER, 1]).astype(np.float64)])
+    per_mode = (model.basis[:, INNER_UPPER_LIP, 1] - model.basis[:, INNER_LOWER_LIP, 1]).astype(np.float64).T
+    return np.column_stack(
+        [per_mode, (model.mean[INNER_UPPER_LIP, 1] - model.mean[INNER_LOWER_LIP, 1]).astype(np.float64)]
+    )
 
 
 def rest_with_open_lips(model: ShapeModel, limits: NDArray[np.floating]) -> FloatArray:
@@ -31,7 +36,7 @@ def rest_with_open_lips(model: ShapeModel, limits: NDArray[np.floating]) -> Floa
         The lips overlap wherever the limits let them go.
     """
     gaps, rest = facing_gaps(model), model.rest.astype(np.float64)
-    if (np.einsum("pm,m->p", gaps[:, :-1], rest) + gaps[:, -1] >= LEAST_GAP_MM).all():
+    if (np.einsum("pm,m->p", gaps[:, :-1], rest) + gaps[:, -1] >= MIN_LIP_GAP_MM).all():
         return rest
     any_gap = np.full((1, len(gaps)), UNBOUNDED_MM)
     parted: FloatArray = nearest_valid_parameters(rest[None], limits.astype(np.float64), gaps, any_gap)[0]
@@ -40,7 +45,7 @@ def rest_with_open_lips(model: ShapeModel, limits: NDArray[np.floating]) -> Floa
 
 def contact_mm(model: ShapeModel) -> float:
     """Gap up to which the model's tracked lips touch, mm."""
-    return CONTACT * float(np.linalg.norm(model.mean[EYE_OUTER_LEFT] - model.mean[EYE_OUTER_RIGHT]))
+    return CONTACT_SHARE * float(np.linalg.norm(model.mean[EYE_OUTER_LEFT] - model.mean[EYE_OUTER_RIGHT]))
 
 
 def gap_limits(seen: FloatArray, contact: float, at_rest: FloatArray) -> FloatArray:
@@ -48,7 +53,7 @@ def gap_limits(seen: FloatArray, contact: float, at_rest: FloatArray) -> FloatAr
 
     Lips that touch on the source, which is up to `contact` apart, are no further apart, or as at rest.
     """
-    return np.maximum(seen + STEEP * np.maximum(seen - contact, 0.0), at_rest)
+    return np.maximum(seen + MAX_GAP_SLOPE * np.maximum(seen - contact, 0.0), at_rest)
 
 
 def nearest_valid_parameters(wanted: FloatArray, limits: FloatArray, gaps: FloatArray, most: FloatArray) -> FloatArray:
@@ -62,7 +67,7 @@ def nearest_valid_parameters(wanted: FloatArray, limits: FloatArray, gaps: Float
     gaps : (P, M + 1)
         As `facing_gaps` gives them.
     most : (T, P)
-        Each frame's largest gaps; the least is `LEAST_GAP_MM`.
+        Each frame's largest gaps; the least is `MIN_LIP_GAP_MM`.
 
     Raises
     ------
@@ -85,7 +90,7 @@ def nearest_valid_parameters(wanted: FloatArray, limits: FloatArray, gaps: Float
     found = np.zeros_like(wanted)
     for frame, start in enumerate(wanted):
         here = pairs @ start + gaps[:, -1]
-        short = -np.concatenate([here - LEAST_GAP_MM, most[frame] - here, start + limits, limits - start])
+        short = -np.concatenate([here - MIN_LIP_GAP_MM, most[frame] - here, start + limits, limits - start])
         system = np.vstack([sides.T, short])
         forces, left_over = nnls(system, only)
         if left_over < 1e-9:

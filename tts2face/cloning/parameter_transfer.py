@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.cloning.lip_gaps import (
-    LEAST_GAP_MM,
+    MIN_LIP_GAP_MM,
     contact_mm,
     facing_gaps,
     gap_limits,
@@ -27,11 +27,15 @@ from tts2face.types import Trajectory
 
 FloatArray = NDArray[np.float64]
 
-SPREADS = 3.0  # a mapped parameter stays within so many standard deviations of the target's mean; T07, section 3.1
-MISSING_MM = 0.5  # root of the sum over all landmarks; a component that moves less is not missed: 0.02 mm a landmark
+MAX_STANDARD_DEVIATIONS = (
+    3.0  # a mapped parameter stays within so many standard deviations of the target's mean; T07, section 3.1
+)
+MIN_COMPONENT_MM = (
+    0.5  # root of the sum over all landmarks; a component that moves less is not missed: 0.02 mm a landmark
+)
 
-UNREAL_MM = 1e-4  # far above the rounding of a basis kept as float32, far below any measured motion
-ROUNDING = 1e-12  # an entry of a unit vector below this is a rounding error of float64
+MIN_REAL_MOTION_MM = 1e-4  # far above the rounding of a basis kept as float32, far below any measured motion
+ROUNDING_TOLERANCE = 1e-12  # an entry of a unit vector below this is a rounding error of float64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +102,7 @@ class ParameterTransfer:
         held = np.clip(wanted, -limits, limits)
         most = gap_limits(self._scaled_source_gaps(source), self.contact, self.resting_gaps)
         gaps = ordered_product(held, self.target_gaps[:, :-1].T) + self.target_gaps[:, -1]
-        wrong = np.flatnonzero(((gaps < LEAST_GAP_MM) | (gaps > most)).any(axis=1))
+        wrong = np.flatnonzero(((gaps < MIN_LIP_GAP_MM) | (gaps > most)).any(axis=1))
         held[wrong] = nearest_valid_parameters(wanted[wrong], limits, self.target_gaps, most[wrong])
         return np.clip(held.astype(np.float32), -self.limits, self.limits)
 
@@ -158,7 +162,7 @@ def append_missing_components(source: ShapeModel, target: ShapeModel, n: int | N
     Parameters
     ----------
     n
-        How many, those that move most first; all that move more than `MISSING_MM` when None.
+        How many, those that move most first; all that move more than `MIN_COMPONENT_MM` when None.
 
     Returns
     -------
@@ -184,7 +188,7 @@ def append_missing_components(source: ShapeModel, target: ShapeModel, n: int | N
     found = size * np.concatenate([mouth_spread, other_spread])
     if n is not None and not 0 <= n <= len(found):
         raise InputError(f"{len(found)} components of the source are missing in the target, not {n}; ask for fewer")
-    n_added = int((found > MISSING_MM).sum()) if n is None else n
+    n_added = int((found > MIN_COMPONENT_MM).sum()) if n is None else n
     chosen = np.sort(np.argsort(-found, kind="stable")[:n_added])
     of_mouth, others = chosen[chosen < len(mouth)], chosen[chosen >= len(mouth)]
     added = np.concatenate([mouth, other])
@@ -236,8 +240,8 @@ def face_size(model: ShapeModel) -> float:
 
 
 def parameter_limits(model: ShapeModel) -> NDArray[np.float32]:
-    """(M,) largest numbers that are not above `SPREADS` times the spread."""
-    exact = SPREADS * model.spread.astype(np.float64)
+    """(M,) largest numbers that are not above `MAX_STANDARD_DEVIATIONS` times the spread."""
+    exact = MAX_STANDARD_DEVIATIONS * model.spread.astype(np.float64)
     rounded = exact.astype(np.float32)
     return np.where(rounded > exact, np.nextafter(rounded, np.float32(0)), rounded)
 
@@ -246,7 +250,9 @@ def _rest_of_model(model: ShapeModel) -> FloatArray:
     limits = parameter_limits(model)
     beyond = np.flatnonzero(np.abs(model.rest) > limits)
     if len(beyond):
-        raise DataError(f"a talker rests beyond {SPREADS:g} spreads in mode {beyond[0]}; build it again")
+        raise DataError(
+            f"a talker rests beyond {MAX_STANDARD_DEVIATIONS:g} spreads in mode {beyond[0]}; build it again"
+        )
     return rest_with_open_lips(model, limits)
 
 
@@ -269,10 +275,12 @@ def _missing_components(source: ShapeModel, block: slice, span: FloatArray) -> t
         modes = modes - (modes @ span.T) @ span
     moved = np.concatenate([source.spread[block, None] * modes, source.rest[None, block] @ modes])
     _, distances, components = np.linalg.svd(moved, full_matrices=False)
-    real = distances > UNREAL_MM  # what is below consists of rounding errors, which may point into the span
+    real = distances > MIN_REAL_MOTION_MM  # what is below consists of rounding errors, which may point into the span
     components, distances = components[real], distances[real]
     components = components - (components @ span.T) @ span
-    components[np.abs(components) < ROUNDING] = 0.0  # mouth modes leave the rest of the face exactly where it is
+    components[np.abs(components) < ROUNDING_TOLERANCE] = (
+        0.0  # mouth modes leave the rest of the face exactly where it is
+    )
     largest = components[np.arange(len(components)), np.abs(components).argmax(axis=1)]
     signed: FloatArray = components * np.sign(largest)[:, None]
     return signed, distances

@@ -13,7 +13,7 @@ from tts2face.exemplar.tokens import Tokens
 from tts2face.models.talker import Talker, require_appearance
 from tts2face.types import Trajectory
 
-LOOKS_BLENDED = 3  # exemplars; more of them blur teeth and tongue (docs/decisions.md)
+N_BLENDED_APPEARANCES = 3  # exemplars; more of them blur teeth and tongue (docs/decisions.md)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +55,7 @@ def appearance_trajectory(
 ) -> Trajectory:
     """Looks for phones in time, from the very tokens that move the lips; arguments as `blend_trajectory`."""
     phones, targets = selection.phones, selection.targets
-    options = replace(selection.options, k=min(selection.options.k, LOOKS_BLENDED), contacts=False)
+    options = replace(selection.options, k=min(selection.options.k, N_BLENDED_APPEARANCES), contacts=False)
     found = TokenRanking(selection.found.tokens[:, : options.k], selection.found.scores[:, : options.k])
     frame_times = np.arange(n_frames) / fps
     n_instants = int(np.ceil(max(phones.end, frame_times[-1]) * blending.CLOCK_HZ)) + 2

@@ -13,9 +13,9 @@ from tts2face.exemplar.time_warping import warp_to_reference
 from tts2face.exemplar.tokens import Tokens
 
 CLOCK_HZ = 100.0  # instants at which motion is made; lips move below 15 Hz, so nothing is lost
-KNOTS = 8  # samples a phone; 10 are no better (docs/decisions.md)
+N_KNOTS = 8  # samples a phone; 10 are no better (docs/decisions.md)
 ALIGN_BAND = 1  # knots by which an exemplar's event may lie off the best one's; 2 lose .002 of r opening
-LEAST_SPREAD = 0.15  # of a parameter's spread: exemplars that happen to agree are not surer than this
+MIN_DEVIATION = 0.15  # of a parameter's spread: exemplars that happen to agree are not surer than this
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +56,7 @@ def average_tokens(
     to the target's duration; with `options.align`, it is first warped in time onto the best token.
     """
     parts = np.arange(3) if options.overlap else np.array([1])
-    knots = np.concatenate([part + np.arange(KNOTS) / KNOTS for part in parts] + [[parts[-1] + 1.0]])
+    knots = np.concatenate([part + np.arange(N_KNOTS) / N_KNOTS for part in parts] + [[parts[-1] + 1.0]])
     shape = (len(chosen), len(knots), tokens.frames.shape[1])
     mean, square = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
     _accumulate_average(
@@ -139,7 +139,7 @@ def _overlap_add(pieces, overlap, precision, total, weight):  # type: ignore[no-
             for d in range(n_dims):
                 value = (1.0 - u) * mean[n, low_knot, d] + u * mean[n, low_knot + 1, d]
                 spread = (1.0 - u) * variance[n, low_knot, d] + u * variance[n, low_knot + 1, d]
-                w = share / (spread + LEAST_SPREAD**2) ** precision
+                w = share / (spread + MIN_DEVIATION**2) ** precision
                 total[i, d] += w * value
                 weight[i, d] += w
 

@@ -25,11 +25,16 @@ class ContactRule:
 
 # As many lips touch as in recordings (docs/decisions.md). Some bilabials close between two frames, so not all exemplars
 # tell the pose. Labiodentals leave a gap that varies: drawing each to the mean closes those that were recorded open.
-RULES = {"bilabial": ContactRule(pose_share=0.7, enough=0.0), "labiodental": ContactRule(pose_share=1.0, enough=0.75)}
-NON_CONTACTS = frozenset({"approximant"})  # narrowed, not closed
-WINDOW_S = 0.03  # a closure may lie this far outside its phone's edges (video frames are 40 ms, edges +- 10 ms)
-HOLD_S = 0.03  # lips stay together at least this long: shorter, and the touch falls between two frames at 30 fps
-EASE_S = 0.05  # way into and out of it; longer eats into the vowels (0.06: r of opening falls by .001)
+CONTACT_RULES = {
+    "bilabial": ContactRule(pose_share=0.7, enough=0.0),
+    "labiodental": ContactRule(pose_share=1.0, enough=0.75),
+}
+MANNERS_WITHOUT_CONTACT = frozenset({"approximant"})  # narrowed, not closed
+CONTACT_MARGIN_S = 0.03  # a closure may lie this far outside its phone's edges (video frames are 40 ms, edges +- 10 ms)
+CONTACT_HOLD_S = (
+    0.03  # lips stay together at least this long: shorter, and the touch falls between two frames at 30 fps
+)
+CONTACT_EASE_S = 0.05  # way into and out of it; longer eats into the vowels (0.06: r of opening falls by .001)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,7 +52,7 @@ class LipGap:
 def contact_rule(label: str) -> ContactRule | None:
     """What counts as a phone's contact; None for a phone without one."""
     phone = look_up_phone(label)
-    return None if phone.manner in NON_CONTACTS else RULES.get(phone.place)
+    return None if phone.manner in MANNERS_WITHOUT_CONTACT else CONTACT_RULES.get(phone.place)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,8 +112,8 @@ def _closest_rows(corpus, chosen, gap, rows, gaps):  # type: ignore[no-untyped-d
             if token < 0:
                 continue
             first, last = first_frame[utterance[token]], first_frame[utterance[token] + 1] - 1
-            low = first + int(np.ceil((spans[token, 1] - WINDOW_S) * fps))
-            high = first + int(np.floor((spans[token, 2] + WINDOW_S) * fps))
+            low = first + int(np.ceil((spans[token, 1] - CONTACT_MARGIN_S) * fps))
+            high = first + int(np.floor((spans[token, 2] + CONTACT_MARGIN_S) * fps))
             low = min(max(low, first), last)
             rows[n, e], gaps[n, e] = _closest_row(frames, low, max(low, min(high, last)), gap)
 
@@ -135,22 +140,22 @@ def enforce_contacts(
 ) -> NDArray[np.float32]:
     """(T, D) values at `rate_hz` whose lips come close enough in every contact.
 
-    Where the lips are closest already, the motion is drawn to the exemplars' pose: fully for `HOLD_S`, easing in and
-    out over `EASE_S`. A contact that is closed enough is left alone.
+    Where the lips are closest already, the motion is drawn to the exemplars' pose: fully for `CONTACT_HOLD_S`,
+    easing in and out over `CONTACT_EASE_S`. A contact that is closed enough is left alone.
     """
     kept = values.copy()
     times = np.arange(len(values)) / rate_hz
     for (start, end), pose, enough in zip(contacts.spans, contacts.poses, contacts.enough, strict=True):
-        low, high = np.searchsorted(times, (start - WINDOW_S, end + WINDOW_S))
+        low, high = np.searchsorted(times, (start - CONTACT_MARGIN_S, end + CONTACT_MARGIN_S))
         if low >= high:
             continue
         gaps = gap.of(kept[low:high])
         at = low + int(np.argmin(gaps))
         if gaps[at - low] <= enough:
             continue
-        reach = int((HOLD_S / 2 + EASE_S) * rate_hz)
+        reach = int((CONTACT_HOLD_S / 2 + CONTACT_EASE_S) * rate_hz)
         here = slice(max(0, at - reach), min(len(kept), at + reach + 1))
-        away = np.maximum(np.abs(times[here] - times[at]) - HOLD_S / 2, 0.0) / EASE_S
+        away = np.maximum(np.abs(times[here] - times[at]) - CONTACT_HOLD_S / 2, 0.0) / CONTACT_EASE_S
         pull = (0.5 + 0.5 * np.cos(np.pi * np.minimum(away, 1.0)))[:, None].astype(np.float32)
         kept[here] += pull * (pose - kept[here])
     return kept

@@ -67,4 +67,4 @@ THEOBALD_2007 = SynthesisOptions(
     context=4, k=10, duration=0.0, sharpness=0.0, overlap=False, precision=0.0, align=True, network=0.0,
     articulation=1.0, smoothing_s=0.02, contacts=False,
 )  # fmt: skip
-METHODS = {"exemplar": SynthesisOptions(), "theobald2007": THEOBALD_2007}
+METHOD_OPTIONS = {"exemplar": SynthesisOptions(), "theobald2007": THEOBALD_2007}

@@ -11,10 +11,10 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar.tokens import PAUSE_REACH_S, spans_with_reach
 
 # Sounds of the throat have no shape of their own: lips and tongue already stand as for what follows.
-TRANSPARENT = frozenset({"h", "ɦ", "ʔ"})
+TRANSPARENT_PHONES = frozenset({"h", "ɦ", "ʔ"})
 
 
-LEAST_GAP_S = 1e-6  # between targets: less is rounding
+MIN_TARGET_GAP_S = 1e-6  # between targets: less is rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +44,7 @@ def substitute_phones(label: str, inventory: tuple[str, ...]) -> tuple[str, ...]
     InputError
         The label is not in the phone table, or the inventory has no phone but silence.
     """
-    if label not in inventory and label in TRANSPARENT:
+    if label not in inventory and label in TRANSPARENT_PHONES:
         return ()
     return nearest_phones(label, inventory)
 
@@ -73,7 +73,7 @@ def target_phones(targets: Targets) -> PhoneSequence:
     labels: list[str] = []
     edges = [0.0]
     for label, (start, end) in zip(targets.labels, targets.spans[:, 1:3], strict=True):
-        if start - edges[-1] > LEAST_GAP_S:
+        if start - edges[-1] > MIN_TARGET_GAP_S:
             labels.append(SILENCE)
             edges.append(float(start))
         labels.append(label)
@@ -81,11 +81,11 @@ def target_phones(targets: Targets) -> PhoneSequence:
     return PhoneSequence(labels, edges)
 
 
-Row = tuple[str, float, float, int]  # label, start, end, index of the wanted phone
+TargetRow = tuple[str, float, float, int]  # label, start, end, index of the wanted phone
 
 
-def _substitution_rows(phones: PhoneSequence, inventory: tuple[str, ...]) -> list[Row]:
-    rows: list[Row] = []
+def _substitution_rows(phones: PhoneSequence, inventory: tuple[str, ...]) -> list[TargetRow]:
+    rows: list[TargetRow] = []
     waiting: float | None = None  # onset of a transparent phone
     for at, label in enumerate(phones.phones):
         start, end = float(phones.edges[at]), float(phones.edges[at + 1])
@@ -105,7 +105,7 @@ def _substitution_rows(phones: PhoneSequence, inventory: tuple[str, ...]) -> lis
     return rows
 
 
-def _cut_to_speech(row: Row, behind_speech: bool, before_speech: bool) -> list[Row]:
+def _cut_to_speech(row: TargetRow, behind_speech: bool, before_speech: bool) -> list[TargetRow]:
     label, start, end, source = row
     if label != SILENCE or end - start <= PAUSE_REACH_S:
         return [row]

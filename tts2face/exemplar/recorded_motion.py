@@ -5,11 +5,11 @@ from numpy.typing import NDArray
 
 from tts2face.compilation import kernel
 
-FloatArray = NDArray[np.float32]
+Float32Array = NDArray[np.float32]
 
 
 @kernel
-def read_motion(frames: FloatArray, first: int, last: int, at: float, out: FloatArray) -> None:
+def read_motion(frames: Float32Array, first: int, last: int, at: float, out: Float32Array) -> None:
     """Write into `out` (D,) the value of rows [first, last) at frame position `at`, counted from `first`.
 
     Catmull-Rom cubic through the frames (Catmull and Rom 1974): it passes through each of them and, unlike straight
@@ -30,7 +30,9 @@ def read_motion(frames: FloatArray, first: int, last: int, at: float, out: Float
 
 
 @kernel
-def sample_tokens(frames: FloatArray, bounds: NDArray[np.int64], positions: NDArray[np.float64]) -> NDArray[np.float32]:
+def sample_tokens(
+    frames: Float32Array, bounds: NDArray[np.int64], positions: NDArray[np.float64]
+) -> NDArray[np.float32]:
     """(N, S, D) recorded motion of N tokens at S frame positions each.
 
     Parameters

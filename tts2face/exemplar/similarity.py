@@ -9,8 +9,11 @@ from lexicon.errors import InputError
 from tts2face.exemplar.recorded_motion import sample_tokens
 from tts2face.exemplar.tokens import Tokens
 
-N_SAMPLES = 5  # per token
-INNER = (0.2, 0.8)  # part of a phone that is sampled: beyond it, a corpus of few words shows its neighbours instead
+N_TOKEN_SAMPLES = 5  # per token
+SAMPLED_PART = (
+    0.2,
+    0.8,
+)  # part of a phone that is sampled: beyond it, a corpus of few words shows its neighbours instead
 PRIOR_TOKENS = 10.0  # a phone with this many tokens takes half of its spread from all phones together
 SHARPNESS = 1.4  # similarity at the mean distance between phones is exp(-SHARPNESS); 1 to 3 animate alike
 
@@ -29,9 +32,9 @@ class PhoneSimilarity:
         return [(self.phones[at], float(row[at])) for at in order[:n]]
 
 
-def token_samples(tokens: Tokens, n_samples: int = N_SAMPLES) -> NDArray[np.float32]:
-    """(N, n_samples, D) speech parameters of every token, evenly over its `INNER` part."""
-    steps = np.linspace(*INNER, n_samples)
+def token_samples(tokens: Tokens, n_samples: int = N_TOKEN_SAMPLES) -> NDArray[np.float32]:
+    """(N, n_samples, D) speech parameters of every token, evenly over its `SAMPLED_PART` part."""
+    steps = np.linspace(*SAMPLED_PART, n_samples)
     starts, ends = tokens.spans[:, 1:2], tokens.spans[:, 2:3]
     positions = (starts + (ends - starts) * steps) * tokens.fps
     bounds = np.stack([tokens.first_frame[tokens.utterance], tokens.first_frame[tokens.utterance + 1]], axis=1)

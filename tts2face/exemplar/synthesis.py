@@ -28,7 +28,7 @@ from tts2face.types import Trajectory
 
 RELEASE_FROM_S = 0.08  # this far from speech the face begins to leave what the exemplars did ...
 REST_FROM_S = 0.20  # ... and this far it is at rest; recorded lips settle within 0.2 s
-LEAST_EASE_S = 0.06  # a chunk that begins or ends within speech still eases from and to rest over this time
+MIN_EASE_S = 0.06  # a chunk that begins or ends within speech still eases from and to rest over this time
 DEFAULT_OPTIONS = SynthesisOptions()
 
 
@@ -206,8 +206,8 @@ def rest_weights(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[n
     away = np.minimum(ahead, np.maximum(behind, 0.0))
     pull = _smoothstep((away - RELEASE_FROM_S) / (REST_FROM_S - RELEASE_FROM_S))
     last = times[-1]
-    onset = np.clip(starts[0], LEAST_EASE_S, REST_FROM_S)
-    offset = np.clip(last - ends[-1], LEAST_EASE_S, REST_FROM_S)
+    onset = np.clip(starts[0], MIN_EASE_S, REST_FROM_S)
+    offset = np.clip(last - ends[-1], MIN_EASE_S, REST_FROM_S)
     if onset < REST_FROM_S:
         pull = np.maximum(pull, 1.0 - _smoothstep(times / onset))
     if offset < REST_FROM_S:

@@ -9,7 +9,7 @@ from lexicon.errors import InputError
 from tts2face.compilation import kernel
 from tts2face.exemplar.tokens import MAX_CONTEXT, Tokens
 
-GROUPED = 3  # neighbours either side that are alike in a group; the default context
+N_GROUP_CONTEXT = 3  # neighbours either side that are alike in a group; the default context
 _ROUNDING = 1e-9  # a bound may fall below the score it bounds by rounding; scores are of order 1
 
 
@@ -27,7 +27,7 @@ class TokenQuery:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContextIndex:
-    """Tokens sorted into groups with the same phone and the same `GROUPED` neighbours either side.
+    """Tokens sorted into groups with the same phone and the same `N_GROUP_CONTEXT` neighbours either side.
 
     The tokens ``order[group_first[g]:group_first[g + 1]]`` form group g, the shortest first; the groups
     ``phone_first[p]:phone_first[p + 1]`` belong to phone p. ``likeness[g, c, q]`` is the highest similarity of label q
@@ -59,7 +59,7 @@ def log_durations(spans: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def context_index(tokens: Tokens, similarity: NDArray[np.float64]) -> ContextIndex:
     """Index of a talker's tokens for the (P, P) similarity of its phones."""
-    near = tokens.context[:, : 2 * GROUPED]
+    near = tokens.context[:, : 2 * N_GROUP_CONTEXT]
     durations = log_durations(tokens.spans)
     order = np.lexsort((durations[:, 1], *near.T[::-1], tokens.phone)).astype(np.int32)
     keys = np.column_stack([tokens.phone, near])[order]

@@ -10,10 +10,10 @@ from tts2face.compilation import kernel
 
 FloatArray = NDArray[np.float64]
 
-MOST_ROUNDS = 10_000  # of pivoting; a frame of speech takes about four
-PATIENCE = 3  # rounds without progress before shapes are moved one at a time
-BEYOND = 1e-12  # a weight further outside its limit than this is outside
-UNEVEN = 1e-9  # of the mean curvature: a slope that pulls a weight off its limit
+MAX_ROUNDS = 10_000  # of pivoting; a frame of speech takes about four
+MAX_STALLED_ROUNDS = 3  # rounds without progress before shapes are moved one at a time
+BOUND_TOLERANCE = 1e-12  # a weight further outside its limit than this is outside
+SLOPE_TOLERANCE = 1e-9  # of the mean curvature: a slope that pulls a weight off its limit
 
 
 def bounded_least_squares(curvature: FloatArray, linear: FloatArray, limits: FloatArray) -> FloatArray:
@@ -39,13 +39,13 @@ def bounded_least_squares(curvature: FloatArray, linear: FloatArray, limits: Flo
     """
     low, high = np.ascontiguousarray(limits[:, 0]), np.ascontiguousarray(limits[:, 1])
     solved: FloatArray = np.zeros(linear.shape)
-    slack = UNEVEN * float(np.trace(curvature)) / len(curvature)
+    slack = SLOPE_TOLERANCE * float(np.trace(curvature)) / len(curvature)
     bounds = (low, high, slack)
     try:
         rounds = _solve_all(np.ascontiguousarray(curvature), np.ascontiguousarray(linear), bounds, solved)
     except ZeroDivisionError:  # a pivot of the factor is 0
-        rounds = MOST_ROUNDS
-    if rounds >= MOST_ROUNDS or not np.isfinite(solved).all():
+        rounds = MAX_ROUNDS
+    if rounds >= MAX_ROUNDS or not np.isfinite(solved).all():
         raise DataError("the face's shapes cannot be told apart, so their weights are not unique; build the face again")
     return solved
 
@@ -62,8 +62,8 @@ def _solve_all(curvature, linear, bounds, weights):  # type: ignore[no-untyped-d
     for t in range(n_frames):
         for i in range(k):
             state[i] = 0
-        fewest, patience, rounds = k + 1, PATIENCE, 0
-        while rounds < MOST_ROUNDS:
+        fewest, patience, rounds = k + 1, MAX_STALLED_ROUNDS, 0
+        while rounds < MAX_ROUNDS:
             rounds += 1
             n_free = 0
             for i in range(k):
@@ -75,11 +75,11 @@ def _solve_all(curvature, linear, bounds, weights):  # type: ignore[no-untyped-d
             n_wrong = _classify_weights(curvature, linear[t], bounds, weights[t], (state, belongs))
             if n_wrong == 0:
                 break
-            patience = PATIENCE if n_wrong < fewest else patience - 1
+            patience = MAX_STALLED_ROUNDS if n_wrong < fewest else patience - 1
             fewest = min(fewest, n_wrong)
             _pivot_states(state, belongs, patience < 0)
         longest = max(longest, rounds)
-        if rounds >= MOST_ROUNDS:  # no answer: the other frames have none either
+        if rounds >= MAX_ROUNDS:  # no answer: the other frames have none either
             break
     return longest
 
@@ -110,7 +110,7 @@ def _classify_weights(curvature, linear, bounds, weights, states):  # type: igno
     n_wrong = 0
     for i in range(len(weights)):
         if state[i] == 0:
-            belongs[i] = (weights[i] > high[i] + BEYOND) - (weights[i] < low[i] - BEYOND)
+            belongs[i] = (weights[i] > high[i] + BOUND_TOLERANCE) - (weights[i] < low[i] - BOUND_TOLERANCE)
         else:
             slope = _dot(curvature[i], weights) - linear[i]
             belongs[i] = 0 if low[i] < high[i] and state[i] * slope > slack else state[i]

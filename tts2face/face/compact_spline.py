@@ -17,8 +17,8 @@ from tts2face.face.rbf import check_centres
 
 FloatArray = NDArray[np.float64]
 
-WORST_CONDITION = 1e9  # of the matrix of centres: beyond it, half of the digits of the coefficients would be noise
-AT_ONCE = 4096  # places evaluated at once, to bound memory
+MAX_CONDITION = 1e9  # of the matrix of centres: beyond it, half of the digits of the coefficients would be noise
+CHUNK_SIZE = 4096  # places evaluated at once, to bound memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,8 +41,8 @@ class LocalInterpolant:
     def __call__(self, places: NDArray[np.floating]) -> FloatArray:
         """(P, E) displacements at places (P, D); exactly 0 beyond the support of every centre."""
         found = np.zeros((len(places), self.coefficients.shape[1]))
-        for first in range(0, len(places), AT_ONCE):
-            span = slice(first, first + AT_ONCE)
+        for first in range(0, len(places), CHUNK_SIZE):
+            span = slice(first, first + CHUNK_SIZE)
             found[span] = _basis_values(places[span], self.centres, self.support) @ self.coefficients
         return found
 
@@ -77,7 +77,7 @@ def fit_local_interpolant(
     if not support > 0:
         raise InputError(f"the support must be above 0, not {support}")
     matrix = _basis_values(places, places, support)
-    if np.linalg.cond(matrix) > WORST_CONDITION:
+    if np.linalg.cond(matrix) > MAX_CONDITION:
         raise DataError("centres lie too near to each other for their support; leave some out, or make it smaller")
     coefficients: FloatArray = np.linalg.solve(matrix, wanted).astype(np.float64)
     return LocalInterpolant(places, coefficients, float(support))

@@ -14,7 +14,7 @@ from tts2face.types import HEAD_CHANNELS
 
 REST_HEAD = np.zeros(len(HEAD_CHANNELS), np.float32)  # the head pose of the face at rest
 CHIN_MARGIN_MM = 8.0  # flesh under the chin that still turns with the skull
-NECK_LEAST_MM = 20.0  # a mesh that ends nearer to the chin has no neck to bend and turns as a whole
+MIN_NECK_MM = 20.0  # a mesh that ends nearer to the chin has no neck to bend and turns as a whole
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,7 +109,7 @@ def head_share(face: Face) -> NDArray[np.float32]:
     corners = face.vertices[face.landmark_vertices[chin[0]], 1]
     top = float(corners @ face.landmark_weights[chin[0]]) - CHIN_MARGIN_MM
     bottom = float(height.min())
-    if top - bottom < NECK_LEAST_MM:
+    if top - bottom < MIN_NECK_MM:
         return np.ones(len(height), np.float32)
     share = np.clip((height - bottom) / (top - bottom), 0.0, 1.0)
     smooth: NDArray[np.float32] = (share * share * (3.0 - 2.0 * share)).astype(np.float32)

@@ -13,16 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.face.eyelids import BLINK, WIDE, build_eyelid_model
+from tts2face.face.eyelids import BLINK_SHAPES, WIDE_SHAPES, build_eyelid_model
 from tts2face.face.landmark_fit import N_SKIN, landmark_motion, scatter_landmarks
 from tts2face.face.lip_constraints import LipConstraints, build_lip_constraints
 from tts2face.face.shape_transfer import add_missing_shapes
 from tts2face.models.face import Face
 from tts2face.models.palette import EXPRESSIONS
 
-TABLE = "expressions.tsv"
+EXPRESSION_TABLE = "expressions.tsv"
 BOTH_SIDES = "*"  # at the end of a name: this shape of the left and of the right
-GAZE = tuple(f"eyeLook{way}{side}" for way in ("Up", "Down", "In", "Out") for side in ("Left", "Right"))
+GAZE_SHAPES = tuple(f"eyeLook{way}{side}" for way in ("Up", "Down", "In", "Out") for side in ("Left", "Right"))
 
 FloatArray = NDArray[np.float64]
 
@@ -36,15 +36,21 @@ def expression_table() -> Mapping[str, tuple[float, ...]]:
     DataError
         The table is not as it should be.
     """
-    rows = list(csv.reader(files("tts2face.face").joinpath(TABLE).read_text("utf-8").splitlines(), delimiter="\t"))
+    rows = list(
+        csv.reader(files("tts2face.face").joinpath(EXPRESSION_TABLE).read_text("utf-8").splitlines(), delimiter="\t")
+    )
     if tuple(rows[0][1:]) != EXPRESSIONS:
-        raise DataError(f"{TABLE} must have the columns {', '.join(EXPRESSIONS)}, not {', '.join(rows[0][1:])}")
+        raise DataError(
+            f"{EXPRESSION_TABLE} must have the columns {', '.join(EXPRESSIONS)}, not {', '.join(rows[0][1:])}"
+        )
     table: dict[str, tuple[float, ...]] = {}
     for name, *cells in rows[1:]:
         try:
             weights = tuple(float(cell or 0.0) for cell in cells)
         except ValueError as broken:
-            raise DataError(f"{TABLE} holds something that is no weight in the row {name}: {broken}") from broken
+            raise DataError(
+                f"{EXPRESSION_TABLE} holds something that is no weight in the row {name}: {broken}"
+            ) from broken
         sides = ("Left", "Right") if name.endswith(BOTH_SIDES) else ("",)
         table |= {name.removesuffix(BOTH_SIDES) + side: weights for side in sides}
     return table
@@ -52,7 +58,7 @@ def expression_table() -> Mapping[str, tuple[float, ...]]:
 
 def add_expression_shapes(face: Face) -> Face:
     """A face with every shape of expressions, lids and gaze: those that it lacks are carried from the default head."""
-    return add_missing_shapes(face, (*expression_table(), *BLINK, *WIDE, *GAZE))
+    return add_missing_shapes(face, (*expression_table(), *BLINK_SHAPES, *WIDE_SHAPES, *GAZE_SHAPES))
 
 
 def expression_weights(face: Face, mouth: LipConstraints) -> FloatArray:

@@ -14,12 +14,12 @@ from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scat
 from tts2face.models.face import Face
 from tts2face.numeric import ordered_product
 
-SIDES = ("Left", "Right")  # the face's own, in the order of `tts2face.models.palette.EYES`
+SIDES = ("Left", "Right")  # the face's own, in the order of `tts2face.models.palette.EYE_CHANNELS`
 # Upper and lower lid of each eye, at the middle and halfway to the nose: where they meet last.
-LIDS = (((386, 385), (374, 380)), ((159, 158), (145, 153)))
-BLINK, WIDE = ("eyeBlinkLeft", "eyeBlinkRight"), ("eyeWideLeft", "eyeWideRight")
-NARROWING = (("eyeSquintLeft", "cheekSquintLeft"), ("eyeSquintRight", "cheekSquintRight"))
-MOST_NARROWED = 0.6  # of the opening that squinting may take, so that lids that nobody shuts do not meet
+LID_LANDMARK_PAIRS = (((386, 385), (374, 380)), ((159, 158), (145, 153)))
+BLINK_SHAPES, WIDE_SHAPES = ("eyeBlinkLeft", "eyeBlinkRight"), ("eyeWideLeft", "eyeWideRight")
+NARROWING_SHAPES = (("eyeSquintLeft", "cheekSquintLeft"), ("eyeSquintRight", "cheekSquintRight"))
+MAX_NARROWING = 0.6  # of the opening that squinting may take, so that lids that nobody shuts do not meet
 
 FloatArray = NDArray[np.float64]
 
@@ -69,12 +69,12 @@ class EyelidModel:
         columns = self.narrowing[eye]
         taken = -ordered_product(lids[:, columns], self.per_weight[eye, columns])
         others = self.opening[eye] + ordered_product(lids, self.per_weight[eye]) + taken
-        most = MOST_NARROWED * np.maximum(others, 0.0)
+        most = MAX_NARROWING * np.maximum(others, 0.0)
         lids[:, columns] *= np.where(taken > most, most / np.maximum(taken, 1e-9), 1.0)[:, None]
 
 
 def build_eyelid_model(face: Face) -> EyelidModel:
-    """The lids of a face that has the shapes `BLINK`, `WIDE` and `NARROWING`.
+    """The lids of a face that has the shapes `BLINK_SHAPES`, `WIDE_SHAPES` and `NARROWING_SHAPES`.
 
     Raises
     ------
@@ -83,19 +83,23 @@ def build_eyelid_model(face: Face) -> EyelidModel:
     """
     places = scatter_landmarks(face, landmark_positions(face))[:, 1]
     motion = scatter_landmarks(face, landmark_motion(face, np.arange(len(face.shape_names))))[:, 1]
-    opening = np.array([(places[list(upper)] - places[list(lower)]).mean() for upper, lower in LIDS])
-    per_weight = np.stack([(motion[list(upper)] - motion[list(lower)]).mean(axis=0) for upper, lower in LIDS])
+    opening = np.array([(places[list(upper)] - places[list(lower)]).mean() for upper, lower in LID_LANDMARK_PAIRS])
+    per_weight = np.stack(
+        [(motion[list(upper)] - motion[list(lower)]).mean(axis=0) for upper, lower in LID_LANDMARK_PAIRS]
+    )
     number = {name: column for column, name in enumerate(face.shape_names)}
-    blink, wide = (np.array([number[name] for name in names], np.int64) for names in (BLINK, WIDE))
+    blink, wide = (np.array([number[name] for name in names], np.int64) for names in (BLINK_SHAPES, WIDE_SHAPES))
     if not (np.isfinite(opening).all() and (opening > 0).all()):
         raise DataError("the face lacks landmarks of its lids; build it with its landmark table")
     if not all((per_weight[eye, blink[eye]] < 0) and (per_weight[eye, wide[eye]] > 0) for eye in range(len(SIDES))):
-        raise DataError(f"{BLINK[0]} does not shut the face's lids, or {WIDE[0]} does not open them; build it again")
+        raise DataError(
+            f"{BLINK_SHAPES[0]} does not shut the face's lids, or {WIDE_SHAPES[0]} does not open them; build it again"
+        )
     return EyelidModel(
         opening=opening,
         per_weight=per_weight,
         blink=blink,
         wide=wide,
-        narrowing=np.array([[number[name] for name in names] for names in NARROWING], np.int64),
+        narrowing=np.array([[number[name] for name in names] for names in NARROWING_SHAPES], np.int64),
         limits=face.limits.astype(np.float64),
     )

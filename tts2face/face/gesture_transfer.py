@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.face.expressions import GAZE, add_expression_shapes, expression_weights
+from tts2face.face.expressions import GAZE_SHAPES, add_expression_shapes, expression_weights
 from tts2face.face.eyelids import EyelidModel, build_eyelid_model
 from tts2face.face.landmark_fit import N_SKIN, axis_scales, landmark_positions, procrustes_rotation, scatter_landmarks
 from tts2face.face.lip_constraints import LipConstraints, build_lip_constraints
-from tts2face.face.mouth_model import SPEECH_SHAPES
-from tts2face.face.shape_transfer import SIZES, append_shapes, spread_landmark_motion
+from tts2face.face.mouth_model import SPEECH_SHAPE_PREFIXES
+from tts2face.face.shape_transfer import SCALE_LIMITS, append_shapes, spread_landmark_motion
 from tts2face.models.face import Face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, OUTER_LIP_LOWER, OUTER_LIP_UPPER
 from tts2face.models.palette import FEATURES, FIXED_CHANNELS, REGION_FEATURES, FaceRegion, Palette
@@ -26,21 +26,21 @@ from tts2face.types import HEAD_CHANNELS, Trajectory
 
 # Weights of an expression from which the mouth begins to answer, and answers in full: a neutral speaker reads as up to
 # .1 sad or angry (99th percentile of 40 minutes), and the mouth's part of that is in the recorded lips already.
-ANSWERED = (0.05, 0.2)
+MOUTH_RESPONSE_RANGE = (0.05, 0.2)
 SPEECH_GAINS = ("jaw", "lips")
-GAINS = (*FEATURES, *SPEECH_GAINS)  # whose motion may be multiplied
-MOST_MOVED_MM = 10.0  # of a landmark by one mode: brows rise 10 mm at most
+GAIN_NAMES = (*FEATURES, *SPEECH_GAINS)  # whose motion may be multiplied
+MAX_MODE_MM = 10.0  # of a landmark by one mode: brows rise 10 mm at most
 # What stays still while a region moves: the rims of the lids, and the lips. Lids and lips have features of their own.
-LID_RIMS = (
+LID_LANDMARKS = (
     33, 246, 161, 160, 159, 158, 157, 173, 133, 155, 154, 153, 145, 144, 163, 7,
     263, 466, 388, 387, 386, 385, 384, 398, 362, 382, 381, 380, 374, 373, 390, 249,
 )  # fmt: skip
-LIPS = (*OUTER_LIP_UPPER, *OUTER_LIP_LOWER, *INNER_LIP_UPPER, *INNER_LIP_LOWER)
+LIP_LANDMARKS = (*OUTER_LIP_UPPER, *OUTER_LIP_LOWER, *INNER_LIP_UPPER, *INNER_LIP_LOWER)
 # Added to a region when its size is fitted: corners of the eyes, root and base of the nose.
-FRAME = (33, 133, 362, 263, 168, 6, 2)
-USUAL_TURN = 0.4  # rad per weight of a gaze shape on a face whose eyes are part of its shapes
+FIT_LANDMARKS = (33, 133, 362, 263, 168, 6, 2)
+DEFAULT_GAZE_TURN = 0.4  # rad per weight of a gaze shape on a face whose eyes are part of its shapes
 
-Floats = NDArray[np.float32]
+Float32Array = NDArray[np.float32]
 FloatArray = NDArray[np.float64]
 NO_GAINS: Mapping[str, float] = MappingProxyType({})
 
@@ -82,7 +82,7 @@ class GestureFace:
     lids: EyelidModel
 
     def perform(
-        self, speech: Trajectory, gestures: Mapping[str, Floats], gains: Mapping[str, float] = NO_GAINS
+        self, speech: Trajectory, gestures: Mapping[str, Float32Array], gains: Mapping[str, float] = NO_GAINS
     ) -> FaceMotion:
         """Speech with gestures.
 
@@ -126,7 +126,7 @@ class GestureFace:
         """Speech with its jaw and lips multiplied."""
         jaw, lips = (
             np.where([shape.startswith(prefix) for shape in self.face.shape_names], gains.get(name, 1.0), 1.0)
-            for name, prefix in zip(SPEECH_GAINS, SPEECH_SHAPES, strict=True)
+            for name, prefix in zip(SPEECH_GAINS, SPEECH_SHAPE_PREFIXES, strict=True)
         )
         return self.mouth.amplify(spoken, jaw, lips)
 
@@ -147,7 +147,7 @@ class GestureFace:
         added[:, others] = np.clip(spoken[:, others] + added[:, others], low, high) - spoken[:, others]
         return added
 
-    def _check(self, speech: Trajectory, gestures: Mapping[str, Floats], gains: Mapping[str, float]) -> None:
+    def _check(self, speech: Trajectory, gestures: Mapping[str, Float32Array], gains: Mapping[str, float]) -> None:
         if speech.channels != self.face.shape_names[: self.n_speech_shapes]:
             raise InputError("the speech is not in the shapes of this face; retarget it to the face first")
         widths = {name: columns.stop - columns.start for name, columns in self.regions.items()}
@@ -156,13 +156,13 @@ class GestureFace:
 
 def mouth_response(expression: FloatArray) -> FloatArray:
     """Weights of expressions (T, 5) as the mouth answers them, whose motion in a neutral face is speech already."""
-    low, high = ANSWERED
+    low, high = MOUTH_RESPONSE_RANGE
     share = np.clip((np.abs(expression) - low) / (high - low), 0.0, 1.0)
     return np.asarray(expression * share * share * (3.0 - 2.0 * share))
 
 
 def check_gestures(
-    gestures: Mapping[str, Floats], gains: Mapping[str, float], n_frames: int, regions: Mapping[str, int]
+    gestures: Mapping[str, Float32Array], gains: Mapping[str, float], n_frames: int, regions: Mapping[str, int]
 ) -> None:
     """Refuse gestures that are none, or do not fit the frames or the palette; `regions` are numbers of modes.
 
@@ -179,8 +179,8 @@ def check_gestures(
         if values.shape != wanted or not np.isfinite(values).all():
             raise InputError(f"{name} must be finite values {wanted}, not {values.shape}")
     for name, gain in gains.items():
-        if name not in GAINS:
-            raise InputError(f"there is no gain for {name!r}; give {', '.join(GAINS)}")
+        if name not in GAIN_NAMES:
+            raise InputError(f"there is no gain for {name!r}; give {', '.join(GAIN_NAMES)}")
         if not (np.isfinite(gain) and gain >= 0):
             raise InputError(f"the gain of {name} must be 0 or more, not {gain}")
 
@@ -204,7 +204,7 @@ def gesture_face(face: Face, palette: Palette) -> GestureFace:
         first = len(whole.shape_names)
         regions[name] = slice(first, first + len(shapes))
         size = np.linalg.norm(palette.regions[name].modes, axis=2).max(axis=1)
-        most = MOST_MOVED_MM / np.maximum(size.astype(np.float64), 1e-6)
+        most = MAX_MODE_MM / np.maximum(size.astype(np.float64), 1e-6)
         whole = append_shapes(whole, palette.channels(name), shapes, np.column_stack([-most, most]))
     mouth = build_lip_constraints(whole)
     return GestureFace(
@@ -218,7 +218,7 @@ def gesture_face(face: Face, palette: Palette) -> GestureFace:
     )
 
 
-def region_shapes(face: Face, neutral: FloatArray, region: FaceRegion) -> Floats:
+def region_shapes(face: Face, neutral: FloatArray, region: FaceRegion) -> Float32Array:
     """(k, V, 3) shapes of a region's modes on a face, mm per mm.
 
     Notes
@@ -228,7 +228,7 @@ def region_shapes(face: Face, neutral: FloatArray, region: FaceRegion) -> Floats
     """
     places = scatter_landmarks(face, landmark_positions(face))
     own = {*region.landmarks.tolist()}
-    still = [number for number in (*LID_RIMS, *LIPS) if number not in own]
+    still = [number for number in (*LID_LANDMARKS, *LIP_LANDMARKS) if number not in own]
     return spread_landmark_motion(face, region.landmarks, fit_modes(places, neutral, region), still)
 
 
@@ -237,21 +237,22 @@ def fit_modes(places: FloatArray, neutral: FloatArray, region: FaceRegion) -> Fl
     seen: NDArray[np.bool_] = np.isfinite(places[:, 0])
     skin = np.flatnonzero(seen[:N_SKIN])
     turn = procrustes_rotation(neutral[skin], places[skin])
-    fitted = np.array([number for number in (*region.landmarks, *FRAME) if seen[number]])
-    sizes = axis_scales(ordered_product(neutral[fitted], turn.T), places[fitted], SIZES)
+    fitted = np.array([number for number in (*region.landmarks, *FIT_LANDMARKS) if seen[number]])
+    sizes = axis_scales(ordered_product(neutral[fitted], turn.T), places[fitted], SCALE_LIMITS)
     return ordered_product(region.modes.astype(np.float64), turn.T) * sizes
 
 
 def gaze_weights(face: Face) -> FloatArray:
     """(4, K) weight of each gaze shape per radian of looking down, up, to the face's own left, and right.
 
-    Eyes that turn take their own angles; shapes that move eyes as part of the skin are taken to turn them `USUAL_TURN`.
+    Eyes that turn take their own angles; shapes that move eyes as part of the skin are taken to turn them by
+    `DEFAULT_GAZE_TURN`.
     """
     directions = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])  # about x and y
     weights = np.zeros((4, len(face.shape_names)))
     turns = {name: turn for eye in face.eyes for name, turn in eye.turns.items()}
-    for name in GAZE:
-        turn = np.asarray(turns.get(name, USUAL_TURN * _default_gaze_axis(name)), np.float64)[:2]
+    for name in GAZE_SHAPES:
+        turn = np.asarray(turns.get(name, DEFAULT_GAZE_TURN * _default_gaze_axis(name)), np.float64)[:2]
         main = int(np.abs(turn).argmax())
         along = directions[:, main] * turn[main]
         weights[:, face.shape_names.index(name)] = np.where(along > 0, 1.0 / np.maximum(along, 1e-6), 0.0)

@@ -15,15 +15,15 @@ from tts2face.models.landmarks import (
 from tts2face.numeric import ordered_product
 
 FloatArray = NDArray[np.float64]
-SPEECH_SHAPES = ("jaw", "mouth")  # how the names of the shapes that speech moves begin
+SPEECH_SHAPE_PREFIXES = ("jaw", "mouth")  # how the names of the shapes that speech moves begin
 CORNERS_LEFT, CORNERS_RIGHT = (OUTER_LIP_UPPER[-1], INNER_LIP_UPPER[-1]), (OUTER_LIP_UPPER[0], INNER_LIP_UPPER[0])
-CHIN_POINTS = (175, 199, 171, 396, 208, 428)  # where the skin lies on the bone of the jaw
+CHIN_LANDMARKS = (175, 199, 171, 396, 208, 428)  # where the skin lies on the bone of the jaw
 MIDDLE_PAIR = INNER_LIP_UPPER.index(UPPER_LIP_INNER_MID)
 LIP_WEIGHT = 10.0  # a lip landmark against one of the jaw or cheek
 DEPTH_WEIGHT = 0.1  # z against x and y: a single camera sees depth with some ten times their error
 WIDTH_WEIGHT = 60.0  # the mouth's width, likewise: rounding is the other thing that a viewer reads from lips
 CHIN_WEIGHT = 600.0  # the drop of the chin, likewise: it sets how far the teeth go apart
-EFFORT = 0.005  # share of the mean curvature that draws every weight to 0: makes the answer unique and calm
+REGULARISATION = 0.005  # share of the mean curvature that draws every weight to 0: makes the answer unique and calm
 
 
 def mouth_curvature(moved: FloatArray, common: list[int]) -> FloatArray:
@@ -36,11 +36,11 @@ def mouth_curvature(moved: FloatArray, common: list[int]) -> FloatArray:
     """
     at = {landmark: row for row, landmark in enumerate(common)}
     curvature: FloatArray = np.einsum("ldk,ldj->kj", moved * landmark_weights(common)[..., None], moved)
-    effort = EFFORT * np.trace(curvature) / moved.shape[-1]
+    effort = REGULARISATION * np.trace(curvature) / moved.shape[-1]
     left, right = ([at[corner] for corner in corners] for corners in (CORNERS_LEFT, CORNERS_RIGHT))
     widened = moved[left, 0] - moved[right, 0]
     curvature += WIDTH_WEIGHT * ordered_product(widened.T, widened) + effort * np.eye(moved.shape[-1])
-    dropped = moved[[at[landmark] for landmark in CHIN_POINTS if landmark in at], 1].mean(axis=0)
+    dropped = moved[[at[landmark] for landmark in CHIN_LANDMARKS if landmark in at], 1].mean(axis=0)
     curvature += CHIN_WEIGHT * np.outer(dropped, dropped)
     return curvature
 

@@ -13,10 +13,10 @@ from lexicon.errors import DataError, InputError
 
 FloatArray = NDArray[np.float64]
 
-REACH = 64.0  # the basis function is exp(-r / 64) (eq. 4) ...
+DECAY_LENGTH = 64.0  # the basis function is exp(-r / 64) (eq. 4) ...
 FACE_WIDTH = 200.0  # ... where a face is this wide: picture elements in the paper, whatever the unit here
-LEAST_APART = 1e-6  # of the reach; centres nearer than this are one place, whose matrix cannot be inverted
-AT_ONCE = 4096  # places evaluated at once, to bound memory
+MIN_CENTRE_DISTANCE = 1e-6  # of the reach; centres nearer than this are one place, whose matrix cannot be inverted
+CHUNK_SIZE = 4096  # places evaluated at once, to bound memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,8 +40,8 @@ class Interpolant:
     def __call__(self, places: NDArray[np.floating]) -> FloatArray:
         """(P, E) displacements at places (P, D)."""
         found = np.zeros((len(places), self.coefficients.shape[1]))
-        for first in range(0, len(places), AT_ONCE):
-            span = slice(first, first + AT_ONCE)
+        for first in range(0, len(places), CHUNK_SIZE):
+            span = slice(first, first + CHUNK_SIZE)
             found[span] = rbf_values(places[span], self.centres, self.decay_length) @ self.coefficients
         return found
 
@@ -80,8 +80,8 @@ def fit_interpolant(
     places, wanted = check_centres(centres, displacements)
     if not face_width > 0:
         raise InputError(f"the face's width must be above 0, not {face_width}")
-    reach = REACH / FACE_WIDTH * face_width
-    if len(places) > 1 and float(pdist(places).min()) < LEAST_APART * reach:
+    reach = DECAY_LENGTH / FACE_WIDTH * face_width
+    if len(places) > 1 and float(pdist(places).min()) < MIN_CENTRE_DISTANCE * reach:
         raise DataError("two centres lie in one place; give each place one displacement")
     coefficients = solve(rbf_values(places, places, reach), wanted, assume_a="pos")
     return Interpolant(places, coefficients, reach)

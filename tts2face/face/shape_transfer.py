@@ -14,16 +14,18 @@ from tts2face.models.face import Eye, Face
 from tts2face.models.face_file import load_face
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS
 
-DEFAULT = "head"
+DEFAULT_FACE = "head"
 SOFT_PARTS = ("lash", "brow")  # parts that go with the skin, by what their names hold
 SUPPORT = 0.3  # of the distance of the outer eye corners, some 27 mm: from a brow to its lid and no further
-ONE_PLACE = 0.02  # of that distance: landmarks nearer than 2 mm, as those of closed lips, are one centre
+MERGE_DISTANCE = 0.02  # of that distance: landmarks nearer than 2 mm, as those of closed lips, are one centre
 DIGITS = 5  # of a displacement in mm; the last bits of a solver depend on its threads
-MOST_CARRIED = 1.5  # a carried shape reaches further than on the default head where a face is made so
-DRAWN_IN = 1.5  # times as far as on the default head do eyeballs go in: carried lids follow the eyeball less closely
-SIZES = (0.4, 2.5)  # a face's features against another's, axis by axis; beyond that landmarks are wrong
+MAX_CARRIED_WEIGHT = 1.5  # a carried shape reaches further than on the default head where a face is made so
+EYEBALL_RETRACTION_FACTOR = (
+    1.5  # times as far as on the default head do eyeballs go in: carried lids follow the eyeball less closely
+)
+SCALE_LIMITS = (0.4, 2.5)  # a face's features against another's, axis by axis; beyond that landmarks are wrong
 
-Floats = NDArray[np.float32]
+Float32Array = NDArray[np.float32]
 FloatArray = NDArray[np.float64]
 
 
@@ -58,7 +60,7 @@ def soft_vertices(face: Face) -> NDArray[np.int64]:
 
 def spread_landmark_motion(
     face: Face, landmarks: NDArray[np.integer], motion: FloatArray, still: Sequence[int] = ()
-) -> Floats:
+) -> Float32Array:
     """(k, V, 3) displacement of the vertices for k motions (k, L, 3) of landmarks, mm.
 
     Landmarks that the face lacks are left out; those of `still` stay where they are.
@@ -71,14 +73,14 @@ def spread_landmark_motion(
     if not numbers:
         return shapes
     size = eye_distance(face)
-    centres, moved = _merge_places(places[numbers], wanted[numbers].reshape(len(numbers), -1), ONE_PLACE * size)
+    centres, moved = _merge_places(places[numbers], wanted[numbers].reshape(len(numbers), -1), MERGE_DISTANCE * size)
     soft = soft_vertices(face)
     carried = fit_local_interpolant(centres, moved, SUPPORT * size)(face.vertices[soft])
     shapes[:, soft] = np.round(carried, DIGITS).reshape(len(soft), -1, 3).transpose(1, 0, 2)
     return shapes
 
 
-def append_shapes(face: Face, names: Sequence[str], shapes: Floats, limits: NDArray[np.floating]) -> Face:
+def append_shapes(face: Face, names: Sequence[str], shapes: Float32Array, limits: NDArray[np.floating]) -> Face:
     """A face with more shapes (k, V, 3), and their limits (k, 2)."""
     return replace(
         face,
@@ -99,14 +101,14 @@ def add_missing_shapes(face: Face, names: Sequence[str]) -> Face:
     head = default_head()
     common = np.intersect1d(face.landmarks[face.landmarks < N_SKIN], head.landmarks)
     here, there = (scatter_landmarks(one, landmark_positions(one)) for one in (face, head))
-    sizes = axis_scales(there[common], here[common], SIZES)
+    sizes = axis_scales(there[common], here[common], SCALE_LIMITS)
     motion = scatter_landmarks(
         head, landmark_motion(head, np.array([head.shape_names.index(name) for name in missing]))
     )
     shapes = spread_landmark_motion(face, common, motion[common].transpose(2, 0, 1) * sizes)
     for eye in face.eyes:
         shapes[:, eye.first : eye.first + eye.count] = _eyeball_retraction(eye, missing)[:, None] * sizes
-    limits = np.tile([0.0, MOST_CARRIED], (len(missing), 1))
+    limits = np.tile([0.0, MAX_CARRIED_WEIGHT], (len(missing), 1))
     return replace(
         append_shapes(face, missing, shapes, limits), eyes=tuple(_add_eye_turns(eye, missing) for eye in face.eyes)
     )
@@ -133,7 +135,7 @@ def _eyeball_retraction(eye: Eye, names: Sequence[str]) -> FloatArray:
     """(k, 3) how far the default head's shapes shift the eyeball of this side, mm: lids that shut slide over it."""
     head, model = default_head(), _default_head_eye(eye)
     shifts = [head.shapes[head.shape_names.index(name), model.first : model.first + model.count] for name in names]
-    return DRAWN_IN * np.stack([shift.mean(axis=0, dtype=np.float64) for shift in shifts])
+    return EYEBALL_RETRACTION_FACTOR * np.stack([shift.mean(axis=0, dtype=np.float64) for shift in shifts])
 
 
 def _add_eye_turns(eye: Eye, missing: Sequence[str]) -> Eye:
@@ -150,4 +152,4 @@ def _default_head_eye(eye: Eye) -> Eye:
 @cache
 def default_head() -> Face:
     """The head from which motion is carried."""
-    return load_face(DEFAULT)
+    return load_face(DEFAULT_FACE)

@@ -5,10 +5,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
+FloatArray = NDArray[np.float64]
 
 
-def span_weights(times: ArrayLike, start: float, end: float, ease_s: float) -> Floats:
+def span_weights(times: ArrayLike, start: float, end: float, ease_s: float) -> FloatArray:
     """Share (T,) of a span that is on at each of T times: 0 outside, 1 inside, half at its edges.
 
     The span's step smoothed by a raised cosine `ease_s` wide, so that the shares of spans that meet add up to 1. A span
@@ -20,13 +20,13 @@ def span_weights(times: ArrayLike, start: float, end: float, ease_s: float) -> F
     return begun - ended
 
 
-def _raised_cosine_integral(share: Floats) -> Floats:
+def _raised_cosine_integral(share: FloatArray) -> FloatArray:
     """From 0 at -1/2 to 1 at 1/2: the integral of a raised cosine."""
     at = np.clip(2 * share, -1.0, 1.0)
     return 0.5 * (1 + at + np.sin(np.pi * at) / np.pi)
 
 
-def interpolate_keys(times: ArrayLike, keys: tuple[tuple[float, float], ...]) -> Floats:
+def interpolate_keys(times: ArrayLike, keys: tuple[tuple[float, float], ...]) -> FloatArray:
     """Values (T,) on a curve through (time, value) keys that stands still at each; constant outside them."""
     seconds = np.asarray(times, np.float64)
     curve = np.full(seconds.shape, keys[0][1])

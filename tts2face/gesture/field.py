@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture.field_kernels import APART, SLACK, generate_frames, nearest_distances
+from tts2face.gesture.field_kernels import MIN_MOMENT_GAP, SEARCH_SLACK, generate_frames, nearest_distances
 from tts2face.gesture.kd_tree import KdTree, build_tree
 from tts2face.models.palette import GESTURE_FPS
 
-DIMENSIONS = 8  # of the search: the windows' principal axes
-SAMPLED = 8  # every so many windows tell the axes; all of them tell the same
-ASKED = 200  # moments whose nearest ones are looked for
-Floats = NDArray[np.float32]
+N_SEARCH_AXES = 8  # of the search: the windows' principal axes
+AXES_STRIDE = 8  # every so many windows tell the axes; all of them tell the same
+N_DISTANCE_SAMPLES = 200  # moments whose nearest ones are looked for
+Float32Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,8 +67,8 @@ class FieldOptions:
     future: int = 20
     settle_s: float = 0.06
     memory: int = 400
-    apart: int = APART
-    search_error: float = SLACK
+    apart: int = MIN_MOMENT_GAP
+    search_error: float = SEARCH_SLACK
 
     def __post_init__(self) -> None:
         """Refuse numbers outside their range."""
@@ -106,13 +106,13 @@ class Field:
         Mean squared distance of a moment from the one most like it; median.
     """
 
-    values: Floats
-    heard: Floats
+    values: Float32Array
+    heard: Float32Array
     starts: NDArray[np.int32]
-    axes: Floats
+    axes: Float32Array
     tree: KdTree
     scale: float
-    weights: Floats
+    weights: Float32Array
     median_distance: float
     options: FieldOptions
 
@@ -135,10 +135,10 @@ class FieldState:
         Frames shown so far.
     """
 
-    shown: Floats
-    heard: Floats
+    shown: Float32Array
+    heard: Float32Array
     moment: int
-    offset: Floats
+    offset: Float32Array
     recent_jumps: NDArray[np.int64]
     n_frames: int
 
@@ -147,12 +147,12 @@ class FieldState:
 class FieldSample:
     """Frames (n, D) in the units of the recordings, the recorded moment (n,) of each, and the state behind them."""
 
-    values: Floats
+    values: Float32Array
     moments: NDArray[np.int64]
     state: FieldState
 
 
-def build_field(values: Floats, heard: Floats, lengths: NDArray[np.int32], options: FieldOptions) -> Field:
+def build_field(values: Float32Array, heard: Float32Array, lengths: NDArray[np.int32], options: FieldOptions) -> Field:
     """Index recorded motion (T, D) with the sound (T, E) that went with it; recordings of `lengths` (R,) frames.
 
     Raises
@@ -178,7 +178,7 @@ def build_field(values: Floats, heard: Floats, lengths: NDArray[np.int32], optio
     weights = (np.sqrt(np.array(options.alpha[: heard.shape[1]])) / spread).astype(np.float32)
     scaled = np.ascontiguousarray(values / np.float32(scale), np.float32)
     weighted = np.ascontiguousarray(heard * weights, np.float32)
-    axes = _principal_axes(_history_windows(scaled, weighted, usable[::SAMPLED], options.history))
+    axes = _principal_axes(_history_windows(scaled, weighted, usable[::AXES_STRIDE], options.history))
     tree = build_tree(_history_windows(scaled, weighted, usable, options.history) @ axes.T)
     tree.order[:] = usable[tree.order]
     made = Field(scaled, weighted, starts, axes, tree, scale, weights, 1.0, options)
@@ -186,13 +186,13 @@ def build_field(values: Floats, heard: Floats, lengths: NDArray[np.int32], optio
 
 
 def _median_nearest_distance(made: Field, usable: NDArray[np.int64]) -> float:
-    moments = usable[np.linspace(0, len(usable) - 1, min(ASKED, len(usable))).astype(int)]
+    moments = usable[np.linspace(0, len(usable) - 1, min(N_DISTANCE_SAMPLES, len(usable))).astype(int)]
     away = np.zeros(len(moments))
     nearest_distances(_field_arrays(made), _tree_arrays(made.tree), made.axes, made.options.history, (moments, away))
     return max(float(np.median(away[np.isfinite(away)])) if np.isfinite(away).any() else 1.0, 1e-9)
 
 
-def _field_arrays(made: Field) -> tuple[Floats, Floats, NDArray[np.int32]]:
+def _field_arrays(made: Field) -> tuple[Float32Array, Float32Array, NDArray[np.int32]]:
     return made.values, made.heard, made.starts
 
 
@@ -200,21 +200,23 @@ def _tree_arrays(tree: KdTree) -> tuple[NDArray[Any], ...]:
     return tree.places, tree.order, tree.spans, tree.axes, tree.cuts
 
 
-def _history_windows(values: Floats, heard: Floats, frames: NDArray[np.int64], history: int) -> Floats:
+def _history_windows(
+    values: Float32Array, heard: Float32Array, frames: NDArray[np.int64], history: int
+) -> Float32Array:
     """(N, h (E + D)) what was heard and shown before each of N frames."""
     rows = frames[:, None] + np.arange(-history, 0)
     return np.concatenate([heard[rows].reshape(len(rows), -1), values[rows].reshape(len(rows), -1)], axis=1)
 
 
-def _principal_axes(windows: Floats) -> Floats:
+def _principal_axes(windows: Float32Array) -> Float32Array:
     away = (windows - windows.mean(axis=0)).astype(np.float64)
     _, vectors = np.linalg.eigh(np.asarray(away.T @ away))
-    return np.ascontiguousarray(vectors[:, ::-1][:, :DIMENSIONS].T, np.float32)
+    return np.ascontiguousarray(vectors[:, ::-1][:, :N_SEARCH_AXES].T, np.float32)
 
 
 def _no_recent_jumps(made: Field) -> NDArray[np.int64]:
     """No leaps to remember; of few recordings fewer, so that some moment is always left."""
-    return np.full(min(made.options.memory, len(made.tree.order) // (8 * APART)), -APART, np.int64)
+    return np.full(min(made.options.memory, len(made.tree.order) // (8 * MIN_MOMENT_GAP)), -MIN_MOMENT_GAP, np.int64)
 
 
 def _spring(settle_s: float) -> tuple[np.float32, np.float32]:
@@ -246,8 +248,8 @@ def transfer_state(state: FieldState, before: Field, after: Field) -> FieldState
 
 
 def sample_field(
-    field: Field, state: FieldState, heard: Floats, chances: NDArray[np.float64]
-) -> tuple[Floats, FieldState]:
+    field: Field, state: FieldState, heard: Float32Array, chances: NDArray[np.float64]
+) -> tuple[Float32Array, FieldState]:
     """The next n frames (n, D), in the units of the recordings, and the state behind them; in parts as at once.
 
     Parameters
@@ -261,7 +263,9 @@ def sample_field(
     return made.values, made.state
 
 
-def sample_field_moments(field: Field, state: FieldState, heard: Floats, chances: NDArray[np.float64]) -> FieldSample:
+def sample_field_moments(
+    field: Field, state: FieldState, heard: Float32Array, chances: NDArray[np.float64]
+) -> FieldSample:
     """As `sample_field`, with the recorded moments that were shown."""
     if not len(chances):
         return FieldSample(np.zeros((0, state.offset.shape[1]), np.float32), np.zeros(0, np.int64), state)

@@ -4,8 +4,10 @@ import numpy as np
 
 from tts2face.compilation import kernel
 
-SLACK = 1.1  # default search error: moments found are at most so much farther than the best (Ju and Lee 2008 use ANN)
-APART = 10  # default least number of frames between two moments that count as different
+SEARCH_SLACK = (
+    1.1  # default search error: moments found are at most so much farther than the best (Ju and Lee 2008 use ANN)
+)
+MIN_MOMENT_GAP = 10  # default least number of frames between two moments that count as different
 
 
 @kernel
@@ -20,7 +22,9 @@ def nearest_distances(corpus, tree, axes, history, asked):  # type: ignore[no-un
         best[:], distance[:] = -1, np.inf
         window = (values[moments[n] - history : moments[n]], recorded[moments[n] - history : moments[n]], 0, history)
         _project_window(window, axes, query)
-        _search_tree(corpus, tree, window, query, (best[:0], best, distance, (APART, SLACK), stack, bounds))
+        _search_tree(
+            corpus, tree, window, query, (best[:0], best, distance, (MIN_MOMENT_GAP, SEARCH_SLACK), stack, bounds)
+        )
         away[n] = distance[1]
 
 
@@ -90,7 +94,7 @@ def _insert_moment(moment, away, known, found):  # type: ignore[no-untyped-def]
     if away >= distance[at]:
         return
     for r in range(len(recent)):
-        if abs(recent[r] - moment) < APART:
+        if abs(recent[r] - moment) < MIN_MOMENT_GAP:
             return
     for c in range(len(best)):
         if best[c] >= 0 and starts[best[c]] == starts[moment] and abs(best[c] - moment) < apart:

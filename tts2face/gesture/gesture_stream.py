@@ -17,8 +17,8 @@ from tts2face.interpolation import interpolate_cubic
 from tts2face.models.palette import FEATURES, GESTURE_FPS, FeatureChange, Palette, Style
 from tts2face.types import Waveform
 
-BEYOND = 2  # frames of a field behind an instant, which its cubic needs
-UNCHANGED = FeatureChange()
+N_LOOKAHEAD_FRAMES = 2  # frames of a field behind an instant, which its cubic needs
+NO_CHANGE = FeatureChange()
 # Chosen within three quarters of the recordings of GRID s1 (docs/gestures.md); the others take the options of brows.
 OPTIONS: Mapping[str, FieldOptions] = MappingProxyType(
     {
@@ -36,8 +36,8 @@ OPTIONS: Mapping[str, FieldOptions] = MappingProxyType(
         ),
     }
 )
-Floats = NDArray[np.float32]
-Gestures = Mapping[str, Floats]  # (T, k) values of each feature
+Float32Array = NDArray[np.float32]
+GestureValues = Mapping[str, Float32Array]  # (T, k) values of each feature
 
 
 @dataclass(slots=True, eq=False)
@@ -69,9 +69,9 @@ class GestureFields:
     def change(self, style: str, feature: str) -> FeatureChange:
         """What a style does to the feature of its source."""
         derived = self.palette.derivations.get(style)
-        return UNCHANGED if derived is None else derived.changes.get(feature, UNCHANGED)
+        return NO_CHANGE if derived is None else derived.changes.get(feature, NO_CHANGE)
 
-    def apply_change(self, style: str, feature: str, values: Floats) -> Floats:
+    def apply_change(self, style: str, feature: str, values: Float32Array) -> Float32Array:
         """Values (T, k) of a feature's source with the gain and offset of a style."""
         change = self.change(style, feature)
         middle = style_median(self.palette.styles[self.source(style, feature)], feature)
@@ -97,7 +97,7 @@ class GestureStream:
         self._tracks = {name: _FeatureTrack(fields, name, style, seed) for name in fields.features}
         self._n_frames = 0
 
-    def next(self, sound: Waveform, n_frames: int, timeline: Timeline) -> Gestures:
+    def next(self, sound: Waveform, n_frames: int, timeline: Timeline) -> GestureValues:
         """Values of every feature for the next n frames, in which a sound is heard.
 
         Expressions and nods of the timeline, whose clock is the clip's, are in it; its gains of features, too.
@@ -112,7 +112,7 @@ class GestureStream:
         return made
 
 
-def apply_timeline(feature: str, values: Floats, times: NDArray[np.float64], timeline: Timeline) -> Floats:
+def apply_timeline(feature: str, values: Float32Array, times: NDArray[np.float64], timeline: Timeline) -> Float32Array:
     """Values (T, k) of a feature with the gain, expressions and nods of a timeline."""
     values = np.asarray(values * np.float32(timeline.gains.of(feature)), np.float32)
     if feature == "expression":
@@ -127,9 +127,9 @@ class _SoundFeatures:
 
     def __init__(self, sound: Waveform, begin: float, *, with_pitch: bool) -> None:
         self._sound, self._begin, self._with_pitch = sound, begin, with_pitch
-        self._found: dict[bytes, Floats] = {}
+        self._found: dict[bytes, Float32Array] = {}
 
-    def at(self, times: NDArray[np.float64]) -> Floats:
+    def at(self, times: NDArray[np.float64]) -> Float32Array:
         """(T, 1 or 2) as `prosody_features`."""
         key = times.tobytes()
         if key not in self._found:
@@ -150,9 +150,9 @@ class _FeatureTrack:
         self._values = np.zeros((0, made.values.shape[1]), np.float32)
 
     def extend(self, sound: "_SoundFeatures", end: float, timeline: Timeline) -> None:
-        """Add frames up to `BEYOND` an instant."""
+        """Add frames up to `N_LOOKAHEAD_FRAMES` an instant."""
         first = len(self._times)
-        while len(self._times) <= BEYOND or self._times[-1 - BEYOND] <= end:
+        while len(self._times) <= N_LOOKAHEAD_FRAMES or self._times[-1 - N_LOOKAHEAD_FRAMES] <= end:
             tempo = 1.0
             if self._times:
                 (style,) = timeline.style_at(self._feature, self._times[-1], default=self._style)
@@ -171,7 +171,7 @@ class _FeatureTrack:
         parts = [self._sample(styles[low], heard[low:high], chances[low:high]) for low, high in pairwise(borders)]
         self._values = np.concatenate([self._values, *parts])
 
-    def _sample(self, source: str, heard: Floats, chances: NDArray[np.float64]) -> Floats:
+    def _sample(self, source: str, heard: Float32Array, chances: NDArray[np.float64]) -> Float32Array:
         made = self._fields.of(source, self._feature)
         if source != self._source:
             self._state = transfer_state(self._state, self._fields.of(self._source, self._feature), made)
@@ -179,7 +179,7 @@ class _FeatureTrack:
         values, self._state = sample_field(made, self._state, heard, chances)
         return values
 
-    def at(self, times: NDArray[np.float64], timeline: Timeline) -> Floats:
+    def at(self, times: NDArray[np.float64], timeline: Timeline) -> Float32Array:
         """(T, k) values at instants, changed as the styles state; older frames are forgotten."""
         clock = np.array(self._times)
         values = interpolate_cubic(self._values, np.interp(times, clock, np.arange(len(clock))))
@@ -187,11 +187,11 @@ class _FeatureTrack:
         changed = np.zeros_like(values)
         for style, share in shares.items():
             changed += share.astype(np.float32)[:, None] * self._fields.apply_change(style, self._feature, values)
-        passed = max(0, bisect_right(self._times, times[-1]) - 1 - BEYOND)
+        passed = max(0, bisect_right(self._times, times[-1]) - 1 - N_LOOKAHEAD_FRAMES)
         self._times, self._values = self._times[passed:], self._values[passed:]
         return changed
 
 
-def style_median(style: Style, feature: str) -> Floats:
+def style_median(style: Style, feature: str) -> Float32Array:
     """(k,) median of a style's feature: where the face mostly is."""
     return np.asarray(np.median(style.motion[feature], axis=0), np.float32)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tts2face.compilation import kernel
 
-LEAF = 32  # places in a leaf at most; 16 to 96 are as fast within a tenth
+MAX_LEAF_SIZE = 32  # places in a leaf at most; 16 to 96 are as fast within a tenth
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +38,7 @@ class KdTree:
 
 def build_tree(places: NDArray[np.float32]) -> KdTree:
     """The tree of (N, p) places, N at least 1. O(N log N) time, O(N p) memory."""
-    n_levels = max(0, int(np.ceil(np.log2(max(len(places) / LEAF, 1.0)))))
+    n_levels = max(0, int(np.ceil(np.log2(max(len(places) / MAX_LEAF_SIZE, 1.0)))))
     n_nodes = 2 ** (n_levels + 1) - 1
     order = np.arange(len(places), dtype=np.int32)
     spans = np.zeros((n_nodes, 2), np.int32)

@@ -4,15 +4,15 @@ import math
 from collections.abc import Iterator, Mapping
 
 from lexicon.errors import InputError
-from tts2face.gesture.spans import GAINED, ExpressionSpan, Gains, check_feature
+from tts2face.gesture.spans import GAIN_NAMES, ExpressionSpan, Gains, check_feature
 from tts2face.models.palette import FEATURES
 
-ALL = "all"  # every feature
+ALL_FEATURES = "all"  # every feature
 
 
 def expand_feature(name: str) -> tuple[str, ...]:
     """The features that a name stands for: itself, or every one of them for ``all``."""
-    return FEATURES if name == ALL else (check_feature(name),)
+    return FEATURES if name == ALL_FEATURES else (check_feature(name),)
 
 
 def parse_style(written: str) -> Mapping[str, str]:
@@ -28,12 +28,12 @@ def parse_style(written: str) -> Mapping[str, str]:
     chosen: dict[str, str] = {}
     hint = "a style is a name, or features with styles such as brows=annoyed,head=delighted"
     for name, style in _parse_pairs(written, hint, is_named=False):
-        if (name or ALL) in chosen:
-            raise InputError(f"{written!r} chooses a style for {name or ALL} twice; keep one")
-        if name not in {"", ALL}:
+        if (name or ALL_FEATURES) in chosen:
+            raise InputError(f"{written!r} chooses a style for {name or ALL_FEATURES} twice; keep one")
+        if name not in {"", ALL_FEATURES}:
             check_feature(name)
-        chosen[name or ALL] = style
-    base = chosen.pop(ALL, None)
+        chosen[name or ALL_FEATURES] = style
+    base = chosen.pop(ALL_FEATURES, None)
     return (dict.fromkeys(FEATURES, base) if base is not None else {}) | chosen
 
 
@@ -50,10 +50,10 @@ def parse_gains(written: str) -> Gains:
     for name, number in _parse_pairs(written, hint):
         if name in chosen:
             raise InputError(f"{written!r} chooses a gain for {name} twice; keep one")
-        if name != ALL:
-            check_feature(name, GAINED)
+        if name != ALL_FEATURES:
+            check_feature(name, GAIN_NAMES)
         chosen[name] = _parse_number(number, hint)
-    base = chosen.pop(ALL, None)
+    base = chosen.pop(ALL_FEATURES, None)
     return Gains((dict.fromkeys(FEATURES, base) if base is not None else {}) | chosen)
 
 

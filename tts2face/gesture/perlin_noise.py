@@ -8,16 +8,16 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.gesture.gesture_stream import GestureFields, Gestures, apply_timeline, style_median
+from tts2face.gesture.gesture_stream import GestureFields, GestureValues, apply_timeline, style_median
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.types import Waveform
 
 OCTAVES_HZ = (0.5, 1.0, 2.0)  # each half as strong as the last (Perlin 1985)
-NOISE_SPREAD = 0.164  # standard deviation of the octaves' sum, over two hours of it
-BLINK_S = 0.2  # from open to open
-SHUT = 0.5  # share from which a lid counts as shut
-Floats = NDArray[np.float32]
+NOISE_STANDARD_DEVIATION = 0.164  # standard deviation of the octaves' sum, over two hours of it
+BLINK_DURATION_S = 0.2  # from open to open
+CLOSED_SHARE = 0.5  # share from which a lid counts as shut
+Float32Array = NDArray[np.float32]
 
 
 class NoiseStream:
@@ -27,7 +27,7 @@ class NoiseStream:
         self._fields, self._style, self._seed, self._fps = fields, fields.palette.require(style), seed, fps
         self._n_frames = 0
 
-    def next(self, sound: Waveform, n_frames: int, timeline: Timeline) -> Gestures:
+    def next(self, sound: Waveform, n_frames: int, timeline: Timeline) -> GestureValues:
         """Values of every feature for the next n frames; the sound changes nothing."""
         times = (self._n_frames + np.arange(n_frames)) / self._fps
         self._n_frames += n_frames
@@ -35,7 +35,7 @@ class NoiseStream:
             name: apply_timeline(name, self._values(name, times), times, timeline) for name in self._fields.features
         }
 
-    def _values(self, feature: str, times: NDArray[np.float64]) -> Floats:
+    def _values(self, feature: str, times: NDArray[np.float64]) -> Float32Array:
         style = self._fields.palette.styles[self._fields.source(self._style, feature)]
         motion, key = style.motion[feature], (self._seed << 32) + crc32(feature.encode())
         if feature == "blink":
@@ -58,25 +58,25 @@ def perlin_noise(times: NDArray[np.float64], key: int) -> NDArray[np.float64]:
         blend = part**3 * (part * (6 * part - 15) + 10)
         left, right = _hash_noise(low, key, octave) * part, _hash_noise(low + 1, key, octave) * (part - 1)
         total += 0.5**octave * ((1 - blend) * left + blend * right)
-    return total / NOISE_SPREAD
+    return total / NOISE_STANDARD_DEVIATION
 
 
 def blink_closure(times: NDArray[np.float64], rate: float, key: int) -> NDArray[np.float64]:
     """(T,) share by which lids are shut: raised cosines that begin at random, `rate` a second in the mean."""
-    cell = BLINK_S / 2
+    cell = BLINK_DURATION_S / 2
     first = int(np.floor(times[0] / cell)) - 2
     numbers = np.arange(first, int(np.floor(times[-1] / cell)) + 1)
     begins = numbers[(_hash_noise(numbers, key, 0) + 1) / 2 < rate * cell] * cell
     shut = np.zeros(len(times))
     for begin in begins:
-        away = np.abs(times - begin - BLINK_S / 2) / (BLINK_S / 2)
+        away = np.abs(times - begin - BLINK_DURATION_S / 2) / (BLINK_DURATION_S / 2)
         shut = np.maximum(shut, np.where(away < 1, 0.5 + 0.5 * np.cos(np.pi * away), 0.0))
     return shut
 
 
-def blinks_per_second(shut: Floats) -> float:
+def blinks_per_second(shut: Float32Array) -> float:
     """How often the lids (T, 2) of a style's recordings shut."""
-    is_shut = shut.mean(axis=1) > SHUT
+    is_shut = shut.mean(axis=1) > CLOSED_SHARE
     return float((np.diff(is_shut.astype(np.int8)) > 0).sum()) * GESTURE_FPS / max(len(shut), 1)
 
 

@@ -10,19 +10,19 @@ from tts2face.types import Waveform
 QUIET_DB, LOUD_DB = -35.0, 10.0  # against the mean level of speech; what lies beyond tells nothing more
 AUDIBLE_DB = 30.0  # a sound whose loudest instant is below, against 20 micropascals, holds no speech
 HIGH_SEMITONES = 12.0
-SILENCE = np.array([QUIET_DB, 0.0], np.float32)
-LEAST_S = 0.1  # shorter sounds have no pitch
+SILENT_PROSODY = np.array([QUIET_DB, 0.0], np.float32)
+MIN_PITCH_SOUND_S = 0.1  # shorter sounds have no pitch
 
-Floats = NDArray[np.float32]
+Float32Array = NDArray[np.float32]
 
 
-def prosody_features(sound: Waveform, times: NDArray[np.float64], *, with_pitch: bool) -> Floats:
+def prosody_features(sound: Waveform, times: NDArray[np.float64], *, with_pitch: bool) -> Float32Array:
     """(T, 1 or 2) intensity in dB against the sound's speech, and pitch in semitones against its median.
 
     Instants beyond the sound are silent.
     """
-    heard = np.tile(SILENCE[: 2 if with_pitch else 1], (len(times), 1))
-    if sound.duration < LEAST_S:
+    heard = np.tile(SILENT_PROSODY[: 2 if with_pitch else 1], (len(times), 1))
+    if sound.duration < MIN_PITCH_SOUND_S:
         return heard
     grid = np.arange(0.0, sound.duration, 0.02)
     levels = intensity(sound, grid)

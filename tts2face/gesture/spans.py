@@ -13,10 +13,10 @@ from typing import TypeVar
 from lexicon.errors import InputError
 from tts2face.models.palette import EXPRESSIONS, FEATURES
 
-WEIGHTS = (-0.5, 1.5)  # -e to 1 + e with e = 0.5, the middle of what Ju and Lee 2008 (section 4) allow
-GAINS = (0.0, 3.0)  # beyond three times as far, lids and brows of any face are at their limits
-GAINED = (*FEATURES, "jaw", "lips")
-NOD_SIZES = (0.1, 2.0)  # above 12 degrees a nod is a bow
+EXPRESSION_WEIGHT_LIMITS = (-0.5, 1.5)  # -e to 1 + e with e = 0.5, the middle of what Ju and Lee 2008 (section 4) allow
+GAIN_LIMITS = (0.0, 3.0)  # beyond three times as far, lids and brows of any face are at their limits
+GAIN_NAMES = (*FEATURES, "jaw", "lips")
+NOD_SIZE_LIMITS = (0.1, 2.0)  # above 12 degrees a nod is a bow
 
 
 def check_feature(feature: str, known: Sequence[str] = FEATURES) -> str:
@@ -68,7 +68,7 @@ class ExpressionSpan:
             raise InputError("neutral is the face at rest, of which nothing can be added; leave it away")
         if self.expression not in EXPRESSIONS:
             raise InputError(f"there is no expression {self.expression!r}; choose {', '.join(EXPRESSIONS)}")
-        _check_range(f"the weight of {self.expression}", self.weight, WEIGHTS)
+        _check_range(f"the weight of {self.expression}", self.weight, EXPRESSION_WEIGHT_LIMITS)
         _check_span(f"the span of {self.expression}", self.start, self.end)
 
     @property
@@ -88,7 +88,7 @@ class Nod:
         """Refuse times before the clip and sizes out of range."""
         if not 0.0 <= self.time < math.inf:
             raise InputError(f"a nod needs a time of 0 s or more, not {self.time:g}")
-        _check_range("the size of a nod", self.size, NOD_SIZES)
+        _check_range("the size of a nod", self.size, NOD_SIZE_LIMITS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,13 +100,13 @@ class Gains:
     def __post_init__(self) -> None:
         """Refuse unknown features and factors out of range."""
         for feature, factor in self.factors.items():
-            check_feature(feature, GAINED)
-            _check_range(f"the gain of {feature}", factor, GAINS)
+            check_feature(feature, GAIN_NAMES)
+            _check_range(f"the gain of {feature}", factor, GAIN_LIMITS)
         object.__setattr__(self, "factors", MappingProxyType(dict(self.factors)))
 
     def of(self, feature: str) -> float:
         """The factor of a feature, 1 where none was chosen."""
-        return self.factors.get(check_feature(feature, GAINED), 1.0)
+        return self.factors.get(check_feature(feature, GAIN_NAMES), 1.0)
 
 
 AnySpan = TypeVar("AnySpan", StyleSpan, ExpressionSpan)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lexicon.errors import InputError
-from tts2face.gesture.easing import Floats, interpolate_keys, span_weights
+from tts2face.gesture.easing import FloatArray, interpolate_keys, span_weights
 from tts2face.gesture.spans import (
     ExpressionSpan,
     Gains,
@@ -35,7 +35,7 @@ ONSET_S = 0.6
 # (1.8-3.7 Hz: Hadar et al. 1983, Human Movement Science 2); seconds, and shares of NOD_RAD.
 NOD_KEYS = ((0.0, 0.0), (0.18, 1.0), (0.42, -0.1), (0.55, 0.0))
 NOD_RAD = math.radians(6.0)  # of a nod of size 1; radians, as a head moves with a stressed word
-SLACK_S = 0.05  # a span may end this much behind the clip: people round to tenths of a second
+MAX_OVERRUN_S = 0.05  # a span may end this much behind the clip: people round to tenths of a second
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +92,7 @@ class Timeline:
             for k, second in zip(at.tolist(), seconds.tolist(), strict=True)
         )
 
-    def style_shares(self, feature: str, times: ArrayLike, *, default: str) -> dict[str, Floats]:
+    def style_shares(self, feature: str, times: ArrayLike, *, default: str) -> dict[str, FloatArray]:
         """Share (T,) of each style in a feature at T times; they add up to 1, and blend at edges.
 
         Over `BLEND_S`; expressions, which are slow, over `ONSET_S`.
@@ -107,7 +107,7 @@ class Timeline:
                 shares[span.style] = shares.get(span.style, np.zeros(len(seconds))) + share
         return {style: np.clip(share, 0.0, 1.0) for style, share in shares.items()}
 
-    def expression_weights(self, times: ArrayLike) -> Floats:
+    def expression_weights(self, times: ArrayLike) -> FloatArray:
         """Weights (T, 5) added to `EXPRESSIONS` at T times; they rise and fall within `ONSET_S` around the edges."""
         seconds = np.atleast_1d(np.asarray(times, np.float64))
         weights = np.zeros((len(seconds), len(EXPRESSIONS)))
@@ -116,7 +116,7 @@ class Timeline:
             weights[:, column] += span.weight * span_weights(seconds, span.start, span.end, ONSET_S)
         return weights
 
-    def nod_pitch(self, times: ArrayLike) -> Floats:
+    def nod_pitch(self, times: ArrayLike) -> FloatArray:
         """Radians (T,) by which nods turn the head down at T times; of nods that meet the deeper one counts."""
         seconds = np.atleast_1d(np.asarray(times, np.float64))
         down, up = np.zeros(len(seconds)), np.zeros(len(seconds))
@@ -173,7 +173,7 @@ class Timeline:
     def check_duration(self, duration: float) -> None:
         """Refuse times beyond a clip; as `check`."""
         for span in self._all_spans:
-            last = span.start if math.isinf(span.end) else span.end - SLACK_S
+            last = span.start if math.isinf(span.end) else span.end - MAX_OVERRUN_S
             if max(last, span.start) >= duration:
                 raise InputError(
                     f"the span of {span.lane} from {span.start:g} to {span.end:g} s lies beyond the clip, which lasts "

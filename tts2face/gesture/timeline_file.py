@@ -10,12 +10,12 @@ from typing import Any, TypeVar
 
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
-from tts2face.gesture.notation import ALL, expand_feature, parse_style
+from tts2face.gesture.notation import ALL_FEATURES, expand_feature, parse_style
 from tts2face.gesture.spans import ExpressionSpan, Gains, Nod, StyleSpan, check_feature
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import FEATURES
 
-KEYS = ("style", "spans", "expressions", "nods", "gains")
+TIMELINE_KEYS = ("style", "spans", "expressions", "nods", "gains")
 
 Made = TypeVar("Made")
 
@@ -40,7 +40,7 @@ def read_timeline(path: Path) -> Timeline:
 def parse_timeline(content: str, name: str = "timeline") -> Timeline:
     """A timeline from the text of a JSON file; errors as `read_timeline`."""
     told = parse_json(content, name)
-    parts = _add_place_to_errors(name, lambda: _check_object(told, {}, dict.fromkeys(KEYS)))
+    parts = _add_place_to_errors(name, lambda: _check_object(told, {}, dict.fromkeys(TIMELINE_KEYS)))
     spans = _parse_each(f"{name}, spans", parts["spans"], _parse_spans)
     expressions = _parse_each(f"{name}, expressions", parts["expressions"], _parse_expression)
     nods = _parse_each(f"{name}, nods", parts["nods"], _parse_nod)
@@ -93,7 +93,7 @@ def _parse_styles(told: Any) -> Mapping[str, str]:
     if not isinstance(told, dict):
         raise InputError(f"give a name, or a style for each feature, not {_format_value(told)}")
     named = {name: _check_type(name, style, str) for name, style in told.items()}
-    base = named.pop(ALL, None)
+    base = named.pop(ALL_FEATURES, None)
     return {**(dict.fromkeys(FEATURES, base) if base else {}), **{check_feature(name): named[name] for name in named}}
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 
-STEPS_PER_LOOK = 1000.0  # looks are kept as 16-bit integers in steps of this part of their spread
+STEPS_PER_PARAMETER = 1000.0  # looks are kept as 16-bit integers in steps of this part of their spread
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 
-PREFIX = "drive."
+AUDIO_MAP_PREFIX = "drive."
 # Numbers a frame of each kind of feature (`tts2face.speech.features`, which measures them).
 FEATURE_SIZES: Mapping[str, int] = MappingProxyType({"formants": 4, "mfcc": 13, "lpc": 16, "lsf": 16, "level": 1})
 MOST_CONTEXT = 1000  # frames on either side
-MOST_GAIN_DB = 40.0  # a recording that is fainter holds more noise than speech
+MAX_GAIN_DB = 40.0  # a recording that is fainter holds more noise than speech
 Values = NDArray[np.floating]
 
 
@@ -69,7 +69,7 @@ class AudioMap:
     def gain_for(self, loudness: float) -> float:
         """Factor on the samples of a recording whose speech has a level in dB, so that it is as loud as the learnt."""
         missing = self.loudness - loudness
-        return 1.0 if math.isnan(missing) else float(10.0 ** (min(max(missing, -MOST_GAIN_DB), MOST_GAIN_DB) / 20.0))
+        return 1.0 if math.isnan(missing) else float(10.0 ** (min(max(missing, -MAX_GAIN_DB), MAX_GAIN_DB) / 20.0))
 
     def parameters(self, features: Values) -> NDArray[np.float32]:
         """(T, S) shape parameters of (T, D) features; beyond the ends the first and the last frame go on.
@@ -114,10 +114,12 @@ def audio_map_arrays(drives: Mapping[str, AudioMap]) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {}
     for name, drive in drives.items():
         for part in ("mean", "spread", "inner", "bias", "outer", "offset"):
-            arrays[f"{PREFIX}{name}.{part}"] = getattr(drive, part)
-        arrays[f"{PREFIX}{name}.context"] = np.array([drive.before, drive.after, drive.is_nonlinear], np.int32)
-        arrays[f"{PREFIX}{name}.loudness"] = np.array([drive.loudness], np.float32)
-        arrays[f"{PREFIX}{name}.feature"] = np.frombuffer(drive.feature.encode(), np.uint8)
+            arrays[f"{AUDIO_MAP_PREFIX}{name}.{part}"] = getattr(drive, part)
+        arrays[f"{AUDIO_MAP_PREFIX}{name}.context"] = np.array(
+            [drive.before, drive.after, drive.is_nonlinear], np.int32
+        )
+        arrays[f"{AUDIO_MAP_PREFIX}{name}.loudness"] = np.array([drive.loudness], np.float32)
+        arrays[f"{AUDIO_MAP_PREFIX}{name}.feature"] = np.frombuffer(drive.feature.encode(), np.uint8)
     return arrays
 
 
@@ -129,14 +131,15 @@ def audio_maps_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Audi
     KeyError
         A part is missing.
     """
-    names = sorted({key.split(".")[1] for key in arrays if key.startswith(PREFIX)})
+    names = sorted({key.split(".")[1] for key in arrays if key.startswith(AUDIO_MAP_PREFIX)})
     found = {}
     for name in names:
-        before, after, bends = (int(number) for number in arrays[f"{PREFIX}{name}.context"])
+        before, after, bends = (int(number) for number in arrays[f"{AUDIO_MAP_PREFIX}{name}.context"])
         parts = {
-            part: arrays[f"{PREFIX}{name}.{part}"] for part in ("mean", "spread", "inner", "bias", "outer", "offset")
+            part: arrays[f"{AUDIO_MAP_PREFIX}{name}.{part}"]
+            for part in ("mean", "spread", "inner", "bias", "outer", "offset")
         }
-        feature = arrays[f"{PREFIX}{name}.feature"].tobytes().decode()
-        loudness = float(arrays[f"{PREFIX}{name}.loudness"][0])
+        feature = arrays[f"{AUDIO_MAP_PREFIX}{name}.feature"].tobytes().decode()
+        loudness = float(arrays[f"{AUDIO_MAP_PREFIX}{name}.loudness"][0])
         found[name] = AudioMap(feature, before, after, **parts, is_nonlinear=bool(bends), loudness=loudness)
     return found

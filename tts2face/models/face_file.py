@@ -20,7 +20,7 @@ FORMAT_VERSION = 1
 STEPS_PER_SHAPE = 32000.0  # a shape's largest displacement in 16-bit steps: below 0.002 mm for 60 mm
 JPEG_QUALITY = 92
 MOST_TEXTURE = 8192  # pixels along a side: 200 MB when decoded
-LIGHTENED = 150  # a tint lightens texels up to this and no further: skin at the edge of dark hair stays skin
+MAX_BRIGHTENED_LEVEL = 150  # a tint lightens texels up to this and no further: skin at the edge of dark hair stays skin
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -218,7 +218,7 @@ def _apply_identity(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapp
         if part.textured and texture is not None and not np.all(tint == 1):
             share = _part_texel_weights(face, part, texture.shape)[:, :, None]
             tinted = texture * (1 + share * (tint - 1))
-            texture = np.clip(tinted, 0, np.maximum(texture, LIGHTENED)).astype(np.uint8)
+            texture = np.clip(tinted, 0, np.maximum(texture, MAX_BRIGHTENED_LEVEL)).astype(np.uint8)
     eyes = [
         replace(eye, centre=eye.centre + moved[eye.first : eye.first + eye.count].mean(axis=0).astype(np.float32))
         for eye in face.eyes

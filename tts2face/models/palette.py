@@ -25,17 +25,17 @@ GESTURE_FPS = 30.0  # Ju and Lee 2008, section 3; every style is kept at this ra
 STEPS_PER_SPREAD = 2000.0  # of 16-bit integers: finer than any tracker's noise
 
 EXPRESSIONS = ("sad", "happy", "afraid", "angry", "surprised")  # neutral, the sixth, is the face at rest
-EYES = ("left", "right")  # the person's own
+EYE_CHANNELS = ("left", "right")  # the person's own
 # What gestures consist of, and the channels that are the same in every palette; "brows" and "cheeks" have as many
 # modes as the palette's regions. Units: weights of basis expressions; shares by which lids are shut; radians (down, to
 # own left); radians and mm.
 FIXED_CHANNELS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {"expression": EXPRESSIONS, "blink": EYES, "gaze": ("pitch", "yaw"), "head": HEAD_CHANNELS}
+    {"expression": EXPRESSIONS, "blink": EYE_CHANNELS, "gaze": ("pitch", "yaw"), "head": HEAD_CHANNELS}
 )
 REGION_FEATURES = ("brows", "cheeks")
 FEATURES = ("expression", "brows", "blink", "cheeks", "gaze", "head")
 
-Floats = NDArray[np.float32]
+Float32Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +51,7 @@ class FaceRegion:
     """
 
     landmarks: NDArray[np.int32]
-    modes: Floats
+    modes: Float32Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,9 +73,9 @@ class Style:
     """
 
     lengths: NDArray[np.int32]
-    intensity: Floats
-    pitch: Floats
-    motion: Mapping[str, Floats]
+    intensity: Float32Array
+    pitch: Float32Array
+    motion: Mapping[str, Float32Array]
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -129,7 +129,7 @@ class Palette:
         Measured styles, and those derived from them.
     """
 
-    neutral: Floats
+    neutral: Float32Array
     regions: Mapping[str, FaceRegion]
     styles: Mapping[str, Style]
     derivations: Mapping[str, Derivation]

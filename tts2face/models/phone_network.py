@@ -16,11 +16,11 @@ from lexicon.phones import nearest_phones
 from lexicon.sequence import PhoneSequence
 from tts2face.compilation import kernel
 
-WINDOW_S = 0.28  # either side
+PHONE_WINDOW_S = 0.28  # either side
 STEP_S = 0.04
 NEIGHBOURS = (-3, -2, -1, 1, 2, 3)  # phones about the one that sounds
-PREFIX = "network."
-N_PHONES_SEEN = 2 * round(WINDOW_S / STEP_S) + 1 + len(NEIGHBOURS)
+NETWORK_PREFIX = "network."
+N_PHONES_SEEN = 2 * round(PHONE_WINDOW_S / STEP_S) + 1 + len(NEIGHBOURS)
 N_PLACE = 4  # numbers of the place within the present phone
 
 
@@ -102,7 +102,7 @@ def window_features(
         raise InputError("a window needs phones to look at")
     number = {label: at for at, label in enumerate(inventory)}
     labels = np.array([number[nearest_phones(label, inventory)[0]] for label in phones.phones])
-    offsets = np.arange(-round(WINDOW_S / STEP_S), round(WINDOW_S / STEP_S) + 1) * STEP_S
+    offsets = np.arange(-round(PHONE_WINDOW_S / STEP_S), round(PHONE_WINDOW_S / STEP_S) + 1) * STEP_S
     starts, ends = phones.edges[:-1], phones.edges[1:]
 
     def sounding(at: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -120,8 +120,8 @@ def network_arrays(network: PhoneNetwork) -> dict[str, NDArray[Any]]:
     """The networks as arrays of a talker's file, in 16 bits; `network_from_arrays` reads them."""
     arrays: dict[str, NDArray[Any]] = {}
     for at, (weights, biases) in enumerate(zip(network.weights, network.biases, strict=True)):
-        arrays[f"{PREFIX}weights{at}"] = weights.astype(np.float16)
-        arrays[f"{PREFIX}biases{at}"] = biases.astype(np.float32)
+        arrays[f"{NETWORK_PREFIX}weights{at}"] = weights.astype(np.float16)
+        arrays[f"{NETWORK_PREFIX}biases{at}"] = biases.astype(np.float32)
     return arrays
 
 
@@ -133,8 +133,10 @@ def network_from_arrays(arrays: Mapping[str, NDArray[Any]], inventory: Sequence[
     KeyError
         A part is missing.
     """
-    n_layers = sum(name.startswith(f"{PREFIX}weights") for name in arrays)
+    n_layers = sum(name.startswith(f"{NETWORK_PREFIX}weights") for name in arrays)
     if not n_layers:
         return None
-    weights = tuple(arrays[f"{PREFIX}weights{at}"].astype(np.float32) for at in range(n_layers))
-    return PhoneNetwork(tuple(inventory), weights, tuple(arrays[f"{PREFIX}biases{at}"] for at in range(n_layers)))
+    weights = tuple(arrays[f"{NETWORK_PREFIX}weights{at}"].astype(np.float32) for at in range(n_layers))
+    return PhoneNetwork(
+        tuple(inventory), weights, tuple(arrays[f"{NETWORK_PREFIX}biases{at}"] for at in range(n_layers))
+    )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence, WordSpan
-from tts2face.models.appearance import STEPS_PER_LOOK, Appearance, appearance_arrays, appearance_from_arrays
+from tts2face.models.appearance import STEPS_PER_PARAMETER, Appearance, appearance_arrays, appearance_from_arrays
 from tts2face.models.audio_map import AudioMap, audio_map_arrays, audio_maps_from_arrays
 from tts2face.models.phone_network import PhoneNetwork, network_arrays, network_from_arrays
 from tts2face.models.talker_layout import check_talker
@@ -154,7 +154,7 @@ def write_talker(path: Path, talker: Talker) -> None:
     }
     if talker.appearance is not None:
         looks = np.concatenate([utterance.looks for utterance in utterances if utterance.looks is not None])
-        steps = looks / (talker.appearance.spread / STEPS_PER_LOOK)
+        steps = looks / (talker.appearance.spread / STEPS_PER_PARAMETER)
         arrays["looks"] = np.clip(np.rint(steps), -32768, 32767).astype(np.int16)
         arrays |= appearance_arrays(talker.appearance)
     if talker.network is not None:
@@ -206,7 +206,7 @@ def _talker_from_arrays(arrays: dict[str, NDArray[Any]], header: dict[str, Any])
     head, intensity = arrays["head"].astype(np.float32), arrays["intensity"].astype(np.float32)
     appearance = appearance_from_arrays(arrays)
     network = network_from_arrays(arrays, header.pop("network_inventory", ()))
-    looks = arrays["looks"] * (appearance.spread / STEPS_PER_LOOK) if appearance is not None else None
+    looks = arrays["looks"] * (appearance.spread / STEPS_PER_PARAMETER) if appearance is not None else None
     utterances = []
     for i, (name, words) in enumerate(header.pop("utterances")):
         labels = [inventory[number] for number in arrays["phones"][phones[i] : phones[i + 1]]]

@@ -11,26 +11,32 @@ from numpy.typing import NDArray
 
 from tts2face.face.compact_spline import fit_local_interpolant
 from tts2face.face.expressions import expression_landmarks
-from tts2face.face.gesture_transfer import LID_RIMS, LIPS, NO_GAINS, check_gestures, fit_modes
+from tts2face.face.gesture_transfer import LID_LANDMARKS, LIP_LANDMARKS, NO_GAINS, check_gestures, fit_modes
 from tts2face.face.landmark_fit import axis_scales, landmark_positions, procrustes_rotation, scatter_landmarks
-from tts2face.face.shape_transfer import SIZES, SUPPORT, default_head
+from tts2face.face.shape_transfer import SCALE_LIMITS, SUPPORT, default_head
 from tts2face.models.appearance import Appearance
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
 from tts2face.models.palette import EXPRESSIONS, REGION_FEATURES, Palette
 from tts2face.models.talker import ShapeModel, Talker, require_appearance
 from tts2face.numeric import ordered_product
-from tts2face.retargeting.performer import LIDS, eye_aperture
+from tts2face.retargeting.performer import EYELID_LANDMARKS, eye_aperture
 from tts2face.types import Trajectory
 
-LIDS_CHANNEL = "lids"
-OPEN, SHUT = 0.7, 0.005  # quantiles of the opening of lids over all frames: open ones, and those in blinks
-LEAST_BLINK = 0.5  # share of the opening that must be lost in blinks; who never blinks on video has none to show
-WIDEST = -0.3  # share of lids opened wide
+LID_CHANNEL = "lids"
+OPEN_QUANTILE, CLOSED_QUANTILE = (
+    0.7,
+    0.005,
+)  # quantiles of the opening of lids over all frames: open ones, and those in blinks
+MIN_BLINK_CLOSURE = 0.5  # share of the opening that must be lost in blinks; who never blinks on video has none to show
+MIN_LID_CLOSURE = -0.3  # share of lids opened wide
 RIDGE = 1e-5
-INNER, OUTER = 0.7, 1.1  # of an eye's width from its middle: how far lids change their looks in full, and at all
-LIVELY = 0.6  # of an expression is shown: folds and teeth that go with the rest are not known from speech
+LID_INNER_RADIUS, LID_OUTER_RADIUS = (
+    0.7,
+    1.1,
+)  # of an eye's width from its middle: how far lids change their looks in full, and at all
+EXPRESSION_SHARE = 0.6  # of an expression is shown: folds and teeth that go with the rest are not known from speech
 
-Floats = NDArray[np.float32]
+Float32Array = NDArray[np.float32]
 FloatArray = NDArray[np.float64]
 
 
@@ -56,14 +62,14 @@ class OwnFaceGestures:
 
     channels: tuple[str, ...]
     regions: Mapping[str, int]
-    modes: Floats
-    lids: Floats
-    lid_appearance: Floats
-    lid_pixels: Floats
-    plate_lid_closure: Floats
+    modes: Float32Array
+    lids: Float32Array
+    lid_appearance: Float32Array
+    lid_pixels: Float32Array
+    plate_lid_closure: Float32Array
 
     def motion(
-        self, own: Trajectory, gestures: Mapping[str, Floats], gains: Mapping[str, float] = NO_GAINS
+        self, own: Trajectory, gestures: Mapping[str, Float32Array], gains: Mapping[str, float] = NO_GAINS
     ) -> Trajectory:
         """Speech and looks (T, S + A) with gestures: more channels for `tts2face.render.own_face.PlateStage`.
 
@@ -87,12 +93,12 @@ class OwnFaceGestures:
             if name in gestures:
                 felt[:, first : first + width] = gains.get(name, 1.0) * gestures[name]
             first += width
-        felt[:, : len(EXPRESSIONS)] *= LIVELY
+        felt[:, : len(EXPRESSIONS)] *= EXPRESSION_SHARE
         if "blink" in gestures:
             felt[:, -1] = np.clip(gains.get("blink", 1.0) * gestures["blink"].mean(axis=1), 0.0, 1.0)
         return Trajectory(own.channels + self.channels, np.concatenate([own.values, felt], axis=1), own.fps)
 
-    def displacements(self, felt: NDArray[np.floating], number: int) -> tuple[Floats, Floats]:
+    def displacements(self, felt: NDArray[np.floating], number: int) -> tuple[Float32Array, Float32Array]:
         """Motion of the points (N, 3), mm, and change of the face's looks (A,), on a frame of the plate."""
         before = float(self.plate_lid_closure[number])
         after = before + float(felt[-1]) * (1.0 - before)
@@ -116,7 +122,7 @@ def build_own_face_gestures(talker: Talker, palette: Palette) -> OwnFaceGestures
     regions = [_region_modes(rest, palette, name) for name in REGION_FEATURES]
     lids, looks, plate_shares = _lid_model(talker, appearance)
     return OwnFaceGestures(
-        channels=(*EXPRESSIONS, *(c for name in REGION_FEATURES for c in palette.channels(name)), LIDS_CHANNEL),
+        channels=(*EXPRESSIONS, *(c for name in REGION_FEATURES for c in palette.channels(name)), LID_CHANNEL),
         regions={name: len(palette.regions[name].modes) for name in REGION_FEATURES},
         modes=np.concatenate([expressions, *regions])[:, :n_mesh].astype(np.float32),
         lids=lids[:, :n_mesh].astype(np.float32),
@@ -132,7 +138,7 @@ def _expression_modes(rest: FloatArray) -> FloatArray:
     places = scatter_landmarks(head, landmark_positions(head))
     turn = procrustes_rotation(places, rest)
     return ordered_product(expression_landmarks(head), turn.T) * axis_scales(
-        ordered_product(places, turn.T), rest, SIZES
+        ordered_product(places, turn.T), rest, SCALE_LIMITS
     )
 
 
@@ -140,7 +146,7 @@ def _region_modes(rest: FloatArray, palette: Palette, name: str) -> FloatArray:
     """(k, 478, 3) a region's modes on all landmarks; rims of the lids and lips stay."""
     region = palette.regions[name]
     modes = fit_modes(rest, palette.neutral.astype(np.float64), region)
-    still = [number for number in sorted({*LID_RIMS, *LIPS}) if number not in region.landmarks]
+    still = [number for number in sorted({*LID_LANDMARKS, *LIP_LANDMARKS}) if number not in region.landmarks]
     moved = np.concatenate([modes, np.zeros((len(modes), len(still), 3))], axis=1)
     size = float(np.linalg.norm(rest[EYE_OUTER_LEFT] - rest[EYE_OUTER_RIGHT]))
     flat = moved.transpose(1, 0, 2).reshape(-1, 3 * len(modes))
@@ -155,11 +161,13 @@ def _lid_model(talker: Talker, appearance: Appearance) -> tuple[FloatArray, Floa
     shapes = np.concatenate([spoken.shape for spoken in seen])
     looks = np.concatenate([spoken.looks[:, :n_face] for spoken in seen if spoken.looks is not None])
     openings = _mean_eye_openings(model, shapes)
-    opened, shut = np.quantile(openings, [OPEN, SHUT])
+    opened, shut = np.quantile(openings, [OPEN_QUANTILE, CLOSED_QUANTILE])
     still, plate = model.basis[model.n_speech :].astype(np.float64), _mean_eye_openings(model, appearance.plate.shape)
-    if shut > (1.0 - LEAST_BLINK) * opened:
+    if shut > (1.0 - MIN_BLINK_CLOSURE) * opened:
         return np.zeros((2, len(model.mean), 3)), np.zeros((2, n_face)), np.zeros(len(plate))
-    shares, on_plate = (np.clip((opened - values) / (opened - shut), WIDEST, 1.0) for values in (openings, plate))
+    shares, on_plate = (
+        np.clip((opened - values) / (opened - shut), MIN_LID_CLOSURE, 1.0) for values in (openings, plate)
+    )
     terms = np.stack([np.ones_like(shares), shares, shares**2], axis=1)
     normal = ordered_product(terms.T, terms) + RIDGE * len(terms) * np.diag([0.0, 1.0, 1.0])
     motion, change = (
@@ -169,22 +177,24 @@ def _lid_model(talker: Talker, appearance: Appearance) -> tuple[FloatArray, Floa
     return ordered_product(motion, still.reshape(len(still), -1)).reshape(2, -1, 3), change.astype(np.float64), on_plate
 
 
-def _mean_eye_openings(model: ShapeModel, shapes: Floats) -> FloatArray:
+def _mean_eye_openings(model: ShapeModel, shapes: Float32Array) -> FloatArray:
     """(T,) mean opening of both eyes over their width."""
     landmarks = model.shapes(shapes)
-    left, right = (eye_aperture(landmarks, side) for side in LIDS)
+    left, right = (eye_aperture(landmarks, side) for side in EYELID_LANDMARKS)
     return (left + right) / 2
 
 
-def _lid_pixel_weights(appearance: Appearance) -> Floats:
+def _lid_pixel_weights(appearance: Appearance) -> Float32Array:
     """(P,) where lids change the picture of a face, fading outwards."""
     width = appearance.face.size[0]
     places = np.stack([appearance.face.pixels % width, appearance.face.pixels // width], axis=1)
     share = np.zeros(len(places))
-    for rim in (LID_RIMS[:16], LID_RIMS[16:]):
+    for rim in (LID_LANDMARKS[:16], LID_LANDMARKS[16:]):
         around = appearance.face.reference[list(rim)]
         size = float(around[:, 0].max() - around[:, 0].min())
         distance = np.linalg.norm(places - around.mean(axis=0), axis=1) / size
-        share = np.maximum(share, np.clip((OUTER - distance) / (OUTER - INNER), 0.0, 1.0))
-    smooth: Floats = (share * share * (3.0 - 2.0 * share)).astype(np.float32)
+        share = np.maximum(
+            share, np.clip((LID_OUTER_RADIUS - distance) / (LID_OUTER_RADIUS - LID_INNER_RADIUS), 0.0, 1.0)
+        )
+    smooth: Float32Array = (share * share * (3.0 - 2.0 * share)).astype(np.float32)
     return smooth

@@ -10,9 +10,9 @@ from tts2face.models.face import Face
 from tts2face.models.landmarks import CHIN
 from tts2face.render.camera_views import CameraView
 
-FIELD_RAD = math.radians(22.0)  # opening angle across the frame: a portrait lens, which keeps the nose small
-AIR = 0.06  # free space on each side, of the head's size
-NECK = 0.28  # of the head's height, shown under the chin
+FIELD_OF_VIEW_RAD = math.radians(22.0)  # opening angle across the frame: a portrait lens, which keeps the nose small
+FRAME_MARGIN = 0.06  # free space on each side, of the head's size
+SHOWN_NECK_SHARE = 0.28  # of the head's height, shown under the chin
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,8 +36,8 @@ def camera_matrices(camera: CameraView, face: Face, size: tuple[int, int]) -> Ca
     turned = np.stack([right, np.cross(ahead, right), ahead])
     half = np.abs(turned) @ (high - low) / 2  # of the box as the camera sees it
     half_height = max(half[1], half[0] * size[1] / size[0])
-    reach = half_height / math.tan(FIELD_RAD / 2) + 0.5 * half[2]
-    focal = size[1] / 2 / math.tan(FIELD_RAD / 2) / camera.share
+    reach = half_height / math.tan(FIELD_OF_VIEW_RAD / 2) + 0.5 * half[2]
+    focal = size[1] / 2 / math.tan(FIELD_OF_VIEW_RAD / 2) / camera.share
     distance = camera.distance or float(reach)
     view = np.column_stack([turned, -turned @ ((low + high) / 2 - distance * ahead)])
     extent = float(np.abs(face.vertices).max()) + distance
@@ -52,11 +52,11 @@ def framing_box(face: Face) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     chin_y = _chin_height(face, float(high[1]))
     if chin_y is not None and chin_y < high[1]:
         head = rest[rest[:, 1] > chin_y]
-        bottom = max(chin_y - NECK * (high[1] - chin_y), low[1])
+        bottom = max(chin_y - SHOWN_NECK_SHARE * (high[1] - chin_y), low[1])
         low, high = head.min(axis=0), head.max(axis=0)
         low[1] = bottom
-        return low - AIR * (high - low) * [1, 0, 1], high + AIR * (high - low)
-    return low - AIR * (high - low), high + AIR * (high - low)
+        return low - FRAME_MARGIN * (high - low) * [1, 0, 1], high + FRAME_MARGIN * (high - low)
+    return low - FRAME_MARGIN * (high - low), high + FRAME_MARGIN * (high - low)
 
 
 def _chin_height(face: Face, top: float) -> float | None:

@@ -20,14 +20,14 @@ class CameraView:
     share: float = 1.0
 
 
-NAMED = {
+NAMED_VIEWS = {
     "front": CameraView(0.0, 3.0),
     "three-quarter": CameraView(38.0, 4.0),
     "profile": CameraView(88.0, 2.0),
     "close": CameraView(0.0, 2.0, share=0.62),
 }
-FURTHEST_MM = 100_000.0
-NEAREST_MM = 50.0
+MAX_DISTANCE_MM = 100_000.0
+MIN_DISTANCE_MM = 50.0
 
 
 def parse_camera(text: str) -> CameraView:
@@ -38,19 +38,19 @@ def parse_camera(text: str) -> CameraView:
     InputError
         There is no such name, or the numbers are out of range.
     """
-    if text in NAMED:
-        return NAMED[text]
+    if text in NAMED_VIEWS:
+        return NAMED_VIEWS[text]
     try:
         numbers = [float(part) for part in text.split(",")]
     except ValueError:
         numbers = []
     if not 2 <= len(numbers) <= 3 or not all(math.isfinite(number) for number in numbers):
         raise InputError(
-            f"there is no camera {text!r}; choose {', '.join(NAMED)}, or give yaw,pitch,distance such as 20,5,900"
+            f"there is no camera {text!r}; choose {', '.join(NAMED_VIEWS)}, or give yaw,pitch,distance such as 20,5,900"
         )
     yaw, pitch = numbers[:2]
     distance = numbers[2] if len(numbers) == 3 else 0.0
-    if abs(yaw) > 180 or abs(pitch) > 85 or (len(numbers) == 3 and not NEAREST_MM <= distance <= FURTHEST_MM):
+    if abs(yaw) > 180 or abs(pitch) > 85 or (len(numbers) == 3 and not MIN_DISTANCE_MM <= distance <= MAX_DISTANCE_MM):
         raise InputError(
             f"camera {text!r} is out of range; yaw is -180 to 180 and pitch -85 to 85 degrees, distance 50 to 100000 mm"
         )

@@ -14,7 +14,7 @@ from tts2face.prefetch import map_in_order
 from tts2face.render import vtk_renderer
 from tts2face.render.picture import PYVISTA, Picture
 from tts2face.render.picture_kernels import DrawingBuffers, allocate_buffers, draw_surface
-from tts2face.render.renderer import SYNTHETIC
+from tts2face.render.renderer import SYNTHETIC_NOTICE
 from tts2face.render.scene import Scene, available_cores, build_scene
 from tts2face.types import Clip
 
@@ -34,7 +34,7 @@ class MeshRenderer:
     def notice(self) -> str:
         """What every file says about itself: nothing, unless the head is a real person's likeness."""
         metadata = self.scene.face.metadata
-        return SYNTHETIC.format(name=metadata.get("name", "a person")) if "consent" in metadata else ""
+        return SYNTHETIC_NOTICE.format(name=metadata.get("name", "a person")) if "consent" in metadata else ""
 
     def frames(self, clip: Clip, *, threads: int | None = None, first: int = 0) -> Iterator[NDArray[np.uint8]]:
         """Pictures of a clip's frames; its motion is in the face's first shapes, and the others stay at rest."""

@@ -8,11 +8,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-AHEAD = 8  # pictures that may wait
-PATIENCE_S = 0.05  # between looks at whether the encoder still works
+QUEUE_LENGTH = 8  # pictures that may wait
+POLL_INTERVAL_S = 0.05  # between looks at whether the encoder still works
 
 Pixels = NDArray[np.uint8] | None
-Samples = NDArray[np.float32] | None
+SoundBlock = NDArray[np.float32] | None
 
 
 class Sink(Protocol):
@@ -36,7 +36,7 @@ class EncoderThread:
 
     def __init__(self, sink: Sink) -> None:
         self._sink, self._stopped = sink, False
-        self._queue: queue.Queue[tuple[Pixels, Samples] | None] = queue.Queue(AHEAD)
+        self._queue: queue.Queue[tuple[Pixels, SoundBlock] | None] = queue.Queue(QUEUE_LENGTH)
         self._pool = ThreadPoolExecutor(1, "encode")
         self._work: Future[None] = self._pool.submit(self._run)
 
@@ -48,14 +48,14 @@ class EncoderThread:
             if samples is not None and len(samples):
                 self._sink.sound(samples)
 
-    def put(self, pixels: Pixels = None, samples: Samples = None) -> None:
+    def put(self, pixels: Pixels = None, samples: SoundBlock = None) -> None:
         """Append a picture, and the sound that belongs to it; waits while the queue is full."""
         self._put((pixels, samples))
 
-    def _put(self, item: tuple[Pixels, Samples] | None) -> None:
+    def _put(self, item: tuple[Pixels, SoundBlock] | None) -> None:
         while not self._work.done():
             try:
-                return self._queue.put(item, timeout=PATIENCE_S)
+                return self._queue.put(item, timeout=POLL_INTERVAL_S)
             except queue.Full:
                 continue
         return self._work.result()
@@ -73,6 +73,6 @@ class EncoderThread:
         while not self._work.done():  # it may end by an error of its own with a full queue that nobody empties
             with contextlib.suppress(queue.Full):
                 self._queue.put_nowait(None)
-            wait([self._work], PATIENCE_S)
+            wait([self._work], POLL_INTERVAL_S)
         self._pool.shutdown()
         self._sink.abandon()

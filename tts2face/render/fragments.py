@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.compilation import kernel
-from tts2face.render.raster import NOTHING
+from tts2face.render.raster import NO_TRIANGLE
 
 Array = NDArray[Any]
 
-SMOOTH = np.float32(0.85)  # cosine between normals down to which samples of a part are lit together
-INSIDE = np.float32(0.3)  # share of the light that reaches the back of a closed part
-SPECULAR, SHININESS, WRAP, OPACITY, TEXTURED, OPEN = range(6)  # columns of the material table
+MIN_NORMAL_COSINE = np.float32(0.85)  # cosine between normals down to which samples of a part are lit together
+BACK_LIGHT_SHARE = np.float32(0.3)  # share of the light that reaches the back of a closed part
+SPECULAR, SHININESS, WRAP, OPACITY, TEXTURED, OPEN_SURFACE = range(6)  # columns of the material table
 CAMERA, NORMAL, EXPOSURE, COLOUR, UV = 0, 3, 6, 10, 13  # columns of the vertex table: 3, 3, 4, 3, 2 numbers
 N_VERTEX_COLUMNS = 16  # one cache line
 # Rows of the fragment table: normal 3, albedo 3, exposure 4, ray 2, material 4, share of the pixel.
@@ -57,7 +57,9 @@ def is_same_surface(number: int, other: int, flat: Array, part_of: Array) -> boo
     cosine = flat[t, 0] * flat[u, 0] + flat[t, 1] * flat[u, 1] + flat[t, 2] * flat[u, 2]
     squared = flat[t, 0] ** 2 + flat[t, 1] ** 2 + flat[t, 2] ** 2
     squared *= flat[u, 0] ** 2 + flat[u, 1] ** 2 + flat[u, 2] ** 2
-    smooth = (cosine > 0) & (cosine * cosine > SMOOTH * SMOOTH * squared) & (part_of[t] == part_of[u])
+    smooth = (
+        (cosine > 0) & (cosine * cosine > MIN_NORMAL_COSINE * MIN_NORMAL_COSINE * squared) & (part_of[t] == part_of[u])
+    )
     return bool(smooth | (t == u))
 
 
@@ -97,18 +99,18 @@ def find_fragments(
                     for column in range(x, x + side):
                         n_same += owner[layer, row, column] == number
                 if n_same == side * side:
-                    if number != NOTHING:
+                    if number != NO_TRIANGLE:
                         number_of[n_fragments] = number
                         spread[n_fragments, 0] = (x + 0.5 * (side - 1)) * n_same
                         spread[n_fragments, 1] = (r + first_row + 0.5 * (side - 1)) * n_same
                         spread[n_fragments, 2] = n_same
                         n_fragments += 1
                     continue
-                last, g = NOTHING, first
+                last, g = NO_TRIANGLE, first
                 for row in range(r, r + side):
                     for column in range(x, x + side):
                         number = owner[layer, row, column]
-                        if number == NOTHING:
+                        if number == NO_TRIANGLE:
                             continue
                         if number != last:
                             last, g = number, first
@@ -186,7 +188,7 @@ def evaluate_fragments(found: Any, n_fragments: int, vertex: Array, scene: Any, 
             for k in range(3):
                 table[AT_ALBEDO + k, g] = texel(texture, linear, u, v, k)
         turn = one if number >= 0 else -one
-        inner = INSIDE if number < 0 and materials[material, OPEN] == zero else one
+        inner = BACK_LIGHT_SHARE if number < 0 and materials[material, OPEN_SURFACE] == zero else one
         for k in range(3):
             table[AT_NORMAL + k, g] *= turn
         for k in range(4):

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-TICKS = 100  # a GIF's clock, per second
-LEAST_TICKS = 2  # a shorter stay is played as a tenth of a second by browsers
-BITS = 6  # of each channel by which a colour finds its place in the palette
+TICKS_PER_SECOND = 100  # a GIF's clock, per second
+MIN_TICKS = 2  # a shorter stay is played as a tenth of a second by browsers
+COLOUR_BITS = 6  # of each channel by which a colour finds its place in the palette
 BAYER = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]], np.int16)
-DITHER = 10  # 8-bit steps between the extremes of the ordered dither: still where the picture is still
-SOLID = 128  # coverage from which a pixel is drawn
+DITHER_AMPLITUDE = 10  # 8-bit steps between the extremes of the ordered dither: still where the picture is still
+OPAQUE_COVERAGE = 128  # coverage from which a pixel is drawn
 
 
 class GifWriter:
@@ -24,34 +24,36 @@ class GifWriter:
         import av
 
         self._path, self._notice = path, notice
-        self._fps, self._n_frames, self._last = fps, 0, -LEAST_TICKS
+        self._fps, self._n_frames, self._last = fps, 0, -MIN_TICKS
         height, width, channels = swatches[0].shape
         self._palette, self._nearest = _colour_table(swatches, 256 if channels == 3 else 255)
         pattern = np.tile(BAYER, (-(-height // 4), -(-width // 4)))[:height, :width, None]
-        self._dither = (pattern * DITHER // 16 - DITHER // 2).astype(np.int16)
-        stay = max(LEAST_TICKS, round(TICKS / fps))  # of the last picture
+        self._dither = (pattern * DITHER_AMPLITUDE // 16 - DITHER_AMPLITUDE // 2).astype(np.int16)
+        stay = max(MIN_TICKS, round(TICKS_PER_SECOND / fps))  # of the last picture
         options = {"loop": "0", "final_delay": str(stay)}
         self._container: Any = av.open(str(path), "w", format="gif", options=options)
         self._video: Any = self._container.add_stream("gif", rate=fps)
         self._video.width, self._video.height, self._video.pix_fmt = width, height, "pal8"
-        self._video.codec_context.time_base = Fraction(1, TICKS)
+        self._video.codec_context.time_base = Fraction(1, TICKS_PER_SECOND)
 
     def picture(self, pixels: NDArray[np.uint8]) -> None:
         """Append one picture, unless it would stay for too short."""
         import av
 
-        tick = round(self._n_frames * TICKS / self._fps)
+        tick = round(self._n_frames * TICKS_PER_SECOND / self._fps)
         self._n_frames += 1
-        if tick - self._last < LEAST_TICKS:
+        if tick - self._last < MIN_TICKS:
             return
         self._last = tick
-        levels = np.clip(pixels[:, :, :3] + self._dither, 0, 255).astype(np.int32) >> (8 - BITS)
-        indices = self._nearest[(levels[:, :, 0] << 2 * BITS) | (levels[:, :, 1] << BITS) | levels[:, :, 2]]
+        levels = np.clip(pixels[:, :, :3] + self._dither, 0, 255).astype(np.int32) >> (8 - COLOUR_BITS)
+        indices = self._nearest[
+            (levels[:, :, 0] << 2 * COLOUR_BITS) | (levels[:, :, 1] << COLOUR_BITS) | levels[:, :, 2]
+        ]
         if pixels.shape[2] == 4:
-            indices[pixels[:, :, 3] < SOLID] = 255
+            indices[pixels[:, :, 3] < OPAQUE_COVERAGE] = 255
         coloured: Any = (indices, self._palette)  # PyAV takes a pair for pal8; its stubs do not say so
         frame = av.VideoFrame.from_ndarray(coloured, format="pal8")
-        frame.pts, frame.time_base = tick, Fraction(1, TICKS)
+        frame.pts, frame.time_base = tick, Fraction(1, TICKS_PER_SECOND)
         self._container.mux(self._video.encode(frame))
 
     def sound(self, samples: NDArray[np.float32]) -> None:
@@ -80,7 +82,7 @@ def _write_comment(path: Path, notice: str) -> None:
 
 
 def _colour_table(swatches: Sequence[NDArray[np.uint8]], n_colours: int) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """(256, 4) alpha, red, green, blue by median cut, and the nearest entry for every colour of `BITS` bits."""
+    """(256, 4) alpha, red, green, blue by median cut, and the nearest entry for every colour of `COLOUR_BITS` bits."""
     from PIL import Image
     from scipy.spatial import cKDTree
 
@@ -90,6 +92,6 @@ def _colour_table(swatches: Sequence[NDArray[np.uint8]], n_colours: int) -> tupl
     colours = np.array(chosen, np.uint8).reshape(-1, 3)[:n_colours]
     palette = np.zeros((256, 4), np.uint8)
     palette[: len(colours), 0], palette[: len(colours), 1:] = 255, colours
-    levels = np.indices((1 << BITS,) * 3).reshape(3, -1).T * (1 << (8 - BITS)) + (1 << (7 - BITS))
+    levels = np.indices((1 << COLOUR_BITS,) * 3).reshape(3, -1).T * (1 << (8 - COLOUR_BITS)) + (1 << (7 - COLOUR_BITS))
     nearest = np.asarray(cKDTree(colours).query(levels)[1], np.uint8)
     return palette, nearest

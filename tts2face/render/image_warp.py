@@ -13,7 +13,9 @@ from tts2face.interpolation import interpolate_bilinear
 
 Array = NDArray[Any]
 
-EDGE = -1e-6  # barycentric coordinates down to here belong to a triangle, so that no pixel is left between two
+EDGE_TOLERANCE = (
+    -1e-6
+)  # barycentric coordinates down to here belong to a triangle, so that no pixel is left between two
 
 
 @inlined_kernel
@@ -59,7 +61,7 @@ def warp_image(
                 b = ((x - x0) * (y2 - y0) - (x2 - x0) * (y - y0)) / area
                 c = ((x1 - x0) * (y - y0) - (x - x0) * (y1 - y0)) / area
                 a = 1.0 - b - c
-                if min(a, b, c) < EDGE:
+                if min(a, b, c) < EDGE_TOLERANCE:
                     continue
                 u = a * source[triangle[0], 0] + b * source[triangle[1], 0] + c * source[triangle[2], 0]
                 v = a * source[triangle[0], 1] + b * source[triangle[1], 1] + c * source[triangle[2], 1]
@@ -91,7 +93,7 @@ def draw_texture(triangles: Array, target: Array, texture: Array, places: Array,
                 b = ((x - x0) * (y2 - y0) - (x2 - x0) * (y - y0)) / area
                 c = ((x1 - x0) * (y - y0) - (x - x0) * (y1 - y0)) / area
                 a = 1.0 - b - c
-                if min(a, b, c) < EDGE:
+                if min(a, b, c) < EDGE_TOLERANCE:
                     continue
                 u = a * places[triangle[0], 0] + b * places[triangle[1], 0] + c * places[triangle[2], 0]
                 v = a * places[triangle[0], 1] + b * places[triangle[1], 1] + c * places[triangle[2], 1]

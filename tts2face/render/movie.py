@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 SOUND_RATE = 48_000  # Hz; what players and editors expect, and Opus demands
-BT709, LIMITED = 1, 1  # H.273 code points: primaries, transfer and matrix of BT.709; studio range
+BT709, LIMITED_RANGE = 1, 1  # H.273 code points: primaries, transfer and matrix of BT.709; studio range
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class MovieWriter:
         video.codec_context.thread_count = 1  # drawing fills the other cores; more threads here cost twice the work
         video.codec_context.bit_rate = 0  # the quality of `crf` rules alone
         video.codec_context.color_primaries = video.codec_context.color_trc = BT709
-        video.codec_context.colorspace, video.codec_context.color_range = BT709, LIMITED
+        video.codec_context.colorspace, video.codec_context.color_range = BT709, LIMITED_RANGE
         if self._has_alpha:
             video.metadata["alpha_mode"] = "1"
         audio: Any = self._container.add_stream(kind.audio, rate=SOUND_RATE, layout="mono")

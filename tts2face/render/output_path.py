@@ -11,11 +11,11 @@ from tts2face.storage.output_names import check_name
 from tts2face.storage.temporary import Temporary
 
 MP4, WEBM, GIF, FOLDER = ".mp4", ".webm", ".gif", ""
-KINDS = (MP4, WEBM, GIF)
+FILE_SUFFIXES = (MP4, WEBM, GIF)
 
 
 def output_kind(path: Path | str) -> str:
-    """What a path asks for: one of `KINDS`, or `FOLDER`.
+    """What a path asks for: one of `FILE_SUFFIXES`, or `FOLDER`.
 
     Raises
     ------
@@ -23,11 +23,11 @@ def output_kind(path: Path | str) -> str:
         The suffix is unknown.
     """
     suffix = Path(path).suffix.lower()
-    if str(path).endswith(("/", os.sep)) or suffix == "" or (suffix not in KINDS and Path(path).is_dir()):
+    if str(path).endswith(("/", os.sep)) or suffix == "" or (suffix not in FILE_SUFFIXES and Path(path).is_dir()):
         return FOLDER
-    if suffix not in KINDS:
+    if suffix not in FILE_SUFFIXES:
         raise InputError(
-            f"{path} has the unknown suffix {suffix}; give one of {', '.join(KINDS)}, "
+            f"{path} has the unknown suffix {suffix}; give one of {', '.join(FILE_SUFFIXES)}, "
             "or a folder without a suffix for .png pictures"
         )
     return suffix

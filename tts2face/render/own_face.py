@@ -20,21 +20,21 @@ from tts2face.models.talker import ShapeModel, Talker
 from tts2face.own_face.gestures import OwnFaceGestures
 from tts2face.prefetch import map_in_order
 from tts2face.render.image_warp import draw_texture, warp_image
-from tts2face.render.picture import AUTO, SIDES, Picture
+from tts2face.render.picture import AUTO_SIZE, SIDE_LIMITS_PX, Picture
 from tts2face.render.plate_sampling import TextureSamples, texture_samples
-from tts2face.render.renderer import SYNTHETIC
+from tts2face.render.renderer import SYNTHETIC_NOTICE
 from tts2face.render.scene import available_cores
 from tts2face.types import Clip
 
 if TYPE_CHECKING:
     from PIL.Image import Image as Drawn
 
-FINE = 3  # samples along a pixel's side about the mouth, where the lips' edge is drawn
-MOST_RAW_BYTES = 400_000_000  # of frames kept as they are: 250 of 720 x 740
-PACKED_QUALITY = 95
+MOUTH_SUPERSAMPLING = 3  # samples along a pixel's side about the mouth, where the lips' edge is drawn
+MAX_RAW_BYTES = 400_000_000  # of frames kept as they are: 250 of 720 x 740
+FRAME_JPEG_QUALITY = 95
 MOST_VIDEO_SIDE = 8192  # px: a picture of 200 MB
-MARGIN = 3  # pixels around the mouth that are drawn finely
-Floats = NDArray[np.float32]
+MOUTH_MARGIN_PX = 3  # pixels around the mouth that are drawn finely
+Float32Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +51,7 @@ class OwnFaceRenderer:
     fps: float
     picture: Picture
     plate: "FrameStore"
-    points: Floats
+    points: Float32Array
     scale: float
     triangles: NDArray[np.int32]
     face_fill: NDArray[np.int64]
@@ -62,7 +62,7 @@ class OwnFaceRenderer:
     @property
     def notice(self) -> str:
         """What every file of it says about itself."""
-        return SYNTHETIC.format(name=self.name)
+        return SYNTHETIC_NOTICE.format(name=self.name)
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -95,7 +95,7 @@ class OwnFaceRenderer:
         at = int(instant * self.fps + 0.5) % max(2 * last, 1)
         return min(at, 2 * last - at)
 
-    def _motion(self, clip: Clip) -> Floats:
+    def _motion(self, clip: Clip) -> Float32Array:
         n_moved = len(clip.motion.channels)
         if clip.motion.channels != self.channels[:n_moved] or n_moved < self.n_spoken:
             raise InputError(
@@ -122,7 +122,7 @@ def own_face_renderer(talker: Talker, picture: Picture, gestures: OwnFaceGesture
         raise InputError(
             "a talker's own face is drawn on her own video; choose a face file for a transparent background"
         )
-    if picture.size == AUTO:
+    if picture.size == AUTO_SIZE:
         picture = replace(picture, size=_background_video_size(appearance))
     plate, scale, shift = _fit_background_video(appearance, picture)
     points = ((appearance.plate.points + 0.5) * scale - 0.5 - shift).astype(np.float32)
@@ -173,7 +173,7 @@ def draw_video_frame(stage: OwnFaceRenderer, motion: NDArray[np.floating], numbe
     return drawn
 
 
-def _lid_texture_change(stage: OwnFaceRenderer, number: int, looks: Floats, share: float) -> Floats:
+def _lid_texture_change(stage: OwnFaceRenderer, number: int, looks: Float32Array, share: float) -> Float32Array:
     """(P, 3) change of the face's texture by lids shut by a share: what the model does not know of the eye fades."""
     face = stage.appearance.face
     change = np.zeros((len(face.pixels), 3), np.float32)
@@ -188,7 +188,11 @@ def _lid_texture_change(stage: OwnFaceRenderer, number: int, looks: Floats, shar
 
 
 def _draw_mouth_and_face(
-    stage: OwnFaceRenderer, number: int, target: NDArray[np.float64], textures: tuple[Floats, Floats], frame: Floats
+    stage: OwnFaceRenderer,
+    number: int,
+    target: NDArray[np.float64],
+    textures: tuple[Float32Array, Float32Array],
+    frame: Float32Array,
 ) -> None:
     appearance, (change, mouth) = stage.appearance, textures
     source = stage.points[number].astype(np.float64)
@@ -198,19 +202,23 @@ def _draw_mouth_and_face(
 
 
 def _draw_mouth_finely(
-    stage: OwnFaceRenderer, number: int, target: NDArray[np.float64], textures: tuple[Floats, Floats], frame: Floats
+    stage: OwnFaceRenderer,
+    number: int,
+    target: NDArray[np.float64],
+    textures: tuple[Float32Array, Float32Array],
+    frame: Float32Array,
 ) -> None:
     """Draw the box around the mouth again with more samples, and their mean."""
     lips = target[stage.appearance.mouth_points]
-    low = np.maximum(np.floor(lips.min(axis=0)).astype(int) - MARGIN, 0)
-    high = np.minimum(np.ceil(lips.max(axis=0)).astype(int) + MARGIN + 1, frame.shape[1::-1])
+    low = np.maximum(np.floor(lips.min(axis=0)).astype(int) - MOUTH_MARGIN_PX, 0)
+    high = np.minimum(np.ceil(lips.max(axis=0)).astype(int) + MOUTH_MARGIN_PX + 1, frame.shape[1::-1])
     if (high <= low).any():
         return
     box = np.s_[low[1] : high[1], low[0] : high[0]]
-    fine = np.repeat(np.repeat(frame[box], FINE, axis=0), FINE, axis=1)
-    _draw_mouth_and_face(stage, number, (target - low + 0.5) * FINE - 0.5, textures, fine)
+    fine = np.repeat(np.repeat(frame[box], MOUTH_SUPERSAMPLING, axis=0), MOUTH_SUPERSAMPLING, axis=1)
+    _draw_mouth_and_face(stage, number, (target - low + 0.5) * MOUTH_SUPERSAMPLING - 0.5, textures, fine)
     height, width = frame[box].shape[:2]
-    frame[box] = fine.reshape(height, FINE, width, FINE, 3).mean(axis=(1, 3))
+    frame[box] = fine.reshape(height, MOUTH_SUPERSAMPLING, width, MOUTH_SUPERSAMPLING, 3).mean(axis=(1, 3))
 
 
 class FrameStore:
@@ -220,11 +228,11 @@ class FrameStore:
         self._raw: list[NDArray[np.uint8]] = []
         self._packed: list[bytes] = []
         for picture in pictures:
-            if sum(map(np.size, self._raw)) < MOST_RAW_BYTES:
+            if sum(map(np.size, self._raw)) < MAX_RAW_BYTES:
                 self._raw.append(np.asarray(picture))
             else:
                 store = io.BytesIO()
-                picture.save(store, "JPEG", quality=PACKED_QUALITY, subsampling=0)
+                picture.save(store, "JPEG", quality=FRAME_JPEG_QUALITY, subsampling=0)
                 self._packed.append(store.getvalue())
 
     def __len__(self) -> int:
@@ -243,8 +251,8 @@ class FrameStore:
 def _background_video_size(appearance: Appearance) -> str:
     """The size of the talker's video, within what can be drawn."""
     height, width = next(_decode_video(appearance.plate)).shape[:2]
-    scale = min(1.0, SIDES[1] / max(height, width))
-    return "x".join(str(max(int(side * scale) // 2 * 2, SIDES[0])) for side in (width, height))
+    scale = min(1.0, SIDE_LIMITS_PX[1] / max(height, width))
+    return "x".join(str(max(int(side * scale) // 2 * 2, SIDE_LIMITS_PX[0])) for side in (width, height))
 
 
 def _fit_background_video(appearance: Appearance, picture: Picture) -> tuple[FrameStore, float, NDArray[np.float64]]:
@@ -305,5 +313,5 @@ def ring_triangles(n_mesh: int) -> NDArray[np.int32]:
     return np.array(rows, np.int32)
 
 
-def _fill_texture(texture: Floats, fill: NDArray[np.int64], size: tuple[int, int]) -> Floats:
+def _fill_texture(texture: Float32Array, fill: NDArray[np.int64], size: tuple[int, int]) -> Float32Array:
     return np.ascontiguousarray(texture[fill].reshape(size[1], size[0], 3), np.float32)

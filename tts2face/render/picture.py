@@ -8,9 +8,9 @@ from lexicon.errors import InputError
 from tts2face.render.camera_views import CameraView, parse_camera
 from tts2face.request import option
 
-SIDES = (16, 4096)  # px
-AUTO, USUAL = "auto", (512, 512)
-SUPERSAMPLING = (1, 2, 3)
+SIDE_LIMITS_PX = (16, 4096)  # px
+AUTO_SIZE, DEFAULT_SIZE = "auto", (512, 512)
+SUPERSAMPLING_FACTORS = (1, 2, 3)
 NUMBA, PYVISTA = RENDERERS = ("numba", "pyvista")
 STUDIO, TRANSPARENT = "studio", "transparent"
 COLOURS = {
@@ -18,7 +18,7 @@ COLOURS = {
     "blue": "0047bb", "navy": "14213d", "sky": "9ec9e8", "teal": "127475", "yellow": "f2c14e", "orange": "e07a1f",
     "pink": "f4b6c2", "purple": "5f4b8b", "brown": "6b4f3a", "cream": "f6f0e2",
 }  # fmt: skip  # sRGB; green and blue are those of studio walls for keying
-IMAGES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +45,7 @@ class Picture:
         parse_size(self.size)
         parse_camera(self.camera)
         parse_background(self.background)
-        if self.supersampling not in SUPERSAMPLING:
+        if self.supersampling not in SUPERSAMPLING_FACTORS:
             raise InputError(f"supersampling must be 1, 2 or 3, not {self.supersampling}")
         if self.renderer not in RENDERERS:
             raise InputError(f"there is no renderer {self.renderer!r}; choose numba or pyvista")
@@ -77,22 +77,24 @@ class Picture:
 
 
 def parse_size(size: str) -> tuple[int, int]:
-    """Width and height of a size such as ``640x480`` or ``512``; those of ``auto`` are `USUAL`.
+    """Width and height of a size such as ``640x480`` or ``512``; those of ``auto`` are `DEFAULT_SIZE`.
 
     Raises
     ------
     InputError
         It is not a size, or a side is odd or out of range.
     """
-    if size.strip() == AUTO:
-        return USUAL
+    if size.strip() == AUTO_SIZE:
+        return DEFAULT_SIZE
     match = re.fullmatch(r"\s*(\d{1,9})\s*(?:[xX×,]\s*(\d{1,9})\s*)?", size)
     if match is None:
         raise InputError(f"size must be width x height such as 640x480, not {size!r}")
     width, height = int(match[1]), int(match[2] or match[1])
     for side in (width, height):
-        if not SIDES[0] <= side <= SIDES[1] or side % 2:
-            raise InputError(f"size must be even numbers from {SIDES[0]} to {SIDES[1]} pixels, not {width}x{height}")
+        if not SIDE_LIMITS_PX[0] <= side <= SIDE_LIMITS_PX[1] or side % 2:
+            raise InputError(
+                f"size must be even numbers from {SIDE_LIMITS_PX[0]} to {SIDE_LIMITS_PX[1]}, not {width}x{height}"
+            )
     return width, height
 
 
@@ -112,7 +114,7 @@ def parse_background(background: str) -> tuple[int, int, int] | Path | str:
     if re.fullmatch(r"[0-9a-fA-F]{6}", digits):
         return int(digits[:2], 16), int(digits[2:4], 16), int(digits[4:], 16)
     path = Path(background)
-    if path.suffix.lower() not in IMAGES:
+    if path.suffix.lower() not in IMAGE_SUFFIXES:
         raise InputError(
             f"there is no background {background!r}; give studio, transparent, #rrggbb, an image file, "
             f"or one of {', '.join(COLOURS)}"

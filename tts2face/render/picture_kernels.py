@@ -26,8 +26,8 @@ from tts2face.render.surface import Surface, encoding_table, linear_table
 
 BAND_SAMPLES = 65_536  # of a band of rows that is drawn, then lit; from 16,384 to 262,144 the time is the same
 TONE_STEPS = 8192  # entries of the table from linear light to 8 bits; fine enough for its darkest step
-ODD = 80  # entries beyond the last of a table's row, so that its rows do not all begin in one set of the cache
-TABLES = (linear_table(), encoding_table(TONE_STEPS))
+ROW_PADDING = 80  # entries beyond the last of a table's row, so that its rows do not all begin in one set of the cache
+TONE_TABLES = (linear_table(), encoding_table(TONE_STEPS))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +58,7 @@ def allocate_buffers(surface: Surface, size: tuple[int, int], side: int) -> Draw
     n_vertices, n_triangles = len(surface.rig.rest), len(surface.triangles)
     width, height = size[0] * side, size[1] * side
     rows = side * max(1, BAND_SAMPLES // (width * side))
-    n_most = N_LAYERS * width * rows + ODD
+    n_most = N_LAYERS * width * rows + ROW_PADDING
     vertex = np.zeros((n_vertices, N_VERTEX_COLUMNS), np.float32)
     vertex[:, COLOUR : COLOUR + 3] = surface.colours
     vertex[:, UV : UV + 2] = surface.uv
@@ -99,7 +99,7 @@ def draw_surface(
     face_normals(room.vertex, surface.triangles, room.flat)
     vertex_normals(room.flat, surface.starts, surface.members, room.vertex)
     geometry = (room.vertex, surface.triangles, surface.translucent, lens)
-    scene = (surface.triangles, surface.part_of, surface.materials, surface.texture, TABLES[0])
+    scene = (surface.triangles, surface.part_of, surface.materials, surface.texture, TONE_TABLES[0])
     facets = (room.flat, surface.part_of)
     n_rows = room.depth.shape[1]
     for band, (begin, end) in enumerate(zip(room.band_starts[:-1], room.band_starts[1:], strict=True)):
@@ -116,7 +116,9 @@ def draw_surface(
         evaluate_fragments(room.found, n_fragments, room.vertex, scene, lens, room.fragments)
         shade_fragments(room.fragments, n_fragments, lights[0], room.scratch, room.colour)
         shown = (room.fragments, room.colour)
-        compose_band(room.owner, place, (room.pixels, n_pixels), (room.found[0], *facets), shown, (picture, TABLES))
+        compose_band(
+            room.owner, place, (room.pixels, n_pixels), (room.found[0], *facets), shown, (picture, TONE_TABLES)
+        )
 
 
 def project_surface(

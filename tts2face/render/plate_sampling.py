@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tts2face.models.appearance import TextureModel
 
-Floats = NDArray[np.float32]
+Float32Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -20,9 +20,9 @@ class TextureSamples:
 
     pixels: NDArray[np.int64]
     corners: NDArray[np.int32]
-    weights: Floats
+    weights: Float32Array
 
-    def of(self, picture: NDArray[np.uint8], points: NDArray[np.floating]) -> Floats:
+    def of(self, picture: NDArray[np.uint8], points: NDArray[np.floating]) -> Float32Array:
         """(Q, 3) colours of a picture (H, W, 3) whose mesh has these points (N, 2), between pixels."""
         height, width = picture.shape[:2]
         places = np.einsum("qc,qcd->qd", self.weights, points[self.corners])

@@ -16,12 +16,12 @@ from tts2face.compilation import inlined_kernel, kernel
 
 Array = NDArray[Any]
 
-SHIFT = 8
-GRID = 1 << SHIFT  # steps of the snapping grid in one sample
-HALF = GRID >> 1
-NOTHING = np.int32(2**31 - 1)  # no triangle at this sample
+GRID_SHIFT = 8
+GRID = 1 << GRID_SHIFT  # steps of the snapping grid in one sample
+HALF_GRID = GRID >> 1
+NO_TRIANGLE = np.int32(2**31 - 1)  # no triangle at this sample
 BACK_BIAS = np.float32(1.0 - 3e-4)  # back faces lie 0.3 permille further away: a front face wins where both meet
-TILE = 8  # samples along a side of the squares by which hidden back faces are left out
+TILE_SAMPLES = 8  # samples along a side of the squares by which hidden back faces are left out
 N_LAYERS = 3  # the opaque surface and the two nearest translucent ones before it
 
 
@@ -71,7 +71,7 @@ def clip_to_near_plane(camera: Array, grid: Array, triangle: Array, lens: Array,
 @inlined_kernel
 def may_be_seen(low: int, high: int, n_samples: int) -> bool:
     """Whether a sample's middle lies within a range of the grid and of the picture."""
-    return bool(max((low + HALF - 1) >> SHIFT, 0) <= min((high - HALF) >> SHIFT, n_samples - 1))
+    return bool(max((low + HALF_GRID - 1) >> GRID_SHIFT, 0) <= min((high - HALF_GRID) >> GRID_SHIFT, n_samples - 1))
 
 
 @kernel
@@ -129,8 +129,8 @@ def sort_into_bands(corners: Array, count: int, band_rows: int, starts: Array, m
         starts[band] = 0
     for turn in range(2):
         for i in range(count):
-            low = np.int64(min(corners[i, 1], corners[i, 3], corners[i, 5])) >> SHIFT
-            high = np.int64(max(corners[i, 1], corners[i, 3], corners[i, 5])) >> SHIFT
+            low = np.int64(min(corners[i, 1], corners[i, 3], corners[i, 5])) >> GRID_SHIFT
+            high = np.int64(max(corners[i, 1], corners[i, 3], corners[i, 5])) >> GRID_SHIFT
             for band in range(max(low // band_rows, 0), min(high // band_rows, n_bands - 1) + 1):
                 if turn == 0:
                     starts[band + 1] += 1
@@ -180,8 +180,8 @@ def tile_depths(depth: Array, tiles: Array) -> None:
             tiles[r, x] = np.float32(np.inf)
     for r in range(depth.shape[0]):
         for x in range(depth.shape[1]):
-            tile = tiles[r // TILE, x // TILE]
-            tiles[r // TILE, x // TILE] = min(tile, depth[r, x])
+            tile = tiles[r // TILE_SAMPLES, x // TILE_SAMPLES]
+            tiles[r // TILE_SAMPLES, x // TILE_SAMPLES] = min(tile, depth[r, x])
 
 
 @kernel
@@ -189,7 +189,7 @@ def clear_layer(depth: Array, owner: Array, layer: int) -> None:
     """Empty a layer of a band."""
     for r in range(depth.shape[1]):
         for x in range(depth.shape[2]):
-            depth[layer, r, x], owner[layer, r, x] = np.float32(0), NOTHING
+            depth[layer, r, x], owner[layer, r, x] = np.float32(0), NO_TRIANGLE
 
 
 @kernel
@@ -211,7 +211,9 @@ def draw_band(geometry: Any, batch: Any, first_row: int, depth: Array, owner: Ar
     corners, source, members = batch
     n_rows, width = depth.shape[1], depth.shape[2]
     clear_layer(depth, owner, 0)
-    tiles = np.zeros(((n_rows + TILE - 1) // TILE, (width + TILE - 1) // TILE), np.float32)
+    tiles = np.zeros(
+        ((n_rows + TILE_SAMPLES - 1) // TILE_SAMPLES, (width + TILE_SAMPLES - 1) // TILE_SAMPLES), np.float32
+    )
     n_translucent = 0
     for turn in range(3):
         if turn == 1:
@@ -228,24 +230,24 @@ def draw_band(geometry: Any, batch: Any, first_row: int, depth: Array, owner: Ar
                 continue
             x0, y0, x1 = np.int64(corners[i, 0]), np.int64(corners[i, 1]), np.int64(corners[i, 2])
             y1, x2, y2 = np.int64(corners[i, 3]), np.int64(corners[i, 4]), np.int64(corners[i, 5])
-            left = max((min(x0, x1, x2) + HALF - 1) >> SHIFT, 0)
-            right = min((max(x0, x1, x2) - HALF) >> SHIFT, width - 1)
-            top = max((min(y0, y1, y2) + HALF - 1) >> SHIFT, first_row) - first_row
-            bottom = min((max(y0, y1, y2) - HALF) >> SHIFT, first_row + n_rows - 1) - first_row
+            left = max((min(x0, x1, x2) + HALF_GRID - 1) >> GRID_SHIFT, 0)
+            right = min((max(x0, x1, x2) - HALF_GRID) >> GRID_SHIFT, width - 1)
+            top = max((min(y0, y1, y2) + HALF_GRID - 1) >> GRID_SHIFT, first_row) - first_row
+            bottom = min((max(y0, y1, y2) - HALF_GRID) >> GRID_SHIFT, first_row + n_rows - 1) - first_row
             if turn == 1:
                 ahead = min(camera[triangles[t, 0], 2], camera[triangles[t, 1], 2], camera[triangles[t, 2], 2])
                 nearest, hidden = np.float32(1) / max(ahead, np.float32(lens[3])), True
-                for r in range(top // TILE, bottom // TILE + 1):
-                    for x in range(left // TILE, right // TILE + 1):
+                for r in range(top // TILE_SAMPLES, bottom // TILE_SAMPLES + 1):
+                    for x in range(left // TILE_SAMPLES, right // TILE_SAMPLES + 1):
                         hidden &= tiles[r, x] >= nearest
                 if hidden:
                     continue
             across, along, origin, least, most = depth_plane(camera, triangles, t, lens)
             bias = np.float32(1) if number >= 0 else BACK_BIAS
-            px, py = (left << SHIFT) + HALF, ((top + first_row) << SHIFT) + HALF
+            px, py = (left << GRID_SHIFT) + HALF_GRID, ((top + first_row) << GRID_SHIFT) + HALF_GRID
             row_0, row_1 = edge_function(x1, y1, x2, y2, px, py), edge_function(x2, y2, x0, y0, px, py)
             row_2 = edge_function(x0, y0, x1, y1, px, py)
-            right_0, right_1, right_2 = (y1 - y2) << SHIFT, (y2 - y0) << SHIFT, (y0 - y1) << SHIFT
+            right_0, right_1, right_2 = (y1 - y2) << GRID_SHIFT, (y2 - y0) << GRID_SHIFT, (y0 - y1) << GRID_SHIFT
             base = origin + along * (top + first_row + 0.5) + across * (left + 0.5)
             for r in range(top, bottom + 1):
                 e0, e1, e2, value = row_0, row_1, row_2, base
@@ -263,6 +265,6 @@ def draw_band(geometry: Any, batch: Any, first_row: int, depth: Array, owner: Ar
                     value += across
                     e0, e1, e2 = e0 + right_0, e1 + right_1, e2 + right_2
                 base += along
-                row_0, row_1 = row_0 + ((x2 - x1) << SHIFT), row_1 + ((x0 - x2) << SHIFT)
-                row_2 += (x1 - x0) << SHIFT
+                row_0, row_1 = row_0 + ((x2 - x1) << GRID_SHIFT), row_1 + ((x0 - x2) << GRID_SHIFT)
+                row_2 += (x1 - x0) << GRID_SHIFT
     return int(n_translucent)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tts2face.compilation import kernel
 from tts2face.render.fragments import AT_OPACITY, AT_SHARE, PIXEL_ENDS, PIXEL_X, PIXEL_Y, is_same_surface
-from tts2face.render.raster import NOTHING
+from tts2face.render.raster import NO_TRIANGLE
 
 Array = NDArray[Any]
 
@@ -53,7 +53,7 @@ def mix_samples(
         for turn in range(3):
             layer = (0, 2, 1)[turn]
             number = owner[layer, row + s // side, column + s % side]
-            if number == NOTHING:
+            if number == NO_TRIANGLE:
                 continue
             g = begins[layer]
             while not is_same_surface(number, number_of[g], flat, part_of):

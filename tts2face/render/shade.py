@@ -19,12 +19,17 @@ from tts2face.render.fragments import (
 
 Array = NDArray[Any]
 
-REACH = np.array([1.0, 0.5, 0.36], np.float32)  # of red, green and blue light under skin, of the part's wrap
-BOUNCE = np.float32(0.8)  # share of the light between walls of a hollow that stays in it
+SKIN_SCATTERING = np.array([1.0, 0.5, 0.36], np.float32)  # of red, green and blue light under skin, of the part's wrap
+INTERREFLECTION = np.float32(0.8)  # share of the light between walls of a hollow that stays in it
 SKY_GLOSS = np.float32(0.1)  # of the sky that a glossy part mirrors
-SHOULDER = np.float32(0.65)  # linear light from which bright places are pressed together, below 1
+TONE_SHOULDER = np.float32(0.65)  # linear light from which bright places are pressed together, below 1
 N_SCRATCH_ROWS = 9
-SKY, FLOOR, UP, LIGHTS = 0, 1, 2, 3  # rows of the table of lights; a light has a direction and a colour
+SKY_ROW, FLOOR_ROW, UP_ROW, FIRST_LIGHT_ROW = (
+    0,
+    1,
+    2,
+    3,
+)  # rows of the table of lights; a light has a direction and a colour
 
 
 @vectorized_kernel
@@ -54,18 +59,18 @@ def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour:
         view_x[i], view_y[i], view_z[i] = ray_x[i] * scale, ray_y[i] * scale, scale
         edge = one - max(nx[i] * view_x[i] + ny[i] * view_y[i] + nz[i] * view_z[i], zero)
         gloss[i] = specular[i] * (one + np.float32(3) * edge * edge * edge)  # after Schlick 1994
-        towards[i] = nx[i] * lights[UP, 0] + ny[i] * lights[UP, 1] + nz[i] * lights[UP, 2]
+        towards[i] = nx[i] * lights[UP_ROW, 0] + ny[i] * lights[UP_ROW, 1] + nz[i] * lights[UP_ROW, 2]
     for c in range(3):
         matt, shine, albedo, seen = colour[c], scratch[6 + c], table[AT_ALBEDO + c], table[AT_EXPOSURE]
-        middle = np.float32(0.5) * (lights[SKY, c] + lights[FLOOR, c])
-        swing = np.float32(0.5) * (lights[SKY, c] - lights[FLOOR, c])
+        middle = np.float32(0.5) * (lights[SKY_ROW, c] + lights[FLOOR_ROW, c])
+        swing = np.float32(0.5) * (lights[SKY_ROW, c] - lights[FLOOR_ROW, c])
         for i in range(n):
             around = (middle + swing * towards[i]) * seen[i]
-            matt[i] = around / (one - (one - seen[i]) * albedo[i] * BOUNCE)
+            matt[i] = around / (one - (one - seen[i]) * albedo[i] * INTERREFLECTION)
             shine[i] = SKY_GLOSS * around
-    for k in range(LIGHTS, len(lights)):
+    for k in range(FIRST_LIGHT_ROW, len(lights)):
         lx, ly, lz = lights[k, 0], lights[k, 1], lights[k, 2]
-        seen = table[AT_EXPOSURE + 1 + k - LIGHTS]
+        seen = table[AT_EXPOSURE + 1 + k - FIRST_LIGHT_ROW]
         for i in range(n):
             towards[i] = nx[i] * lx + ny[i] * ly + nz[i] * lz
             hx, hy, hz = lx + view_x[i], ly + view_y[i], lz + view_z[i]
@@ -76,7 +81,7 @@ def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour:
             base *= base
             lobe[i] = base * base * min(max(towards[i] * np.float32(4), zero), one) * seen[i]
         for c in range(3):
-            matt, shine, strength, reach = colour[c], scratch[6 + c], lights[k, 3 + c], REACH[c]
+            matt, shine, strength, reach = colour[c], scratch[6 + c], lights[k, 3 + c], SKIN_SCATTERING[c]
             for i in range(n):
                 around_edge = wrap[i] * reach
                 soaked = seen[i] + around_edge * seen[i] * (one - seen[i])  # a shadow's edge is redder under skin
@@ -86,5 +91,5 @@ def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour:
         matt, shine, albedo, opacity = colour[c], scratch[6 + c], table[AT_ALBEDO + c], table[AT_OPACITY]
         for i in range(n):
             value = opacity[i] * matt[i] * albedo[i] + gloss[i] * shine[i]
-            over = max(value - SHOULDER, zero) / (one - SHOULDER)
-            matt[i] = min(value, SHOULDER) + (one - SHOULDER) * over / (one + over)
+            over = max(value - TONE_SHOULDER, zero) / (one - TONE_SHOULDER)
+            matt[i] = min(value, TONE_SHOULDER) + (one - TONE_SHOULDER) * over / (one + over)

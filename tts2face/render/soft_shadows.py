@@ -18,18 +18,18 @@ from tts2face.models.face import Face
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.render.fragments import NORMAL, face_normals, vertex_normals
 from tts2face.render.picture_kernels import allocate_buffers, project_surface
-from tts2face.render.raster import SHIFT, draw_band, transform_to_camera
+from tts2face.render.raster import GRID_SHIFT, draw_band, transform_to_camera
 from tts2face.render.studio_light import LAMP_RADIUS_RAD
 from tts2face.render.surface import Surface
 
-SIDE = 192  # samples along a side of the views: 1.5 mm of a head
+VIEW_SAMPLES = 192  # samples along a side of the views: 1.5 mm of a head
 N_SKY, N_LAMP = 36, 7  # views for the sky and for each lamp
 LIFT_MM, SLACK_MM = 1.2, 1.2  # a vertex is looked for this far before the surface, and this far before what hides it
-FAR_MM = 20_000.0  # distance of the views: almost parallel light
-OPEN_JAW = 0.6  # weight of the wide open mouth
-HIDDEN_EYE = 0.75  # light on the parts of an eyeball that come out when it turns, of its lit parts' light
-HIDDEN_TOOTH = 0.6  # likewise of teeth behind the lips of the open mouth: enamel scatters light along itself
-SMOOTHINGS = 2  # means over neighbours, against the grain of few views
+VIEW_DISTANCE_MM = 20_000.0  # distance of the views: almost parallel light
+OPEN_JAW_WEIGHT = 0.6  # weight of the wide open mouth
+HIDDEN_EYE_LIGHT = 0.75  # light on the parts of an eyeball that come out when it turns, of its lit parts' light
+HIDDEN_TOOTH_LIGHT = 0.6  # likewise of teeth behind the lips of the open mouth: enamel scatters light along itself
+N_SMOOTHING_PASSES = 2  # means over neighbours, against the grain of few views
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,12 +54,12 @@ def compute_exposure(face: Face, surface: Surface, lamps: NDArray[np.float64], t
     jaw = face.shape_names.index("jawOpen") if "jawOpen" in face.shape_names else -1
     poses = np.zeros((1 if jaw < 0 else 2, len(face.shape_names)), np.float32)
     if jaw >= 0:
-        poses[1, jaw] = OPEN_JAW
+        poses[1, jaw] = OPEN_JAW_WEIGHT
     baked = [_rest_exposure(surface, surface.rig.pose(pose), lamps, threads) for pose in poses]
     for part in face.parts:
         if part.name.startswith("teeth"):
             teeth = np.unique(face.triangles[part.first : part.first + part.count])
-            lit = HIDDEN_TOOTH * np.percentile(baked[-1][teeth], 90, axis=0)
+            lit = HIDDEN_TOOTH_LIGHT * np.percentile(baked[-1][teeth], 90, axis=0)
             baked[-1][teeth] = np.maximum(baked[-1][teeth], lit)
     return Exposure(baked[0], baked[-1] - baked[0], lip_opening(face, jaw))
 
@@ -71,7 +71,7 @@ def lip_opening(face: Face, jaw: int) -> NDArray[np.float32]:
     """
     opening = np.zeros(len(face.shape_names), np.float32)
     if jaw >= 0:
-        opening[jaw] = 1 / OPEN_JAW
+        opening[jaw] = 1 / OPEN_JAW_WEIGHT
     rows = {int(number): row for row, number in enumerate(face.landmarks)}
     if jaw < 0 or not {UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID} <= rows.keys():
         return opening
@@ -80,7 +80,7 @@ def lip_opening(face: Face, jaw: int) -> NDArray[np.float32]:
         for lip in (UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID)
     )
     parted = upper - lower
-    return (parted / (OPEN_JAW * parted[jaw])).astype(np.float32) if parted[jaw] > 0 else opening
+    return (parted / (OPEN_JAW_WEIGHT * parted[jaw])).astype(np.float32) if parted[jaw] > 0 else opening
 
 
 def sphere_directions(n: int) -> NDArray[np.float64]:
@@ -121,7 +121,7 @@ def _rest_exposure(
     smooth = _smooth_values(surface, exposure)
     for first, end in surface.rig.eye_spans:
         ball = smooth[first:end]
-        np.maximum(ball, HIDDEN_EYE * np.percentile(ball, 85, axis=0), out=ball)
+        np.maximum(ball, HIDDEN_EYE_LIGHT * np.percentile(ball, 85, axis=0), out=ball)
     return smooth
 
 
@@ -144,11 +144,11 @@ def _visibility(
     seen = np.zeros((len(directions), len(points)), np.float32)
 
     def look(share: range) -> None:
-        room = allocate_buffers(surface, (SIDE, SIDE), 1)
+        room = allocate_buffers(surface, (VIEW_SAMPLES, VIEW_SAMPLES), 1)
         grid, camera = np.zeros_like(room.grid), np.zeros((len(points), 3), np.float32)
         for d in share:
             view, lens = _shadow_view(directions[d], middle, radius)
-            members = project_surface(points, surface, (view, lens), room, (SIDE, SIDE))
+            members = project_surface(points, surface, (view, lens), room, (VIEW_SAMPLES, VIEW_SAMPLES))
             geometry = (room.vertex, surface.triangles, surface.translucent, lens)
             draw_band(geometry, (room.corners, room.source, members), 0, room.depth, room.owner)
             transform_to_camera(lifted, view, lens, camera, grid)
@@ -164,16 +164,18 @@ def _shadow_view(direction: NDArray[np.float64], middle: Any, radius: float) -> 
     right = np.cross(ahead, [0.0, 1.0, 0.0] if abs(direction[1]) < 0.99 else [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     turned = np.stack([right, np.cross(ahead, right), ahead])
-    view = np.column_stack([turned, -turned @ (middle - FAR_MM * ahead)])
-    return view, np.array([(SIDE / 2 - 1) * FAR_MM / radius, SIDE / 2, SIDE / 2, FAR_MM / 2])
+    view = np.column_stack([turned, -turned @ (middle - VIEW_DISTANCE_MM * ahead)])
+    return view, np.array(
+        [(VIEW_SAMPLES / 2 - 1) * VIEW_DISTANCE_MM / radius, VIEW_SAMPLES / 2, VIEW_SAMPLES / 2, VIEW_DISTANCE_MM / 2]
+    )
 
 
 @kernel
 def mark_visible(camera: Any, grid: Any, depth: Any, slack: Any, seen: Any) -> None:
     """Mark in `seen` (V,) the vertices before which nothing nearer than `slack` mm lies."""
     for v in range(len(camera)):
-        x = min(max(grid[v, 0] >> SHIFT, 0), depth.shape[2] - 1)
-        y = min(max(grid[v, 1] >> SHIFT, 0), depth.shape[1] - 1)
+        x = min(max(grid[v, 0] >> GRID_SHIFT, 0), depth.shape[2] - 1)
+        y = min(max(grid[v, 1] >> GRID_SHIFT, 0), depth.shape[1] - 1)
         if depth[0, y, x] * (camera[v, 2] - slack) <= np.float32(1):
             seen[v] = np.float32(1)
 
@@ -182,7 +184,7 @@ def _smooth_values(surface: Surface, values: NDArray[np.float32]) -> NDArray[np.
     """Values at vertices, each replaced by the mean over its triangles, a few times."""
     n_around = np.diff(surface.starts)
     inner = np.flatnonzero(n_around > 0)
-    for _ in range(SMOOTHINGS):
+    for _ in range(N_SMOOTHING_PASSES):
         at_triangles = values[surface.triangles].mean(axis=1)
         sums = np.add.reduceat(at_triangles[surface.members], surface.starts[:-1][inner], axis=0)
         values = values.copy()

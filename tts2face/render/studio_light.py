@@ -9,10 +9,10 @@ from tts2face.render.camera import CameraMatrices
 from tts2face.render.camera_views import CameraView
 
 # Sky, floor: colour. Lamps: yaw and pitch in degrees as the camera's, then colour; linear light.
-SKY, FLOOR = (0.26, 0.265, 0.285), (0.13, 0.105, 0.095)
-KEY = (-44.0, 36.0, (1.22, 1.14, 1.04))
-FILL = (52.0, 6.0, (0.25, 0.245, 0.25))
-RIM = (148.0, 36.0, (0.75, 0.84, 1.0))
+SKY_COLOUR, FLOOR_COLOUR = (0.26, 0.265, 0.285), (0.13, 0.105, 0.095)
+KEY_LIGHT = (-44.0, 36.0, (1.22, 1.14, 1.04))
+FILL_LIGHT = (52.0, 6.0, (0.25, 0.245, 0.25))
+RIM_LIGHT = (148.0, 36.0, (0.75, 0.84, 1.0))
 LAMP_RADIUS_RAD = math.radians(13.0)  # the lamps are large: their shadows have soft edges
 
 
@@ -24,14 +24,16 @@ def lamp_direction(yaw_deg: float, pitch_deg: float) -> NDArray[np.float64]:
 
 def lamp_directions(camera: CameraView) -> NDArray[np.float64]:
     """(3, 3) directions of the lamps in the world; they go around the head with the camera."""
-    return np.array([lamp_direction(yaw + camera.yaw_deg, pitch) for yaw, pitch, _ in (KEY, FILL, RIM)])
+    return np.array(
+        [lamp_direction(yaw + camera.yaw_deg, pitch) for yaw, pitch, _ in (KEY_LIGHT, FILL_LIGHT, RIM_LIGHT)]
+    )
 
 
 def light_table(directions: NDArray[np.float64], optics: CameraMatrices) -> NDArray[np.float32]:
     """(6, 6) lights for `tts2face.render.shade.shade_fragments`: sky, floor, up, and three lamps, in camera space."""
     turn = optics.view[:, :3]
     rows = np.zeros((6, 6))
-    rows[0, :3], rows[1, :3], rows[2, :3] = SKY, FLOOR, turn @ [0.0, 1.0, 0.0]
-    for row, towards, (_, _, colour) in zip(rows[3:], directions, (KEY, FILL, RIM), strict=True):
+    rows[0, :3], rows[1, :3], rows[2, :3] = SKY_COLOUR, FLOOR_COLOUR, turn @ [0.0, 1.0, 0.0]
+    for row, towards, (_, _, colour) in zip(rows[3:], directions, (KEY_LIGHT, FILL_LIGHT, RIM_LIGHT), strict=True):
         row[:3], row[3:] = turn @ towards, colour
     return rows.astype(np.float32)

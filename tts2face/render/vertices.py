@@ -14,10 +14,10 @@ from tts2face.render.fragments import (
     AT_RAY,
     AT_SHARE,
     AT_SPECULAR,
-    INSIDE,
+    BACK_LIGHT_SHARE,
     N_ROWS,
     NORMAL,
-    OPEN,
+    OPEN_SURFACE,
     TEXTURED,
     face_normals,
     texel,
@@ -26,7 +26,7 @@ from tts2face.render.fragments import (
 from tts2face.render.shade import N_SCRATCH_ROWS, shade_fragments
 from tts2face.render.surface import Surface, encoding_table, linear_table
 
-ENCODED = (encoding_table(4096) / 255.0).astype(np.float32)  # sRGB in [0, 1] of linear light in equal steps
+SRGB_TABLE = (encoding_table(4096) / 255.0).astype(np.float32)  # sRGB in [0, 1] of linear light in equal steps
 SHADE_STEP, N_SHADES = 1.5, 6  # of colours of a texture that are drawn with one copy of it
 
 
@@ -92,7 +92,7 @@ def build_vertex_light(surface: Surface) -> VertexLight:
         camera=np.zeros((n_vertices, NORMAL + 3), np.float32),
         flat=np.zeros((len(surface.triangles), 3), np.float32),
         table=table,
-        inside=np.where(material[:, OPEN] > 0, np.float32(1), INSIDE),
+        inside=np.where(material[:, OPEN_SURFACE] > 0, np.float32(1), BACK_LIGHT_SHARE),
         albedo=albedo,
         divisor=np.where(textured[:, None], albedo, np.maximum(material[:, 3:4], np.float32(1 / 255))),
         front=light_of[0],
@@ -102,8 +102,8 @@ def build_vertex_light(surface: Surface) -> VertexLight:
 
 def encode_srgb(linear: NDArray[np.float32]) -> NDArray[np.float32]:
     """Linear light as sRGB in [0, 1]."""
-    steps = np.clip(linear, 0.0, 1.0) * np.float32(len(ENCODED) - 1) + np.float32(0.5)
-    srgb: NDArray[np.float32] = ENCODED[steps.astype(np.intp)]
+    steps = np.clip(linear, 0.0, 1.0) * np.float32(len(SRGB_TABLE) - 1) + np.float32(0.5)
+    srgb: NDArray[np.float32] = SRGB_TABLE[steps.astype(np.intp)]
     return srgb
 
 

@@ -25,9 +25,9 @@ from tts2face.render.surface import Surface, encoding_table, linear_table
 from tts2face.render.vertices import VertexLight, brighten, build_vertex_light, triangle_shades
 
 OFF_SCREEN, ON_SCREEN = "vtkEGLRenderWindow", "vtkXOpenGLRenderWindow"  # the first falls back to OSMesa by itself
-UNSEEN = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
-PROBE_SECONDS = 60.0
-PROBE = """
+OFF_SCREEN_CLASSES = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
+PROBE_TIMEOUT_S = 60.0
+PROBE_CODE = """
 import numpy, pyvista
 plotter = pyvista.Plotter(off_screen={off_screen}, window_size=(32, 32))
 plotter.add_mesh(pyvista.Sphere(), color="red", lighting=False)
@@ -36,7 +36,7 @@ seen = numpy.asarray(plotter.screenshot(return_img=True))
 opened = plotter.render_window.GetClassName()
 raise SystemExit(0 if int(seen[16, 16, 0]) > 200 and opened not in {refused} else 3)
 """
-TONE = (linear_table(), encoding_table(8192))
+VTK_TONE_TABLES = (linear_table(), encoding_table(8192))
 
 
 def require_gl() -> None:
@@ -73,11 +73,11 @@ def require_pyvista(purpose: str) -> None:
 def can_draw_with(window: str) -> bool:
     """Whether a child process can draw with VTK in a window of a class; it is what crashes if VTK does."""
     is_off_screen = window == OFF_SCREEN  # without a display VTK falls back to a window that nobody sees
-    code = PROBE.format(off_screen=is_off_screen, refused=() if is_off_screen else UNSEEN)
+    code = PROBE_CODE.format(off_screen=is_off_screen, refused=() if is_off_screen else OFF_SCREEN_CLASSES)
     environment = os.environ | window_environment(window)
     try:
         done = subprocess.run(
-            [sys.executable, "-c", code], env=environment, capture_output=True, timeout=PROBE_SECONDS, check=False
+            [sys.executable, "-c", code], env=environment, capture_output=True, timeout=PROBE_TIMEOUT_S, check=False
         )
     except (OSError, subprocess.TimeoutExpired):
         return False
@@ -131,7 +131,7 @@ def render_frames(
             samples = np.asarray(plotter.screenshot(None, transparent_background=True, return_img=True))
             drawn = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
             drawn[:, :, :3] = scene.background
-            average_samples(samples, side, TONE, drawn)
+            average_samples(samples, side, VTK_TONE_TABLES, drawn)
             yield drawn
     finally:
         plotter.close()

@@ -13,16 +13,22 @@ from tts2face.models.talker import ShapeModel, Talker, speech_channels
 from tts2face.retargeting.to_face import Retargeter, build_retargeter
 from tts2face.types import Trajectory
 
-MOUTH_MODES = 20
-CLOSED_SHARE = 0.15  # of the frames are taken for those with the lips closed
-MOST_CONTACT_MM = 1.5  # a gap that a tracker reads on touching lips is below this
-SCORED = ("eye", "brow", "nose", "cheek")  # how the names begin of shapes that follow scores
-CALM = 0.04  # scores rise by this much from noise alone
-LID_OPEN, LID_SHUT = 0.9, 0.25  # quantile of the apertures of an open eye; share of it that is left of a shut one
+N_MOUTH_MODES = 20
+CLOSED_FRAME_SHARE = 0.15  # of the frames are taken for those with the lips closed
+MAX_CONTACT_MM = 1.5  # a gap that a tracker reads on touching lips is below this
+SCORE_DRIVEN_SHAPES = ("eye", "brow", "nose", "cheek")  # how the names begin of shapes that follow scores
+SCORE_DEAD_ZONE = 0.04  # scores rise by this much from noise alone
+OPEN_LID_QUANTILE, CLOSED_LID_SHARE = (
+    0.9,
+    0.25,
+)  # quantile of the apertures of an open eye; share of it that is left of a shut one
 # Upper and lower lid, outer and inner corner of each eye.
-LIDS = {"Left": ((386, 385, 387), (374, 380, 373), 263, 362), "Right": ((159, 158, 160), (145, 153, 144), 33, 133)}
+EYELID_LANDMARKS = {
+    "Left": ((386, 385, 387), (374, 380, 373), 263, 362),
+    "Right": ((159, 158, 160), (145, 153, 144), 33, 133),
+}
 
-Floats = NDArray[np.float64]
+FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,12 +55,12 @@ class PerformerRetargeter:
         """
         speech = self.lip_motion(landmarks, scores.fps, gain=gain)
         weights = np.array(self.lips.retarget(speech).values)
-        lids = {side: self._lid_closure(landmarks, side) for side in LIDS}
+        lids = {side: self._lid_closure(landmarks, side) for side in EYELID_LANDMARKS}
         for column, name in enumerate(self.face.shape_names):
-            if not name.startswith(SCORED) or name not in scores.channels:
+            if not name.startswith(SCORE_DRIVEN_SHAPES) or name not in scores.channels:
                 continue
             at = scores.channels.index(name)
-            moved = np.maximum(scores.values[:, at] - self.neutral_scores[at] - CALM, 0.0)
+            moved = np.maximum(scores.values[:, at] - self.neutral_scores[at] - SCORE_DEAD_ZONE, 0.0)
             if name.startswith("eyeBlink"):
                 moved = lids[name.removeprefix("eyeBlink")]
             elif not name.startswith("eye"):
@@ -68,9 +74,9 @@ class PerformerRetargeter:
         values = rest + gain * (self.model.parameters(landmarks) - rest)
         return Trajectory(speech_channels(self.model), values, fps)
 
-    def _lid_closure(self, landmarks: NDArray[np.floating], side: str) -> Floats:
+    def _lid_closure(self, landmarks: NDArray[np.floating], side: str) -> FloatArray:
         opened = self.open_apertures[side]
-        return np.clip((opened - eye_aperture(landmarks, side)) / (opened * (1.0 - LID_SHUT)), 0.0, 1.0)
+        return np.clip((opened - eye_aperture(landmarks, side)) / (opened * (1.0 - CLOSED_LID_SHARE)), 0.0, 1.0)
 
 
 def build_performer_retargeter(landmarks: NDArray[np.floating], scores: Trajectory, face: Face) -> PerformerRetargeter:
@@ -88,14 +94,16 @@ def build_performer_retargeter(landmarks: NDArray[np.floating], scores: Trajecto
     """
     model = lip_model(landmarks)
     gaps = lip_gaps(landmarks)
-    closed = gaps[np.argsort(gaps[:, MIDDLE_PAIR], kind="stable")[: max(1, int(CLOSED_SHARE * len(gaps)))]]
-    contact = np.clip(np.percentile(closed, 50, axis=0), 0.0, MOST_CONTACT_MM)
+    closed = gaps[np.argsort(gaps[:, MIDDLE_PAIR], kind="stable")[: max(1, int(CLOSED_FRAME_SHARE * len(gaps)))]]
+    contact = np.clip(np.percentile(closed, 50, axis=0), 0.0, MAX_CONTACT_MM)
     talker = Talker(scores.fps, model, (), {"name": "performer"})
     return PerformerRetargeter(
         model=model,
         lips=build_retargeter(talker, face, contact=contact),
         face=face,
-        open_apertures={side: float(np.quantile(eye_aperture(landmarks, side), LID_OPEN)) for side in LIDS},
+        open_apertures={
+            side: float(np.quantile(eye_aperture(landmarks, side), OPEN_LID_QUANTILE)) for side in EYELID_LANDMARKS
+        },
         neutral_scores=np.median(scores.values, axis=0),
     )
 
@@ -122,7 +130,7 @@ def lip_model(landmarks: NDArray[np.floating]) -> ShapeModel:
     DataError
         There are too few frames.
     """
-    n_modes = min(MOUTH_MODES, len(landmarks) - 1)
+    n_modes = min(N_MOUTH_MODES, len(landmarks) - 1)
     if n_modes < 1:
         raise DataError("one frame tells nothing of how a face moves; give a longer take")
     mean = landmarks.mean(axis=0, dtype=np.float64)
@@ -133,7 +141,7 @@ def lip_model(landmarks: NDArray[np.floating]) -> ShapeModel:
     basis = np.zeros((n_modes, N_LANDMARKS, 3))
     basis[:, region] = vectors[:, order].T.reshape(n_modes, -1, 3)
     gap = lip_gaps(landmarks)[:, MIDDLE_PAIR]
-    closed = gap <= np.quantile(gap, CLOSED_SHARE)
+    closed = gap <= np.quantile(gap, CLOSED_FRAME_SHARE)
     flat = np.median(landmarks[closed], axis=0) - mean
     rest = basis.reshape(n_modes, -1) @ flat.ravel()
     spread = np.sqrt(np.maximum(variances[order], 1e-12))
@@ -146,14 +154,14 @@ def lip_model(landmarks: NDArray[np.floating]) -> ShapeModel:
     )
 
 
-def lip_gaps(landmarks: NDArray[np.floating]) -> Floats:
+def lip_gaps(landmarks: NDArray[np.floating]) -> FloatArray:
     """(T, P) height of each upper inner lip point above the one that faces it, mm."""
     upper, lower = landmarks[:, list(INNER_LIP_UPPER), 1], landmarks[:, list(INNER_LIP_LOWER), 1]
     return np.asarray(upper - lower, np.float64)
 
 
-def eye_aperture(landmarks: NDArray[np.floating], side: str) -> Floats:
+def eye_aperture(landmarks: NDArray[np.floating], side: str) -> FloatArray:
     """(T,) distance of the lids over the width of an eye, ``Left`` or ``Right``."""
-    upper, lower, outer, inner = LIDS[side]
+    upper, lower, outer, inner = EYELID_LANDMARKS[side]
     height = np.linalg.norm(landmarks[:, list(upper)] - landmarks[:, list(lower)], axis=2).mean(axis=1)
     return np.asarray(height / np.linalg.norm(landmarks[:, outer] - landmarks[:, inner], axis=1), np.float64)

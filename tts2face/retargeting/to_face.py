@@ -14,12 +14,12 @@ from lexicon.sequence import PhoneSequence
 from tts2face.face.bounded_least_squares import bounded_least_squares
 from tts2face.face.landmark_fit import landmark_motion, landmark_positions, procrustes_rotation
 from tts2face.face.mouth_model import (
-    CHIN_POINTS,
+    CHIN_LANDMARKS,
     CHIN_WEIGHT,
     CORNERS_LEFT,
     CORNERS_RIGHT,
     MIDDLE_PAIR,
-    SPEECH_SHAPES,
+    SPEECH_SHAPE_PREFIXES,
     WIDTH_WEIGHT,
     landmark_weights,
     mouth_curvature,
@@ -40,9 +40,9 @@ from tts2face.types import Trajectory
 FloatArray = NDArray[np.float64]
 
 BILABIALS = frozenset({"p", "b", "m"})
-SURE_CONTACT = 90  # percentile of the least gaps in bilabials: up to this gap the talker's lips touch
-MOST_CONTACT_MM = 1.5  # a tracker that reads more than this on touching lips is not to be trusted
-CLEAR_MM = 3.0  # this far beyond contact a gap is shown in full
+CONTACT_PERCENTILE = 90  # percentile of the least gaps in bilabials: up to this gap the talker's lips touch
+MAX_CONTACT_MM = 1.5  # a tracker that reads more than this on touching lips is not to be trusted
+FULL_GAP_MM = 3.0  # this far beyond contact a gap is shown in full
 GAP_WEIGHT = 300.0  # the gap between facing lip points against one of the cheek: whether lips touch is what is seen
 
 
@@ -86,7 +86,7 @@ class Retargeter:
         parameters = speech.values.astype(np.float64)
         read = ordered_product(parameters, self.gaps[:, :-1].T) + self.gaps[:, -1]
         over = np.maximum(read, 0.0)  # a face rests with its lips closed: its gaps are counted from there
-        shown = over + self.contact * np.minimum(over / CLEAR_MM, 1.0)
+        shown = over + self.contact * np.minimum(over / FULL_GAP_MM, 1.0)
         linear = ordered_product(parameters, self.linear_term[:, :-1].T) + self.linear_term[:, -1]
         linear += ordered_product(shown, self.gap_linear_term.T) + ordered_product(
             shown - read + self.gap_rest, self.lip_linear_term.T
@@ -110,7 +110,7 @@ def build_retargeter(talker: Talker, face: Face, *, contact: FloatArray | None =
     DataError
         The face lacks the lips' landmarks, or has no shape that speech could move.
     """
-    moving = np.array([i for i, name in enumerate(face.shape_names) if name.startswith(SPEECH_SHAPES)])
+    moving = np.array([i for i, name in enumerate(face.shape_names) if name.startswith(SPEECH_SHAPE_PREFIXES)])
     require_lips(face, moving)
     common = [landmark for landmark in MOUTH_REGION if landmark in set(face.landmarks.tolist())]
     at = {landmark: row for row, landmark in enumerate(common)}
@@ -124,7 +124,7 @@ def build_retargeter(talker: Talker, face: Face, *, contact: FloatArray | None =
     upper, lower = ([at[lip] for lip in lips] for lips in (INNER_LIP_UPPER, INNER_LIP_LOWER))
     widened, opened = moved[left, 0] - moved[right, 0], moved[upper, 1] - moved[lower, 1]
     pull += WIDTH_WEIGHT * ordered_product(widened.T, wanted[left, 0] - wanted[right, 0])
-    chin = [at[landmark] for landmark in CHIN_POINTS if landmark in at]
+    chin = [at[landmark] for landmark in CHIN_LANDMARKS if landmark in at]
     dropped = moved[chin, 1].mean(axis=0)
     pull += CHIN_WEIGHT * np.outer(dropped, wanted[chin, 1].mean(axis=0))
     contact = scale * (contact_gaps(talker) if contact is None else contact)
@@ -198,7 +198,9 @@ def contact_gaps(talker: Talker) -> FloatArray:
         least.append(_bilabial_minima(gaps, utterance.phones, talker.fps))
     found = np.concatenate(least)
     return (
-        np.clip(np.percentile(found, SURE_CONTACT, axis=0), 0.0, MOST_CONTACT_MM) if len(found) else np.zeros(len(mean))
+        np.clip(np.percentile(found, CONTACT_PERCENTILE, axis=0), 0.0, MAX_CONTACT_MM)
+        if len(found)
+        else np.zeros(len(mean))
     )
 
 

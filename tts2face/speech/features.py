@@ -18,19 +18,19 @@ from tts2face.types import Trajectory, Waveform
 
 FEATURE_RATE = 16_000  # Hz; sound is read at this rate
 WINDOW_S = 0.04  # effective length of the Gaussian window (T07, section 3.2)
-CELL = 1361  # samples, odd: twice the window, which is where Praat cuts its Gaussian off, and 5 ms
-HALF_CELL = CELL // 2  # samples needed behind a frame's instant
+WINDOW_SAMPLES = 1361  # samples, odd: twice the window, which is where Praat cuts its Gaussian off, and 5 ms
+HALF_WINDOW_SAMPLES = WINDOW_SAMPLES // 2  # samples needed behind a frame's instant
 N_MFCC = 12
 LPC_ORDER = 16  # two for each kHz of the rate
 PRE_EMPHASIS_HZ = 50.0
-POLES = 8  # formants up to half the rate, one for each kHz; the first four are kept
+N_FORMANT_POLES = 8  # formants up to half the rate, one for each kHz; the first four are kept
 NEUTRAL_TUBE_HZ = (500.0, 1500.0, 2500.0, 3500.0)  # of a vocal tract at rest; stand where no formant is found
-NOISE = 3e-5  # of full scale; digital silence has neither logarithm nor formants
-CELLS_AT_ONCE = 1000  # 11 MB
+NOISE_LEVEL = 3e-5  # of full scale; digital silence has neither logarithm nor formants
+WINDOWS_AT_ONCE = 1000  # 11 MB
 
-Cells = NDArray[np.float64]
-Measure = Callable[[Cells], NDArray[np.float64]]
-FEATURES = ("formants", "mfcc", "lpc", "lsf", "level")
+AnalysisWindows = NDArray[np.float64]
+Measure = Callable[[AnalysisWindows], NDArray[np.float64]]
+FEATURE_KINDS = ("formants", "mfcc", "lpc", "lsf", "level")
 
 
 def speech_features(sound: Waveform, kind: str, *, fps: float, n_frames: int, start: float = 0.0) -> Trajectory:
@@ -41,7 +41,7 @@ def speech_features(sound: Waveform, kind: str, *, fps: float, n_frames: int, st
     sound
         At `FEATURE_RATE`.
     kind
-        One of `FEATURES`, or several as ``mfcc+lsf``: ``formants`` (4, Hz), ``mfcc`` (13, the first is the level),
+        One of `FEATURE_KINDS`, or several as ``mfcc+lsf``: ``formants`` (4, Hz), ``mfcc`` (13, the first is the level),
         ``lpc`` (16 prediction coefficients), ``lsf`` (16, rad), ``level`` (1, dB of full scale).
 
     Raises
@@ -54,8 +54,8 @@ def speech_features(sound: Waveform, kind: str, *, fps: float, n_frames: int, st
         raise InputError(f"features are measured at {FEATURE_RATE} Hz, not {sound.rate}; resample the sound")
     centres = np.rint((start + np.arange(n_frames) / fps) * FEATURE_RATE).astype(np.int64)
     parts = [
-        measure_windows(analysis_windows(sound.samples, centres[at : at + CELLS_AT_ONCE]), measures)
-        for at in range(0, n_frames, CELLS_AT_ONCE)
+        measure_windows(analysis_windows(sound.samples, centres[at : at + WINDOWS_AT_ONCE]), measures)
+        for at in range(0, n_frames, WINDOWS_AT_ONCE)
     ]
     values = np.concatenate(parts)
     return Trajectory([f"{kind}.{i}" for i in range(values.shape[1])], values, fps)
@@ -72,30 +72,30 @@ def feature_measures(kind: str) -> tuple[Measure, ...]:
     names = kind.split("+")
     for name in names:
         if name not in MEASURES:
-            raise InputError(f"there is no feature {name!r}; choose {', '.join(FEATURES)}")
+            raise InputError(f"there is no feature {name!r}; choose {', '.join(FEATURE_KINDS)}")
     return tuple(MEASURES[name] for name in names)
 
 
-def measure_windows(windows: Cells, measures: tuple[Measure, ...]) -> NDArray[np.float32]:
+def measure_windows(windows: AnalysisWindows, measures: tuple[Measure, ...]) -> NDArray[np.float32]:
     """(T, D) features of cells, one kind beside the other."""
     if not len(windows):  # Praat knows no sound without samples
-        return measure_windows(np.zeros((1, CELL)) + NOISE, measures)[:0]
+        return measure_windows(np.zeros((1, WINDOW_SAMPLES)) + NOISE_LEVEL, measures)[:0]
     return np.concatenate([measure(windows) for measure in measures], axis=1).astype(np.float32)
 
 
-def analysis_windows(samples: NDArray[np.float32], centres: NDArray[np.int64]) -> Cells:
-    """(T, `CELL`) samples about each of T places, zeros beyond the ends, with the same faint noise in each cell."""
-    first = max(int(centres.min(initial=len(samples))) - HALF_CELL, 0)
-    last = max(int(centres.max(initial=0)) + HALF_CELL + 1, first)
-    part = np.zeros(last - first + 2 * CELL)
+def analysis_windows(samples: NDArray[np.float32], centres: NDArray[np.int64]) -> AnalysisWindows:
+    """(T, `WINDOW_SAMPLES`) samples about each of T places, zeros beyond the ends, with the same faint noise."""
+    first = max(int(centres.min(initial=len(samples))) - HALF_WINDOW_SAMPLES, 0)
+    last = max(int(centres.max(initial=0)) + HALF_WINDOW_SAMPLES + 1, first)
+    part = np.zeros(last - first + 2 * WINDOW_SAMPLES)
     heard = samples[first:last]
-    part[CELL : CELL + len(heard)] = heard
-    starts = np.clip(centres - HALF_CELL - first + CELL, 0, len(part) - CELL)
-    noise = np.random.default_rng(0).normal(0.0, NOISE, CELL)
-    return np.asarray(part[starts[:, None] + np.arange(CELL)] + noise, np.float64)
+    part[WINDOW_SAMPLES : WINDOW_SAMPLES + len(heard)] = heard
+    starts = np.clip(centres - HALF_WINDOW_SAMPLES - first + WINDOW_SAMPLES, 0, len(part) - WINDOW_SAMPLES)
+    noise = np.random.default_rng(0).normal(0.0, NOISE_LEVEL, WINDOW_SAMPLES)
+    return np.asarray(part[starts[:, None] + np.arange(WINDOW_SAMPLES)] + noise, np.float64)
 
 
-def mfcc(windows: Cells) -> NDArray[np.float64]:
+def mfcc(windows: AnalysisWindows) -> NDArray[np.float64]:
     """(T, 13) mel-frequency cepstral coefficients of cells; the first is the level."""
     sound = _concatenate_windows(
         np.concatenate([windows, windows[-1:]])
@@ -104,7 +104,7 @@ def mfcc(windows: Cells) -> NDArray[np.float64]:
     return np.asarray(found.to_array().T[: len(windows)], np.float64)
 
 
-def lpc(windows: Cells) -> NDArray[np.float64]:
+def lpc(windows: AnalysisWindows) -> NDArray[np.float64]:
     """(T, 16) linear prediction coefficients of cells, by autocorrelation."""
     from parselmouth.praat import call
 
@@ -113,17 +113,17 @@ def lpc(windows: Cells) -> NDArray[np.float64]:
     return np.asarray(found.values.T, np.float64)
 
 
-def lsf(windows: Cells) -> NDArray[np.float64]:
+def lsf(windows: AnalysisWindows) -> NDArray[np.float64]:
     """(T, 16) line spectral frequencies of cells, radians."""
     return line_spectral_frequencies(lpc(windows))
 
 
-def formants(windows: Cells) -> NDArray[np.float64]:
+def formants(windows: AnalysisWindows) -> NDArray[np.float64]:
     """(T, 4) first formants of cells, Hz; those of a neutral tube where none is found."""
     even = windows[:, :-1]  # Praat takes the sample before the middle of a window: let none lie on the middle
     found = _concatenate_windows(even).to_formant_burg(
         time_step=_sample_step(even),
-        max_number_of_formants=POLES,
+        max_number_of_formants=N_FORMANT_POLES,
         maximum_formant=FEATURE_RATE / 2,
         window_length=WINDOW_S,
         pre_emphasis_from=PRE_EMPHASIS_HZ,
@@ -134,7 +134,7 @@ def formants(windows: Cells) -> NDArray[np.float64]:
     return np.where(np.isfinite(values), values, NEUTRAL_TUBE_HZ)
 
 
-def level(windows: Cells) -> NDArray[np.float64]:
+def level(windows: AnalysisWindows) -> NDArray[np.float64]:
     """(T, 1) level of cells in dB of full scale, through a Hann window of twice `WINDOW_S`."""
     taper = np.hanning(windows.shape[1])
     power = np.square(windows) @ taper / taper.sum()
@@ -147,14 +147,16 @@ def speech_level(levels: NDArray[np.floating]) -> float:
     return float(levels[levels >= (noise + speech) / 2].mean())
 
 
-MEASURES: Mapping[str, Measure] = MappingProxyType(dict(zip(FEATURES, (formants, mfcc, lpc, lsf, level), strict=True)))
+MEASURES: Mapping[str, Measure] = MappingProxyType(
+    dict(zip(FEATURE_KINDS, (formants, mfcc, lpc, lsf, level), strict=True))
+)
 
 
-def _sample_step(windows: Cells) -> float:
+def _sample_step(windows: AnalysisWindows) -> float:
     return float(windows.shape[1] / FEATURE_RATE)
 
 
-def _concatenate_windows(windows: Cells) -> Any:
+def _concatenate_windows(windows: AnalysisWindows) -> Any:
     import parselmouth
 
     return parselmouth.Sound(windows.ravel(), sampling_frequency=FEATURE_RATE)

@@ -18,16 +18,16 @@ from tts2face.types import Waveform
 
 MODEL_RATE = 16000  # Hz, what the acoustic model was trained on
 FRAME_RATE = 200  # 1/s; 100 halves the time and doubles the edge error
-DELAY_S = (
+MODEL_DELAY_S = (
     0.009  # the model's frames lie this much early; measured on the TIMIT sample, confirmed on an Australian voice
 )
 PADDING_S = 0.1  # quiet noise before and behind, so that the first and last phone have a silence to begin from
 MARGIN_S = 0.15  # kept of the silence at either end: the model normalises by the mean, which more silence would shift
-AUDIBLE = 0.01  # of the loudest window's level
-WINDOW_S = 0.01
-NOISE = 1e-4  # of full scale; digital silence has no logarithm
-PEAK = 0.7  # level at which the model hears the sound
-SHORTEST_S = 0.005  # one frame: shorter phones and silences are not found
+AUDIBLE_SHARE = 0.01  # of the loudest window's level
+LEVEL_WINDOW_S = 0.01
+NOISE_LEVEL = 1e-4  # of full scale; digital silence has no logarithm
+PEAK_LEVEL = 0.7  # level at which the model hears the sound
+MIN_PHONE_S = 0.005  # one frame: shorter phones and silences are not found
 SILENT_NAMES = frozenset({"SIL", "+NSN+", "+SPN+"})
 
 Pronunciations = Sequence[tuple[str, ...]]  # alternatives of one word, in phones of the table
@@ -133,20 +133,20 @@ def acoustic_phones(phones: Sequence[str]) -> list[str]:
     """ARPABET names that the acoustic model knows, one for each phone, the nearest where it lacks one."""
     names = []
     for phone in phones:
-        nearest = nearest_phones(phone, _MODELLED)[0]
+        nearest = nearest_phones(phone, _MODEL_PHONES)[0]
         names.append(PHONES[nearest].arpabet.removesuffix("0"))
     return names
 
 
-_MODELLED = frozenset(ARPABET.values())
+_MODEL_PHONES = frozenset(ARPABET.values())
 
 
 def _trim_to_audible(sound: Waveform) -> tuple[Waveform, float]:
     """The part of a sound from a margin before to a margin behind what can be heard, and the second it begins at."""
-    window = max(1, round(WINDOW_S * sound.rate))
+    window = max(1, round(LEVEL_WINDOW_S * sound.rate))
     n_windows = len(sound.samples) // window
     levels = np.abs(sound.samples[: n_windows * window].reshape(n_windows, window)).max(axis=1, initial=0.0)
-    loud = np.flatnonzero(levels > AUDIBLE * levels.max(initial=0.0))
+    loud = np.flatnonzero(levels > AUDIBLE_SHARE * levels.max(initial=0.0))
     if not len(loud):
         return sound, 0.0
     margin = round(MARGIN_S * sound.rate)
@@ -162,9 +162,9 @@ def _pcm_bytes(sound: Waveform) -> bytes:
     samples = sound.samples
     if sound.rate != MODEL_RATE:
         samples = soxr.resample(samples, sound.rate, MODEL_RATE)
-    level = PEAK / max(float(np.abs(samples).max(initial=0.0)), 1e-3)
+    level = PEAK_LEVEL / max(float(np.abs(samples).max(initial=0.0)), 1e-3)
     n_padding = round(PADDING_S * MODEL_RATE)
-    heard = np.random.default_rng(0).normal(0.0, NOISE, len(samples) + 2 * n_padding)
+    heard = np.random.default_rng(0).normal(0.0, NOISE_LEVEL, len(samples) + 2 * n_padding)
     heard[n_padding : n_padding + len(samples)] += samples * level
     pcm: NDArray[np.int16] = np.clip(heard * 32767, -32768, 32767).astype(np.int16)
     return pcm.tobytes()
@@ -182,7 +182,7 @@ def _build_alignment(
     n_frames = 0
     for entry, (text, ways) in zip(entries, words, strict=True):
         onset = begin + _frame_to_seconds(entry.phones[0][1])
-        if onset - end >= SHORTEST_S:  # silence, at the beginning too
+        if onset - end >= MIN_PHONE_S:  # silence, at the beginning too
             labels.append(SILENCE)
             starts.append(end)
         spans.append(WordSpan(text, len(labels), len(labels) + len(entry.phones)))
@@ -192,7 +192,7 @@ def _build_alignment(
             starts.append(begin + _frame_to_seconds(first))
             end = begin + _frame_to_seconds(first + count)
             n_frames += count
-    if duration - end >= SHORTEST_S:
+    if duration - end >= MIN_PHONE_S:
         labels.append(SILENCE)
         starts.append(end)
     edges = np.array([*starts, duration])
@@ -203,10 +203,10 @@ def _build_alignment(
 
 
 def _frame_to_seconds(frame: int) -> float:
-    return frame / FRAME_RATE + DELAY_S - PADDING_S
+    return frame / FRAME_RATE + MODEL_DELAY_S - PADDING_S
 
 
-def enforce_increasing(edges: NDArray[np.float64], least: float = SHORTEST_S) -> NDArray[np.float64]:
+def enforce_increasing(edges: NDArray[np.float64], least: float = MIN_PHONE_S) -> NDArray[np.float64]:
     """Edges of which each lies at least `least` seconds behind the one before; first and last stay.
 
     Shorter phones borrow from their neighbours; where the whole is too short, all phones share it equally.

@@ -6,10 +6,10 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from tts2face.types import Waveform
 
-LOWEST_PITCH_HZ = 100.0  # of a voice: intensity is averaged over 3.2 periods of it, 32 ms (parselmouth's rule)
-QUIETEST_DB = 0.0  # digital silence has no level; it counts as the threshold of hearing
+MIN_PITCH_HZ = 100.0  # of a voice: intensity is averaged over 3.2 periods of it, 32 ms (parselmouth's rule)
+MIN_INTENSITY_DB = 0.0  # digital silence has no level; it counts as the threshold of hearing
 PITCH_RANGE_HZ = (75.0, 600.0)  # Praat's own
-SEMITONES = 12.0  # in an octave
+SEMITONES_PER_OCTAVE = 12.0  # in an octave
 
 
 def intensity(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -23,12 +23,14 @@ def intensity(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32
     import parselmouth
 
     try:
-        levels = _praat_sound(sound).to_intensity(minimum_pitch=LOWEST_PITCH_HZ, subtract_mean=True)
+        levels = _praat_sound(sound).to_intensity(minimum_pitch=MIN_PITCH_HZ, subtract_mean=True)
     except parselmouth.PraatError as refused:
         raise DataError(
             f"a sound of {sound.duration:.3f} s is too short to measure; give a longer recording"
         ) from refused
-    values = np.maximum(np.nan_to_num(levels.values[0], nan=QUIETEST_DB, neginf=QUIETEST_DB), QUIETEST_DB)
+    values = np.maximum(
+        np.nan_to_num(levels.values[0], nan=MIN_INTENSITY_DB, neginf=MIN_INTENSITY_DB), MIN_INTENSITY_DB
+    )
     at_times: NDArray[np.float64] = np.interp(times, levels.xs(), values)
     return at_times.astype(np.float32)
 
@@ -56,7 +58,7 @@ def pitch(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32]:
     if not voiced.any():
         return np.zeros(len(times), np.float32)
     median = float(np.median(hertz[voiced]))
-    semitones = SEMITONES * np.log2(np.maximum(hertz, low) / median)
+    semitones = SEMITONES_PER_OCTAVE * np.log2(np.maximum(hertz, low) / median)
     return np.where(voiced, semitones, 0.0).astype(np.float32)
 
 

@@ -10,9 +10,9 @@ from lexicon.errors import BackendError, InputError
 from lexicon.ipa import parse_ipa
 from tts2face.types import Waveform
 
-RATE = 16_000  # Hz, what the network was trained on
-LONGEST_S = 30.0  # of sound at a time; memory grows with it
-BORDER = "|"  # between words in the network's answer
+RECOGNISER_RATE = 16_000  # Hz, what the network was trained on
+MAX_SOUND_S = 30.0  # of sound at a time; memory grows with it
+WORD_BOUNDARY = "|"  # between words in the network's answer
 
 Phones = tuple[str, ...]
 
@@ -39,20 +39,21 @@ class PhoneRecogniser:
         self._spellings: dict[str, Phones] = {}
 
     def words(self, sound: Waveform) -> tuple[Phones, ...]:
-        """Phones of each word heard in a sound of at most `LONGEST_S`.
+        """Phones of each word heard in a sound of at most `MAX_SOUND_S`.
 
         Raises
         ------
         InputError
             The sound is longer.
         """
-        if sound.duration > LONGEST_S + 1e-6:
-            raise InputError(f"a sound of {sound.duration:.1f} s is heard in parts of at most {LONGEST_S:.0f} s")
+        if sound.duration > MAX_SOUND_S + 1e-6:
+            raise InputError(f"a sound of {sound.duration:.1f} s is heard in parts of at most {MAX_SOUND_S:.0f} s")
         if not len(sound.samples):
             return ()
         heard = self._network.transcribe_waveform(sound.samples, sound.rate).word_phoneme_text
         words = (
-            tuple(phone for token in word.split() for phone in self._phones(token)) for word in heard.split(BORDER)
+            tuple(phone for token in word.split() for phone in self._phones(token))
+            for word in heard.split(WORD_BOUNDARY)
         )
         return tuple(word for word in words if word)
 

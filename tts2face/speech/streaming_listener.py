@@ -9,16 +9,16 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from tts2face.models.audio_map import AudioMap
 from tts2face.speech.features import (
-    CELLS_AT_ONCE,
     FEATURE_RATE,
-    HALF_CELL,
+    HALF_WINDOW_SAMPLES,
+    WINDOWS_AT_ONCE,
     analysis_windows,
     feature_measures,
     measure_windows,
 )
 from tts2face.types import frame_count
 
-Samples = NDArray[np.floating]
+SampleBlock = NDArray[np.floating]
 
 
 class StreamingFeatures:
@@ -37,7 +37,7 @@ class StreamingFeatures:
         """Samples heard so far."""
         return self._buffer_start + len(self._kept)
 
-    def hear(self, samples: Samples) -> NDArray[np.float32]:
+    def hear(self, samples: SampleBlock) -> NDArray[np.float32]:
         """(n, D) features of the frames that can be measured now, 43 ms of sound behind each.
 
         Raises
@@ -48,7 +48,7 @@ class StreamingFeatures:
         if samples.ndim != 1 or not np.isfinite(samples).all():
             raise InputError(f"a block of sound is a row of finite samples, not an array of shape {samples.shape}")
         self._kept = np.concatenate([self._kept, samples.astype(np.float32)])
-        last = max(int((self.n_samples - HALF_CELL - 2) * self._fps / FEATURE_RATE), -1)
+        last = max(int((self.n_samples - HALF_WINDOW_SAMPLES - 2) * self._fps / FEATURE_RATE), -1)
         return self._features_until(last + 1)
 
     def finish(self) -> NDArray[np.float32]:
@@ -59,7 +59,7 @@ class StreamingFeatures:
         """Features of the frames from the last given to the `n_frames`-th."""
         found = [measure_windows(self._cells(range(0)), self._measures)] if n_frames <= self._n_given else []
         while self._n_given < n_frames:
-            last = min(self._n_given + CELLS_AT_ONCE, n_frames)
+            last = min(self._n_given + WINDOWS_AT_ONCE, n_frames)
             found.append(measure_windows(self._cells(range(self._n_given, last)), self._measures))
             self._n_given = last
         self._drop_samples()
@@ -71,7 +71,7 @@ class StreamingFeatures:
 
     def _drop_samples(self) -> None:
         """Drop what no frame to come needs."""
-        needed = round(self._n_given / self._fps * FEATURE_RATE) - HALF_CELL
+        needed = round(self._n_given / self._fps * FEATURE_RATE) - HALF_WINDOW_SAMPLES
         spare = min(max(needed - self._buffer_start, 0), len(self._kept))
         self._kept, self._buffer_start = self._kept[spare:].copy(), self._buffer_start + spare
 
@@ -88,9 +88,9 @@ class StreamingAudioMap:
     @property
     def look_ahead_s(self) -> float:
         """Seconds of sound that must be heard behind a frame before its lips are known."""
-        return self._audio_map.after / self._fps + (HALF_CELL + 2) / FEATURE_RATE
+        return self._audio_map.after / self._fps + (HALF_WINDOW_SAMPLES + 2) / FEATURE_RATE
 
-    def hear(self, samples: Samples) -> NDArray[np.float32]:
+    def hear(self, samples: SampleBlock) -> NDArray[np.float32]:
         """(n, S) parameters of the frames that can be known now.
 
         Raises

@@ -12,14 +12,14 @@ from tts2face.speech.pauses import cut_at_pauses
 from tts2face.speech.text_fit import TextMismatch, find_misfits, mismatch_of, surrounded
 from tts2face.types import Waveform
 
-Ways = tuple[tuple[str, ...], ...]  # pronunciations of one word, each a row of phones
-Script = tuple[tuple[str, Ways], ...]
+Pronunciations = tuple[tuple[str, ...], ...]  # pronunciations of one word, each a row of phones
+PronouncedTranscript = tuple[tuple[str, Pronunciations], ...]
 
-LONGEST_AT_ONCE_S = 60.0  # alignment takes memory with the square of the length: 234 MB
-LONGEST_STRETCH_S = 20.0  # of the parts into which longer recordings are cut
+MAX_ALIGNED_S = 60.0  # alignment takes memory with the square of the length: 234 MB
+MAX_STRETCH_S = 20.0  # of the parts into which longer recordings are cut
 
 
-def pronounce_transcript(text: str, language: str, own: Dictionary | None = None) -> Script:
+def pronounce_transcript(text: str, language: str, own: Dictionary | None = None) -> PronouncedTranscript:
     """The words of a text with their pronunciations; English ones with all that the dictionary knows.
 
     Raises
@@ -33,7 +33,7 @@ def pronounce_transcript(text: str, language: str, own: Dictionary | None = None
     return tuple((word.text, _pronunciations(word, language, own)) for word in said)
 
 
-def _pronunciations(word: Word, language: str, own: Dictionary | None) -> Ways:
+def _pronunciations(word: Word, language: str, own: Dictionary | None) -> Pronunciations:
     if not language.startswith("en") or (own is not None and own.lookup(word.text) is not None):
         return (word.phones,)
     ways = [word.phones]
@@ -46,7 +46,7 @@ def _pronunciations(word: Word, language: str, own: Dictionary | None) -> Ways:
 
 
 def align_recording(
-    sound: Waveform, words: Script, *, is_english: bool = True
+    sound: Waveform, words: PronouncedTranscript, *, is_english: bool = True
 ) -> tuple[PhoneSequence, tuple[WordSpan, ...], tuple[TextMismatch, ...]]:
     """Phones and words on the clock of a sound, from 0 s to its end, and where the words do not fit it.
 
@@ -58,10 +58,10 @@ def align_recording(
         It is longer than a minute, and nothing on this machine recognises phones, by which the words are placed.
     """
     aligner = Aligner()
-    if sound.duration <= LONGEST_AT_ONCE_S:
+    if sound.duration <= MAX_ALIGNED_S:
         found = aligner.align(sound, words)
         return found.phones, found.words, _mismatches(aligner, sound, words, found, is_english=is_english)
-    parts = [_cut_sound(sound, span) for span in cut_at_pauses(sound, LONGEST_STRETCH_S)]
+    parts = [_cut_sound(sound, span) for span in cut_at_pauses(sound, MAX_STRETCH_S)]
     phones: list[PhoneSequence] = []
     spans: list[tuple[WordSpan, ...]] = []
     mismatches: list[TextMismatch] = []
@@ -81,7 +81,7 @@ def align_recording(
 
 
 def _mismatches(
-    aligner: Aligner, sound: Waveform, words: Script, found: Alignment, *, is_english: bool
+    aligner: Aligner, sound: Waveform, words: PronouncedTranscript, found: Alignment, *, is_english: bool
 ) -> tuple[TextMismatch, ...]:
     """Spans that do not fit, each confirmed by aligning it again with what surrounds it.
 
@@ -106,7 +106,7 @@ def _mismatches(
     return tuple(confirmed)
 
 
-def _words_by_part(parts: Sequence[Waveform], words: Script) -> list[Script]:
+def _words_by_part(parts: Sequence[Waveform], words: PronouncedTranscript) -> list[PronouncedTranscript]:
     """The words that are said in each part."""
     from tts2face.speech.phone_recognition import PhoneRecogniser
     from tts2face.speech.transcript_placement import assign_words

@@ -13,9 +13,9 @@ from lexicon.errors import InputError
 from tts2face.compilation import kernel
 
 BAND = 1500  # phones that the text may run ahead of or behind the sound: two minutes of speech
-OTHER = 1.0  # cost of a phone heard as another
-MISSED = 0.7  # of a phone that is not heard or not written; two of them cost more than one heard as another
-SAID, MISHEARD, SKIPPED = 0, 1, 2  # steps back: both sequences, the heard one, the written one
+SUBSTITUTION_COST = 1.0  # cost of a phone heard as another
+GAP_COST = 0.7  # of a phone that is not heard or not written; two of them cost more than one heard as another
+MATCHED, INSERTED, DELETED = 0, 1, 2  # steps back: both sequences, the heard one, the written one
 
 Phones = Sequence[str]
 
@@ -57,11 +57,11 @@ def assign_words(words: Sequence[Phones], heard: Sequence[Phones]) -> NDArray[np
 def _match_phones(written: NDArray[np.int64], sounded: NDArray[np.int64], band: int) -> NDArray[np.int64]:
     """(N,) index of the sounded phone that each written one is matched with, or of the one before it."""
     n, m, width = len(written), len(sounded), 2 * band + 1
-    steps = np.full((n + 1, width), SKIPPED, np.uint8)
+    steps = np.full((n + 1, width), DELETED, np.uint8)
     before = np.full(width, np.inf, np.float32)
     for j in range(min(width - band, m + 1)):
-        before[j + band] = j * MISSED
-        steps[0, j + band] = MISHEARD
+        before[j + band] = j * GAP_COST
+        steps[0, j + band] = INSERTED
     for i in range(1, n + 1):
         low, low_before = i * m // n - band, (i - 1) * m // n - band
         before = _cost_row(written[i - 1], sounded, before, (low, low_before), steps[i])
@@ -85,13 +85,13 @@ def _cost_row(
         j = low + k
         above = j - low_before
         if above < width:
-            row[k] = before[above] + MISSED
+            row[k] = before[above] + GAP_COST
         if j > 0 and 0 < above <= width:
-            cost = before[above - 1] + (0.0 if phone == sounded[j - 1] else OTHER)
+            cost = before[above - 1] + (0.0 if phone == sounded[j - 1] else SUBSTITUTION_COST)
             if cost <= row[k]:
-                row[k], steps[k] = cost, SAID
-        if j > 0 and k > 0 and row[k - 1] + MISSED < row[k]:
-            row[k], steps[k] = row[k - 1] + MISSED, MISHEARD
+                row[k], steps[k] = cost, MATCHED
+        if j > 0 and k > 0 and row[k - 1] + GAP_COST < row[k]:
+            row[k], steps[k] = row[k - 1] + GAP_COST, INSERTED
     return row
 
 
@@ -102,10 +102,10 @@ def _trace_back(steps: NDArray[np.uint8], m: int, band: int) -> NDArray[np.int64
     i, j = n, m
     while i > 0:
         step = steps[i, j - (i * m // n - band)]
-        if step == MISHEARD:
+        if step == INSERTED:
             j -= 1
         else:
             partner[i - 1] = max(j - 1, 0)
             i -= 1
-            j -= step == SAID
+            j -= step == MATCHED
     return partner

@@ -5,7 +5,7 @@ from pathlib import Path
 from lexicon.errors import BackendError, InputError
 from tts2face.storage.temporary import Temporary
 
-SHIPPED = Path(__file__).parents[1] / "data"
+SHIPPED_FOLDER = Path(__file__).parents[1] / "data"
 
 
 def write_atomically(path: Path, content: bytes) -> None:
@@ -34,10 +34,10 @@ def find_file(name: str, kind: str) -> Path:
     InputError
         There is neither.
     """
-    shipped = SHIPPED / f"{name}.{kind}"
-    if shipped.parent == SHIPPED and shipped.is_file():
+    shipped = SHIPPED_FOLDER / f"{name}.{kind}"
+    if shipped.parent == SHIPPED_FOLDER and shipped.is_file():
         return shipped
     if Path(name).suffix or Path(name).exists():
         return Path(name)
-    known = ", ".join(sorted(file.stem for file in SHIPPED.glob(f"*.{kind}")))
+    known = ", ".join(sorted(file.stem for file in SHIPPED_FOLDER.glob(f"*.{kind}")))
     raise InputError(f"there is no {kind} {name!r}; give {known}, or the path of a .{kind} file")

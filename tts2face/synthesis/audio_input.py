@@ -28,10 +28,10 @@ from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, fr
 from tts2face.video.media import sound_blocks
 
 CLIP_RATE = 48_000  # Hz, of the sound in the clip
-PIECE_FRAMES = 300  # of the clips that a long recording is given on in
-SHORTEST_S = 0.1  # shorter sounds hold no phone
-SILENT = 1e-4  # of full scale: nobody is heard below
-BEST_DRIVE = "network"
+MAX_CLIP_FRAMES = 300  # of the clips that a long recording is given on in
+MIN_RECORDING_S = 0.1  # shorter sounds hold no phone
+SILENCE_LEVEL = 1e-4  # of full scale: nobody is heard below
+DEFAULT_AUDIO_MAP = "network"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +59,7 @@ def select_audio_map(request: Request, talker: Talker) -> AudioMap:
     InputError
         The talker was learnt without it.
     """
-    name = request.drive or BEST_DRIVE
+    name = request.drive or DEFAULT_AUDIO_MAP
     if name not in talker.audio_maps:
         raise InputError(
             f"the talker {talker.metadata.get('name', '')} has no {name} drive, for it was learnt with too little "
@@ -113,11 +113,11 @@ def resample_motion(values: NDArray[np.float32], rate: float, fps: float, n_fram
 
 
 def recording_clips(path: Path, said: TimedTranscript, motion: Trajectory, *, volume: float) -> Iterator[Clip]:
-    """A recording's motion and sound as clips of at most `PIECE_FRAMES` frames, each with the phones that it holds."""
+    """A recording's motion and sound as clips of at most `MAX_CLIP_FRAMES` frames, each with its phones."""
     fps = exact_rate(motion.fps)
     sound = _SampleReader(sound_blocks(path, CLIP_RATE))
-    for first in range(0, len(motion), PIECE_FRAMES):
-        last = min(first + PIECE_FRAMES, len(motion))
+    for first in range(0, len(motion), MAX_CLIP_FRAMES):
+        last = min(first + MAX_CLIP_FRAMES, len(motion))
         begin, end = (first_sample(frame, CLIP_RATE, fps) for frame in (first, last))
         samples = np.clip(volume * sound.next(end - begin), -1.0, 1.0)
         seconds = (float(Fraction(first) / fps), len(samples) / CLIP_RATE)
@@ -171,7 +171,9 @@ def _read_audible_blocks(path: Path) -> Iterator[NDArray[np.float32]]:
         n_samples += len(block)
         peak = max(peak, float(np.abs(block).max(initial=0.0)))
         yield block
-    if n_samples < SHORTEST_S * FEATURE_RATE:
-        raise DataError(f"{path} lasts {n_samples / FEATURE_RATE:.3f} s; give a recording of {SHORTEST_S} s or more")
-    if peak < SILENT:
+    if n_samples < MIN_RECORDING_S * FEATURE_RATE:
+        raise DataError(
+            f"{path} lasts {n_samples / FEATURE_RATE:.3f} s; give a recording of {MIN_RECORDING_S} s or more"
+        )
+    if peak < SILENCE_LEVEL:
         raise DataError(f"{path} is silent; check the microphone, or give another recording")

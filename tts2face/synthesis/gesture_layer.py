@@ -5,7 +5,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import numpy as np
 
 from tts2face.face.gesture_transfer import SPEECH_GAINS
-from tts2face.gesture.gesture_stream import GestureFields, Gestures, GestureStream
+from tts2face.gesture.gesture_stream import GestureFields, GestureStream, GestureValues
 from tts2face.gesture.perlin_noise import NoiseStream
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import Palette
@@ -14,12 +14,12 @@ from tts2face.synthesis.marked_speech import marked_styles
 from tts2face.synthesis.prepared_request import PreparedRequest
 from tts2face.types import Clip, Speech, Trajectory
 
-USUAL_STYLE = "neutral"
+DEFAULT_STYLE = "neutral"
 
 
 def default_style(palette: Palette) -> str:
     """The style of a clip for which none was chosen."""
-    return USUAL_STYLE if USUAL_STYLE in palette.names else next(iter(palette.styles))
+    return DEFAULT_STYLE if DEFAULT_STYLE in palette.names else next(iter(palette.styles))
 
 
 class GestureLayer:
@@ -78,7 +78,7 @@ class GestureLayer:
         self._requested.check_duration(self._seconds)
 
 
-def _gaze_relative_to_head(gestures: Gestures) -> Gestures:
+def _gaze_relative_to_head(gestures: GestureValues) -> GestureValues:
     """Gestures with the line of sight as the eyes must turn: they hold what they look at while the head moves."""
     if "gaze" not in gestures or "head" not in gestures:
         return gestures

@@ -18,9 +18,9 @@ from tts2face.video.media import TimedFrame
 from tts2face.video.pose import head_angles, remove_pose
 from tts2face.video.track import FaceTracker
 
-LEARNING_S = 5.0  # in which lips close and open, and eyes blink
-LEAST_LEARNT = 40  # frames with a face
-SIZE_S = 2.0  # over which the size of the face is averaged
+CALIBRATION_S = 5.0  # in which lips close and open, and eyes blink
+MIN_CALIBRATION_FRAMES = 40  # frames with a face
+SCALE_WINDOW_S = 2.0  # over which the size of the face is averaged
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,7 +47,7 @@ def track_poses(
         The face lacks landmarks or shapes.
     """
     learning, ready = _Calibrator(), None
-    recent: deque[NDArray[np.float32]] = deque(maxlen=max(2, round(SIZE_S * fps)))
+    recent: deque[NDArray[np.float32]] = deque(maxlen=max(2, round(SCALE_WINDOW_S * fps)))
     waiting: deque[TimedFrame] = deque()
     for (points, _), _ in tracker.follow(_queue_frames(pictures, waiting)):
         time = waiting.popleft().time
@@ -97,7 +97,7 @@ class _Calibrator:
 
     def done(self, face: Face, fps: float) -> _Calibration | None:
         """The person, as soon as enough of her was seen."""
-        if len(self._times) < LEAST_LEARNT or self._times[-1] - self._times[0] < LEARNING_S:
+        if len(self._times) < MIN_CALIBRATION_FRAMES or self._times[-1] - self._times[0] < CALIBRATION_S:
             return None
         posed = remove_pose(np.array(self._points), fps)
         scores = Trajectory(BLENDSHAPES, np.array(self._scores), fps)

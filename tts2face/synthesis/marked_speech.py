@@ -25,7 +25,7 @@ from tts2face.gesture.easing import span_weights
 from tts2face.gesture.notation import parse_style
 from tts2face.gesture.spans import Nod, StyleSpan
 from tts2face.gesture.timeline import Timeline
-from tts2face.request import RATES, VOLUMES, Request
+from tts2face.request import RATE_LIMITS, VOLUME_LIMITS, Request
 from tts2face.synthesis.speech_joining import join_utterances, silent_speech
 from tts2face.types import Speech, Waveform, concatenate_speech, frame_count
 from tts2face.voice.engine import SpokenWord, Voice, apply_volume
@@ -33,11 +33,11 @@ from tts2face.voice.level import level_speech
 from tts2face.voice.resample import resampled_speech
 from tts2face.voice.spans import Voices, speaker_of
 
-LEAST_GAP_S = 0.02  # between utterances of a sentence: less cuts into their sounds (edges are good to 16 ms)
-JOINT_S = 0.06  # where only the speed changes
+MIN_UTTERANCE_GAP_S = 0.02  # between utterances of a sentence: less cuts into their sounds (edges are good to 16 ms)
+SPEED_CHANGE_PAUSE_S = 0.06  # where only the speed changes
 IDLE_PART_S = 10.0  # of a silent clip, as a long sentence
 IDLE_RATE = 48_000  # Hz, of its silence
-RAMP_S = 0.03  # from one loudness to another
+LOUDNESS_RAMP_S = 0.03  # from one loudness to another
 
 Floats = NDArray[np.float64]
 
@@ -270,8 +270,8 @@ def check_marks(text: MarkedText, request: Request) -> None:
         raise InputError(f"the text names the language {text.language}, not {request.language}; choose one of them")
     marked_styles(text)
     for what, marked, asked, (low, high) in (
-        ("speed", {run.rate for run in text.runs}, request.rate, RATES),
-        ("loudness", {run.volume for run in text.runs}, request.volume, VOLUMES),
+        ("speed", {run.rate for run in text.runs}, request.rate, RATE_LIMITS),
+        ("loudness", {run.volume for run in text.runs}, request.volume, VOLUME_LIMITS),
     ):
         for factor in marked:
             if not low <= factor * asked <= high:
@@ -289,8 +289,8 @@ def _primary(language: str) -> str:
 def _pause_after(utterance: Phrase) -> float:
     """Seconds of silence between an utterance and the next one of its sentence."""
     if utterance.pause is not None:
-        return max(utterance.pause, LEAST_GAP_S)
-    return max(PAUSES_S.get(utterance.source[-1:], 0.0), JOINT_S)
+        return max(utterance.pause, MIN_UTTERANCE_GAP_S)
+    return max(PAUSES_S.get(utterance.source[-1:], 0.0), SPEED_CHANGE_PAUSE_S)
 
 
 def _gain(sound: Waveform, runs: Sequence[StyleRun], part: Phrase, times: WordTimes) -> Floats:
@@ -308,7 +308,7 @@ def _gain(sound: Waveform, runs: Sequence[StyleRun], part: Phrase, times: WordTi
         start = times.onset(first) if first > part.first else 0.0
         end = times.end(last) if last < part.last else math.inf
         if start < end:
-            gain += (volume - 1.0) * span_weights(seconds, start, end, RAMP_S)
+            gain += (volume - 1.0) * span_weights(seconds, start, end, LOUDNESS_RAMP_S)
     factors: Floats = np.maximum(gain, 0.0)
     return factors
 

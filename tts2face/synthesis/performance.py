@@ -21,7 +21,7 @@ CAPTURE_SUFFIX = ".csv"
 CAPTURE_FPS = 30.0  # captures run faster than videos need
 GAINS = (0.0, 4.0)
 SOUND_RATE = 48_000  # Hz
-PIECE_FRAMES = 300  # of the clips that a long take is given on in
+MAX_CLIP_FRAMES = 300  # of the clips that a long take is given on in
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -169,10 +169,10 @@ def resample_take(motion: FaceMotion, fps: float) -> FaceMotion:
 
 
 def take_clips(motion: FaceMotion, sound: Waveform) -> Iterator[Clip]:
-    """Motion and its sound as clips of at most `PIECE_FRAMES` frames; sound that is too short ends in silence."""
+    """Motion and its sound as clips of at most `MAX_CLIP_FRAMES` frames; sound that is too short ends in silence."""
     fps = exact_rate(motion.face.fps)
-    for first in range(0, len(motion.face), PIECE_FRAMES):
-        last = min(first + PIECE_FRAMES, len(motion.face))
+    for first in range(0, len(motion.face), MAX_CLIP_FRAMES):
+        last = min(first + MAX_CLIP_FRAMES, len(motion.face))
         begin, end = (first_sample(frame, sound.rate, fps) for frame in (first, last))
         samples = np.zeros(end - begin, np.float32)
         heard = sound.samples[begin:end]

@@ -10,7 +10,7 @@ from lexicon.marked_text import MarkedText
 from lexicon.readable import check_readable
 from lexicon.sentences import Sentence, split_sentences
 from tts2face.clock import exact_rate
-from tts2face.exemplar.options import METHODS, SynthesisOptions
+from tts2face.exemplar.options import METHOD_OPTIONS, SynthesisOptions
 from tts2face.gesture.request_timeline import build_request_timeline
 from tts2face.gesture.timeline import Timeline
 from tts2face.render.picture import Picture
@@ -88,7 +88,7 @@ def prepare(request: Request) -> PreparedRequest:
 
 def synthesis_options(request: Request) -> SynthesisOptions:
     """How lips are made from recorded examples: the method's options, with those that the request changes."""
-    options = METHODS[request.synthesis]
+    options = METHOD_OPTIONS[request.synthesis]
     if request.context is not None:
         options = replace(options, context=request.context)
     if request.exemplars is not None:

@@ -17,14 +17,14 @@ from tts2face.render import raster
 from tts2face.render.draw import draw
 from tts2face.render.picture import Picture
 
-COMPILE_MOTION = """
+COMPILE_MOTION_CODE = """
 import os
 from tts2face.child_process import exit_after
 exit_after(lambda: os.read(0, 1))
 from tts2face.synthesis.warm_up import compile_motion
 compile_motion()
 """
-PATIENCE_S = 120.0
+COMPILE_TIMEOUT_S = 120.0
 
 
 def kernels_are_compiled() -> bool:
@@ -38,14 +38,14 @@ def compile_kernels() -> None:
     """Compile all kernels that a clip needs. Where the other process fails they are compiled at their first use."""
     face = load_face("head")
     other = subprocess.Popen(
-        [sys.executable, "-c", COMPILE_MOTION],
+        [sys.executable, "-c", COMPILE_MOTION_CODE],
         stdin=subprocess.PIPE,  # by whose end the other process knows that this one is dead
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
     try:
         draw(face, np.zeros(len(face.shape_names), np.float32), picture=Picture(size="64x64"))
-        other.wait(PATIENCE_S)
+        other.wait(COMPILE_TIMEOUT_S)
     except subprocess.TimeoutExpired:
         other.kill()
     finally:

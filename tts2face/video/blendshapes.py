@@ -23,7 +23,7 @@ BLENDSHAPES = (
 )  # fmt: skip
 
 # Landmarks that the network reads, in order. Source: MediaPipe's blendshape graph.
-READ_LANDMARKS = (
+INPUT_LANDMARKS = (
     0, 1, 4, 5, 6, 7, 8, 10, 13, 14, 17, 21, 33, 37, 39, 40, 46, 52, 53, 54, 55, 58, 61, 63, 65, 66, 67, 70, 78, 80,
     81, 82, 84, 87, 88, 91, 93, 95, 103, 105, 107, 109, 127, 132, 133, 136, 144, 145, 146, 148, 149, 150, 152, 153, 154,
     155, 157, 158, 159, 160, 161, 162, 163, 168, 172, 173, 176, 178, 181, 185, 191, 195, 197, 234, 246, 249, 251, 263,
@@ -60,5 +60,5 @@ class BlendshapeReader:
         """
         if landmarks.shape != (N_LANDMARKS, 3) or not np.isfinite(landmarks).all():
             raise InputError(f"blendshapes need finite landmarks of shape ({N_LANDMARKS}, 3), not {landmarks.shape}")
-        points = landmarks[list(READ_LANDMARKS), :2].astype(np.float32)
+        points = landmarks[list(INPUT_LANDMARKS), :2].astype(np.float32)
         return self._network(points[None])[0].ravel()

@@ -9,7 +9,7 @@ from typing import Any
 from lexicon.errors import BackendError, InputError
 from tts2face.video.media import TimedFrame
 
-PATIENCE_S = 10.0  # without a picture the camera is gone
+FRAME_TIMEOUT_S = 10.0  # without a picture the camera is gone
 
 
 class CaptureDevice:
@@ -58,7 +58,7 @@ class CaptureDevice:
         """The newest picture each time one is asked for, with the seconds since the beginning; until filming ends."""
         while True:
             with self._frame_arrived:
-                self._frame_arrived.wait_for(lambda: self._newest is not None or self._ended, PATIENCE_S)
+                self._frame_arrived.wait_for(lambda: self._newest is not None or self._ended, FRAME_TIMEOUT_S)
                 picture, self._newest = self._newest, None
             if picture is None:
                 return

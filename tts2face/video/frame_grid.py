@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 
-LONGEST_GAP_S = 0.12  # frames without a face that are filled in; lips make no full movement in less
+MAX_FILLED_GAP_S = 0.12  # frames without a face that are filled in; lips make no full movement in less
 SAME_INSTANT_S = 0.001  # times in a file are rounded to milliseconds
 
 
@@ -52,14 +52,14 @@ def fill_gaps(points: NDArray[np.float32], fps: float) -> tuple[NDArray[np.float
     Raises
     ------
     DataError
-        A gap is longer than `LONGEST_GAP_S`.
+        A gap is longer than `MAX_FILLED_GAP_S`.
     """
     missing = np.isnan(points[:, 0, 0])
     if not missing.any():
         return points, 0
     present = np.flatnonzero(~missing)
     longest = int(np.diff(present).max()) - 1
-    if longest > round(LONGEST_GAP_S * fps):
+    if longest > round(MAX_FILLED_GAP_S * fps):
         raise DataError(f"the face is out of sight for {longest / fps:.2f} s")
     grid, _ = resample_to_grid(points[present], present / fps, fps)
     return grid, int(missing.sum())

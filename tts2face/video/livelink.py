@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError, InputError
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
-HEAD = ("HeadPitch", "HeadYaw", "HeadRoll")
-LEAST_FPS, MOST_FPS = 10.0, 240.0
-MOST_GAP_S = 0.5
-COUNTED_RATES = (24, 25, 30, 50, 60, 120)  # frames in a second of timecode
-SIGNS = np.array([1.0, -1.0, 1.0])  # as of its eyes: pitch down (EyePitch follows EyeLookDown), yaw to the right
+HEAD_COLUMNS = ("HeadPitch", "HeadYaw", "HeadRoll")
+MIN_CAPTURE_FPS, MAX_CAPTURE_FPS = 10.0, 240.0
+MAX_CAPTURE_GAP_S = 0.5
+TIMECODE_RATES = (24, 25, 30, 50, 60, 120)  # frames in a second of timecode
+HEAD_SIGNS = np.array([1.0, -1.0, 1.0])  # as of its eyes: pitch down (EyePitch follows EyeLookDown), yaw to the right
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,9 +52,9 @@ def read_livelink(path: Path) -> FaceCapture:
     shapes = [at for at, name in enumerate(names) if not name.startswith(("Head", "LeftEye", "RightEye"))]
     channels = tuple(names[at][0].lower() + names[at][1:] for at in shapes)
     head = np.zeros((n_frames, len(HEAD_CHANNELS)))
-    if all(name in names for name in HEAD):
-        turns = read[:, [names.index(name) for name in HEAD]]
-        head[:, :3] = SIGNS * (turns - np.median(turns, axis=0))
+    if all(name in names for name in HEAD_COLUMNS):
+        turns = read[:, [names.index(name) for name in HEAD_COLUMNS]]
+        head[:, :3] = HEAD_SIGNS * (turns - np.median(turns, axis=0))
     return FaceCapture(Trajectory(channels, read[:, shapes], fps), Trajectory(HEAD_CHANNELS, head, fps))
 
 
@@ -72,7 +72,7 @@ def _parse_rows(path: Path, rows: list[list[str]]) -> tuple[list[str], NDArray[n
     if not np.isfinite(values).all():
         raise DataError(f"{path} holds values that are no numbers; export it again")
     seconds, frames = np.array(times).T
-    counted = next((rate for rate in COUNTED_RATES if rate > frames.max()), COUNTED_RATES[-1])
+    counted = next((rate for rate in TIMECODE_RATES if rate > frames.max()), TIMECODE_RATES[-1])
     return names, seconds + frames / counted, np.array(values)
 
 
@@ -84,9 +84,9 @@ def _parse_timecode(text: str) -> tuple[float, float]:
 
 def _frame_rate(path: Path, times: NDArray[np.float64]) -> float:
     steps = np.diff(times)
-    if (steps <= 0).any() or steps.max() > MOST_GAP_S:
+    if (steps <= 0).any() or steps.max() > MAX_CAPTURE_GAP_S:
         raise DataError(f"the times of {path} do not run evenly from row to row; export it again")
     fps = float(np.round(1.0 / np.mean(steps)))
-    if not LEAST_FPS <= fps <= MOST_FPS:
-        raise DataError(f"{path} has {fps:g} frames a second; {LEAST_FPS:g} to {MOST_FPS:g} can be read")
+    if not MIN_CAPTURE_FPS <= fps <= MAX_CAPTURE_FPS:
+        raise DataError(f"{path} has {fps:g} frames a second; {MIN_CAPTURE_FPS:g} to {MAX_CAPTURE_FPS:g} can be read")
     return fps

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 Stream = TypeVar("Stream", "AudioStream", "VideoStream")
 
-LONGEST_SHORTFALL_S = 0.25  # a file that ends this much before its stated end is truncated; codecs pad by less
-LONGEST_DELAY_S = 60.0  # of the sound against the file's clock; more of it is damage
-MOST_FPS = 240.0  # fast cameras have no more; a higher rate counts the ticks of the file's clock
+MAX_SHORTFALL_S = 0.25  # a file that ends this much before its stated end is truncated; codecs pad by less
+MAX_DELAY_S = 60.0  # of the sound against the file's clock; more of it is damage
+MAX_FPS = 240.0  # fast cameras have no more; a higher rate counts the ticks of the file's clock
 QUARTER_TURN_DEG = 90
 
 
@@ -149,7 +149,7 @@ def sound_blocks(path: Path, rate: int) -> Iterator[NDArray[np.float32]]:
 
 def _first_sample_time(frame: "AudioFrame", path: Path) -> float:
     start = float(frame.time or 0.0)
-    if abs(start) > LONGEST_DELAY_S:
+    if abs(start) > MAX_DELAY_S:
         raise DataError(f"{path} says that its sound begins at {start:.0f} s; it is damaged: copy or convert it")
     return start
 
@@ -186,11 +186,11 @@ def _first_decodable(streams: Sequence[Stream]) -> Stream | None:
 def _frame_rate(container: "InputContainer", stream: "VideoStream", path: Path) -> float:
     """Frames per second as the file states them; counted where it states none, or the ticks of its clock."""
     stated = float(stream.average_rate or stream.guessed_rate or 0)
-    if 0 < stated <= MOST_FPS:
+    if 0 < stated <= MAX_FPS:
         return stated
     times = [packet.pts * packet.time_base for packet in container.demux(stream) if packet.pts and packet.time_base]
     counted = float((len(times) - 1) / (max(times) - min(times))) if len(set(times)) > 1 else 0.0
-    if not 0 < counted <= MOST_FPS:
+    if not 0 < counted <= MAX_FPS:
         raise DataError(f"{path} does not tell how many frames it shows per second; convert it with ffmpeg -r")
     return counted
 
@@ -220,7 +220,7 @@ def _decode_frames(container: "InputContainer", stream: Any, path: Path) -> Iter
     if n_frames == 0:
         raise DataError(f"{path} holds a {stream.type} track without a frame; copy or record it again")
     stated = (container.duration or 0) / 1e6
-    if end < stated - LONGEST_SHORTFALL_S:
+    if end < stated - MAX_SHORTFALL_S:
         raise DataError(f"{path} is truncated: it ends at {end:.2f} s of {stated:.2f} s; copy it again")
 
 

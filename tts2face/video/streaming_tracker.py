@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.prefetch import Prefetch
 from tts2face.video.media import TimedFrame
-from tts2face.video.track import CROP_SMOOTHING_S, LEAST_SCORE, Crop, FaceTracker, jittered_crops, smooth_crops
+from tts2face.video.track import CROP_SMOOTHING_S, MIN_SCORE, Crop, FaceTracker, jittered_crops, smooth_crops
 
-MOST_PIXELS = 1280  # along the longer side; a face in a larger picture is larger than the networks' input anyway
-REACH = 4.0  # standard deviations over which squares are smoothed
-LOOK_S = 0.5  # between looks for further faces
+MAX_SIDE_PX = 1280  # along the longer side; a face in a larger picture is larger than the networks' input anyway
+SMOOTHING_REACH = 4.0  # standard deviations over which squares are smoothed
+FACE_COUNT_INTERVAL_S = 0.5  # between looks for further faces
 CHANGE_STEP = 2  # every second pixel of every second row tells whether a picture differs from the one before
-ROOM = 4  # pictures that are decoded and followed ahead
+MAX_PREFETCHED_FRAMES = 4  # pictures that are decoded and followed ahead
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +32,7 @@ class TrackedFrame:
     score
         Probability that the landmarks lie on a face.
     n_faces
-        Faces in the picture, counted every `LOOK_S`; None where they were not counted.
+        Faces in the picture, counted every `FACE_COUNT_INTERVAL_S`; None where they were not counted.
     change
         Mean difference from the picture before, in steps of 8 bits; infinite for the first.
     """
@@ -46,7 +46,7 @@ class TrackedFrame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _CroppedFrame:
-    """A picture of at most `MOST_PIXELS`, `scale` of the one it was made from, and the face's square in it."""
+    """A picture of at most `MAX_SIDE_PX`, `scale` of the one it was made from, and the face's square in it."""
 
     picture: TimedFrame
     scale: float
@@ -69,10 +69,10 @@ class StreamingTracker:
 
     def track(self, pictures: Iterable[TimedFrame], fps: float) -> Iterator[TrackedFrame]:
         """What each picture shows in turn, some 0.6 s behind, in memory that does not grow."""
-        reach = int(REACH * CROP_SMOOTHING_S * fps + 0.5)
+        reach = int(SMOOTHING_REACH * CROP_SMOOTHING_S * fps + 0.5)
         window: deque[_CroppedFrame] = deque()
         at = 0  # place in the window of the picture to read next
-        with Prefetch(self._crop_frames(pictures, fps), ROOM) as followed:
+        with Prefetch(self._crop_frames(pictures, fps), MAX_PREFETCHED_FRAMES) as followed:
             for found in followed:
                 window.append(found)
                 if len(window) > at + reach:
@@ -89,7 +89,7 @@ class StreamingTracker:
         waiting: deque[_CroppedFrame] = deque()
 
         def shrunk() -> Iterator[NDArray[np.uint8]]:
-            for found in self._inspect_frames(pictures, max(1, round(LOOK_S * fps))):
+            for found in self._inspect_frames(pictures, max(1, round(FACE_COUNT_INTERVAL_S * fps))):
                 waiting.append(found)
                 yield found.picture.pixels
 
@@ -115,20 +115,20 @@ class StreamingTracker:
         if crop is not None:
             readings = [self._reader.read_crop(here.picture.pixels, near) for near in jittered_crops(crop)]
             score = float(np.mean([score for _, score in readings]))
-            if score >= LEAST_SCORE:
+            if score >= MIN_SCORE:
                 points = np.mean([points for points, _ in readings], axis=0, dtype=np.float32)
                 points = _enlarge(points, here.scale)
         return TrackedFrame(here.picture.time, points, score, here.n_faces, here.change)
 
 
 def _shrink(pixels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float]:
-    """A picture of at most `MOST_PIXELS` along its longer side, and its size over that of the picture given."""
+    """A picture of at most `MAX_SIDE_PX` along its longer side, and its size over that of the picture given."""
     height, width = pixels.shape[:2]
-    if max(height, width) <= MOST_PIXELS:
+    if max(height, width) <= MAX_SIDE_PX:
         return pixels, 1.0
     import cv2
 
-    scale = MOST_PIXELS / max(height, width)
+    scale = MAX_SIDE_PX / max(height, width)
     size = (round(width * scale), round(height * scale))
     small: NDArray[Any] = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
     return small.astype(np.uint8, copy=False), scale

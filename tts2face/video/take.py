@@ -15,8 +15,8 @@ from tts2face.video.media import read_frames, read_media_info
 from tts2face.video.pose import head_angles, remove_pose
 from tts2face.video.streaming_tracker import StreamingTracker, TrackedFrame
 
-MOST_LOOKS_WITH_TWO = 1  # a picture on the wall may be taken for a face once
-LEAST_SEEN = 0.5  # of the frames must show a face
+MAX_COUNTS_WITH_TWO_FACES = 1  # a picture on the wall may be taken for a face once
+MIN_TRACKED_SHARE = 0.5  # of the frames must show a face
 PROFILE_RAD = 0.8  # median turn beyond which landmarks of the far side are guessed
 
 Progress = Callable[[int, int], None]
@@ -73,7 +73,7 @@ def read_take(
     for sight in film.track(read_frames(video), fps):
         found.append(sight)
         n_crowded += sight.n_faces is not None and sight.n_faces > 1
-        if n_crowded > MOST_LOOKS_WITH_TWO:
+        if n_crowded > MAX_COUNTS_WITH_TWO_FACES:
             raise DataError(f"{video} shows two faces at {sight.time:.1f} s; crop it so that it shows one person")
         if on_progress:
             on_progress(min(len(found), of), of)
@@ -81,7 +81,7 @@ def read_take(
     seen = np.isfinite(pixels[:, 0, 0])
     if not seen.any():
         raise DataError(f"{video} shows no face; film one from the front, in the light")
-    if seen.mean() < LEAST_SEEN:
+    if seen.mean() < MIN_TRACKED_SHARE:
         raise DataError(f"{video} shows a face in {seen.sum()} of {len(seen)} frames; film it from the front")
     scores = np.array([reader.blendshape_scores(points) for points in pixels[seen]])
     points, first = resample_to_grid(_interpolate_frames(pixels[seen], times[seen], times), times, fps)

@@ -17,17 +17,17 @@ from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMAR
 from tts2face.video.landmark_models import find_bundle, load_network
 
 N_MESH = 468  # landmarks of the face mesh; the iris points follow
-LEAST_SCORE = 0.5  # the mesh network's own face probability; below it the landmarks are noise
-LEAST_CONTRAST = 2.0  # standard deviation of pixel values; a blank frame has 0, a dark face about 20
+MIN_SCORE = 0.5  # the mesh network's own face probability; below it the landmarks are noise
+MIN_CONTRAST = 2.0  # standard deviation of pixel values; a blank frame has 0, a dark face about 20
 DETECTOR_SIZE = 128  # pixels of the detector's square input
 MESH_SIZE = 256  # pixels of the mesh network's square input
 CROP_SCALE = 1.5  # side of the square over the longer side of the landmarks' box, as the mesh network was trained
 CROP_SMOOTHING_S = 0.16  # standard deviation; slower than speech, faster than a turn of the head
 CROP_STEP = 0.015  # of the square's side: the second pass's two squares lie this much either side
 APART = 0.4  # of a square's side: faces whose middles are nearer are one face found twice
-SURE_LOGIT = 0.0  # the detector's logit from which the best detection is a face
-COUNTED_LOGIT = 1.0  # and from which further ones count
-SAME_FACE = 0.5  # of a face's size between the middles of two detections of it
+MIN_FACE_LOGIT = 0.0  # the detector's logit from which the best detection is a face
+MIN_FURTHER_FACE_LOGIT = 1.0  # and from which further ones count
+SAME_FACE_DISTANCE = 0.5  # of a face's size between the middles of two detections of it
 DETECTOR_GRIDS = ((16, 2), (8, 6))  # cells per side and anchors per cell of BlazeFace's two feature maps
 
 
@@ -114,7 +114,7 @@ class FaceTracker:
             if crop is not None:
                 readings = [self.read_crop(pixels, near) for near in jittered_crops(crop)]
                 scores[at] = np.mean([score for _, score in readings])
-                if scores[at] >= LEAST_SCORE:
+                if scores[at] >= MIN_SCORE:
                     points[at] = np.mean([found for found, _ in readings], axis=0)
         return Tracking(points, scores)
 
@@ -126,7 +126,7 @@ class FaceTracker:
         """Square around the most prominent face, or None."""
         boxes, scores, shift, scale = self._detections(pixels)
         best = int(scores.argmax())
-        if scores[best] < SURE_LOGIT:
+        if scores[best] < MIN_FACE_LOGIT:
             return None
         row = boxes[best].reshape(8, 2)  # centre, size, then right eye, left eye, nose, mouth, ears
         centre, right_eye, left_eye = (row[[0, 2, 3]] + self._anchors[best] * DETECTOR_SIZE - shift) / scale
@@ -141,10 +141,10 @@ class FaceTracker:
         centres, sizes = rows[:, 0] + self._anchors * DETECTOR_SIZE, rows[:, 1].max(axis=1)
         kept: list[int] = []
         for number in np.argsort(scores)[::-1]:
-            if scores[number] < COUNTED_LOGIT:
+            if scores[number] < MIN_FURTHER_FACE_LOGIT:
                 break
             away = [float(np.linalg.norm(centres[number] - centres[other])) / sizes[other] for other in kept]
-            if all(distance > SAME_FACE for distance in away):
+            if all(distance > SAME_FACE_DISTANCE for distance in away):
                 kept.append(int(number))
         return len(kept)
 
@@ -188,11 +188,11 @@ class FaceTracker:
         crop: Crop | None = None
         for pixels in pictures:
             points, score = np.full((N_LANDMARKS, 3), np.nan, np.float32), 0.0
-            if float(pixels.std()) >= LEAST_CONTRAST:
+            if float(pixels.std()) >= MIN_CONTRAST:
                 crop = crop or self._found(pixels)
                 if crop is not None:
                     points, score = self.read_crop(pixels, crop)
-            crop = crop_around(points) if score >= LEAST_SCORE else None
+            crop = crop_around(points) if score >= MIN_SCORE else None
             yield (points, score), crop
 
     def _found(self, pixels: NDArray[np.uint8]) -> Crop | None:

@@ -13,8 +13,8 @@ from lexicon.ipa import Segment
 from lexicon.languages import language_code
 from tts2face.types import Speech
 
-ENGLISH = ("en", "en-us", "en-gb")
-NAMES: Mapping[str, str] = {
+ENGLISH_CODES = ("en", "en-us", "en-gb")
+VOICE_NAMES: Mapping[str, str] = {
     "heart": "neural, American English, female",
     "espeak": "formant synthesis, every language of espeak-ng",
     "espeak-female": "the same, female",
@@ -33,8 +33,8 @@ class SpokenWord:
     after: str = ""
 
 
-Spoken = str | Sequence[SpokenWord]  # text, or phones word by word
-Pronouncing = Mapping[str, tuple[Segment, ...]]  # a user's words, lower case, and how they are spoken
+SpeechInput = str | Sequence[SpokenWord]  # text, or phones word by word
+PronunciationMap = Mapping[str, tuple[Segment, ...]]  # a user's words, lower case, and how they are spoken
 
 
 class Voice(Protocol):
@@ -44,7 +44,7 @@ class Voice(Protocol):
     def sample_rate(self) -> int:
         """Hz."""
 
-    def speak(self, spoken: Spoken, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
+    def speak(self, spoken: SpeechInput, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
         """Sound, phones and words of a sentence; the phones' edges sum to the sound's length to the sample.
 
         The same arguments give the same bytes.
@@ -56,13 +56,13 @@ class Voice(Protocol):
         """
 
 
-def load_voice(name: str | None, language: str, own_words: Pronouncing | None = None) -> Voice:
+def load_voice(name: str | None, language: str, own_words: PronunciationMap | None = None) -> Voice:
     """The voice of a name, or the best one for a language.
 
     Parameters
     ----------
     name
-        One of `NAMES`, or the path of a Piper voice (``.onnx``).
+        One of `VOICE_NAMES`, or the path of a Piper voice (``.onnx``).
     language
         As `lexicon.languages.language_code` reads it.
     own_words
@@ -76,9 +76,9 @@ def load_voice(name: str | None, language: str, own_words: Pronouncing | None = 
         What the voice needs is not installed.
     """
     language = language_code(language)
-    chosen = name or ("heart" if language in ENGLISH[:2] else "espeak")
+    chosen = name or ("heart" if language in ENGLISH_CODES[:2] else "espeak")
     if chosen == "heart":
-        if language not in ENGLISH:
+        if language not in ENGLISH_CODES:
             raise InputError(f"the voice heart speaks English, not {language}; choose --voice espeak")
         from tts2face.voice.neural import NeuralVoice
 
@@ -91,7 +91,9 @@ def load_voice(name: str | None, language: str, own_words: Pronouncing | None = 
         from tts2face.voice.piper import PiperVoice
 
         return PiperVoice(Path(chosen), language, own_words or {})
-    raise InputError(f"there is no voice {chosen!r}; give {', '.join(NAMES)}, or the path of a Piper voice (.onnx)")
+    raise InputError(
+        f"there is no voice {chosen!r}; give {', '.join(VOICE_NAMES)}, or the path of a Piper voice (.onnx)"
+    )
 
 
 def apply_volume(samples: NDArray[np.floating], volume: float) -> NDArray[np.float32]:

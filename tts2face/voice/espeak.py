@@ -25,20 +25,20 @@ from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from lexicon.writing_systems import check_script
 from tts2face.speech.forced_alignment import enforce_increasing
 from tts2face.types import Speech, Waveform
-from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, apply_volume
+from tts2face.voice.engine import PronunciationMap, SpeechInput, SpokenWord, apply_volume
 
 CHILD = Path(__file__).with_name("espeak_child.py")
 WORD_EVENT, PHONEME_EVENT = 1, 7
 ANY_GENDER, FEMALE = 0, 2  # espeak_VOICE.gender; any is male where a language has both
-SWITCH = re.compile(r"\([a-z0-9-]+\)")  # espeak-ng marks where a foreign word begins and ends: (en)...(fr)
-USUAL_WORDS_PER_MINUTE = 175  # espeak-ng's default; its events go wrong above 400
-PATIENCE_S = 60.0  # a sentence takes some 50 ms
-LONGEST_CLOSURE_S = 0.06  # the event of a stop stands at its burst; the closure before it is 38-46 ms
+LANGUAGE_SWITCH = re.compile(r"\([a-z0-9-]+\)")  # espeak-ng marks where a foreign word begins and ends: (en)...(fr)
+DEFAULT_WORDS_PER_MINUTE = 175  # espeak-ng's default; its events go wrong above 400
+CHILD_TIMEOUT_S = 60.0  # a sentence takes some 50 ms
+MAX_CLOSURE_S = 0.06  # the event of a stop stands at its burst; the closure before it is 38-46 ms
 CLOSED_LEVEL = 0.006  # of full scale: espeak-ng's closures are digital silence but for the tail of what went before
 QUIET_LEVEL = 0.03  # of full scale: what a pause may still hold of the phone before it
-WINDOW_S = 0.001
-LEAST_PAUSE_S = 0.03
-QUIET_S = 0.25  # put before and behind: espeak-ng begins at once, lips begin to move earlier
+LEVEL_WINDOW_S = 0.001
+MIN_EVENT_PAUSE_S = 0.03
+EDGE_SILENCE_S = 0.25  # put before and behind: espeak-ng begins at once, lips begin to move earlier
 # espeak-ng's own names of phonemes for [[...]] input (docs/phonemes.md of espeak-ng).
 MNEMONICS = MappingProxyType({
     "ɑ": "A:", "æ": "a", "ʌ": "V", "ɔ": "O:", "aʊ": "aU", "aɪ": "aI", "ɛ": "E", "ɝ": "3:", "eɪ": "eI", "ɪ": "I",
@@ -61,7 +61,7 @@ class _PhonemeEvent:
 class EspeakVoice:
     """A voice of espeak-ng, 22.05 kHz; every request runs in a process of its own."""
 
-    def __init__(self, language: str, own_words: Pronouncing, *, is_female: bool = False) -> None:
+    def __init__(self, language: str, own_words: PronunciationMap, *, is_female: bool = False) -> None:
         self._language, self._own_words = language_code(language), own_words
         self._gender = FEMALE if is_female else ANY_GENDER
         self._rate = 22050
@@ -71,14 +71,14 @@ class EspeakVoice:
         """Hz."""
         return self._rate
 
-    def speak(self, spoken: Spoken, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
+    def speak(self, spoken: SpeechInput, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
         """Speech of a sentence; see `tts2face.voice.engine.Voice`. Nothing is random: `seed` changes nothing."""
         text, words = self._written(spoken)
         header, samples = _run_child({
             "text": text, "language": self._language, "gender": self._gender, "has_phonemes": bool(words),
-            "words_per_minute": round(USUAL_WORDS_PER_MINUTE * rate), "parent": os.getpid(),
+            "words_per_minute": round(DEFAULT_WORDS_PER_MINUTE * rate), "parent": os.getpid(),
         })  # fmt: skip
-        sound = np.pad(samples / np.float32(32768), round(QUIET_S * self._rate)).astype(np.float32)
+        sound = np.pad(samples / np.float32(32768), round(EDGE_SILENCE_S * self._rate)).astype(np.float32)
         sounded, names = self._phoneme_events(header, text, sound)
         if words:
             sounded = _by_written_words(sounded, header, text)
@@ -87,7 +87,7 @@ class EspeakVoice:
         phones, spans = _phone_sequence(sounded, words or names, len(sound) / self._rate)
         return Speech(Waveform(apply_volume(sound, volume), self._rate), phones, spans)
 
-    def _written(self, spoken: Spoken) -> tuple[str, list[str]]:
+    def _written(self, spoken: SpeechInput) -> tuple[str, list[str]]:
         """Text for espeak-ng; and the words, where they are given as phones."""
         if isinstance(spoken, str):
             check_script(spoken, self._language)
@@ -118,9 +118,9 @@ class EspeakVoice:
             if kind == WORD_EVENT:
                 names.append(text[value[0] : value[0] + value[1]])
                 continue
-            written = SWITCH.sub("", value)
+            written = LANGUAGE_SWITCH.sub("", value)
             phones = tuple(segment.phone for segment in parse_espeak_word(written, self._language)) if written else ()
-            at = sample + round(QUIET_S * self._rate)
+            at = sample + round(EDGE_SILENCE_S * self._rate)
             start = at / self._rate
             if phones and PHONES[phones[0]].kind in {"stop", "affricate"}:
                 start = _closure_start(sound, at, self._rate)
@@ -167,11 +167,11 @@ def _run_child(request: Mapping[str, Any]) -> tuple[dict[str, Any], NDArray[np.i
             [sys.executable, "-I", str(CHILD)],
             input=json.dumps(request).encode(),
             capture_output=True,
-            timeout=PATIENCE_S,
+            timeout=CHILD_TIMEOUT_S,
             check=False,
         )
     except subprocess.TimeoutExpired as late:
-        raise BackendError(f"espeak-ng did not answer within {PATIENCE_S:.0f} s; try a shorter text") from late
+        raise BackendError(f"espeak-ng did not answer within {CHILD_TIMEOUT_S:.0f} s; try a shorter text") from late
     if answer.returncode < 0:
         raise BackendError(
             f"espeak-ng crashed (signal {-answer.returncode}) on {str(request['text'])[:40]!r}; "
@@ -188,9 +188,9 @@ def _run_child(request: Mapping[str, Any]) -> tuple[dict[str, Any], NDArray[np.i
 
 
 def _closure_start(sound: NDArray[np.float32], burst: int, rate: int) -> float:
-    """Seconds at which the silence before a stop's burst begins, at most `LONGEST_CLOSURE_S` before it."""
-    window = max(1, round(WINDOW_S * rate))
-    earliest = max(0, burst - round(LONGEST_CLOSURE_S * rate))
+    """Seconds at which the silence before a stop's burst begins, at most `MAX_CLOSURE_S` before it."""
+    window = max(1, round(LEVEL_WINDOW_S * rate))
+    earliest = max(0, burst - round(MAX_CLOSURE_S * rate))
     at = burst
     while at - window >= earliest and float(np.abs(sound[at - window : at]).max()) < CLOSED_LEVEL:
         at -= window
@@ -205,7 +205,7 @@ def _phone_sequence(
     labels: list[str] = []
     starts: list[float] = []
     owners: list[int] = []
-    if sounded[0].start > LEAST_PAUSE_S and sounded[0].phones != (SILENCE,):
+    if sounded[0].start > MIN_EVENT_PAUSE_S and sounded[0].phones != (SILENCE,):
         labels, starts, owners = [SILENCE], [0.0], [-1]
     for event, end in zip(sounded, ends, strict=True):
         if end <= event.start or (event.phones == (SILENCE,) and labels[-1:] == [SILENCE]):

@@ -17,7 +17,7 @@ SYNCHRONOUS, PHONEME_EVENTS, IPA_EVENTS, DO_NOT_EXIT = 2, 0x0001, 0x0002, 0x8000
 WORD_EVENT, PHONEME_EVENT = 1, 7
 CHARACTERS_UTF8, PHONEMES_IN_BRACKETS, POSITION_IN_CHARACTERS = 1, 0x100, 1
 RATE_PARAMETER = 1
-USUAL_BUFFER_MS = 200
+DEFAULT_BUFFER_MS = 200
 WATCH_S = 0.2  # between looks at whether the parent lives
 
 
@@ -68,7 +68,7 @@ def _start_library() -> tuple[Any, int]:
     ]  # fmt: skip
     data = espeakng_loader.get_data_path().encode()
     options = PHONEME_EVENTS | IPA_EVENTS | DO_NOT_EXIT
-    return library, library.espeak_Initialize(SYNCHRONOUS, USUAL_BUFFER_MS, data, options)
+    return library, library.espeak_Initialize(SYNCHRONOUS, DEFAULT_BUFFER_MS, data, options)
 
 
 def _decode_event(event: _Event) -> tuple[int, int, Any] | None:

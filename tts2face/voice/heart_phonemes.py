@@ -21,7 +21,7 @@ LETTERS_OF_PHONE = MappingProxyType({
     "θ": "θ", "ʃ": "ʃ", "ʒ": "ʒ", "ŋ": "ŋ", "j": "j", "ɡ": "ɡ", "h": "h", "b": "b", "d": "d", "f": "f", "k": "k",
     "l": "l", "m": "m", "n": "n", "p": "p", "s": "s", "t": "t", "v": "v", "w": "w", "z": "z",
 })  # fmt: skip
-RHOTIC = MappingProxyType({"ə": "ɚ", "ɝ": "ɝ", "ɚ": "ɚ"})  # a vowel that swallows the ɹ behind it
+RHOTIC_VOWELS = MappingProxyType({"ə": "ɚ", "ɝ": "ɝ", "ɚ": "ɚ"})  # a vowel that swallows the ɹ behind it
 VOWELS = frozenset(phone for letter, phone in PHONE_OF_LETTER.items() if letter in "AIOQWYəɐᵊᵻɪiɛæaɑɒɔʊuʌɜɚeo")
 STRESS_MARKS = MappingProxyType({1: "ˈ", 2: "ˌ"})
 
@@ -36,9 +36,9 @@ def letters_to_phones(letters: str) -> tuple[tuple[str, ...], tuple[int, ...]]:
     places: list[int] = []
     for number, (phone, at) in enumerate(spelt):
         follows = spelt[number + 1][0] if number + 1 < len(spelt) else ""
-        swallowed = phone == "ɹ" and phones and phones[-1] in RHOTIC
+        swallowed = phone == "ɹ" and phones and phones[-1] in RHOTIC_VOWELS
         if swallowed and (phones[-1] != "ə" or follows not in VOWELS):
-            phones[-1] = RHOTIC[phones[-1]]
+            phones[-1] = RHOTIC_VOWELS[phones[-1]]
             continue
         phones.append(phone)
         places.append(at)

@@ -14,15 +14,15 @@ from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.speech.forced_alignment import Aligner, enforce_increasing
 from tts2face.telemetry import disable_telemetry
 from tts2face.types import Speech, Waveform, concatenate_speech
-from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, apply_volume
+from tts2face.voice.engine import PronunciationMap, SpeechInput, SpokenWord, apply_volume
 from tts2face.voice.heart_phonemes import letters_to_phones, segments_to_letters
 
-MOST_LETTERS = 400  # the model hears at most this many letters at once
-UNIT_S = 0.025  # length of one step of the model's durations
-LATE_S = 0.045  # the model's own boundaries lie this much behind the sound (41-51 ms)
-DURATIONS = "/Cast_32_output_0"  # inner tensor of the ONNX graph: steps of 25 ms for each letter
+MAX_LETTERS = 400  # the model hears at most this many letters at once
+DURATION_STEP_S = 0.025  # length of one step of the model's durations
+BOUNDARY_DELAY_S = 0.045  # the model's own boundaries lie this much behind the sound (41-51 ms)
+DURATION_TENSOR = "/Cast_32_output_0"  # inner tensor of the ONNX graph: steps of 25 ms for each letter
 NO_LETTER = re.compile(r"[^\w'’-]+")  # what a word in the reader's brackets may not hold
-SAYABLE = re.compile(r"[^\W_]")
+WORD_CHARACTER = re.compile(r"[^\W_]")
 """Anything that must be heard: a letter or a digit."""
 
 
@@ -38,7 +38,7 @@ class _Token:
 class NeuralVoice:
     """The voice ``heart``: American English, 24 kHz. One thread at a time."""
 
-    def __init__(self, own_words: Pronouncing) -> None:
+    def __init__(self, own_words: PronunciationMap) -> None:
         self._own_words = {word: segments_to_letters(segments) for word, segments in own_words.items()}
         disable_telemetry()
         try:
@@ -54,14 +54,14 @@ class NeuralVoice:
         """Hz."""
         return int(self._model.sample_rate)
 
-    def speak(self, spoken: Spoken, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
+    def speak(self, spoken: SpeechInput, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
         """Speech of a sentence; see `tts2face.voice.engine.Voice`."""
         parts = list(self._parts(spoken))
         if not any(letters_to_phones(token.letters)[0] for part in parts for token in part):
             raise InputError("there is nothing to say in the text; give at least one word")
         return concatenate_speech([self._speak_tokens(part, rate, volume, seed) for part in parts])
 
-    def _parts(self, spoken: Spoken) -> Iterator[list[_Token]]:
+    def _parts(self, spoken: SpeechInput) -> Iterator[list[_Token]]:
         if isinstance(spoken, str):
             split = self._model.split_sentences(spoken)
             sentences = [self._tokens(self._insert_own_words(sentence)) for sentence in split]
@@ -81,7 +81,9 @@ class NeuralVoice:
         read = reader.phonemize_tokens(reader.tokenize(normalize(sentence)))
         tokens = [_Token(token.text, self._known(token.phonemes), bool(token.whitespace)) for token in read]
         unsaid = [
-            token.text for token in tokens if SAYABLE.search(token.text) and not letters_to_phones(token.letters)[0]
+            token.text
+            for token in tokens
+            if WORD_CHARACTER.search(token.text) and not letters_to_phones(token.letters)[0]
         ]
         if unsaid:
             raise InputError(f"the voice heart cannot say {unsaid[0]!r}; write it in English words, or choose a voice")
@@ -126,29 +128,29 @@ class NeuralVoice:
         self, tokens: Sequence[_Token], letters: str, rate: float, sound: Waveform
     ) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
         """Phones where the model meant to put them, less its lateness: for sound that cannot be aligned."""
-        begins = np.concatenate([[0.0], np.cumsum(self._durations(letters, rate) * UNIT_S)])[1:]
+        begins = np.concatenate([[0.0], np.cumsum(self._durations(letters, rate) * DURATION_STEP_S)])[1:]
         labels, starts, spans = [SILENCE], [0.0], []
         for owner, phones, places in _spoken_words(tokens):
             spans.append(WordSpan(str(owner), len(labels), len(labels) + len(phones)))
             labels += phones
-            starts += [float(begins[place]) - LATE_S for place in places]
+            starts += [float(begins[place]) - BOUNDARY_DELAY_S for place in places]
         labels.append(SILENCE)
-        starts.append(min(float(begins[len(letters)]) - LATE_S, sound.duration))
+        starts.append(min(float(begins[len(letters)]) - BOUNDARY_DELAY_S, sound.duration))
         edges = enforce_increasing(np.array([*starts, sound.duration]))
         return PhoneSequence(labels, edges), _token_spans(spans, tokens)
 
     def _durations(self, letters: str, rate: float) -> NDArray[np.float64]:
-        """Steps of `UNIT_S` for the letters with one pad before and one behind."""
+        """Steps of `DURATION_STEP_S` for the letters with one pad before and one behind."""
         disable_telemetry()
         import onnxruntime
 
-        graph = add_graph_output(Path(self._model.model_path).read_bytes(), DURATIONS)
+        graph = add_graph_output(Path(self._model.model_path).read_bytes(), DURATION_TENSOR)
         session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
         given = {
             "ids": np.array([self._model.ids(letters)], np.int64),
             "speed": np.array([rate], np.float32),
         }
-        steps: NDArray[np.float64] = np.asarray(session.run([DURATIONS], given)[0], np.float64).ravel()
+        steps: NDArray[np.float64] = np.asarray(session.run([DURATION_TENSOR], given)[0], np.float64).ravel()
         return steps
 
 
@@ -168,11 +170,11 @@ def _token_from_word(word: SpokenWord) -> _Token:
 
 
 def _cut_tokens(tokens: Sequence[_Token]) -> Iterator[list[_Token]]:
-    """Stretches of at most `MOST_LETTERS` letters, cut behind a clause mark where there is one."""
+    """Stretches of at most `MAX_LETTERS` letters, cut behind a clause mark where there is one."""
     part: list[_Token] = []
     length = 0
     for token in tokens:
-        if part and length + len(token.letters) + 1 > MOST_LETTERS:
+        if part and length + len(token.letters) + 1 > MAX_LETTERS:
             marks = [at for at, earlier in enumerate(part) if earlier.letters[-1:] in {",", ";", ":", "—"}]
             keep = marks[-1] + 1 if marks else len(part)
             yield part[:keep]

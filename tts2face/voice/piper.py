@@ -15,7 +15,7 @@ from lexicon.writing_systems import check_script
 from tts2face.speech.forced_alignment import Aligner
 from tts2face.telemetry import disable_telemetry
 from tts2face.types import Speech, Waveform
-from tts2face.voice.engine import Pronouncing, Spoken, SpokenWord, apply_volume
+from tts2face.voice.engine import PronunciationMap, SpeechInput, SpokenWord, apply_volume
 
 WORD = re.compile(r"[^\W_]+(?:['’-][^\W_]+)*")
 STRESS_MARKS = MappingProxyType({1: "ˈ", 2: "ˌ"})
@@ -24,7 +24,7 @@ STRESS_MARKS = MappingProxyType({1: "ˈ", 2: "ˌ"})
 class PiperVoice:
     """A Piper voice (VITS in ONNX) with the settings file that lies beside it."""
 
-    def __init__(self, path: Path, language: str, own_words: Pronouncing) -> None:
+    def __init__(self, path: Path, language: str, own_words: PronunciationMap) -> None:
         if not path.is_file():
             raise InputError(f"there is no Piper voice {path}; check the path")
         settings = path.with_name(path.name + ".json")
@@ -51,7 +51,7 @@ class PiperVoice:
         """Hz."""
         return int(self._model.config.sample_rate)
 
-    def speak(self, spoken: Spoken, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
+    def speak(self, spoken: SpeechInput, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
         """Speech of a sentence; see `tts2face.voice.engine.Voice`. Spoken without noise: `seed` changes nothing."""
         words = self._words(spoken)
         if not words:
@@ -62,7 +62,7 @@ class PiperVoice:
         found = self._aligner.align(sound, ways)
         return Speech(Waveform(apply_volume(sound.samples, volume), self.sample_rate), found.phones, found.words)
 
-    def _words(self, spoken: Spoken) -> list[SpokenWord]:
+    def _words(self, spoken: SpeechInput) -> list[SpokenWord]:
         if not isinstance(spoken, str):
             return [part for word in spoken for part in ([word] if word.segments else self._read(word))]
         check_script(spoken, self._language)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from lexicon.errors import InputError
 from lexicon.sentences import Phrase
 from tts2face.request import Request
-from tts2face.voice.engine import ENGLISH, NAMES, Voice
+from tts2face.voice.engine import ENGLISH_CODES, VOICE_NAMES, Voice
 
 Voices = Callable[[str | None, str], Voice]  # a voice by name (None: the best one) and language
 
@@ -27,6 +27,6 @@ def speaker_of(part: Phrase, voice: Voice, request: Request, voices: Voices | No
 
 def voice_in(name: str | None, language: str | None) -> str | None:
     """The voice asked for where it speaks the language of a span (None: that of the text), else None: the best one."""
-    if language is None or (name in NAMES and (name != "heart" or language in ENGLISH)):
+    if language is None or (name in VOICE_NAMES and (name != "heart" or language in ENGLISH_CODES)):
         return name
     return None

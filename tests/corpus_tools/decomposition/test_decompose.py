@@ -9,8 +9,8 @@ from corpus_tools.decomposition.basis_expressions import ExpressionBasis, transf
 from corpus_tools.decomposition.blend_weights import build_least_squares_estimator
 from corpus_tools.decomposition.capture import FaceRecording
 from corpus_tools.decomposition.decompose import (
-    IRIS,
-    IRIS_PER_RAD,
+    IRIS_LANDMARKS,
+    IRIS_SHIFT_PER_RAD,
     Decomposition,
     decompose,
     gaze_angles,
@@ -26,7 +26,7 @@ from tts2face.face.expressions import expression_landmarks
 from tts2face.models.face import Face
 from tts2face.models.landmarks import MOUTH_REGION
 from tts2face.models.palette import EXPRESSIONS, REGION_FEATURES
-from tts2face.retargeting.performer import LIDS
+from tts2face.retargeting.performer import EYELID_LANDMARKS
 from tts2face.types import Trajectory, Waveform
 
 FPS, SECONDS = 30.0, 12.0
@@ -114,10 +114,10 @@ def test_lids_of_a_face_that_blinks(face: Face, basis: ExpressionBasis) -> None:
 def test_the_line_of_sight_is_the_eyes_and_the_head_s(basis: ExpressionBasis) -> None:
     looking = 0.2 * np.sin(2 * np.pi * 0.5 * TIMES)
     moved = np.tile(basis.rest, (len(TIMES), 1, 1))
-    for side, iris in IRIS.items():
-        _, _, outer, inner = LIDS[side]
+    for side, iris in IRIS_LANDMARKS.items():
+        _, _, outer, inner = EYELID_LANDMARKS[side]
         width = np.linalg.norm(basis.rest[outer] - basis.rest[inner])
-        moved[:, iris, 0] += IRIS_PER_RAD[1] * width * looking
+        moved[:, iris, 0] += IRIS_SHIFT_PER_RAD[1] * width * looking
     still = _parts(moved, basis).motion["gaze"]
     np.testing.assert_allclose(still[:, 1], looking, atol=0.01)
     turned = np.zeros((len(TIMES), 6))

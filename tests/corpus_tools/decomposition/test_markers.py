@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from corpus_tools.decomposition.marker_files import read_c3d, read_markers
-from corpus_tools.decomposition.marker_gaps import LONGEST_GAP_S, fill_marker_gaps, find_gaps
-from corpus_tools.decomposition.marker_set import SHIPPED, MarkerSet, read_marker_set
+from corpus_tools.decomposition.marker_gaps import MAX_MARKER_GAP_S, fill_marker_gaps, find_gaps
+from corpus_tools.decomposition.marker_set import DEFAULT_MARKER_TABLE, MarkerSet, read_marker_set
 from corpus_tools.decomposition.markers import read_marker_face, read_marker_recording, read_marker_still
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.decomposition.made_markers import FPS, SIZE, Made, write_c3d, write_table
@@ -120,7 +120,7 @@ def test_a_missing_marker_is_told_and_a_missing_region_refused(
 
 def test_a_set_without_brows_tells_nothing_of_them(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
     table = tmp_path / "set.tsv"
-    lines = SHIPPED.read_text().splitlines()
+    lines = DEFAULT_MARKER_TABLE.read_text().splitlines()
     table.write_text("# no brows\n" + "\n".join(line for line in lines if "brow" not in line) + "\n")
     fewer = read_marker_set(table)
     path = write_table(tmp_path / "take.csv", made.names, made.points)
@@ -171,7 +171,7 @@ def test_two_markers_show_no_head(made: Made, face: Face, worn: MarkerSet, tmp_p
 
 def test_three_markers_show_no_face(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
     table = tmp_path / "set.tsv"
-    brows = [line for line in SHIPPED.read_text().splitlines() if "BRO" in line or "\thead\t" in line]
+    brows = [line for line in DEFAULT_MARKER_TABLE.read_text().splitlines() if "BRO" in line or "\thead\t" in line]
     table.write_text("\n".join(["marker\tregion\tlandmark", *brows]) + "\n")
     names = ("RBRO1", "RBRO2", "LBRO1", *worn.head)
     kept = [made.names.index(name) for name in names]
@@ -302,14 +302,14 @@ def test_the_shipped_set_is_the_paper_s_number_of_markers(worn: MarkerSet) -> No
 )
 def test_a_damaged_set_is_refused(tmp_path: Path, old: str, new: str, reason: str) -> None:
     path = tmp_path / "set.tsv"
-    path.write_text(SHIPPED.read_text().replace(old, new, 1))
+    path.write_text(DEFAULT_MARKER_TABLE.read_text().replace(old, new, 1))
     with pytest.raises(DataError, match=reason):
         read_marker_set(path)
 
 
 def test_a_set_without_a_head_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "set.tsv"
-    lines = SHIPPED.read_text().splitlines()
+    lines = DEFAULT_MARKER_TABLE.read_text().splitlines()
     path.write_text("\n".join(line for line in lines if "\thead\t" not in line) + "\n")
     with pytest.raises(DataError, match="0 markers of the region head; a head's pose takes at least 3"):
         read_marker_set(path)
@@ -324,4 +324,4 @@ def test_a_gap_is_bridged_without_overshoot() -> None:
     assert whole.max() <= 1.0
     assert notes == ("gaps were filled in A (10 frames)",)
     assert find_gaps(np.isnan(track[:, 0, 0])).tolist() == [[15, 25]]
-    assert LONGEST_GAP_S * 100.0 > 10
+    assert MAX_MARKER_GAP_S * 100.0 > 10
