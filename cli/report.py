@@ -67,7 +67,7 @@ def gestures(
         int, Parameter(help="Which recordings, halves and clips are drawn.", converter=parse_whole_number)
     ] = 0,
 ) -> None:
-    """Compare each style's gestures with those that its fields, and noise, make of the same sound."""
+    """Compare each style's gestures with motion from its fields, noise and published fields for the same sound."""
     refuse_overwriting({"--out": out}, {"the palette": palette})
     from corpus_tools.gesture_study.analysis import Options
     from corpus_tools.gesture_study.write import write_gestures

@@ -14,24 +14,27 @@ PAGE = Path(__file__).with_name("gestures.md")
 
 def distances(found: StyleStudy) -> str:
     """Markdown table of all traits, those with a target first and in bold."""
-    heads = ("trait", "unit", "n", "recorded, mean", "field", "noise", "W halves", "W field", "W noise")
-    lines = _headed((*heads, "field / halves", "field / noise"))
+    heads = ("trait", "unit", "n", "recorded, mean", "field", "noise", "ju2008")
+    apart = ("W halves", "W field", "W noise", "W ju2008", "field / halves", "field / noise", "ju2008 / halves")
+    lines = _headed((*heads, *apart))
     for one in sorted(found.compared, key=lambda one: not one.trait.has_target):
         lines.append(_line(one))
     return "\n".join(lines)
 
 
 def _line(one: TraitComparison) -> str:
-    means = (float(values.mean()) for values in (one.real, one.field, one.noise))
+    means = (float(values.mean()) for values in (one.real, one.field, one.noise, one.published))
     near = [f"{one.to_field / one.halves:.2f}", f"{one.to_field / one.to_noise:.2f}"]
+    published = f"{one.to_published / one.halves:.2f}"
     mark = "**" if one.trait.has_target else ""
     cells = (
         f"{mark}{one.trait.name}{mark}",
         one.trait.unit,
         str(len(one.real)),
         *(f"{mean:.3g}" for mean in means),
-        *(f"{away:.3f}" for away in (one.halves, one.to_field, one.to_noise)),
+        *(f"{away:.3f}" for away in (one.halves, one.to_field, one.to_noise, one.to_published)),
         *(f"{mark}{share}{mark}" for share in near),
+        published,
     )
     return f"| {' | '.join(cells)} |"
 
@@ -44,7 +47,9 @@ def movements(found: StyleStudy) -> str:
             "r of speed with intensity: recorded",
             "field",
             "noise",
+            "ju2008",
             "power above 6 Hz, of recorded",
+            "ju2008",
             "diversity",
             "visited in 1 / 3 / 10 min",
             "highest autocorrelation, speech / silence",
@@ -52,10 +57,11 @@ def movements(found: StyleStudy) -> str:
     )
     moving = {one.feature: one for one in found.moving}
     for feature, visited in found.long.visited.items():
-        cells = [""] * 5
+        cells = [""] * 7
         if feature in moving:
             one = moving[feature]
-            cells = [*(f"{r:.2f}" for r in one.with_intensity), f"{one.fast[0]:.2f}", f"{one.diversity[0]:.2f}"]
+            cells = [*(f"{r:.2f}" for r in one.with_intensity), f"{one.fast[0]:.2f}", f"{one.fast[2]:.2f}"]
+            cells.append(f"{one.diversity[0]:.2f}")
         shares = " / ".join(f"{100 * share:.0f}" for share in visited)
         _, speech, silence = found.long.repeating[feature].highest
         lines.append(f"| {feature} | {' | '.join(cells)} | {shares} % | {speech:.2f} / {silence:.2f} |")
@@ -64,8 +70,9 @@ def movements(found: StyleStudy) -> str:
 
 def blinks(found: StyleStudy) -> str:
     """A line on how often lids shut."""
-    real, field, noise = found.blinks_per_minute
-    return f"Blinks a minute: {real:.1f} recorded, {field:.1f} by the field, {noise:.1f} by noise."
+    real, field, noise, published = found.blinks_per_minute
+    made = f"{field:.1f} by the field, {noise:.1f} by noise, {published:.1f} by the published field"
+    return f"Blinks a minute: {real:.1f} recorded, {made}."
 
 
 def _headed(names: tuple[str, ...]) -> list[str]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.evaluation.measures import pearson
 from corpus_tools.gesture_study.blinks import blinks_of
-from corpus_tools.gesture_study.clips import field_clip, hold_out, noise_clip, replace_style
+from corpus_tools.gesture_study.clips import field_clip, hold_out, noise_clip, published_clip, replace_style
 from corpus_tools.gesture_study.longrun import LongRun, long_run
 from corpus_tools.gesture_study.measures import (
     Spectrum,
@@ -64,18 +64,22 @@ class Options:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TraitComparison:
-    """A trait of recordings, of a field's clips and of noise, and Wasserstein distances in its unit.
+    """A trait of recordings, of a field's clips, of noise and of a published field, and Wasserstein distances.
 
     `halves` lies between random halves of the recordings (mean); the others between all of them and one clip (mean).
+    Distances are in the trait's unit. Only measured styles have a clip of the published field; for derived ones
+    `published` is empty and `to_published` NaN.
     """
 
     trait: Trait
     real: Doubles
     field: Doubles
     noise: Doubles
+    published: Doubles
     halves: float
     to_field: float
     to_noise: float
+    to_published: float
 
     @property
     def is_met(self) -> bool:
@@ -85,12 +89,16 @@ class TraitComparison:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionComparison:
-    """Spectra of a feature, the correlation (r) of its speed with the sound's intensity, and diversity."""
+    """Spectra of a feature, the correlation (r) of its speed with the sound's intensity, and diversity.
+
+    Spectra and r are those of recordings, field, noise and, for measured styles, the published field; diversity is
+    that of field and noise.
+    """
 
     feature: str
     unit: str
-    spectra: tuple[Spectrum, Spectrum, Spectrum]
-    with_intensity: tuple[float, float, float]
+    spectra: tuple[Spectrum, ...]
+    with_intensity: tuple[float, ...]
     diversity: tuple[float, float]
 
     @property
@@ -99,17 +107,18 @@ class MotionComparison:
         return abs(self.with_intensity[0] - self.with_intensity[1]) <= CORRELATION_WITHIN
 
     @property
-    def fast(self) -> tuple[float, float]:
-        """Power above `measures.FAST_HZ` of field and noise, over that of the recordings."""
-        real, field, noise = (one.fast for one in self.spectra)
-        return ratio(field, real), ratio(noise, real)
+    def fast(self) -> tuple[float, ...]:
+        """Power above `measures.FAST_HZ` of field, noise and published field, over that of the recordings."""
+        real, *others = (one.fast for one in self.spectra)
+        return tuple(ratio(one, real) for one in others)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StyleStudy:
     """Results for one style: `real` is its recordings, or for a derived style the motion of its source's field.
 
-    Only measured styles have long clips; derived styles transform those.
+    Only measured styles have long clips and a clip of the published field; derived styles transform long clips.
+    `blinks_per_minute` has the order of `MotionComparison.spectra`.
     """
 
     name: str
@@ -119,7 +128,7 @@ class StyleStudy:
     n_held: int
     is_held_out: bool
     minutes: float
-    blinks_per_minute: tuple[float, float, float]
+    blinks_per_minute: tuple[float, ...]
     compared: tuple[TraitComparison, ...]
     moving: tuple[MotionComparison, ...]
     long: LongRun
@@ -187,8 +196,9 @@ def _style_found(palette: Palette, name: str, ready: _Ready, options: Options) -
     learnt, held, fields = ready.learnt, ready.held, ready.fields
     clips = [_from_fields(fields, name, held, options.seed + k) for k in range(options.clips)]
     noises = [noise_clip(fields, name, len(held.intensity), options.seed + k) for k in range(options.clips)]
+    published = [published_clip(fields.palette, name, held.intensity, options.seed)] if derived is None else []
     real = held.motion if derived is None else ready.again
-    rates = [_rate(real, held), _rate(clips[0], held), _rate(noises[0], held)]
+    kinds = [[real], clips, noises, published]
     return StyleStudy(
         name=name,
         source=None if derived is None else source,
@@ -197,9 +207,9 @@ def _style_found(palette: Palette, name: str, ready: _Ready, options: Options) -
         n_held=len(held.lengths),
         is_held_out=ready.is_held_out,
         minutes=palette.styles[source].seconds / 60,
-        blinks_per_minute=(rates[0], rates[1], rates[2]),
-        compared=tuple(_compared(trait, held, (real, clips, noises), options) for trait in traits_of(palette, learnt)),
-        moving=_moving(palette, held, real, clips, noises),
+        blinks_per_minute=tuple(_rate(kind[0], held) for kind in kinds if kind),
+        compared=tuple(_compared(trait, held, kinds, options) for trait in traits_of(palette, learnt)),
+        moving=_moving(palette, held, [kind for kind in kinds if kind]),
         long=long_run(fields, name, learnt, held, options.seed) if derived is None else LongRun({}, {}),
     )
 
@@ -212,14 +222,12 @@ def _rate(motion: Motion, held: Style) -> float:
     return blinks_of(motion["blink"], held.lengths, GESTURE_FPS).per_minute if "blink" in motion else float("nan")
 
 
-def _compared(
-    trait: Trait, held: Style, kinds: tuple[Motion, list[Motion], list[Motion]], options: Options
-) -> TraitComparison:
+def _compared(trait: Trait, held: Style, kinds: list[list[Motion]], options: Options) -> TraitComparison:
     def values_of(motion: Motion) -> list[Doubles]:
         return [trait.of(part) for part in split_recordings(motion[trait.feature], held.lengths)]
 
-    parts = values_of(kinds[0])
-    clips, noises = ([np.concatenate(values_of(clip)) for clip in kind] for kind in kinds[1:])
+    parts = values_of(kinds[0][0])
+    clips, noises, published = ([np.concatenate(values_of(clip)) for clip in kind] for kind in kinds[1:])
     generator = np.random.default_rng([options.seed, 2])
     apart = [
         distance(np.concatenate([parts[i] for i in one]), np.concatenate([parts[i] for i in other]))
@@ -232,16 +240,18 @@ def _compared(
         real,
         np.concatenate(clips),
         np.concatenate(noises),
+        np.concatenate([np.zeros(0), *published]),
         float(np.mean(apart)) if apart else float("nan"),
-        float(np.mean([distance(real, clip) for clip in clips])),
-        float(np.mean([distance(real, noise) for noise in noises])),
+        *(
+            float(np.mean([distance(real, clip) for clip in kind])) if kind else float("nan")
+            for kind in (clips, noises, published)
+        ),
     )
 
 
-def _moving(
-    palette: Palette, held: Style, real: Motion, clips: list[Motion], noises: list[Motion]
-) -> tuple[MotionComparison, ...]:
-    shown = [in_display_units(palette, motion) for motion in (real, clips[0], noises[0])]
+def _moving(palette: Palette, held: Style, kinds: list[list[Motion]]) -> tuple[MotionComparison, ...]:
+    (real,), clips, noises, *_ = kinds
+    shown = [in_display_units(palette, kind[0]) for kind in kinds]
     intensity = between_frames(held.intensity, held.lengths)
     found = []
     for trait in traits_of(palette, held):
@@ -255,7 +265,7 @@ def _moving(
                     [pearson(trait.all_of(split_recordings(one[feature], held.lengths)), intensity) for one in kind]
                 )
             )
-            for kind in ([real], clips, noises)
+            for kind in kinds
         ]
         unlike = [_diversity([one[feature] for one in kind], real[feature], held) for kind in (clips, noises)]
         unit = trait.unit.removesuffix("/s")
@@ -263,8 +273,8 @@ def _moving(
             MotionComparison(
                 feature,
                 "" if unit == "1" else unit,
-                (spectra[0], spectra[1], spectra[2]),
-                (together[0], together[1], together[2]),
+                tuple(spectra),
+                tuple(together),
                 (unlike[0], unlike[1]),
             )
         )

@@ -1,6 +1,7 @@
 """Clips of gestures to measure: held-out recordings, and motion from fields that were not built from them."""
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from zlib import crc32
 
@@ -11,6 +12,7 @@ from corpus_tools.gesture_study.measures import split_recordings
 from lexicon.errors import InputError
 from tts2face.gesture.field import initial_state, sample_field_moments
 from tts2face.gesture.gesture_stream import GestureFields
+from tts2face.gesture.ju2008 import FIELD_OPTIONS
 from tts2face.gesture.perlin_noise import NoiseStream
 from tts2face.gesture.timeline import Timeline
 from tts2face.interpolation import interpolate_cubic
@@ -81,6 +83,15 @@ def field_clip(fields: GestureFields, style: str, feature: str, intensity: Float
     if tempo != 1.0:
         values = interpolate_cubic(walk.values, tempo * np.arange(len(intensity), dtype=np.float64))
     return Clip(fields.apply_change(style, feature, values), walk.moments[: round(len(intensity) * tempo)])
+
+
+def published_clip(palette: Palette, style: str, intensity: Floats, seed: int) -> Mapping[str, Floats]:
+    """All features of a measured style by the published fields (`tts2face.gesture.ju2008`), each as `field_clip`."""
+    fields = GestureFields(palette, FIELD_OPTIONS["ju2008"])
+    features = tuple(palette.styles[style].motion)
+    with ThreadPoolExecutor() as threads:  # an exact search at every frame takes ten times as long as the default
+        clips = threads.map(lambda feature: field_clip(fields, style, feature, intensity, seed).values, features)
+        return dict(zip(features, clips, strict=True))
 
 
 def noise_clip(fields: GestureFields, style: str, n_frames: int, seed: int) -> Mapping[str, Floats]:

@@ -1,4 +1,4 @@
-"""The plots of a style: distributions, spectra and autocorrelations of recordings, field and noise."""
+"""The plots of a style: distributions, spectra and autocorrelations of recordings, fields and noise."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -32,9 +32,9 @@ class Panel:
     draw: "Callable[[Axes], None]"
 
 
-def series_names(found: StyleStudy) -> tuple[str, str, str]:
-    """Names of the three lines of a plot."""
-    return ("recorded" if found.source is None else found.source, "field", "noise")
+def series_names(found: StyleStudy) -> tuple[str, ...]:
+    """Names of the lines of a plot; only measured styles have one of the published field."""
+    return ("recorded", "field", "noise", "ju2008") if found.source is None else (found.source, "field", "noise")
 
 
 def panel_svg(panel: Panel) -> str:
@@ -63,18 +63,19 @@ def panels_png(title: str, panels: Sequence[Panel]) -> bytes:
 
 def distribution(found: StyleStudy, compared: TraitComparison) -> Panel:
     """Histograms of a trait over the same bins."""
-    kinds = compared.real, compared.field, compared.noise
+    kinds = compared.real, compared.field, compared.noise, compared.published
     edges = np.linspace(*_limits(np.concatenate(kinds[:2])), N_BINS + 1)
     unit = f", {compared.trait.unit}" if compared.trait.unit else ""
+    names = series_names(found)
 
     def draw(axes: "Axes") -> None:
         highest = 0.0
-        for name, values, (colour, dash) in zip(series_names(found), kinds, SERIES, strict=False):
+        for name, values, (colour, dash) in zip(names, kinds, SERIES, strict=False):
             if len(values):
                 counts, _ = np.histogram(np.clip(values, edges[0], edges[-1]), edges)
                 shares = 100 * counts / len(values)
                 axes.stairs(shares, edges, color=colour, linestyle=dash, linewidth=1.5, label=name)
-                highest = max(highest, shares.max() if values is not compared.noise else 0.0)
+                highest = max(highest, shares.max() if name in names[:2] else 0.0)
         axes.set(title=compared.trait.name, xlabel=f"{compared.trait.name}{unit}", ylabel="% of values")
         axes.set(xlim=edges[[0, -1]], ylim=(0, 1.25 * highest or 1.0))
         if axes.patches:

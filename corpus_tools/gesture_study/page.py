@@ -16,7 +16,7 @@ from corpus_tools.gesture_study.analysis import (
 from corpus_tools.gesture_study.figure import Panel, distribution, panel_svg, power, repetition, series_names
 from corpus_tools.gesture_study.longrun import FROM_S, MINUTES, VISITED_AFTER
 from corpus_tools.gesture_study.measures import FAST_HZ, ratio
-from corpus_tools.report.page import note, page, paragraphs, table
+from corpus_tools.report.page import note, page, paragraphs, table, wide
 
 LAYOUT = "<style>.panels { display: flex; flex-wrap: wrap; gap: .5rem 1rem; }</style>"
 
@@ -41,7 +41,8 @@ def _method(found: GestureStudy) -> str:
     return note(
         f"One in {options.one_in} recordings is held out (seed {options.seed}). Fields are built from the others and "
         "driven by the intensity of the held-out ones; noise does not depend on the sound. "
-        f"{options.clips} clips of each are cut to the recordings' lengths, so that all have the same borders. "
+        f"{options.clips} clips of each, and for measured styles one of the published fields (ju2008: Ju and Lee 2008, "
+        "section 5.1), are cut to the recordings' lengths, so that all have the same borders. "
         f"Distances are Wasserstein distances (W) in the trait's unit: between {options.halves} random halves of the "
         "held-out recordings, and from all of them to a clip (means). "
         f"Target: at most {NEAR:g} times the distance between halves, and below {HALF:g} times that of noise."
@@ -79,7 +80,9 @@ def _origin(found: StyleStudy) -> str:
         if found.is_held_out
         else f"{found.n_learnt} recordings, too few to hold any out: compared with the recordings of the fields."
     )
-    return paragraphs(f"{found.minutes:.1f} minutes. {held}", f"Blinks per minute, recorded / field / noise: {rates}.")
+    return paragraphs(
+        f"{found.minutes:.1f} minutes. {held}", f"Blinks per minute, recorded / field / noise / ju2008: {rates}."
+    )
 
 
 def _distances(found: StyleStudy) -> str:
@@ -89,20 +92,22 @@ def _distances(found: StyleStudy) -> str:
             one.trait.name,
             one.trait.unit,
             str(len(one.real)),
-            number(float(np.mean(one.real)) if len(one.real) else np.nan),
-            number(float(np.mean(one.field)) if len(one.field) else np.nan),
-            number(float(np.mean(one.noise)) if len(one.noise) else np.nan),
-            number(one.halves, 3),
-            number(one.to_field, 3),
-            number(one.to_noise, 3),
+            *(
+                number(float(np.mean(values)) if len(values) else np.nan)
+                for values in (one.real, one.field, one.noise, one.published)
+            ),
+            *(number(apart, 3) for apart in (one.halves, one.to_field, one.to_noise, one.to_published)),
             number(ratio(one.to_field, one.halves)),
             number(ratio(one.to_field, one.to_noise)),
+            number(ratio(one.to_published, one.halves)),
             verdict(found, one),
         )
         for one in found.compared
     ]
-    head = ("trait", "unit", "n", f"mean {real}", "field", "noise", "W halves", "W field", "W noise")
-    return table((*head, "field / halves", "field / noise", "target"), rows, numbers=range(2, 11))
+    head = ("trait", "unit", "n", f"mean {real}", "field", "noise", "ju2008")
+    distances = ("W halves", "W field", "W noise", "W ju2008")
+    ratios = ("field / halves", "field / noise", "ju2008 / halves")
+    return wide(table((*head, *distances, *ratios, "target"), rows, numbers=range(2, 14)))
 
 
 def verdict(found: StyleStudy, one: TraitComparison) -> str:
@@ -117,18 +122,24 @@ def _moving(found: StyleStudy) -> str:
     rows = [
         (
             one.feature,
-            *(number(r) for r in one.with_intensity),
+            *(number(r) for r in _with_published(one.with_intensity, 4)),
             _near(found, one),
-            *(number(share) for share in one.fast),
+            *(number(share) for share in _with_published(one.fast, 3)),
             *(number(share) for share in one.diversity),
         )
         for one in found.moving
     ]
     above = f"power above {FAST_HZ:g} Hz / {real}"
-    head = ("feature", f"r of speed with intensity: {real}", "field", "noise", "target", f"{above}: field", "noise")
-    return table((*head, "diversity: field", "noise"), rows, numbers=(1, 2, 3, 5, 6, 7, 8)) + note(
+    correlations = (f"r of speed with intensity: {real}", "field", "noise", "ju2008", "target")
+    head = ("feature", *correlations, f"{above}: field", "noise", "ju2008", "diversity: field", "noise")
+    return wide(table(head, rows, numbers=(1, 2, 3, 4, 6, 7, 8, 9, 10))) + note(
         "Diversity: distance between clips of different seeds for the same sound, over that between recordings."
     )
+
+
+def _with_published(values: tuple[float, ...], n: int) -> tuple[float, ...]:
+    """Values for n columns, NaN where a derived style has no published field."""
+    return (*values, *[float("nan")] * (n - len(values)))
 
 
 def _near(found: StyleStudy, one: MotionComparison) -> str:

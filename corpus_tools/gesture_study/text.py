@@ -12,8 +12,9 @@ from corpus_tools.gesture_study.analysis import GestureStudy, MotionComparison, 
 from corpus_tools.gesture_study.longrun import VISITED_AFTER
 from corpus_tools.gesture_study.page import verdict
 
+KINDS = ("real", "field", "noise", "ju2008")  # the last one of measured styles only
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-HEAD = ("style", "source", "trait", "unit", "n", "w_halves", "w_field", "w_noise", "target")
+HEAD = ("style", "source", "trait", "unit", "n", "w_halves", "w_field", "w_noise", "w_ju2008", "target")
 
 
 def gestures_csv(found: GestureStudy) -> str:
@@ -23,7 +24,7 @@ def gestures_csv(found: GestureStudy) -> str:
     rows.writerow(HEAD)
     for style in found.styles:
         for one in style.compared:
-            distances = [f"{value:.6g}" for value in (one.halves, one.to_field, one.to_noise)]
+            distances = [_cell(value) for value in (one.halves, one.to_field, one.to_noise, one.to_published)]
             trait = one.trait
             rows.writerow(
                 [style.name, style.source, trait.name, trait.unit, len(one.real), *distances, verdict(style, one)]
@@ -54,7 +55,7 @@ def _style(found: StyleStudy) -> dict[str, Any]:
         "minutes": _number(found.minutes),
         "recordings_learnt": found.n_learnt,
         "recordings_held_out": found.n_held if found.is_held_out else 0,
-        "blinks_per_minute": _three(found.blinks_per_minute),
+        "blinks_per_minute": _by_kind(found.blinks_per_minute),
         "traits": [_compared(found, one) for one in found.compared],
         "features": [_moving(one) for one in found.moving],
         "visited": {
@@ -72,6 +73,8 @@ def _style(found: StyleStudy) -> dict[str, Any]:
 
 def _compared(found: StyleStudy, one: TraitComparison) -> dict[str, Any]:
     kinds = {"real": one.real, "field": one.field, "noise": one.noise}
+    if len(one.published):
+        kinds["ju2008"] = one.published
     return {
         "name": one.trait.name,
         "unit": one.trait.unit,
@@ -80,6 +83,7 @@ def _compared(found: StyleStudy, one: TraitComparison) -> dict[str, Any]:
         "halves": _number(one.halves),
         "field": _number(one.to_field),
         "noise": _number(one.to_noise),
+        "ju2008": _number(one.to_published),
         "target": verdict(found, one) or None,
         "means": {kind: _number(float(values.mean())) if len(values) else None for kind, values in kinds.items()},
         "quantiles": {kind: _quantiles(values) for kind, values in kinds.items()},
@@ -89,19 +93,23 @@ def _compared(found: StyleStudy, one: TraitComparison) -> dict[str, Any]:
 def _moving(one: MotionComparison) -> dict[str, Any]:
     return {
         "name": one.feature,
-        "r_with_intensity": _three(one.with_intensity),
-        "fast_power": {kind: _number(share) for kind, share in zip(("field", "noise"), one.fast, strict=True)},
+        "r_with_intensity": _by_kind(one.with_intensity),
+        "fast_power": {kind: _number(share) for kind, share in zip(KINDS[1:], one.fast, strict=False)},
         "diversity": {kind: _number(share) for kind, share in zip(("field", "noise"), one.diversity, strict=True)},
         "hz": one.spectra[0].hz.round(4).tolist(),
         "power": {
             kind: [_number(float(value)) for value in spectrum.power]
-            for kind, spectrum in zip(("real", "field", "noise"), one.spectra, strict=True)
+            for kind, spectrum in zip(KINDS, one.spectra, strict=False)
         },
     }
 
 
-def _three(values: tuple[float, float, float]) -> dict[str, float | None]:
-    return {kind: _number(value) for kind, value in zip(("real", "field", "noise"), values, strict=True)}
+def _by_kind(values: tuple[float, ...]) -> dict[str, float | None]:
+    return {kind: _number(value) for kind, value in zip(KINDS, values, strict=False)}
+
+
+def _cell(value: float) -> str:
+    return "" if np.isnan(value) else f"{value:.6g}"
 
 
 def _quantiles(values: NDArray[np.float64]) -> list[float | None]:

@@ -35,7 +35,7 @@ def write_gestures(palette: str, out: Path, options: Options, *, on_progress: Pr
 
 def _picture(found: GestureStudy) -> bytes:
     first = found.styles[0]
-    return panels_png(f"Gestures of {first.name}: recorded, by its fields, by noise", brief(first))
+    return panels_png(f"Gestures of {first.name}: recorded, by its fields, by noise, by published fields", brief(first))
 
 
 WRITERS: Mapping[str, Callable[[GestureStudy], bytes]] = MappingProxyType(

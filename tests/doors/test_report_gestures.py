@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 from cli.main import run
+from corpus_tools.report.drawing import SERIES
 from tests.corpus_tools.gesture_study.made_palette import made_palette
 from tts2face.models.palette import write_palette
 
@@ -50,6 +51,8 @@ def test_the_page_holds_everything_and_fetches_nothing(here: Path) -> None:
     assert not re.search(r"http|<(script|link|img)|url\((?!#)|@import|\bnan\b", html)
     # of each style 10 distributions and 2 spectra; of the measured one 3 of repetition
     assert html.count("<svg") == html.count("</svg>") == 2 * (10 + 2) + 3
+    assert html.count(">ju2008</text>") == 10 + 2  # of the measured style alone
+    assert html.count("<th class=n>W ju2008</th>") == 2
     assert html.count("<td>met</td>") + html.count("<td>missed</td>") == 4
 
 
@@ -81,7 +84,7 @@ def test_the_picture_shows_the_main_plots(here: Path) -> None:
     with Image.open("g.PNG") as image:
         assert image.size == (2 * 3 * 380, 2 * (2 * 250 + 26))
         colours = {colour for _, colour in image.convert("RGB").getcolors(1 << 20)}
-    assert len(colours) > 10
+    assert {tuple(bytes.fromhex(colour[1:])) for colour, _ in SERIES[:4]} <= colours
 
 
 @pytest.mark.parametrize("option", [("--held-out", "4"), ("--halves", "9"), ("--clips", "2"), ("--seed", "7")])

@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 
 from corpus_tools.gesture_study.analysis import Options, StyleStudy, TraitComparison, study
-from corpus_tools.gesture_study.clips import field_clip, hold_out, noise_clip, replace_style, select_recordings
-from corpus_tools.gesture_study.measures import split_recordings
+from corpus_tools.gesture_study.clips import (
+    field_clip,
+    hold_out,
+    noise_clip,
+    published_clip,
+    replace_style,
+    select_recordings,
+)
+from corpus_tools.gesture_study.measures import distance, split_recordings
 from corpus_tools.gesture_study.traits import brow_lift, traits_of
 from lexicon.errors import InputError
 from tests.corpus_tools.gesture_study.made_palette import BLINK, N_FRAMES, made_palette, made_style
@@ -103,9 +110,35 @@ def test_a_field_is_nearer_than_noise(found):
     for name in ("head speed", "brow speed", "closing speed"):
         assert compared(calm, name).to_field < 0.5 * compared(calm, name).to_noise
     by_feature = {one.feature: one for one in calm.moving}
-    real, field, noise = by_feature["head"].with_intensity
+    real, field, noise, _ = by_feature["head"].with_intensity
     assert min(real, field) > noise + 0.1
     assert 0.3 < by_feature["head"].diversity[0] < 1.5
+
+
+def test_published_fields_stand_beside_those_of_measured_styles(found):
+    calm, quick = found.styles
+    one = compared(calm, "head speed")
+    assert len(one.published) == len(one.noise) / 2
+    assert one.to_published == pytest.approx(distance(one.real, one.published))
+    assert one.to_published > 3 * one.to_field  # without a spring a leap is a jump
+    assert len(calm.blinks_per_minute) == 4
+    assert all(len(one.spectra) == len(one.with_intensity) == 4 for one in calm.moving)
+    assert calm.moving[0].fast[2] > calm.moving[0].fast[0]
+    assert not len(compared(quick, "head speed").published)
+    assert np.isnan(compared(quick, "head speed").to_published)
+    assert len(quick.blinks_per_minute) == len(quick.moving[0].spectra) == 3
+
+
+def test_a_published_clip_consists_of_recorded_frames():
+    palette = made_palette()
+    heard = palette.styles["calm"].intensity[:200]
+    made = published_clip(palette, "calm", heard, 3)
+    again = published_clip(palette, "calm", heard, 3)
+    for feature, values in made.items():
+        np.testing.assert_array_equal(values, again[feature])
+        recorded = palette.styles["calm"].motion[feature]
+        nearest = np.abs(recorded[:, None] - values[None, ::20]).max(axis=2).min(axis=0)
+        np.testing.assert_allclose(nearest, 0.0, atol=1e-5)
 
 
 def test_long_clips_visit_more_and_more_and_do_not_repeat(found):

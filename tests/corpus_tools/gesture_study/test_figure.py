@@ -22,7 +22,7 @@ from corpus_tools.gesture_study.figure import (
     power,
     repetition,
 )
-from corpus_tools.report.drawing import FIRST, INK, PNG_SCALE, SECOND, load_matplotlib
+from corpus_tools.report.drawing import PNG_SCALE, SERIES, load_matplotlib
 
 
 @pytest.fixture
@@ -46,8 +46,11 @@ def steps(axes):
 def test_a_distribution_is_in_percent_and_holds_what_is_beyond(calm):
     compared = calm.compared[0]
     found = steps(drawn(distribution(calm, compared)))
-    assert set(found) == {"recorded", "field", "noise"}
-    for name, values in (("recorded", compared.real), ("field", compared.field), ("noise", compared.noise)):
+    kinds = {
+        "recorded": compared.real, "field": compared.field, "noise": compared.noise, "ju2008": compared.published,
+    }  # fmt: skip
+    assert set(found) == set(kinds)
+    for name, values in kinds.items():
         shares, edges, _ = found[name]
         inside = [((values >= low) & (values < high)).mean() for low, high in pairwise(edges[:-1])]
         inside[0] += (values < edges[0]).mean()
@@ -56,8 +59,15 @@ def test_a_distribution_is_in_percent_and_holds_what_is_beyond(calm):
         assert len(shares) == N_BINS
 
 
+def test_a_derived_style_has_no_line_of_the_published_field(found):
+    quick = found.styles[1]
+    assert set(steps(drawn(distribution(quick, quick.compared[0])))) == {"calm", "field", "noise"}
+    assert [line.get_label() for line in drawn(power(quick, quick.moving[0])).lines] == ["calm", "field", "noise"]
+
+
 def test_a_trait_without_values_is_an_empty_plot(calm):
-    empty = SimpleNamespace(real=np.zeros(0), field=np.zeros(0), noise=np.zeros(0), trait=calm.compared[0].trait)
+    none = np.zeros(0)
+    empty = SimpleNamespace(real=none, field=none, noise=none, published=none, trait=calm.compared[0].trait)
     axes = drawn(distribution(calm, empty))
     assert not axes.patches
     assert axes.get_xlim() == (0, 1)
@@ -66,7 +76,9 @@ def test_a_trait_without_values_is_an_empty_plot(calm):
 def test_a_spectrum_names_powers_of_ten_and_its_unit(calm):
     (moving,) = (one for one in calm.moving if one.feature == "head")
     axes = drawn(power(calm, moving))
-    np.testing.assert_array_equal(axes.lines[1].get_ydata(), moving.spectra[1].power[1:])
+    assert [line.get_label() for line in axes.lines] == ["recorded", "field", "noise", "ju2008"]
+    for line, one in zip(axes.lines, moving.spectra, strict=True):
+        np.testing.assert_array_equal(line.get_ydata(), one.power[1:])
     assert axes.get_ylabel() == "power, deg²/Hz"
     words = re.findall(r">([^<>]+)</text>", panel_svg(power(calm, moving)))
     assert {"0.1", "1"} <= set(words)
@@ -89,5 +101,5 @@ def test_the_picture_shows_each_panel_in_its_place(calm):
     for at in range(len(panels)):
         column, row = at % COLUMNS * WIDTH * PNG_SCALE, (HEAD + at // COLUMNS * HEIGHT) * PNG_SCALE
         part = pixels[row : row + HEIGHT * PNG_SCALE, column : column + WIDTH * PNG_SCALE].reshape(-1, 3)
-        for colour in (INK, FIRST, SECOND):
+        for colour, _ in SERIES[:4]:
             assert (part == tuple(bytes.fromhex(colour[1:]))).all(axis=1).any()

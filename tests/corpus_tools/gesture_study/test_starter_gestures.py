@@ -42,7 +42,7 @@ def test_fields_are_as_near_as_other_recordings_of_the_same_person(name: str, st
 
 
 def test_heads_move_with_the_sound_as_real_ones_do(style: StyleStudy) -> None:
-    real, field, noise = moving(style, "head").with_intensity
+    real, field, noise, _ = moving(style, "head").with_intensity
     assert real > 0.3
     assert abs(field - real) <= 0.1
     assert abs(noise) < 0.1
@@ -51,6 +51,12 @@ def test_heads_move_with_the_sound_as_real_ones_do(style: StyleStudy) -> None:
 @pytest.mark.parametrize("feature", ["head", "brows"])
 def test_nothing_trembles(feature: str, style: StyleStudy) -> None:
     assert 0.7 < moving(style, feature).fast[0] < NO_JITTER
+
+
+@pytest.mark.parametrize("name", ["head speed", "brow height", "brow speed"])
+def test_fields_are_nearer_than_the_published_ones(name: str, style: StyleStudy) -> None:
+    found = compared(style, name)
+    assert found.to_field < found.to_published
 
 
 def test_clips_of_ten_minutes_do_not_repeat_themselves(style: StyleStudy) -> None:
