@@ -26,7 +26,7 @@ from tts2face.synthesis.marked_speech import (
     speak_sentence,
 )
 from tts2face.synthesis.speech_joining import join_utterances, silent_speech, trim_silence
-from tts2face.voice.engine import load_voice
+from tts2face.voice.loading import load_voice
 from tts2face.voice.spans import voice_in
 
 

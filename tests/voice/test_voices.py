@@ -9,7 +9,8 @@ from lexicon.ipa import Segment, parse_ipa
 from lexicon.phones import PHONES
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.types import Speech, Waveform
-from tts2face.voice.engine import SpokenWord, Voice, apply_volume, load_voice
+from tts2face.voice.engine import SpokenWord, Voice, apply_volume
+from tts2face.voice.loading import load_voice
 from tts2face.voice.resample import resampled_speech
 
 SENTENCE = "Bob may move five big maps."

@@ -2,15 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import InputError
 from lexicon.ipa import Segment
-from lexicon.languages import language_code
 from tts2face.types import Speech
 
 ENGLISH_CODES = ("en", "en-us", "en-gb")
@@ -54,46 +51,6 @@ class Voice(Protocol):
         InputError
             There is nothing to say, or something that this voice cannot say.
         """
-
-
-def load_voice(name: str | None, language: str, own_words: PronunciationMap | None = None) -> Voice:
-    """The voice of a name, or the best one for a language.
-
-    Parameters
-    ----------
-    name
-        One of `VOICE_NAMES`, or the path of a Piper voice (``.onnx``).
-    language
-        As `lexicon.languages.language_code` reads it.
-    own_words
-        A user's pronunciations, which win over the voice's own.
-
-    Raises
-    ------
-    InputError
-        There is no such voice, or it does not speak the language.
-    BackendError
-        What the voice needs is not installed.
-    """
-    language = language_code(language)
-    chosen = name or ("heart" if language in ENGLISH_CODES[:2] else "espeak")
-    if chosen == "heart":
-        if language not in ENGLISH_CODES:
-            raise InputError(f"the voice heart speaks English, not {language}; choose --voice espeak")
-        from tts2face.voice.neural import NeuralVoice
-
-        return NeuralVoice(own_words or {})
-    if chosen in {"espeak", "espeak-female"}:
-        from tts2face.voice.espeak import EspeakVoice
-
-        return EspeakVoice(language, own_words or {}, is_female=chosen == "espeak-female")
-    if chosen.endswith(".onnx"):
-        from tts2face.voice.piper import PiperVoice
-
-        return PiperVoice(Path(chosen), language, own_words or {})
-    raise InputError(
-        f"there is no voice {chosen!r}; give {', '.join(VOICE_NAMES)}, or the path of a Piper voice (.onnx)"
-    )
 
 
 def apply_volume(samples: NDArray[np.floating], volume: float) -> NDArray[np.float32]:
