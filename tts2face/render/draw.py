@@ -90,7 +90,7 @@ class MeshRenderer:
         n_channels = len(clip.motion.channels)
         if clip.motion.channels != names[:n_channels]:
             raise InputError(
-                "the channels of the clip are not in the shapes of this face; make the clip with a session of this face"
+                "the clip's motion is not in the shapes of this face; make the clip with a session of this face"
             )
         if n_channels == len(names):
             return clip.motion.values
