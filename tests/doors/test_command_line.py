@@ -132,7 +132,7 @@ def test_every_kind_of_error_has_an_exit_code() -> None:
         (["Hi.", "--out", "x.mp4", "--talker", "none.talker"], 2, "no talker file none.talker"),
         (["Hi.", "--out", "x.mp4", "--talker", "junk.talker"], 3, "junk.talker is damaged or not a talker file"),
         (["Hi.", "--out", "x.mp4", "--talker", "face.talker"], 3, "face.talker is not a talker file"),
-        (["Hi.", "--out", "x.mp4", "--talker", "old.talker"], 3, "of version 0, this one reads 1"),
+        (["Hi.", "--out", "x.mp4", "--talker", "old.talker"], 3, "of version 0, not 1"),
         (["Hi.", "--out", "x.mp4", "--face", "half.face"], 3, "half.face is damaged or not a face file"),
         (["Hi.", "--out", "x.mp4", "--face", "nobody"], 2, "no face 'nobody'"),
         (["Hi.", "--out", "x.mp4", "--identity", "nobody"], 2, "no identity 'nobody'"),

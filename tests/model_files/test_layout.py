@@ -1,4 +1,4 @@
-"""What loading refuses, one wrong thing at a time: a valid file, one array or key of it changed, and the reason."""
+"""Validation of model files: one array or key of a valid file is changed, and the error names the reason."""
 
 import json
 from collections.abc import Callable
@@ -67,20 +67,20 @@ def put(name: str, value: float) -> Callable[[dict, dict], None]:
         ("face", "shape_vertices", -1, "shape_vertices holds -1, beyond its"),
         ("face", "landmark_vertices", 10**6, "landmark_vertices holds 1000000, beyond its"),
         ("face", "landmarks", 478, "landmarks holds 478, beyond its 478 landmarks"),
-        ("face", "landmarks", 0, "landmarks holds a number twice"),
+        ("face", "landmarks", 0, "landmarks holds a duplicate number"),
         ("face", "landmark_weights", 0.9, "landmark_weights of a landmark add up to"),
         ("face", "shape_counts", 7, "shape_counts adds up to"),
-        ("face", "limits", -1, "limits of the shape eyeLookInRight fall"),
+        ("face", "limits", -1, "limits of the shape eyeLookInRight are reversed"),
         ("face", "identity0_step", np.inf, "identity0_step holds inf"),
         ("palette", "region.brows.landmarks", 500, "region.brows.landmarks holds 500, beyond its 478"),
         ("palette", "region.brows.modes", 0.9, "region.brows.modes is not orthonormal"),
         ("palette", "style.calm.lengths", 91, "style.calm.lengths adds up to 901, but there are 900"),
-        ("palette", "style.calm.head.step", 0, "style.calm.head.step holds 0; a step is above it"),
+        ("palette", "style.calm.head.step", 0, "style.calm.head.step holds 0; steps must be above 0"),
         ("palette", "style.calm.pitch", np.nan, "style.calm.pitch holds nan"),
         ("talker", "phones", 6, "phones holds 6, beyond its 6 phones of the inventory"),
         ("talker", "n_frames", 22, "n_frames adds up to"),
         ("talker", "edges", 0.1, "edges do not increase at"),
-        ("talker", "edges", 9.0, "phones of the utterance 'u5' end behind its frames"),
+        ("talker", "edges", 9.0, "phones of the utterance 'u5' end after its frames"),
         ("talker", "basis", 0.9, "basis is not orthonormal"),
         ("talker", "drive.linear.context", 2, "drive.linear.context ends with 2, not 0 or 1"),
         ("talker", "drive.linear.feature", 98, "drive.linear.feature is 'mfcb', not a sum of formants"),
@@ -128,7 +128,7 @@ def _deep(levels: int) -> list:
         ("face", lambda a, h: h["parts"][0].update(opacity="1"), "parts[0]: opacity is '1', not a number from"),
         ("face", lambda a, h: h["eyes"][0].update(count=10**6), "eye 0 reaches beyond"),
         ("face", lambda a, h: h["eyes"][0].update(count=True), "eyes[0]: count is True, not a whole number"),
-        ("face", lambda a, h: h["eyes"][0]["turns"].update(x=[0, 0, 1]), "turns with ['x'], which is none of its"),
+        ("face", lambda a, h: h["eyes"][0]["turns"].update(x=[0, 0, 1]), "turns with ['x'], which is not one of its"),
         ("face", lambda a, h: h.update(shape_names=["jawOpen"] * 4), "two shapes of the same name"),
         ("face", lambda a, h: h.update(metadata=_deep(3)), "metadata is a list of 1, not an object"),
         ("face", lambda a, h: h["metadata"].update(x=_deep(40)), "nested deeper than 16 levels"),
@@ -163,7 +163,7 @@ def test_a_wrong_array_or_key(
         ("[1]", "the metadata are a list, not an object"),
     ],
 )
-def test_metadata_that_are_no_object(tmp_path: Path, text: str, reason: str) -> None:
+def test_metadata_that_are_not_an_object(tmp_path: Path, text: str, reason: str) -> None:
     file = tmp_path / "wrong.face"
     file.write_bytes(save({"a": np.zeros(1)}, {"kind": "face", "version": "1", "metadata": text}))
     with pytest.raises(DataError, match=reason):
@@ -190,8 +190,8 @@ def test_a_plate_that_is_no_video() -> None:
         own_face_renderer(wrong, Picture(size="64x64"))
 
 
-def test_shapes_that_do_not_move() -> None:
-    with pytest.raises(DataError, match="cannot be told apart"):
+def test_shapes_without_motion_are_refused() -> None:
+    with pytest.raises(DataError, match="linearly dependent"):
         bounded_least_squares(np.zeros((2, 2)), np.ones((1, 2)), np.array([[0.0, 1.0]] * 2))
 
 

@@ -1,4 +1,4 @@
-"""Metadata of model files is JSON that a user may have changed."""
+"""Validation of the JSON metadata of model files."""
 
 from pathlib import Path
 
