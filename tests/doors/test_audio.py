@@ -78,11 +78,11 @@ def opening(motion: np.ndarray, talker: Talker) -> np.ndarray:
     return np.linalg.norm(shapes[:, 13] - shapes[:, 14], axis=1)
 
 
-@pytest.mark.parametrize(("drive", "least"), [("linear", 0.5), ("network", 0.65)])
+@pytest.mark.parametrize(("audio_map", "least"), [("linear", 0.5), ("network", 0.65)])
 def test_lips_that_hear_a_new_sentence_move_as_the_speaker_s(
-    drive: str, least: float, film: Path, talker: Talker
+    audio_map: str, least: float, film: Path, talker: Talker
 ) -> None:
-    _, lips = map_audio_to_motion(film, talker.audio_maps[drive], talker, talker.fps)
+    _, lips = map_audio_to_motion(film, talker.audio_maps[audio_map], talker, talker.fps)
     (real,) = (one.shape for one in talker.utterances if one.name == "bbaf2n")
     n = min(len(real), len(lips))
     assert np.corrcoef(opening(real[:n], talker), opening(lips.values[:n], talker))[0, 1] > least
@@ -101,8 +101,8 @@ def test_with_the_words_lips_close_where_they_are_said(film: Path, talker: Talke
 def test_drives_and_words_give_different_lips(film: Path, talker: Talker, face: Face) -> None:
     requests = (
         Request(audio=film),
-        Request(audio=film, drive="network"),
-        Request(audio=film, drive="linear"),
+        Request(audio=film, audio_map="network"),
+        Request(audio=film, audio_map="linear"),
         Request(audio=film, text=TEXT),
         Request(audio=film, volume=0.5),
     )
@@ -147,9 +147,9 @@ def test_files_of_sound_alone_are_read(suffix: str, here: Path) -> None:
 
 def test_a_faint_recording_moves_the_lips_as_a_loud_one(film: Path, talker: Talker, here: Path) -> None:
     sound = read_sound(film, 16000).samples
-    drive = replace(talker.audio_maps["network"], loudness=-18.0)
+    audio_map = replace(talker.audio_maps["network"], loudness=-18.0)
     loud, faint = (
-        map_audio_to_motion(written(here / f"{gain}.wav", gain * sound), drive, talker, 25.0)[1].values
+        map_audio_to_motion(written(here / f"{gain}.wav", gain * sound), audio_map, talker, 25.0)[1].values
         for gain in (1.0, 0.1)
     )
     spread = talker.model.spread[: talker.model.n_speech]
@@ -169,7 +169,7 @@ def test_the_command_writes_clips(film: Path, talker: Talker, here: Path) -> Non
     common = ["--audio", str(film), "--talker", "me.talker", "--size", "64x64", "--fps", "5", "--quiet"]
     for out, more in (
         ("sound.mp4", []),
-        ("linear.mp4", ["--drive", "linear"]),
+        ("linear.mp4", ["--audio-map", "linear"]),
         ("text.mp4", ["--text", TEXT]),
         ("words.mp4", [TEXT]),
         ("script.mp4", ["--transcript", "said.txt", "--explain", "why.json"]),
@@ -204,9 +204,9 @@ def test_files_without_sound_are_refused(talker: Talker, face: Face, here: Path)
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        ({"drive": "magic"}, "no drive 'magic'; choose linear or network"),
-        ({"drive": "linear", "audio": None, "text": "Hi."}, "a drive follows a recording"),
-        ({"drive": "linear", "text": "Hi."}, "leave --drive or the text away"),
+        ({"audio_map": "magic"}, "no drive 'magic'; choose linear or network"),
+        ({"audio_map": "linear", "audio": None, "text": "Hi."}, "a drive follows a recording"),
+        ({"audio_map": "linear", "text": "Hi."}, "leave --drive or the text away"),
         ({"voice": "espeak"}, "leave --voice and --rate away"),
         ({"rate": 1.5}, "leave --voice and --rate away"),
     ],

@@ -48,16 +48,16 @@ def test_features_of_blocks_are_those_of_the_whole(kind: str, fps: float, sizes:
 @pytest.mark.parametrize("sizes", [(800,), (7, 4001, 0, 350), (100_000,)])
 @pytest.mark.parametrize(("before", "after", "bends"), [(0, 0, False), (2, 3, False), (3, 1, True)])
 def test_lips_of_blocks_are_those_of_the_whole(before: int, after: int, bends: bool, sizes: tuple[int, ...]) -> None:
-    drive = taught("mfcc", before, after, bends=bends)
-    listener = StreamingAudioMap(drive, 25.0)
+    audio_map = taught("mfcc", before, after, bends=bends)
+    listener = StreamingAudioMap(audio_map, 25.0)
     made = np.concatenate([*(listener.hear(block) for block in blocks(*sizes)), listener.finish()])
     features = speech_features(SOUND, "mfcc", fps=25.0, n_frames=frame_count(SOUND.duration, 25.0))
-    np.testing.assert_array_equal(made, drive.parameters(features.values))
+    np.testing.assert_array_equal(made, audio_map.parameters(features.values))
 
 
 def test_lips_come_no_later_than_stated() -> None:
-    drive = taught("lsf", 2, 3, bends=True)
-    listener = StreamingAudioMap(drive, 25.0)
+    audio_map = taught("lsf", 2, 3, bends=True)
+    listener = StreamingAudioMap(audio_map, 25.0)
     assert listener.look_ahead_s == pytest.approx(3 / 25 + 0.0427, abs=1e-3)
     known, heard = 0, 0
     for block in blocks(160):

@@ -79,11 +79,11 @@ class StreamingFeatures:
 class StreamingAudioMap:
     """Turns blocks of sound at `FEATURE_RATE` into a talker's speech parameters at her frame rate."""
 
-    def __init__(self, drive: AudioMap, fps: float) -> None:
-        self._audio_map = drive
-        self._feature_stream = StreamingFeatures(drive.feature, fps)
+    def __init__(self, audio_map: AudioMap, fps: float) -> None:
+        self._audio_map = audio_map
+        self._feature_stream = StreamingFeatures(audio_map.feature, fps)
         self._fps = fps
-        self._features: NDArray[np.float32] = np.zeros((0, len(drive.mean)), np.float32)
+        self._features: NDArray[np.float32] = np.zeros((0, len(audio_map.mean)), np.float32)
 
     @property
     def look_ahead_s(self) -> float:
@@ -108,10 +108,10 @@ class StreamingAudioMap:
         return self._map_features(np.concatenate([rest, tail]))
 
     def _map_features(self, features: NDArray[np.float32]) -> NDArray[np.float32]:
-        drive = self._audio_map
+        audio_map = self._audio_map
         if not len(self._features) and len(features):
-            features = np.concatenate([np.repeat(features[:1], drive.before, axis=0), features])
+            features = np.concatenate([np.repeat(features[:1], audio_map.before, axis=0), features])
         self._features = np.concatenate([self._features, features])
-        made = drive.inside(self._features)
+        made = audio_map.inside(self._features)
         self._features = self._features[len(made) :]
         return made
