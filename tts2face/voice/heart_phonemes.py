@@ -21,23 +21,23 @@ LETTERS_OF_PHONE = MappingProxyType({
     "θ": "θ", "ʃ": "ʃ", "ʒ": "ʒ", "ŋ": "ŋ", "j": "j", "ɡ": "ɡ", "h": "h", "b": "b", "d": "d", "f": "f", "k": "k",
     "l": "l", "m": "m", "n": "n", "p": "p", "s": "s", "t": "t", "v": "v", "w": "w", "z": "z",
 })  # fmt: skip
-RHOTIC_VOWELS = MappingProxyType({"ə": "ɚ", "ɝ": "ɝ", "ɚ": "ɚ"})  # a vowel that swallows the ɹ behind it
+RHOTIC_VOWELS = MappingProxyType({"ə": "ɚ", "ɝ": "ɝ", "ɚ": "ɚ"})  # vowels that merge with a following ɹ
 VOWELS = frozenset(phone for letter, phone in PHONE_OF_LETTER.items() if letter in "AIOQWYəɐᵊᵻɪiɛæaɑɒɔʊuʌɜɚeo")
 STRESS_MARKS = MappingProxyType({1: "ˈ", 2: "ˌ"})
 
 
 def letters_to_phones(letters: str) -> tuple[tuple[str, ...], tuple[int, ...]]:
-    """Phones that a word's letters spell, and for each the position of its first letter.
+    """Phones of a word's letters, and the position of each phone's first letter.
 
-    əɹ is one phone (ɚ) unless a vowel follows, ɜɹ always (ɝ). Stress marks and length signs spell nothing.
+    əɹ is one phone (ɚ) unless a vowel follows; ɜɹ is always one (ɝ). Stress marks and length signs are skipped.
     """
-    spelt = [(PHONE_OF_LETTER[letter], at) for at, letter in enumerate(letters) if letter in PHONE_OF_LETTER]
+    candidates = [(PHONE_OF_LETTER[letter], at) for at, letter in enumerate(letters) if letter in PHONE_OF_LETTER]
     phones: list[str] = []
     places: list[int] = []
-    for number, (phone, at) in enumerate(spelt):
-        follows = spelt[number + 1][0] if number + 1 < len(spelt) else ""
-        swallowed = phone == "ɹ" and phones and phones[-1] in RHOTIC_VOWELS
-        if swallowed and (phones[-1] != "ə" or follows not in VOWELS):
+    for number, (phone, at) in enumerate(candidates):
+        follows = candidates[number + 1][0] if number + 1 < len(candidates) else ""
+        is_rhotic = phone == "ɹ" and phones and phones[-1] in RHOTIC_VOWELS
+        if is_rhotic and (phones[-1] != "ə" or follows not in VOWELS):
             phones[-1] = RHOTIC_VOWELS[phones[-1]]
             continue
         phones.append(phone)
@@ -46,12 +46,12 @@ def letters_to_phones(letters: str) -> tuple[tuple[str, ...], tuple[int, ...]]:
 
 
 def segments_to_letters(segments: Sequence[Segment]) -> str:
-    """The letters that make the voice say these phones; a phone it lacks is said as the nearest one.
+    """Letters of phones in the voice's alphabet; a phone that the alphabet lacks is replaced by the nearest one.
 
     Raises
     ------
     InputError
-        There is no phone.
+        `segments` is empty.
     """
     if not segments:
         raise InputError("a spoken word needs at least one phone")

@@ -7,9 +7,9 @@ from tts2face.types import Speech, Waveform
 
 
 def resampled_speech(speech: Speech, rate: int) -> Speech:
-    """The same speech at a rate in Hz, with the same edges but the last, which is the length of the sound.
+    """Resample speech to `rate` Hz; all phone edges but the last, the duration of the sound, are unchanged.
 
-    Source: soxr's high quality (De Jong, the SoX resampler library); clipped to full scale.
+    The sound is clipped to full scale. Source: soxr, quality HQ (De Jong, the SoX resampler library).
     """
     sound = speech.waveform
     if sound.rate == rate:

@@ -11,12 +11,12 @@ Voices = Callable[[str | None, str], Voice]  # a voice by name (None: the best o
 
 
 def speaker_of(part: Phrase, voice: Voice, request: Request, voices: Voices | None) -> Voice:
-    """The request's voice; for a span the voice that it names, or one that speaks its language.
+    """Voice of a phrase: the request's, or for a span with a voice or language of its own, the matching one.
 
     Raises
     ------
     InputError
-        There are no other voices to choose from, or none of this name or language.
+        `voices` is None and the phrase needs another voice, or no voice has this name or language.
     """
     if part.voice is None and part.language is None:
         return voice
@@ -26,7 +26,7 @@ def speaker_of(part: Phrase, voice: Voice, request: Request, voices: Voices | No
 
 
 def voice_in(name: str | None, language: str | None) -> str | None:
-    """The voice asked for where it speaks the language of a span (None: that of the text), else None: the best one."""
+    """`name` if that voice speaks `language` (None: the language of the text), else None for the default voice."""
     if language is None or (name in VOICE_NAMES and (name != "heart" or language in ENGLISH_CODES)):
         return name
     return None
