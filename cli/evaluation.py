@@ -103,7 +103,7 @@ def _evaluate(
 
 def _load_default_voice() -> "Voice":
     from tts2face.request import Request
-    from tts2face.voice.engine import load_voice
+    from tts2face.voice.loading import load_voice
 
     return load_voice(None, Request(text="").language)
 

@@ -18,7 +18,7 @@ from corpus_tools.evaluation.tables import Evaluation
 from corpus_tools.recordings.observe import observe
 from corpus_tools.run_options import RunOptions
 from tts2face.exemplar.options import METHOD_OPTIONS
-from tts2face.voice.engine import load_voice
+from tts2face.voice.loading import load_voice
 
 HERE = Path(__file__).parent
 PAGE, FIGURES_FILE = HERE / "accuracy.md", HERE / "accuracy.json"

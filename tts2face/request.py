@@ -59,9 +59,7 @@ class Request:
     volume: float = option(1.0, "Loudness as a factor, 0 to 2; 1 is -16 LUFS, or the original level of a recording.")
     seed: int = option(0, "Seed of all random numbers; the same seed gives the same sound and motion.")
     dictionary: Path | None = option(None, "Pronunciation dictionary that takes precedence over the built-in one.")
-    synthesis: str = option(
-        "exemplar", "Method of lip synthesis: exemplar, or theobald2007 (the method as published)."
-    )
+    synthesis: str = option("exemplar", "Method of lip synthesis: exemplar, or theobald2007 (the method as published).")
     context: int | None = option(
         None, "Number of phones on either side that are compared when exemplars are chosen; default: the method's."
     )

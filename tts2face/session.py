@@ -32,7 +32,8 @@ from tts2face.synthesis.marked_speech import MarkTime
 from tts2face.synthesis.performance import Performance, perform, take_clips
 from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, prepare
 from tts2face.types import Clip, concatenate_clips
-from tts2face.voice.engine import PronunciationMap, Voice, load_voice
+from tts2face.voice.engine import PronunciationMap, Voice
+from tts2face.voice.loading import load_voice
 
 DEFAULT_FIELDS = "fields"
 OWN_FACE = "self"  # name of the talker's own face

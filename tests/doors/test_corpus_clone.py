@@ -19,7 +19,13 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     few = replace(starter, utterances=starter.utterances[:4])
     kept, own = [*range(8), *range(20, 25)], starter.model
     model = replace(own, basis=own.basis[kept], spread=own.spread[kept], rest=own.rest[kept], n_speech=8)
-    narrow = replace(few, model=model, utterances=tuple(replace(u, shape=u.shape[:, kept]) for u in few.utterances))
+    narrow = replace(
+        few,
+        model=model,
+        network=None,
+        audio_maps={},
+        utterances=tuple(replace(u, shape=u.shape[:, kept]) for u in few.utterances),
+    )
     write_talker(tmp_path / "a.talker", few)
     write_talker(tmp_path / "b.talker", narrow)
     return tmp_path
@@ -52,7 +58,7 @@ def test_every_option_matters(here: Path, capsys: pytest.CaptureFixture[str]) ->
     assert more.model.n_speech > plain.model.n_speech == 8
 
 
-def test_a_cloned_talker_can_be_spokenreplace(here: Path) -> None:
+def test_a_cloned_talker_can_be_spoken(here: Path) -> None:
     assert run(["corpus", "clone", "grid_s1", "b.talker", "--out", "c.talker"]) == 0
     small = ["--size", "64x64", "--fps", "5", "--quiet"]
     assert run(["Place blue.", "--talker", "c.talker", "--out", "x.mp4", *small]) == 0

@@ -16,7 +16,7 @@ from tts2face import __version__, catalogue
 from tts2face.models.face_file import load_face
 from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
-from tts2face.voice.engine import load_voice
+from tts2face.voice.loading import load_voice
 
 LISTED = ["voices", "languages", "faces", "identities", "styles", "talkers"]
 

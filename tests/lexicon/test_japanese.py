@@ -10,7 +10,7 @@ from lexicon.errors import BackendError
 from lexicon.pronounce import pronounce
 from lexicon.writing_systems import check_script
 from tests.lexicon.japanese_readings import READINGS
-from tts2face.voice.engine import load_voice
+from tts2face.voice.loading import load_voice
 
 
 def spoken(text: str) -> str:

@@ -35,7 +35,7 @@ def write_made_face(path: Path) -> None:
 
 def write_made_palette(path: Path) -> None:
     """Two styles; heads, brows and lids move."""
-    write_palette(path, made_palette(20))
+    write_palette(path, made_palette(10))
 
 
 def write_made_talker(path: Path, *, has_face: bool) -> None:

@@ -20,7 +20,7 @@ from tts2face.speech.text_fit import (
 from tts2face.speech.transcript_alignment import align_recording, pronounce_transcript
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
-from tts2face.voice.engine import load_voice
+from tts2face.voice.loading import load_voice
 
 RIGHT = ("Please wait for the beep, then say your name.", "The young chef usually pushes five big maps before noon.")
 WRONG = "She sold seven old houses near the river."

@@ -24,10 +24,10 @@ from tts2face.synthesis.marked_speech import (
     marked_styles,
     resolve_recording_marks,
     speak_sentence,
+    voice_in,
 )
 from tts2face.synthesis.speech_joining import join_utterances, silent_speech, trim_silence
-from tts2face.voice.engine import load_voice
-from tts2face.voice.spans import voice_in
+from tts2face.voice.loading import load_voice
 
 
 def said(text: str, voice: object | None = None, **options: object) -> list[SpokenSentence]:

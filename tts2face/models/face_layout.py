@@ -32,6 +32,10 @@ MOST_CELLS = 100_000_000  # shapes x vertices: 1.2 GB when read; a head has 1.4 
 LEAST_EXTENT_MM = 1.0  # of a face from side to side and from top to bottom
 SUM_WITHIN = 1e-3  # of barycentric weights; 32-bit rounding is 1e-7
 N_CORNERS = 3
+# Triangles' area over that of the box around them: 0.5 of a head; shuffled vertices have 200, and take minutes to draw.
+MOST_AREA = 10.0
+MEASURED = 4000  # triangles, spread over all, of which the area is measured: all of a head would take 10 ms
+WIDE_OPEN = "jawOpen"  # the shape with which a face is drawn besides at rest before its first picture
 
 _INDEX, _POINT = whole(0, 2**31 - 1), listed(number(-MOST_MM, MOST_MM), 3)
 _PART = record(
@@ -97,6 +101,7 @@ def check_face(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[s
     _check_places(contents)
     _check_shapes(contents, n_vertices)
     _check_parts(contents, n_vertices)
+    _check_area(contents)
 
 
 def _check_places(contents: Contents) -> None:
@@ -133,3 +138,25 @@ def _check_parts(contents: Contents, n_vertices: int) -> None:
         contents.require(not unknown, f"eye {number_} turns with {unknown[:1]}, which is none of its shapes")
     names = [name for name, _, _ in header["identities"]]
     contents.require(len(set(names)) == len(names), "has two identities of the same name")
+
+
+def _check_area(contents: Contents) -> None:
+    """Refuse a face whose triangles, at rest or with its jaw wide open, lie crosswise through each other."""
+    arrays, names = contents.arrays, contents.header["shape_names"]
+    poses = {"at rest": arrays["vertices"]}
+    if WIDE_OPEN in names:
+        number_ = names.index(WIDE_OPEN)
+        first = int(arrays["shape_counts"][:number_].sum(dtype=np.int64))
+        moved = slice(first, first + int(arrays["shape_counts"][number_]))
+        opened = arrays["vertices"].copy()
+        opened[arrays["shape_vertices"][moved]] += arrays["shape_deltas"][moved] * arrays["shape_steps"][number_]
+        poses[f"with {WIDE_OPEN}"] = opened
+    size = np.ptp(arrays["vertices"], axis=0).astype(np.float64)
+    box = 2.0 * float(size @ np.roll(size, 1))
+    every = len(arrays["triangles"]) // MEASURED + 1
+    for pose, vertices in poses.items():
+        a, b, c = (vertices[corner] for corner in arrays["triangles"][::every].T)
+        (ux, uy, uz), (vx, vy, vz) = (b - a).T, (c - a).T
+        squared = (uy * vz - uz * vy) ** 2 + (uz * vx - ux * vz) ** 2 + (ux * vy - uy * vx) ** 2
+        share = every * float(np.sqrt(squared).sum(dtype=np.float64)) / 2.0 / box
+        contents.require(share <= MOST_AREA, f"triangles {pose} cover {share:.0f} times the box around the face")

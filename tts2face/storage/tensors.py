@@ -82,7 +82,10 @@ def _metadata(text: str, path: Path) -> dict[str, Any]:
     """
     if len(text) > MOST_METADATA:
         raise DataError(f"{path}: the metadata have {len(text)} characters, more than {MOST_METADATA}; build it again")
-    found = parse_json(text, f"the metadata of {path}")
+    try:
+        found = parse_json(text, "the metadata")
+    except DataError as broken:
+        raise DataError(f"{path}: the metadata cannot be read as JSON ({broken}); build or copy it again") from broken
     if not isinstance(found, dict):
         raise DataError(f"{path}: the metadata are a {type(found).__name__}, not an object; build or copy it again")
     return found

@@ -84,7 +84,9 @@ def align_transcript(request: Request, path: Path) -> TimedTranscript:
     return TimedTranscript(*align_recording(sound, words, is_english=request.language.startswith("en")))
 
 
-def map_audio_to_motion(path: Path, audio_map: AudioMap, talker: Talker, fps: float) -> tuple[TimedTranscript, Trajectory]:
+def map_audio_to_motion(
+    path: Path, audio_map: AudioMap, talker: Talker, fps: float
+) -> tuple[TimedTranscript, Trajectory]:
     """Speech parameters (T, S) of a recording without a transcript, at `fps` frames per second.
 
     Raises

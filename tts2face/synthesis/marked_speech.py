@@ -1,24 +1,20 @@
 """Synthesis of sentences with marks: sound with pauses, and the times of the marks."""
 
 import math
-from bisect import bisect_left, bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.cleaning import canonical_text
 from lexicon.errors import InputError
 from lexicon.languages import language_code
 from lexicon.marked_text import Mark, MarkedText, NameMark, NodMark, StyleRun
 from lexicon.pronounce import PAUSES_S
-from lexicon.said import as_said
-from lexicon.sentences import Phrase, Sentence, index_by_letters, n_letters, text_prefix
+from lexicon.sentences import Phrase, Sentence, index_by_letters, n_letters
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.clock import first_sample
 from tts2face.gesture.easing import span_weights
@@ -26,12 +22,11 @@ from tts2face.gesture.notation import parse_style
 from tts2face.gesture.spans import Nod, StyleSpan
 from tts2face.gesture.timeline import Timeline
 from tts2face.request import RATE_LIMITS, VOLUME_LIMITS, Request
-from tts2face.synthesis.speech_joining import join_utterances, silent_speech
+from tts2face.synthesis.speech_joining import join_utterances, resampled_speech, silent_speech
+from tts2face.synthesis.word_times import LetterTimes, SentenceTimes, WordTimes
 from tts2face.types import Speech, Waveform, concatenate_speech, frame_count
-from tts2face.voice.engine import SpokenWord, Voice, apply_volume
+from tts2face.voice.engine import ENGLISH_CODES, VOICE_NAMES, SpokenWord, Voice, apply_volume
 from tts2face.voice.level import level_speech
-from tts2face.voice.resample import resampled_speech
-from tts2face.voice.spans import Voices, speaker_of
 
 MIN_UTTERANCE_GAP_S = 0.02  # between utterances of a sentence; less would cut into speech (edges are exact to 16 ms)
 SPEED_CHANGE_PAUSE_S = 0.06  # between utterances that differ in speed only
@@ -40,6 +35,7 @@ IDLE_RATE = 48_000  # Hz, sample rate of idle animation
 LOUDNESS_RAMP_S = 0.03  # transition between two loudness levels
 
 Floats = NDArray[np.float64]
+Voices = Callable[[str | None, str], Voice]  # a voice by name (None: the best one) and language
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,89 +66,6 @@ class SpokenSentence:
     timeline: Timeline
     marks: tuple[MarkTime, ...]
     sound: Waveform
-
-
-class WordTimes:
-    """Times of the letters of a text, from the onsets and ends of its spoken words.
-
-    The words before a letter are counted in the normalised text. If a voice divides the text into another number of
-    words, the letter is assigned to the word boundary whose share of preceding letters is most similar.
-
-    Parameters
-    ----------
-    written
-        The text as written.
-    phones, words
-        Spoken phones and words of the text.
-    language
-        espeak-ng code.
-    first
-        Index of the text's first letter.
-    """
-
-    def __init__(
-        self, written: str, phones: PhoneSequence, words: Sequence[WordSpan], *, language: str, first: int = 0
-    ) -> None:
-        self._written, self._language, self._first = written, language, first
-        self._n_letters = max(n_letters(written), 1)
-        self._onsets = [float(phones.edges[word.first]) for word in words] or [phones.start]
-        self._ends = [float(phones.edges[word.last]) for word in words] or [phones.end]
-        self._counts_agree = self._count_words(written) == len(self._onsets)
-        lengths = [max(n_letters(word.text), 1) for word in words] or [1]
-        self._cache: dict[int, int] = {}
-        self._shares = np.concatenate([[0.0], np.cumsum(lengths) / sum(lengths)])
-
-    def onset(self, letter: int) -> float:
-        """Start in seconds of the word at or after a letter; after the last word, the end of that word."""
-        word = self._words_before(letter)
-        return self._onsets[word] if word < len(self._onsets) else self._ends[-1]
-
-    def end(self, letter: int) -> float:
-        """End in seconds of the word before a letter; before the first word, the onset of that word."""
-        word = self._words_before(letter)
-        return self._ends[word - 1] if word > 0 else self._onsets[0]
-
-    def _words_before(self, letter: int) -> int:
-        if letter not in self._cache:
-            self._cache[letter] = self._search_word(min(max(letter - self._first, 0), self._n_letters))
-        return self._cache[letter]
-
-    def _search_word(self, at: int) -> int:
-        if not self._counts_agree:
-            return int(np.abs(self._shares - at / self._n_letters).argmin())
-        before = text_prefix(self._written, at).rstrip()
-        rest = self._written[len(before) :]
-        is_inside = before[-1:].isalnum() and rest[:1].isalnum()
-        return min(self._count_words(before) - is_inside, len(self._onsets))
-
-    def _count_words(self, written: str) -> int:
-        normalised = as_said(written, self._language)
-        if not self._language.startswith("en"):
-            normalised = canonical_text(normalised, keep_marks=True)
-        return sum(any(letter.isalnum() for letter in word) for word in normalised.split())
-
-
-class _LetterTimes(Protocol):
-    def onset(self, letter: int) -> float: ...
-
-    def end(self, letter: int) -> float: ...
-
-
-@dataclass(frozen=True, slots=True)
-class _SentenceTimes:
-    """Times of the letters of several utterances: index of the first letter, word times and start of each."""
-
-    firsts: tuple[int, ...]
-    word_times: tuple[WordTimes, ...]
-    begins: tuple[float, ...]
-
-    def onset(self, letter: int) -> float:
-        at = max(bisect_right(self.firsts, letter) - 1, 0)
-        return self.begins[at] + self.word_times[at].onset(letter)
-
-    def end(self, letter: int) -> float:
-        at = max(bisect_left(self.firsts, letter) - 1, 0)
-        return self.begins[at] + self.word_times[at].end(letter)
 
 
 def speak_sentence(voice: Voice, sentence: Sentence, request: Request, voices: Voices | None = None) -> SpokenSentence:
@@ -191,10 +104,32 @@ def speak_sentence(voice: Voice, sentence: Sentence, request: Request, voices: V
     speech, begins = _join_sentence(scaled, sentence, voice.sample_rate)
     levelled = level_speech(spoken, [request.volume * gain for gain in gains])
     sound = _join_sentence(levelled, sentence, voice.sample_rate)[0].waveform
-    times = _SentenceTimes(tuple(part.first for part in sentence.utterances), tuple(word_times), tuple(begins))
+    times = SentenceTimes(tuple(part.first for part in sentence.utterances), tuple(word_times), tuple(begins))
     return SpokenSentence(
         speech, *resolve_marks(sentence.runs, sentence.marks, times, (sentence.first, sentence.last)), sound
     )
+
+
+def speaker_of(part: Phrase, voice: Voice, request: Request, voices: Voices | None) -> Voice:
+    """Voice of a phrase: the request's, or for a span with a voice or language of its own, the matching one.
+
+    Raises
+    ------
+    InputError
+        `voices` is None and the phrase needs another voice, or no voice has this name or language.
+    """
+    if part.voice is None and part.language is None:
+        return voice
+    if voices is None:
+        raise InputError("a text with spans of other voices or languages needs voices to speak them")
+    return voices(voice_in(part.voice or request.voice, part.language), part.language or request.language)
+
+
+def voice_in(name: str | None, language: str | None) -> str | None:
+    """`name` if that voice speaks `language` (None: the language of the text), else None for the default voice."""
+    if language is None or (name in VOICE_NAMES and (name != "heart" or language in ENGLISH_CODES)):
+        return name
+    return None
 
 
 def _join_sentence(speeches: Sequence[Speech], sentence: Sentence, rate: int) -> tuple[Speech, list[float]]:
@@ -220,7 +155,7 @@ def silent_sentences(seconds: float, fps: Fraction, n_steps: int) -> Iterator[tu
 
 
 def resolve_marks(
-    runs: Sequence[StyleRun], marks: Sequence[Mark], times: _LetterTimes, letters: tuple[int, int]
+    runs: Sequence[StyleRun], marks: Sequence[Mark], times: LetterTimes, letters: tuple[int, int]
 ) -> tuple[Timeline, tuple[MarkTime, ...]]:
     """Convert marks in a range of letters to a timeline and named marks, by the times of the letters.
 

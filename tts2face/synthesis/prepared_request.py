@@ -11,8 +11,10 @@ from lexicon.readable import check_readable
 from lexicon.sentences import Sentence, split_sentences
 from tts2face.clock import exact_rate
 from tts2face.exemplar.options import METHOD_OPTIONS, SynthesisOptions
-from tts2face.gesture.request_timeline import build_request_timeline
+from tts2face.gesture.notation import parse_expressions, parse_gains, parse_style
+from tts2face.gesture.spans import Gains
 from tts2face.gesture.timeline import Timeline
+from tts2face.gesture.timeline_file import read_timeline
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.storage.overwrite import AnyPath
@@ -84,6 +86,22 @@ def prepare(request: Request) -> PreparedRequest:
     if next(prepared.sentences(), None) is None:
         raise InputError(f"there is nothing to say in {request.text[:40]!r}; give at least one word")
     return prepared
+
+
+def build_request_timeline(request: Request) -> Timeline:
+    """Timeline of a request's ``timeline`` file and of its ``style``, ``gain`` and ``expression``, which override the file.
+
+    Raises
+    ------
+    InputError, DataError
+        An option cannot be parsed, or the file is invalid.
+    """
+    flags = Timeline(
+        style=parse_style(request.style) if request.style is not None else {},
+        expressions=parse_expressions(request.expression) if request.expression is not None else (),
+        gains=parse_gains(request.gain) if request.gain is not None else Gains(),
+    )
+    return read_timeline(request.timeline).merge(flags) if request.timeline is not None else flags
 
 
 def synthesis_options(request: Request) -> SynthesisOptions:

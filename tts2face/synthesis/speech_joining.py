@@ -76,6 +76,22 @@ def silent_speech(seconds: float, rate: int) -> Speech:
     return Speech(Waveform(np.zeros(n_samples, np.float32), rate), phones, ())
 
 
+def resampled_speech(speech: Speech, rate: int) -> Speech:
+    """Resample speech to `rate` Hz; all phone edges but the last, the duration of the sound, are unchanged.
+
+    The sound is clipped to full scale. Source: soxr, quality HQ (De Jong, the SoX resampler library).
+    """
+    sound = speech.waveform
+    if sound.rate == rate:
+        return speech
+    import soxr
+
+    samples = np.clip(soxr.resample(sound.samples, sound.rate, rate, quality="HQ"), -1.0, 1.0)
+    edges = speech.phones.edges.copy()
+    edges[-1] = len(samples) / rate
+    return Speech(Waveform(samples, rate), PhoneSequence(speech.phones.phones, edges), speech.words)
+
+
 def _silence_at_ends(speech: Speech) -> tuple[float, float]:
     """Seconds of silence at the start and at the end."""
     labels, edges = speech.phones.phones, speech.phones.edges

@@ -4,18 +4,20 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError, InputError
+from lexicon.ipa import Segment
+from lexicon.phones import nearest_phones
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.speech.forced_alignment import Aligner, enforce_increasing
 from tts2face.telemetry import disable_telemetry
 from tts2face.types import Speech, Waveform, concatenate_speech
 from tts2face.voice.engine import PronunciationMap, SpeechInput, SpokenWord, apply_volume
-from tts2face.voice.heart_phonemes import letters_to_phones, segments_to_letters
 
 MAX_LETTERS = 400  # the model accepts at most this many letters in one call
 DURATION_STEP_S = 0.025  # length of one step of the model's durations
@@ -23,6 +25,23 @@ BOUNDARY_DELAY_S = 0.045  # delay of the model's own boundaries against its soun
 DURATION_TENSOR = "/Cast_32_output_0"  # internal tensor of the ONNX graph: steps of 25 ms for each letter
 NO_LETTER = re.compile(r"[^\w'’-]+")  # characters that hibari does not accept in bracketed words
 WORD_CHARACTER = re.compile(r"[^\W_]")  # a letter or a digit, which must have a pronunciation
+# Letters of the misaki alphabet, in which the voice was trained, to phones of the table.
+PHONE_OF_LETTER = MappingProxyType({
+    "A": "eɪ", "I": "aɪ", "O": "oʊ", "Q": "oʊ", "W": "aʊ", "Y": "ɔɪ", "ʤ": "dʒ", "ʧ": "tʃ", "ə": "ə", "ɐ": "ə",
+    "ᵊ": "ə", "ᵻ": "ɪ", "ɪ": "ɪ", "i": "i", "ɛ": "ɛ", "æ": "æ", "a": "æ", "ɑ": "ɑ", "ɒ": "ɑ", "ɔ": "ɔ", "ʊ": "ʊ",
+    "u": "u", "ʌ": "ʌ", "ɜ": "ɝ", "ɚ": "ɚ", "e": "ɛ", "o": "ɔ", "ɹ": "ɹ", "r": "ɹ", "ð": "ð", "θ": "θ", "ʃ": "ʃ",
+    "ʒ": "ʒ", "ŋ": "ŋ", "j": "j", "ɡ": "ɡ", "T": "t", "ɾ": "t", "ʔ": "t", "h": "h", "x": "k", "b": "b", "d": "d",
+    "f": "f", "k": "k", "l": "l", "m": "m", "n": "n", "p": "p", "s": "s", "t": "t", "v": "v", "w": "w", "z": "z",
+})  # fmt: skip
+LETTERS_OF_PHONE = MappingProxyType({
+    "eɪ": "A", "aɪ": "I", "oʊ": "O", "aʊ": "W", "ɔɪ": "Y", "dʒ": "ʤ", "tʃ": "ʧ", "ə": "ə", "ɪ": "ɪ", "i": "i",
+    "ɛ": "ɛ", "æ": "æ", "ɑ": "ɑ", "ɔ": "ɔ", "ʊ": "ʊ", "u": "u", "ʌ": "ʌ", "ɝ": "ɜɹ", "ɚ": "əɹ", "ɹ": "ɹ", "ð": "ð",
+    "θ": "θ", "ʃ": "ʃ", "ʒ": "ʒ", "ŋ": "ŋ", "j": "j", "ɡ": "ɡ", "h": "h", "b": "b", "d": "d", "f": "f", "k": "k",
+    "l": "l", "m": "m", "n": "n", "p": "p", "s": "s", "t": "t", "v": "v", "w": "w", "z": "z",
+})  # fmt: skip
+RHOTIC_VOWELS = MappingProxyType({"ə": "ɚ", "ɝ": "ɝ", "ɚ": "ɚ"})  # vowels that merge with a following ɹ
+VOWELS = frozenset(phone for letter, phone in PHONE_OF_LETTER.items() if letter in "AIOQWYəɐᵊᵻɪiɛæaɑɒɔʊuʌɜɚeo")
+STRESS_MARKS = MappingProxyType({1: "ˈ", 2: "ˌ"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,3 +248,39 @@ def _length_delimited(field: int, content: bytes) -> bytes:
 def _encode_varint(number: int) -> bytes:
     low, rest = number & 0x7F, number >> 7
     return bytes([low | 0x80]) + _encode_varint(rest) if rest else bytes([low])
+
+
+def letters_to_phones(letters: str) -> tuple[tuple[str, ...], tuple[int, ...]]:
+    """Phones of a word's letters, and the position of each phone's first letter.
+
+    əɹ is one phone (ɚ) unless a vowel follows; ɜɹ is always one (ɝ). Stress marks and length signs are skipped.
+    """
+    candidates = [(PHONE_OF_LETTER[letter], at) for at, letter in enumerate(letters) if letter in PHONE_OF_LETTER]
+    phones: list[str] = []
+    places: list[int] = []
+    for number, (phone, at) in enumerate(candidates):
+        follows = candidates[number + 1][0] if number + 1 < len(candidates) else ""
+        is_rhotic = phone == "ɹ" and phones and phones[-1] in RHOTIC_VOWELS
+        if is_rhotic and (phones[-1] != "ə" or follows not in VOWELS):
+            phones[-1] = RHOTIC_VOWELS[phones[-1]]
+            continue
+        phones.append(phone)
+        places.append(at)
+    return tuple(phones), tuple(places)
+
+
+def segments_to_letters(segments: Sequence[Segment]) -> str:
+    """Letters of phones in the voice's alphabet; a phone that the alphabet lacks is replaced by the nearest one.
+
+    Raises
+    ------
+    InputError
+        `segments` is empty.
+    """
+    if not segments:
+        raise InputError("a spoken word needs at least one phone")
+    letters = ""
+    for segment in segments:
+        for phone in nearest_phones(segment.phone, LETTERS_OF_PHONE.keys()):
+            letters += STRESS_MARKS.get(segment.stress, "") + LETTERS_OF_PHONE[phone]
+    return letters
