@@ -1,4 +1,4 @@
-"""A recording of a voice drives a head: with its words, by its sound alone; what cannot be heard is refused."""
+"""Lip motion from recordings: with their words, by their sound alone; refusal of silent recordings."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -38,7 +38,7 @@ def film(clips: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def talker(clips: Path) -> Talker:
-    """The shipped talker with drives learnt from some of her recordings, the one above left out."""
+    """The shipped talker with audio maps learnt from some of its recordings, without the one above."""
     shipped = load_talker("grid_s1")
     spoken = [one for one in shipped.utterances if one.name != "bbaf2n"][:: len(shipped.utterances) // LEARNT_FROM]
     lessons = []
@@ -98,7 +98,7 @@ def test_with_the_words_lips_close_where_they_are_said(film: Path, talker: Talke
     assert abs(starts - real.phones.edges[real.phones.phones.index("b")]) < 0.02
 
 
-def test_drives_and_words_give_different_lips(film: Path, talker: Talker, face: Face) -> None:
+def test_audio_maps_and_words_give_different_lips(film: Path, talker: Talker, face: Face) -> None:
     requests = (
         Request(audio=film),
         Request(audio=film, audio_map="network"),
@@ -204,11 +204,11 @@ def test_files_without_sound_are_refused(talker: Talker, face: Face, here: Path)
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        ({"audio_map": "magic"}, "no drive 'magic'; choose linear or network"),
-        ({"audio_map": "linear", "audio": None, "text": "Hi."}, "a drive follows a recording"),
-        ({"audio_map": "linear", "text": "Hi."}, "leave --drive or the text away"),
-        ({"voice": "espeak"}, "leave --voice and --rate away"),
-        ({"rate": 1.5}, "leave --voice and --rate away"),
+        ({"audio_map": "magic"}, "no audio map 'magic'; choose linear or network"),
+        ({"audio_map": "linear", "audio": None, "text": "Hi."}, "--audio-map needs a recording"),
+        ({"audio_map": "linear", "text": "Hi."}, "remove --audio-map or the text"),
+        ({"voice": "espeak"}, "--voice and --rate have no effect on a recording"),
+        ({"rate": 1.5}, "--voice and --rate have no effect on a recording"),
     ],
 )
 def test_options_that_do_not_go_together_are_refused(options: dict, reason: str) -> None:
@@ -216,12 +216,12 @@ def test_options_that_do_not_go_together_are_refused(options: dict, reason: str)
         Request(**{"audio": Path("a.wav"), **options})
 
 
-def test_a_recording_that_is_not_there_and_a_talker_without_drives_are_refused(
+def test_a_recording_that_is_not_there_and_a_talker_without_audio_maps_are_refused(
     film: Path, talker: Talker, face: Face
 ) -> None:
     with pytest.raises(InputError, match=r"there is no recording none\.wav"):
         Session(talker, face).clip(Request(audio=Path("none.wav")))
-    with pytest.raises(InputError, match="has no network drive"):
+    with pytest.raises(InputError, match="has no network audio map"):
         Session(replace(talker, audio_maps={}), face).clip(Request(audio=film))
 
 

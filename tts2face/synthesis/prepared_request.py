@@ -89,7 +89,7 @@ def prepare(request: Request) -> PreparedRequest:
 
 
 def build_request_timeline(request: Request) -> Timeline:
-    """Timeline of a request's ``timeline`` file and of its ``style``, ``gain`` and ``expression``, which override the file.
+    """Timeline of a request's ``timeline`` file, overridden by its ``style``, ``gain`` and ``expression``.
 
     Raises
     ------

@@ -74,9 +74,13 @@ class WordTimes:
 
 
 class LetterTimes(Protocol):
-    def onset(self, letter: int) -> float: ...
+    """Times in seconds of the words around a letter, which is given by its index."""
 
-    def end(self, letter: int) -> float: ...
+    def onset(self, letter: int) -> float:
+        """Start of the word at or after a letter."""
+
+    def end(self, letter: int) -> float:
+        """End of the word before a letter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,9 +92,11 @@ class SentenceTimes:
     begins: tuple[float, ...]
 
     def onset(self, letter: int) -> float:
+        """Start in seconds of the word at or after a letter."""
         at = max(bisect_right(self.firsts, letter) - 1, 0)
         return self.begins[at] + self.word_times[at].onset(letter)
 
     def end(self, letter: int) -> float:
+        """End in seconds of the word before a letter."""
         at = max(bisect_left(self.firsts, letter) - 1, 0)
         return self.begins[at] + self.word_times[at].end(letter)
