@@ -13,9 +13,9 @@ from tts2face.speech.text_fit import (
     LEAST_FOREIGN_CONFIDENCE,
     LEAST_LOCAL_CONFIDENCE,
     TextMismatch,
+    extend_range,
     find_misfits,
     mismatch_of,
-    surrounded,
 )
 from tts2face.speech.transcript_alignment import align_recording, pronounce_transcript
 from tts2face.types import Waveform
@@ -56,7 +56,7 @@ def test_other_languages_have_a_limit_of_their_own() -> None:
 
 
 def test_what_surrounds_a_span_is_cut_between_words() -> None:
-    first, last, begin, end = surrounded(alignment(*[-4000.0] * 20), 8, 10)
+    first, last, begin, end = extend_range(alignment(*[-4000.0] * 20), 8, 10)
     assert (first, last) == (5, 13)
     assert (begin, end) == pytest.approx((2.45, 6.45))
 

@@ -1,4 +1,4 @@
-"""What every voice does, and how one is chosen."""
+"""Protocol of all voices, and the types of their input."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ VOICE_NAMES: Mapping[str, str] = {
 
 @dataclass(frozen=True, slots=True)
 class SpokenWord:
-    """A written word and how it is spoken; `after` is the punctuation that follows it.
+    """A written word with its phones; `after` is the punctuation that follows it.
 
-    A word without segments is read by the voice, as it reads text.
+    If `segments` is empty, the voice determines the pronunciation.
     """
 
     text: str
@@ -31,31 +31,45 @@ class SpokenWord:
 
 
 SpeechInput = str | Sequence[SpokenWord]  # text, or phones word by word
-PronunciationMap = Mapping[str, tuple[Segment, ...]]  # a user's words, lower case, and how they are spoken
+PronunciationMap = Mapping[str, tuple[Segment, ...]]  # pronunciations of a user's words, by lower-case spelling
 
 
 class Voice(Protocol):
-    """Speaks text or phones."""
+    """A voice that synthesises text or phones."""
 
     @property
     def sample_rate(self) -> int:
-        """Hz."""
+        """Sample rate in Hz."""
 
-    def speak(self, spoken: SpeechInput, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
-        """Sound, phones and words of a sentence; the phones' edges sum to the sound's length to the sample.
+    def speak(self, content: SpeechInput, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
+        """Synthesise a sentence.
 
-        The same arguments give the same bytes.
+        Parameters
+        ----------
+        content
+            Text, or words with their phones.
+        rate
+            Factor of the speaking rate.
+        volume
+            Factor of the samples; they are scaled as a whole to stay within full scale.
+        seed
+            Seed of random numbers, for voices that use any.
+
+        Returns
+        -------
+        Speech
+            Sound, phones and words; the last phone ends with the last sample. Equal arguments give equal bytes.
 
         Raises
         ------
         InputError
-            There is nothing to say, or something that this voice cannot say.
+            The content has no word, or characters that this voice cannot speak.
         """
 
 
 def apply_volume(samples: NDArray[np.floating], volume: float) -> NDArray[np.float32]:
-    """Samples times a factor, turned down as a whole where they would exceed full scale."""
-    louder = np.asarray(samples, np.float32) * np.float32(volume)
-    peak = float(np.abs(louder).max(initial=0.0))
-    scaled: NDArray[np.float32] = louder / np.float32(max(peak, 1.0))
+    """Samples (n,) times a factor, scaled as a whole to [-1, 1] if they exceed full scale."""
+    amplified = np.asarray(samples, np.float32) * np.float32(volume)
+    peak = float(np.abs(amplified).max(initial=0.0))
+    scaled: NDArray[np.float32] = amplified / np.float32(max(peak, 1.0))
     return np.clip(scaled, -1.0, 1.0)

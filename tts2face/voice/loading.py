@@ -1,4 +1,4 @@
-"""How a voice is chosen and loaded."""
+"""Choice and loading of a voice by name and language."""
 
 from pathlib import Path
 
@@ -8,23 +8,25 @@ from tts2face.voice.engine import ENGLISH_CODES, VOICE_NAMES, PronunciationMap, 
 
 
 def load_voice(name: str | None, language: str, own_words: PronunciationMap | None = None) -> Voice:
-    """The voice of a name, or the best one for a language.
+    """Load a voice by name, or the default voice of a language.
 
     Parameters
     ----------
     name
-        One of `VOICE_NAMES`, or the path of a Piper voice (``.onnx``).
+        One of `VOICE_NAMES`, the path of a Piper voice (``.onnx``), or None for the default.
     language
-        As `lexicon.languages.language_code` reads it.
+        Code, tag or English name, see `lexicon.languages.language_code`.
     own_words
-        A user's pronunciations, which win over the voice's own.
+        A user's pronunciations, which take precedence over those of the voice.
 
     Raises
     ------
     InputError
-        There is no such voice, or it does not speak the language.
+        The voice does not exist or does not speak the language.
+    DataError
+        The file of a Piper voice or its settings is damaged.
     BackendError
-        What the voice needs is not installed.
+        A package that the voice needs is not installed.
     """
     language = language_code(language)
     chosen = name or ("heart" if language in ENGLISH_CODES[:2] else "espeak")
