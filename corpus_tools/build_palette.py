@@ -143,7 +143,7 @@ def decompose_recordings(
     leak = fit_pose_correction(captured)
     parts = []
     for number, one in enumerate(captured, start=1):
-        parts.append(decompose(leak.removed(one), basis, estimator))
+        parts.append(decompose(leak.apply(one), basis, estimator))
         if on_progress:
             on_progress(number, len(captured))
     return parts

@@ -7,11 +7,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import Refusal, check_any_kept, observe
 from corpus_tools.report.drawing import load_matplotlib
 from corpus_tools.report.recordings import recordings_page
-from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
+from corpus_tools.run_options import Progress, RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.pose_correction import correct_pose
 from corpus_tools.training.train_audio_map import learn_audio_maps
 from corpus_tools.training.train_phone_network import add_phone_network
@@ -20,9 +21,11 @@ from lexicon.errors import DataError, InputError
 from lexicon.inputs import read_json
 from tts2face.models.talker import Talker, write_talker
 from tts2face.storage.files import write_atomically
+from tts2face.video.landmark_models import find_bundle
 
 PROVENANCE = "provenance.json"  # in the folder of recordings: where they come from and how they may be used
 PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
+MIN_STATEMENT_WORDS = 3  # shorter is a slip of the keyboard, not a statement
 NOT_STATED = "not stated"
 READING_STAGE = "reading recordings"  # the first stage
 CONTENT_WITH_PICTURES = (
@@ -63,7 +66,7 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
     created
         Date for the metadata; today when None.
     consent
-        Of the person shown, from `corpus_tools.consent.consent_record`; with it the talker gets an appearance.
+        Of the person shown, from `corpus_tools.build_talker.consent_record`; with it the talker gets an appearance.
     report
         HTML page about the recordings to write; it is written even where none could be used.
     stages
@@ -101,13 +104,44 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
     talker = add_phone_network(learn_talker(steady, metadata=metadata), on_progress=stages("learning lips"))
     talker = replace(talker, audio_maps=learn_audio_maps(steady, talker, stages=stages))
     if consent is not None:
-        from corpus_tools.aam.add_appearance import add_appearance
-
-        looks = stages("learning looks")
-        talker = add_appearance(talker, observations.kept, effort=effort or RunOptions(), on_progress=looks)
+        on_frames = stages("learning appearance")
+        talker = add_appearance(talker, observations.kept, effort=effort or RunOptions(), on_progress=on_frames)
     write_talker(out, talker)
     seconds = sum(len(utterance.shape) for utterance in talker.utterances) / talker.fps
     return BuiltTalker(len(talker.utterances), seconds / 60.0, observations.refused)
+
+
+def add_appearance(
+    talker: Talker, observations: Sequence[Observation], *, effort: RunOptions, on_progress: Progress | None = None
+) -> Talker:
+    """The talker with texture models, a plate, and the appearance parameters of every utterance.
+
+    Parameters
+    ----------
+    observations
+        Those that the talker was learnt from, in the order of its utterances.
+
+    Raises
+    ------
+    InputError
+        There are too few frames for the modes.
+    BackendError
+        A package or the landmark models are missing.
+    """
+    from corpus_tools.aam.source_videos import build_appearance_recording
+    from corpus_tools.aam.train_appearance import learn_appearance
+
+    tracker = CachedTracker(effort.folder(), find_bundle(effort.model))
+    recordings = [
+        build_appearance_recording(observation, utterance.shape, tracker)
+        for observation, utterance in zip(observations, talker.utterances, strict=True)
+    ]
+    learnt = learn_appearance(recordings, on_progress=on_progress)
+    utterances = tuple(
+        replace(utterance, looks=parameters)
+        for utterance, parameters in zip(talker.utterances, learnt.parameters, strict=True)
+    )
+    return replace(talker, utterances=utterances, appearance=learnt.appearance)
 
 
 def add_audio_maps(
@@ -172,3 +206,19 @@ def _command_line(recordings: Path, out: Path, name: str | None, provenance: Pat
     words += ["--name", name] if name else []
     words += ["--provenance", provenance.name] if provenance else []
     return shlex.join([*words, "--out", out.name])
+
+
+def consent_record(name: str, statement: str | None, *, date: str | None = None) -> Mapping[str, str]:
+    """The consent as a file's metadata keep it: name, statement, date.
+
+    Raises
+    ------
+    InputError
+        There is no statement, or none that says anything.
+    """
+    if statement is None or len(statement.split()) < MIN_STATEMENT_WORDS:
+        raise InputError(
+            f"the file will carry pictures of {name}'s face; state the consent: "
+            '--consent "I, NAME, agree that my face is used for ..."'
+        )
+    return {"name": name, "statement": statement.strip(), "date": date or datetime.now(UTC).date().isoformat()}

@@ -10,12 +10,71 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.aam.appearance_transfer import build_appearance_transfer
+from corpus_tools.aam.reference_frame import rasterise_triangles
 from lexicon.errors import InputError
-from tts2face.cloning.parameter_transfer import ParameterTransfer, build_parameter_transfer, extend_talker
+from tts2face.cloning.parameter_transfer import (
+    MAX_STANDARD_DEVIATIONS,
+    ParameterTransfer,
+    build_parameter_transfer,
+    extend_talker,
+)
+from tts2face.interpolation import sample_triangles
+from tts2face.models.appearance import Appearance, TextureModel, nearest_pixels
 from tts2face.models.talker import Talker, Utterance, load_talker, speech_channels, write_talker
 from tts2face.own_face.appearance_regression import fit_appearance_regression
 from tts2face.types import Trajectory
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AppearanceTransfer:
+    """``relation`` (A, B) gives the target's parameters for the source's; ``limits`` (A,) are the largest of each."""
+
+    relation: Floats
+    limits: Floats
+
+    def parameters(self, parameters: NDArray[np.floating], *, gain: float = 1.0) -> NDArray[np.float32]:
+        """(T, A) parameters of the target for (T, B) of the source."""
+        wanted = gain * (parameters.astype(np.float64) @ self.relation.T)
+        return np.clip(wanted, -self.limits, self.limits).astype(np.float32)
+
+
+def build_appearance_transfer(source: Appearance, target: Appearance) -> AppearanceTransfer:
+    """The way from the parameters of one talker to those of another, face to face and mouth to mouth.
+
+    Notes
+    -----
+    The source's basis textures are warped to the target's reference shape, piece by piece, and R holds their inner
+    products with the target's; textures of all talkers are sRGB values over the same landmarks.
+    """
+    blocks = [
+        _basis_products(source.face, target.face),
+        _basis_products(source.mouth, target.mouth),
+    ]
+    relation = np.zeros((sum(len(block) for block in blocks), sum(block.shape[1] for block in blocks)))
+    (n_target, n_source), (face, mouth) = blocks[0].shape, blocks
+    relation[:n_target, :n_source] = face
+    relation[n_target:, n_source:] = mouth
+    return AppearanceTransfer(relation, MAX_STANDARD_DEVIATIONS * target.spread.astype(np.float64))
+
+
+def _basis_products(source: TextureModel, target: TextureModel) -> Floats:
+    """(A, B) inner products of the target's basis textures with the source's, warped to the target's frame."""
+    owner, weights = rasterise_triangles(target.reference.astype(np.float64), target.triangles, target.size)
+    corners = target.triangles[owner[target.pixels]].astype(np.int32)
+    inside = weights[target.pixels].astype(np.float32)
+    fill = nearest_pixels(source)
+    width, height = source.size
+    own = target.basis.reshape(target.n_modes, -1).astype(np.float64)
+    warped = np.zeros((len(target.pixels), 3), np.float32)
+    relation = np.zeros((target.n_modes, source.n_modes))
+    for number, texture in enumerate(source.basis):
+        picture = np.ascontiguousarray(texture[fill].reshape(height, width, 3))
+        sample_triangles(picture, source.reference.astype(np.float64), corners, inside, warped)
+        relation[:, number] = own @ warped.ravel()
+    return relation
+
 
 CONTENT = "motion only: one talker's recorded motion carried to the shape model of another's face; no image, no sound"
 CONTENT_WITH_PICTURES = (
@@ -110,8 +169,8 @@ def _appearance_function(source: Talker, target: Talker, gain: float) -> Appeara
     if target.appearance is None:
         return lambda spoken, shape: None
     if source.appearance is not None:
-        carry = build_appearance_transfer(source.appearance, target.appearance)
-        return lambda spoken, shape: None if spoken.looks is None else carry.carried(spoken.looks, gain=gain)
+        transfer = build_appearance_transfer(source.appearance, target.appearance)
+        return lambda spoken, shape: None if spoken.looks is None else transfer.parameters(spoken.looks, gain=gain)
     own, channels = fit_appearance_regression(target), speech_channels(target.model)
 
     def with_lips(_spoken: Utterance, shape: NDArray[np.float32]) -> NDArray[np.float32]:

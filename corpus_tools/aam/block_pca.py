@@ -56,7 +56,7 @@ class IncrementalPca:
         deviations: NDArray[np.float64] = self.singular_values / np.sqrt(max(self.n_rows, 1))
         return deviations
 
-    def explained(self) -> NDArray[np.float64]:
+    def explained_variance(self) -> NDArray[np.float64]:
         """(K,) share of the variance in the first 1, 2, ... components."""
         shares: NDArray[np.float64] = np.cumsum(self.singular_values**2) / max(self.total_variance, 1e-300)
         return shares

@@ -4,7 +4,9 @@ N is the face at rest, B_i are basis expressions, c_i their slow weights, P what
 region does besides, R and T the head's pose. Lids and gaze are read from what is left at the eyes.
 """
 
+import csv
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +14,6 @@ from numpy.typing import NDArray
 from corpus_tools.decomposition.basis_expressions import ExpressionBasis
 from corpus_tools.decomposition.blend_weights import Estimator, moving_average
 from corpus_tools.decomposition.capture import FaceRecording, resample_to_gesture_rate
-from corpus_tools.decomposition.regions import feature_landmarks
 from tts2face.gesture.prosody import SILENT_PROSODY, prosody_features
 from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS
 from tts2face.models.palette import FEATURES, GESTURE_FPS, REGION_FEATURES
@@ -144,3 +145,22 @@ def _smooth(values: NDArray[np.floating]) -> Floats:
     from scipy.ndimage import gaussian_filter1d
 
     return np.asarray(gaussian_filter1d(values, TREMOR_SMOOTHING_S * GESTURE_FPS, axis=0), np.float32)
+
+
+REGION_TABLE = Path(__file__).with_name("regions.tsv")
+
+
+def region_landmarks() -> dict[str, NDArray[np.int32]]:
+    """Landmarks of each region, by name."""
+    return {row["region"]: np.array([int(n) for n in row["landmarks"].split()], np.int32) for row in _read_rows()}
+
+
+def feature_landmarks(feature: str) -> NDArray[np.int32]:
+    """Landmarks of all regions that a feature moves together: both brows, both eyes."""
+    found = [row["landmarks"].split() for row in _read_rows() if row["feature"] == feature]
+    return np.array([int(n) for part in found for n in part], np.int32)
+
+
+def _read_rows() -> list[dict[str, str]]:
+    lines = [line for line in REGION_TABLE.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    return list(csv.DictReader(lines, delimiter="\t"))

@@ -32,7 +32,7 @@ def adapt_head(face: Face, talker: NDArray[np.floating]) -> Face:
     bone, balls = part_vertices(face, RIGID_MOUTH_PARTS), part_vertices(face, EYE_PARTS)
     soft = np.setdiff1d(np.arange(len(rest)), np.concatenate([bone, balls]))
     moved = rest.copy()
-    moved[soft] = warp.carried(rest[soft], soft)
+    moved[soft] = warp.apply(rest[soft], soft)
     linear, shift = _fit_similarity(rest[bone], rest[bone] + warp.field(rest[bone]))
     shift[2] += _lip_protrusion(warp) - (rest[bone] @ linear.T + shift - rest[bone])[:, 2].max()
     moved[bone] = rest[bone] @ linear.T + shift
@@ -90,9 +90,9 @@ def _warp_shapes(face: Face, warp: HeadWarp, soft: NDArray[np.int64], moved: Flo
         rows = soft[np.abs(shape[soft]).max(axis=1) > MIN_SHAPE_MOTION_MM]
         if name == "mouthClose":
             before = rest[rows] + jaw[rows]
-            shapes[number, rows] = warp.carried(before + shape[rows], rows) - warp.carried(before, rows)
+            shapes[number, rows] = warp.apply(before + shape[rows], rows) - warp.apply(before, rows)
         else:
-            shapes[number, rows] = warp.carried(rest[rows] + shape[rows], rows) - moved[rows]
+            shapes[number, rows] = warp.apply(rest[rows] + shape[rows], rows) - moved[rows]
     return shapes
 
 

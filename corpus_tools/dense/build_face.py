@@ -17,7 +17,7 @@ from corpus_tools.dense.mesh_fit import (
     face_landmarks,
     select_consistent_landmarks,
 )
-from corpus_tools.dense.modes import MOST_MODES, DenseModel, dense_model, mode_fitter, with_modes
+from corpus_tools.dense.modes import MOST_MODES, DenseModel, add_modes, dense_model, mode_fitter
 from corpus_tools.dense.skin_colour import average_skin_colours, build_picture_fitter
 from corpus_tools.dense.texture_painting import paint_skin
 from corpus_tools.dense.video_landmarks import find_videos, resting_landmarks, track_videos
@@ -60,7 +60,7 @@ def build_face(
         A folder of recordings, or one video; transcripts are not needed. A ``provenance.json`` in the folder tells the
         licence of the person's likeness; the mesh's own says nothing about it.
     consent
-        Of the person shown, from `corpus_tools.consent.consent_record`; kept in the file.
+        Of the person shown, from `corpus_tools.build_talker.consent_record`; kept in the file.
     n_modes
         Modes of the talker's own dense shape model, added as the shapes denseMean, dense1, dense2, ...
     effort
@@ -114,7 +114,7 @@ def build_face(
         "created": datetime.now(UTC).date().isoformat(),
     }
     if model is not None:
-        face, metadata = with_modes(face, model), {**metadata, "dense": model.summary()}
+        face, metadata = add_modes(face, model), {**metadata, "dense": model.summary()}
     write_face(out, replace(face, metadata=metadata))
     reached = face_landmarks(shaped, shaped.vertices)[:N_MESH_LANDMARKS]
     again = align_to_head(talker, reached)

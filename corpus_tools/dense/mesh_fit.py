@@ -70,7 +70,7 @@ class HeadWarp:
     sockets: tuple[EyeSocket, ...]
     landmarks: NDArray[np.int64]
 
-    def carried(self, places: Floats, rows: NDArray[np.int64]) -> Floats:
+    def apply(self, places: Floats, rows: NDArray[np.int64]) -> Floats:
         """(P, 3) new places of the vertices `rows` (P,), each at its place (P, 3) on the head with closed lips."""
         moved = places + self.field(places + self.opened[rows])
         for socket in self.sockets:

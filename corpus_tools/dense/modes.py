@@ -66,7 +66,7 @@ class Components:
         """The fewest modes that hold a share of the variance."""
         return int(np.searchsorted(self.shares(), share - 1e-12)) + 1
 
-    def left(self, displacements: Floats, n_modes: int) -> Floats:
+    def residual(self, displacements: Floats, n_modes: int) -> Floats:
         """(T, N, 3) what the first modes do not describe of displacements (T, N, 3)."""
         away = displacements - self.mean
         parameters = np.tensordot(away, self.duals[:n_modes], axes=((1, 2), (1, 2)))
@@ -118,19 +118,19 @@ class DenseModel:
             "frames": self.n_frames,
             "landmarks": self.n_landmarks,
             "modes": len(self.modes),
-            "shares": _rounded(self.dense.shares()[: len(self.modes)]),
-            "sparse_shares": _rounded(self.sparse.shares()[: len(self.modes)]),
+            "shares": _round_shapes(self.dense.shares()[: len(self.modes)]),
+            "sparse_shares": _round_shapes(self.sparse.shares()[: len(self.modes)]),
             "modes_for_95_and_99": [self.dense.n_modes(share) for share in (0.95, 0.99)],
             "sparse_modes_for_95_and_99": [self.sparse.n_modes(share) for share in (0.95, 0.99)],
             "held_out": {
                 "modes": list(held.n_modes),
-                "dense_mm": _rounded(held.dense),
-                "sparse_mm": _rounded(held.sparse),
+                "dense_mm": _round_shapes(held.dense),
+                "sparse_mm": _round_shapes(held.sparse),
             },
         }
 
 
-def _rounded(values: Iterable[float]) -> list[float]:
+def _round_shapes(values: Iterable[float]) -> list[float]:
     return [round(float(value), 6) for value in values]
 
 
@@ -224,7 +224,7 @@ def spread_shapes(face: Face, fit: PictureFitter, moved: Floats) -> Floats:
     return shapes
 
 
-def with_modes(face: Face, model: DenseModel) -> Face:
+def add_modes(face: Face, model: DenseModel) -> Face:
     """The face with the shapes denseMean, dense1, dense2, ...: denseMean at 1 and the modes' parameters give eq. 1."""
     names = (MEAN, *(f"{MODE}{number}" for number in range(1, len(model.modes) + 1)))
     limits = np.array([(0.0, 1.0), *[(-LIMIT, LIMIT)] * len(model.modes)])
@@ -242,7 +242,7 @@ def _held_out(videos: Sequence[Floats], metric: Floats, n_vertices: int, n_modes
     errors = []
     for own in (metric, np.eye(len(metric))):
         found = components(learnt, own)
-        left = [found.left(frames, k) for k in counts]
+        left = [found.residual(frames, k) for k in counts]
         squares = [(one * _times(metric, one)).sum(axis=(1, 2)).mean() for one in left]
         errors.append(tuple(float(np.sqrt(square / n_vertices)) for square in squares))
     return HeldOut(counts, *errors)

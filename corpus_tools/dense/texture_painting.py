@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from corpus_tools.dense.mesh_fit import face_landmarks
 from corpus_tools.dense.skin_colour import SkinColours, vertex_normals
+from corpus_tools.dense.texels import Texels
 from corpus_tools.dense.visible_texels import SkinCanvas, smooth_step, soften_edges
-from corpus_tools.head.layout import Texels
 from tts2face.models.face import Face
 
 Floats = NDArray[np.float64]
@@ -33,7 +33,7 @@ def paint_skin(face: Face, canvas: SkinCanvas, seen: SkinColours) -> Face:
     texels = canvas.texels
     base = canvas.texture[texels.rows, texels.columns].astype(np.float64)
     share = canvas.share * smooth_step(seen.weight / seen.weight.max(), 0.0, MIN_TEXEL_WEIGHT)
-    own = _remove_shading(canvas.texels.carried(vertex_normals(face)), seen.colour, share)
+    own = _remove_shading(canvas.texels.interpolate(vertex_normals(face)), seen.colour, share)
     share = soften_edges(_remove_fringe(face, canvas, own, share), texels, len(canvas.texture))
     hair = 1.0 - smooth_step(base @ LUMA, *HAIR_LUMA)
     tint = _skin_tint(face, canvas, own / np.maximum(base, 1.0), (share, base @ LUMA))
@@ -81,7 +81,9 @@ def _remove_fringe(face: Face, canvas: SkinCanvas, own: Floats, share: Floats) -
     from scipy.ndimage import gaussian_filter, minimum_filter
 
     marks = face_landmarks(face, face.vertices)
-    above = canvas.texels.carried(face.vertices.astype(np.float64))[:, 1] - float(marks[list(BROW_LANDMARKS), 1].max())
+    above = canvas.texels.interpolate(face.vertices.astype(np.float64))[:, 1] - float(
+        marks[list(BROW_LANDMARKS), 1].max()
+    )
     luma = own @ LUMA
     usual = float(np.median(luma[share > 0.5]))
     clear = smooth_step(luma / usual, *FRINGE_LUMA)
@@ -109,7 +111,7 @@ def _skin_tint(face: Face, canvas: SkinCanvas, ratio: Floats, told: tuple[Floats
     mixed = (near @ logs + 0.5 * usual) / (near.sum(axis=1, keepdims=True) + 0.5)
     of_vertices = np.zeros((len(face.vertices), 3))
     of_vertices[used] = mixed
-    factors: Floats = np.exp(canvas.texels.carried(of_vertices))
+    factors: Floats = np.exp(canvas.texels.interpolate(of_vertices))
     return factors
 
 

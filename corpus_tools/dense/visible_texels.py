@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.dense.mesh_fit import LID_LANDMARKS, N_MESH_LANDMARKS, OPEN_JAW_WEIGHT, face_landmarks
-from corpus_tools.head.layout import BELOW, Texels, texels_of
+from corpus_tools.dense.texels import ISLANDS_TOP, Texels, find_texels
 from lexicon.errors import DataError
 from tts2face.models.face import Face
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
@@ -60,10 +60,10 @@ def build_canvas(face: Face) -> SkinCanvas:
     spans = [face.triangles[part.first : part.first + part.count] for part in face.parts if part.textured]
     triangles = np.concatenate(spans).astype(np.int64)
     side = len(face.texture)
-    texels = texels_of(face.uv.astype(np.float64), triangles, side)
+    texels = find_texels(face.uv.astype(np.float64), triangles, side)
     jaw = face.shapes[face.shape_names.index("jawOpen")]
     opened = face.vertices.astype(np.float64) + OPEN_JAW_WEIGHT * jaw
-    island = texels.rows > BELOW * side - 1
+    island = texels.rows > ISLANDS_TOP * side - 1
     share = _front_share(face, texels, opened)
     share[island] = 0.0
     in_mouth = island & (texels.columns < 0.24 * side)
@@ -71,7 +71,7 @@ def build_canvas(face: Face) -> SkinCanvas:
 
 
 def _front_share(face: Face, texels: Texels, opened: Floats) -> Floats:
-    place = texels.carried(opened)
+    place = texels.interpolate(opened)
     marks = face_landmarks(face, opened)[:N_MESH_LANDMARKS]
     share = smooth_step(polygon_depth(place[:, :2], marks[list(FACE_OVAL), :2], RIM_MM[1] + 1), *RIM_MM)
     share[place[:, 2] < float(marks[list(FACE_OVAL), 2].min())] = 0.0

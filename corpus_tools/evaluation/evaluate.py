@@ -2,12 +2,12 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.cross_talker import SpeakerScale, compare_across_talkers, standardise_reference
+from corpus_tools.evaluation.measures import speech_frames
 from corpus_tools.evaluation.methods import SynthesisMethod, build_methods
 from corpus_tools.evaluation.own_durations import VoicedUtterance, compare_own_durations, speak_references
 from corpus_tools.evaluation.reference import LipCurves, ReferenceUtterance, Thresholds
@@ -28,6 +28,43 @@ EVALUATION_METADATA = {
     "name": "evaluation", "language": "", "sources": "", "licence": "", "attribution": "", "command": "", "created": "",
 }  # fmt: skip
 TRACKS_METHOD, CEILING_METHOD = "tracks", "real, through the model"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpeakerScale:
+    """Mean and spread (2,) of one person's opening and width while speaking."""
+
+    mean: NDArray[np.float64]
+    spread: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, observations: Sequence[Observation]) -> "SpeakerScale":
+        """Of one person's recordings, over the frames about speech."""
+        parts = []
+        for seen in observations:
+            here = speech_frames(seen.phones, len(seen.landmarks), seen.fps)
+            parts.append(LipCurves.of(seen.landmarks[here]).stacked())
+        frames = np.concatenate(parts)
+        return cls(frames.mean(axis=0), np.maximum(frames.std(axis=0), 1e-9))
+
+    def z_score(self, curves: LipCurves) -> LipCurves:
+        """Curves in this person's spreads from the mean."""
+        opening, width = ((curves.stacked() - self.mean) / self.spread).T
+        return LipCurves(opening, width)
+
+
+def standardise_reference(real: ReferenceUtterance, scale: SpeakerScale) -> ReferenceUtterance:
+    """A real utterance whose parameters are its z-scored curves."""
+    curves = scale.z_score(real.curves)
+    return replace(real, curves=curves, parameters=curves.stacked().astype(np.float32))
+
+
+def compare_across_talkers(
+    one: ReferenceUtterance, made: NDArray[np.float32], model: ShapeModel, scale: SpeakerScale
+) -> UtteranceComparison:
+    """What a method made (T, S) in the talker's units, beside somebody else's utterance in that person's."""
+    curves = scale.z_score(LipCurves.of(model.shapes(made)))
+    return UtteranceComparison(one, curves.stacked(), curves, np.ones(2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,7 +150,7 @@ def evaluate_split(
 ) -> SplitResult:
     """One split: learn a talker from `train`, and make the motion of `test` by every method."""
     leak = fit_pose_correction(train)
-    train, test = ([leak.removed(seen) for seen in part] for part in (train, test))
+    train, test = ([leak.apply(seen) for seen in part] for part in (train, test))
     talker = _train_talker(train)
     methods = build_methods(talker, options)
     real = tuple(ReferenceUtterance.of(seen, talker.model) for seen in test)

@@ -58,7 +58,7 @@ def _build_observation(
     fps: float,
 ) -> Observation:
     ears, sound = heard_in
-    heard = ears.heard(sound, None, span)
+    heard = ears.align(sound, None, span)
     phones, words = trim_to_picture(heard, 0.0, len(landmarks) / fps)
     return Observation(
         name,

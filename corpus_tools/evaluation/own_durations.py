@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from corpus_tools.evaluation.measures import speech_frames
 from corpus_tools.evaluation.methods import SynthesisMethod
 from corpus_tools.evaluation.reference import LipCurves, ReferenceUtterance
-from corpus_tools.evaluation.scores import OwnDurationMotion, UtteranceComparison, compared_spread
+from corpus_tools.evaluation.scores import OwnDurationMotion, UtteranceComparison, speech_spread
 from lexicon.errors import InputError
 from lexicon.normalize import normalize
 from lexicon.sequence import PhoneSequence, WordSpan
@@ -99,4 +99,4 @@ def compare_own_durations(
     own = OwnDurationMotion(
         said.phones, speech_frames(said.phones, said.n_frames, fps), ours, LipCurves.of(model.shapes(ours))
     )
-    return UtteranceComparison(one, there, LipCurves.of(model.shapes(there)), compared_spread(model), own)
+    return UtteranceComparison(one, there, LipCurves.of(model.shapes(there)), speech_spread(model), own)

@@ -141,14 +141,14 @@ def available_figures(scores: Sequence[Scores]) -> tuple[tuple[str, str, int], .
 def score_splits(method: str, splits: Sequence[SplitMotion], limits: Thresholds, spent: float = 0.0) -> Scores:
     """Figures of a method over the utterances of all splits; making them took `spent` seconds."""
     judged = [
-        UtteranceComparison(one, values, LipCurves.of(model.shapes(values)), compared_spread(model))
+        UtteranceComparison(one, values, LipCurves.of(model.shapes(values)), speech_spread(model))
         for model, real, made in splits
         for one, values in zip(real, made, strict=True)
     ]
     return compute_scores(method, judged, limits, spent)
 
 
-def compared_spread(model: ShapeModel) -> NDArray[np.float32]:
+def speech_spread(model: ShapeModel) -> NDArray[np.float32]:
     """(D,) spread of the parameters that are compared."""
     return model.spread[: min(measures.N_DTW_PARAMETERS, model.n_speech)]
 

@@ -10,7 +10,7 @@ from lexicon.errors import InputError
 Split = tuple[tuple[Observation, ...], tuple[Observation, ...]]  # learnt from, held out
 
 
-def split(observations: Sequence[Observation], *, hold_out: int, seed: int) -> Split:
+def split_randomly(observations: Sequence[Observation], *, hold_out: int, seed: int) -> Split:
     """Training and held-out utterances, drawn by a seed from the sorted names.
 
     Raises

@@ -7,20 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.evaluation.measures import pearson
-from corpus_tools.gesture_study.blinks import blinks_of
+from corpus_tools.gesture_study.blinks import find_blinks
 from corpus_tools.gesture_study.clips import field_clip, hold_out, noise_clip, published_clip, replace_style
 from corpus_tools.gesture_study.longrun import LongRun, long_run
 from corpus_tools.gesture_study.measures import (
     Spectrum,
-    between_frames,
-    distance,
     diversity,
-    halves,
+    frame_midpoints,
+    random_halves,
     ratio,
     spectrum,
     split_recordings,
+    wasserstein,
 )
-from corpus_tools.gesture_study.traits import Trait, in_display_units, traits_of
+from corpus_tools.gesture_study.traits import Trait, in_display_units, style_traits
 from lexicon.errors import InputError
 from tts2face.gesture.gesture_stream import GestureFields
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
@@ -107,9 +107,9 @@ class MotionComparison:
         return abs(self.with_intensity[0] - self.with_intensity[1]) <= CORRELATION_WITHIN
 
     @property
-    def fast(self) -> tuple[float, ...]:
+    def fast_power(self) -> tuple[float, ...]:
         """Power above `measures.FAST_HZ` of field, noise and published field, over that of the recordings."""
-        real, *others = (one.fast for one in self.spectra)
+        real, *others = (one.fast_power for one in self.spectra)
         return tuple(ratio(one, real) for one in others)
 
 
@@ -124,14 +124,14 @@ class StyleStudy:
     name: str
     source: str | None
     summary: str
-    n_learnt: int
-    n_held: int
+    n_training: int
+    n_held_out: int
     is_held_out: bool
     minutes: float
     blinks_per_minute: tuple[float, ...]
-    compared: tuple[TraitComparison, ...]
-    moving: tuple[MotionComparison, ...]
-    long: LongRun
+    trait_comparisons: tuple[TraitComparison, ...]
+    motion_comparisons: tuple[MotionComparison, ...]
+    long_run: LongRun
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,29 +146,29 @@ class GestureStudy:
     def targets(self) -> tuple[int, int]:
         """Number of targets of measured styles that are met, and number of targets."""
         measured = [style for style in self.styles if style.source is None]
-        kept = [one.is_met for style in measured for one in style.compared if one.trait.has_target]
-        kept += [one.follows_sound for style in measured for one in style.moving if one.feature == "head"]
+        kept = [one.is_met for style in measured for one in style.trait_comparisons if one.trait.has_target]
+        kept += [one.follows_sound for style in measured for one in style.motion_comparisons if one.feature == "head"]
         return sum(kept), len(kept)
 
 
-def study(name: str, palette: Palette, options: Options, on_progress: Progress | None = None) -> GestureStudy:
+def study_gestures(name: str, palette: Palette, options: Options, on_progress: Progress | None = None) -> GestureStudy:
     """Measure every style of a palette."""
     found: list[StyleStudy] = []
-    ready: dict[str, _Ready] = {}
+    ready: dict[str, _PreparedStyle] = {}
     for done, style in enumerate(names := (*palette.styles, *palette.derivations)):
         if on_progress:
             on_progress(done, len(names))
         source = palette.derivations[style].source if style in palette.derivations else style
         if source not in ready:
-            ready[source] = _ready(palette, source, options)
-        found.append(_style_found(palette, style, ready[source], options))
+            ready[source] = _prepare_style(palette, source, options)
+        found.append(_study_style(palette, style, ready[source], options))
     if on_progress:
         on_progress(len(names), len(names))
     return GestureStudy(name, options, tuple(found))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Ready:
+class _PreparedStyle:
     """A measured style: the recordings of its fields, the held-out ones, the fields, and a clip of theirs.
 
     Derived styles are compared with the clip.
@@ -181,20 +181,20 @@ class _Ready:
     again: Motion
 
 
-def _ready(palette: Palette, source: str, options: Options) -> _Ready:
+def _prepare_style(palette: Palette, source: str, options: Options) -> _PreparedStyle:
     whole = palette.styles[source]
     is_held_out = len(whole.lengths) >= FEWEST
     learnt, held = hold_out(whole, options.one_in, options.seed) if is_held_out else (whole, whole)
     fields = GestureFields(replace_style(palette, source, learnt))
-    again = _from_fields(fields, source, held, options.seed + options.clips) if palette.derivations else {}
-    return _Ready(learnt, held, is_held_out, fields, again)
+    again = _field_motion(fields, source, held, options.seed + options.clips) if palette.derivations else {}
+    return _PreparedStyle(learnt, held, is_held_out, fields, again)
 
 
-def _style_found(palette: Palette, name: str, ready: _Ready, options: Options) -> StyleStudy:
+def _study_style(palette: Palette, name: str, ready: _PreparedStyle, options: Options) -> StyleStudy:
     derived = palette.derivations.get(name)
     source = name if derived is None else derived.source
     learnt, held, fields = ready.learnt, ready.held, ready.fields
-    clips = [_from_fields(fields, name, held, options.seed + k) for k in range(options.clips)]
+    clips = [_field_motion(fields, name, held, options.seed + k) for k in range(options.clips)]
     noises = [noise_clip(fields, name, len(held.intensity), options.seed + k) for k in range(options.clips)]
     published = [published_clip(fields.palette, name, held.intensity, options.seed)] if derived is None else []
     real = held.motion if derived is None else ready.again
@@ -203,26 +203,26 @@ def _style_found(palette: Palette, name: str, ready: _Ready, options: Options) -
         name=name,
         source=None if derived is None else source,
         summary="" if derived is None else derived.summary,
-        n_learnt=len(learnt.lengths),
-        n_held=len(held.lengths),
+        n_training=len(learnt.lengths),
+        n_held_out=len(held.lengths),
         is_held_out=ready.is_held_out,
         minutes=palette.styles[source].seconds / 60,
-        blinks_per_minute=tuple(_rate(kind[0], held) for kind in kinds if kind),
-        compared=tuple(_compared(trait, held, kinds, options) for trait in traits_of(palette, learnt)),
-        moving=_moving(palette, held, [kind for kind in kinds if kind]),
-        long=long_run(fields, name, learnt, held, options.seed) if derived is None else LongRun({}, {}),
+        blinks_per_minute=tuple(_blink_rate(kind[0], held) for kind in kinds if kind),
+        trait_comparisons=tuple(_compare_trait(trait, held, kinds, options) for trait in style_traits(palette, learnt)),
+        motion_comparisons=_compare_motion(palette, held, [kind for kind in kinds if kind]),
+        long_run=long_run(fields, name, learnt, held, options.seed) if derived is None else LongRun({}, {}),
     )
 
 
-def _from_fields(fields: GestureFields, name: str, held: Style, seed: int) -> Motion:
+def _field_motion(fields: GestureFields, name: str, held: Style, seed: int) -> Motion:
     return {feature: field_clip(fields, name, feature, held.intensity, seed).values for feature in held.motion}
 
 
-def _rate(motion: Motion, held: Style) -> float:
-    return blinks_of(motion["blink"], held.lengths, GESTURE_FPS).per_minute if "blink" in motion else float("nan")
+def _blink_rate(motion: Motion, held: Style) -> float:
+    return find_blinks(motion["blink"], held.lengths, GESTURE_FPS).per_minute if "blink" in motion else float("nan")
 
 
-def _compared(trait: Trait, held: Style, kinds: list[list[Motion]], options: Options) -> TraitComparison:
+def _compare_trait(trait: Trait, held: Style, kinds: list[list[Motion]], options: Options) -> TraitComparison:
     def values_of(motion: Motion) -> list[Doubles]:
         return [trait.of(part) for part in split_recordings(motion[trait.feature], held.lengths)]
 
@@ -230,8 +230,8 @@ def _compared(trait: Trait, held: Style, kinds: list[list[Motion]], options: Opt
     clips, noises, published = ([np.concatenate(values_of(clip)) for clip in kind] for kind in kinds[1:])
     generator = np.random.default_rng([options.seed, 2])
     apart = [
-        distance(np.concatenate([parts[i] for i in one]), np.concatenate([parts[i] for i in other]))
-        for one, other in halves(len(parts), options.halves, generator)
+        wasserstein(np.concatenate([parts[i] for i in one]), np.concatenate([parts[i] for i in other]))
+        for one, other in random_halves(len(parts), options.halves, generator)
         if len(parts) > 1
     ]
     real = np.concatenate(parts)
@@ -243,18 +243,18 @@ def _compared(trait: Trait, held: Style, kinds: list[list[Motion]], options: Opt
         np.concatenate([np.zeros(0), *published]),
         float(np.mean(apart)) if apart else float("nan"),
         *(
-            float(np.mean([distance(real, clip) for clip in kind])) if kind else float("nan")
+            float(np.mean([wasserstein(real, clip) for clip in kind])) if kind else float("nan")
             for kind in (clips, noises, published)
         ),
     )
 
 
-def _moving(palette: Palette, held: Style, kinds: list[list[Motion]]) -> tuple[MotionComparison, ...]:
+def _compare_motion(palette: Palette, held: Style, kinds: list[list[Motion]]) -> tuple[MotionComparison, ...]:
     (real,), clips, noises, *_ = kinds
     shown = [in_display_units(palette, kind[0]) for kind in kinds]
-    intensity = between_frames(held.intensity, held.lengths)
+    intensity = frame_midpoints(held.intensity, held.lengths)
     found = []
-    for trait in traits_of(palette, held):
+    for trait in style_traits(palette, held):
         if not trait.name.endswith(" speed") or trait.feature == "blink":
             continue
         feature = trait.feature
@@ -262,7 +262,7 @@ def _moving(palette: Palette, held: Style, kinds: list[list[Motion]]) -> tuple[M
         together = [
             float(
                 np.mean(
-                    [pearson(trait.all_of(split_recordings(one[feature], held.lengths)), intensity) for one in kind]
+                    [pearson(trait.values_of(split_recordings(one[feature], held.lengths)), intensity) for one in kind]
                 )
             )
             for kind in kinds

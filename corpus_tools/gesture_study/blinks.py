@@ -48,28 +48,28 @@ class Blinks:
         return 60 * self.n / self.seconds
 
 
-def blinks_of(shut: NDArray[np.floating], lengths: NDArray[np.int32], fps: float) -> Blinks:
+def find_blinks(shut: NDArray[np.floating], lengths: NDArray[np.int32], fps: float) -> Blinks:
     """Blinks of recordings of `lengths` (R,) frames, concatenated; shut (T, 2) or (T,) shares of lids."""
     lids = np.asarray(shut, np.float64).reshape(len(shut), -1).mean(axis=1)
     n, intervals, found = 0, [np.zeros(0)], [np.zeros((0, 4))]
     for part in np.split(lids, np.cumsum(lengths)[:-1]):
-        onsets = onsets_of(part) / fps
+        onsets = blink_onsets(part) / fps
         n += len(onsets)
         intervals.append(np.diff(onsets))
-        found.append(_courses(part, fps))
+        found.append(_blink_phases(part, fps))
     closing, opening, closing_speeds, opening_speeds = np.concatenate(found).T
     seconds = float(np.sum(lengths)) / fps
     return Blinks(n, seconds, np.concatenate(intervals), closing, opening, closing_speeds, opening_speeds)
 
 
-def onsets_of(lids: Doubles) -> Doubles:
+def blink_onsets(lids: Doubles) -> Doubles:
     """(B,) frames, and parts of frames, at which lids (T,) pass `SHUT`."""
     shut = lids > SHUT
     last = np.flatnonzero(~shut[:-1] & shut[1:])
     return np.asarray(last + (SHUT - lids[last]) / (lids[last + 1] - lids[last]))
 
 
-def _courses(lids: Doubles, fps: float) -> Doubles:
+def _blink_phases(lids: Doubles, fps: float) -> Doubles:
     """(B, 4) closing and opening time and speed of the blinks that lie within a recording."""
     rows = []
     closed = lids > OPEN

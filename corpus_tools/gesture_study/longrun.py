@@ -43,15 +43,15 @@ class Repetition:
 class LongRun:
     """By feature: shares of recorded moments that speech visits after `VISITED_AFTER`, and repetition."""
 
-    visited: Mapping[str, tuple[float, ...]]
-    repeating: Mapping[str, Repetition]
+    coverage: Mapping[str, tuple[float, ...]]
+    repetition: Mapping[str, Repetition]
 
 
 def long_run(fields: GestureFields, name: str, learnt: Style, held: Style, seed: int) -> LongRun:
     """Measure clips of `MINUTES` of a style, with the recordings' sound in random order and with silence."""
     n_frames = round(MINUTES * 60 * GESTURE_FPS)
     order = np.random.default_rng([seed, 3]).permutation(len(learnt.lengths))
-    intensity = _shuffled(learnt.intensity, learnt.lengths, order, n_frames)
+    intensity = _shuffle_recordings(learnt.intensity, learnt.lengths, order, n_frames)
     silence = np.full(n_frames, SILENT_PROSODY[0], np.float32)
     visited, repeating = {}, {}
     for feature in held.motion:
@@ -61,12 +61,14 @@ def long_run(fields: GestureFields, name: str, learnt: Style, held: Style, seed:
             coverage(speech.moments[: round(minutes * 60 * GESTURE_FPS)], learnt.lengths, MIN_MOMENT_GAP)
             for minutes in VISITED_AFTER
         )
-        real = _shuffled(learnt.motion[feature], learnt.lengths, order, n_frames)
-        repeating[feature] = Repetition(*(_by_second(values) for values in (real, speech.values, quiet.values)))
+        real = _shuffle_recordings(learnt.motion[feature], learnt.lengths, order, n_frames)
+        repeating[feature] = Repetition(
+            *(_highest_per_second(values) for values in (real, speech.values, quiet.values))
+        )
     return LongRun(visited, repeating)
 
 
-def _shuffled(
+def _shuffle_recordings(
     values: NDArray[np.float32], lengths: NDArray[np.int32], order: NDArray[np.int64], n_frames: int
 ) -> NDArray[np.float32]:
     """`n_frames` of recordings concatenated in an order, repeated from the first one where they are too short."""
@@ -75,7 +77,7 @@ def _shuffled(
     return np.resize(whole, (n_frames, *whole.shape[1:])) if len(whole) < n_frames else whole[:n_frames]
 
 
-def _by_second(values: NDArray[np.float32]) -> Doubles:
+def _highest_per_second(values: NDArray[np.float32]) -> Doubles:
     a_second = round(GESTURE_FPS)
     found = autocorrelation(values, LAGS_S * a_second - 1)
     return np.asarray(found.reshape(LAGS_S, a_second).max(axis=1))

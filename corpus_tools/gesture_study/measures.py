@@ -25,12 +25,12 @@ def split_recordings(values: Motion, lengths: Lengths) -> list[Motion]:
     return np.split(values, np.cumsum(lengths)[:-1])
 
 
-def distance(one: Motion, other: Motion) -> float:
+def wasserstein(one: Motion, other: Motion) -> float:
     """Wasserstein distance of two sets of numbers, in their unit; NaN where one is empty."""
     return float(wasserstein_distance(one, other)) if len(one) and len(other) else float("nan")
 
 
-def halves(n: int, n_times: int, generator: np.random.Generator) -> Iterator[tuple[NDArray[np.int64], ...]]:
+def random_halves(n: int, n_times: int, generator: np.random.Generator) -> Iterator[tuple[NDArray[np.int64], ...]]:
     """`n_times` pairs of random halves of the indices below n."""
     for _ in range(n_times):
         order = generator.permutation(n)
@@ -45,7 +45,7 @@ class Spectrum:
     power: Doubles
 
     @property
-    def fast(self) -> float:
+    def fast_power(self) -> float:
         """Power above `FAST_HZ`."""
         return float(self.power[self.hz >= FAST_HZ].sum() * (self.hz[1] - self.hz[0]))
 
@@ -73,7 +73,7 @@ def ratio(one: float, other: float) -> float:
     return one / other if other else float("nan")
 
 
-def between_frames(values: Motion, lengths: Lengths) -> Doubles:
+def frame_midpoints(values: Motion, lengths: Lengths) -> Doubles:
     """(T - R,) means of neighbouring frames of (T,): values at the instants of the speeds of `speeds`."""
     return np.concatenate([(part[1:] + part[:-1]) / 2.0 for part in split_recordings(values, lengths)])
 

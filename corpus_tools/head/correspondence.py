@@ -49,7 +49,7 @@ def write_places(places: dict[int, Floats], path: Path = TABLE) -> None:
         writer.writerows([number, *(f"{value:.6f}" for value in place)] for number, place in sorted(places.items()))
 
 
-def with_landmarks(face: Face, base: Floats, places: dict[int, Floats] | None = None) -> Face:
+def add_landmarks(face: Face, base: Floats, places: dict[int, Floats] | None = None) -> Face:
     """A face with its landmarks: those of the table on the skin, those of the irises on the eyeballs.
 
     Parameters
@@ -67,7 +67,7 @@ def with_landmarks(face: Face, base: Floats, places: dict[int, Floats] | None = 
     table = read_places() if places is None else places
     skin = face.triangles[(face.triangles < len(base)).all(axis=1)].astype(np.int64)
     wanted = np.array(list(table.values()))
-    triangle, weights, distance = nearest_on_surface(wanted, base, skin)
+    triangle, weights, distance = nearest_surface_points(wanted, base, skin)
     if distance.max() > FAR:
         stray = list(table)[int(distance.argmax())]
         raise DataError(f"landmark {stray} lies {distance.max():.3f} units off the skin; the table is of another mesh")
@@ -96,19 +96,19 @@ def iris_vertices(face: Face, eye: Eye) -> Ints:
     return np.asarray(inside[nearest], np.int64)
 
 
-def nearest_on_surface(points: Floats, vertices: Floats, triangles: Ints) -> tuple[Ints, Floats, Floats]:
+def nearest_surface_points(points: Floats, vertices: Floats, triangles: Ints) -> tuple[Ints, Floats, Floats]:
     """Triangle (P,), barycentric weights (P, 3) and distance (P,) of the surface's nearest place to each point.
 
     Source: Ericson 2005, Real-Time Collision Detection, section 5.1.5 (closest point on a triangle).
     """
-    found = [_nearest(point, vertices[triangles]) for point in points]
+    found = [_nearest_point(point, vertices[triangles]) for point in points]
     numbers = np.array([number for number, _ in found], np.int64)
     weights = np.array([weight for _, weight in found])
     there = np.einsum("pk,pkd->pd", weights, vertices[triangles[numbers]])
     return numbers, weights, np.linalg.norm(there - points, axis=1)
 
 
-def _nearest(point: Floats, corners: Floats) -> tuple[int, Floats]:
+def _nearest_point(point: Floats, corners: Floats) -> tuple[int, Floats]:
     """Of triangles (F, 3, 3): which one is nearest, and the weights (3,) of its nearest place."""
     first, second, third = corners[:, 0], corners[:, 1], corners[:, 2]
     edges = [(0, 1, first, second), (1, 2, second, third), (2, 0, third, first)]

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.head.cage import Cage, sphere_of
-from corpus_tools.head.piece import Ball, Piece, Span
+from corpus_tools.head.cage import Cage, fit_sphere
+from corpus_tools.head.piece import Eyeball, MaterialSpan, Piece
 
 Floats = NDArray[np.float64]
 
@@ -14,7 +14,7 @@ N_AROUND = 44
 RECEDE_MM = 1.6  # how far a ball sinks while its lids are shut, which nobody sees: lids move on straight lines
 BULGE = 0.04  # of the radius, height of the cornea at its top
 BACK_RAD = 1.6  # the ball ends here; what is further back is never seen
-LOOKS = {
+GAZE_ANGLES = {
     "eyeLookUp": (-1, 0, 20.0),
     "eyeLookDown": (1, 0, 20.0),
     "eyeLookOut": (0, 1, 25.0),
@@ -39,26 +39,26 @@ class EyeStyle:
 MATERIALS = {"sclera": {"specular": 0.55, "shininess": 140.0}, "iris": {"specular": 0.9, "shininess": 260.0}}
 
 
-def balls_of(cage: Cage, style: EyeStyle | None = None) -> tuple[Ball, Ball]:
+def fit_eyeballs(cage: Cage, style: EyeStyle | None = None) -> tuple[Eyeball, Eyeball]:
     """Left and right eyeball of a cage."""
     found, drawn = [], style or EyeStyle()
     for side, word, sign in (("l", "Left", 1.0), ("r", "Right", -1.0)):
-        centre, radius = sphere_of(cage.vertices[cage.group(f"helper-{side}-eye")])
+        centre, radius = fit_sphere(cage.vertices[cage.group(f"helper-{side}-eye")])
         turns = {}
-        for look, (about_x, about_y, degrees) in LOOKS.items():
+        for look, (about_x, about_y, degrees) in GAZE_ANGLES.items():
             turns[look + word] = np.radians(degrees) * np.array([about_x, sign * about_y, 0.0])
-        found.append(Ball(centre, radius, turns, drawn.iris, drawn.pupil))
+        found.append(Eyeball(centre, radius, turns, drawn.iris, drawn.pupil))
     return found[0], found[1]
 
 
-def ball_radius(ball: Ball, off: Floats) -> Floats:
+def ball_radius(ball: Eyeball, off: Floats) -> Floats:
     """Distance of the surface from the centre, mm, at angles from the gaze, radians."""
     return ball.radius * (1.0 + BULGE * np.clip(1.0 - (off / (ball.iris * 1.15)) ** 2, 0, None) ** 1.3)
 
 
-def eyeball(ball: Ball, side: str, style: EyeStyle, generator: np.random.Generator) -> Piece:
+def eyeball_piece(ball: Eyeball, side: str, style: EyeStyle, generator: np.random.Generator) -> Piece:
     """The drawn eyeball of the side ``Left`` or ``Right``."""
-    rings = _rings(style)
+    rings = _ring_angles(style)
     around = np.linspace(0, 2 * np.pi, N_AROUND, endpoint=False)
     off, turn = (grid.ravel() for grid in np.meshgrid(rings, around, indexing="ij"))
     towards = np.stack([np.sin(off) * np.cos(turn), np.sin(off) * np.sin(turn), np.cos(off)], axis=1)
@@ -70,22 +70,22 @@ def eyeball(ball: Ball, side: str, style: EyeStyle, generator: np.random.Generat
     return Piece(
         vertices=ball.centre + ball_radius(ball, off)[:, None] * towards,
         spans=(
-            Span("sclera", triangles[~in_iris], MATERIALS["sclera"]),
-            Span("iris", triangles[in_iris], MATERIALS["iris"]),
+            MaterialSpan("sclera", triangles[~in_iris], MATERIALS["sclera"]),
+            MaterialSpan("iris", triangles[in_iris], MATERIALS["iris"]),
         ),
-        colours=_painted((off, turn, towards[:, 1]), style, generator),
+        colours=_eye_colours((off, turn, towards[:, 1]), style, generator),
         shapes={f"eyeBlink{side}": np.tile([0.0, 0.0, -RECEDE_MM], (len(towards), 1))},
     )
 
 
-def _rings(style: EyeStyle) -> Floats:
+def _ring_angles(style: EyeStyle) -> Floats:
     """Angles from the gaze at which the ball's vertices lie."""
     inner = np.linspace(style.pupil + 0.02, style.iris, 10)
     outer = np.linspace(style.iris + 0.03, style.iris + 0.27, 4)
     return np.concatenate([np.linspace(0, style.pupil, 4), inner, outer, np.linspace(style.iris + 0.4, BACK_RAD, 7)])
 
 
-def _painted(at: tuple[Floats, Floats, Floats], style: EyeStyle, generator: np.random.Generator) -> Floats:
+def _eye_colours(at: tuple[Floats, Floats, Floats], style: EyeStyle, generator: np.random.Generator) -> Floats:
     """(N, 3) colours by the angle from the gaze, the angle around it and the height on the ball."""
     off, turn, up = at
     fibres = np.zeros_like(turn)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.head.noise import lumps, ramp
-from corpus_tools.head.piece import Piece, Span
+from corpus_tools.head.noise import ramp, value_noise
+from corpus_tools.head.piece import MaterialSpan, Piece
 
 Floats = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ LOCK_MATERIAL = {"specular": 0.08, "shininess": 9.0, "wrap": 0.2}
 
 
 @dataclass(frozen=True, slots=True)
-class Cut:
+class Haircut:
     """A haircut: thickness in mm on top, at the sides and at the nape, and the number of loose locks."""
 
     top: float = 13.0
@@ -45,13 +45,13 @@ def hair_share(places: Floats) -> Floats:
     return share * ramp(ear, 0.92, 1.12)
 
 
-def thickness(places: Floats, cut: Cut, generator: np.random.Generator) -> Floats:
+def hair_thickness(places: Floats, cut: Haircut, generator: np.random.Generator) -> Floats:
     """(P,) how far hair stands off the skin, mm."""
     up = ramp(places[:, 1], 20, 110)
     back = ramp(-places[:, 2], 120, 190) * (1 - up)
     full = cut.side + (cut.top - cut.side) * up + (cut.nape - cut.side) * back
     inner = _inner_share(places)
-    clumps = 1 + 0.22 * lumps(strand_field(places, 9.0, 40.0), 1.0, generator)
+    clumps = 1 + 0.22 * value_noise(strand_field(places, 9.0, 40.0), 1.0, generator)
     return full * inner * clumps
 
 
@@ -78,15 +78,15 @@ def strand_field(places: Floats, width_mm: float, length_mm: float) -> Floats:
 
 def strand_colour(places: Floats, colour: Floats, generator: np.random.Generator) -> Floats:
     """(P, 3) hair at places."""
-    fine = lumps(strand_field(places, 1.6, 38.0), 1.0, generator)
-    broad = lumps(strand_field(places, 6.0, 55.0), 1.0, generator)
+    fine = value_noise(strand_field(places, 1.6, 38.0), 1.0, generator)
+    broad = value_noise(strand_field(places, 6.0, 55.0), 1.0, generator)
     light = 1 + 0.34 * fine + 0.22 * broad
     warm = np.array([1.06, 1.0, 0.92])
     return np.clip(colour * light[:, None] * np.where(fine[:, None] > 0.4, warm, 1.0), 0.02, 1)
 
 
-def locks(
-    surface: tuple[Floats, Floats, Floats], share: Floats, cut: Cut, colour: Floats, generator: np.random.Generator
+def lock_piece(
+    surface: tuple[Floats, Floats, Floats], share: Floats, cut: Haircut, colour: Floats, generator: np.random.Generator
 ) -> Piece:
     """Loose locks on the cap: bent blades along the strands.
 
@@ -111,6 +111,6 @@ def locks(
     shades = strand_colour(default[roots], colour, generator)
     return Piece(
         points.reshape(-1, 3),
-        (Span("hair_locks", (one + 4 * np.arange(len(roots))[:, None, None]).reshape(-1, 3), LOCK_MATERIAL),),
+        (MaterialSpan("hair_locks", (one + 4 * np.arange(len(roots))[:, None, None]).reshape(-1, 3), LOCK_MATERIAL),),
         np.repeat(shades, 4, axis=0),
     )

@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import shortest_path
 from scipy.spatial import cKDTree
 
 from corpus_tools.head.cage import Cage
-from corpus_tools.head.piece import Piece, Span
+from corpus_tools.head.piece import MaterialSpan, Piece
 from corpus_tools.head.skin import Skin
 
 Floats = NDArray[np.float64]
@@ -19,7 +19,7 @@ MATERIAL = {"specular": 0.05, "shininess": 20.0}
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class LashRow:
     """Lashes of one lid: the strip's number in the source, blades, length in rows of the strip, width in mm."""
 
     strip: int
@@ -28,7 +28,7 @@ class Row:
     width: float
 
 
-UPPER, LOWER = Row(2, 60, 3.7, 0.24), Row(1, 34, 2.1, 0.15)
+UPPER, LOWER = LashRow(2, 60, 3.7, 0.24), LashRow(1, 34, 2.1, 0.15)
 N_OF_BLADE = 5  # vertices; the first two are its root
 ROOT_ROW = 0.85  # the strip's first row lies within the lid
 SHUT_DOWN, SHUT_AHEAD = 0.5, 0.87  # where upper lashes point when the lids are shut, of their length
@@ -49,9 +49,9 @@ def lash_piece(cage: Cage, skin: Skin, generator: np.random.Generator) -> Piece:
             blades = carry @ cage.vertices[used] + offset
             beside = np.repeat(nearest.query(_roots(blades))[1], N_OF_BLADE)
             for name, moved in cage.units.items():
-                own = carry @ moved[used] + (skin.mended[name][beside] if name in skin.mended else 0.0)
+                own = carry @ moved[used] + (skin.corrections[name][beside] if name in skin.corrections else 0.0)
                 if name == f"eyeBlink{word}":
-                    own = _lowered(blades, own) if row is UPPER else _kept_under(blades, own, line)
+                    own = _lower_lashes(blades, own) if row is UPPER else _keep_under(blades, own, line)
                     line = _roots(blades + own)
                 shapes[name].append(own)
             points.append(blades)
@@ -60,13 +60,13 @@ def lash_piece(cage: Cage, skin: Skin, generator: np.random.Generator) -> Piece:
     vertices = np.concatenate(points)
     return Piece(
         vertices,
-        (Span("lashes", np.concatenate(triangles), MATERIAL),),
+        (MaterialSpan("lashes", np.concatenate(triangles), MATERIAL),),
         np.tile(COLOUR, (len(vertices), 1)),
         {name: np.concatenate(blocks) for name, blocks in shapes.items()},
     )
 
 
-def grid_of(quads: NDArray[np.int64]) -> NDArray[np.int64]:
+def strip_grid(quads: NDArray[np.int64]) -> NDArray[np.int64]:
     """Vertex numbers (across, along) of a strip of quads (F, 4) that forms a grid, the short side first."""
     n = int(quads.max()) + 1
     sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2)
@@ -90,7 +90,7 @@ def _roots(blades: Floats) -> Floats:
     return roots
 
 
-def _lowered(blades: Floats, moved: Floats) -> Floats:
+def _lower_lashes(blades: Floats, moved: Floats) -> Floats:
     """(5 B, 3) the motion of upper lashes that go with their roots and turn to point ahead and down."""
     off = blades - np.repeat(_roots(blades), N_OF_BLADE, axis=0)
     length = np.linalg.norm(off[:, 1:], axis=1)
@@ -99,7 +99,7 @@ def _lowered(blades: Floats, moved: Floats) -> Floats:
     return lowered
 
 
-def _kept_under(blades: Floats, moved: Floats, line: Floats) -> Floats:
+def _keep_under(blades: Floats, moved: Floats, line: Floats) -> Floats:
     """(5 B, 3) the motion of lower lashes, whose roots stay under and about as far ahead as a line (N, 3)."""
     roots = _roots(blades + moved)
     order = np.argsort(line[:, 0])
@@ -112,10 +112,10 @@ def _kept_under(blades: Floats, moved: Floats, line: Floats) -> Floats:
 
 
 def _blades(
-    places: Floats, quads: NDArray[np.int64], row: Row, generator: np.random.Generator
+    places: Floats, quads: NDArray[np.int64], row: LashRow, generator: np.random.Generator
 ) -> tuple[sparse.csr_array, Floats, NDArray[np.int64]]:
     """What carries 5 vertices per blade from the strip's (5 B, S), what is added (5 B, 3), triangles (3 B, 3)."""
-    grid = grid_of(quads)
+    grid = strip_grid(quads)
     if places[grid[0], 2].mean() > places[grid[-1], 2].mean():
         grid = grid[::-1]  # the root lies behind the tip
     n_across, n_along = grid.shape

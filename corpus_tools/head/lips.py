@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from corpus_tools.head.rings import Strips, narrowest_ring
+from corpus_tools.head.rings import EdgeRings, find_narrowest_ring
 from corpus_tools.head.skin import Skin
 
 Floats = NDArray[np.float64]
@@ -23,7 +23,7 @@ DEPTH_MM = 12.0  # behind the foremost place of a lip at its x begins the cavity
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Slit:
+class LipLine:
     """The line between the lips: half its width in mm, and (N,) which lip a vertex is of, -1 upper to 1 lower."""
 
     half_width: float
@@ -34,10 +34,10 @@ def lip_ring(skin: Skin) -> NDArray[np.int64]:
     """Vertices of the ring of edges where the lips meet; the same for every identity."""
     middles = [int(np.linalg.norm(skin.base - place, axis=1).argmin()) for place in LIP_MIDDLES]
     opened = skin.vertices + OPENING * skin.shapes["jawOpen"]
-    return narrowest_ring(Strips(skin.quads, skin.base), opened, opened[middles].mean(axis=0), RING_REACH_MM)
+    return find_narrowest_ring(EdgeRings(skin.quads, skin.base), opened, opened[middles].mean(axis=0), RING_REACH_MM)
 
 
-def slit_of(skin: Skin, ring: NDArray[np.int64]) -> Slit:
+def find_lip_line(skin: Skin, ring: NDArray[np.int64]) -> LipLine:
     """The slit, read with the jaw open, when the lips are apart."""
     opened = skin.vertices + OPENING * skin.shapes["jawOpen"]
     ring = np.roll(ring, -int(opened[ring, 0].argmin()))
@@ -46,19 +46,19 @@ def slit_of(skin: Skin, ring: NDArray[np.int64]) -> Slit:
     arcs = [np.interp(opened[:, 0], arc[:, 0], arc[:, 1]) for arc in (line[: turn + 1], line[turn:][::-1])]
     half = float(np.abs(skin.vertices[ring, 0]).max())
     lower = np.clip(((arcs[0] + arcs[1]) / 2 - opened[:, 1]) / BETWEEN_MM, -1, 1)
-    return Slit(half, lower * (np.abs(opened[:, 0]) < half))
+    return LipLine(half, lower * (np.abs(opened[:, 0]) < half))
 
 
-def closed(skin: Skin, ring: NDArray[np.int64]) -> Skin:
+def close_lips(skin: Skin, ring: NDArray[np.int64]) -> Skin:
     """The skin with lips that meet."""
-    slit = slit_of(skin, ring)
+    slit = find_lip_line(skin, ring)
     vertices = skin.vertices
     for _ in range(5):
-        vertices = vertices + _closing(replace(skin, vertices=vertices), slit)
+        vertices = vertices + _closing_step(replace(skin, vertices=vertices), slit)
     return replace(skin, vertices=vertices)
 
 
-def lip_gaps(skin: Skin, slit: Slit) -> tuple[Floats, Floats, Floats]:
+def lip_gaps(skin: Skin, slit: LipLine) -> tuple[Floats, Floats, Floats]:
     """Columns x (C,), and the upper and lower lip's edges there as (C, 2) of y and z, mm."""
     low, high = np.array(MOUTH_BOX).T
     near = np.all((skin.base > low) & (skin.base < high), axis=1)
@@ -85,7 +85,7 @@ def _rims(vertices: Floats, edges: NDArray[np.int64], columns: Floats, sign: flo
     return rims
 
 
-def _closing(skin: Skin, slit: Slit) -> Floats:
+def _closing_step(skin: Skin, slit: LipLine) -> Floats:
     """(N, 3) half a step towards contact on each lip."""
     columns, upper, lower = lip_gaps(skin, slit)
     gap = np.nan_to_num(upper[:, 0] - lower[:, 0]) + PRESS_MM

@@ -9,14 +9,14 @@ Floats = NDArray[np.float64]
 SIZE = 32  # lattice points each way; the field repeats beyond
 
 
-def lumps(points: Floats, size_mm: float, generator: np.random.Generator) -> Floats:
+def value_noise(points: Floats, size_mm: float, generator: np.random.Generator) -> Floats:
     """(P,) about -1..1 with spots of about `size_mm`, at points (P, 3) in mm."""
     lattice = generator.standard_normal((SIZE, SIZE, SIZE))
     field = map_coordinates(lattice, (points / size_mm).T % SIZE, order=1, mode="grid-wrap")
     return np.clip(field / 1.2, -2, 2)
 
 
-def bell(points: Floats, centre: tuple[float, ...], reach: tuple[float, ...]) -> Floats:
+def gaussian_bump(points: Floats, centre: tuple[float, ...], reach: tuple[float, ...]) -> Floats:
     """(P,) 1 at the centre, falling as a Gaussian; |x| counts, so that both sides are alike."""
     mirrored = np.column_stack([np.abs(points[:, 0]), points[:, 1:]])[:, : len(centre)]
     falling: Floats = np.exp(-(((mirrored - np.array(centre)) / np.array(reach)) ** 2).sum(axis=1))

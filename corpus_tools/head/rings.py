@@ -13,7 +13,7 @@ Ints = NDArray[np.int64]
 LONGEST = 400  # vertices; the head's own rings around mouth and eyes have under 100
 
 
-class Strips:
+class EdgeRings:
     """Edges of a quad mesh that run straight on from vertex to vertex.
 
     Parameters
@@ -55,7 +55,7 @@ class Strips:
         return ahead[0] if len(ahead) == 1 and len(self._beside[here]) == 4 else None
 
 
-def narrowest_ring(strips: Strips, vertices: Floats, inside: Floats, reach: float, clear: float = 0.0) -> Ints:
+def find_narrowest_ring(strips: EdgeRings, vertices: Floats, inside: Floats, reach: float, clear: float = 0.0) -> Ints:
     """The ring around a hole that encloses least, seen from the front: the edge of lips or lids.
 
     Parameters
@@ -81,7 +81,7 @@ def narrowest_ring(strips: Strips, vertices: Floats, inside: Floats, reach: floa
             seen.update(ring)
             flat = vertices[ring, :2] - inside[:2]
             is_clear = np.linalg.norm(vertices[ring] - inside, axis=1).mean() > clear
-            if np.hypot(*flat.T).max() > reach or not _winds(flat) or not is_clear:
+            if np.hypot(*flat.T).max() > reach or not _encloses_origin(flat) or not is_clear:
                 continue
             area = abs(_area(flat))
             if area < least:
@@ -91,7 +91,7 @@ def narrowest_ring(strips: Strips, vertices: Floats, inside: Floats, reach: floa
     return np.array(best, np.int64)
 
 
-def _winds(flat: Floats) -> bool:
+def _encloses_origin(flat: Floats) -> bool:
     """Whether a closed line goes once around the origin."""
     angles = np.unwrap(np.arctan2(*np.concatenate([flat, flat[:1]]).T[::-1]))
     return bool(abs(abs(angles[-1] - angles[0]) - 2 * np.pi) < 0.1)

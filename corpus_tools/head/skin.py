@@ -42,32 +42,32 @@ class Skin:
     quads: NDArray[np.int64]
     source_uv: Floats
     base: Floats
-    mended: Mapping[str, Floats] = field(default_factory=dict)
+    corrections: Mapping[str, Floats] = field(default_factory=dict)
 
 
-def skinned(cage: Cage) -> Skin:
+def build_skin(cage: Cage) -> Skin:
     """The head and neck of a cage, one Catmull-Clark step finer."""
     body = cage.source.groups["body"]
     places, where = cage.source.vertices[body.corners], cage.source.uv[body.uv_corners]
     kept: NDArray[np.bool_] = np.any(places[:, :, 1] - NECK_SLOPE * places[:, :, 2] > NECK_Y, axis=1)
     kept &= np.all((np.abs(places[:, :, 0]) < HEAD_WIDEST) & (places[:, :, 1] > LOWEST), axis=1)
     kept &= ~np.all((where[:, :, 0] < SOCKET_U) & (places[:, :, 2] < SOCKET_Z), axis=1)
-    return _finer(cage, kept)
+    return _subdivide(cage, kept)
 
 
-def shoulders(cage: Cage) -> Skin:
+def build_shoulders(cage: Cage) -> Skin:
     """Neck and shoulders of a cage, on which a shirt lies."""
     places = cage.source.vertices[cage.source.groups["body"].corners]
     inside = (places[:, :, 1] > LOWEST) & (places[:, :, 1] < SHOULDER_Y) & (np.abs(places[:, :, 0]) < WIDEST)
     kept: NDArray[np.bool_] = np.all(inside, axis=1)
-    return _finer(cage, kept)
+    return _subdivide(cage, kept)
 
 
-def _finer(cage: Cage, kept: NDArray[np.bool_]) -> Skin:
+def _subdivide(cage: Cage, kept: NDArray[np.bool_]) -> Skin:
     body = cage.source.groups["body"]
     used, quads = np.unique(body.corners[kept], return_inverse=True)
     matrix, fine = catmull_clark(len(used), quads.reshape(-1, 4))
-    fine_uv = _halved(cage.source.uv[body.uv_corners[kept]])
+    fine_uv = _subdivide_coordinates(cage.source.uv[body.uv_corners[kept]])
     keys = np.column_stack([fine.ravel(), np.rint(fine_uv.reshape(-1, 2) * 1e6).astype(np.int64)])
     _, first, corner = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     rows = fine.ravel()[first]
@@ -81,7 +81,7 @@ def _finer(cage: Cage, kept: NDArray[np.bool_]) -> Skin:
     )
 
 
-def _halved(corners: Floats) -> Floats:
+def _subdivide_coordinates(corners: Floats) -> Floats:
     """(4 F, 4, 2) texture coordinates of quads split in four as `catmull_clark` does, each in its middle."""
     after = (corners + np.roll(corners, -1, axis=1)) / 2
     centre = corners.mean(axis=1)

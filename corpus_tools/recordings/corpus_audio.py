@@ -68,7 +68,7 @@ class CachedAligner:
         whole = self._last[1]
         return whole if span is None else cut_sound(whole, span)
 
-    def heard(self, video: Path, words: PronouncedTranscript | None, span: Span | None = None) -> AlignedSpeech:
+    def align(self, video: Path, words: PronouncedTranscript | None, span: Span | None = None) -> AlignedSpeech:
         """Phones of a recording's sound, from the cache when the same sound and words were aligned before.
 
         Parameters
@@ -89,7 +89,7 @@ class CachedAligner:
         asked = hashlib.sha256(json.dumps([words, span]).encode()).hexdigest()[:8]
         kept = self._cache / f"{content_key(video)}-{asked}-{ALIGNMENT_VERSION}.{ALIGNMENT_KIND}"
         found = _read_cached_alignment(kept, sound, is_recognised=words is None)
-        return found or self._aligned(sound, words, kept)
+        return found or self._align_words(sound, words, kept)
 
     def utterances(
         self, video: Path, words: PronouncedTranscript | None
@@ -115,7 +115,7 @@ class CachedAligner:
         ]
         return tuple((span, said) for span, said in zip(spans, said_in, strict=True) if said)
 
-    def _aligned(self, sound: Waveform, words: PronouncedTranscript | None, kept: Path) -> AlignedSpeech:
+    def _align_words(self, sound: Waveform, words: PronouncedTranscript | None, kept: Path) -> AlignedSpeech:
         from tts2face.speech.forced_alignment import Aligner
 
         self._aligner = self._aligner or Aligner()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from corpus_tools.recordings.subtitles import find_subtitles, read_cues
-from corpus_tools.transcripts.find import find_transcript, read_transcript
+from corpus_tools.recordings.transcripts import find_transcript, read_transcript
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import DataError, InputError
 from lexicon.normalize import normalize

@@ -87,7 +87,7 @@ def observe_recording(recording: Recording, eyes: CachedTracker, ears: CachedAli
     DataError
         The recording cannot serve; the message says why.
     """
-    sound = ears.heard(recording.video, pronounce_recording(recording), recording.span)
+    sound = ears.align(recording.video, pronounce_recording(recording), recording.span)
     check_limits({"recognised" if sound.is_recognised else "confidence": sound.confidence})
     measures = sound_measures(sound.sound, sound.phones)
     check_limits(measures)

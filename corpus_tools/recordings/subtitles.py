@@ -1,11 +1,12 @@
 """Subtitles beside a video: what is said, and about when."""
 
+import codecs
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from corpus_tools.transcripts.decoding import read_text
 from lexicon.errors import BackendError, DataError
+from lexicon.inputs import check_regular_file
 
 SUBTITLE_FORMATS = {".srt": "srt", ".vtt": "vtt"}  # stated to the reader: it guesses wrongly for files without a header
 # Blocks for people and for styling; the reader would take them for words of the cue before (W3C WebVTT, 4.1).
@@ -67,3 +68,48 @@ def read_cues(path: Path) -> tuple[Cue, ...]:
 def _spoken_text(text: str) -> str:
     """What is said in a cue, on one line; nothing where it shows noises only."""
     return " ".join(_SPEAKER.sub(" ", _NOISE.sub(" ", text)).split())
+
+
+MAX_BYTES = 8 << 20  # 8 MiB; the words of a whole day of speech are below 1 MiB
+_BYTE_ORDER_MARKS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF32_LE, "utf-32-le"),
+    (codecs.BOM_UTF32_BE, "utf-32-be"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)  # in this order: the mark of UTF-32-LE begins with that of UTF-16-LE
+
+
+def read_text(path: Path) -> str:
+    """Characters of a text file: by its byte order mark, else as UTF-8, else as Windows 1252.
+
+    Raises
+    ------
+    DataError
+        It cannot be read, is too large, or is no text.
+    """
+    check_regular_file(path)
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except OSError as refused:
+        raise DataError(f"{path} cannot be read ({refused.strerror}); check the file") from refused
+    if len(content) > MAX_BYTES:
+        raise DataError(f"{path} is larger than {MAX_BYTES >> 20} MiB; a transcript holds words only")
+    text = _decode(content, path)
+    if "\0" in text:
+        raise DataError(f"{path} is no text (it holds zero bytes); save it as UTF-8")
+    return text
+
+
+def _decode(content: bytes, path: Path) -> str:
+    try:
+        for mark, encoding in _BYTE_ORDER_MARKS:
+            if content.startswith(mark):
+                return content[len(mark) :].decode(encoding)
+        try:
+            return content.decode("utf-8")
+        except UnicodeDecodeError:
+            return content.decode("cp1252")
+    except UnicodeDecodeError as broken:
+        raise DataError(f"{path} is no text in UTF-8, UTF-16, UTF-32 or Windows 1252; save it as UTF-8") from broken

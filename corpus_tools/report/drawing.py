@@ -82,7 +82,7 @@ def load_matplotlib() -> None:
 
 
 @contextmanager
-def drawn_figure(draw: Draw, width: float, height: float) -> Iterator[tuple["Figure", Sequence[Tip]]]:
+def open_figure(draw: Draw, width: float, height: float) -> Iterator[tuple["Figure", Sequence[Tip]]]:
     """A figure of so many px and its tips, in the house style whatever the user's matplotlib settings are.
 
     The style holds inside the block, where the figure has to be saved, too.
@@ -99,7 +99,7 @@ def drawn_figure(draw: Draw, width: float, height: float) -> Iterator[tuple["Fig
 def draw_svg(draw: Draw, width: float, height: float, name: str) -> str:
     """A figure of so many px as an SVG element, with a name for those who cannot see it."""
     file = BytesIO()
-    with drawn_figure(draw, width, height) as (figure, tips):
+    with open_figure(draw, width, height) as (figure, tips):
         figure.savefig(
             file, format="svg", transparent=True, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type"))
         )
@@ -117,7 +117,7 @@ def draw_svg(draw: Draw, width: float, height: float, name: str) -> str:
 def draw_png(draw: Draw, width: float, height: float) -> bytes:
     """A figure of so many px, `PNG_SCALE` times as many pixels, on white; PNG bytes."""
     file = BytesIO()
-    with drawn_figure(draw, width, height) as (figure, _):
+    with open_figure(draw, width, height) as (figure, _):
         figure.savefig(
             file, format="png", dpi=PNG_SCALE * PX_PER_INCH, metadata={"Software": None}, pil_kwargs={"optimize": True}
         )

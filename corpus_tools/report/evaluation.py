@@ -11,8 +11,8 @@ from corpus_tools.evaluation.evaluate import CEILING_METHOD, SplitResult
 from corpus_tools.evaluation.scores import CONFIDENCE, Scores, available_figures
 from corpus_tools.evaluation.tables import Evaluation, figure_text
 from corpus_tools.report.drawing import RULE, SERIES, draw_svg
-from corpus_tools.report.page import page, paragraphs, table, wide
-from corpus_tools.report.videos import Films
+from corpus_tools.report.page import page, paragraphs, scroll_box, table
+from corpus_tools.report.videos import MethodVideos
 from lexicon.sequence import SILENCE, PhoneSequence
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def evaluation_page(result: Evaluation, runs: Sequence[SplitResult]) -> str:
         [
             f"<p>{about} In brackets: {CONFIDENCE:.0%} bootstrap intervals over utterances.</p>",
             _figures(result.scores),
-            *_own(result.own),
+            *_own_durations(result.own),
             *_folds(result),
             "<h2>By class of phone</h2>",
             _classes(result.scores),
@@ -71,7 +71,7 @@ def _figures(scores: Sequence[Scores]) -> str:
     return table(("method", *(head for _, head, _ in heads)), rows, numbers=range(1, len(heads) + 1))
 
 
-def _own(scores: Sequence[Scores]) -> Iterator[str]:
+def _own_durations(scores: Sequence[Scores]) -> Iterator[str]:
     if scores:
         n = len(scores[0].utterances)
         yield f"<h2>With own durations</h2>\n{paragraphs(f'{n} utterances. {ABOUT_OWN}')}\n{_figures(scores)}"
@@ -114,7 +114,7 @@ def _sentences(result: Evaluation, runs: Sequence[SplitResult], seen: str, plain
     order = np.argsort([one.dtw_cost for one in scores.utterances], kind="stable")
     middle = len(order) // 2 - N_SHOWN // 2
     places = [(run, at) for run in runs for at in range(len(run.real))]
-    films = Films(seen)
+    films = MethodVideos(seen)
     for title, chosen in (
         ("Worst sentences", order[::-1][:N_SHOWN]),
         ("Median sentences", order[middle : middle + N_SHOWN]),
@@ -127,7 +127,7 @@ def _sentences(result: Evaluation, runs: Sequence[SplitResult], seen: str, plain
             yield f"<h3>{run.real[at].observation.name} (DTW cost {cost:.2f})</h3>"
             yield _curves(run, at, [name for name in (seen, plain) if name])
             if title.startswith("Worst"):
-                yield films.film(run, at)
+                yield films.render_tag(run, at)
 
 
 def _curves(run: SplitResult, at: int, names: Sequence[str]) -> str:
@@ -154,7 +154,7 @@ def curves_plot(times: Floats, curves: Mapping[str, Floats], label: str, phones:
         figure.legend(loc="outside lower right", ncols=len(curves))
         return ()
 
-    return wide(draw_svg(draw, WIDTH, HEIGHT, f"{label} over time"))
+    return scroll_box(draw_svg(draw, WIDTH, HEIGHT, f"{label} over time"))
 
 
 def label_phones(axes: "Axes", phones: PhoneSequence, end: float) -> None:
@@ -180,7 +180,7 @@ def cost_histogram(samples: Mapping[str, Sequence[float]]) -> str:
         figure.legend(loc="outside lower right", ncols=len(samples))
         return ()
 
-    return wide(draw_svg(draw, WIDTH, HEIGHT, "histogram of DTW costs"))
+    return scroll_box(draw_svg(draw, WIDTH, HEIGHT, "histogram of DTW costs"))
 
 
 def _series_axes(figure: "Figure", y_label: str, x_label: str) -> "Axes":

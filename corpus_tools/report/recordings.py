@@ -14,7 +14,7 @@ from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import Observations, Refusal
 from corpus_tools.report.drawing import FIRST, SECOND, draw_svg
 from corpus_tools.report.evaluation import label_phones
-from corpus_tools.report.page import note, page, paragraphs, picture_tag, table
+from corpus_tools.report.page import note_paragraph, page, paragraphs, picture_tag, table
 from corpus_tools.training.train_talker import normalised_lip_gap
 from lexicon.errors import DataError, InputError
 from lexicon.phones import ARPABET
@@ -54,10 +54,12 @@ def recordings_page(name: str, found: Observations) -> str:
             "<h2>Phones spoken</h2>",
             _phones(found.kept),
             f"<h2>Refused ({len(found.refused)})</h2>",
-            *(_refused(refusal, pictures.get(refusal.name)) for refusal in found.refused),
+            *(_refused_item(refusal, pictures.get(refusal.name)) for refusal in found.refused),
             f"<h2>Kept ({len(found.kept)})</h2>",
-            note("Blue: gap of the lips over the distance of the eyes. Ochre: intensity of the sound, 25 to 85 dB."),
-            *(_kept(seen, pictures.get(seen.name)) for seen in found.kept),
+            note_paragraph(
+                "Blue: gap of the lips over the distance of the eyes. Ochre: intensity of the sound, 25 to 85 dB."
+            ),
+            *(_kept_item(seen, pictures.get(seen.name)) for seen in found.kept),
         ],
     )
 
@@ -70,10 +72,12 @@ def thumbnails(found: Observations) -> dict[str, NDArray[np.uint8]]:
         wanted.setdefault(seen.video, []).append((middle, seen.name))
     for refusal in found.refused:
         wanted.setdefault(refusal.video, []).append((refusal.at, refusal.name))
-    return {name: picture for video, moments in wanted.items() for name, picture in _at(video, sorted(moments))}
+    return {
+        name: picture for video, moments in wanted.items() for name, picture in _read_pictures(video, sorted(moments))
+    }
 
 
-def _at(video: Path, moments: Sequence[tuple[float, str]]) -> Iterator[tuple[str, NDArray[np.uint8]]]:
+def _read_pictures(video: Path, moments: Sequence[tuple[float, str]]) -> Iterator[tuple[str, NDArray[np.uint8]]]:
     waiting = list(reversed(moments))
     try:
         for picture in read_frames(video):
@@ -119,18 +123,18 @@ def _phones(kept: Iterable[Observation]) -> str:
     return paragraphs(spoken, f"English phones never spoken: {missing}")
 
 
-def _refused(refusal: Refusal, picture: NDArray[np.uint8] | None) -> str:
+def _refused_item(refusal: Refusal, picture: NDArray[np.uint8] | None) -> str:
     return _item(refusal.name, f'<p class="bad">{escape(refusal.reason)}</p>', picture)
 
 
-def _kept(seen: Observation, picture: NDArray[np.uint8] | None) -> str:
+def _kept_item(seen: Observation, picture: NDArray[np.uint8] | None) -> str:
     texts = []
     for measure, (label, unit, factor) in MEASURES.items():
         value = factor * getattr(seen.quality, measure)
         if measure in {"confidence", "snr_db", "turn_deg"} or (value != 0 and measure != "score"):
             texts.append(f"{label} {value:.3g} {unit}".strip())
     how = " (phones recognised)" if seen.is_recognised else ""
-    return _item(seen.name, note("; ".join(texts) + how) + utterance_curves(seen), picture)
+    return _item(seen.name, note_paragraph("; ".join(texts) + how) + utterance_curves(seen), picture)
 
 
 def _item(name: str, content: str, picture: NDArray[np.uint8] | None) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.evaluation.evaluate import SplitResult
 from corpus_tools.evaluation.reference import ReferenceUtterance
-from corpus_tools.report.page import note
+from corpus_tools.report.page import note_paragraph
 from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
@@ -28,7 +28,7 @@ SETTINGS = {"crf": "26", "preset": "veryfast"}  # some 100 kB a sentence
 NOTE = "Left: the recording; right: {method} on the default head. No sound."
 
 
-class Films:
+class MethodVideos:
     """Films of the motion that one method synthesised; the head is loaded with the first film."""
 
     def __init__(self, method: str) -> None:
@@ -43,10 +43,10 @@ class Films:
     def _renderer(self) -> MeshRenderer:
         return mesh_renderer(self._face, Picture(size=f"{SIDE_PX}x{SIDE_PX}", camera="close"))
 
-    def film(self, run: SplitResult, at: int) -> str:
+    def render_tag(self, run: SplitResult, at: int) -> str:
         """A film of one utterance (HTML); empty where its video is missing or shows too few pictures."""
         one = run.real[at]
-        seen = list(pictures_of(one))
+        seen = list(judged_pictures(one))
         if len(seen) < one.judged.stop - one.judged.start:
             return ""
         speech = Trajectory(speech_channels(run.model), run.made[self._method][at], one.observation.fps)
@@ -55,10 +55,10 @@ class Films:
             np.concatenate([letterbox(pixels), self._renderer.draw(row)], axis=1)
             for pixels, row in zip(seen, weights[one.judged], strict=False)
         ]
-        return film_tag(sides, one.observation.fps, NOTE.format(method=self._method))
+        return video_tag(sides, one.observation.fps, NOTE.format(method=self._method))
 
 
-def pictures_of(one: ReferenceUtterance) -> Iterator[NDArray[np.uint8]]:
+def judged_pictures(one: ReferenceUtterance) -> Iterator[NDArray[np.uint8]]:
     """The pictures of an utterance's judged frames; fewer where the video cannot be read."""
     seen = one.observation
     instants = seen.quality.cut + (np.arange(one.judged.start, one.judged.stop) - 0.5) / seen.fps
@@ -85,7 +85,7 @@ def letterbox(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(square)
 
 
-def film_tag(pictures: Sequence[NDArray[np.uint8]], fps: float, text: str) -> str:
+def video_tag(pictures: Sequence[NDArray[np.uint8]], fps: float, text: str) -> str:
     """A silent film that repeats inside the page, with a note below it."""
     import av
 
@@ -100,5 +100,5 @@ def film_tag(pictures: Sequence[NDArray[np.uint8]], fps: float, text: str) -> st
     data = b64encode(content.getvalue()).decode()
     return (
         f'<video autoplay loop muted playsinline controls width="{width}" height="{height}" '
-        f'src="data:video/mp4;base64,{data}"></video>\n{note(text)}'
+        f'src="data:video/mp4;base64,{data}"></video>\n{note_paragraph(text)}'
     )

@@ -55,7 +55,7 @@ def cluster_tree(distance: NDArray[np.floating]) -> Tree:
     return Tree(np.asarray(links, np.float64), leaves_list(links).astype(np.int64))
 
 
-def cut(tree: Tree, n_classes: int) -> NDArray[np.int64]:
+def cut_into_classes(tree: Tree, n_classes: int) -> NDArray[np.int64]:
     """(P,) class of each phone when the tree is cut into exactly `n_classes`, numbered in the dendrogram's order.
 
     Raises
@@ -72,7 +72,7 @@ def cut(tree: Tree, n_classes: int) -> NDArray[np.int64]:
 
 
 def check_classes(n_classes: int, n_phones: int) -> None:
-    """Check a number of classes; errors as `cut`."""
+    """Check a number of classes; errors as `cut_into_classes`."""
     if not 2 <= n_classes <= n_phones:
         raise InputError(f"{n_phones} phones cannot make {n_classes} classes; give a number from 2 to {n_phones}")
 
@@ -103,8 +103,8 @@ def silhouettes(distance: NDArray[np.floating], labels: NDArray[np.integer]) -> 
 
 
 def viseme_classes(distance: NDArray[np.floating], tree: Tree, n_classes: int) -> VisemeClasses:
-    """The classes of a cut and their silhouettes; errors as `cut`."""
-    labels = cut(tree, n_classes)
+    """The classes of a cut and their silhouettes; errors as `cut_into_classes`."""
+    labels = cut_into_classes(tree, n_classes)
     return VisemeClasses(labels, silhouettes(distance, labels))
 
 

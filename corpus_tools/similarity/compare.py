@@ -25,7 +25,7 @@ class Comparison:
     agreement: Agreement
     left_out: tuple[str, ...]
 
-    def largest(self, n: int = 10) -> list[tuple[str, str, float]]:
+    def largest_differences(self, n: int = 10) -> list[tuple[str, str, float]]:
         """The n pairs that differ most: phone, phone, difference."""
         rows, columns = np.triu_indices(len(self.phones), 1)
         sizes = self.difference[rows, columns]
@@ -46,13 +46,13 @@ def compare_tables(one: SimilarityTable, two: SimilarityTable, other: str, strea
         raise InputError(
             f"the talkers share {len(common)} phones, and a comparison needs {LEAST_PHONES}; compare others"
         )
-    a, b = _among(one, common), _among(two, common)
+    a, b = _select_phones(one, common), _select_phones(two, common)
     difference = a - b
     per_phone = np.abs(difference).sum(axis=1) / (len(common) - 1)
     apart = sorted({*one.phones, *two.phones} - set(common))
     return Comparison(other, common, difference, per_phone, mantel(a, b, stream), tuple(apart))
 
 
-def _among(table: SimilarityTable, phones: tuple[str, ...]) -> NDArray[np.float64]:
+def _select_phones(table: SimilarityTable, phones: tuple[str, ...]) -> NDArray[np.float64]:
     at = [table.phones.index(phone) for phone in phones]
     return table.matrix[np.ix_(at, at)]

@@ -12,8 +12,8 @@ from corpus_tools.report.drawing import FIRST, INK, RULE, SECOND, SOFT, Tip, dra
 from corpus_tools.similarity.analysis import Analysis
 from corpus_tools.similarity.classes import cluster_tree
 from corpus_tools.similarity.compare import Comparison
-from corpus_tools.similarity.labels import label
 from corpus_tools.similarity.mantel import upper_triangle
+from corpus_tools.similarity.tokens import phone_label
 from lexicon.phones import look_up_phone
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def similarity_figure(found: Analysis, labels: str) -> TableFigure:
     starts = [0, *(np.flatnonzero(np.diff(found.best.labels[order])) + 1).tolist(), n]
     return TableFigure(
         f"Similarity of phones: {found.name}",
-        tuple(label(found.table.phones[at], labels) for at in order),
+        tuple(phone_label(found.table.phones[at], labels) for at in order),
         found.table.matrix[np.ix_(order, order)],
         LIKENESS,
         (0.0, 1.0),
@@ -86,7 +86,7 @@ def difference_figure(found: Analysis, compared: Comparison, labels: str) -> Tab
     largest = max(0.1, float(np.ceil(np.abs(compared.difference).max() * 10) / 10))
     return TableFigure(
         f"{found.name} minus {compared.other}",
-        tuple(label(compared.phones[at], labels) for at in order),
+        tuple(phone_label(compared.phones[at], labels) for at in order),
         compared.difference[np.ix_(order, order)],
         DIFFERENCE,
         (-largest, largest),
@@ -194,7 +194,7 @@ def articulation_svg(found: Analysis, labels: str) -> str:
         axes.set_xlim(0, apart.max() * 1.03)
         axes.legend(loc="upper right")
         return [
-            Tip(axes, x, y, f"{label(phones[a], labels)} – {label(phones[b], labels)}: {y:.3f}")
+            Tip(axes, x, y, f"{phone_label(phones[a], labels)} – {phone_label(phones[b], labels)}: {y:.3f}")
             for a, b, x, y in zip(rows, columns, apart, alike, strict=True)
         ]
 

@@ -94,7 +94,7 @@ def split_half(
         sizes.append(int(enough.sum()))
     if not rows:
         return None
-    per_phone = _mean_of_known(np.array(rows))
+    per_phone = _nan_mean(np.array(rows))
     left_out = tuple(phone for phone, r in zip(phones, per_phone, strict=True) if np.isnan(r))
     return Reliability(np.array(correlations), np.array(sizes), phones, per_phone, left_out, n_halves)
 
@@ -112,7 +112,7 @@ def _agreement(
     return rows, pearson(upper_triangle(a), upper_triangle(b))
 
 
-def _mean_of_known(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def _nan_mean(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     known = ~np.isnan(rows)
     n = known.sum(axis=0)
     return np.where(n > 0, np.where(known, rows, 0.0).sum(axis=0) / np.maximum(n, 1), np.nan)

@@ -51,7 +51,7 @@ class SimilarityTable:
     silence: NDArray[np.float64]
 
 
-def spoken_tokens(talker: Talker, name: str) -> SpokenTokens:
+def collect_spoken_tokens(talker: Talker, name: str) -> SpokenTokens:
     """Tokens of a talker.
 
     Raises
@@ -73,10 +73,12 @@ def spoken_tokens(talker: Talker, name: str) -> SpokenTokens:
             f"{2 * LEAST_TOKENS} times or more; the analysis needs 2 utterances and {LEAST_PHONES} such phones: "
             "record more"
         )
-    return SpokenTokens(tokens.inventory, token_samples(tokens), tokens.phone, tokens.utterance, _words(talker), spread)
+    return SpokenTokens(
+        tokens.inventory, token_samples(tokens), tokens.phone, tokens.utterance, _word_numbers(talker), spread
+    )
 
 
-def _words(talker: Talker) -> NDArray[np.int64]:
+def _word_numbers(talker: Talker) -> NDArray[np.int64]:
     """(N,) number of the word, by its text, to which each token belongs."""
     numbers: dict[str, int] = {}
     made = []
@@ -111,3 +113,20 @@ def similarity_table(spoken: SpokenTokens, chosen: NDArray[np.bool_] | None = No
         found.matrix[np.ix_(order, order)],
         found.matrix[order, silence],
     )
+
+
+LABELS = ("both", "ipa", "arpabet")
+
+
+def check_labels(labels: str) -> None:
+    """Check a kind of label; `InputError` where it is none of `LABELS`."""
+    if labels not in LABELS:
+        raise InputError(f"phones are labelled in {', '.join(LABELS[1:])} or {LABELS[0]}, not {labels!r}")
+
+
+def phone_label(phone: str, labels: str) -> str:
+    """A phone in IPA, in ARPABET, or in both: ``tʃ CH``; IPA where ARPABET has no name."""
+    name = look_up_phone(phone).arpabet
+    if not name or labels == "ipa":
+        return phone
+    return name if labels == "arpabet" else f"{phone} {name}"

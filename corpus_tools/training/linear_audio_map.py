@@ -31,7 +31,7 @@ class TrainingUtterance:
 class TrainingData:
     """Lessons as numbers: standardised windows (N, W), parameters (N, S), and the features' mean and spread."""
 
-    heard: NDArray[np.float32]
+    features: NDArray[np.float32]
     targets: NDArray[np.float32]
     mean: NDArray[np.float32]
     spread: NDArray[np.float32]
@@ -48,8 +48,8 @@ def learn_linear_map(
         There are not more frames than numbers in a window, or nothing moves.
     """
     material = build_training_data(lessons, before, after)
-    factors = canonical_correlation(material.heard, material.targets)
-    projected = (material.heard - factors.mean_a) @ factors.weights_a  # eq. 6
+    factors = canonical_correlation(material.features, material.targets)
+    projected = (material.features - factors.mean_a) @ factors.weights_a  # eq. 6
     offsets = material.targets - factors.mean_b
     mapping = np.linalg.lstsq(projected, offsets, rcond=None)[0].T  # eq. 7
     inner = factors.weights_a.T

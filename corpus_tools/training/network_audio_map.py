@@ -73,7 +73,7 @@ def learn_network_map(lessons: Sequence[TrainingUtterance], *, feature: str, opt
         for one in (material.targets, np.concatenate([one.parameters for one in aside]))
     )
     checked = TrainingData(heard, seen_aside, material.mean, material.spread)
-    layers = _train_layers(TrainingData(material.heard, seen, material.mean, material.spread), checked, options, rng)
+    layers = _train_layers(TrainingData(material.features, seen, material.mean, material.spread), checked, options, rng)
     inner, bias, outer, offset = layers
     moved = np.tanh(heard @ inner.T + bias) @ outer.T
     gain = float(np.sqrt(seen_aside.var(axis=0).sum() / moved.var(axis=0).sum())) ** options.articulation
@@ -101,7 +101,7 @@ def _train_layers(
 
     minimize: Any = scipy.optimize.minimize  # its stubs know no gradient that comes with the value
 
-    n_inputs, n_outputs = material.heard.shape[1], material.targets.shape[1]
+    n_inputs, n_outputs = material.features.shape[1], material.targets.shape[1]
     shapes = ((options.n_hidden, n_inputs), (options.n_hidden,), (n_outputs, options.n_hidden), (n_outputs,))
     start = [
         rng.normal(0.0, 1.0 / np.sqrt(n_inputs), shapes[0]),
@@ -118,7 +118,9 @@ def _train_layers(
     first = np.concatenate([layer.ravel() for layer in start])
 
     def error(weights: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-        return loss_and_gradient(unpack_layers(weights, shapes), material.heard, material.targets, options.weight_decay)
+        return loss_and_gradient(
+            unpack_layers(weights, shapes), material.features, material.targets, options.weight_decay
+        )
 
     minimize(
         error,
@@ -142,7 +144,7 @@ class _EarlyStopping:
 
     def should_stop(self, weights: NDArray[np.float64], layers: Layers) -> bool:
         """Look at new weights; true when none was better for `PATIENCE` steps."""
-        error = loss_and_gradient(layers, self._validation.heard, self._validation.targets, 0.0)[0]
+        error = loss_and_gradient(layers, self._validation.features, self._validation.targets, 0.0)[0]
         self._n_stalled += 1
         if error < self._error:
             self._error, self._n_stalled, self.weights = error, 0, weights.copy()

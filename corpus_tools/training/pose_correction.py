@@ -47,7 +47,7 @@ class PoseCorrection:
     scale: Floats
     offsets: Floats
 
-    def removed(self, observation: AnyPosedLandmarks) -> AnyPosedLandmarks:
+    def apply(self, observation: AnyPosedLandmarks) -> AnyPosedLandmarks:
         """The observation with landmarks as if the head stood at the centre."""
         if not self.offsets.any():
             return observation
@@ -82,7 +82,7 @@ def _keep_lip_contact(offsets: Floats) -> Floats:
 def correct_pose(observations: Sequence[AnyPosedLandmarks]) -> tuple[AnyPosedLandmarks, ...]:
     """Observations of one person without the leak that they show."""
     leak = fit_pose_correction(observations) if observations else None
-    return tuple(leak.removed(seen) for seen in observations) if leak else ()
+    return tuple(leak.apply(seen) for seen in observations) if leak else ()
 
 
 def angle_terms(angles: NDArray[np.floating]) -> Floats:

@@ -13,8 +13,8 @@ from corpus_tools.decomposition.capture import (
     resample,
     resample_to_gesture_rate,
 )
+from corpus_tools.decomposition.capture_files import read_livelink_recording
 from corpus_tools.decomposition.face_motion import moved_landmarks, rest_landmarks
-from corpus_tools.decomposition.livelink import read_livelink_recording
 from corpus_tools.decomposition.video import read_sound_span
 from lexicon.errors import DataError, InputError
 from tts2face.face.deformation import posed_vertices

@@ -4,8 +4,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from corpus_tools.recordings.subtitles import Cue
-from corpus_tools.transcripts.decoding import read_text
+from corpus_tools.recordings.subtitles import SUBTITLE_FORMATS, Cue, read_cues, read_text
 from lexicon.errors import DataError
 
 SILENT_LABELS = frozenset({"", "sil", "sp", "spn", "<p:>", "<sil>", "pau", "#"})
@@ -61,3 +60,54 @@ def _parse_cue(start: str | float, end: str | float, label: str | float) -> Cue:
     if not isinstance(label, str) or not 0 <= float(start) < float(end):
         raise ValueError(label)
     return Cue(float(start), float(end), label.strip())
+
+
+UNITS_PER_S = 25_000  # Cooke et al. 2006: samples of the 25 kHz sound
+
+
+def read_word_times(path: Path) -> tuple[Cue, ...]:
+    """The words of an .align file with their times, without silences.
+
+    Raises
+    ------
+    DataError
+        A line is not start, end and word, or there is no word.
+    """
+    cues = []
+    for number, line in enumerate(read_text(path).splitlines(), start=1):
+        fields = line.split()
+        if not fields:
+            continue
+        if len(fields) != 3 or not (fields[0].isdecimal() and fields[1].isdecimal()):
+            raise DataError(f"{path}, line {number}: {line[:60]!r} is not start, end and word; mend it")
+        if fields[2].lower() not in SILENT_LABELS:
+            cues.append(Cue(int(fields[0]) / UNITS_PER_S, int(fields[1]) / UNITS_PER_S, fields[2]))
+    if not cues:
+        raise DataError(f"{path} holds no word; check the file")
+    return tuple(cues)
+
+
+TEXT_SUFFIX = ".txt"
+READERS = {".textgrid": read_textgrid, ".align": read_word_times, **dict.fromkeys(SUBTITLE_FORMATS, read_cues)}
+
+
+def find_transcript(video: Path) -> Path | None:
+    """The transcript beside a video: text before TextGrid, word times and subtitles; None without one."""
+    beside = {path.suffix.lower(): path for path in sorted(video.parent.iterdir()) if path.stem == video.stem}
+    return next((beside[suffix] for suffix in (TEXT_SUFFIX, *READERS) if suffix in beside), None)
+
+
+def read_transcript(transcript: Path) -> str:
+    """All words of a transcript, in order.
+
+    Raises
+    ------
+    DataError
+        It cannot be read or holds no word.
+    BackendError
+        A package that reads it is missing.
+    """
+    suffix = transcript.suffix.lower()
+    if suffix == TEXT_SUFFIX:
+        return read_text(transcript)
+    return " ".join(cue.text for cue in READERS[suffix](transcript))
