@@ -12,7 +12,7 @@ ISLANDS_TOP = 0.815  # v at which the layout of the shipped heads has mouth, nec
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Texels:
-    """Pixels of the texture that lie on the surface: rows and columns (P,), and a triangle's corners and weights."""
+    """Texels on the surface: rows and columns (P,), corners and barycentric weights in their triangles (P, 3)."""
 
     rows: NDArray[np.int64]
     columns: NDArray[np.int64]
@@ -20,13 +20,13 @@ class Texels:
     weights: Floats
 
     def interpolate(self, values: Floats) -> Floats:
-        """Values (N, D) of vertices brought to the texels, (P, D)."""
-        found: Floats = np.einsum("pk,pkd->pd", self.weights, values[self.corners])
-        return found
+        """(P, D) values at the texels, interpolated from vertex values (N, D)."""
+        interpolated: Floats = np.einsum("pk,pkd->pd", self.weights, values[self.corners])
+        return interpolated
 
 
 def find_texels(uv: Floats, triangles: NDArray[np.int64], side: int) -> Texels:
-    """The texels whose centres lie in a triangle; the last triangle wins."""
+    """The texels whose centres lie in a triangle; where triangles overlap, in the last one."""
     places = uv * side - 0.5
     owner = np.full((side, side), -1)
     for number, corners in enumerate(places[triangles]):

@@ -1,4 +1,4 @@
-"""The study as a page."""
+"""HTML page of a gesture study."""
 
 from collections.abc import Iterable
 from html import escape
@@ -47,7 +47,7 @@ def _method(found: GestureStudy) -> str:
     options = found.options
     return note_paragraph(
         f"One in {options.one_in} recordings is held out (seed {options.seed}). Fields are built from the others and "
-        "driven by the intensity of the held-out ones; noise does not depend on the sound. "
+        "sampled for the intensity of the held-out ones; noise does not depend on the sound. "
         f"{options.clips} clips of each, and for measured styles one of the published fields (ju2008: Ju and Lee 2008, "
         "section 5.1), are cut to the recordings' lengths, so that all have the same borders. "
         f"Distances are Wasserstein distances (W) in the trait's unit: between {options.halves} random halves of the "
@@ -65,7 +65,7 @@ def _style(found: StyleStudy) -> list[str]:
         _origin(found),
         _distances(found),
         "<h3>Distributions</h3>",
-        note_paragraph("Values beyond a plot count in its first or last bin."),
+        note_paragraph("Values outside a plot count in its first or last bin."),
         _panels(distribution_panel(found, one) for ones in by_feature.values() for one in ones),
         "<h3>Spectra, sound, seeds</h3>",
         _motion_table(found),
@@ -83,7 +83,7 @@ def _origin(found: StyleStudy) -> str:
             f"Blinks per minute, {found.source} / field / noise: {rates}.",
         )
     held = (
-        f"{found.n_training} recordings learnt from, {found.n_held_out} held out."
+        f"{found.n_training} training recordings, {found.n_held_out} held out."
         if found.is_held_out
         else f"{found.n_training} recordings, too few to hold any out: compared with the recordings of the fields."
     )

@@ -1,4 +1,4 @@
-"""The study as numbers for other programs: one line for each trait as CSV, all figures as JSON."""
+"""Export of a gesture study: one line for each trait as CSV, all figures as JSON."""
 
 import csv
 import json

@@ -1,4 +1,4 @@
-"""The traits of gestures that are compared: a number for each frame, or for each blink, of a recording."""
+"""Traits of gestures that are compared: a number for each frame or each blink of a recording."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ IN_DEGREES = 180.0 / np.pi
 
 @dataclass(frozen=True, slots=True)
 class Trait:
-    """A name, its unit, its feature, and how it is computed from a recording's motion (T, k).
+    """A trait: its name, unit and feature, and the function that computes it from a recording's motion (T, k).
 
-    A field must keep the traits with a target near the recorded ones (docs/gestures.md).
+    Fields must reproduce the recorded distribution of traits with a target (docs/gestures.md).
     """
 
     name: str

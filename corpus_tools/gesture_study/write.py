@@ -1,4 +1,4 @@
-"""Write the study of a palette as a page, tables or a picture."""
+"""Write the study of a palette as HTML, JSON, CSV or PNG."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -35,9 +35,7 @@ def write_gestures(palette: str, out: Path, options: Options, *, on_progress: Pr
 
 def _summary_png(found: GestureStudy) -> bytes:
     first = found.styles[0]
-    return panels_png(
-        f"Gestures of {first.name}: recorded, by its fields, by noise, by published fields", summary_panels(first)
-    )
+    return panels_png(f"Gestures of {first.name}: recordings, fields, noise, published fields", summary_panels(first))
 
 
 WRITERS: Mapping[str, Callable[[GestureStudy], bytes]] = MappingProxyType(

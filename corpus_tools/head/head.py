@@ -1,4 +1,4 @@
-"""The head: its pieces for any identity, in one order, so that vertex for vertex they are the same."""
+"""The head: the pieces of any identity in a fixed order, so that their vertices correspond."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -25,14 +25,14 @@ from corpus_tools.head.texture import HeadColours
 Floats = NDArray[np.float64]
 
 SKIN_MATERIAL = {"specular": 0.16, "shininess": 14.0, "wrap": 0.35, "textured": True}
-HAIR_PART_SHARE = 0.66  # of a quad that counts as hair; below it the hairline is painted on skin
-PIVOT = np.array([0.0, -75.0, -95.0])  # where the skull sits on the neck
+HAIR_PART_SHARE = 0.66  # of a quad that counts as hair; below it hair is only in the texture
+PIVOT = np.array([0.0, -75.0, -95.0])  # where the skull meets the neck
 ADULT = {
     "macrodetails/caucasian-female-young": 1.0,
     "macrodetails/universal-female-young-averagemuscle-averageweight": 1.0,
 }
 JAW_SHAPES = ("jawOpen", "jawForward", "jawLeft", "jawRight")
-TONGUE_DROP_MM = 2.5  # MakeHuman's tongue stands up to the upper teeth and hides them when the jaw opens
+TONGUE_DROP_MM = 2.5  # MakeHuman's tongue reaches the upper teeth and hides them when the jaw opens
 TONGUE_FLATTENING = 0.75
 TONGUE_COLOUR, TONGUE_ROOT_COLOUR = np.array([0.72, 0.36, 0.36]), np.array([0.40, 0.13, 0.14])
 TONGUE_MATERIAL = {"specular": 0.35, "shininess": 30.0, "wrap": 0.3}
@@ -45,12 +45,12 @@ class Jaw:
     motions: Mapping[str, tuple[Floats, Floats]]
 
     def shapes(self, points: Floats) -> dict[str, Floats]:
-        """Displacements (N, 3) by shape of points (N, 3) that are fixed to the lower jaw."""
+        """Displacements (N, 3) by shape of points (N, 3) that move with the lower jaw."""
         return {name: points @ turn.T + shift - points for name, (turn, shift) in self.motions.items()}
 
 
 def fit_jaw(cage: Cage) -> Jaw:
-    """The lower jaw of a cage."""
+    """Rigid motion of a cage's lower jaw, fitted to MakeHuman's lower teeth."""
     teeth = cage.group("helper-lower-teeth")
     rest = cage.vertices[teeth]
     return Jaw({name: fit_rotation(rest, rest + cage.units[name][teeth]) for name in JAW_SHAPES})
@@ -76,7 +76,7 @@ def tongue_piece(cage: Cage, jaw: Jaw) -> Piece:
 
 @dataclass(frozen=True, slots=True)
 class HeadStyle:
-    """Everything about a head that is not its shape."""
+    """Colours, hair, eyes and material of a head: everything except its shape."""
 
     palette: HeadColours = field(default_factory=HeadColours)
     cut: Haircut = field(default_factory=Haircut)
@@ -88,7 +88,7 @@ class HeadStyle:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReferenceHead:
-    """The default identity, on whose skin is measured where paint, hair and shirt go."""
+    """The default identity, on whose skin texture, hair and shirt are defined."""
 
     cage: Cage
     skin: Skin
@@ -97,60 +97,60 @@ class ReferenceHead:
 
 
 def build_reference(cage: Cage) -> ReferenceHead:
-    """The ground that a default identity's cage gives."""
+    """The reference head of a default identity's cage."""
     skin = build_skin(cage)
     return ReferenceHead(cage, skin, build_shoulders(cage), lip_ring(skin))
 
 
-def assemble_head(cage: Cage, ground: ReferenceHead, look: HeadStyle) -> HeadPieces:
+def assemble_head(cage: Cage, reference: ReferenceHead, style: HeadStyle) -> HeadPieces:
     """Skin with hair, eyeballs, teeth, tongue, lashes, locks and shirt of a cage."""
     jaw = fit_jaw(cage)
-    balls = fit_eyeballs(cage, look.eyes)
-    skin = clear_eyeballs(correct_shapes(close_lips(build_skin(cage), ground.lips)), balls)
-    flesh, hairs = _flesh(skin, ground, look)
+    balls = fit_eyeballs(cage, style.eyes)
+    skin = clear_eyeballs(correct_shapes(close_lips(build_skin(cage), reference.lips)), balls)
+    flesh, hairs = _flesh(skin, reference, style)
     eyes = [
-        eyeball_piece(ball, side, look.eyes, _generator(look))
+        eyeball_piece(ball, side, style.eyes, _generator(style))
         for ball, side in zip(balls, ("Left", "Right"), strict=True)
     ]
     pieces = (
         flesh,
         *eyes,
-        *_teeth_pieces(cage, ground, jaw),
+        *_teeth_pieces(cage, reference, jaw),
         tongue_piece(cage, jaw),
-        lash_piece(cage, skin, _generator(look)),
+        lash_piece(cage, skin, _generator(style)),
         hairs,
-        shirt_piece(ground.shoulders, build_shoulders(cage), np.array(look.shirt)),
+        shirt_piece(reference.shoulders, build_shoulders(cage), np.array(style.shirt)),
     )
     return HeadPieces(pieces, (1, 2), balls, PIVOT)
 
 
-def _generator(look: HeadStyle) -> np.random.Generator:
-    return np.random.default_rng(look.seed)
+def _generator(style: HeadStyle) -> np.random.Generator:
+    return np.random.default_rng(style.seed)
 
 
-def _flesh(skin: Skin, ground: ReferenceHead, look: HeadStyle) -> tuple[Piece, Piece]:
-    """The skin, its scalp raised by the hair, and the loose locks."""
-    places = ground.skin.vertices
+def _flesh(skin: Skin, reference: ReferenceHead, style: HeadStyle) -> tuple[Piece, Piece]:
+    """The skin with the scalp raised by the hair, and the loose locks."""
+    places = reference.skin.vertices
     share = hair_share(places)
     normals = vertex_normals(skin.vertices, skin.quads, skin.base)
-    vertices = skin.vertices + hair_thickness(places, look.cut, _generator(look))[:, None] * normals
+    vertices = skin.vertices + hair_thickness(places, style.cut, _generator(style))[:, None] * normals
     has_hair = share[skin.quads].mean(axis=1) > HAIR_PART_SHARE
     spans = (
-        MaterialSpan("skin", triangulate(skin.quads[~has_hair]), look.skin_material),
+        MaterialSpan("skin", triangulate(skin.quads[~has_hair]), style.skin_material),
         MaterialSpan("hair", triangulate(skin.quads[has_hair]), HAIR_MATERIAL),
     )
-    colours = np.tile(np.array(look.palette.skin), (len(vertices), 1))
-    colours[np.unique(spans[1].triangles)] = look.palette.hair
-    hairs = lock_piece((vertices, normals, places), share, look.cut, np.array(look.palette.hair), _generator(look))
+    colours = np.tile(np.array(style.palette.skin), (len(vertices), 1))
+    colours[np.unique(spans[1].triangles)] = style.palette.hair
+    hairs = lock_piece((vertices, normals, places), share, style.cut, np.array(style.palette.hair), _generator(style))
     return Piece(vertices, spans, colours, skin.shapes, layout_coordinates(skin.source_uv)), hairs
 
 
-def _teeth_pieces(cage: Cage, ground: ReferenceHead, jaw: Jaw) -> tuple[Piece, Piece]:
+def _teeth_pieces(cage: Cage, reference: ReferenceHead, jaw: Jaw) -> tuple[Piece, Piece]:
     pieces = []
     for arch, name in ((UPPER, "upper"), (LOWER, "lower")):
         strip = cage.group(f"helper-{name}-teeth")
         piece = arch_piece(arch, name)
-        points = fit_teeth(piece.vertices, ground.cage.vertices[strip], cage.vertices[strip])
+        points = fit_teeth(piece.vertices, reference.cage.vertices[strip], cage.vertices[strip])
         moved = jaw.shapes(points) if name == "lower" else {}
         pieces.append(Piece(points, piece.spans, piece.colours, moved))
     return pieces[0], pieces[1]

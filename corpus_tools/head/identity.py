@@ -17,7 +17,7 @@ PLAIN: Tint = (1.0, 1.0, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """A preset: sex and age as MakeHuman's words, shares of ancestry, tints, further targets, and a summary."""
+    """A preset: sex and age in MakeHuman's terms, shares of ancestry, tints, further targets, and a summary."""
 
     summary: str
     sex: str
@@ -30,7 +30,7 @@ class Preset:
     more: Mapping[str, float] | None = None
 
     def targets(self) -> dict[str, float]:
-        """Weights of the targets."""
+        """Weight of each MakeHuman target."""
         found: dict[str, float] = dict(self.more or {})
         for age, share in self.ages.items():
             found[f"macrodetails/universal-{self.sex}-{age}-averagemuscle-averageweight"] = share
@@ -39,7 +39,7 @@ class Preset:
         return found
 
 
-BROWN, DARK = (0.72, 0.50, 0.36), (0.46, 0.31, 0.22)  # eyes; the drawn iris is light
+BROWN, DARK = (0.72, 0.50, 0.36), (0.46, 0.31, 0.22)  # eyes; the iris texture is light
 BLACK, BLOND, GREY = (0.45, 0.46, 0.52), (2.35, 2.75, 2.5), (2.0, 2.8, 3.8)  # hair
 YOUNG, MATURE, OLD, CHILD = {"young": 1.0}, {"young": 0.5, "old": 0.5}, {"old": 1.0}, {"child": 0.85, "young": 0.15}
 PRESETS: dict[str, Preset] = {
@@ -116,13 +116,13 @@ PRESETS: dict[str, Preset] = {
 
 
 def build_identities(
-    source: SourceMesh, ground: ReferenceHead, look: HeadStyle, default: HeadPieces
+    source: SourceMesh, reference: ReferenceHead, style: HeadStyle, default: HeadPieces
 ) -> dict[str, Identity]:
-    """Every preset as a displacement of the default head."""
+    """Each preset as a displacement of the default head."""
     rest = stack_vertices(default)
     found = {}
     for name, person in PRESETS.items():
-        own = stack_vertices(assemble_head(build_cage(source, person.targets()), ground, look))
+        own = stack_vertices(assemble_head(build_cage(source, person.targets()), reference, style))
         tints = {
             "skin": person.skin, "hair": person.hair, "hair_locks": person.hair, "iris": person.iris,
             "shirt": person.shirt, "gums_upper": _dampen_tint(person.skin), "gums_lower": _dampen_tint(person.skin),

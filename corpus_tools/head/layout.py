@@ -1,4 +1,4 @@
-"""The texture layout: MakeHuman's, its head enlarged so that eyes, nose and mouth get most pixels."""
+"""The texture layout: MakeHuman's, with the head enlarged so that eyes, nose and mouth get most pixels."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ HEAD_BOTTOM = 0.80  # v at which the rows of the head end; the other islands beg
 HEAD_BOX = ((0.638, 0.997), (0.145, 0.822))
 FACE = ((0.872, 0.055), (0.4835, 0.085))  # centre and half width along u and v
 FACE_GAIN = 4.0
-ISLANDS = {  # box in MakeHuman's layout -> place in this one, both (u low, u high, v low, v high)
+ISLANDS = {  # box in MakeHuman's layout -> box in this one, both (u low, u high, v low, v high)
     "mouth": ((0.75, 0.93, 0.0, 0.14), (0.005, 0.235, ISLANDS_TOP, 0.995)),
     "neck": ((0.15, 0.62, 0.80, 1.0), (0.245, 0.695, ISLANDS_TOP, 0.995)),
     "sockets": ((0.008, 0.155, 0.54, 0.64), (0.705, 0.995, ISLANDS_TOP, 0.995)),
@@ -33,7 +33,7 @@ def layout_coordinates(source_uv: Floats) -> Floats:
 
 
 def _stretch(values: Floats, box: tuple[float, float], face: tuple[float, float]) -> Floats:
-    """The box brought to 0..1, a bell about the face's centre taking more room; rises everywhere."""
+    """A box mapped monotonically to 0..1, with a higher density about the face's centre."""
     grid = np.linspace(box[0], box[1], 2001)
     density = 1.0 + FACE_GAIN * np.exp(-(((grid - face[0]) / face[1]) ** 4))
     share = np.concatenate([[0], np.cumsum((density[1:] + density[:-1]) / 2)])

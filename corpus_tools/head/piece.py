@@ -1,4 +1,4 @@
-"""A piece of a face under construction, and how pieces become a `Face`."""
+"""Pieces of a head, and their assembly into a `Face`."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

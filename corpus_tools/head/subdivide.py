@@ -1,4 +1,4 @@
-"""Catmull-Clark subdivision of a quad mesh as a matrix, so that shapes and texture coordinates follow for free."""
+"""Catmull-Clark subdivision of a quad mesh as a matrix, which also applies to shapes and texture coordinates."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ def catmull_clark(n_vertices: int, quads: NDArray[np.integer]) -> tuple[sparse.c
     Parameters
     ----------
     quads : (F, 4)
-        Every vertex belongs to one at least.
+        Every vertex belongs to at least one.
 
     Returns
     -------
@@ -54,7 +54,7 @@ def catmull_clark(n_vertices: int, quads: NDArray[np.integer]) -> tuple[sparse.c
 
 
 def triangulate(quads: NDArray[np.integer]) -> NDArray[np.int64]:
-    """(2 F, 3) triangles of (F, 4) quads, wound alike."""
+    """(2 F, 3) triangles of (F, 4) quads, with the same winding."""
     return np.stack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]], axis=1).reshape(-1, 3).astype(np.int64)
 
 
@@ -66,7 +66,7 @@ def _edges(quads: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.in
 
 
 def _averages(rows: NDArray[np.integer], columns: NDArray[np.integer], shape: tuple[int, int]) -> sparse.csr_array:
-    """Each row the mean of its columns."""
+    """Matrix whose rows average their columns."""
     counts = np.bincount(rows, minlength=shape[0])
     return sparse.csr_array((1.0 / counts[rows], (rows, columns)), shape=shape)
 

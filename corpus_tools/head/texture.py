@@ -1,4 +1,4 @@
-"""The skin's texture, painted by rule: every texel knows its place on the head, so seams do not show."""
+"""Procedural texture of the skin and brows, computed per texel from its 3-D position, so that it has no seams."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -24,7 +24,7 @@ THICK_MM = np.array([5.6, 6.6, 5.8, 4.6, 3.2, 1.4])  # across the line, at the p
 
 
 def brow_cover(places: Floats, generator: np.random.Generator, thickness: float = 1.0) -> Floats:
-    """(P,) cover by brow hairs at places (P, 3), mm; both sides, not quite alike."""
+    """(P,) coverage by brow hairs at positions (P, 3), mm; the two sides are drawn independently."""
     cover = np.zeros(len(places))
     in_front = places[:, 2] > 0
     for side in (1.0, -1.0):
@@ -55,7 +55,7 @@ def _hairs(generator: np.random.Generator, thickness: float) -> tuple[Floats, Fl
 
 
 def _shadow(flat: Floats, thickness: float) -> Floats:
-    """Soft body of the brow under the hairs."""
+    """(P,) soft shading of the brow under the hairs."""
     x = flat[:, 0]
     off = np.abs(flat[:, 1] - np.interp(x, ARCH[:, 0], ARCH[:, 1]) - 0.6)
     thick = thickness * np.interp(x, ARCH[:, 0], THICK_MM) / 2
@@ -66,7 +66,7 @@ def _shadow(flat: Floats, thickness: float) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class HeadColours:
-    """Colours, sRGB 0..1, and how strongly the skin varies (1 is natural, 0 flat)."""
+    """Colours, sRGB 0..1, and the strength of the skin's variation (1 natural, 0 flat)."""
 
     skin: tuple[float, float, float] = (0.815, 0.625, 0.535)
     lips: tuple[float, float, float] = (0.70, 0.40, 0.375)
@@ -76,7 +76,7 @@ class HeadColours:
     brow_thickness: float = 1.0
 
 
-# Places (|x|, y, z) and reach in mm, then what is multiplied in at full strength: the blood and the shadows of a face.
+# Positions (|x|, y, z) and radii in mm, then the colour factor at full strength: blood and shadows of a face.
 TINTS = (
     ((39, -27, 15), (17, 15, 30), (1.01, 0.885, 0.90)),  # cheeks
     ((0, -40, 40), (12, 10, 16), (1.00, 0.88, 0.88)),  # tip of the nose
@@ -180,7 +180,7 @@ def _sample_mask(mask: Floats, where: Floats) -> Floats:
 
 
 def _fill_gaps(rows: NDArray[np.int64], columns: NDArray[np.int64], colour: Floats) -> NDArray[np.uint8]:
-    """The picture, texels off the surface taking the nearest colour on it."""
+    """The texture; texels off the surface take the nearest colour on it."""
     picture = np.zeros((SIDE, SIDE, 3))
     known = np.zeros((SIDE, SIDE), bool)
     picture[rows, columns], known[rows, columns] = colour, True

@@ -1,4 +1,4 @@
-"""An HTML page that holds everything it shows."""
+"""Building blocks of self-contained HTML pages, and the choice of a report's format by its suffix."""
 
 from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
@@ -42,7 +42,7 @@ def page(title: str, parts: Iterable[str]) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Iterable[int] = ()) -> str:
-    """A table of texts; the columns in `numbers` are aligned to the right."""
+    """A table of strings; the columns in `numbers` are aligned to the right."""
     right = set(numbers)
 
     def row(cells: Sequence[str], tag: str) -> str:
@@ -63,7 +63,7 @@ def note_paragraph(sentence: str) -> str:
 
 
 def scroll_box(element: str) -> str:
-    """An element that scrolls sideways where the window is narrower."""
+    """An element that scrolls horizontally in narrow windows."""
     return f'<div class="wide">{element}</div>'
 
 
@@ -80,24 +80,24 @@ def picture_tag(pixels: NDArray[np.uint8], height: int) -> str:
 
 
 Writer = TypeVar("Writer")
-DRAWN = (".html", ".png")  # kinds of file that hold plots
+PLOT_SUFFIXES = (".html", ".png")  # kinds of file that hold plots
 
 
 def report_writer(out: Path, writers: Mapping[str, Writer]) -> Writer:
-    """The writer for a file's suffix; checked before the work begins.
+    """The writer for a file's suffix; checks the path before the analysis starts.
 
     Raises
     ------
     InputError
         There is no writer for the suffix, or no folder for the file.
     BackendError
-        The file has plots, and matplotlib is not installed.
+        The format contains plots and matplotlib is not installed.
     """
     suffix = out.suffix.lower()
     if suffix not in writers:
-        raise InputError(f"a report is written as {', '.join(writers)}, not {out.name}")
+        raise InputError(f"a report cannot be written as {out.name}; choose one of {', '.join(writers)}")
     if not out.parent.is_dir():
         raise InputError(f"there is no folder {out.parent}; make it or choose another")
-    if suffix in DRAWN:
+    if suffix in PLOT_SUFFIXES:
         load_matplotlib()
     return writers[suffix]

@@ -12,7 +12,7 @@ from lexicon.errors import InputError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """Two tables over the P phones that both have.
+    """Comparison of two tables over their P common phones.
 
     ``difference`` (P, P) is the first talker's similarity minus the other's; ``per_phone`` (P,) the mean size of a
     phone's differences; ``left_out`` are phones of one talker only.
@@ -39,12 +39,12 @@ def compare_tables(one: SimilarityTable, two: SimilarityTable, other: str, strea
     Raises
     ------
     InputError
-        They share fewer than `LEAST_PHONES` phones.
+        They have fewer than `LEAST_PHONES` phones in common.
     """
     common = tuple(phone for phone in one.phones if phone in two.phones)
     if len(common) < LEAST_PHONES:
         raise InputError(
-            f"the talkers share {len(common)} phones, and a comparison needs {LEAST_PHONES}; compare others"
+            f"the talkers have {len(common)} phones in common; a comparison needs {LEAST_PHONES}; choose another talker"
         )
     a, b = _select_phones(one, common), _select_phones(two, common)
     difference = a - b

@@ -1,4 +1,4 @@
-"""The analysis as a page for people who study visual speech."""
+"""HTML page of a similarity analysis."""
 
 from collections.abc import Sequence
 from html import escape
@@ -30,7 +30,7 @@ def similarity_page(found: Analysis, labels: str) -> str:
     parts = [
         _summary(found),
         "<h2>Phone by phone</h2>",
-        note_paragraph("Without silence. Point at a cell for its number."),
+        note_paragraph("Without silence. Hover over a cell for its value."),
         scroll_box(table_svg(similarity_figure(found, labels))),
         "<h2>Most similar phones</h2>",
         note_paragraph(
@@ -70,7 +70,7 @@ def _neighbours(found: Analysis, labels: str) -> str:
             str(count),
             *(f"{phone_label(near, labels)} {value:.3f}" for near, value in ranked),
             f"{silence:.2f}",
-            f"{agreement:.2f}" if np.isfinite(agreement) else f"under {LEAST_TOKENS} tokens a half",
+            f"{agreement:.2f}" if np.isfinite(agreement) else f"under {LEAST_TOKENS} tokens per half",
         )
         for phone, count, ranked, silence, agreement in zip(
             found.table.phones,
@@ -99,7 +99,7 @@ def _classes(found: Analysis, labels: str) -> list[str]:
     return [
         note_paragraph(
             "Average linkage on 1 - similarity, cut into the given number of classes. A phone's silhouette is near 1 "
-            "where it is similar to its own class and dissimilar to the nearest other; 0 for a phone alone."
+            "if it is similar to its own class and dissimilar to the nearest other; 0 for a single phone."
         ),
         silhouettes_svg(found),
         table(("classes", "silhouette", "phones"), rows, numbers=(1,)),
@@ -133,8 +133,8 @@ def _reliability(found: Analysis, labels: str) -> list[str]:
         note_paragraph(
             f"The corpus is split in two at random, {found.options.halves} times; a table is computed from each half, "
             "and the two are correlated over the pairs of phones. Halves of the utterances contain the same words: "
-            "they measure what more recordings of the same kind would change. Halves of the words have no word in "
-            "common: they measure what other words would change."
+            "they measure the effect of more recordings of the same kind. Halves of the words have no word in "
+            "common: they measure the effect of other words."
         ),
         table(head, rows, numbers=range(1, 7)),
         paragraphs(*left),
@@ -157,11 +157,11 @@ def _articulation(found: Analysis, labels: str) -> list[str]:
     ]
     return [
         note_paragraph(
-            "Mantel test: correlation r of the distances on the face with those by articulatory features, and the "
+            "Mantel test: correlation r of the similarity distances with articulatory distances, and the "
             f"share p of {N_PERMUTATIONS} permutations with at least this r."
         ),
         table(("phones", "pairs", "r", "p"), agreements, numbers=(1, 2, 3)),
-        note_paragraph("One mark for each pair of phones; point at it for their names."),
+        note_paragraph("One mark for each pair of phones; hover over it for their names."),
         articulation_svg(found, labels),
     ]
 
@@ -176,19 +176,19 @@ def _consistency(found: Analysis, labels: str) -> list[str]:
     ]
     return [
         note_paragraph(
-            "Share of each movement's variance that the phones do not explain: that of context and chance. "
+            "Share of each movement's variance that the phones do not explain, that is, of context and noise. "
             "0: constant within each phone; 1: independent of the phone."
         ),
         shares_svg(movements.names, movements.free_share),
         note_paragraph(
-            "Phone by phone: spread within the phone over the spread in all speech. Blue: constrained, whatever the "
-            "context; yellow: as variable as all speech, or more. A phone that occurs in few words seems constrained "
-            "because its context is always the same."
+            "By phone: standard deviation within the phone relative to all speech. Blue: constrained in any "
+            "context; yellow: at least as variable as all speech. Phones in few words appear constrained because their "
+            "context is always the same."
         ),
         scroll_box(freedom_svg(names, movements.names, movements.free[order])),
         note_paragraph(
-            "The talker's own parameters, named by the movement of one spread of each (mm), with their spread (mm over "
-            "all landmarks together) and the share that the phones do not explain:"
+            "The talker's shape parameters, named by their movement at one standard deviation (mm), with their "
+            "standard deviation (mm over all landmarks) and the share that the phones do not explain:"
         ),
         table(("mode", "movement", "spread", "share"), rows, numbers=(0, 2, 3)),
     ]
@@ -214,7 +214,7 @@ def _comparison(found: Analysis, labels: str) -> list[str]:
         scroll_box(table_svg(difference_figure(found, compared, labels))),
         "<h2>Phones and pairs with the largest differences</h2>",
         table(("phone", "mean difference"), phones, numbers=(1,)),
-        note_paragraph("Pairs, with the sign of the difference:"),
+        note_paragraph("Pairs with signed differences:"),
         _pairs(compared, labels),
     ]
 

@@ -1,4 +1,4 @@
-"""The analysis as numbers for other programs: the matrix as CSV, all figures as JSON."""
+"""Export of an analysis: the matrix as CSV, all figures as JSON."""
 
 import csv
 import json
@@ -127,12 +127,12 @@ def _agreement(agreement: Agreement) -> dict[str, Any]:
     }
 
 
-def _consistency(found: Analysis, held: Consistency) -> dict[str, Any]:
+def _consistency(found: Analysis, consistency: Consistency) -> dict[str, Any]:
     return {
-        "names": list(held.names),
-        "spread_mm": _round_values(held.spread),
-        "free_share": _round_values(held.free_share),
-        "free": dict(zip(found.table.phones, _round_values(held.free), strict=True)),
+        "names": list(consistency.names),
+        "spread_mm": _round_values(consistency.spread),
+        "free_share": _round_values(consistency.free_share),
+        "free": dict(zip(found.table.phones, _round_values(consistency.free), strict=True)),
     }
 
 

@@ -1,4 +1,4 @@
-"""Write the analysis as a page, tables or a picture."""
+"""Write the analysis of a talker as HTML, JSON, CSV or PNG."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
