@@ -1,4 +1,4 @@
-"""Facial captures by their kind: Live Link Face tables, and markers as C3D or tables."""
+"""Facial capture files: Live Link Face tables, and markers as C3D or tables."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +22,7 @@ LIVELINK_FIRST_COLUMN = "timecode"  # first column of a Live Link Face table
 
 @dataclass(frozen=True, slots=True)
 class MarkerOptions:
-    """How markers are read: the table of their set, a recording of the person at rest, frames a second of tables."""
+    """Options of marker files: the table of the marker set, a recording of the person at rest, frame rate of tables."""
 
     marker_table: Path = DEFAULT_MARKER_TABLE
     neutral: Path | None = None
@@ -30,7 +30,7 @@ class MarkerOptions:
 
 
 def is_livelink(path: Path) -> bool:
-    """Whether a file begins as a Live Link Face table does."""
+    """Whether a file begins like a Live Link Face table."""
     if path.suffix.lower() != ".csv" or not path.is_file():
         return False
     with path.open("rb") as file:
@@ -38,9 +38,9 @@ def is_livelink(path: Path) -> bool:
 
 
 def read_capture_file(
-    path: Path, face: Face, *, sound: Path | None = None, worn: MarkerOptions | None = None
+    path: Path, face: Face, *, sound: Path | None = None, options: MarkerOptions | None = None
 ) -> FaceRecording:
-    """A capture of whichever kind, as landmarks; sound from the file, as given, or of the same name beside it.
+    """A facial capture as landmarks; its sound is that of the file, the given one, or a file of the same name.
 
     Raises
     ------
@@ -52,21 +52,23 @@ def read_capture_file(
         Reading C3D needs a package that is missing.
     """
     if path.suffix.lower() not in CAPTURE_SUFFIXES:
-        raise InputError(f"{path.name} is no facial capture; they are read from {', '.join(sorted(CAPTURE_SUFFIXES))}")
+        raise InputError(
+            f"{path.name} is not a facial capture; supported suffixes are {', '.join(sorted(CAPTURE_SUFFIXES))}"
+        )
     if is_livelink(path):
         return read_livelink_recording(path, face, sound=sound)
-    how = worn or MarkerOptions()
+    options = options or MarkerOptions()
     return read_marker_recording(
-        path, face, read_marker_set(how.marker_table), neutral=how.neutral, sound=sound, fps=how.fps
+        path, face, read_marker_set(options.marker_table), neutral=options.neutral, sound=sound, fps=options.fps
     )
 
 
-# Channels without which a feature is not told.
+# A feature is missing if no channel with one of these prefixes moves.
 FEATURE_CHANNELS = {"gaze": ("eyeLook",), "blink": ("eyeBlink",), "brows": ("brow",), "cheeks": ("cheek", "nose")}
 
 
 def read_livelink_recording(path: Path, face: Face, *, sound: Path | None = None) -> FaceRecording:
-    """A capture, in the size of the face that it moves; sound as `read_capture_sound` finds it.
+    """A Live Link capture in the size of `face`; sound as in `read_capture_sound`.
 
     Raises
     ------
@@ -90,9 +92,9 @@ def read_livelink_recording(path: Path, face: Face, *, sound: Path | None = None
 
 
 def eye_motion(face: Face, motion: Trajectory) -> NDArray[np.float32]:
-    """(T, 4) shares by which both lids are shut, and pitch and yaw of the eyes, of weights (T, K) of a face's shapes.
+    """(T, 4) closures of both lids, and pitch and yaw of the eyes, from weights (T, K) of a face's shapes.
 
-    The capture's own measure: its lids are shut at 1, wherever those of the face meet.
+    Lids are closed at weight 1, independent of the geometry of the face.
     """
     at = {name: number for number, name in enumerate(face.shape_names)}
     lids = [motion.values[:, at[f"eyeBlink{side}"]] for side in ("Left", "Right")]
@@ -108,9 +110,9 @@ def _missing_features(capture: FaceCapture) -> frozenset[str]:
     moving = [
         name for name, values in zip(capture.weights.channels, capture.weights.values.T, strict=True) if np.ptp(values)
     ]
-    untold = {
+    missing = {
         feature for feature, begins in FEATURE_CHANNELS.items() if not any(name.startswith(begins) for name in moving)
     }
     if not capture.head.values.any():
-        untold.add("head")
-    return frozenset(untold)
+        missing.add("head")
+    return frozenset(missing)

@@ -1,4 +1,4 @@
-"""A filmed face as the decomposition needs it; what is said does not matter."""
+"""Recordings of faces from videos as input of the decomposition."""
 
 from pathlib import Path
 
@@ -15,15 +15,15 @@ from tts2face.video.media import read_sound
 from tts2face.video.pose import head_angles, remove_pose
 
 
-def read_video_recording(video: Path, eyes: CachedTracker) -> FaceRecording:
-    """The face in a video, from the first picture that shows it to the last, and the sound meanwhile.
+def read_video_recording(video: Path, tracker: CachedTracker) -> FaceRecording:
+    """The face in a video, from the first to the last frame with a face, and its sound.
 
     Raises
     ------
     DataError
-        The video cannot be read, shows no face, or cannot serve; the message says why.
+        The video cannot be read, shows no face, or is unsuitable; the message states the reason.
     """
-    seen = eyes.track(video)
+    seen = tracker.track(video)
     points, first = resample_to_grid(seen.tracking.points, seen.times, seen.fps)
     if np.isnan(points).all():
         raise DataError("no frame shows a face")
@@ -40,15 +40,15 @@ def read_video_recording(video: Path, eyes: CachedTracker) -> FaceRecording:
         landmarks=posed.landmarks,
         head=np.column_stack([angles, place]).astype(np.float32),
         sound=read_sound_span(video, begin, len(filled) / seen.fps),
-        notes=(f"{n_filled} frames without a face were filled in",) if n_filled else (),
+        notes=(f"{n_filled} frames without a face were interpolated",) if n_filled else (),
     )
 
 
 def read_sound_span(video: Path, begin: float, seconds: float) -> Waveform:
-    """Sound of a video from `begin`, which may lie before it."""
-    heard = read_sound(video, SOUND_RATE)
-    samples = np.zeros(round(seconds * heard.rate), np.float32)
-    shift = round(begin * heard.rate)
-    source = heard.samples[max(shift, 0) :][: len(samples) - max(-shift, 0)]
+    """Sound of a video from `begin`; silence before the video's sound."""
+    sound = read_sound(video, SOUND_RATE)
+    samples = np.zeros(round(seconds * sound.rate), np.float32)
+    shift = round(begin * sound.rate)
+    source = sound.samples[max(shift, 0) :][: len(samples) - max(-shift, 0)]
     samples[max(-shift, 0) :][: len(source)] = source
-    return Waveform(samples, heard.rate)
+    return Waveform(samples, sound.rate)

@@ -171,7 +171,7 @@ def study_gestures(name: str, palette: Palette, options: Options, on_progress: P
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _PreparedStyle:
-    """A measured style: training and held-out recordings, the fields, and the clip that derived styles are compared with."""
+    """A measured style: training and held-out recordings, fields, and the reference clip of derived styles."""
 
     training: Style
     held_out: Style

@@ -77,7 +77,7 @@ def mode_consistency(spoken: SpokenTokens, phones: tuple[str, ...], model: Shape
 
 
 def mode_names(model: ShapeModel) -> tuple[str, ...]:
-    """Largest movements of each speech parameter at one standard deviation, as ``opening -4.6, jaw lowering -2.6`` (mm)."""
+    """Largest movements (mm) of each parameter at one standard deviation, as ``opening -4.6, jaw lowering -2.6``."""
     amounts = movement_weights(model) * model.spread[: model.n_speech]
     names, kinds = [], tuple(MOVEMENTS)
     for column in amounts.T:
