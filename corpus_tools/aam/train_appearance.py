@@ -1,4 +1,4 @@
-"""An appearance model learnt from tracked recordings (T07 section 2, eqs 1 and 2), in memory that does not grow."""
+"""Training of an appearance model from tracked recordings (T07 section 2, eqs 1 and 2) in bounded memory."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -58,19 +58,19 @@ def fit_lighting(texture: Floats, reference: Floats, still: NDArray[np.bool_]) -
 
 
 N_REFERENCE_SHAPES = 4000  # frames from which the reference shape is made
-OPEN_LIP_QUANTILE = 0.9  # the reference is the mean of the frames whose lips stand further apart than in this share
-MIN_OPEN_GAP = 0.03  # of the eye distance: the inner mouth is seen from here on
-TEXTURE_STRIDE = 3  # of the frames from which textures are learnt; neighbours hardly differ
-BLOCK_FRAMES = 128  # frames that are learnt from at a time
-N_SPARE_COMPONENTS = 20  # components carried beyond those that are kept
-MAX_STILL_WEIGHT = 0.02  # pixels that speech changes by less show the light
-N_LIGHTING_FRAMES = 25  # from which a recording's light is read
-N_SMOOTHINGS = 4  # rounds by which the edge of what speech changes is softened over the mesh
+OPEN_LIP_QUANTILE = 0.9  # the reference is the mean of the frames with lip gaps above this quantile
+MIN_OPEN_GAP = 0.03  # of the eye distance, from which the inner mouth is visible
+TEXTURE_STRIDE = 3  # of training frames; neighbouring frames hardly differ
+BLOCK_FRAMES = 128  # frames per block of the incremental PCA
+N_SPARE_COMPONENTS = 20  # extra components during the incremental PCA
+MAX_STILL_WEIGHT = 0.02  # pixels with less change by speech are used to estimate lighting
+N_LIGHTING_FRAMES = 25  # from which a recording's lighting is estimated
+N_SMOOTHINGS = 4  # smoothing steps of the speech weights over the mesh
 
 
 @dataclass(frozen=True, slots=True)
 class TextureOptions:
-    """How large the textures are, and how many components are kept."""
+    """Sizes of the textures and numbers of components."""
 
     side: int = 128
     modes: int = 40
@@ -80,7 +80,7 @@ class TextureOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LearnedAppearance:
-    """An appearance and how it was learnt.
+    """An appearance model and results of its training.
 
     ``frames`` and ``lights`` belong to the textures; ``parameters`` holds the appearance parameters (T, A + B) of each
     recording; ``explained_variance`` the share of the variance in the first 1, 2, ... modes of the face and the mouth.
@@ -205,7 +205,7 @@ def _add_textures(
 
 def _build_texture_model(frame: ReferenceFrame, grown: IncrementalPca, n_modes: int, what: str) -> TextureModel:
     if len(grown.basis) < n_modes:
-        raise InputError(f"{grown.n_rows} pictures of {what} have no {n_modes} modes; record more, or ask for fewer")
+        raise InputError(f"{grown.n_rows} pictures of {what} have no {n_modes} modes; record more, or request fewer")
     n_pixels = len(frame.pixels)
     return TextureModel(
         reference=frame.points,

@@ -143,9 +143,7 @@ def moving_average(motion: NDArray[np.floating], n_frames: int = N_AVERAGED) -> 
     from scipy.ndimage import uniform_filter1d
 
     if n_frames < 1 or n_frames % 2 == 0 or not len(motion):
-        raise InputError(
-            f"a moving average needs an odd number of frames and a recording with frames, not {n_frames} of {len(motion)}"
-        )
+        raise InputError(f"a moving average needs frames and an odd number of them, not {n_frames} of {len(motion)}")
     mean: Floats = uniform_filter1d(np.asarray(motion, np.float64), n_frames, axis=0, mode="reflect")
     return mean
 

@@ -87,7 +87,7 @@ def decompose(captured: FaceRecording, basis: ExpressionBasis, estimator: Estima
     times = np.arange(len(moved)) / GESTURE_FPS
     prosody = np.tile(SILENT_PROSODY, (len(times), 1))
     if recorded.sound is not None:
-        heard = prosody_features(recorded.sound, times, with_pitch=True)
+        prosody = prosody_features(recorded.sound, times, with_pitch=True)
     return Decomposition(
         recorded.name,
         {name: motion[name] for name in FEATURES if name not in recorded.missing_features},

@@ -86,7 +86,7 @@ def fit_head_poses(
     misfit = float(np.sqrt(np.square(off[seen]).sum(axis=1).mean()))
     if misfit > MAX_MISFIT_MM:
         raise DataError(
-            f"the head's markers do not move rigidly (deviation {misfit:.1f} mm); list only markers on the skull as head"
+            f"the head's markers do not move rigidly (deviation {misfit:.1f} mm); list only those on the skull as head"
         )
     notes = () if posed.all() else (f"the head's pose was interpolated in {int((~posed).sum())} frames",)
     return HeadPoses(head, *_interpolate_poses(rotations, places, posed), misfit), notes
@@ -108,7 +108,7 @@ def _interpolate_poses(rotations: Floats, places: Floats, posed: NDArray[np.bool
 def _first_reference(points: Floats, seen: NDArray[np.bool_]) -> Floats:
     whole = np.flatnonzero(seen.all(axis=1))
     if not len(whole):
-        raise DataError("no frame shows all markers of the head; remove rarely visible ones from the marker set")
+        raise DataError("no frame shows all markers of the head; remove rarely visible ones from the set")
     head: Floats = points[whole[0]] - points[whole[0]].mean(axis=0)
     return head
 

@@ -1,4 +1,4 @@
-"""From videos of a talker to a textured head of the talker."""
+"""Build a textured head of a talker from videos."""
 
 import shlex
 from collections.abc import Mapping
@@ -35,7 +35,7 @@ CONTENT = "a head with the shape and, with the stated consent, the skin of a rea
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BuiltFace:
-    """Videos used of those found, the mean distance of the head's landmarks from the talker's, and its dense model."""
+    """Result of a build: videos used and found, mean distance of the head's landmarks from the talker's, dense model."""
 
     n_videos: int
     n_found: int
@@ -57,21 +57,22 @@ def build_face(
     Parameters
     ----------
     recordings
-        A folder of recordings, or one video; transcripts are not needed. A ``provenance.json`` in the folder tells the
-        licence of the person's likeness; the mesh's own says nothing about it.
+        A folder of recordings, or one video; transcripts are not needed. A ``provenance.json`` in the folder states the
+        licence of the person's likeness, which that of the mesh does not cover.
     consent
-        Of the person shown, from `corpus_tools.build_talker.consent_record`; kept in the file.
+
+        Consent of the person shown, from `corpus_tools.build_talker.consent_record`; kept in the file.
     n_modes
         Modes of the talker's own dense shape model, added as the shapes denseMean, dense1, dense2, ...
     effort
         Its cache and landmark models; the work is done in one process.
     on_progress
-        Called with steps done and of all, two for each video.
+        Called with the number of finished steps and of all steps, two for each video.
 
     Raises
     ------
     InputError
-        There is no video, or there are not so many modes.
+        There is no video, or too few frames for the modes.
     DataError
         No video shows a face, or the provenance cannot be read.
     BackendError

@@ -1,4 +1,4 @@
-"""Praat TextGrids, long or short: the intervals of the tier that holds the words."""
+"""Transcripts of videos: Praat TextGrids, word alignments of the GRID corpus, subtitles and plain text."""
 
 import re
 from collections.abc import Iterator
@@ -8,22 +8,22 @@ from corpus_tools.recordings.subtitles import SUBTITLE_FORMATS, Cue, read_cues, 
 from lexicon.errors import DataError
 
 SILENT_LABELS = frozenset({"", "sil", "sp", "spn", "<p:>", "<sil>", "pau", "#"})
-# Outside quotes only numbers count; names, brackets and comments are for people (Praat manual, "TextGrid file format").
+# Outside quotes only numbers have a meaning (Praat manual, "TextGrid file format").
 _TOKEN = re.compile(r'"(?P<label>(?:[^"]|"")*)"|\[[^\]\n]*\]|!.*|(?<![\w.])(?P<number>-?\d+(?:\.\d+)?)(?![\w.])')
 _TIER_ENTRY_SIZES = {"IntervalTier": 3, "TextTier": 2}  # entries of one interval or point
 
 
 def read_textgrid(path: Path) -> tuple[Cue, ...]:
-    """The intervals of the tier of words: of a name that contains "word", else of the first tier of intervals.
+    """The intervals of the first tier whose name contains "word", or else of the first interval tier.
 
     Raises
     ------
     DataError
-        It is no TextGrid, is cut short, or holds no word.
+        The file is not a TextGrid, is truncated, or contains no word.
     """
     items = _split_items(read_text(path))
     if list(items[:2]) != ["ooTextFile", "TextGrid"]:
-        raise DataError(f"{path} is no TextGrid; save it with Praat as text")
+        raise DataError(f"{path} is not a TextGrid; save it with Praat as text")
     try:
         tiers = list(_read_tiers(iter(items[5:])))
     except (StopIteration, RuntimeError, TypeError, ValueError, OverflowError, KeyError) as broken:
@@ -32,7 +32,7 @@ def read_textgrid(path: Path) -> tuple[Cue, ...]:
     spoken = next(iter(named or [cues for _, cues in tiers]), ())
     found = tuple(cue for cue in spoken if cue.text.lower() not in SILENT_LABELS)
     if not found:
-        raise DataError(f"{path} holds no interval with a word; check the file")
+        raise DataError(f"{path} has no interval with a word; check the file")
     return found
 
 
@@ -48,7 +48,7 @@ def _split_items(text: str) -> list[str | float]:
 
 
 def _read_tiers(items: Iterator[str | float]) -> Iterator[tuple[str, tuple[Cue, ...]]]:
-    """Name and cues of each tier of intervals; tiers of points are read over."""
+    """Name and cues of each interval tier; point tiers are skipped."""
     for kind in items:
         name, _, _, size = (next(items) for _ in range(4))
         rows = [[next(items) for _ in range(_TIER_ENTRY_SIZES[str(kind)])] for _ in range(int(size))]
@@ -66,12 +66,12 @@ UNITS_PER_S = 25_000  # Cooke et al. 2006: samples of the 25 kHz sound
 
 
 def read_word_times(path: Path) -> tuple[Cue, ...]:
-    """The words of an .align file with their times, without silences.
+    """Words and times of an .align file (start, end and word per line, in units of 1/25000 s), without silences.
 
     Raises
     ------
     DataError
-        A line is not start, end and word, or there is no word.
+        A line is malformed, or there is no word.
     """
     cues = []
     for number, line in enumerate(read_text(path).splitlines(), start=1):
@@ -79,11 +79,11 @@ def read_word_times(path: Path) -> tuple[Cue, ...]:
         if not fields:
             continue
         if len(fields) != 3 or not (fields[0].isdecimal() and fields[1].isdecimal()):
-            raise DataError(f"{path}, line {number}: {line[:60]!r} is not start, end and word; mend it")
+            raise DataError(f"{path}, line {number}: {line[:60]!r} is not start, end and word; correct it")
         if fields[2].lower() not in SILENT_LABELS:
             cues.append(Cue(int(fields[0]) / UNITS_PER_S, int(fields[1]) / UNITS_PER_S, fields[2]))
     if not cues:
-        raise DataError(f"{path} holds no word; check the file")
+        raise DataError(f"{path} contains no word; check the file")
     return tuple(cues)
 
 
@@ -92,7 +92,7 @@ READERS = {".textgrid": read_textgrid, ".align": read_word_times, **dict.fromkey
 
 
 def find_transcript(video: Path) -> Path | None:
-    """The transcript beside a video: text before TextGrid, word times and subtitles; None without one."""
+    """The transcript beside a video, in order of preference text, TextGrid, word times, subtitles; None without one."""
     beside = {path.suffix.lower(): path for path in sorted(video.parent.iterdir()) if path.stem == video.stem}
     return next((beside[suffix] for suffix in (TEXT_SUFFIX, *READERS) if suffix in beside), None)
 
@@ -103,9 +103,9 @@ def read_transcript(transcript: Path) -> str:
     Raises
     ------
     DataError
-        It cannot be read or holds no word.
+        It cannot be read or contains no word.
     BackendError
-        A package that reads it is missing.
+        A package for its format is missing.
     """
     suffix = transcript.suffix.lower()
     if suffix == TEXT_SUFFIX:
