@@ -1,7 +1,7 @@
 """Build a style of a palette from recordings of one person in one mood."""
 
 import shlex
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,30 +19,25 @@ from corpus_tools.decomposition.blend_weights import (
     build_nearest_samples_estimator,
 )
 from corpus_tools.decomposition.capture import FaceRecording
-from corpus_tools.decomposition.capture_files import CAPTURE_SUFFIXES, MarkerOptions, read_capture_file
+from corpus_tools.decomposition.capture_files import MarkerOptions
 from corpus_tools.decomposition.decompose import Decomposition, decompose, weight_displacements
 from corpus_tools.decomposition.derived_styles import read_derived_styles
 from corpus_tools.decomposition.face_motion import rest_landmarks
 from corpus_tools.decomposition.marker_set import read_marker_set
 from corpus_tools.decomposition.markers import read_marker_face
+from corpus_tools.decomposition.recording_files import read_recordings
 from corpus_tools.decomposition.stills import NEUTRAL, PictureReader, Still, build_marker_reader
 from corpus_tools.decomposition.style import add_style
-from corpus_tools.decomposition.video import read_video_recording
-from corpus_tools.process_pool import map_unordered
-from corpus_tools.recordings.corpus_video import CachedTracker
-from corpus_tools.recordings.folder import MANIFEST, VIDEO_SUFFIXES
 from corpus_tools.recordings.observe import Refusal
 from corpus_tools.run_options import Progress, RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.pose_correction import fit_pose_correction
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import check_regular_file
 from tts2face.face.expressions import expression_landmarks
 from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
 from tts2face.models.palette import Palette, write_palette
 from tts2face.retargeting.performer import CLOSED_FRAME_SHARE, eye_aperture, lip_gaps
-from tts2face.video.landmark_models import find_bundle
 
 ESTIMATORS = ("least-squares", "samples")
 SAMPLES_SEED = 2008
@@ -118,7 +113,9 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
         recorded.provenance or recorded.recordings / PROVENANCE, must_exist=recorded.provenance is not None
     )
     face = load_face("head")
-    captured, refused = read_recordings(recorded, face, effort or RunOptions(), stages("reading recordings"))
+    captured, refused = read_recordings(
+        recorded.recordings, face, recorded.marker_options, effort or RunOptions(), stages("reading recordings")
+    )
     if not captured:
         raise DataError(f"no recording could be used; the first: {refused[0].name}: {refused[0].reason}")
     basis = build_basis(recorded, captured, face)
@@ -204,94 +201,6 @@ def person_at_rest(captured: Sequence[FaceRecording]) -> NDArray[np.float64]:
     gaps = lip_gaps(frames)[:, MIDDLE_PAIR]
     closed = gaps <= np.quantile(gaps[is_open], CLOSED_FRAME_SHARE)
     return np.asarray(np.median(frames[is_open & closed], axis=0), np.float64)
-
-
-def read_recordings(
-    recorded: StyleSource, face: Face, effort: RunOptions, on_progress: Progress | None
-) -> tuple[list[FaceRecording], list[Refusal]]:
-    """Recordings and refusals, each sorted by name.
-
-    Raises
-    ------
-    InputError
-        There is no recording.
-    BackendError
-        The landmark models are missing, the cache cannot be written, or a process died.
-    """
-    files = find_recording_files(recorded.recordings)
-    jobs = min(effort.n_processes(), len(files))
-    model = find_bundle(effort.model) if any(file.suffix.lower() in VIDEO_SUFFIXES for file in files) else None
-    ready = (effort.folder(), model, face, recorded.marker_options)
-    captured: list[FaceRecording] = []
-    refused: list[Refusal] = []
-    for number, outcome in enumerate(_read_files(files, ready, jobs), start=1):
-        if isinstance(outcome, Refusal):
-            refused.append(outcome)
-        else:
-            captured.append(outcome)
-        if on_progress:
-            on_progress(number, len(files))
-    return sorted(captured, key=lambda one: one.name), sorted(refused, key=lambda one: one.name)
-
-
-def find_recording_files(recordings: Path) -> list[Path]:
-    """Videos and captures in a folder and its subfolder ``clips``, or the given file.
-
-    Raises
-    ------
-    InputError
-        There is none.
-    """
-    known = VIDEO_SUFFIXES | CAPTURE_SUFFIXES
-    if recordings.is_file() and recordings.suffix.lower() in known:
-        return [recordings]
-    folders = [recordings, recordings / "clips"]
-    found = [file for folder in folders if folder.is_dir() for file in folder.iterdir() if file.suffix.lower() in known]
-    if not found:
-        raise InputError(
-            f"{recordings} contains no video and no capture ({', '.join(sorted(known))}); give a folder of them"
-        )
-    return sorted(file for file in found if file.name != MANIFEST)
-
-
-WorkerInputs = tuple[Path, Path | None, Face, MarkerOptions]
-FileOutcome = FaceRecording | Refusal
-
-
-def _read_files(files: Sequence[Path], ready: WorkerInputs, jobs: int) -> Iterator[FileOutcome]:
-    if jobs > 1:
-        yield from (outcome for _, outcome in map_unordered(files, _read_file, _start_worker, ready, jobs))
-        return
-    worker = _FileReader(*ready)
-    for file in files:
-        yield worker.read(file)
-
-
-class _FileReader:
-    def __init__(self, cache: Path, model: Path | None, face: Face, marker_options: MarkerOptions) -> None:
-        self._tracker = CachedTracker(cache, model) if model is not None else None
-        self._face, self._marker_options = face, marker_options
-
-    def read(self, file: Path) -> FileOutcome:
-        """A recording, or the reason for its refusal."""
-        try:
-            check_regular_file(file)
-            if self._tracker is not None and file.suffix.lower() in VIDEO_SUFFIXES:
-                return read_video_recording(file, self._tracker)
-            return read_capture_file(file, self._face, options=self._marker_options)
-        except DataError as reason:
-            return Refusal(file.stem, str(reason), file, 0.0)
-
-
-_worker: list[_FileReader] = []  # of this process; filled once by the pool
-
-
-def _start_worker(*ready: Any) -> None:
-    _worker.append(_FileReader(*ready))
-
-
-def _read_file(file: Path) -> FileOutcome:
-    return _worker[0].read(file)
 
 
 def _command_words(recorded: StyleSource, style: str, out: Path, is_alone: bool, epsilon: float) -> list[str]:

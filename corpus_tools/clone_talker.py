@@ -90,8 +90,8 @@ NOT_STATED = "not stated"
 class ClonedTalker:
     """A cloned talker.
 
-    ``n_appended`` is the number of modes added to the target's; ``share_at_limits`` the share of frames with a parameter
-    at the target's limits; ``lacks_appearance`` is true if only the source has an appearance model.
+    ``n_appended`` is the number of modes added to the target's; ``share_at_limits`` the share of frames with a
+    parameter at the target's limits; ``lacks_appearance`` is true if only the source has an appearance model.
     """
 
     talker: Talker
@@ -103,7 +103,7 @@ class ClonedTalker:
 def clone_talker(
     source: str, target: str, out: Path, *, gain: float = 1.0, append: bool = False, created: str | None = None
 ) -> ClonedTalker:
-    """Clone one talker's speech onto another's face and write the talker; apart from the date the bytes are reproducible.
+    """Clone one talker's speech onto another's face and write the talker; its bytes are reproducible except the date.
 
     Parameters
     ----------
@@ -137,8 +137,8 @@ def clone_talker(
 def transfer_talker(source: Talker, target: Talker, *, gain: float = 1.0, append: bool = False) -> ClonedTalker:
     """The talker with the target's face and the source's utterances.
 
-    Head translations are scaled with the size of the faces; angles do not change. If the target has an appearance model,
-    appearance parameters are transferred from the source by eq. 5, or predicted from the lips if the source has none.
+    Head translations are scaled with the size of the faces; angles do not change. If the target has an appearance
+    model, its parameters are transferred from the source by eq. 5, or predicted from the lips if the source has none.
 
     Raises
     ------

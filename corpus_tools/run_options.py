@@ -9,15 +9,15 @@ from lexicon.errors import BackendError, InputError
 from tts2face.video.landmark_models import user_cache
 
 Progress = Callable[[int, int], None]  # number of finished steps, number of all steps
-StageCallback = Callable[[str], Progress]  # starts a named stage and returns its progress callback
+StageCallback = Callable[[str], Progress]  # name of a stage -> its progress callback
 
 
 @dataclass(frozen=True, slots=True)
 class RunOptions:
     """Options of a run that do not change its result.
 
-    ``cache`` is the folder for intermediate results (the user's cache when None), ``jobs`` the number of processes (one per
-    core when None), ``model`` the bundle of landmark models (found when None).
+    ``cache`` is the folder for intermediate results (the user's cache when None), ``jobs`` the number of processes (one
+    per core when None), ``model`` the bundle of landmark models (found when None).
     """
 
     cache: Path | None = None

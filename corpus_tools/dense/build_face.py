@@ -35,7 +35,7 @@ CONTENT = "a head with the shape and, with the stated consent, the skin of a rea
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BuiltFace:
-    """Result of a build: videos used and found, mean distance of the head's landmarks from the talker's, dense model."""
+    """Result of a build: videos used and found, mean distance of the landmarks from the talker's, dense model."""
 
     n_videos: int
     n_found: int
@@ -60,7 +60,6 @@ def build_face(
         A folder of recordings, or one video; transcripts are not needed. A ``provenance.json`` in the folder states the
         licence of the person's likeness, which that of the mesh does not cover.
     consent
-
         Consent of the person shown, from `corpus_tools.build_talker.consent_record`; kept in the file.
     n_modes
         Modes of the talker's own dense shape model, added as the shapes denseMean, dense1, dense2, ...

@@ -13,7 +13,7 @@ from tts2face.video.pose import similarity_transforms
 Floats = NDArray[np.float64]
 
 N_MESH_LANDMARKS = 468  # the iris landmarks after them depend on gaze, not on the shape of the face
-OPEN_JAW_WEIGHT = 0.12  # weight of jawOpen at which the warp is fitted: with closed lips it would tear the mouth, with more leave it open
+OPEN_JAW_WEIGHT = 0.12  # weight of jawOpen at which the warp is fitted; with closed lips the mouth would tear
 # The edge of the lids, once around, from the outer corner; the person's right eye, then the left.
 LID_LANDMARKS = (
     (33, 246, 161, 160, 159, 158, 157, 173, 133, 155, 154, 153, 145, 144, 163, 7),
@@ -107,7 +107,7 @@ def face_width(landmarks: Floats) -> float:
 
 
 def align_to_head(talker: NDArray[np.floating], rest: Floats) -> Floats:
-    """(468, 3) landmarks of the talker aligned with the head's by a similarity, because a camera shows no absolute size."""
+    """(468, 3) landmarks of the talker aligned with the head's by a similarity; their size is unknown."""
     own = np.asarray(talker, np.float64)[:N_MESH_LANDMARKS]
     weights = np.full(N_MESH_LANDMARKS, 1.0 / N_MESH_LANDMARKS)
     turns, scales = similarity_transforms(own[None], rest, weights)

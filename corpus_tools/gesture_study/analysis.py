@@ -162,7 +162,6 @@ def study_gestures(name: str, palette: Palette, options: Options, on_progress: P
         source = palette.derivations[style].source if style in palette.derivations else style
         if source not in prepared:
             prepared[source] = _prepare_style(palette, source, options)
-
         studies.append(_study_style(palette, style, prepared[source], options))
     if on_progress:
         on_progress(len(names), len(names))

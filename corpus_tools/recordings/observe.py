@@ -181,7 +181,6 @@ class _VideoReader:
         whole = recordings[0]
         if whole.span is not None or self._aligner.sound(whole.video).duration <= MAX_UTTERANCE_S:
             return recordings
-
         utterances = self._aligner.utterances(whole.video, pronounce_recording(whole))
         return tuple(
             replace(whole, name=f"{whole.name}-{number:04d}", span=span, words=words)

@@ -16,7 +16,7 @@ from corpus_tools.decomposition.blend_weights import approximation_error, moving
 from corpus_tools.decomposition.capture import FaceRecording, resample_to_gesture_rate
 from corpus_tools.decomposition.capture_files import read_livelink_recording
 from corpus_tools.decomposition.decompose import weight_displacements
-from corpus_tools.decomposition.video import read_video_recording
+from corpus_tools.decomposition.recording_files import read_video_recording
 from corpus_tools.dense.video_landmarks import find_videos
 from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.run_options import RunOptions
