@@ -85,7 +85,7 @@ def check_suffix(out: Path, kind: str) -> None:
 
 def _ask_consent(name: str, statement: str | None) -> Mapping[str, str]:
     """The consent of the person shown; asked for where somebody sits at the keyboard."""
-    from corpus_tools.consent import consent_record
+    from corpus_tools.build_talker import consent_record
 
     if statement is None and sys.stdin.isatty():
         statement = input(f"The talker will carry pictures of {name}'s face. State the consent: ")

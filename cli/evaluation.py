@@ -119,7 +119,7 @@ def _observe_other_talker(recordings: Path, effort: "RunOptions") -> "tuple[Obse
 
 
 def _make_splits(asked: SplitFlags, effort: "RunOptions") -> "tuple[Split, ...]":
-    from corpus_tools.evaluation.splits import split, split_by_words, split_into_folds
+    from corpus_tools.evaluation.splits import split_by_words, split_into_folds, split_randomly
 
     if asked.train is not None and asked.test is not None:
         return ((_read_observations(asked.train, effort), _read_observations(asked.test, effort)),)
@@ -130,7 +130,7 @@ def _make_splits(asked: SplitFlags, effort: "RunOptions") -> "tuple[Split, ...]"
         return split_into_folds(found, n_folds=asked.folds, seed=asked.seed)
     if asked.words is not None:
         return (split_by_words(found, [word for word in asked.words.replace(",", " ").split() if word]),)
-    return (split(found, hold_out=asked.hold_out, seed=asked.seed),)
+    return (split_randomly(found, hold_out=asked.hold_out, seed=asked.seed),)
 
 
 def _read_observations(folder: Path, effort: "RunOptions") -> "tuple[Observation, ...]":

@@ -57,7 +57,7 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
 
     shown = (find_stills(stills) if stills is not None else {}) | parse_stills(still or [])
     worn = MarkerOptions(markers or DEFAULT_MARKER_TABLE, neutral, marker_rate)
-    recorded = StyleSource(recordings=recordings, stills=shown, worn=worn, provenance=provenance)
+    recorded = StyleSource(recordings=recordings, stills=shown, marker_options=worn, provenance=provenance)
     base = None if alone else load_palette(palette)
     with stage_bar() as stages:
         made = build_style(
