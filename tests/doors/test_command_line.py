@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from cli.exits import EXIT_CODES
 from cli.main import run
+from cli.process import EXIT_CODES
 from lexicon import errors
 from tts2face.render.picture import Picture
 from tts2face.request import Request

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from cli.flags import check_options
 from cli.main import app, run
-from cli.options import check_options
 from lexicon.errors import InputError
 from tts2face.render.output_path import check_output
 from tts2face.storage.output_names import check_name

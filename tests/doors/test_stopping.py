@@ -22,7 +22,7 @@ def start(folder):
     (Path(folder) / str(os.getpid())).touch()
 
 if __name__ == "__main__":
-    from cli.stopping import raise_on_signals
+    from cli.process import raise_on_signals
     raise_on_signals()
     list(each_done([600.0, 600.0], time.sleep, start, (sys.argv[1],), 2))
 """

@@ -17,9 +17,9 @@ from lexicon.errors import InputError
 from lexicon.languages import language_code
 from lexicon.marked_text import Mark, MarkedText, NameMark, NodMark, StyleRun
 from lexicon.pronounce import PAUSES_S
-from lexicon.said import as_said
 from lexicon.sentences import Phrase, Sentence, index_by_letters, n_letters, text_prefix
 from lexicon.sequence import PhoneSequence, WordSpan
+from lexicon.spoken_form import spoken_form
 from tts2face.clock import first_sample
 from tts2face.gesture.easing import span_weights
 from tts2face.gesture.notation import parse_style
@@ -111,7 +111,7 @@ class WordTimes:
         return min(self._count_words(before) - is_inside, len(self._onsets))
 
     def _count_words(self, written: str) -> int:
-        said = as_said(written, self._language)
+        said = spoken_form(written, self._language)
         if not self._language.startswith("en"):
             said = canonical_text(said, keep_marks=True)
         return sum(any(letter.isalnum() for letter in word) for word in said.split())
