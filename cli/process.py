@@ -20,6 +20,7 @@ BROKEN_PIPE_CODE = 141  # 128 + SIGPIPE, as shells report it
 PATH_ERRNOS = frozenset({errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP})
 MAX_QUOTED_CHARACTERS = 60  # characters of a path in a message
 ESCAPE_HANDLER = "tts2face.escapes"  # name of the error handler for characters that the terminal cannot show
+REFUSING_HANDLERS = frozenset({"strict", "surrogateescape"})  # the second is Python's default in the C locale
 SIGNAL_NAMES = ("SIGTERM", "SIGHUP")  # sent by a service manager or `kill`, and when a terminal is closed
 TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3  # parameter numbers of mallopt in glibc's malloc.h
 LARGE_BYTES = 1 << 20  # arrays of at least this size are mapped one by one; pictures of 512 x 512 are smaller
@@ -83,7 +84,7 @@ def repair_streams() -> None:
     sys.stdout = sys.stdout or open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115 - as above
     sys.stderr = sys.stderr or open(2, "w", encoding="utf-8", closefd=False)  # noqa: SIM115 - as above
     codecs.register_error(ESCAPE_HANDLER, _escape_characters)
-    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
+    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors in REFUSING_HANDLERS:
         sys.stdout.reconfigure(errors=ESCAPE_HANDLER)
 
 

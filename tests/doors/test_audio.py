@@ -227,7 +227,7 @@ def test_a_recording_that_is_not_there_and_a_talker_without_drives_are_refused(
 
 def test_the_text_is_given_once(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["Hi.", "--text", "Hi.", "--out", "a.mp4"]) == 2
-    assert "give the text once" in capsys.readouterr().err
+    assert "the text is given twice" in capsys.readouterr().err
 
 
 def test_an_explanation_needs_words(film: Path, capsys: pytest.CaptureFixture[str]) -> None:

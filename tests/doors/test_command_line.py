@@ -139,11 +139,11 @@ def test_every_kind_of_error_has_an_exit_code() -> None:
         (["Hi.", "--out", "x.mp4", "--fps", "0"], 2, "fps must lie between 1 and 120, not 0"),
         (["Hi.", "--out", "x.mp4", "--size", "9x9"], 2, "even numbers from 16 to 4096"),
         (["Hi.", "--out", "x.mp4", "--fps", "many"], 2, 'unable to convert "many"'),
-        (["Hi.", "--out", "x.mp4", "--exemplars", "2.5"], 2, '"2.5" is no whole number'),
-        (["corpus", "evaluate", "--recordings", ".", "--folds", "2.5"], 2, '"2.5" is no whole number'),
+        (["Hi.", "--out", "x.mp4", "--exemplars", "2.5"], 2, '"2.5" is not a whole number'),
+        (["corpus", "evaluate", "--recordings", ".", "--folds", "2.5"], 2, '"2.5" is not a whole number'),
         (["Hi.", "--out", "x.mp4", "--flag", "1"], 2, "--flag"),
-        (["Hi."], 2, "say where the clip goes"),
-        (["Hi.", "--file", "x.txt", "--out", "x.mp4"], 2, "not both"),
+        (["Hi."], 2, "there is no output; add --out"),
+        (["Hi.", "--file", "x.txt", "--out", "x.mp4"], 2, "--file cannot be combined with a text"),
         (["--file", "none.txt", "--out", "x.mp4"], 2, "cannot read the text from none.txt"),
         (["--file", "latin.txt", "--out", "x.mp4"], 2, "latin.txt is not UTF-8 text (byte 1)"),
     ],
@@ -200,7 +200,7 @@ def test_an_interruption_leaves_nothing(here: Path) -> None:
     process.send_signal(signal.SIGINT)
     _, told = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "stopped; nothing was written" in told
+    assert "interrupted; no output was written" in told
     assert list(here.iterdir()) == []
 
 

@@ -79,11 +79,11 @@ def test_an_actor_gives_each_pose_once(film: Path, bundle: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        (["take.mp4", "--camera", "0"], "give neither a take nor --out"),
-        (["--camera", "0", "--out", "m.mp4"], "give neither a take nor --out"),
-        (["--camera", "0", "--face", "self"], "and a head as --face"),
-        ([], "give a take and --out, or --camera"),
-        (["take.mp4"], "give a take and --out, or --camera"),
+        (["take.mp4", "--camera", "0"], "--camera cannot be combined with a take, --out"),
+        (["--camera", "0", "--out", "m.mp4"], "--camera cannot be combined with a take, --out"),
+        (["--camera", "0", "--face", "self"], "--out or --face self; remove them"),
+        ([], "add a take and --out, or use --camera"),
+        (["take.mp4"], "add a take and --out, or use --camera"),
     ],
 )
 def test_orders_that_make_no_sense(words: list[str], reason: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -105,13 +105,13 @@ def test_the_same_options_write_the_same(plain: bytes, here: Path) -> None:
         ("made.palette", "nowhere/g.html", (), "there is no folder nowhere"),
         ("made.palette", "g.html", ("--held-out", "1"), "one in 1 recordings cannot be held out"),
         ("made.palette", "g.html", ("--held-out", "50"), "of 60 recordings one in 50 cannot be held out"),
-        ("made.palette", "g.html", ("--held-out", "2.5"), '"2.5" is no whole number'),
+        ("made.palette", "g.html", ("--held-out", "2.5"), '"2.5" is not a whole number'),
         ("made.palette", "g.html", ("--halves", "0"), "at least 1 halving, not 0"),
-        ("made.palette", "g.html", ("--halves", "0.5"), '"0.5" is no whole number'),
+        ("made.palette", "g.html", ("--halves", "0.5"), '"0.5" is not a whole number'),
         ("made.palette", "g.html", ("--clips", "1"), "at least 2 clips, not 1"),
-        ("made.palette", "g.html", ("--clips", "x"), '"x" is no whole number'),
+        ("made.palette", "g.html", ("--clips", "x"), '"x" is not a whole number'),
         ("made.palette", "g.html", ("--seed", "-1"), "a seed is a whole number from 0, not -1"),
-        ("made.palette", "g.html", ("--seed", "0.5"), '"0.5" is no whole number'),
+        ("made.palette", "g.html", ("--seed", "0.5"), '"0.5" is not a whole number'),
     ],
 )
 def test_refusals_are_one_sentence_and_write_nothing(

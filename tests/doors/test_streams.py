@@ -26,14 +26,14 @@ def test_a_full_standard_output_is_one_sentence(words: tuple[str, ...]) -> None:
     told = done(*words, redirect=">/dev/full")
     assert told.returncode == 4
     assert told.stderr == (
-        "tts2face: cannot write the answer: No space left on device; check where standard output goes\n"
+        "tts2face: cannot write to standard output: No space left on device; check where it is redirected to\n"
     )
 
 
 def test_a_closed_standard_output_is_one_sentence() -> None:
     told = done("phones", "Hello.", redirect=">&-")
     assert told.returncode == 4
-    assert told.stderr.startswith("tts2face: cannot write the answer: ")
+    assert told.stderr.startswith("tts2face: cannot write to standard output: ")
     assert len(told.stderr.splitlines()) == 1
 
 
@@ -63,6 +63,12 @@ def test_an_answer_for_a_terminal_with_few_characters_is_escaped(encoding: str) 
     assert names["mi"] == "Māori"
 
 
+def test_a_result_in_the_c_locale_is_escaped() -> None:
+    told = done("phones", "Hello.", LC_ALL="C", LANG="C", PYTHONUTF8="0", PYTHONCOERCECLOCALE="0")
+    assert told.returncode == 0, told.stderr
+    assert "h\\u0259\\u02c8lo\\u028a" in told.stdout
+
+
 def test_text_without_end_is_refused(tmp_path: Path) -> None:
     out = str(tmp_path / "x.mp4")
     for words, redirect, source in (
@@ -71,4 +77,4 @@ def test_text_without_end_is_refused(tmp_path: Path) -> None:
     ):
         told = done(*words, "--out", out, redirect=redirect)
         assert told.returncode == 2
-        assert told.stderr == f"tts2face: {source} holds more than 17 MB; split it into smaller files\n"
+        assert told.stderr == f"tts2face: {source} contains more than 17 MB; split it into smaller files\n"

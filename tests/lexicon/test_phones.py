@@ -139,8 +139,8 @@ def test_nothing_available_is_refused() -> None:
     ("lines", "reason"),
     [
         ("p\tP\tstop\n", "line 2: 3 cells instead of 13"),
-        ("p\tP\tplop\tbilabial\tplosive\tvoiceless\t\t\t\t\t\t\tpea\n", "line 2: p has 'plop', which is none of"),
-        ("p\tP\tstop\tbilabial\tplosive\tvoiceless\t\t\t\t\t\t\tpea\n" * 2, "line 3: p stands there twice"),
+        ("p\tP\tplop\tbilabial\tplosive\tvoiceless\t\t\t\t\t\t\tpea\n", "line 2: p has the value 'plop'; use one of"),
+        ("p\tP\tstop\tbilabial\tplosive\tvoiceless\t\t\t\t\t\t\tpea\n" * 2, "line 3: p occurs twice"),
         ("pf\t\taffricate\tlabiodental\taffricate\tvoiceless\t\t\t\t\tp f\t\tPferd\n", "pf has the part p"),
     ],
 )
