@@ -92,8 +92,8 @@ def test_with_the_words_lips_close_where_they_are_said(film: Path, talker: Talke
     clip = Session(talker, face).clip(Request(audio=film, text=TEXT, fps=25.0))
     assert [word.text for word in clip.speech.words] == TEXT.split()
     (real,) = (one for one in talker.utterances if one.name == "bbaf2n")
-    said = [phone for phone in clip.speech.phones.phones if phone != "sil"]
-    assert said[:3] == ["b", "ɪ", "n"]
+    sounding = [phone for phone in clip.speech.phones.phones if phone != "sil"]
+    assert sounding[:3] == ["b", "ɪ", "n"]
     starts = clip.speech.phones.edges[clip.speech.phones.phones.index("b")]
     assert abs(starts - real.phones.edges[real.phones.phones.index("b")]) < 0.02
 
@@ -236,7 +236,7 @@ def test_an_explanation_needs_words(film: Path, capsys: pytest.CaptureFixture[st
 
 
 def test_lips_are_in_the_talker_s_channels(film: Path, talker: Talker) -> None:
-    said, lips = map_audio_to_motion(film, talker.audio_maps["linear"], talker, 30.0)
+    speech, lips = map_audio_to_motion(film, talker.audio_maps["linear"], talker, 30.0)
     assert isinstance(lips, Trajectory)
-    assert said.phones.phones == ("sil",)
+    assert speech.phones.phones == ("sil",)
     assert lips.channels == tuple(f"shape{i}" for i in range(talker.model.n_speech))

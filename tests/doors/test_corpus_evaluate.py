@@ -73,8 +73,8 @@ def test_folders_that_are_split_already(here: Path, capsys: pytest.CaptureFixtur
 
 
 def test_another_talker_is_told_apart(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    told = json.loads(measured("across.json", "--train", "all", "--cross-talker", "other"))
-    assert (told["is_across"], told["n_train"], told["n_test"]) == (True, 24, 4)
+    result = json.loads(measured("across.json", "--train", "all", "--cross-talker", "other"))
+    assert (result["is_across"], result["n_train"], result["n_test"]) == (True, 24, 4)
     assert "4 utterances of somebody else, 24 learnt from" in capsys.readouterr().err
 
 
@@ -133,9 +133,9 @@ def test_refusals_are_one_sentence(
     arguments: tuple[str, ...], reason: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert evaluate(*arguments) == 2
-    said = capsys.readouterr().err
-    assert re.search(re.escape(reason), said)
-    assert said.count("\n") == 1
+    message = capsys.readouterr().err
+    assert re.search(re.escape(reason), message)
+    assert message.count("\n") == 1
 
 
 def test_own_durations_need_words(here: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:

@@ -114,9 +114,9 @@ def test_what_cannot_be_done_is_refused_before_work_begins(
         Image.new("1", (11_000, 11_000)).save(here / "huge.png")
     before = set(here.iterdir())
     assert run(words) == code
-    told = capsys.readouterr().err
-    assert reason in told
-    assert len(told.strip().splitlines()) == 1
+    message = capsys.readouterr().err
+    assert reason in message
+    assert len(message.strip().splitlines()) == 1
     assert set(here.iterdir()) == before
 
 

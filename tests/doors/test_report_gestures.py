@@ -68,8 +68,10 @@ def test_the_table_has_a_line_a_trait(here: Path) -> None:
 def test_the_json_says_the_same_as_the_table(here: Path) -> None:
     content = json.loads(written("g.json"))
     rows = list(csv.DictReader(written("g.csv").decode().splitlines()))
-    told = [(style["name"], trait["name"], trait["field"]) for style in content["styles"] for trait in style["traits"]]
-    assert told == [(row["style"], row["trait"], float(row["w_field"])) for row in rows]
+    weights = [
+        (style["name"], trait["name"], trait["field"]) for style in content["styles"] for trait in style["traits"]
+    ]
+    assert weights == [(row["style"], row["trait"], float(row["w_field"])) for row in rows]
     calm = content["styles"][0]
     assert [trait["ju2008"] for trait in calm["traits"]] == [float(row["w_ju2008"]) for row in rows[:10]]
     assert set(calm["features"][0]["power"]) == set(calm["blinks_per_minute"]) == {"real", "field", "noise", "ju2008"}
@@ -118,7 +120,7 @@ def test_refusals_are_one_sentence_and_write_nothing(
     palette: str, out: str, more: tuple[str, ...], reason: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["report", "gestures", palette, "--out", out, *more]) == 2
-    said = capsys.readouterr().err
-    assert re.search(re.escape(reason), said)
-    assert said.count("\n") == 1
+    message = capsys.readouterr().err
+    assert re.search(re.escape(reason), message)
+    assert message.count("\n") == 1
     assert not Path(out).exists()

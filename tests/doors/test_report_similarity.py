@@ -147,7 +147,7 @@ def test_refusals_are_one_sentence_and_write_nothing(
     talker: str, out: str, more: tuple[str, ...], reason: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["report", "similarity", talker, "--out", out, *more]) == 2
-    said = capsys.readouterr().err
-    assert re.search(re.escape(reason), said)
-    assert said.count("\n") == 1
+    message = capsys.readouterr().err
+    assert re.search(re.escape(reason), message)
+    assert message.count("\n") == 1
     assert not Path(out).exists()
