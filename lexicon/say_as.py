@@ -104,8 +104,8 @@ def _telephone(text: str, _: str) -> str:
     groups = re.findall(r"[0-9]+|[A-Za-z]+", text)
     if not any(group.isdigit() for group in groups):
         raise _reading_error(text, "a telephone number", "+1 555 123 4567")
-    said = ", ".join(digit_words(group) if group.isdigit() else _characters(group, "") for group in groups)
-    return f"plus {said}" if text.startswith("+") else said
+    words = ", ".join(digit_words(group) if group.isdigit() else _characters(group, "") for group in groups)
+    return f"plus {words}" if text.startswith("+") else words
 
 
 def _fraction(text: str, _: str) -> str:

@@ -38,7 +38,7 @@ def film(clips: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def talker(clips: Path) -> Talker:
-    """The shipped talker with drives learnt from some of her recordings, the one above left out."""
+    """The shipped talker with audio maps trained on some of its recordings, without the one above."""
     shipped = load_talker("grid_s1")
     spoken = [one for one in shipped.utterances if one.name != "bbaf2n"][:: len(shipped.utterances) // LEARNT_FROM]
     lessons = []

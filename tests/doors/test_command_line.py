@@ -180,8 +180,8 @@ def test_a_folder_that_cannot_be_written_is_named(here: Path, capsys: pytest.Cap
 
 def test_text_from_standard_input_and_from_a_file(here: Path) -> None:
     (here / "text.txt").write_text("\ufeffHello.", encoding="utf-8")
-    for words, given in ((["--file", "text.txt"], ""), ([], "Hello."), (["-"], "Hello.")):
-        out = here / f"{len(words)}{len(given)}.mp4"
+    for words, standard_input in ((["--file", "text.txt"], ""), ([], "Hello."), (["-"], "Hello.")):
+        out = here / f"{len(words)}{len(standard_input)}.mp4"
         done = subprocess.run(
             [*COMMAND, *words, "--out", str(out), *SMALL],
             input=standard_input,

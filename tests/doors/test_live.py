@@ -44,7 +44,7 @@ def live(film: Path, bundle: Path) -> list[LivePose | None]:
 
 
 def test_a_person_is_learnt_and_then_followed(live: list[LivePose | None], film: Path, bundle: Path) -> None:
-    """Against the take read as a whole, which knows the future and more of her."""
+    """Compared with the take read as a whole, which includes later frames."""
     head = load_face("head")
     learnt = round(CALIBRATION_S * FPS)
     assert all(pose is None for pose in live[:learnt])
