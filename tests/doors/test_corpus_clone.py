@@ -33,8 +33,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_a_cloned_talker_is_written_and_can_be_shown(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["corpus", "clone", "a.talker", "b.talker", "--out", "c.talker"]) == 0
-    told = capsys.readouterr().err
-    assert re.search(r"wrote c.talker: 4 utterances, \d+\.\d% of frames at limits", told)
+    captured = capsys.readouterr().err
+    assert re.search(r"wrote c.talker: 4 utterances, \d+\.\d% of frames at limits", captured)
     assert run(["corpus", "show", "c.talker"]) == 0
     shown = capsys.readouterr().out
     assert "GRID s1 with the speech of GRID s1" in shown
@@ -83,7 +83,7 @@ def test_bad_input_gets_one_sentence_and_leaves_nothing(
     (here / "junk.talker").write_bytes(b"no talker at all")
     before = set(here.iterdir())
     assert run(["corpus", "clone", *arguments]) == code
-    told = capsys.readouterr().err
-    assert reason in told
-    assert len(told.strip().splitlines()) == 1
+    captured = capsys.readouterr().err
+    assert reason in captured
+    assert len(captured.strip().splitlines()) == 1
     assert set(here.iterdir()) == before

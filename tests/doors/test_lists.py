@@ -81,8 +81,10 @@ def test_the_version(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_the_package_is_a_command() -> None:
-    told = subprocess.run([sys.executable, "-m", "tts2face", "--version"], capture_output=True, text=True, check=True)
-    assert told.stdout.strip() == __version__
+    completed = subprocess.run(
+        [sys.executable, "-m", "tts2face", "--version"], capture_output=True, text=True, check=True
+    )
+    assert completed.stdout.strip() == __version__
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])

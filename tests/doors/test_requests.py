@@ -86,8 +86,8 @@ def test_the_same_request_gives_the_same_bytes_in_another_process(clip: Clip) ->
 def test_a_voice_that_has_spoken_before_gives_the_same_bytes(clip: Clip, talker: Talker, face: Face) -> None:
     ready = Session(talker, face)
     for text in ("Something else was said. Bob may have been away.", TEXT):
-        said = concatenate_clips([piece.clip for piece in ready.stream(Request(text=text))])
-    assert digest(said) == digest(clip)
+        joined = concatenate_clips([piece.clip for piece in ready.stream(Request(text=text))])
+    assert digest(joined) == digest(clip)
 
 
 def test_a_stream_is_the_whole_in_pieces(clip: Clip, talker: Talker, face: Face) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lexicon.dictionary import MOST_PHONES, parse_dictionary
+from lexicon.dictionary import MAX_PHONES, parse_dictionary
 from lexicon.errors import BackendError, DataError, InputError
 from lexicon.ipa import Segment, parse_ipa
 from lexicon.phones import PHONES
@@ -183,9 +183,9 @@ def test_letters_of_another_script_are_refused() -> None:
 @pytest.mark.parametrize("language", ["en-us", "de", "ru"])
 def test_the_longest_words_of_a_dictionary_are_spoken(language: str) -> None:
     longest = parse_dictionary(
-        "bob /" + "ˈɔu " * MOST_PHONES + "/"
+        "bob /" + "ˈɔu " * MAX_PHONES + "/"
     ).entries  # ɔu takes the most bytes of a stressed phone
-    assert len(longest["bob"]) == MOST_PHONES
+    assert len(longest["bob"]) == MAX_PHONES
     spoken = load_voice("espeak", language, longest).speak("bob bob")
     assert len(spoken.words) == 2
 

@@ -7,8 +7,8 @@ from fractions import Fraction
 from lexicon.errors import InputError
 from lexicon.mark_parser import parse_marks
 from lexicon.marked_text import MarkedText
-from lexicon.readable import check_readable
 from lexicon.sentences import Sentence, split_sentences
+from lexicon.writing_systems import check_readable
 from tts2face.clock import exact_rate
 from tts2face.exemplar.options import METHOD_OPTIONS, SynthesisOptions
 from tts2face.gesture.notation import parse_expressions, parse_gains, parse_style

@@ -8,7 +8,6 @@ from typing import Protocol
 import numpy as np
 
 from lexicon.cleaning import canonical_text
-from lexicon.said import as_said
 from lexicon.sentences import n_letters, text_prefix
 from lexicon.sequence import PhoneSequence, WordSpan
 

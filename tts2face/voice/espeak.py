@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from lexicon.errors import BackendError, InputError
 from lexicon.g2p import parse_espeak_word
 from lexicon.ipa import Segment
-from lexicon.japanese import has_kanji, with_kana
+from lexicon.japanese import has_kanji, to_kana
 from lexicon.languages import language_code
 from lexicon.phones import PHONES, nearest_phones
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
@@ -92,7 +92,7 @@ class EspeakVoice:
         if isinstance(content, str):
             check_script(content, self._language)
             if self._language == "ja" and has_kanji(content):
-                content = with_kana(content)
+                content = to_kana(content)
             plain = _without_brackets(content)
             if not any(map(self._look_up, plain.split())):
                 return plain, []
