@@ -39,7 +39,7 @@ def write_made_palette(path: Path) -> None:
 
 
 def write_made_talker(path: Path, *, has_face: bool) -> None:
-    """Six utterances of random shapes, a network of two layers and an audio map; with `has_face` an appearance model."""
+    """Six utterances of random shapes, a network of two layers and an audio map; with `has_face` an appearance."""
     rng = np.random.default_rng(6)
     talker = own_talker(has_face=has_face)
     n_looks = 0 if talker.appearance is None else len(talker.appearance.channels)

@@ -127,7 +127,7 @@ def _deep(levels: int) -> list:
         ("palette", lambda a, h: h["derivations"]["quick"]["changes"]["blink"].update(tempo=1e9), "from 0.05 to 20"),
         ("palette", lambda a, h: h["derivations"]["quick"]["changes"].update(nose={}), "changes 'nose'; it must be"),
         ("palette", lambda a, h: h["styles"].clear(), "array 'style.calm.blink', which no palette has"),
-        ("palette", lambda a, h: h.update(fps=10**400), "fps is a number of more than 60 digits"),
+        ("palette", lambda a, h: h.update(fps=10**70), "fps is a number of more than 60 digits"),
         ("talker", lambda a, h: h.update(inventory=["x1"] * 6), "inventory holds ['x1'], which is no phone"),
         ("talker", lambda a, h: h["utterances"].pop(), "names 5 utterances, but n_frames has 6"),
         ("talker", lambda a, h: h["utterances"][0][1][0].__setitem__(2, 99), "'u0' reaches beyond its phones"),
@@ -147,11 +147,11 @@ def test_a_wrong_array_or_key(
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ('{"a": NaN}', "NaN is not a number"),
-        ('{"a": 1, "a": 2}', "an object has a key twice"),
-        ("[" * 100_000 + "]" * 100_000, "cannot be read as JSON"),
-        ('{"a": "\\ud800"}', "cannot be read as JSON"),
-        ('{"a": ' + "9" * 5000 + "}", "cannot be read as JSON"),
+        ('{"a": NaN}', "NaN"),
+        ('{"a": 1, "a": 2}', "'a'.*twice"),
+        ("[" * 100_000 + "]" * 100_000, "nested"),
+        ('{"a": "\\ud800"}', "surrogate"),
+        ('{"a": ' + "9" * 5000 + "}", "5000 characters"),
         ("[1]", "the metadata are a list, not an object"),
     ],
 )

@@ -83,7 +83,7 @@ def _metadata(text: str, path: Path) -> dict[str, Any]:
         raise DataError(
             f"{path}: the metadata have {len(text)} characters, more than {MAX_METADATA_CHARACTERS}; build it again"
         )
-    found = parse_json(text, f"the metadata of {path}")
-    if not isinstance(found, dict):
-        raise DataError(f"{path}: the metadata are a {type(found).__name__}, not an object; build or copy it again")
-    return found
+    parsed = parse_json(text, f"the metadata of {path}")
+    if not isinstance(parsed, dict):
+        raise DataError(f"{path}: the metadata are a {type(parsed).__name__}, not an object; build or copy it again")
+    return parsed
