@@ -91,7 +91,7 @@ def livelink(shared_recordings: Path) -> Path:
     return shared_recordings / "livelink" / "testset_arkit61_60fps.csv"
 
 
-def test_a_real_capture_closes_its_lips_where_bilabials_are_heard(livelink: Path, tmp_path: Path) -> None:
+def test_a_real_capture_closes_its_lips_in_bilabials(livelink: Path, tmp_path: Path) -> None:
     pytest.importorskip("hama", reason="needs the extra [capture]")
     found = observe_livelink(livelink, RunOptions(tmp_path))
     assert len(found) >= 4

@@ -26,7 +26,7 @@ def test_good_measures_pass() -> None:
 @pytest.mark.parametrize(
     ("measure", "value", "reason"),
     [
-        ("confidence", -7300.0, "does not fit the transcript"),
+        ("confidence", -7300.0, "does not match the transcript"),
         ("recognised", -7300.0, "could not be recognised well"),
         ("clipped", 0.02, r"2\.0% of the speech is clipped"),
         ("snr_db", 6.0, "speech is 6 dB above the noise"),
@@ -40,7 +40,7 @@ def test_a_measure_beyond_its_limit_is_refused(measure: str, value: float, reaso
         check_limits({**GOOD, measure: value})
 
 
-def test_every_limit_is_asked() -> None:
+def test_every_limit_is_checked() -> None:
     assert {limit.measure for limit in LIMITS} == {*GOOD, "recognised"}
 
 

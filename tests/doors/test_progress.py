@@ -15,9 +15,9 @@ def test_a_bar_starts_again_with_each_stage(
     with stage_bar() as stages:
         assert stages is not None
         stages("reading recordings")(3, 4)
-        stages("learning lips")(1, 2)
+        stages("learning phone network")(1, 2)
     told = capsys.readouterr().err
-    assert "learning lips" in told
+    assert "learning phone network" in told
     assert "50%" in told
 
 

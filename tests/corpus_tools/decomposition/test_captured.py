@@ -88,7 +88,7 @@ def test_landmarks_follow_the_face_s_own_posing(face: Face) -> None:
 
 
 def test_weights_of_other_shapes_are_refused(face: Face) -> None:
-    with pytest.raises(DataError, match="not of this face's shapes"):
+    with pytest.raises(DataError, match="not for the shapes of this face"):
         moved_landmarks(face, Trajectory(("jawOpen",), np.zeros((2, 1)), 30.0))
 
 
