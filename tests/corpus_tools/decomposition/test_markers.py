@@ -95,14 +95,14 @@ def test_gaps_are_filled_and_reported(made: Made, face: Face, marker_set: Marker
 def test_a_long_gap_is_refused_with_its_time(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
     points = made.points.copy()
     points[120:150, made.names.index("LBRO2")] = np.nan
-    with pytest.raises(DataError, match=r"take\.csv: the marker LBRO2 is out of sight for 0\.25 s from 1\.00 s on"):
+    with pytest.raises(DataError, match=r"take\.csv: the marker LBRO2 is hidden for 0\.25 s from 1\.00 s on"):
         read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
 
 
 def test_a_marker_never_seen_is_refused(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
     points = made.points.copy()
     points[:, made.names.index("LBRO2")] = np.nan
-    with pytest.raises(DataError, match="LBRO2 is never seen"):
+    with pytest.raises(DataError, match="LBRO2 is never visible"):
         read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
 
 
@@ -157,10 +157,10 @@ def test_a_pose_that_no_three_markers_show_is_interpolated_and_reported(
     points[200:210, head[:5]] = np.nan
     points[300:, head[6]] = np.nan
     found = read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
-    assert "the head's pose was filled in in 10 frames" in found.notes
+    assert "the head's pose was interpolated in 10 frames" in found.notes
     assert np.degrees(np.abs(found.head - whole.head)[:, :3]).max() < 0.2  # over 0.08 s
     points[200:240, head[:5]] = np.nan
-    with pytest.raises(DataError, match=r"the head's pose is out of sight for 0\.33 s from 1\.67 s on"):
+    with pytest.raises(DataError, match=r"the head's pose is hidden for 0\.33 s from 1\.67 s on"):
         read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
 
 
@@ -178,7 +178,7 @@ def test_three_markers_show_no_face(made: Made, face: Face, marker_set: MarkerSe
     names = ("RBRO1", "RBRO2", "LBRO1", *marker_set.head)
     kept = [made.names.index(name) for name in names]
     path = write_table(tmp_path / "take.csv", names, made.points[:, kept])
-    with pytest.raises(DataError, match="3 of the set's markers of the face; it takes at least 4"):
+    with pytest.raises(DataError, match="3 of the set's markers of the face; it needs at least 4"):
         read_marker_recording(path, face, read_marker_set(table))
 
 

@@ -25,7 +25,7 @@ def test_what_is_neither_is_refused(face: Face, tmp_path: Path) -> None:
     (tmp_path / "take.csv").write_text("a,b\n1,2\n3,4\n")
     with pytest.raises(DataError, match="needs the columns time or frame"):
         read_capture_file(tmp_path / "take.csv", face)
-    with pytest.raises(InputError, match=r"take\.bvh is no facial capture"):
+    with pytest.raises(InputError, match=r"take\.bvh is not a facial capture"):
         read_capture_file(tmp_path / "take.bvh", face)
     with pytest.raises(InputError, match="there is no capture"):
         read_capture_file(tmp_path / "none.csv", face)
