@@ -164,7 +164,7 @@ def test_what_cannot_be_said_is_refused(change: dict, reason: str, talker: Talke
         ({"idle": 0.0, "text": ""}, "idle must lie between 0.1 and 3600, not 0"),
         ({"gestures": "none", "style": "calm"}, "without gestures there is nothing to style"),
         ({"gestures": "none", "pitch": True}, "without gestures there is nothing to style"),
-        ({"gestures": "noise", "pitch": True}, "noise hears no voice; leave --pitch or --noise away"),
+        ({"gestures": "noise", "pitch": True}, "--pitch has no effect with --gestures noise; remove one of them"),
     ],
 )
 def test_options_out_of_range_are_refused(change: dict, reason: str) -> None:
