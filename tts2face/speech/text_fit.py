@@ -13,10 +13,10 @@ from tts2face.speech.forced_alignment import Alignment
 
 LEAST_CONFIDENCE = (
     -6500.0
-)  # log likelihood per second of a whole utterance; docs/decisions.md, "A recording is refused"
+)  # log likelihood per second of a whole utterance; docs/decisions/013-transcript-confidence.md
 CONTEXT_S = 1.5  # on either side of a span that is aligned again
 WINDOW_S = 1.0  # of speech that is judged together: two to four words; single words scatter by half as much again
-# Log likelihood per second in the window; measured in docs/decisions.md, "A text that a recording does not say".
+# Log likelihood per second in the window; measured in docs/decisions/056-text-mismatch.md.
 LEAST_LOCAL_CONFIDENCE = -7000.0
 LEAST_FOREIGN_CONFIDENCE = -9000.0  # the acoustic model is English: right texts of other languages reach -8200
 LONGEST_GAP_S = 1.0  # spans closer than this are one

@@ -1,7 +1,8 @@
 """Face landmarks in pictures: 478 points per frame with a score, no filter over time.
 
 Networks: BlazeFace finds the face once, the face mesh (Kartynnik et al. 2019) reads each frame from a square around the
-previous frame's landmarks. A filter over time would blunt lip closures and lag (docs/decisions.md), so there is none.
+previous frame's landmarks. A filter over time would blunt lip closures and lag (docs/decisions/010-landmarks-two-passes.md),
+so there is none.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
