@@ -24,7 +24,8 @@ class ContactRule:
 
 
 # As many lips touch as in recordings (docs/decisions/039-phone-networks.md). Some bilabials close between two frames,
-# so not all exemplars tell the pose. Labiodentals leave a gap that varies: drawing each to the mean closes those that were recorded open.
+# so not all exemplars tell the pose. Labiodentals leave a gap that varies: drawing each to the mean closes those that
+# were recorded open.
 CONTACT_RULES = {
     "bilabial": ContactRule(pose_share=0.7, enough=0.0),
     "labiodental": ContactRule(pose_share=1.0, enough=0.75),
