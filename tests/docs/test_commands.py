@@ -1,14 +1,16 @@
 """Every command line of the documentation is parsed by the real command line; those of README and cli.md are executed.
 
-What is not executed here stands in `NOT_EXECUTED` with its reason; with recordings of people, `test_recorded_commands`
-executes most of it.
+What is not executed here stands in `tests.docs.blocks.NOT_EXECUTED` with its reason; lines that need video of a
+person are executed by `tests/doors/test_command_line.py`.
 """
 
+import functools
 import io
 import json
 import shutil
 import sys
 import wave
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -16,39 +18,29 @@ from cyclopts import App
 
 from cli.main import app, run
 from cli.options import check_options, option_names
-from tests.docs.blocks import DOCS, PAGES, ROOT, own_commands, shell_lines
+from tests.docs.blocks import (
+    CLI_PAGE,
+    EXECUTED_PAGES,
+    NOT_EXECUTED,
+    PAGES,
+    README,
+    own_commands,
+    reason_not_executed,
+    shell_lines,
+)
+from tts2face import session
 from tts2face.models.palette import Palette, load_palette, write_palette
-from tts2face.session import Session
 from tts2face.storage.files import SHIPPED_FOLDER
 
-README, CLI_PAGE = ROOT / "README.md", DOCS / "cli.md"
-SMALL = ["--size", "64x64", "--fps", "5"]
-PERSON, WINDOW, LONG = "needs video of a person", "opens a window", "takes over a minute"
-NOT_EXECUTED = {  # beginning of a command line: why it is parsed only
-    '"Hello." --view': WINDOW,
-    '"Hello." --talker me.talker --face self': PERSON,
-    "mimic take.mp4": PERSON,
-    "mimic --camera": WINDOW,
-    "corpus setup": "uses the network",
-    "corpus build": PERSON,
-    "corpus face": PERSON,
-    "corpus gestures": PERSON,
-    "corpus audio-maps": PERSON,
-    "corpus evaluate": PERSON,
-    "report gestures": LONG,
-}
+SMALL = {"--size": "64x64", "--fps": "5"}
 LISTS = {"voices", "languages", "faces", "identities", "styles", "talkers", "phones", "completion", "corpus", "report"}
-EXECUTED_PAGES = (README, CLI_PAGE)
-
-
-def not_executed(line: str) -> str | None:
-    """Why a command line is not executed."""
-    command = line.partition("tts2face ")[2]
-    return next((reason for start, reason in NOT_EXECUTED.items() if command.startswith(start)), None)
-
-
 OWN_LINES = [(page.name, line) for page in PAGES for line in shell_lines(page) if own_commands(line)]
-EXECUTED = [line for page in EXECUTED_PAGES for line in shell_lines(page) if own_commands(line) and not not_executed(line)]
+EXECUTED = [
+    line
+    for page in EXECUTED_PAGES
+    for line in shell_lines(page)
+    if own_commands(line) and not reason_not_executed(line)
+]
 
 
 def commands_of(command: App, path: tuple[str, ...] = ()) -> dict[tuple[str, ...], App]:
@@ -60,6 +52,14 @@ def commands_of(command: App, path: tuple[str, ...] = ()) -> dict[tuple[str, ...
     return found
 
 
+@pytest.fixture(scope="module", autouse=True)
+def kept_sessions() -> Iterator[None]:
+    """Sessions with the same models are one: loading a voice and lighting a face take longer than a small clip."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(session, "Session", functools.cache(session.Session))
+        yield
+
+
 @pytest.fixture(scope="module")
 def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The files that the examples read: made by the project itself, small, with the names of the examples."""
@@ -68,8 +68,8 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "speech.txt").write_text("Hello there.", encoding="utf-8")
     (folder / "words.txt").write_text("gif  JH IH1 F\n", encoding="utf-8")
     (folder / "timeline.json").write_text('{"style": "delighted", "nods": [{"time": 0.2}]}', encoding="utf-8")
-    session = Session()
-    sound = session.clip("Hello there.").speech.waveform
+    spoken = session.Session("grid_s1", "head", identity=None, palette="starter")
+    sound = spoken.clip("Hello there.").speech.waveform
     with wave.open(str(folder / "speech.wav"), "wb") as file:
         file.setparams((1, 2, sound.rate, 0, "NONE", ""))
         file.writeframes((sound.samples * 32767).astype("<i2").tobytes())
@@ -78,9 +78,9 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     starter = load_palette("starter")
     styles = {"mine" if name == "grid_s1" else name: style for name, style in starter.styles.items()}
     write_palette(folder / "mine.palette", Palette(starter.neutral, starter.regions, styles, {}))
-    shapes = [shape for shape in session.mesh.shape_names[:52]]
+    shapes = spoken.mesh.shape_names[:52]
     rows = ["Timecode,BlendshapeCount," + ",".join(shape[0].upper() + shape[1:] for shape in shapes)]
-    rows += [f"00:00:{i // 60:02d}:{i % 60:02d}.000,61," + ",".join(["0.1"] * len(shapes)) for i in range(90)]
+    rows += [f"00:00:00:{i:02d}.000,61," + ",".join(["0.1"] * len(shapes)) for i in range(20)]
     (folder / "take.csv").write_text("\n".join(rows), encoding="utf-8")
     return folder
 
@@ -111,7 +111,7 @@ def test_command_lines_of_readme_and_cli_page_work(
     (words,) = own_commands(line)
     is_clip = words[0] not in LISTS and not words[0].startswith(("--help", "--version"))
     if is_clip:
-        words = [*words[: _end_of_options(words)], *_small(words), *words[_end_of_options(words) :]]
+        words = _small(words)
     if words[:2] == ["report", "similarity"]:
         words += ["--halves", "2"]
     assert run(words) == 0, capsys.readouterr().err
@@ -125,14 +125,11 @@ def test_command_lines_of_readme_and_cli_page_work(
             assert json.loads(printed)
 
 
-def _end_of_options(words: list[str]) -> int:
-    return words.index("--") if "--" in words else len(words)
-
-
 def _small(words: list[str]) -> list[str]:
-    """Options for a small clip that the line does not set itself."""
-    given = zip(SMALL[::2], SMALL[1::2], strict=True)
-    return [word for name, value in given if name not in words for word in (name, value)]
+    """The same command for a small clip of few frames."""
+    kept = [word for before, word in zip(["", *words], words, strict=False) if not {before, word} & set(SMALL)]
+    end = kept.index("--") if "--" in kept else len(kept)
+    return [*kept[:end], *(word for option in SMALL.items() for word in option), *kept[end:]]
 
 
 def test_every_command_stands_on_the_cli_page() -> None:
