@@ -15,7 +15,7 @@ from tts2face.request import Request
 from tts2face.synthesis.prepared_request import prepare
 
 PAGE = DOCS / "file-formats.md"
-STYLE_MARK = re.compile(r"\[style:([^\]]+)\]")
+STYLE_MARK = re.compile(r"\[style:([a-z][^\]]*)\]")
 
 
 @pytest.fixture(scope="module")
