@@ -17,11 +17,11 @@ import pytest
 from cli.main import run
 from cli.process import EXIT_CODES
 from lexicon import errors
+from tests.docs.blocks import lines_that_need_a_person
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.video.media import read_sound
 
-README = Path(__file__).parents[2] / "README.md"
 COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
 SMALL = ["--size", "64x64", "--fps", "5"]
 
@@ -33,8 +33,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def readme_commands() -> list[str]:
-    block = re.findall(r"^    (.*tts2face .*)$", README.read_text(encoding="utf-8"), re.MULTILINE)
-    return [line.split(" #")[0].strip() for line in block if not line.startswith("pip")]
+    return lines_that_need_a_person()
 
 
 def lay_out(here: Path, source: Path) -> None:

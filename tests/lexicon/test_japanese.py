@@ -18,7 +18,7 @@ def spoken(text: str) -> str:
 
 
 def test_most_sentences_are_read_as_a_person_reads_them() -> None:
-    """35 of 40 when the library was chosen (docs/decisions.md)."""
+    """35 of 40 when the library was chosen (docs/decisions/058-japanese.md)."""
     assert len(READINGS) == 40
     right = [written for written, kana in READINGS if spoken(written) == kana]
     assert len(right) >= 35

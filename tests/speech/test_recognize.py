@@ -13,7 +13,7 @@ from tts2face.speech.phone_recognition import MAX_SOUND_S, PhoneRecogniser
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 
-EDITED = 0.4  # of the phones: 0.285 over 100 sentences of this talker (docs/decisions.md)
+EDITED = 0.4  # of the phones: 0.285 over 100 sentences of this talker (docs/decisions/036-raw-recordings.md)
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from tts2face.exemplar.tokens import Tokens
 from tts2face.models.talker import Talker, require_appearance
 from tts2face.types import Trajectory
 
-N_BLENDED_APPEARANCES = 3  # exemplars; more of them blur teeth and tongue (docs/decisions.md)
+N_BLENDED_APPEARANCES = 3  # exemplars; more of them blur teeth and tongue (docs/decisions/032-own-face.md)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,7 +13,7 @@ from tts2face.exemplar.time_warping import warp_to_reference
 from tts2face.exemplar.tokens import Tokens
 
 CLOCK_HZ = 100.0  # instants at which motion is made; lips move below 15 Hz, so nothing is lost
-N_KNOTS = 8  # samples a phone; 10 are no better (docs/decisions.md)
+N_KNOTS = 8  # samples a phone; 10 are no better (docs/decisions/007-exemplar-method.md)
 ALIGN_BAND = 1  # knots by which an exemplar's event may lie off the best one's; 2 lose .002 of r opening
 MIN_DEVIATION = 0.15  # lower limit of the deviation between exemplars, relative to a parameter's spread
 

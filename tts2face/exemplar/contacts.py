@@ -27,8 +27,9 @@ class ContactRule:
     enough: float
 
 
-# As many lips touch as in recordings (docs/decisions.md). Some bilabials close between two frames, so not all exemplars
-# tell the pose. Labiodentals leave a gap that varies: drawing each to the mean closes those that were recorded open.
+# As many lips touch as in recordings (docs/decisions/039-phone-networks.md). Some bilabials close between two frames,
+# so not all exemplars tell the pose. Labiodentals leave a gap that varies: drawing each to the mean closes those that
+# were recorded open.
 CONTACT_RULES = {
     "bilabial": ContactRule(pose_share=0.7, enough=0.0),
     "labiodental": ContactRule(pose_share=1.0, enough=0.75),

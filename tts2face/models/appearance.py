@@ -2,7 +2,7 @@
 
 The appearance model of Theobald et al. 2007, section 2: the picture inside the landmarks' mesh, warped to a reference
 shape, is ``mean + sum_i b_i basis_i`` (eq. 2). The inside of the mouth has a separate model, so that teeth and tongue
-stay sharp (design of Cosker et al. 2004; measured in docs/decisions.md).
+stay sharp (design of Cosker et al. 2004; measured in docs/decisions/032-own-face.md).
 """
 
 from collections.abc import Mapping

@@ -26,7 +26,8 @@ class MovieKind:
     container_options: Mapping[str, str] = field(default_factory=dict)
 
 
-# Of the presets measured (docs/decisions.md) veryfast gives a quarter of ultrafast's size at half its speed.
+# Of the presets measured (docs/decisions/031-h264-settings.md) veryfast gives a quarter of ultrafast's size at half its
+# speed.
 MP4_MOVIE = MovieKind(
     "mp4", "libx264", "aac", 128_000,
     MappingProxyType({"crf": "18", "preset": "veryfast", "profile": "high"}),

@@ -13,10 +13,10 @@ from tts2face.speech.forced_alignment import Alignment
 
 LEAST_CONFIDENCE = (
     -6500.0
-)  # log likelihood per second of a whole utterance; docs/decisions.md, "A recording is refused"
+)  # log likelihood per second of a whole utterance; docs/decisions/013-transcript-confidence.md
 CONTEXT_S = 1.5  # context on either side of a span that is aligned a second time
 WINDOW_S = 1.0  # speech that is scored together, two to four words; scores of single words scatter 1.5 times as much
-# Log likelihood per second in the window; measured in docs/decisions.md, "A text that a recording does not say".
+# Log likelihood per second in the window; measured in docs/decisions/056-text-mismatch.md.
 LEAST_LOCAL_CONFIDENCE = -7000.0
 LEAST_FOREIGN_CONFIDENCE = -9000.0  # the acoustic model is English: correct texts of other languages reach -8200
 LONGEST_GAP_S = 1.0  # spans with a smaller gap are merged

@@ -2,7 +2,7 @@
 
 BlazeFace detects the face once; the face mesh network (Kartynnik et al. 2019) reads each picture from a square crop
 around the landmarks of the previous one. Temporal filtering would attenuate lip closures and add delay
-(docs/decisions.md).
+(docs/decisions/010-landmarks-two-passes.md).
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence

@@ -1,0 +1,50 @@
+"""Hook of MkDocs: the page of options is made from the command line itself, so that it cannot differ from it."""
+
+from collections.abc import Iterator
+
+from cyclopts import App
+
+from cli.main import app
+
+PLACE = "<!-- options -->"
+
+
+def on_page_markdown(markdown: str, **_: object) -> str:
+    """A page with the tables of options in their place."""
+    return markdown.replace(PLACE, "\n".join(command_tables())) if PLACE in markdown else markdown
+
+
+def walk_commands(command: App, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], App]]:
+    """Every command that does something, with the words that call it."""
+    if command.default_command is not None:
+        yield path, command
+    for name in command:
+        if not name.startswith("-"):
+            yield from walk_commands(command[name], (*path, name))
+
+
+def command_tables() -> Iterator[str]:
+    """Lines of Markdown: a heading, a sentence and a table for each command."""
+    for path, command in walk_commands(app):
+        words = " ".join(("tts2face", *path))
+        yield f"\n## {words}\n\n{command.help}\n"
+        rows = list(_rows(command))
+        if rows:
+            yield "| option | meaning | default |\n| --- | --- | --- |"
+            yield from rows
+
+
+def _rows(command: App) -> Iterator[str]:
+    for argument in command.assemble_argument_collection():
+        names = [name for name in argument.names if name.startswith("-")]
+        shown = ", ".join(f"`{name}`" for name in names) or f"`{argument.name.lstrip('-').upper()}`"
+        default = "required" if argument.required else _default(argument.field_info.default)
+        yield f"| {shown} | {_cell(argument.parameter.help or '')} | {default} |"
+
+
+def _default(value: object) -> str:
+    return "" if value is None or value is False or not isinstance(value, bool | int | float | str) else f"`{value}`"
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.split()).replace("|", r"\|").replace("[", r"\[")

@@ -1,0 +1,157 @@
+"""Every command line of the documentation is parsed by the real command line; those of README and cli.md are executed.
+
+What is not executed here stands in `tests.docs.blocks.NOT_EXECUTED` with its reason; lines that need video of a
+person are executed by `tests/doors/test_command_line.py`.
+"""
+
+import functools
+import io
+import json
+import shutil
+import sys
+import wave
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from cyclopts import App
+
+from cli.main import app, run
+from cli.options import check_options, option_names
+from tests.docs.blocks import (
+    CLI_PAGE,
+    EXECUTED_PAGES,
+    NOT_EXECUTED,
+    PAGES,
+    README,
+    own_commands,
+    reason_not_executed,
+    shell_lines,
+)
+from tts2face import session
+from tts2face.models.palette import Palette, load_palette, write_palette
+from tts2face.storage.files import SHIPPED_FOLDER
+
+SMALL = {"--size": "64x64", "--fps": "5"}
+LISTS = {"voices", "languages", "faces", "identities", "styles", "talkers", "phones", "completion", "corpus", "report"}
+OWN_LINES = [(page.name, line) for page in PAGES for line in shell_lines(page) if own_commands(line)]
+EXECUTED = [
+    line
+    for page in EXECUTED_PAGES
+    for line in shell_lines(page)
+    if own_commands(line) and not reason_not_executed(line)
+]
+
+
+def commands_of(command: App, path: tuple[str, ...] = ()) -> dict[tuple[str, ...], App]:
+    """Every command that does something, by the words that call it."""
+    found = {path: command} if command.default_command is not None else {}
+    for name in command:
+        if not name.startswith("-"):
+            found |= commands_of(command[name], (*path, name))
+    return found
+
+
+@pytest.fixture(scope="module", autouse=True)
+def kept_sessions() -> Iterator[None]:
+    """Sessions with the same models are one: loading a voice and lighting a face take longer than a small clip."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(session, "Session", functools.cache(session.Session))
+        yield
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The files that the examples read: made by the project itself, small, with the names of the examples."""
+    folder = tmp_path_factory.mktemp("inputs")
+    (folder / "chapter.txt").write_text("Chapter one. It was late.", encoding="utf-8")
+    (folder / "speech.txt").write_text("Hello there.", encoding="utf-8")
+    (folder / "words.txt").write_text("gif  JH IH1 F\n", encoding="utf-8")
+    (folder / "timeline.json").write_text('{"style": "delighted", "nods": [{"time": 0.2}]}', encoding="utf-8")
+    spoken = session.Session("grid_s1", "head", identity=None, palette="starter")
+    sound = spoken.clip("Hello there.").speech.waveform
+    with wave.open(str(folder / "speech.wav"), "wb") as file:
+        file.setparams((1, 2, sound.rate, 0, "NONE", ""))
+        file.writeframes((sound.samples * 32767).astype("<i2").tobytes())
+    shutil.copy(SHIPPED_FOLDER / "grid_s1.talker", folder / "me.talker")
+    shutil.copy(SHIPPED_FOLDER / "head.face", folder / "me.face")
+    starter = load_palette("starter")
+    styles = {"mine" if name == "grid_s1" else name: style for name, style in starter.styles.items()}
+    write_palette(folder / "mine.palette", Palette(starter.neutral, starter.regions, styles, {}))
+    shapes = spoken.mesh.shape_names[:52]
+    rows = ["Timecode,BlendshapeCount," + ",".join(shape[0].upper() + shape[1:] for shape in shapes)]
+    rows += [f"00:00:00:{i:02d}.000,61," + ",".join(["0.1"] * len(shapes)) for i in range(20)]
+    (folder / "take.csv").write_text("\n".join(rows), encoding="utf-8")
+    return folder
+
+
+@pytest.fixture
+def here(inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    for path in inputs.iterdir():
+        (tmp_path / path.name).symlink_to(path)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(("page", "line"), OWN_LINES, ids=lambda text: text[:60])
+def test_every_command_line_is_understood(page: str, line: str) -> None:
+    for words in own_commands(line):
+        if {"--help", "--version"} & set(words):
+            continue
+        check_options(app, words)
+        app.parse_args(words, exit_on_error=False, print_error=False)
+
+
+@pytest.mark.parametrize("line", EXECUTED, ids=lambda line: line.split("#")[0].strip())
+def test_command_lines_of_readme_and_cli_page_work(
+    line: str, here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if line.startswith("echo"):
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"Good morning.\n")))
+    (words,) = own_commands(line)
+    is_clip = words[0] not in LISTS and not words[0].startswith(("--help", "--version"))
+    if is_clip:
+        words = _small(words)
+    if words[:2] == ["report", "similarity"]:
+        words += ["--halves", "2"]
+    assert run(words) == 0, capsys.readouterr().err
+    for flag in ("--out", "--explain"):
+        if flag in words:
+            assert (here / words[words.index(flag) + 1]).exists()
+    if not is_clip and "--out" not in words:
+        printed = capsys.readouterr().out
+        assert printed
+        if "--json" in words:
+            assert json.loads(printed)
+
+
+def _small(words: list[str]) -> list[str]:
+    """The same command for a small clip of few frames."""
+    kept = [word for before, word in zip(["", *words], words, strict=False) if not {before, word} & set(SMALL)]
+    end = kept.index("--") if "--" in kept else len(kept)
+    return [*kept[:end], *(word for option in SMALL.items() for word in option), *kept[end:]]
+
+
+def test_every_command_stands_on_the_cli_page() -> None:
+    shown = [tuple(words) for line in shell_lines(CLI_PAGE) for words in own_commands(line)]
+    missing = [path for path in commands_of(app) if path and not any(words[: len(path)] == path for words in shown)]
+    assert not missing
+
+
+def test_options_named_in_the_documentation_exist() -> None:
+    known = {name for command in commands_of(app).values() for name in option_names(command)}
+    known |= {"--help", "--version", "--", "--strict", "--noise"}
+    words = {word.split("=")[0] for _, line in OWN_LINES for own in own_commands(line) for word in own}
+    assert {word for word in words if word.startswith("--") and word != "--five"} <= known
+
+
+def test_reasons_name_command_lines_that_exist() -> None:
+    lines = [line.partition("tts2face ")[2] for page in EXECUTED_PAGES for line in shell_lines(page)]
+    assert not [start for start in NOT_EXECUTED if not any(line.startswith(start) for line in lines)]
+
+
+def test_readme_holds_the_two_promised_commands() -> None:
+    lines = shell_lines(README)
+    text = "We were away a year ago, but Bob may move five big maps."
+    assert f'pip install . && tts2face "{text}" --out clip.mp4' in lines
+    assert "pip install '.[test]' && pytest" in lines
