@@ -10,6 +10,7 @@ import numpy as np
 from lexicon.cleaning import canonical_text
 from lexicon.sentences import n_letters, text_prefix
 from lexicon.sequence import PhoneSequence, WordSpan
+from lexicon.spoken_form import spoken_form
 
 
 class WordTimes:
