@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from lexicon.errors import Tts2faceError as Tts2faceError
     from lexicon.sequence import PhoneSequence as PhoneSequence
     from lexicon.sequence import WordSpan as WordSpan
-    from tts2face.api import write_request as write_clip
+    from tts2face.api import write_clip as write_clip
     from tts2face.catalogue import faces as faces
     from tts2face.catalogue import identities as identities
     from tts2face.catalogue import languages as languages

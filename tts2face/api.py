@@ -9,7 +9,7 @@ from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.types import Clip
 
 
-def write_request(
+def write_clip(
     clip: Clip,
     face: AnimatedFace,
     out: str | Path,
