@@ -15,6 +15,7 @@ from corpus_tools.decomposition.marker_interpolation import MarkerInterpolator, 
 from corpus_tools.decomposition.marker_set import MIN_FACE_MARKERS, MarkerSet
 from lexicon.errors import DataError
 from tts2face.models.face import Face
+from tts2face.numeric import nearest_rotation
 from tts2face.video.pose import head_angles
 
 MAX_QUOTED_MARKERS = 6  # markers quoted in a message
@@ -162,8 +163,7 @@ def _face_in_head_axes(
 def _head_motion(poses: HeadPoses, spread: MarkerInterpolator, face: Face) -> Floats:
     """(T, 6) `HEAD_CHANNELS` in the face's axes: angles relative to the mean, pivot relative to the median."""
     turn = spread.rotation
-    left, _, right = np.linalg.svd(poses.rotations.mean(axis=0))
-    mean = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    mean = nearest_rotation(poses.rotations.mean(axis=0))
     level = turn @ mean.T  # the world's axes in those of the face at its mean pose
     pivot = (face.pivot / spread.size - spread.translation) @ turn
     places = (poses.rotations @ pivot + poses.places) @ level.T

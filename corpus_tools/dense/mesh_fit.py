@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from tts2face.face.rbf import Interpolant, fit_interpolant
 from tts2face.models.face import Eye, Face
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.numeric import smoothstep
 from tts2face.video.pose import similarity_transforms
 
 Floats = NDArray[np.float64]
@@ -47,7 +48,7 @@ class EyeSocket:
         share = np.clip(
             (self.radius + FREE_SKIN_DISTANCE_MM - off) / (FREE_SKIN_DISTANCE_MM - FULL_EYE_DISTANCE_MM), 0.0, 1.0
         )
-        share = share * share * (3.0 - 2.0 * share)
+        share = smoothstep(share)
         towards = moved - self.after
         length = np.maximum(np.linalg.norm(towards, axis=1), 1e-9)
         wanted = self.scale * off / length

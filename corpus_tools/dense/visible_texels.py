@@ -10,6 +10,7 @@ from corpus_tools.dense.texels import ISLANDS_TOP, Texels, find_texels
 from lexicon.errors import DataError
 from tts2face.models.face import Face
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.numeric import smoothstep
 
 Floats = NDArray[np.float64]
 
@@ -114,7 +115,7 @@ def polygon_depth(places: Floats, polygon: Floats, most: float) -> Floats:
 def smooth_step(values: Floats, low: float, high: float) -> Floats:
     """Smooth step from 0 at `low` to 1 at `high`."""
     t = np.clip((values - low) / (high - low), 0.0, 1.0)
-    smooth: Floats = t * t * (3.0 - 2.0 * t)
+    smooth: Floats = smoothstep(t)
     return smooth
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.head.source import SourceMesh
+from tts2face.numeric import nearest_rotation
 
 Floats = NDArray[np.float64]
 
@@ -48,7 +49,5 @@ def fit_sphere(points: Floats) -> tuple[Floats, float]:
 def fit_rotation(before: Floats, after: Floats) -> tuple[Floats, Floats]:
     """Least-squares rotation (3, 3) and translation (3,) from points to their new positions (Kabsch 1976)."""
     middle, there = before.mean(axis=0), after.mean(axis=0)
-    left, _, right = np.linalg.svd((before - middle).T @ (after - there))
-    flip = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    rotation = (left * flip @ right).T
+    rotation = nearest_rotation((before - middle).T @ (after - there)).T
     return rotation, there - rotation @ middle

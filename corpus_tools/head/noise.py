@@ -4,6 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from tts2face.numeric import smoothstep
+
 Floats = NDArray[np.float64]
 
 SIZE = 32  # lattice points along each axis; the field is periodic
@@ -26,7 +28,7 @@ def gaussian_bump(points: Floats, centre: tuple[float, ...], reach: tuple[float,
 def ramp(values: Floats, low: float, high: float) -> Floats:
     """Smooth step from 0 at `low` to 1 at `high`; `high` may be the smaller."""
     share = np.clip((values - low) / (high - low), 0, 1)
-    return share * share * (3 - 2 * share)
+    return smoothstep(share)
 
 
 def stroke_cover(places: Floats, starts: Floats, ends: Floats, widths: Floats) -> Floats:

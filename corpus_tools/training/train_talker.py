@@ -18,6 +18,7 @@ from tts2face.models.landmarks import (
     UPPER_LIP_INNER_MID,
 )
 from tts2face.models.talker import ShapeModel, Talker, Utterance
+from tts2face.numeric import nearest_rotation
 from tts2face.video.pose import head_angles
 
 REST_MARGIN_S = 0.2  # lips start to move this long before the first sound
@@ -123,10 +124,7 @@ def normalised_lip_gap(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
 def mean_rotation(observations: Sequence[Observation]) -> NDArray[np.float64]:
     """(3, 3) mean rotation of the head: the rotation nearest to the mean of the matrices."""
     total = sum(_rotation_matrices(observation.head[:, :3]).sum(axis=0) for observation in observations)
-    left, _, right = np.linalg.svd(np.asarray(total))
-    signs = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    mean: NDArray[np.float64] = left @ signs @ right
-    return mean
+    return nearest_rotation(np.asarray(total))
 
 
 def _principal_components(

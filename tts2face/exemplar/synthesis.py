@@ -24,6 +24,7 @@ from tts2face.exemplar.tokens import Tokens, collect_tokens, phone_contexts
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker, speech_channels
+from tts2face.numeric import smoothstep
 from tts2face.types import Trajectory
 
 RELEASE_FROM_S = 0.08  # distance from speech at which the transition to rest begins
@@ -218,4 +219,4 @@ def rest_weights(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[n
 def _smoothstep(part: NDArray[np.float64]) -> NDArray[np.float64]:
     """Cubic smoothstep from 0 to 1."""
     part = np.clip(part, 0.0, 1.0)
-    return np.asarray(part * part * (3.0 - 2.0 * part))
+    return smoothstep(part)

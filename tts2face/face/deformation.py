@@ -10,6 +10,7 @@ from lexicon.errors import InputError
 from tts2face.compilation import kernel
 from tts2face.models.face import Face
 from tts2face.models.landmarks import CHIN
+from tts2face.numeric import smoothstep
 from tts2face.types import HEAD_CHANNELS
 
 REST_HEAD = np.zeros(len(HEAD_CHANNELS), np.float32)  # head pose at rest
@@ -112,7 +113,7 @@ def head_share(face: Face) -> NDArray[np.float32]:
     if top - bottom < MIN_NECK_MM:
         return np.ones(len(height), np.float32)
     share = np.clip((height - bottom) / (top - bottom), 0.0, 1.0)
-    smooth: NDArray[np.float32] = (share * share * (3.0 - 2.0 * share)).astype(np.float32)
+    smooth: NDArray[np.float32] = smoothstep(share).astype(np.float32)
     return smooth
 
 

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_LANDMARKS
+from tts2face.numeric import nearest_rotation
 
 FloatArray = NDArray[np.float64]
 
@@ -35,9 +36,7 @@ def scatter_landmarks(face: Face, values: FloatArray) -> FloatArray:
 def procrustes_rotation(source: FloatArray, target: FloatArray) -> FloatArray:
     """Rotation (3, 3) of points (N, 3) that fits the target best, up to translation and scale (Procrustes)."""
     inertia = np.einsum("nc,nd->cd", source - source.mean(axis=0), target - target.mean(axis=0))
-    left, _, right = np.linalg.svd(inertia)
-    mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    turn: FloatArray = np.round((left @ mirror @ right).T, DIGITS)
+    turn: FloatArray = np.round(nearest_rotation(inertia).T, DIGITS)
     return turn
 
 

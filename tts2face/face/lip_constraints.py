@@ -20,7 +20,7 @@ from tts2face.models.landmarks import (
     MOUTH_CORNER_RIGHT,
     MOUTH_REGION,
 )
-from tts2face.numeric import ordered_product
+from tts2face.numeric import ordered_product, smoothstep
 
 FULL_EXPRESSION_GAP_MM = 4.0  # lips this far apart follow an expression in full; touching lips do not follow it
 MIN_GAP_SHARE = 0.5  # least share of the speech gap that an expression leaves open
@@ -138,5 +138,5 @@ def build_lip_constraints(face: Face) -> LipConstraints:
 
 def _smoothstep(share: FloatArray) -> FloatArray:
     clipped = np.clip(share, 0.0, 1.0)
-    eased: FloatArray = clipped * clipped * (3.0 - 2.0 * clipped)
+    eased: FloatArray = smoothstep(clipped)
     return eased

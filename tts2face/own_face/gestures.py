@@ -18,7 +18,7 @@ from tts2face.models.appearance import Appearance
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
 from tts2face.models.palette import EXPRESSIONS, REGION_FEATURES, Palette
 from tts2face.models.talker import ShapeModel, Talker, require_appearance
-from tts2face.numeric import ordered_product
+from tts2face.numeric import ordered_product, smoothstep
 from tts2face.retargeting.performer import EYELID_LANDMARKS, eye_aperture
 from tts2face.types import Trajectory
 
@@ -194,5 +194,5 @@ def _lid_pixel_weights(appearance: Appearance) -> Float32Array:
         share = np.maximum(
             share, np.clip((LID_OUTER_RADIUS - distance) / (LID_OUTER_RADIUS - LID_INNER_RADIUS), 0.0, 1.0)
         )
-    smooth: Float32Array = (share * share * (3.0 - 2.0 * share)).astype(np.float32)
+    smooth: Float32Array = smoothstep(share).astype(np.float32)
     return smooth
