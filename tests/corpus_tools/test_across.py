@@ -67,7 +67,7 @@ def test_the_answer_says_what_it_is(measured: tuple[Evaluation, tuple[SplitResul
     assert result.to_json()["is_across"]
     assert result.rows()[1][:2] == ("another talker", "mean face")
     html = evaluation_page(result, runs)
-    assert "8 utterances of another talker with their own phone edges, 30 learnt from" in html
+    assert "8 utterances of another talker with their own phone edges, 30 training utterances" in html
     assert "gap of the lips (z)" in html
 
 
