@@ -95,7 +95,7 @@ def report_writer(out: Path, writers: Mapping[str, Writer]) -> Writer:
     """
     suffix = out.suffix.lower()
     if suffix not in writers:
-        raise InputError(f"a report cannot be written as {out.name}; choose one of {', '.join(writers)}")
+        raise InputError(f"a report is written as {', '.join(writers)}, not {out.name}")
     if not out.parent.is_dir():
         raise InputError(f"there is no folder {out.parent}; make it or choose another")
     if suffix in PLOT_SUFFIXES:

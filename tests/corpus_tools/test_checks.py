@@ -32,7 +32,7 @@ def test_good_measures_pass() -> None:
         ("snr_db", 6.0, "speech is 6 dB above the noise"),
         ("crowded", 0.5, "50% of the frames show more than one face"),
         ("turn_deg", 60.0, "turned away by 60 degrees"),
-        ("frozen_s", 0.5, r"stands still for 0\.50 s"),
+        ("frozen_s", 0.5, r"is frozen for 0\.50 s"),
     ],
 )
 def test_a_measure_beyond_its_limit_is_refused(measure: str, value: float, reason: str) -> None:

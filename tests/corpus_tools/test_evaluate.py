@@ -103,7 +103,7 @@ def test_folds_hold_out_every_utterance_once(observations: list[Observation]):
     html = evaluation_page(result, runs)
     assert "<h2>2 folds</h2>" in html
     assert html.count("<td>mean ± spread</td>") == 5
-    assert html.count("<td>2 (10 held out, 30 learnt from)</td>") == 5
+    assert html.count("<td>2 (10 held out, 30 for training)</td>") == 5
 
 
 @pytest.mark.parametrize("n_folds", [1, 41])

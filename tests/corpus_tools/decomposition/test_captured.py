@@ -20,7 +20,7 @@ from lexicon.errors import DataError, InputError
 from tts2face.face.deformation import posed_vertices
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_LANDMARKS
-from tts2face.synthesis.performance import retarget_capture
+from tts2face.retargeting.performer import match_shapes
 from tts2face.types import Trajectory, Waveform
 from tts2face.video.livelink import read_livelink
 
@@ -111,7 +111,7 @@ def test_a_live_link_capture_moves_the_face_with_its_head_and_sound(shared_recor
     assert found.missing_features == frozenset()
     assert found.sound is not None
     assert found.sound.duration == pytest.approx(len(found.landmarks) / found.fps, abs=0.3)
-    weights = retarget_capture(read_livelink(path), face).face.values
+    weights = match_shapes(read_livelink(path).weights, face).values
     np.testing.assert_allclose(found.rest, rest_landmarks(face), atol=1e-4)
     jaw = weights[:, face.shape_names.index("jawOpen")]
     assert np.corrcoef(jaw, -found.landmarks[:, 152, 1])[0, 1] > 0.95
