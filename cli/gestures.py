@@ -1,4 +1,4 @@
-"""``tts2face corpus gestures``: recordings become a style of a palette."""
+"""``tts2face corpus gestures``: build a gesture style from recordings."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,48 +6,55 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from cli.corpus import Cache, Jobs, Model, check_suffix, corpus
-from cli.progress import stage_bar, write_message
+from cli.process import write_message
+from cli.progress import stage_bar
 from tts2face.storage.overwrite import refuse_overwriting
 
 
 @corpus.command
 def gestures(  # noqa: PLR0913 - one parameter a flag
-    recordings: Annotated[Path, Parameter(help="Videos, Live Link tables or marker captures; a folder or one file.")],
+    recordings: Annotated[Path, Parameter(help="Videos, Live Link tables or marker captures: a folder or one file.")],
     /,
     *,
     style: Annotated[str, Parameter(help="Name of the new style.")],
-    out: Annotated[Path, Parameter(help="The palette to write (.palette).", alias="-o")],
-    palette: Annotated[str, Parameter(help="The palette that the style is added to: shipped, or a file.")] = "starter",
+    out: Annotated[Path, Parameter(help="Output palette (.palette).", alias="-o")],
+    palette: Annotated[
+        str, Parameter(help="Palette to which the style is added: a shipped palette or a .palette file.")
+    ] = "starter",
     alone: Annotated[
-        bool, Parameter(help="Write this style alone, with the six moods derived from it.", negative="")
+        bool, Parameter(help="Write a palette of this style only, with the six derived moods.", negative="")
     ] = False,
     stills: Annotated[
-        Path | None, Parameter(help="Folder with stills of the person: neutral.png, sad.png, happy.png, ...")
+        Path | None, Parameter(help="Folder of stills of the person: neutral.png, sad.png, happy.png, ...")
     ] = None,
     still: Annotated[
-        list[str] | None, Parameter(help="One still, as sad=FILE or sad=VIDEO@SECONDS; give it for each expression.")
+        list[str] | None, Parameter(help="Still of one expression, as sad=FILE or sad=VIDEO@SECONDS; can be repeated.")
     ] = None,
-    markers: Annotated[Path | None, Parameter(help="Table of a marker set (.tsv); 68 + 7 markers without it.")] = None,
-    neutral: Annotated[Path | None, Parameter(help="A marker capture of the person at rest.")] = None,
-    marker_rate: Annotated[float | None, Parameter(help="Frames a second of marker tables without times.")] = None,
+    markers: Annotated[
+        Path | None, Parameter(help="Table of the marker set (.tsv); by default 68 + 7 markers.")
+    ] = None,
+    neutral: Annotated[Path | None, Parameter(help="Marker capture of the person at rest.")] = None,
+    marker_rate: Annotated[float | None, Parameter(help="Frames per second of marker tables without times.")] = None,
     estimator: Annotated[
-        str, Parameter(help="Of expressions: least-squares, or samples as published.")
+        str, Parameter(help="Estimator of expression weights: least-squares, or samples (as published).")
     ] = "least-squares",
     epsilon: Annotated[
-        float, Parameter(help="How far below 0 and above 1 weights of expressions may lie, 0 to 1; 0 is steadiest.")
+        float, Parameter(help="Slack of the expression weights beyond [0, 1], from 0 to 1; 0 is the most stable.")
     ] = 0.0,
     provenance: Annotated[
         Path | None,
-        Parameter(help="JSON with name, language, sources, licence, attribution; provenance.json of the folder."),
+        Parameter(
+            help="JSON with name, language, sources, licence and attribution; by default provenance.json of the folder."
+        ),
     ] = None,
     jobs: Jobs = None,
     cache: Cache = None,
     model: Model = None,
 ) -> None:
-    """Learn how a person moves beside the lips, from recordings without transcripts: a style for `--palette`."""
+    """Build a gesture style for `--palette` from recordings of a person; transcripts are not needed."""
     check_suffix(out, "palette")
-    given = {"the recordings": recordings, "--stills": stills, "--markers": markers, "--neutral": neutral}
-    refuse_overwriting({"--out": out}, given | {"--palette": palette, "--provenance": provenance, "--model": model})
+    inputs = {"the recordings": recordings, "--stills": stills, "--markers": markers, "--neutral": neutral}
+    refuse_overwriting({"--out": out}, inputs | {"--palette": palette, "--provenance": provenance, "--model": model})
     from corpus_tools.build_palette import StyleSource, build_style
     from corpus_tools.decomposition.capture_files import MarkerOptions
     from corpus_tools.decomposition.marker_set import DEFAULT_MARKER_TABLE
@@ -55,13 +62,15 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
     from corpus_tools.run_options import RunOptions, ignore_stage
     from tts2face.models.palette import load_palette
 
-    shown = (find_stills(stills) if stills is not None else {}) | parse_stills(still or [])
-    worn = MarkerOptions(markers or DEFAULT_MARKER_TABLE, neutral, marker_rate)
-    recorded = StyleSource(recordings=recordings, stills=shown, worn=worn, provenance=provenance)
+    still_files = (find_stills(stills) if stills is not None else {}) | parse_stills(still or [])
+    marker_options = MarkerOptions(markers or DEFAULT_MARKER_TABLE, neutral, marker_rate)
+    source = StyleSource(
+        recordings=recordings, stills=still_files, marker_options=marker_options, provenance=provenance
+    )
     base = None if alone else load_palette(palette)
     with stage_bar() as stages:
-        made = build_style(
-            recorded,
+        result = build_style(
+            source,
             style,
             out,
             base=base,
@@ -70,11 +79,11 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
             effort=RunOptions(cache, jobs, model),
             stages=stages or ignore_stage,
         )
-    for refusal in made.refused:
-        write_message(f"refused {refusal.name}: {refusal.reason}")
-    for note in made.notes:
+    for refusal in result.refused:
+        write_message(f"rejected {refusal.name}: {refusal.reason}")
+    for note in result.notes:
         write_message(note)
-    kept = ", ".join(f"{share:.0%} of the {feature}'s motion" for feature, share in made.kept.items())
+    shares = ", ".join(f"{share:.0%} of the {feature}'s motion" for feature, share in result.kept.items())
     write_message(
-        f"wrote {out}: the style {style} of {made.n_kept} recordings, {made.minutes:.1f} minutes; kept {kept}"
+        f"wrote {out}: style {style} from {result.n_kept} recordings, {result.minutes:.1f} minutes; modes keep {shares}"
     )

@@ -1,4 +1,4 @@
-"""``tts2face voices | languages | faces | identities | styles | talkers``: what there is to choose from."""
+"""``tts2face voices | languages | faces | identities | styles | talkers``: lists of the available choices."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -27,7 +27,7 @@ def voices(*, as_json: AsJson = False) -> None:
 
 
 def languages(*, as_json: AsJson = False) -> None:
-    """List the languages (`--language`): codes and English names, both of which are understood."""
+    """List the languages (`--language`): codes and English names; `--language` accepts both."""
     from tts2face.catalogue import languages
 
     entries = languages()
@@ -44,7 +44,7 @@ def faces(*, as_json: AsJson = False) -> None:
 
 
 def identities(
-    *, face: Annotated[str, Parameter(help="A shipped face or a .face file.")] = "head", as_json: AsJson = False
+    *, face: Annotated[str, Parameter(help="Shipped face or .face file.")] = "head", as_json: AsJson = False
 ) -> None:
     """List the identities (`--identity`) of a face: presets of age, sex and ancestry."""
     from tts2face.catalogue import identities
@@ -55,7 +55,7 @@ def identities(
 
 def styles(
     *,
-    palette: Annotated[str, Parameter(help="A shipped palette or a .palette file.")] = "starter",
+    palette: Annotated[str, Parameter(help="Shipped palette or .palette file.")] = "starter",
     as_json: AsJson = False,
 ) -> None:
     """List the styles (`--style`) of a palette."""
@@ -97,10 +97,10 @@ def _languages_text(codes: Sequence[str]) -> str:
 def _print(
     entries: "Sequence[DataclassInstance]", heading: Sequence[str], rows: Iterable[Sequence[str]], as_json: bool
 ) -> None:
-    """Entries as JSON, or as a table with aligned columns."""
+    """Print entries as JSON or as a table with aligned columns."""
     if as_json:
-        found: list[dict[str, Any]] = [asdict(entry) for entry in entries]
-        print(json.dumps(found, ensure_ascii=False, indent=2))  # noqa: T201 - the answer
+        records: list[dict[str, Any]] = [asdict(entry) for entry in entries]
+        print(json.dumps(records, ensure_ascii=False, indent=2))  # noqa: T201 - the result
         return
     table = [heading, *rows]
     widths = [max(len(row[column]) for row in table) for column in range(len(heading))]

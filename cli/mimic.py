@@ -1,65 +1,69 @@
-"""``tts2face mimic``: a video of a person, or a capture of her face, drives any face."""
+"""``tts2face mimic``: transfer the motion of a person in a video, face capture or camera to a face."""
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from cli.progress import stage_bar, write_message
+from cli.process import write_message
+from cli.progress import stage_bar
 from lexicon.errors import InputError
 from tts2face.storage.overwrite import refuse_overwriting
+
+if TYPE_CHECKING:
+    from tts2face.render.picture import Picture
 
 OWN_FACE = "self"
 
 
 def mimic(  # noqa: PLR0913 - one parameter a flag
-    take: Annotated[Path | None, Parameter(help="A video of one person, or a .csv file of Live Link Face.")] = None,
+    take: Annotated[Path | None, Parameter(help="Video of one person, or a .csv file of Live Link Face.")] = None,
     /,
     *,
     out: Annotated[
-        Path | None, Parameter(help="The clip: .mp4, .webm, .gif, or a folder for .png files.", alias="-o")
+        Path | None, Parameter(help="Output clip: .mp4, .webm, .gif, or a folder for .png files.", alias="-o")
     ] = None,
     camera: Annotated[
         str | None,
-        Parameter(help="Instead of a take: a camera's number (0 is the first) or address, live in a window."),
+        Parameter(help="Camera number (0 is the first) or address, shown live in a window, instead of a take."),
     ] = None,
     face: Annotated[
-        str, Parameter(help="What is shown: head, cartoon, a .face file, or self (with --talker).")
+        str, Parameter(help="Face to show: head, cartoon, a .face file, or self (with --talker).")
     ] = "head",
-    identity: Annotated[str | None, Parameter(help="A preset of the face's age, sex and ancestry.")] = None,
-    talker: Annotated[Path | None, Parameter(help="With --face self: the talker whose own face is shown.")] = None,
+    identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
+    talker: Annotated[Path | None, Parameter(help="With --face self: talker whose own face is shown.")] = None,
     gain: Annotated[float, Parameter(help="Factor on the motion of lips and brows.")] = 1.0,
     append_missing: Annotated[
-        bool, Parameter(help="With --face self: add the motion that she never made.", negative="")
+        bool, Parameter(help="With --face self: append modes for motion outside the talker's shape basis.", negative="")
     ] = False,
-    fps: Annotated[float | None, Parameter(help="Frames per second; the take's own, at most 30 of a capture.")] = None,
-    audio: Annotated[Path | None, Parameter(help="The sound that belongs to a capture.")] = None,
+    fps: Annotated[
+        float | None, Parameter(help="Frames per second; by default the take's own rate, at most 30 for a capture.")
+    ] = None,
+    audio: Annotated[Path | None, Parameter(help="Sound of a Live Link capture.")] = None,
     size: Annotated[
-        str, Parameter(help="Width x height in pixels; auto: 512x512, or the talker's own video.")
+        str, Parameter(help="Width x height in pixels; auto: 512x512, or the size of the talker's video.")
     ] = "auto",
     background: Annotated[str, Parameter(help="studio, transparent, a colour, or an image file.")] = "studio",
-    model: Annotated[Path | None, Parameter(help="face_landmarker.task; found or set up without it.")] = None,
-    quiet: Annotated[bool, Parameter(help="No progress bar and no last line.", negative="")] = False,
+    model: Annotated[Path | None, Parameter(help="Path of face_landmarker.task; by default found or set up.")] = None,
+    quiet: Annotated[bool, Parameter(help="Print no progress bar and no summary.", negative="")] = False,
 ) -> None:
-    """Let a recorded person drive a face: lips, eyes, brows and head; her sound is kept."""
+    """Transfer recorded motion of lips, eyes, brows and head to a face; the sound is copied."""
     began = time.perf_counter()
     from tts2face.render.picture import Picture
 
     if camera is not None:
         if take is not None or out is not None or face == OWN_FACE:
-            raise InputError("--camera is shown live in a window: give neither a take nor --out, and a head as --face")
-        from cli.live import run_live_window
-
-        return run_live_window(camera, face, identity, Picture(size=size, background=background), model)
+            raise InputError("--camera cannot be combined with a take, --out or --face self; remove them")
+        return _run_live_window(camera, face, identity, Picture(size=size, background=background), model)
     if take is None or out is None:
-        raise InputError("give a take and --out, or --camera for a live camera")
-    given = {"the take": take, "--audio": audio, "--talker": talker, "--face": face, "--background": background}
-    refuse_overwriting({"--out": out}, given | {"--model": model})
+        raise InputError("there is no input or no output; add a take and --out, or use --camera")
+    inputs = {"the take": take, "--audio": audio, "--talker": talker, "--face": face, "--background": background}
+    refuse_overwriting({"--out": out}, inputs | {"--model": model})
     if (face == OWN_FACE) != (talker is not None):
-        raise InputError("--face self shows a talker's own face: give both --face self and --talker FILE")
+        raise InputError("--face self and --talker need each other; add the missing one, or remove both")
     if append_missing and talker is None:
-        raise InputError("--append-missing needs --face self: a face file has a fixed set of shapes; remove it")
+        raise InputError("--append-missing needs --face self: a mesh face has a fixed set of shapes; remove it")
     from tts2face.session import Session
     from tts2face.synthesis.performance import Performance
 
@@ -71,8 +75,30 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     if quiet:
         return
     if written.is_silent:
-        write_message(f"{take} holds no sound; the clip is silent")
+        write_message(f"{take} contains no sound; the clip is silent")
     took = time.perf_counter() - began
     write_message(
         f"wrote {out}: {written.seconds:.1f} s, made in {took:.1f} s ({written.seconds / took:.1f} x real time)"
     )
+
+
+def _run_live_window(source: str, face: str, identity: str | None, picture: "Picture", model: Path | None) -> None:
+    """Show a head that follows the person in front of a camera, until the window is closed."""
+    from tts2face.models.face_file import load_face
+    from tts2face.render.window import LiveWindow, require_display
+    from tts2face.synthesis.live_capture import CALIBRATION_S, LiveCapture
+    from tts2face.video.camera import CaptureDevice
+
+    require_display("--camera")
+    head = load_face(face, identity)
+    with CaptureDevice(source) as camera:
+        write_message(
+            f"calibration, {CALIBRATION_S:.0f} s: look into the camera, close your lips, speak, blink; "
+            "then the head follows you"
+        )
+        with LiveCapture(camera.pictures(), head, camera.fps, model) as capture:
+            window = LiveWindow(head, picture, capture.latest_pose)
+            try:
+                window.run()
+            finally:
+                window.close()

@@ -1,29 +1,22 @@
-"""Progress bars and last lines, on standard error."""
+"""Progress bars on standard error."""
 
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from cli.streams import write_error
-
 Progress = Callable[[int, int], None]
 
 
-def write_message(line: str) -> None:
-    """One line for the person at the terminal."""
-    write_error(line)
-
-
 @contextmanager
-def progress_bar(what: str, quiet: bool = False) -> Iterator[Progress | None]:
-    """A bar that follows ``on_progress(done, of)``; nothing when quiet or when no person is looking."""
+def progress_bar(description: str, quiet: bool = False) -> Iterator[Progress | None]:
+    """Progress bar updated by ``on_progress(done, of)``; None if quiet or if standard error is no terminal."""
     with stage_bar(quiet) as stages:
-        yield stages(what) if stages else None
+        yield stages(description) if stages else None
 
 
 @contextmanager
 def stage_bar(quiet: bool = False) -> Iterator[Callable[[str], Progress] | None]:
-    """A bar that starts again with each stage, under its name; nothing when quiet or when no person is looking."""
+    """Progress bar that restarts with each named stage; None if quiet or if standard error is no terminal."""
     if quiet or not sys.stderr.isatty():
         yield None
         return
@@ -34,10 +27,10 @@ def stage_bar(quiet: bool = False) -> Iterator[Callable[[str], Progress] | None]
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
 
-        def begin(what: str) -> Progress:
+        def begin_stage(description: str) -> Progress:
             for task in bar.task_ids:
                 bar.remove_task(task)
-            task = bar.add_task(what, total=None)
+            task = bar.add_task(description, total=None)
             return lambda done, of: bar.update(task, completed=done, total=of)
 
-        yield begin
+        yield begin_stage

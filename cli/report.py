@@ -1,4 +1,4 @@
-"""``tts2face report``: what recordings tell about visual speech and gestures, as pages, tables and pictures."""
+"""``tts2face report``: analyses of visual speech and gestures, as pages, tables and pictures."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,65 +6,72 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from cli.flags import parse_whole_number
-from cli.progress import progress_bar, write_message
+from cli.process import write_message
+from cli.progress import progress_bar
 from lexicon.errors import InputError
 from tts2face.storage.overwrite import refuse_overwriting
 
-report = App(name="report", help="Study what recordings tell: which phones look alike, how a person gestures.")
+report = App(name="report", help="Analyse recordings: visual similarity of phones, statistics of gestures.")
 
 
 @report.command
 def similarity(  # noqa: PLR0913 - one parameter a flag
-    talker: Annotated[str, Parameter(help="A shipped talker or a .talker file.")],
+    talker: Annotated[str, Parameter(help="Shipped talker or .talker file.")],
     /,
     *,
-    out: Annotated[Path, Parameter(help="What to write: .html, .csv, .json or .png.", alias="-o")],
+    out: Annotated[Path, Parameter(help="Output: .html, .csv, .json or .png.", alias="-o")],
     classes: Annotated[
         str | None,
-        Parameter(help="Numbers of viseme classes to list; without it those of 4,6,8,10,12 that the phones allow."),
+        Parameter(help="Numbers of viseme classes to list; by default those of 4,6,8,10,12 that the phones allow."),
     ] = None,
     halves: Annotated[
-        int, Parameter(help="Random halves of the corpus to compare (.html, .json).", converter=parse_whole_number)
+        int,
+        Parameter(
+            help="Number of random split halves of the corpus to compare (.html, .json).", converter=parse_whole_number
+        ),
     ] = 20,
     seed: Annotated[
-        int, Parameter(help="Which halves and permutations are drawn (.html, .json).", converter=parse_whole_number)
+        int, Parameter(help="Seed of the random halves and permutations (.html, .json).", converter=parse_whole_number)
     ] = 0,
     compare: Annotated[
-        str | None, Parameter(help="Another talker to compare with; .csv and .png then hold the difference.")
+        str | None, Parameter(help="Second talker to compare with; .csv and .png then contain the difference.")
     ] = None,
-    labels: Annotated[str, Parameter(help="How phones are labelled: both, ipa or arpabet (.json has both).")] = "both",
+    labels: Annotated[str, Parameter(help="Phone labels: both, ipa or arpabet (.json always has both).")] = "both",
 ) -> None:
-    """Analyse which phones look alike: matrix, neighbours, viseme classes, reliability, articulation."""
+    """Analyse the visual similarity of phones: matrix, neighbours, viseme classes, reliability, articulation."""
     refuse_overwriting({"--out": out}, {"the talker": talker, "--compare": compare})
     from corpus_tools.similarity.analysis import Options
     from corpus_tools.similarity.write import write_similarity
 
     options = Options(_parse_numbers(classes), halves, seed)
     with progress_bar("comparing halves") as on_progress:
-        found = write_similarity(talker, out, options, other=compare, labels=labels, on_progress=on_progress)
+        analysis = write_similarity(talker, out, options, other=compare, labels=labels, on_progress=on_progress)
     write_message(
-        f"wrote {out}: {len(found.table.phones)} phones, best in {found.best.n_classes} classes, "
-        f"reliability {found.by_utterances.corrected:.3f}"
+        f"wrote {out}: {len(analysis.table.phones)} phones, best number of classes {analysis.best.n_classes}, "
+        f"reliability {analysis.by_utterances.corrected:.3f}"
     )
 
 
 @report.command
 def gestures(
-    palette: Annotated[str, Parameter(help="A shipped palette or a .palette file.")] = "starter",
+    palette: Annotated[str, Parameter(help="Shipped palette or .palette file.")] = "starter",
     /,
     *,
-    out: Annotated[Path, Parameter(help="What to write: .html, .csv, .json or .png.", alias="-o")],
+    out: Annotated[Path, Parameter(help="Output: .html, .csv, .json or .png.", alias="-o")],
     held_out: Annotated[
-        int, Parameter(help="One in so many recordings is held out, to compare with.", converter=parse_whole_number)
+        int, Parameter(help="Hold out one in this many recordings for the comparison.", converter=parse_whole_number)
     ] = 5,
     halves: Annotated[
-        int, Parameter(help="Random halves of the held-out recordings to compare.", converter=parse_whole_number)
+        int,
+        Parameter(
+            help="Number of random split halves of the held-out recordings to compare.", converter=parse_whole_number
+        ),
     ] = 50,
     clips: Annotated[
-        int, Parameter(help="Clips of different seeds that fields and noise make.", converter=parse_whole_number)
+        int, Parameter(help="Number of clips, of different seeds, made by each method.", converter=parse_whole_number)
     ] = 3,
     seed: Annotated[
-        int, Parameter(help="Which recordings, halves and clips are drawn.", converter=parse_whole_number)
+        int, Parameter(help="Seed of the random choice of recordings, halves and clips.", converter=parse_whole_number)
     ] = 0,
 ) -> None:
     """Compare each style's gestures with motion from its fields, noise and published fields for the same sound."""
@@ -73,10 +80,10 @@ def gestures(
     from corpus_tools.gesture_study.write import write_gestures
 
     options = Options(held_out, halves, clips, seed)
-    with progress_bar("studying styles") as on_progress:
-        found = write_gestures(palette, out, options, on_progress=on_progress)
-    n_met, n_targets = found.targets
-    write_message(f"wrote {out}: {len(found.styles)} styles, {n_met} of {n_targets} targets met")
+    with progress_bar("analysing styles") as on_progress:
+        study = write_gestures(palette, out, options, on_progress=on_progress)
+    n_met, n_targets = study.targets
+    write_message(f"wrote {out}: {len(study.styles)} styles, {n_met} of {n_targets} targets met")
 
 
 def _parse_numbers(classes: str | None) -> tuple[int, ...] | None:
@@ -85,4 +92,6 @@ def _parse_numbers(classes: str | None) -> tuple[int, ...] | None:
     try:
         return tuple(int(number) for number in classes.split(","))
     except ValueError as wrong:
-        raise InputError(f"--classes takes whole numbers with commas between, like 4,8,12, not {classes!r}") from wrong
+        raise InputError(
+            f"--classes must be whole numbers separated by commas, such as 4,8,12, not {classes!r}"
+        ) from wrong

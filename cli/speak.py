@@ -1,4 +1,4 @@
-"""``tts2face "text"``: what the command does once its flags are read."""
+"""``tts2face "text"``: write, explain or show a clip from the parsed flags."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -7,7 +7,8 @@ from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cli.progress import progress_bar, write_message
+from cli.process import write_message
+from cli.progress import progress_bar
 from lexicon.errors import InputError
 from tts2face.render.picture import Picture
 from tts2face.request import Request
@@ -26,7 +27,7 @@ EXPLANATION_SUFFIXES = (".json", ".txt")
 
 @dataclass(frozen=True, slots=True)
 class SpeakOptions:
-    """The flags beside those of the request and the picture."""
+    """The flags that belong neither to the request nor to the picture."""
 
     out: Path | None
     talker: str
@@ -46,20 +47,20 @@ def run_request(request: Request, picture: Picture, options: SpeakOptions) -> No
 
     prepare(request)  # refuses a wrong request before anything is loaded
     session = _open_session(options)
-    shown: list[PhoneExplanation] = []
+    explanations: list[PhoneExplanation] = []
 
-    def keep(piece: "Piece") -> None:
+    def collect(piece: "Piece") -> None:
         if options.explain is not None:
-            shown.extend(piece.shown())
+            explanations.extend(piece.shown())
 
     if options.out is not None:
-        _write_clip(session, (request, picture), options.out, (keep, options.quiet))
+        _write_clip(session, (request, picture), options.out, (collect, options.quiet))
     elif options.explain is not None:
         for piece in session.stream(request):
-            keep(piece)
+            collect(piece)
             _warn_mismatches(piece.mismatches)
     if options.explain is not None:
-        _write_explanation(tuple(shown), options.explain)
+        _write_explanation(tuple(explanations), options.explain)
     if options.view:
         from tts2face.render.window import show_clip
 
@@ -67,7 +68,7 @@ def run_request(request: Request, picture: Picture, options: SpeakOptions) -> No
 
 
 def _check_options(request: Request, picture: Picture, options: SpeakOptions) -> None:
-    """Refuse flags that do not go together, before anything is loaded."""
+    """Refuse conflicting flags before anything is loaded."""
     if options.out is None and options.explain is None and not options.view:
         raise InputError("there is no output; add --out clip.mp4 (or .webm, .gif, or a folder for .png files)")
     if options.explain is not None:
@@ -75,10 +76,10 @@ def _check_options(request: Request, picture: Picture, options: SpeakOptions) ->
     _check_overwriting(request, picture, options)
     is_silent = request.audio is not None or request.idle is not None
     if not request.text.strip() and (not is_silent or options.explain is not None):
-        raise InputError("the text is empty; give something to say, or the words of --audio")
+        raise InputError("the text is empty; add words to speak, or the words of --audio")
     if options.view:
         if options.face == OWN_FACE:
-            raise InputError("--view shows mesh faces only; remove it, or choose --face head")
+            raise InputError("--view cannot show the talker's own face; remove it, or use --face head")
         from tts2face.render.window import require_display
 
         require_display("--view")
@@ -88,19 +89,22 @@ def _check_overwriting(request: Request, picture: Picture, options: SpeakOptions
     from tts2face.storage.overwrite import refuse_overwriting
     from tts2face.synthesis.prepared_request import input_paths
 
-    read = {f"--{name}": path for name, path in input_paths(request, picture).items()}
+    inputs = {f"--{name}": path for name, path in input_paths(request, picture).items()}
     models = {"--talker": options.talker, "--face": options.face, "--palette": options.palette}
     outputs = {"--out": options.out, "--explain": options.explain}
-    refuse_overwriting(outputs, {"--file": options.file} | models | read)
+    refuse_overwriting(outputs, {"--file": options.file} | models | inputs)
 
 
 def _write_clip(
-    session: "Session", what: tuple[Request, Picture], out: Path, how: tuple[Callable[["Piece"], None], bool]
+    session: "Session",
+    request_and_picture: tuple[Request, Picture],
+    out: Path,
+    how: tuple[Callable[["Piece"], None], bool],
 ) -> None:
     began = time.perf_counter()
-    (request, picture), (keep, is_quiet) = what, how
-    with progress_bar("speaking and drawing", is_quiet) as on_progress:
-        written = session.write(request, out, picture=picture, on_progress=on_progress, on_piece=keep)
+    (request, picture), (on_piece, is_quiet) = request_and_picture, how
+    with progress_bar("rendering", is_quiet) as on_progress:
+        written = session.write(request, out, picture=picture, on_progress=on_progress, on_piece=on_piece)
     _warn_mismatches(written.mismatches)
     if is_quiet:
         return
@@ -114,7 +118,7 @@ def _write_clip(
 
 
 def _warn_mismatches(mismatches: "Sequence[TextMismatch]") -> None:
-    """One line for each span of a recording that does not fit its text; in quiet runs too: the clip is wrong there."""
+    """Warn of each span of a recording that does not match its text; also with --quiet, as the clip is wrong there."""
     for mismatch in mismatches:
         write_message(f"tts2face: warning: {mismatch.sentence}")
 
@@ -129,14 +133,14 @@ def _open_session(options: SpeakOptions) -> "Session":
     session = Session(options.talker, options.face, identity=options.identity, palette=options.palette)
     if not kernels_are_compiled():
         if not options.quiet:
-            write_message("first run on this machine: compiling the kernels, which takes some ten seconds once")
+            write_message("first run on this machine: compiling kernels (about ten seconds, once)")
         compile_kernels()
     return session
 
 
-def _write_explanation(shown: "tuple[PhoneExplanation, ...]", path: Path) -> None:
+def _write_explanation(explanations: "tuple[PhoneExplanation, ...]", path: Path) -> None:
     from tts2face.exemplar.explanation import explanation_json, explanation_text
 
     is_json = path.suffix == ".json"
-    text = dumps(explanation_json(shown), ensure_ascii=False) if is_json else explanation_text(shown)
+    text = dumps(explanation_json(explanations), ensure_ascii=False) if is_json else explanation_text(explanations)
     write_atomically(path, text.encode())

@@ -1,7 +1,7 @@
-"""Recordings of one person in one mood become a style of a palette."""
+"""Build a style of a palette from recordings of one person in one mood."""
 
 import shlex
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,63 +19,58 @@ from corpus_tools.decomposition.blend_weights import (
     build_nearest_samples_estimator,
 )
 from corpus_tools.decomposition.capture import FaceRecording
-from corpus_tools.decomposition.capture_files import CAPTURE_SUFFIXES, MarkerOptions, read_capture_file
+from corpus_tools.decomposition.capture_files import MarkerOptions
 from corpus_tools.decomposition.decompose import Decomposition, decompose, weight_displacements
 from corpus_tools.decomposition.derived_styles import read_derived_styles
 from corpus_tools.decomposition.face_motion import rest_landmarks
 from corpus_tools.decomposition.marker_set import read_marker_set
 from corpus_tools.decomposition.markers import read_marker_face
+from corpus_tools.decomposition.recording_files import read_recordings
 from corpus_tools.decomposition.stills import NEUTRAL, PictureReader, Still, build_marker_reader
 from corpus_tools.decomposition.style import add_style
-from corpus_tools.decomposition.video import read_video_recording
-from corpus_tools.process_pool import map_unordered
-from corpus_tools.recordings.corpus_video import CachedTracker
-from corpus_tools.recordings.folder import MANIFEST, VIDEO_SUFFIXES
 from corpus_tools.recordings.observe import Refusal
 from corpus_tools.run_options import Progress, RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.pose_correction import fit_pose_correction
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import check_regular_file
 from tts2face.face.expressions import expression_landmarks
 from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
 from tts2face.models.palette import Palette, write_palette
 from tts2face.retargeting.performer import CLOSED_FRAME_SHARE, eye_aperture, lip_gaps
-from tts2face.video.landmark_models import find_bundle
 
 ESTIMATORS = ("least-squares", "samples")
 SAMPLES_SEED = 2008
-MIN_OPEN_LIDS = 0.85  # of the usual opening of the lids: frames with less show a blink
-N_REST_FRAMES = 3000  # are enough to know a face at rest
+MIN_OPEN_LIDS = 0.85  # of the median lid opening; frames with less are blinks
+N_REST_FRAMES = 3000  # used to estimate the face at rest
 CONTENT = "expression, brows, lids, cheeks, gaze, head pose, loudness and pitch; no image, no sound, no lips"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StyleSource:
-    """What a style is learnt from.
+    """Recordings and options from which a style is learnt.
 
     Parameters
     ----------
     recordings
         A folder of videos, Live Link tables (.csv) or marker captures (.c3d, .csv); or one of these files.
     stills
-        Captured basis expressions; the default head's, carried to the person, where there is none.
-    worn
-        How markers are read.
+        Captured basis expressions; by default those of the default head, transferred to the person.
+    marker_options
+        Options of marker files.
     provenance
         JSON file as `corpus_tools.build_talker.read_provenance` reads it; ``provenance.json`` in the folder when None.
     """
 
     recordings: Path
     stills: Mapping[str, Still] = field(default_factory=dict)
-    worn: MarkerOptions = MarkerOptions()  # noqa: RUF009 - frozen
+    marker_options: MarkerOptions = MarkerOptions()  # noqa: RUF009 - frozen
     provenance: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class BuiltStyle:
-    """What a build gave: recordings kept, minutes of them, what was refused, notes, and the share of motion kept."""
+    """Result of a build: number and minutes of kept recordings, refusals, notes, and the share of motion kept."""
 
     n_kept: int
     minutes: float
@@ -95,16 +90,16 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
     effort: RunOptions | None = None,
     stages: StageCallback = ignore_stage,
 ) -> BuiltStyle:
-    """Learn a style from recordings and write a palette: `base` with it, or it alone with the styles derived from it.
+    """Learn a style from recordings and write a palette: `base` with the style, or the style and its derived styles.
 
     Weights of expressions lie within ``-epsilon`` and ``1 + epsilon`` (Ju and Lee 2008, section 4.1).
 
     Raises
     ------
     InputError
-        There is nothing to learn from, the palette has the style, or an estimator or epsilon that there is not.
+        There are no recordings, the palette has the style already, or the estimator or epsilon is invalid.
     DataError
-        No recording could be used, or a still cannot.
+        No recording or a still could not be used.
     BackendError
         A package or the landmark models are missing, or a file cannot be written.
     """
@@ -118,14 +113,16 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
         recorded.provenance or recorded.recordings / PROVENANCE, must_exist=recorded.provenance is not None
     )
     face = load_face("head")
-    captured, refused = read_recordings(recorded, face, effort or RunOptions(), stages("watching recordings"))
+    captured, refused = read_recordings(
+        recorded.recordings, face, recorded.marker_options, effort or RunOptions(), stages("reading recordings")
+    )
     if not captured:
         raise DataError(f"no recording could be used; the first: {refused[0].name}: {refused[0].reason}")
     basis = build_basis(recorded, captured, face)
     parts = decompose_recordings(
-        captured, basis, build_estimator(estimator, basis, epsilon), stages("taking them apart")
+        captured, basis, build_estimator(estimator, basis, epsilon), stages("decomposing recordings")
     )
-    words = _words(recorded, style, out, base is None, epsilon)
+    words = _command_words(recorded, style, out, base is None, epsilon)
     learnt = add_style(base, style, parts, basis.rest, _metadata(recorded, stated, words))
     palette = learnt.palette
     if base is None:
@@ -139,18 +136,18 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
 def decompose_recordings(
     captured: Sequence[FaceRecording], basis: ExpressionBasis, estimator: Estimator, on_progress: Progress | None = None
 ) -> list[Decomposition]:
-    """Recordings of one person taken apart, without what turning the head does to landmarks."""
+    """Decompositions of recordings of one person, after correction of pose-dependent errors."""
     leak = fit_pose_correction(captured)
     parts = []
     for number, one in enumerate(captured, start=1):
-        parts.append(decompose(leak.removed(one), basis, estimator))
+        parts.append(decompose(leak.apply(one), basis, estimator))
         if on_progress:
             on_progress(number, len(captured))
     return parts
 
 
 def build_estimator(name: str, basis: ExpressionBasis, epsilon: float = 0.0) -> Estimator:
-    """One of `ESTIMATORS` for a basis, of weights within ``-epsilon`` and ``1 + epsilon``."""
+    """One of the `ESTIMATORS` for a basis, with weights between ``-epsilon`` and ``1 + epsilon``."""
     expressions = weight_displacements(basis.expressions)
     if name == "least-squares":
         return build_least_squares_estimator(expressions, epsilon)
@@ -158,7 +155,7 @@ def build_estimator(name: str, basis: ExpressionBasis, epsilon: float = 0.0) -> 
 
 
 def build_basis(recorded: StyleSource, captured: Sequence[FaceRecording], face: Face) -> ExpressionBasis:
-    """The person's basis expressions: as captured, or the default head's, carried over.
+    """The person's basis expressions: captured, or transferred from the default head.
 
     Raises
     ------
@@ -173,127 +170,41 @@ def build_basis(recorded: StyleSource, captured: Sequence[FaceRecording], face: 
 
 
 def build_still_reader(recorded: StyleSource, face: Face) -> Callable[[Still], NDArray[np.float64]]:
-    """What reads the stills: the tracker, or for markers the person's markers at rest.
+    """The reader of the stills: the tracker for pictures, or a reader of markers.
 
     Raises
     ------
     InputError
-        Some stills are markers and some are not, or no markers at rest are known.
+        Only some stills are markers, or there are no markers at rest.
     """
     are_markers = {still.is_markers for still in recorded.stills.values()}
     if are_markers == {False}:
         return PictureReader()
-    at_rest = recorded.worn.neutral or (recorded.stills[NEUTRAL].path if NEUTRAL in recorded.stills else None)
+    at_rest = recorded.marker_options.neutral or (recorded.stills[NEUTRAL].path if NEUTRAL in recorded.stills else None)
     if are_markers != {True} or at_rest is None:
-        raise InputError("stills of markers need each other and the person at rest; give all as markers, with neutral")
-    worn = read_marker_set(recorded.worn.marker_table)
-    return build_marker_reader(read_marker_face(at_rest, face, worn, fps=recorded.worn.fps))
+        raise InputError(
+            "marker stills cannot be mixed with pictures and need the person at rest; give all as markers, with neutral"
+        )
+    marker_set = read_marker_set(recorded.marker_options.marker_table)
+    return build_marker_reader(read_marker_face(at_rest, face, marker_set, fps=recorded.marker_options.fps))
 
 
 def person_at_rest(captured: Sequence[FaceRecording]) -> NDArray[np.float64]:
     """(478, 3) landmarks of the person at rest: as captured, or the median of frames with closed lips and open lids."""
-    known = next((one.rest for one in captured if one.rest is not None), None)
-    if known is not None:
-        return np.asarray(known, np.float64)
+    given = next((one.rest for one in captured if one.rest is not None), None)
+    if given is not None:
+        return np.asarray(given, np.float64)
     frames = np.concatenate([one.landmarks for one in captured])
     frames = frames[:: max(1, len(frames) // N_REST_FRAMES)]
     opened = np.minimum(eye_aperture(frames, "Left"), eye_aperture(frames, "Right"))
-    awake = opened >= MIN_OPEN_LIDS * np.median(opened)
+    is_open = opened >= MIN_OPEN_LIDS * np.median(opened)
     gaps = lip_gaps(frames)[:, MIDDLE_PAIR]
-    closed = gaps <= np.quantile(gaps[awake], CLOSED_FRAME_SHARE)
-    return np.asarray(np.median(frames[awake & closed], axis=0), np.float64)
+    closed = gaps <= np.quantile(gaps[is_open], CLOSED_FRAME_SHARE)
+    return np.asarray(np.median(frames[is_open & closed], axis=0), np.float64)
 
 
-def read_recordings(
-    recorded: StyleSource, face: Face, effort: RunOptions, on_progress: Progress | None
-) -> tuple[list[FaceRecording], list[Refusal]]:
-    """Every recording, or why it cannot serve; both by name.
-
-    Raises
-    ------
-    InputError
-        There is no recording.
-    BackendError
-        The landmark models are missing, the cache cannot be written, or a process died.
-    """
-    files = find_recording_files(recorded.recordings)
-    jobs = min(effort.n_processes(), len(files))
-    model = find_bundle(effort.model) if any(file.suffix.lower() in VIDEO_SUFFIXES for file in files) else None
-    ready = (effort.folder(), model, face, recorded.worn)
-    captured: list[FaceRecording] = []
-    refused: list[Refusal] = []
-    for number, outcome in enumerate(_read_files(files, ready, jobs), start=1):
-        if isinstance(outcome, Refusal):
-            refused.append(outcome)
-        else:
-            captured.append(outcome)
-        if on_progress:
-            on_progress(number, len(files))
-    return sorted(captured, key=lambda one: one.name), sorted(refused, key=lambda one: one.name)
-
-
-def find_recording_files(recordings: Path) -> list[Path]:
-    """Videos and captures of a folder and of its folder ``clips``; or the file that is given.
-
-    Raises
-    ------
-    InputError
-        There is none.
-    """
-    known = VIDEO_SUFFIXES | CAPTURE_SUFFIXES
-    if recordings.is_file() and recordings.suffix.lower() in known:
-        return [recordings]
-    folders = [recordings, recordings / "clips"]
-    found = [file for folder in folders if folder.is_dir() for file in folder.iterdir() if file.suffix.lower() in known]
-    if not found:
-        raise InputError(
-            f"{recordings} holds no video and no capture ({', '.join(sorted(known))}); give a folder of them"
-        )
-    return sorted(file for file in found if file.name != MANIFEST)
-
-
-WorkerInputs = tuple[Path, Path | None, Face, MarkerOptions]
-FileOutcome = FaceRecording | Refusal
-
-
-def _read_files(files: Sequence[Path], ready: WorkerInputs, jobs: int) -> Iterator[FileOutcome]:
-    if jobs > 1:
-        yield from (outcome for _, outcome in map_unordered(files, _read_file, _start_worker, ready, jobs))
-        return
-    worker = _FileReader(*ready)
-    for file in files:
-        yield worker.read(file)
-
-
-class _FileReader:
-    def __init__(self, cache: Path, model: Path | None, face: Face, worn: MarkerOptions) -> None:
-        self._tracker = CachedTracker(cache, model) if model is not None else None
-        self._face, self._marker_options = face, worn
-
-    def read(self, file: Path) -> FileOutcome:
-        """A recording, or why it cannot serve."""
-        try:
-            check_regular_file(file)
-            if self._tracker is not None and file.suffix.lower() in VIDEO_SUFFIXES:
-                return read_video_recording(file, self._tracker)
-            return read_capture_file(file, self._face, worn=self._marker_options)
-        except DataError as reason:
-            return Refusal(file.stem, str(reason), file, 0.0)
-
-
-_worker: list[_FileReader] = []  # of this process; filled once by the pool
-
-
-def _start_worker(*ready: Any) -> None:
-    _worker.append(_FileReader(*ready))
-
-
-def _read_file(file: Path) -> FileOutcome:
-    return _worker[0].read(file)
-
-
-def _words(recorded: StyleSource, style: str, out: Path, is_alone: bool, epsilon: float) -> list[str]:
-    """The command that makes the style again."""
+def _command_words(recorded: StyleSource, style: str, out: Path, is_alone: bool, epsilon: float) -> list[str]:
+    """The command that builds the style."""
     words = ["tts2face", "corpus", "gestures", recorded.recordings.name, "--style", style, *["--alone"] * is_alone]
     words += ["--provenance", recorded.provenance.name] if recorded.provenance else []
     words += ["--epsilon", f"{epsilon:g}"] if epsilon else []

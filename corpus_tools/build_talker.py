@@ -1,4 +1,4 @@
-"""From a folder of recordings to a talker file."""
+"""Build a talker file from a folder of recordings."""
 
 import shlex
 from collections.abc import Mapping, Sequence
@@ -7,11 +7,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import Refusal, check_any_kept, observe
 from corpus_tools.report.drawing import load_matplotlib
 from corpus_tools.report.recordings import recordings_page
-from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
+from corpus_tools.run_options import Progress, RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.pose_correction import correct_pose
 from corpus_tools.training.train_audio_map import learn_audio_maps
 from corpus_tools.training.train_phone_network import add_phone_network
@@ -20,11 +21,13 @@ from lexicon.errors import DataError, InputError
 from lexicon.inputs import read_json
 from tts2face.models.talker import Talker, write_talker
 from tts2face.storage.files import write_atomically
+from tts2face.video.landmark_models import find_bundle
 
-PROVENANCE = "provenance.json"  # in the folder of recordings: where they come from and how they may be used
+PROVENANCE = "provenance.json"  # in the folder of recordings: their sources and licence
 PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
+MIN_STATEMENT_WORDS = 3  # shorter statements are taken for typing errors
 NOT_STATED = "not stated"
-READING_STAGE = "reading recordings"  # the first stage
+READING_STAGE = "reading recordings"  # name of the first stage
 CONTENT_WITH_PICTURES = (
     "landmark shapes, head pose, phones, loudness, and with the stated consent pictures of the person's face; no sound"
 )
@@ -33,7 +36,7 @@ CONTENT = "motion only: landmark shapes, head pose, phones and loudness; no imag
 
 @dataclass(frozen=True, slots=True)
 class BuiltTalker:
-    """What a build gave: recordings kept, minutes of them, and those refused."""
+    """Result of a build: number and minutes of kept recordings, and refusals."""
 
     n_kept: int
     minutes: float
@@ -52,22 +55,22 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
     report: Path | None = None,
     stages: StageCallback = ignore_stage,
 ) -> BuiltTalker:
-    """Observe recordings, learn their talker, and write it; the same recordings give the same bytes but for `created`.
+    """Observe recordings, learn a talker and write it; apart from `created` the bytes are reproducible.
 
     Parameters
     ----------
     name
-        Whose talker it is; the provenance's name, or the folder's, when None.
+        Name of the talker; that of the provenance, or of the folder, when None.
     provenance
         JSON file as `read_provenance` reads it; ``provenance.json`` in the folder when None.
     created
         Date for the metadata; today when None.
     consent
-        Of the person shown, from `corpus_tools.consent.consent_record`; with it the talker gets an appearance.
+        Consent of the person shown, from `consent_record`; required for an appearance model.
     report
-        HTML page about the recordings to write; it is written even where none could be used.
+        HTML page about the recordings to write, also if none could be used.
     stages
-        Called with the name of each stage as it begins.
+        Called with the name of each stage at its start.
 
     Raises
     ------
@@ -79,17 +82,17 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
         A package or the landmark models are missing, or a file cannot be written.
     """
     if report is not None:
-        load_matplotlib()  # a missing package is reported before hours of work
+        load_matplotlib()  # reports a missing package before the recordings are read
     stated = read_provenance(provenance or recordings / PROVENANCE, must_exist=provenance is not None)
     observations = observe(recordings, effort=effort, on_progress=stages(READING_STAGE))
-    called = name or stated.get("name") or recordings.resolve().stem
+    talker_name = name or stated.get("name") or recordings.resolve().stem
     if report is not None:
-        write_atomically(report, recordings_page(called, observations).encode())
+        write_atomically(report, recordings_page(talker_name, observations).encode())
     check_any_kept(observations)
     metadata = {
         **dict.fromkeys(PROVENANCE_FIELDS, NOT_STATED),
         **stated,
-        "name": called,
+        "name": talker_name,
         "command": _command_line(recordings, out, name, provenance),
         "created": created or datetime.now(UTC).date().isoformat(),
         "content": CONTENT if consent is None else CONTENT_WITH_PICTURES,
@@ -98,16 +101,47 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
         **_reading_metadata(observations.kept),
     }
     steady = correct_pose(observations.kept)
-    talker = add_phone_network(learn_talker(steady, metadata=metadata), on_progress=stages("learning lips"))
+    talker = add_phone_network(learn_talker(steady, metadata=metadata), on_progress=stages("learning phone network"))
     talker = replace(talker, audio_maps=learn_audio_maps(steady, talker, stages=stages))
     if consent is not None:
-        from corpus_tools.aam.add_appearance import add_appearance
-
-        looks = stages("learning looks")
-        talker = add_appearance(talker, observations.kept, effort=effort or RunOptions(), on_progress=looks)
+        on_frames = stages("learning appearance")
+        talker = add_appearance(talker, observations.kept, effort=effort or RunOptions(), on_progress=on_frames)
     write_talker(out, talker)
     seconds = sum(len(utterance.shape) for utterance in talker.utterances) / talker.fps
     return BuiltTalker(len(talker.utterances), seconds / 60.0, observations.refused)
+
+
+def add_appearance(
+    talker: Talker, observations: Sequence[Observation], *, effort: RunOptions, on_progress: Progress | None = None
+) -> Talker:
+    """The talker with texture models, a plate, and the appearance parameters of every utterance.
+
+    Parameters
+    ----------
+    observations
+        Training observations of the talker, in the order of its utterances.
+
+    Raises
+    ------
+    InputError
+        There are too few frames for the modes.
+    BackendError
+        A package or the landmark models are missing.
+    """
+    from corpus_tools.aam.source_videos import build_appearance_recording
+    from corpus_tools.aam.train_appearance import learn_appearance
+
+    tracker = CachedTracker(effort.folder(), find_bundle(effort.model))
+    recordings = [
+        build_appearance_recording(observation, utterance.shape, tracker)
+        for observation, utterance in zip(observations, talker.utterances, strict=True)
+    ]
+    learnt = learn_appearance(recordings, on_progress=on_progress)
+    utterances = tuple(
+        replace(utterance, looks=parameters)
+        for utterance, parameters in zip(talker.utterances, learnt.parameters, strict=True)
+    )
+    return replace(talker, utterances=utterances, appearance=learnt.appearance)
 
 
 def add_audio_maps(
@@ -118,7 +152,7 @@ def add_audio_maps(
     effort: RunOptions | None = None,
     stages: StageCallback = ignore_stage,
 ) -> Talker:
-    """Learn the drives of a talker from the recordings that she was learnt from, and write her with them.
+    """Learn the audio maps of a talker from its recordings, and write the talker with them.
 
     Raises
     ------
@@ -130,16 +164,16 @@ def add_audio_maps(
     kept = correct_pose(check_any_kept(observe(recordings, effort=effort, on_progress=stages(READING_STAGE))))
     if any(one.fps != talker.fps for one in kept):
         raise DataError(f"the recordings do not have the talker's {talker.fps:g} frames per second; convert them")
-    drives = learn_audio_maps(kept, talker, stages=stages)
-    if not drives:
-        raise InputError(f"{recordings} holds too little speech to learn drives from; give 20 utterances or more")
-    made = replace(talker, audio_maps=drives)
-    write_talker(out, made)
-    return made
+    audio_maps = learn_audio_maps(kept, talker, stages=stages)
+    if not audio_maps:
+        raise InputError(f"{recordings} contains too little speech for audio maps; give 20 utterances or more")
+    talker = replace(talker, audio_maps=audio_maps)
+    write_talker(out, talker)
+    return talker
 
 
 def _reading_metadata(kept: Sequence[Observation]) -> dict[str, Any]:
-    """What users of the talker must know of how its recordings were read."""
+    """Metadata about the recognition of phones and the correction of delays."""
     recognised = [seen.name for seen in kept if seen.is_recognised]
     lags = {seen.video.name: seen.quality.lag for seen in kept if seen.quality.lag}
     return {
@@ -149,12 +183,12 @@ def _reading_metadata(kept: Sequence[Observation]) -> dict[str, Any]:
 
 
 def read_provenance(path: Path, *, must_exist: bool) -> Mapping[str, Any]:
-    """Where recordings come from: a JSON object with any of name, language, sources, licence and attribution.
+    """Provenance of recordings: a JSON object with any of name, language, sources, licence and attribution.
 
     Raises
     ------
     DataError
-        The file is missing though it must exist, is no JSON object, or has other fields.
+        The file is missing but must exist, is not a JSON object, or has other fields.
     """
     if not must_exist and not path.is_file():
         return {}
@@ -172,3 +206,19 @@ def _command_line(recordings: Path, out: Path, name: str | None, provenance: Pat
     words += ["--name", name] if name else []
     words += ["--provenance", provenance.name] if provenance else []
     return shlex.join([*words, "--out", out.name])
+
+
+def consent_record(name: str, statement: str | None, *, date: str | None = None) -> Mapping[str, str]:
+    """Consent record for the metadata of a file: name, statement, date.
+
+    Raises
+    ------
+    InputError
+        The statement is missing or too short.
+    """
+    if statement is None or len(statement.split()) < MIN_STATEMENT_WORDS:
+        raise InputError(
+            f"the file will contain pictures of {name}'s face; state the consent: "
+            '--consent "I, NAME, agree that my face is used for ..."'
+        )
+    return {"name": name, "statement": statement.strip(), "date": date or datetime.now(UTC).date().isoformat()}

@@ -10,27 +10,88 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.aam.appearance_transfer import build_appearance_transfer
+from corpus_tools.aam.reference_frame import rasterise_triangles
 from lexicon.errors import InputError
-from tts2face.cloning.parameter_transfer import ParameterTransfer, build_parameter_transfer, extend_talker
+from tts2face.cloning.parameter_transfer import (
+    MAX_STANDARD_DEVIATIONS,
+    ParameterTransfer,
+    build_parameter_transfer,
+    extend_talker,
+)
+from tts2face.interpolation import sample_triangles
+from tts2face.models.appearance import Appearance, TextureModel, nearest_pixels
 from tts2face.models.talker import Talker, Utterance, load_talker, speech_channels, write_talker
 from tts2face.own_face.appearance_regression import fit_appearance_regression
 from tts2face.types import Trajectory
 
-CONTENT = "motion only: one talker's recorded motion carried to the shape model of another's face; no image, no sound"
-CONTENT_WITH_PICTURES = (
-    "one talker's recorded motion carried to another's face, with pictures of that face, agreed to; no sound"
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AppearanceTransfer:
+    """Linear map of appearance parameters: ``relation`` (A, B) from source to target; ``limits`` (A,) of the target."""
+
+    relation: Floats
+    limits: Floats
+
+    def parameters(self, parameters: NDArray[np.floating], *, gain: float = 1.0) -> NDArray[np.float32]:
+        """(T, A) appearance parameters of the target for (T, B) of the source."""
+        wanted = gain * (parameters.astype(np.float64) @ self.relation.T)
+        return np.clip(wanted, -self.limits, self.limits).astype(np.float32)
+
+
+def build_appearance_transfer(source: Appearance, target: Appearance) -> AppearanceTransfer:
+    """Map of appearance parameters from one talker to another, face to face and mouth to mouth.
+
+    Notes
+    -----
+    The source's basis textures are warped piecewise to the target's reference shape, and ``relation`` contains their
+    inner products with the target's (Theobald et al. 2007, eq. 5). Textures of all talkers are sRGB.
+    """
+    blocks = [
+        _basis_products(source.face, target.face),
+        _basis_products(source.mouth, target.mouth),
+    ]
+    relation = np.zeros((sum(len(block) for block in blocks), sum(block.shape[1] for block in blocks)))
+    (n_target, n_source), (face, mouth) = blocks[0].shape, blocks
+    relation[:n_target, :n_source] = face
+    relation[n_target:, n_source:] = mouth
+    return AppearanceTransfer(relation, MAX_STANDARD_DEVIATIONS * target.spread.astype(np.float64))
+
+
+def _basis_products(source: TextureModel, target: TextureModel) -> Floats:
+    """(A, B) inner products of the target's basis textures with the source's, warped to the target's frame."""
+    owner, weights = rasterise_triangles(target.reference.astype(np.float64), target.triangles, target.size)
+    corners = target.triangles[owner[target.pixels]].astype(np.int32)
+    inside = weights[target.pixels].astype(np.float32)
+    fill = nearest_pixels(source)
+    width, height = source.size
+    own = target.basis.reshape(target.n_modes, -1).astype(np.float64)
+    warped = np.zeros((len(target.pixels), 3), np.float32)
+    relation = np.zeros((target.n_modes, source.n_modes))
+    for number, texture in enumerate(source.basis):
+        picture = np.ascontiguousarray(texture[fill].reshape(height, width, 3))
+        sample_triangles(picture, source.reference.astype(np.float64), corners, inside, warped)
+        relation[:, number] = own @ warped.ravel()
+    return relation
+
+
+CONTENT = (
+    "motion only: one talker's recorded motion transferred to the shape model of another's face; no image, no sound"
 )
-LICENCE_FIELDS = ("sources", "licence", "attribution")  # these bind whoever uses the clone, for both talkers
+CONTENT_WITH_PICTURES = (
+    "one talker's recorded motion transferred to another's face, with pictures of that face by consent; no sound"
+)
+LICENCE_FIELDS = ("sources", "licence", "attribution")  # of both talkers; they apply to the clone
 NOT_STATED = "not stated"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClonedTalker:
-    """A cloned talker and what happened on the way.
+    """A cloned talker.
 
-    ``n_appended`` modes were added to the target's; ``at_limits`` is the share of frames with a parameter at the
-    target's limits; ``left_pictures`` tells that the source had pictures, for which the target has no place.
+    ``n_appended`` is the number of modes added to the target's; ``share_at_limits`` the share of frames with a
+    parameter at the target's limits; ``lacks_appearance`` is true if only the source has an appearance model.
     """
 
     talker: Talker
@@ -42,25 +103,25 @@ class ClonedTalker:
 def clone_talker(
     source: str, target: str, out: Path, *, gain: float = 1.0, append: bool = False, created: str | None = None
 ) -> ClonedTalker:
-    """Clone one talker's speech onto another's face and write it; equal talkers give equal bytes but for the date.
+    """Clone one talker's speech onto another's face and write the talker; its bytes are reproducible except the date.
 
     Parameters
     ----------
     source, target
-        Shipped talkers by name, or ``.talker`` files: who speaks, and whose face moves.
+        Shipped talkers by name, or ``.talker`` files, of the speech and of the face.
     gain
         Factor on the motion from rest, before the target's limits.
     append
-        Give the target the components of the source's motion that its own modes lack.
+        Append modes for components of the source's motion outside the target's model.
     created
         Date for the metadata; today when None.
 
     Raises
     ------
     InputError
-        There is no such talker, the source has no utterance, or the gain is no number from 0 up.
+        There is no such talker, the source has no utterance, or the gain is not a number from 0 up.
     DataError
-        A talker is damaged or its model unfit.
+        A talker is damaged or its shape model is unsuitable.
     BackendError
         The file cannot be written.
     """
@@ -74,25 +135,25 @@ def clone_talker(
 
 
 def transfer_talker(source: Talker, target: Talker, *, gain: float = 1.0, append: bool = False) -> ClonedTalker:
-    """The talker with the target's face whose utterances are the source's, carried over.
+    """The talker with the target's face and the source's utterances.
 
-    Sizes of the head's motion follow the faces' sizes, its angles stay. Where the target has pictures, so has the
-    clone: their looks are the source's by eq. 5 where it has pictures too, else those that go with the target's lips.
+    Head translations are scaled with the size of the faces; angles do not change. If the target has an appearance
+    model, its parameters are transferred from the source by eq. 5, or predicted from the lips if the source has none.
 
     Raises
     ------
     InputError
-        The source has no utterance, or the gain is no number from 0 up.
+        The source has no utterance, or the gain is not a number from 0 up.
     DataError
-        A shape model is unfit.
+        A shape model is unsuitable.
     """
     if not source.utterances:
-        raise InputError("the source talker has no utterance to clone; give one that was built from recordings")
+        raise InputError("the source talker has no utterance to clone; give a talker built from recordings")
     n_before = len(target.model.spread)
     target = extend_talker(source.model, target) if append else target
     ready = build_parameter_transfer(source.model, target.model, gain=gain)
-    looks = _appearance_function(source, target, gain)
-    utterances = tuple(_transfer_utterance(utterance, ready, looks) for utterance in source.utterances)
+    appearance = _appearance_function(source, target, gain)
+    utterances = tuple(_transfer_utterance(utterance, ready, appearance) for utterance in source.utterances)
     shapes = np.concatenate([utterance.shape for utterance in utterances])
     n_appended = len(target.model.spread) - n_before
     about = {"gain": gain, "size": round(ready.size, 4), "appended_modes": n_appended}
@@ -106,12 +167,12 @@ AppearanceFunction = Callable[[Utterance, NDArray[np.float32]], NDArray[np.float
 
 
 def _appearance_function(source: Talker, target: Talker, gain: float) -> AppearanceFunction:
-    """The looks of an utterance of the source on the target, given its shape there; none without pictures."""
+    """Function from an utterance and its shape on the target to appearance parameters, or None without a model."""
     if target.appearance is None:
         return lambda spoken, shape: None
     if source.appearance is not None:
-        carry = build_appearance_transfer(source.appearance, target.appearance)
-        return lambda spoken, shape: None if spoken.looks is None else carry.carried(spoken.looks, gain=gain)
+        transfer = build_appearance_transfer(source.appearance, target.appearance)
+        return lambda spoken, shape: None if spoken.looks is None else transfer.parameters(spoken.looks, gain=gain)
     own, channels = fit_appearance_regression(target), speech_channels(target.model)
 
     def with_lips(_spoken: Utterance, shape: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -121,17 +182,17 @@ def _appearance_function(source: Talker, target: Talker, gain: float) -> Appeara
     return with_lips
 
 
-def _transfer_utterance(utterance: Utterance, ready: ParameterTransfer, looks: AppearanceFunction) -> Utterance:
+def _transfer_utterance(utterance: Utterance, ready: ParameterTransfer, appearance: AppearanceFunction) -> Utterance:
     head = utterance.head.copy()
     head[:, 3:] *= ready.size
     shape = ready.parameters(utterance.shape)
-    return replace(utterance, shape=shape, head=head, looks=looks(utterance, shape))
+    return replace(utterance, shape=shape, head=head, looks=appearance(utterance, shape))
 
 
 def _metadata(
     source: Mapping[str, Any], target: Mapping[str, Any], about: Mapping[str, Any], *, has_pictures: bool
 ) -> dict[str, Any]:
-    """Provenance of both, and in full under ``cloning``."""
+    """Provenance of both talkers, with full details under ``cloning``."""
     origins = {
         role: {key: value for key, value in stated.items() if key != "refused"}
         for role, stated in (("speech", source), ("face", target))

@@ -1,4 +1,4 @@
-"""Work shared among processes that each make something ready first."""
+"""Parallel work in processes with an initialiser."""
 
 import signal
 from collections.abc import Callable, Iterator, Sequence
@@ -18,9 +18,9 @@ Result = TypeVar("Result")
 def map_unordered(
     tasks: Sequence[Task], work: Callable[[Task], Result], start: Callable[..., None], ready: tuple[Any, ...], jobs: int
 ) -> Iterator[tuple[Task, Result]]:
-    """Tasks with their results as they come, in no order; every process calls ``start(*ready)`` once.
+    """Yield tasks with their results in order of completion; every process calls ``start(*ready)`` once.
 
-    The processes end at once when the caller stops early, by an error or an interruption, and when this process dies.
+    The processes end immediately if the caller stops early, by an error or an interruption, and if this process dies.
 
     Raises
     ------
@@ -28,7 +28,7 @@ def map_unordered(
         A process died.
     """
     context = get_context("spawn")
-    ends, alive = context.Pipe(duplex=False)  # nothing is ever sent: it ends with whoever holds `alive`
+    ends, alive = context.Pipe(duplex=False)  # carries no data: its end signals the death of this process
     pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_initialise, initargs=(ends, start, ready))
     try:
         waiting = {pool.submit(work, task): task for task in tasks}
@@ -37,16 +37,16 @@ def map_unordered(
         pool.shutdown()
     except BrokenProcessPool as died:
         raise BackendError(
-            "a process that read recordings died; run the command again (it goes on), with fewer jobs"
+            "a worker process died; run the command again with fewer jobs (finished recordings are cached)"
         ) from died
     finally:
-        alive.close()  # where processes still work, nobody waits for their results any more
+        alive.close()  # ends processes that are still working
         pool.shutdown(cancel_futures=True)
         ends.close()
 
 
 def _initialise(ends: Connection, start: Callable[..., None], ready: tuple[Any, ...]) -> None:
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):  # sent to the whole group, too; the parent stops the pool
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):  # also sent to the process group; the parent stops the pool
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
     exit_after(ends.recv_bytes)

@@ -1,4 +1,4 @@
-"""How much of the machine a long piece of work takes, and where it keeps its finished parts."""
+"""Options of long computations that do not affect results: cache folder, processes, model files."""
 
 import os
 from collections.abc import Callable
@@ -8,16 +8,16 @@ from pathlib import Path
 from lexicon.errors import BackendError, InputError
 from tts2face.video.landmark_models import user_cache
 
-Progress = Callable[[int, int], None]  # steps done, and of all
-StageCallback = Callable[[str], Progress]  # begins a stage of a long piece of work by its name, and gives its progress
+Progress = Callable[[int, int], None]  # number of finished steps, number of all steps
+StageCallback = Callable[[str], Progress]  # name of a stage -> its progress callback
 
 
 @dataclass(frozen=True, slots=True)
 class RunOptions:
-    """How the work is done, which changes nothing in its result.
+    """Options of a run that do not change its result.
 
-    ``cache`` is the folder for finished parts (the user's cache when None), ``jobs`` the number of processes (one per
-    core when None), ``model`` the bundle of landmark models (found when None).
+    ``cache`` is the folder for intermediate results (the user's cache when None), ``jobs`` the number of processes (one
+    per core when None), ``model`` the bundle of landmark models (found when None).
     """
 
     cache: Path | None = None
@@ -25,12 +25,12 @@ class RunOptions:
     model: Path | None = None
 
     def folder(self) -> Path:
-        """The folder for finished parts, made if it was not there.
+        """The cache folder, created if necessary.
 
         Raises
         ------
         BackendError
-            It cannot be written.
+            The folder cannot be written.
         """
         folder = self.cache or user_cache() / "recordings"
         try:
@@ -45,7 +45,7 @@ class RunOptions:
         Raises
         ------
         InputError
-            It is below 1.
+            ``jobs`` is below 1.
         """
         jobs = self.jobs or os.cpu_count() or 1
         if jobs < 1:
@@ -54,5 +54,5 @@ class RunOptions:
 
 
 def ignore_stage(_: str) -> Progress:
-    """Stages that nobody watches."""
+    """Stage callback that ignores progress."""
     return lambda done, of: None

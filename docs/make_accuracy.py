@@ -13,12 +13,12 @@ from typing import Any
 from corpus_tools.evaluation.evaluate import evaluate, evaluate_across_talkers
 from corpus_tools.evaluation.livelink_reference import observe_livelink
 from corpus_tools.evaluation.scores import FIGURES, Scores
-from corpus_tools.evaluation.splits import split, split_by_words
+from corpus_tools.evaluation.splits import split_by_words, split_randomly
 from corpus_tools.evaluation.tables import Evaluation
 from corpus_tools.recordings.observe import observe
 from corpus_tools.run_options import RunOptions
 from tts2face.exemplar.options import METHOD_OPTIONS
-from tts2face.voice.engine import load_voice
+from tts2face.voice.loading import load_voice
 
 HERE = Path(__file__).parent
 PAGE, FIGURES_FILE = HERE / "accuracy.md", HERE / "accuracy.json"
@@ -30,7 +30,7 @@ TABLES = ("utterances", "own durations", "words", "another talker")
 def measured(recordings: Path, other: Path, effort: RunOptions) -> dict[str, Any]:
     """The figures of both splits and of another talker, and the options that were measured."""
     kept = observe(recordings, effort=effort).kept
-    utterances, _ = evaluate([split(kept, hold_out=HELD_OUT, seed=SEED)], voice=load_voice(None, LANGUAGE))
+    utterances, _ = evaluate([split_randomly(kept, hold_out=HELD_OUT, seed=SEED)], voice=load_voice(None, LANGUAGE))
     words, _ = evaluate([split_by_words(kept, WORDS)])
     across, _ = evaluate_across_talkers(kept, observe_livelink(other, effort))
     return {

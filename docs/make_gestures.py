@@ -6,7 +6,7 @@ Run: python docs/make_gestures.py
 from dataclasses import replace
 from pathlib import Path
 
-from corpus_tools.gesture_study.analysis import Options, StyleStudy, TraitComparison, study
+from corpus_tools.gesture_study.analysis import Options, StyleStudy, TraitComparison, study_gestures
 from tts2face.models.palette import load_palette
 
 PAGE = Path(__file__).with_name("gestures.md")
@@ -17,7 +17,7 @@ def distances(found: StyleStudy) -> str:
     heads = ("trait", "unit", "n", "recorded, mean", "field", "noise", "ju2008")
     apart = ("W halves", "W field", "W noise", "W ju2008", "field / halves", "field / noise", "ju2008 / halves")
     lines = _headed((*heads, *apart))
-    for one in sorted(found.compared, key=lambda one: not one.trait.has_target):
+    for one in sorted(found.trait_comparisons, key=lambda one: not one.trait.has_target):
         lines.append(_line(one))
     return "\n".join(lines)
 
@@ -55,15 +55,15 @@ def movements(found: StyleStudy) -> str:
             "highest autocorrelation, speech / silence",
         )
     )
-    moving = {one.feature: one for one in found.moving}
-    for feature, visited in found.long.visited.items():
+    moving = {one.feature: one for one in found.motion_comparisons}
+    for feature, visited in found.long_run.coverage.items():
         cells = [""] * 7
         if feature in moving:
             one = moving[feature]
-            cells = [*(f"{r:.2f}" for r in one.with_intensity), f"{one.fast[0]:.2f}", f"{one.fast[2]:.2f}"]
+            cells = [*(f"{r:.2f}" for r in one.with_intensity), f"{one.fast_power[0]:.2f}", f"{one.fast_power[2]:.2f}"]
             cells.append(f"{one.diversity[0]:.2f}")
         shares = " / ".join(f"{100 * share:.0f}" for share in visited)
-        _, speech, silence = found.long.repeating[feature].highest
+        _, speech, silence = found.long_run.repetition[feature].highest
         lines.append(f"| {feature} | {' | '.join(cells)} | {shares} % | {speech:.2f} / {silence:.2f} |")
     return "\n".join(lines)
 
@@ -82,7 +82,7 @@ def _headed(names: tuple[str, ...]) -> list[str]:
 def main() -> None:
     """Measure and write."""
     palette = replace(load_palette("starter"), derivations={})
-    (found,) = study("starter", palette, Options()).styles
+    (found,) = study_gestures("starter", palette, Options()).styles
     page = PAGE.read_text(encoding="utf-8")
     tables = {"distances": distances(found), "blinks": blinks(found), "movements": movements(found)}
     for name, table in tables.items():

@@ -1,24 +1,24 @@
-"""A long text in sentence-sized pieces, in bounded memory."""
+"""Split a long text into sentences, in bounded memory."""
 
 import re
 from collections.abc import Iterator
 
 from lexicon.errors import InputError
-from lexicon.stops import ends_sentence
+from lexicon.sentence_ends import ends_sentence
 
-# A sentence ends at ., !, ? or … (with closing quotes) before a space and no small letter, at an end mark of East Asian
-# or Indic writing, or at a blank line.
+# A sentence ends at ., !, ? or … (with closing quotes) before a space that no lower-case letter follows, at an end mark
+# of East Asian or Indic writing, or at a blank line.
 _END = re.compile(r"""[.!?…]+["'”’)\]]*(?=\s+[^\sa-z])|[。！？｡।॥؟۔]+["'”’」』）]*|\n\s*\n""")
 _CLAUSE = re.compile(r"[,;:—–、，；：،؛](?=\s)|[、，；：]")
-_SEEN_BEFORE, _SEEN_BEHIND = 24, 40  # characters around a full stop by which an abbreviation is known
+_CONTEXT_BEFORE, _CONTEXT_AFTER = 24, 40  # characters around a full stop by which an abbreviation is recognised
 
 
 def split_chunks(text: str, limit: int, language: str = "en-us") -> Iterator[str]:
     """Sentences of a text, none longer than `limit` characters unless a single word is.
 
-    A longer sentence is cut behind the last clause mark that fits, else at the last space, and where a text has neither
-    (Chinese, Japanese) behind `limit` characters. Nothing but space is lost. Abbreviations are those of the language
-    (`lexicon.stops`).
+    A longer sentence is split after the last clause mark within the limit, else at the last space, and in text without
+    either (Chinese, Japanese) after `limit` characters. Only white space is dropped. Abbreviations are those of the
+    language (`lexicon.sentence_ends`).
 
     Raises
     ------
@@ -26,7 +26,7 @@ def split_chunks(text: str, limit: int, language: str = "en-us") -> Iterator[str
         `limit` is below 1.
     """
     if limit < 1:
-        raise InputError(f"a piece of text needs at least 1 character, not {limit}")
+        raise InputError(f"the limit of a chunk must be at least 1 character, not {limit}; increase it")
     begin = 0
     for match in _END.finditer(text):
         if _is_abbreviated(text, begin, match, language):
@@ -37,11 +37,11 @@ def split_chunks(text: str, limit: int, language: str = "en-us") -> Iterator[str
 
 
 def _is_abbreviated(text: str, begin: int, end: "re.Match[str]", language: str) -> bool:
-    """The full stop of a possible sentence end belongs to an abbreviation."""
+    """Whether the full stop of a possible sentence end belongs to an abbreviation."""
     if end.group().rstrip("\"'”’)]") != ".":
         return False
-    before = text[max(begin, end.start() - _SEEN_BEFORE) : end.start()]
-    return not ends_sentence(before, text[end.end() : end.end() + _SEEN_BEHIND].lstrip(), language)
+    before = text[max(begin, end.start() - _CONTEXT_BEFORE) : end.start()]
+    return not ends_sentence(before, text[end.end() : end.end() + _CONTEXT_AFTER].lstrip(), language)
 
 
 def _split_sentence(sentence: str, limit: int) -> Iterator[str]:
@@ -55,7 +55,7 @@ def _split_sentence(sentence: str, limit: int) -> Iterator[str]:
 
 
 def _cut_position(text: str, limit: int) -> int:
-    """Where a text that is too long is cut."""
+    """Index at which a text longer than the limit is split."""
     clauses = [match.end() for match in _CLAUSE.finditer(text, limit // 3, limit)]
     if clauses:
         return clauses[-1]

@@ -1,6 +1,7 @@
 """Unicode text to plain characters in canonical form: one kind of quote, dash and space, no invisible characters.
 
-What is taken away here is never spoken (marks, quotes, decoration); what is spoken stays, for `lexicon.normalize`.
+Only characters that are never spoken are removed (marks, quotes, decoration); the others are kept for
+`lexicon.normalize`.
 """
 
 import functools
@@ -34,7 +35,7 @@ _SPOKEN_PUNCTUATION = frozenset(".,;:!?'-–/&@#%‰§¶^")
 
 
 def _replacement(code: int) -> int | str:
-    """What stands for a character: itself, a space, a newline, an ASCII digit, or nothing."""
+    """Replacement of a character: itself, a space, a newline, an ASCII digit, or an empty string."""
     category = unicodedata.category(chr(code))
     if code in {10, 13, 0x2028, 0x2029}:
         return "\n"
@@ -47,11 +48,11 @@ def _replacement(code: int) -> int | str:
 
 
 class _TranslationTable(dict[int, int | str | None]):
-    """Translation that decides once for each character it meets."""
+    """Translation table that computes the entry of a character on first use."""
 
     def __missing__(self, code: int) -> int | str:
-        self[code] = kept = _replacement(code)
-        return kept
+        self[code] = replacement = _replacement(code)
+        return replacement
 
 
 @functools.cache
@@ -62,7 +63,7 @@ def _translation_table() -> _TranslationTable:
 _MARKS = re.compile("[\u0300-\u036f\u0483-\u0489\u1ab0-\u1aff\u1dc0-\u1dff\u20d0-\u20ff\ufe20-\ufe2f]+")
 
 
-# In order; each is linear in the text: no pattern repeats over what another repeat may take.
+# Applied in order; each is linear in the text, as no pattern has overlapping repeats.
 _STEPS: tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...] = (
     (re.compile(r"\r"), "\n"),
     (re.compile(r"(?<!\.)\.{2,}+(?= ?\n?[a-z])"), ","),
@@ -87,9 +88,9 @@ def _strongest_mark(run: re.Match[str]) -> str:
 
 
 def canonical_text(text: str, *, keep_marks: bool = False) -> str:
-    """The text in canonical characters: NFKC, ASCII digits, plain quotes, single spaces, no two marks together.
+    """The text in canonical characters: NFKC, ASCII digits, plain quotes, single spaces, no adjacent marks.
 
-    Loose combining marks go, unless they are kept for a script that is written with them.
+    Loose combining marks are removed unless `keep_marks` is set, for scripts that are written with them.
     """
     text = _AREA_CODE.sub(r"\1-", text)
     text = _VULGAR.sub(r" \1", text).translate(_translation_table())

@@ -1,7 +1,7 @@
-"""Pronunciations that are looked up: the user's own, which win, and CMUdict for American English.
+"""Pronunciation dictionaries: the user's own, which takes precedence, and CMUdict for American English.
 
 A user dictionary is a UTF-8 text file, one word a line: the word, white space, and its phones, either as ARPABET names
-(vowels with a stress digit) or as IPA between slashes. Empty lines and everything from ``#`` on are skipped::
+(vowels with a stress digit) or as IPA between slashes. Empty lines and comments from ``#`` on are skipped::
 
     # word      pronunciation
     Siobhan     SH IH0 V AO1 N
@@ -21,26 +21,26 @@ from lexicon.inputs import read_text
 from lexicon.ipa import Segment, parse_ipa
 from lexicon.phones import PHONES, arpabet_to_ipa
 
-MAX_SCANNED_WORDS = 40  # looked up by scanning the file (about 1 ms each) before all of it is split (about 100 ms)
-# Phones of a word. CMUdict's longest has 28. espeak-ng keeps a word in 200 bytes without a check of its length; a phone
-# takes up to five of them (two vowels with their lengths, and the stress).
-MOST_PHONES = 40
+MAX_SCANNED_WORDS = 40  # words found by scanning the text (about 1 ms each) before it is parsed (about 100 ms)
+# Phones of a word. CMUdict's longest has 28. espeak-ng stores a word in 200 bytes without a bounds check; a phone
+# takes up to five bytes (two vowels with their lengths, and the stress).
+MAX_PHONES = 40
 _APOSTROPHES = str.maketrans({"’": "'", "ʼ": "'", "‘": "'"})
 
 
 def word_key(word: str) -> str:
-    """The form under which a word is looked up: case and kind of apostrophe do not count."""
+    """Lookup key of a word: case-folded, with plain apostrophes."""
     return word.translate(_APOSTROPHES).casefold()
 
 
 @functools.lru_cache(maxsize=50_000)
 def arpabet_segments(names: str) -> tuple[Segment, ...]:
-    """Phones of ARPABET names between spaces, with their stress.
+    """Phones of ARPABET names separated by spaces, with their stress.
 
     Raises
     ------
     InputError
-        One of them is no ARPABET name.
+        A name is not an ARPABET name.
     """
     segments = []
     for name in names.upper().split():
@@ -57,7 +57,7 @@ class Dictionary:
     entries: Mapping[str, tuple[Segment, ...]]
 
     def lookup(self, word: str) -> tuple[Segment, ...] | None:
-        """Phones of a word, or None where the dictionary does not hold it."""
+        """Phones of a word, or None if the dictionary does not contain it."""
         return self.entries.get(word_key(word))
 
 
@@ -65,25 +65,25 @@ def _parse_entry(line: str, where: str) -> tuple[str, tuple[Segment, ...]]:
     word, _, written = line.partition(" ")
     written = written.strip()
     if not written:
-        raise DataError(f"{where}: {word!r} has no pronunciation; write ARPABET names or /IPA/ after it")
+        raise DataError(f"{where}: {word!r} has no pronunciation; add ARPABET names or /IPA/ after it")
     if written.startswith("/") != written.endswith("/") or written == "/":
-        raise DataError(f"{where}: IPA stands between two slashes, as in /həˈləʊ/, not {written!r}")
+        raise DataError(f"{where}: IPA must be enclosed in two slashes, as in /həˈləʊ/, not {written!r}")
     try:
         segments = parse_ipa(written.strip("/")) if written.startswith("/") else arpabet_segments(written)
     except InputError as wrong:
         raise DataError(f"{where}: {wrong}") from wrong
     if not segments:
-        raise DataError(f"{where}: the pronunciation of {word!r} holds no phone")
-    if len(segments) > MOST_PHONES:
+        raise DataError(f"{where}: the pronunciation of {word!r} contains no phone; add ARPABET names or /IPA/")
+    if len(segments) > MAX_PHONES:
         raise DataError(
             f"{where}: the pronunciation of {word[:40]!r} has {len(segments)} phones; "
-            f"a word has at most {MOST_PHONES}: divide it into several words"
+            f"a word has at most {MAX_PHONES}; split it into several words"
         )
     return word_key(word), segments
 
 
 def parse_dictionary(text: str, name: str = "dictionary") -> Dictionary:
-    """A user dictionary from its text; of two lines for one word the later counts.
+    """A user dictionary from its text; a later line for the same word replaces an earlier one.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def read_dictionary(path: Path) -> Dictionary:
     try:
         text = read_text(path)
     except OSError as missing:
-        raise DataError(f"dictionary {path} cannot be read ({missing.strerror}); give a text file") from missing
+        raise DataError(f"dictionary {path} cannot be read ({missing.strerror}); check the path") from missing
     return parse_dictionary(text, str(path))
 
 

@@ -1,4 +1,4 @@
-"""English words to phones: CMUdict first, spelled initialisms, compounds and endings by their parts."""
+"""Phones of English words: CMUdict, spelled initialisms, and the parts of compounds and inflected words."""
 
 from collections.abc import Callable
 from types import MappingProxyType
@@ -8,7 +8,7 @@ from lexicon.ipa import Segment
 from lexicon.phones import ARPABET, PHONES, nearest_phones
 
 _INVENTORY = frozenset(ARPABET.values())
-# espeak-ng's finer English phones in the phones that CMUdict knows; whatever is not listed goes to its nearest.
+# espeak-ng's finer English phones in the inventory of CMUdict; phones that are not listed map to the nearest one.
 _FOLDED_PHONES = MappingProxyType({
     "ɜ": ("ɝ",), "ɐ": ("ə",), "ɾ": ("t",), "ʔ": ("t",), "ɒ": ("ɑ",), "a": ("æ",), "e": ("ɛ",), "o": ("oʊ",),
     "r": ("ɹ",), "ɫ": ("l",), "x": ("k",), "əʊ": ("oʊ",), "iə": ("i", "ə"), "ɪə": ("ɪ", "ə"), "eə": ("ɛ", "ə"),
@@ -16,18 +16,18 @@ _FOLDED_PHONES = MappingProxyType({
 })  # fmt: skip
 _REDUCED_VOWELS = MappingProxyType({"ʌ": "ə", "ɝ": "ɚ"})
 _FULL_VOWELS = MappingProxyType({reduced: full for full, reduced in _REDUCED_VOWELS.items()})
-MAX_SPELLED_LETTERS = 3  # letters; longer capitals are a word (NASA) where CMUdict or its vowels say so
+MAX_SPELLED_LETTERS = 3  # letters; longer capitals are a word (NASA) if CMUdict has it or it contains vowels
 _ACRONYMS = frozenset({"AIDS", "SIM", "RAM", "ROM", "PIN", "GIF", "LED", "ZIP", "LAN", "WAN", "NATO", "NASA"})
 CAPITALISED_WORDS = frozenset({
     "THE", "AND", "NOT", "YOU", "ARE", "FOR", "BUT", "ALL", "NO", "YES", "SO", "GO", "OF", "TO", "IN", "ON", "IS", "BE",
     "AT", "AN", "AS", "BY", "DO", "HE", "ME", "MY", "WE", "IF", "UP", "WAS", "CAN", "HIS", "HER", "OUR", "NEW", "NOW",
-})  # fmt: skip  # short words that are never initialisms: where they stand in capitals, so do their neighbours
+})  # fmt: skip  # short words that are never initialisms; a capital neighbour is none either
 _VOICELESS_ENDINGS = frozenset({"p", "t", "k", "f", "θ"})
 _SIBILANTS = frozenset({"s", "z", "ʃ", "ʒ", "tʃ", "dʒ"})
 
 
 def fold_to_arpabet(segments: tuple[Segment, ...]) -> tuple[Segment, ...]:
-    """The same word in CMUdict's phones: 39 ARPABET phones and the reduced vowels."""
+    """A word in CMUdict's inventory: 39 ARPABET phones and the reduced vowels."""
     result: list[Segment] = []
     for segment in segments:
         phone, stress = segment.phone, segment.stress
@@ -46,7 +46,7 @@ def fold_to_arpabet(segments: tuple[Segment, ...]) -> tuple[Segment, ...]:
 
 
 def _spell_letters(letters: str) -> tuple[Segment, ...] | None:
-    """Names of letters one behind the other; each letter's name keeps its stress."""
+    """Concatenated names of letters; each name keeps its stress."""
     result: list[Segment] = []
     for letter in letters:
         name = cmudict_lookup("a." if letter in "Aa" else letter)
@@ -73,14 +73,14 @@ Lookup = Callable[[str], tuple[Segment, ...] | None]
 
 
 def look_up_word(word: str, *, is_letter: bool, own: Lookup) -> tuple[Segment, ...] | None:
-    """Phones of an English word by `own` entries, CMUdict and its parts; None where only spelling rules can tell.
+    """Phones of an English word from the user's entries, CMUdict or its parts; None if spelling rules are needed.
 
     Parameters
     ----------
     is_letter
         A single capital is the name of a letter (plan A), not the article.
     own
-        The user's dictionary: asked first, for the whole word and for its parts.
+        Lookup in the user's dictionary, which takes precedence for the whole word and for its parts.
     """
     entry = own(word)
     if entry is not None:

@@ -1,20 +1,20 @@
-"""The errors of tts2face: three kinds, named by who can put them right.
+"""The errors of tts2face: three kinds, by who can correct them.
 
-Every message says what is wrong, which value, and what to do next.
+Every message states what is wrong, which value, and what to do.
 """
 
 
 class Tts2faceError(Exception):
-    """Root of everything that tts2face refuses; never raised itself."""
+    """Base class of all errors; never raised itself."""
 
 
 class InputError(Tts2faceError, ValueError):
-    """What was asked for cannot be done: ask differently."""
+    """An invalid request: change the request."""
 
 
 class DataError(Tts2faceError, ValueError):
-    """A file is not what it should be: mend or rebuild the file."""
+    """An invalid or damaged file: correct or rebuild the file."""
 
 
 class BackendError(Tts2faceError, RuntimeError):
-    """Something that the work needs is missing on this machine: install it."""
+    """A required library, model or device is missing on this machine: install it."""

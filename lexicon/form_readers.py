@@ -1,13 +1,13 @@
-"""What a matched written form says, given the word before it: the readers that `lexicon.normalize` calls."""
+"""Readers of `lexicon.normalize`: the words of a matched written form, given the word before it."""
 
 import re
 import unicodedata
 from collections.abc import Callable
 
 from lexicon import written_forms as readings
-from lexicon.letters import letter_name
+from lexicon.letter_names import letter_name
 from lexicon.numbers import cardinal_words, digit_words, number_words, ordinal_words, roman_value, year_words
-from lexicon.stops import is_abbreviated, starts_sentence
+from lexicon.sentence_ends import is_abbreviated, starts_sentence
 from lexicon.writing_systems import language_scripts, letter_script
 
 
@@ -35,11 +35,11 @@ Reader = Callable[[re.Match[str], str], str]
 
 
 def read_numeric_date(m: re.Match[str], _: str) -> str:
-    """3/15/2024 is March fifteenth; 13/13/13 is no date and is read number by number."""
+    """3/15/2024 is March fifteenth; 13/13/13 is not a date and is read number by number."""
     first, separator, second, last = m["nd1"], m["ndsep"], m["nd2"], m["ndy"]
-    said = readings.numeric_date_words(int(first), int(second), last, separator)
+    words = readings.numeric_date_words(int(first), int(second), last, separator)
     sign = {"/": "slash", ".": "point", "-": "dash"}[separator]
-    return said or f" {sign} ".join(number_words(part) for part in (first, second, last))
+    return words or f" {sign} ".join(number_words(part) for part in (first, second, last))
 
 
 def read_iso_date(m: re.Match[str], _: str) -> str:
@@ -68,12 +68,12 @@ def read_day_first(m: re.Match[str], previous: str) -> str:
     month, day, last = readings.month_number(m["df"]), int(m["dfd"]), m["dfy"] or ""
     if not 1 <= day <= 31:
         return f"{number_words(m['dfd'])} {readings.MONTHS[month - 1]}" + (f" {year_words(int(last))}" if last else "")
-    said = readings.date_words(day, month, last, day_first=True)
-    return said.removeprefix("the ") if previous.lower() == "the" else said
+    words = readings.date_words(day, month, last, day_first=True)
+    return words.removeprefix("the ") if previous.lower() == "the" else words
 
 
 def read_clock(m: re.Match[str], _: str) -> str:
-    """3:05 pm is three oh five PM; 26:70 is no time but twenty-six to seventy."""
+    """3:05 pm is three oh five PM; 26:70 is not a time and is read as twenty-six to seventy."""
     hour, minute = m["hh"] or m["hh2"] or m["hh3"], m["mm"] or m["mm3"] or "0"
     half = m["half"] or m["half2"] or m["half3"] or ""
     if int(hour) > 24 or int(minute) > 59:
@@ -142,25 +142,25 @@ def read_initial(m: re.Match[str], previous: str) -> str:
     if m.group()[0] in "IVXLCDM" and previous.lower() in _RULERS | _BEFORE_ROMAN:
         return m.group()
     is_first = not previous or previous in _MARKS
-    if not is_first and starts_sentence(m.string[m.end() : m.end() + _SEEN_BEHIND].lstrip()):
+    if not is_first and starts_sentence(m.string[m.end() : m.end() + _CONTEXT_AFTER].lstrip()):
         return m.group()
     starts_name = is_first or previous[:1].isupper() or previous in {"by", "and", "with"}
     return m.group()[0] if starts_name else m.group()
 
 
 def read_nothing(_m: re.Match[str], _: str) -> str:
-    """Space says nothing."""
+    """Nothing for white space."""
     return ""
 
 
-def mark(m: re.Match[str], _: str) -> str:
-    """Punctuation; nothing for the full stop of an abbreviation that ends no sentence (Insp. Morse)."""
-    before, after = m.string[max(m.start() - 24, 0) : m.start()], m.string[m.end() : m.end() + _SEEN_BEHIND]
+def read_punctuation(m: re.Match[str], _: str) -> str:
+    """A punctuation mark; nothing for the full stop of an abbreviation within a sentence (Insp. Morse)."""
+    before, after = m.string[max(m.start() - 24, 0) : m.start()], m.string[m.end() : m.end() + _CONTEXT_AFTER]
     return "" if m.group() == "." and is_abbreviated(before, after.lstrip(), "en") else m.group()
 
 
 def read_dot(m: re.Match[str], _: str) -> str:
-    """A full stop inside a form that nothing else reads."""
+    """A full stop within a form without a reader of its own."""
     before, after = m.string[: m.start()][-1:], m.string[m.end() : m.end() + 1]
     return "dot" if before.isalnum() and after.isalnum() else "."
 
@@ -168,10 +168,10 @@ def read_dot(m: re.Match[str], _: str) -> str:
 def read_range(m: re.Match[str], previous: str) -> str:
     """5-10 km is five to ten kilometers, 1990-1995 two years."""
     before = "in" if len(m["from"]) == len(m["to"]) == 4 else previous
-    said = f"{_number(m['from'], before)} to {_number(m['to'], before)}"
+    words = f"{_number(m['from'], before)} to {_number(m['to'], before)}"
     if m["sign4"]:
         return f"{_number(m['from'], '')} to {readings.money_words(m['to'], m['sign4'], '')}"
-    return f"{said} {readings.read_table('units.tsv')[m['runit']][1]}" if m["runit"] else said
+    return f"{words} {readings.read_table('units.tsv')[m['runit']][1]}" if m["runit"] else words
 
 
 def _number(written: str, previous: str) -> str:
@@ -196,7 +196,7 @@ def read_ordinal(m: re.Match[str], _: str) -> str:
 
 
 def read_roman_numeral(m: re.Match[str], previous: str) -> str:
-    """Henry VIII is Henry the eighth, Chapter IV Chapter four; elsewhere capitals stay letters."""
+    """Henry VIII is Henry the eighth, Chapter IV Chapter four; elsewhere capitals are read as letters."""
     value, before = roman_value(m.group()), previous.lower()
     if value == 1 and not previous[:1].isupper():
         return m.group()
@@ -211,12 +211,12 @@ _BEFORE_NAME = re.compile(r" [A-Z]")
 _BEFORE_NUMBER = re.compile(r" ?[0-9]")
 _NO_NAMES = _word_set("The On In At And But When Dear I If As To From Near")
 _AT_END = re.compile(r"\s*$")
-_SEEN_BEHIND = 48  # characters behind a full stop that tell whether a sentence begins there
+_CONTEXT_AFTER = 48  # characters after a full stop that decide whether a sentence begins there
 
 
 def _keep_full_stop(words: str, m: re.Match[str]) -> str:
     """Keep the full stop of an abbreviation that also ends the sentence."""
-    after = m.string[m.end() : m.end() + _SEEN_BEHIND]
+    after = m.string[m.end() : m.end() + _CONTEXT_AFTER]
     ends = _AT_END.match(m.string, m.end()) or (after[:1].isspace() and starts_sentence(after.lstrip()))
     return f"{words}." if ends and m.group().endswith(".") else words
 
@@ -247,8 +247,8 @@ def read_address(m: re.Match[str], _: str) -> str:
 
 def read_hashtag(m: re.Match[str], _: str) -> str:
     """#MachineLearning is hashtag machine learning."""
-    said = readings.hashtag_words(m.group())
-    return f"{'hashtag' if m.group()[0] == '#' else 'at'} {said}".strip()
+    words = readings.hashtag_words(m.group())
+    return f"{'hashtag' if m.group()[0] == '#' else 'at'} {words}".strip()
 
 
 def read_feet(m: re.Match[str], _: str) -> str:
@@ -264,16 +264,16 @@ def read_slashed(m: re.Match[str], _: str) -> str:
 
 
 def read_unchanged(m: re.Match[str], _: str) -> str:
-    """What is written."""
+    """The written form itself."""
     return m.group()
 
 
-def unit_name(m: re.Match[str], _: str) -> str:
+def read_unit_name(m: re.Match[str], _: str) -> str:
     """A unit without a number: the kΩ of "in kΩ" is kiloohms."""
     return readings.read_table("units.tsv")[m.group()][1]
 
 
-def letter(m: re.Match[str], _: str) -> str:
+def read_letter(m: re.Match[str], _: str) -> str:
     """A single letter of another script is its name: π is pi."""
     return m.group() if letter_script(m.group()) in language_scripts("en") else letter_name(m.group()) or m.group()
 

@@ -1,4 +1,4 @@
-"""Spelling to IPA by espeak-ng, through phonemizer, in every language that espeak-ng has.
+"""Grapheme-to-phoneme conversion by espeak-ng, through phonemizer, in every language of espeak-ng.
 
 espeak-ng is a library with global state: one lock guards all calls.
 """
@@ -17,11 +17,9 @@ from lexicon.ipa import Segment, parse_ipa
 DEFAULT_LANGUAGE = "en-us"
 MAX_DATA_PATH = 150  # characters; espeak-ng cuts longer paths off (its buffer holds 160)
 _LOCK = threading.RLock()
-_LANGUAGE_SWITCH = re.compile(
-    r"\([a-z0-9-]+\)"
-)  # espeak-ng marks a foreign word: (en)...(fr); its phones are read as well
+_LANGUAGE_SWITCH = re.compile(r"\([a-z0-9-]+\)")  # espeak-ng marks foreign words: (en)...(fr); their phones are kept
 
-# What espeak-ng writes in a tone language is partly no IPA: tones as digits and as ɜ (a "3"), retroflexes with a dot.
+# The output of espeak-ng in tone languages is partly not IPA: tones as digits and as ɜ (a "3"), retroflexes with a dot.
 _TONE_LANGUAGES = frozenset({"cmn", "hak", "yue", "vi", "th", "my", "shn"})
 _TONE_SPELLINGS = (
     (re.compile(r"ɜ|[0-9]|-"), ""),
@@ -41,7 +39,7 @@ _SPELLINGS = (
 
 @functools.cache
 def _espeak_wrapper() -> Any:
-    """Phonemizer's espeak-ng class, told where the library and its data lie."""
+    """Phonemizer's espeak-ng class, set to the paths of the library and its data."""
     try:
         import espeakng_loader
         from phonemizer.backend.espeak.wrapper import EspeakWrapper
@@ -72,12 +70,12 @@ def languages() -> Mapping[str, str]:
         try:
             voices = wrapper().available_voices()
         except RuntimeError as broken:
-            raise BackendError(f"espeak-ng does not start: {broken}; reinstall espeakng-loader") from broken
+            raise BackendError(f"espeak-ng cannot be loaded: {broken}; reinstall espeakng-loader") from broken
     return MappingProxyType({voice.language: voice.name.strip() for voice in voices})
 
 
 def check_language(language: str) -> None:
-    """Refuse what is no code of espeak-ng; `lexicon.languages.language_code` gives the code of other spellings.
+    """Check that a language is a code of espeak-ng; `lexicon.languages.language_code` converts other spellings.
 
     Raises
     ------
@@ -86,7 +84,7 @@ def check_language(language: str) -> None:
     """
     if language != DEFAULT_LANGUAGE and language not in languages():
         raise InputError(
-            f"there is no language {language[:40]!r}; give a code such as en-us, de, fr-fr, ja "
+            f"there is no language {language[:40]!r}; use a code such as en-us, de, fr-fr, ja "
             "(`tts2face languages` lists all)"
         )
 
@@ -102,9 +100,9 @@ def _espeak_backend(language: str) -> Any:
 
 
 def phonemize(lines: Sequence[str], language: str) -> tuple[tuple[str, ...], ...]:
-    """IPA of each line as espeak-ng writes it: one string a spoken word, phones between underscores.
+    """IPA of each line in the notation of espeak-ng: one string per spoken word, phones separated by underscores.
 
-    espeak-ng joins and splits words at will (``of the`` is one, a year is four).
+    espeak-ng joins and splits words (``of the`` is one, a year is four).
 
     Raises
     ------
@@ -131,12 +129,12 @@ def phonemize(lines: Sequence[str], language: str) -> tuple[tuple[str, ...], ...
 
 
 def parse_espeak_word(written: str, language: str) -> tuple[Segment, ...]:
-    """Phones of one word as espeak-ng wrote it.
+    """Phones of one word in the notation of espeak-ng.
 
     Raises
     ------
     InputError
-        It holds a letter that is no phone of the table.
+        It contains a letter that is not a phone of the table.
     """
     is_tonal = language.partition("-")[0] in _TONE_LANGUAGES
     for pattern, ipa in (*_TONE_SPELLINGS, *_SPELLINGS) if is_tonal else _SPELLINGS:

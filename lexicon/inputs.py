@@ -1,4 +1,4 @@
-"""Files and streams that a user names, read to a stated size and no further: text in UTF-8, and JSON."""
+"""Bounded reading of files and streams given by a user: UTF-8 text and JSON."""
 
 import json
 import re
@@ -9,10 +9,10 @@ from typing import Any, BinaryIO
 
 from lexicon.errors import DataError, InputError
 
-LARGEST_TEXT_BYTES = 16 << 20  # 16 MiB of text to speak; at 15 characters a second some 300 hours
+LARGEST_TEXT_BYTES = 16 << 20  # 16 MiB of text to speak; at 15 characters a second about 300 hours
 LARGEST_JSON_BYTES = 10_000_000  # an hour of timeline spans, one a second in each feature, takes 2 MB
-DEEPEST = 64  # lists and objects within each other; the formats read here need 5
-LONGEST_NUMBER = 400  # characters; a double written out in full has at most 310 before the point
+MAX_DEPTH = 64  # nesting of lists and objects; the supported formats need 5
+MAX_NUMBER_CHARACTERS = 400  # characters; a double has at most 310 digits before the point
 _FILE_KINDS = (
     (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a pipe"),
@@ -20,17 +20,17 @@ _FILE_KINDS = (
     (stat.S_ISCHR, "a device"),
     (stat.S_ISBLK, "a device"),
 )
-_TOKENS = re.compile(r'"(?:[^"\\]|\\.)*+"?|[\[{]|[\]}]', re.DOTALL)  # a string as a whole, or one bracket
+_TOKENS = re.compile(r'"(?:[^"\\]|\\.)*+"?|[\[{]|[\]}]', re.DOTALL)  # a whole string, or one bracket
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 
 
 def check_regular_file(path: Path) -> None:
-    """Refuse what is no ordinary file: opening a pipe waits for its writer, reading a device may never end.
+    """Refuse anything but a regular file: opening a pipe waits for its writer, reading a device may never end.
 
     Raises
     ------
     DataError
-        The path is a folder, a pipe, a socket or a device, a link that leads nowhere, or cannot be looked at.
+        The path is a folder, a pipe, a socket, a device or a broken link, or cannot be accessed.
     """
     try:
         mode = path.stat().st_mode
@@ -38,30 +38,30 @@ def check_regular_file(path: Path) -> None:
         raise DataError(f"{path} cannot be read ({refused.strerror}); check the path") from refused
     kind = next((name for is_kind, name in _FILE_KINDS if is_kind(mode)), None)
     if kind is not None:
-        raise DataError(f"{path} is {kind}, not a file; remove it or give a file")
+        raise DataError(f"{path} is {kind}, not a file; remove it or use a file")
 
 
 def read_bounded(file: BinaryIO, name: str, largest: int) -> bytes:
-    """All bytes of an open file or stream, which may be a pipe.
+    """All bytes of an open file or stream, including pipes.
 
     Raises
     ------
     DataError
-        It holds more than `largest` bytes; no more than that is read.
+        It contains more than `largest` bytes; no more than that is read.
     """
     content = file.read(largest + 1)
     if len(content) > largest:
-        raise DataError(f"{name} holds more than {largest / 1e6:.0f} MB; split it into smaller files")
+        raise DataError(f"{name} contains more than {largest / 1e6:.0f} MB; split it into smaller files")
     return content
 
 
-def decoded(content: bytes, name: str) -> str:
-    """Characters of UTF-8 bytes, with or without byte order mark.
+def decode_utf8(content: bytes, name: str) -> str:
+    """Decode UTF-8 bytes, with or without byte order mark.
 
     Raises
     ------
     DataError
-        They are not UTF-8; the message names the first wrong byte.
+        They are not UTF-8; the message names the first invalid byte.
     """
     try:
         return content.decode("utf-8-sig")
@@ -70,41 +70,41 @@ def decoded(content: bytes, name: str) -> str:
 
 
 def read_text(path: Path, largest: int = LARGEST_TEXT_BYTES) -> str:
-    """Characters of a UTF-8 file or pipe.
+    """Text of a UTF-8 file or pipe.
 
     Raises
     ------
     OSError
         It cannot be opened or read.
     DataError
-        It holds more than `largest` bytes, or is not UTF-8.
+        It contains more than `largest` bytes, or is not UTF-8.
     """
     with path.open("rb") as file:
-        return decoded(read_bounded(file, str(path), largest), str(path))
+        return decode_utf8(read_bounded(file, str(path), largest), str(path))
 
 
 def read_json(path: Path) -> Any:
-    """What a JSON file holds; errors as `parse_json`, and OSError where the file cannot be opened or read."""
+    """Content of a JSON file; errors as `parse_json`, and OSError if the file cannot be opened or read."""
     return parse_json(read_text(path, LARGEST_JSON_BYTES), str(path))
 
 
 def parse_json(content: str, name: str) -> Any:
-    """What a JSON text holds.
+    """Content of a JSON text.
 
     Raises
     ------
     DataError
-        It is not JSON, is nested deeper than `DEEPEST`, holds a number that is too long or not finite, an object with
-        the same name twice, or half of a surrogate pair; the message begins with `name`.
+        It is not JSON, is nested deeper than `MAX_DEPTH`, or contains a number that is too long or not finite, a
+        duplicate name in an object, or an unpaired surrogate; the message begins with `name`.
     """
     _check_depth(content, name)
     try:
         parsed = json.loads(
             content,
             object_pairs_hook=_refuse_duplicates,
-            parse_constant=_constant,
-            parse_int=_integer,
-            parse_float=_number,
+            parse_constant=_refuse_constant,
+            parse_int=_parse_integer,
+            parse_float=_parse_number,
         )
     except json.JSONDecodeError as broken:
         raise DataError(f"{name}, line {broken.lineno}: not JSON ({broken.msg}); correct it there") from broken
@@ -122,44 +122,44 @@ def _check_depth(content: str, name: str) -> None:
         if first == '"':
             continue
         depth += 1 if first in "[{" else -1
-        if depth > DEEPEST:
-            raise DataError(f"{name} is nested too deep: more than {DEEPEST} lists and objects within each other")
+        if depth > MAX_DEPTH:
+            raise DataError(f"{name} is nested too deep: at most {MAX_DEPTH} levels of lists and objects are allowed")
 
 
 def _check_characters(parsed: Any, name: str) -> None:
     try:
         json.dumps(parsed, ensure_ascii=False).encode()
     except UnicodeEncodeError as broken:
-        half = f"\\u{ord(broken.object[broken.start]):04x}"
-        raise DataError(f"{name} holds {half}, half of a surrogate pair; write the whole character") from broken
+        surrogate = f"\\u{ord(broken.object[broken.start]):04x}"
+        raise DataError(f"{name} contains the unpaired surrogate {surrogate}; write the whole character") from broken
 
 
 def _refuse_duplicates(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    parsed: dict[str, Any] = {}
     for name, value in pairs:
-        if name in found:
-            raise InputError(f"{name!r} stands twice in one object; keep one")
-        found[name] = value
-    return found
+        if name in parsed:
+            raise InputError(f"the name {name!r} occurs twice in one object; remove one of them")
+        parsed[name] = value
+    return parsed
 
 
-def _constant(written: str) -> Any:
-    raise InputError(f"{written} is no number of JSON; JSON numbers are finite")
+def _refuse_constant(written: str) -> Any:
+    raise InputError(f"{written} is not a JSON number; use a finite number")
 
 
-def _integer(written: str) -> int:
+def _parse_integer(written: str) -> int:
     _check_length(written)
     return int(written)
 
 
-def _number(written: str) -> float:
+def _parse_number(written: str) -> float:
     _check_length(written)
     value = float(written)
     if value in (float("inf"), float("-inf")):
-        raise InputError(f"the number {written[:20]} is too large; the largest is 1.8e308")
+        raise InputError(f"the number {written[:20]} is too large; the maximum is 1.8e308")
     return value
 
 
 def _check_length(written: str) -> None:
-    if len(written) > LONGEST_NUMBER:
+    if len(written) > MAX_NUMBER_CHARACTERS:
         raise InputError(f"a number of {len(written)} characters is too long ({written[:20]}...); shorten it")

@@ -1,7 +1,7 @@
-"""A written IPA string to phones of the table, with stress and length.
+"""Parse IPA strings into phones of the table, with stress and length.
 
-Reads what espeak-ng and phonemizer write (separators, ties, length and stress marks, diacritics, tone digits) and
-what a phonetician writes.
+Reads the notation of espeak-ng and phonemizer (separators, ties, length and stress marks, diacritics, tone digits) and
+standard IPA.
 """
 
 import functools
@@ -18,26 +18,26 @@ LENGTHS = frozenset("ːˑ:")
 SEPARATORS = frozenset("_ .|‖‿\t\n-")
 _TIES = "\u0361\u035c"
 _SYLLABIC = frozenset("\u0329\u030d")
-# Marks that change a phone by less than its neighbours do: they are read and not kept. Superscripts (aspiration,
-# palatalisation, ...), tone letters and digits, ejective and unreleased marks, and signs that espeak-ng leaves bare
-# (Quechua p`, Icelandic l#, Korean p-).
+# Marks with less effect on a phone than its neighbours have: they are accepted and dropped. Superscripts (aspiration,
+# palatalisation, ...), tone letters and digits, ejective and unreleased marks, and signs without conversion
+# by espeak-ng (Quechua p`, Icelandic l#, Korean p-).
 _IGNORED = frozenset('ʰʱʲʷˠˤⁿˡʼ̚ʴʵʶᵝᵊᵐᶮᵑ˞˥˦˧˨˩↗↘ꜛꜜ0123456789¹²³⁴⁵⁶⁷⁸⁹`#^~*?!"ˀˁ\u200d')
 
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """One phone as it was written.
+    """One phone with its stress and length.
 
     Parameters
     ----------
     phone
         Symbol of the phone table.
     stress
-        0 none, 1 primary, 2 secondary; always 0 for a consonant that is not syllabic.
+        0 none, 1 primary, 2 secondary; always 0 for non-syllabic consonants.
     is_long
-        A length mark follows.
+        Whether a length mark follows.
     is_syllabic
-        A vowel, or a consonant marked as the middle of a syllable.
+        Whether it is a vowel or a consonant marked as a syllable nucleus.
     """
 
     phone: str
@@ -49,25 +49,25 @@ class Segment:
 @functools.cache
 def _spellings() -> tuple[dict[str, str], int]:
     """Symbol by decomposed spelling, and the length of the longest spelling."""
-    spelt = {}
+    spellings = {}
     for symbol, phone in PHONES.items():
         if phone.kind != "silence":
             for spelling in (symbol, *phone.aliases):
-                spelt[unicodedata.normalize("NFD", spelling)] = symbol
-    return spelt, max(map(len, spelt))
+                spellings[unicodedata.normalize("NFD", spelling)] = symbol
+    return spellings, max(map(len, spellings))
 
 
 def _longest_spelling(text: str, at: int) -> str:
-    """Longest spelling that begins at a place; empty where none does."""
-    spelt, longest = _spellings()
+    """Longest spelling that begins at an index; empty if there is none."""
+    spellings, longest = _spellings()
     for length in range(min(longest, len(text) - at), 0, -1):
-        if text[at : at + length] in spelt:
+        if text[at : at + length] in spellings:
             return text[at : at + length]
     return ""
 
 
 def _apply_mark(segments: list[Segment], mark: str) -> bool:
-    """Apply a mark to the phone before it; say whether the mark is one."""
+    """Apply a mark to the phone before it; False if the character is not a mark."""
     if mark in LENGTHS:
         if segments:
             segments[-1] = replace(segments[-1], is_long=True)
@@ -80,7 +80,7 @@ def _apply_mark(segments: list[Segment], mark: str) -> bool:
 
 
 def _apply_stress(segments: Sequence[Segment], marks: Sequence[tuple[int, int]]) -> tuple[Segment, ...]:
-    """Give each mark (index of the next phone, stress) to the first syllabic phone from there on."""
+    """Assign each stress mark (index of the next phone, stress) to the first syllabic phone from that index."""
     stressed = list(segments)
     for start, stress in marks:
         for at in range(start, len(stressed)):
@@ -93,14 +93,14 @@ def _apply_stress(segments: Sequence[Segment], marks: Sequence[tuple[int, int]])
 def parse_ipa(text: str) -> tuple[Segment, ...]:
     """Phones of an IPA string in order.
 
-    The longest symbol of the table wins (tʃ is one phone) except across a separator (``t_ʃ`` and ``t.ʃ`` are two).
+    The longest symbol of the table is matched (tʃ is one phone), except across separators (``t_ʃ``, ``t.ʃ`` are two).
 
     Raises
     ------
     InputError
-        A letter is no phone of the table; the message names it.
+        A letter is not a phone of the table; the message names it.
     """
-    spelt, _ = _spellings()
+    spellings, _ = _spellings()
     decomposed = unicodedata.normalize("NFD", text).translate(dict.fromkeys(map(ord, _TIES)))
     segments: list[Segment] = []
     marks: list[tuple[int, int]] = []
@@ -111,10 +111,12 @@ def parse_ipa(text: str) -> tuple[Segment, ...]:
         if letter in STRESSES:
             marks.append((len(segments), STRESSES[letter]))
         elif spelling:
-            symbol = spelt[spelling]
+            symbol = spellings[spelling]
             segments.append(Segment(symbol, is_syllabic=PHONES[symbol].is_vowel))
         elif not _apply_mark(segments, letter):
             name = unicodedata.name(letter, f"U+{ord(letter):04X}")
-            raise InputError(f"{letter!r} ({name}) in {text!r} is no phone of the table lexicon/phones.tsv")
+            raise InputError(
+                f"{letter!r} ({name}) in {text!r} is not a phone of lexicon/phones.tsv; use one of its symbols"
+            )
         at += max(1, len(spelling))
     return _apply_stress(segments, marks)

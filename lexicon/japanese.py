@@ -1,6 +1,6 @@
-"""Japanese with Chinese characters in katakana as it is spoken, by pyopenjtalk-plus (extra ``[japanese]``).
+"""Convert Japanese text with Chinese characters to spoken katakana, by pyopenjtalk-plus (extra ``[japanese]``).
 
-Texts in kana alone are left to espeak-ng, which reads no Chinese characters.
+Texts in kana alone are read by espeak-ng, which cannot read Chinese characters.
 """
 
 import functools
@@ -15,11 +15,11 @@ from lexicon.errors import BackendError
 _KANJI = re.compile("[㐀-䶿一-鿿豈-﫿々〆〇𠀀-𪛟]")
 _KANA = re.compile("[ァ-ヺー]+")
 _PUNCTUATION = frozenset("。、？！…，．")
-LONGEST = 300  # characters at once; the library refuses texts of some 8,000 bytes
+MAX_CHARACTERS = 300  # per call; the library rejects texts of about 8,000 bytes
 
 
 def has_kanji(text: str) -> bool:
-    """The text holds Chinese characters."""
+    """Whether the text contains Chinese characters."""
     return not text.isascii() and _KANJI.search(text) is not None
 
 
@@ -32,7 +32,7 @@ def load_reader() -> Any:
     BackendError
         It is not installed.
     """
-    os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # it imports onnxruntime, which would report its use
+    os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")  # it imports onnxruntime, which would send telemetry
     try:
         import pyopenjtalk
     except ImportError as missing:
@@ -43,8 +43,8 @@ def load_reader() -> Any:
     return pyopenjtalk
 
 
-def with_kana(text: str) -> str:
-    """Katakana as it is spoken (particles wa and e, long vowels, numbers), with spaces between accent phrases.
+def to_kana(text: str) -> str:
+    """Spoken form in katakana (particles wa and e, long vowels, numbers), with spaces between accent phrases.
 
     Raises
     ------
@@ -52,11 +52,11 @@ def with_kana(text: str) -> str:
         The library is not installed.
     """
     read = load_reader().run_frontend
-    return " ".join("".join(_spoken(read(chunk))).strip() for chunk in split_chunks(text, LONGEST, "ja"))
+    return " ".join("".join(_kana_pieces(read(chunk))).strip() for chunk in split_chunks(text, MAX_CHARACTERS, "ja"))
 
 
-def _spoken(words: list[Mapping[str, Any]]) -> Iterator[str]:
-    """Pieces of a sentence; `chain_flag` 1 ties a word to the phrase before it."""
+def _kana_pieces(words: list[Mapping[str, Any]]) -> Iterator[str]:
+    """Pieces of a sentence; `chain_flag` 1 joins a word to the phrase before it."""
     for number, word in enumerate(words):
         written, spoken = str(word["string"]), str(word["pron"]).replace("’", "").replace("ヲ", "オ")
         if not _KANA.fullmatch(spoken):

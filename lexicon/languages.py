@@ -1,4 +1,4 @@
-"""Languages as people and documents write them (``EN``, ``en_US``, ``zh-Hans``, ``German``) to codes of espeak-ng."""
+"""Convert language names and tags (``EN``, ``en_US``, ``zh-Hans``, ``German``) to codes of espeak-ng."""
 
 import difflib
 import functools
@@ -9,8 +9,8 @@ from types import MappingProxyType
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE, languages
 
-# Tags that espeak-ng has under another code or in no plain form: languages without their region, macrolanguages,
-# withdrawn codes, and regions whose speech is nearer to one variety of espeak-ng than to another.
+# Tags with another code in espeak-ng: languages without region, macrolanguages, withdrawn codes, and regions whose
+# speech is closer to one variety of espeak-ng than to another.
 CODES_OF_TAGS = MappingProxyType({
     "en": "en-us", "en-ca": "en-us", "en-uk": "en-gb", "en-au": "en-gb", "en-nz": "en-gb", "en-ie": "en-gb",
     "en-za": "en-gb", "en-in": "en-gb", "en-sg": "en-gb", "en-hk": "en-gb", "en-jm": "en-029", "en-tt": "en-029",
@@ -22,7 +22,7 @@ CODES_OF_TAGS = MappingProxyType({
     "chr": "chr-US-Qaaa-x-west", "no": "nb", "nn": "nb", "iw": "he", "in": "id", "mo": "ro",
     "sh": "hr", "jp": "ja", "vi-central": "vi-vn-x-central", "vi-south": "vi-vn-x-south",
 })  # fmt: skip
-# English names that espeak-ng lists otherwise, or for several varieties.
+# English names that differ from those of espeak-ng, or that espeak-ng lists for several varieties.
 CODES_OF_NAMES = MappingProxyType({
     "english": "en-us", "american english": "en-us", "us english": "en-us", "british english": "en-gb",
     "uk english": "en-gb", "scottish english": "en-gb-scotland", "french": "fr-fr", "belgian french": "fr-be",
@@ -36,14 +36,14 @@ CODES_OF_NAMES = MappingProxyType({
 _SUBTAGS = re.compile(r"[a-z]{2,8}(?:-[a-z0-9]{1,8})*")
 _LOCALE_END = re.compile(r"[.@].*")  # of a POSIX locale: en_US.UTF-8, de_DE@euro
 _SCRIPT = re.compile(r"[a-z]{4}")
-MOST_HINTS = 4
+MAX_HINTS = 4
 
 
 def language_code(written: str) -> str:
     """The espeak-ng code of a language: from the code itself, a BCP 47 tag, a POSIX locale, or its English name.
 
-    Upper and lower case are the same, as are ``-`` and ``_``. Of a tag that espeak-ng does not have, the nearest one
-    counts: without its script, then without its last parts (RFC 4647, lookup).
+    Case is ignored, and ``_`` is read as ``-``. A tag that espeak-ng does not have falls back to a shorter one: without
+    its script, then without its last parts (RFC 4647, lookup).
 
     Examples
     --------
@@ -53,7 +53,7 @@ def language_code(written: str) -> str:
     Raises
     ------
     InputError
-        It names no language that espeak-ng speaks, or several; the message names near ones.
+        It matches no language of espeak-ng, or several; the message names similar ones.
     """
     if written == DEFAULT_LANGUAGE:  # espeak-ng need not be loaded
         return written
@@ -68,8 +68,8 @@ def language_code(written: str) -> str:
     named = _codes_of_names().get(wanted, ())
     if len(named) == 1:
         return named[0]
-    close = [f"{code} ({languages()[code]})" for code in named or _near(wanted)]
-    hint = f"did you mean {', '.join(close)}?" if close else "`tts2face languages` lists all"
+    close = [f"{code} ({languages()[code]})" for code in named or _close_codes(wanted)]
+    hint = f"did you mean {', '.join(close)}?" if close else "`tts2face languages` lists all languages"
     raise InputError(f"there is no language {written[:40]!r}; {hint}")
 
 
@@ -85,22 +85,22 @@ def _fallbacks(tag: str) -> Iterator[str]:
 
 @functools.cache
 def _codes_of_names() -> dict[str, tuple[str, ...]]:
-    """Codes by English name in lower case: espeak-ng's own, those without what stands in brackets, and more."""
+    """Codes by English name in lower case: espeak-ng's names, with and without parentheses, and `CODES_OF_NAMES`."""
     known = languages()
     found: dict[str, tuple[str, ...]] = {}
     for code in sorted(known, key=len):
         base = known[code].casefold().partition(" (")[0]
         before = found.get(base, ())
-        if not before or len(code) == len(before[0]):  # of varieties the one with the shortest code
+        if not before or len(code) == len(before[0]):  # the variety with the shortest code
             found[base] = (*before, code)
     found |= {name.casefold(): (code,) for code, name in known.items()}
     return found | {name: (code,) for name, code in CODES_OF_NAMES.items() if code in known}
 
 
-def _near(wanted: str) -> list[str]:
-    """Codes whose own spelling or whose name is near to what is wanted."""
+def _close_codes(wanted: str) -> list[str]:
+    """Codes whose spelling or name is similar to `wanted`."""
     names = _codes_of_names()
     near = [code for name, codes in names.items() if len(wanted) > 2 and name.startswith(wanted) for code in codes]
     near += [code for name in difflib.get_close_matches(wanted, names, n=3, cutoff=0.7) for code in names[name]]
     near += difflib.get_close_matches(wanted, list(languages()), n=3, cutoff=0.6)
-    return list(dict.fromkeys(near))[:MOST_HINTS]
+    return list(dict.fromkeys(near))[:MAX_HINTS]

@@ -1,6 +1,6 @@
-"""A text and what is marked in it: styles, speed and loudness run by run, and pauses, nods and names at places.
+"""A text with its marks: runs of style, rate and volume, and pauses, nods and names at positions.
 
-Places are characters of the text that is said, in which the marks themselves are missing.
+Positions are character indices of the spoken text, which does not contain the marks themselves.
 """
 
 from dataclasses import dataclass, replace
@@ -8,18 +8,18 @@ from dataclasses import dataclass, replace
 from lexicon.errors import InputError
 from lexicon.ipa import Segment
 
-RATE_LIMITS = (0.5, 2.0)  # speed of marked words, as of a whole request
+RATE_LIMITS = (0.5, 2.0)  # speaking rate of marked words, as of a whole request
 VOLUME_LIMITS = (0.0, 2.0)
 NOD_SIZE_LIMITS = (0.1, 2.0)
-MAX_PAUSE_S = 10.0  # at one place; speech services allow 10 to 20
-MAX_NESTING = 16  # marks within marks; nobody reads more
+MAX_PAUSE_S = 10.0  # s, at one position; speech services allow 10 to 20
+MAX_NESTING = 16  # levels of marks within marks
 
 
 @dataclass(frozen=True, slots=True)
 class StyleRun:
-    """From a character on, to the next run: styles in force, outermost first, and factors of speed and loudness.
+    """Styles, outermost first, and factors of rate and volume from a character up to the next run.
 
-    ``voice`` and ``language`` are those of a span that another voice speaks, or in another language; None elsewhere.
+    ``voice`` and ``language`` are set in a span of another voice or language, and None elsewhere.
     """
 
     start: int
@@ -44,7 +44,7 @@ class PauseMark:
 
 @dataclass(frozen=True, slots=True)
 class NodMark:
-    """The head nods with the word at or behind a character."""
+    """A nod with the word at or after a character."""
 
     at: int
     size: float = 1.0
@@ -56,7 +56,7 @@ class NodMark:
 
 @dataclass(frozen=True, slots=True)
 class NameMark:
-    """A place whose time is kept."""
+    """A named position whose time is reported."""
 
     at: int
     name: str
@@ -64,7 +64,7 @@ class NameMark:
 
 @dataclass(frozen=True, slots=True)
 class PhoneMark:
-    """A word, from a character up to another, that is said with these phones."""
+    """A word, as a half-open range of characters, with given phones."""
 
     at: int
     end: int
@@ -76,18 +76,18 @@ Mark = PauseMark | NodMark | NameMark | PhoneMark
 
 @dataclass(frozen=True, slots=True)
 class MarkedText:
-    """What is said, and how.
+    """Spoken text with runs and marks.
 
     Parameters
     ----------
     text
-        Without any mark.
+        Spoken text, without marks.
     runs
-        At least one; the first begins at 0, the others each behind the one before.
+        At least one; the first begins at 0, and starts increase.
     marks
-        In order of place; of one place in the order in which they were written.
+        Ordered by position; at one position in the order of the source.
     language
-        That the text itself names (SSML), or nothing.
+        Language declared in the text (SSML), or None.
     """
 
     text: str
@@ -97,16 +97,16 @@ class MarkedText:
 
     @property
     def has_voice_changes(self) -> bool:
-        """A pause, speed, loudness, voice or language is marked: what only a voice that has not spoken yet can do."""
-        spoken_alike = all(
+        """Whether a pause, rate, volume, voice or language is marked, which a recording cannot follow."""
+        is_uniform = all(
             run.rate == run.volume == 1.0 and run.voice is None and run.language is None for run in self.runs
         )
-        return not spoken_alike or any(isinstance(mark, PauseMark) for mark in self.marks)
+        return not is_uniform or any(isinstance(mark, PauseMark) for mark in self.marks)
 
 
 @dataclass(slots=True)
 class _OpenSpan:
-    """A mark that is not closed yet."""
+    """A mark that is not yet closed."""
 
     kind: str
     shown: str
@@ -115,7 +115,7 @@ class _OpenSpan:
 
 
 class MarkedTextBuilder:
-    """Takes text and marks in order, and becomes a `MarkedText`."""
+    """Builds a `MarkedText` from text and marks in order."""
 
     def __init__(self) -> None:
         self._pieces: list[str] = []
@@ -127,50 +127,50 @@ class MarkedTextBuilder:
 
     @property
     def at(self) -> int:
-        """Characters so far."""
+        """Number of characters so far."""
         return self._length
 
     def add_text(self, text: str) -> None:
-        """Add words."""
+        """Append text."""
         self._pieces.append(text)
         self._length += len(text)
 
-    def mark(self, mark: Mark) -> None:
-        """Add a mark at the present place; pauses at one place add up.
+    def add_mark(self, mark: Mark) -> None:
+        """Add a mark at the current position; pauses at one position are added up.
 
         Raises
         ------
         InputError
-            They last too long.
+            Their sum is too long.
         """
         if isinstance(mark, PauseMark):
-            place, earlier = self._last_pause
+            index, earlier = self._last_pause
             if earlier is not None and earlier.at == mark.at:
                 mark = PauseMark(mark.at, earlier.seconds + mark.seconds)
-                self._marks[place] = mark
-                self._last_pause = (place, mark)
+                self._marks[index] = mark
+                self._last_pause = (index, mark)
                 return
             self._last_pause = (len(self._marks), mark)
         self._marks.append(mark)
 
     def open(self, kind: str, shown: str, *, style: str | None = None, rate: float = 1.0, volume: float = 1.0) -> None:
-        """Begin a span that `close` ends; within another, factors multiply and styles add up.
+        """Begin a span that `close` ends; in nested spans factors multiply and styles accumulate.
 
         Raises
         ------
         InputError
-            Spans are nested too deep, or together too fast, slow or loud.
+            Spans are nested too deep, or their combined rate or volume is out of range.
         """
         before = self._begin(kind, shown)
-        _check_range(f"the speed within {shown}", before.rate * rate, RATE_LIMITS)
-        _check_range(f"the loudness within {shown}", before.volume * volume, VOLUME_LIMITS)
+        _check_range(f"the speaking rate within {shown}", before.rate * rate, RATE_LIMITS)
+        _check_range(f"the volume within {shown}", before.volume * volume, VOLUME_LIMITS)
         styles = (*before.styles, style) if style is not None else before.styles
         self._start_run(
             replace(before, start=self._length, styles=styles, rate=before.rate * rate, volume=before.volume * volume)
         )
 
     def open_voice(self, kind: str, shown: str, *, voice: str | None, language: str | None) -> None:
-        """Begin a span of another voice or language that `close` ends; None keeps what is in force.
+        """Begin a span of another voice or language that `close` ends; None keeps the current one.
 
         Raises
         ------
@@ -184,28 +184,28 @@ class MarkedTextBuilder:
 
     @property
     def language(self) -> str | None:
-        """Language of the span at the present place; None where it is that of the whole text."""
+        """Language of the span at the current position; None where it is that of the whole text."""
         return self._runs[-1].language
 
     def close(self, kind: str, shown: str) -> None:
-        """End the span that was opened last.
+        """End the innermost open span.
 
         Raises
         ------
         InputError
-            None of this kind is open, another one is, or a style holds nothing that is said.
+            No span is open, the innermost one is of another kind, or a style span contains no text.
         """
         if not self._open_spans:
-            raise InputError(f"{shown} closes nothing; open it before, or leave it away")
+            raise InputError(f"{shown} has no opening mark; add one, or remove it")
         last = self._open_spans.pop()
         if last.kind != kind:
-            raise InputError(f"{shown} stands where {last.shown} must be closed first")
+            raise InputError(f"{shown} comes before the end of {last.shown}; close {last.shown} first")
         if self._length == last.start and self._runs[-1].styles != last.before.styles:
-            raise InputError(f"{last.shown} holds no word; put what is said between it and its end")
+            raise InputError(f"{last.shown} contains no text; add words before its end")
         self._start_run(replace(last.before, start=self._length))
 
-    def done(self, language: str | None = None, *, spoken: str | None = None) -> MarkedText:
-        """All that was given; a span in the language that is `spoken` anyway is none of its own.
+    def build(self, language: str | None = None, *, spoken: str | None = None) -> MarkedText:
+        """The marked text; spans in the base language `spoken` get no language of their own.
 
         Raises
         ------
@@ -213,18 +213,18 @@ class MarkedTextBuilder:
             A span is still open.
         """
         if self._open_spans:
-            raise InputError(f"{self._open_spans[-1].shown} is never closed; say where it ends")
+            raise InputError(f"{self._open_spans[-1].shown} is not closed; add its end")
         runs: list[StyleRun] = []
         for run in self._runs:
-            kept = replace(run, language=None) if run.language == spoken else run
-            if not runs or replace(runs[-1], start=run.start) != kept:
-                runs.append(kept)
+            merged = replace(run, language=None) if run.language == spoken else run
+            if not runs or replace(runs[-1], start=run.start) != merged:
+                runs.append(merged)
         return MarkedText("".join(self._pieces), tuple(runs), tuple(self._marks), language)
 
     def _begin(self, kind: str, shown: str) -> StyleRun:
-        """Note a span that opens here; the run before it."""
+        """Open a span at the current position; the run before it."""
         if len(self._open_spans) >= MAX_NESTING:
-            raise InputError(f"{shown} stands within {MAX_NESTING} other marks; nest them less deep")
+            raise InputError(f"{shown} is nested in {MAX_NESTING} other marks; reduce the nesting")
         before = self._runs[-1]
         self._open_spans.append(_OpenSpan(kind, shown, self._length, before))
         return before

@@ -1,7 +1,7 @@
-"""Phones on a clock where no voice has spoken them: nominal durations by class.
+"""Nominal phone durations by class, for phones without sound.
 
-Round figures of the order that is found in read English, to give tables and TextGrids an axis; they predict nothing. A
-voice's own durations or an alignment take their place as soon as there is sound.
+Rounded values of read English that give tables and TextGrids a time axis; they are not predictions. With sound, the
+durations of the voice or of an alignment are used instead.
 """
 
 from types import MappingProxyType
@@ -14,21 +14,21 @@ NOMINAL_S = MappingProxyType({
     "vowel": 0.09, "diphthong": 0.14, "stop": 0.07, "affricate": 0.11, "fricative": 0.09, "nasal": 0.07,
     "approximant": 0.06, "lateral": 0.06, "tap": 0.03, "trill": 0.07, "click": 0.08,
 })  # fmt: skip
-STRESS_FACTOR = 1.3  # times as long is a vowel with stress
-LEADING_SILENCE_S = 0.1  # silence before the first word and, at least, behind the last
+STRESS_FACTOR = 1.3  # stressed vowels are longer by this factor
+LEADING_SILENCE_S = 0.1  # s of silence before the first word and, at least, after the last
 
 
-def nominal_phones(spoken: Pronunciation) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
-    """Phones, with a silence at each punctuation mark, and the words as ranges of them."""
+def nominal_phones(pronunciation: Pronunciation) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+    """Phones, with a silence at each punctuation mark, and words as ranges of phones."""
     phones, edges = [SILENCE], [0.0, LEADING_SILENCE_S]
     spans = []
-    for word in spoken.words:
+    for word in pronunciation.words:
         first = len(phones)
         for phone, stress in zip(word.phones, word.stress, strict=True):
             phones.append(phone)
             edges.append(round(edges[-1] + NOMINAL_S[PHONES[phone].kind] * (STRESS_FACTOR if stress else 1.0), 6))
         spans.append(WordSpan(word.text, first, len(phones)))
-        pause = max(word.pause_s, LEADING_SILENCE_S if word is spoken.words[-1] else 0.0)
+        pause = max(word.pause_s, LEADING_SILENCE_S if word is pronunciation.words[-1] else 0.0)
         if pause:
             phones.append(SILENCE)
             edges.append(round(edges[-1] + pause, 6))

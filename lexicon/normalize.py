@@ -1,7 +1,7 @@
-"""English text as it is said: numbers, dates, money, units, abbreviations, addresses and symbols become words.
+"""Normalise English text: numbers, dates, money, units, abbreviations, addresses and symbols become words.
 
-One scan from left to right: each written form has a pattern and a reader. What comes out is words, the apostrophes and
-hyphens inside them, and sentence punctuation; a second normalisation changes nothing. The time is linear in the text.
+One scan from left to right: each written form has a pattern and a reader. The result consists of words, with
+apostrophes and hyphens inside them, and sentence punctuation; normalisation is idempotent and linear in time.
 """
 
 import functools
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from lexicon import form_readers as forms
 from lexicon import written_forms as readings
 from lexicon.cleaning import canonical_text
-from lexicon.foreign import with_names_inside
+from lexicon.foreign_letters import name_letters_in_words
 
 MARKS = frozenset(".,;:!?")
 _FULL_MONTH = "|".join(readings.MONTHS)
@@ -26,13 +26,13 @@ _TLD = r"(?:com|org|net|edu|gov|io|ai|app|dev|info|uk|us|de|fr|eu|tv|me|ca|ch|au
 _LABEL = r"[A-Za-z0-9][A-Za-z0-9-]{0,62}"
 _TAIL = r"[^\s,;!]{0,500}[^\s,;!.:?]"
 _HALF = r"(?:[aApP]\.[mM]\.?|[aApP][mM]\b)"
-_START, _STOP = r"(?<![^\W\d_])", r"(?![^\W\d_])"  # no letter stands before, behind
+_START, _STOP = r"(?<![^\W\d_])", r"(?![^\W\d_])"  # no letter before, after
 _LETTERS = r"[^\W\d_]+"
 
 
 @dataclass(frozen=True, slots=True)
 class WrittenForm:
-    """A written form and the words that it is said with; a punctuation mark stands for itself."""
+    """A written form and its words; a punctuation mark is kept."""
 
     source: str
     spoken: str
@@ -44,7 +44,7 @@ def _unit_pattern() -> str:
 
 
 def _letter_unit_pattern() -> str:
-    """Units that hold a letter by which they cannot be taken for a word (μm, kΩ)."""
+    """Units with a letter that occurs in no English word (μm, kΩ)."""
     units = [unit for unit in readings.read_table("units.tsv") if len(unit) > 1 and set(unit) & set("μΩ")]
     return "(?:" + "|".join(sorted(units, key=len, reverse=True)) + ")"
 
@@ -55,14 +55,14 @@ def _abbreviation_pattern() -> str:
     return rf"(?P<abbr>(?:{'|'.join(map(re.escape, written))})(?=\.)|{dotless})\.?"
 
 
-# Name, pattern and reader, in the order in which they are tried at each place; every repeat over letters is bounded or
-# cannot be tried again from its own middle, so that the scan is linear.
+# Name, pattern and reader, in the order in which they are tried at each position; every repeat over letters is bounded
+# or cannot be retried from within itself, so that the scan is linear.
 def _form_table() -> tuple[tuple[str, str, forms.Reader], ...]:
     unit = _unit_pattern()
     return (
         ("quick", r"(?!(?:etc|vs|approx|et)\b)[a-z]+(?= |$|[,;!?](?: |$))", forms.read_unchanged),
         ("space", r" +", forms.read_nothing),
-        ("mark", r"[.,;:!?](?= |$)", forms.mark),
+        ("mark", r"[.,;:!?](?= |$)", forms.read_punctuation),
         ("email", rf"[\w+-](?:[\w.+-]{{0,62}}[\w+-])?@{_LABEL}(?:\.{_LABEL}){{1,5}}(?!\w)", forms.read_address),
         ("url", rf"(?:(?:https?|ftp)://|www\.){_TAIL}", forms.read_address),
         ("host", rf"(?:{_LABEL}\.){{1,4}}{_TLD}\b(?![.]\w)(?:/(?:{_TAIL})?)?", forms.read_address),
@@ -139,8 +139,8 @@ def _form_table() -> tuple[tuple[str, str, forms.Reader], ...]:
         ),
         ("initial", rf"{_START}[A-Z]\.(?= [A-Z](?:[a-z]|\.))", forms.read_initial),
         ("roman", rf"{_START}[IVXLCDM]{{1,15}}{_STOP}(?!['-][^\W\d_])", forms.read_roman_numeral),
-        ("unitname", rf"{_START}{_letter_unit_pattern()}{_STOP}", forms.unit_name),
-        ("letter", rf"{_START}(?![\u0000-\u024f])[^\W\d_]{_STOP}", forms.letter),
+        ("unitname", rf"{_START}{_letter_unit_pattern()}{_STOP}", forms.read_unit_name),
+        ("letter", rf"{_START}(?![\u0000-\u024f])[^\W\d_]{_STOP}", forms.read_letter),
         ("word", rf"{_LETTERS}(?:['-]{_LETTERS})*", forms.read_unchanged),
         ("sentence", r"(?<=[a-z])\.(?=[A-Z])|[,;:!?]", forms.read_unchanged),
         ("dot", r"\.", forms.read_dot),
@@ -157,10 +157,10 @@ def _scanner() -> tuple[re.Pattern[str], dict[str, forms.Reader]]:
 
 
 def split_tokens(text: str) -> Iterator[WrittenForm]:
-    """Written forms of an English text in order, each with what it says; text between them is white space."""
+    """Written forms of an English text in order, with their words; the text between them is white space."""
     pattern, readers = _scanner()
     previous = ""
-    for match in pattern.finditer(with_names_inside(canonical_text(text))):
+    for match in pattern.finditer(name_letters_in_words(canonical_text(text))):
         spoken = readers[match.lastgroup or ""](match, previous)
         if spoken:
             yield WrittenForm(match.group(), spoken)
@@ -168,7 +168,7 @@ def split_tokens(text: str) -> Iterator[WrittenForm]:
 
 
 def join_words(spoken: list[str]) -> str:
-    """Words with single spaces, marks behind their word; of marks that meet, the first of the strongest stays."""
+    """Join words with single spaces and marks after their word; of adjacent marks the strongest is kept."""
     pieces: list[str] = []
     for piece in spoken:
         if piece not in MARKS:
@@ -181,9 +181,9 @@ def join_words(spoken: list[str]) -> str:
 
 
 def normalize(text: str, language: str = "en-us") -> str:
-    """The text in the words that it is said with; other languages than English: canonical characters only.
+    """Normalise an English text to words, and a text of another language to canonical characters.
 
-    espeak-ng itself reads the numbers of the other languages.
+    Numbers in other languages are read by espeak-ng.
     """
     if not language.startswith("en"):
         return canonical_text(text, keep_marks=True)

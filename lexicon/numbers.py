@@ -8,7 +8,7 @@ _TENS = ("zero", "ten", "twenty", "thirty", "forty", "fifty", "sixty", "seventy"
 _SCALES = ("", "thousand", "million", "billion", "trillion", "quadrillion", "quintillion")
 _IRREGULAR = {"one": "first", "two": "second", "three": "third", "five": "fifth", "eight": "eighth", "nine": "ninth"}
 _IRREGULAR["twelve"] = "twelfth"
-LONGEST_CARDINAL = 3 * len(_SCALES)  # digits; longer numbers are read digit by digit
+MAX_CARDINAL_DIGITS = 3 * len(_SCALES)  # longer numbers are read digit by digit
 _ROMAN = {"I": 1, "V": 5, "X": 10, "L": 50, "C": 100, "D": 500, "M": 1000}
 
 
@@ -31,10 +31,10 @@ def _below_thousand(value: int) -> str:
 
 
 def cardinal_words(value: int) -> str:
-    """42 is forty-two, 1234 is one thousand two hundred thirty-four; beyond quintillions digit by digit."""
+    """42 is forty-two, 1234 is one thousand two hundred thirty-four; above quintillions digit by digit."""
     if value < 0:
         return f"minus {cardinal_words(-value)}"
-    if value >= 10**LONGEST_CARDINAL:
+    if value >= 10**MAX_CARDINAL_DIGITS:
         return digit_words(str(value))
     groups: list[str] = []
     scale = 0
@@ -47,16 +47,16 @@ def cardinal_words(value: int) -> str:
 
 
 def number_words(written: str) -> str:
-    """A number as it is written, with thousands commas, decimals, leading zeros: 3.14 is three point one four."""
+    """A number with thousands commas, decimals or leading zeros: 3.14 is three point one four."""
     whole, _, decimals = written.replace(",", "").partition(".")
-    if len(whole) > LONGEST_CARDINAL or (len(whole) > 1 and whole[0] == "0" and not decimals):
+    if len(whole) > MAX_CARDINAL_DIGITS or (len(whole) > 1 and whole[0] == "0" and not decimals):
         words = digit_words(whole)
     else:
         words = cardinal_words(int(whole or "0"))
     return f"{words} point {digit_words(decimals)}" if decimals else words
 
 
-def ordinal_of(words: str) -> str:
+def ordinal_from_cardinal(words: str) -> str:
     """The ordinal of a cardinal in words: twenty-one is twenty-first."""
     start = max(words.rfind(" "), words.rfind("-")) + 1
     last = words[start:]
@@ -66,7 +66,7 @@ def ordinal_of(words: str) -> str:
 
 def ordinal_words(value: int) -> str:
     """21 is twenty-first."""
-    return ordinal_of(cardinal_words(value))
+    return ordinal_from_cardinal(cardinal_words(value))
 
 
 def year_words(value: int) -> str:
@@ -102,7 +102,7 @@ def fraction_words(top: int, bottom: int) -> str:
 
 
 def roman_value(numeral: str) -> int:
-    """Value of a Roman numeral in its one proper spelling; 0 for any other string."""
+    """Value of a Roman numeral in standard spelling; 0 for any other string."""
     value = 0
     for letter, following in zip(numeral, [*numeral[1:], ""], strict=True):
         worth = _ROMAN[letter]

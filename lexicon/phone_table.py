@@ -1,4 +1,4 @@
-"""The form of the phone table: which columns `phones.tsv` has, and which words may stand in them."""
+"""Schema of the phone table `phones.tsv`: its columns and their allowed values."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ PLACES = MappingProxyType({
     "bilabial": 0.0, "labiodental": 0.0, "dental": 0.1, "alveolar": 0.2, "postalveolar": 0.35, "retroflex": 0.3,
     "alveolo-palatal": 0.4, "palatal": 0.5, "labial-palatal": 0.5, "velar": 0.75, "labial-velar": 0.75, "uvular": 0.85,
     "pharyngeal": 0.95, "glottal": 1.0,
-})  # fmt: skip  # way of the tongue's constriction from lips (0) to glottis (1); the lips have features of their own
+})  # fmt: skip  # position of the constriction from lips (0) to glottis (1); the lips have separate features
 MANNERS = (
     "plosive", "implosive", "affricate", "fricative", "sibilant", "nasal", "approximant", "lateral", "tap", "trill",
     "click",
@@ -39,7 +39,7 @@ class Phone:
     arpabet
         ARPABET name without stress digit; ``AH0`` and ``ER0`` name the reduced vowels.
     kind, place, manner, voicing, height, backness, rounding, nasality
-        In the phonetician's words; `rounding` of a consonant is what its own lips do.
+        Phonetic features; `rounding` of a consonant describes its own lip shape.
     parts
         Of a diphthong its two vowels, of an affricate its stop and its fricative.
     aliases
@@ -64,19 +64,19 @@ class Phone:
 
     @property
     def is_vowel(self) -> bool:
-        """Vowel or diphthong: what a syllable has in its middle."""
+        """Whether the phone is a vowel or diphthong, the nucleus of a syllable."""
         return self.kind in {"vowel", "diphthong"}
 
     @property
     def is_voiced(self) -> bool:
-        """The vocal folds swing."""
+        """Whether the vocal folds vibrate."""
         return self.voicing == "voiced"
 
 
 def _parse_row(line: str, where: str) -> Phone:
     cells = line.split("\t")
     if len(cells) != 13:
-        raise DataError(f"{where}: {len(cells)} cells instead of 13; the cells stand between tabs")
+        raise DataError(f"{where}: {len(cells)} cells instead of 13; separate the cells by tabs")
     symbol, arpabet, kind, place, manner, voicing, height, backness, rounding, nasality, parts, aliases, example = cells
     phone = Phone(
         symbol=symbol,
@@ -105,7 +105,9 @@ def _parse_row(line: str, where: str) -> Phone:
     )
     for value, words in allowed:
         if value not in words:
-            raise DataError(f"{where}: {phone.symbol} has {value!r}, which is none of {', '.join(filter(None, words))}")
+            raise DataError(
+                f"{where}: {phone.symbol} has the value {value!r}; use one of {', '.join(filter(None, words))}"
+            )
     return phone
 
 
@@ -115,13 +117,13 @@ def read_phones(text: str, name: str = "phones.tsv") -> dict[str, Phone]:
     Raises
     ------
     DataError
-        A line has the wrong number of cells or a word that is no feature, a symbol stands twice, or a part is missing.
+        A line has the wrong number of cells or an unknown feature, a symbol occurs twice, or a part is missing.
     """
     phones: dict[str, Phone] = {}
     for number, line in enumerate(text.splitlines()[1:], start=2):
         phone = _parse_row(line, f"{name}, line {number}")
         if phone.symbol in phones:
-            raise DataError(f"{name}, line {number}: {phone.symbol} stands there twice; remove one")
+            raise DataError(f"{name}, line {number}: {phone.symbol} occurs twice; remove one line")
         phones[phone.symbol] = phone
     for phone in phones.values():
         for part in phone.parts:

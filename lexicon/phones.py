@@ -1,6 +1,6 @@
-"""The phone table: what each phone is, its ARPABET name, and how far two phones look apart.
+"""The phone table: articulatory features and ARPABET names of phones, and their articulatory distance.
 
-The knowledge stands in `phones.tsv`, one phone a line, for a phonetician to read and correct.
+The data are in `phones.tsv`, one phone per line.
 """
 
 import functools
@@ -13,21 +13,22 @@ from types import MappingProxyType
 from lexicon.errors import InputError
 from lexicon.phone_table import BACKNESSES, HEIGHTS, PLACES, ROUNDINGS, Phone, read_phones
 
-# Weight of each feature in `phone_distance`. Lips and jaw first: the distance serves faces, so that what a viewer sees
-# counts more than what a listener hears (order of Fisher 1968's viseme classes: lips, rounding, opening, teeth, rest).
+# Weight of each feature in `phone_distance`. Lips and jaw have the largest weights: the distance is for faces, where
+# visible features matter more than audible ones (order of Fisher 1968's viseme classes: lips, rounding, opening, teeth,
+# rest).
 ARTICULATORY_WEIGHTS = MappingProxyType({
-    "silence": 10.0,  # nothing that sounds is like a pause
-    "vowel": 2.0,  # a vowel stands in for a vowel, a consonant for a consonant
-    "labial": 2.5,  # the lips make the sound
-    "bilabial": 2.0,  # with each other
-    "labiodental": 2.0,  # the lower lip with the teeth
+    "silence": 10.0,  # no phone is similar to a pause
+    "vowel": 2.0,  # vowels replace vowels, consonants consonants
+    "labial": 2.5,  # articulated with the lips
+    "bilabial": 2.0,  # lip against lip
+    "labiodental": 2.0,  # lower lip against teeth
     "rounding": 1.5,
     "opening": 1.2,  # jaw and lips: 0 closed, 1 as in /a/
     "dental": 0.6,  # tongue between the teeth
     "sibilance": 0.5,  # teeth together
     "lateral": 0.3,
     "tongue": 0.8,  # from front to back
-    "closure": 0.3,  # a complete stop of the breath through the mouth
+    "closure": 0.3,  # complete closure of the oral tract
     "nasality": 0.2,
     "trill": 0.1,
     "voicing": 0.1,
@@ -49,7 +50,7 @@ ARPABET: Mapping[str, str] = MappingProxyType({p.arpabet: p.symbol for p in PHON
 
 
 def look_up_phone(label: str) -> Phone:
-    """The table's line for a label.
+    """Row of the phone table for a label.
 
     Raises
     ------
@@ -60,7 +61,7 @@ def look_up_phone(label: str) -> Phone:
         return PHONES[label]
     except KeyError as missing:
         hint = f"; did you mean {ARPABET[label]}, its IPA symbol?" if label in ARPABET else ""
-        raise InputError(f"{label!r} is no phone of the table lexicon/phones.tsv{hint}") from missing
+        raise InputError(f"{label!r} is not a phone of the table lexicon/phones.tsv{hint}") from missing
 
 
 def arpabet_to_ipa(name: str) -> str:
@@ -75,7 +76,9 @@ def arpabet_to_ipa(name: str) -> str:
         return ARPABET[name]
     base = name[:-1] if name[-1:] in {"0", "1", "2"} else name
     if base not in ARPABET or (base != name and not PHONES[ARPABET[base]].is_vowel):
-        raise InputError(f"{name!r} is no ARPABET name; they are {' '.join(ARPABET)}, vowels with a stress 0, 1 or 2")
+        raise InputError(
+            f"{name!r} is not an ARPABET name; use one of {' '.join(ARPABET)}, vowels with a stress 0, 1 or 2"
+        )
     return ARPABET[base]
 
 
@@ -89,7 +92,7 @@ def ipa_to_arpabet(label: str, stress: int | None = None) -> str:
     """
     phone = look_up_phone(label)
     if not phone.arpabet:
-        raise InputError(f"ARPABET has no name for {label}; it names English phones only")
+        raise InputError(f"ARPABET has no name for {label}; it covers English phones only")
     if stress not in {None, 0, 1, 2}:
         raise InputError(f"stress must be 0, 1 or 2, not {stress}")
     name = phone.arpabet.removesuffix("0")
@@ -150,7 +153,7 @@ def _weighted_halves(label: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
 
 
 def phone_distance(a: str, b: str) -> float:
-    """How differently two phones look in their articulation; 0 for the same features.
+    """Articulatory distance of two phones, weighted by visibility; 0 for equal features.
 
     Raises
     ------
@@ -171,9 +174,9 @@ def _nearest_phone(label: str, available: Collection[str]) -> str:
 
 
 def nearest_phones(label: str, available: Collection[str]) -> tuple[str, ...]:
-    """The available phones that stand in for one: itself, its nearest, or its parts' nearest in order.
+    """Available phones that replace a phone: itself, the nearest one, or those nearest to its parts in order.
 
-    The parts of a diphthong or affricate are used where they come nearer than any available phone as a whole.
+    The parts of a diphthong or affricate are used if they are closer than any available phone.
 
     Raises
     ------
@@ -183,13 +186,13 @@ def nearest_phones(label: str, available: Collection[str]) -> tuple[str, ...]:
     phone = look_up_phone(label)
     if label in available:
         return (label,)
-    sounding = {look_up_phone(other).symbol for other in available} - {SILENCE}
-    if not sounding:
-        raise InputError(f"nothing can stand in for {label}: no phone is available")
-    whole = _nearest_phone(label, sounding)
+    candidates = {look_up_phone(other).symbol for other in available} - {SILENCE}
+    if not candidates:
+        raise InputError(f"no phone can replace {label}: no phone is available; add at least one sounding phone")
+    whole = _nearest_phone(label, candidates)
     if not phone.parts:
         return (whole,)
-    simple = {other for other in sounding if not PHONES[other].parts} or sounding
+    simple = {other for other in candidates if not PHONES[other].parts} or candidates
     parts = tuple(_nearest_phone(part, simple) for part in phone.parts)
     apart = math.hypot(*(phone_distance(part, own) for part, own in zip(parts, phone.parts, strict=True))) / math.sqrt(
         2

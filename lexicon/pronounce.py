@@ -1,4 +1,4 @@
-"""Text to words with phones, stress and syllables."""
+"""Pronounce text: words with phones, stress and syllables."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -14,14 +14,27 @@ from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word, phonemize
 from lexicon.ipa import Segment
 from lexicon.languages import language_code
 from lexicon.normalize import MARKS, split_tokens
-from lexicon.phones import ipa_to_arpabet
-from lexicon.said import as_said
-from lexicon.syllables import split_syllables
+from lexicon.phones import PHONES, ipa_to_arpabet
+from lexicon.spoken_form import spoken_form
 from lexicon.writing_systems import check_script
 
-PAUSES_S = MappingProxyType({"": 0.0, ",": 0.2, ";": 0.3, ":": 0.3, ".": 0.5, "!": 0.5, "?": 0.5})  # nominal
-_MARKS_BY_STRENGTH = tuple(PAUSES_S)  # of two marks that meet, the later one here stays
+PAUSES_S = MappingProxyType({"": 0.0, ",": 0.2, ";": 0.3, ":": 0.3, ".": 0.5, "!": 0.5, "?": 0.5})  # s, nominal
+_MARKS_BY_STRENGTH = tuple(PAUSES_S)  # of two adjacent marks the later one of this order is kept
 _PIECE = re.compile(r"[^\s.,;:!?]+|[.,;:!?]")
+# English onsets of two and three consonants (Cruttenden, Gimson's Pronunciation of English, chapter on clusters).
+_ONSET_PAIRS = MappingProxyType({
+    "ɹ": "p b t d k ɡ f θ ʃ", "l": "p b k ɡ f s", "w": "t d k ɡ θ s h", "j": "p b k ɡ f v m n h s l t d θ",
+    "p": "s", "t": "s", "k": "s", "m": "s", "n": "s", "f": "s",
+})  # fmt: skip
+ENGLISH_ONSETS = frozenset(
+    {(first, second) for second, firsts in _ONSET_PAIRS.items() for first in firsts.split()}
+    | {("s", "p", "ɹ"), ("s", "p", "l"), ("s", "p", "j"), ("s", "t", "ɹ"), ("s", "t", "j"), ("s", "k", "ɹ")}
+    | {("s", "k", "l"), ("s", "k", "w"), ("s", "k", "j")}
+)
+_SONORITY = MappingProxyType({
+    "stop": 0, "click": 0, "affricate": 0, "fricative": 1, "nasal": 2, "lateral": 3, "tap": 3, "trill": 3,
+    "approximant": 4,
+})  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,16 +44,16 @@ class Word:
     Parameters
     ----------
     text
-        The word that is said (five).
+        Spoken word (five).
     source
-        The written form that it comes from ($5); several words may share one.
+        Written form of the word ($5); several words may share one.
     phones : N symbols of the phone table
     stress : N digits
         1 primary, 2 secondary, 0 none; 0 for consonants.
     syllables : pairs
         Half-open ranges of phones, without gap from 0 to N.
     mark
-        The punctuation behind the word, or nothing.
+        Punctuation after the word, or empty.
     arpabet : N names, English only
         ARPABET with stress digits; empty for other languages.
     """
@@ -55,7 +68,7 @@ class Word:
 
     @property
     def pause_s(self) -> float:
-        """Nominal seconds of silence behind the word."""
+        """Nominal seconds of silence after the word."""
         return PAUSES_S[self.mark]
 
     @property
@@ -70,7 +83,7 @@ class Word:
 
 @dataclass(frozen=True, slots=True)
 class Pronunciation:
-    """A text's words in order, in the language that they are read in."""
+    """Words of a text in order, in the language of their pronunciation."""
 
     text: str
     language: str
@@ -91,7 +104,7 @@ class _WordDraft:
 
 
 def _split_words(forms: Iterator[tuple[str, str]]) -> list[_WordDraft]:
-    """Words of (written, spoken) pairs, each with the punctuation behind it."""
+    """Words of (written, spoken) pairs, each with the punctuation after it."""
     words: list[_WordDraft] = []
     for written, spoken in forms:
         for piece in _PIECE.findall(spoken):
@@ -103,13 +116,13 @@ def _split_words(forms: Iterator[tuple[str, str]]) -> list[_WordDraft]:
 
 
 def _are_all_capitals(words: Sequence[_WordDraft]) -> bool:
-    """All words are capitals: a heading, not a row of initialisms."""
+    """Whether all words are capitals, as in a heading, rather than initialisms."""
     long = [word.text for word in words if len(word.text) > 1]
     return len(long) > 1 and all(text.isupper() for text in long) and any(len(text) > 3 for text in long)
 
 
 def _lookup_forms(words: Sequence[_WordDraft]) -> list[str]:
-    """Words as they are looked up: capitals that only shout are small."""
+    """Lookup forms of words: words in capitals that are not initialisms become lower case."""
     texts = ["", *(word.text for word in words), ""]
     if _are_all_capitals(words):
         return [text.lower() for text in texts[1:-1]]
@@ -120,7 +133,7 @@ def _lookup_forms(words: Sequence[_WordDraft]) -> list[str]:
 
 
 def _pronounce_english(words: list[_WordDraft], own: Dictionary) -> None:
-    """Give English words CMUdict's phones, and espeak-ng's to the rest, in one call."""
+    """Assign CMUdict's phones to English words, and espeak-ng's to the others in one call."""
     for word, text, following in zip(words, _lookup_forms(words), [*words[1:], None], strict=True):
         is_article = text == "A" and not word.mark and following is not None and following.text[:1].islower()
         word.segments = look_up_word(text, is_letter=text.isupper() and not is_article, own=own.lookup)
@@ -132,35 +145,62 @@ def _pronounce_english(words: list[_WordDraft], own: Dictionary) -> None:
 
 
 def _pronounce_by_rules(words: Sequence[_WordDraft], language: str) -> None:
-    """Phones by espeak-ng, each word by itself."""
+    """Phones by espeak-ng, word by word."""
     for word, written in zip(words, phonemize([word.text for word in words], language), strict=True):
         segments = tuple(segment for part in written for segment in parse_espeak_word(part, language))
         word.segments = fold_to_arpabet(segments) if language == DEFAULT_LANGUAGE else segments
 
 
 def _pronounce_in_context(words: list[_WordDraft], language: str) -> None:
-    """Phones by espeak-ng clause by clause; word by word where it joins or splits the words of a clause."""
+    """Phones by espeak-ng clause by clause, or word by word where it joins or splits the words of a clause."""
     clauses: list[list[_WordDraft]] = [[]]
     for word in words:
         clauses[-1].append(word)
         if word.mark:
             clauses.append([])
     spoken = phonemize([" ".join(word.text for word in clause) for clause in clauses], language)
-    alone: list[_WordDraft] = []
+    unmatched: list[_WordDraft] = []
     for clause, written in zip(clauses, spoken, strict=True):
         if len(clause) == len(written):
             for word, part in zip(clause, written, strict=True):
                 word.segments = parse_espeak_word(part, language)
         else:
-            alone += clause
-    _pronounce_by_rules(alone, language)
+            unmatched += clause
+    _pronounce_by_rules(unmatched, language)
+
+
+def _is_english_onset(onset: tuple[str, ...]) -> bool:
+    return (len(onset) == 1 and onset[0] != "ŋ") or onset in ENGLISH_ONSETS
+
+
+def _is_sonority_rising(onset: tuple[str, ...]) -> bool:
+    """Whether sonority rises towards the vowel: the rule for languages without a table of onsets."""
+    steps = [_SONORITY[PHONES[phone].kind] for phone in onset]
+    return all(low < high for low, high in pairwise(steps))
+
+
+def split_syllables(segments: Sequence[Segment], *, is_english: bool) -> tuple[tuple[int, int], ...]:
+    """Half-open phone ranges of the syllables of a word; a word without vowel is one syllable.
+
+    A vowel takes the longest legal onset; consonants before the first and after the last vowel belong to the first and
+    the last syllable.
+    """
+    is_legal = _is_english_onset if is_english else _is_sonority_rising
+    nuclei = [at for at, segment in enumerate(segments) if segment.is_syllabic]
+    starts = [0]
+    for before, nucleus in pairwise(nuclei):
+        start = nucleus
+        while start - 1 > before and is_legal(tuple(s.phone for s in segments[start - 1 : nucleus])):
+            start -= 1
+        starts.append(start)
+    return tuple(zip(starts, [*starts[1:], len(segments)], strict=True)) if segments else ()
 
 
 def _build_word(word: _WordDraft, language: str) -> Word:
     segments = word.segments or ()
     if not segments:
         raise InputError(
-            f"language {language!r} has no sound for {word.text!r}; write it in another way or leave it out"
+            f"language {language!r} has no pronunciation of {word.text!r}; write it in another way or remove it"
         )
     is_english = language.partition("-")[0] == "en"
     names = (
@@ -180,19 +220,19 @@ def _build_word(word: _WordDraft, language: str) -> Word:
 
 
 def pronounce(text: str, language: str = DEFAULT_LANGUAGE, dictionary: Dictionary | None = None) -> Pronunciation:
-    """The words that a text is said with, and the phones, stress and syllables of each.
+    """Spoken words of a text with their phones, stress and syllables.
 
     Parameters
     ----------
     language
         An espeak-ng code; ``en-us`` looks words up in CMUdict first.
     dictionary
-        The user's entries, which win over all else.
+        The user's entries, which take precedence.
 
     Raises
     ------
     InputError
-        The text holds no word, the language does not exist or cannot read the text's letters.
+        The text contains no word, the language does not exist or cannot read the letters of the text.
     BackendError
         A word needs espeak-ng, which is not installed.
     """
@@ -202,11 +242,11 @@ def pronounce(text: str, language: str = DEFAULT_LANGUAGE, dictionary: Dictionar
     if language.partition("-")[0] == "en":
         words = _split_words((token.source, token.spoken) for token in split_tokens(text))
     else:
-        said = as_said(text, language)
-        words = _split_words((piece, piece) for piece in canonical_text(said, keep_marks=True).split())
+        spoken = spoken_form(text, language)
+        words = _split_words((piece, piece) for piece in canonical_text(spoken, keep_marks=True).split())
         words = [word for word in words if any(letter.isalnum() for letter in word.text)]
     if not words:
-        raise InputError("there is no word to say in this text; give at least one word or number")
+        raise InputError("the text contains no word to speak; add at least one word or number")
     if language == DEFAULT_LANGUAGE:
         _pronounce_english(words, own)
     else:

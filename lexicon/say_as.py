@@ -1,7 +1,7 @@
-"""What ``<say-as>`` says: a text read as a number, a date, letters, ..., in words.
+"""Words of a ``<say-as>`` element: a text read as a number, a date, letters and so on.
 
-English reads every kind. In other languages espeak-ng reads numbers itself, and only kinds that need no words of the
-language are read: letters, digits, telephone and cardinal numbers.
+All kinds are supported in English. In other languages, where espeak-ng reads numbers itself, only kinds that need no
+words of the language are: letters, digits, telephone and cardinal numbers.
 """
 
 import re
@@ -13,7 +13,7 @@ from lexicon.errors import InputError
 from lexicon.normalize import normalize
 from lexicon.numbers import cardinal_words, digit_words, number_words, ordinal_words, roman_value
 
-LONGEST = 300  # characters of one reading
+MAX_CHARACTERS = 300  # characters of one element
 _SIGNS = MappingProxyType({
     ".": "dot", "-": "dash", "/": "slash", "_": "underscore", ":": "colon", ",": "comma", ";": "semicolon", "*": "star",
     "!": "exclamation mark", "?": "question mark", "'": "apostrophe", '"': "quote", "(": "open parenthesis",
@@ -34,7 +34,7 @@ DATE_FORMATS = ("mdy", "dmy", "ymd", "ydm", "md", "dm", "ym", "my", "y", "m", "d
 
 
 def say_as(kind: str, text: str, written_format: str, language: str) -> str:
-    """The words for a text that is to be read as something.
+    """Words of a text that is read as a given kind.
 
     Parameters
     ----------
@@ -46,21 +46,21 @@ def say_as(kind: str, text: str, written_format: str, language: str) -> str:
     Raises
     ------
     InputError
-        There is no such kind, the text is none of it, or the language cannot say it.
+        The kind does not exist, the text is not of this kind, or the language does not support it.
     """
     if kind not in KINDS:
-        raise InputError(f"<say-as> cannot read as {kind[:40]!r}; choose {', '.join(KINDS)}")
+        raise InputError(f"<say-as> has no kind {kind[:40]!r}; use {', '.join(KINDS)}")
     content = " ".join("".join(str(int(c)) if c.isdecimal() else c for c in text).split())
-    if not content or len(content) > LONGEST:
-        raise InputError(f"<say-as> needs 1 to {LONGEST} characters to read, not {len(content)}")
+    if not content or len(content) > MAX_CHARACTERS:
+        raise InputError(f"<say-as> needs 1 to {MAX_CHARACTERS} characters, not {len(content)}")
     if language.partition("-")[0] == "en":
         return KINDS[kind](content, written_format.strip())
-    if kind not in _ELSEWHERE:
-        raise InputError(f"<say-as> reads {kind} in English only, not in {language}; write it in words")
-    return _ELSEWHERE[kind](content)
+    if kind not in _OTHER_LANGUAGES:
+        raise InputError(f"<say-as> supports {kind} in English only, not in {language}; write it in words")
+    return _OTHER_LANGUAGES[kind](content)
 
 
-def _unreadable(text: str, what: str, example: str) -> InputError:
+def _reading_error(text: str, what: str, example: str) -> InputError:
     return InputError(f"cannot read {text[:40]!r} as {what}; write it as in {example}")
 
 
@@ -70,7 +70,7 @@ def _cardinal(text: str, _: str) -> str:
         return readings.signed_number_words(match[1] + re.sub(r"[ \u00a0\u202f]", "", match[2]))
     if _ROMAN.fullmatch(text) and roman_value(text):
         return cardinal_words(roman_value(text))
-    raise _unreadable(text, "a cardinal number", "1,234")
+    raise _reading_error(text, "a cardinal number", "1,234")
 
 
 def _ordinal(text: str, _: str) -> str:
@@ -79,7 +79,7 @@ def _ordinal(text: str, _: str) -> str:
         return ordinal_words(int(match[1].replace(",", "")[:15]))
     if _ROMAN.fullmatch(text) and roman_value(text):
         return ordinal_words(roman_value(text))
-    raise _unreadable(text, "an ordinal number", "3 or 3rd")
+    raise _reading_error(text, "an ordinal number", "3 or 3rd")
 
 
 def _characters(text: str, _: str) -> str:
@@ -96,52 +96,52 @@ def _character(character: str) -> str:
 
 def _digits(text: str, _: str) -> str:
     if not re.fullmatch(r"[0-9 .,-]*[0-9][0-9 .,-]*", text):
-        raise _unreadable(text, "digits", "4711")
+        raise _reading_error(text, "digits", "4711")
     return digit_words(text)
 
 
 def _telephone(text: str, _: str) -> str:
     groups = re.findall(r"[0-9]+|[A-Za-z]+", text)
     if not any(group.isdigit() for group in groups):
-        raise _unreadable(text, "a telephone number", "+1 555 123 4567")
-    said = ", ".join(digit_words(group) if group.isdigit() else _characters(group, "") for group in groups)
-    return f"plus {said}" if text.startswith("+") else said
+        raise _reading_error(text, "a telephone number", "+1 555 123 4567")
+    words = ", ".join(digit_words(group) if group.isdigit() else _characters(group, "") for group in groups)
+    return f"plus {words}" if text.startswith("+") else words
 
 
 def _fraction(text: str, _: str) -> str:
     match = _FRACTION.fullmatch(text)
     if match is None:
-        raise _unreadable(text, "a fraction", "3/4 or 1 1/2")
+        raise _reading_error(text, "a fraction", "3/4 or 1 1/2")
     return readings.ratio_words(match[2], match[3], match[1] or "")
 
 
 def _time(text: str, written_format: str) -> str:
-    match, lasts = _CLOCK.fullmatch(text), _DURATION.fullmatch(text)
+    match, duration = _CLOCK.fullmatch(text), _DURATION.fullmatch(text)
     if match and written_format in {"", "hms12", "hms24"}:
         hour, minute = int(match[1] or match[5]), int(match[2] or 0)
         half = match[4] or match[6] or ""
         if hour <= 24 and minute <= 59 and int(match[3] or 0) <= 59:
             return readings.time_words(hour, minute, int(match[3] or 0), half)
-    if lasts and not written_format:
-        named = zip((lasts[1], lasts[2], lasts[3]), ("hour", "minute", "second"), strict=True)
+    if duration and not written_format:
+        named = zip((duration[1], duration[2], duration[3]), ("hour", "minute", "second"), strict=True)
         return " ".join(f"{number_words(n)} {unit}{'' if int(n) == 1 else 's'}" for n, unit in named if n)
     if written_format not in {"", "hms12", "hms24"}:
-        raise InputError(f"there is no format {written_format[:20]!r} of times; choose hms12 or hms24")
-    raise _unreadable(text, "a time", "3:05pm or 1'21\"")
+        raise InputError(f"there is no format {written_format[:20]!r} of times; use hms12 or hms24")
+    raise _reading_error(text, "a time", "3:05pm or 1'21\"")
 
 
 def _date(text: str, written_format: str) -> str:
     if not written_format:
-        said = normalize(text)
-        if said == text or not any(character.isdigit() for character in text):
-            raise _unreadable(text, "a date", '2024-03-15, with format="ymd" where it is unclear')
-        return said
+        words = normalize(text)
+        if words == text or not any(character.isdigit() for character in text):
+            raise _reading_error(text, "a date", '2024-03-15, with format="ymd" if it is ambiguous')
+        return words
     if written_format not in DATE_FORMATS:
-        raise InputError(f"there is no format {written_format[:20]!r} of dates; choose {', '.join(DATE_FORMATS)}")
+        raise InputError(f"there is no format {written_format[:20]!r} of dates; use {', '.join(DATE_FORMATS)}")
     try:
-        return _spoken_date(_date_parts(text, written_format))
+        return _date_words(_date_parts(text, written_format))
     except (ValueError, IndexError, StopIteration) as wrong:
-        raise _unreadable(text, f"a date of the format {written_format}", "12/31/1999 for mdy") from wrong
+        raise _reading_error(text, f"a date of the format {written_format}", "12/31/1999 for mdy") from wrong
 
 
 def _date_parts(text: str, written_format: str) -> dict[str, str]:
@@ -153,12 +153,11 @@ def _date_parts(text: str, written_format: str) -> dict[str, str]:
     return dict(zip(written_format, parts, strict=True))
 
 
-def _spoken_date(found: dict[str, str]) -> str:
+def _date_words(found: dict[str, str]) -> str:
     known = {letter: part for letter, part in found.items() if part.strip("?")}
     year = known.get("y", "")
     if "m" not in known:
-        said = ordinal_words(int(known["d"])) if "d" in known else readings.year_or_number_words(year)
-        return said
+        return ordinal_words(int(known["d"])) if "d" in known else readings.year_or_number_words(year)
     month = int(known["m"]) if known["m"].isdigit() else readings.month_number(known["m"])
     day = int(re.sub(r"\D", "", known["d"])) if "d" in known else 0
     if not 1 <= month <= 12 or day > 31 or ("d" in known and day < 1):
@@ -178,19 +177,19 @@ def _currency(text: str, code: str) -> str:
         match = _CURRENCY_FIRST.fullmatch(f"{code.upper()} {text}")
     if match:
         if match[1] not in readings.CURRENCIES:
-            raise InputError(f"there is no currency {match[1]!r} here; write it in words")
+            raise InputError(f"the currency {match[1]!r} is not supported; write it in words")
         return readings.money_words(match[2], match[1], "")
-    said = normalize(text)
-    if said == text or not any(character.isdigit() for character in text):
-        raise _unreadable(text, "money", "$12.50 or 12 EUR")
-    return said
+    words = normalize(text)
+    if words == text or not any(character.isdigit() for character in text):
+        raise _reading_error(text, "money", "$12.50 or 12 EUR")
+    return words
 
 
 def _unit(text: str, _: str) -> str:
-    said = normalize(text)
-    if not said or any(character.isdigit() for character in said):
-        raise _unreadable(text, "a measure", "5 km")
-    return said
+    words = normalize(text)
+    if not words or any(character.isdigit() for character in words):
+        raise _reading_error(text, "a measure", "5 km")
+    return words
 
 
 def _bleep(_text: str, _: str) -> str:
@@ -206,24 +205,24 @@ KINDS: MappingProxyType[str, Reader] = MappingProxyType({
 })  # fmt: skip
 
 
-def _apart(text: str) -> str:
+def _spell(text: str) -> str:
     return " ".join("".join(text.split()))
 
 
-def _grouped(text: str) -> str:
+def _spell_groups(text: str) -> str:
     groups = re.findall(r"[^\W_]+", text)
     if not groups:
-        raise _unreadable(text, "a telephone number", "+1 555 123 4567")
-    return ", ".join(_apart(group) for group in groups)
+        raise _reading_error(text, "a telephone number", "+1 555 123 4567")
+    return ", ".join(_spell(group) for group in groups)
 
 
 def _plain_number(text: str) -> str:
     if not re.fullmatch(r"[+-]?[\d ,.\u00a0\u202f']*\d", text):
-        raise _unreadable(text, "a cardinal number", "1234")
+        raise _reading_error(text, "a cardinal number", "1234")
     return re.sub(r"[ \u00a0\u202f']", "", text)
 
 
-_ELSEWHERE: MappingProxyType[str, Callable[[str], str]] = MappingProxyType({
-    "cardinal": _plain_number, "number": _plain_number, "characters": _apart, "spell-out": _apart, "verbatim": _apart,
-    "digits": _apart, "telephone": _grouped,
+_OTHER_LANGUAGES: MappingProxyType[str, Callable[[str], str]] = MappingProxyType({
+    "cardinal": _plain_number, "number": _plain_number, "characters": _spell, "spell-out": _spell, "verbatim": _spell,
+    "digits": _spell, "telephone": _spell_groups,
 })  # fmt: skip

@@ -1,4 +1,4 @@
-"""Phones in time: labels and the edges that they share, so that a gap or an overlap cannot be written."""
+"""Phones in time: labels on shared edges, which exclude gaps and overlaps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,19 +8,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from lexicon.errors import InputError
 
-SILENCE = "sil"  # the label of every stretch without speech
+SILENCE = "sil"  # label of segments without speech
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PhoneSequence:
-    """N phones that follow each other without gap.
+    """N contiguous phones.
 
     Parameters
     ----------
     phones : N labels
         IPA symbols of the phone table (`lexicon.phones`), or `SILENCE`.
     edges : (N + 1,)
-        Seconds, strictly increasing: phone i sounds in [edges[i], edges[i + 1]).
+        Seconds, strictly increasing: phone i lies in [edges[i], edges[i + 1]).
 
     Raises
     ------
@@ -34,7 +34,7 @@ class PhoneSequence:
     def __init__(self, phones: Sequence[str], edges: ArrayLike) -> None:
         locked = np.array(edges, dtype=np.float64)
         if not phones:
-            raise InputError("a phone sequence needs at least one phone; give SILENCE for a stretch without speech")
+            raise InputError("a phone sequence needs at least one phone; use SILENCE for a segment without speech")
         if locked.shape != (len(phones) + 1,):
             raise InputError(f"{len(phones)} phones need {len(phones) + 1} edges, not an array of shape {locked.shape}")
         if not np.isfinite(locked).all():
@@ -60,27 +60,23 @@ class PhoneSequence:
 
     @property
     def start(self) -> float:
-        """Seconds at which the first phone begins."""
+        """Start of the first phone in seconds."""
         return float(self.edges[0])
 
     @property
     def end(self) -> float:
-        """Seconds at which the last phone ends."""
+        """End of the last phone in seconds."""
         return float(self.edges[-1])
 
     def index_at(self, seconds: float) -> int:
-        """Index of the phone that sounds at an instant; the first or last one outside the sequence."""
+        """Index of the phone at an instant; the first or last one outside the sequence."""
         at = int(np.searchsorted(self.edges, seconds, side="right")) - 1
         return min(max(at, 0), len(self.phones) - 1)
-
-    def shifted(self, seconds: float) -> "PhoneSequence":
-        """Same phones, moved along the clock."""
-        return PhoneSequence(self.phones, self.edges + seconds)
 
 
 @dataclass(frozen=True, slots=True)
 class WordSpan:
-    """A written word and the half-open range of phones, ``[first, last)``, that speak it."""
+    """A written word and its half-open range of phones, ``[first, last)``."""
 
     text: str
     first: int
@@ -89,13 +85,13 @@ class WordSpan:
     def __post_init__(self) -> None:
         """Refuse an empty or reversed range."""
         if not 0 <= self.first < self.last:
-            raise InputError(f"word {self.text!r} needs a range of phones, not [{self.first}, {self.last})")
+            raise InputError(f"word {self.text!r} needs a nonempty range of phones, not [{self.first}, {self.last})")
 
 
 def concatenate_phones(
     parts: Sequence[PhoneSequence], words: Sequence[Sequence[WordSpan]]
 ) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
-    """Put sequences and their words one behind the other; silences that meet at a joint become one.
+    """Concatenate sequences and their words; adjacent silences are merged.
 
     Raises
     ------
@@ -107,7 +103,9 @@ def concatenate_phones(
     spans: list[WordSpan] = []
     for part, part_words in zip(parts, words, strict=True):
         if part.start != 0.0:
-            raise InputError(f"sequences are joined from 0 s on, and one begins at {part.start} s; shift it first")
+            raise InputError(
+                f"concatenated sequences must begin at 0 s, but one begins at {part.start} s; shift it first"
+            )
         offset = edges[-1]
         if phones and phones[-1] == SILENCE == part.phones[0]:
             phones.pop()

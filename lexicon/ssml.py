@@ -1,21 +1,21 @@
-"""The part of SSML 1.1 (W3C 2010) that a talking face can follow, and ``express-as``; anything else is refused by name.
+"""Parser of the supported subset of SSML 1.1 (W3C 2010) and ``express-as``; other elements are refused by name.
 
 ======================= ==============================================================================================
 ``speak p s``           the text, its paragraphs and sentences; ``xml:lang`` of ``speak`` must be the request's language
 ``break``               silence: ``time`` (``400ms``, ``0.4s``), or ``strength``
 ``emphasis``            louder words and a nod; ``level`` strong, moderate (default), none, reduced (softer, no nod)
-``prosody``             ``rate`` and ``volume``; ``pitch`` and the rest are refused, for no voice here can follow them
+``prosody``             ``rate`` and ``volume``; ``pitch`` and the rest are refused, as no voice supports them
 ``mark``                a ``name`` whose time is reported
-``sub``                 ``alias`` is said in place of the text
-``phoneme``             ``ph`` is said in place of the text: IPA, or ARPABET with ``alphabet="x-arpabet"``
-``say-as``              the text is read as ``interpret-as`` says (`lexicon.say_as`)
+``sub``                 ``alias`` is spoken instead of the text
+``phoneme``             ``ph`` is spoken instead of the text: IPA, or ARPABET with ``alphabet="x-arpabet"``
+``say-as``              the text is read as ``interpret-as`` (`lexicon.say_as`)
 ``voice lang``          another voice (``name``, ``gender``, ``language``), another language (``xml:lang``)
 ``express-as``          ``style`` of the gestures, as ``[style:...]``; also ``mstts:express-as``
 ======================= ==============================================================================================
 
 The parser is expat; a document type declaration is refused, and without one there are no entities to expand or fetch.
-Attributes have at most `lexicon.ssml_values.LONGEST_ATTRIBUTE` characters, so that reading takes time linear in the
-document.
+Attributes have at most `lexicon.ssml_values.MAX_ATTRIBUTE_CHARACTERS` characters, so that parsing is linear in the
+length of the document.
 """
 
 import re
@@ -28,34 +28,42 @@ from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.languages import language_code
 from lexicon.marked_text import MAX_NESTING, MarkedText, MarkedTextBuilder, NameMark, NodMark, PauseMark, PhoneMark
 from lexicon.say_as import say_as
-from lexicon.ssml_speech import named_voice, phoned_words
-from lexicon.ssml_values import BREAKS_S, check_lengths, choice, loudness, only, primary_of, speed
+from lexicon.ssml_speech import choose_voice, phoneme_words
+from lexicon.ssml_values import (
+    BREAKS_S,
+    check_attributes,
+    check_lengths,
+    look_up_value,
+    parse_rate,
+    parse_volume,
+    primary_subtag,
+)
 
 _BEGINS = re.compile(r"\ufeff?\s*<(?:speak[\s>/]|\?xml\s|!DOCTYPE\s)")
 _MARK = re.compile(r"\[/?(?:style|nod|pause)\b")
 _TIME = re.compile(r"\+?([0-9]{1,9}(?:\.[0-9]{1,9})?|\.[0-9]{1,9})\s*(ms|s)")
-# Loudness and size of the nod of each level: accented words are some 2-5 dB louder than their neighbours, and nods are
-# what viewers take for stress beside it (Krahmer and Swerts 2007, J. Memory and Language 57).
+# Volume factor and nod size of each level: accented words are 2-5 dB louder than their neighbours, and nods are the
+# visual cue of stress (Krahmer and Swerts 2007, J. Memory and Language 57).
 EMPHASES = MappingProxyType({"strong": (1.6, 1.0), "moderate": (1.25, 0.6), "none": (1.0, 0.0), "reduced": (0.7, 0.0)})
 SPAN_KINDS = frozenset({"emphasis", "prosody", "express-as", "voice", "lang"})
-CLOSED_KINDS = frozenset({"break", "mark", "sub", "phoneme", "say-as"})  # hold no elements
-HELD_KINDS = frozenset({"phoneme", "say-as"})  # say something in place of their text
+LEAF_KINDS = frozenset({"break", "mark", "sub", "phoneme", "say-as"})  # contain no elements
+REPLACED_KINDS = frozenset({"phoneme", "say-as"})  # speak other words than their text
 LANGUAGE = "xml:lang"
 Attributes = Mapping[str, str]
 
 
 def is_ssml(text: str) -> bool:
-    """The text is meant as SSML: it begins with ``<speak``, an XML or a document type declaration."""
+    """Whether a text is SSML: it begins with ``<speak``, an XML or a document type declaration."""
     return _BEGINS.match(text) is not None
 
 
 def parse_ssml(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
-    """What an SSML document says, and how.
+    """Parse an SSML document into a marked text.
 
     Parameters
     ----------
     language
-        Of the text, where no element names another.
+        Language of the text, where no element sets another.
 
     Raises
     ------
@@ -68,22 +76,24 @@ def parse_ssml(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
         return reader.read(text)
     except expat.ExpatError as broken:
         reason = expat.ErrorString(broken.code)
-        raise InputError(f"the SSML is not well-formed: {reason} in line {broken.lineno}; mend it there") from broken
+        raise InputError(
+            f"the SSML is not well-formed: {reason} in line {broken.lineno}; correct that line"
+        ) from broken
     except UnicodeEncodeError as broken:
-        raise InputError(f"the SSML holds a half character (number {broken.start}); take it out") from broken
+        raise InputError(f"the SSML contains an unpaired surrogate (character {broken.start}); remove it") from broken
     except InputError as wrong:
         raise InputError(f"SSML, line {reader.line}: {wrong}") from wrong
 
 
 class _SsmlReader:
-    """Follows the elements of one document."""
+    """Handlers of the elements of one document."""
 
     def __init__(self, language: str) -> None:
-        self._gathering = MarkedTextBuilder()
+        self._builder = MarkedTextBuilder()
         self._elements: list[str] = []
-        self._spans: list[str] = []  # for each element the kind of span that it opened, or nothing
-        self._held: list[str] = []  # text of a phoneme or say-as
-        self._held_attributes: Attributes = {}
+        self._spans: list[str] = []  # for each element the kind of its span, or empty
+        self._replaced_text: list[str] = []  # text of a phoneme or say-as
+        self._replaced_attributes: Attributes = {}
         self._base = language
         self._language: str | None = None
         parser = expat.ParserCreate()
@@ -103,8 +113,8 @@ class _SsmlReader:
             "prosody": self._prosody,
             "mark": self._mark,
             "sub": self._sub,
-            "phoneme": self._hold,
-            "say-as": self._hold,
+            "phoneme": self._open_replaced,
+            "say-as": self._open_replaced,
             "voice": self._voice,
             "lang": self._lang,
             "express-as": self._express_as,
@@ -112,30 +122,30 @@ class _SsmlReader:
 
     @property
     def line(self) -> int:
-        """Where the parser stands."""
+        """Current line of the parser."""
         return self._parser.CurrentLineNumber
 
     def read(self, text: str) -> MarkedText:
-        """The whole document."""
+        """Parse the whole document."""
         self._parser.Parse(text.removeprefix("\ufeff").lstrip(), True)
-        return self._gathering.done(self._language, spoken=self._base)
+        return self._builder.build(self._language, spoken=self._base)
 
     def _doctype(self, *_: object) -> None:
-        raise InputError("a document type declaration is not read; leave <!DOCTYPE ...> away")
+        raise InputError("a document type declaration is not supported; remove <!DOCTYPE ...>")
 
     def _instruction(self, target: str, _: str) -> None:
-        raise InputError(f"the instruction <?{target}?> is not read; leave it away")
+        raise InputError(f"the instruction <?{target}?> is not supported; remove it")
 
     def _start(self, tag: str, attributes: Attributes) -> None:
         name = tag.removeprefix("mstts:") if tag == "mstts:express-as" else tag
         if name not in self._starts:
-            raise InputError(f"there is no <{tag[:40]}> here; choose {', '.join(self._starts)}")
+            raise InputError(f"the element <{tag[:40]}> is not supported; use {', '.join(self._starts)}")
         if (name == "speak") != (not self._elements):
-            raise InputError("<speak> holds all the rest, once; put everything into one")
+            raise InputError("<speak> must be the only root element; put everything into one")
         if len(self._elements) > 2 * MAX_NESTING:
-            raise InputError(f"<{tag}> stands within {len(self._elements)} others; nest them less deep")
-        if self._elements and self._elements[-1] in CLOSED_KINDS:
-            raise InputError(f"<{self._elements[-1]}> holds no elements, and this one a <{tag}>; close it before")
+            raise InputError(f"<{tag}> is nested in {len(self._elements)} others; reduce the nesting")
+        if self._elements and self._elements[-1] in LEAF_KINDS:
+            raise InputError(f"<{self._elements[-1]}> cannot contain elements; close it before <{tag}>")
         check_lengths(name, attributes)
         self._elements.append(name)
         self._spans.append(name if name in SPAN_KINDS else "")
@@ -143,112 +153,118 @@ class _SsmlReader:
 
     def _end(self, tag: str) -> None:
         name, span = self._elements.pop(), self._spans.pop()
-        if name in HELD_KINDS:
-            self._say_held(name)
+        if name in REPLACED_KINDS:
+            self._speak_replacement(name)
         if span:
-            self._gathering.close(span, f"</{tag}>")
+            self._builder.close(span, f"</{tag}>")
         if name in {"p", "s"}:
-            self._gathering.add_text("\n\n")
+            self._builder.add_text("\n\n")
 
     def _words(self, text: str) -> None:
         inside = self._elements[-1]
         if inside == "sub":
             return
         if inside in {"break", "mark"} and text.strip():
-            raise InputError(f"<{inside}> holds no words; close it before {text.strip()[:20]!r}")
+            raise InputError(f"<{inside}> cannot contain text; close it before {text.strip()[:20]!r}")
         if _MARK.search(text):
-            raise InputError("marks in square brackets do not go with SSML; write <break>, <emphasis> or <express-as>")
-        if inside in HELD_KINDS:
-            self._held.append(text)
+            raise InputError(
+                "marks in square brackets cannot be combined with SSML; use <break>, <emphasis> or <express-as>"
+            )
+        if inside in REPLACED_KINDS:
+            self._replaced_text.append(text)
         else:
-            self._gathering.add_text(text)
+            self._builder.add_text(text)
 
     def _speak(self, attributes: Attributes) -> None:
         known = {name: value for name, value in attributes.items() if not name.startswith("xmlns")}
-        self._language = only("speak", known, "version", LANGUAGE, "xsi:schemaLocation").get(LANGUAGE)
+        self._language = check_attributes("speak", known, "version", LANGUAGE, "xsi:schemaLocation").get(LANGUAGE)
 
     def _stretch(self, attributes: Attributes) -> None:
-        tag = only(self._elements[-1], attributes, LANGUAGE).get(LANGUAGE)
-        self._gathering.add_text("\n\n")  # a blank line ends what was said before
-        if tag is not None and primary_of(tag) != primary_of(self._spoken):
+        tag = check_attributes(self._elements[-1], attributes, LANGUAGE).get(LANGUAGE)
+        self._builder.add_text("\n\n")  # a blank line ends the sentence before
+        if tag is not None and primary_subtag(tag) != primary_subtag(self._spoken):
             self._spans[-1] = "lang"
-            self._gathering.open_voice("lang", f"<{self._elements[-1]}>", voice=None, language=language_code(tag))
+            self._builder.open_voice("lang", f"<{self._elements[-1]}>", voice=None, language=language_code(tag))
 
     @property
     def _spoken(self) -> str:
-        """The language at the present place."""
-        return self._gathering.language or self._base
+        """Language at the current position."""
+        return self._builder.language or self._base
 
     def _lang(self, attributes: Attributes) -> None:
-        tag = only("lang", attributes, LANGUAGE).get(LANGUAGE, "")
-        self._gathering.open_voice("lang", "<lang>", voice=None, language=language_code(tag))
+        tag = check_attributes("lang", attributes, LANGUAGE).get(LANGUAGE, "")
+        self._builder.open_voice("lang", "<lang>", voice=None, language=language_code(tag))
 
     def _voice(self, attributes: Attributes) -> None:
-        given = only("voice", attributes, "name", "gender", "language", "languages", LANGUAGE, "required")
-        voice, language = named_voice(given, self._spoken)
-        self._gathering.open_voice("voice", "<voice>", voice=voice, language=language)
+        known = check_attributes("voice", attributes, "name", "gender", "language", "languages", LANGUAGE, "required")
+        voice, language = choose_voice(known, self._spoken)
+        self._builder.open_voice("voice", "<voice>", voice=voice, language=language)
 
-    def _hold(self, attributes: Attributes) -> None:
+    def _open_replaced(self, attributes: Attributes) -> None:
         kind = self._elements[-1]
         known = ("alphabet", "ph") if kind == "phoneme" else ("interpret-as", "format", "detail")
-        self._held_attributes = only(kind, attributes, *known)
+        self._replaced_attributes = check_attributes(kind, attributes, *known)
         needed = known[1] if kind == "phoneme" else known[0]
         if not attributes.get(needed, "").strip():
             raise InputError(f'a <{kind}> needs {needed}; write <{kind} {needed}="...">')
-        self._held = []
+        self._replaced_text = []
 
-    def _say_held(self, kind: str) -> None:
-        given, text = self._held_attributes, "".join(self._held)
+    def _speak_replacement(self, kind: str) -> None:
+        attributes, text = self._replaced_attributes, "".join(self._replaced_text)
         if kind == "say-as":
-            self._gathering.add_text(say_as(given["interpret-as"].strip(), text, given.get("format", ""), self._spoken))
+            self._builder.add_text(
+                say_as(attributes["interpret-as"].strip(), text, attributes.get("format", ""), self._spoken)
+            )
             return
-        for number, (word, segments) in enumerate(phoned_words(text, given["ph"], given.get("alphabet", "ipa"))):
-            begin = self._gathering.at + (number > 0)
-            self._gathering.mark(PhoneMark(begin, begin + len(word), segments))
-            self._gathering.add_text(f" {word}" if number else word)
+        for number, (word, segments) in enumerate(
+            phoneme_words(text, attributes["ph"], attributes.get("alphabet", "ipa"))
+        ):
+            begin = self._builder.at + (number > 0)
+            self._builder.add_mark(PhoneMark(begin, begin + len(word), segments))
+            self._builder.add_text(f" {word}" if number else word)
 
     def _break(self, attributes: Attributes) -> None:
-        told = only("break", attributes, "time", "strength")
-        seconds = choice("strength", told.get("strength", "medium"), BREAKS_S)
-        if "time" in told:
-            match = _TIME.fullmatch(told["time"].strip())
+        known = check_attributes("break", attributes, "time", "strength")
+        seconds = look_up_value("strength", known.get("strength", "medium"), BREAKS_S)
+        if "time" in known:
+            match = _TIME.fullmatch(known["time"].strip())
             if match is None:
-                raise InputError(f'cannot read the time {told["time"][:40]!r} of a <break>; write "400ms" or "0.4s"')
+                raise InputError(f'cannot read the time {known["time"][:40]!r} of a <break>; write "400ms" or "0.4s"')
             seconds = float(match[1]) / (1000 if match[2] == "ms" else 1)
         if seconds > 0:
-            self._gathering.mark(PauseMark(self._gathering.at, seconds))
+            self._builder.add_mark(PauseMark(self._builder.at, seconds))
 
     def _emphasis(self, attributes: Attributes) -> None:
-        level = only("emphasis", attributes, "level").get("level", "moderate")
+        level = check_attributes("emphasis", attributes, "level").get("level", "moderate")
         if level not in EMPHASES:
-            raise InputError(f"there is no level {level[:40]!r} of <emphasis>; choose {', '.join(EMPHASES)}")
+            raise InputError(f"<emphasis> has no level {level[:40]!r}; use {', '.join(EMPHASES)}")
         volume, size = EMPHASES[level]
         if size:
-            self._gathering.mark(NodMark(self._gathering.at, size))
-        self._gathering.open("emphasis", "<emphasis>", volume=volume)
+            self._builder.add_mark(NodMark(self._builder.at, size))
+        self._builder.open("emphasis", "<emphasis>", volume=volume)
 
     def _prosody(self, attributes: Attributes) -> None:
         for name in ("pitch", "contour", "range", "duration"):
             if attributes.get(name, "default") not in {"medium", "default"}:
-                raise InputError(f"no voice here can change its {name}; leave {name} away, and use rate and volume")
-        told = only("prosody", attributes, "rate", "volume", "pitch", "contour", "range", "duration")
-        rate, volume = speed(told.get("rate", "medium")), loudness(told.get("volume", "medium"))
-        self._gathering.open("prosody", "<prosody>", rate=rate, volume=volume)
+                raise InputError(f"no voice supports {name}; remove it, and use rate and volume")
+        known = check_attributes("prosody", attributes, "rate", "volume", "pitch", "contour", "range", "duration")
+        rate, volume = parse_rate(known.get("rate", "medium")), parse_volume(known.get("volume", "medium"))
+        self._builder.open("prosody", "<prosody>", rate=rate, volume=volume)
 
     def _mark(self, attributes: Attributes) -> None:
-        name = only("mark", attributes, "name").get("name", "")
+        name = check_attributes("mark", attributes, "name").get("name", "")
         if not name.strip():
             raise InputError('a <mark> needs a name; write <mark name="here"/>')
-        self._gathering.mark(NameMark(self._gathering.at, name))
+        self._builder.add_mark(NameMark(self._builder.at, name))
 
     def _sub(self, attributes: Attributes) -> None:
-        alias = only("sub", attributes, "alias").get("alias", "")
+        alias = check_attributes("sub", attributes, "alias").get("alias", "")
         if not alias.strip():
-            raise InputError('a <sub> needs what is said instead; write <sub alias="doctor">Dr</sub>')
-        self._gathering.add_text(alias)
+            raise InputError('a <sub> needs an alias; write <sub alias="doctor">Dr</sub>')
+        self._builder.add_text(alias)
 
     def _express_as(self, attributes: Attributes) -> None:
-        style = only("express-as", attributes, "style").get("style", "")
+        style = check_attributes("express-as", attributes, "style").get("style", "")
         if not style.strip():
             raise InputError('<express-as> needs a style; write <express-as style="delighted">')
-        self._gathering.open("express-as", f'<express-as style="{style}">', style=style.strip())
+        self._builder.open("express-as", f'<express-as style="{style}">', style=style.strip())

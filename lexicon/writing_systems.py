@@ -1,4 +1,4 @@
-"""Which writing systems a language is read in, and which words of a text it cannot read."""
+"""Writing systems of languages, and checks that a text can be read in its language."""
 
 import functools
 import re
@@ -8,8 +8,10 @@ from types import MappingProxyType
 
 from lexicon import written_forms as readings
 from lexicon.errors import InputError
+from lexicon.g2p import check_language
 from lexicon.japanese import has_kanji, load_reader
-from lexicon.letters import run_name
+from lexicon.letter_names import run_name
+from lexicon.marked_text import MarkedText, PhoneMark
 
 _CYRILLIC = frozenset({"CYRILLIC"})
 _ARABIC = frozenset({"ARABIC"})
@@ -17,10 +19,10 @@ _DEVANAGARI = frozenset({"DEVANAGARI"})
 _HAN = frozenset({"CJK"})
 _JAPANESE = frozenset({"HIRAGANA", "KATAKANA", "CJK", "IDEOGRAPHIC"})
 
-# First words of the Unicode names of a language's letters, by its espeak-ng code or the first part of it. Latin is read
-# in every language (espeak-ng spells it or switches to English); a language without a line reads nothing else. Chinese
-# characters are missing under ko and hak: espeak-ng says "Chinese letter" for each; in Japanese `lexicon.japanese`
-# reads them.
+# First words of the Unicode names of a language's letters, by its espeak-ng code or primary subtag. Latin is read in
+# every language (espeak-ng spells it or switches to English); a language without an entry reads Latin only. Chinese
+# characters are not listed for ko and hak, where espeak-ng speaks "Chinese letter" for each; in Japanese
+# `lexicon.japanese` reads them.
 SCRIPTS = MappingProxyType({
     "am": frozenset({"ETHIOPIC"}), "ar": _ARABIC, "as": frozenset({"BENGALI"}), "ba": _CYRILLIC,
     "be": _CYRILLIC, "bg": _CYRILLIC, "bn": frozenset({"BENGALI"}), "bpy": frozenset({"BENGALI"}),
@@ -37,8 +39,8 @@ SCRIPTS = MappingProxyType({
 })  # fmt: skip
 _COMMON_SCRIPTS = frozenset({"LATIN", "MODIFIER", "MASCULINE", "FEMININE", "KATAKANA-HIRAGANA", "VULGAR"})
 _NAMES = MappingProxyType({"CJK": "Chinese"})
-SHOWN_WORDS, SHOWN_CHARACTERS = 3, 24  # that a refusal names, of each at most so many characters
-# Combining marks that no script needs to tell its words apart: accents, enclosing marks.
+MAX_QUOTED_WORDS, MAX_QUOTED_CHARACTERS = 3, 24  # number of words quoted in an error, and characters of each
+# Combining marks that distinguish no words in any script: accents, enclosing marks.
 _LOOSE_MARKS = re.compile(
     "[\u0300-\u036f\u0483-\u0489\u1ab0-\u1aff\u1dc0-\u1dff\u20d0-\u20ff\ufe00-\ufe0f\ufe20-\ufe2f]"
 )
@@ -46,18 +48,18 @@ _FOREIGN = re.compile("f[fm]*")
 
 
 def letter_script(letter: str) -> str:
-    """First word of a letter's Unicode name: LATIN, CYRILLIC, CJK, ...; empty for a letter without name."""
+    """First word of a letter's Unicode name (LATIN, CYRILLIC, CJK, ...); empty for a letter without name."""
     return unicodedata.name(letter, "").partition(" ")[0]
 
 
 def language_scripts(language: str) -> frozenset[str]:
-    """Writing systems that a language is read in, Latin included."""
+    """Writing systems of a language, including Latin."""
     own = SCRIPTS.get(language, SCRIPTS.get(language.partition("-")[0], frozenset()))
     return own | _COMMON_SCRIPTS
 
 
-class _Kinds(dict[int, str]):
-    """Each character as f (foreign letter), m (mark of a letter) or o (other), decided once."""
+class _LetterKinds(dict[int, str]):
+    """Translation of characters to f (foreign letter), m (mark of a letter) or o (other), computed on first use."""
 
     def __init__(self, language: str) -> None:
         super().__init__()
@@ -76,26 +78,26 @@ class _Kinds(dict[int, str]):
 
 
 @functools.lru_cache(maxsize=16)
-def _kinds(language: str) -> _Kinds:
-    return _Kinds(language)
+def _letter_kinds(language: str) -> _LetterKinds:
+    return _LetterKinds(language)
 
 
 def foreign_runs(text: str, language: str) -> Iterator[tuple[int, int]]:
-    """Where letters stand that a language does not read: half-open ranges, each as long as it can be."""
+    """Maximal half-open ranges of letters that a language does not read."""
     if not text.isascii():
-        for run in _FOREIGN.finditer(text.translate(_kinds(language))):
+        for run in _FOREIGN.finditer(text.translate(_letter_kinds(language))):
             yield run.span()
 
 
 def check_script(text: str, language: str) -> None:
-    """Refuse words that a language cannot read; digits, symbols and single letters with a name are fine everywhere.
+    """Check that a language can read a text; digits, symbols and single letters with a name are always accepted.
 
     Raises
     ------
     InputError
-        The text holds words of another script; the message names them, their script and the language.
+        The text contains words of another script; the message names them, their script and the language.
     BackendError
-        It is Japanese with Chinese characters, and the library that reads them is not installed.
+        The text is Japanese with Chinese characters, and the library that reads them is not installed.
     """
     if language == "ja" and has_kanji(text):
         load_reader()
@@ -105,11 +107,41 @@ def check_script(text: str, language: str) -> None:
         if not run_name(run) and unicodedata.normalize("NFKC", run) not in readings.read_table("units.tsv"):
             words[run] = None
     if words:
-        shown = ", ".join(word[:SHOWN_CHARACTERS] for word in list(words)[:SHOWN_WORDS])
+        shown = ", ".join(word[:MAX_QUOTED_CHARACTERS] for word in list(words)[:MAX_QUOTED_WORDS])
         scripts = {letter_script(unicodedata.normalize("NFKC", c)[0]) for word in words for c in word if c.isalpha()}
         names = ", ".join(sorted(_NAMES.get(script, script.capitalize() or "unnamed") for script in scripts))
-        more = ", ..." if len(words) > SHOWN_WORDS else ""
+        more = ", ..." if len(words) > MAX_QUOTED_WORDS else ""
         raise InputError(
             f"language {language!r} cannot read {shown}{more} ({names} letters); "
-            "choose the text's own language, or write it in another way"
+            "use the language of the text, or transliterate it"
         )
+
+
+def check_readable(text: MarkedText, language: str) -> None:
+    """Check that the language of each span can read its words; words with given phones are skipped.
+
+    Raises
+    ------
+    InputError
+        A word cannot be read, or the language does not exist.
+    BackendError
+        The text is Japanese with Chinese characters, and the library that reads them is not installed.
+    """
+    unread = _blank_given_words(text)
+    ends = [*(run.start for run in text.runs[1:]), len(unread)]
+    if all(run.language is None for run in text.runs):
+        check_script(unread, language)
+        return
+    for run, end in zip(text.runs, ends, strict=True):
+        span_language = run.language or language
+        check_language(span_language)
+        check_script(unread[run.start : end], span_language)
+
+
+def _blank_given_words(text: MarkedText) -> str:
+    pieces, at = [], 0
+    for mark in text.marks:
+        if isinstance(mark, PhoneMark):
+            pieces += [text.text[at : mark.at], " " * (mark.end - mark.at)]
+            at = mark.end
+    return "".join([*pieces, text.text[at:]])

@@ -1,6 +1,6 @@
-"""How written forms are read in English: money, dates, times, measures, telephone numbers, addresses.
+"""English words of written forms: money, dates, times, measures, telephone numbers, addresses.
 
-A reading takes the parts of a written form and gives words without digits or symbols.
+The functions take the parts of a written form and return words without digits or symbols.
 """
 
 import functools
@@ -78,7 +78,7 @@ def measure_words(amount: str, unit: str) -> str:
 
 
 def year_or_number_words(written: str) -> str:
-    """A year where four digits look like one."""
+    """A year for four digits without leading zero, else a number."""
     return year_words(int(written)) if len(written) == 4 and written[0] != "0" else number_words(written)
 
 
@@ -96,7 +96,7 @@ def date_words(day: int, month: int, year_written: str, *, day_first: bool = Fal
 
 
 def numeric_date_words(first: int, second: int, year_written: str, separator: str) -> str | None:
-    """3/15/2024 month first, 15/3/2024 and 15.3.2024 day first; None where it is no date."""
+    """3/15/2024 month first, 15/3/2024 and 15.3.2024 day first; None if it is not a date."""
     day_first = separator == "." or first > 12
     day, month = (first, second) if day_first else (second, first)
     if not (1 <= day <= 31 and 1 <= month <= 12):
@@ -135,8 +135,8 @@ _ADDRESS_SIGNS = {
 _SPELLED_ENDINGS = re.compile("uk|us|de|fr|eu|io|ai|tv|ca|ch|at|au|nz|jp|cn|ru|es|nl|se|pl|be|dk|fi|ie|br|mx|kr")
 
 
-def _readable_name(written: str) -> str:
-    """A word of an address or tag, in a form that is read in no other way: small, or an initialism in capitals."""
+def _unambiguous_word(written: str) -> str:
+    """A word of an address or tag in an unambiguous form: lower case, or an initialism in capitals."""
     is_initialism = written.isupper() and len(written) > 1 and not re.fullmatch("[IVXLCDM]+", written)
     if is_initialism:
         return written
@@ -156,7 +156,7 @@ def address_words(written: str) -> str:
             words.append(number_words(text) if len(text) < 5 else digit_words(text))
         elif text.isalpha():
             is_spelled = text == "www" or (piece.start() == last_dot + 1 and _SPELLED_ENDINGS.fullmatch(text))
-            words.append(text.upper() if is_spelled else _readable_name(text.lower()))
+            words.append(text.upper() if is_spelled else _unambiguous_word(text.lower()))
         elif text in _ADDRESS_SIGNS:
             words.append(_ADDRESS_SIGNS[text])
     return " ".join(words)
@@ -165,7 +165,7 @@ def address_words(written: str) -> str:
 def hashtag_words(written: str) -> str:
     """#MachineLearning2024 is machine learning twenty twenty-four."""
     pieces = re.findall(r"[A-Z]{2,}(?![a-z])|[A-Z]?[^\W\d_A-Z]+|[A-Z]|[0-9]+|[^\W\d_]+", written.lstrip("#@"))
-    return " ".join(year_or_number_words(piece) if piece[0].isdigit() else _readable_name(piece) for piece in pieces)
+    return " ".join(year_or_number_words(piece) if piece[0].isdigit() else _unambiguous_word(piece) for piece in pieces)
 
 
 def ratio_words(top: str, bottom: str, whole: str = "") -> str:

@@ -1,4 +1,4 @@
-"""Text becomes a talking face.
+"""Animation of talking faces from text, recorded speech and videos.
 
 Examples
 --------
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from tts2face.render.picture import Picture as Picture
     from tts2face.request import Request as Request
     from tts2face.session import Session as Session
-    from tts2face.session import WrittenClip as Written
+    from tts2face.session import WrittenClip as WrittenClip
     from tts2face.synthesis.animated_face import AnimatedFace as AnimatedFace
     from tts2face.synthesis.clip_stream import Piece as Piece
     from tts2face.synthesis.performance import Performance as Performance
@@ -64,7 +64,7 @@ __all__ = [
     "Tts2faceError",
     "Waveform",
     "WordSpan",
-    "Written",
+    "WrittenClip",
     "faces",
     "identities",
     "languages",
@@ -88,7 +88,7 @@ _MODULES = {
     "tts2face.models.talker": ("Talker", "load_talker"),
     "tts2face.render.picture": ("Picture",),
     "tts2face.request": ("Request",),
-    "tts2face.session": ("Session", "Written"),
+    "tts2face.session": ("Session", "WrittenClip"),
     "tts2face.synthesis.animated_face": ("AnimatedFace",),
     "tts2face.synthesis.clip_stream": ("Piece",),
     "tts2face.synthesis.performance": ("Performance",),

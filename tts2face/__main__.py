@@ -1,4 +1,4 @@
-"""``python -m tts2face``: the command line, where the script ``tts2face`` is not on the path."""
+"""Entry point of ``python -m tts2face``, which runs the command line without the installed script."""
 
 from cli.main import main
 

@@ -1,4 +1,4 @@
-"""The public functions beside `tts2face.session.Session`: writing clips that exist already."""
+"""Public functions besides `tts2face.session.Session`: drawing an existing clip into a file."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,23 +17,24 @@ def write_clip(
     picture: Picture | None = None,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> None:
-    """Draw a clip on a face and write it into a file.
+    """Draw a clip on a face and write it to a file.
 
     Parameters
     ----------
     face
         `Session.face` of the session that made the clip, or of another one with the same face.
     out
-        .mp4, .webm, .gif, or a folder of .png. It appears when all is done; after an error nothing is left.
+        .mp4, .webm, .gif, or a folder of .png files. The file appears when it is complete; after an error no partial
+        file remains.
     picture
-        How the clip is drawn; the default options without it.
+        Drawing options; None for the defaults.
     on_progress
-        Called with frames drawn, and frames in all.
+        Called with the number of frames drawn and the total number of frames.
 
     Raises
     ------
     InputError
-        The clip's motion is not in the channels of this face, or the file cannot have this name.
+        The clip's motion is not in the channels of this face, or the name of the file has no known suffix.
     BackendError
         The file cannot be written.
     """

@@ -1,4 +1,4 @@
-"""What there is to choose from: voices, languages, faces, their identities, styles and talkers."""
+"""Lists of the available voices, languages, faces, identity presets, styles and talkers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,9 +14,10 @@ OWN_FACE = "self"
 
 @dataclass(frozen=True, slots=True)
 class VoiceEntry:
-    """A voice; ``languages`` are espeak-ng codes, empty where the voice's own file says which it speaks.
+    """A voice.
 
-    ``name`` is what ``Request.voice`` takes; for Piper voices the path of a file stands there.
+    ``name`` is a value of ``Request.voice``; for Piper voices it is a placeholder for the path of a file.
+    ``languages`` are espeak-ng codes; they are empty for Piper voices, whose settings files name the language.
     """
 
     name: str
@@ -36,7 +37,7 @@ class LanguageEntry:
 
 @dataclass(frozen=True, slots=True)
 class FaceEntry:
-    """A face, and the names of its identity presets."""
+    """A face and the names of its identity presets."""
 
     name: str
     identities: tuple[str, ...]
@@ -54,7 +55,7 @@ class IdentityEntry:
 
 @dataclass(frozen=True, slots=True)
 class StyleEntry:
-    """A style of a palette; ``source`` is the recorded style that it is derived from, None where it was recorded."""
+    """A style of a palette; ``source`` is the recorded style that it is derived from, None for a recorded style."""
 
     name: str
     palette: str
@@ -64,7 +65,7 @@ class StyleEntry:
 
 @dataclass(frozen=True, slots=True)
 class TalkerEntry:
-    """A talker: how much was recorded, and whether the talker's own face can be shown (``--face self``)."""
+    """A talker: the amount of recorded speech, and whether the talker's own face can be drawn (``--face self``)."""
 
     name: str
     language: str
@@ -75,12 +76,12 @@ class TalkerEntry:
 
 
 def voices() -> tuple[VoiceEntry, ...]:
-    """Every voice, whether what it needs is installed, and the languages that it speaks.
+    """All voices, whether their packages are installed, and their languages.
 
     Raises
     ------
     BackendError
-        espeak-ng does not start.
+        espeak-ng is not installed or does not start.
     """
     from tts2face.voice.engine import ENGLISH_CODES, VOICE_NAMES
 
@@ -94,7 +95,7 @@ def voices() -> tuple[VoiceEntry, ...]:
 
 
 def languages() -> tuple[LanguageEntry, ...]:
-    """Every language that espeak-ng speaks, by code.
+    """All languages of espeak-ng, sorted by code.
 
     Raises
     ------
@@ -107,25 +108,25 @@ def languages() -> tuple[LanguageEntry, ...]:
 
 
 def faces() -> tuple[FaceEntry, ...]:
-    """The shipped faces, and the talker's own."""
+    """The shipped faces and the entry ``self`` for the talker's own face."""
     shipped = []
     for path in _shipped("face"):
         _, header = _read(path, "face")
         names = tuple(name for name, _, _ in header["identities"])
         shipped.append(FaceEntry(path.stem, names, f"mesh with {len(header['shape_names'])} shapes"))
-    own = FaceEntry(OWN_FACE, (), "the talker's own face, of talkers with pictures")
+    own = FaceEntry(OWN_FACE, (), "the talker's own face, for talkers learnt with --appearance")
     return (*shipped, own)
 
 
 def identities(face: str = "head") -> tuple[IdentityEntry, ...]:
-    """The identity presets of a face: a shipped one by name, or a ``.face`` file.
+    """The identity presets of a face, given by name or as the path of a ``.face`` file.
 
     Raises
     ------
     InputError
-        There is no such face.
+        The face does not exist.
     DataError
-        The file is damaged, or no face.
+        The file is damaged or is not a ``.face`` file.
     """
     path = find_file(face, "face")
     _, header = _read(path, "face")
@@ -136,7 +137,7 @@ def identities(face: str = "head") -> tuple[IdentityEntry, ...]:
 
 
 def styles(palette: str = "starter") -> tuple[StyleEntry, ...]:
-    """The styles of a palette, a shipped one by name or a ``.palette`` file; errors as `load_palette`."""
+    """The styles of a palette, given by name or as the path of a ``.palette`` file; raises as `load_palette`."""
     from tts2face.models.palette import load_palette
 
     found = load_palette(palette)

@@ -1,4 +1,4 @@
-"""Processes that end with the process that started them, however that one ends."""
+"""Termination of child processes together with their parent process, however the parent ends."""
 
 import os
 import threading
@@ -6,12 +6,13 @@ from collections.abc import Callable
 
 
 def exit_after(wait: Callable[[], object]) -> None:
-    """End this process, from a thread of its own, when `wait` returns or fails.
+    """Exit this process as soon as `wait`, which runs in a background thread, returns or raises.
 
     Parameters
     ----------
     wait
-        Reads from a pipe whose other end only the parent holds: it returns when the parent closes it or is dead.
+        Blocking read from a pipe whose other end only the parent holds; it returns when the parent closes the pipe or
+        terminates.
     """
     threading.Thread(target=_exit_after, args=(wait,), name="exit_after", daemon=True).start()
 
@@ -20,4 +21,4 @@ def _exit_after(wait: Callable[[], object]) -> None:
     try:
         wait()
     finally:
-        os._exit(1)  # without cleaning up: whoever would want the results is gone
+        os._exit(1)  # no clean-up: the parent that would receive the results no longer exists

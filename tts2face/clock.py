@@ -1,4 +1,4 @@
-"""Frames and samples on one exact clock."""
+"""Exact conversion between video frames and audio samples."""
 
 from fractions import Fraction
 
@@ -13,12 +13,12 @@ NTSC_NOMINAL_RATES = (24, 30, 48, 60, 120)  # nominal rates whose broadcast form
 
 
 def exact_rate(fps: float) -> Fraction:
-    """Frames per second as a fraction; 23.976, 29.97, 59.94 and the like are thousandths over 1001.
+    """Frame rate as an exact fraction; 23.976, 29.97, 59.94 and the like become multiples of 1000/1001.
 
     Raises
     ------
     InputError
-        The rate is out of range.
+        The rate lies outside `FPS_LIMITS`.
     """
     low, high = FPS_LIMITS
     if not low <= fps <= high:
@@ -30,12 +30,18 @@ def exact_rate(fps: float) -> Fraction:
 
 
 def first_sample(frame: int, rate: int, fps: Fraction) -> int:
-    """The sample that sounds when a frame appears."""
+    """Index of the audio sample, at `rate` Hz, that coincides with the start of a frame."""
     return round(Fraction(frame) * rate / fps)
 
 
 def pad_to_frame(speech: Speech, first_frame: int, fps: Fraction) -> Speech:
-    """Speech lengthened by silence to the last sample of a frame, counted from the start of the whole sound."""
+    """Speech padded with silence up to the end of its last frame.
+
+    Parameters
+    ----------
+    first_frame
+        Index of the speech's first frame within the whole clip, from which sample positions are rounded.
+    """
     rate, samples = speech.waveform.rate, speech.waveform.samples
     n_frames = frame_count(speech.waveform.duration, float(fps))
     wanted = first_sample(first_frame + n_frames, rate, fps) - first_sample(first_frame, rate, fps)

@@ -1,7 +1,7 @@
-"""Decorators that compile kernels with numba, and the folder in which the compiled code is kept.
+"""Decorators that compile kernels with numba, and the choice of the cache folder for compiled code.
 
-Every kernel of the package is compiled by these decorators, so numba is imported here only, and finds a folder that it
-can write even where neither the installed package nor the user's cache folder can be written.
+All kernels of the package use these decorators; numba is imported in this module only. If neither the package's folder
+nor the user's cache folder is writable, compiled code is cached in a private temporary folder.
 """
 
 import os
@@ -15,17 +15,17 @@ import numba
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
-CACHE_VARIABLE = "NUMBA_CACHE_DIR"  # where the user wants compiled kernels; numba reads it itself
+CACHE_VARIABLE = "NUMBA_CACHE_DIR"  # set by the user; numba reads it itself
 
 
 def kernel(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """A function compiled at its first call and kept on disk; it runs without the interpreter's lock."""
+    """Compile a function at its first call, cache the code on disk, and release the GIL while it runs."""
     compiled: Callable[Arguments, Result] = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
     return compiled
 
 
 def vectorized_kernel(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """A kernel of plain loops over long arrays, compiled for the vector unit: sums may be reordered."""
+    """Compile a kernel with `fastmath`, which vectorises loops over long arrays by reordering sums."""
     compiled: Callable[Arguments, Result] = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=True)(
         function
     )
@@ -33,13 +33,13 @@ def vectorized_kernel(function: Callable[Arguments, Result]) -> Callable[Argumen
 
 
 def inlined_kernel(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """A piece of a kernel, compiled within each kernel that calls it."""
+    """Compile a function inline in each kernel that calls it."""
     compiled: Callable[Arguments, Result] = numba.njit(inline="always", error_model="numpy")(function)
     return compiled
 
 
 def cache_folder(package: Path) -> Path | None:
-    """A private folder for compiled kernels; None where numba's own choice can be written."""
+    """Private cache folder for compiled kernels; None if numba's own choice is writable."""
     if CACHE_VARIABLE in os.environ or _can_write(package / "__pycache__") or _can_write(_user_cache_folder()):
         return None
     return _private_folder()
@@ -50,7 +50,7 @@ def _user_cache_folder() -> Path:
 
 
 def _can_write(folder: Path) -> bool:
-    """Whether a folder can be written; it is made where it is missing, as numba makes it."""
+    """Whether a folder is writable; a missing folder is created, as numba does."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
@@ -59,9 +59,9 @@ def _can_write(folder: Path) -> bool:
 
 
 def _private_folder() -> Path:
-    """A folder of this user alone, the same for every process; a new one where somebody else took the name.
+    """Temporary folder that only this user can write; a new one if another user owns the usual name.
 
-    What lies in it is loaded as code.
+    The folder must be private because its files are loaded as code.
     """
     owner = os.getuid() if hasattr(os, "getuid") else 0
     folder = Path(tempfile.gettempdir()) / f"tts2face-kernels-{owner}"

@@ -1,4 +1,4 @@
-"""Pictures read at places between their pixels, and motion at instants between its frames."""
+"""Bilinear interpolation of pictures and cubic interpolation of trajectories."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ Array = NDArray[Any]
 
 @kernel
 def interpolate_bilinear(picture: Array, x: float, y: float, c: int) -> float:
-    """One channel of an (H, W, C) picture at a place; beyond its edge the edge goes on."""
+    """Value of channel `c` of an (H, W, C) picture at (x, y) in pixels; positions outside are clamped to the edge."""
     height, width = picture.shape[0], picture.shape[1]
     x = min(max(x, 0.0), width - 1.0)
     y = min(max(y, 0.0), height - 1.0)
@@ -26,9 +26,9 @@ def interpolate_bilinear(picture: Array, x: float, y: float, c: int) -> float:
 
 @kernel
 def sample_triangles(picture: Array, points: Array, corners: Array, weights: Array, out: Array) -> None:
-    """Write into (P, C) `out` an (H, W, C) picture at P places inside triangles of (N, 2) points.
+    """Sample an (H, W, C) picture at P positions inside triangles of (N, 2) points, into (P, C) `out`.
 
-    Place i is the sum of ``weights[i, k] * points[corners[i, k]]``, k = 0..2: piecewise-affine warping.
+    Position i is the sum of ``weights[i, k] * points[corners[i, k]]``, k = 0..2 (piecewise-affine warping).
     """
     for i in range(len(corners)):
         x = y = 0.0
@@ -40,7 +40,7 @@ def sample_triangles(picture: Array, points: Array, corners: Array, weights: Arr
 
 
 def interpolate_cubic(values: NDArray[np.float32], at: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(N, D) of (T, D) values at rows between them, by cubics through them (Catmull and Rom 1974)."""
+    """(N, D) values at N fractional row indices of (T, D) values, by Catmull-Rom cubics (Catmull and Rom 1974)."""
     low = np.minimum(at, len(values) - 1).astype(int)
     part = (at - low)[:, None].astype(np.float32)
     before, here, after, beyond = (values[np.clip(low + k, 0, len(values) - 1)] for k in (-1, 0, 1, 2))

@@ -1,4 +1,4 @@
-"""Work done before its result is needed: the items of a source in one thread, a function of items in several."""
+"""Computation ahead of use: items of an iterable in one thread, a function of items in several threads."""
 
 import contextlib
 import queue
@@ -12,37 +12,45 @@ from typing import Any, Generic, TypeVar
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 ItemOrError = tuple[Any, BaseException | None]
-POLL_INTERVAL_S = 0.1  # how soon the maker notices that nobody wants its items any more
+POLL_INTERVAL_S = 0.1  # longest time until the producer thread notices that it has been stopped
 
 
 class Prefetch(Generic[Item]):
-    """The items of a source in their order; up to `room` of them are made before they are asked for.
+    """Iterator over a source whose items are produced in a background thread.
 
-    Making begins at once and ends with the ``with`` block. An error of the source is raised where its item would come.
+    Production starts at once and stops at the end of the ``with`` block. An exception of the source is raised in place
+    of the item that failed.
+
+    Parameters
+    ----------
+    source
+        Items, produced in order.
+    n_ahead
+        Largest number of items that are produced before they are requested.
     """
 
-    def __init__(self, source: Iterable[Item], room: int) -> None:
+    def __init__(self, source: Iterable[Item], n_ahead: int) -> None:
         self._source = source
-        self._made: queue.Queue[ItemOrError] = queue.Queue(room)
+        self._queue: queue.Queue[ItemOrError] = queue.Queue(n_ahead)
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._fill, name="prefetch", daemon=True)
         self._thread.start()
 
     def __enter__(self) -> "Prefetch[Item]":
-        """Give the items."""
+        """Return the iterator itself."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Let the maker finish the item at hand and end: a process that ends around running native code aborts."""
+        """Wait until the current item is finished: a process that exits while native code is running aborts."""
         self._stopped.set()
         self._thread.join()
 
     def __iter__(self) -> Iterator[Item]:
-        """Items in their order."""
+        """Yield the items in order."""
         while True:
-            item, error = self._made.get()
+            item, error = self._queue.get()
             if isinstance(error, StopIteration):
                 return
             if error is not None:
@@ -56,17 +64,17 @@ class Prefetch(Generic[Item]):
                 if self._stopped.is_set():
                     return
             self._put((None, StopIteration()))
-        except BaseException as error:  # noqa: BLE001 - raised again in the thread that asked
+        except BaseException as error:  # noqa: BLE001 - raised again in the consuming thread
             self._put((None, error))
 
     def _put(self, item: ItemOrError) -> None:
         while not self._stopped.is_set():
             with contextlib.suppress(queue.Full):
-                return self._made.put(item, timeout=POLL_INTERVAL_S)
+                return self._queue.put(item, timeout=POLL_INTERVAL_S)
 
 
 def map_in_order(function: Callable[[Item], Result], items: Iterable[Item], threads: int) -> Iterator[Result]:
-    """`function` of each item, in order, computed in several threads, as many in advance as there are threads."""
+    """Yield `function` of each item in order; up to `threads` results are computed in advance."""
     with ThreadPoolExecutor(threads, "map") as pool:
         ahead: deque[Future[Result]] = deque()
         try:
@@ -77,5 +85,5 @@ def map_in_order(function: Callable[[Item], Result], items: Iterable[Item], thre
             while ahead:
                 yield ahead.popleft().result()
         finally:
-            for waiting in ahead:
-                waiting.cancel()
+            for pending in ahead:
+                pending.cancel()

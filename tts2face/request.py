@@ -1,6 +1,6 @@
-"""The Request: the single list of options for what is said and how the face moves.
+"""The request: all options of a clip's speech and motion.
 
-Flags, JSON fields and studio controls are made from these fields and their help texts. Imports nothing heavy.
+The flags of the command line are generated from the fields and their help texts. The module imports no numeric library.
 """
 
 from dataclasses import dataclass, field
@@ -19,75 +19,79 @@ IDLE_LIMITS_S = (0.1, 3600.0)
 
 
 def option(default: Any, help_text: str) -> Any:
-    """A dataclass field that carries its own help text."""
+    """Dataclass field with a default value and a help text in its metadata."""
     return field(default=default, metadata={"help": help_text})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
-    """What is said, by which voice, and how the face moves with it.
+    """Options of a clip: text or recording, voice, lip motion and gestures.
 
-    With ``audio`` a recording is heard in place of a voice; ``text`` then is what is said in it, or empty.
-    ``language`` is kept as the espeak-ng code of what is given (`lexicon.languages.language_code`).
+    If ``audio`` is given, the clip uses the sound of that recording, and ``text`` is its transcript or empty.
+    ``language`` is converted to an espeak-ng code (`lexicon.languages.language_code`).
 
     Raises
     ------
     InputError
-        There is no such language, a number lies outside its range, or an option belongs to a voice where there is a
-        recording.
+        The language does not exist, a number lies outside its range, or two options exclude each other.
     """
 
-    text: str = option("", "What to say.")
+    text: str = option("", "Text to speak.")
     audio: Path | None = option(
-        None, "A recording of a voice (any sound or video file) that the lips follow; best with its words as text."
-    )
-    drive: str | None = option(
         None,
-        "How lips follow a recording without its words: network (default, best for the talker's own voice) or linear "
-        "(moves them less, steadier with other voices).",
+        "Recorded speech (any sound or video file) that the lips follow in place of a synthesised voice; most accurate "
+        "if its words are given as text.",
+    )
+    audio_map: str | None = option(
+        None,
+        "Map from sound to lip motion for a recording without a transcript: network (default, most accurate for the "
+        "talker's own voice) or linear (smaller movements, less sensitive to other voices).",
     )
     language: str = option(
         "en-us",
         "Language of the text: a code (en-us, de), a tag (pt-BR, zh-Hans) or a name (German); `tts2face languages` "
-        "lists all. Chinese characters in Japanese need the extra japanese.",
+        "lists all. Chinese characters in Japanese text need the extra japanese.",
     )
     voice: str | None = option(
-        None, "heart (English), espeak or espeak-female (every language), or a Piper voice (x.onnx)."
+        None, "Voice: heart (English), espeak or espeak-female (every language), or a Piper voice (x.onnx)."
     )
-    rate: float = option(1.0, "Speed of speech, 0.5 to 2.")
-    volume: float = option(1.0, "Loudness of the sound, 0 to 2; 1 is -16 LUFS, or a recording as it is.")
-    seed: int = option(0, "The same seed gives the same sound and motion.")
-    dictionary: Path | None = option(None, "Your own pronunciations, which win over the built-in ones.")
-    synthesis: str = option("exemplar", "How lips are made from exemplars: exemplar, or theobald2007 as published.")
-    context: int | None = option(None, "Phones either side by which exemplars are chosen; the method's own without it.")
-    exemplars: int | None = option(None, "Exemplars averaged for each phone; the method's own without it.")
+    rate: float = option(1.0, "Speaking rate as a factor, 0.5 to 2.")
+    volume: float = option(1.0, "Loudness as a factor, 0 to 2; 1 is -16 LUFS, or the original level of a recording.")
+    seed: int = option(0, "Seed of all random numbers; the same seed gives the same sound and motion.")
+    dictionary: Path | None = option(None, "Pronunciation dictionary that takes precedence over the built-in one.")
+    synthesis: str = option("exemplar", "Method of lip synthesis: exemplar, or theobald2007 (the method as published).")
+    context: int | None = option(
+        None, "Number of phones on either side that are compared when exemplars are chosen; default: the method's."
+    )
+    exemplars: int | None = option(None, "Number of exemplars averaged for each phone; default: the method's.")
     fps: float = option(30.0, "Frames per second, 1 to 120.")
     gestures: str = option(
         "fields",
-        "How face and head move with the speech: fields, ju2008 (fields as published), noise (Perlin, for comparison), "
-        "or none (only the lips move).",
+        "Method of gesture synthesis: fields, ju2008 (fields as published), noise (Perlin noise, for comparison), or "
+        "none (only the lips move).",
     )
     style: str | None = option(
-        None, "Style of the gestures: a name, or names by feature (brows=annoyed,head=delighted)."
+        None, "Style of the gestures: one name, or one for each feature (brows=annoyed,head=delighted)."
     )
     gain: str | None = option(
-        None, "How far features move, 0 to 3: head=1.5,blink=0.8; jaw and lips too; all for every gesture."
+        None, "Gain of each feature's motion, 0 to 3: head=1.5,blink=0.8; jaw and lips too; all sets every gesture."
     )
     expression: str | None = option(
         None,
-        "Expressions added (sad, happy, afraid, angry, surprised), with weight and seconds: happy=0.6@1.2-3.4,sad=0.3.",
+        "Expressions to add (sad, happy, afraid, angry, surprised) with weights and times in seconds: "
+        "happy=0.6@1.2-3.4,sad=0.3.",
     )
-    timeline: Path | None = option(None, "A JSON file with styles, expressions, nods and gains over time.")
-    pitch: bool = option(False, "Gestures follow the pitch of the voice, not only its loudness.")
-    idle: float | None = option(None, "Seconds of a living, silent face, in place of a text.")
+    timeline: Path | None = option(None, "JSON file with styles, expressions, nods and gains over time.")
+    pitch: bool = option(False, "Gestures follow the pitch of the voice in addition to its loudness.")
+    idle: float | None = option(None, "Seconds of idle animation instead of speech.")
 
     @property
     def has_gestures(self) -> bool:
-        """Whether face and head move beside the lips."""
+        """Whether gestures are added to the lip motion."""
         return self.gestures != "none"
 
     def __post_init__(self) -> None:
-        """Refuse numbers outside their range."""
+        """Reject numbers outside their range and options that exclude each other."""
         from lexicon.languages import language_code
 
         object.__setattr__(self, "language", language_code(self.language))
@@ -98,10 +102,10 @@ class Request:
             raise InputError(f"there is no synthesis {self.synthesis!r}; choose {' or '.join(SYNTHESIS_METHODS)}")
         if self.seed < 0:
             raise InputError(f"seed must be 0 or more, not {self.seed}")
-        if self.drive is not None:
+        if self.audio_map is not None:
             _check_audio_map(self)
         if self.audio is not None and (self.voice is not None or self.rate != 1.0):
-            raise InputError("a recording keeps its own voice and speed; leave --voice and --rate away")
+            raise InputError("--voice and --rate have no effect on a recording; remove them or --audio")
         if self.idle is not None:
             _check_limits("idle", self.idle, IDLE_LIMITS_S)
             _check_idle(self)
@@ -109,12 +113,12 @@ class Request:
 
 
 def _check_audio_map(request: Request) -> None:
-    if request.drive not in AUDIO_MAP_NAMES:
-        raise InputError(f"there is no drive {request.drive!r}; choose {' or '.join(AUDIO_MAP_NAMES)}")
+    if request.audio_map not in AUDIO_MAP_NAMES:
+        raise InputError(f"there is no audio map {request.audio_map!r}; choose {' or '.join(AUDIO_MAP_NAMES)}")
     if request.audio is None:
-        raise InputError("a drive follows a recording; give one with --audio, or leave --drive away")
+        raise InputError("--audio-map needs a recording; add --audio or remove --audio-map")
     if request.text.strip():
-        raise InputError("where the words are known the lips follow them; leave --drive or the text away")
+        raise InputError("--audio-map has no effect if the words are given; remove --audio-map or the text")
 
 
 def _check_gestures(request: Request) -> None:
@@ -122,19 +126,19 @@ def _check_gestures(request: Request) -> None:
         raise InputError(f"gestures must be {', '.join(GESTURES[:-1])} or {GESTURES[-1]}, not {request.gestures!r}")
     if request.gestures == "noise" and request.pitch:
         raise InputError("--pitch has no effect with --gestures noise; remove one of them")
-    asked = (request.style, request.gain, request.expression, request.timeline, request.pitch)
-    if request.gestures == "none" and asked != (None, None, None, None, False):
+    gesture_options = (request.style, request.gain, request.expression, request.timeline, request.pitch)
+    if request.gestures == "none" and gesture_options != (None, None, None, None, False):
         raise InputError(
-            "without gestures there is nothing to style; remove --style, --gain, --expression, --timeline and --pitch, "
+            "--style, --gain, --expression, --timeline and --pitch have no effect with --gestures none; remove them, "
             "or choose --gestures fields"
         )
 
 
 def _check_idle(request: Request) -> None:
     if request.text.strip() or request.audio is not None:
-        raise InputError("an idle face is silent; leave the text and --audio away, or --idle")
+        raise InputError("--idle cannot be combined with text or --audio; remove one of them")
     if (request.voice, request.rate, request.volume) != (None, 1.0, 1.0):
-        raise InputError("an idle face says nothing; leave --voice, --rate and --volume away")
+        raise InputError("--voice, --rate and --volume have no effect with --idle; remove them")
 
 
 def _check_limits(name: str, value: float, limits: tuple[float, float]) -> None:

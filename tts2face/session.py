@@ -1,4 +1,4 @@
-"""The Session: a talker, a face and a palette, loaded once, that turn any number of requests into clips and files."""
+"""The session: a talker, a face and a palette, loaded once, for synthesising any number of clips."""
 
 import threading
 from collections import OrderedDict
@@ -26,19 +26,20 @@ from tts2face.request import Request
 from tts2face.speech.text_fit import TextMismatch
 from tts2face.storage.overwrite import refuse_overwriting
 from tts2face.synthesis.animated_face import AnimatedFace, mesh_face, own_appearance_face
-from tts2face.synthesis.clip_stream import Performers, Piece, pieces
+from tts2face.synthesis.clip_stream import Piece, SynthesisModels, pieces
 from tts2face.synthesis.gesture_layer import GestureLayer
 from tts2face.synthesis.marked_speech import MarkTime
 from tts2face.synthesis.performance import Performance, perform, take_clips
 from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, prepare
 from tts2face.types import Clip, concatenate_clips
-from tts2face.voice.engine import PronunciationMap, Voice, load_voice
+from tts2face.voice.engine import PronunciationMap, Voice
+from tts2face.voice.loading import load_voice
 
 DEFAULT_FIELDS = "fields"
-OWN_FACE = "self"  # the face that the talker's own video shows
-MAX_VOICES = 2  # idle voices by name and language; each keeps some 100 MB
-RENDERERS_KEPT = 2  # by picture; each keeps some 30 MB
-PIECES_AHEAD = 2  # pieces that may wait to be drawn while the next is spoken
+OWN_FACE = "self"  # name of the talker's own face
+MAX_VOICES = 2  # unused voices in memory; about 100 MB each
+MAX_RENDERERS = 2  # renderers in memory, one for each picture; about 30 MB each
+N_PIECES_AHEAD = 2  # pieces synthesised before they are drawn
 
 Progress = Callable[[int, int], None]
 Value = TypeVar("Value")
@@ -46,9 +47,20 @@ Value = TypeVar("Value")
 
 @dataclass(frozen=True, slots=True)
 class WrittenClip:
-    """What a file holds: seconds of sound, frames, and when the named marks of the text are reached.
+    """Summary of a written file.
 
-    ``mismatches`` are words of the text that the recording probably does not say.
+    Parameters
+    ----------
+    seconds
+        Duration of the sound.
+    n_frames
+        Number of video frames.
+    marks
+        Named marks of the text with their times.
+    is_silent
+        Whether the file has no sound.
+    mismatches
+        Words of the text that the recording probably does not contain.
     """
 
     path: Path
@@ -60,29 +72,29 @@ class WrittenClip:
 
 
 class Session:
-    """A talker, a face and a palette that serve many requests.
+    """A talker, a face and a palette for any number of requests.
 
-    Models are loaded once, what a request needs beyond them when it is first needed. All methods may be called from
-    several threads at a time: voices are lent to one request each, everything else is only read. The same request,
-    talker, face, palette and version give the same clip, whatever ran before or runs beside it.
+    Talker and face are loaded by the constructor; palette, voices and renderers at their first use. All methods are
+    thread-safe: a voice is used by one request at a time, and all other models are read-only. The same request, talker,
+    face, palette and version give the same clip, independent of earlier and concurrent requests.
 
     Parameters
     ----------
     talker
-        A shipped talker, a .talker file, or a talker.
+        Name of a shipped talker, path of a .talker file, or a `Talker`.
     face
-        A shipped face, a .face file, a face, or ``"self"`` for the talker's own face.
+        Name of a shipped face, path of a .face file, a `Face`, or ``"self"`` for the talker's own face.
     identity
-        A preset of the face's age, sex and ancestry.
+        Name of a preset of the face's age, sex and ancestry.
     palette
-        A shipped palette, a .palette file, or a palette; None for a face without gestures.
+        Name of a shipped palette, path of a .palette file, or a `Palette`; None for clips without gestures.
 
     Raises
     ------
     InputError
-        There is no such model; the talker has no face of its own to show; the face has no such identity.
+        A model or identity preset does not exist, or the talker has no face of its own.
     DataError
-        A file is damaged, or the face lacks what speech moves.
+        A file is damaged, or the face lacks landmarks or shapes that speech needs.
 
     Examples
     --------
@@ -106,14 +118,14 @@ class Session:
             self._mesh = face if isinstance(face, Face) else load_face(str(face), identity)
         self._palette = palette
         self._lock = threading.RLock()
-        self._kept: dict[Hashable, Any] = {}
+        self._cache: dict[Hashable, Any] = {}
         self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
         self._voices: OrderedDict[Hashable, list[Voice]] = OrderedDict()
-        self._still_face: AnimatedFace = self._prepare_face(None)
+        self._speech_face: AnimatedFace = self._prepare_face(None)
 
     @property
     def palette(self) -> Palette | None:
-        """The styles of the gestures."""
+        """Palette with the styles of the gestures; None for a session without gestures."""
         given = self._palette
         if given is None or isinstance(given, Palette):
             return given
@@ -121,44 +133,46 @@ class Session:
 
     @property
     def mesh(self) -> Face:
-        """The mesh of the face, with the shapes of all channels.
+        """Mesh of the face with the shapes of all channels.
 
         Raises
         ------
         InputError
-            The face is a talker's own, which has no mesh.
+            The face is a talker's own face, which has no mesh.
         """
         return self.face.mesh
 
     @property
     def face(self) -> AnimatedFace:
-        """The face in whose channels clips move; `tts2face.write_clip` draws them on it."""
+        """Face whose channels the clips of this session use; `tts2face.write_clip` draws clips on it."""
         palette = self.palette
-        return self._still_face if palette is None else self._once("face", lambda: self._prepare_face(palette))
+        return self._speech_face if palette is None else self._once("face", lambda: self._prepare_face(palette))
 
     def clip(self, text: str | Request, **options: Any) -> Clip:
-        """The whole clip of a text or request.
+        """Synthesise the whole clip of a text or request.
 
         Parameters
         ----------
         text
-            What to say, or a request with everything.
+            Text to speak, or a complete request.
         options
-            Fields of `Request`, such as ``style="delighted"``.
+            Fields of `Request`, such as ``style="delighted"``; only with a text.
 
         Raises
         ------
         InputError
-            The text is empty or holds something that the voice cannot say, or an option is wrong.
+            The text is empty or contains characters that the voice cannot speak, or an option is invalid.
+        DataError
+            A file of the request is damaged, or the recording is silent or does not contain the words.
         BackendError
             The voice is not installed.
         """
         return concatenate_clips([piece.clip for piece in self.stream(text, **options)])
 
     def stream(self, text: str | Request, **options: Any) -> Iterator[Piece]:
-        """The clip of a text or request piece by piece, in bounded memory; arguments as for `clip`.
+        """Synthesise the clip of a text or request piece by piece, in bounded memory; arguments as for `clip`.
 
-        The clips put together are what `clip` gives.
+        The concatenated clips of the pieces equal the result of `clip`.
         """
         return self._pieces(prepare(request_of(text, options)))
 
@@ -172,18 +186,21 @@ class Session:
         on_piece: Callable[[Piece], None] | None = None,
         **options: Any,
     ) -> WrittenClip:
-        """Speak, animate, draw and encode a text or request into a file.
+        """Synthesise, draw and encode the clip of a text or request into a file.
 
-        The next sentence is spoken while one is drawn.
+        Synthesis and drawing run in parallel, piece by piece.
 
         Parameters
         ----------
+        text
+            As for `clip`.
         out
-            .mp4, .webm, .gif, or a folder of .png. It appears when all is done; after an error nothing is left.
+            .mp4, .webm, .gif, or a folder of .png files. The file appears when it is complete; after an error no
+            partial file remains.
         picture
-            How the clip is drawn; without it, fields of `Picture` may stand among the options.
+            Drawing options; if None, fields of `Picture` may be given among the options.
         on_progress
-            Called with steps drawn, and steps in all: characters of a text, or parts of a recording.
+            Called with the number of steps done and the total: characters of a text, or parts of a recording.
         on_piece
             Called with each piece before it is drawn.
         options
@@ -191,12 +208,12 @@ class Session:
 
         Raises
         ------
-        InputError, BackendError
+        InputError, DataError, BackendError
             As `clip`; or the file cannot be written.
         """
-        of_picture = {name: options.pop(name) for name in _names(Picture) if name in options and picture is None}
+        picture_options = {name: options.pop(name) for name in _names(Picture) if name in options and picture is None}
         prepared = prepare(request_of(text, options))
-        picture = picture or Picture(**of_picture)
+        picture = picture or Picture(**picture_options)
         check_output(out)
         refuse_overwriting({"out": out}, input_paths(prepared.request, picture))
         renderer = self.renderer(picture, has_gestures=prepared.request.has_gestures)
@@ -205,10 +222,10 @@ class Session:
         mismatches: list[TextMismatch] = []
         seconds, n_frames = 0.0, 0
         with (
-            Prefetch(self._pieces(prepared), PIECES_AHEAD) as spoken,
-            ClipWriter(out, renderer, on_progress=progress.drawn) as writer,
+            Prefetch(self._pieces(prepared), N_PIECES_AHEAD) as synthesised,
+            ClipWriter(out, renderer, on_progress=progress.report_frames) as writer,
         ):
-            for piece in spoken:
+            for piece in synthesised:
                 if on_piece:
                     on_piece(piece)
                 progress.begin(piece.n_steps, n_frames)
@@ -228,12 +245,16 @@ class Session:
         picture: Picture | None = None,
         stages: Callable[[str], Progress] | None = None,
     ) -> WrittenClip:
-        """Let a recorded person drive the session's face, and write the clip into a file.
+        """Transfer a recorded performance to the session's face and write the clip to a file.
 
         Parameters
         ----------
+        performance
+            The video or capture and its options.
+        out, picture
+            As for `write`.
         stages
-            Called with the name of each stage of the work; gives what its progress is reported to.
+            Called with the name of each stage of the work; returns the progress callback of that stage.
 
         Raises
         ------
@@ -242,8 +263,8 @@ class Session:
         """
         check_output(out)
         picture = picture or Picture()
-        self._still_face.renderer(picture)  # refuses what cannot be drawn before the take is watched
-        take = perform(performance, self._still_face, on_progress=stages("watching") if stages else None)
+        self._speech_face.renderer(picture)  # rejects invalid options before the video is tracked
+        take = perform(performance, self._speech_face, on_progress=stages("tracking") if stages else None)
         n_frames = len(take.motion.face)
         draw = stages("drawing") if stages else None
         clips = take_clips(take.motion, take.sound)
@@ -252,11 +273,11 @@ class Session:
         return WrittenClip(Path(out), take.seconds, n_frames, is_silent=not len(take.sound.samples))
 
     def renderer(self, picture: Picture, *, has_gestures: bool = True) -> FrameRenderer:
-        """What draws the session's face into pictures of a kind; the last `RENDERERS_KEPT` of them are kept."""
+        """Renderer of the session's face for drawing options; the last `MAX_RENDERERS` renderers are cached."""
         face, key = self._face(has_gestures), (picture, has_gestures)
         with self._lock:
             if key not in self._renderers:
-                while len(self._renderers) >= RENDERERS_KEPT:
+                while len(self._renderers) >= MAX_RENDERERS:
                     self._renderers.popitem(last=False)
                 self._renderers[key] = face.renderer(picture)
             return self._renderers[key]
@@ -266,23 +287,23 @@ class Session:
         face = self._face(request.has_gestures)
         palette = self.palette if request.has_gestures else None
         layer = None if palette is None else GestureLayer(prepared, self._fields(palette, request), face)
-        own = read_dictionary(request.dictionary).entries if request.dictionary else {}
+        dictionary = read_dictionary(request.dictionary).entries if request.dictionary else {}
 
-        def lent_voice(name: str | None, language: str) -> AbstractContextManager[Voice]:
-            return self._lent_voice(name, language, own)
+        def borrow_voice(name: str | None, language: str) -> AbstractContextManager[Voice]:
+            return self._borrow_voice(name, language, dictionary)
 
-        performers = Performers(self.talker, self._exemplars, face, lent_voice)
-        return pieces(prepared, performers, layer)
+        models = SynthesisModels(self.talker, self._exemplars, face, borrow_voice)
+        return pieces(prepared, models, layer)
 
     def _face(self, has_gestures: bool) -> AnimatedFace:
-        return self.face if has_gestures else self._still_face
+        return self.face if has_gestures else self._speech_face
 
     @property
     def _exemplars(self) -> ExemplarModel:
         return self._once("exemplars", lambda: build_exemplar_model(self.talker))
 
     def _fields(self, palette: Palette, request: Request) -> GestureFields:
-        method = request.gestures if request.gestures in FIELD_OPTIONS else DEFAULT_FIELDS  # noise uses no options
+        method = request.gestures if request.gestures in FIELD_OPTIONS else DEFAULT_FIELDS  # noise has no options
         key = ("fields", method, request.pitch)
         return self._once(key, lambda: GestureFields(palette, FIELD_OPTIONS[method], with_pitch=request.pitch))
 
@@ -292,21 +313,21 @@ class Session:
         return mesh_face(self.talker, self._exemplars, self._mesh, palette)
 
     def _once(self, key: Hashable, make: Callable[[], Value]) -> Value:
-        """What was made under a key, made now if it is the first time; by one thread only."""
+        """Cached value of a key, computed at the first call by one thread only."""
         with self._lock:
-            if key not in self._kept:
-                self._kept[key] = make()
-            kept: Value = self._kept[key]
-            return kept
+            if key not in self._cache:
+                self._cache[key] = make()
+            value: Value = self._cache[key]
+            return value
 
     @contextmanager
-    def _lent_voice(self, name: str | None, language: str, own: PronunciationMap) -> Iterator[Voice]:
-        """A voice for the time of a request, used by nobody else; loading one takes half a second."""
-        key = (name, language, frozenset(own.items()))
+    def _borrow_voice(self, name: str | None, language: str, dictionary: PronunciationMap) -> Iterator[Voice]:
+        """A voice for exclusive use within a ``with`` block; loading one takes half a second."""
+        key = (name, language, frozenset(dictionary.items()))
         with self._lock:
-            idle = self._voices.get(key)
-            voice = idle.pop() if idle else None
-        voice = voice or load_voice(name, language, own)
+            unused = self._voices.get(key)
+            voice = unused.pop() if unused else None
+        voice = voice or load_voice(name, language, dictionary)
         try:
             yield voice
         finally:
@@ -321,12 +342,12 @@ class Session:
 
 
 def request_of(text: str | Request, options: dict[str, Any]) -> Request:
-    """The request of a text and options by name.
+    """Build the request of a text and options by name.
 
     Raises
     ------
     InputError
-        There is no such option, or options stand beside a whole request.
+        An option does not exist, or options are given together with a complete request.
     """
     known = _names(Request)
     for name in options:
@@ -335,7 +356,7 @@ def request_of(text: str | Request, options: dict[str, Any]) -> Request:
     if isinstance(text, Request):
         if options:
             raise InputError(
-                f"the option {next(iter(options))!r} stands beside a whole request; put it into the request"
+                f"the option {next(iter(options))!r} cannot be given with a complete request; set it in the request"
             )
         return text
     return Request(text=text, **options)
@@ -346,24 +367,24 @@ def _names(options: type) -> tuple[str, ...]:
 
 
 class _Steps:
-    """Progress in steps of a request, while the frames of its pieces are drawn."""
+    """Converts the number of drawn frames into steps of a request."""
 
-    def __init__(self, of: int, on_progress: Progress | None) -> None:
-        self._of, self._on_progress = of, on_progress
-        self._before = self._length = self._frames_before = 0
+    def __init__(self, n_steps: int, on_progress: Progress | None) -> None:
+        self._n_steps, self._on_progress = n_steps, on_progress
+        self._steps_before = self._piece_steps = self._frames_before = 0
 
     def begin(self, n_steps: int, n_frames_before: int) -> None:
-        """The next piece begins, behind so many frames."""
-        self._before += self._length
-        self._length, self._frames_before = n_steps, n_frames_before
+        """Start a piece of `n_steps` steps that follows `n_frames_before` frames."""
+        self._steps_before += self._piece_steps
+        self._piece_steps, self._frames_before = n_steps, n_frames_before
 
-    def drawn(self, done: int, given: int) -> None:
-        """So many frames are drawn, of those given to the writer so far."""
+    def report_frames(self, n_drawn: int, n_submitted: int) -> None:
+        """Report the frames drawn, out of those passed to the writer so far."""
         if self._on_progress:
-            share = (done - self._frames_before) / max(given - self._frames_before, 1)
-            self._on_progress(min(self._of, int(self._before + self._length * share)), self._of)
+            share = (n_drawn - self._frames_before) / max(n_submitted - self._frames_before, 1)
+            self._on_progress(min(self._n_steps, int(self._steps_before + self._piece_steps * share)), self._n_steps)
 
     def finish(self) -> None:
-        """All is drawn."""
+        """Report that all steps are done."""
         if self._on_progress:
-            self._on_progress(self._of, self._of)
+            self._on_progress(self._n_steps, self._n_steps)

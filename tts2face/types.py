@@ -1,4 +1,4 @@
-"""What flows between the rooms: sound, motion and the clip that joins them on one clock.
+"""Data types shared by all packages: waveform, trajectory, speech and clip.
 
 Units: seconds, millimetres, radians. Frame i is the instant i / fps.
 """
@@ -17,14 +17,15 @@ HEAD_CHANNELS = ("pitch", "yaw", "roll", "x", "y", "z")  # radians (nod down, tu
 
 
 def frame_count(duration_s: float, fps: float) -> int:
-    """Fewest frames whose time covers a duration; at least one. The only place where seconds become frames.
+    """Smallest number of frames that covers a duration in seconds, at least 1.
 
-    A duration is a whole number of samples: up to a hundredth of a frame beyond a frame's end counts as rounding.
+    All conversions from seconds to frame counts use this function. An excess of up to 0.01 frames counts as rounding,
+    since durations are multiples of the sampling interval.
     """
     return max(1, math.ceil(duration_s * fps - 0.01))
 
 
-def _read_only(values: ArrayLike, what: str, ndim: int) -> NDArray[np.float32]:
+def _checked_read_only(values: ArrayLike, what: str, ndim: int) -> NDArray[np.float32]:
     array = np.array(values, dtype=np.float32)
     if array.ndim != ndim:
         raise InputError(f"{what} must have {ndim} dimension(s), not shape {array.shape}")
@@ -36,13 +37,26 @@ def _read_only(values: ArrayLike, what: str, ndim: int) -> NDArray[np.float32]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Waveform:
-    """Mono sound: samples (n,) float32 in [-1, 1] at `rate` Hz."""
+    """Mono sound.
+
+    Parameters
+    ----------
+    samples : (n,)
+        Finite float32 values in [-1, 1].
+    rate
+        Sample rate in Hz.
+
+    Raises
+    ------
+    InputError
+        The samples are not a finite vector in [-1, 1], or the rate is not above 0.
+    """
 
     samples: NDArray[np.float32]
     rate: int
 
     def __init__(self, samples: ArrayLike, rate: int) -> None:
-        locked = _read_only(samples, "samples", 1)
+        locked = _checked_read_only(samples, "samples", 1)
         if rate <= 0:
             raise InputError(f"a waveform's rate must be above 0 Hz, not {rate}")
         if locked.size and float(np.abs(locked).max()) > 1.0:
@@ -52,20 +66,35 @@ class Waveform:
 
     @property
     def duration(self) -> float:
-        """Seconds."""
+        """Duration in seconds."""
         return len(self.samples) / self.rate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
-    """Named channels over time: values (T, D) float32; row i is the instant i / fps."""
+    """Named channels over time.
+
+    Parameters
+    ----------
+    channels
+        D different names.
+    values : (T, D)
+        Finite float32 values; row i belongs to the time i / fps.
+    fps
+        Frames per second.
+
+    Raises
+    ------
+    InputError
+        The values are not a finite matrix with one column for each channel, names repeat, or `fps` is not above 0.
+    """
 
     channels: tuple[str, ...]
     values: NDArray[np.float32]
     fps: float
 
     def __init__(self, channels: Sequence[str], values: ArrayLike, fps: float) -> None:
-        locked = _read_only(values, "trajectory values", 2)
+        locked = _checked_read_only(values, "trajectory values", 2)
         if len(set(channels)) != len(channels):
             raise InputError("trajectory channels must have different names")
         if locked.shape[1] != len(channels):
@@ -77,15 +106,20 @@ class Trajectory:
         object.__setattr__(self, "fps", float(fps))
 
     def __len__(self) -> int:
-        """Count the frames."""
+        """Return the number of frames."""
         return len(self.values)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Speech:
-    """A voice's answer: sound, the phones it consists of, and the words they belong to.
+    """Synthesised or recorded speech: sound with its phones and words.
 
-    ``phones`` starts at 0 and its last edge is the length of the sound to the sample.
+    ``phones`` starts at 0 s and ends at the duration of the sound, exact to half a sample.
+
+    Raises
+    ------
+    InputError
+        The phones do not cover the sound, or a word reaches beyond the last phone.
     """
 
     waveform: Waveform
@@ -93,7 +127,7 @@ class Speech:
     words: tuple[WordSpan, ...]
 
     def __post_init__(self) -> None:
-        """Refuse phones that do not cover the sound exactly, and words beyond the phones."""
+        """Reject phones that do not cover the sound exactly, and words beyond the phones."""
         if self.phones.start != 0.0 or abs(self.phones.end - self.waveform.duration) > 0.5 / self.waveform.rate:
             raise InputError(
                 f"phones cover {self.phones.start}-{self.phones.end} s but the sound lasts {self.waveform.duration} s"
@@ -104,7 +138,7 @@ class Speech:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clip:
-    """A talking face on one clock.
+    """Motion, head pose and speech of a face on a common time axis.
 
     Parameters
     ----------
@@ -113,7 +147,12 @@ class Clip:
     head : (T, 6)
         `HEAD_CHANNELS`, relative to the face at rest.
     speech
-        Sound, phones and words; the T frames cover the sound and end within one frame of it.
+        Sound, phones and words; the T frames cover the sound and exceed it by less than one frame.
+
+    Raises
+    ------
+    InputError
+        The parts differ in frame rate or length, or the head pose has other channels.
     """
 
     motion: Trajectory
@@ -121,7 +160,7 @@ class Clip:
     speech: Speech
 
     def __post_init__(self) -> None:
-        """Refuse parts that are not on one clock."""
+        """Reject parts that differ in frame rate or length."""
         if self.head.channels != HEAD_CHANNELS:
             raise InputError(f"head pose needs the channels {HEAD_CHANNELS}, not {self.head.channels}")
         if (len(self.motion), self.motion.fps) != (len(self.head), self.head.fps):
@@ -137,10 +176,16 @@ class Clip:
 
 
 def concatenate_speech(parts: Sequence[Speech]) -> Speech:
-    """Speech put one behind the other, at one sample rate."""
+    """Concatenate speech in time.
+
+    Raises
+    ------
+    InputError
+        The sample rates differ.
+    """
     rate = parts[0].waveform.rate
     if any(part.waveform.rate != rate for part in parts):
-        raise InputError("speech is joined at one sample rate only; resample it first")
+        raise InputError("speech of different sample rates cannot be concatenated; resample it first")
     phones, words = concatenate_phones([part.phones for part in parts], [part.words for part in parts])
     samples = np.concatenate([part.waveform.samples for part in parts])
     edges = phones.edges.copy()
@@ -149,7 +194,7 @@ def concatenate_speech(parts: Sequence[Speech]) -> Speech:
 
 
 def concatenate_clips(clips: Sequence[Clip]) -> Clip:
-    """Clips put one behind the other; all but the last must end on a frame, as `tts2face.api.stream` makes them."""
+    """Concatenate clips in time; all but the last must end on a frame, as those of `Session.stream` do."""
     first = clips[0]
     motion = np.concatenate([clip.motion.values for clip in clips])
     head = np.concatenate([clip.head.values for clip in clips])

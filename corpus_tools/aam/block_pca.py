@@ -1,4 +1,4 @@
-"""Principal components of more rows than fit into memory, block by block."""
+"""Incremental principal component analysis of data larger than memory."""
 
 from dataclasses import dataclass, field
 
@@ -10,14 +10,14 @@ Floats = NDArray[np.float32]
 
 @dataclass(slots=True)
 class IncrementalPca:
-    """Principal components that grow with the data; memory does not depend on the number of rows.
+    """Incremental principal components; memory does not depend on the number of rows.
 
     Sequential Karhunen-Loeve (Levey and Lindenbaum 2000), with the mean of Ross et al. 2008.
 
     Parameters
     ----------
     n_kept
-        Components that are carried from block to block; those that are used should be fewer.
+        Components kept between blocks; use fewer of them.
     """
 
     n_kept: int
@@ -28,7 +28,7 @@ class IncrementalPca:
     total_variance: float = 0.0
 
     def add(self, rows: NDArray[np.floating]) -> None:
-        """Take in (B, D) more rows."""
+        """Update with (B, D) rows."""
         rows = np.asarray(rows, np.float32)
         n_new = len(rows)
         if not n_new:
@@ -56,7 +56,7 @@ class IncrementalPca:
         deviations: NDArray[np.float64] = self.singular_values / np.sqrt(max(self.n_rows, 1))
         return deviations
 
-    def explained(self) -> NDArray[np.float64]:
+    def explained_variance(self) -> NDArray[np.float64]:
         """(K,) share of the variance in the first 1, 2, ... components."""
         shares: NDArray[np.float64] = np.cumsum(self.singular_values**2) / max(self.total_variance, 1e-300)
         return shares

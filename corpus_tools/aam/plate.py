@@ -1,4 +1,4 @@
-"""The plate: which stretch of the talker's video is drawn on, and the stretch as a small film."""
+"""The plate: selection and encoding of the part of a talker's video on which pictures are drawn."""
 
 import io
 from collections.abc import Iterator, Sequence
@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from tts2face.models.landmarks import CHIN, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 
-MAX_PLATE_FRAMES = 250  # frames; a film that goes to and fro hides its length
+MAX_PLATE_FRAMES = 250  # frames; played forwards and backwards its length is not noticeable
 NEAR_LOSSLESS = {"crf": "8", "preset": "slow"}
 
 
 def choose_plate_frames(points: Sequence[NDArray[np.float32]]) -> tuple[int, int, int]:
-    """The recording with the stillest mouth, and the range of its frames, of (T, N, 2) landmarks of each."""
+    """Index of the recording with the least mouth motion and its range of frames, from landmarks (T, N, 2) of each."""
 
     def unrest(places: NDArray[np.float32]) -> float:
         gap = np.linalg.norm(places[:, UPPER_LIP_INNER_MID] - places[:, LOWER_LIP_INNER_MID], axis=1)
@@ -29,7 +29,7 @@ def choose_plate_frames(points: Sequence[NDArray[np.float32]]) -> tuple[int, int
 
 
 def encode_plate_video(pictures: Iterator[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-    """The bytes of an MP4 film of (H, W, 3) pictures; odd sides lose their last row or column."""
+    """Bytes of an MP4 video of (H, W, 3) pictures; odd sides lose their last row or column."""
     import av
 
     first = next(pictures)

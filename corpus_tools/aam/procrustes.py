@@ -1,16 +1,16 @@
-"""Shapes brought to one place, size and turn: similarity Procrustes analysis (T07 section 2, before eq. 1)."""
+"""Similarity Procrustes analysis of shapes (T07 section 2, before eq. 1)."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-N_ROUNDS = 5  # the mean stands still to 1e-4 px after three
+N_ROUNDS = 5  # the mean changes by less than 1e-4 px after three
 Floats = NDArray[np.float64]
 
 
 def fit_similarities(
     shapes: NDArray[np.floating], target: NDArray[np.floating]
 ) -> tuple[NDArray[np.complex128], Floats]:
-    """Similarity transforms that bring shapes nearest to a target, least squares over the points.
+    """Least-squares similarity transforms from shapes to a target.
 
     Parameters
     ----------
@@ -38,8 +38,8 @@ def apply_similarities(shapes: NDArray[np.floating], turns: NDArray[np.complex12
 def align_shapes(shapes: NDArray[np.floating]) -> tuple[Floats, Floats]:
     """(T, N, 2) shapes aligned with their mean, and the mean (N, 2), of the mean size of the shapes.
 
-    Generalised Procrustes analysis (Goodall 1991): the mean keeps the place, size and turn of the mean of the shapes as
-    they are given.
+    Generalised Procrustes analysis (Goodall 1991); the mean keeps position, size and rotation of the arithmetic mean of
+    the shapes.
     """
     mean = shapes.mean(axis=0, dtype=np.float64)
     anchor = mean

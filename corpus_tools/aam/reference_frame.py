@@ -1,4 +1,4 @@
-"""The reference frame of a texture: its points, triangles and pixels, and pictures warped to it."""
+"""Reference frame of a texture: points, triangles and pixels, and warping of pictures to it."""
 
 from dataclasses import dataclass
 
@@ -27,7 +27,7 @@ class ReferenceFrame:
     weights: NDArray[np.float32]
 
     def texture(self, picture: NDArray[np.uint8], points: NDArray[np.floating]) -> NDArray[np.float32]:
-        """(P, 3) texture of an (H, W, 3) picture whose (N, 2) points are these, warped piece by piece."""
+        """(P, 3) texture of an (H, W, 3) picture with landmarks (N, 2), by piecewise-affine warping."""
         texture = np.zeros((len(self.pixels), 3), np.float32)
         sample_triangles(picture, np.asarray(points, np.float64), self.corners, self.weights, texture)
         return texture
@@ -71,7 +71,7 @@ def rasterise_triangles(
 
 
 def barycentric_coordinates(places: NDArray[np.floating], corners: Floats) -> Floats:
-    """(P, 3) barycentric coordinates of (P, 2) places in a triangle (3, 2); a flat one holds nothing."""
+    """(P, 3) barycentric coordinates of (P, 2) places in a triangle (3, 2); a degenerate triangle contains no point."""
     a, b, c = corners
     across, along, off = b - a, c - a, places - a
     area = across[0] * along[1] - across[1] * along[0]

@@ -1,4 +1,4 @@
-"""What an appearance model is learnt from: recordings with their pictures, and where the landmarks lie in them."""
+"""Training recordings of an appearance model, with pictures and landmarks."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from tts2face.video.media import read_frames
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AppearanceRecording:
-    """One recording as an appearance model needs it.
+    """One training recording of an appearance model.
 
     ``points`` (T, 478, 2) pixels and ``landmarks`` (T, 478, 3) mm; frame i is the instant ``begin + i / fps`` of the
     video; ``shape`` (T, M) are parameters of the talker's shape model.
@@ -49,9 +49,9 @@ class AppearanceRecording:
 
 
 def build_appearance_recording(
-    observation: Observation, shape: NDArray[np.float32], eyes: CachedTracker
+    observation: Observation, shape: NDArray[np.float32], tracker: CachedTracker
 ) -> AppearanceRecording:
-    """A recording that was observed, with its landmarks in the picture; tracking comes from the cache.
+    """An observed recording with its landmarks in the picture; tracking is read from the cache.
 
     Parameters
     ----------
@@ -61,9 +61,9 @@ def build_appearance_recording(
     Raises
     ------
     DataError
-        The video cannot be read any more.
+        The video can no longer be read.
     """
-    seen = eyes.track(observation.video)
+    seen = tracker.track(observation.video)
     points, first = resample_to_grid(seen.tracking.points, seen.times, seen.fps)
     begin = observation.quality.cut
     start = round(begin * seen.fps) - first

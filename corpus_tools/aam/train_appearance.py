@@ -1,4 +1,4 @@
-"""An appearance model learnt from tracked recordings (T07 section 2, eqs 1 and 2), in memory that does not grow."""
+"""Training of an appearance model from tracked recordings (T07 section 2, eqs 1 and 2) in bounded memory."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.aam.block_pca import IncrementalPca
-from corpus_tools.aam.lighting import LightingCorrection, fit_lighting
 from corpus_tools.aam.mesh import MOUTH_LANDMARKS, N_MESH_LANDMARKS, face_ring, face_triangles, mouth_triangles
 from corpus_tools.aam.plate import choose_plate_frames, encode_plate_video
 from corpus_tools.aam.procrustes import align_shapes
@@ -26,20 +25,52 @@ from tts2face.models.landmarks import (
     UPPER_LIP_INNER_MID,
 )
 
+GAIN_LIMITS = (0.5, 2.0)  # beyond them it is another scene, not another light
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LightingCorrection:
+    """``texture in the reference's light = gain * texture + offset``, each (3,)."""
+
+    gain: Floats
+    offset: Floats
+
+    def apply(self, texture: Floats) -> Floats:
+        """(P, 3) a texture in the reference's light."""
+        return self.gain * texture + self.offset
+
+
+def fit_lighting(texture: Floats, reference: Floats, still: NDArray[np.bool_]) -> LightingCorrection:
+    """The light of a recording whose mean texture (P, 3) this is, by least squares on the pixels that speech leaves.
+
+    Parameters
+    ----------
+    still : (P,)
+        Pixels to compare.
+    """
+    here, there = texture[still].astype(np.float64), reference[still].astype(np.float64)
+    centred = here - here.mean(axis=0)
+    gain = (centred * (there - there.mean(axis=0))).sum(axis=0) / np.maximum((centred**2).sum(axis=0), 1e-9)
+    gain = np.clip(gain, *GAIN_LIMITS)
+    offset = there.mean(axis=0) - gain * here.mean(axis=0)
+    return LightingCorrection(gain.astype(np.float32), offset.astype(np.float32))
+
+
 N_REFERENCE_SHAPES = 4000  # frames from which the reference shape is made
-OPEN_LIP_QUANTILE = 0.9  # the reference is the mean of the frames whose lips stand further apart than in this share
-MIN_OPEN_GAP = 0.03  # of the eye distance: the inner mouth is seen from here on
-TEXTURE_STRIDE = 3  # of the frames from which textures are learnt; neighbours hardly differ
-BLOCK_FRAMES = 128  # frames that are learnt from at a time
-N_SPARE_COMPONENTS = 20  # components carried beyond those that are kept
-MAX_STILL_WEIGHT = 0.02  # pixels that speech changes by less show the light
-N_LIGHTING_FRAMES = 25  # from which a recording's light is read
-N_SMOOTHINGS = 4  # rounds by which the edge of what speech changes is softened over the mesh
+OPEN_LIP_QUANTILE = 0.9  # the reference is the mean of the frames with lip gaps above this quantile
+MIN_OPEN_GAP = 0.03  # of the eye distance, from which the inner mouth is visible
+TEXTURE_STRIDE = 3  # of training frames; neighbouring frames hardly differ
+BLOCK_FRAMES = 128  # frames per block of the incremental PCA
+N_SPARE_COMPONENTS = 20  # extra components during the incremental PCA
+MAX_STILL_WEIGHT = 0.02  # pixels with less change by speech are used to estimate lighting
+N_LIGHTING_FRAMES = 25  # from which a recording's lighting is estimated
+N_SMOOTHINGS = 4  # smoothing steps of the speech weights over the mesh
 
 
 @dataclass(frozen=True, slots=True)
 class TextureOptions:
-    """How large the textures are, and how many components are kept."""
+    """Sizes of the textures and numbers of components."""
 
     side: int = 128
     modes: int = 40
@@ -49,17 +80,17 @@ class TextureOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LearnedAppearance:
-    """An appearance and how it was learnt.
+    """An appearance model and results of its training.
 
-    ``frames`` and ``lights`` are those of the textures, ``looks`` (T, A + B) of every recording in turn, ``explained``
-    the share of the variance in the first 1, 2, ... modes of the face and of the mouth.
+    ``frames`` and ``lights`` belong to the textures; ``parameters`` holds the appearance parameters (T, A + B) of each
+    recording; ``explained_variance`` the share of the variance in the first 1, 2, ... modes of the face and the mouth.
     """
 
     appearance: Appearance
     frames: tuple[ReferenceFrame, ReferenceFrame]
     lights: "LightingReference"
-    looks: tuple[NDArray[np.float32], ...]
-    explained: tuple[NDArray[np.float64], NDArray[np.float64]]
+    parameters: tuple[NDArray[np.float32], ...]
+    explained_variance: tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 def learn_appearance(
@@ -68,7 +99,7 @@ def learn_appearance(
     *,
     on_progress: Progress | None = None,
 ) -> LearnedAppearance:
-    """Texture models of the face and of the inner mouth, the plate, and the looks of every frame.
+    """Texture models of the face and of the inner mouth, the plate, and the appearance parameters of every frame.
 
     Raises
     ------
@@ -93,14 +124,16 @@ def learn_appearance(
         _build_texture_model(frames[0], grown[0], options.modes, "the face"),
         _build_texture_model(frames[1], grown[1], options.mouth_modes, "the inside of the mouth"),
     )
-    looks = []
+    parameters = []
     for number, (recording, light) in enumerate(zip(recordings, found, strict=True)):
-        looks.append(appearance_parameters(recording, frames, light, models))
+        parameters.append(appearance_parameters(recording, frames, light, models))
         if on_progress:
             on_progress(len(recordings) + number + 1, steps)
-    plate = _build_plate(recordings, stretch, looks, models[0].n_modes)
+    plate = _build_plate(recordings, stretch, parameters, models[0].n_modes)
     appearance = Appearance(models[0], models[1], np.array(MOUTH_LANDMARKS, np.int32), moving, plate)
-    return LearnedAppearance(appearance, frames, lights, tuple(looks), (grown[0].explained(), grown[1].explained()))
+    return LearnedAppearance(
+        appearance, frames, lights, tuple(parameters), (grown[0].explained_variance(), grown[1].explained_variance())
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,9 +191,9 @@ def _add_textures(
     for number, picture in enumerate(recording.pictures()):
         points = recording.points[number]
         if number % TEXTURE_STRIDE == 0:
-            faces.append(light.removed(frames[0].texture(picture, points)).ravel())
+            faces.append(light.apply(frames[0].texture(picture, points)).ravel())
         if gaps[number] >= MIN_OPEN_GAP:
-            mouths.append(light.removed(frames[1].texture(picture, points[list(MOUTH_LANDMARKS)])).ravel())
+            mouths.append(light.apply(frames[1].texture(picture, points[list(MOUTH_LANDMARKS)])).ravel())
         for rows, components in ((faces, grown[0]), (mouths, grown[1])):
             if len(rows) >= BLOCK_FRAMES:
                 components.add(np.array(rows))
@@ -172,7 +205,7 @@ def _add_textures(
 
 def _build_texture_model(frame: ReferenceFrame, grown: IncrementalPca, n_modes: int, what: str) -> TextureModel:
     if len(grown.basis) < n_modes:
-        raise InputError(f"{grown.n_rows} pictures of {what} have no {n_modes} modes; record more, or ask for fewer")
+        raise InputError(f"{grown.n_rows} pictures of {what} have no {n_modes} modes; record more, or request fewer")
     n_pixels = len(frame.pixels)
     return TextureModel(
         reference=frame.points,
@@ -191,21 +224,21 @@ def appearance_parameters(
     light: LightingCorrection,
     models: tuple[TextureModel, TextureModel],
 ) -> NDArray[np.float32]:
-    """(T, A + B) looks of a recording; where the lips hide the mouth, its looks go straight from before to behind."""
+    """(T, A + B) appearance parameters of a recording; those of a hidden mouth are interpolated linearly."""
     face, mouth = frames
     n_frames, n_face = len(recording.points), models[0].n_modes
-    looks = np.zeros((n_frames, n_face + models[1].n_modes), np.float32)
+    parameters = np.zeros((n_frames, n_face + models[1].n_modes), np.float32)
     seen = normalised_lip_gap(recording.points) >= MIN_OPEN_GAP
     for number, picture in enumerate(recording.pictures()):
         points = recording.points[number]
-        looks[number, :n_face] = models[0].parameters(light.removed(face.texture(picture, points))[None])[0]
+        parameters[number, :n_face] = models[0].parameters(light.apply(face.texture(picture, points))[None])[0]
         if seen[number]:
-            inner = light.removed(mouth.texture(picture, points[list(MOUTH_LANDMARKS)]))
-            looks[number, n_face:] = models[1].parameters(inner[None])[0]
+            inner = light.apply(mouth.texture(picture, points[list(MOUTH_LANDMARKS)]))
+            parameters[number, n_face:] = models[1].parameters(inner[None])[0]
     if seen.any():
-        for column in range(n_face, looks.shape[1]):
-            looks[:, column] = np.interp(np.arange(n_frames), np.flatnonzero(seen), looks[seen, column])
-    return looks
+        for column in range(n_face, parameters.shape[1]):
+            parameters[:, column] = np.interp(np.arange(n_frames), np.flatnonzero(seen), parameters[seen, column])
+    return parameters
 
 
 def speech_weights(face: ReferenceFrame) -> NDArray[np.float32]:
@@ -228,7 +261,7 @@ def speech_weights(face: ReferenceFrame) -> NDArray[np.float32]:
 def _build_plate(
     recordings: Sequence[AppearanceRecording],
     stretch: tuple[int, int, int],
-    looks: Sequence[NDArray[np.float32]],
+    parameters: Sequence[NDArray[np.float32]],
     n_face: int,
 ) -> Plate:
     number, first, last = stretch
@@ -239,7 +272,7 @@ def _build_plate(
         points=np.concatenate([points, face_ring(points)], axis=1).astype(np.float32),
         axes=camera_axes(recording.points[here], recording.landmarks[here]),
         shape=recording.shape[here],
-        looks=looks[number][here, :n_face],
+        looks=parameters[number][here, :n_face],
     )
 
 

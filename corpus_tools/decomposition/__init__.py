@@ -1,1 +1,1 @@
-"""Recordings taken apart: head pose, weights of basis expressions, and what each region of the face does besides."""
+"""Decomposition of recordings into head pose, weights of basis expressions, and independent motion of regions."""

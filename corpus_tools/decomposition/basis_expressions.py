@@ -1,4 +1,4 @@
-"""Basis expressions B_i of a person (Ju and Lee 2008, Fig. 4): carried over from a face that has them, or captured."""
+"""Basis expressions B_i of a person (Ju and Lee 2008, Fig. 4): transferred from a face that has them, or captured."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class ExpressionBasis:
 def transfer_basis(
     expressions: NDArray[np.floating], face_rest: NDArray[np.floating], rest: NDArray[np.floating]
 ) -> ExpressionBasis:
-    """Expressions of one face as another person would show them.
+    """Expressions of one face transferred to a person.
 
     Parameters
     ----------
@@ -48,12 +48,12 @@ def transfer_basis(
     Raises
     ------
     InputError
-        A shape is another.
+        An array has a wrong shape.
 
     Notes
     -----
-    One affine map, of least squares between both faces at rest, carries displacements: it turns them into the person's
-    axes and scales width, height and depth each by itself.
+    Displacements are transformed by the least-squares affine map between the faces at rest, which rotates them into the
+    person's axes and scales width, height and depth separately.
     """
     shapes = (np.shape(expressions), np.shape(face_rest), np.shape(rest))
     if shapes != ((len(EXPRESSIONS), N_LANDMARKS, 3), (N_LANDMARKS, 3), (N_LANDMARKS, 3)):
@@ -68,7 +68,7 @@ def transfer_basis(
 def basis_from_stills(
     stills: Mapping[str, Still], read: Callable[[Still], Floats], *, rest: NDArray[np.floating] | None = None
 ) -> ExpressionBasis:
-    """Expressions that a person was captured with.
+    """Captured expressions of a person.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def basis_from_stills(
     InputError
         A still is missing.
     DataError
-        A still shows no face, or one as the face at rest; or as `read` says.
+        A still shows no face, or no difference from the face at rest; or as `read` says.
     """
     needed = required_stills(stills, is_rest_known=rest is not None)
     own = np.asarray(read(stills[NEUTRAL]) if rest is None else rest, np.float64)
@@ -93,5 +93,5 @@ def basis_from_stills(
     sizes = np.sqrt(np.square(expressions[:, :N_SKIN]).sum(axis=2).mean(axis=1))
     for name, size in zip(EXPRESSIONS, sizes, strict=True):
         if size < MIN_EXPRESSION_MM:
-            raise DataError(f"{stills[name]} shows {name} as the face at rest; capture it stronger")
+            raise DataError(f"{stills[name]} shows no {name} expression; capture a stronger one")
     return ExpressionBasis(own, expressions)

@@ -1,8 +1,8 @@
 """Weights c_i of basis expressions in a face's slow displacement: Ju and Lee 2008, section 4.1, and least squares.
 
-Both estimators obey ``-slack <= c_i <= 1 + slack`` (the paper's epsilon). The paper draws random weights, keeps the
-faces they make in a k-d tree and averages those nearest to the face that is seen; least squares within the same limits
-is the best that any estimator can reach.
+Both estimators obey ``-slack <= c_i <= 1 + slack`` (the paper's epsilon). The paper draws random weights, stores their
+faces in a k-d tree and averages those nearest to the observed face; least squares within the same limits has the
+lowest error of all estimators.
 """
 
 from dataclasses import dataclass
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 N_AVERAGED = 41  # frames at 30 a second, 1.36 s: speech and small gestures average out (Ju and Lee 2008, section 4.1)
 N_SAMPLES, N_NEAREST = 1000, 60  # Ju and Lee 2008, section 4.1
 MAX_SLACK = 1.0  # Ju and Lee 2008, section 4.1
-MIN_CONDITION = 1e-9  # of the largest singular value: expressions nearer to dependent have no weights of their own
-CHUNK_SIZE = 4096  # frames asked at once, to bound memory
+MIN_CONDITION = 1e-9  # of the largest singular value: below it the weights of expressions are not unique
+CHUNK_SIZE = 4096  # frames per query, to bound memory
 
 Floats = NDArray[np.float64]
 
 
 class Estimator(Protocol):
-    """What turns displacements (T, ...) into weights (T, B)."""
+    """Estimator of weights (T, B) from displacements (T, ...)."""
 
     def weights(self, displacements: NDArray[np.floating]) -> Floats:
         """Weights (T, B) of the basis expressions in displacements (T, ...) from the face at rest, in mm."""
@@ -85,7 +85,7 @@ class NearestSamplesEstimator:
     samples : (S, B)
         Random weights c^k within the limits.
     tree
-        Of the faces F_k that they make, in the span of the basis.
+        Of their faces F_k, in the span of the basis.
     n_nearest
         n_k of the paper.
     """
@@ -100,8 +100,8 @@ class NearestSamplesEstimator:
 
         Notes
         -----
-        ``a_k`` is inversely proportional to the distance of F_k in all coordinates: what lies beyond the span is far
-        from every sample alike. The search is exact; the paper's is approximate within a small bound.
+        ``a_k`` is inversely proportional to the distance of F_k in all coordinates; the part beyond the span adds the
+        same squared distance to every sample. The search is exact; the paper's is approximate within a small bound.
         """
         found = np.zeros((len(displacements), self.samples.shape[1]))
         for first in range(0, len(displacements), CHUNK_SIZE):
@@ -137,13 +137,13 @@ def moving_average(motion: NDArray[np.floating], n_frames: int = N_AVERAGED) -> 
 
     Notes
     -----
-    Mirrored, a window keeps its length: windows that shorten towards an end would leave the first frame as it is, lips
-    and all (measured: docs/gestures.md).
+    With mirrored ends all windows have the same length; windows that shorten towards an end would leave the lips of the
+    first frame unsmoothed (docs/gestures.md).
     """
     from scipy.ndimage import uniform_filter1d
 
     if n_frames < 1 or n_frames % 2 == 0 or not len(motion):
-        raise InputError(f"an average needs frames and an odd number of them, not {n_frames} of {len(motion)}")
+        raise InputError(f"a moving average needs frames and an odd number of them, not {n_frames} of {len(motion)}")
     mean: Floats = uniform_filter1d(np.asarray(motion, np.float64), n_frames, axis=0, mode="reflect")
     return mean
 
@@ -173,7 +173,7 @@ def build_nearest_samples_estimator(
     from scipy.spatial import cKDTree
 
     if not 1 <= n_nearest <= n_samples:
-        raise InputError(f"{n_nearest} nearest of {n_samples} samples cannot be found; ask for 1 to {n_samples}")
+        raise InputError(f"{n_nearest} nearest of {n_samples} samples cannot be found; choose 1 to {n_samples}")
     within = reduce_basis(basis, slack)
     samples = generator.uniform(-slack, 1.0 + slack, (n_samples, len(within.rows)))
     return NearestSamplesEstimator(within, samples, cKDTree(samples @ within.rows), n_nearest)
@@ -193,10 +193,10 @@ def reduce_basis(basis: NDArray[np.floating], slack: float = 0.0) -> ReducedBasi
         raise InputError(f"weights may pass their limits by 0 to {MAX_SLACK:g}, not by {slack:g}")
     flat = np.asarray(basis, np.float64).reshape(len(basis), -1)
     if not np.isfinite(flat).all():
-        raise DataError("a basis expression holds values that are no numbers; capture it again")
+        raise DataError("a basis expression contains values that are not finite; capture it again")
     strengths = np.linalg.svd(flat, compute_uv=False)
     if len(flat) > flat.shape[1] or strengths[-1] <= MIN_CONDITION * strengths[0]:
-        raise DataError("the basis expressions depend on each other; capture each as a face of its own")
+        raise DataError("the basis expressions are linearly dependent; capture distinct expressions")
     axes, upper = np.linalg.qr(flat.T)
     return ReducedBasis(np.asarray(axes), np.asarray(upper).T, slack)
 
@@ -204,7 +204,7 @@ def reduce_basis(basis: NDArray[np.floating], slack: float = 0.0) -> ReducedBasi
 def approximation_error(
     displacements: NDArray[np.floating], basis: NDArray[np.floating], weights: NDArray[np.floating]
 ) -> Floats:
-    """(T,) root mean square over landmarks, in mm, of what weights (T, B) leave of displacements (T, L, 3)."""
-    left = np.asarray(displacements, np.float64) - np.tensordot(weights, np.asarray(basis, np.float64), axes=1)
-    error: Floats = np.sqrt(np.square(left).sum(axis=-1).mean(axis=-1))
+    """(T,) root mean square over landmarks, in mm, of the residual of displacements (T, L, 3) for weights (T, B)."""
+    residual = np.asarray(displacements, np.float64) - np.tensordot(weights, np.asarray(basis, np.float64), axes=1)
+    error: Floats = np.sqrt(np.square(residual).sum(axis=-1).mean(axis=-1))
     return error

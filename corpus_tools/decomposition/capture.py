@@ -1,4 +1,4 @@
-"""A recorded face from whichever source, as the decomposition needs it: pose-free landmarks, head pose and sound."""
+"""Recorded face motion from any source as input of the decomposition: pose-free landmarks, head pose and sound."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +13,7 @@ from tts2face.models.palette import FEATURES, GESTURE_FPS
 from tts2face.types import HEAD_CHANNELS, Waveform
 from tts2face.video.media import read_sound
 
-SOUND_SUFFIXES = (".wav", ".flac", ".m4a", ".mp3", ".ogg", ".opus", ".mov", ".mp4")  # looked for beside a capture
+SOUND_SUFFIXES = (".wav", ".flac", ".m4a", ".mp3", ".ogg", ".opus", ".mov", ".mp4")  # of sound files beside a capture
 CHUNK_SIZE = 128  # coordinates resampled at once, to bound memory
 RATE_TOLERANCE_FPS = 1e-6  # frames a second
 
@@ -31,14 +31,14 @@ class FaceRecording:
     head : (T, 6)
         `HEAD_CHANNELS`.
     rest : (478, 3)
-        The face at rest, mm, where the source tells.
+        The face at rest, mm, if the source provides it.
     eyes : (T, 4)
-        Shares by which the left and the right lids are shut, pitch and yaw of the eyes in the head in radians; where
-        the source itself tells them, and they need not be read from landmarks.
+        Closure of the left and the right lids in 0..1, pitch and yaw of the eyes in the head in radians, if the source
+        provides them; otherwise they are computed from landmarks.
     missing
-        Features of `tts2face.models.palette.FEATURES` of which this source tells nothing.
+        Features of `tts2face.models.palette.FEATURES` that the source does not contain.
     notes
-        What was filled in or supposed, a sentence each.
+        Interpolations and assumptions, one sentence each.
     """
 
     name: str
@@ -52,7 +52,7 @@ class FaceRecording:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse landmarks and head poses that do not fit each other, and unknown features."""
+        """Check the shapes of landmarks and head poses, and the names of features."""
         n_frames = len(self.landmarks)
         if self.landmarks.shape != (n_frames, N_LANDMARKS, 3) or self.head.shape != (n_frames, len(HEAD_CHANNELS)):
             raise DataError(
@@ -79,7 +79,7 @@ def resample_to_gesture_rate(captured: FaceRecording) -> FaceRecording:
 
 
 def resample(values: NDArray[np.floating], fps: float, wanted: float) -> Floats:
-    """Values (T, ...) at another frame rate, the first frame staying where it is.
+    """Values (T, ...) at another frame rate, with the first frame at the same instant.
 
     Raises
     ------
@@ -88,12 +88,11 @@ def resample(values: NDArray[np.floating], fps: float, wanted: float) -> Floats:
 
     Notes
     -----
-    Values of the cubic spline through the frames: straight lines between frames of 25 a second would blunt five frames
-    of six at 30. For a lower rate, its means over the time of a frame, so that what is too fast does not come back as
-    something slow.
+    Values of the cubic spline through the frames; linear interpolation from 25 to 30 frames per second would smooth
+    five frames of six. For a lower rate, means of the spline over each frame, to avoid aliasing.
     """
     if not len(values) or not (fps > 0 and wanted > 0):
-        raise InputError(f"frames at {fps:g} a second cannot be read at {wanted:g}; give rates above 0")
+        raise InputError(f"{fps:g} frames per second cannot be resampled to {wanted:g}; give rates above 0")
     flat = np.asarray(values, np.float64).reshape(len(values), -1)
     n_frames = int(np.floor((len(values) - 1) / fps * wanted + RATE_TOLERANCE_FPS)) + 1
     read = np.zeros((n_frames, flat.shape[1]))
@@ -118,7 +117,7 @@ def _interpolate_frames(values: Floats, fps: float, wanted: float, n_frames: int
 
 
 def read_capture_sound(capture: Path, given: Path | None = None) -> Waveform | None:
-    """The sound that belongs to a capture: the file that is given, or `find_capture_sound` it.
+    """The sound of a capture: of the given file, or of the file that `find_capture_sound` finds.
 
     Raises
     ------
@@ -130,7 +129,7 @@ def read_capture_sound(capture: Path, given: Path | None = None) -> Waveform | N
 
 
 def find_capture_sound(capture: Path) -> Path | None:
-    """The sound file of the same name beside a capture, or the only one there; None where there is none.
+    """The sound file of the same name beside a capture, or the only one in its folder; None without one.
 
     Raises
     ------
@@ -140,5 +139,7 @@ def find_capture_sound(capture: Path) -> Path | None:
     beside = sorted(file for file in capture.parent.iterdir() if file.suffix.lower() in SOUND_SUFFIXES)
     found = [file for file in beside if file.stem == capture.stem and file != capture] or beside
     if len(found) > 1:
-        raise InputError(f"beside {capture.name} lie {len(found)} sound files; name one as the capture")
+        raise InputError(
+            f"there are {len(found)} sound files beside {capture.name}; give one of them the capture's name"
+        )
     return found[0] if found else None

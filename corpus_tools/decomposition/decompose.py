@@ -1,10 +1,12 @@
-"""A recorded face taken apart (Ju and Lee 2008, section 4): F = R (N + sum c_i B_i + P + sum D_j) + T.
+"""Decomposition of a recorded face (Ju and Lee 2008, section 4): F = R (N + sum c_i B_i + P + sum D_j) + T.
 
-N is the face at rest, B_i are basis expressions, c_i their slow weights, P what the lips do, D_j what every other
-region does besides, R and T the head's pose. Lids and gaze are read from what is left at the eyes.
+N is the face at rest, B_i are basis expressions, c_i their slow weights, P the motion of the lips, D_j the independent
+motion of the other regions, R and T the head's pose. Lids and gaze are computed from the residual at the eyes.
 """
 
+import csv
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,39 +14,36 @@ from numpy.typing import NDArray
 from corpus_tools.decomposition.basis_expressions import ExpressionBasis
 from corpus_tools.decomposition.blend_weights import Estimator, moving_average
 from corpus_tools.decomposition.capture import FaceRecording, resample_to_gesture_rate
-from corpus_tools.decomposition.regions import feature_landmarks
 from tts2face.gesture.prosody import SILENT_PROSODY, prosody_features
 from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS
 from tts2face.models.palette import FEATURES, GESTURE_FPS, REGION_FEATURES
 from tts2face.retargeting.performer import EYELID_LANDMARKS, eye_aperture
 
-TREMOR_SMOOTHING_S = (
-    0.03  # standard deviation of the Gaussian that takes the tracker's tremor from head, brows and cheeks
-)
+TREMOR_SMOOTHING_S = 0.03  # standard deviation of the Gaussian that removes tracking noise from head, brows and cheeks
 CLOSED_LID_APERTURE = (
     0.055  # of tracked lids that touch; first percentile of 40 minutes of one person (docs/gestures.md)
 )
 IRIS_LANDMARKS = {"Left": 473, "Right": 468}
-# A tracked iris moves so far, in widths of an eye, when the line of sight turns by a radian: down, to the left. From
-# one person who turns her head and looks into the camera (docs/gestures.md).
+# Motion of a tracked iris in eye widths per radian of gaze, down and to the left; measured on one person who turns the
+# head with the gaze on the camera (docs/gestures.md).
 IRIS_SHIFT_PER_RAD = (-0.23, 0.33)
-# Of a landmark's displacement that counts when expressions are told, in the region of the lips. At full weight the jaw
-# of a speaker reads as surprise (mean weight .20 in neutral speech) and the rest of the face is described three times
-# worse than by no expression; without lips a smile is hard to see (docs/gestures.md).
+# Weight of lip landmarks in the estimation of expressions. At full weight the jaw motion of speech is estimated as
+# surprise (mean weight 0.20 in neutral speech), and the error in the rest of the face is three times that of no
+# expression; without lips, smiles are hard to detect (docs/gestures.md).
 LIP_WEIGHT = 0.1
-MAX_GAZE_LID_CLOSURE = 0.35  # a lid that covers more of the eye hides the iris
+MAX_GAZE_LID_CLOSURE = 0.35  # beyond this closure the lid hides the iris
 
 Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Decomposition:
-    """One recording taken apart, at `GESTURE_FPS`.
+    """Decomposition of one recording, at `GESTURE_FPS`.
 
     Parameters
     ----------
     motion
-        (T, ...) of each feature that was seen: as `tts2face.models.palette.Style`, but "brows" and "cheeks" as
+        (T, ...) of each observed feature: as `tts2face.models.palette.Style`, but "brows" and "cheeks" as
         displacements (T, L, 3) of their landmarks, mm.
     speech : (T, M, 3)
         P: displacement of `MOUTH_REGION`, mm.
@@ -86,27 +85,27 @@ def decompose(captured: FaceRecording, basis: ExpressionBasis, estimator: Estima
         "head": head,
     }
     times = np.arange(len(moved)) / GESTURE_FPS
-    heard = np.tile(SILENT_PROSODY, (len(times), 1))
+    prosody = np.tile(SILENT_PROSODY, (len(times), 1))
     if recorded.sound is not None:
-        heard = prosody_features(recorded.sound, times, with_pitch=True)
+        prosody = prosody_features(recorded.sound, times, with_pitch=True)
     return Decomposition(
         recorded.name,
         {name: motion[name] for name in FEATURES if name not in recorded.missing_features},
         left[:, list(MOUTH_REGION)].astype(np.float32),
-        heard[:, 0],
-        heard[:, 1],
+        prosody[:, 0],
+        prosody[:, 1],
     )
 
 
 def weight_displacements(displacements: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Displacements (N, 478, 3) as they count for expressions: lips move for speech most of the time."""
+    """Displacements (N, 478, 3) weighted for the estimation of expressions, with a low weight of the lips."""
     counts = np.ones((N_LANDMARKS, 1))
     counts[list(MOUTH_REGION)] = LIP_WEIGHT
     return np.asarray(displacements, np.float64) * counts
 
 
 def lid_closure(landmarks: NDArray[np.floating], rest: NDArray[np.floating]) -> Floats:
-    """(T, 2) share by which the left and the right lids are shut, of (T, 478, 3): 0 as at rest (478, 3), 1 fully."""
+    """(T, 2) closure of the left and the right lids in landmarks (T, 478, 3): 0 as at rest (478, 3), 1 fully closed."""
     columns = []
     for side in ("Left", "Right"):
         opened = float(eye_aperture(rest[None], side)[0])
@@ -115,7 +114,7 @@ def lid_closure(landmarks: NDArray[np.floating], rest: NDArray[np.floating]) -> 
 
 
 def eye_angles(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(T, 2) pitch and yaw of the eyes in the head, of tracked landmarks (T, 478, 3): from where the irises stand."""
+    """(T, 2) pitch and yaw of the eyes in the head, from the irises of tracked landmarks (T, 478, 3)."""
     turned = []
     for side, iris in IRIS_LANDMARKS.items():
         _, _, outer, inner = EYELID_LANDMARKS[side]
@@ -127,9 +126,9 @@ def eye_angles(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def gaze_angles(turned: NDArray[np.float64], head: NDArray[np.floating], shut: Floats) -> Floats:
-    """(T, 2) pitch and yaw at which eyes look that are turned (T, 2) in the head, against the recording's median.
+    """(T, 2) gaze pitch and yaw relative to the recording's median, from the eyes' angles (T, 2) in the head.
 
-    Where lids hide the irises the line goes straight from before to behind.
+    Frames in which lids hide the irises are interpolated linearly.
     """
     sight = turned + head[:, :2]
     seen = np.flatnonzero(shut.max(axis=1) < MAX_GAZE_LID_CLOSURE)
@@ -144,3 +143,22 @@ def _smooth(values: NDArray[np.floating]) -> Floats:
     from scipy.ndimage import gaussian_filter1d
 
     return np.asarray(gaussian_filter1d(values, TREMOR_SMOOTHING_S * GESTURE_FPS, axis=0), np.float32)
+
+
+REGION_TABLE = Path(__file__).with_name("regions.tsv")
+
+
+def region_landmarks() -> dict[str, NDArray[np.int32]]:
+    """Landmarks of each region, by name."""
+    return {row["region"]: np.array([int(n) for n in row["landmarks"].split()], np.int32) for row in _read_rows()}
+
+
+def feature_landmarks(feature: str) -> NDArray[np.int32]:
+    """Landmarks of all regions of a feature, such as both brows."""
+    found = [row["landmarks"].split() for row in _read_rows() if row["feature"] == feature]
+    return np.array([int(n) for part in found for n in part], np.int32)
+
+
+def _read_rows() -> list[dict[str, str]]:
+    lines = [line for line in REGION_TABLE.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    return list(csv.DictReader(lines, delimiter="\t"))

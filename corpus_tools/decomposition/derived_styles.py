@@ -1,4 +1,4 @@
-"""Styles that nobody recorded: the table of how a measured style is changed into each."""
+"""Derived styles without recordings: the table of changes of a measured style."""
 
 import csv
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ def read_derived_styles(source: str, table: Path = DERIVED_STYLE_TABLE) -> dict[
     for row in csv.DictReader(lines, delimiter="\t"):
         style, feature = row["style"], row["feature"]
         if feature not in FIXED_CHANNELS and feature not in REGION_FEATURES:
-            raise DataError(f"{table.name}: {style} changes {feature!r}, which is no feature; correct the table")
+            raise DataError(f"{table.name}: {style} changes {feature!r}, which is not a feature; correct the table")
         try:
             offset = _parse_offsets(row["offsets"] or "", feature)
             changes.setdefault(style, {})[feature] = FeatureChange(float(row["gain"]), offset, float(row["tempo"]))

@@ -1,4 +1,4 @@
-"""What the landmarks of a face do when weights move it."""
+"""Landmarks of a face moved by weights of its shapes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,7 @@ def moved_landmarks(face: Face, motion: Trajectory) -> NDArray[np.float32]:
         The face has not all landmarks, or the weights are not of its shapes.
     """
     if motion.channels != face.shape_names:
-        raise DataError("the weights are not of this face's shapes; carry them to it first")
+        raise DataError("the weights are not for the shapes of this face; retarget them to it first")
     weights = motion.values.astype(np.float64)
     moves = scatter_landmarks(face, landmark_motion(face, np.arange(len(face.shapes))))
     found = rest_landmarks(face) + np.tensordot(weights, moves, axes=(1, 2))

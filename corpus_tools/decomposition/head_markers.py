@@ -1,4 +1,4 @@
-"""The head's pose from markers that the face does not move, and the face's markers without it."""
+"""Head pose from markers on the skull, and its removal from the markers of the face."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,8 +11,10 @@ from lexicon.errors import DataError
 from tts2face.video.pose import similarity_transforms
 
 MIN_VISIBLE_MARKERS = 3  # markers that show a pose
-MAX_MISFIT_MM = 5.0  # of the head's markers against a rigid head, root mean square; caps slip by less
-N_ROUNDS = 3  # of reference and poses in turn; the reference moves by less than 0.01 mm from the second on
+MAX_MISFIT_MM = 5.0  # root mean square deviation of the head's markers from a rigid head; caps slip by less
+N_ROUNDS = (
+    3  # alternating estimates of reference and poses; the reference moves by less than 0.01 mm from the second on
+)
 MAX_COLLINEAR_RATIO = 0.05  # second over first spread of markers that lie nearly on a line
 
 Floats = NDArray[np.float64]
@@ -46,7 +48,7 @@ class HeadPoses:
 def fit_head_poses(
     points: Floats, names: Sequence[str], fps: float, *, reference: Floats | None = None
 ) -> tuple[HeadPoses, tuple[str, ...]]:
-    """Poses of the head, and a sentence that says what was filled.
+    """Poses of the head, and a note on filled gaps.
 
     Parameters
     ----------
@@ -58,22 +60,21 @@ def fit_head_poses(
     Raises
     ------
     DataError
-        They are fewer than three, on a line, out of sight too long, or do not move as one.
+        There are fewer than three, they are collinear, hidden for too long, or do not move rigidly.
 
     Notes
     -----
-    Kabsch 1976 on the markers that are seen; reference and poses are found in turn. Poses between frames that show
-    them are filled in.
+    Kabsch 1976 on the visible markers, alternating between reference and poses. Missing poses are interpolated.
     """
     if len(names) < MIN_VISIBLE_MARKERS:
-        raise DataError(f"{len(names)} markers of the head are there; its pose takes at least {MIN_VISIBLE_MARKERS}")
+        raise DataError(f"the file has {len(names)} markers of the head; its pose needs at least {MIN_VISIBLE_MARKERS}")
     seen = np.asarray(np.isfinite(points).all(axis=2))
     posed = np.asarray(seen.sum(axis=1) >= MIN_VISIBLE_MARKERS)
     check_gap("head's pose", ~posed, fps)
     head = _first_reference(points, seen) if reference is None else reference
     spreads = np.linalg.svd(head - head.mean(axis=0), compute_uv=False)
     if spreads[1] <= MAX_COLLINEAR_RATIO * spreads[0]:
-        raise DataError("the head's markers lie on a line, so that its pose is not known; wear them apart")
+        raise DataError("the head's markers are collinear and do not determine its pose; place them apart")
     shown, seen = points[posed], seen[posed]
     rotations, places = _fit_poses(shown, seen, head)
     for _ in range(N_ROUNDS if reference is None else 0):
@@ -85,14 +86,14 @@ def fit_head_poses(
     misfit = float(np.sqrt(np.square(off[seen]).sum(axis=1).mean()))
     if misfit > MAX_MISFIT_MM:
         raise DataError(
-            f"the head's markers do not move as one ({misfit:.1f} mm apart); name only those on the skull as head"
+            f"the head's markers do not move rigidly (deviation {misfit:.1f} mm); list only those on the skull as head"
         )
-    notes = () if posed.all() else (f"the head's pose was filled in in {int((~posed).sum())} frames",)
+    notes = () if posed.all() else (f"the head's pose was interpolated in {int((~posed).sum())} frames",)
     return HeadPoses(head, *_interpolate_poses(rotations, places, posed), misfit), notes
 
 
 def _interpolate_poses(rotations: Floats, places: Floats, posed: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """Poses of all frames from those of the frames that have one: evenly turned and straight between them."""
+    """Poses of all frames, interpolated from known ones: spherical for rotations, linear for positions."""
     from scipy.spatial.transform import Rotation, Slerp
 
     there = np.flatnonzero(posed)
@@ -107,13 +108,13 @@ def _interpolate_poses(rotations: Floats, places: Floats, posed: NDArray[np.bool
 def _first_reference(points: Floats, seen: NDArray[np.bool_]) -> Floats:
     whole = np.flatnonzero(seen.all(axis=1))
     if not len(whole):
-        raise DataError("no frame shows all markers of the head; leave those out that are rarely seen")
+        raise DataError("no frame shows all markers of the head; remove rarely visible ones from the set")
     head: Floats = points[whole[0]] - points[whole[0]].mean(axis=0)
     return head
 
 
 def _fit_poses(points: Floats, seen: NDArray[np.bool_], head: Floats) -> tuple[Floats, Floats]:
-    """Rotations (T, 3, 3) and places (T, 3) of the head; frames in which the same markers are seen go together."""
+    """Rotations (T, 3, 3) and positions (T, 3) of the head, fitted jointly for frames with the same visible markers."""
     rotations, places = np.zeros((len(points), 3, 3)), np.zeros((len(points), 3))
     patterns, which = np.unique(seen, axis=0, return_inverse=True)
     for number, pattern in enumerate(patterns):

@@ -17,10 +17,10 @@ from tts2face.types import Waveform
 
 MM_PER_UNIT = {"": 1.0, "mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "in": 25.4, "inch": 25.4, "ft": 304.8}
 SOUND_LABELS = ("audio", "sound", "voice", "speech", "mic")  # how analogue channels that hold sound are named
-MIN_SOUND_HZ = 8000.0  # an analogue channel of fewer samples a second is no sound
+MIN_SOUND_HZ = 8000.0  # analogue channels with a lower rate are not sound
 MIN_FPS, MAX_FPS = 10.0, 1000.0
 TIME_TOLERANCE_FRAMES = 0.25  # of a frame: times in a file are rounded, often to milliseconds
-MIN_GAP_STEPS = 1.5  # of the usual step: a longer one leaves frames out
+MIN_GAP_STEPS = 1.5  # of the usual step: a longer one is a gap of frames
 BLOCK_BYTES, MAX_BLOCKS, BIG_ENDIAN = 512, 256, 86  # of a C3D file; its first byte counts blocks
 AXES = ("x", "y", "z")
 
@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MarkerTake:
-    """What a file holds: `points` (T, M, 3) in mm of the markers `names`, NaN in gaps, and sound where it has some."""
+    """Contents of a file: `points` (T, M, 3) in mm of the markers `names`, NaN in gaps, and sound where it has some."""
 
     names: tuple[str, ...]
     points: Floats
@@ -43,12 +43,12 @@ def read_markers(path: Path, fps: float | None = None) -> MarkerTake:
     Parameters
     ----------
     fps
-        Frames a second of a table that counts frames.
+        Frame rate of a table with frame numbers.
 
     Raises
     ------
     InputError
-        There is no such file, it is of neither kind, or a table counts frames and `fps` is missing.
+        There is no such file, its format is unknown, or a table has frame numbers and `fps` is missing.
     DataError
         It is damaged.
     BackendError
@@ -56,7 +56,7 @@ def read_markers(path: Path, fps: float | None = None) -> MarkerTake:
     """
     readers = {".c3d": lambda: read_c3d(path), ".csv": lambda: read_marker_table(path, fps)}
     if path.suffix.lower() not in readers:
-        raise InputError(f"{path.name} is no file of markers; they are read from .c3d and .csv")
+        raise InputError(f"{path.name} is not a marker file; supported suffixes are .c3d and .csv")
     if not path.is_file():
         raise InputError(f"there is no capture {path}; check the path")
     take = readers[path.suffix.lower()]()
@@ -66,7 +66,7 @@ def read_markers(path: Path, fps: float | None = None) -> MarkerTake:
     if twice:
         raise DataError(f"{path} holds the marker {twice[0]} twice; export one person alone")
     if not MIN_FPS <= take.fps <= MAX_FPS:
-        raise DataError(f"{path} has {take.fps:g} frames a second; {MIN_FPS:g} to {MAX_FPS:g} can be read")
+        raise DataError(f"{path} has {take.fps:g} frames per second; supported rates are {MIN_FPS:g} to {MAX_FPS:g}")
     return take
 
 
@@ -98,7 +98,7 @@ def read_c3d(path: Path) -> MarkerTake:
 
 
 def _check_length(path: Path, n_frames: int) -> None:
-    """Refuse a file that ends before the last frame that its header states: ezc3d reads what is there in silence.
+    """Check that a file contains all frames that its header states; ezc3d reads truncated files without an error.
 
     Source: the C3D file format, header words 4 and 5 (first and last frame, 16 bits) and the processor type.
     """
@@ -111,7 +111,7 @@ def _check_length(path: Path, n_frames: int) -> None:
 
 
 def _analogue_sound(file: Any) -> Waveform | None:
-    """Sound among the analogue channels, its loudest sample being full scale."""
+    """Sound among the analogue channels, scaled to full scale."""
     import soxr
 
     about = file["parameters"]["ANALOG"]
@@ -121,8 +121,8 @@ def _analogue_sound(file: Any) -> Waveform | None:
         return None
     samples = np.asarray(file["data"]["analogs"], np.float64)[0, named[0]]
     samples = np.nan_to_num(samples - np.nanmean(samples))
-    heard = soxr.resample(samples.astype(np.float32), rates[0], SOUND_RATE)
-    return Waveform(heard / max(float(np.abs(heard).max(initial=0.0)), 1e-9), SOUND_RATE)
+    samples_at_rate = soxr.resample(samples.astype(np.float32), rates[0], SOUND_RATE)
+    return Waveform(samples_at_rate / max(float(np.abs(samples_at_rate).max(initial=0.0)), 1e-9), SOUND_RATE)
 
 
 def read_marker_table(path: Path, fps: float | None = None) -> MarkerTake:
@@ -152,7 +152,7 @@ def _parse_header(path: Path, header: list[str]) -> tuple[str, ...]:
     wanted = sorted(f"{name}_{axis}" for name in names for axis in AXES)
     if sorted(header[1:]) != wanted:
         odd = next(iter(set(header[1:]) ^ set(wanted)), "one twice")
-        raise DataError(f"{path} needs the columns NAME_x, NAME_y and NAME_z once for every marker; look at {odd}")
+        raise DataError(f"{path} needs the columns NAME_x, NAME_y and NAME_z once for every marker; check {odd}")
     return names
 
 
@@ -168,19 +168,19 @@ def _parse_row(path: Path, number: int, row: list[str], n_columns: int) -> list[
 def _build_even_take(
     path: Path, names: tuple[str, ...], points: Floats, counted: tuple[str, Floats], fps: float | None
 ) -> MarkerTake:
-    """Frames at an even rate; those that a table leaves out are gaps."""
+    """Frames at a constant rate; missing rows of a table are gaps."""
     what, at = counted
     if what == "frame" and fps is None and len(at) > 1:
-        raise InputError(f"{path.name} counts frames; give its frames a second, or a column time")
+        raise InputError(f"{path.name} has frame numbers; give its frame rate, or a column time")
     if len(at) == 1:  # a still
         return MarkerTake(names, points, fps or GESTURE_FPS)
     steps = np.diff(at)
     if not np.isfinite(at).all() or (steps <= 0).any():
-        raise DataError(f"the column {what} of {path} must rise from row to row; export it again")
+        raise DataError(f"the column {what} of {path} must increase from row to row; export it again")
     usual = 1.0 if what == "frame" else float(steps[steps < MIN_GAP_STEPS * np.median(steps)].mean())
     away = steps / usual
     if np.abs(away - np.rint(away)).max() > TIME_TOLERANCE_FRAMES:
-        raise DataError(f"the column {what} of {path} does not run evenly from row to row; export it again")
+        raise DataError(f"the column {what} of {path} does not increase in even steps; export it again")
     rows = np.concatenate([[0], np.cumsum(np.rint(away).astype(int))])
     found = np.full((rows[-1] + 1, len(names), 3), np.nan)
     found[rows] = points

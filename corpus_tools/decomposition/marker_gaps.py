@@ -1,4 +1,4 @@
-"""Gaps in marker tracks: short ones filled and told, long ones refused."""
+"""Gaps in marker tracks: short ones are interpolated and reported, long ones rejected."""
 
 from collections.abc import Sequence
 
@@ -7,15 +7,15 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 
-MAX_MARKER_GAP_S = 0.2  # half a blink with its pause; what a face does in longer gaps nobody knows
-MARKER_SET_ADVICE = "give a marker set that does without it"
-MAX_QUOTED_MARKERS = 4  # markers in a sentence
+MAX_MARKER_GAP_S = 0.2  # motion in longer gaps cannot be interpolated reliably
+MARKER_SET_ADVICE = "give a marker set without it"
+MAX_QUOTED_MARKERS = 4  # markers quoted in a message
 
 Floats = NDArray[np.float64]
 
 
 def fill_marker_gaps(tracks: Floats, names: Sequence[str], fps: float) -> tuple[Floats, tuple[str, ...]]:
-    """Tracks without gaps, and a sentence that says what was filled.
+    """Tracks without gaps, and a note on the filled gaps.
 
     Parameters
     ----------
@@ -25,11 +25,11 @@ def fill_marker_gaps(tracks: Floats, names: Sequence[str], fps: float) -> tuple[
     Raises
     ------
     DataError
-        A gap is longer than `MAX_MARKER_GAP_S`; the sentence names the marker and the time.
+        A gap is longer than `MAX_MARKER_GAP_S`; the message names the marker and the time.
 
     Notes
     -----
-    Inside, by a curve that does not overshoot (PCHIP, Fritsch and Carlson 1980); at the ends the nearest place stays.
+    Inner gaps by monotone cubic interpolation (PCHIP, Fritsch and Carlson 1980); gaps at the ends by the nearest value.
     """
     whole, counts = tracks.copy(), {}
     for marker, name in enumerate(names):
@@ -53,19 +53,19 @@ def find_gaps(gone: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 
 def check_gap(what: str, gone: NDArray[np.bool_], fps: float) -> None:
-    """Refuse gaps, True in (T,), that are too long to be filled; errors as `fill_marker_gaps`."""
+    """Check that gaps, True in (T,), are short enough to be filled; errors as `fill_marker_gaps`."""
     if gone.all():
-        raise DataError(f"the {what} is never seen; {MARKER_SET_ADVICE}, or capture it again")
+        raise DataError(f"the {what} is never visible; {MARKER_SET_ADVICE}, or capture it again")
     begin, end = max(find_gaps(gone).tolist(), key=lambda gap: gap[1] - gap[0], default=(0, 0))
     if (end - begin) / fps > MAX_MARKER_GAP_S:
         raise DataError(
-            f"the {what} is out of sight for {(end - begin) / fps:.2f} s from {begin / fps:.2f} s on, and gaps up to "
-            f"{MAX_MARKER_GAP_S:g} s can be filled; fill it where it was captured, or {MARKER_SET_ADVICE}"
+            f"the {what} is hidden for {(end - begin) / fps:.2f} s from {begin / fps:.2f} s on, and gaps up to "
+            f"{MAX_MARKER_GAP_S:g} s can be filled; fill it in the capture software, or {MARKER_SET_ADVICE}"
         )
 
 
 def _interpolate_gaps(track: Floats, gone: NDArray[np.bool_]) -> Floats:
-    """(G, 3) places in the frames that are gone."""
+    """(G, 3) positions in the frames of gaps."""
     from scipy.interpolate import PchipInterpolator
 
     there = np.flatnonzero(~gone)

@@ -1,4 +1,4 @@
-"""From a few markers to all landmarks: the person's face at rest, and what moves between its markers."""
+"""Interpolation from a few markers to all landmarks of a person's face."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from tts2face.models.landmarks import (
 from tts2face.video.pose import similarity_transforms
 
 FACE_WIDTH_LANDMARKS = (234, 454)  # landmarks as far apart as the face is wide
-MIN_SIZE_RATIO, MAX_SIZE_RATIO = 0.6, 1.7  # of the common face over the person's; beyond it the unit is wrong
+MIN_SIZE_RATIO, MAX_SIZE_RATIO = 0.6, 1.7  # of the common face over the person's; beyond these the unit is wrong
 # Lines of each lip between the outer and the inner one, from the right corner to the left: entry k of each lies behind
 # entry k of the outer line. Then the landmarks of upper lids and of lower lids.
 UPPER_LIP_LINES = (
@@ -53,7 +53,7 @@ class MarkerInterpolator:
     rest : (478, 3)
         Landmarks at rest in the person's own size, mm.
     shares : (478, M)
-        How far each landmark follows each marker.
+        Interpolation weight of each marker for each landmark.
     turn, shift, size
         ``common / size = turn @ head + shift``, from the head's axes: (3, 3), (3,), and common over own size.
     """
@@ -71,7 +71,7 @@ class MarkerInterpolator:
 
 
 def build_marker_interpolator(markers: Floats, at: Sequence[int], common: Floats) -> MarkerInterpolator:
-    """The way from a person's markers to landmarks.
+    """The interpolator from a person's markers to landmarks.
 
     Parameters
     ----------
@@ -85,47 +85,47 @@ def build_marker_interpolator(markers: Floats, at: Sequence[int], common: Floats
     Raises
     ------
     DataError
-        They do not lie as on a face of plausible size.
+        The implied size of the face is implausible.
 
     Notes
     -----
-    The common face is turned and scaled to the markers (Umeyama 1991) and bent to them by radial basis functions
-    (`tts2face.face.rbf`). Landmarks of an upper lip or lid do not follow the markers of the lower one, nor the other
-    way round: near each other at rest, they move apart. A lip moves as the line along its outer edge does, for few wear
-    markers further inside.
+    The common face is aligned with the markers by a similarity (Umeyama 1991) and warped to them by radial basis
+    functions (`tts2face.face.rbf`). Landmarks of an upper lip or lid do not depend on markers of the lower one and vice
+    versa, because they are close at rest and move apart. Inner landmarks of a lip move like its outer line, because
+    marker sets rarely have markers further inside.
     """
     places = common[list(at)]
     weights = np.full(len(at), 1.0 / len(at))
     turns, sizes = similarity_transforms(markers[None], places, weights)
     turn, size = turns[0], float(sizes[0])
     if not MIN_SIZE_RATIO <= size <= MAX_SIZE_RATIO:
-        raise DataError(f"the markers lie {1 / size:.3g} times as far apart as on a face; check the file's unit")
+        raise DataError(f"the distances of the markers are {1 / size:.3g} times those on a face; check the file's unit")
     shift = weights @ places / size - turn @ (weights @ markers)
     own = common / size
     width = float(np.linalg.norm(own[FACE_WIDTH_LANDMARKS[0]] - own[FACE_WIDTH_LANDMARKS[1]]))
     bent = fit_interpolant(own[list(at)], markers @ turn.T + shift - own[list(at)], width)
     rest = own + bent(own)
     shares = np.zeros((len(common), len(at)))
-    asked = _query_points(rest)
+    queries = _query_points(rest)
     for side, opposite in _landmark_groups(common):
         free = [marker for marker, landmark in enumerate(at) if landmark not in opposite]
         if free:
             follow = fit_interpolant(rest[[at[marker] for marker in free]], np.eye(len(free)), width)
-            shares[np.ix_(side, free)] = follow(asked[side])
+            shares[np.ix_(side, free)] = follow(queries[side])
     return MarkerInterpolator(rest, shares, turn, shift, size)
 
 
 def _query_points(rest: Floats) -> Floats:
-    """(478, 3) places whose motion landmarks take: their own, but for those inside the lips."""
-    asked = rest.copy()
+    """(478, 3) positions at which the field is evaluated for each landmark: its own, or that of the outer lip line."""
+    queries = rest.copy()
     for outer, lines in ((OUTER_LIP_UPPER, UPPER_LIP_LINES), (OUTER_LIP_LOWER, LOWER_LIP_LINES)):
         for line in lines:
-            asked[list(line)] = rest[list(outer)]
-    return asked
+            queries[list(line)] = rest[list(outer)]
+    return queries
 
 
 def _landmark_groups(common: Floats) -> list[tuple[list[int], set[int]]]:
-    """Landmarks that follow the same markers, each with the landmarks whose markers they do not follow."""
+    """Groups of landmarks that depend on the same markers, each with the landmarks of the excluded markers."""
     corners = {landmark for line in (OUTER_LIP_UPPER, *UPPER_LIP_LINES) for landmark in (line[0], line[-1])}
     upper = {*OUTER_LIP_UPPER, *(landmark for line in UPPER_LIP_LINES for landmark in line)} - corners
     height = common[[OUTER_LIP_UPPER[0], OUTER_LIP_UPPER[-1]], 1].mean()

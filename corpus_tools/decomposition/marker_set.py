@@ -1,4 +1,4 @@
-"""Which markers a person wears: their regions, and the landmarks at which they lie, as a table that can be edited."""
+"""Marker sets: the regions of markers and their landmarks, as an editable table."""
 
 import csv
 from collections.abc import Mapping
@@ -9,12 +9,12 @@ from lexicon.errors import DataError, InputError
 from tts2face.models.landmarks import N_LANDMARKS
 
 # 68 markers of the face and 7 of the head, as many as Ju and Lee 2008, section 3, has. The paper shows its layout in a
-# picture only (Fig. 2): names and places here are this project's.
+# figure only (Fig. 2); names and positions here are this project's.
 DEFAULT_MARKER_TABLE = Path(__file__).with_name("markers_68.tsv")
 COLUMNS = ("marker", "region", "landmark")
-HEAD_REGION = "head"  # region of the markers that the face does not move
-MIN_HEAD_MARKERS = 3  # markers that a head's pose takes
-MIN_FACE_MARKERS = 4  # markers that show which way a face looks
+HEAD_REGION = "head"  # region of the markers on the skull
+MIN_HEAD_MARKERS = 3  # needed for head pose
+MIN_FACE_MARKERS = 4  # needed to orient a face
 # Regions of the face (Ju and Lee 2008, Fig. 5, by sides), and those that a feature of a palette is read from.
 REGIONS = (
     "brow_left", "brow_right", "lid_left", "lid_right", "nose", "cheek_left", "cheek_right", "lips", "jaw", "forehead",
@@ -46,7 +46,7 @@ class MarkerSet:
 
     @property
     def missing_features(self) -> frozenset[str]:
-        """Features of a palette that these markers cannot tell; no marker lies on an eyeball."""
+        """Features of a palette that these markers do not capture; gaze always, for lack of markers on eyeballs."""
         there = set(self.regions.values())
         return frozenset(
             {"gaze"} | {feature for feature, regions in FEATURE_REGIONS.items() if not there.issuperset(regions)}
@@ -70,8 +70,8 @@ def read_marker_set(path: Path = DEFAULT_MARKER_TABLE) -> MarkerSet:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError as broken:
         raise DataError(f"{path} is not UTF-8 text ({broken}); save it as such") from broken
-    told = [line for line in lines if line.strip() and not line.startswith("#")]
-    rows = list(csv.reader(told, delimiter="\t"))
+    rows_text = [line for line in lines if line.strip() and not line.startswith("#")]
+    rows = list(csv.reader(rows_text, delimiter="\t"))
     if not rows or tuple(rows[0]) != COLUMNS:
         raise DataError(f"{path} is not a marker set: its first line must be {', '.join(COLUMNS)}, between tabs")
     regions: dict[str, str] = {}
@@ -81,11 +81,11 @@ def read_marker_set(path: Path = DEFAULT_MARKER_TABLE) -> MarkerSet:
     n_head = len(regions) - len(landmarks)
     if n_head < MIN_HEAD_MARKERS:
         raise DataError(
-            f"{path} has {n_head} markers of the region head; head pose needs at least {MIN_HEAD_MARKERS} that the "
-            "face does not move, on a cap or a band"
+            f"{path} has {n_head} markers of the region head; head pose needs at least {MIN_HEAD_MARKERS} "
+            "on the skull, on a cap or a band"
         )
     if len(landmarks) < MIN_FACE_MARKERS:
-        raise DataError(f"{path} has {len(landmarks)} markers of the face; it takes at least {MIN_FACE_MARKERS}")
+        raise DataError(f"{path} has {len(landmarks)} markers of the face; it needs at least {MIN_FACE_MARKERS}")
     return MarkerSet(regions, landmarks)
 
 

@@ -17,7 +17,7 @@ from lexicon.errors import DataError
 from tts2face.models.face import Face
 from tts2face.video.pose import head_angles
 
-MAX_QUOTED_MARKERS = 6  # markers in a sentence
+MAX_QUOTED_MARKERS = 6  # markers quoted in a message
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class MarkerFace:
         From markers to landmarks.
     """
 
-    worn: MarkerSet
+    marker_set: MarkerSet
     names: tuple[str, ...]
     head_names: tuple[str, ...]
     head: Floats
@@ -45,21 +45,21 @@ class MarkerFace:
 
 
 def read_marker_recording(
-    path: Path, face: Face, worn: MarkerSet, *, neutral: Path | None = None, sound: Path | None = None,
+    path: Path, face: Face, marker_set: MarkerSet, *, neutral: Path | None = None, sound: Path | None = None,
     fps: float | None = None,
 ) -> FaceRecording:  # fmt: skip
-    """A recording of markers as landmarks in the person's own size; gaps are filled and told.
+    """A marker recording as landmarks in the person's own size; filled gaps are reported in its notes.
 
     Parameters
     ----------
     face
-        Has the common landmarks; only where they lie at rest matters.
+        Provides the common landmarks at rest.
     neutral
-        A recording of the person at rest; without it the median of the recording is taken for rest.
+        A recording of the person at rest; by default the median of the recording.
     sound
-        As `read_capture_sound`, where the file itself holds none.
+        As in `read_capture_sound`, if the file itself has none.
     fps
-        Of a table that counts frames.
+        Frame rate of a table with frame numbers.
 
     Raises
     ------
@@ -71,11 +71,11 @@ def read_marker_recording(
         Reading C3D needs a package that is missing.
     """
     take = read_markers(path, fps)
-    rest = read_marker_face(path if neutral is None else neutral, face, worn, fps=fps)
+    rest = read_marker_face(path if neutral is None else neutral, face, marker_set, fps=fps)
     points, poses, notes = _face_in_head_axes(path, take, rest.names, rest.head_names, rest.head)
     landmarks = rest.spread.landmarks(points - rest.rest)
     if neutral is None:
-        notes = ("the recording's median stands for the face at rest", *notes)
+        notes = ("the median of the recording is used as the face at rest", *notes)
     return FaceRecording(
         name=path.stem,
         fps=take.fps,
@@ -83,26 +83,26 @@ def read_marker_recording(
         head=_head_motion(poses, rest.spread, face).astype(np.float32),
         sound=take.sound or read_capture_sound(path, sound),
         rest=rest.spread.rest.astype(np.float32),
-        missing_features=worn.missing_features,
-        notes=(*_absent_markers(take, worn), *notes),
+        missing_features=marker_set.missing_features,
+        notes=(*_absent_markers(take, marker_set), *notes),
     )
 
 
-def read_marker_face(path: Path, face: Face, worn: MarkerSet, *, fps: float | None = None) -> MarkerFace:
+def read_marker_face(path: Path, face: Face, marker_set: MarkerSet, *, fps: float | None = None) -> MarkerFace:
     """The person's face at rest: the median of a recording; errors as `read_marker_recording`."""
     take = read_markers(path, fps)
-    check_regions(path, take, worn)
+    check_regions(path, take, marker_set)
     there = set(take.names)
-    names = tuple(name for name in worn.face if name in there)
+    names = tuple(name for name in marker_set.face if name in there)
     if len(names) < MIN_FACE_MARKERS:
         raise DataError(
-            f"{path} has {len(names)} of the set's markers of the face; it takes at least {MIN_FACE_MARKERS}"
+            f"{path} has {len(names)} of the set's markers of the face; it needs at least {MIN_FACE_MARKERS}"
         )
-    head_names = tuple(name for name in worn.head if name in there)
+    head_names = tuple(name for name in marker_set.head if name in there)
     points, poses, _ = _face_in_head_axes(path, take, names, head_names, None)
     rest = np.median(points, axis=0)
-    spread = build_marker_interpolator(rest, [worn.landmarks[name] for name in names], rest_landmarks(face))
-    return MarkerFace(worn, names, head_names, poses.reference, rest, spread)
+    spread = build_marker_interpolator(rest, [marker_set.landmarks[name] for name in names], rest_landmarks(face))
+    return MarkerFace(marker_set, names, head_names, poses.reference, rest, spread)
 
 
 def read_marker_still(path: Path, rest: MarkerFace) -> Floats:
@@ -112,8 +112,8 @@ def read_marker_still(path: Path, rest: MarkerFace) -> Floats:
     return found
 
 
-def check_regions(path: Path, take: MarkerTake, worn: MarkerSet) -> None:
-    """Refuse a file that has no marker of a region that the set has.
+def check_regions(path: Path, take: MarkerTake, marker_set: MarkerSet) -> None:
+    """Check that a file has a marker of every region of the set.
 
     Raises
     ------
@@ -121,11 +121,11 @@ def check_regions(path: Path, take: MarkerTake, worn: MarkerSet) -> None:
         It lacks a region, or all markers of the set.
     """
     there = set(take.names)
-    if not there & set(worn.regions):
+    if not there & set(marker_set.regions):
         shown = ", ".join(take.names[:MAX_QUOTED_MARKERS])
-        raise DataError(f"{path} holds none of the set's markers; it has {shown}. Give its marker set with --markers")
-    for region in dict.fromkeys(worn.regions.values()):
-        names = [name for name, of in worn.regions.items() if of == region]
+        raise DataError(f"{path} has none of the set's markers but {shown}; give its marker set with --markers")
+    for region in dict.fromkeys(marker_set.regions.values()):
+        names = [name for name, of in marker_set.regions.items() if of == region]
         if not there.intersection(names):
             shown = ", ".join(names[:MAX_QUOTED_MARKERS])
             raise DataError(
@@ -134,19 +134,21 @@ def check_regions(path: Path, take: MarkerTake, worn: MarkerSet) -> None:
             )
 
 
-def _absent_markers(take: MarkerTake, worn: MarkerSet) -> tuple[str, ...]:
-    gone = [name for name in worn.regions if name not in take.names]
-    return (f"the file has no marker {', '.join(gone)}; its region goes by the others",) if gone else ()
+def _absent_markers(take: MarkerTake, marker_set: MarkerSet) -> tuple[str, ...]:
+    gone = [name for name in marker_set.regions if name not in take.names]
+    return (f"the file has no marker {', '.join(gone)}; its region is interpolated from the others",) if gone else ()
 
 
 def _face_in_head_axes(
     path: Path, take: MarkerTake, names: tuple[str, ...], head_names: tuple[str, ...], head: Floats | None
 ) -> tuple[Floats, HeadPoses, tuple[str, ...]]:
-    """(T, M, 3) markers of the face in the head's axes without gaps, the head's poses, and what was filled."""
+    """(T, M, 3) markers of the face in the head's axes without gaps, the head's poses, and notes on filled gaps."""
     at = {name: number for number, name in enumerate(take.names)}
     gone = [name for name in (*names, *head_names) if name not in at]
     if gone:
-        raise DataError(f"{path} lacks the marker {gone[0]}, which the face at rest has; capture both with all markers")
+        raise DataError(
+            f"{path} lacks the marker {gone[0]}, which the face at rest has; capture both with the same markers"
+        )
     try:
         of_head = take.points[:, [at[name] for name in head_names]]
         poses, head_notes = fit_head_poses(of_head, head_names, take.fps, reference=head)
@@ -158,11 +160,11 @@ def _face_in_head_axes(
 
 
 def _head_motion(poses: HeadPoses, spread: MarkerInterpolator, face: Face) -> Floats:
-    """(T, 6) `HEAD_CHANNELS` in the face's axes: angles against the mean, place of the pivot against the median."""
+    """(T, 6) `HEAD_CHANNELS` in the face's axes: angles relative to the mean, pivot relative to the median."""
     turn = spread.rotation
     left, _, right = np.linalg.svd(poses.rotations.mean(axis=0))
     mean = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
-    level = turn @ mean.T  # the world's axes, as the face has them when the head is as it mostly is
+    level = turn @ mean.T  # the world's axes in those of the face at its mean pose
     pivot = (face.pivot / spread.size - spread.translation) @ turn
     places = (poses.rotations @ pivot + poses.places) @ level.T
     return np.column_stack([head_angles(level @ poses.rotations @ turn.T), places - np.median(places, axis=0)])

@@ -132,7 +132,7 @@ def _parse_still(place: str) -> Still:
     if not still.path.is_file():
         raise InputError(f"there is no still {still.path}; check the path")
     if still.at is None and suffix in VIDEO_SUFFIXES:
-        raise InputError(f"{still.path} is a video; say which instant, as {still.path}@12.5")
+        raise InputError(f"{still.path} is a video; give an instant, as {still.path}@12.5")
     if suffix not in PICTURE_SUFFIXES | MARKER_SUFFIXES | VIDEO_SUFFIXES:
         raise InputError(f"{still.path} is no picture, video or capture of markers; give one")
     return still

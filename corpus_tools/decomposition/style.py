@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.decomposition.decompose import Decomposition
-from corpus_tools.decomposition.regions import feature_landmarks
+from corpus_tools.decomposition.decompose import Decomposition, feature_landmarks
 from lexicon.errors import InputError
 from tts2face.models.palette import FEATURES, REGION_FEATURES, FaceRegion, Palette, Style
 

@@ -1,1 +1,1 @@
-"""From a talker's videos to a textured head of the talker."""
+"""Textured dense heads of talkers, built from videos."""

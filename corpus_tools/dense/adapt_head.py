@@ -1,4 +1,4 @@
-"""The default head adapted to a talker: its vertices, eyes, teeth and all its shapes."""
+"""Adaptation of the default head to a talker: vertices, eyes, teeth and all shapes."""
 
 from dataclasses import replace
 
@@ -12,13 +12,13 @@ from tts2face.video.pose import similarity_transforms
 
 Floats = NDArray[np.float64]
 
-RIGID_MOUTH_PARTS = ("teeth", "gums", "tongue")  # bone and what hangs on it: moved and scaled as one, never bent
+RIGID_MOUTH_PARTS = ("teeth", "gums", "tongue")  # moved and scaled as a unit, never deformed
 EYE_PARTS = ("sclera", "iris")
-MIN_SHAPE_MOTION_MM = 1e-4  # a shape that moves a vertex less does not move it
+MIN_SHAPE_MOTION_MM = 1e-4  # smaller displacements of a shape are ignored
 
 
 def adapt_head(face: Face, talker: NDArray[np.floating]) -> Face:
-    """The face with the talker's shape.
+    """The default head with the shape of a talker.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def adapt_head(face: Face, talker: NDArray[np.floating]) -> Face:
     bone, balls = part_vertices(face, RIGID_MOUTH_PARTS), part_vertices(face, EYE_PARTS)
     soft = np.setdiff1d(np.arange(len(rest)), np.concatenate([bone, balls]))
     moved = rest.copy()
-    moved[soft] = warp.carried(rest[soft], soft)
+    moved[soft] = warp.apply(rest[soft], soft)
     linear, shift = _fit_similarity(rest[bone], rest[bone] + warp.field(rest[bone]))
     shift[2] += _lip_protrusion(warp) - (rest[bone] @ linear.T + shift - rest[bone])[:, 2].max()
     moved[bone] = rest[bone] @ linear.T + shift
@@ -41,7 +41,7 @@ def adapt_head(face: Face, talker: NDArray[np.floating]) -> Face:
     shapes[:, bone] = face.shapes[:, bone] @ linear.T
     for eye, socket in zip(eyes_from_right(face), warp.sockets, strict=True):
         span = slice(eye.first, eye.first + eye.count)
-        shapes[:, span] = socket.scale * face.shapes[:, span]  # an eyeball gives way to a lid that closes
+        shapes[:, span] = socket.scale * face.shapes[:, span]  # an eyeball recedes under a closing lid
     origin = np.mean([eye.centre for eye in eyes], axis=0)
     turning = _warp_pivot(face, warp)
     return replace(
@@ -61,7 +61,7 @@ def _fit_similarity(before: Floats, after: Floats) -> tuple[Floats, Floats]:
 
 
 def _lip_protrusion(warp: HeadWarp) -> float:
-    """How far the lips come forward, mm: teeth and tongue stay as far behind them as they were."""
+    """Forward shift of the lips in mm, which teeth and tongue follow."""
     lips = np.isin(warp.landmarks, (*INNER_LIP_UPPER, *INNER_LIP_LOWER))
     centres = warp.field.centres[lips]
     return float(warp.field(centres)[:, 2].mean())
@@ -78,9 +78,9 @@ def _place_eyes(face: Face, warp: HeadWarp, rest: Floats, moved: Floats) -> list
 
 
 def _warp_shapes(face: Face, warp: HeadWarp, soft: NDArray[np.int64], moved: Floats) -> Floats:
-    """(K, V, 3) shapes: where the warp brings a vertex that the head's shape has moved, less where it was.
+    """(K, V, 3) shapes: the warped position of a displaced vertex minus its warped position at rest.
 
-    mouthClose is carried from the open jaw, which it closes.
+    mouthClose is warped relative to the open jaw, which it closes.
     """
     shapes = np.zeros(face.shapes.shape)
     rest = face.vertices.astype(np.float64)
@@ -90,9 +90,9 @@ def _warp_shapes(face: Face, warp: HeadWarp, soft: NDArray[np.int64], moved: Flo
         rows = soft[np.abs(shape[soft]).max(axis=1) > MIN_SHAPE_MOTION_MM]
         if name == "mouthClose":
             before = rest[rows] + jaw[rows]
-            shapes[number, rows] = warp.carried(before + shape[rows], rows) - warp.carried(before, rows)
+            shapes[number, rows] = warp.apply(before + shape[rows], rows) - warp.apply(before, rows)
         else:
-            shapes[number, rows] = warp.carried(rest[rows] + shape[rows], rows) - moved[rows]
+            shapes[number, rows] = warp.apply(rest[rows] + shape[rows], rows) - moved[rows]
     return shapes
 
 

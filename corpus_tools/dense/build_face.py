@@ -1,4 +1,4 @@
-"""From videos of a talker to a textured head of the talker."""
+"""Build a textured head of a talker from videos."""
 
 import shlex
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from corpus_tools.dense.mesh_fit import (
     face_landmarks,
     select_consistent_landmarks,
 )
-from corpus_tools.dense.modes import MOST_MODES, DenseModel, dense_model, mode_fitter, with_modes
+from corpus_tools.dense.modes import MOST_MODES, DenseModel, add_modes, dense_model, mode_fitter
 from corpus_tools.dense.skin_colour import average_skin_colours, build_picture_fitter
 from corpus_tools.dense.texture_painting import paint_skin
 from corpus_tools.dense.video_landmarks import find_videos, resting_landmarks, track_videos
@@ -35,7 +35,7 @@ CONTENT = "a head with the shape and, with the stated consent, the skin of a rea
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BuiltFace:
-    """Videos used of those found, the mean distance of the head's landmarks from the talker's, and its dense model."""
+    """Result of a build: videos used and found, mean distance of the landmarks from the talker's, dense model."""
 
     n_videos: int
     n_found: int
@@ -57,21 +57,21 @@ def build_face(
     Parameters
     ----------
     recordings
-        A folder of recordings, or one video; transcripts are not needed. A ``provenance.json`` in the folder tells the
-        licence of the person's likeness; the mesh's own says nothing about it.
+        A folder of recordings, or one video; transcripts are not needed. A ``provenance.json`` in the folder states the
+        licence of the person's likeness, which that of the mesh does not cover.
     consent
-        Of the person shown, from `corpus_tools.consent.consent_record`; kept in the file.
+        Consent of the person shown, from `corpus_tools.build_talker.consent_record`; kept in the file.
     n_modes
         Modes of the talker's own dense shape model, added as the shapes denseMean, dense1, dense2, ...
     effort
         Its cache and landmark models; the work is done in one process.
     on_progress
-        Called with steps done and of all, two for each video.
+        Called with the number of finished steps and of all steps, two for each video.
 
     Raises
     ------
     InputError
-        There is no video, or there are not so many modes.
+        There is no video, or too few frames for the modes.
     DataError
         No video shows a face, or the provenance cannot be read.
     BackendError
@@ -114,7 +114,7 @@ def build_face(
         "created": datetime.now(UTC).date().isoformat(),
     }
     if model is not None:
-        face, metadata = with_modes(face, model), {**metadata, "dense": model.summary()}
+        face, metadata = add_modes(face, model), {**metadata, "dense": model.summary()}
     write_face(out, replace(face, metadata=metadata))
     reached = face_landmarks(shaped, shaped.vertices)[:N_MESH_LANDMARKS]
     again = align_to_head(talker, reached)

@@ -1,4 +1,4 @@
-"""The way from the default head's skin to the talker's: eqs 3 and 4, with eyeballs that stay round under their lids."""
+"""Warp from the default head's skin to a talker's (eqs 3 and 4) with rigid eyeballs."""
 
 from dataclasses import dataclass
 
@@ -12,10 +12,8 @@ from tts2face.video.pose import similarity_transforms
 
 Floats = NDArray[np.float64]
 
-N_MESH_LANDMARKS = 468  # the iris points behind them follow the gaze and say nothing about the shape of the face
-OPEN_JAW_WEIGHT = (
-    0.12  # weight of jawOpen in whose space the lips lie apart; a closed mouth would be torn, a wide one gape
-)
+N_MESH_LANDMARKS = 468  # the iris landmarks after them depend on gaze, not on the shape of the face
+OPEN_JAW_WEIGHT = 0.12  # weight of jawOpen at which the warp is fitted; with closed lips the mouth would tear
 # The edge of the lids, once around, from the outer corner; the person's right eye, then the left.
 LID_LANDMARKS = (
     (33, 246, 161, 160, 159, 158, 157, 173, 133, 155, 154, 153, 145, 144, 163, 7),
@@ -26,12 +24,12 @@ EYE_SCALE_LIMITS = (0.92, 1.08)  # eyeballs of adults differ in size by less tha
 FULL_EYE_DISTANCE_MM, FREE_SKIN_DISTANCE_MM = (
     2.0,
     11.0,
-)  # off an eyeball: skin so near keeps its distance from it; beyond, it is free
-N_NEIGHBOURS = 10  # landmarks on the head whose motion tells what a landmark's own should be like
+)  # from an eyeball: skin up to the first keeps its distance from it, beyond the second it is free
+N_NEIGHBOURS = 10  # neighbouring landmarks with whose motion a landmark's is compared
 MAX_STRAY_MM = (
-    4.0  # off its neighbours' motion: its place on the head is another than the tracker's, along the face's rim
+    4.0  # maximum deviation from the neighbours' motion; larger ones are errors of correspondence at the face's rim
 )
-N_ROUNDS = 3  # a landmark lies within a triangle whose corners move each by itself: the rest is removed again
+N_ROUNDS = 3  # landmarks lie inside triangles, so that residuals are fitted again
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +42,7 @@ class EyeSocket:
     scale: float
 
     def keep_distance(self, places: Floats, moved: Floats) -> Floats:
-        """(P, 3) moved places whose distance from the eyeball is as it was at places (P, 3) near it, but for scale."""
+        """(P, 3) moved positions with the scaled distance from the eyeball that positions (P, 3) near it had."""
         off = np.linalg.norm(places - self.before, axis=1)
         share = np.clip(
             (self.radius + FREE_SKIN_DISTANCE_MM - off) / (FREE_SKIN_DISTANCE_MM - FULL_EYE_DISTANCE_MM), 0.0, 1.0
@@ -59,10 +57,10 @@ class EyeSocket:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeadWarp:
-    """Carries places of the default head to the talker.
+    """Warp of positions on the default head to the talker.
 
-    ``opened`` (V, 3) is what a slightly open jaw adds to each vertex: the field is asked there. ``landmarks`` (N,) are
-    the numbers of the field's centres.
+    ``opened`` (V, 3) is the displacement of each vertex by a slightly open jaw, at which the field is evaluated.
+    ``landmarks`` (N,) are the indices of the field's centres.
     """
 
     field: Interpolant
@@ -70,8 +68,8 @@ class HeadWarp:
     sockets: tuple[EyeSocket, ...]
     landmarks: NDArray[np.int64]
 
-    def carried(self, places: Floats, rows: NDArray[np.int64]) -> Floats:
-        """(P, 3) new places of the vertices `rows` (P,), each at its place (P, 3) on the head with closed lips."""
+    def apply(self, places: Floats, rows: NDArray[np.int64]) -> Floats:
+        """(P, 3) warped positions of the vertices `rows` (P,) from positions (P, 3) on the head with closed lips."""
         moved = places + self.field(places + self.opened[rows])
         for socket in self.sockets:
             moved = socket.keep_distance(places, moved)
@@ -79,7 +77,7 @@ class HeadWarp:
 
 
 def fit_head_warp(face: Face, talker: NDArray[np.floating]) -> HeadWarp:
-    """The warp onto resting landmarks (478, 3) of a talker with closed lips, in the place and size of the head."""
+    """The warp onto resting landmarks (478, 3) of a talker with closed lips, aligned with the head."""
     opened = OPEN_JAW_WEIGHT * face.shapes[face.shape_names.index("jawOpen")].astype(np.float64)
     rest = face_landmarks(face, face.vertices)[:N_MESH_LANDMARKS]
     target = correct_lips_and_lids(rest, align_to_head(talker, rest))
@@ -104,12 +102,12 @@ def face_landmarks(face: Face, vertices: NDArray[np.floating]) -> Floats:
 
 
 def face_width(landmarks: Floats) -> float:
-    """Width of a face's oval, in its own unit: what the paper's 200 picture elements are."""
+    """Width of a face's oval in its own unit, which corresponds to 200 pixels in the paper."""
     return float(np.ptp(landmarks[list(FACE_OVAL), 0]))
 
 
 def align_to_head(talker: NDArray[np.floating], rest: Floats) -> Floats:
-    """(468, 3) landmarks of the talker brought to the head's by the nearest similarity: a camera shows no size."""
+    """(468, 3) landmarks of the talker aligned with the head's by a similarity; their size is unknown."""
     own = np.asarray(talker, np.float64)[:N_MESH_LANDMARKS]
     weights = np.full(N_MESH_LANDMARKS, 1.0 / N_MESH_LANDMARKS)
     turns, scales = similarity_transforms(own[None], rest, weights)
@@ -118,7 +116,7 @@ def align_to_head(talker: NDArray[np.floating], rest: Floats) -> Floats:
 
 
 def correct_lips_and_lids(rest: Floats, target: Floats) -> Floats:
-    """(468, 3) the talker's landmarks with lips that meet as the head's do, and lids as deep as their eye."""
+    """(468, 3) landmarks of the talker with the lip contact of the head, and lids at the depth of the eyes."""
     placed = target.copy()
     upper, lower = list(INNER_LIP_UPPER[1:-1]), list(INNER_LIP_LOWER[1:-1])
     middle = (target[upper] + target[lower]) / 2
@@ -131,7 +129,7 @@ def correct_lips_and_lids(rest: Floats, target: Floats) -> Floats:
 
 
 def select_consistent_landmarks(rest: Floats, target: Floats) -> NDArray[np.bool_]:
-    """(468,) landmarks that move as their neighbours do."""
+    """(468,) mask of landmarks whose motion agrees with that of their neighbours."""
     apart = np.linalg.norm(rest[:, None] - rest[None], axis=2)
     nearest = np.argsort(apart, axis=1)[:, : N_NEIGHBOURS + 1]
     moved = target - rest
@@ -141,7 +139,7 @@ def select_consistent_landmarks(rest: Floats, target: Floats) -> NDArray[np.bool
 
 
 def fit_eye_sockets(face: Face, rest: Floats, target: Floats) -> tuple[EyeSocket, ...]:
-    """Where the eyeballs go: with the middle of their lids, as much larger as the eye is longer."""
+    """Eyeballs moved with the centres of their lids and scaled with the length of the eyes."""
     found = []
     for eye, lids, (outer, inner) in zip(eyes_from_right(face), LID_LANDMARKS, EYE_CORNERS, strict=True):
         edge = list(lids)
@@ -155,12 +153,12 @@ def fit_eye_sockets(face: Face, rest: Floats, target: Floats) -> tuple[EyeSocket
 
 
 def eyes_from_right(face: Face) -> list[Eye]:
-    """The person's right eye, then the left."""
+    """Eyes ordered from the person's right to left."""
     return sorted(face.eyes, key=lambda eye: float(eye.centre[0]))
 
 
 def part_vertices(face: Face, starts: tuple[str, ...]) -> NDArray[np.int64]:
-    """Vertices of the parts whose names begin so."""
+    """Vertices of the parts with one of the name prefixes."""
     spans = [
         face.triangles[part.first : part.first + part.count] for part in face.parts if part.name.startswith(starts)
     ]

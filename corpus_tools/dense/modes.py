@@ -1,9 +1,9 @@
-"""A dense linear model of a talker's shape: the head's mesh fitted to many frames, then its principal modes.
+"""Dense linear shape model of a talker: principal components of the head's mesh fitted to many frames.
 
 Theobald et al. 2007, section 2.1: the generic mesh is fitted to the sparse shape of every frame (eqs 3 and 4), and the
 modes of eq. 1 are those of the dense shapes. The centres of eq. 4 lie where the mesh is in its default position, so a
 dense shape is a linear function of the landmarks, ``spread @ displacements``; its principal components are those of the
-landmarks under the metric ``spread.T @ spread`` and are found there, exactly, without dense frames in memory.
+landmarks under the metric ``spread.T @ spread``, from which they are computed exactly without dense frames in memory.
 """
 
 from collections.abc import Iterable, Sequence
@@ -23,15 +23,13 @@ from tts2face.face.shape_transfer import append_shapes
 from tts2face.models.face import Face
 from tts2face.video.pose import similarity_transforms
 
-OPEN_JAW = (
-    0.6  # weight of jawOpen at which eq. 4 is asked; at 0.12 the edge of the lower lip is serrated between landmarks
-)
+OPEN_JAW = 0.6  # weight of jawOpen at which eq. 4 is evaluated; at 0.12 the lower lip is serrated between landmarks
 SKIN = "skin"  # the part whose vertices are the dense shape
-JAW = ("jawOpen", "jawForward", "jawLeft")  # shapes that move the lower teeth and the tongue with a mode's chin
-LIMIT = 3.0  # standard deviations within which a mode looks right (Theobald et al. 2007, section 3.1)
+JAW = ("jawOpen", "jawForward", "jawLeft")  # shapes that move lower teeth and tongue with the chin
+LIMIT = 3.0  # standard deviations within which modes are plausible (Theobald et al. 2007, section 3.1)
 MEAN, MODE = "denseMean", "dense"  # names of the added shapes: denseMean, dense1, dense2, ...
 MOST_MODES = 100  # 30 hold 99.8 % of the variance of GRID s1
-HELD_OUT = 5  # one in so many videos is held out, to measure the model on frames that it has not seen
+HELD_OUT = 5  # one in so many videos is held out for validation
 
 Floats = NDArray[np.float64]
 
@@ -58,16 +56,16 @@ class Components:
     variances: Floats
 
     def shares(self) -> Floats:
-        """(K,) share of the variance in the first 1, 2, ... modes: the compactness of the model."""
+        """(K,) compactness: share of the variance in the first 1, 2, ... modes."""
         shares: Floats = np.cumsum(self.variances) / self.variances.sum()
         return shares
 
     def n_modes(self, share: float) -> int:
-        """The fewest modes that hold a share of the variance."""
+        """The smallest number of modes with a share of the variance."""
         return int(np.searchsorted(self.shares(), share - 1e-12)) + 1
 
-    def left(self, displacements: Floats, n_modes: int) -> Floats:
-        """(T, N, 3) what the first modes do not describe of displacements (T, N, 3)."""
+    def residual(self, displacements: Floats, n_modes: int) -> Floats:
+        """(T, N, 3) residual of displacements (T, N, 3) after projection on the first modes."""
         away = displacements - self.mean
         parameters = np.tensordot(away, self.duals[:n_modes], axes=((1, 2), (1, 2)))
         rest: Floats = away - np.tensordot(parameters, self.modes[:n_modes], axes=1)
@@ -76,10 +74,10 @@ class Components:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeldOut:
-    """Root mean square errors, mm, in frames of videos that were held out, with a number of modes of either model.
+    """Root mean square errors in mm of both models in held-out videos, by number of modes.
 
-    ``dense`` and ``sparse`` are errors of the dense shape: of the dense model, and of the sparse model's landmarks with
-    the mesh fitted to them. None is known of fewer than `HELD_OUT` videos.
+    ``dense`` and ``sparse`` are errors of the dense shape: of the dense model, and of the mesh fitted to the sparse
+    model's landmarks. Empty for fewer than `HELD_OUT` videos.
     """
 
     n_modes: tuple[int, ...]
@@ -100,7 +98,7 @@ class DenseModel:
     modes : (K, V, 3)
         Displacement at one standard deviation, mm.
     n_frames, n_landmarks
-        From which it was learnt.
+        Numbers of training frames and of landmarks.
     """
 
     dense: Components
@@ -118,24 +116,24 @@ class DenseModel:
             "frames": self.n_frames,
             "landmarks": self.n_landmarks,
             "modes": len(self.modes),
-            "shares": _rounded(self.dense.shares()[: len(self.modes)]),
-            "sparse_shares": _rounded(self.sparse.shares()[: len(self.modes)]),
+            "shares": _round_shapes(self.dense.shares()[: len(self.modes)]),
+            "sparse_shares": _round_shapes(self.sparse.shares()[: len(self.modes)]),
             "modes_for_95_and_99": [self.dense.n_modes(share) for share in (0.95, 0.99)],
             "sparse_modes_for_95_and_99": [self.sparse.n_modes(share) for share in (0.95, 0.99)],
             "held_out": {
                 "modes": list(held.n_modes),
-                "dense_mm": _rounded(held.dense),
-                "sparse_mm": _rounded(held.sparse),
+                "dense_mm": _round_shapes(held.dense),
+                "sparse_mm": _round_shapes(held.sparse),
             },
         }
 
 
-def _rounded(values: Iterable[float]) -> list[float]:
+def _round_shapes(values: Iterable[float]) -> list[float]:
     return [round(float(value), 6) for value in values]
 
 
 def mode_fitter(face: Face, used: NDArray[np.int64]) -> PictureFitter:
-    """The fitter of an adapted head by the landmarks `used`, asked with the jaw open, so that lips do not tear."""
+    """The fitter of an adapted head by the landmarks `used`, evaluated with the jaw open so that lips do not tear."""
     jaw = face.shapes[face.shape_names.index("jawOpen")].astype(np.float64)
     return build_picture_fitter(face, face.vertices + OPEN_JAW * jaw, used)
 
@@ -159,13 +157,13 @@ def dense_model(
     Raises
     ------
     InputError
-        There are fewer frames or directions than modes, or no mode is wanted.
+        There are fewer frames or directions than modes, or `n_modes` is below 1.
     """
     videos = [displacements(fit, one.landmarks, talker) for one in seen]
     frames = np.concatenate(videos)
     most = min(len(frames) - 1, MOST_MODES)
     if not 1 <= n_modes <= most:
-        raise InputError(f"{n_modes} dense modes cannot be found in {len(frames)} frames; ask for 1 to {most}")
+        raise InputError(f"{n_modes} dense modes cannot be computed from {len(frames)} frames; choose 1 to {most}")
     skin = fit.spread[part_vertices(face, (SKIN,))]
     metric = skin.T @ skin
     dense, sparse = components(frames, metric), components(frames, np.eye(len(metric)))
@@ -179,7 +177,7 @@ def dense_model(
 def displacements(fit: PictureFitter, landmarks: NDArray[np.floating], talker: NDArray[np.floating]) -> Floats:
     """(T', N, 3) u of eq. 3 in the head's size: the landmarks of each frame with a face, less the talker's at rest.
 
-    Landmarks (T, 478, 3) are without head pose; those of a frame without a face are NaN, and it is left out.
+    Landmarks (T, 478, 3) are pose-free; frames without a face are NaN and are skipped.
     """
     rest = np.asarray(talker, np.float64)[:N_MESH_LANDMARKS]
     turns, scales = similarity_transforms(rest[None], fit.marks, np.full(N_MESH_LANDMARKS, 1.0 / N_MESH_LANDMARKS))
@@ -211,7 +209,7 @@ def _times(matrix: NDArray[np.floating], frames: Floats) -> Floats:
 def spread_shapes(face: Face, fit: PictureFitter, moved: Floats) -> Floats:
     """(K, V, 3) displacement of every vertex for displacements (K, N, 3) of the landmarks.
 
-    Eyeballs stay; lower teeth and tongue, which no camera sees, go with the jaw that the chin shows.
+    Eyeballs do not move; lower teeth and tongue, which are hidden, follow the jaw estimated from the chin.
     """
     shapes: Floats = _times(fit.spread, moved)
     shapes[:, part_vertices(face, EYE_PARTS)] = 0.0
@@ -224,7 +222,7 @@ def spread_shapes(face: Face, fit: PictureFitter, moved: Floats) -> Floats:
     return shapes
 
 
-def with_modes(face: Face, model: DenseModel) -> Face:
+def add_modes(face: Face, model: DenseModel) -> Face:
     """The face with the shapes denseMean, dense1, dense2, ...: denseMean at 1 and the modes' parameters give eq. 1."""
     names = (MEAN, *(f"{MODE}{number}" for number in range(1, len(model.modes) + 1)))
     limits = np.array([(0.0, 1.0), *[(-LIMIT, LIMIT)] * len(model.modes)])
@@ -242,7 +240,7 @@ def _held_out(videos: Sequence[Floats], metric: Floats, n_vertices: int, n_modes
     errors = []
     for own in (metric, np.eye(len(metric))):
         found = components(learnt, own)
-        left = [found.left(frames, k) for k in counts]
+        left = [found.residual(frames, k) for k in counts]
         squares = [(one * _times(metric, one)).sum(axis=(1, 2)).mean() for one in left]
         errors.append(tuple(float(np.sqrt(square / n_vertices)) for square in squares))
     return HeldOut(counts, *errors)

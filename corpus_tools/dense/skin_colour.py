@@ -18,9 +18,9 @@ from tts2face.video.pose import similarity_transforms
 
 Floats = NDArray[np.float64]
 
-N_FRAMES = 160  # averaged; noise of the picture is gone after some dozens
-FACING_COSINES = (0.15, 0.75)  # cosine to the camera: where a texel begins to count, and where it counts in full
-MIN_EYE_OPENING = 0.8  # of the median opening of the eyes: frames with less show lids where the skin's lids are open
+N_FRAMES = 160  # averaged; a few dozen remove the noise of the pictures
+FACING_COSINES = (0.15, 0.75)  # cosine between normal and camera at which the weight of a texel starts and is full
+MIN_EYE_OPENING = 0.8  # of the median eye opening; frames with less are skipped
 REMAP_COLUMNS = 1024  # OpenCV maps pictures, not lists
 FOREHEAD_TOP, HAIR_REGION_MM = (
     10,
@@ -39,7 +39,7 @@ class SkinColours:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PictureFitter:
-    """Brings a head's vertices into pictures: similarity on the landmarks, then eqs 3 and 4 on what is left."""
+    """Fit of a head's vertices to pictures: a similarity on the landmarks, then eqs 3 and 4 on the residual."""
 
     vertices: Floats
     marks: Floats
@@ -78,7 +78,7 @@ def average_skin_colours(
     Raises
     ------
     DataError
-        No frame serves, or a video cannot be read any more.
+        No frame is suitable, or a video can no longer be read.
     """
     rows = np.flatnonzero(canvas.share > 0)
     corners, weights = canvas.texels.corners[rows], canvas.texels.weights[rows]
@@ -122,7 +122,7 @@ def select_frames(
 
 
 def sample_picture(picture: NDArray[np.uint8], places: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """Colours (P, 3) of a picture (H, W, 3) at places (P, 2), x and y, and which lie in it; cubic."""
+    """Colours (P, 3) of a picture (H, W, 3) at positions (P, 2), and a mask of those inside it; cubic interpolation."""
     import cv2
 
     height, width = picture.shape[:2]
@@ -135,7 +135,7 @@ def sample_picture(picture: NDArray[np.uint8], places: Floats) -> tuple[Floats, 
 
 
 def hair_vertices(face: Face, fit: PictureFitter, normals: Floats) -> NDArray[np.int64]:
-    """Vertices in the hair above the forehead, in sight from the front."""
+    """Vertices in the hair above the forehead that are visible from the front."""
     away = face.vertices - fit.marks[FOREHEAD_TOP]
     low, high, half = HAIR_REGION_MM
     is_hair = (
@@ -145,7 +145,7 @@ def hair_vertices(face: Face, fit: PictureFitter, normals: Floats) -> NDArray[np
 
 
 def vertex_normals(face: Face) -> Floats:
-    """(V, 3) outward unit normals of the face at rest; vertices in one place have one normal."""
+    """(V, 3) outward unit normals of the face at rest; vertices at one position share one normal."""
     corners = face.vertices[face.triangles].astype(np.float64)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     _, place = np.unique(face.vertices, axis=0, return_inverse=True)

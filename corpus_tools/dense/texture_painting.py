@@ -1,4 +1,4 @@
-"""The talker's skin painted over the head's own: where nothing was seen, the head's colours in the talker's tint."""
+"""Texture of the talker's skin; unseen parts take the head's texture in the talker's tint."""
 
 from dataclasses import replace
 
@@ -7,25 +7,25 @@ from numpy.typing import NDArray
 
 from corpus_tools.dense.mesh_fit import face_landmarks
 from corpus_tools.dense.skin_colour import SkinColours, vertex_normals
+from corpus_tools.dense.texels import Texels
 from corpus_tools.dense.visible_texels import SkinCanvas, smooth_step, soften_edges
-from corpus_tools.head.layout import Texels
 from tts2face.models.face import Face
 
 Floats = NDArray[np.float64]
 
 LUMA = np.array([0.299, 0.587, 0.114])  # ITU-R BT.601
-SKIN_LUMA = 0.72  # of the head's usual skin: darker texels are brows, lashes, nostrils, hair, and tell no tint
+SKIN_LUMA = 0.72  # of the head's median skin; darker texels are brows, lashes, nostrils or hair
 HAIR_LUMA = (55.0, 115.0)  # of the head's texture: hair alone, and skin alone
 TINT_REACH_MM = 14.0  # reach over which unseen skin takes the tint of the seen skin beside it
 TINT_BOUNDS = (0.35, 1.6)
-SHADE_BOUNDS = (0.75, 1.35)  # a lamp's shading that is taken out; more would amplify noise at the rim
+SHADE_BOUNDS = (0.75, 1.35)  # limits of the shading correction; more would amplify noise at the rim
 BROW_LANDMARKS = (105, 66, 334, 296)  # upper edges
-FRINGE_MM = (2.0, 7.0)  # above the brows: where dark texels begin to be taken for hair, and where they surely are
-STRAND_TEXELS = 25  # about 4 mm of the forehead: around a strand its shadow is not skin either
-FRINGE_LUMA = (0.78, 0.95)  # of the usual skin: hair, and skin
-N_SAMPLES = 1500  # seen texels that stand for all of them
+FRINGE_MM = (2.0, 7.0)  # above the brows: dark texels count as hair from the first, fully from the second
+STRAND_TEXELS = 25  # about 4 mm of the forehead, for the shadow around a strand
+FRINGE_LUMA = (0.78, 0.95)  # of the median skin: up to the first hair, from the second skin
+N_SAMPLES = 1500  # sample of the seen texels
 SHARP_TEXELS, SHARP_GAIN = 4.0, 0.7  # unsharp masking, Gaussian of this deviation
-MIN_TEXEL_WEIGHT = 0.02  # of the largest: texels seen less count less than in full
+MIN_TEXEL_WEIGHT = 0.02  # of the largest weight: texels below it are blended
 
 
 def paint_skin(face: Face, canvas: SkinCanvas, seen: SkinColours) -> Face:
@@ -33,7 +33,7 @@ def paint_skin(face: Face, canvas: SkinCanvas, seen: SkinColours) -> Face:
     texels = canvas.texels
     base = canvas.texture[texels.rows, texels.columns].astype(np.float64)
     share = canvas.share * smooth_step(seen.weight / seen.weight.max(), 0.0, MIN_TEXEL_WEIGHT)
-    own = _remove_shading(canvas.texels.carried(vertex_normals(face)), seen.colour, share)
+    own = _remove_shading(canvas.texels.interpolate(vertex_normals(face)), seen.colour, share)
     share = soften_edges(_remove_fringe(face, canvas, own, share), texels, len(canvas.texture))
     hair = 1.0 - smooth_step(base @ LUMA, *HAIR_LUMA)
     tint = _skin_tint(face, canvas, own / np.maximum(base, 1.0), (share, base @ LUMA))
@@ -56,14 +56,14 @@ def paint_skin(face: Face, canvas: SkinCanvas, seen: SkinColours) -> Face:
 
 
 def _remove_shading(normals: Floats, colour: Floats, share: Floats) -> Floats:
-    """Colours (P, 3) without the shading of the room's lamps, so far as it follows the surface's direction.
+    """Colours (P, 3) without the shading that depends on the surface normal.
 
     Source: the shading of a matt surface under distant light is nearly a quadratic function of its normal (Ramamoorthi
-    and Hanrahan 2001); each channel has its own, for lamps have colours.
+    and Hanrahan 2001); each colour channel has its own.
     """
-    told = np.flatnonzero(share > 0.5)
-    brightness = colour[told] @ LUMA
-    lit = told[brightness > SKIN_LUMA * np.median(brightness)]
+    seen = np.flatnonzero(share > 0.5)
+    brightness = colour[seen] @ LUMA
+    lit = seen[brightness > SKIN_LUMA * np.median(brightness)]
     terms = np.column_stack([_shading_terms(normals), np.ones(len(normals))])
     slopes = np.linalg.lstsq(terms[lit], np.log(np.maximum(colour[lit], 1.0)), rcond=None)[0]
     shade = np.exp((terms - terms[lit].mean(axis=0)) @ slopes)
@@ -77,11 +77,13 @@ def _shading_terms(normals: Floats) -> Floats:
 
 
 def _remove_fringe(face: Face, canvas: SkinCanvas, own: Floats, share: Floats) -> Floats:
-    """Shares (P,) without the dark strands that hang over the forehead: hair is no skin."""
+    """Shares (P,) without the dark strands of hair over the forehead."""
     from scipy.ndimage import gaussian_filter, minimum_filter
 
     marks = face_landmarks(face, face.vertices)
-    above = canvas.texels.carried(face.vertices.astype(np.float64))[:, 1] - float(marks[list(BROW_LANDMARKS), 1].max())
+    above = canvas.texels.interpolate(face.vertices.astype(np.float64))[:, 1] - float(
+        marks[list(BROW_LANDMARKS), 1].max()
+    )
     luma = own @ LUMA
     usual = float(np.median(luma[share > 0.5]))
     clear = smooth_step(luma / usual, *FRINGE_LUMA)
@@ -93,11 +95,11 @@ def _remove_fringe(face: Face, canvas: SkinCanvas, own: Floats, share: Floats) -
     return kept
 
 
-def _skin_tint(face: Face, canvas: SkinCanvas, ratio: Floats, told: tuple[Floats, Floats]) -> Floats:
-    """(P, 3) factors for the head's own skin: those of the nearest seen skin, blending into the usual one."""
+def _skin_tint(face: Face, canvas: SkinCanvas, ratio: Floats, share_and_luma: tuple[Floats, Floats]) -> Floats:
+    """(P, 3) tint factors for the head's skin: those of the nearest seen skin, blended with the median."""
     from scipy.spatial.distance import cdist
 
-    share, luma = told
+    share, luma = share_and_luma
     skin = np.flatnonzero((share > 0.3) & (luma > SKIN_LUMA * np.median(luma[share > 0.3])))
     chosen = skin[np.linspace(0, len(skin) - 1, min(N_SAMPLES, len(skin))).round().astype(int)]
     logs = np.log(np.clip(ratio[chosen], *TINT_BOUNDS))
@@ -109,12 +111,12 @@ def _skin_tint(face: Face, canvas: SkinCanvas, ratio: Floats, told: tuple[Floats
     mixed = (near @ logs + 0.5 * usual) / (near.sum(axis=1, keepdims=True) + 0.5)
     of_vertices = np.zeros((len(face.vertices), 3))
     of_vertices[used] = mixed
-    factors: Floats = np.exp(canvas.texels.carried(of_vertices))
+    factors: Floats = np.exp(canvas.texels.interpolate(of_vertices))
     return factors
 
 
 def sharpen(colour: Floats, share: Floats, texels: Texels, side: int) -> Floats:
-    """Colours (P, 3) with edges as crisp as in one frame: an average over frames is blurred by the tracker's jitter."""
+    """Sharpened colours (P, 3), which compensate the blur of averaging over frames with tracking noise."""
     from scipy.ndimage import gaussian_filter
 
     weight = np.zeros((side, side))

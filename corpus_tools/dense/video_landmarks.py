@@ -1,4 +1,4 @@
-"""What videos show of a talker: landmarks in the picture and without head pose."""
+"""Landmarks of a talker in videos, in the picture and pose-free."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,10 +21,10 @@ from tts2face.video.pose import remove_pose
 
 Floats = NDArray[np.float64]
 
-MAX_VIDEOS = 40  # evenly out of more; of GRID's s1, the mean of 201 lies 0.05 mm from that of 40
-MAX_CLOSED_GAP = 0.02  # gap of the inner lips over the distance of the eyes up to which lips are closed at rest
-MIN_CLOSED_FRAMES = 10  # frames; with fewer, the frames with the smallest gaps serve
-OPEN_EYES_PERCENTILE = 50  # lids at rest are those of the frames whose eyes are open at least so far
+MAX_VIDEOS = 40  # evenly selected from more; means of 40 and 201 videos of GRID s1 differ by 0.05 mm
+MAX_CLOSED_GAP = 0.02  # lip gap relative to the eye distance up to which lips count as closed
+MIN_CLOSED_FRAMES = 10  # frames; with fewer, those with the smallest gaps are used
+OPEN_EYES_PERCENTILE = 50  # of the eye openings: frames above it define lids at rest
 RIGHT_LIDS, LEFT_LIDS = (159, 145), (386, 374)  # upper and lower, in the middle of each eye
 
 
@@ -41,7 +41,7 @@ class VideoLandmarks:
 
 
 def find_videos(recordings: Path) -> tuple[Path, ...]:
-    """The videos of a folder of recordings, or the one video; not more than `MAX_VIDEOS`, evenly chosen.
+    """The videos of a folder of recordings, or the given video; at most `MAX_VIDEOS`, evenly selected.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def find_videos(recordings: Path) -> tuple[Path, ...]:
         There is no such folder or file, or no video in it.
     """
     if recordings.is_file() and recordings.suffix.lower() not in VIDEO_SUFFIXES:
-        raise InputError(f"{recordings} is no video ({', '.join(sorted(VIDEO_SUFFIXES))}); give one, or a folder")
+        raise InputError(f"{recordings} is not a video ({', '.join(sorted(VIDEO_SUFFIXES))}); give one, or a folder")
     if recordings.is_file():
         return (recordings,)
     found = [recording.video for recording in find_recordings(recordings)]
@@ -58,12 +58,12 @@ def find_videos(recordings: Path) -> tuple[Path, ...]:
 
 
 def track_videos(videos: Sequence[Path], eyes: CachedTracker, on_progress: Progress) -> tuple[VideoLandmarks, ...]:
-    """The videos that can be read and show a face.
+    """Landmarks of the videos that can be read and show a face.
 
     Raises
     ------
     DataError
-        None can.
+        There are none.
     """
     kept, reason = [], ""
     for number, video in enumerate(videos):

@@ -1,4 +1,4 @@
-"""Which texels of the skin a camera in front sees: the face without the eyes, the mouth's inside and what hides."""
+"""Texels of the skin that are visible from the front: the face without eyes, inner mouth and hidden parts."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.dense.mesh_fit import LID_LANDMARKS, N_MESH_LANDMARKS, OPEN_JAW_WEIGHT, face_landmarks
-from corpus_tools.head.layout import BELOW, Texels, texels_of
+from corpus_tools.dense.texels import ISLANDS_TOP, Texels, find_texels
 from lexicon.errors import DataError
 from tts2face.models.face import Face
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
@@ -15,29 +15,29 @@ Floats = NDArray[np.float64]
 
 INNER_LIPS = (*INNER_LIP_UPPER, *INNER_LIP_LOWER[-2:0:-1])
 CELL_MM = 0.75  # of the grid in which the foremost surface is found
-HIDDEN_MM = 5.0  # this far behind the foremost surface is hidden; less is the slope of a nose within a cell
-RIM_MM = (3.0, 16.0)  # inside the face's oval: where the talker's colour begins, and where it is alone
-LID_MM = (0.8, 2.2)  # off the lids' edge, where lashes and the wet rim blur into the skin
-LIP_MM = (0.4, 1.4)  # off the inner lips' edge, where the dark between them does
+HIDDEN_MM = 5.0  # depth behind the foremost surface from which a texel is hidden; slopes within a cell are less
+RIM_MM = (3.0, 16.0)  # inside the face's oval: the share of the talker's colour is 0 up to the first, 1 from the second
+LID_MM = (0.8, 2.2)  # from the lids' edge, where lashes and the wet rim mix with the skin
+LIP_MM = (0.4, 1.4)  # from the inner lips' edge, where the dark between them does
 MASK_BLUR = 2.0  # texels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SkinCanvas:
-    """The skin as a picture.
+    """The skin texture of a head, to be painted.
 
     Parameters
     ----------
     texture : (S, S, 3)
-        The head's own, sRGB.
+        The head's texture, sRGB.
     texels
-        Those of the textured parts, P of them.
+        Texels of the textured parts, P of them.
     opened : (V, 3)
         The face with its jaw slightly open.
     share : (P,)
-        How much of the talker's own colour each texel takes, 0 to 1.
+        Share of the talker's colour in each texel, 0 to 1.
     in_mouth : (P,)
-        Texels of the mouth's inside, which stay as they are.
+        Texels of the inner mouth, which are not changed.
     """
 
     texture: NDArray[np.uint8]
@@ -53,17 +53,17 @@ def build_canvas(face: Face) -> SkinCanvas:
     Raises
     ------
     DataError
-        It has no texture.
+        The head has no texture.
     """
     if face.uv is None or face.texture is None:
         raise DataError("the head has no texture to paint a talker's skin on; build the shipped faces again")
     spans = [face.triangles[part.first : part.first + part.count] for part in face.parts if part.textured]
     triangles = np.concatenate(spans).astype(np.int64)
     side = len(face.texture)
-    texels = texels_of(face.uv.astype(np.float64), triangles, side)
+    texels = find_texels(face.uv.astype(np.float64), triangles, side)
     jaw = face.shapes[face.shape_names.index("jawOpen")]
     opened = face.vertices.astype(np.float64) + OPEN_JAW_WEIGHT * jaw
-    island = texels.rows > BELOW * side - 1
+    island = texels.rows > ISLANDS_TOP * side - 1
     share = _front_share(face, texels, opened)
     share[island] = 0.0
     in_mouth = island & (texels.columns < 0.24 * side)
@@ -71,7 +71,7 @@ def build_canvas(face: Face) -> SkinCanvas:
 
 
 def _front_share(face: Face, texels: Texels, opened: Floats) -> Floats:
-    place = texels.carried(opened)
+    place = texels.interpolate(opened)
     marks = face_landmarks(face, opened)[:N_MESH_LANDMARKS]
     share = smooth_step(polygon_depth(place[:, :2], marks[list(FACE_OVAL), :2], RIM_MM[1] + 1), *RIM_MM)
     share[place[:, 2] < float(marks[list(FACE_OVAL), 2].min())] = 0.0
@@ -83,7 +83,7 @@ def _front_share(face: Face, texels: Texels, opened: Floats) -> Floats:
 
 
 def _is_hidden(place: Floats) -> NDArray[np.bool_]:
-    """(P,) whether another texel lies before one."""
+    """(P,) whether a texel is hidden by another."""
     cells = np.floor(place[:, :2] / CELL_MM).astype(np.int64)
     cells -= cells.min(axis=0)
     foremost = np.full(tuple(cells.max(axis=0) + 1), -np.inf)
@@ -93,7 +93,7 @@ def _is_hidden(place: Floats) -> NDArray[np.bool_]:
 
 
 def polygon_depth(places: Floats, polygon: Floats, most: float) -> Floats:
-    """(P,) distance of places (P, 2) from a polygon's edge, above 0 inside; not looked for beyond `most`."""
+    """(P,) signed distance of points (P, 2) from a polygon's edge, positive inside, limited to `most`."""
     low, high = polygon.min(axis=0) - most, polygon.max(axis=0) + most
     near = np.flatnonzero(((places > low) & (places < high)).all(axis=1))
     depth = np.full(len(places), -most)
@@ -112,14 +112,14 @@ def polygon_depth(places: Floats, polygon: Floats, most: float) -> Floats:
 
 
 def smooth_step(values: Floats, low: float, high: float) -> Floats:
-    """0 up to `low`, 1 from `high`, smooth between."""
+    """Smooth step from 0 at `low` to 1 at `high`."""
     t = np.clip((values - low) / (high - low), 0.0, 1.0)
     smooth: Floats = t * t * (3.0 - 2.0 * t)
     return smooth
 
 
 def soften_edges(share: Floats, texels: Texels, side: int) -> Floats:
-    """Shares without steps: blurred, and never above what they were."""
+    """Blurred shares that do not exceed the original ones."""
     from scipy.ndimage import gaussian_filter
 
     picture = np.zeros((side, side))

@@ -1,1 +1,1 @@
-"""How near synthesised lips come to real ones that were not learnt from."""
+"""Evaluation of synthesised lip motion against held-out recordings."""

@@ -1,13 +1,13 @@
-"""Held-out comparison: a talker learnt from some utterances speaks others, and is measured against the real face."""
+"""Held-out evaluation: motion synthesised for held-out utterances is compared with the recorded face."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.cross_talker import SpeakerScale, compare_across_talkers, standardise_reference
+from corpus_tools.evaluation.measures import speech_frames
 from corpus_tools.evaluation.methods import SynthesisMethod, build_methods
 from corpus_tools.evaluation.own_durations import VoicedUtterance, compare_own_durations, speak_references
 from corpus_tools.evaluation.reference import LipCurves, ReferenceUtterance, Thresholds
@@ -31,10 +31,47 @@ TRACKS_METHOD, CEILING_METHOD = "tracks", "real, through the model"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SplitResult:
-    """One split, made: the talker, the real utterances, and what each method made of them (T, S), by name.
+class SpeakerScale:
+    """Mean and standard deviation (2,) of a person's lip opening and width during speech."""
 
-    ``own`` is what methods made of a voice's own durations. ``scale`` is the talker's where curves are z-scored.
+    mean: NDArray[np.float64]
+    spread: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, observations: Sequence[Observation]) -> "SpeakerScale":
+        """Statistics of one person's recordings over speech frames."""
+        parts = []
+        for seen in observations:
+            here = speech_frames(seen.phones, len(seen.landmarks), seen.fps)
+            parts.append(LipCurves.of(seen.landmarks[here]).stacked())
+        frames = np.concatenate(parts)
+        return cls(frames.mean(axis=0), np.maximum(frames.std(axis=0), 1e-9))
+
+    def z_score(self, curves: LipCurves) -> LipCurves:
+        """z-scored curves of this person."""
+        opening, width = ((curves.stacked() - self.mean) / self.spread).T
+        return LipCurves(opening, width)
+
+
+def standardise_reference(real: ReferenceUtterance, scale: SpeakerScale) -> ReferenceUtterance:
+    """A real utterance whose parameters are its z-scored curves."""
+    curves = scale.z_score(real.curves)
+    return replace(real, curves=curves, parameters=curves.stacked().astype(np.float32))
+
+
+def compare_across_talkers(
+    one: ReferenceUtterance, made: NDArray[np.float32], model: ShapeModel, scale: SpeakerScale
+) -> UtteranceComparison:
+    """Comparison of synthesised parameters (T, S) of one talker with a real utterance of another, both z-scored."""
+    curves = scale.z_score(LipCurves.of(model.shapes(made)))
+    return UtteranceComparison(one, curves.stacked(), curves, np.ones(2))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SplitResult:
+    """Results of one split: the talker, the real utterances, and the parameters (T, S) of each method, by name.
+
+    ``own`` are comparisons with a voice's own durations; ``scale`` is the talker's if curves are z-scored.
     """
 
     talker: Talker
@@ -50,7 +87,7 @@ class SplitResult:
         return self.talker.model
 
     def curves(self, method: str, at: int) -> LipCurves:
-        """Curves of the lips as a method made them, in the units of the real ones."""
+        """Lip curves of a method, in the units of the real ones."""
         curves = LipCurves.of(self.model.shapes(self.made[method][at]))
         return curves if self.scale is None else self.scale.z_score(curves)
 
@@ -63,33 +100,34 @@ def evaluate(
     voice: Voice | None = None,
     on_progress: Progress | None = None,
 ) -> tuple[Evaluation, tuple[SplitResult, ...]]:
-    """Every method on held-out utterances, with their true phone edges; all is learnt from the training parts.
+    """Scores of every method on held-out utterances with their true phone edges.
 
     Parameters
     ----------
     parts
-        Training and held-out utterances; of several splits the held-out parts are taken together, and the figures in
-        units of spread refer to each split's own model.
+        Training and held-out utterances. The held-out parts of several splits are pooled; z-scored measures use each
+        split's own model.
     options
         Exemplar methods by name; by default `METHODS`.
     tracks
-        Somebody's curves by utterance, to be measured beside them.
+        External tracks by utterance, evaluated as a further method.
     voice
-        Says the words of the held-out utterances with its own durations, for a second table.
+        Voice that speaks the words of the held-out utterances with its own durations, for a second table.
 
     Raises
     ------
     InputError
-        There is nothing to learn from or nothing to test, an utterance is on both sides, or no words are known for the
-        voice.
+        A part is empty, an utterance is in both parts, or no words are known for the voice.
     BackendError
         scikit-learn is missing.
     """
     runs = []
     for number, (train, test) in enumerate(parts):
         check_disjoint(train, test)
-        tell = _split_progress(on_progress, number, len(parts))
-        runs.append(evaluate_split(train, test, options=options, tracks=tracks, voice=voice, on_progress=tell))
+        on_split_progress = _split_progress(on_progress, number, len(parts))
+        runs.append(
+            evaluate_split(train, test, options=options, tracks=tracks, voice=voice, on_progress=on_split_progress)
+        )
     limits = Thresholds.of([one for each in runs for one in each.real])
     n_train = len(parts[0][0]) if len(parts) == 1 else min(len(train) for train, _ in parts)
     result = Evaluation(
@@ -111,18 +149,18 @@ def evaluate_split(
     voice: Voice | None = None,
     on_progress: Progress | None = None,
 ) -> SplitResult:
-    """One split: learn a talker from `train`, and make the motion of `test` by every method."""
+    """Learn a talker from `train` and synthesise the motion of `test` by every method."""
     leak = fit_pose_correction(train)
-    train, test = ([leak.removed(seen) for seen in part] for part in (train, test))
+    train, test = ([leak.apply(seen) for seen in part] for part in (train, test))
     talker = _train_talker(train)
     methods = build_methods(talker, options)
     real = tuple(ReferenceUtterance.of(seen, talker.model) for seen in test)
-    said = speak_references(voice, real) if voice is not None else ()
+    voiced = speak_references(voice, real) if voice is not None else ()
     made, spent, own = {}, {}, {}
     for number, (name, method) in enumerate(methods.items()):
         made[name], spent[name] = _synthesise(method, real)
-        if said:
-            own[name] = _synthesise_own_durations(method, real, said, talker.model)
+        if voiced:
+            own[name] = _synthesise_own_durations(method, real, voiced, talker.model)
         if on_progress:
             on_progress(number + 1, len(methods))
     if tracks is not None:
@@ -138,14 +176,14 @@ def evaluate_across_talkers(
     options: Mapping[str, SynthesisOptions] | None = None,
     on_progress: Progress | None = None,
 ) -> tuple[Evaluation, tuple[SplitResult, ...]]:
-    """Every method, learnt from one person, on what somebody else said, with that person's phone edges.
+    """Scores of every method, learnt from one person, on utterances of another with the latter's phone edges.
 
-    Opening and width are z-scored by the spread of each one's speech, and all figures are those of these two curves.
+    Opening and width are z-scored over each person's speech; all measures use these two curves.
 
     Raises
     ------
     InputError
-        There is nothing to learn from or nothing to test, or an utterance is on both sides.
+        A part is empty, or an utterance is in both parts.
     BackendError
         scikit-learn is missing.
     """
@@ -192,10 +230,10 @@ def _synthesise(
 def _synthesise_own_durations(
     method: SynthesisMethod,
     real: Sequence[ReferenceUtterance],
-    said: Sequence[VoicedUtterance | None],
+    voiced: Sequence[VoicedUtterance | None],
     model: ShapeModel,
 ) -> tuple[UtteranceComparison, ...]:
-    pairs = zip(real, said, strict=True)
+    pairs = zip(real, voiced, strict=True)
     return tuple(compare_own_durations(method, one, spoken, model) for one, spoken in pairs if spoken is not None)
 
 
@@ -219,7 +257,7 @@ def _pooled_own_scores(runs: Sequence[SplitResult], limits: Thresholds) -> tuple
 
 
 def _score_folds(parts: Sequence[Split], runs: Sequence[SplitResult], limits: Thresholds) -> tuple[Fold, ...]:
-    """Figures of every run alone; thresholds are those of all."""
+    """Scores of each run alone, with the thresholds of all runs."""
     return tuple(
         Fold(len(train), len(test), {one.method: one.values() for one in _pooled_scores([each], limits)})
         for (train, test), each in zip(parts, runs, strict=True)

@@ -1,4 +1,4 @@
-"""An ARKit capture as recordings of somebody: lips as it shows them on the default head, phones from its sound."""
+"""Reference utterances from an ARKit capture: lips of the default head moved by it, phones from its sound."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from tts2face.types import Trajectory
 from tts2face.video.livelink import read_livelink
 
 LIVELINK_SUFFIX = ".csv"
-MAX_UTTERANCE_S = 6.0  # cut at pauses into utterances of about a sentence: intervals come from drawing utterances again
+MAX_UTTERANCE_S = 6.0  # cut at pauses into utterances of about a sentence, which the bootstrap resamples
 
 
 def observe_livelink(path: Path, effort: RunOptions) -> tuple[Observation, ...]:
@@ -30,36 +30,36 @@ def observe_livelink(path: Path, effort: RunOptions) -> tuple[Observation, ...]:
     InputError
         There is no such capture, or no sound beside it, or several.
     DataError
-        The capture or its sound cannot be read, or nobody speaks.
+        The capture or its sound cannot be read, or it contains no speech.
     BackendError
-        Nothing on this machine recognises phones.
+        No phone recogniser is installed.
     """
     capture = read_livelink(path)
     sound = find_capture_sound(path)
     if sound is None:
-        raise InputError(f"no sound lies beside {path.name}; put its sound file there")
+        raise InputError(f"there is no sound file beside {path.name}; put one there")
     face = load_face("head")
     motion = match_shapes(capture.weights, face)
-    ears = CachedAligner(effort.folder())
+    aligner = CachedAligner(effort.folder())
     found = []
-    for number, span in enumerate(cut_at_pauses(ears.sound(sound), MAX_UTTERANCE_S), start=1):
+    for number, span in enumerate(cut_at_pauses(aligner.sound(sound), MAX_UTTERANCE_S), start=1):
         begin, end = (round(second * motion.fps) for second in span)
         part = Trajectory(motion.channels, motion.values[begin:end], motion.fps)
         landmarks = moved_landmarks(face, part)
-        found.append(_build_observation(f"{path.stem}-{number:02d}", (ears, sound), span, landmarks, motion.fps))
+        found.append(_build_observation(f"{path.stem}-{number:02d}", (aligner, sound), span, landmarks, motion.fps))
     return tuple(found)
 
 
 def _build_observation(
     name: str,
-    heard_in: tuple[CachedAligner, Path],
+    source: tuple[CachedAligner, Path],
     span: tuple[float, float],
     landmarks: NDArray[np.float32],
     fps: float,
 ) -> Observation:
-    ears, sound = heard_in
-    heard = ears.heard(sound, None, span)
-    phones, words = trim_to_picture(heard, 0.0, len(landmarks) / fps)
+    aligner, sound = source
+    speech = aligner.align(sound, None, span)
+    phones, words = trim_to_picture(speech, 0.0, len(landmarks) / fps)
     return Observation(
         name,
         fps,
@@ -67,8 +67,8 @@ def _build_observation(
         np.zeros((len(landmarks), 6), np.float32),
         phones,
         words,
-        intensity(heard.sound, np.arange(len(landmarks)) / fps),
-        Quality(heard.confidence, 1.0, 0, cut=span[0]),
+        intensity(speech.sound, np.arange(len(landmarks)) / fps),
+        Quality(speech.confidence, 1.0, 0, cut=span[0]),
         sound,
         is_recognised=True,
     )

@@ -1,4 +1,4 @@
-"""How near synthesised lips come to real ones: each measure a pure function of arrays.
+"""Measures of the similarity of synthesised and real lip motion, as functions of arrays.
 
 Openings and widths are distances between landmarks over the distance of the outer eye corners; frame i is the instant
 i / fps of the phones' clock.
@@ -22,13 +22,13 @@ from tts2face.models.landmarks import (
     UPPER_LIP_INNER_MID,
 )
 
-SPEECH_MARGIN_S = 0.1  # judged from this long before the first phone to this long behind the last
-CLOSURE_MARGIN_S = 0.03  # a closure may lie this far outside its phone's edges: frames are 40 ms, edges good to 10 ms
-CLOSURE_QUANTILE = 0.9  # of the real closures count as closed: the threshold is this quantile of their least openings
-DTW_BAND_S = 0.12  # of time by which synthesis may lead or lag unpunished by the warping cost
+SPEECH_MARGIN_S = 0.1  # evaluated from this long before the first phone to this long after the last
+CLOSURE_MARGIN_S = 0.03  # a closure may lie this far outside its phone: frames are 40 ms, edges accurate to 10 ms
+CLOSURE_QUANTILE = 0.9  # quantile of the minimum openings of real closures that is the threshold of a closure
+DTW_BAND_S = 0.12  # half width of the warping band: lead or lag of synthesis without cost
 N_DTW_PARAMETERS = 6  # shape parameters that the warping cost compares: 95 % of the motion
-TIME_TOLERANCE_S = 1e-6  # a frame that falls on an edge counts, whatever the sum of floats says
-PEAK_MARGIN_S = 0.06  # the widest opening of a vowel may lie this far outside its edges
+TIME_TOLERANCE_S = 1e-6  # a frame on an edge counts, in spite of rounding
+PEAK_MARGIN_S = 0.06  # the maximum opening of a vowel may lie this far outside its edges
 BILABIALS = ("p", "b", "m")
 OPEN_HEIGHTS = ("open", "near-open", "open-mid")
 
@@ -56,11 +56,11 @@ def speech_frames(phones: PhoneSequence, n_frames: int, fps: float) -> slice:
     Raises
     ------
     InputError
-        There is nothing but silence.
+        All phones are silence.
     """
     sounding = [at for at, label in enumerate(phones.phones) if label != SILENCE]
     if not sounding:
-        raise InputError("an utterance without speech cannot be judged; leave it out")
+        raise InputError("an utterance without speech cannot be evaluated; remove it")
     start = phones.edges[sounding[0]] - SPEECH_MARGIN_S - TIME_TOLERANCE_S
     end = phones.edges[sounding[-1] + 1] + SPEECH_MARGIN_S + TIME_TOLERANCE_S
     times = np.arange(n_frames) / fps
@@ -80,7 +80,7 @@ def correlation(real: Values, made: Values) -> float:
 
 
 def range_ratio(real: Values, made: Values) -> float:
-    """Standard deviation of the made series over that of the real one: 1 = articulated as strongly."""
+    """Standard deviation of the synthesised series over that of the real one; 1 is equal articulation."""
     return float(made.std(dtype=np.float64) / real.std(dtype=np.float64))
 
 
@@ -99,7 +99,7 @@ def warping_cost(real: Values, made: Values, spread: Values, band: int | None) -
 def min_openings(
     opening: Values, phones: PhoneSequence, fps: float, labels: Collection[str] = BILABIALS
 ) -> NDArray[np.float64]:
-    """Least opening within each phone with one of the labels, `CLOSURE_MARGIN_S` either side included."""
+    """Minimum opening within each phone with one of the labels, extended by `CLOSURE_MARGIN_S` on both sides."""
     times = np.arange(len(opening)) / fps
     least = []
     for at, label in enumerate(phones.phones):
@@ -121,7 +121,7 @@ def midpoint_openings(
 
 
 def open_vowels() -> frozenset[str]:
-    """Vowels spoken with open lips, and diphthongs that begin with one."""
+    """Open vowels, and diphthongs that begin with one."""
     first = {label: look_up_phone(label).parts[0] if look_up_phone(label).parts else label for label in vowel_symbols()}
     heights = {label: look_up_phone(start) for label, start in first.items()}
     return frozenset(label for label, phone in heights.items() if phone.height in OPEN_HEIGHTS and not phone.nasality)
@@ -133,9 +133,9 @@ def closure_threshold(real_least: Values) -> float:
 
 
 def peak_times(opening: Values, phones: PhoneSequence, fps: float) -> NDArray[np.float64]:
-    """Seconds at which the lips are widest apart in each open vowel, `PEAK_MARGIN_S` either side; between frames.
+    """Instant of the maximum opening in each open vowel, extended by `PEAK_MARGIN_S` on both sides, in seconds.
 
-    The top of the parabola through the highest frame and its neighbours; NaN where the curve peaks at the border.
+    Vertex of the parabola through the highest frame and its neighbours; NaN if the maximum is at the border.
     """
     wanted, peaks = open_vowels(), []
     for at, label in enumerate(phones.phones):

@@ -1,4 +1,4 @@
-"""Ways to make lips move that are compared: from what the training part taught, for phones in time."""
+"""Synthesis methods that are compared, learnt from the training part."""
 
 from collections.abc import Callable, Mapping
 
@@ -14,7 +14,7 @@ from tts2face.models.talker import Talker
 
 NETWORK_METHOD = "sliding-window network"
 
-# Speech parameters (T, D) for phones at T frames, from what the training part taught.
+# Speech parameters (T, D) for timed phones at T frames, learnt from the training part.
 SynthesisMethod = Callable[[PhoneSequence, int, float], NDArray[np.float32]]
 
 
@@ -31,7 +31,7 @@ def build_methods(talker: Talker, options: Mapping[str, SynthesisOptions] | None
 
 
 def network_method(network: PhoneNetwork) -> SynthesisMethod:
-    """The first of a talker's networks alone: what a plain sliding-window network makes of phones."""
+    """The first of a talker's networks alone: a plain sliding-window network."""
 
     def made(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
         return network.parameters(phones, np.arange(n_frames) / fps, slice(1))
@@ -49,7 +49,7 @@ def exemplar_method(voice: ExemplarModel, options: SynthesisOptions) -> Synthesi
 
 
 def mean_pose_method(talker: Talker, voice: ExemplarModel) -> SynthesisMethod:
-    """The simplest synthesis that knows phones: their mean poses, joined by straight lines from middle to middle."""
+    """Baseline: linear interpolation between the mean poses of phones, placed at their middles."""
     n_speech, inventory = talker.model.n_speech, voice.tokens.inventory
     poses: dict[str, list[NDArray[np.float64]]] = {label: [] for label in inventory}
     for spoken in talker.utterances:

@@ -1,9 +1,8 @@
-"""The words of held-out utterances in a voice of our own, with its own durations, brought onto the real clock.
+"""Evaluation with a voice's own durations, mapped to the time axis of the recordings.
 
-The voice says the words in its own time. To be laid beside the real lips its clock is put onto theirs word by word:
-the beginning and the end of each word fall on those of the real one, time runs evenly between. So tempo and pauses, in
-which no two speakers agree, count for nothing; how the time of a word is shared among its phones, and which phones
-those are, counts in full. The map knows words' edges only and never looks at lips.
+A voice speaks the words of held-out utterances. Its time axis is mapped to the recorded one piecewise linearly, from
+the edges of its words to those of the recorded words. Differences of tempo and pauses therefore have no effect on the
+measures, whereas phones and their durations within words have. The map uses word edges only, not lip motion.
 """
 
 from collections.abc import Sequence
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from corpus_tools.evaluation.measures import speech_frames
 from corpus_tools.evaluation.methods import SynthesisMethod
 from corpus_tools.evaluation.reference import LipCurves, ReferenceUtterance
-from corpus_tools.evaluation.scores import OwnDurationMotion, UtteranceComparison, compared_spread
+from corpus_tools.evaluation.scores import OwnDurationMotion, UtteranceComparison, speech_spread
 from lexicon.errors import InputError
 from lexicon.normalize import normalize
 from lexicon.sequence import PhoneSequence, WordSpan
@@ -23,18 +22,16 @@ from tts2face.models.talker import ShapeModel
 from tts2face.types import Speech, frame_count
 from tts2face.voice.engine import Voice
 
-OVERSAMPLING = (
-    4  # instants a frame at which motion is made before it is read between frames: lines across 10 ms cut no peak
-)
-MIN_WORD_GAP_S = 1e-6  # a word ends this long before the next begins, where the real one pauses less than that
-EXTRAPOLATION_S = 60.0  # outside the words time runs evenly, this far
+OVERSAMPLING = 4  # instants per frame at which motion is synthesised before linear interpolation: 10 ms preserve peaks
+MIN_WORD_GAP_S = 1e-6  # minimum pause between words
+EXTRAPOLATION_S = 60.0  # the map is extrapolated linearly this far outside the words
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VoicedUtterance:
-    """One utterance in a voice's own time: phones, frames of the sound, and where its words lie on both clocks.
+    """One utterance of a voice with its own durations: phones, number of frames, and word edges on both time axes.
 
-    ``ours`` and ``real`` (K,) are the same instants, in seconds of the voice's clock and of the real one.
+    ``voice_s`` and ``real`` (K,) are corresponding instants in seconds of the voice and of the recording.
     """
 
     phones: PhoneSequence
@@ -43,22 +40,22 @@ class VoicedUtterance:
     real: NDArray[np.float64]
 
     def times(self, real: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Seconds of the voice's clock for seconds of the real one."""
+        """Seconds of the voice for seconds of the recording."""
         return np.interp(real, self.real, self.voice_s)
 
 
 def speak_references(voice: Voice, real: Sequence[ReferenceUtterance]) -> tuple[VoicedUtterance | None, ...]:
-    """Utterances as a voice says them; None for those without words, and where it counts other words.
+    """Utterances spoken by a voice; None for those without words or with another number of words.
 
     Raises
     ------
     InputError
-        None is left.
+        No utterance remains.
     """
-    said = tuple(_speak_reference(voice, one) for one in real)
-    if all(one is None for one in said):
+    voiced = tuple(_speak_reference(voice, one) for one in real)
+    if all(one is None for one in voiced):
         raise InputError("own durations need recordings whose words are known; add transcripts")
-    return said
+    return voiced
 
 
 def _speak_reference(voice: Voice, one: ReferenceUtterance) -> VoicedUtterance | None:
@@ -72,7 +69,7 @@ def _speak_reference(voice: Voice, one: ReferenceUtterance) -> VoicedUtterance |
 
 
 def map_word_times(speech: Speech, phones: PhoneSequence, words: Sequence[WordSpan], fps: float) -> VoicedUtterance:
-    """Speech, and where its words lie among those of a recording."""
+    """One utterance spoken by the voice, with the map of its word edges to those of the recording."""
     ours, real = _word_edges(speech.phones, speech.words), _word_edges(phones, words)
     outside = np.array([-EXTRAPOLATION_S, EXTRAPOLATION_S])
     ours, real = (np.concatenate([each[:1] + outside[:1], each, each[-1:] + outside[1:]]) for each in (ours, real))
@@ -80,7 +77,7 @@ def map_word_times(speech: Speech, phones: PhoneSequence, words: Sequence[WordSp
 
 
 def _word_edges(phones: PhoneSequence, words: Sequence[WordSpan]) -> NDArray[np.float64]:
-    """(2 W,) seconds at which words begin and end, always rising."""
+    """(2 W,) strictly increasing seconds at which words begin and end."""
     begins = np.array([phones.edges[word.first] for word in words])
     ends = np.array([phones.edges[word.last] for word in words])
     ends[:-1] = np.minimum(ends[:-1], begins[1:] - MIN_WORD_GAP_S)
@@ -88,15 +85,15 @@ def _word_edges(phones: PhoneSequence, words: Sequence[WordSpan]) -> NDArray[np.
 
 
 def compare_own_durations(
-    method: SynthesisMethod, one: ReferenceUtterance, said: VoicedUtterance, model: ShapeModel
+    method: SynthesisMethod, one: ReferenceUtterance, voiced: VoicedUtterance, model: ShapeModel
 ) -> UtteranceComparison:
-    """What a method makes of the voice's phones, beside the real utterance."""
-    fps, n_fine = one.observation.fps, OVERSAMPLING * (said.n_frames - 1) + 1
-    made = method(said.phones, n_fine, OVERSAMPLING * fps)
-    wanted = said.times(np.arange(len(one.parameters)) / fps)
+    """Comparison of a method's motion for the voice's phones with the real utterance."""
+    fps, n_fine = one.observation.fps, OVERSAMPLING * (voiced.n_frames - 1) + 1
+    made = method(voiced.phones, n_fine, OVERSAMPLING * fps)
+    wanted = voiced.times(np.arange(len(one.parameters)) / fps)
     columns = [np.interp(wanted, np.arange(n_fine) / (OVERSAMPLING * fps), column) for column in made.T]
     there, ours = np.stack(columns, axis=1).astype(np.float32), made[::OVERSAMPLING]
     own = OwnDurationMotion(
-        said.phones, speech_frames(said.phones, said.n_frames, fps), ours, LipCurves.of(model.shapes(ours))
+        voiced.phones, speech_frames(voiced.phones, voiced.n_frames, fps), ours, LipCurves.of(model.shapes(ours))
     )
-    return UtteranceComparison(one, there, LipCurves.of(model.shapes(there)), compared_spread(model), own)
+    return UtteranceComparison(one, there, LipCurves.of(model.shapes(there)), speech_spread(model), own)

@@ -1,4 +1,4 @@
-"""What the camera saw of held-out utterances, and the thresholds that it sets."""
+"""Reference motion of held-out utterances, and thresholds derived from it."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from corpus_tools.recordings.observation import Observation
 from lexicon.phones import PHONES
 from tts2face.models.talker import ShapeModel
 
-# Phones by what the lips do in them; a frame belongs to the phone that sounds, to one class only, the first that fits.
+# Phone classes by lip articulation; a frame belongs to the first class that contains its phone.
 PHONE_CLASSES: dict[str, frozenset[str]] = {
     "bilabial": frozenset(measures.BILABIALS),
     "labiodental": frozenset({"f", "v"}),
@@ -40,7 +40,7 @@ class LipCurves:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReferenceUtterance:
-    """One held-out utterance: its judged frames, speech parameters (T, S), curves, and the class of each frame (T,)."""
+    """One held-out utterance: evaluated frames, speech parameters (T, S), curves, and the class of each frame (T,)."""
 
     observation: Observation
     judged: slice
@@ -68,7 +68,7 @@ class ReferenceUtterance:
 
 @dataclass(frozen=True, slots=True)
 class Thresholds:
-    """Below these come nine tenths of real lips: openings in bilabials and labiodentals, widths in rounded phones."""
+    """Upper bounds of nine tenths of real openings in bilabials and labiodentals, and of widths in rounded phones."""
 
     closed: float
     labiodental: float
@@ -93,7 +93,7 @@ class Thresholds:
 
 
 def frame_classes(labels: Sequence[str], edges: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.str_]:
-    """(T,) class of the phone that sounds at each instant."""
+    """(T,) class of the phone at each instant."""
     of_phone = np.array(
         [next((name for name, some in PHONE_CLASSES.items() if label in some), OTHER_CLASS) for label in labels]
     )

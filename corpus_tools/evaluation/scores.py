@@ -1,4 +1,4 @@
-"""Figures of one method over held-out utterances, with intervals from drawing utterances again."""
+"""Scores of a method over held-out utterances, with bootstrap intervals over utterances."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class IntervalEstimate:
 
 @dataclass(frozen=True, slots=True)
 class UtteranceScore:
-    """One held-out utterance: RMSE and warping cost in units of spread, r and range of opening and width."""
+    """Scores of one utterance: RMSE and warping cost in units of spread, r and range ratio of opening and width."""
 
     name: str
     r_opening: float
@@ -48,9 +48,9 @@ class UtteranceScore:
 
 @dataclass(frozen=True, slots=True)
 class ClassScore:
-    """Frames of one class of phones: how many, their RMSE in units of spread, error and bias of the opening.
+    """Scores of the frames of one phone class: their number, RMSE in units of spread, error and bias of the opening.
 
-    Error and bias are in parts of the eye distance; a negative bias is a mouth too closed.
+    Error and bias are relative to the eye distance; a negative bias is a mouth that is too closed.
     """
 
     phones: str
@@ -62,9 +62,9 @@ class ClassScore:
 
 @dataclass(frozen=True, slots=True)
 class Scores:
-    """One method over all held-out utterances: frames pooled for r and range, the other figures means or shares.
+    """Scores of a method over all held-out utterances: r and range of pooled frames, means or shares otherwise.
 
-    ``figures`` are those of `FIGURES` by name, ``free_cost`` only for speech on a clock of its own;
+    ``figures`` are those of `FIGURES` by name, ``free_cost`` only with a voice's own durations;
     ``real_time_factor`` is the time spent over the utterances' duration.
     """
 
@@ -85,10 +85,10 @@ class Scores:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UtteranceStatistics:
-    """What one utterance adds to the figures of a method.
+    """Sufficient statistics of one utterance for the scores of a method.
 
-    ``opening`` and ``width`` (6,) are moments of real and made curves; ``counts`` (4, 2) are events that happened, and
-    that could: closures, false closures, labiodental contacts, roundings; ``offsets`` are seconds between peaks.
+    ``opening`` and ``width`` (6,) are moments of real and synthesised curves; ``counts`` (4, 2) numbers of events and
+    opportunities: closures, false closures, labiodental contacts, roundings; ``offsets`` seconds between peaks.
     """
 
     opening: Floats
@@ -102,9 +102,9 @@ class UtteranceStatistics:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OwnDurationMotion:
-    """The same words as a voice says them, on its own clock: its phones, and parameters (U, S) and curves made of them.
+    """Motion for a voice's own durations, on its time axis: phones, parameters (U, S) and lip curves.
 
-    ``judged`` are the frames about its speech.
+    ``judged`` are its speech frames.
     """
 
     phones: PhoneSequence
@@ -115,10 +115,10 @@ class OwnDurationMotion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UtteranceComparison:
-    """One utterance as it was and as it was made: parameters (T, S) and curves of the lips on the real clock.
+    """One real utterance and its synthesis: parameters (T, S) and lip curves on the recorded time axis.
 
-    Of the parameters the first ``len(spread)`` are compared. Where the motion was made on an ``own`` clock, what the
-    lips do in its phones is looked at there.
+    The first ``len(spread)`` parameters are compared. With a voice's durations, events within phones are evaluated on
+    its time axis (``own``).
     """
 
     real: ReferenceUtterance
@@ -139,24 +139,24 @@ def available_figures(scores: Sequence[Scores]) -> tuple[tuple[str, str, int], .
 
 
 def score_splits(method: str, splits: Sequence[SplitMotion], limits: Thresholds, spent: float = 0.0) -> Scores:
-    """Figures of a method over the utterances of all splits; making them took `spent` seconds."""
+    """Scores of a method over the utterances of all splits; synthesis took `spent` seconds."""
     judged = [
-        UtteranceComparison(one, values, LipCurves.of(model.shapes(values)), compared_spread(model))
+        UtteranceComparison(one, values, LipCurves.of(model.shapes(values)), speech_spread(model))
         for model, real, made in splits
         for one, values in zip(real, made, strict=True)
     ]
     return compute_scores(method, judged, limits, spent)
 
 
-def compared_spread(model: ShapeModel) -> NDArray[np.float32]:
-    """(D,) spread of the parameters that are compared."""
+def speech_spread(model: ShapeModel) -> NDArray[np.float32]:
+    """(D,) standard deviations of the compared parameters."""
     return model.spread[: min(measures.N_DTW_PARAMETERS, model.n_speech)]
 
 
 def compute_scores(
     method: str, judged: Sequence[UtteranceComparison], limits: Thresholds, spent: float = 0.0
 ) -> Scores:
-    """Figures of a method over judged utterances; making them took `spent` seconds."""
+    """Scores of a method over compared utterances; synthesis took `spent` seconds."""
     tallies = [_utterance_statistics(one, limits) for one in judged]
     return Scores(
         method,
@@ -185,7 +185,7 @@ def _utterance_statistics(judged: UtteranceComparison, limits: Thresholds) -> Ut
 
 
 def _free_cost(judged: UtteranceComparison) -> float | None:
-    """Warping cost of what was made on its own clock, without a band."""
+    """Warping cost, without a band, of motion on the voice's time axis."""
     if judged.own is None:
         return None
     n = len(judged.spread)
@@ -194,7 +194,7 @@ def _free_cost(judged: UtteranceComparison) -> float | None:
 
 
 def _event_counts(judged: UtteranceComparison, limits: Thresholds) -> Floats:
-    """(4, 2) events that happened and that could, in the phones of the clock on which the motion was made."""
+    """(4, 2) numbers of events and of opportunities, in the phones of the time axis of the synthesis."""
     own, fps = judged.own, judged.real.observation.fps
     phones, seen = (own.phones, own.curves) if own else (judged.real.observation.phones, judged.curves)
 

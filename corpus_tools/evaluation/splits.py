@@ -1,4 +1,4 @@
-"""Which utterances are learnt from and which are held out: always whole utterances."""
+"""Splits into training and held-out utterances."""
 
 from collections.abc import Collection, Sequence
 
@@ -7,16 +7,16 @@ import numpy as np
 from corpus_tools.recordings.observation import Observation
 from lexicon.errors import InputError
 
-Split = tuple[tuple[Observation, ...], tuple[Observation, ...]]  # learnt from, held out
+Split = tuple[tuple[Observation, ...], tuple[Observation, ...]]  # training, held out
 
 
-def split(observations: Sequence[Observation], *, hold_out: int, seed: int) -> Split:
+def split_randomly(observations: Sequence[Observation], *, hold_out: int, seed: int) -> Split:
     """Training and held-out utterances, drawn by a seed from the sorted names.
 
     Raises
     ------
     InputError
-        `hold_out` leaves nothing to learn from or nothing to test.
+        `hold_out` is below 1 or not below the number of utterances.
     """
     if not 0 < hold_out < len(observations):
         raise InputError(
@@ -43,31 +43,31 @@ def split_into_folds(observations: Sequence[Observation], *, n_folds: int, seed:
 
 
 def split_by_words(observations: Sequence[Observation], words: Collection[str]) -> Split:
-    """Utterances without any of the words, and those with one: their contexts are never seen in training.
+    """Utterances without any of the words for training, and those with one held out: its contexts are unseen.
 
     Raises
     ------
     InputError
-        A word is not spoken, or every utterance has one of them.
+        A word does not occur, or every utterance contains one of them.
     """
     wanted = {word.lower() for word in words}
-    said = {word.text.lower() for seen in observations for word in seen.words}
-    if missing := sorted(wanted - said):
-        raise InputError(f"nobody says {', '.join(missing)}; words that are said: {', '.join(sorted(said)[:60])}")
+    spoken = {word.text.lower() for seen in observations for word in seen.words}
+    if missing := sorted(wanted - spoken):
+        raise InputError(f"no utterance contains {', '.join(missing)}; choose from: {', '.join(sorted(spoken)[:60])}")
     ordered = _sort_by_name(observations)
     held = {at for at, seen in enumerate(ordered) if wanted & {word.text.lower() for word in seen.words}}
     if len(held) == len(ordered):
-        raise InputError(f"every utterance has one of {', '.join(sorted(wanted))}; nothing is left to learn from")
+        raise InputError(f"every utterance contains one of {', '.join(sorted(wanted))}; hold out fewer words")
     return _split_at(ordered, held)
 
 
 def check_disjoint(train: Sequence[Observation], test: Sequence[Observation]) -> None:
-    """Refuse a split in which an utterance is on both sides.
+    """Check that no utterance is in both parts.
 
     Raises
     ------
     InputError
-        There is such an utterance, nothing to test, or nothing to learn from.
+        There is such an utterance, or one of the parts is empty.
     """
     if not test:
         raise InputError("there is no utterance to test")
@@ -75,11 +75,13 @@ def check_disjoint(train: Sequence[Observation], test: Sequence[Observation]) ->
         raise InputError("there is no utterance to learn from")
     known = {_content_identity(seen) for seen in train}
     if both := sorted(seen.name for seen in test if _content_identity(seen) in known):
-        raise InputError(f"{both[0]} is learnt from and tested on ({len(both)} such); take it out of one part")
+        raise InputError(
+            f"{both[0]} is in both the training and the held-out part ({len(both)} in all); remove it from one"
+        )
 
 
 def _content_identity(seen: Observation) -> tuple[int, bytes]:
-    """What is the same in copies of one recording, whatever they are called."""
+    """Identity of an utterance's content, the same for copies under other names."""
     return len(seen.landmarks), seen.landmarks[:: max(1, len(seen.landmarks) // 4), :20].tobytes()
 
 

@@ -1,4 +1,4 @@
-"""What was measured, as tables for the terminal and for files."""
+"""Results of an evaluation as tables for the terminal and for files."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -13,7 +13,7 @@ TRUE_DURATIONS, OWN_DURATIONS, OTHER_TALKER = "true durations", "own durations",
 
 @dataclass(frozen=True, slots=True)
 class Fold:
-    """One of several splits: how many utterances were learnt from and held out, and figures by method and name."""
+    """One of several splits: numbers of training and held-out utterances, and scores by method and name."""
 
     n_train: int
     n_test: int
@@ -22,10 +22,10 @@ class Fold:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """All methods on held-out utterances.
+    """Scores of all methods on held-out utterances.
 
-    ``own`` are the scores with a voice's own durations, none where no voice spoke; ``folds`` those of each split where
-    there are several. Where the evaluation ``is_across`` talkers, all figures are those of z-scored curves.
+    ``own`` are the scores with a voice's own durations, empty without a voice; ``folds`` those of each split if there
+    are several. If the evaluation ``is_across`` talkers, all scores use z-scored curves.
     """
 
     n_train: int
@@ -36,11 +36,11 @@ class Evaluation:
     is_across: bool = False
 
     def to_json(self) -> dict[str, Any]:
-        """Plain dictionary, utterances included."""
+        """Dictionary for JSON, including utterances."""
         return asdict(self)
 
     def tables(self) -> Iterator[tuple[str, tuple[Scores, ...]]]:
-        """The tables there are, by name."""
+        """The available tables, by name."""
         yield OTHER_TALKER if self.is_across else TRUE_DURATIONS, self.scores
         if self.own:
             yield OWN_DURATIONS, self.own
@@ -80,7 +80,7 @@ class Evaluation:
     def rows(self) -> tuple[tuple[str, ...], ...]:
         """All figures with their intervals, for a CSV file; the first row names the columns.
 
-        Folds have no interval of their own: those cells are empty, and so is what a table does not have.
+        Cells are empty for values that a table lacks and for the intervals of folds.
         """
         head = ("table", "method", *(part for name, _, _ in FIGURES for part in (name, f"{name}_low", f"{name}_high")))
         rows = [(name, one.method, *_interval_cells(one)) for name, scores in self.tables() for one in scores]

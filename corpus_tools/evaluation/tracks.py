@@ -1,4 +1,4 @@
-"""Anybody's face curves, measured like our own: through one linear map fitted on the training sentences."""
+"""External tracks of facial motion, mapped to speech parameters by a linear map fitted on the training utterances."""
 
 import csv
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ class ExternalTrack:
     values: NDArray[np.float64]
 
     def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(N, C) values at other instants, straight between, held at the ends."""
+        """(N, C) values at other instants, interpolated linearly and constant beyond the ends."""
         columns = [np.interp(times, self.times, column) for column in self.values.T]
         return np.stack(columns, axis=1)
 
@@ -51,7 +51,7 @@ def read_tracks(path: Path) -> Mapping[str, ExternalTrack]:
                 raise DataError(f"{path} must begin with the columns utterance, time and a channel, not {head[:3]}")
             for number, row in enumerate(reader, start=2):
                 if len(row) != len(head):
-                    raise DataError(f"{path}, line {number}: {len(row)} columns, not {len(head)}; mend it")
+                    raise DataError(f"{path}, line {number}: {len(row)} columns, not {len(head)}; correct the line")
                 rows.setdefault(row[0], []).append([_parse_number(value, path, number) for value in row[1:]])
     except (OSError, UnicodeDecodeError, csv.Error) as broken:
         raise DataError(f"{path} cannot be read as CSV in UTF-8 ({broken}); export it again") from broken
@@ -68,7 +68,7 @@ def _parse_number(text: str, path: Path, line: int) -> float:
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
-        raise DataError(f"{path}, line {line}: {text!r} is no number; mend it")
+        raise DataError(f"{path}, line {line}: {text!r} is not a number; correct it")
     return value
 
 

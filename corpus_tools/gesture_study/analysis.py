@@ -1,4 +1,4 @@
-"""Comparison of each style's held-out recordings with the motion that its fields and noise make for their sound."""
+"""Comparison of each style's held-out recordings with motion generated for their sound by fields and by noise."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -7,27 +7,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.evaluation.measures import pearson
-from corpus_tools.gesture_study.blinks import blinks_of
+from corpus_tools.gesture_study.blinks import find_blinks
 from corpus_tools.gesture_study.clips import field_clip, hold_out, noise_clip, published_clip, replace_style
 from corpus_tools.gesture_study.longrun import LongRun, long_run
 from corpus_tools.gesture_study.measures import (
     Spectrum,
-    between_frames,
-    distance,
     diversity,
-    halves,
+    frame_midpoints,
+    random_halves,
     ratio,
     spectrum,
     split_recordings,
+    wasserstein,
 )
-from corpus_tools.gesture_study.traits import Trait, in_display_units, traits_of
+from corpus_tools.gesture_study.traits import Trait, in_display_units, style_traits
 from lexicon.errors import InputError
 from tts2face.gesture.gesture_stream import GestureFields
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
 
-NEAR, HALF = 1.5, 0.5  # targets of a field's distance, over that between halves and over that of noise
+NEAR, HALF = 1.5, 0.5  # maximum distance of a field, relative to the distance between halves and to that of noise
 CORRELATION_WITHIN = 0.1
-FEWEST = 10  # recordings; with fewer none is held out
+FEWEST = 10  # recordings; with fewer, none is held out
 N_TAKES = 60  # recordings whose distances are the reference of diversity
 
 Doubles = NDArray[np.float64]
@@ -37,7 +37,7 @@ Motion = Mapping[str, NDArray[np.floating]]
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """One in `one_in` recordings is held out; numbers of random halvings and of clips; the seed.
+    """Options of a study: one in `one_in` recordings is held out; numbers of random halvings and clips; the seed.
 
     Raises
     ------
@@ -64,9 +64,10 @@ class Options:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TraitComparison:
-    """A trait of recordings, of a field's clips, of noise and of a published field, and Wasserstein distances.
+    """Values of a trait in recordings, clips of a field, of noise and of a published field, and Wasserstein distances.
 
-    `halves` lies between random halves of the recordings (mean); the others between all of them and one clip (mean).
+    `halves` is the mean distance between random halves of the recordings; the others are means from all recordings to
+    one clip.
     Distances are in the trait's unit. Only measured styles have a clip of the published field; for derived ones
     `published` is empty and `to_published` NaN.
     """
@@ -103,13 +104,13 @@ class MotionComparison:
 
     @property
     def follows_sound(self) -> bool:
-        """Whether the field's r is near the recordings'."""
+        """Whether the correlation of the field is within `CORRELATION_WITHIN` of the recordings'."""
         return abs(self.with_intensity[0] - self.with_intensity[1]) <= CORRELATION_WITHIN
 
     @property
-    def fast(self) -> tuple[float, ...]:
+    def fast_power(self) -> tuple[float, ...]:
         """Power above `measures.FAST_HZ` of field, noise and published field, over that of the recordings."""
-        real, *others = (one.fast for one in self.spectra)
+        real, *others = (one.fast_power for one in self.spectra)
         return tuple(ratio(one, real) for one in others)
 
 
@@ -124,14 +125,14 @@ class StyleStudy:
     name: str
     source: str | None
     summary: str
-    n_learnt: int
-    n_held: int
+    n_training: int
+    n_held_out: int
     is_held_out: bool
     minutes: float
     blinks_per_minute: tuple[float, ...]
-    compared: tuple[TraitComparison, ...]
-    moving: tuple[MotionComparison, ...]
-    long: LongRun
+    trait_comparisons: tuple[TraitComparison, ...]
+    motion_comparisons: tuple[MotionComparison, ...]
+    long_run: LongRun
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,92 +147,91 @@ class GestureStudy:
     def targets(self) -> tuple[int, int]:
         """Number of targets of measured styles that are met, and number of targets."""
         measured = [style for style in self.styles if style.source is None]
-        kept = [one.is_met for style in measured for one in style.compared if one.trait.has_target]
-        kept += [one.follows_sound for style in measured for one in style.moving if one.feature == "head"]
+        kept = [one.is_met for style in measured for one in style.trait_comparisons if one.trait.has_target]
+        kept += [one.follows_sound for style in measured for one in style.motion_comparisons if one.feature == "head"]
         return sum(kept), len(kept)
 
 
-def study(name: str, palette: Palette, options: Options, on_progress: Progress | None = None) -> GestureStudy:
+def study_gestures(name: str, palette: Palette, options: Options, on_progress: Progress | None = None) -> GestureStudy:
     """Measure every style of a palette."""
-    found: list[StyleStudy] = []
-    ready: dict[str, _Ready] = {}
+    studies: list[StyleStudy] = []
+    prepared: dict[str, _PreparedStyle] = {}
     for done, style in enumerate(names := (*palette.styles, *palette.derivations)):
         if on_progress:
             on_progress(done, len(names))
         source = palette.derivations[style].source if style in palette.derivations else style
-        if source not in ready:
-            ready[source] = _ready(palette, source, options)
-        found.append(_style_found(palette, style, ready[source], options))
+        if source not in prepared:
+            prepared[source] = _prepare_style(palette, source, options)
+        studies.append(_study_style(palette, style, prepared[source], options))
     if on_progress:
         on_progress(len(names), len(names))
-    return GestureStudy(name, options, tuple(found))
+    return GestureStudy(name, options, tuple(studies))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Ready:
-    """A measured style: the recordings of its fields, the held-out ones, the fields, and a clip of theirs.
+class _PreparedStyle:
+    """A measured style: training and held-out recordings, fields, and the reference clip of derived styles."""
 
-    Derived styles are compared with the clip.
-    """
-
-    learnt: Style
-    held: Style
+    training: Style
+    held_out: Style
     is_held_out: bool
     fields: GestureFields
-    again: Motion
+    reference_clip: Motion
 
 
-def _ready(palette: Palette, source: str, options: Options) -> _Ready:
+def _prepare_style(palette: Palette, source: str, options: Options) -> _PreparedStyle:
     whole = palette.styles[source]
     is_held_out = len(whole.lengths) >= FEWEST
-    learnt, held = hold_out(whole, options.one_in, options.seed) if is_held_out else (whole, whole)
-    fields = GestureFields(replace_style(palette, source, learnt))
-    again = _from_fields(fields, source, held, options.seed + options.clips) if palette.derivations else {}
-    return _Ready(learnt, held, is_held_out, fields, again)
+    training, held_out = hold_out(whole, options.one_in, options.seed) if is_held_out else (whole, whole)
+    fields = GestureFields(replace_style(palette, source, training))
+    reference = _field_motion(fields, source, held_out, options.seed + options.clips) if palette.derivations else {}
+    return _PreparedStyle(training, held_out, is_held_out, fields, reference)
 
 
-def _style_found(palette: Palette, name: str, ready: _Ready, options: Options) -> StyleStudy:
+def _study_style(palette: Palette, name: str, prepared: _PreparedStyle, options: Options) -> StyleStudy:
     derived = palette.derivations.get(name)
     source = name if derived is None else derived.source
-    learnt, held, fields = ready.learnt, ready.held, ready.fields
-    clips = [_from_fields(fields, name, held, options.seed + k) for k in range(options.clips)]
-    noises = [noise_clip(fields, name, len(held.intensity), options.seed + k) for k in range(options.clips)]
-    published = [published_clip(fields.palette, name, held.intensity, options.seed)] if derived is None else []
-    real = held.motion if derived is None else ready.again
+    training, held_out, fields = prepared.training, prepared.held_out, prepared.fields
+    clips = [_field_motion(fields, name, held_out, options.seed + k) for k in range(options.clips)]
+    noises = [noise_clip(fields, name, len(held_out.intensity), options.seed + k) for k in range(options.clips)]
+    published = [published_clip(fields.palette, name, held_out.intensity, options.seed)] if derived is None else []
+    real = held_out.motion if derived is None else prepared.reference_clip
     kinds = [[real], clips, noises, published]
     return StyleStudy(
         name=name,
         source=None if derived is None else source,
         summary="" if derived is None else derived.summary,
-        n_learnt=len(learnt.lengths),
-        n_held=len(held.lengths),
-        is_held_out=ready.is_held_out,
+        n_training=len(training.lengths),
+        n_held_out=len(held_out.lengths),
+        is_held_out=prepared.is_held_out,
         minutes=palette.styles[source].seconds / 60,
-        blinks_per_minute=tuple(_rate(kind[0], held) for kind in kinds if kind),
-        compared=tuple(_compared(trait, held, kinds, options) for trait in traits_of(palette, learnt)),
-        moving=_moving(palette, held, [kind for kind in kinds if kind]),
-        long=long_run(fields, name, learnt, held, options.seed) if derived is None else LongRun({}, {}),
+        blinks_per_minute=tuple(_blink_rate(kind[0], held_out) for kind in kinds if kind),
+        trait_comparisons=tuple(
+            _compare_trait(trait, held_out, kinds, options) for trait in style_traits(palette, training)
+        ),
+        motion_comparisons=_compare_motion(palette, held_out, [kind for kind in kinds if kind]),
+        long_run=long_run(fields, name, training, held_out, options.seed) if derived is None else LongRun({}, {}),
     )
 
 
-def _from_fields(fields: GestureFields, name: str, held: Style, seed: int) -> Motion:
-    return {feature: field_clip(fields, name, feature, held.intensity, seed).values for feature in held.motion}
+def _field_motion(fields: GestureFields, name: str, held_out: Style, seed: int) -> Motion:
+    return {feature: field_clip(fields, name, feature, held_out.intensity, seed).values for feature in held_out.motion}
 
 
-def _rate(motion: Motion, held: Style) -> float:
-    return blinks_of(motion["blink"], held.lengths, GESTURE_FPS).per_minute if "blink" in motion else float("nan")
+def _blink_rate(motion: Motion, held_out: Style) -> float:
+    return find_blinks(motion["blink"], held_out.lengths, GESTURE_FPS).per_minute if "blink" in motion else float("nan")
 
 
-def _compared(trait: Trait, held: Style, kinds: list[list[Motion]], options: Options) -> TraitComparison:
+def _compare_trait(trait: Trait, held_out: Style, kinds: list[list[Motion]], options: Options) -> TraitComparison:
     def values_of(motion: Motion) -> list[Doubles]:
-        return [trait.of(part) for part in split_recordings(motion[trait.feature], held.lengths)]
+        return [trait.of(part) for part in split_recordings(motion[trait.feature], held_out.lengths)]
 
     parts = values_of(kinds[0][0])
     clips, noises, published = ([np.concatenate(values_of(clip)) for clip in kind] for kind in kinds[1:])
     generator = np.random.default_rng([options.seed, 2])
-    apart = [
-        distance(np.concatenate([parts[i] for i in one]), np.concatenate([parts[i] for i in other]))
-        for one, other in halves(len(parts), options.halves, generator)
+    between_halves = [
+        wasserstein(np.concatenate([parts[i] for i in one]), np.concatenate([parts[i] for i in other]))
+        for one, other in random_halves(len(parts), options.halves, generator)
         if len(parts) > 1
     ]
     real = np.concatenate(parts)
@@ -241,51 +241,54 @@ def _compared(trait: Trait, held: Style, kinds: list[list[Motion]], options: Opt
         np.concatenate(clips),
         np.concatenate(noises),
         np.concatenate([np.zeros(0), *published]),
-        float(np.mean(apart)) if apart else float("nan"),
+        float(np.mean(between_halves)) if between_halves else float("nan"),
         *(
-            float(np.mean([distance(real, clip) for clip in kind])) if kind else float("nan")
+            float(np.mean([wasserstein(real, clip) for clip in kind])) if kind else float("nan")
             for kind in (clips, noises, published)
         ),
     )
 
 
-def _moving(palette: Palette, held: Style, kinds: list[list[Motion]]) -> tuple[MotionComparison, ...]:
+def _compare_motion(palette: Palette, held_out: Style, kinds: list[list[Motion]]) -> tuple[MotionComparison, ...]:
     (real,), clips, noises, *_ = kinds
     shown = [in_display_units(palette, kind[0]) for kind in kinds]
-    intensity = between_frames(held.intensity, held.lengths)
+    intensity = frame_midpoints(held_out.intensity, held_out.lengths)
     found = []
-    for trait in traits_of(palette, held):
+    for trait in style_traits(palette, held_out):
         if not trait.name.endswith(" speed") or trait.feature == "blink":
             continue
         feature = trait.feature
-        spectra = [spectrum(motion[feature], held.lengths, GESTURE_FPS) for motion in shown]
-        together = [
+        spectra = [spectrum(motion[feature], held_out.lengths, GESTURE_FPS) for motion in shown]
+        correlations = [
             float(
                 np.mean(
-                    [pearson(trait.all_of(split_recordings(one[feature], held.lengths)), intensity) for one in kind]
+                    [
+                        pearson(trait.values_of(split_recordings(one[feature], held_out.lengths)), intensity)
+                        for one in kind
+                    ]
                 )
             )
             for kind in kinds
         ]
-        unlike = [_diversity([one[feature] for one in kind], real[feature], held) for kind in (clips, noises)]
+        diversities = [_diversity([one[feature] for one in kind], real[feature], held_out) for kind in (clips, noises)]
         unit = trait.unit.removesuffix("/s")
         found.append(
             MotionComparison(
                 feature,
                 "" if unit == "1" else unit,
                 tuple(spectra),
-                tuple(together),
-                (unlike[0], unlike[1]),
+                tuple(correlations),
+                (diversities[0], diversities[1]),
             )
         )
     return tuple(found)
 
 
-def _diversity(clips: list[NDArray[np.floating]], real: NDArray[np.floating], held: Style) -> float:
-    """Mean of `diversity` over the clips made for each recording's sound."""
-    if len(held.lengths) < 2:
+def _diversity(clips: list[NDArray[np.floating]], real: NDArray[np.floating], held_out: Style) -> float:
+    """Mean of `diversity` over the sounds of the recordings."""
+    if len(held_out.lengths) < 2:
         return float("nan")
-    least = int(held.lengths.min())
-    takes = [part[:least] for part in split_recordings(real, held.lengths)][:N_TAKES]
-    cut = [[part[:least] for part in split_recordings(clip, held.lengths)] for clip in clips]
+    least = int(held_out.lengths.min())
+    takes = [part[:least] for part in split_recordings(real, held_out.lengths)][:N_TAKES]
+    cut = [[part[:least] for part in split_recordings(clip, held_out.lengths)] for clip in clips]
     return float(np.mean([diversity([clip[at] for clip in cut], takes) for at in range(len(takes))]))

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-SHUT = 0.5  # share from which lids count as shut (as in tts2face.gesture.perlin_noise)
-OPEN = 0.2  # share below which they count as open; trackers measure about .1 for a narrowed eye
+SHUT = 0.5  # closure from which lids count as shut (as in tts2face.gesture.perlin_noise)
+OPEN = 0.2  # closure below which lids count as open; trackers measure about 0.1 for narrowed eyes
 
 Doubles = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ class Blinks:
     closing_speeds, opening_speeds : (B,)
         Highest speed of each, shares per second.
 
-    Of blinks that begin or end outside their recording only the onsets count.
+    Blinks that begin or end outside their recording contribute only their onsets.
     """
 
     n: int
@@ -48,29 +48,29 @@ class Blinks:
         return 60 * self.n / self.seconds
 
 
-def blinks_of(shut: NDArray[np.floating], lengths: NDArray[np.int32], fps: float) -> Blinks:
-    """Blinks of recordings of `lengths` (R,) frames, concatenated; shut (T, 2) or (T,) shares of lids."""
+def find_blinks(shut: NDArray[np.floating], lengths: NDArray[np.int32], fps: float) -> Blinks:
+    """Blinks in concatenated recordings of `lengths` (R,) frames, from lid closures (T, 2) or (T,) in 0..1."""
     lids = np.asarray(shut, np.float64).reshape(len(shut), -1).mean(axis=1)
     n, intervals, found = 0, [np.zeros(0)], [np.zeros((0, 4))]
     for part in np.split(lids, np.cumsum(lengths)[:-1]):
-        onsets = onsets_of(part) / fps
+        onsets = blink_onsets(part) / fps
         n += len(onsets)
         intervals.append(np.diff(onsets))
-        found.append(_courses(part, fps))
+        found.append(_blink_phases(part, fps))
     closing, opening, closing_speeds, opening_speeds = np.concatenate(found).T
     seconds = float(np.sum(lengths)) / fps
     return Blinks(n, seconds, np.concatenate(intervals), closing, opening, closing_speeds, opening_speeds)
 
 
-def onsets_of(lids: Doubles) -> Doubles:
-    """(B,) frames, and parts of frames, at which lids (T,) pass `SHUT`."""
+def blink_onsets(lids: Doubles) -> Doubles:
+    """(B,) fractional frames at which lid closures (T,) cross `SHUT` upwards."""
     shut = lids > SHUT
     last = np.flatnonzero(~shut[:-1] & shut[1:])
     return np.asarray(last + (SHUT - lids[last]) / (lids[last + 1] - lids[last]))
 
 
-def _courses(lids: Doubles, fps: float) -> Doubles:
-    """(B, 4) closing and opening time and speed of the blinks that lie within a recording."""
+def _blink_phases(lids: Doubles, fps: float) -> Doubles:
+    """(B, 4) closing time, opening time, closing speed and opening speed of the blinks within a recording."""
     rows = []
     closed = lids > OPEN
     begins = np.flatnonzero(~closed[:-1] & closed[1:])

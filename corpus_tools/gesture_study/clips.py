@@ -1,4 +1,4 @@
-"""Clips of gestures to measure: held-out recordings, and motion from fields that were not built from them."""
+"""Gesture clips for the study: held-out recordings, and motion of fields built from the other recordings."""
 
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -25,7 +25,7 @@ NO_SOUND = Waveform(np.zeros(2, np.float32), 16000)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clip:
-    """Motion (T, k), and the recorded moment (T',) from which each frame of the field was drawn."""
+    """Motion (T, k), and the recorded moment (T',) of each frame of the field."""
 
     values: Floats
     moments: NDArray[np.int64]
@@ -52,16 +52,16 @@ def hold_out(style: Style, one_in: int, seed: int) -> tuple[Style, Style]:
 def select_recordings(style: Style, chosen: NDArray[np.int64]) -> Style:
     """A style of some of its recordings, in that order."""
 
-    def kept(values: Floats) -> Floats:
+    def select(values: Floats) -> Floats:
         parts = split_recordings(values, style.lengths)
         return np.concatenate([parts[at] for at in chosen])
 
     return replace(
         style,
         lengths=style.lengths[chosen],
-        intensity=kept(style.intensity),
-        pitch=kept(style.pitch),
-        motion={feature: kept(values) for feature, values in style.motion.items()},
+        intensity=select(style.intensity),
+        pitch=select(style.pitch),
+        motion={feature: select(values) for feature, values in style.motion.items()},
     )
 
 
@@ -89,12 +89,12 @@ def published_clip(palette: Palette, style: str, intensity: Floats, seed: int) -
     """All features of a measured style by the published fields (`tts2face.gesture.ju2008`), each as `field_clip`."""
     fields = GestureFields(palette, FIELD_OPTIONS["ju2008"])
     features = tuple(palette.styles[style].motion)
-    with ThreadPoolExecutor() as threads:  # an exact search at every frame takes ten times as long as the default
+    with ThreadPoolExecutor() as threads:  # an exact search at each frame takes ten times as long as the default
         clips = threads.map(lambda feature: field_clip(fields, style, feature, intensity, seed).values, features)
         return dict(zip(features, clips, strict=True))
 
 
 def noise_clip(fields: GestureFields, style: str, n_frames: int, seed: int) -> Mapping[str, Floats]:
-    """All features of a style by noise, which does not depend on the sound."""
+    """All features of a style from noise, which does not depend on the sound."""
     stream = NoiseStream(fields, style=style, seed=seed, fps=GESTURE_FPS)
     return stream.next(NO_SOUND, n_frames, Timeline())

@@ -1,4 +1,4 @@
-"""The plots of a style: distributions, spectra and autocorrelations of recordings, fields and noise."""
+"""Plots of a style: distributions, spectra and autocorrelations of recordings, fields and noise."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 WIDTH, HEIGHT, HEAD, COLUMNS = 380, 250, 26, 3  # px of a panel and of the title; panels in a row of the picture
 MARGINS = {"left": 0.175, "right": 0.985, "bottom": 0.17, "top": 0.9}  # of a panel of a page
 N_BINS = 40
-SHOWN = 0.995  # of the values are within a plot; those beyond count in its first or last bin
+SHOWN = 0.995  # share of the values within a plot; the others count in its first or last bin
 DECADES = 7  # of a spectrum
 MOST_HZ = 15.0  # half of the frame rate of gestures
-BRIEF = ("head speed", "brow height", "blink interval", "blink duration")  # traits in the picture
+SUMMARY_TRAITS = ("head speed", "brow height", "blink interval", "blink duration")  # traits in the picture
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Panel:
-    """A title and how the plot below it is drawn."""
+    """A title and the function that draws the plot below it."""
 
     title: str
     draw: "Callable[[Axes], None]"
@@ -41,7 +41,7 @@ def panel_svg(panel: Panel) -> str:
     """A panel for a page."""
 
     def draw(figure: "Figure") -> tuple[()]:
-        figure.set_layout_engine("none")  # half of the time
+        figure.set_layout_engine("none")  # a constrained layout takes twice as long
         panel.draw(figure.subplots(gridspec_kw=MARGINS))
         return ()
 
@@ -61,8 +61,8 @@ def panels_png(title: str, panels: Sequence[Panel]) -> bytes:
     return draw_png(draw, COLUMNS * WIDTH, rows * HEIGHT + HEAD)
 
 
-def distribution(found: StyleStudy, compared: TraitComparison) -> Panel:
-    """Histograms of a trait over the same bins."""
+def distribution_panel(found: StyleStudy, compared: TraitComparison) -> Panel:
+    """Histograms of a trait over common bins."""
     kinds = compared.real, compared.field, compared.noise, compared.published
     edges = np.linspace(*_limits(np.concatenate(kinds[:2])), N_BINS + 1)
     unit = f", {compared.trait.unit}" if compared.trait.unit else ""
@@ -84,7 +84,7 @@ def distribution(found: StyleStudy, compared: TraitComparison) -> Panel:
     return Panel(compared.trait.name, draw)
 
 
-def power(found: StyleStudy, moving: MotionComparison) -> Panel:
+def spectrum_panel(found: StyleStudy, moving: MotionComparison) -> Panel:
     """Power spectra without the mean, on a logarithmic scale."""
     title = f"{moving.feature}: power"
 
@@ -106,9 +106,9 @@ def power(found: StyleStudy, moving: MotionComparison) -> Panel:
     return Panel(title, draw)
 
 
-def repetition(found: StyleStudy, feature: str) -> Panel:
+def autocorrelation_panel(found: StyleStudy, feature: str) -> Panel:
     """Autocorrelation of ten minutes over the lag."""
-    one, title = found.long.repeating[feature], f"{feature}: autocorrelation"
+    one, title = found.long_run.repetition[feature], f"{feature}: autocorrelation"
     lags = np.arange(FROM_S, LAGS_S) + 0.5
     kinds = ("recordings, shuffled", one.real), ("field, speech", one.speech), ("field, silence", one.silence)
 
@@ -121,11 +121,11 @@ def repetition(found: StyleStudy, feature: str) -> Panel:
     return Panel(title, draw)
 
 
-def brief(found: StyleStudy) -> Sequence[Panel]:
-    """The panels of the picture."""
-    traits = [distribution(found, one) for one in found.compared if one.trait.name in BRIEF]
-    spectra = [power(found, one) for one in found.moving if one.feature in {"head", "brows"}]
-    return [*traits, *spectra] or [distribution(found, found.compared[0])]
+def summary_panels(found: StyleStudy) -> Sequence[Panel]:
+    """The panels of the summary picture."""
+    traits = [distribution_panel(found, one) for one in found.trait_comparisons if one.trait.name in SUMMARY_TRAITS]
+    spectra = [spectrum_panel(found, one) for one in found.motion_comparisons if one.feature in {"head", "brows"}]
+    return [*traits, *spectra] or [distribution_panel(found, found.trait_comparisons[0])]
 
 
 def _limits(values: NDArray[np.float64]) -> tuple[float, float]:

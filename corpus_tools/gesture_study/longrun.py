@@ -1,4 +1,4 @@
-"""Clips of ten minutes: the share of the palette that they visit, and their autocorrelation."""
+"""Clips of ten minutes: their coverage of the recordings and their autocorrelation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from tts2face.models.palette import GESTURE_FPS, Style
 
 MINUTES = 10
 VISITED_AFTER = (1, 3, MINUTES)  # minutes
-LAGS_S = 300  # half of the clip, so that every lag is averaged over at least as long
+LAGS_S = 300  # half of the clip, so that each lag is averaged over at least five minutes
 FROM_S = 5  # shorter lags are within one gesture
 
 Doubles = NDArray[np.float64]
@@ -41,41 +41,43 @@ class Repetition:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LongRun:
-    """By feature: shares of recorded moments that speech visits after `VISITED_AFTER`, and repetition."""
+    """By feature: coverage of the recorded moments after `VISITED_AFTER` minutes of speech, and repetition."""
 
-    visited: Mapping[str, tuple[float, ...]]
-    repeating: Mapping[str, Repetition]
+    coverage: Mapping[str, tuple[float, ...]]
+    repetition: Mapping[str, Repetition]
 
 
-def long_run(fields: GestureFields, name: str, learnt: Style, held: Style, seed: int) -> LongRun:
+def long_run(fields: GestureFields, name: str, training: Style, held_out: Style, seed: int) -> LongRun:
     """Measure clips of `MINUTES` of a style, with the recordings' sound in random order and with silence."""
     n_frames = round(MINUTES * 60 * GESTURE_FPS)
-    order = np.random.default_rng([seed, 3]).permutation(len(learnt.lengths))
-    intensity = _shuffled(learnt.intensity, learnt.lengths, order, n_frames)
+    order = np.random.default_rng([seed, 3]).permutation(len(training.lengths))
+    intensity = _shuffle_recordings(training.intensity, training.lengths, order, n_frames)
     silence = np.full(n_frames, SILENT_PROSODY[0], np.float32)
-    visited, repeating = {}, {}
-    for feature in held.motion:
+    coverages, repetitions = {}, {}
+    for feature in held_out.motion:
         speech = field_clip(fields, name, feature, intensity, seed)
         quiet = field_clip(fields, name, feature, silence, seed)
-        visited[feature] = tuple(
-            coverage(speech.moments[: round(minutes * 60 * GESTURE_FPS)], learnt.lengths, MIN_MOMENT_GAP)
+        coverages[feature] = tuple(
+            coverage(speech.moments[: round(minutes * 60 * GESTURE_FPS)], training.lengths, MIN_MOMENT_GAP)
             for minutes in VISITED_AFTER
         )
-        real = _shuffled(learnt.motion[feature], learnt.lengths, order, n_frames)
-        repeating[feature] = Repetition(*(_by_second(values) for values in (real, speech.values, quiet.values)))
-    return LongRun(visited, repeating)
+        real = _shuffle_recordings(training.motion[feature], training.lengths, order, n_frames)
+        repetitions[feature] = Repetition(
+            *(_highest_per_second(values) for values in (real, speech.values, quiet.values))
+        )
+    return LongRun(coverages, repetitions)
 
 
-def _shuffled(
+def _shuffle_recordings(
     values: NDArray[np.float32], lengths: NDArray[np.int32], order: NDArray[np.int64], n_frames: int
 ) -> NDArray[np.float32]:
-    """`n_frames` of recordings concatenated in an order, repeated from the first one where they are too short."""
+    """The first `n_frames` frames of the recordings in an order, repeated from the first if too short."""
     parts = split_recordings(values, lengths)
     whole = np.concatenate([parts[at] for at in order])
     return np.resize(whole, (n_frames, *whole.shape[1:])) if len(whole) < n_frames else whole[:n_frames]
 
 
-def _by_second(values: NDArray[np.float32]) -> Doubles:
+def _highest_per_second(values: NDArray[np.float32]) -> Doubles:
     a_second = round(GESTURE_FPS)
     found = autocorrelation(values, LAGS_S * a_second - 1)
     return np.asarray(found.reshape(LAGS_S, a_second).max(axis=1))

@@ -12,7 +12,7 @@ from scipy.signal import welch
 from scipy.spatial.distance import cdist
 from scipy.stats import wasserstein_distance
 
-FAST_HZ = 6.0  # motion of head or brows above this is seen as trembling
+FAST_HZ = 6.0  # motion of head or brows above this is perceived as trembling
 SEGMENT = 64  # frames of a spectrum's window: 2.1 s, which a recording of 3 s holds
 
 Doubles = NDArray[np.float64]
@@ -25,12 +25,12 @@ def split_recordings(values: Motion, lengths: Lengths) -> list[Motion]:
     return np.split(values, np.cumsum(lengths)[:-1])
 
 
-def distance(one: Motion, other: Motion) -> float:
+def wasserstein(one: Motion, other: Motion) -> float:
     """Wasserstein distance of two sets of numbers, in their unit; NaN where one is empty."""
     return float(wasserstein_distance(one, other)) if len(one) and len(other) else float("nan")
 
 
-def halves(n: int, n_times: int, generator: np.random.Generator) -> Iterator[tuple[NDArray[np.int64], ...]]:
+def random_halves(n: int, n_times: int, generator: np.random.Generator) -> Iterator[tuple[NDArray[np.int64], ...]]:
     """`n_times` pairs of random halves of the indices below n."""
     for _ in range(n_times):
         order = generator.permutation(n)
@@ -45,7 +45,7 @@ class Spectrum:
     power: Doubles
 
     @property
-    def fast(self) -> float:
+    def fast_power(self) -> float:
         """Power above `FAST_HZ`."""
         return float(self.power[self.hz >= FAST_HZ].sum() * (self.hz[1] - self.hz[0]))
 
@@ -73,28 +73,28 @@ def ratio(one: float, other: float) -> float:
     return one / other if other else float("nan")
 
 
-def between_frames(values: Motion, lengths: Lengths) -> Doubles:
-    """(T - R,) means of neighbouring frames of (T,): values at the instants of the speeds of `speeds`."""
+def frame_midpoints(values: Motion, lengths: Lengths) -> Doubles:
+    """(T - R,) means of neighbouring frames of (T,): values at the instants of finite differences."""
     return np.concatenate([(part[1:] + part[:-1]) / 2.0 for part in split_recordings(values, lengths)])
 
 
 def diversity(clips: Sequence[Motion], takes: Sequence[Motion]) -> float:
     """Mean distance between clips of different seeds, over that between different takes of the same length.
 
-    Distance: square root of the mean square over frames. 0: all seeds give the same motion; 1: clips differ as
-    recordings do.
+    The distance is the root mean square over frames. 0: all seeds give the same motion; 1: clips differ as much as
+    recordings.
     """
     return ratio(_mean_distance(clips), _mean_distance(takes))
 
 
 def _mean_distance(clips: Sequence[Motion]) -> float:
     flat = np.stack([clip.astype(np.float64).ravel() for clip in clips])
-    away = cdist(flat, flat)
-    return float(away[np.triu_indices(len(flat), 1)].mean() / np.sqrt(len(clips[0])))
+    gaps = cdist(flat, flat)
+    return float(gaps[np.triu_indices(len(flat), 1)].mean() / np.sqrt(len(clips[0])))
 
 
 def coverage(shown: NDArray[np.int64], lengths: Lengths, within: int) -> float:
-    """Share of recorded moments within so many frames of one that was shown, in the same recording."""
+    """Share of recorded moments within `within` frames of a moment in `shown`, in the same recording."""
     edges = np.concatenate([[0], np.cumsum(lengths)])
     visited = np.zeros(edges[-1], bool)
     moments = np.unique(shown)
@@ -107,11 +107,11 @@ def coverage(shown: NDArray[np.int64], lengths: Lengths, within: int) -> float:
 def autocorrelation(values: Motion, most: int) -> Doubles:
     """(most + 1,) autocorrelation of a clip at lags of 0 to `most` frames, over all channels; 1 at lag 0.
 
-    About 1 at the period of a repetition. Each lag is averaged over the frames that it has.
+    Close to 1 at the period of a repetition. Each lag is averaged over its number of frame pairs.
     """
-    away = values.astype(np.float64) - values.mean(axis=0, dtype=np.float64)
-    size = 1 << int(np.ceil(np.log2(2 * len(away))))
-    power = np.abs(np.fft.rfft(away, size, axis=0)) ** 2
+    centred = values.astype(np.float64) - values.mean(axis=0, dtype=np.float64)
+    size = 1 << int(np.ceil(np.log2(2 * len(centred))))
+    power = np.abs(np.fft.rfft(centred, size, axis=0)) ** 2
     sums = np.fft.irfft(power.sum(axis=1), size)[: most + 1]
-    means = sums / (len(away) - np.arange(most + 1))
+    means = sums / (len(centred) - np.arange(most + 1))
     return np.asarray(means / means[0])

@@ -1,4 +1,4 @@
-"""The study as a page."""
+"""HTML page of a gesture study."""
 
 from collections.abc import Iterable
 from html import escape
@@ -13,10 +13,17 @@ from corpus_tools.gesture_study.analysis import (
     StyleStudy,
     TraitComparison,
 )
-from corpus_tools.gesture_study.figure import Panel, distribution, panel_svg, power, repetition, series_names
+from corpus_tools.gesture_study.figure import (
+    Panel,
+    autocorrelation_panel,
+    distribution_panel,
+    panel_svg,
+    series_names,
+    spectrum_panel,
+)
 from corpus_tools.gesture_study.longrun import FROM_S, MINUTES, VISITED_AFTER
 from corpus_tools.gesture_study.measures import FAST_HZ, ratio
-from corpus_tools.report.page import note, page, paragraphs, table, wide
+from corpus_tools.report.page import note_paragraph, page, paragraphs, scroll_box, table
 
 LAYOUT = "<style>.panels { display: flex; flex-wrap: wrap; gap: .5rem 1rem; }</style>"
 
@@ -29,7 +36,7 @@ def gestures_page(found: GestureStudy) -> str:
     return page(f"Gestures: {found.name}", parts)
 
 
-def number(value: float, digits: int = 2) -> str:
+def format_number(value: float, digits: int = 2) -> str:
     """A number, or a dash for NaN."""
     if not np.isfinite(value):
         return "\N{EN DASH}"
@@ -38,9 +45,9 @@ def number(value: float, digits: int = 2) -> str:
 
 def _method(found: GestureStudy) -> str:
     options = found.options
-    return note(
+    return note_paragraph(
         f"One in {options.one_in} recordings is held out (seed {options.seed}). Fields are built from the others and "
-        "driven by the intensity of the held-out ones; noise does not depend on the sound. "
+        "sampled for the intensity of the held-out ones; noise does not depend on the sound. "
         f"{options.clips} clips of each, and for measured styles one of the published fields (ju2008: Ju and Lee 2008, "
         "section 5.1), are cut to the recordings' lengths, so that all have the same borders. "
         f"Distances are Wasserstein distances (W) in the trait's unit: between {options.halves} random halves of the "
@@ -51,24 +58,24 @@ def _method(found: GestureStudy) -> str:
 
 def _style(found: StyleStudy) -> list[str]:
     by_feature: dict[str, list[TraitComparison]] = {}
-    for one in found.compared:
+    for one in found.trait_comparisons:
         by_feature.setdefault(one.trait.feature, []).append(one)
     return [
         f"<h2>{escape(found.name)}</h2>",
         _origin(found),
         _distances(found),
         "<h3>Distributions</h3>",
-        note("Values beyond a plot count in its first or last bin."),
-        _panels(distribution(found, one) for ones in by_feature.values() for one in ones),
+        note_paragraph("Values outside a plot count in its first or last bin."),
+        _panels(distribution_panel(found, one) for ones in by_feature.values() for one in ones),
         "<h3>Spectra, sound, seeds</h3>",
-        _moving(found),
-        _panels(power(found, one) for one in found.moving),
-        *_long(found),
+        _motion_table(found),
+        _panels(spectrum_panel(found, one) for one in found.motion_comparisons),
+        *_long_run(found),
     ]
 
 
 def _origin(found: StyleStudy) -> str:
-    rates = " / ".join(number(rate, 1) for rate in found.blinks_per_minute)
+    rates = " / ".join(format_number(rate, 1) for rate in found.blinks_per_minute)
     if found.source is not None:
         return paragraphs(
             f"{found.summary[:1].upper()}{found.summary[1:]}.",
@@ -76,9 +83,9 @@ def _origin(found: StyleStudy) -> str:
             f"Blinks per minute, {found.source} / field / noise: {rates}.",
         )
     held = (
-        f"{found.n_learnt} recordings learnt from, {found.n_held} held out."
+        f"{found.n_training} training recordings, {found.n_held_out} held out."
         if found.is_held_out
-        else f"{found.n_learnt} recordings, too few to hold any out: compared with the recordings of the fields."
+        else f"{found.n_training} recordings, too few to hold any out: compared with the recordings of the fields."
     )
     return paragraphs(
         f"{found.minutes:.1f} minutes. {held}", f"Blinks per minute, recorded / field / noise / ju2008: {rates}."
@@ -93,79 +100,79 @@ def _distances(found: StyleStudy) -> str:
             one.trait.unit,
             str(len(one.real)),
             *(
-                number(float(np.mean(values)) if len(values) else np.nan)
+                format_number(float(np.mean(values)) if len(values) else np.nan)
                 for values in (one.real, one.field, one.noise, one.published)
             ),
-            *(number(apart, 3) for apart in (one.halves, one.to_field, one.to_noise, one.to_published)),
-            number(ratio(one.to_field, one.halves)),
-            number(ratio(one.to_field, one.to_noise)),
-            number(ratio(one.to_published, one.halves)),
-            verdict(found, one),
+            *(format_number(apart, 3) for apart in (one.halves, one.to_field, one.to_noise, one.to_published)),
+            format_number(ratio(one.to_field, one.halves)),
+            format_number(ratio(one.to_field, one.to_noise)),
+            format_number(ratio(one.to_published, one.halves)),
+            target_result(found, one),
         )
-        for one in found.compared
+        for one in found.trait_comparisons
     ]
     head = ("trait", "unit", "n", f"mean {real}", "field", "noise", "ju2008")
     distances = ("W halves", "W field", "W noise", "W ju2008")
     ratios = ("field / halves", "field / noise", "ju2008 / halves")
-    return wide(table((*head, *distances, *ratios, "target"), rows, numbers=range(2, 14)))
+    return scroll_box(table((*head, *distances, *ratios, "target"), rows, numbers=range(2, 14)))
 
 
-def verdict(found: StyleStudy, one: TraitComparison) -> str:
+def target_result(found: StyleStudy, one: TraitComparison) -> str:
     """Whether a trait with a target meets it; empty without a target."""
     if not one.trait.has_target or found.source is not None:
         return ""
     return "met" if one.is_met else "missed"
 
 
-def _moving(found: StyleStudy) -> str:
+def _motion_table(found: StyleStudy) -> str:
     real, *_ = series_names(found)
     rows = [
         (
             one.feature,
-            *(number(r) for r in _with_published(one.with_intensity, 4)),
-            _near(found, one),
-            *(number(share) for share in _with_published(one.fast, 3)),
-            *(number(share) for share in one.diversity),
+            *(format_number(r) for r in _pad_columns(one.with_intensity, 4)),
+            _correlation_result(found, one),
+            *(format_number(share) for share in _pad_columns(one.fast_power, 3)),
+            *(format_number(share) for share in one.diversity),
         )
-        for one in found.moving
+        for one in found.motion_comparisons
     ]
     above = f"power above {FAST_HZ:g} Hz / {real}"
     correlations = (f"r of speed with intensity: {real}", "field", "noise", "ju2008", "target")
     head = ("feature", *correlations, f"{above}: field", "noise", "ju2008", "diversity: field", "noise")
-    return wide(table(head, rows, numbers=(1, 2, 3, 4, 6, 7, 8, 9, 10))) + note(
+    return scroll_box(table(head, rows, numbers=(1, 2, 3, 4, 6, 7, 8, 9, 10))) + note_paragraph(
         "Diversity: distance between clips of different seeds for the same sound, over that between recordings."
     )
 
 
-def _with_published(values: tuple[float, ...], n: int) -> tuple[float, ...]:
+def _pad_columns(values: tuple[float, ...], n: int) -> tuple[float, ...]:
     """Values for n columns, NaN where a derived style has no published field."""
     return (*values, *[float("nan")] * (n - len(values)))
 
 
-def _near(found: StyleStudy, one: MotionComparison) -> str:
+def _correlation_result(found: StyleStudy, one: MotionComparison) -> str:
     if one.feature != "head" or found.source is not None:
         return ""
     return "met" if one.follows_sound else "missed"
 
 
-def _long(found: StyleStudy) -> list[str]:
-    if not found.long.visited:
+def _long_run(found: StyleStudy) -> list[str]:
+    if not found.long_run.coverage:
         return []
     rows = [
         (
             feature,
-            *(f"{100 * share:.0f} %" for share in found.long.visited[feature]),
-            *(number(highest) for highest in found.long.repeating[feature].highest),
+            *(f"{100 * share:.0f} %" for share in found.long_run.coverage[feature]),
+            *(format_number(highest) for highest in found.long_run.repetition[feature].highest),
         )
-        for feature in found.long.visited
+        for feature in found.long_run.coverage
     ]
     after = [f"moments visited after {minutes} min" for minutes in VISITED_AFTER]
     highest = [f"highest r from {FROM_S} s: {kind}" for kind in ("recordings", "speech", "silence")]
     return [
         f"<h3>Clips of {MINUTES} minutes</h3>",
         table(("feature", *after, *highest), rows, numbers=range(1, 7)),
-        note("A clip that repeats itself has r = 1 at the period of the repetition."),
-        _panels(repetition(found, feature) for feature in found.long.repeating),
+        note_paragraph("A clip that repeats itself has r = 1 at the period of the repetition."),
+        _panels(autocorrelation_panel(found, feature) for feature in found.long_run.repetition),
     ]
 
 

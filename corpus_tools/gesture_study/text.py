@@ -1,4 +1,4 @@
-"""The study as numbers for other programs: one line for each trait as CSV, all figures as JSON."""
+"""Export of a gesture study: one line for each trait as CSV, all figures as JSON."""
 
 import csv
 import json
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.gesture_study.analysis import GestureStudy, MotionComparison, StyleStudy, TraitComparison
 from corpus_tools.gesture_study.longrun import VISITED_AFTER
-from corpus_tools.gesture_study.page import verdict
+from corpus_tools.gesture_study.page import target_result
 
 KINDS = ("real", "field", "noise", "ju2008")  # the last one of measured styles only
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -23,11 +23,11 @@ def gestures_csv(found: GestureStudy) -> str:
     rows = csv.writer(file, lineterminator="\n")
     rows.writerow(HEAD)
     for style in found.styles:
-        for one in style.compared:
+        for one in style.trait_comparisons:
             distances = [_cell(value) for value in (one.halves, one.to_field, one.to_noise, one.to_published)]
             trait = one.trait
             rows.writerow(
-                [style.name, style.source, trait.name, trait.unit, len(one.real), *distances, verdict(style, one)]
+                [style.name, style.source, trait.name, trait.unit, len(one.real), *distances, target_result(style, one)]
             )
     return file.getvalue()
 
@@ -52,26 +52,29 @@ def _style(found: StyleStudy) -> dict[str, Any]:
         "name": found.name,
         "derived_from": found.source,
         "summary": found.summary,
-        "minutes": _number(found.minutes),
-        "recordings_learnt": found.n_learnt,
-        "recordings_held_out": found.n_held if found.is_held_out else 0,
+        "minutes": _round_number(found.minutes),
+        "recordings_learnt": found.n_training,
+        "recordings_held_out": found.n_held_out if found.is_held_out else 0,
         "blinks_per_minute": _by_kind(found.blinks_per_minute),
-        "traits": [_compared(found, one) for one in found.compared],
-        "features": [_moving(one) for one in found.moving],
+        "traits": [_trait_figures(found, one) for one in found.trait_comparisons],
+        "features": [_motion_figures(one) for one in found.motion_comparisons],
         "visited": {
-            feature: {f"{minutes} min": _number(share) for minutes, share in zip(VISITED_AFTER, shares, strict=True)}
-            for feature, shares in found.long.visited.items()
+            feature: {
+                f"{minutes} min": _round_number(share) for minutes, share in zip(VISITED_AFTER, shares, strict=True)
+            }
+            for feature, shares in found.long_run.coverage.items()
         },
         "repetition": {
             feature: {
-                kind: _number(value) for kind, value in zip(("real", "speech", "silence"), one.highest, strict=True)
+                kind: _round_number(value)
+                for kind, value in zip(("real", "speech", "silence"), one.highest, strict=True)
             }
-            for feature, one in found.long.repeating.items()
+            for feature, one in found.long_run.repetition.items()
         },
     }
 
 
-def _compared(found: StyleStudy, one: TraitComparison) -> dict[str, Any]:
+def _trait_figures(found: StyleStudy, one: TraitComparison) -> dict[str, Any]:
     kinds = {"real": one.real, "field": one.field, "noise": one.noise}
     if len(one.published):
         kinds["ju2008"] = one.published
@@ -80,32 +83,34 @@ def _compared(found: StyleStudy, one: TraitComparison) -> dict[str, Any]:
         "unit": one.trait.unit,
         "feature": one.trait.feature,
         "n": len(one.real),
-        "halves": _number(one.halves),
-        "field": _number(one.to_field),
-        "noise": _number(one.to_noise),
-        "ju2008": _number(one.to_published),
-        "target": verdict(found, one) or None,
-        "means": {kind: _number(float(values.mean())) if len(values) else None for kind, values in kinds.items()},
+        "halves": _round_number(one.halves),
+        "field": _round_number(one.to_field),
+        "noise": _round_number(one.to_noise),
+        "ju2008": _round_number(one.to_published),
+        "target": target_result(found, one) or None,
+        "means": {kind: _round_number(float(values.mean())) if len(values) else None for kind, values in kinds.items()},
         "quantiles": {kind: _quantiles(values) for kind, values in kinds.items()},
     }
 
 
-def _moving(one: MotionComparison) -> dict[str, Any]:
+def _motion_figures(one: MotionComparison) -> dict[str, Any]:
     return {
         "name": one.feature,
         "r_with_intensity": _by_kind(one.with_intensity),
-        "fast_power": {kind: _number(share) for kind, share in zip(KINDS[1:], one.fast, strict=False)},
-        "diversity": {kind: _number(share) for kind, share in zip(("field", "noise"), one.diversity, strict=True)},
+        "fast_power": {kind: _round_number(share) for kind, share in zip(KINDS[1:], one.fast_power, strict=False)},
+        "diversity": {
+            kind: _round_number(share) for kind, share in zip(("field", "noise"), one.diversity, strict=True)
+        },
         "hz": one.spectra[0].hz.round(4).tolist(),
         "power": {
-            kind: [_number(float(value)) for value in spectrum.power]
+            kind: [_round_number(float(value)) for value in spectrum.power]
             for kind, spectrum in zip(KINDS, one.spectra, strict=False)
         },
     }
 
 
 def _by_kind(values: tuple[float, ...]) -> dict[str, float | None]:
-    return {kind: _number(value) for kind, value in zip(KINDS, values, strict=False)}
+    return {kind: _round_number(value) for kind, value in zip(KINDS, values, strict=False)}
 
 
 def _cell(value: float) -> str:
@@ -113,8 +118,8 @@ def _cell(value: float) -> str:
 
 
 def _quantiles(values: NDArray[np.float64]) -> list[float | None]:
-    return [_number(float(value)) for value in np.quantile(values, QUANTILES)] if len(values) else []
+    return [_round_number(float(value)) for value in np.quantile(values, QUANTILES)] if len(values) else []
 
 
-def _number(value: float) -> float | None:
+def _round_number(value: float) -> float | None:
     return float(f"{value:.6g}") if np.isfinite(value) else None

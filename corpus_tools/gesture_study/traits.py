@@ -1,4 +1,4 @@
-"""The traits of gestures that are compared: a number for each frame, or for each blink, of a recording."""
+"""Traits of gestures that are compared: a number for each frame or each blink of a recording."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.gesture_study.blinks import Blinks, blinks_of
+from corpus_tools.gesture_study.blinks import Blinks, find_blinks
 from tts2face.gesture.gesture_stream import style_median
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
 
@@ -17,9 +17,9 @@ IN_DEGREES = 180.0 / np.pi
 
 @dataclass(frozen=True, slots=True)
 class Trait:
-    """A name, its unit, its feature, and how it is computed from a recording's motion (T, k).
+    """A trait: its name, unit and feature, and the function that computes it from a recording's motion (T, k).
 
-    A field must keep the traits with a target near the recorded ones (docs/gestures.md).
+    Fields must reproduce the recorded distribution of traits with a target (docs/gestures.md).
     """
 
     name: str
@@ -28,12 +28,12 @@ class Trait:
     of: Callable[[Motion], Doubles]
     has_target: bool = False
 
-    def all_of(self, parts: Sequence[Motion]) -> Doubles:
+    def values_of(self, parts: Sequence[Motion]) -> Doubles:
         """Values of all recordings."""
         return np.concatenate([self.of(part) for part in parts]) if len(parts) else np.zeros(0)
 
 
-def traits_of(palette: Palette, style: Style) -> tuple[Trait, ...]:
+def style_traits(palette: Palette, style: Style) -> tuple[Trait, ...]:
     """The traits of a style's features; amplitudes are distances from its medians."""
     middle = {feature: style_median(style, feature).astype(np.float64) for feature in style.motion}
     found: list[Trait] = []
@@ -49,7 +49,7 @@ INTERVALS = "blink interval"
 
 
 def _blink_trait(value: Callable[[Blinks], Doubles]) -> Callable[[Motion], Doubles]:
-    return lambda part: value(blinks_of(part, np.array([len(part)], np.int32), GESTURE_FPS))
+    return lambda part: value(find_blinks(part, np.array([len(part)], np.int32), GESTURE_FPS))
 
 
 BLINKS: tuple[tuple[str, str, Callable[[Motion], Doubles]], ...] = (

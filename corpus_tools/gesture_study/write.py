@@ -1,14 +1,14 @@
-"""Write the study of a palette as a page, tables or a picture."""
+"""Write the study of a palette as HTML, JSON, CSV or PNG."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from corpus_tools.gesture_study.analysis import GestureStudy, Options, Progress, study
-from corpus_tools.gesture_study.figure import brief, panels_png
+from corpus_tools.gesture_study.analysis import GestureStudy, Options, Progress, study_gestures
+from corpus_tools.gesture_study.figure import panels_png, summary_panels
 from corpus_tools.gesture_study.page import gestures_page
 from corpus_tools.gesture_study.text import gestures_csv, gestures_json
-from corpus_tools.report.output import report_writer
+from corpus_tools.report.page import report_writer
 from tts2face.models.palette import load_palette
 from tts2face.storage.files import write_atomically
 from tts2face.storage.output_names import check_name
@@ -28,14 +28,14 @@ def write_gestures(palette: str, out: Path, options: Options, *, on_progress: Pr
     """
     writer = report_writer(out, WRITERS)
     check_name(out)
-    found = study(palette, load_palette(palette), options, on_progress)
+    found = study_gestures(palette, load_palette(palette), options, on_progress)
     write_atomically(out, writer(found))
     return found
 
 
-def _picture(found: GestureStudy) -> bytes:
+def _summary_png(found: GestureStudy) -> bytes:
     first = found.styles[0]
-    return panels_png(f"Gestures of {first.name}: recorded, by its fields, by noise, by published fields", brief(first))
+    return panels_png(f"Gestures of {first.name}: recordings, fields, noise, published fields", summary_panels(first))
 
 
 WRITERS: Mapping[str, Callable[[GestureStudy], bytes]] = MappingProxyType(
@@ -43,6 +43,6 @@ WRITERS: Mapping[str, Callable[[GestureStudy], bytes]] = MappingProxyType(
         ".html": lambda found: gestures_page(found).encode(),
         ".csv": lambda found: gestures_csv(found).encode(),
         ".json": lambda found: gestures_json(found).encode(),
-        ".png": _picture,
+        ".png": _summary_png,
     }
 )

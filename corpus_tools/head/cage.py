@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.head.source import Source
+from corpus_tools.head.source import SourceMesh
 
 Floats = NDArray[np.float64]
 
@@ -18,35 +18,35 @@ SIDES = ("l", "r")  # the person's own left has x > 0
 class Cage:
     """Vertices (N, 3) of one identity and displacements (N, 3) of its shapes by name; mm, origin between the eyes."""
 
-    source: Source
+    source: SourceMesh
     vertices: Floats
     units: Mapping[str, Floats]
 
     def group(self, name: str) -> NDArray[np.int64]:
-        """Vertex numbers of a group of the source."""
+        """Vertex indices of a group of the source mesh."""
         return np.unique(self.source.groups[name].corners)
 
 
-def caged(source: Source, targets: Mapping[str, float]) -> Cage:
-    """The cage with weighted targets."""
+def build_cage(source: SourceMesh, targets: Mapping[str, float]) -> Cage:
+    """The control cage of the source mesh with weighted targets."""
     vertices = source.vertices.copy()
     for name, weight in targets.items():
         vertices += weight * source.target(name)
     vertices *= SCALE
-    eyes = [sphere_of(vertices[np.unique(source.groups[f"helper-{side}-eye"].corners)])[0] for side in SIDES]
+    eyes = [fit_sphere(vertices[np.unique(source.groups[f"helper-{side}-eye"].corners)])[0] for side in SIDES]
     units = {name: SCALE * moved for name, moved in source.face_units().items()}
     return Cage(source, vertices - np.mean(eyes, axis=0), units)
 
 
-def sphere_of(points: Floats) -> tuple[Floats, float]:
-    """Centre and radius of the sphere nearest to points (algebraic least squares)."""
+def fit_sphere(points: Floats) -> tuple[Floats, float]:
+    """Centre and radius of the least-squares sphere through points (algebraic distance)."""
     rows = np.column_stack([2.0 * points, np.ones(len(points))])
-    solved = np.linalg.lstsq(rows, (points**2).sum(axis=1), rcond=None)[0]
-    return solved[:3], float(np.sqrt(solved[3] + solved[:3] @ solved[:3]))
+    solution = np.linalg.lstsq(rows, (points**2).sum(axis=1), rcond=None)[0]
+    return solution[:3], float(np.sqrt(solution[3] + solution[:3] @ solution[:3]))
 
 
-def rotation_between(before: Floats, after: Floats) -> tuple[Floats, Floats]:
-    """Rotation (3, 3) and translation (3,) that bring points nearest to their new places (Kabsch 1976)."""
+def fit_rotation(before: Floats, after: Floats) -> tuple[Floats, Floats]:
+    """Least-squares rotation (3, 3) and translation (3,) from points to their new positions (Kabsch 1976)."""
     middle, there = before.mean(axis=0), after.mean(axis=0)
     left, _, right = np.linalg.svd((before - middle).T @ (after - there))
     flip = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])

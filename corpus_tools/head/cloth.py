@@ -1,13 +1,13 @@
-"""A round-necked shirt: the shoulders cut along a tilted plane and raised a little, so that the bust ends cleanly."""
+"""A round-necked shirt: the shoulders, cut along a tilted plane and offset from the skin."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.head.piece import Piece, Span
+from corpus_tools.head.piece import MaterialSpan, Piece
 from corpus_tools.head.skin import Skin, vertex_normals
-from corpus_tools.head.subdivide import triangulated
+from corpus_tools.head.subdivide import triangulate
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -27,40 +27,42 @@ class Sheet:
     triangles: Ints
 
 
-def above_collar(places: Floats) -> Floats:
-    """(P,) mm above the collar's edge, for places on the default skin; negative below."""
+def height_above_collar(places: Floats) -> Floats:
+    """(P,) signed height above the collar's edge in mm, for positions on the default skin."""
     return places[:, 1] - COLLAR_Y - COLLAR_SLOPE * np.minimum(places[:, 2], 20.0)
 
 
-def shirt(default: Skin, own: Skin, colour: Floats) -> Piece:
-    """The shirt over the shoulders of any identity; those of the default one say where it is cut."""
+def shirt_piece(default: Skin, own: Skin, colour: Floats) -> Piece:
+    """The shirt over the shoulders `own` of an identity, cut where the shoulders of the `default` identity are."""
     normals = vertex_normals(own.vertices, own.quads, own.base)
-    whole = Sheet(np.column_stack([default.vertices, own.vertices, normals]), triangulated(own.quads))
-    whole = clipped(clipped(whole, whole.points[:, 1] - BOTTOM_Y), None)
-    whole = clipped(whole, WIDEST - np.abs(whole.points[:, 0]))
-    below = clipped(whole, -above_collar(whole.points))
-    band = clipped(below, above_collar(below.points) + BAND_MM)
-    body = clipped(below, -above_collar(below.points) - BAND_MM + 0.6)
+    whole = Sheet(np.column_stack([default.vertices, own.vertices, normals]), triangulate(own.quads))
+    whole = clip_sheet(clip_sheet(whole, whole.points[:, 1] - BOTTOM_Y), None)
+    whole = clip_sheet(whole, WIDEST - np.abs(whole.points[:, 0]))
+    below = clip_sheet(whole, -height_above_collar(whole.points))
+    band = clip_sheet(below, height_above_collar(below.points) + BAND_MM)
+    body = clip_sheet(below, -height_above_collar(below.points) - BAND_MM + 0.6)
     points, faces, colours, count = [], [], [], 0
     for sheet, off, shade in ((body, BODY_OFF, 1.0), (band, BAND_OFF, 0.88)):
-        rolled = _rolled(sheet, off)
+        rolled = _roll_collar(sheet, off)
         points.append(rolled.points)
         faces.append(rolled.triangles + count)
         colours.append(np.tile(colour * shade, (len(rolled.points), 1)))
         count += len(rolled.points)
-    return Piece(np.concatenate(points), (Span("shirt", np.concatenate(faces), MATERIAL),), np.concatenate(colours))
+    return Piece(
+        np.concatenate(points), (MaterialSpan("shirt", np.concatenate(faces), MATERIAL),), np.concatenate(colours)
+    )
 
 
-def clipped(sheet: Sheet, inside: Floats | None) -> Sheet:
-    """The part of a sheet where `inside` (N,) is not negative, cut exactly; unused points are dropped."""
+def clip_sheet(sheet: Sheet, inside: Floats | None) -> Sheet:
+    """The part of a sheet where `inside` (N,) is not negative, without unused points."""
     points, triangles = sheet.points, sheet.triangles
     if inside is not None:
-        points, triangles = _cut(points, triangles, inside)
+        points, triangles = _cut_triangles(points, triangles, inside)
     used, packed = np.unique(triangles, return_inverse=True)
     return Sheet(points[used], packed.reshape(-1, 3).astype(np.int64))
 
 
-def _cut(points: Floats, triangles: Ints, inside: Floats) -> tuple[Floats, Ints]:
+def _cut_triangles(points: Floats, triangles: Ints, inside: Floats) -> tuple[Floats, Ints]:
     is_in = inside >= 0
     n_in = is_in[triangles].sum(axis=1)
     new_points: list[Floats] = []
@@ -86,16 +88,16 @@ def _cut(points: Floats, triangles: Ints, inside: Floats) -> tuple[Floats, Ints]
     )
 
 
-def _rolled(sheet: Sheet, off: float) -> Sheet:
-    """The sheet raised off the skin, its upper edge rolled in to it."""
+def _roll_collar(sheet: Sheet, off: float) -> Sheet:
+    """The sheet offset from the skin by `off` mm, its upper edge joined to the skin."""
     raised = sheet.points[:, 3:6] + off * sheet.points[:, 6:9]
     sides = np.stack([sheet.triangles, np.roll(sheet.triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
     _, first, uses = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
     free = sides[first[uses == 1]]
-    height = above_collar(sheet.points)
+    height = height_above_collar(sheet.points)
     top = free[(height[free] > height.max() - 1.0).all(axis=1)]
     n = len(raised)
     low = sheet.points[:, 3:6] - 0.5 * sheet.points[:, 6:9] + [0.0, 0.8, 0.0]
     strip = np.concatenate([top[:, ::-1], top + n], axis=1)  # b, a, a', b'
     rim = np.concatenate([strip[:, [0, 1, 2]], strip[:, [0, 2, 3]]])
-    return clipped(Sheet(np.concatenate([raised, low]), np.concatenate([sheet.triangles, rim])), None)
+    return clip_sheet(Sheet(np.concatenate([raised, low]), np.concatenate([sheet.triangles, rim])), None)

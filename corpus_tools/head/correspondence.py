@@ -1,6 +1,6 @@
-"""Which point of the head each landmark is: a table of places on MakeHuman's skin, the same for every identity.
+"""Correspondence of landmarks: a table of positions on MakeHuman's skin, the same for every identity.
 
-The table was made by `corpus_tools.head.locate`; it is all that building a head needs.
+The table is computed by `corpus_tools.head.locate`; building a head needs no other data about landmarks.
 """
 
 import csv
@@ -17,14 +17,14 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 TABLE = Path(__file__).with_name("correspondence.csv")
-FAR = 0.05  # units of the source; a place further from the skin than this belongs to another mesh
+FAR = 0.05  # units of the source; a position further from the skin than this belongs to another mesh
 # Centre, then the rim of the iris towards the person's left, the top, the right and the bottom; right eye, left eye.
 IRISES = (range(468, 473), range(473, 478))
 IRIS_SIDES = np.array([(0, 0), (1, 0), (0, 1), (-1, 0), (0, -1)], np.float64)
 
 
 def read_places(path: Path = TABLE) -> dict[int, Floats]:
-    """Place (3,) of each landmark on the skin of the source's base mesh, in its units.
+    """Position (3,) of each landmark on the skin of the source's base mesh, in its units.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def read_places(path: Path = TABLE) -> dict[int, Floats]:
         return {int(row["landmark"]): np.array([float(row[axis]) for axis in "xyz"]) for row in rows}
     except (OSError, KeyError, TypeError, ValueError) as broken:
         raise DataError(
-            f"{path} is not a table of landmark,x,y,z; make it again with corpus_tools.head.locate"
+            f"{path} is not a table of landmark,x,y,z; build it again with corpus_tools.head.locate"
         ) from broken
 
 
@@ -49,8 +49,8 @@ def write_places(places: dict[int, Floats], path: Path = TABLE) -> None:
         writer.writerows([number, *(f"{value:.6f}" for value in place)] for number, place in sorted(places.items()))
 
 
-def with_landmarks(face: Face, base: Floats, places: dict[int, Floats] | None = None) -> Face:
-    """A face with its landmarks: those of the table on the skin, those of the irises on the eyeballs.
+def add_landmarks(face: Face, base: Floats, places: dict[int, Floats] | None = None) -> Face:
+    """A face with landmarks: those of the table on the skin, those of the irises on the eyeballs.
 
     Parameters
     ----------
@@ -67,10 +67,10 @@ def with_landmarks(face: Face, base: Floats, places: dict[int, Floats] | None = 
     table = read_places() if places is None else places
     skin = face.triangles[(face.triangles < len(base)).all(axis=1)].astype(np.int64)
     wanted = np.array(list(table.values()))
-    triangle, weights, distance = nearest_on_surface(wanted, base, skin)
+    triangle, weights, distance = nearest_surface_points(wanted, base, skin)
     if distance.max() > FAR:
         stray = list(table)[int(distance.argmax())]
-        raise DataError(f"landmark {stray} lies {distance.max():.3f} units off the skin; the table is of another mesh")
+        raise DataError(f"landmark {stray} lies {distance.max():.3f} units off the skin; build the table for this mesh")
     numbers, corners, shares = [np.array(list(table))], [skin[triangle]], [weights]
     for eye, iris in zip(sorted(face.eyes, key=lambda eye: float(eye.centre[0])), IRISES, strict=True):
         rows = iris_vertices(face, eye)
@@ -96,20 +96,20 @@ def iris_vertices(face: Face, eye: Eye) -> Ints:
     return np.asarray(inside[nearest], np.int64)
 
 
-def nearest_on_surface(points: Floats, vertices: Floats, triangles: Ints) -> tuple[Ints, Floats, Floats]:
-    """Triangle (P,), barycentric weights (P, 3) and distance (P,) of the surface's nearest place to each point.
+def nearest_surface_points(points: Floats, vertices: Floats, triangles: Ints) -> tuple[Ints, Floats, Floats]:
+    """Triangle (P,), barycentric weights (P, 3) and distance (P,) of the surface point nearest to each point.
 
     Source: Ericson 2005, Real-Time Collision Detection, section 5.1.5 (closest point on a triangle).
     """
-    found = [_nearest(point, vertices[triangles]) for point in points]
+    found = [_nearest_point(point, vertices[triangles]) for point in points]
     numbers = np.array([number for number, _ in found], np.int64)
     weights = np.array([weight for _, weight in found])
     there = np.einsum("pk,pkd->pd", weights, vertices[triangles[numbers]])
     return numbers, weights, np.linalg.norm(there - points, axis=1)
 
 
-def _nearest(point: Floats, corners: Floats) -> tuple[int, Floats]:
-    """Of triangles (F, 3, 3): which one is nearest, and the weights (3,) of its nearest place."""
+def _nearest_point(point: Floats, corners: Floats) -> tuple[int, Floats]:
+    """Index of the nearest of the triangles (F, 3, 3), and the barycentric weights (3,) of its nearest point."""
     first, second, third = corners[:, 0], corners[:, 1], corners[:, 2]
     edges = [(0, 1, first, second), (1, 2, second, third), (2, 0, third, first)]
     inner = _plane_weights(point, corners)
@@ -129,7 +129,7 @@ def _nearest(point: Floats, corners: Floats) -> tuple[int, Floats]:
 
 
 def _plane_weights(point: Floats, corners: Floats) -> Floats:
-    """(F, 3) barycentric weights of a point's foot on each triangle's plane."""
+    """(F, 3) barycentric weights of a point's orthogonal projection onto each triangle's plane."""
     one, two, there = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], point - corners[:, 0]
     d11, d12, d22 = (one * one).sum(axis=1), (one * two).sum(axis=1), (two * two).sum(axis=1)
     d1, d2 = (there * one).sum(axis=1), (there * two).sum(axis=1)

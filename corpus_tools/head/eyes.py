@@ -1,20 +1,20 @@
-"""Eyeballs: a sphere with a cornea, an iris with fibres and a dark rim, a pupil, a sclera that is not white."""
+"""Eyeballs: a sphere with a cornea, an iris with fibres and a dark rim, a pupil and a sclera."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.head.cage import Cage, sphere_of
-from corpus_tools.head.piece import Ball, Piece, Span
+from corpus_tools.head.cage import Cage, fit_sphere
+from corpus_tools.head.piece import Eyeball, MaterialSpan, Piece
 
 Floats = NDArray[np.float64]
 
 N_AROUND = 44
-RECEDE_MM = 1.6  # how far a ball sinks while its lids are shut, which nobody sees: lids move on straight lines
+RECEDE_MM = 1.6  # backward shift of an eyeball whose lids are shut, because blend shapes move lids on straight lines
 BULGE = 0.04  # of the radius, height of the cornea at its top
-BACK_RAD = 1.6  # the ball ends here; what is further back is never seen
-LOOKS = {
+BACK_RAD = 1.6  # angle from the gaze at which the eyeball ends; the rest is never visible
+GAZE_ANGLES = {
     "eyeLookUp": (-1, 0, 20.0),
     "eyeLookDown": (1, 0, 20.0),
     "eyeLookOut": (0, 1, 25.0),
@@ -27,8 +27,8 @@ SCLERA = np.array([0.90, 0.875, 0.855])
 class EyeStyle:
     """Half angles of iris and pupil seen from the centre, radians, and the iris' colour.
 
-    MakeHuman's balls are a third too large, so a natural iris takes a smaller angle than on a real eye. Its colour is
-    light, so that a tint can make it any.
+    MakeHuman's eyeballs are a third too large, so a natural iris takes a smaller angle than on a real eye. The colour
+    is light, so that a tint can produce any other.
     """
 
     iris: float = 0.385
@@ -39,26 +39,26 @@ class EyeStyle:
 MATERIALS = {"sclera": {"specular": 0.55, "shininess": 140.0}, "iris": {"specular": 0.9, "shininess": 260.0}}
 
 
-def balls_of(cage: Cage, style: EyeStyle | None = None) -> tuple[Ball, Ball]:
+def fit_eyeballs(cage: Cage, style: EyeStyle | None = None) -> tuple[Eyeball, Eyeball]:
     """Left and right eyeball of a cage."""
-    found, drawn = [], style or EyeStyle()
+    found, style = [], style or EyeStyle()
     for side, word, sign in (("l", "Left", 1.0), ("r", "Right", -1.0)):
-        centre, radius = sphere_of(cage.vertices[cage.group(f"helper-{side}-eye")])
+        centre, radius = fit_sphere(cage.vertices[cage.group(f"helper-{side}-eye")])
         turns = {}
-        for look, (about_x, about_y, degrees) in LOOKS.items():
-            turns[look + word] = np.radians(degrees) * np.array([about_x, sign * about_y, 0.0])
-        found.append(Ball(centre, radius, turns, drawn.iris, drawn.pupil))
+        for gaze, (about_x, about_y, degrees) in GAZE_ANGLES.items():
+            turns[gaze + word] = np.radians(degrees) * np.array([about_x, sign * about_y, 0.0])
+        found.append(Eyeball(centre, radius, turns, style.iris, style.pupil))
     return found[0], found[1]
 
 
-def ball_radius(ball: Ball, off: Floats) -> Floats:
+def ball_radius(ball: Eyeball, off: Floats) -> Floats:
     """Distance of the surface from the centre, mm, at angles from the gaze, radians."""
     return ball.radius * (1.0 + BULGE * np.clip(1.0 - (off / (ball.iris * 1.15)) ** 2, 0, None) ** 1.3)
 
 
-def eyeball(ball: Ball, side: str, style: EyeStyle, generator: np.random.Generator) -> Piece:
-    """The drawn eyeball of the side ``Left`` or ``Right``."""
-    rings = _rings(style)
+def eyeball_piece(ball: Eyeball, side: str, style: EyeStyle, generator: np.random.Generator) -> Piece:
+    """The piece of the eyeball on the side ``Left`` or ``Right``."""
+    rings = _ring_angles(style)
     around = np.linspace(0, 2 * np.pi, N_AROUND, endpoint=False)
     off, turn = (grid.ravel() for grid in np.meshgrid(rings, around, indexing="ij"))
     towards = np.stack([np.sin(off) * np.cos(turn), np.sin(off) * np.sin(turn), np.cos(off)], axis=1)
@@ -70,22 +70,22 @@ def eyeball(ball: Ball, side: str, style: EyeStyle, generator: np.random.Generat
     return Piece(
         vertices=ball.centre + ball_radius(ball, off)[:, None] * towards,
         spans=(
-            Span("sclera", triangles[~in_iris], MATERIALS["sclera"]),
-            Span("iris", triangles[in_iris], MATERIALS["iris"]),
+            MaterialSpan("sclera", triangles[~in_iris], MATERIALS["sclera"]),
+            MaterialSpan("iris", triangles[in_iris], MATERIALS["iris"]),
         ),
-        colours=_painted((off, turn, towards[:, 1]), style, generator),
+        colours=_eye_colours((off, turn, towards[:, 1]), style, generator),
         shapes={f"eyeBlink{side}": np.tile([0.0, 0.0, -RECEDE_MM], (len(towards), 1))},
     )
 
 
-def _rings(style: EyeStyle) -> Floats:
-    """Angles from the gaze at which the ball's vertices lie."""
+def _ring_angles(style: EyeStyle) -> Floats:
+    """Angles from the gaze at which the eyeball's vertices lie, radians."""
     inner = np.linspace(style.pupil + 0.02, style.iris, 10)
     outer = np.linspace(style.iris + 0.03, style.iris + 0.27, 4)
     return np.concatenate([np.linspace(0, style.pupil, 4), inner, outer, np.linspace(style.iris + 0.4, BACK_RAD, 7)])
 
 
-def _painted(at: tuple[Floats, Floats, Floats], style: EyeStyle, generator: np.random.Generator) -> Floats:
+def _eye_colours(at: tuple[Floats, Floats, Floats], style: EyeStyle, generator: np.random.Generator) -> Floats:
     """(N, 3) colours by the angle from the gaze, the angle around it and the height on the ball."""
     off, turn, up = at
     fibres = np.zeros_like(turn)

@@ -1,17 +1,17 @@
-"""Short hair: the scalp raised to a soft cap, strands painted on it, and loose locks that break its outline."""
+"""Short hair: the scalp raised to a cap, strands in its texture, and loose locks along its outline."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.head.noise import lumps, ramp
-from corpus_tools.head.piece import Piece, Span
+from corpus_tools.head.noise import ramp, value_noise
+from corpus_tools.head.piece import MaterialSpan, Piece
 
 Floats = NDArray[np.float64]
 
 MIDDLE = np.array([0.0, 25.0, -72.0])  # of the skull, mm
-CROWN = np.array([14.0, 122.0, -98.0])  # strands leave it to all sides
+CROWN = np.array([14.0, 122.0, -98.0])  # strands run from here
 # The hairline: height y in mm by the angle from the front about the skull's middle, in degrees.
 LINE_DEG = np.array([0, 18, 34, 48, 58, 66, 74, 84, 98, 108, 122, 140, 160, 180])
 LINE_Y = np.array([64, 62, 60, 55, 44, 26, 2, -6, 14, -6, -42, -60, -70, -72])
@@ -22,7 +22,7 @@ LOCK_MATERIAL = {"specular": 0.08, "shininess": 9.0, "wrap": 0.2}
 
 
 @dataclass(frozen=True, slots=True)
-class Cut:
+class Haircut:
     """A haircut: thickness in mm on top, at the sides and at the nape, and the number of loose locks."""
 
     top: float = 13.0
@@ -32,7 +32,7 @@ class Cut:
 
 
 def hair_share(places: Floats) -> Floats:
-    """(P,) 1 where hair grows, 0 where it does not, for places (P, 3) on the default skin, mm."""
+    """(P,) 1 where hair grows, 0 where it does not, for positions (P, 3) on the default skin, mm."""
     off = places - MIDDLE
     angle = np.degrees(np.arctan2(np.abs(off[:, 0]), off[:, 2]))
     line = np.interp(angle, LINE_DEG, LINE_Y)
@@ -45,25 +45,25 @@ def hair_share(places: Floats) -> Floats:
     return share * ramp(ear, 0.92, 1.12)
 
 
-def thickness(places: Floats, cut: Cut, generator: np.random.Generator) -> Floats:
-    """(P,) how far hair stands off the skin, mm."""
+def hair_thickness(places: Floats, cut: Haircut, generator: np.random.Generator) -> Floats:
+    """(P,) height of the hair above the skin, mm."""
     up = ramp(places[:, 1], 20, 110)
     back = ramp(-places[:, 2], 120, 190) * (1 - up)
     full = cut.side + (cut.top - cut.side) * up + (cut.nape - cut.side) * back
     inner = _inner_share(places)
-    clumps = 1 + 0.22 * lumps(strand_field(places, 9.0, 40.0), 1.0, generator)
+    clumps = 1 + 0.22 * value_noise(strand_field(places, 9.0, 40.0), 1.0, generator)
     return full * inner * clumps
 
 
 def _inner_share(places: Floats) -> Floats:
-    """Hair rises gently from its line."""
+    """(P,) share of the full thickness, which increases from the hairline."""
     lowered = places.copy()
     lowered[:, 1] -= 13.0
     return 0.12 * hair_share(places) + 0.88 * hair_share(places) * hair_share(lowered)
 
 
 def strand_field(places: Floats, width_mm: float, length_mm: float) -> Floats:
-    """(P, 3) coordinates in which a lump of size 1 is a strand of that width and length running from the crown."""
+    """(P, 3) coordinates in which noise of size 1 has the width and length of a strand that runs from the crown."""
     off = places - CROWN
     axis = (CROWN - MIDDLE) / np.linalg.norm(CROWN - MIDDLE)
     ahead = np.array([0, 0, 1.0]) - axis[2] * axis
@@ -72,25 +72,25 @@ def strand_field(places: Floats, width_mm: float, length_mm: float) -> Floats:
     turn = np.arctan2(off @ aside, off @ ahead)
     far = np.linalg.norm(off, axis=1)
     swirl = turn + 0.004 * far
-    around = 75.0  # mm, about the skull's radius, so that widths are honest at its girth
+    around = 75.0  # mm, about the skull's radius, where strand widths are exact
     return np.column_stack([around * np.cos(swirl) / width_mm, around * np.sin(swirl) / width_mm, far / length_mm])
 
 
 def strand_colour(places: Floats, colour: Floats, generator: np.random.Generator) -> Floats:
-    """(P, 3) hair at places."""
-    fine = lumps(strand_field(places, 1.6, 38.0), 1.0, generator)
-    broad = lumps(strand_field(places, 6.0, 55.0), 1.0, generator)
+    """(P, 3) colour of the hair at positions (P, 3)."""
+    fine = value_noise(strand_field(places, 1.6, 38.0), 1.0, generator)
+    broad = value_noise(strand_field(places, 6.0, 55.0), 1.0, generator)
     light = 1 + 0.34 * fine + 0.22 * broad
     warm = np.array([1.06, 1.0, 0.92])
     return np.clip(colour * light[:, None] * np.where(fine[:, None] > 0.4, warm, 1.0), 0.02, 1)
 
 
-def locks(
-    surface: tuple[Floats, Floats, Floats], share: Floats, cut: Cut, colour: Floats, generator: np.random.Generator
+def lock_piece(
+    surface: tuple[Floats, Floats, Floats], share: Floats, cut: Haircut, colour: Floats, generator: np.random.Generator
 ) -> Piece:
     """Loose locks on the cap: bent blades along the strands.
 
-    `surface` holds points, normals, and the points' places on the default skin, (N, 3) each.
+    `surface` holds points, normals, and the points' positions on the default skin, (N, 3) each.
     """
     skin_points, normals, default = surface
     chance = share * (share > 0.5)
@@ -111,6 +111,6 @@ def locks(
     shades = strand_colour(default[roots], colour, generator)
     return Piece(
         points.reshape(-1, 3),
-        (Span("hair_locks", (one + 4 * np.arange(len(roots))[:, None, None]).reshape(-1, 3), LOCK_MATERIAL),),
+        (MaterialSpan("hair_locks", (one + 4 * np.arange(len(roots))[:, None, None]).reshape(-1, 3), LOCK_MATERIAL),),
         np.repeat(shades, 4, axis=0),
     )

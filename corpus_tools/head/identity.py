@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from corpus_tools.head.cage import caged
-from corpus_tools.head.head import Ground, Look, built_head
-from corpus_tools.head.piece import Built, stacked_vertices
-from corpus_tools.head.source import Source
+from corpus_tools.head.cage import build_cage
+from corpus_tools.head.head import HeadStyle, ReferenceHead, assemble_head
+from corpus_tools.head.piece import HeadPieces, stack_vertices
+from corpus_tools.head.source import SourceMesh
 from tts2face.models.face_file import Identity
 
 Tint = tuple[float, float, float]
@@ -16,8 +16,8 @@ PLAIN: Tint = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Person:
-    """A preset: sex and age as MakeHuman's words, shares of ancestry, tints, further targets, and a summary."""
+class Preset:
+    """A preset: sex and age in MakeHuman's terms, shares of ancestry, tints, further targets, and a summary."""
 
     summary: str
     sex: str
@@ -30,7 +30,7 @@ class Person:
     more: Mapping[str, float] | None = None
 
     def targets(self) -> dict[str, float]:
-        """Weights of the targets."""
+        """Weight of each MakeHuman target."""
         found: dict[str, float] = dict(self.more or {})
         for age, share in self.ages.items():
             found[f"macrodetails/universal-{self.sex}-{age}-averagemuscle-averageweight"] = share
@@ -39,11 +39,11 @@ class Person:
         return found
 
 
-BROWN, DARK = (0.72, 0.50, 0.36), (0.46, 0.31, 0.22)  # eyes; the drawn iris is light
+BROWN, DARK = (0.72, 0.50, 0.36), (0.46, 0.31, 0.22)  # eyes; the iris texture is light
 BLACK, BLOND, GREY = (0.45, 0.46, 0.52), (2.35, 2.75, 2.5), (2.0, 2.8, 3.8)  # hair
 YOUNG, MATURE, OLD, CHILD = {"young": 1.0}, {"young": 0.5, "old": 0.5}, {"old": 1.0}, {"child": 0.85, "young": 0.15}
-PERSONS: dict[str, Person] = {
-    "erik": Person(
+PRESETS: dict[str, Preset] = {
+    "erik": Preset(
         "man, about 30, European",
         "male",
         YOUNG,
@@ -53,7 +53,7 @@ PERSONS: dict[str, Person] = {
         (0.9, 1.0, 1.2),
         (1.2, 0.9, 0.8),
     ),
-    "amara": Person(
+    "amara": Preset(
         "woman, about 30, West African",
         "female",
         YOUNG,
@@ -63,7 +63,7 @@ PERSONS: dict[str, Person] = {
         DARK,
         (2.6, 1.5, 0.7),
     ),
-    "kofi": Person(
+    "kofi": Preset(
         "man, about 35, West African",
         "male",
         {"young": 0.85, "old": 0.15},
@@ -72,13 +72,13 @@ PERSONS: dict[str, Person] = {
         BLACK,
         DARK,
     ),
-    "mei": Person(
+    "mei": Preset(
         "woman, about 28, East Asian", "female", YOUNG, {"asian": 1}, (1.01, 0.99, 0.94), BLACK, DARK, (2.8, 1.2, 1.1)
     ),
-    "kenji": Person(
+    "kenji": Preset(
         "man, about 40, East Asian", "male", {"young": 0.75, "old": 0.25}, {"asian": 1}, (0.95, 0.91, 0.86), BLACK, DARK
     ),
-    "leila": Person(
+    "leila": Preset(
         "woman, about 35, mixed ancestry",
         "female",
         {"young": 0.85, "old": 0.15},
@@ -88,7 +88,7 @@ PERSONS: dict[str, Person] = {
         BROWN,
         (1.2, 2.0, 1.3),
     ),
-    "ravi": Person(
+    "ravi": Preset(
         "man, about 30, mixed ancestry",
         "male",
         YOUNG,
@@ -98,11 +98,11 @@ PERSONS: dict[str, Person] = {
         DARK,
         (1.7, 1.7, 1.6),
     ),
-    "ingrid": Person(
+    "ingrid": Preset(
         "woman, about 70, European", "female", OLD, {"caucasian": 1}, (1.0, 0.965, 0.955), GREY, PLAIN, (2.0, 0.8, 1.1)
     ),
-    "walter": Person("man, about 65, European", "male", OLD, {"caucasian": 1}, (0.98, 0.93, 0.91), GREY, PLAIN),
-    "nia": Person(
+    "walter": Preset("man, about 65, European", "male", OLD, {"caucasian": 1}, (0.98, 0.93, 0.91), GREY, PLAIN),
+    "nia": Preset(
         "child, about 9, mixed ancestry",
         "female",
         CHILD,
@@ -115,20 +115,22 @@ PERSONS: dict[str, Person] = {
 }
 
 
-def identities(source: Source, ground: Ground, look: Look, default: Built) -> dict[str, Identity]:
-    """Every preset as a displacement of the default head."""
-    rest = stacked_vertices(default)
+def build_identities(
+    source: SourceMesh, reference: ReferenceHead, style: HeadStyle, default: HeadPieces
+) -> dict[str, Identity]:
+    """Each preset as a displacement of the default head."""
+    rest = stack_vertices(default)
     found = {}
-    for name, person in PERSONS.items():
-        own = stacked_vertices(built_head(caged(source, person.targets()), ground, look))
+    for name, person in PRESETS.items():
+        own = stack_vertices(assemble_head(build_cage(source, person.targets()), reference, style))
         tints = {
             "skin": person.skin, "hair": person.hair, "hair_locks": person.hair, "iris": person.iris,
-            "shirt": person.shirt, "gums_upper": _half(person.skin), "gums_lower": _half(person.skin),
+            "shirt": person.shirt, "gums_upper": _dampen_tint(person.skin), "gums_lower": _dampen_tint(person.skin),
         }  # fmt: skip
         found[name] = Identity((own - rest).astype(np.float32), tints, person.summary)
     return found
 
 
-def _half(tint: Tint) -> Tint:
+def _dampen_tint(tint: Tint) -> Tint:
     red, green, blue = (0.6 + 0.4 * part for part in tint)
     return red, green, blue

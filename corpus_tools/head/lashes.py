@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import shortest_path
 from scipy.spatial import cKDTree
 
 from corpus_tools.head.cage import Cage
-from corpus_tools.head.piece import Piece, Span
+from corpus_tools.head.piece import MaterialSpan, Piece
 from corpus_tools.head.skin import Skin
 
 Floats = NDArray[np.float64]
@@ -19,7 +19,7 @@ MATERIAL = {"specular": 0.05, "shininess": 20.0}
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class LashRow:
     """Lashes of one lid: the strip's number in the source, blades, length in rows of the strip, width in mm."""
 
     strip: int
@@ -28,30 +28,33 @@ class Row:
     width: float
 
 
-UPPER, LOWER = Row(2, 60, 3.7, 0.24), Row(1, 34, 2.1, 0.15)
+UPPER, LOWER = LashRow(2, 60, 3.7, 0.24), LashRow(1, 34, 2.1, 0.15)
 N_OF_BLADE = 5  # vertices; the first two are its root
 ROOT_ROW = 0.85  # the strip's first row lies within the lid
-SHUT_DOWN, SHUT_AHEAD = 0.5, 0.87  # where upper lashes point when the lids are shut, of their length
-BELOW_MM, BEHIND_MM = 0.3, 0.3  # the lower lashes' roots then lie so far under and behind the upper ones'
+SHUT_DOWN, SHUT_AHEAD = (
+    0.5,
+    0.87,
+)  # offset of upper lashes over closed lids, in their lengths
+BELOW_MM, BEHIND_MM = 0.3, 0.3  # minimum distance of the lower lashes' roots below and behind the upper ones then
 
 
 def lash_piece(cage: Cage, skin: Skin, generator: np.random.Generator) -> Piece:
-    """The lashes of both eyes; what was mended in the skin's shapes moves them too."""
+    """The lashes of both eyes, which also follow the corrections of the skin's shapes."""
     nearest = cKDTree(skin.vertices)
     points, triangles, count = [], [], 0
     shapes: dict[str, list[Floats]] = {name: [] for name in cage.units}
     for side, word in (("l", "Left"), ("r", "Right")):
-        line = np.zeros((0, 3))  # the upper lashes' roots when the lids are shut
+        line = np.zeros((0, 3))  # roots of the upper lashes over closed lids
         for row in (UPPER, LOWER):
             strip = cage.source.groups[f"helper-{side}-eyelashes-{row.strip}"].corners
             used = np.unique(strip)
-            carry, offset, faces = _blades(cage.vertices[used], np.searchsorted(used, strip), row, generator)
-            blades = carry @ cage.vertices[used] + offset
+            weights, offset, faces = _blades(cage.vertices[used], np.searchsorted(used, strip), row, generator)
+            blades = weights @ cage.vertices[used] + offset
             beside = np.repeat(nearest.query(_roots(blades))[1], N_OF_BLADE)
             for name, moved in cage.units.items():
-                own = carry @ moved[used] + (skin.mended[name][beside] if name in skin.mended else 0.0)
+                own = weights @ moved[used] + (skin.corrections[name][beside] if name in skin.corrections else 0.0)
                 if name == f"eyeBlink{word}":
-                    own = _lowered(blades, own) if row is UPPER else _kept_under(blades, own, line)
+                    own = _lower_lashes(blades, own) if row is UPPER else _keep_under(blades, own, line)
                     line = _roots(blades + own)
                 shapes[name].append(own)
             points.append(blades)
@@ -60,14 +63,14 @@ def lash_piece(cage: Cage, skin: Skin, generator: np.random.Generator) -> Piece:
     vertices = np.concatenate(points)
     return Piece(
         vertices,
-        (Span("lashes", np.concatenate(triangles), MATERIAL),),
+        (MaterialSpan("lashes", np.concatenate(triangles), MATERIAL),),
         np.tile(COLOUR, (len(vertices), 1)),
         {name: np.concatenate(blocks) for name, blocks in shapes.items()},
     )
 
 
-def grid_of(quads: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Vertex numbers (across, along) of a strip of quads (F, 4) that forms a grid, the short side first."""
+def strip_grid(quads: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Vertex indices (across, along) of a strip of quads (F, 4) that forms a grid, the short side first."""
     n = int(quads.max()) + 1
     sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2)
     steps = shortest_path(
@@ -85,13 +88,13 @@ def grid_of(quads: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _roots(blades: Floats) -> Floats:
-    """(B, 3) where blades (5 B, 3) grow."""
+    """(B, 3) roots of blades (5 B, 3)."""
     roots: Floats = blades.reshape(-1, N_OF_BLADE, 3)[:, :2].mean(axis=1)
     return roots
 
 
-def _lowered(blades: Floats, moved: Floats) -> Floats:
-    """(5 B, 3) the motion of upper lashes that go with their roots and turn to point ahead and down."""
+def _lower_lashes(blades: Floats, moved: Floats) -> Floats:
+    """(5 B, 3) motion of upper lashes that follow their roots and rotate forwards and down."""
     off = blades - np.repeat(_roots(blades), N_OF_BLADE, axis=0)
     length = np.linalg.norm(off[:, 1:], axis=1)
     turned = np.column_stack([off[:, 0], -SHUT_DOWN * length, SHUT_AHEAD * length])
@@ -99,8 +102,8 @@ def _lowered(blades: Floats, moved: Floats) -> Floats:
     return lowered
 
 
-def _kept_under(blades: Floats, moved: Floats, line: Floats) -> Floats:
-    """(5 B, 3) the motion of lower lashes, whose roots stay under and about as far ahead as a line (N, 3)."""
+def _keep_under(blades: Floats, moved: Floats, line: Floats) -> Floats:
+    """(5 B, 3) motion of lower lashes whose roots stay below and behind the line (N, 3) of the upper roots."""
     roots = _roots(blades + moved)
     order = np.argsort(line[:, 0])
     y, z = (np.interp(roots[:, 0], line[order, 0], line[order, k]) for k in (1, 2))
@@ -112,12 +115,12 @@ def _kept_under(blades: Floats, moved: Floats, line: Floats) -> Floats:
 
 
 def _blades(
-    places: Floats, quads: NDArray[np.int64], row: Row, generator: np.random.Generator
+    places: Floats, quads: NDArray[np.int64], row: LashRow, generator: np.random.Generator
 ) -> tuple[sparse.csr_array, Floats, NDArray[np.int64]]:
-    """What carries 5 vertices per blade from the strip's (5 B, S), what is added (5 B, 3), triangles (3 B, 3)."""
-    grid = grid_of(quads)
+    """Weights (5 B, S) of the strip's vertices, offsets (5 B, 3) and triangles (3 B, 3), 5 vertices per blade."""
+    grid = strip_grid(quads)
     if places[grid[0], 2].mean() > places[grid[-1], 2].mean():
-        grid = grid[::-1]  # the root lies behind the tip
+        grid = grid[::-1]  # roots lie behind tips
     n_across, n_along = grid.shape
     n = row.n_blades
     root = (np.arange(n) + generator.uniform(0.2, 0.8, n)) / n * (n_along - 1)
@@ -138,10 +141,9 @@ def _blades(
                 ((1, 1), u * v),
             ):
                 weights[5 * blade + vertex, grid[i + step[0], j + step[1]]] += part
-    carry = weights.tocsr()
     tangent = np.gradient(places[grid[0]], axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     aside = np.stack([np.interp(root, np.arange(n_along), tangent[:, k]) for k in range(3)], axis=1) * row.width / 2
     offset = np.stack([aside, -aside, 0.7 * aside, -0.7 * aside, 0 * aside], axis=1).reshape(-1, 3)
     one = np.array([(0, 1, 2), (1, 3, 2), (2, 3, 4)])
-    return carry, offset, (one + 5 * np.arange(n)[:, None, None]).reshape(-1, 3)
+    return weights.tocsr(), offset, (one + 5 * np.arange(n)[:, None, None]).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Lips that touch at rest: MakeHuman's stand half a millimetre to a millimetre apart beside the middle."""
+"""Lips that touch at rest; MakeHuman's are 0.5 to 1 mm apart beside the middle."""
 
 from dataclasses import dataclass, replace
 
@@ -6,25 +6,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from corpus_tools.head.rings import Strips, narrowest_ring
+from corpus_tools.head.rings import EdgeRings, find_narrowest_ring
 from corpus_tools.head.skin import Skin
 
 Floats = NDArray[np.float64]
 
 PRESS_MM = 0.12  # lips overlap by this at rest, so that no light falls between them
-REACH_MM = 5.0  # how far from the line of contact the skin follows
+REACH_MM = 5.0  # from the line of contact to where the skin's motion has decayed
 N_COLUMNS = 61
 OPENING = 0.3  # weight of jawOpen at which the lips are apart
 RING_REACH_MM = 40.0
-BETWEEN_MM = 1.5  # this far from the middle of the open slit a vertex is wholly of one lip
+BETWEEN_MM = 1.5  # from the middle of the opening to where a vertex belongs to one lip alone
 LIP_MIDDLES = np.array([(0.0, 6.696, 1.596), (0.0, 6.47, 1.54)])  # on the source's base mesh, upper and lower lip
 MOUTH_BOX = ((-0.32, 0.32), (6.45, 6.75), (1.25, 1.75))  # around the lips on the source's base mesh
-DEPTH_MM = 12.0  # behind the foremost place of a lip at its x begins the cavity; lips touch up to 10 mm behind it
+DEPTH_MM = 12.0  # depth of a lip behind its foremost point at each x; lips touch up to 10 mm behind it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Slit:
-    """The line between the lips: half its width in mm, and (N,) which lip a vertex is of, -1 upper to 1 lower."""
+class LipLine:
+    """The line between the lips: half its width in mm, and the lip of each vertex (N,), -1 upper to 1 lower."""
 
     half_width: float
     lower: Floats
@@ -34,11 +34,11 @@ def lip_ring(skin: Skin) -> NDArray[np.int64]:
     """Vertices of the ring of edges where the lips meet; the same for every identity."""
     middles = [int(np.linalg.norm(skin.base - place, axis=1).argmin()) for place in LIP_MIDDLES]
     opened = skin.vertices + OPENING * skin.shapes["jawOpen"]
-    return narrowest_ring(Strips(skin.quads, skin.base), opened, opened[middles].mean(axis=0), RING_REACH_MM)
+    return find_narrowest_ring(EdgeRings(skin.quads, skin.base), opened, opened[middles].mean(axis=0), RING_REACH_MM)
 
 
-def slit_of(skin: Skin, ring: NDArray[np.int64]) -> Slit:
-    """The slit, read with the jaw open, when the lips are apart."""
+def find_lip_line(skin: Skin, ring: NDArray[np.int64]) -> LipLine:
+    """The line between the lips, found with the jaw open."""
     opened = skin.vertices + OPENING * skin.shapes["jawOpen"]
     ring = np.roll(ring, -int(opened[ring, 0].argmin()))
     line = opened[np.append(ring, ring[0])]
@@ -46,33 +46,33 @@ def slit_of(skin: Skin, ring: NDArray[np.int64]) -> Slit:
     arcs = [np.interp(opened[:, 0], arc[:, 0], arc[:, 1]) for arc in (line[: turn + 1], line[turn:][::-1])]
     half = float(np.abs(skin.vertices[ring, 0]).max())
     lower = np.clip(((arcs[0] + arcs[1]) / 2 - opened[:, 1]) / BETWEEN_MM, -1, 1)
-    return Slit(half, lower * (np.abs(opened[:, 0]) < half))
+    return LipLine(half, lower * (np.abs(opened[:, 0]) < half))
 
 
-def closed(skin: Skin, ring: NDArray[np.int64]) -> Skin:
-    """The skin with lips that meet."""
-    slit = slit_of(skin, ring)
+def close_lips(skin: Skin, ring: NDArray[np.int64]) -> Skin:
+    """The skin with lips in contact."""
+    line = find_lip_line(skin, ring)
     vertices = skin.vertices
     for _ in range(5):
-        vertices = vertices + _closing(replace(skin, vertices=vertices), slit)
+        vertices = vertices + _closing_step(replace(skin, vertices=vertices), line)
     return replace(skin, vertices=vertices)
 
 
-def lip_gaps(skin: Skin, slit: Slit) -> tuple[Floats, Floats, Floats]:
+def lip_gaps(skin: Skin, lips: LipLine) -> tuple[Floats, Floats, Floats]:
     """Columns x (C,), and the upper and lower lip's edges there as (C, 2) of y and z, mm."""
     low, high = np.array(MOUTH_BOX).T
     near = np.all((skin.base > low) & (skin.base < high), axis=1)
     quads = skin.quads[near[skin.quads].all(axis=1)]
     edges = np.unique(np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1), axis=0)
-    is_lower = slit.lower[edges].mean(axis=1)
-    columns = slit.half_width * np.linspace(-0.985, 0.985, N_COLUMNS)
+    is_lower = lips.lower[edges].mean(axis=1)
+    columns = lips.half_width * np.linspace(-0.985, 0.985, N_COLUMNS)
     upper = _rims(skin.vertices, edges[is_lower < 0], columns, 1.0)
     lower = _rims(skin.vertices, edges[is_lower > 0], columns, -1.0)
     return columns, upper, lower
 
 
 def _rims(vertices: Floats, edges: NDArray[np.int64], columns: Floats, sign: float) -> Floats:
-    """(C, 2) y and z of the lowest (sign 1) or highest (-1) place of a lip at each x; NaN where there is none."""
+    """(C, 2) y and z of the lowest (sign 1) or highest (-1) point of a lip at each x; NaN where there is none."""
     rims = np.full((len(columns), 2), np.nan)
     ends = vertices[edges]
     for at, x in enumerate(columns):
@@ -85,12 +85,12 @@ def _rims(vertices: Floats, edges: NDArray[np.int64], columns: Floats, sign: flo
     return rims
 
 
-def _closing(skin: Skin, slit: Slit) -> Floats:
-    """(N, 3) half a step towards contact on each lip."""
-    columns, upper, lower = lip_gaps(skin, slit)
+def _closing_step(skin: Skin, lips: LipLine) -> Floats:
+    """(N, 3) displacement of half the remaining gap on each lip."""
+    columns, upper, lower = lip_gaps(skin, lips)
     gap = np.nan_to_num(upper[:, 0] - lower[:, 0]) + PRESS_MM
     gap = gaussian_filter1d(gap, 1.0)
-    share = slit.lower
+    share = lips.lower
     x = skin.vertices[:, 0]
     moved = np.zeros_like(skin.vertices)
     for sign, rim in ((-1.0, upper), (1.0, lower)):

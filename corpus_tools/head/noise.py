@@ -6,31 +6,31 @@ from scipy.ndimage import map_coordinates
 
 Floats = NDArray[np.float64]
 
-SIZE = 32  # lattice points each way; the field repeats beyond
+SIZE = 32  # lattice points along each axis; the field is periodic
 
 
-def lumps(points: Floats, size_mm: float, generator: np.random.Generator) -> Floats:
-    """(P,) about -1..1 with spots of about `size_mm`, at points (P, 3) in mm."""
+def value_noise(points: Floats, size_mm: float, generator: np.random.Generator) -> Floats:
+    """(P,) value noise of about -1..1 with features of about `size_mm`, at points (P, 3) in mm."""
     lattice = generator.standard_normal((SIZE, SIZE, SIZE))
     field = map_coordinates(lattice, (points / size_mm).T % SIZE, order=1, mode="grid-wrap")
     return np.clip(field / 1.2, -2, 2)
 
 
-def bell(points: Floats, centre: tuple[float, ...], reach: tuple[float, ...]) -> Floats:
-    """(P,) 1 at the centre, falling as a Gaussian; |x| counts, so that both sides are alike."""
+def gaussian_bump(points: Floats, centre: tuple[float, ...], reach: tuple[float, ...]) -> Floats:
+    """(P,) Gaussian with value 1 at the centre, symmetric in x."""
     mirrored = np.column_stack([np.abs(points[:, 0]), points[:, 1:]])[:, : len(centre)]
     falling: Floats = np.exp(-(((mirrored - np.array(centre)) / np.array(reach)) ** 2).sum(axis=1))
     return falling
 
 
 def ramp(values: Floats, low: float, high: float) -> Floats:
-    """0 below `low`, 1 above `high`, smooth between; `high` may be the smaller."""
+    """Smooth step from 0 at `low` to 1 at `high`; `high` may be the smaller."""
     share = np.clip((values - low) / (high - low), 0, 1)
     return share * share * (3 - 2 * share)
 
 
 def stroke_cover(places: Floats, starts: Floats, ends: Floats, widths: Floats) -> Floats:
-    """(P,) cover of places (P, 2) by strokes: 1 on a stroke's line, tapering to its end; `widths` in mm at the root."""
+    """(P,) coverage of points (P, 2) by tapering strokes, 1 on a stroke's line; `widths` at the root, mm."""
     cover = np.zeros(len(places))
     for start, end, width in zip(starts, ends, widths, strict=True):
         near = np.flatnonzero(np.abs(places - (start + end) / 2).max(axis=1) < np.abs(end - start).max() / 2 + width)

@@ -1,4 +1,4 @@
-"""A piece of a face under construction, and how pieces become a `Face`."""
+"""Pieces of a head, and their assembly into a `Face`."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Span:
+class MaterialSpan:
     """Triangles (F, 3) of one material within a piece; `material` holds the keyword arguments of `Part`."""
 
     name: str
@@ -26,14 +26,14 @@ class Piece:
     """Vertices (N, 3) in mm, colours (N, 3) in 0..1, shapes by name (N, 3), texture coordinates (N, 2) or None."""
 
     vertices: Floats
-    spans: tuple[Span, ...]
+    spans: tuple[MaterialSpan, ...]
     colours: Floats
     shapes: Mapping[str, Floats] = field(default_factory=dict)
     uv: Floats | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ball:
+class Eyeball:
     """An eyeball: centre (3,), radius in mm, and its turns by gaze shape, rotation vectors (3,) in radians.
 
     ``iris`` and ``pupil`` are half angles seen from the centre, radians.
@@ -47,21 +47,23 @@ class Ball:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Built:
+class HeadPieces:
     """The pieces of a head; pieces `eye_pieces` are the eyeballs `balls`."""
 
     pieces: tuple[Piece, ...]
     eye_pieces: tuple[int, ...]
-    balls: tuple[Ball, ...]
+    balls: tuple[Eyeball, ...]
     pivot: Floats
 
 
-def stacked_vertices(built: Built) -> Floats:
+def stack_vertices(built: HeadPieces) -> Floats:
     """(V, 3) vertices of all pieces in order."""
     return np.concatenate([piece.vertices for piece in built.pieces])
 
 
-def joined(built: Built, shape_names: Sequence[str], texture: NDArray[np.uint8], metadata: Mapping[str, Any]) -> Face:
+def assemble_face(
+    built: HeadPieces, shape_names: Sequence[str], texture: NDArray[np.uint8], metadata: Mapping[str, Any]
+) -> Face:
     """The face of the pieces, without landmarks."""
     firsts = np.cumsum([0, *(len(piece.vertices) for piece in built.pieces)])
     triangles, parts = _parts(built, firsts)
@@ -75,7 +77,7 @@ def joined(built: Built, shape_names: Sequence[str], texture: NDArray[np.uint8],
             uv[here] = piece.uv
     colours = np.concatenate([piece.colours for piece in built.pieces])
     return Face(
-        vertices=stacked_vertices(built).astype(np.float32),
+        vertices=stack_vertices(built).astype(np.float32),
         triangles=triangles,
         parts=tuple(parts),
         shape_names=tuple(shape_names),
@@ -93,7 +95,7 @@ def joined(built: Built, shape_names: Sequence[str], texture: NDArray[np.uint8],
     )
 
 
-def _parts(built: Built, firsts: NDArray[np.integer]) -> tuple[NDArray[np.int32], list[Part]]:
+def _parts(built: HeadPieces, firsts: NDArray[np.integer]) -> tuple[NDArray[np.int32], list[Part]]:
     triangles, parts, begin = [], [], 0
     for first, piece in zip(firsts, built.pieces, strict=False):
         for span in piece.spans:
@@ -103,7 +105,7 @@ def _parts(built: Built, firsts: NDArray[np.integer]) -> tuple[NDArray[np.int32]
     return np.concatenate(triangles).astype(np.int32), parts
 
 
-def _eyes(built: Built, firsts: NDArray[np.integer]) -> list[Eye]:
+def _eyes(built: HeadPieces, firsts: NDArray[np.integer]) -> list[Eye]:
     eyes = []
     for at, ball in zip(built.eye_pieces, built.balls, strict=True):
         turns = {name: turn.astype(np.float32) for name, turn in ball.turns.items()}

@@ -13,14 +13,14 @@ Ints = NDArray[np.int64]
 LONGEST = 400  # vertices; the head's own rings around mouth and eyes have under 100
 
 
-class Strips:
-    """Edges of a quad mesh that run straight on from vertex to vertex.
+class EdgeRings:
+    """Edge rings of a quad mesh: at each vertex of four edges a ring continues with the opposite edge.
 
     Parameters
     ----------
     quads : (F, 4)
     places : (N, 3)
-        Vertices at one place count as one: a texture may have cut the mesh there.
+        Vertices at one position count as one, because texture seams split the mesh.
     """
 
     def __init__(self, quads: Ints, places: Floats) -> None:
@@ -35,7 +35,7 @@ class Strips:
         self.vertices = sorted(self._beside)
 
     def ring(self, start: int, towards: int) -> list[int] | None:
-        """The closed ring of vertices that leaves `start` by the edge to `towards`; None if it does not close."""
+        """The closed ring of vertices beginning with the edge from `start` to `towards`; None if it is open."""
         path = [start, towards]
         while len(path) < LONGEST:
             onward = self._onward(path[-2], path[-1])
@@ -45,7 +45,7 @@ class Strips:
         return None
 
     def rings_from(self, start: int) -> list[list[int]]:
-        """Closed rings that pass `start`."""
+        """Closed rings through `start`."""
         found = [self.ring(start, towards) for towards in sorted(self._beside[start])]
         return [ring for ring in found if ring is not None]
 
@@ -55,23 +55,23 @@ class Strips:
         return ahead[0] if len(ahead) == 1 and len(self._beside[here]) == 4 else None
 
 
-def narrowest_ring(strips: Strips, vertices: Floats, inside: Floats, reach: float, clear: float = 0.0) -> Ints:
-    """The ring around a hole that encloses least, seen from the front: the edge of lips or lids.
+def find_narrowest_ring(strips: EdgeRings, vertices: Floats, inside: Floats, reach: float, clear: float = 0.0) -> Ints:
+    """The ring around an opening with the smallest area in the frontal view: the edge of lips or lids.
 
     Parameters
     ----------
     vertices : (N, 3)
     inside : (3,)
-        A point in the hole, or behind it.
+        A point in the opening, or behind it.
     reach
-        No ring goes further than this from the point, seen from the front, mm.
+        Maximum distance of a ring from the point in the frontal view, mm.
     clear
-        Every ring stays further than this from the point, on average, mm: an eyeball's radius.
+        Minimum mean distance of a ring from the point, mm: an eyeball's radius.
 
     Raises
     ------
     DataError
-        No ring goes around the point.
+        No ring encloses the point.
     """
     near = np.hypot(*(vertices[strips.vertices] - inside).T[:2]) < reach
     best, least = None, np.inf
@@ -81,18 +81,18 @@ def narrowest_ring(strips: Strips, vertices: Floats, inside: Floats, reach: floa
             seen.update(ring)
             flat = vertices[ring, :2] - inside[:2]
             is_clear = np.linalg.norm(vertices[ring] - inside, axis=1).mean() > clear
-            if np.hypot(*flat.T).max() > reach or not _winds(flat) or not is_clear:
+            if np.hypot(*flat.T).max() > reach or not _encloses_origin(flat) or not is_clear:
                 continue
             area = abs(_area(flat))
             if area < least:
                 best, least = ring, area
     if best is None:
-        raise DataError(f"no ring of edges goes around {inside}; the mesh is not the one that this was made for")
+        raise DataError(f"no edge ring encloses {inside}; use the pinned source mesh")
     return np.array(best, np.int64)
 
 
-def _winds(flat: Floats) -> bool:
-    """Whether a closed line goes once around the origin."""
+def _encloses_origin(flat: Floats) -> bool:
+    """Whether a closed line winds once around the origin."""
     angles = np.unwrap(np.arctan2(*np.concatenate([flat, flat[:1]]).T[::-1]))
     return bool(abs(abs(angles[-1] - angles[0]) - 2 * np.pi) < 0.1)
 

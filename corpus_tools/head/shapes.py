@@ -1,4 +1,4 @@
-"""Mends to MakeHuman's face units: folds that a strong smile breaks the cheek into are smoothed, brows rise more."""
+"""Corrections of MakeHuman's face units: smoother cheeks, stronger brows, lids that slide over the eyeballs."""
 
 from dataclasses import replace
 
@@ -6,43 +6,46 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from corpus_tools.head.eyes import RECEDE_MM, ball_radius
 from corpus_tools.head.noise import ramp
+from corpus_tools.head.piece import Eyeball
 from corpus_tools.head.skin import Skin
+from tts2face.face.deformation import rotation_matrix
 
 Floats = NDArray[np.float64]
 
-SOFTENED = ("mouthSmileLeft", "mouthSmileRight", "mouthDimpleLeft", "mouthDimpleRight", "cheekPuff")
-STRONGER = {  # a real brow rises 8 mm, theirs 5; their upper lids hardly follow a gaze that goes up
+SMOOTHED_SHAPES = ("mouthSmileLeft", "mouthSmileRight", "mouthDimpleLeft", "mouthDimpleRight", "cheekPuff")
+SHAPE_GAINS = {  # real brows rise 8 mm, these 5; these upper lids hardly follow an upward gaze
     "browInnerUp": 1.6,
     "browOuterUpLeft": 1.4,
     "browOuterUpRight": 1.4,
     "eyeLookUpLeft": 1.7,
     "eyeLookUpRight": 1.7,
 }
-N_MEANS = 14  # means over neighbours: folds narrower than about 10 mm go
+N_MEANS = 14  # averages over neighbours; removes folds narrower than about 10 mm
 MOUTH = np.array([0.0, 6.585, 1.50])  # on the source's base mesh, its units
-NEAR, FAR = 0.30, 0.46  # lips closer than this keep their shape; cheeks further than that are smoothed
+NEAR, FAR = 0.30, 0.46  # distance from the mouth where smoothing begins (lips keep their shape) and is full (cheeks)
 BELOW_EYES = 7.10
 
 
-def softened(skin: Skin) -> Skin:
-    """The skin with smoother cheeks and livelier brows."""
-    beside = neighbours(skin)
+def correct_shapes(skin: Skin) -> Skin:
+    """The skin with smoother cheeks and stronger motion of brows and upper lids."""
+    means = neighbour_means(skin)
     off = (skin.base - MOUTH) * [0.85, 1.25, 0.6]
     share = ramp(np.linalg.norm(off, axis=1), NEAR, FAR) * ramp(skin.base[:, 1], BELOW_EYES, BELOW_EYES - 0.12)
     shapes = dict(skin.shapes)
-    for name in SOFTENED:
+    for name in SMOOTHED_SHAPES:
         smooth = shapes[name]
         for _ in range(N_MEANS):
-            smooth = 0.3 * smooth + 0.7 * (beside @ smooth)
+            smooth = 0.3 * smooth + 0.7 * (means @ smooth)
         shapes[name] = shapes[name] + share[:, None] * (smooth - shapes[name])
-    for name, factor in STRONGER.items():
+    for name, factor in SHAPE_GAINS.items():
         shapes[name] = factor * shapes[name]
     return replace(skin, shapes=shapes)
 
 
-def neighbours(skin: Skin) -> sparse.csr_array:
-    """(N, N) means over the vertices that share an edge, those of a seam counting as one."""
+def neighbour_means(skin: Skin) -> sparse.csr_array:
+    """(N, N) averaging over vertices that share an edge; vertices along a seam count as one."""
     _, weld = np.unique(np.rint(skin.base * 1e6).astype(np.int64), axis=0, return_inverse=True)
     weld = weld.ravel()
     n, m = len(weld), int(weld.max()) + 1
@@ -54,3 +57,53 @@ def neighbours(skin: Skin) -> sparse.csr_array:
     mean = sparse.csr_array(sparse.diags_array(1.0 / one.sum(axis=1)) @ one).tocoo()
     rows = sparse.csr_array((mean.data, (mean.row, first[mean.col])), shape=(m, n))
     return sparse.csr_array(rows[weld])
+
+
+CLEAR_MM = 0.30  # between lid and eyeball; edges of 2 mm lie below the surface by a tenth of it
+STEPS = (0.3, 0.4, 0.5, 0.6, 0.75, 0.9, 1.0)  # weights at which the clearance is computed
+LID_SHAPES = ("eyeBlink", "eyeLookDown", "eyeLookUp", "eyeLookIn", "eyeLookOut", "eyeSquint", "eyeWide", "cheekSquint")
+N_SPREAD = 4  # edges over which the correction decays
+
+
+def clear_eyeballs(skin: Skin, balls: tuple[Eyeball, Eyeball]) -> Skin:
+    """The skin with shapes that keep the lids outside the eyeballs at every weight."""
+    means = neighbour_means(skin)
+    shapes, corrections = dict(skin.shapes), dict(skin.corrections)
+    for ball, side in zip(balls, ("Left", "Right"), strict=True):
+        for name in (shape + side for shape in LID_SHAPES):
+            push = _push(skin.vertices, shapes[name], ball, name, means)
+            shapes[name] = shapes[name] + push
+            corrections[name] = push
+    return replace(skin, shapes=shapes, corrections=corrections)
+
+
+def eyeball_overlap(vertices: Floats, ball: Eyeball, name: str, weight: float) -> Floats:
+    """(N,) depth of vertices inside an eyeball in the pose of a shape, mm; negative outside."""
+    turn = rotation_matrix(weight * ball.turns.get(name, np.zeros(3)))
+    sink = RECEDE_MM * weight if name.startswith("eyeBlink") else 0.0
+    off = vertices - ball.centre + [0.0, 0.0, sink]
+    distance = np.linalg.norm(off, axis=1)
+    angle = np.arccos(np.clip((off @ turn)[:, 2] / distance, -1, 1))
+    depth: Floats = ball_radius(ball, angle) - distance
+    return depth
+
+
+def _push(vertices: Floats, moved: Floats, ball: Eyeball, name: str, means: sparse.csr_array) -> Floats:
+    """(N, 3) displacement that a shape needs to clear an eyeball."""
+    rest_depth = eyeball_overlap(vertices, ball, "", 0.0)
+    is_lid = (rest_depth < 0.1) & (rest_depth > -0.6 * ball.radius) & (vertices[:, 2] > ball.centre[2])
+    is_lid &= np.linalg.norm(moved, axis=1) > 0.05
+    clear = np.minimum(CLEAR_MM, np.maximum(-rest_depth, 0.0))
+    out = vertices + moved - ball.centre
+    out = out * [0.8, 0.8, 1.0]
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    length = np.zeros(len(vertices))
+    for _ in range(6):
+        lacking = np.zeros(len(vertices))
+        for weight in STEPS:
+            at = vertices + weight * (moved + length[:, None] * out)
+            lacking = np.maximum(lacking, (eyeball_overlap(at, ball, name, weight) + clear) / weight)
+        length += np.where(is_lid, np.clip(lacking, 0, 4), 0)
+    for _ in range(N_SPREAD):
+        length = np.maximum(length, 0.9 * (means @ length))
+    return length[:, None] * out

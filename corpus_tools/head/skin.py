@@ -1,4 +1,4 @@
-"""The skin: MakeHuman's head subdivided once, with its own texture layout that gives the face most pixels."""
+"""The skin: MakeHuman's head after one step of subdivision."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,10 +12,10 @@ from corpus_tools.head.subdivide import catmull_clark
 Floats = NDArray[np.float64]
 
 LOWEST, WIDEST = 5.1, 2.25  # of the bust, in units of the source
-NECK_Y, NECK_SLOPE = 5.80, -0.272  # the head ends below this plane, which a shirt's collar hides
-HEAD_WIDEST = 1.2  # half the head's width with its neck; arms lie further out
+NECK_Y, NECK_SLOPE = 5.80, -0.272  # the head ends below this plane, under the shirt's collar
+HEAD_WIDEST = 1.2  # half the width of head and neck; arms are further out
 SHOULDER_Y = 6.35  # the bust ends above this
-SOCKET_U, SOCKET_Z = 0.2, 1.30  # MakeHuman's islands of the sockets; what lies further back is behind the eyeballs
+SOCKET_U, SOCKET_Z = 0.2, 1.30  # MakeHuman's islands of the sockets; parts further back are behind the eyeballs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,16 +25,16 @@ class Skin:
     Parameters
     ----------
     vertices : (N, 3)
-        mm; split where the texture layout is cut.
+        mm; split along texture seams.
     shapes
         Displacement (N, 3) by name.
     quads : (F, 4)
     source_uv : (N, 2)
         Texture coordinates in MakeHuman's own layout, v up.
     base : (N, 3)
-        Where the vertex lies on the source's base mesh, the same for every identity: where paint goes.
-    mended
-        What was added to shapes, (N, 3) by name; lashes follow it.
+        Position of each vertex on the source's base mesh, the same for every identity.
+    corrections
+        Displacements (N, 3) added to shapes, by name; lashes follow them.
     """
 
     vertices: Floats
@@ -42,32 +42,32 @@ class Skin:
     quads: NDArray[np.int64]
     source_uv: Floats
     base: Floats
-    mended: Mapping[str, Floats] = field(default_factory=dict)
+    corrections: Mapping[str, Floats] = field(default_factory=dict)
 
 
-def skinned(cage: Cage) -> Skin:
-    """The head and neck of a cage, one Catmull-Clark step finer."""
+def build_skin(cage: Cage) -> Skin:
+    """Head and neck of a cage after one Catmull-Clark step."""
     body = cage.source.groups["body"]
     places, where = cage.source.vertices[body.corners], cage.source.uv[body.uv_corners]
     kept: NDArray[np.bool_] = np.any(places[:, :, 1] - NECK_SLOPE * places[:, :, 2] > NECK_Y, axis=1)
     kept &= np.all((np.abs(places[:, :, 0]) < HEAD_WIDEST) & (places[:, :, 1] > LOWEST), axis=1)
     kept &= ~np.all((where[:, :, 0] < SOCKET_U) & (places[:, :, 2] < SOCKET_Z), axis=1)
-    return _finer(cage, kept)
+    return _subdivide(cage, kept)
 
 
-def shoulders(cage: Cage) -> Skin:
-    """Neck and shoulders of a cage, on which a shirt lies."""
+def build_shoulders(cage: Cage) -> Skin:
+    """Neck and shoulders of a cage, under the shirt."""
     places = cage.source.vertices[cage.source.groups["body"].corners]
     inside = (places[:, :, 1] > LOWEST) & (places[:, :, 1] < SHOULDER_Y) & (np.abs(places[:, :, 0]) < WIDEST)
     kept: NDArray[np.bool_] = np.all(inside, axis=1)
-    return _finer(cage, kept)
+    return _subdivide(cage, kept)
 
 
-def _finer(cage: Cage, kept: NDArray[np.bool_]) -> Skin:
+def _subdivide(cage: Cage, kept: NDArray[np.bool_]) -> Skin:
     body = cage.source.groups["body"]
     used, quads = np.unique(body.corners[kept], return_inverse=True)
     matrix, fine = catmull_clark(len(used), quads.reshape(-1, 4))
-    fine_uv = _halved(cage.source.uv[body.uv_corners[kept]])
+    fine_uv = _subdivide_coordinates(cage.source.uv[body.uv_corners[kept]])
     keys = np.column_stack([fine.ravel(), np.rint(fine_uv.reshape(-1, 2) * 1e6).astype(np.int64)])
     _, first, corner = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     rows = fine.ravel()[first]
@@ -81,8 +81,8 @@ def _finer(cage: Cage, kept: NDArray[np.bool_]) -> Skin:
     )
 
 
-def _halved(corners: Floats) -> Floats:
-    """(4 F, 4, 2) texture coordinates of quads split in four as `catmull_clark` does, each in its middle."""
+def _subdivide_coordinates(corners: Floats) -> Floats:
+    """(4 F, 4, 2) texture coordinates of quads split in four as in `catmull_clark`."""
     after = (corners + np.roll(corners, -1, axis=1)) / 2
     centre = corners.mean(axis=1)
     new = [np.stack([corners[:, k], after[:, k], centre, after[:, k - 1]], axis=1) for k in range(4)]
@@ -90,7 +90,7 @@ def _halved(corners: Floats) -> Floats:
 
 
 def vertex_normals(vertices: Floats, quads: NDArray[np.int64], base: Floats) -> Floats:
-    """(N, 3) unit normals, those of a seam's vertices alike."""
+    """(N, 3) unit normals; vertices on a seam share one."""
     diagonals = vertices[quads[:, 2]] - vertices[quads[:, 0]], vertices[quads[:, 3]] - vertices[quads[:, 1]]
     faces = np.cross(*diagonals)
     _, weld = np.unique(np.rint(base * 1e6).astype(np.int64), axis=0, return_inverse=True)

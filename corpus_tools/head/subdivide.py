@@ -1,4 +1,4 @@
-"""Catmull-Clark subdivision of a quad mesh as a matrix, so that shapes and texture coordinates follow for free."""
+"""Catmull-Clark subdivision of a quad mesh as a matrix, which also applies to shapes and texture coordinates."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ def catmull_clark(n_vertices: int, quads: NDArray[np.integer]) -> tuple[sparse.c
     Parameters
     ----------
     quads : (F, 4)
-        Every vertex belongs to one at least.
+        Every vertex belongs to at least one.
 
     Returns
     -------
@@ -32,7 +32,9 @@ def catmull_clark(n_vertices: int, quads: NDArray[np.integer]) -> tuple[sparse.c
     midpoints = _averages(np.repeat(np.arange(n_edges), 2), edges.ravel(), (n_edges, n_vertices))
     beside = _averages(edge_of, face_of, (n_edges, n_faces)) @ face_points
     is_inner = np.bincount(edge_of, minlength=n_edges) == 2
-    edge_points = _scaled(np.where(is_inner, 0.5, 1.0), midpoints) + _scaled(np.where(is_inner, 0.5, 0.0), beside)
+    edge_points = _scale_rows(np.where(is_inner, 0.5, 1.0), midpoints) + _scale_rows(
+        np.where(is_inner, 0.5, 0.0), beside
+    )
     rim = edges[~is_inner]
     on_rim = np.zeros(n_vertices, bool)
     on_rim[rim] = True
@@ -40,17 +42,19 @@ def catmull_clark(n_vertices: int, quads: NDArray[np.integer]) -> tuple[sparse.c
     same = sparse.eye_array(n_vertices, format="csr")
     faces_around = _averages(quads.ravel(), face_of, (n_vertices, n_faces)) @ face_points
     edges_around = _averages(edges.ravel(), np.repeat(np.arange(n_edges), 2), (n_vertices, n_edges)) @ midpoints
-    inner = _scaled(~on_rim / valence, faces_around + 2.0 * edges_around) + _scaled(~on_rim * (1 - 3 / valence), same)
+    inner = _scale_rows(~on_rim / valence, faces_around + 2.0 * edges_around) + _scale_rows(
+        ~on_rim * (1 - 3 / valence), same
+    )
     along = sparse.csr_array((np.full(2 * len(rim), 0.125), (rim.ravel(), rim[:, ::-1].ravel())), shape=same.shape)
-    matrix = sparse.vstack([inner + _scaled(0.75 * on_rim, same) + along, edge_points, face_points], format="csr")
+    matrix = sparse.vstack([inner + _scale_rows(0.75 * on_rim, same) + along, edge_points, face_points], format="csr")
     edge_at = n_vertices + edge_of.reshape(-1, 4)  # of side k, from corner k to k + 1
     centre = n_vertices + n_edges + np.arange(n_faces)
     new = [np.stack([quads[:, k], edge_at[:, k], centre, edge_at[:, k - 1]], axis=1) for k in range(4)]
     return matrix, np.stack(new, axis=1).reshape(-1, 4).astype(np.int64)
 
 
-def triangulated(quads: NDArray[np.integer]) -> NDArray[np.int64]:
-    """(2 F, 3) triangles of (F, 4) quads, wound alike."""
+def triangulate(quads: NDArray[np.integer]) -> NDArray[np.int64]:
+    """(2 F, 3) triangles of (F, 4) quads, with the same winding."""
     return np.stack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]], axis=1).reshape(-1, 3).astype(np.int64)
 
 
@@ -62,11 +66,11 @@ def _edges(quads: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.in
 
 
 def _averages(rows: NDArray[np.integer], columns: NDArray[np.integer], shape: tuple[int, int]) -> sparse.csr_array:
-    """Each row the mean of its columns."""
+    """Matrix whose rows average their columns."""
     counts = np.bincount(rows, minlength=shape[0])
     return sparse.csr_array((1.0 / counts[rows], (rows, columns)), shape=shape)
 
 
-def _scaled(factors: NDArray[np.floating], matrix: sparse.csr_array) -> sparse.csr_array:
+def _scale_rows(factors: NDArray[np.floating], matrix: sparse.csr_array) -> sparse.csr_array:
     scaled: sparse.csr_array = sparse.diags_array(factors.astype(float)) @ matrix
     return scaled

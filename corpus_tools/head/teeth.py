@@ -1,4 +1,4 @@
-"""Teeth: two arches of single crowns in a gum, laid along the curve of MakeHuman's strip of teeth."""
+"""Teeth: two arches of crowns and gums along the curves of MakeHuman's teeth."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.head.cage import SCALE
-from corpus_tools.head.piece import Piece, Span
+from corpus_tools.head.piece import MaterialSpan, Piece
 
 Floats = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ LOWER = Arch(
     np.array([9.0, 9.2, 10.0, 8.6, 8.0, 7.4]),
     np.array([4.6, 4.8, 6.0, 7.2, 8.0, 9.4]),
 )  # fmt: skip
-SHADE = np.array([1.0, 1.0, 0.95, 0.84, 0.70, 0.56])  # cheeks keep light from the crowns further back
+SHADE = np.array([1.0, 1.0, 0.95, 0.84, 0.70, 0.56])  # brightness of the crowns; cheeks shade the back ones
 TOOTH, TOOTH_DARK = np.array([0.985, 0.965, 0.915]), np.array([0.90, 0.84, 0.74])
 GUM = np.array([0.68, 0.36, 0.36])
 N_AROUND, LEVELS = 12, np.array([0.0, 0.04, 0.13, 0.45, 1.0])
@@ -72,7 +72,7 @@ def arch_piece(arch: Arch, name: str) -> Piece:
         along = 0.0
         for width, height, depth, light in zip(arch.widths, arch.heights, arch.depths, SHADE, strict=True):
             crown, enamel = _crown(width, height, depth)
-            points.append(_placed(crown, path, side * (along + width / 2), arch))
+            points.append(_place_crown(crown, path, side * (along + width / 2), arch))
             colours.append(light * enamel)
             triangles.append(_tube_triangles(len(LEVELS), N_AROUND, closed_start=True) + count)
             count += len(crown)
@@ -83,23 +83,23 @@ def arch_piece(arch: Arch, name: str) -> Piece:
     points.append(gum)
     colours.append(np.repeat(_light_along(arch), _GUM_GRID[1])[:, None] * GUM)
     vertices, faces = np.concatenate(points), np.concatenate(triangles)
-    faces = _outward(vertices, faces, arch.up)
+    faces = _wind_outward(vertices, faces, arch.up)
     spans = (
-        Span(f"teeth_{name}", faces[:n_crowns], MATERIALS["teeth"]),
-        Span(f"gums_{name}", faces[n_crowns:], MATERIALS["gums"]),
+        MaterialSpan(f"teeth_{name}", faces[:n_crowns], MATERIALS["teeth"]),
+        MaterialSpan(f"gums_{name}", faces[n_crowns:], MATERIALS["gums"]),
     )
     return Piece(vertices, spans, np.concatenate(colours))
 
 
-def fitted(points: Floats, before: Floats, after: Floats) -> Floats:
-    """Points moved and scaled along each axis as a strip of teeth (N, 3) is from one identity to another."""
+def fit_teeth(points: Floats, before: Floats, after: Floats) -> Floats:
+    """Points scaled and shifted per axis as the strip of teeth `before` (N, 3) is to `after` (N, 3)."""
     scale = after.std(axis=0) / before.std(axis=0)
     moved: Floats = after.mean(axis=0) + scale * (points - before.mean(axis=0))
     return moved
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Path:
+class ArchPath:
     """The curve by arc length from the middle, left positive: (n,) lengths, (n, 2) x and z, (n, 2) outward normals."""
 
     lengths: Floats
@@ -107,13 +107,13 @@ class Path:
     normals: Floats
 
     def at(self, along: Floats) -> tuple[Floats, Floats]:
-        """Places and normals (..., 2) at arc lengths."""
+        """Positions and normals (..., 2) at arc lengths."""
         both = [np.stack([np.interp(along, self.lengths, line[:, k]) for k in (0, 1)], axis=-1)
                 for line in (self.places, self.normals)]  # fmt: skip
         return both[0], both[1]
 
 
-def _path(curve: Floats) -> Path:
+def _path(curve: Floats) -> ArchPath:
     from scipy.interpolate import CubicSpline
 
     mirrored = np.concatenate([curve[:0:-1] * [-1, 1], curve])
@@ -122,11 +122,11 @@ def _path(curve: Floats) -> Path:
     lengths = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
     tangents = np.gradient(places, lengths, axis=0)
     normals = np.column_stack([-tangents[:, 1], tangents[:, 0]])
-    return Path(lengths - lengths[-1] / 2, places, normals)
+    return ArchPath(lengths - lengths[-1] / 2, places, normals)
 
 
 def _crown(width: float, height: float, depth: float) -> tuple[Floats, Floats]:
-    """Points (n, 3) along the arch, up from the edge and out of the face, and their colours (n, 3)."""
+    """Points (n, 3) of a crown, x along the arch, y from the edge, z outwards, and their colours (n, 3)."""
     around = np.linspace(0, 2 * np.pi, N_AROUND, endpoint=False)
     corner = np.stack([np.cos(around), np.sin(around)], axis=1)
     corner = np.sign(corner) * np.abs(corner) ** 0.7  # between an ellipse and a box
@@ -148,8 +148,8 @@ def _crown(width: float, height: float, depth: float) -> tuple[Floats, Floats]:
     return np.concatenate([rings.reshape(-1, 3), cap]), colours
 
 
-def _placed(points: Floats, path: Path, along: float, arch: Arch) -> Floats:
-    """Points of a crown in the face, standing straight on the arch's curve."""
+def _place_crown(points: Floats, path: ArchPath, along: float, arch: Arch) -> Floats:
+    """Points of a crown in head coordinates, upright on the arch's curve."""
     place, normal = path.at(np.array(along))
     normal = normal / np.linalg.norm(normal)
     tangent = np.array([normal[1], -normal[0]])
@@ -161,15 +161,15 @@ _GUM_GRID = (61, 8)
 
 
 def _light_along(arch: Arch) -> Floats:
-    """(61,) how much of the light reaches the rings of a gum."""
+    """(61,) brightness of the rings of a gum."""
     ends = np.cumsum(arch.widths)
     along = np.linspace(-ends[-1], ends[-1], _GUM_GRID[0])
     light: Floats = np.interp(np.abs(along), ends - arch.widths / 2, SHADE)
     return light
 
 
-def _gum(path: Path, arch: Arch) -> Floats:
-    """A tube along the arch, scalloped about the necks of the teeth."""
+def _gum(path: ArchPath, arch: Arch) -> Floats:
+    """Points of a tube along the arch, scalloped about the necks of the teeth."""
     total = arch.widths.sum()
     along = np.linspace(-total, total, _GUM_GRID[0])
     bounds = np.concatenate([[0], np.cumsum(arch.widths)])
@@ -194,7 +194,7 @@ def _gum(path: Path, arch: Arch) -> Floats:
 
 
 def _tube_triangles(n_rings: int, n_around: int, closed_start: bool) -> NDArray[np.int64]:
-    """Triangles of rings one after the other, each closed; with a cap vertex behind the last for the first ring."""
+    """Triangles between consecutive closed rings; `closed_start` adds a cap whose vertex follows the last ring."""
     row, column = (grid.ravel() for grid in np.meshgrid(np.arange(n_rings - 1), np.arange(n_around), indexing="ij"))
     a, b = row * n_around + column, row * n_around + (column + 1) % n_around
     faces = [np.stack([a, b, b + n_around], 1), np.stack([a, b + n_around, a + n_around], 1)]
@@ -204,6 +204,6 @@ def _tube_triangles(n_rings: int, n_around: int, closed_start: bool) -> NDArray[
     return np.concatenate(faces).astype(np.int64)
 
 
-def _outward(vertices: Floats, faces: NDArray[np.int64], up: float) -> NDArray[np.int64]:
-    """Crowns are wound alike; mirrored heights turn them inside out."""
+def _wind_outward(vertices: Floats, faces: NDArray[np.int64], up: float) -> NDArray[np.int64]:
+    """Faces with outward winding; mirrored heights reverse it."""
     return faces if up < 0 else faces[:, ::-1]

@@ -1,4 +1,4 @@
-"""The skin's texture, painted by rule: every texel knows its place on the head, so seams do not show."""
+"""Procedural texture of the skin and brows, computed per texel from its 3-D position, so that it has no seams."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -7,20 +7,66 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates
 
-from corpus_tools.head.brows import brow_cover
+from corpus_tools.dense.texels import find_texels
 from corpus_tools.head.hair import hair_share, strand_colour, strand_field
-from corpus_tools.head.layout import SIDE, laid_out, texels_of
-from corpus_tools.head.noise import bell, lumps, ramp
+from corpus_tools.head.layout import SIDE, layout_coordinates
+from corpus_tools.head.noise import gaussian_bump, ramp, stroke_cover, value_noise
 from corpus_tools.head.skin import Skin
-from corpus_tools.head.source import Source
-from corpus_tools.head.subdivide import triangulated
+from corpus_tools.head.source import SourceMesh
+from corpus_tools.head.subdivide import triangulate
 
 Floats = NDArray[np.float64]
 
 
+N_HAIRS = 330  # each side
+ARCH = np.array([(10.5, 10.4), (18, 13.2), (28, 16.0), (37, 17.3), (45, 15.6), (52, 11.6)])  # middle line: |x|, y in mm
+THICK_MM = np.array([5.6, 6.6, 5.8, 4.6, 3.2, 1.4])  # across the line, at the points of ARCH
+
+
+def brow_cover(places: Floats, generator: np.random.Generator, thickness: float = 1.0) -> Floats:
+    """(P,) coverage by brow hairs at positions (P, 3), mm; the two sides are drawn independently."""
+    cover = np.zeros(len(places))
+    in_front = places[:, 2] > 0
+    for side in (1.0, -1.0):
+        near = in_front & (side * places[:, 0] > 5) & (np.abs(places[:, 1] - 14) < 14)
+        flat = places[near, :2] * [side, 1]
+        starts, ends, widths = _hairs(generator, thickness)
+        soft = _shadow(flat, thickness)
+        cover[near] = np.maximum(0.42 * soft, 0.92 * stroke_cover(flat, starts, ends, widths) * (0.25 + 0.75 * soft))
+    return cover
+
+
+def _hairs(generator: np.random.Generator, thickness: float) -> tuple[Floats, Floats, Floats]:
+    """Roots (H, 2), tips (H, 2) and widths (H,) of the hairs of the left brow."""
+    along = generator.beta(1.0, 1.15, N_HAIRS)
+    across = np.clip(generator.normal(0, 0.42, N_HAIRS), -1, 1)
+    x = ARCH[0, 0] + along * (ARCH[-1, 0] - ARCH[0, 0])
+    slope = np.gradient(np.interp(ARCH[:, 0], ARCH[:, 0], ARCH[:, 1]), ARCH[:, 0])
+    thick = thickness * np.interp(x, ARCH[:, 0], THICK_MM)
+    roots = np.column_stack([x, np.interp(x, ARCH[:, 0], ARCH[:, 1]) + across * thick / 2])
+    lift = np.interp(
+        along, [0, 0.12, 0.4, 1], [1.35, 1.0, 0.45, -0.05]
+    )  # hairs stand up at the nose and lie down outside
+    turn = np.arctan(np.interp(x, ARCH[:, 0], slope)) + lift - 0.55 * across * np.clip(along + 0.3, 0, 1)
+    turn += generator.normal(0, 0.13, N_HAIRS)
+    length = np.interp(along, [0, 0.3, 1], [4.2, 6.2, 4.6]) * generator.uniform(0.75, 1.15, N_HAIRS)
+    tips = roots + length[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+    return roots, tips, generator.uniform(0.22, 0.40, N_HAIRS)
+
+
+def _shadow(flat: Floats, thickness: float) -> Floats:
+    """(P,) soft shading of the brow under the hairs."""
+    x = flat[:, 0]
+    off = np.abs(flat[:, 1] - np.interp(x, ARCH[:, 0], ARCH[:, 1]) - 0.6)
+    thick = thickness * np.interp(x, ARCH[:, 0], THICK_MM) / 2
+    ends = np.clip((x - ARCH[0, 0] + 2.5) / 6, 0, 1) * np.clip((ARCH[-1, 0] + 3 - x) / 7, 0, 1)
+    body: Floats = np.exp(-((off / (thick + 0.4)) ** 2)) * ends
+    return body
+
+
 @dataclass(frozen=True, slots=True)
-class Palette:
-    """Colours, sRGB 0..1, and how strongly the skin varies (1 is natural, 0 flat)."""
+class HeadColours:
+    """Colours, sRGB 0..1, and the strength of the skin's variation (1 natural, 0 flat)."""
 
     skin: tuple[float, float, float] = (0.815, 0.625, 0.535)
     lips: tuple[float, float, float] = (0.70, 0.40, 0.375)
@@ -30,7 +76,7 @@ class Palette:
     brow_thickness: float = 1.0
 
 
-# Places (|x|, y, z) and reach in mm, then what is multiplied in at full strength: the blood and the shadows of a face.
+# Positions (|x|, y, z) and radii in mm, then the colour factor at full strength: blood and shadows of a face.
 TINTS = (
     ((39, -27, 15), (17, 15, 30), (1.01, 0.885, 0.90)),  # cheeks
     ((0, -40, 40), (12, 10, 16), (1.00, 0.88, 0.88)),  # tip of the nose
@@ -46,40 +92,44 @@ FOLD = np.array([(16, -43), (22, -52), (27, -61), (29, -69)])  # from the nose t
 N_FRECKLES = 240
 
 
-def painted(source: Source, skin: Skin, palette: Palette, generator: np.random.Generator) -> NDArray[np.uint8]:
+def paint_texture(
+    source: SourceMesh, skin: Skin, palette: HeadColours, generator: np.random.Generator
+) -> NDArray[np.uint8]:
     """(SIDE, SIDE, 3) texture of a skin."""
-    texels = texels_of(laid_out(skin.source_uv), triangulated(skin.quads), SIDE)
-    place = texels.carried(skin.vertices)
-    where = texels.carried(skin.source_uv)
+    texels = find_texels(layout_coordinates(skin.source_uv), triangulate(skin.quads), SIDE)
+    place = texels.interpolate(skin.vertices)
+    where = texels.interpolate(skin.source_uv)
     colour = _flesh(place, where, source, palette, generator)
-    lips = _sampled(gaussian_filter(source.mask("lips"), 2.5), where)
+    lips = _sample_mask(gaussian_filter(source.mask("lips"), 2.5), where)
     colour += _lip_share(lips)[:, None] * (_lip_colour(place, palette, generator) - colour)
-    inside = np.maximum(_sampled(gaussian_filter(source.mask("inside-mouth"), 2.0), where), _in_mouth(where))
+    inside = np.maximum(_sample_mask(gaussian_filter(source.mask("inside-mouth"), 2.0), where), _in_mouth(where))
     colour += ramp(inside, 0.15, 0.95)[:, None] * (np.array(palette.cavity) - colour)
     brows = brow_cover(place, generator, palette.brow_thickness)
     colour += brows[:, None] * (np.array(palette.hair) * 0.9 - colour)
     hair = hair_share(place)
     strands = strand_colour(place, np.array(palette.hair), generator)
     ragged = np.clip(
-        hair * 1.6 - 0.3 + 0.45 * lumps(strand_field(place, 1.4, 16.0), 1.0, generator) * (hair < 0.97), 0, 1
+        hair * 1.6 - 0.3 + 0.45 * value_noise(strand_field(place, 1.4, 16.0), 1.0, generator) * (hair < 0.97), 0, 1
     )
     colour += (ragged * (hair > 0.02))[:, None] * (strands - colour)
-    return _filled(texels.rows, texels.columns, colour)
+    return _fill_gaps(texels.rows, texels.columns, colour)
 
 
-def _flesh(place: Floats, where: Floats, source: Source, palette: Palette, generator: np.random.Generator) -> Floats:
+def _flesh(
+    place: Floats, where: Floats, source: SourceMesh, palette: HeadColours, generator: np.random.Generator
+) -> Floats:
     strength = palette.variation
     factors = np.ones((len(place), 3))
     for centre, reach, tint in TINTS:
-        factors *= 1 + strength * bell(place, centre, reach)[:, None] * (np.array(tint) - 1)
-    factors *= 1 - strength * _sampled(source.mask("ears"), where)[:, None] * np.array([0.0, 0.10, 0.09])
-    factors *= 1 - strength * _sampled(gaussian_filter(source.mask("eyelids"), 3), where)[:, None] * np.array(
+        factors *= 1 + strength * gaussian_bump(place, centre, reach)[:, None] * (np.array(tint) - 1)
+    factors *= 1 - strength * _sample_mask(source.mask("ears"), where)[:, None] * np.array([0.0, 0.10, 0.09])
+    factors *= 1 - strength * _sample_mask(gaussian_filter(source.mask("eyelids"), 3), where)[:, None] * np.array(
         [0.04, 0.10, 0.09]
     )
     factors *= 1 - strength * 0.07 * _fold(place)[:, None] * np.array([0.7, 1.0, 1.0])
-    blotch = 0.6 * lumps(place, 14.0, generator) + 0.4 * lumps(place, 5.0, generator)
+    blotch = 0.6 * value_noise(place, 14.0, generator) + 0.4 * value_noise(place, 5.0, generator)
     factors *= 1 + strength * 0.016 * blotch[:, None] * np.array([0.4, 1.3, 1.2])
-    factors *= 1 + strength * 0.018 * lumps(place, 0.9, generator)[:, None]
+    factors *= 1 + strength * 0.018 * value_noise(place, 0.9, generator)[:, None]
     factors *= 1 - strength * _freckles(place, generator)[:, None] * np.array([0.10, 0.17, 0.20])
     return np.array(palette.skin) * factors
 
@@ -95,7 +145,7 @@ def _fold(place: Floats) -> Floats:
 
 def _freckles(place: Floats, generator: np.random.Generator) -> Floats:
     """(P,) small spots on cheeks, nose and forehead."""
-    chance = 0.9 * bell(place, (32, -22), (24, 18)) + 0.5 * bell(place, (0, -25), (16, 20)) + 0.12
+    chance = 0.9 * gaussian_bump(place, (32, -22), (24, 18)) + 0.5 * gaussian_bump(place, (0, -25), (16, 20)) + 0.12
     chance *= place[:, 2] > -30
     centres = place[generator.choice(len(place), N_FRECKLES, p=chance / chance.sum())]
     spots = np.zeros(len(place))
@@ -112,10 +162,10 @@ def _lip_share(mask: Floats) -> Floats:
     return 0.92 * ramp(mask, 0.22, 0.80)
 
 
-def _lip_colour(place: Floats, palette: Palette, generator: np.random.Generator) -> Floats:
-    lines = lumps(place * np.array([1.0, 0.22, 0.3]), 0.9, generator)  # fine creases from edge to edge
+def _lip_colour(place: Floats, palette: HeadColours, generator: np.random.Generator) -> Floats:
+    lines = value_noise(place * np.array([1.0, 0.22, 0.3]), 0.9, generator)  # fine creases from edge to edge
     colour = np.tile(np.array(palette.lips), (len(place), 1))
-    return colour * (1 + palette.variation * (0.035 * lines + 0.03 * lumps(place, 4.0, generator))[:, None])
+    return colour * (1 + palette.variation * (0.035 * lines + 0.03 * value_noise(place, 4.0, generator))[:, None])
 
 
 def _in_mouth(where: Floats) -> Floats:
@@ -124,13 +174,13 @@ def _in_mouth(where: Floats) -> Floats:
     return inside.astype(float)
 
 
-def _sampled(mask: Floats, where: Floats) -> Floats:
+def _sample_mask(mask: Floats, where: Floats) -> Floats:
     height, width = mask.shape
     return map_coordinates(mask, [(1 - where[:, 1]) * (height - 1), where[:, 0] * (width - 1)], order=1, mode="nearest")
 
 
-def _filled(rows: NDArray[np.int64], columns: NDArray[np.int64], colour: Floats) -> NDArray[np.uint8]:
-    """The picture, texels off the surface taking the nearest colour on it."""
+def _fill_gaps(rows: NDArray[np.int64], columns: NDArray[np.int64], colour: Floats) -> NDArray[np.uint8]:
+    """The texture; texels off the surface take the nearest colour on it."""
     picture = np.zeros((SIDE, SIDE, 3))
     known = np.zeros((SIDE, SIDE), bool)
     picture[rows, columns], known[rows, columns] = colour, True

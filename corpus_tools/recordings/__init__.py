@@ -1,1 +1,1 @@
-"""Recordings of a person, observed: sound, phones, landmarks, on one clock."""
+"""Recordings of a person: sound, phones and landmarks on one time axis."""

@@ -1,7 +1,7 @@
-"""One clock for all recordings: how far sound and picture are apart, and the frame rate that most of them have.
+"""Audio-video synchronisation: the lag of the sound, and the most common frame rate.
 
-What is compared is how fast lips open and how fast the sound rises. Opening and loudness themselves agree at many lags,
-for speech has a rhythm: of 51 s in a row of GRID s1 they name lags from -0.26 to 0.3 s, their rates -0.02 to 0.05 s.
+The lag is estimated from the derivatives of lip opening and loudness. The signals themselves correlate at many lags
+because speech is rhythmic: over 51 s of GRID s1 they give lags from -0.26 to 0.3 s, their derivatives -0.02 to 0.05 s.
 """
 
 from collections import Counter
@@ -15,22 +15,22 @@ from numpy.typing import NDArray
 from corpus_tools.recordings.observation import Observation, Timing
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 
-MAX_LAG_S = 0.3  # lags from minus to plus this are looked at
+MAX_LAG_S = 0.3  # lags between minus and plus this are compared
 LAG_STEP_S = 0.01
 LAGS_S = np.arange(-round(MAX_LAG_S / LAG_STEP_S), round(MAX_LAG_S / LAG_STEP_S) + 1) * LAG_STEP_S
-MIN_FRAMES = 25  # that sound and picture must share
-# Lips open before they are heard: by this in GRID s1, whose sound and picture are taken to be together.
+MIN_FRAMES = 25  # common to sound and picture
+# Lip motion precedes the sound by this in GRID s1, whose sound and picture are assumed to be synchronous.
 LIP_LEAD_S = 0.01
-# Of sentences of GRID s1 in a row, a lag read from 51 s is off by 15 ms (standard deviation), from 96 s by 14 ms.
+# Standard error of the lag in sequences of GRID s1: 15 ms from 51 s, 14 ms from 96 s.
 MIN_DURATION_S = 48.0
-MIN_LAG_S = 0.045  # three deviations for `MIN_DURATION_S`; it falls with the square root of the time
-# Of 400 samples of 51 s of GRID s1 1 % lie below .38; of its sounds on other sentences 1 % lie above .21.
+MIN_LAG_S = 0.045  # three standard errors for `MIN_DURATION_S`; it falls with the square root of the duration
+# 1 % of 400 samples of 51 s of GRID s1 lie below 0.38; with the sound of other sentences 1 % lie above 0.21.
 MIN_CORRELATION = 0.28
 
 
 @dataclass(frozen=True, slots=True)
 class SyncEstimate:
-    """Seconds of ``lag`` by which the sound comes late, how well lips and loudness then agree, and of how much."""
+    """Estimated ``lag`` of the sound in seconds, correlation of lips and loudness at it, and duration of the data."""
 
     lag: float
     correlation: float
@@ -38,24 +38,24 @@ class SyncEstimate:
 
     @property
     def lag_correction_s(self) -> float:
-        """The lag to take out: 0 where it cannot be told from none."""
+        """The lag to correct: 0 if it is not significant."""
         least = MIN_LAG_S * np.sqrt(MIN_DURATION_S / self.seconds) if self.seconds >= MIN_DURATION_S else np.inf
         return round(self.lag, 3) if abs(self.lag) >= least else 0.0
 
     @property
     def problem(self) -> str | None:
-        """Why sound and picture do not belong together, None where they do or where too little tells."""
+        """Why sound and picture do not match; None if they do or if there is too little data."""
         if self.seconds < MIN_DURATION_S:
             return None
         if self.correlation < MIN_CORRELATION:
-            return f"the lips do not move with the sound (correlation {self.correlation:.2f}); give the original sound"
+            return f"lip motion does not match the sound (correlation {self.correlation:.2f}); give the original sound"
         if abs(self.lag) > MAX_LAG_S - 2 * LAG_STEP_S:
-            return f"sound and picture are {MAX_LAG_S:g} s or more apart; put them together with an editor"
+            return f"sound and picture are out of sync by {MAX_LAG_S:g} s or more; synchronise them with an editor"
         return None
 
 
 def estimate_sync_by_video(observations: Sequence[Observation]) -> Mapping[Path, SyncEstimate]:
-    """How sound and picture of each video agree; videos of less than `MIN_DURATION_S` are taken together."""
+    """Synchronisation of each video; videos shorter than `MIN_DURATION_S` are pooled."""
     together: dict[Path, list[Observation]] = {}
     for observation in observations:
         together.setdefault(observation.video, []).append(observation)
@@ -65,7 +65,7 @@ def estimate_sync_by_video(observations: Sequence[Observation]) -> Mapping[Path,
 
 
 def corrected_timings(observations: Sequence[Observation], found: Mapping[Path, SyncEstimate]) -> Mapping[Path, Timing]:
-    """How the videos must be read that were read otherwise: at the rate that most frames have, without a lag."""
+    """Timing of the videos that must be read again: at the most common frame rate, with their lag corrected."""
     frames: Counter[float] = Counter()
     rates = {}
     for seen in observations:
@@ -79,7 +79,7 @@ def corrected_timings(observations: Sequence[Observation], found: Mapping[Path, 
 
 
 def estimate_sync(observations: Iterable[Observation]) -> SyncEstimate:
-    """The lag at which lips and loudness of recordings agree best; 0 and 0 where nothing moves."""
+    """Lag of the highest correlation of lips and loudness; lag and correlation are 0 without motion."""
     found = [(curve, seen) for seen in observations if (curve := lag_correlations(seen)) is not None]
     if not found:
         return SyncEstimate(0.0, 0.0, 0.0)
@@ -99,13 +99,13 @@ def estimate_sync(observations: Iterable[Observation]) -> SyncEstimate:
 
 
 def lag_correlations(seen: Observation) -> NDArray[np.float64] | None:
-    """Correlations of the lips' speed with the rise of the loudness `LAGS_S` later; None with too little to compare."""
-    apart = seen.landmarks[:, UPPER_LIP_INNER_MID] - seen.landmarks[:, LOWER_LIP_INNER_MID]
-    times = np.arange(len(apart)) / seen.fps
+    """Correlations of the lips' speed with the change of loudness `LAGS_S` later; None with too few frames."""
+    opening = seen.landmarks[:, UPPER_LIP_INNER_MID] - seen.landmarks[:, LOWER_LIP_INNER_MID]
+    times = np.arange(len(opening)) / seen.fps
     within = (times >= MAX_LAG_S) & (times <= times[-1] - MAX_LAG_S)
     if within.sum() < MIN_FRAMES:
         return None
-    speed = np.gradient(np.linalg.norm(apart.astype(np.float64), axis=1))
+    speed = np.gradient(np.linalg.norm(opening.astype(np.float64), axis=1))
     rise = np.gradient(seen.intensity.astype(np.float64))
     if speed[within].std() == 0:
         return None

@@ -1,4 +1,4 @@
-"""What the microphone heard in a recording: its sound, and phones that are found once and kept in a cache folder."""
+"""Sound and aligned phones of recordings, stored in a cache folder."""
 
 import hashlib
 import json
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from tts2face.speech.phone_recognition import PhoneRecogniser
 
 ALIGNMENT_KIND = "alignment"
-ALIGNMENT_VERSION = 4  # rises when alignment gives other edges, so that cached ones are made again
+ALIGNMENT_VERSION = 4  # increased when alignment gives other edges, which invalidates cached ones
 RECOGNITION_KIND = "hearing"
-RECOGNITION_VERSION = 1  # rises when other phones are recognised
-SOUND_RATE = 16_000  # Hz; what the aligner and the recogniser hear
+RECOGNITION_VERSION = 1  # increased when other phones are recognised
+SOUND_RATE = 16_000  # Hz; input of the aligner and the recogniser
 MAX_UTTERANCE_S = 20.0  # longer recordings are cut at pauses
 
 
@@ -34,7 +34,7 @@ MAX_UTTERANCE_S = 20.0  # longer recordings are cut at pauses
 class AlignedSpeech:
     """Phones, words, the alignment's confidence, and the sound.
 
-    ``is_recognised`` where nobody wrote what is said: the words then are the phones heard, between slashes.
+    ``is_recognised`` if there is no transcript: the words are then recognised phones between slashes.
     """
 
     phones: PhoneSequence
@@ -45,7 +45,7 @@ class AlignedSpeech:
 
 
 class CachedAligner:
-    """Listens to recordings; models are loaded when they are needed, the last file's sound is kept."""
+    """Aligner of recordings with a cache; models are loaded on first use, and the last file's sound stays in memory."""
 
     def __init__(self, cache: Path) -> None:
         self._cache = cache
@@ -63,90 +63,93 @@ class CachedAligner:
         """
         key = content_key(video)
         if self._last is None or self._last[0] != key:
-            self._last = None  # two long sounds need not lie in memory together
+            self._last = None  # frees the memory before the next sound is read
             self._last = key, read_sound(video, SOUND_RATE)
         whole = self._last[1]
         return whole if span is None else cut_sound(whole, span)
 
-    def heard(self, video: Path, words: PronouncedTranscript | None, span: Span | None = None) -> AlignedSpeech:
-        """Phones of a recording's sound, from the cache when the same sound and words were aligned before.
+    def align(self, video: Path, words: PronouncedTranscript | None, span: Span | None = None) -> AlignedSpeech:
+        """Phones of a recording's sound, from the cache if the same sound and words have been aligned.
 
         Parameters
         ----------
         words
-            What is said; recognised from the sound when None.
+            The transcript; phones are recognised from the sound if None.
         span
-            Seconds of the file that are listened to, the clock of the phones beginning with them; all without it.
+            Seconds of the file to align, from which the phones' time starts; the whole file by default.
 
         Raises
         ------
         DataError
-            There is no sound, it does not hold these words, or nobody speaks.
+            There is no sound, it does not match these words, or it contains no speech.
         BackendError
-            Nothing on this machine recognises phones.
+            No phone recogniser is installed.
         """
         sound = self.sound(video, span)
-        asked = hashlib.sha256(json.dumps([words, span]).encode()).hexdigest()[:8]
-        kept = self._cache / f"{content_key(video)}-{asked}-{ALIGNMENT_VERSION}.{ALIGNMENT_KIND}"
-        found = _read_cached_alignment(kept, sound, is_recognised=words is None)
-        return found or self._aligned(sound, words, kept)
+        request = hashlib.sha256(json.dumps([words, span]).encode()).hexdigest()[:8]
+        cached = self._cache / f"{content_key(video)}-{request}-{ALIGNMENT_VERSION}.{ALIGNMENT_KIND}"
+        found = _read_cached_alignment(cached, sound, is_recognised=words is None)
+        return found or self._align_words(sound, words, cached)
 
     def utterances(
         self, video: Path, words: PronouncedTranscript | None
     ) -> tuple[tuple[Span, PronouncedTranscript | None], ...]:
-        """A long recording cut at pauses: spans of its seconds, and the words that are said in each.
+        """A long recording cut at pauses: spans in seconds, and the words in each.
 
         Raises
         ------
         DataError
             There is no sound.
         BackendError
-            Nothing on this machine recognises phones, by which the words are placed.
+            No phone recogniser, which locates the words, is installed.
         """
         from tts2face.speech.transcript_placement import assign_words
 
         spans = cut_at_pauses(self.sound(video), MAX_UTTERANCE_S)
         if words is None:
             return tuple((span, None) for span in spans)
-        heard = [[phone for word in said for phone in word] for said in self._recognise_spans(video, spans)]
-        places = assign_words([ways[0] for _, ways in words], heard)
-        said_in = [
+
+        recognised = [
+            [phone for word in span_words for phone in word] for span_words in self._recognise_spans(video, spans)
+        ]
+        places = assign_words([pronunciations[0] for _, pronunciations in words], recognised)
+        words_of_spans = [
             tuple(word for word, place in zip(words, places, strict=True) if place == at) for at in range(len(spans))
         ]
-        return tuple((span, said) for span, said in zip(spans, said_in, strict=True) if said)
+        return tuple((span, found) for span, found in zip(spans, words_of_spans, strict=True) if found)
 
-    def _aligned(self, sound: Waveform, words: PronouncedTranscript | None, kept: Path) -> AlignedSpeech:
+    def _align_words(self, sound: Waveform, words: PronouncedTranscript | None, cached: Path) -> AlignedSpeech:
         from tts2face.speech.forced_alignment import Aligner
 
         self._aligner = self._aligner or Aligner()
-        said = (
+        transcript = (
             words
             if words is not None
             else tuple((f"/{''.join(word)}/", (word,)) for word in self._recognise_words(sound))
         )
-        if not said:
-            raise DataError("no speech is heard; give recordings of somebody who speaks")
-        found = self._aligner.align(sound, said)
+        if not transcript:
+            raise DataError("the sound contains no speech; give recordings of a person speaking")
+        found = self._aligner.align(sound, transcript)
         header = {
             "phones": found.phones.phones,
             "words": [[word.text, word.first, word.last] for word in found.words],
             "confidence": found.confidence,
         }
-        write_tensors(kept, ALIGNMENT_KIND, ALIGNMENT_VERSION, {"edges": found.phones.edges}, header)
+        write_tensors(cached, ALIGNMENT_KIND, ALIGNMENT_VERSION, {"edges": found.phones.edges}, header)
         return AlignedSpeech(found.phones, found.words, found.confidence, sound, words is None)
 
     def _recognise_spans(self, video: Path, spans: Sequence[Span]) -> list[list[tuple[str, ...]]]:
-        """Phones of the words heard in each span, from the cache when they were recognised before."""
-        kept = self._cache / f"{content_key(video)}-{RECOGNITION_VERSION}.{RECOGNITION_KIND}"
-        if kept.is_file():
+        """Recognised phones of the words in each span, from the cache if available."""
+        cached = self._cache / f"{content_key(video)}-{RECOGNITION_VERSION}.{RECOGNITION_KIND}"
+        if cached.is_file():
             try:
-                said = read_tensors(kept, RECOGNITION_KIND, RECOGNITION_VERSION)[1]["words"]
-                if len(said) == len(spans):
-                    return [[tuple(word) for word in words] for words in said]
+                stored = read_tensors(cached, RECOGNITION_KIND, RECOGNITION_VERSION)[1]["words"]
+                if len(stored) == len(spans):
+                    return [[tuple(word) for word in words] for words in stored]
             except (DataError, KeyError):
-                pass  # damaged: made again
+                pass  # a damaged file is written again
         found = [list(self._recognise_words(self.sound(video, span))) for span in spans]
-        write_tensors(kept, RECOGNITION_KIND, RECOGNITION_VERSION, {"spans": np.array(spans)}, {"words": found})
+        write_tensors(cached, RECOGNITION_KIND, RECOGNITION_VERSION, {"spans": np.array(spans)}, {"words": found})
         return found
 
     def _recognise_words(self, sound: Waveform) -> tuple[tuple[str, ...], ...]:
@@ -163,12 +166,12 @@ def cut_sound(sound: Waveform, span: Span) -> Waveform:
     return Waveform(sound.samples[first:last], sound.rate)
 
 
-def _read_cached_alignment(kept: Path, sound: Waveform, *, is_recognised: bool) -> AlignedSpeech | None:
-    """What the cache holds; None where it holds nothing or is damaged."""
-    if not kept.is_file():
+def _read_cached_alignment(cached: Path, sound: Waveform, *, is_recognised: bool) -> AlignedSpeech | None:
+    """The cached alignment; None if it is missing or damaged."""
+    if not cached.is_file():
         return None
     try:
-        arrays, header = read_tensors(kept, ALIGNMENT_KIND, ALIGNMENT_VERSION)
+        arrays, header = read_tensors(cached, ALIGNMENT_KIND, ALIGNMENT_VERSION)
         words = tuple(WordSpan(text, first, last) for text, first, last in header["words"])
         phones = PhoneSequence(header["phones"], arrays["edges"])
         return AlignedSpeech(phones, words, float(header["confidence"]), sound, is_recognised)

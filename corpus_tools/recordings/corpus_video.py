@@ -1,4 +1,4 @@
-"""What the camera saw in a recording: landmarks of every frame, tracked once and kept in a cache folder."""
+"""Tracked landmarks of videos, stored in a cache folder."""
 
 import hashlib
 from collections.abc import Callable, Mapping
@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     from tts2face.video.streaming_tracker import StreamingTracker
 
 TRACKING_KIND = "tracking"
-TRACKING_VERSION = 2  # rises when tracking gives other numbers, so that cached ones are made again
+TRACKING_VERSION = 2  # increased when tracking gives other values, which invalidates cached ones
 NOT_COUNTED = -1
 
-ShareCallback = Callable[[float], None]  # told the share of a video that is done
+ShareCallback = Callable[[float], None]  # called with the finished share of a video
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedVideo:
-    """What the camera saw in T frames.
+    """Tracking results of T frames.
 
     Parameters
     ----------
@@ -38,11 +38,11 @@ class TrackedVideo:
     times : (T,)
         Seconds.
     fps
-        As the file states it.
+        Frame rate stated in the file.
     n_faces : (T,)
-        Faces in the picture, `NOT_COUNTED` where they were not counted.
+        Number of faces in the frame, or `NOT_COUNTED`.
     changes : (T,)
-        Mean difference from the picture before, in steps of 8 bits; infinite for the first.
+        Mean absolute difference from the previous frame, in 8-bit steps; infinite for the first.
     """
 
     tracking: Tracking
@@ -53,59 +53,59 @@ class TrackedVideo:
 
 
 class CachedTracker:
-    """Watches videos; the networks are loaded for the first that is not in the cache, the last one seen is kept."""
+    """Landmark tracker with a cache; networks are loaded on first use, and the last video's result stays in memory."""
 
     def __init__(self, cache: Path, model: Path) -> None:
         self._cache, self._model = cache, model
         self._reader: StreamingTracker | None = None
         self._last: tuple[Path, TrackedVideo] | None = None
 
-    def track(self, video: Path, tell: ShareCallback | None = None) -> TrackedVideo:
-        """What a video shows, from the cache when its content was tracked before.
+    def track(self, video: Path, on_share: ShareCallback | None = None) -> TrackedVideo:
+        """Landmarks of a video, from the cache if its content has been tracked.
 
         Parameters
         ----------
-        tell
-            Called with the share that is done.
+        on_share
+            Called with the finished share.
 
         Raises
         ------
         DataError
-            The video cannot be read or holds no picture.
+            The video cannot be read or contains no frames.
         """
-        kept = self._cache / f"{content_key(video)}-{MODEL_SHA256[:8]}-{TRACKING_VERSION}.{TRACKING_KIND}"
-        if self._last is None or self._last[0] != kept:
-            self._last = None  # two long videos need not lie in memory together
+        cached = self._cache / f"{content_key(video)}-{MODEL_SHA256[:8]}-{TRACKING_VERSION}.{TRACKING_KIND}"
+        if self._last is None or self._last[0] != cached:
+            self._last = None  # frees the memory before the next video is read
             self._last = (
-                kept,
-                _read_cached_tracking(kept) or self._track_and_cache(video, kept, tell or (lambda share: None)),
+                cached,
+                _read_cached_tracking(cached) or self._track_and_cache(video, cached, on_share or (lambda share: None)),
             )
         return self._last[1]
 
-    def _track_and_cache(self, video: Path, kept: Path, tell: ShareCallback) -> TrackedVideo:
+    def _track_and_cache(self, video: Path, cached: Path, on_share: ShareCallback) -> TrackedVideo:
         from tts2face.video.streaming_tracker import StreamingTracker
 
         self._reader = self._reader or StreamingTracker(self._model)
         facts = read_media_info(video)
-        sights = []
-        for sight in self._reader.track(read_frames(video), facts.fps):
-            sights.append(sight)
-            tell(min(sight.time / max(facts.duration, sight.time, 1e-3), 1.0))
-        if not sights:
-            raise DataError(f"{video} holds no picture; copy or record it again")
+        frames = []
+        for frame in self._reader.track(read_frames(video), facts.fps):
+            frames.append(frame)
+            on_share(min(frame.time / max(facts.duration, frame.time, 1e-3), 1.0))
+        if not frames:
+            raise DataError(f"{video} contains no frames; copy or record it again")
         arrays = {
-            "points": np.array([sight.points for sight in sights]),
-            "scores": np.array([sight.score for sight in sights], np.float32),
-            "times": np.array([sight.time for sight in sights]),
-            "n_faces": np.array([_stored_face_count(sight.n_faces) for sight in sights], np.int8),
-            "changes": np.array([sight.change for sight in sights], np.float32),
+            "points": np.array([frame.points for frame in frames]),
+            "scores": np.array([frame.score for frame in frames], np.float32),
+            "times": np.array([frame.time for frame in frames]),
+            "n_faces": np.array([_stored_face_count(frame.n_faces) for frame in frames], np.int8),
+            "changes": np.array([frame.change for frame in frames], np.float32),
         }
-        write_tensors(kept, TRACKING_KIND, TRACKING_VERSION, arrays, {"fps": facts.fps})
+        write_tensors(cached, TRACKING_KIND, TRACKING_VERSION, arrays, {"fps": facts.fps})
         return _build_tracked_video(arrays, facts.fps)
 
 
 def content_key(path: Path) -> str:
-    """Name for everything computed from a file's content alone.
+    """Cache key of a file's content.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def _content_key(path: Path, _size: int, _changed_ns: int) -> str:
 
 
 def _read_cached_tracking(path: Path) -> TrackedVideo | None:
-    """What the cache holds; None where it holds nothing or is damaged."""
+    """The cached tracking; None if it is missing or damaged."""
     if not path.is_file():
         return None
     try:

@@ -1,4 +1,4 @@
-"""A folder of recordings: which videos there are and which words each one says."""
+"""Folders of recordings: their videos and transcripts."""
 
 import csv
 import re
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from corpus_tools.recordings.subtitles import find_subtitles, read_cues
-from corpus_tools.transcripts.find import find_transcript, read_transcript
+from corpus_tools.recordings.transcripts import find_transcript, read_transcript
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import DataError, InputError
 from lexicon.normalize import normalize
 
 VIDEO_SUFFIXES = frozenset({".mkv", ".mp4", ".mov", ".webm", ".avi", ".mpg", ".mpeg", ".m4v"})
 MANIFEST = "manifest.csv"
-# Names of letters in ARPABET, as speakers of southern British English and of American English say them.
+# Names of letters in ARPABET, in southern British and in American English.
 LETTER_NAMES = {
     "a": ("EY1",), "b": ("B IY1",), "c": ("S IY1",), "d": ("D IY1",), "e": ("IY1",), "f": ("EH1 F",),
     "g": ("JH IY1",), "h": ("EY1 CH",), "i": ("AY1",), "j": ("JH EY1",), "k": ("K EY1",), "l": ("EH1 L",),
@@ -22,20 +22,19 @@ LETTER_NAMES = {
     "s": ("EH1 S",), "t": ("T IY1",), "u": ("Y UW1",), "v": ("V IY1",), "w": ("D AH1 B AH0 L Y UW0",),
     "x": ("EH1 K S",), "y": ("W AY1",), "z": ("Z EH1 D", "Z IY1"),
 }  # fmt: skip
-# The older "hw" of "white" (Wells 1982, "glide cluster reduction"); aligned, it makes an h of the rounded lips of w.
+# The older "hw" of "white" (Wells 1982, "glide cluster reduction"); alignment would label the rounded lips of w as h.
 HW_CLUSTER = ("h", "w")
 
-Pronunciations = tuple[tuple[str, ...], ...]  # pronunciations of one word, each a row of phones
+Pronunciations = tuple[tuple[str, ...], ...]  # pronunciations of one word, each a tuple of phones
 PronouncedTranscript = tuple[tuple[str, Pronunciations], ...]  # words with their pronunciations
 
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """One video and what is said in it; `is_spelling` marks words of one letter as names of letters.
+    """A recording: a video, or a part of one, and its transcript.
 
-    ``transcript`` is its text, or the file that holds it; None where the folder does not say what is spoken.
-    ``span`` are the seconds of the video that the recording takes, None where it takes all. ``words`` are what is said
-    in it where that is known already.
+    If `is_spelling`, words of one letter are names of letters. ``transcript`` is a text or its file, None without one.
+    ``span`` are the seconds of the video, None for all. ``words`` are its pronounced words if already known.
     """
 
     name: str
@@ -47,11 +46,11 @@ class Recording:
 
 
 def find_recordings(folder: Path) -> tuple[Recording, ...]:
-    """Every video of a folder with its transcript, by name; or one video.
+    """Recordings of a folder sorted by name, or those of one video.
 
-    Two layouts are read: ``manifest.csv`` (columns clip, transcript) beside a folder ``clips``, as the GRID corpus is
-    kept here, where single letters are names of letters; and videos with subtitles (.srt, .vtt; every cue is a
-    recording) or a transcript (.txt, .TextGrid, .align) of the same name beside each.
+    Two layouts are supported: ``manifest.csv`` (columns clip, transcript) beside a folder ``clips``, as for the GRID
+    corpus, where single letters are names of letters; and videos with subtitles (.srt, .vtt; each cue is a recording)
+    or a transcript (.txt, .TextGrid, .align) of the same name.
 
     Raises
     ------
@@ -67,39 +66,41 @@ def find_recordings(folder: Path) -> tuple[Recording, ...]:
     manifest = folder / MANIFEST
     found = _recordings_from_manifest(folder, manifest) if manifest.is_file() else _recordings_without_manifest(folder)
     if not found:
-        raise InputError(f"{folder} holds no video ({', '.join(sorted(VIDEO_SUFFIXES))}); give a folder of recordings")
+        raise InputError(
+            f"{folder} contains no video ({', '.join(sorted(VIDEO_SUFFIXES))}); give a folder of recordings"
+        )
     return found
 
 
 def pronounce_recording(recording: Recording) -> PronouncedTranscript | None:
-    """Each word of a transcript with its pronunciations; None without a transcript.
+    """The words of a transcript with their pronunciations; None without a transcript.
 
     Raises
     ------
     DataError
-        It cannot be read, holds no word, or one that nobody can say.
+        The transcript cannot be read, contains no word, or one without a pronunciation.
     """
     if recording.words is not None or recording.transcript is None:
         return recording.words
-    said = read_transcript(recording.transcript) if isinstance(recording.transcript, Path) else recording.transcript
-    text = said if recording.is_spelling else normalize(said)
+    content = read_transcript(recording.transcript) if isinstance(recording.transcript, Path) else recording.transcript
+    text = content if recording.is_spelling else normalize(content)
     words = re.findall(r"[^\W_]+(?:['’][^\W_]+)*", text)
     if not words:
-        raise DataError(f"the transcript of {recording.name} holds no word; write what is said")
+        raise DataError(f"the transcript of {recording.name} contains no word; write the spoken words into it")
     return tuple(
         (word, look_up_pronunciations(word, is_letter=recording.is_spelling and len(word) == 1)) for word in words
     )
 
 
 def look_up_pronunciations(word: str, *, is_letter: bool) -> Pronunciations:
-    """All ways to say a word, in phones of the table; the letter's names if it stands for one.
+    """All pronunciations of a word as phones of the phone table; with `is_letter`, the names of the letter.
 
-    A word that the dictionary does not hold is said by rule.
+    Words outside the dictionary are pronounced by rule.
 
     Raises
     ------
     DataError
-        There is no way to say it.
+        No pronunciation is known.
     """
     from lexicon.dictionary import arpabet_segments
 
@@ -111,9 +112,9 @@ def look_up_pronunciations(word: str, *, is_letter: bool) -> Pronunciations:
             found.append(variant)
     if not found:
         return (_pronounce_by_rule(word),)
-    ways = dict.fromkeys(tuple(segment.phone for segment in segments) for segments in found)
-    plain = [way for way in ways if way[:2] != HW_CLUSTER]
-    return tuple(plain or ways)
+    pronunciations = dict.fromkeys(tuple(segment.phone for segment in segments) for segments in found)
+    plain = [phones for phones in pronunciations if phones[:2] != HW_CLUSTER]
+    return tuple(plain or pronunciations)
 
 
 def _pronounce_by_rule(word: str) -> tuple[str, ...]:
@@ -123,18 +124,18 @@ def _pronounce_by_rule(word: str) -> tuple[str, ...]:
         spoken = pronounce(word)
     except InputError as unsayable:
         raise DataError(f"no pronunciation is known for {word!r}; check the transcript's spelling") from unsayable
-    return tuple(phone for said in spoken.words for phone in said.phones)
+    return tuple(phone for part in spoken.words for phone in part.phones)
 
 
 def _recordings_from_manifest(folder: Path, manifest: Path) -> tuple[Recording, ...]:
     try:
         with manifest.open(encoding="utf-8-sig", newline="") as file:
-            said = {row["clip"]: row["transcript"] for row in csv.DictReader(file)}
+            transcripts = {row["clip"]: row["transcript"] for row in csv.DictReader(file)}
     except (OSError, UnicodeDecodeError, KeyError, csv.Error) as broken:
-        raise DataError(f"{manifest} needs the columns clip and transcript in UTF-8; mend it") from broken
+        raise DataError(f"{manifest} needs the columns clip and transcript in UTF-8; correct it") from broken
     clips = folder / "clips"
     videos = _list_videos(clips if clips.is_dir() else folder)
-    return tuple(Recording(video.stem, video, said.get(video.stem), is_spelling=True) for video in videos)
+    return tuple(Recording(video.stem, video, transcripts.get(video.stem), is_spelling=True) for video in videos)
 
 
 def _recordings_without_manifest(folder: Path) -> tuple[Recording, ...]:
@@ -142,7 +143,7 @@ def _recordings_without_manifest(folder: Path) -> tuple[Recording, ...]:
 
 
 def _recordings_in_video(video: Path) -> Iterator[Recording]:
-    """The recordings in a video: one for each cue of its subtitles, or the whole; damage is told when it is read."""
+    """Recordings of a video: one for each cue of its subtitles, or the whole; damaged files are reported on reading."""
     subtitles = find_subtitles(video)
     try:
         cues = read_cues(subtitles) if subtitles else ()

@@ -1,6 +1,6 @@
-"""Whether a recording can serve: what is measured of it, and the limits.
+"""Quality measures of recordings and their limits.
 
-Every limit stands beside what 804 recordings of GRID s1 measure (median, worst), which all can serve.
+Each limit is listed with the median and the worst value of 804 recordings of GRID s1, all of which are suitable.
 """
 
 from collections.abc import Mapping
@@ -15,17 +15,15 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.speech.text_fit import LEAST_CONFIDENCE
 from tts2face.types import Waveform
 
-CLIPPED_LEVEL = 0.999  # a sample from here on is taken for clipped
-MIN_PICTURE_CHANGE = (
-    0.02  # of an 8-bit step: pictures that differ by less are one picture; a camera's own noise is above
-)
+CLIPPED_LEVEL = 0.999  # amplitude from which a sample counts as clipped
+MIN_PICTURE_CHANGE = 0.02  # of an 8-bit step: frames that differ by less are equal; camera noise is above
 LEVEL_WINDOW_S = 0.02
-NOISE_QUANTILE = 0.1  # of the windows without speech; steps and breaths are louder
+NOISE_QUANTILE = 0.1  # of the windows without speech; excludes footsteps and breaths
 
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """A measure that must not lie beyond `bound`, and the sentence for when it does."""
+    """A bound of a measure, and the message if it is exceeded."""
 
     measure: str
     bound: float
@@ -33,39 +31,39 @@ class Limit:
     sentence: str
 
     def is_broken_by(self, value: float) -> bool:
-        """Whether a value lies beyond."""
+        """Whether a value exceeds the bound."""
         return value < self.bound if self.is_minimum else value > self.bound
 
 
 LIMITS = (
-    # Of other sentences of GRID's small grammar the median is -7300, of unrelated text -10500, or it is not found.
+    # The median is -7300 for other sentences of GRID's small grammar, -10500 for unrelated text if it aligns at all.
     Limit(
         "confidence",
         LEAST_CONFIDENCE,
         True,
-        "the sound does not fit the transcript (confidence {value:.0f}); correct the words",
+        "the sound does not match the transcript (confidence {value:.0f}); correct the words",
     ),
     Limit(
         "recognised",
         LEAST_CONFIDENCE,
         True,
-        "its phones could not be recognised well (confidence {value:.0f}); write what is said into a .txt beside it",
+        "its phones could not be recognised well (confidence {value:.0f}); write the transcript into a .txt beside it",
     ),
     Limit("clipped", 0.005, False, "{value:.1%} of the speech is clipped; record it again with less gain"),
-    Limit("snr_db", 10.0, True, "speech is {value:.0f} dB above the noise; record where it is quiet"),
-    Limit("crowded", 0.25, False, "{value:.0%} of the pictures show more than one face; crop them to one person"),
+    Limit("snr_db", 10.0, True, "speech is {value:.0f} dB above the noise; record in a quieter room"),
+    Limit("crowded", 0.25, False, "{value:.0%} of the frames show more than one face; crop them to one person"),
     Limit("turn_deg", 30.0, False, "the face is turned away by {value:.0f} degrees; film it from the front"),
-    Limit("frozen_s", 0.2, False, "the picture stands still for {value:.2f} s; record it again"),
+    Limit("frozen_s", 0.2, False, "the picture is frozen for {value:.2f} s; record it again"),
 )
 
 
 def check_limits(measured: Mapping[str, float]) -> None:
-    """Let good measures pass; those that are not among the limits are not looked at.
+    """Check measures against their limits; measures without a limit are ignored.
 
     Raises
     ------
     DataError
-        A measure lies beyond its limit.
+        A measure exceeds its limit.
     """
     for limit in LIMITS:
         value = measured.get(limit.measure)
@@ -76,7 +74,7 @@ def check_limits(measured: Mapping[str, float]) -> None:
 def sound_measures(sound: Waveform, phones: PhoneSequence) -> dict[str, float]:
     """Share of the speech that is ``clipped``, and ``snr_db``: level of the speech over that of the pauses in dB.
 
-    Without a pause nothing tells the noise; the ratio is infinite then.
+    Without pauses the noise cannot be estimated and the ratio is infinite.
     """
     window = max(1, round(LEVEL_WINDOW_S * sound.rate))
     n_windows = len(sound.samples) // window
@@ -96,7 +94,7 @@ def sound_measures(sound: Waveform, phones: PhoneSequence) -> dict[str, float]:
 def picture_measures(
     n_faces: NDArray[np.int8], changes: NDArray[np.float32], times: NDArray[np.float64]
 ) -> dict[str, float]:
-    """Share of the counted pictures that are ``crowded``, and ``frozen_s``: the longest time without change.
+    """Share of the counted frames with several faces (``crowded``), and ``frozen_s``: the longest time without change.
 
     Parameters
     ----------
@@ -112,6 +110,6 @@ def picture_measures(
 
 
 def head_turn_deg(angles: NDArray[np.floating]) -> float:
-    """Degrees by which a face looks away from the camera, from (T, 3) pitch, yaw and roll: the median over time."""
+    """Median angle in degrees between a face and the camera, from (T, 3) pitch, yaw and roll."""
     away = np.arccos(np.clip(np.cos(angles[:, 0]) * np.cos(angles[:, 1]), -1.0, 1.0))
     return float(np.degrees(np.median(away)))

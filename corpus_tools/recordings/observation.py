@@ -1,4 +1,4 @@
-"""One recording as a corpus needs it: pose-free landmarks, head pose, phones and loudness on one clock."""
+"""Observation of one recording: pose-free landmarks, head pose, phones and loudness on one time axis."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,13 +17,13 @@ from tts2face.video.frame_grid import face_span, fill_gaps, resample_to_grid
 from tts2face.video.pose import PoseFreeLandmarks, head_angles, remove_pose
 
 TIME_TOLERANCE_S = 1e-6  # seconds
-N_NEIGHBOUR_FRAMES = 2.0  # frames about a span, from which those in it are read
+N_NEIGHBOUR_FRAMES = 2.0  # frames around a span that are used to interpolate those in it
 MIN_FRAMES = 2
 
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """The common frame rate, a video's own when None, and seconds by which a video's sound comes late."""
+    """The common frame rate (None: that of the video), and the delay of a video's sound in seconds."""
 
     fps: float | None = None
     lag: float = 0.0
@@ -31,11 +31,11 @@ class Timing:
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """How well a recording could be read.
+    """Quality measures of a recording.
 
     ``confidence`` of the alignment (0 is perfect, log likelihood per second), lowest face ``score``, ``n_filled``
-    frames filled in, seconds ``cut`` from the video's beginning, seconds of ``lag`` taken out, share of ``clipped``
-    speech, ``snr_db`` of speech over noise, share of ``crowded`` pictures, ``turn_deg`` away from the camera,
+    interpolated frames, seconds ``cut`` from the video's start, corrected ``lag`` in seconds, share of ``clipped``
+    speech, ``snr_db`` of speech over noise, share of ``crowded`` frames, ``turn_deg`` away from the camera,
     ``frozen_s`` without a change.
     """
 
@@ -60,11 +60,11 @@ class Observation:
     landmarks : (T, 478, 3)
         Millimetres, head pose removed; axes as in `tts2face.models.landmarks`.
     head : (T, 6)
-        `HEAD_CHANNELS`: angles against the camera, place against the recording's middle.
+        `HEAD_CHANNELS`: angles relative to the camera, position relative to the recording's median.
     intensity : (T,)
         Level of the sound in dB.
     is_recognised
-        Nobody wrote what is said: the phones were heard, and some are wrong.
+        There is no transcript: the phones were recognised automatically and contain errors.
     """
 
     name: str
@@ -79,23 +79,25 @@ class Observation:
     is_recognised: bool = False
 
 
-def observe_recording(recording: Recording, eyes: CachedTracker, ears: CachedAligner, timing: Timing) -> Observation:
-    """One recording, read and measured.
+def observe_recording(
+    recording: Recording, tracker: CachedTracker, aligner: CachedAligner, timing: Timing
+) -> Observation:
+    """Read and measure one recording.
 
     Raises
     ------
     DataError
-        The recording cannot serve; the message says why.
+        The recording is unsuitable; the message states the reason.
     """
-    sound = ears.heard(recording.video, pronounce_recording(recording), recording.span)
+    sound = aligner.align(recording.video, pronounce_recording(recording), recording.span)
     check_limits({"recognised" if sound.is_recognised else "confidence": sound.confidence})
     measures = sound_measures(sound.sound, sound.phones)
     check_limits(measures)
-    seen = eyes.track(recording.video)
+    seen = tracker.track(recording.video)
     filled, first, n_filled = _span_landmarks(seen, recording.span, timing)
     fps = timing.fps or seen.fps
     begin = first / fps
-    start = begin + timing.lag - (recording.span[0] if recording.span else 0.0)  # on the clock of the sound
+    start = begin + timing.lag - (recording.span[0] if recording.span else 0.0)  # in seconds of the sound
     phones, spans = trim_to_picture(sound, start, start + len(filled) / fps)
     posed = remove_pose(filled, fps)
     here = (seen.times > begin - TIME_TOLERANCE_S) & (seen.times < begin + len(filled) / fps - TIME_TOLERANCE_S)
@@ -126,19 +128,19 @@ def observe_recording(recording: Recording, eyes: CachedTracker, ears: CachedAli
 def _span_landmarks(
     seen: TrackedVideo, span: tuple[float, float] | None, timing: Timing
 ) -> tuple[NDArray[np.float32], int, int]:
-    """Landmarks of the frames that belong to a span of the sound, the number of the first, and how many were filled.
+    """Landmarks of the frames of a span of the sound, the index of the first, and the number of interpolated ones.
 
     Raises
     ------
     DataError
-        The video shows nothing there, no face, or a face that is out of sight too long.
+        The video has no frames or no face there, or the face is hidden for too long.
     """
     fps = timing.fps or seen.fps
     begin, end = (0.0, np.inf) if span is None else (span[0] - timing.lag, span[1] - timing.lag)
     near = (seen.times > begin - N_NEIGHBOUR_FRAMES / fps) & (seen.times < end + N_NEIGHBOUR_FRAMES / fps)
     if near.sum() < MIN_FRAMES:
         where = "" if span is None else f" from {span[0]:.2f} s to {span[1]:.2f} s"
-        raise DataError(f"the video shows nothing{where}; check its length and the times")
+        raise DataError(f"the video has no frames{where}; check its length and the times")
     points, first = resample_to_grid(seen.tracking.points[near], seen.times[near], fps)
     instants = (first + np.arange(len(points))) / fps
     inside = (instants > begin - TIME_TOLERANCE_S) & (instants < end + TIME_TOLERANCE_S)
@@ -151,7 +153,7 @@ def _span_landmarks(
 
 
 def trim_to_picture(sound: AlignedSpeech, begin: float, stop: float) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
-    """Phones and words on a clock that starts at `begin`, the silence outside [begin, stop] cut away.
+    """Phones and words relative to `begin`, without the silence outside [begin, stop].
 
     Raises
     ------
@@ -165,10 +167,12 @@ def trim_to_picture(sound: AlignedSpeech, begin: float, stop: float) -> tuple[Ph
     phones, edges = phones[lead:tail], np.clip(edges[lead : tail + 1], None, stop)
     spoken = [i for i, phone in enumerate(phones) if phone != SILENCE]
     if edges[spoken[0]] < begin or sound.phones.edges[lead + spoken[-1] + 1] > stop:
-        raise DataError(f"words are spoken while no face is seen (it is seen from {begin:.2f} s to {stop:.2f} s)")
+        raise DataError(
+            f"there is speech while no face is visible (visible: {begin:.2f} s to {stop:.2f} s); cut the video"
+        )
     if phones[0] == SILENCE:
         edges[0] = begin
-    elif edges[0] > begin:  # the sound begins after the picture
+    elif edges[0] > begin:  # the sound starts after the picture
         phones, edges, lead = [SILENCE, *phones], np.concatenate([[begin], edges]), lead - 1
     words = tuple(WordSpan(word.text, word.first - lead, word.last - lead) for word in sound.words)
     return PhoneSequence(phones, edges - begin), words

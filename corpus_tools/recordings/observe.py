@@ -1,4 +1,4 @@
-"""A folder of recordings, observed in parallel; what was done stays in a cache, so that a second run goes on."""
+"""Parallel observation of a folder of recordings, with a cache from which interrupted runs continue."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ MAX_QUOTED_REASONS = 3  # of recordings, where none could be used
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A recording that cannot serve, and why; ``at`` are seconds of its ``video`` in which it lies."""
+    """A refused recording and the reason; ``at`` is its position in its ``video`` in seconds."""
 
     name: str
     reason: str
@@ -31,7 +31,7 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observations:
-    """What a folder of recordings gave, both by name."""
+    """Observations and refusals of a folder of recordings, sorted by name."""
 
     kept: tuple[Observation, ...]
     refused: tuple[Refusal, ...]
@@ -39,7 +39,7 @@ class Observations:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VideoTask:
-    """The recordings of one video, read together so that it is watched once."""
+    """The recordings of one video, which are read together so that it is tracked once."""
 
     recordings: tuple[Recording, ...]
     timing: Timing = Timing()  # noqa: RUF009 - frozen
@@ -51,11 +51,11 @@ class VideoTask:
 
 
 RecordingOutcomes = list[Observation | Refusal]
-ShareCallback = Callable[[float], None]  # told the share of a task that is done
+ShareCallback = Callable[[float], None]  # called with the finished share of a task
 
 
 def observe(recordings: Path, *, effort: RunOptions | None = None, on_progress: Progress | None = None) -> Observations:
-    """Every recording of a folder, or the reason why not; all at one frame rate, sound and picture together.
+    """Observations of a folder at one frame rate with sound and picture synchronised, and reasons for refusals.
 
     Parameters
     ----------
@@ -95,12 +95,12 @@ def observe(recordings: Path, *, effort: RunOptions | None = None, on_progress: 
 
 
 def check_any_kept(observations: Observations) -> tuple[Observation, ...]:
-    """The recordings that were kept.
+    """The kept observations.
 
     Raises
     ------
     InputError
-        None was; the message says why the first `MAX_QUOTED_REASONS` were refused.
+        There are none; the message quotes the first `MAX_QUOTED_REASONS` reasons.
     """
     refused = observations.refused
     if observations.kept:
@@ -125,7 +125,7 @@ def _refuse_unsynchronised(outcome: Observation | Refusal, fault: str) -> Refusa
 
 
 def group_by_video(recordings: Sequence[Recording]) -> list[VideoTask]:
-    """Recordings of one video together."""
+    """One task for each video."""
     together: dict[Path, list[Recording]] = {}
     for recording in recordings:
         together.setdefault(recording.video, []).append(recording)
@@ -135,35 +135,35 @@ def group_by_video(recordings: Sequence[Recording]) -> list[VideoTask]:
 def _observe_tasks(
     tasks: Sequence[VideoTask], cache: Path, model: Path, jobs: int, on_progress: Progress | None
 ) -> Iterator[tuple[VideoTask, RecordingOutcomes]]:
-    """Tasks with their outcomes as they come, in no order."""
-    tell = on_progress or (lambda done, of: None)
+    """Tasks with their outcomes in order of completion."""
+    report = on_progress or (lambda done, of: None)
     of = STEPS_PER_VIDEO * len(tasks)
     if jobs <= 1:
         worker = _VideoReader(cache, model)
         for number, task in enumerate(tasks):
-            yield task, worker.outcomes(task, _task_share_callback(tell, number, of))
+            yield task, worker.outcomes(task, _task_share_callback(report, number, of))
         return
     for number, done in enumerate(map_unordered(tasks, _observe_task, _start_worker, (cache, model), jobs), start=1):
         yield done
-        tell(STEPS_PER_VIDEO * number, of)
+        report(STEPS_PER_VIDEO * number, of)
 
 
-def _task_share_callback(tell: Progress, number: int, of: int) -> ShareCallback:
-    return lambda share: tell(int(STEPS_PER_VIDEO * (number + share)), of)
+def _task_share_callback(on_progress: Progress, number: int, of: int) -> ShareCallback:
+    return lambda share: on_progress(int(STEPS_PER_VIDEO * (number + share)), of)
 
 
 class _VideoReader:
-    """Reads videos one after the other; the networks and the acoustic models are loaded once."""
+    """Observer of videos that loads networks and acoustic models once."""
 
     def __init__(self, cache: Path, model: Path) -> None:
         self._tracker, self._aligner = CachedTracker(cache, model), CachedAligner(cache)
 
-    def outcomes(self, task: VideoTask, tell: ShareCallback) -> RecordingOutcomes:
-        """An observation, or why there is none, for each utterance of a video."""
+    def outcomes(self, task: VideoTask, on_share: ShareCallback) -> RecordingOutcomes:
+        """An observation, or the reason for its refusal, for each utterance of a video."""
         found: RecordingOutcomes = []
         try:
             recordings = self._split_long_recording(task.recordings)
-            self._tracker.track(task.video, lambda share: tell(TRACKING_SHARE * share))
+            self._tracker.track(task.video, lambda share: on_share(TRACKING_SHARE * share))
         except DataError as reason:
             recordings = ()
             found = [_refusal(recording, reason) for recording in task.recordings]
@@ -172,19 +172,19 @@ class _VideoReader:
                 found.append(observe_recording(recording, self._tracker, self._aligner, task.timing))
             except DataError as reason:
                 found.append(_refusal(recording, reason))
-            tell(TRACKING_SHARE + (1 - TRACKING_SHARE) * number / len(recordings))
-        tell(1.0)
+            on_share(TRACKING_SHARE + (1 - TRACKING_SHARE) * number / len(recordings))
+        on_share(1.0)
         return found
 
     def _split_long_recording(self, recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:
-        """The recordings; where one takes the whole of a long video, its utterances, cut at pauses."""
+        """The recordings; a recording of a whole long video is cut into utterances at pauses."""
         whole = recordings[0]
         if whole.span is not None or self._aligner.sound(whole.video).duration <= MAX_UTTERANCE_S:
             return recordings
-        said = self._aligner.utterances(whole.video, pronounce_recording(whole))
+        utterances = self._aligner.utterances(whole.video, pronounce_recording(whole))
         return tuple(
             replace(whole, name=f"{whole.name}-{number:04d}", span=span, words=words)
-            for number, (span, words) in enumerate(said, start=1)
+            for number, (span, words) in enumerate(utterances, start=1)
         )
 
 

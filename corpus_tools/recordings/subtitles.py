@@ -1,24 +1,28 @@
-"""Subtitles beside a video: what is said, and about when."""
+"""Subtitles of videos as cues, and decoding of text files."""
 
+import codecs
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from corpus_tools.transcripts.decoding import read_text
 from lexicon.errors import BackendError, DataError
+from lexicon.inputs import check_regular_file
 
-SUBTITLE_FORMATS = {".srt": "srt", ".vtt": "vtt"}  # stated to the reader: it guesses wrongly for files without a header
-# Blocks for people and for styling; the reader would take them for words of the cue before (W3C WebVTT, 4.1).
+SUBTITLE_FORMATS = {
+    ".srt": "srt",
+    ".vtt": "vtt",
+}  # passed to the reader, whose detection fails for files without a header
+# Comments and style blocks, which the reader would append to the previous cue (W3C WebVTT, 4.1).
 _UNSPOKEN = re.compile(r"(?:(?<=\n\n)|^)(?:NOTE|STYLE|REGION)\b(?:.+\n?)*")
-# What subtitles for the deaf add: noises in brackets, sung lines between notes, who speaks, dashes between speakers.
+# Additions of subtitles for the deaf: noises in brackets, lyrics between notes, speaker names, dashes between speakers.
 _NOISE = re.compile(r"\[[^\]]*\]|\([^)]*\)|\{[^}]*\}|♪[^♪]*(?:♪|$)")
 _SPEAKER = re.compile(r"(?m)^\s*(?:[-–—]\s*|>>\s*)?(?:[A-Z][A-Z0-9 .'’#-]*:(?=\s))?")
-CUE_MARGIN_S = 0.3  # before and behind a cue; subtitles are rarely nearer to the speech
+CUE_MARGIN_S = 0.3  # before and after a cue; subtitles are rarely closer to the speech
 
 
 @dataclass(frozen=True, slots=True)
 class Cue:
-    """Words said between two instants in seconds."""
+    """Words spoken between two instants in seconds."""
 
     begin: float
     end: float
@@ -26,17 +30,17 @@ class Cue:
 
 
 def find_subtitles(video: Path) -> Path | None:
-    """The file of subtitles of a video, if there is one."""
+    """The subtitle file of a video, or None."""
     return next((path for suffix in SUBTITLE_FORMATS if (path := video.with_suffix(suffix)).is_file()), None)
 
 
 def read_cues(path: Path) -> tuple[Cue, ...]:
-    """Cues in the order of time, each widened by `CUE_MARGIN_S` but not beyond the middle to its neighbour.
+    """Cues in temporal order, each extended by `CUE_MARGIN_S` but not beyond the middle to its neighbour.
 
     Raises
     ------
     DataError
-        The file is no subtitles, or holds none.
+        The file is not a subtitle file, or contains no cue.
     BackendError
         The package pysubs2 is missing.
     """
@@ -54,7 +58,7 @@ def read_cues(path: Path) -> tuple[Cue, ...]:
     spoken = sorted((event.start / 1000, event.end / 1000, _spoken_text(event.plaintext)) for event in read)
     spoken = [(begin, end, text) for begin, end, text in spoken if text and end > begin]
     if not spoken:
-        raise DataError(f"{path} holds no subtitles; export them again")
+        raise DataError(f"{path} contains no subtitles; export them again")
     cues = []
     for number, (begin, end, text) in enumerate(spoken):
         before = spoken[number - 1][1] if number else 0.0
@@ -65,5 +69,50 @@ def read_cues(path: Path) -> tuple[Cue, ...]:
 
 
 def _spoken_text(text: str) -> str:
-    """What is said in a cue, on one line; nothing where it shows noises only."""
+    """The spoken words of a cue on one line; empty if it contains noises only."""
     return " ".join(_SPEAKER.sub(" ", _NOISE.sub(" ", text)).split())
+
+
+MAX_BYTES = 8 << 20  # 8 MiB; the words of a whole day of speech are below 1 MiB
+_BYTE_ORDER_MARKS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF32_LE, "utf-32-le"),
+    (codecs.BOM_UTF32_BE, "utf-32-be"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)  # in this order: the mark of UTF-32-LE begins with that of UTF-16-LE
+
+
+def read_text(path: Path) -> str:
+    """Characters of a text file: by its byte order mark, else as UTF-8, else as Windows 1252.
+
+    Raises
+    ------
+    DataError
+        It cannot be read, is too large, or is not text.
+    """
+    check_regular_file(path)
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except OSError as refused:
+        raise DataError(f"{path} cannot be read ({refused.strerror}); check the file") from refused
+    if len(content) > MAX_BYTES:
+        raise DataError(f"{path} is larger than {MAX_BYTES >> 20} MiB; give the transcript only")
+    text = _decode(content, path)
+    if "\0" in text:
+        raise DataError(f"{path} is not text (it contains zero bytes); save it as UTF-8")
+    return text
+
+
+def _decode(content: bytes, path: Path) -> str:
+    try:
+        for mark, encoding in _BYTE_ORDER_MARKS:
+            if content.startswith(mark):
+                return content[len(mark) :].decode(encoding)
+        try:
+            return content.decode("utf-8")
+        except UnicodeDecodeError:
+            return content.decode("cp1252")
+    except UnicodeDecodeError as broken:
+        raise DataError(f"{path} is not text in UTF-8, UTF-16, UTF-32 or Windows 1252; save it as UTF-8") from broken

@@ -1,1 +1,1 @@
-"""Pages for people to look at: one HTML file each, with nothing outside it."""
+"""Reports as self-contained HTML pages."""

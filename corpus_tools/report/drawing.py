@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 INK, SOFT, RULE, FIRST, SECOND = "#1d2329", "#66707a", "#d5dae0", "#0b6cb0", "#b8860b"
 # In a page these colours follow the page's light or dark theme.
 THEME = {INK: "var(--ink)", SOFT: "var(--soft)", RULE: "var(--line)", FIRST: "var(--first)", SECOND: "var(--second)"}
-# Okabe and Ito 2008 from the fourth on: told apart by colour-blind readers, and by their dashes in grey.
+# Okabe and Ito 2008 from the fourth on: distinguishable by colour-blind readers, and by their dashes in grey.
 SERIES = (
     (INK, "solid"), (FIRST, "solid"), (SECOND, "dashed"), ("#009e73", "dotted"), ("#cc79a7", "dashdot"),
     ("#d55e00", (0, (1, 1))), ("#56b4e9", (0, (5, 1))),
 )  # fmt: skip
 PX_PER_INCH = 72  # of SVG: one unit is one CSS pixel
 PNG_SCALE = 2  # PNG pixels for one SVG unit
-LEAST_TIP = 8  # px: a smaller area is hard to hit with the mouse
+LEAST_TIP = 8  # px; a smaller area is hard to point at
 STYLE = {
     "svg.fonttype": "none", "svg.hashsalt": "tts2face", "figure.dpi": PX_PER_INCH, "savefig.facecolor": "white",
     "font.family": ["DejaVu Sans"], "font.size": 10, "axes.titlesize": 11, "axes.titlecolor": INK,
@@ -57,9 +57,9 @@ Draw = Callable[["Figure"], Sequence[Tip]]
 
 
 def load_matplotlib() -> None:
-    """Import matplotlib, which keeps its list of fonts in this user's cache of tts2face.
+    """Import matplotlib with its font list in the user's cache folder of tts2face.
 
-    ``MPLCONFIGDIR`` is set during the import only, and not at all where the caller set it or imported matplotlib.
+    ``MPLCONFIGDIR`` is set during the import only; it is not changed if the caller set it or imported matplotlib.
 
     Raises
     ------
@@ -82,10 +82,10 @@ def load_matplotlib() -> None:
 
 
 @contextmanager
-def drawn_figure(draw: Draw, width: float, height: float) -> Iterator[tuple["Figure", Sequence[Tip]]]:
-    """A figure of so many px and its tips, in the house style whatever the user's matplotlib settings are.
+def open_figure(draw: Draw, width: float, height: float) -> Iterator[tuple["Figure", Sequence[Tip]]]:
+    """A figure of a size in px and its tips, in the style of this module regardless of the user's matplotlib settings.
 
-    The style holds inside the block, where the figure has to be saved, too.
+    The style applies inside the block; save the figure there.
     """
     load_matplotlib()
     from matplotlib import style
@@ -97,9 +97,9 @@ def drawn_figure(draw: Draw, width: float, height: float) -> Iterator[tuple["Fig
 
 
 def draw_svg(draw: Draw, width: float, height: float, name: str) -> str:
-    """A figure of so many px as an SVG element, with a name for those who cannot see it."""
+    """A figure of a size in px as an SVG element; `name` is its accessible name."""
     file = BytesIO()
-    with drawn_figure(draw, width, height) as (figure, tips):
+    with open_figure(draw, width, height) as (figure, tips):
         figure.savefig(
             file, format="svg", transparent=True, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type"))
         )
@@ -115,9 +115,9 @@ def draw_svg(draw: Draw, width: float, height: float, name: str) -> str:
 
 
 def draw_png(draw: Draw, width: float, height: float) -> bytes:
-    """A figure of so many px, `PNG_SCALE` times as many pixels, on white; PNG bytes."""
+    """A figure of a size in px as PNG bytes, `PNG_SCALE` pixels per px, on white."""
     file = BytesIO()
-    with drawn_figure(draw, width, height) as (figure, _):
+    with open_figure(draw, width, height) as (figure, _):
         figure.savefig(
             file, format="png", dpi=PNG_SCALE * PX_PER_INCH, metadata={"Software": None}, pil_kwargs={"optimize": True}
         )
@@ -125,7 +125,7 @@ def draw_png(draw: Draw, width: float, height: float) -> bytes:
 
 
 def _shorten_tag(tag: re.Match[str]) -> str:
-    """A tag without ids, which the figures of a page would share, in the page's colours, numbers to 0.01 px."""
+    """A tag without ids, which are not unique within a page, with the page's colours and numbers to 0.01 px."""
     content = re.sub(r'(?<=<g) id="[^"]*"| transform="rotate\(-0 [^"]*"', "", tag[0])
     content = re.sub(r"(\.\d\d)\d+(?=[ \n\")])", r"\1", content)
     content = content.replace("'DejaVu Sans'", "'DejaVu Sans', sans-serif")

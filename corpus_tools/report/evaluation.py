@@ -1,4 +1,4 @@
-"""A page about accuracy: figures, where methods differ, and curves of the best, median and worst sentences."""
+"""HTML page of an evaluation: scores, errors by phone class, curves of the best, median and worst sentences."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import cycle
@@ -11,8 +11,8 @@ from corpus_tools.evaluation.evaluate import CEILING_METHOD, SplitResult
 from corpus_tools.evaluation.scores import CONFIDENCE, Scores, available_figures
 from corpus_tools.evaluation.tables import Evaluation, figure_text
 from corpus_tools.report.drawing import RULE, SERIES, draw_svg
-from corpus_tools.report.page import page, paragraphs, table, wide
-from corpus_tools.report.videos import Films
+from corpus_tools.report.page import page, paragraphs, scroll_box, table
+from corpus_tools.report.videos import MethodVideos
 from lexicon.sequence import SILENCE, PhoneSequence
 
 if TYPE_CHECKING:
@@ -26,13 +26,13 @@ N_SHOWN = 3  # sentences of each kind
 WIDTH, HEIGHT = 1100, 236  # px of a plot
 N_BINS = 30
 ABOUT = {
-    False: "{n_test} utterances held out, {n_train} learnt from; true phone edges.",
-    True: "{n_test} utterances of somebody else with their own phone edges, {n_train} learnt from; each talker's "
-    "curves are z-scored over that talker's speech.",
+    False: "{n_test} held-out utterances, {n_train} training utterances; true phone edges.",
+    True: "{n_test} utterances of another talker with their own phone edges, {n_train} training utterances; each "
+    "talker's curves are z-scored over the talker's speech.",
 }
 ABOUT_OWN = (
-    "The words in the default English voice with its own durations, mapped to the recorded times word by word. "
-    "DTW cost, free: on the voice's own clock, without a band."
+    "Words spoken by the default English voice with its own durations, mapped to the recorded times word by word. "
+    "DTW cost, free: on the voice's own time axis, without a band."
 )
 
 
@@ -46,7 +46,7 @@ def evaluation_page(result: Evaluation, runs: Sequence[SplitResult]) -> str:
         [
             f"<p>{about} In brackets: {CONFIDENCE:.0%} bootstrap intervals over utterances.</p>",
             _figures(result.scores),
-            *_own(result.own),
+            *_own_durations(result.own),
             *_folds(result),
             "<h2>By class of phone</h2>",
             _classes(result.scores),
@@ -71,7 +71,7 @@ def _figures(scores: Sequence[Scores]) -> str:
     return table(("method", *(head for _, head, _ in heads)), rows, numbers=range(1, len(heads) + 1))
 
 
-def _own(scores: Sequence[Scores]) -> Iterator[str]:
+def _own_durations(scores: Sequence[Scores]) -> Iterator[str]:
     if scores:
         n = len(scores[0].utterances)
         yield f"<h2>With own durations</h2>\n{paragraphs(f'{n} utterances. {ABOUT_OWN}')}\n{_figures(scores)}"
@@ -86,12 +86,12 @@ def _folds(result: Evaluation) -> Iterator[str]:
     for one in result.scores:
         for number, fold in enumerate(result.folds, start=1):
             cells = (f"{fold.figures[one.method][name]:.{digits}f}" for name, _, digits in heads)
-            rows.append((one.method, f"{number} ({fold.n_test} held out, {fold.n_train} learnt from)", *cells))
+            rows.append((one.method, f"{number} ({fold.n_test} held out, {fold.n_train} for training)", *cells))
         over = ((result.fold_mean_and_deviation(one.method, name), digits) for name, _, digits in heads)
         rows.append((one.method, "mean ± spread", *(f"{mean:.{n}f} ± {spread:.{n}f}" for (mean, spread), n in over)))
     yield f"<h2>{len(result.folds)} folds</h2>"
     yield paragraphs(
-        "Each fold is tested on methods learnt from the others. Spread: standard deviation over the folds."
+        "Each fold is tested with methods learnt from the others. Spread: standard deviation over the folds."
     )
     yield table(("method", "fold", *(head for _, head, _ in heads)), rows, numbers=range(2, len(heads) + 2))
 
@@ -104,17 +104,17 @@ def _classes(scores: Sequence[Scores]) -> str:
         if one.method != CEILING_METHOD
         for some in one.classes
     ]  # fmt: skip
-    heads = ("method", "phones", "frames", "RMSE z", "error of opening", "bias of opening")
+    heads = ("method", "phones", "frames", "RMSE z", "opening error", "opening bias")
     return table(heads, rows, numbers=range(2, 6))
 
 
 def _sentences(result: Evaluation, runs: Sequence[SplitResult], seen: str, plain: str | None) -> Iterator[str]:
-    """Curves of real and synthesised lips, as in T07, figs 6-8, and for the worst the faces."""
+    """Curves of real and synthesised lips, as in T07, figs 6-8, and videos of the worst sentences."""
     scores = next(one for one in result.scores if one.method == seen)
     order = np.argsort([one.dtw_cost for one in scores.utterances], kind="stable")
     middle = len(order) // 2 - N_SHOWN // 2
     places = [(run, at) for run in runs for at in range(len(run.real))]
-    films = Films(seen)
+    films = MethodVideos(seen)
     for title, chosen in (
         ("Worst sentences", order[::-1][:N_SHOWN]),
         ("Median sentences", order[middle : middle + N_SHOWN]),
@@ -127,7 +127,7 @@ def _sentences(result: Evaluation, runs: Sequence[SplitResult], seen: str, plain
             yield f"<h3>{run.real[at].observation.name} (DTW cost {cost:.2f})</h3>"
             yield _curves(run, at, [name for name in (seen, plain) if name])
             if title.startswith("Worst"):
-                yield films.film(run, at)
+                yield films.render_tag(run, at)
 
 
 def _curves(run: SplitResult, at: int, names: Sequence[str]) -> str:
@@ -136,7 +136,7 @@ def _curves(run: SplitResult, at: int, names: Sequence[str]) -> str:
     unit = "/ eyes" if run.scale is None else "(z)"
     made = {name: run.curves(name, at) for name in names}
     plots = []
-    for label, curve in ((f"gap of the lips {unit}", "opening"), (f"width of the mouth {unit}", "width")):
+    for label, curve in ((f"lip gap {unit}", "opening"), (f"mouth width {unit}", "width")):
         values = {"real": getattr(one.curves, curve)}
         values |= {name: getattr(curves, curve) for name, curves in made.items()}
         plots.append(curves_plot(times, values, label, one.observation.phones))
@@ -144,7 +144,7 @@ def _curves(run: SplitResult, at: int, names: Sequence[str]) -> str:
 
 
 def curves_plot(times: Floats, curves: Mapping[str, Floats], label: str, phones: PhoneSequence) -> str:
-    """Named curves (T,) at times (T,) in seconds, with the phones above (SVG)."""
+    """Plot of named curves (T,) at times (T,) in seconds, with the phones above (SVG)."""
 
     def draw(figure: "Figure") -> tuple[()]:
         axes = _series_axes(figure, label, "seconds")
@@ -154,7 +154,7 @@ def curves_plot(times: Floats, curves: Mapping[str, Floats], label: str, phones:
         figure.legend(loc="outside lower right", ncols=len(curves))
         return ()
 
-    return wide(draw_svg(draw, WIDTH, HEIGHT, f"{label} over time"))
+    return scroll_box(draw_svg(draw, WIDTH, HEIGHT, f"{label} over time"))
 
 
 def label_phones(axes: "Axes", phones: PhoneSequence, end: float) -> None:
@@ -167,7 +167,7 @@ def label_phones(axes: "Axes", phones: PhoneSequence, end: float) -> None:
 
 
 def cost_histogram(samples: Mapping[str, Sequence[float]]) -> str:
-    """How many utterances have which DTW cost, one outline for each method (SVG)."""
+    """Histogram of the DTW costs of utterances, one outline for each method (SVG)."""
     edges = np.histogram_bin_edges(np.concatenate([np.asarray(values) for values in samples.values()]), N_BINS)
 
     def draw(figure: "Figure") -> tuple[()]:
@@ -180,7 +180,7 @@ def cost_histogram(samples: Mapping[str, Sequence[float]]) -> str:
         figure.legend(loc="outside lower right", ncols=len(samples))
         return ()
 
-    return wide(draw_svg(draw, WIDTH, HEIGHT, "histogram of DTW costs"))
+    return scroll_box(draw_svg(draw, WIDTH, HEIGHT, "histogram of DTW costs"))
 
 
 def _series_axes(figure: "Figure", y_label: str, x_label: str) -> "Axes":

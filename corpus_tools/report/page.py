@@ -1,12 +1,17 @@
-"""An HTML page that holds everything it shows."""
+"""Building blocks of self-contained HTML pages, and the choice of a report's format by its suffix."""
 
 from base64 import b64encode
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from io import BytesIO
+from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from corpus_tools.report.drawing import load_matplotlib
+from lexicon.errors import InputError
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #1d2329; --soft: #66707a; --line: #d5dae0; --paper: #fff;
@@ -37,7 +42,7 @@ def page(title: str, parts: Iterable[str]) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Iterable[int] = ()) -> str:
-    """A table of texts; the columns in `numbers` are aligned to the right."""
+    """A table of strings; the columns in `numbers` are aligned to the right."""
     right = set(numbers)
 
     def row(cells: Sequence[str], tag: str) -> str:
@@ -52,13 +57,13 @@ def paragraphs(*sentences: str) -> str:
     return "\n".join(f"<p>{escape(sentence)}</p>" for sentence in sentences)
 
 
-def note(sentence: str) -> str:
+def note_paragraph(sentence: str) -> str:
     """A paragraph in a softer colour."""
     return f'<p class="soft">{escape(sentence)}</p>'
 
 
-def wide(element: str) -> str:
-    """An element that scrolls sideways where the window is narrower."""
+def scroll_box(element: str) -> str:
+    """An element that scrolls horizontally in narrow windows."""
     return f'<div class="wide">{element}</div>'
 
 
@@ -72,3 +77,27 @@ def picture_tag(pixels: NDArray[np.uint8], height: int) -> str:
     shown.save(jpeg, "JPEG", quality=75)
     data = b64encode(jpeg.getvalue()).decode()
     return f'<img alt="" width="{shown.width}" height="{shown.height}" src="data:image/jpeg;base64,{data}">'
+
+
+Writer = TypeVar("Writer")
+PLOT_SUFFIXES = (".html", ".png")  # kinds of file that hold plots
+
+
+def report_writer(out: Path, writers: Mapping[str, Writer]) -> Writer:
+    """The writer for a file's suffix; checks the path before the analysis starts.
+
+    Raises
+    ------
+    InputError
+        There is no writer for the suffix, or no folder for the file.
+    BackendError
+        The format contains plots and matplotlib is not installed.
+    """
+    suffix = out.suffix.lower()
+    if suffix not in writers:
+        raise InputError(f"a report cannot be written as {out.name}; choose one of {', '.join(writers)}")
+    if not out.parent.is_dir():
+        raise InputError(f"there is no folder {out.parent}; make it or choose another")
+    if suffix in PLOT_SUFFIXES:
+        load_matplotlib()
+    return writers[suffix]

@@ -1,4 +1,4 @@
-"""A page about recordings: which were kept, which were refused and why, and the measures of each."""
+"""HTML page about recordings: kept and refused ones, reasons, and quality measures."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
@@ -14,7 +14,7 @@ from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import Observations, Refusal
 from corpus_tools.report.drawing import FIRST, SECOND, draw_svg
 from corpus_tools.report.evaluation import label_phones
-from corpus_tools.report.page import note, page, paragraphs, picture_tag, table
+from corpus_tools.report.page import note_paragraph, page, paragraphs, picture_tag, table
 from corpus_tools.training.train_talker import normalised_lip_gap
 from lexicon.errors import DataError, InputError
 from lexicon.phones import ARPABET
@@ -33,11 +33,11 @@ MEASURES = {
     "confidence": ("fit of the words", "log likelihood / s", 1.0),
     "score": ("lowest face score", "", 1.0),
     "n_filled": ("interpolated frames", "", 1.0),
-    "lag": ("delay of the sound, corrected", "ms", 1000.0),
+    "lag": ("audio delay, corrected", "ms", 1000.0),
     "clipped": ("clipped speech", "%", 100.0),
     "snr_db": ("signal-to-noise ratio", "dB", 1.0),
-    "crowded": ("pictures with several faces", "%", 100.0),
-    "turn_deg": ("face turned away", "degrees", 1.0),
+    "crowded": ("frames with several faces", "%", 100.0),
+    "turn_deg": ("head turn", "degrees", 1.0),
     "frozen_s": ("frozen picture", "s", 1.0),
 }
 
@@ -54,35 +54,37 @@ def recordings_page(name: str, found: Observations) -> str:
             "<h2>Phones spoken</h2>",
             _phones(found.kept),
             f"<h2>Refused ({len(found.refused)})</h2>",
-            *(_refused(refusal, pictures.get(refusal.name)) for refusal in found.refused),
+            *(_refused_item(refusal, pictures.get(refusal.name)) for refusal in found.refused),
             f"<h2>Kept ({len(found.kept)})</h2>",
-            note("Blue: gap of the lips over the distance of the eyes. Ochre: intensity of the sound, 25 to 85 dB."),
-            *(_kept(seen, pictures.get(seen.name)) for seen in found.kept),
+            note_paragraph("Blue: lip gap relative to the eye distance. Ochre: sound intensity, 25 to 85 dB."),
+            *(_kept_item(seen, pictures.get(seen.name)) for seen in found.kept),
         ],
     )
 
 
 def thumbnails(found: Observations) -> dict[str, NDArray[np.uint8]]:
-    """A picture of each recording by its name; those that cannot be read are missing."""
+    """A frame of each recording by name; recordings that cannot be read are missing."""
     wanted: dict[Path, list[tuple[float, str]]] = {}
     for seen in found.kept:
         middle = seen.quality.cut + len(seen.landmarks) / seen.fps / 2
         wanted.setdefault(seen.video, []).append((middle, seen.name))
     for refusal in found.refused:
         wanted.setdefault(refusal.video, []).append((refusal.at, refusal.name))
-    return {name: picture for video, moments in wanted.items() for name, picture in _at(video, sorted(moments))}
+    return {
+        name: picture for video, moments in wanted.items() for name, picture in _read_pictures(video, sorted(moments))
+    }
 
 
-def _at(video: Path, moments: Sequence[tuple[float, str]]) -> Iterator[tuple[str, NDArray[np.uint8]]]:
-    waiting = list(reversed(moments))
+def _read_pictures(video: Path, moments: Sequence[tuple[float, str]]) -> Iterator[tuple[str, NDArray[np.uint8]]]:
+    remaining = list(reversed(moments))
     try:
         for picture in read_frames(video):
-            while waiting and picture.time >= waiting[-1][0]:
-                yield waiting.pop()[1], picture.pixels
-            if not waiting:
+            while remaining and picture.time >= remaining[-1][0]:
+                yield remaining.pop()[1], picture.pixels
+            if not remaining:
                 return
     except (DataError, InputError):
-        return  # a video that cannot be read has no picture; its refusal is in the list
+        return  # a video that cannot be read has no frame; the list of refusals has its reason
 
 
 def _summary(found: Observations) -> str:
@@ -93,15 +95,15 @@ def _summary(found: Observations) -> str:
     if found.kept:
         lines.append(f"Frames per second: {found.kept[0].fps:g}.")
     if recognised:
-        lines.append(f"{recognised} have no transcript: their phones were recognised automatically, with errors.")
+        lines.append(f"{recognised} have no transcript; their phones were recognised automatically and contain errors.")
     if lags:
-        lines.append(f"Sound and picture were synchronised by {', '.join(f'{1000 * lag:+.0f} ms' for lag in lags)}.")
+        lines.append(f"Audio delays corrected: {', '.join(f'{1000 * lag:+.0f} ms' for lag in lags)}.")
     return paragraphs(*lines)
 
 
 def _measures(kept: Sequence[Observation]) -> str:
     if not kept:
-        return paragraphs("No recording was kept.")
+        return paragraphs("No recordings were kept.")
     limits = {limit.measure: limit for limit in LIMITS}
     rows = []
     for measure, (label, unit, factor) in MEASURES.items():
@@ -116,21 +118,21 @@ def _phones(kept: Iterable[Observation]) -> str:
     counts = Counter(phone for seen in kept for phone in seen.phones.phones if phone != SILENCE)
     spoken = ", ".join(f"{phone} {count}" for phone, count in counts.most_common()) or "none"
     missing = ", ".join(sorted({phone for phone in ARPABET.values() if phone not in counts})) or "none"
-    return paragraphs(spoken, f"English phones never spoken: {missing}")
+    return paragraphs(spoken, f"English phones that do not occur: {missing}")
 
 
-def _refused(refusal: Refusal, picture: NDArray[np.uint8] | None) -> str:
+def _refused_item(refusal: Refusal, picture: NDArray[np.uint8] | None) -> str:
     return _item(refusal.name, f'<p class="bad">{escape(refusal.reason)}</p>', picture)
 
 
-def _kept(seen: Observation, picture: NDArray[np.uint8] | None) -> str:
+def _kept_item(seen: Observation, picture: NDArray[np.uint8] | None) -> str:
     texts = []
     for measure, (label, unit, factor) in MEASURES.items():
         value = factor * getattr(seen.quality, measure)
         if measure in {"confidence", "snr_db", "turn_deg"} or (value != 0 and measure != "score"):
             texts.append(f"{label} {value:.3g} {unit}".strip())
     how = " (phones recognised)" if seen.is_recognised else ""
-    return _item(seen.name, note("; ".join(texts) + how) + utterance_curves(seen), picture)
+    return _item(seen.name, note_paragraph("; ".join(texts) + how) + utterance_curves(seen), picture)
 
 
 def _item(name: str, content: str, picture: NDArray[np.uint8] | None) -> str:
@@ -139,7 +141,7 @@ def _item(name: str, content: str, picture: NDArray[np.uint8] | None) -> str:
 
 
 def utterance_curves(seen: Observation) -> str:
-    """Gap of the lips and intensity over time, with words and phones above (SVG)."""
+    """Plot of lip gap and intensity over time, with words and phones above (SVG)."""
     times = np.arange(len(seen.landmarks)) / seen.fps
     width = len(times) / seen.fps * PX_PER_S + SIDES
 

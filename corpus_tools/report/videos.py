@@ -1,4 +1,4 @@
-"""Small films inside a page: the recording, and beside it the default head with the synthesised motion."""
+"""Short videos in a page: the recording beside the default head with the synthesised motion."""
 
 from base64 import b64encode
 from collections.abc import Iterator, Sequence
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.evaluation.evaluate import SplitResult
 from corpus_tools.evaluation.reference import ReferenceUtterance
-from corpus_tools.report.page import note
+from corpus_tools.report.page import note_paragraph
 from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
@@ -24,15 +24,15 @@ from tts2face.types import Trajectory
 from tts2face.video.media import read_frames
 
 SIDE_PX = 240
-SETTINGS = {"crf": "26", "preset": "veryfast"}  # some 100 kB a sentence
+SETTINGS = {"crf": "26", "preset": "veryfast"}  # about 100 kB per sentence
 NOTE = "Left: the recording; right: {method} on the default head. No sound."
 
 
-class Films:
-    """Films of the motion that one method synthesised; the head is loaded with the first film."""
+class MethodVideos:
+    """Videos of the motion synthesised by one method; the head is loaded on first use."""
 
     def __init__(self, method: str) -> None:
-        """Films of `method`."""
+        """Videos of the motion synthesised by `method`."""
         self._method = method
 
     @cached_property
@@ -43,10 +43,10 @@ class Films:
     def _renderer(self) -> MeshRenderer:
         return mesh_renderer(self._face, Picture(size=f"{SIDE_PX}x{SIDE_PX}", camera="close"))
 
-    def film(self, run: SplitResult, at: int) -> str:
-        """A film of one utterance (HTML); empty where its video is missing or shows too few pictures."""
+    def render_tag(self, run: SplitResult, at: int) -> str:
+        """Video of one utterance (HTML); empty if the recording is missing or too short."""
         one = run.real[at]
-        seen = list(pictures_of(one))
+        seen = list(judged_pictures(one))
         if len(seen) < one.judged.stop - one.judged.start:
             return ""
         speech = Trajectory(speech_channels(run.model), run.made[self._method][at], one.observation.fps)
@@ -55,11 +55,11 @@ class Films:
             np.concatenate([letterbox(pixels), self._renderer.draw(row)], axis=1)
             for pixels, row in zip(seen, weights[one.judged], strict=False)
         ]
-        return film_tag(sides, one.observation.fps, NOTE.format(method=self._method))
+        return video_tag(sides, one.observation.fps, NOTE.format(method=self._method))
 
 
-def pictures_of(one: ReferenceUtterance) -> Iterator[NDArray[np.uint8]]:
-    """The pictures of an utterance's judged frames; fewer where the video cannot be read."""
+def judged_pictures(one: ReferenceUtterance) -> Iterator[NDArray[np.uint8]]:
+    """The pictures of an utterance's evaluated frames; fewer if the video cannot be read."""
     seen = one.observation
     instants = seen.quality.cut + (np.arange(one.judged.start, one.judged.stop) - 0.5) / seen.fps
     at = 0
@@ -71,11 +71,11 @@ def pictures_of(one: ReferenceUtterance) -> Iterator[NDArray[np.uint8]]:
             if at == len(instants):
                 return
     except (DataError, InputError):
-        return  # the video was removed after the evaluation; its curves are shown all the same
+        return  # the video was removed after the evaluation; the page shows its curves only
 
 
 def letterbox(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """An (H, W, 3) picture in the middle of a black square of `SIDE_PX`."""
+    """An (H, W, 3) picture scaled to fit a black square of `SIDE_PX`."""
     from PIL import Image
 
     shown = Image.fromarray(pixels)
@@ -85,8 +85,8 @@ def letterbox(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(square)
 
 
-def film_tag(pictures: Sequence[NDArray[np.uint8]], fps: float, text: str) -> str:
-    """A silent film that repeats inside the page, with a note below it."""
+def video_tag(pictures: Sequence[NDArray[np.uint8]], fps: float, text: str) -> str:
+    """A silent looping video embedded in the page, with a note below it."""
     import av
 
     height, width = pictures[0].shape[:2]
@@ -100,5 +100,5 @@ def film_tag(pictures: Sequence[NDArray[np.uint8]], fps: float, text: str) -> st
     data = b64encode(content.getvalue()).decode()
     return (
         f'<video autoplay loop muted playsinline controls width="{width}" height="{height}" '
-        f'src="data:video/mp4;base64,{data}"></video>\n{note(text)}'
+        f'src="data:video/mp4;base64,{data}"></video>\n{note_paragraph(text)}'
     )

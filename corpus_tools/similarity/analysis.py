@@ -1,4 +1,4 @@
-"""The complete analysis of one talker's similarity table."""
+"""Analysis of a talker's phone similarity table."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,7 +20,13 @@ from corpus_tools.similarity.compare import Comparison, compare_tables
 from corpus_tools.similarity.consistency import Consistency, mode_consistency, movement_consistency
 from corpus_tools.similarity.mantel import Agreement, articulatory_distances, mantel
 from corpus_tools.similarity.reliability import Reliability, split_half
-from corpus_tools.similarity.tokens import LEAST_PHONES, SimilarityTable, SpokenTokens, similarity_table, spoken_tokens
+from corpus_tools.similarity.tokens import (
+    LEAST_PHONES,
+    SimilarityTable,
+    SpokenTokens,
+    collect_spoken_tokens,
+    similarity_table,
+)
 from lexicon.errors import InputError
 from lexicon.phones import look_up_phone
 from tts2face.exemplar.similarity import PhoneSimilarity
@@ -56,9 +62,9 @@ class Analysis:
     """All results on one talker's similarity table.
 
     ``curve`` holds classes for every number from 2 to P - 1, ``chosen`` those of the options, ``best`` the one with the
-    highest silhouette. ``by_words`` is None where the corpus has too few different words; ``by_utterances_alike``
-    compares the phones of ``by_words`` between halves of the utterances. ``articulation`` (P, P) are distances of the
-    phones by their features, ``articulatory`` how they agree with the table: all phones first, then consonants, vowels.
+    highest silhouette. ``by_words`` is None if the corpus has too few different words; ``by_utterances_same_phones``
+    compares the phones of ``by_words`` between halves of the utterances. ``articulation`` (P, P) are articulatory
+    distances of the phones, ``articulatory`` their agreement with the table: all phones, consonants, vowels.
     """
 
     name: str
@@ -72,7 +78,7 @@ class Analysis:
     best: VisemeClasses
     by_utterances: Reliability
     by_words: Reliability | None
-    by_utterances_alike: Reliability | None
+    by_utterances_same_phones: Reliability | None
     articulation: NDArray[np.float64]
     articulatory: tuple[tuple[str, Agreement], ...]
     movements: Consistency
@@ -95,16 +101,16 @@ def analyse(
         raise InputError(f"a reliability needs at least 2 random halves, not {options.halves}")
     if options.seed < 0:
         raise InputError(f"a seed is a whole number from 0, not {options.seed}")
-    spoken = spoken_tokens(subject.talker, subject.name)
+    spoken = collect_spoken_tokens(subject.talker, subject.name)
     table = similarity_table(spoken)
-    numbers = _numbers(options, len(table.phones))
-    against = None if other is None else similarity_table(spoken_tokens(other.talker, other.name))
-    apart = distances(table.matrix)
-    tree = cluster_tree(apart)
-    curve = tuple(viseme_classes(apart, tree, n) for n in range(2, len(table.phones)))
-    by_utterances, by_words, alike = _halves(spoken, options, on_progress)
+    numbers = _class_numbers(options, len(table.phones))
+    against = None if other is None else similarity_table(collect_spoken_tokens(other.talker, other.name))
+    distance = distances(table.matrix)
+    tree = cluster_tree(distance)
+    curve = tuple(viseme_classes(distance, tree, n) for n in range(2, len(table.phones)))
+    by_utterances, by_words, same_phones = _split_halves(spoken, options, on_progress)
     if by_utterances is None:
-        raise InputError(f"halves of {subject.name}'s utterances share too few phones; record more")
+        raise InputError(f"halves of {subject.name}'s utterances have too few phones in common; record more")
     similarity = PhoneSimilarity(table.phones, table.matrix)
     articulation = articulatory_distances(table.phones)
     return Analysis(
@@ -115,20 +121,20 @@ def analyse(
         tuple(tuple(similarity.nearest(phone, N_NEIGHBOURS)) for phone in table.phones),
         tree,
         curve,
-        tuple(viseme_classes(apart, tree, n) for n in numbers),
+        tuple(viseme_classes(distance, tree, n) for n in numbers),
         best_classes(curve),
         by_utterances,
         by_words,
-        alike,
+        same_phones,
         articulation,
-        _articulatory(table.phones, apart, articulation, options),
+        _articulatory_agreement(table.phones, distance, articulation, options),
         movement_consistency(spoken, table.phones, subject.talker.model),
         mode_consistency(spoken, table.phones, subject.talker.model),
-        _compared(table, against, other, options),
+        _compare(table, against, other, options),
     )
 
 
-def _numbers(options: Options, n_phones: int) -> tuple[int, ...]:
+def _class_numbers(options: Options, n_phones: int) -> tuple[int, ...]:
     if options.classes is None:
         return tuple(n for n in USUAL_CLASSES if n < n_phones)
     for n in options.classes:
@@ -136,10 +142,10 @@ def _numbers(options: Options, n_phones: int) -> tuple[int, ...]:
     return tuple(sorted(set(options.classes)))
 
 
-def _halves(
+def _split_halves(
     spoken: SpokenTokens, options: Options, on_progress: Progress | None
 ) -> tuple[Reliability | None, Reliability | None, Reliability | None]:
-    """Halves of the utterances, of the words, and of the utterances over the phones that the second could compare."""
+    """Reliability by utterances, by words, and by utterances over the phones compared by words."""
     n, done = options.halves, 0
 
     def step() -> None:
@@ -157,21 +163,21 @@ def _halves(
     return by_utterances, by_words, split_half(spoken, spoken.utterance, n, stream, among=among, on_half=step)
 
 
-def _articulatory(
-    phones: tuple[str, ...], apart: NDArray[np.float64], articulation: NDArray[np.float64], options: Options
+def _articulatory_agreement(
+    phones: tuple[str, ...], distance: NDArray[np.float64], articulation: NDArray[np.float64], options: Options
 ) -> tuple[tuple[str, Agreement], ...]:
     """Agreement over all phones, and within consonants and vowels where there are `LEAST_PHONES` of them."""
     vowel = np.array([look_up_phone(phone).is_vowel for phone in phones])
     stream = _stream(options, "articulation")
-    made = []
+    agreements = []
     for name, kept in (("all phones", vowel | True), ("consonants", ~vowel), ("vowels", vowel)):
         at = np.flatnonzero(kept)
         if len(at) >= LEAST_PHONES:
-            made.append((name, mantel(apart[np.ix_(at, at)], articulation[np.ix_(at, at)], stream)))
-    return tuple(made)
+            agreements.append((name, mantel(distance[np.ix_(at, at)], articulation[np.ix_(at, at)], stream)))
+    return tuple(agreements)
 
 
-def _compared(
+def _compare(
     table: SimilarityTable, against: SimilarityTable | None, other: NamedTalker | None, options: Options
 ) -> Comparison | None:
     if against is None or other is None:

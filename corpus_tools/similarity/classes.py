@@ -1,4 +1,4 @@
-"""Viseme classes from data: phones clustered by similarity, and the silhouettes of the classes."""
+"""Viseme classes by hierarchical clustering of phones, and their silhouettes."""
 
 from dataclasses import dataclass
 
@@ -13,8 +13,8 @@ class Tree:
     """Average-linkage clustering of P phones.
 
     ``links`` (P - 1, 4) is scipy's linkage matrix: the two clusters joined (phones are 0 to P - 1, join i makes cluster
-    P + i), their distance, the number of phones. ``order`` (P,) is the phones from one end of the dendrogram to the
-    other, with the most similar neighbours that the tree allows (Bar-Joseph et al. 2001).
+    P + i), their distance, the number of phones. ``order`` (P,) are the phones in the optimal leaf order of the
+    dendrogram (Bar-Joseph et al. 2001).
     """
 
     links: NDArray[np.float64]
@@ -35,15 +35,15 @@ class VisemeClasses:
 
     @property
     def silhouette(self) -> float:
-        """Mean over the phones; near 1 where classes are separate, 0 where they touch."""
+        """Mean over the phones: near 1 for separate classes, 0 for touching ones."""
         return float(self.silhouettes.mean())
 
 
 def distances(similarity: NDArray[np.floating]) -> NDArray[np.float64]:
     """(P, P) 1 - similarity, exactly symmetric, 0 on the diagonal."""
-    apart = 1.0 - (similarity + similarity.T) / 2.0
-    np.fill_diagonal(apart, 0.0)
-    return np.asarray(apart, np.float64)
+    distance = 1.0 - (similarity + similarity.T) / 2.0
+    np.fill_diagonal(distance, 0.0)
+    return np.asarray(distance, np.float64)
 
 
 def cluster_tree(distance: NDArray[np.floating]) -> Tree:
@@ -55,13 +55,13 @@ def cluster_tree(distance: NDArray[np.floating]) -> Tree:
     return Tree(np.asarray(links, np.float64), leaves_list(links).astype(np.int64))
 
 
-def cut(tree: Tree, n_classes: int) -> NDArray[np.int64]:
+def cut_into_classes(tree: Tree, n_classes: int) -> NDArray[np.int64]:
     """(P,) class of each phone when the tree is cut into exactly `n_classes`, numbered in the dendrogram's order.
 
     Raises
     ------
     InputError
-        There are fewer than 2 classes, or more than phones.
+        `n_classes` is below 2 or above the number of phones.
     """
     from scipy.cluster.hierarchy import cut_tree
 
@@ -72,7 +72,7 @@ def cut(tree: Tree, n_classes: int) -> NDArray[np.int64]:
 
 
 def check_classes(n_classes: int, n_phones: int) -> None:
-    """Check a number of classes; errors as `cut`."""
+    """Check a number of classes; errors as `cut_into_classes`."""
     if not 2 <= n_classes <= n_phones:
         raise InputError(f"{n_phones} phones cannot make {n_classes} classes; give a number from 2 to {n_phones}")
 
@@ -94,7 +94,7 @@ def silhouettes(distance: NDArray[np.floating], labels: NDArray[np.integer]) -> 
     if distance.shape != (len(labels), len(labels)) or n_classes < 2:
         raise InputError(f"a silhouette needs two classes and a square matrix; got {n_classes} and {distance.shape}")
     if n_classes == len(labels):
-        return np.zeros(len(labels))  # scikit-learn refuses classes of one item each
+        return np.zeros(len(labels))  # scikit-learn rejects classes of one item each
     try:
         from sklearn.metrics import silhouette_samples
     except ImportError as missing:
@@ -103,11 +103,11 @@ def silhouettes(distance: NDArray[np.floating], labels: NDArray[np.integer]) -> 
 
 
 def viseme_classes(distance: NDArray[np.floating], tree: Tree, n_classes: int) -> VisemeClasses:
-    """The classes of a cut and their silhouettes; errors as `cut`."""
-    labels = cut(tree, n_classes)
+    """The classes of a cut and their silhouettes; errors as `cut_into_classes`."""
+    labels = cut_into_classes(tree, n_classes)
     return VisemeClasses(labels, silhouettes(distance, labels))
 
 
 def best_classes(candidates: tuple[VisemeClasses, ...]) -> VisemeClasses:
-    """The classes with the highest mean silhouette; the fewest of equals."""
+    """The classes with the highest mean silhouette; among equals, the fewest."""
     return max(candidates, key=lambda classes: (classes.silhouette, -classes.n_classes))

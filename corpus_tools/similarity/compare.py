@@ -12,7 +12,7 @@ from lexicon.errors import InputError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """Two tables over the P phones that both have.
+    """Comparison of two tables over their P common phones.
 
     ``difference`` (P, P) is the first talker's similarity minus the other's; ``per_phone`` (P,) the mean size of a
     phone's differences; ``left_out`` are phones of one talker only.
@@ -25,7 +25,7 @@ class Comparison:
     agreement: Agreement
     left_out: tuple[str, ...]
 
-    def largest(self, n: int = 10) -> list[tuple[str, str, float]]:
+    def largest_differences(self, n: int = 10) -> list[tuple[str, str, float]]:
         """The n pairs that differ most: phone, phone, difference."""
         rows, columns = np.triu_indices(len(self.phones), 1)
         sizes = self.difference[rows, columns]
@@ -39,20 +39,20 @@ def compare_tables(one: SimilarityTable, two: SimilarityTable, other: str, strea
     Raises
     ------
     InputError
-        They share fewer than `LEAST_PHONES` phones.
+        They have fewer than `LEAST_PHONES` phones in common.
     """
     common = tuple(phone for phone in one.phones if phone in two.phones)
     if len(common) < LEAST_PHONES:
         raise InputError(
-            f"the talkers share {len(common)} phones, and a comparison needs {LEAST_PHONES}; compare others"
+            f"the talkers have {len(common)} phones in common; a comparison needs {LEAST_PHONES}; choose another talker"
         )
-    a, b = _among(one, common), _among(two, common)
+    a, b = _select_phones(one, common), _select_phones(two, common)
     difference = a - b
     per_phone = np.abs(difference).sum(axis=1) / (len(common) - 1)
     apart = sorted({*one.phones, *two.phones} - set(common))
     return Comparison(other, common, difference, per_phone, mantel(a, b, stream), tuple(apart))
 
 
-def _among(table: SimilarityTable, phones: tuple[str, ...]) -> NDArray[np.float64]:
+def _select_phones(table: SimilarityTable, phones: tuple[str, ...]) -> NDArray[np.float64]:
     at = [table.phones.index(phone) for phone in phones]
     return table.matrix[np.ix_(at, at)]

@@ -1,4 +1,4 @@
-"""How much each movement of the mouth varies within the phones: which movements a phone constrains."""
+"""Variation of mouth movements within phones: which movements each phone constrains."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -33,13 +33,13 @@ MOVEMENTS: Mapping[str, tuple[tuple[int, int, float], ...]] = MappingProxyType({
     "corner raise": ((MOUTH_CORNER_LEFT, Y, 0.5), (MOUTH_CORNER_RIGHT, Y, 0.5)),
     "sideways": ((MOUTH_CORNER_LEFT, X, 0.5), (MOUTH_CORNER_RIGHT, X, 0.5)),
 })  # fmt: skip
-LEAST_MM = 0.1  # a mode with smaller movements at one spread is named fine detail
+LEAST_MM = 0.1  # modes with smaller movements at one standard deviation are named fine detail
 N_NAMED = 2  # movements in a mode's name
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Consistency:
-    """How far P phones constrain K movements (or modes).
+    """Variation of K movements (or modes) within P phones.
 
     Parameters
     ----------
@@ -67,17 +67,17 @@ def movement_weights(model: ShapeModel) -> NDArray[np.float64]:
 
 
 def movement_consistency(spoken: SpokenTokens, phones: tuple[str, ...], model: ShapeModel) -> Consistency:
-    """How far the phones constrain each of the `MOVEMENTS`."""
+    """Variation of each of the `MOVEMENTS` within the phones."""
     return _consistency(spoken, phones, spoken.samples @ movement_weights(model).T, tuple(MOVEMENTS))
 
 
 def mode_consistency(spoken: SpokenTokens, phones: tuple[str, ...], model: ShapeModel) -> Consistency:
-    """How far the phones constrain each speech parameter, named by the movements it makes."""
+    """Variation of each speech parameter within the phones, named by its largest movements."""
     return _consistency(spoken, phones, spoken.samples.astype(np.float64), mode_names(model))
 
 
 def mode_names(model: ShapeModel) -> tuple[str, ...]:
-    """The largest movements of each speech parameter in mm at one spread, like ``opening -4.6, jaw lowering -2.6``."""
+    """Largest movements (mm) of each parameter at one standard deviation, as ``opening -4.6, jaw lowering -2.6``."""
     amounts = movement_weights(model) * model.spread[: model.n_speech]
     names, kinds = [], tuple(MOVEMENTS)
     for column in amounts.T:
@@ -89,7 +89,7 @@ def mode_names(model: ShapeModel) -> tuple[str, ...]:
 def _consistency(
     spoken: SpokenTokens, phones: tuple[str, ...], values: NDArray[np.floating], names: tuple[str, ...]
 ) -> Consistency:
-    """Spread within and over phones of (N, S, K) values, sample by sample, averaged over the samples."""
+    """Standard deviations within and over phones of (N, S, K) values, averaged over the samples."""
     sounding = spoken.phone != spoken.inventory.index(SILENCE)
     total = values[sounding].var(axis=0).mean(axis=0)
     within = np.zeros((len(phones), values.shape[2]))

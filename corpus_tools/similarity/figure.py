@@ -1,4 +1,4 @@
-"""The figures of the analysis: tables of phones as heat maps, class numbers, articulation, free movements."""
+"""Figures of the analysis: heat maps of phones, silhouettes, articulation, variation of movements."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,8 +12,8 @@ from corpus_tools.report.drawing import FIRST, INK, RULE, SECOND, SOFT, Tip, dra
 from corpus_tools.similarity.analysis import Analysis
 from corpus_tools.similarity.classes import cluster_tree
 from corpus_tools.similarity.compare import Comparison
-from corpus_tools.similarity.labels import label
 from corpus_tools.similarity.mantel import upper_triangle
+from corpus_tools.similarity.tokens import phone_label
 from lexicon.phones import look_up_phone
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ CELL = 20  # px of a heat map
 TREE, LABEL, MARGIN = 170, 62, 14  # px: width of the dendrogram, room for "tʃ CH", border
 HEAD, FOOT = 30, 74  # px: the title above, the scales below
 BAR = (240, 12)  # px of the colour scale
-# Lightness changes evenly along viridis and cividis, so that they also read in grey; PuOr tells its ends apart to
+# Lightness changes evenly along viridis and cividis, so that they also work in grey; the ends of PuOr are distinct for
 # colour-blind readers.
 LIKENESS, DIFFERENCE, FREEDOM = "viridis", "PuOr_r", "cividis"
 FREE_RANGE = (0.3, 1.2)
@@ -36,9 +36,9 @@ SIZE = (560, 300)  # px of a small plot
 class TableFigure:
     """A heat map of P phones in the order of its rows.
 
-    ``values`` (P, P), coloured by ``colours`` over ``limits``, which mean ``scale``; ``blocks`` are the first rows of
-    the classes, and P; ``joins`` (P - 1, 4, 2) the dendrogram's brackets as corners (1 - similarity, row), none
-    without one; ``cut`` the 1 - similarity between the classes.
+    ``values`` (P, P) are coloured by the colour map ``colours`` over ``limits``; ``scale`` labels the colour bar;
+    ``blocks`` are the first rows of the classes, and P; ``joins`` (P - 1, 4, 2) the dendrogram's brackets as corners
+    (1 - similarity, row), or None; ``cut`` the 1 - similarity at which the tree is cut.
     """
 
     title: str
@@ -62,13 +62,13 @@ def tree_joins(links: Floats) -> Floats:
 
 
 def similarity_figure(found: Analysis, labels: str) -> TableFigure:
-    """The similarity table in the dendrogram's order, with its best classes framed."""
+    """The similarity table in the dendrogram's order, with frames around the best classes."""
     order, n_classes = found.tree.order, found.best.n_classes
     n = len(order)
     starts = [0, *(np.flatnonzero(np.diff(found.best.labels[order])) + 1).tolist(), n]
     return TableFigure(
         f"Similarity of phones: {found.name}",
-        tuple(label(found.table.phones[at], labels) for at in order),
+        tuple(phone_label(found.table.phones[at], labels) for at in order),
         found.table.matrix[np.ix_(order, order)],
         LIKENESS,
         (0.0, 1.0),
@@ -80,13 +80,13 @@ def similarity_figure(found: Analysis, labels: str) -> TableFigure:
 
 
 def difference_figure(found: Analysis, compared: Comparison, labels: str) -> TableFigure:
-    """The differences of two talkers; phones with similar differences are neighbours."""
-    apart = np.sqrt(np.square(compared.difference[:, None] - compared.difference[None, :]).sum(axis=2))
-    order = cluster_tree(apart).order
+    """The differences of two talkers, ordered by similarity of the differences."""
+    distance = np.sqrt(np.square(compared.difference[:, None] - compared.difference[None, :]).sum(axis=2))
+    order = cluster_tree(distance).order
     largest = max(0.1, float(np.ceil(np.abs(compared.difference).max() * 10) / 10))
     return TableFigure(
         f"{found.name} minus {compared.other}",
-        tuple(label(compared.phones[at], labels) for at in order),
+        tuple(phone_label(compared.phones[at], labels) for at in order),
         compared.difference[np.ix_(order, order)],
         DIFFERENCE,
         (-largest, largest),
@@ -95,7 +95,7 @@ def difference_figure(found: Analysis, compared: Comparison, labels: str) -> Tab
 
 
 def table_svg(table: TableFigure) -> str:
-    """The heat map for a page, with each number under the mouse."""
+    """The heat map for a page, with the value of each cell as tooltip."""
     return draw_svg(lambda figure: draw_table(figure, table), *_table_size(table), table.title)
 
 
@@ -194,7 +194,7 @@ def articulation_svg(found: Analysis, labels: str) -> str:
         axes.set_xlim(0, apart.max() * 1.03)
         axes.legend(loc="upper right")
         return [
-            Tip(axes, x, y, f"{label(phones[a], labels)} – {label(phones[b], labels)}: {y:.3f}")
+            Tip(axes, x, y, f"{phone_label(phones[a], labels)} – {phone_label(phones[b], labels)}: {y:.3f}")
             for a, b, x, y in zip(rows, columns, apart, alike, strict=True)
         ]
 

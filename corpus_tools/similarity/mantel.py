@@ -15,7 +15,7 @@ N_PERMUTATIONS = 9999
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """Correlation `r` of two tables over their pairs, and the share `p` of shuffled tables that agree as well."""
+    """Correlation `r` of two tables over their pairs, and its one-sided permutation p-value `p`."""
 
     r: float
     p: float
@@ -39,14 +39,16 @@ def mantel(
     Raises
     ------
     InputError
-        The tables differ in shape, have fewer than 3 items, or all pairs of one are alike.
+        The tables differ in shape, have fewer than 3 items, or one of them is constant.
 
     Notes
     -----
     Pearson over the upper triangles; ``p = (1 + shuffles with at least this r) / (1 + shuffles)`` (Mantel 1967).
     """
     if first.shape != second.shape or len(first) < 3:
-        raise InputError(f"two tables over the same 3 items or more are needed, not {first.shape} and {second.shape}")
+        raise InputError(
+            f"the test needs two square tables over the same 3 items or more, not {first.shape} and {second.shape}"
+        )
     orders = np.array([stream.permutation(len(first)) for _ in range(n_permutations)])
     found = pearson(upper_triangle(first), upper_triangle(second))
     if np.isnan(found):
@@ -74,7 +76,7 @@ def _standardize(values: NDArray[np.floating]) -> NDArray[np.float64]:
 
 def articulatory_distances(phones: tuple[str, ...]) -> NDArray[np.float64]:
     """(P, P) distance of the phones by their articulatory features (`lexicon.phones.phone_distance`)."""
-    made = np.zeros((len(phones), len(phones)))
+    distance = np.zeros((len(phones), len(phones)))
     for a, b in combinations(range(len(phones)), 2):
-        made[a, b] = made[b, a] = phone_distance(phones[a], phones[b])
-    return made
+        distance[a, b] = distance[b, a] = phone_distance(phones[a], phones[b])
+    return distance

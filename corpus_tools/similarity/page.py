@@ -1,11 +1,11 @@
-"""The analysis as a page for people who study visual speech."""
+"""HTML page of a similarity analysis."""
 
 from collections.abc import Sequence
 from html import escape
 
 import numpy as np
 
-from corpus_tools.report.page import note, page, paragraphs, table, wide
+from corpus_tools.report.page import note_paragraph, page, paragraphs, scroll_box, table
 from corpus_tools.similarity.analysis import Analysis
 from corpus_tools.similarity.classes import VisemeClasses
 from corpus_tools.similarity.compare import Comparison
@@ -18,10 +18,9 @@ from corpus_tools.similarity.figure import (
     similarity_figure,
     table_svg,
 )
-from corpus_tools.similarity.labels import label
 from corpus_tools.similarity.mantel import N_PERMUTATIONS
 from corpus_tools.similarity.reliability import Reliability
-from corpus_tools.similarity.tokens import LEAST_TOKENS
+from corpus_tools.similarity.tokens import LEAST_TOKENS, phone_label
 
 N_DIFFERENT = 10
 
@@ -31,10 +30,10 @@ def similarity_page(found: Analysis, labels: str) -> str:
     parts = [
         _summary(found),
         "<h2>Phone by phone</h2>",
-        note("Without silence. Point at a cell for its number."),
-        wide(table_svg(similarity_figure(found, labels))),
+        note_paragraph("Without silence. Hover over a cell for its value."),
+        scroll_box(table_svg(similarity_figure(found, labels))),
         "<h2>Most similar phones</h2>",
-        note(
+        note_paragraph(
             "Table 1 of Theobald et al. 2007. Agreement: correlation of a phone's similarities between random halves."
         ),
         _neighbours(found, labels),
@@ -67,11 +66,11 @@ def _summary(found: Analysis) -> str:
 def _neighbours(found: Analysis, labels: str) -> str:
     rows = [
         (
-            label(phone, labels),
+            phone_label(phone, labels),
             str(count),
-            *(f"{label(near, labels)} {value:.3f}" for near, value in ranked),
+            *(f"{phone_label(near, labels)} {value:.3f}" for near, value in ranked),
             f"{silence:.2f}",
-            f"{agreement:.2f}" if np.isfinite(agreement) else f"under {LEAST_TOKENS} tokens a half",
+            f"{agreement:.2f}" if np.isfinite(agreement) else f"under {LEAST_TOKENS} tokens per half",
         )
         for phone, count, ranked, silence, agreement in zip(
             found.table.phones,
@@ -93,25 +92,25 @@ def _classes(found: Analysis, labels: str) -> list[str]:
         (
             f"{n} (best)" if n == found.best.n_classes else str(n),
             f"{classes.silhouette:.3f}",
-            members(found, classes, labels),
+            class_members(found, classes, labels),
         )
         for n, classes in sorted(shown.items())
     ]
     return [
-        note(
+        note_paragraph(
             "Average linkage on 1 - similarity, cut into the given number of classes. A phone's silhouette is near 1 "
-            "where it is similar to its own class and dissimilar to the nearest other; 0 for a phone alone."
+            "if it is similar to its own class and dissimilar to the nearest other; 0 for a single phone."
         ),
         silhouettes_svg(found),
         table(("classes", "silhouette", "phones"), rows, numbers=(1,)),
     ]
 
 
-def members(found: Analysis, classes: VisemeClasses, labels: str) -> str:
+def class_members(found: Analysis, classes: VisemeClasses, labels: str) -> str:
     """The phones of each class, in the dendrogram's order."""
     grouped: list[list[str]] = [[] for _ in range(classes.n_classes)]
     for at in found.tree.order:
-        unbroken = label(found.table.phones[at], labels).replace(" ", "\N{NO-BREAK SPACE}")
+        unbroken = phone_label(found.table.phones[at], labels).replace(" ", "\N{NO-BREAK SPACE}")
         grouped[classes.labels[at]].append(unbroken)
     return "  |  ".join((", " if labels == "both" else " ").join(group) for group in grouped)
 
@@ -120,22 +119,22 @@ def _reliability(found: Analysis, labels: str) -> list[str]:
     splits: list[tuple[str, Reliability | None]] = [
         ("utterances", found.by_utterances),
         ("words", found.by_words),
-        ("utterances, phones of the words", found.by_utterances_alike),
+        ("utterances, phones of the words", found.by_utterances_same_phones),
     ]
     rows = [_reliability_row(name, split) for name, split in splits]
     left = [
         f"Not compared between halves of {name}, with fewer than {LEAST_TOKENS} tokens in a half: "
-        f"{', '.join(label(phone, labels) for phone in split.left_out)}."
+        f"{', '.join(phone_label(phone, labels) for phone in split.left_out)}."
         for name, split in splits
-        if split is not None and split.left_out and split is not found.by_utterances_alike
+        if split is not None and split.left_out and split is not found.by_utterances_same_phones
     ]
     head = ("halves of", "halves", "phones", "correlation", "lowest", "highest", "whole (Spearman-Brown)")
     return [
-        note(
+        note_paragraph(
             f"The corpus is split in two at random, {found.options.halves} times; a table is computed from each half, "
             "and the two are correlated over the pairs of phones. Halves of the utterances contain the same words: "
-            "they measure what more recordings of the same kind would change. Halves of the words have no word in "
-            "common: they measure what other words would change."
+            "they measure the effect of more recordings of the same kind. Halves of the words have no word in "
+            "common: they measure the effect of other words."
         ),
         table(head, rows, numbers=range(1, 7)),
         paragraphs(*left),
@@ -157,12 +156,12 @@ def _articulation(found: Analysis, labels: str) -> list[str]:
         for name, agreement in found.articulatory
     ]
     return [
-        note(
-            "Mantel test: correlation r of the distances on the face with those by articulatory features, and the "
+        note_paragraph(
+            "Mantel test: correlation r of the similarity distances with articulatory distances, and the "
             f"share p of {N_PERMUTATIONS} permutations with at least this r."
         ),
         table(("phones", "pairs", "r", "p"), agreements, numbers=(1, 2, 3)),
-        note("One mark for each pair of phones; point at it for their names."),
+        note_paragraph("One mark for each pair of phones; hover over it for their names."),
         articulation_svg(found, labels),
     ]
 
@@ -170,26 +169,26 @@ def _articulation(found: Analysis, labels: str) -> list[str]:
 def _consistency(found: Analysis, labels: str) -> list[str]:
     movements, modes = found.movements, found.modes
     order = found.tree.order
-    names = [label(found.table.phones[at], labels) for at in order]
+    names = [phone_label(found.table.phones[at], labels) for at in order]
     rows = [
         (str(number), name, f"{spread:.2f}", f"{share:.2f}")
         for number, (name, spread, share) in enumerate(zip(modes.names, modes.spread, modes.free_share, strict=True))
     ]
     return [
-        note(
-            "Share of each movement's variance that the phones do not explain: that of context and chance. "
+        note_paragraph(
+            "Share of each movement's variance that the phones do not explain, that is, of context and noise. "
             "0: constant within each phone; 1: independent of the phone."
         ),
         shares_svg(movements.names, movements.free_share),
-        note(
-            "Phone by phone: spread within the phone over the spread in all speech. Blue: constrained, whatever the "
-            "context; yellow: as variable as all speech, or more. A phone that occurs in few words seems constrained "
-            "because its context is always the same."
+        note_paragraph(
+            "By phone: standard deviation within the phone relative to all speech. Blue: constrained in any "
+            "context; yellow: at least as variable as all speech. Phones in few words appear constrained because their "
+            "context is always the same."
         ),
-        wide(freedom_svg(names, movements.names, movements.free[order])),
-        note(
-            "The talker's own parameters, named by the movement of one spread of each (mm), with their spread (mm over "
-            "all landmarks together) and the share that the phones do not explain:"
+        scroll_box(freedom_svg(names, movements.names, movements.free[order])),
+        note_paragraph(
+            "The talker's shape parameters, named by their movement at one standard deviation (mm), with their "
+            "standard deviation (mm over all landmarks) and the share that the phones do not explain:"
         ),
         table(("mode", "movement", "spread", "share"), rows, numbers=(0, 2, 3)),
     ]
@@ -200,25 +199,27 @@ def _comparison(found: Analysis, labels: str) -> list[str]:
     if compared is None:
         return []
     agreement = compared.agreement
-    apart = ", ".join(label(phone, labels) for phone in compared.left_out) or "none"
+    apart = ", ".join(phone_label(phone, labels) for phone in compared.left_out) or "none"
     order = np.argsort(-compared.per_phone, kind="stable")[:N_DIFFERENT]
-    phones = [(label(compared.phones[at], labels), f"{compared.per_phone[at]:.3f}") for at in order]
+    phones = [(phone_label(compared.phones[at], labels), f"{compared.per_phone[at]:.3f}") for at in order]
     return [
         paragraphs(
             f"{len(compared.phones)} phones in common; phones of one talker only: {apart}.",
             f"The tables correlate by r = {agreement.r:.3f} over {agreement.n_pairs} pairs; p = {agreement.p:.4f} "
             f"by {agreement.n_permutations} permutations, one-sided.",
         ),
-        note(f"Similarity on {found.name} minus that on {compared.other}: orange where it is higher on {found.name}."),
-        wide(table_svg(difference_figure(found, compared, labels))),
+        note_paragraph(
+            f"Similarity on {found.name} minus that on {compared.other}: orange where it is higher on {found.name}."
+        ),
+        scroll_box(table_svg(difference_figure(found, compared, labels))),
         "<h2>Phones and pairs with the largest differences</h2>",
         table(("phone", "mean difference"), phones, numbers=(1,)),
-        note("Pairs, with the sign of the difference:"),
+        note_paragraph("Pairs with signed differences:"),
         _pairs(compared, labels),
     ]
 
 
 def _pairs(compared: Comparison, labels: str) -> str:
-    pairs = compared.largest(N_DIFFERENT)
-    rows = [(f"{label(a, labels)} – {label(b, labels)}", f"{value:+.3f}") for a, b, value in pairs]
+    pairs = compared.largest_differences(N_DIFFERENT)
+    rows = [(f"{phone_label(a, labels)} – {phone_label(b, labels)}", f"{value:+.3f}") for a, b, value in pairs]
     return table(("pair", "difference"), rows, numbers=(1,))

@@ -1,4 +1,4 @@
-"""Split-half reliability of a similarity table: tables from random halves of the corpus are compared."""
+"""Split-half reliability of a similarity table."""
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
@@ -25,9 +25,9 @@ class Reliability:
     phones, per_phone : P labels, (P,)
         Mean correlation of a phone's similarities to the others; NaN for a phone never compared.
     left_out
-        Phones that had too few tokens in every pair of halves.
+        Phones with too few tokens in every pair of halves.
     n_requested
-        Halves that were drawn.
+        Number of random splits.
     """
 
     correlations: NDArray[np.float64]
@@ -62,21 +62,21 @@ def split_half(
     among: Collection[str] | None = None,
     on_half: Callable[[], None] | None = None,
 ) -> Reliability | None:
-    """Tables from random halves of the `units` (N,), those of utterances or of words, compared.
+    """Agreement of tables from random halves of the `units` (N,): utterances or words of the tokens.
 
-    A unit's tokens all go into one half; tokens of a unit below 0 into none. A phone is compared when each half has
-    `LEAST_TOKENS` of it, and `among` those given, if any are; halves with fewer than `LEAST_PHONES` such phones are
-    dropped. None when all are. `on_half` is called after each half.
+    All tokens of a unit are in the same half; tokens of units below 0 are in none. A phone is compared if each half has
+    `LEAST_TOKENS` of it and it is in `among` (default: all). Splits with fewer than `LEAST_PHONES` such phones are
+    dropped; the result is None if all are. `on_half` is called after each split.
 
     Raises
     ------
     InputError
-        There are fewer than 2 halves to draw.
+        `n_halves` is below 2.
     """
     if n_halves < 2:
         raise InputError(f"a reliability needs at least 2 random halves, not {n_halves}")
     phones = similarity_table(spoken).phones
-    asked = np.array([among is None or phone in among for phone in phones])
+    is_included = np.array([among is None or phone in among for phone in phones])
     numbers = np.unique(units[units >= 0])
     rows, correlations, sizes = [], [], []
     for _ in range(n_halves):
@@ -85,7 +85,7 @@ def split_half(
         tables = similarity_table(spoken, first), similarity_table(spoken, ~first & (units >= 0))
         if on_half is not None:
             on_half()
-        enough = asked & (np.minimum(tables[0].counts, tables[1].counts) >= LEAST_TOKENS)
+        enough = is_included & (np.minimum(tables[0].counts, tables[1].counts) >= LEAST_TOKENS)
         if enough.sum() < LEAST_PHONES:
             continue
         row, r = _agreement(tables, enough)
@@ -94,7 +94,7 @@ def split_half(
         sizes.append(int(enough.sum()))
     if not rows:
         return None
-    per_phone = _mean_of_known(np.array(rows))
+    per_phone = _nan_mean(np.array(rows))
     left_out = tuple(phone for phone, r in zip(phones, per_phone, strict=True) if np.isnan(r))
     return Reliability(np.array(correlations), np.array(sizes), phones, per_phone, left_out, n_halves)
 
@@ -112,7 +112,7 @@ def _agreement(
     return rows, pearson(upper_triangle(a), upper_triangle(b))
 
 
-def _mean_of_known(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def _nan_mean(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     known = ~np.isnan(rows)
     n = known.sum(axis=0)
     return np.where(n > 0, np.where(known, rows, 0.0).sum(axis=0) / np.maximum(n, 1), np.nan)

@@ -1,4 +1,4 @@
-"""The analysis as numbers for other programs: the matrix as CSV, all figures as JSON."""
+"""Export of an analysis: the matrix as CSV, all figures as JSON."""
 
 import csv
 import json
@@ -13,22 +13,21 @@ from corpus_tools.similarity.analysis import Analysis
 from corpus_tools.similarity.classes import VisemeClasses
 from corpus_tools.similarity.compare import Comparison
 from corpus_tools.similarity.consistency import Consistency
-from corpus_tools.similarity.labels import label
 from corpus_tools.similarity.mantel import Agreement
 from corpus_tools.similarity.reliability import Reliability
-from corpus_tools.similarity.tokens import LEAST_TOKENS, SimilarityTable
+from corpus_tools.similarity.tokens import LEAST_TOKENS, SimilarityTable, phone_label
 from lexicon.phones import look_up_phone
 
 
 def table_csv(found: SimilarityTable, labels: str) -> str:
     """One line for each phone: its label, its tokens, its similarity to each phone."""
     counts = [[str(count)] for count in found.counts]
-    return _csv([label(phone, labels) for phone in found.phones], ["tokens"], counts, found.matrix)
+    return _csv([phone_label(phone, labels) for phone in found.phones], ["tokens"], counts, found.matrix)
 
 
 def difference_csv(compared: Comparison, labels: str) -> str:
     """One line for each phone: its label, its similarity to each phone on the first talker minus that on the other."""
-    names = [label(phone, labels) for phone in compared.phones]
+    names = [phone_label(phone, labels) for phone in compared.phones]
     return _csv(names, [], [[] for _ in names], compared.difference)
 
 
@@ -51,15 +50,15 @@ def analysis_json(found: Analysis) -> str:
         "seed": found.options.seed,
         "phones": [{"ipa": phone, "arpabet": look_up_phone(phone).arpabet or None} for phone in found.table.phones],
         "tokens": found.table.counts.tolist(),
-        "similarity": _rounded(found.table.matrix),
-        "similarity_to_silence": _rounded(found.table.silence),
+        "similarity": _round_values(found.table.matrix),
+        "similarity_to_silence": _round_values(found.table.silence),
         "neighbours": {
             phone: [{"phone": near, "similarity": round(value, 4)} for near, value in ranked]
             for phone, ranked in zip(found.table.phones, found.neighbours, strict=True)
         },
         "dendrogram": {
             "order": [found.table.phones[at] for at in found.tree.order],
-            "links": _rounded(found.tree.links),
+            "links": _round_values(found.tree.links),
         },
         "classes": {
             "best": found.best.n_classes,
@@ -71,11 +70,11 @@ def analysis_json(found: Analysis) -> str:
             "least_tokens": LEAST_TOKENS,
             "utterances": _reliability(found.by_utterances),
             "words": _reliability(found.by_words),
-            "utterances_phones_of_words": _reliability(found.by_utterances_alike),
+            "utterances_phones_of_words": _reliability(found.by_utterances_same_phones),
         },
         "articulation": {
             "agreement": {name: _agreement(agreement) for name, agreement in found.articulatory},
-            "distance": _rounded(found.articulation),
+            "distance": _round_values(found.articulation),
         },
         "movements": _consistency(found, found.movements),
         "modes": _consistency(found, found.modes),
@@ -84,10 +83,10 @@ def analysis_json(found: Analysis) -> str:
     return json.dumps(content, ensure_ascii=False, indent=1, allow_nan=False) + "\n"
 
 
-def _rounded(values: NDArray[np.floating]) -> Any:
+def _round_values(values: NDArray[np.floating]) -> Any:
     """Lists with four decimals, None for NaN."""
     if values.ndim > 1:
-        return [_rounded(row) for row in values]
+        return [_round_values(row) for row in values]
     return [round(float(value), 4) if np.isfinite(value) else None for value in values]
 
 
@@ -96,7 +95,7 @@ def _classes(found: Analysis, classes: VisemeClasses) -> dict[str, Any]:
         [found.table.phones[at] for at in found.tree.order if classes.labels[at] == number]
         for number in range(classes.n_classes)
     ]
-    silhouettes = dict(zip(found.table.phones, _rounded(classes.silhouettes), strict=True))
+    silhouettes = dict(zip(found.table.phones, _round_values(classes.silhouettes), strict=True))
     return {
         "n": classes.n_classes,
         "silhouette": round(classes.silhouette, 4),
@@ -111,10 +110,10 @@ def _reliability(split: Reliability | None) -> dict[str, Any] | None:
     return {
         "mean": round(split.mean, 4),
         "spearman_brown": round(split.corrected, 4),
-        "halves": _rounded(split.correlations),
+        "halves": _round_values(split.correlations),
         "halves_asked": split.n_requested,
         "phones_compared": split.n_phones.tolist(),
-        "phones": dict(zip(split.phones, _rounded(split.per_phone), strict=True)),
+        "phones": dict(zip(split.phones, _round_values(split.per_phone), strict=True)),
         "left_out": list(split.left_out),
     }
 
@@ -128,12 +127,12 @@ def _agreement(agreement: Agreement) -> dict[str, Any]:
     }
 
 
-def _consistency(found: Analysis, held: Consistency) -> dict[str, Any]:
+def _consistency(found: Analysis, consistency: Consistency) -> dict[str, Any]:
     return {
-        "names": list(held.names),
-        "spread_mm": _rounded(held.spread),
-        "free_share": _rounded(held.free_share),
-        "free": dict(zip(found.table.phones, _rounded(held.free), strict=True)),
+        "names": list(consistency.names),
+        "spread_mm": _round_values(consistency.spread),
+        "free_share": _round_values(consistency.free_share),
+        "free": dict(zip(found.table.phones, _round_values(consistency.free), strict=True)),
     }
 
 
@@ -143,6 +142,6 @@ def _comparison(compared: Comparison) -> dict[str, Any]:
         "phones": list(compared.phones),
         "left_out": list(compared.left_out),
         "agreement": _agreement(compared.agreement),
-        "difference": _rounded(compared.difference),
-        "mean_difference": dict(zip(compared.phones, _rounded(compared.per_phone), strict=True)),
+        "difference": _round_values(compared.difference),
+        "mean_difference": dict(zip(compared.phones, _round_values(compared.per_phone), strict=True)),
     }

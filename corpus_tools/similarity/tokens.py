@@ -1,4 +1,4 @@
-"""Phone tokens of a talker, sampled in time, and the similarity table made of them."""
+"""Phone tokens of a talker, sampled in time, and their similarity table."""
 
 from dataclasses import dataclass
 
@@ -12,14 +12,14 @@ from tts2face.exemplar.similarity import phone_similarity, token_samples
 from tts2face.exemplar.tokens import collect_tokens
 from tts2face.models.talker import Talker
 
-LEAST_PHONES = 4  # fewer phones do not make two classes of two
-LEAST_TOKENS = 10  # of a phone, in each half: a mean of fewer shows their neighbours as much as the phone
+LEAST_PHONES = 4  # needed for two classes of two
+LEAST_TOKENS = 10  # of a phone, in each half: means of fewer depend as much on their contexts as on the phone
 NO_WORD = -1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpokenTokens:
-    """N phone tokens of a talker, silence among them, and their motion.
+    """Motion of N phone tokens of a talker, including silence.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class SimilarityTable:
     silence: NDArray[np.float64]
 
 
-def spoken_tokens(talker: Talker, name: str) -> SpokenTokens:
+def collect_spoken_tokens(talker: Talker, name: str) -> SpokenTokens:
     """Tokens of a talker.
 
     Raises
@@ -73,19 +73,21 @@ def spoken_tokens(talker: Talker, name: str) -> SpokenTokens:
             f"{2 * LEAST_TOKENS} times or more; the analysis needs 2 utterances and {LEAST_PHONES} such phones: "
             "record more"
         )
-    return SpokenTokens(tokens.inventory, token_samples(tokens), tokens.phone, tokens.utterance, _words(talker), spread)
+    return SpokenTokens(
+        tokens.inventory, token_samples(tokens), tokens.phone, tokens.utterance, _word_numbers(talker), spread
+    )
 
 
-def _words(talker: Talker) -> NDArray[np.int64]:
-    """(N,) number of the word, by its text, to which each token belongs."""
+def _word_numbers(talker: Talker) -> NDArray[np.int64]:
+    """(N,) index of the word, by its text, to which each token belongs."""
     numbers: dict[str, int] = {}
-    made = []
+    words = []
     for spoken in talker.utterances:
-        here = np.full(len(spoken.phones), NO_WORD, np.int64)
+        indices = np.full(len(spoken.phones), NO_WORD, np.int64)
         for word in spoken.words:
-            here[word.first : word.last] = numbers.setdefault(word.text.lower(), len(numbers))
-        made.append(here)
-    return np.concatenate(made)
+            indices[word.first : word.last] = numbers.setdefault(word.text.lower(), len(numbers))
+        words.append(indices)
+    return np.concatenate(words)
 
 
 def similarity_table(spoken: SpokenTokens, chosen: NDArray[np.bool_] | None = None) -> SimilarityTable:
@@ -98,9 +100,9 @@ def similarity_table(spoken: SpokenTokens, chosen: NDArray[np.bool_] | None = No
     InputError
         A label of the talker is not in the phone table.
     """
-    take = np.ones(len(spoken.phone), bool) if chosen is None else chosen
-    found = phone_similarity(spoken.samples[take], spoken.phone[take], spoken.inventory, spoken.spread)
-    counts = np.bincount(spoken.phone[take], minlength=len(spoken.inventory))
+    selected = np.ones(len(spoken.phone), bool) if chosen is None else chosen
+    found = phone_similarity(spoken.samples[selected], spoken.phone[selected], spoken.inventory, spoken.spread)
+    counts = np.bincount(spoken.phone[selected], minlength=len(spoken.inventory))
     place = {label: at for at, label in enumerate(PHONES)}
     sounding = [at for at, label in enumerate(spoken.inventory) if label != SILENCE]
     order = sorted(sounding, key=lambda at: place[look_up_phone(spoken.inventory[at]).symbol])
@@ -111,3 +113,20 @@ def similarity_table(spoken: SpokenTokens, chosen: NDArray[np.bool_] | None = No
         found.matrix[np.ix_(order, order)],
         found.matrix[order, silence],
     )
+
+
+PHONE_LABELS = ("both", "ipa", "arpabet")
+
+
+def check_labels(labels: str) -> None:
+    """Check a kind of label; `InputError` if it is not one of `PHONE_LABELS`."""
+    if labels not in PHONE_LABELS:
+        raise InputError(f"phones are labelled in {', '.join(PHONE_LABELS[1:])} or {PHONE_LABELS[0]}, not {labels!r}")
+
+
+def phone_label(phone: str, labels: str) -> str:
+    """A phone in IPA, in ARPABET, or in both: ``tʃ CH``; IPA where ARPABET has no name."""
+    name = look_up_phone(phone).arpabet
+    if not name or labels == "ipa":
+        return phone
+    return name if labels == "arpabet" else f"{phone} {name}"

@@ -1,15 +1,15 @@
-"""Write the analysis as a page, tables or a picture."""
+"""Write the analysis of a talker as HTML, JSON, CSV or PNG."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from corpus_tools.report.output import report_writer
+from corpus_tools.report.page import report_writer
 from corpus_tools.similarity.analysis import Analysis, NamedTalker, Options, Progress, analyse
 from corpus_tools.similarity.figure import difference_figure, similarity_figure, table_png
-from corpus_tools.similarity.labels import check_labels
 from corpus_tools.similarity.page import similarity_page
 from corpus_tools.similarity.text import analysis_json, difference_csv, table_csv
+from corpus_tools.similarity.tokens import check_labels
 from tts2face.models.talker import load_talker
 from tts2face.storage.files import write_atomically
 from tts2face.storage.output_names import check_name

@@ -1,1 +1,1 @@
-"""Observed recordings become models."""
+"""Training of talker models from observed recordings."""

@@ -1,4 +1,4 @@
-"""How strongly two sets of measurements are tied: canonical correlation analysis (Hotelling 1936)."""
+"""Canonical correlation analysis (Hotelling 1936)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 
 Values = NDArray[np.floating]
-RANK_TOLERANCE = 1e-10  # singular values below this part of the largest belong to measurements that say nothing new
+RANK_TOLERANCE = 1e-10  # singular values below this share of the largest count as zero
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,19 +39,19 @@ class CanonicalFactors:
 
 
 def canonical_correlation(a: Values, b: Values) -> CanonicalFactors:
-    """Canonical correlations of (T, D) and (T, E) measurements taken together.
+    """Canonical correlations of paired measurements (T, D) and (T, E).
 
     Raises
     ------
     InputError
-        Lengths differ, there are not more frames than measurements, or one set does not move.
+        Lengths differ, there are not more frames than measurements, or one set is constant.
 
     Notes
     -----
     QR of each centred set, SVD of the product of their orthonormal parts (Bjorck and Golub 1973).
     """
     if len(a) != len(b):
-        raise InputError(f"canonical correlation needs measurements taken together, not {len(a)} and {len(b)}")
+        raise InputError(f"canonical correlation needs paired measurements, not {len(a)} and {len(b)}")
     if len(a) <= max(a.shape[1], b.shape[1]) + 1:
         raise InputError(f"{len(a)} frames are too few for {a.shape[1]} and {b.shape[1]} measurements; give more")
     centred_a, centred_b = (np.asarray(one - one.mean(axis=0), np.float64) for one in (a, b))
@@ -79,10 +79,10 @@ def sampled_correlations(
     Raises
     ------
     InputError
-        More frames are asked for than there are, or too few.
+        More frames are requested than there are, or too few.
     """
     if max(n_frames) > len(a):
-        raise InputError(f"there are {len(a)} frames, not {max(n_frames)}; ask for fewer")
+        raise InputError(f"there are {len(a)} frames, not {max(n_frames)}; request fewer")
     strengths = np.zeros((len(n_frames), trials))
     for row, n in enumerate(n_frames):
         for trial in range(trials):
@@ -92,10 +92,10 @@ def sampled_correlations(
 
 
 def _orthonormal_basis(centred: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(T, R) orthonormal columns that span the measurements, and (D, R) what makes them from these."""
+    """Orthonormal columns (T, R) that span the measurements, and the weights (D, R) that compute them."""
     spread = centred.std(axis=0)
     if not (spread > 0.0).any():
-        raise InputError("measurements that do not move have no correlation; give others")
+        raise InputError("constant measurements have no correlation; give others")
     scale = np.where(spread > 0.0, spread, 1.0)
     q, r = np.linalg.qr(centred / scale)
     left, sizes, right = np.linalg.svd(r)

@@ -1,4 +1,4 @@
-"""The linear drive: features are mapped to shape parameters through canonical factors (T07 eqs 6-8)."""
+"""The linear audio map: features are mapped to shape parameters through canonical factors (T07 eqs 6-8)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,46 +19,46 @@ class TrainingUtterance:
     parameters: NDArray[np.float32]
 
     def __post_init__(self) -> None:
-        """Refuse parts that are not on the same frames."""
+        """Check that both are on the same frames."""
         if len(self.features) != len(self.parameters) or not len(self.features):
             raise InputError(
-                f"a lesson needs features and parameters of the same frames, not {len(self.features)} and "
+                f"a training utterance needs features and parameters of the same frames, not {len(self.features)} and "
                 f"{len(self.parameters)}"
             )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrainingData:
-    """Lessons as numbers: standardised windows (N, W), parameters (N, S), and the features' mean and spread."""
+    """Training data: standardised windows (N, W), parameters (N, S), mean and standard deviation of the features."""
 
-    heard: NDArray[np.float32]
+    features: NDArray[np.float32]
     targets: NDArray[np.float32]
     mean: NDArray[np.float32]
     spread: NDArray[np.float32]
 
 
 def learn_linear_map(
-    lessons: Sequence[TrainingUtterance], *, feature: str, before: int = 0, after: int = 0
+    utterances: Sequence[TrainingUtterance], *, feature: str, before: int = 0, after: int = 0
 ) -> AudioMap:
-    """The linear map through canonical factors; the paper's has no context.
+    """Linear audio map through canonical factors, by default without context as in the paper.
 
     Raises
     ------
     InputError
-        There are not more frames than numbers in a window, or nothing moves.
+        There are not more frames than values in a window, or the parameters are constant.
     """
-    material = build_training_data(lessons, before, after)
-    factors = canonical_correlation(material.heard, material.targets)
-    projected = (material.heard - factors.mean_a) @ factors.weights_a  # eq. 6
-    offsets = material.targets - factors.mean_b
+    data = build_training_data(utterances, before, after)
+    factors = canonical_correlation(data.features, data.targets)
+    projected = (data.features - factors.mean_a) @ factors.weights_a  # eq. 6
+    offsets = data.targets - factors.mean_b
     mapping = np.linalg.lstsq(projected, offsets, rcond=None)[0].T  # eq. 7
     inner = factors.weights_a.T
     return AudioMap(
         feature,
         before,
         after,
-        material.mean,
-        material.spread,
+        data.mean,
+        data.spread,
         inner.astype(np.float32),
         (-inner @ factors.mean_a).astype(np.float32),
         mapping.astype(np.float32),
@@ -67,21 +67,23 @@ def learn_linear_map(
     )
 
 
-def build_training_data(lessons: Sequence[TrainingUtterance], before: int, after: int) -> TrainingData:
-    """Lessons as one table of windows; an utterance's first and last frame go on beyond its ends.
+def build_training_data(utterances: Sequence[TrainingUtterance], before: int, after: int) -> TrainingData:
+    """Standardised windows of all utterances, extended at both ends by the first and the last frame.
 
     Raises
     ------
     InputError
-        There is no lesson.
+        There is no utterance.
     """
-    if not lessons:
-        raise InputError("a drive needs utterances with sound to learn from; there is none")
-    every = np.concatenate([lesson.features for lesson in lessons])
+    if not utterances:
+        raise InputError("an audio map needs training utterances with sound; give some")
+    every = np.concatenate([one.features for one in utterances])
     mean, spread = every.mean(axis=0, dtype=np.float64), every.std(axis=0, dtype=np.float64)
     mean32, spread32 = mean.astype(np.float32), np.where(spread > 0.0, spread, 1.0).astype(np.float32)
-    heard = [standardised_windows(lesson.features, (mean32, spread32), before, after) for lesson in lessons]
-    return TrainingData(np.concatenate(heard), np.concatenate([one.parameters for one in lessons]), mean32, spread32)
+    windows = [standardised_windows(one.features, (mean32, spread32), before, after) for one in utterances]
+    return TrainingData(
+        np.concatenate(windows), np.concatenate([one.parameters for one in utterances]), mean32, spread32
+    )
 
 
 def standardised_windows(

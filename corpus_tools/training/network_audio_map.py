@@ -1,4 +1,4 @@
-"""The network drive: three layers, few hidden units, frames of context either side (T07, section 3.2.2)."""
+"""The network audio map: three layers, few hidden units, context frames on both sides (T07, section 3.2.2)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,8 +16,8 @@ from corpus_tools.training.linear_audio_map import (
 from lexicon.errors import InputError
 from tts2face.models.audio_map import AudioMap
 
-VALIDATION_SHARE = 0.1  # of the utterances: they end the training before it learns the others by heart
-PATIENCE = 30  # steps without a better error on them
+VALIDATION_SHARE = 0.1  # of the utterances, for early stopping
+PATIENCE = 30  # steps without a lower validation error
 MAX_STEPS = 600
 Layers = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
@@ -26,10 +26,10 @@ Layers = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], ND
 class NetworkMapOptions:
     """Shape and training of a network.
 
-    ``decay`` is the weight of the mean square of the weights against the error; ``emphasis`` the power of a
-    parameter's spread by which it counts: 0 makes all count alike, 1 as many millimetres as they move. Least squares
-    move the face too little; ``articulation`` is the share of what is missing (0 nothing, 1 all, as logarithm) that one
-    gain about the mean gives back.
+    ``weight_decay`` multiplies the sum of squared weights in the loss. ``spread_exponent`` is the power of a standard
+    deviation that weights the error of its parameter: 0 weights all equally, 1 in millimetres. Least squares reduce the
+    range of motion; ``articulation`` is the share of the loss of range (0 none, 1 all, as logarithm) that a gain about
+    the mean restores.
     """
 
     n_hidden: int = 10
@@ -41,50 +41,52 @@ class NetworkMapOptions:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse a network that cannot be."""
+        """Check the options."""
         if self.n_hidden < 1 or min(self.before, self.after) < 0 or self.weight_decay < 0.0:
-            raise InputError(f"a network needs a hidden unit, and no negative context or decay: not {self}")
+            raise InputError(
+                f"a network needs at least one hidden unit, and context and weight decay from 0 up, not {self}"
+            )
 
 
-def learn_network_map(lessons: Sequence[TrainingUtterance], *, feature: str, options: NetworkMapOptions) -> AudioMap:
-    """The network that drives best on utterances set aside; the same lessons and seed give the same network.
+def learn_network_map(utterances: Sequence[TrainingUtterance], *, feature: str, options: NetworkMapOptions) -> AudioMap:
+    """The network with the lowest validation error; equal utterances and seed give an equal network.
 
     Raises
     ------
     InputError
         There are fewer than two utterances.
     """
-    if len(lessons) < 2:
-        raise InputError(f"a network needs at least 2 utterances, one to check itself by, not {len(lessons)}")
+    if len(utterances) < 2:
+        raise InputError(f"a network needs at least 2 utterances, one of them for validation, not {len(utterances)}")
     rng = np.random.default_rng(options.seed)
-    order = rng.permutation(len(lessons))
-    n_aside = max(1, round(VALIDATION_SHARE * len(lessons)))
-    material = build_training_data([lessons[i] for i in order[n_aside:]], options.before, options.after)
-    aside = [lessons[i] for i in order[:n_aside]]
-    standard = (material.mean, material.spread)
-    heard = np.concatenate(
-        [standardised_windows(one.features, standard, options.before, options.after) for one in aside]
+    order = rng.permutation(len(utterances))
+    n_validation = max(1, round(VALIDATION_SHARE * len(utterances)))
+    data = build_training_data([utterances[i] for i in order[n_validation:]], options.before, options.after)
+    validation_utterances = [utterances[i] for i in order[:n_validation]]
+    standard = (data.mean, data.spread)
+    features = np.concatenate(
+        [standardised_windows(one.features, standard, options.before, options.after) for one in validation_utterances]
     )
-    centre = material.targets.mean(axis=0, dtype=np.float64)
-    spread = np.maximum(material.targets.std(axis=0, dtype=np.float64), 1e-9)
+    centre = data.targets.mean(axis=0, dtype=np.float64)
+    spread = np.maximum(data.targets.std(axis=0, dtype=np.float64), 1e-9)
     weight = spread**options.spread_exponent / np.sqrt(np.mean(spread ** (2 * options.spread_exponent)))
-    seen, seen_aside = (
+    targets, validation_targets = (
         ((one - centre) / spread * weight).astype(np.float32)
-        for one in (material.targets, np.concatenate([one.parameters for one in aside]))
+        for one in (data.targets, np.concatenate([one.parameters for one in validation_utterances]))
     )
-    checked = TrainingData(heard, seen_aside, material.mean, material.spread)
-    layers = _train_layers(TrainingData(material.heard, seen, material.mean, material.spread), checked, options, rng)
+    validation = TrainingData(features, validation_targets, data.mean, data.spread)
+    layers = _train_layers(TrainingData(data.features, targets, data.mean, data.spread), validation, options, rng)
     inner, bias, outer, offset = layers
-    moved = np.tanh(heard @ inner.T + bias) @ outer.T
-    gain = float(np.sqrt(seen_aside.var(axis=0).sum() / moved.var(axis=0).sum())) ** options.articulation
+    moved = np.tanh(features @ inner.T + bias) @ outer.T
+    gain = float(np.sqrt(validation_targets.var(axis=0).sum() / moved.var(axis=0).sum())) ** options.articulation
     outer, offset = gain * outer, gain * offset
     back = spread / weight
     return AudioMap(
         feature,
         options.before,
         options.after,
-        material.mean,
-        material.spread,
+        data.mean,
+        data.spread,
         inner.astype(np.float32),
         bias.astype(np.float32),
         (outer * back[:, None]).astype(np.float32),
@@ -94,14 +96,14 @@ def learn_network_map(lessons: Sequence[TrainingUtterance], *, feature: str, opt
 
 
 def _train_layers(
-    material: TrainingData, checked: TrainingData, options: NetworkMapOptions, rng: np.random.Generator
+    data: TrainingData, validation: TrainingData, options: NetworkMapOptions, rng: np.random.Generator
 ) -> Layers:
-    """Layers with the least error on what is checked, along the way of L-BFGS."""
+    """Layers with the lowest validation error over the iterations of L-BFGS."""
     import scipy.optimize
 
-    minimize: Any = scipy.optimize.minimize  # its stubs know no gradient that comes with the value
+    minimize: Any = scipy.optimize.minimize  # the stubs lack objectives that return value and gradient
 
-    n_inputs, n_outputs = material.heard.shape[1], material.targets.shape[1]
+    n_inputs, n_outputs = data.features.shape[1], data.targets.shape[1]
     shapes = ((options.n_hidden, n_inputs), (options.n_hidden,), (n_outputs, options.n_hidden), (n_outputs,))
     start = [
         rng.normal(0.0, 1.0 / np.sqrt(n_inputs), shapes[0]),
@@ -109,7 +111,7 @@ def _train_layers(
         rng.normal(0.0, 1.0 / np.sqrt(options.n_hidden), shapes[2]),
         np.zeros(shapes[3]),
     ]
-    best = _EarlyStopping(checked)
+    best = _EarlyStopping(validation)
 
     def step(weights: NDArray[np.float64]) -> None:
         if best.should_stop(weights, unpack_layers(weights, shapes)):
@@ -118,7 +120,7 @@ def _train_layers(
     first = np.concatenate([layer.ravel() for layer in start])
 
     def error(weights: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-        return loss_and_gradient(unpack_layers(weights, shapes), material.heard, material.targets, options.weight_decay)
+        return loss_and_gradient(unpack_layers(weights, shapes), data.features, data.targets, options.weight_decay)
 
     minimize(
         error,
@@ -132,17 +134,17 @@ def _train_layers(
 
 
 class _EarlyStopping:
-    """The best weights so far by the error on utterances set aside."""
+    """The weights with the lowest validation error so far."""
 
-    def __init__(self, checked: TrainingData) -> None:
-        self._validation = checked
+    def __init__(self, validation: TrainingData) -> None:
+        self._validation = validation
         self._error = np.inf
         self._n_stalled = 0
         self.weights: NDArray[np.float64] = np.zeros(0)
 
     def should_stop(self, weights: NDArray[np.float64], layers: Layers) -> bool:
-        """Look at new weights; true when none was better for `PATIENCE` steps."""
-        error = loss_and_gradient(layers, self._validation.heard, self._validation.targets, 0.0)[0]
+        """Evaluate new weights; true after `PATIENCE` steps without a lower error."""
+        error = loss_and_gradient(layers, self._validation.features, self._validation.targets, 0.0)[0]
         self._n_stalled += 1
         if error < self._error:
             self._error, self._n_stalled, self.weights = error, 0, weights.copy()
@@ -150,7 +152,7 @@ class _EarlyStopping:
 
 
 def unpack_layers(weights: NDArray[np.float64], shapes: Sequence[tuple[int, ...]]) -> Layers:
-    """The four layers that lie end to end in one vector."""
+    """The four layers that are concatenated in one vector."""
     ends = np.cumsum([int(np.prod(shape)) for shape in shapes])
     parts = np.split(weights, ends[:-1])
     inner, bias, outer, offset = (part.reshape(shape) for part, shape in zip(parts, shapes, strict=True))
@@ -158,7 +160,7 @@ def unpack_layers(weights: NDArray[np.float64], shapes: Sequence[tuple[int, ...]
 
 
 def loss_and_gradient(
-    layers: Layers, heard: NDArray[np.floating], seen: NDArray[np.floating], decay: float
+    layers: Layers, features: NDArray[np.floating], targets: NDArray[np.floating], decay: float
 ) -> tuple[float, NDArray[np.float64]]:
     """Mean square error of a network with weight decay, and its gradient by back-propagation, as one vector.
 
@@ -166,19 +168,19 @@ def loss_and_gradient(
     ----------
     layers
         (H, W), (H,), (S, H), (S,).
-    heard, seen : (N, W), (N, S)
+    features, targets : (N, W), (N, S)
     """
-    inner, bias, outer, offset = (layer.astype(heard.dtype) for layer in layers)
-    units = np.tanh(heard @ inner.T + bias)
-    miss = units @ outer.T + offset - seen
-    n = miss.size
-    error = float(np.einsum("ij,ij->", miss, miss, dtype=np.float64)) / n
+    inner, bias, outer, offset = (layer.astype(features.dtype) for layer in layers)
+    units = np.tanh(features @ inner.T + bias)
+    residual = units @ outer.T + offset - targets
+    n = residual.size
+    error = float(np.einsum("ij,ij->", residual, residual, dtype=np.float64)) / n
     error += decay * (float(np.square(layers[0]).sum()) + float(np.square(layers[2]).sum()))
-    back = (miss @ outer) * (1.0 - units * units)
+    back = (residual @ outer) * (1.0 - units * units)
     slopes = (
-        (2.0 / n) * (back.T @ heard) + 2.0 * decay * inner,
+        (2.0 / n) * (back.T @ features) + 2.0 * decay * inner,
         (2.0 / n) * back.sum(axis=0),
-        (2.0 / n) * (miss.T @ units) + 2.0 * decay * outer,
-        (2.0 / n) * miss.sum(axis=0),
+        (2.0 / n) * (residual.T @ units) + 2.0 * decay * outer,
+        (2.0 / n) * residual.sum(axis=0),
     )
     return error, np.concatenate([slope.ravel() for slope in slopes]).astype(np.float64)

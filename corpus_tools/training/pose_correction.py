@@ -1,8 +1,8 @@
-"""What turning the head does to landmarks from which the head's pose was taken out, and its removal.
+"""Correction of landmarks for errors that depend on head pose.
 
-Trackers know heads of other shapes: as a face turns, its landmarks move a little although the face does not. Over the
-recordings of one person this is a smooth function of the head's angles; it is learnt from means over seconds, in which
-speech averages out, and taken out of every frame.
+Trackers assume another head shape: pose-free landmarks of a turning head move a little although the face does not. For
+one person this error is a smooth function of the head's angles. It is estimated from means over seconds, in which
+speech averages out, and subtracted from every frame.
 """
 
 from collections.abc import Sequence
@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from corpus_tools.training.ridge import fit_ridge
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 
-CHUNK_S = 3.0  # a sentence: long enough for speech to average out
-MIN_CHUNKS = 12  # with fewer nothing is taken out
+CHUNK_S = 3.0  # about a sentence, so that speech averages out
+MIN_CHUNKS = 12  # with fewer there is no correction
 Floats = NDArray[np.float64]
 
 
 class PosedLandmarks(Protocol):
-    """A recording of which landmarks (T, L, 3) without head pose and the head's pose (T, 6) are known."""
+    """A recording with pose-free landmarks (T, L, 3) and head poses (T, 6)."""
 
     @property
     def fps(self) -> float:
@@ -47,18 +47,18 @@ class PoseCorrection:
     scale: Floats
     offsets: Floats
 
-    def removed(self, observation: AnyPosedLandmarks) -> AnyPosedLandmarks:
-        """The observation with landmarks as if the head stood at the centre."""
+    def apply(self, observation: AnyPosedLandmarks) -> AnyPosedLandmarks:
+        """The observation with landmarks corrected to the pose ``centre``."""
         if not self.offsets.any():
             return observation
         terms = angle_terms((observation.head[:, :3] - self.centre) / self.scale)
         leak = np.tensordot(terms, self.offsets, axes=1)
         landmarks = (observation.landmarks - leak).astype(np.float32)
-        return replace(observation, landmarks=landmarks)  # type: ignore[type-var] # protocols cannot ask for a dataclass
+        return replace(observation, landmarks=landmarks)  # type: ignore[type-var] # protocols cannot require a dataclass
 
 
 def fit_pose_correction(observations: Sequence[PosedLandmarks]) -> PoseCorrection:
-    """The leak in recordings of one person; none where they are too few or where taking it out predicts nothing."""
+    """Correction for recordings of one person; zero if they are too few or if cross-validation finds no improvement."""
     angles, landmarks = _chunk_means(observations)
     centre, scale = angles.mean(axis=0), np.maximum(angles.std(axis=0), 1e-6)
     terms = angle_terms((angles - centre) / scale)
@@ -72,7 +72,7 @@ def fit_pose_correction(observations: Sequence[PosedLandmarks]) -> PoseCorrectio
 
 
 def _keep_lip_contact(offsets: Floats) -> Floats:
-    """Offsets by which facing points of the inner lips move together: lips that touch at one angle touch at all."""
+    """Offsets averaged over opposite points of the inner lips, so that lip contact does not depend on the pose."""
     kept = offsets.copy()
     upper, lower = list(INNER_LIP_UPPER), list(INNER_LIP_LOWER)
     kept[:, upper] = kept[:, lower] = (offsets[:, upper] + offsets[:, lower]) / 2
@@ -80,9 +80,9 @@ def _keep_lip_contact(offsets: Floats) -> Floats:
 
 
 def correct_pose(observations: Sequence[AnyPosedLandmarks]) -> tuple[AnyPosedLandmarks, ...]:
-    """Observations of one person without the leak that they show."""
+    """Observations of one person with the correction fitted to them applied."""
     leak = fit_pose_correction(observations) if observations else None
-    return tuple(leak.removed(seen) for seen in observations) if leak else ()
+    return tuple(leak.apply(seen) for seen in observations) if leak else ()
 
 
 def angle_terms(angles: NDArray[np.floating]) -> Floats:

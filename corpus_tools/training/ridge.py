@@ -1,4 +1,4 @@
-"""Ridge regression whose effort is chosen by leaving rows out."""
+"""Ridge regression with regularisation chosen by leave-one-out cross-validation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RidgeFit:
-    """Weights (K, V) of terms about their ``mean`` (K,), and the sum of squares of the errors of rows left out."""
+    """Weights (K, V) of terms about their ``mean`` (K,), and the leave-one-out sum of squared errors."""
 
     mean: Floats
     weights: Floats

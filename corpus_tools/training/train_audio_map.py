@@ -1,4 +1,4 @@
-"""Drives learnt from observations and their sound: which features, how much context, how many hidden units."""
+"""Training of audio maps from observations: features, context and hidden units."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -19,8 +19,8 @@ from tts2face.video.media import read_sound
 # Chosen by inner cross-validation on the training utterances of GRID s1 (docs/accuracy.md, "Speech-driven").
 AUDIO_MAP_FEATURES = "mfcc+lsf"
 TALKER_NETWORK_OPTIONS = NetworkMapOptions(n_hidden=40)
-MIN_UTTERANCES = 20  # a network sets a tenth of them aside
-MIN_FRAMES = 1000  # below, canonical correlation feigns ties (docs/accuracy.md)
+MIN_UTTERANCES = 20  # a tenth of them is the validation set
+MIN_FRAMES = 1000  # with fewer, canonical correlations are spurious (docs/accuracy.md)
 
 UtteranceFeatures = Mapping[str, NDArray[np.float32]]  # features of each utterance by its name
 
@@ -52,11 +52,12 @@ def utterance_features(observation: Observation, sound: Waveform, kind: str) -> 
 
 
 def build_training_utterances(
-    observations: Sequence[Observation], model: ShapeModel, heard: UtteranceFeatures
+    observations: Sequence[Observation], model: ShapeModel, features: UtteranceFeatures
 ) -> list[TrainingUtterance]:
-    """What a drive learns from: features of utterances, and the speech parameters of their landmarks."""
+    """Training utterances: features of the sound and speech parameters of the landmarks."""
     return [
-        TrainingUtterance(heard[one.name], model.parameters(one.landmarks)[:, : model.n_speech]) for one in observations
+        TrainingUtterance(features[one.name], model.parameters(one.landmarks)[:, : model.n_speech])
+        for one in observations
     ]
 
 
@@ -67,7 +68,7 @@ def learn_audio_maps(
     network: NetworkMapOptions = TALKER_NETWORK_OPTIONS,
     stages: StageCallback = ignore_stage,
 ) -> dict[str, AudioMap]:
-    """The linear and the network drive of a talker; none where the recordings are too few to learn them.
+    """The linear and the network audio map of a talker; empty if there are too few recordings.
 
     Raises
     ------
@@ -76,19 +77,21 @@ def learn_audio_maps(
     """
     if len(observations) < MIN_UTTERANCES or sum(len(one.landmarks) for one in observations) < MIN_FRAMES:
         return {}
-    heard = sound_features(observations, (AUDIO_MAP_FEATURES, "level"), on_progress=stages("listening"))
-    lessons = build_training_utterances(observations, talker.model, heard[AUDIO_MAP_FEATURES])
-    loudness = speech_level(np.concatenate(list(heard["level"].values())))
-    told = stages("learning drives")
-    linear = learn_linear_map(lessons, feature=AUDIO_MAP_FEATURES)
-    told(1, 2)
-    bent = learn_network_map(lessons, feature=AUDIO_MAP_FEATURES, options=network)
-    told(2, 2)
-    return {"linear": replace(linear, loudness=loudness), "network": replace(bent, loudness=loudness)}
+    features = sound_features(
+        observations, (AUDIO_MAP_FEATURES, "level"), on_progress=stages("computing sound features")
+    )
+    utterances = build_training_utterances(observations, talker.model, features[AUDIO_MAP_FEATURES])
+    loudness = speech_level(np.concatenate(list(features["level"].values())))
+    on_map = stages("learning audio maps")
+    linear = learn_linear_map(utterances, feature=AUDIO_MAP_FEATURES)
+    on_map(1, 2)
+    nonlinear = learn_network_map(utterances, feature=AUDIO_MAP_FEATURES, options=network)
+    on_map(2, 2)
+    return {"linear": replace(linear, loudness=loudness), "network": replace(nonlinear, loudness=loudness)}
 
 
 def _read_sounds(observations: Sequence[Observation]) -> Iterator[tuple[Observation, Waveform]]:
-    """Each utterance with the sound of its video; a video with many is read once."""
+    """Each utterance with the sound of its video; each video is read once."""
     last: tuple[object, Waveform] | None = None
     for observation in sorted(observations, key=lambda one: str(one.video)):
         if last is None or last[0] != observation.video:

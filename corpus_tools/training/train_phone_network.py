@@ -1,8 +1,8 @@
-"""Networks from phones to lips, trained on a talker's utterances with scikit-learn.
+"""Networks from phones to speech parameters, trained on a talker's utterances with scikit-learn.
 
-The first is told phones as one of N. The others are told what the mouth does in them (`lexicon.phones.phone_features`),
-so that they know what to expect of neighbours that were never recorded together; their first layer is multiplied out
-by phone, and the talker's file holds them all alike.
+The input of the first is a one-hot code of phones. The inputs of the others are articulatory features
+(`lexicon.phones.phone_features`), which generalise to unseen phone contexts; their first layer is multiplied by the
+feature table, so that the talker's file holds all networks in the same form.
 """
 
 import warnings
@@ -21,17 +21,17 @@ from lexicon.sequence import SILENCE
 from tts2face.models.phone_network import PhoneNetwork, window_features
 from tts2face.models.talker import Talker
 
-SILENCE_MARGIN_S = 0.2  # of silence that is learnt from
+SILENCE_MARGIN_S = 0.2  # of silence around speech in the training data
 HIDDEN_UNITS = (128, 128)
 WEIGHT_DECAY = 1e-3
 MAX_EPOCHS = 60
-N_BY_LABEL, N_BY_FEATURES = 1, 3  # networks; features tell unheard words better, labels heard ones (accuracy.md)
-MIN_FRAMES = 3000  # two minutes; from less a network learns nothing that examples do not show
+N_BY_LABEL, N_BY_FEATURES = 1, 3  # networks; features are better on unseen words, labels on seen ones (accuracy.md)
+MIN_FRAMES = 3000  # two minutes; networks from less are no better than exemplars
 Floats = NDArray[np.float32]
 
 
 def add_phone_network(talker: Talker, *, on_progress: Progress | None = None) -> Talker:
-    """The talker with networks trained on what it holds; as it is where that is too little.
+    """The talker with networks trained on its utterances; unchanged if there are too few frames.
 
     Raises
     ------
@@ -66,21 +66,21 @@ def add_phone_network(talker: Talker, *, on_progress: Progress | None = None) ->
 
 
 def feature_table(inventory: Iterable[str]) -> Floats:
-    """(P, K) articulatory features of P phones, of the first half and of the last."""
+    """(P, K) articulatory features of P phones, for their first and their second half."""
     return np.array([[*first, *last] for first, last in map(phone_features, inventory)], np.float32)
 
 
 def encode_windows(shown: NDArray[np.integer], place: Floats, table: Floats) -> Any:
-    """Sparse (T, C K + 4) inputs: for each of the phones (T, C) its line of the table (P, K), then its place (T, 4)."""
+    """Sparse inputs (T, C K + 4): for each of the phones (T, C) its row of the table (P, K), then its place (T, 4)."""
     lines = sparse.csr_matrix(table)
     return sparse.hstack([*(lines[column] for column in shown.T), sparse.csr_matrix(place)]).tocsr()
 
 
 def expand_to_phones(weights: Floats, table: Floats, n_shown: int) -> Floats:
-    """(C P + 4, H) first weights for C phones as one of P that do what (C K + 4, H) do for `encode_windows` ones."""
+    """First-layer weights (C P + 4, H) for C one-hot phones that equal (C K + 4, H) for `encode_windows` inputs."""
     n_features = table.shape[1]
-    told, place = weights[: n_shown * n_features], weights[n_shown * n_features :]
-    return np.concatenate([*(table @ each for each in np.split(told, n_shown)), place])
+    phone_weights, place = weights[: n_shown * n_features], weights[n_shown * n_features :]
+    return np.concatenate([*(table @ each for each in np.split(phone_weights, n_shown)), place])
 
 
 def _stack_layers(members: Iterable[Iterable[Floats]]) -> list[Floats]:
@@ -90,7 +90,7 @@ def _stack_layers(members: Iterable[Iterable[Floats]]) -> list[Floats]:
 def _train_network(
     shown: NDArray[np.integer], place: Floats, wanted: Floats, table: Floats, seed: int
 ) -> tuple[list[Floats], list[Floats]]:
-    """Weights and biases of one network for phones as one of N, learnt from phones as the table tells them."""
+    """Weights and biases of one network for one-hot phones, trained on phones coded by the table."""
     fitted = _fit_regressor(encode_windows(shown, place, table), wanted, seed)
     return [expand_to_phones(fitted.coefs_[0], table, shown.shape[1]), *fitted.coefs_[1:]], fitted.intercepts_
 
@@ -110,5 +110,5 @@ def _fit_regressor(inputs: Any, wanted: Any, seed: int) -> Any:
         random_state=seed,
     )
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)  # it stops after `MAX_EPOCHS`, converged or not
+        warnings.simplefilter("ignore", ConvergenceWarning)  # training ends after `MAX_EPOCHS`
         return network.fit(inputs, wanted)

@@ -1,4 +1,4 @@
-"""A Talker learnt from observations: the shape model, and every utterance in its parameters."""
+"""Training of a talker: the shape model, and every utterance in its parameters."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -20,7 +20,7 @@ from tts2face.models.landmarks import (
 from tts2face.models.talker import ShapeModel, Talker, Utterance
 from tts2face.video.pose import head_angles
 
-REST_MARGIN_S = 0.2  # lips begin to move this long before the first sound
+REST_MARGIN_S = 0.2  # lips start to move this long before the first sound
 CLOSED_GAP = (
     0.01  # of the distance of the outer eye corners: the inner lips' gap below which the mouth counts as closed
 )
@@ -29,7 +29,7 @@ CLOSED_GAP = (
 def learn_talker(
     observations: Sequence[Observation], *, n_speech: int = 20, n_other: int = 10, metadata: Mapping[str, Any]
 ) -> Talker:
-    """The talker whose recordings were observed.
+    """The talker of the observed recordings.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def learn_talker(
     Raises
     ------
     InputError
-        There is no observation, or a number of modes that the regions cannot have.
+        There is no observation, or too few for the numbers of modes.
     DataError
         Recordings differ in frames per second.
     """
@@ -65,7 +65,7 @@ def learn_shapes(observations: Sequence[Observation], n_speech: int, n_other: in
     Raises
     ------
     InputError
-        A region has no such number of modes.
+        A region has fewer modes.
     """
     mouth = np.isin(np.arange(N_LANDMARKS), MOUTH_REGION)
     n_frames = sum(len(observation.landmarks) for observation in observations)
@@ -74,7 +74,7 @@ def learn_shapes(observations: Sequence[Observation], n_speech: int, n_other: in
     for region, n_modes in ((mouth, n_speech), (~mouth, n_other)):
         if not 0 < n_modes <= min(3 * int(region.sum()), n_frames):
             raise InputError(
-                f"{n_frames} frames of {int(region.sum())} landmarks have no {n_modes} modes; ask for fewer"
+                f"{n_frames} frames of {int(region.sum())} landmarks have no {n_modes} modes; request fewer"
             )
         components, variance = _principal_components(observations, mean, region, n_modes)
         basis = np.zeros((n_modes, N_LANDMARKS, 3))
@@ -90,7 +90,7 @@ def learn_shapes(observations: Sequence[Observation], n_speech: int, n_other: in
 
 
 def resting_parameters(observations: Sequence[Observation], model: ShapeModel) -> NDArray[np.float32]:
-    """(M,) mean parameters of the silent frames before speech in which the lips are closed; zeros if there are none."""
+    """(M,) mean parameters of the silent frames with closed lips before speech; zeros if there are none."""
     total = np.zeros(len(model.spread))
     n_frames = 0
     for observation in observations:
@@ -102,7 +102,7 @@ def resting_parameters(observations: Sequence[Observation], model: ShapeModel) -
 
 
 def resting_frames(observation: Observation) -> NDArray[np.bool_]:
-    """(T,) frames before speech that show closed lips."""
+    """(T,) frames with closed lips before speech."""
     phones = observation.phones
     speech = phones.edges[1] if phones.phones[0] == SILENCE else phones.edges[0]
     times = np.arange(len(observation.landmarks)) / observation.fps
@@ -121,7 +121,7 @@ def normalised_lip_gap(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def mean_rotation(observations: Sequence[Observation]) -> NDArray[np.float64]:
-    """(3, 3) mean of the head's rotations: the rotation nearest to the mean of the matrices."""
+    """(3, 3) mean rotation of the head: the rotation nearest to the mean of the matrices."""
     total = sum(_rotation_matrices(observation.head[:, :3]).sum(axis=0) for observation in observations)
     left, _, right = np.linalg.svd(np.asarray(total))
     signs = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])

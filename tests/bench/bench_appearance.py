@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.aam.evaluation import measure_appearance
 from corpus_tools.aam.source_videos import build_appearance_recording
 from corpus_tools.aam.train_appearance import learn_appearance
 from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.observe import observe
 from corpus_tools.run_options import RunOptions
 from corpus_tools.training.train_talker import learn_talker
+from tests.bench.appearance_measures import measure_appearance
 from tts2face.models.talker import write_talker
 from tts2face.render.own_face import draw_video_frame, own_face_renderer
 from tts2face.render.picture import Picture
@@ -57,7 +57,7 @@ def main() -> None:
     for name, value in measure_appearance(films, learnt, unseen, kept).as_dict().items():
         print(f"{name}: {value}")
     stage("measuring")
-    spoken = tuple(replace(one, looks=looks) for one, looks in zip(talker.utterances, learnt.looks, strict=True))
+    spoken = tuple(replace(one, looks=looks) for one, looks in zip(talker.utterances, learnt.parameters, strict=True))
     whole = replace(talker, utterances=spoken, appearance=learnt.appearance)
     path = Path("/tmp/bench_appearance.talker")
     write_talker(path, whole)

@@ -15,7 +15,7 @@ from corpus_tools.evaluation import measures
 from corpus_tools.evaluation.evaluate import EVALUATION_METADATA
 from corpus_tools.evaluation.reference import ReferenceUtterance, Thresholds
 from corpus_tools.evaluation.scores import Scores, score_splits
-from corpus_tools.evaluation.splits import split, split_into_folds
+from corpus_tools.evaluation.splits import split_into_folds, split_randomly
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import observe
 from corpus_tools.training.canonical_correlation import sampled_correlations
@@ -58,9 +58,9 @@ def main() -> None:
     )
     if options.quick:
         kept, options.hold_out, options.trials = kept[:120], 30, 10
-    train, test = split(kept, hold_out=options.hold_out, seed=options.seed)
+    train, test = split_randomly(kept, hold_out=options.hold_out, seed=options.seed)
     leak = fit_pose_correction(train)
-    bench = Bench(*(tuple(leak.removed(one) for one in part) for part in (train, test)))
+    bench = Bench(*(tuple(leak.apply(one) for one in part) for part in (train, test)))
     if options.choose:
         bench.choose()
         return

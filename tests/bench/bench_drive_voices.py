@@ -16,7 +16,7 @@ from tts2face.exemplar.synthesis import build_exemplar_model, speech_trajectory
 from tts2face.models.talker import Talker, load_talker
 from tts2face.synthesis.audio_input import map_audio_to_motion
 from tts2face.types import Speech, frame_count
-from tts2face.voice.engine import load_voice
+from tts2face.voice.loading import load_voice
 
 
 def main() -> None:

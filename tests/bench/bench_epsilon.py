@@ -14,9 +14,9 @@ import numpy as np
 from corpus_tools.build_palette import ESTIMATORS, StyleSource, build_basis, build_estimator
 from corpus_tools.decomposition.blend_weights import approximation_error, moving_average
 from corpus_tools.decomposition.capture import FaceRecording, resample_to_gesture_rate
+from corpus_tools.decomposition.capture_files import read_livelink_recording
 from corpus_tools.decomposition.decompose import weight_displacements
-from corpus_tools.decomposition.livelink import read_livelink_recording
-from corpus_tools.decomposition.video import read_video_recording
+from corpus_tools.decomposition.recording_files import read_video_recording
 from corpus_tools.dense.video_landmarks import find_videos
 from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.run_options import RunOptions
@@ -32,7 +32,7 @@ EPSILONS = (0.0, 0.1, 0.25, 0.5, 1.0)
 def report(name: str, captured: list[FaceRecording]) -> None:
     face, leak = load_face("head"), fit_pose_correction(captured)
     basis = build_basis(StyleSource(recordings=Path()), captured, face)
-    slow = [moving_average(resample_to_gesture_rate(leak.removed(one)).landmarks - basis.rest) for one in captured]
+    slow = [moving_average(resample_to_gesture_rate(leak.apply(one)).landmarks - basis.rest) for one in captured]
     counted, expressions = weight_displacements(np.concatenate(slow)), weight_displacements(basis.expressions)
     print(f"\n{name}: {len(counted)} frames, {root_mean_square(counted):.3f} mm from rest")
     print("| estimator | epsilon | error, mm | beyond 0 to 1 | mean size | spread in a recording | speed, 1/s |")

@@ -24,8 +24,8 @@ from corpus_tools.decomposition.blend_weights import (
     moving_average,
 )
 from corpus_tools.decomposition.capture import resample, resample_to_gesture_rate
+from corpus_tools.decomposition.capture_files import read_livelink_recording
 from corpus_tools.decomposition.face_motion import rest_landmarks
-from corpus_tools.decomposition.livelink import read_livelink_recording
 from corpus_tools.recordings.observe import observe
 from corpus_tools.training.pose_correction import correct_pose
 from tts2face.face.expressions import expression_landmarks

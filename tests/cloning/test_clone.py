@@ -1,4 +1,4 @@
-"""Cloning between talkers: laws of eq. 5, limits, lips that stay apart, and appended components."""
+"""Parameter transfer between talkers: laws of eq. 5, limits, lip gaps, and appended components."""
 
 from dataclasses import replace
 
@@ -33,8 +33,8 @@ some = settings(deadline=None, max_examples=30)
 MOUTH = np.isin(np.arange(N_LANDMARKS), MOUTH_REGION)
 
 
-def plate(gap: float = 0.4, size: float = 1.0) -> np.ndarray:
-    """Landmarks of a face without features; facing inner lip points are `gap` mm apart."""
+def mean_landmarks(gap: float = 0.4, size: float = 1.0) -> np.ndarray:
+    """Random landmarks of a face; facing inner lip points are `gap` mm apart."""
     shape = np.random.default_rng(1).uniform(-60, 60, (N_LANDMARKS, 3))
     shape[INNER_UPPER_LIP], shape[INNER_LOWER_LIP] = (0, gap / 2, 0), (0, -gap / 2, 0)
     shape[EYE_OUTER_RIGHT], shape[EYE_OUTER_LEFT] = (-45, 60, 0), (45, 60, 0)
@@ -42,7 +42,7 @@ def plate(gap: float = 0.4, size: float = 1.0) -> np.ndarray:
 
 
 def model_of(seed: int, n_speech: int = 4, n_other: int = 2, size: float = 1.0) -> ShapeModel:
-    """Random modes as the file wants them: orthonormal, the first ones the mouth's, a rest near the mean."""
+    """Random orthonormal modes, those of the mouth first, and a rest near the mean."""
     rng = np.random.default_rng(seed)
     rows = []
     for region, n_modes in ((MOUTH, n_speech), (~MOUTH, n_other)):
@@ -53,7 +53,7 @@ def model_of(seed: int, n_speech: int = 4, n_other: int = 2, size: float = 1.0) 
     spread = np.sort(rng.uniform(1, 8, n_speech + n_other))[::-1]
     rest = spread * rng.uniform(-0.5, 0.5, len(spread))
     basis = np.concatenate(rows)
-    mean = plate(40.0, size)  # lips far apart: they never cross
+    mean = mean_landmarks(40.0, size)  # lips far apart: they never cross
     return ShapeModel(*(part.astype(np.float32) for part in (mean, basis, spread)), n_speech, rest.astype(np.float32))
 
 
@@ -63,12 +63,12 @@ def motion_of(model: ShapeModel, seed: int = 3, n_frames: int = 20, spreads: flo
 
 
 def opening_model(gap: float = 0.4, second: float = 0.0) -> ShapeModel:
-    """Two modes: one draws the lower lip down as a whole, one moves landmark 0 to the side; unit spread of 10 mm."""
+    """Two modes: one lowers the lower lip, one moves landmark 0 to the side; unit spread of 10 mm."""
     basis = np.zeros((2, N_LANDMARKS, 3), np.float32)
     basis[0, INNER_LOWER_LIP, 1] = -1 / np.sqrt(len(INNER_LOWER_LIP))
     basis[1, 0, 0] = 1
     rest = np.array([0.0, second], np.float32)
-    return ShapeModel(plate(gap).astype(np.float32), basis, np.full(2, 10, np.float32), 2, rest)
+    return ShapeModel(mean_landmarks(gap).astype(np.float32), basis, np.full(2, 10, np.float32), 2, rest)
 
 
 def gaps_of(model: ShapeModel, parameters: np.ndarray) -> np.ndarray:
@@ -78,7 +78,7 @@ def gaps_of(model: ShapeModel, parameters: np.ndarray) -> np.ndarray:
 
 @some
 @given(seeds)
-def test_a_talker_cloned_onto_itself_moves_as_before(seed: int) -> None:
+def test_a_transfer_to_the_same_talker_is_the_identity(seed: int) -> None:
     model = model_of(seed)
     values = motion_of(model, spreads=2.9)
     assert build_parameter_transfer(model, model).parameters(values) == pytest.approx(values, abs=1e-5)
@@ -101,7 +101,7 @@ def test_rest_becomes_rest_whatever_the_gain_and_the_size(seed: int, gain: float
 
 @some
 @given(seeds, st.lists(st.sampled_from([-1.0, 1.0]), min_size=6, max_size=6))
-def test_signs_look_after_themselves(seed: int, signs: list[float]) -> None:
+def test_sign_flips_of_modes_cancel_out(seed: int, signs: list[float]) -> None:
     source, target = model_of(seed), model_of(seed + 1)
     flips = np.array(signs, np.float32)
     flipped = replace(source, basis=source.basis * flips[:, None, None], rest=source.rest * flips)
@@ -115,7 +115,7 @@ def test_signs_look_after_themselves(seed: int, signs: list[float]) -> None:
 @some
 @given(seeds)
 def test_eq_5_is_least_squares_on_the_landmarks(seed: int) -> None:
-    """Against numpy's least squares, which knows nothing of inner products."""
+    """Against numpy's least squares, which does not use inner products."""
     source, target = model_of(seed), model_of(seed + 1, 5, 3, size=0.8)
     values = motion_of(source)
     size = face_size(target) / face_size(source)
@@ -172,7 +172,7 @@ def test_two_modes_in_closed_form() -> None:
     assert moved == pytest.approx(expected, abs=1e-4)
 
 
-def test_there_and_back_again_loses_only_what_the_target_lacks() -> None:
+def test_a_round_trip_loses_only_motion_outside_the_target() -> None:
     source, target = model_of(8), model_of(9, size=1.3)
     wide = np.full(6, 1000, np.float32)
     source, target = replace(source, spread=wide), replace(target, spread=wide)
@@ -212,12 +212,12 @@ def test_with_all_missing_components_the_target_spans_the_source() -> None:
     assert (seen**2).sum(axis=0) == pytest.approx(np.ones(6), abs=1e-6)
 
 
-def test_what_is_appended_first_moves_most() -> None:
+def test_components_are_appended_in_order_of_motion() -> None:
     source, target = model_of(1), model_of(2, 3, 3, size=1.5)
     lost = []
     for n in range(7):
-        ready = build_parameter_transfer(source, append_missing_components(source, target, n))
-        lost.append(((source.spread**2) * (1.5**2 - (ready.relation**2).sum(axis=0))).sum())
+        transfer = build_parameter_transfer(source, append_missing_components(source, target, n))
+        lost.append(((source.spread**2) * (1.5**2 - (transfer.relation**2).sum(axis=0))).sum())
     assert all(np.diff(lost) < 0)
     assert lost[-1] == pytest.approx(0, abs=1e-4)
 
@@ -233,30 +233,30 @@ def test_the_spread_of_an_appended_mode_is_the_source_s_about_its_rest() -> None
     assert len(joined.spread) == 6
 
 
-def test_nothing_is_missing_in_the_same_model() -> None:
+def test_the_same_model_has_no_missing_components() -> None:
     model = model_of(1)
     assert np.array_equal(append_missing_components(model, model).basis, model.basis)
     with pytest.raises(InputError, match="0 components of the source are missing in the target, not 1"):
         append_missing_components(model, model, 1)
 
 
-def test_frames_do_not_know_each_other() -> None:
+def test_frames_are_independent() -> None:
     source, target = model_of(1), opening_model()
-    ready, values = build_parameter_transfer(source, target), motion_of(source, spreads=3)
-    assert np.array_equal(ready.parameters(values)[::-1], ready.parameters(values[::-1]))
-    assert np.array_equal(ready.parameters(values)[4:5], ready.parameters(values[4:5]))
+    transfer, values = build_parameter_transfer(source, target), motion_of(source, spreads=3)
+    assert np.array_equal(transfer.parameters(values)[::-1], transfer.parameters(values[::-1]))
+    assert np.array_equal(transfer.parameters(values)[4:5], transfer.parameters(values[4:5]))
 
 
-def test_speech_becomes_speech_and_all_becomes_all() -> None:
+def test_speech_parameters_map_to_speech_parameters() -> None:
     source, target = model_of(1, 4, 2), model_of(2, 3, 5)
-    ready, values = build_parameter_transfer(source, target), motion_of(source)
-    whole = ready.clone(Trajectory([f"shape{i}" for i in range(6)], values, 25.0))
-    speech = ready.clone(Trajectory([f"shape{i}" for i in range(4)], values[:, :4], 25.0))
+    transfer, values = build_parameter_transfer(source, target), motion_of(source)
+    whole = transfer.clone(Trajectory([f"shape{i}" for i in range(6)], values, 25.0))
+    speech = transfer.clone(Trajectory([f"shape{i}" for i in range(4)], values[:, :4], 25.0))
     assert (len(whole.channels), speech.channels, speech.fps) == (8, ("shape0", "shape1", "shape2"), 25.0)
     assert whole.values[:, :3] == pytest.approx(speech.values, abs=1e-6)  # other modes do not reach the mouth
 
 
-def test_what_does_not_fit_is_refused() -> None:
+def test_invalid_input_is_refused() -> None:
     source, target = model_of(1), model_of(2)
     with pytest.raises(InputError, match="gain must be 0 or more, not -1"):
         build_parameter_transfer(source, target, gain=-1)
@@ -273,7 +273,7 @@ def test_what_does_not_fit_is_refused() -> None:
         build_parameter_transfer(few, target)
     with pytest.raises(DataError, match="68 landmarks, not 478"):
         append_missing_components(source, few)
-    with pytest.raises(DataError, match="rests beyond 3 spreads in mode 2"):
+    with pytest.raises(DataError, match="rest of a talker exceeds 3 standard deviations in mode 2"):
         build_parameter_transfer(source, replace(target, rest=np.array([0, 0, 9e9, 0, 0, 0], np.float32)))
     with pytest.raises(InputError, match="6 components of the source are missing in the target, not 13"):
         append_missing_components(source, target, 13)
@@ -285,8 +285,8 @@ def test_a_real_talker_keeps_limits_and_lips_under_gain() -> None:
     own, kept = talker.model, [*range(10), *range(20, 25)]
     half = ShapeModel(own.mean, own.basis[kept], own.spread[kept], 10, own.rest[kept])
     values = np.concatenate([utterance.shape for utterance in talker.utterances[:10]])
-    ready = build_parameter_transfer(own, half, gain=1.5)
-    mapped = ready.parameters(values)
+    transfer = build_parameter_transfer(own, half, gain=1.5)
+    mapped = transfer.parameters(values)
     assert (np.abs(mapped) <= parameter_limits(half)).all()
     assert gaps_of(half, mapped).min() > 0
     middle = [INNER_UPPER_LIP.index(UPPER_LIP_INNER_MID)]

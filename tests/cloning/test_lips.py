@@ -1,4 +1,4 @@
-"""Cloned lips: they never cross, touch where the source's touch, and are set right by the least motion."""
+"""Transferred lips: no crossing, contact where the source has contact, and the least correction."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from tts2face.cloning.parameter_transfer import build_parameter_transfer
 from tts2face.face.bounded_least_squares import bounded_least_squares
 
 
-def test_crossing_lips_are_parted_and_no_more() -> None:
+def test_crossing_lips_are_separated_by_the_least_gap() -> None:
     """In closed form: a lower lip that would rise 2 mm stops where the lips are 0.01 mm apart."""
     model = opening_model()
     values = np.array([[-2 * np.sqrt(len(INNER_LOWER_LIP)), 5.0], [6.0, 1.0]], np.float32)
@@ -24,7 +24,7 @@ def test_crossing_lips_are_parted_and_no_more() -> None:
     assert mapped[1] == pytest.approx(values[1], abs=1e-6)
 
 
-def test_lips_that_overlap_at_rest_are_parted_there_too() -> None:
+def test_lips_that_overlap_at_rest_are_separated_at_rest() -> None:
     """By 0.31 mm in closed form; other frames keep their displacement from there."""
     model = opening_model(gap=-0.3)
     parted = 0.31 * np.sqrt(len(INNER_LOWER_LIP))
@@ -35,7 +35,7 @@ def test_lips_that_overlap_at_rest_are_parted_there_too() -> None:
 
 @some
 @given(seeds)
-def test_lips_are_set_right_by_the_least_motion(seed: int) -> None:
+def test_lip_gaps_are_corrected_by_the_least_motion(seed: int) -> None:
     """Against the same problem by sequential quadratic programming, and by pivoting where only crossing matters."""
     rng = np.random.default_rng(seed)
     gaps = np.column_stack([rng.normal(size=(3, 5)), rng.uniform(0.1, 0.5, 3)])
@@ -69,7 +69,7 @@ def test_lips_are_set_right_by_the_least_motion(seed: int) -> None:
     assert free == pytest.approx(wanted + forces @ sides, abs=1e-4)
 
 
-def test_lips_that_touch_on_the_source_touch_under_gain_and_open_lips_open_wide() -> None:
+def test_contact_of_the_source_is_kept_under_gain() -> None:
     """0.4 mm apart at rest; 0.8 mm, which is contact, stays 0.8 mm; 10 mm becomes 20 mm less the rest's 0.4."""
     model, per_mm = opening_model(), np.sqrt(len(INNER_LOWER_LIP))
     values = np.array([[0.4 * per_mm, 2.0], [9.6 * per_mm, 2.0]], np.float32)
@@ -82,8 +82,8 @@ def test_lips_that_touch_on_the_source_touch_under_gain_and_open_lips_open_wide(
 
 @some
 @given(seeds)
-def test_frames_never_come_further_apart(seed: int) -> None:
-    """The nearest point of a convex set: limits and lips make no motion jerkier."""
+def test_differences_of_frames_do_not_grow(seed: int) -> None:
+    """The nearest point of a convex set: limits and lip constraints do not add jerk."""
     rng = np.random.default_rng(seed)
     model = opening_model()
     before = rng.normal(size=(30, 2)).astype(np.float32) * 25
@@ -94,6 +94,6 @@ def test_frames_never_come_further_apart(seed: int) -> None:
     assert gaps_of(model, mapped).min() >= 0
 
 
-def test_lips_that_nothing_parts_are_refused() -> None:
-    with pytest.raises(DataError, match="lips cannot be as they must within its limits"):
+def test_unsatisfiable_lip_gaps_are_refused() -> None:
+    with pytest.raises(DataError, match="no parameters within the target"):
         nearest_valid_parameters(np.zeros((1, 1)), np.ones(1), np.array([[1.0, -2.0]]), np.full((1, 1), 9.0))

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from corpus_tools.aam.block_pca import IncrementalPca
-from corpus_tools.aam.lighting import fit_lighting
 from corpus_tools.aam.mesh import MOUTH_LANDMARKS, face_ring, face_triangles, mouth_triangles, points_in_polygon
 from corpus_tools.aam.procrustes import align_shapes, apply_similarities, fit_similarities
 from corpus_tools.aam.reference_frame import barycentric_coordinates, build_reference_frame
 from corpus_tools.aam.source_videos import AppearanceRecording
-from corpus_tools.aam.train_appearance import camera_axes, speech_weights
-from corpus_tools.consent import consent_record
+from corpus_tools.aam.train_appearance import camera_axes, fit_lighting, speech_weights
+from corpus_tools.build_talker import consent_record
 from lexicon.errors import InputError
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.render.own_face import ring_triangles
@@ -47,7 +46,7 @@ def test_components_block_by_block_are_those_of_all_rows(blocks):
     assert np.abs(grown.mean - rows.mean(axis=0)).max() < 1e-5
     assert np.allclose(grown.spread()[:3], scales[:3] / np.sqrt(60), rtol=1e-3)
     assert np.allclose(np.abs((grown.basis[:3] * basis[:3]).sum(axis=1)), 1, atol=1e-4)
-    assert np.allclose(grown.explained()[:3], np.cumsum(scales**2)[:3] / (scales**2).sum(), atol=1e-4)
+    assert np.allclose(grown.explained_variance()[:3], np.cumsum(scales**2)[:3] / (scales**2).sum(), atol=1e-4)
     assert np.abs(grown.basis @ grown.basis.T - np.eye(len(grown.basis))).max() < 1e-3
 
 
@@ -114,7 +113,7 @@ def test_a_light_is_found_again_on_the_pixels_that_stay():
     still = np.arange(300) >= 100
     found = fit_lighting(texture, reference.astype(np.float32), still)
     assert np.abs(found.gain - (1.2, 0.9, 1.0)).max() < 1e-4
-    assert np.abs(found.removed(texture)[100:] - reference[100:]).max() < 0.01
+    assert np.abs(found.apply(texture)[100:] - reference[100:]).max() < 0.01
 
 
 def test_speech_changes_the_mouth_and_neither_forehead_nor_outline():

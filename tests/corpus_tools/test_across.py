@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from corpus_tools.decomposition.face_motion import moved_landmarks
-from corpus_tools.evaluation.cross_talker import SpeakerScale
-from corpus_tools.evaluation.evaluate import SplitResult, evaluate_across_talkers
+from corpus_tools.evaluation.evaluate import SpeakerScale, SplitResult, evaluate_across_talkers
 from corpus_tools.evaluation.livelink_reference import observe_livelink
 from corpus_tools.evaluation.measures import midpoint_openings, min_openings
 from corpus_tools.evaluation.reference import LipCurves

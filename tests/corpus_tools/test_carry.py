@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from corpus_tools.aam.appearance_transfer import build_appearance_transfer
 from corpus_tools.aam.mesh import face_triangles
 from corpus_tools.aam.reference_frame import build_reference_frame
+from corpus_tools.clone_talker import build_appearance_transfer
 from tests.render.tiny_talker import face_points, own_talker
 from tts2face.models.appearance import Appearance, TextureModel
 
@@ -55,6 +55,6 @@ def test_looks_stay_within_three_spreads_and_follow_the_gain() -> None:
     face = looking(painted(1.0, 48, 1.0))
     made = build_appearance_transfer(face, face)
     looks = np.array([[4.0, 0.0, 0.0]])
-    np.testing.assert_allclose(made.carried(looks, gain=2.0), 2 * made.carried(looks), rtol=1e-6)
-    np.testing.assert_allclose(made.carried(looks)[0, 0], 4.0, rtol=1e-4)
-    assert made.carried(100 * looks)[0, 0] == 30.0
+    np.testing.assert_allclose(made.parameters(looks, gain=2.0), 2 * made.parameters(looks), rtol=1e-6)
+    np.testing.assert_allclose(made.parameters(looks)[0, 0], 4.0, rtol=1e-4)
+    assert made.parameters(100 * looks)[0, 0] == 30.0

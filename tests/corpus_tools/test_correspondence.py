@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.head.correspondence import nearest_on_surface, read_places, write_places
-from corpus_tools.head.locate import alike, first_hit
-from corpus_tools.head.rings import Strips, narrowest_ring
+from corpus_tools.head.correspondence import nearest_surface_points, read_places, write_places
+from corpus_tools.head.locate import intersect_ray, symmetrise
+from corpus_tools.head.rings import EdgeRings, find_narrowest_ring
 from lexicon.errors import DataError
 from tts2face.models.face_file import load_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
@@ -35,20 +35,20 @@ def funnel() -> tuple[np.ndarray, np.ndarray]:
 def test_the_narrowest_inner_ring_is_found() -> None:
     """The border has no four neighbours, so the first ring that runs on is ring 1."""
     vertices, quads = funnel()
-    ring = narrowest_ring(Strips(quads, vertices), vertices, np.zeros(3), 10.0)
+    ring = find_narrowest_ring(EdgeRings(quads, vertices), vertices, np.zeros(3), 10.0)
     assert sorted(ring) == list(range(N_AROUND, 2 * N_AROUND))
 
 
 def test_a_ring_stays_clear_of_a_ball() -> None:
     vertices, quads = funnel()
-    ring = narrowest_ring(Strips(quads, vertices), vertices, np.zeros(3), 10.0, clear=3.5)
+    ring = find_narrowest_ring(EdgeRings(quads, vertices), vertices, np.zeros(3), 10.0, clear=3.5)
     assert sorted(ring) == list(range(2 * N_AROUND, 3 * N_AROUND))
 
 
 def test_a_hole_without_a_ring_is_refused() -> None:
     vertices, quads = funnel()
     with pytest.raises(DataError, match="no ring of edges"):
-        narrowest_ring(Strips(quads, vertices), vertices, np.array([50.0, 0, 0]), 10.0)
+        find_narrowest_ring(EdgeRings(quads, vertices), vertices, np.array([50.0, 0, 0]), 10.0)
 
 
 def test_the_nearest_place_is_that_of_a_dense_sample() -> None:
@@ -57,7 +57,7 @@ def test_the_nearest_place_is_that_of_a_dense_sample() -> None:
     points = rng.normal(size=(20, 3)) * 2
     grid = np.array([(a, b) for a in np.linspace(0, 1, 201) for b in np.linspace(0, 1, 201) if a + b <= 1])
     dense = np.concatenate([(np.column_stack([1 - grid.sum(1), grid])) @ vertices[corners] for corners in triangles])
-    number, weights, distance = nearest_on_surface(points, vertices, triangles)
+    number, weights, distance = nearest_surface_points(points, vertices, triangles)
     known = np.linalg.norm(points[:, None] - dense[None], axis=2).min(axis=1)
     assert (weights >= 0).all()
     assert weights.sum(axis=1) == pytest.approx(1, abs=1e-12)
@@ -69,16 +69,18 @@ def test_the_nearest_place_is_that_of_a_dense_sample() -> None:
 
 def test_a_ray_meets_the_first_triangle_squarely() -> None:
     square = np.array([[[-1, -1, 0], [1, -1, 0], [0, 2, 0]], [[-1, -1, -3], [1, -1, -3], [0, 2, -3]]], float)
-    place, facing = first_hit(np.array([0.1, 0.2, 5.0]), np.array([0.0, 0, -1]), square)
+    place, facing = intersect_ray(np.array([0.1, 0.2, 5.0]), np.array([0.0, 0, -1]), square)
     assert place == pytest.approx([0.1, 0.2, 0], abs=1e-12)
     assert facing == pytest.approx(1)
-    place, facing = first_hit(np.array([9.0, 9.0, 5.0]), np.array([0.0, 0, -1]), square)
+    place, facing = intersect_ray(np.array([9.0, 9.0, 5.0]), np.array([0.0, 0, -1]), square)
     assert facing == 0
 
 
 def test_halves_are_made_alike() -> None:
     places = np.array([[2.0, 1, 0], [-2.4, 1.2, 0], [0.1, 3, 1]])
-    assert alike(places, np.array([1, 0, 2])) == pytest.approx(np.array([[2.2, 1.1, 0], [-2.2, 1.1, 0], [0, 3, 1]]))
+    assert symmetrise(places, np.array([1, 0, 2])) == pytest.approx(
+        np.array([[2.2, 1.1, 0], [-2.2, 1.1, 0], [0, 3, 1]])
+    )
 
 
 def test_a_table_comes_back_and_a_damaged_one_is_refused(tmp_path: Path) -> None:

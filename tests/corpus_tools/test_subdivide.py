@@ -1,6 +1,6 @@
 import numpy as np
 
-from corpus_tools.head.subdivide import catmull_clark, triangulated
+from corpus_tools.head.subdivide import catmull_clark, triangulate
 
 CUBE = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 SIDES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
@@ -68,6 +68,6 @@ def test_quads_keep_their_winding_and_first_corner():
     assert np.array_equal(quads[:, 0].reshape(6, 4), SIDES)
     vertices, flat = sheet(2)
     matrix, fine = catmull_clark(len(vertices), flat)
-    corners = (matrix @ vertices)[triangulated(fine)]
+    corners = (matrix @ vertices)[triangulate(fine)]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert np.all(normals[:, 2] > 0)

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from corpus_tools.recordings.folder import find_recordings, pronounce_recording
-from corpus_tools.recordings.subtitles import Cue, read_cues
-from corpus_tools.transcripts.decoding import MAX_BYTES, read_text
-from corpus_tools.transcripts.find import READERS, find_transcript, read_transcript
+from corpus_tools.recordings.subtitles import MAX_BYTES, Cue, read_cues, read_text
+from corpus_tools.recordings.transcripts import READERS, find_transcript, read_transcript
 from lexicon.errors import DataError
 
 SRT = """1

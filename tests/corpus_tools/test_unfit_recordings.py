@@ -16,7 +16,7 @@ REASONS = {
     "frozen": "the picture stands still for",
     "clipped": "of the speech is clipped",
     "noisy": "dB above the noise",
-    "away": "out of sight",
+    "away": "no face is visible",
     "wrong": "check the transcript",
     "dark": "no frame shows a face",
 }

@@ -17,7 +17,7 @@ import pytest
 from cyclopts import App
 
 from cli.main import app, run
-from cli.options import check_options, option_names
+from cli.flags import check_options, option_names
 from tests.docs.blocks import (
     CLI_PAGE,
     EXECUTED_PAGES,

@@ -1,4 +1,4 @@
-"""A recording of a voice drives a head: with its words, by its sound alone; what cannot be heard is refused."""
+"""Lip motion from recordings: with their words, by their sound alone; refusal of silent recordings."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -38,7 +38,7 @@ def film(clips: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def talker(clips: Path) -> Talker:
-    """The shipped talker with drives learnt from some of her recordings, the one above left out."""
+    """The shipped talker with audio maps learnt from some of its recordings, without the one above."""
     shipped = load_talker("grid_s1")
     spoken = [one for one in shipped.utterances if one.name != "bbaf2n"][:: len(shipped.utterances) // LEARNT_FROM]
     lessons = []
@@ -78,11 +78,11 @@ def opening(motion: np.ndarray, talker: Talker) -> np.ndarray:
     return np.linalg.norm(shapes[:, 13] - shapes[:, 14], axis=1)
 
 
-@pytest.mark.parametrize(("drive", "least"), [("linear", 0.5), ("network", 0.65)])
+@pytest.mark.parametrize(("audio_map", "least"), [("linear", 0.5), ("network", 0.65)])
 def test_lips_that_hear_a_new_sentence_move_as_the_speaker_s(
-    drive: str, least: float, film: Path, talker: Talker
+    audio_map: str, least: float, film: Path, talker: Talker
 ) -> None:
-    _, lips = map_audio_to_motion(film, talker.audio_maps[drive], talker, talker.fps)
+    _, lips = map_audio_to_motion(film, talker.audio_maps[audio_map], talker, talker.fps)
     (real,) = (one.shape for one in talker.utterances if one.name == "bbaf2n")
     n = min(len(real), len(lips))
     assert np.corrcoef(opening(real[:n], talker), opening(lips.values[:n], talker))[0, 1] > least
@@ -98,11 +98,11 @@ def test_with_the_words_lips_close_where_they_are_said(film: Path, talker: Talke
     assert abs(starts - real.phones.edges[real.phones.phones.index("b")]) < 0.02
 
 
-def test_drives_and_words_give_different_lips(film: Path, talker: Talker, face: Face) -> None:
+def test_audio_maps_and_words_give_different_lips(film: Path, talker: Talker, face: Face) -> None:
     requests = (
         Request(audio=film),
-        Request(audio=film, drive="network"),
-        Request(audio=film, drive="linear"),
+        Request(audio=film, audio_map="network"),
+        Request(audio=film, audio_map="linear"),
         Request(audio=film, text=TEXT),
         Request(audio=film, volume=0.5),
     )
@@ -147,9 +147,9 @@ def test_files_of_sound_alone_are_read(suffix: str, here: Path) -> None:
 
 def test_a_faint_recording_moves_the_lips_as_a_loud_one(film: Path, talker: Talker, here: Path) -> None:
     sound = read_sound(film, 16000).samples
-    drive = replace(talker.audio_maps["network"], loudness=-18.0)
+    audio_map = replace(talker.audio_maps["network"], loudness=-18.0)
     loud, faint = (
-        map_audio_to_motion(written(here / f"{gain}.wav", gain * sound), drive, talker, 25.0)[1].values
+        map_audio_to_motion(written(here / f"{gain}.wav", gain * sound), audio_map, talker, 25.0)[1].values
         for gain in (1.0, 0.1)
     )
     spread = talker.model.spread[: talker.model.n_speech]
@@ -169,7 +169,7 @@ def test_the_command_writes_clips(film: Path, talker: Talker, here: Path) -> Non
     common = ["--audio", str(film), "--talker", "me.talker", "--size", "64x64", "--fps", "5", "--quiet"]
     for out, more in (
         ("sound.mp4", []),
-        ("linear.mp4", ["--drive", "linear"]),
+        ("linear.mp4", ["--audio-map", "linear"]),
         ("text.mp4", ["--text", TEXT]),
         ("words.mp4", [TEXT]),
         ("script.mp4", ["--transcript", "said.txt", "--explain", "why.json"]),
@@ -204,11 +204,11 @@ def test_files_without_sound_are_refused(talker: Talker, face: Face, here: Path)
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        ({"drive": "magic"}, "no drive 'magic'; choose linear or network"),
-        ({"drive": "linear", "audio": None, "text": "Hi."}, "a drive follows a recording"),
-        ({"drive": "linear", "text": "Hi."}, "leave --drive or the text away"),
-        ({"voice": "espeak"}, "leave --voice and --rate away"),
-        ({"rate": 1.5}, "leave --voice and --rate away"),
+        ({"audio_map": "magic"}, "no audio map 'magic'; choose linear or network"),
+        ({"audio_map": "linear", "audio": None, "text": "Hi."}, "--audio-map needs a recording"),
+        ({"audio_map": "linear", "text": "Hi."}, "remove --audio-map or the text"),
+        ({"voice": "espeak"}, "--voice and --rate have no effect on a recording"),
+        ({"rate": 1.5}, "--voice and --rate have no effect on a recording"),
     ],
 )
 def test_options_that_do_not_go_together_are_refused(options: dict, reason: str) -> None:
@@ -216,12 +216,12 @@ def test_options_that_do_not_go_together_are_refused(options: dict, reason: str)
         Request(**{"audio": Path("a.wav"), **options})
 
 
-def test_a_recording_that_is_not_there_and_a_talker_without_drives_are_refused(
+def test_a_recording_that_is_not_there_and_a_talker_without_audio_maps_are_refused(
     film: Path, talker: Talker, face: Face
 ) -> None:
     with pytest.raises(InputError, match=r"there is no recording none\.wav"):
         Session(talker, face).clip(Request(audio=Path("none.wav")))
-    with pytest.raises(InputError, match="has no network drive"):
+    with pytest.raises(InputError, match="has no network audio map"):
         Session(replace(talker, audio_maps={}), face).clip(Request(audio=film))
 
 

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from cli.exits import EXIT_CODES
 from cli.main import run
+from cli.process import EXIT_CODES
 from lexicon import errors
 from tests.docs.blocks import lines_that_need_a_person
 from tts2face.render.picture import Picture
@@ -73,12 +73,12 @@ def test_every_command_of_the_readme_works(line: str, here: Path, shared_recordi
             pytest.importorskip("ai_edge_litert", reason="needs the extra [capture]")
             (first,) = (other for other in readme_commands() if sign in other)
             subprocess.run([*COMMAND, *shlex.split(first)[1:]], check=True, capture_output=True)
-    told, _, command = line.rpartition("| ")
-    given = shlex.split(told)[1] if told else None
+    echo, _, command = line.rpartition("| ")
+    standard_input = shlex.split(echo)[1] if echo else None
     words = shlex.split(command)[1:]
     if words[0] not in {"phones", "corpus", "report", "voices", "identities", "styles"}:
         words += SMALL
-    done = subprocess.run([*COMMAND, *words], input=given, capture_output=True, text=True, check=False)
+    done = subprocess.run([*COMMAND, *words], input=standard_input, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     for flag in ("--out", "--explain", "--report"):
         if flag in words:
@@ -87,10 +87,10 @@ def test_every_command_of_the_readme_works(line: str, here: Path, shared_recordi
 
 def test_help_names_every_option_and_is_quick(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["--help"]) == 0
-    told = capsys.readouterr().out
+    captured = capsys.readouterr().out
     for options in (Request, Picture):
         for option in fields(options):
-            assert option.name == "text" or f"--{option.name}" in told
+            assert option.name == "text" or f"--{option.name}" in captured
     loaded = "import sys; from cli.main import run; run(['--help']); print(*sys.modules)"
     modules = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True).stdout
     heavy = {"numpy", "numba", "scipy", "onnxruntime", "av", "PIL", "hibari", "pocketsphinx", "pyvista", "parselmouth"}
@@ -114,15 +114,15 @@ def test_every_kind_of_error_has_an_exit_code() -> None:
         (["Hi [style:ears=a]you[/style].", "--out", "x.mp4"], 2, "no feature 'ears'"),
         (["<speak><voice name='Jo'>Hi.</voice></speak>", "--out", "x.mp4"], 2, "SSML, line 1: there is no voice 'Jo'"),
         (["<speak xml:lang='fr'>Salut.</speak>", "--out", "x.mp4"], 2, "the text names the language fr, not en-us"),
-        (["Hi [pause 1] you.", "--audio", "latin.txt", "--out", "x.mp4"], 2, "a recording keeps its own pauses"),
+        (["Hi [pause 1] you.", "--audio", "latin.txt", "--out", "x.mp4"], 2, "have no effect on a recording"),
         (["Hi.", "--style", "ears=a", "--out", "x.mp4"], 2, "no feature 'ears'"),
         (["Hi.", "--gain", "head=9", "--out", "x.mp4"], 2, "the gain of head must lie between 0 and 3, not 9"),
         (["Hi.", "--expression", "sad=1@3-1", "--out", "x.mp4"], 2, "must end after it begins"),
         (["Hi.", "--timeline", "none.json", "--out", "x.mp4"], 2, "cannot read the timeline none.json"),
         (["Hi.", "--timeline", "plan.json", "--out", "x.mp4"], 3, "plan.json: two spans of head overlap"),
-        (["Hi.", "--idle", "5", "--out", "x.mp4"], 2, "an idle face is silent"),
+        (["Hi.", "--idle", "5", "--out", "x.mp4"], 2, "--idle cannot be combined with text or --audio"),
         (["--idle", "5", "--explain", "x.json"], 2, "the text is empty"),
-        (["Hi.", "--no-gestures", "--style", "calm", "--out", "x.mp4"], 2, "without gestures there is nothing"),
+        (["Hi.", "--no-gestures", "--style", "calm", "--out", "x.mp4"], 2, "have no effect with --gestures none"),
         (["Hi.", "--gestures", "ju2009", "--out", "x.mp4"], 2, "gestures must be fields, ju2008, noise or none"),
         (["Hi.", "--gestures", "ju2008", "--noise", "--out", "x.mp4"], 2, "cannot be combined with --noise; remove"),
         (["Hi.", "--noise", "--no-gestures", "--out", "x.mp4"], 2, "--noise cannot be combined with --no-gestures"),
@@ -131,18 +131,18 @@ def test_every_kind_of_error_has_an_exit_code() -> None:
         (["Hi.", "--out", "x.mp4", "--talker", "none.talker"], 2, "no talker file none.talker"),
         (["Hi.", "--out", "x.mp4", "--talker", "junk.talker"], 3, "junk.talker is damaged or not a talker file"),
         (["Hi.", "--out", "x.mp4", "--talker", "face.talker"], 3, "face.talker is not a talker file"),
-        (["Hi.", "--out", "x.mp4", "--talker", "old.talker"], 3, "of version 0, this one reads 1"),
+        (["Hi.", "--out", "x.mp4", "--talker", "old.talker"], 3, "of version 0, not 1"),
         (["Hi.", "--out", "x.mp4", "--face", "half.face"], 3, "half.face is damaged or not a face file"),
         (["Hi.", "--out", "x.mp4", "--face", "nobody"], 2, "no face 'nobody'"),
         (["Hi.", "--out", "x.mp4", "--identity", "nobody"], 2, "no identity 'nobody'"),
         (["Hi.", "--out", "x.mp4", "--fps", "0"], 2, "fps must lie between 1 and 120, not 0"),
         (["Hi.", "--out", "x.mp4", "--size", "9x9"], 2, "even numbers from 16 to 4096"),
         (["Hi.", "--out", "x.mp4", "--fps", "many"], 2, 'unable to convert "many"'),
-        (["Hi.", "--out", "x.mp4", "--exemplars", "2.5"], 2, '"2.5" is no whole number'),
-        (["corpus", "evaluate", "--recordings", ".", "--folds", "2.5"], 2, '"2.5" is no whole number'),
+        (["Hi.", "--out", "x.mp4", "--exemplars", "2.5"], 2, '"2.5" is not a whole number'),
+        (["corpus", "evaluate", "--recordings", ".", "--folds", "2.5"], 2, '"2.5" is not a whole number'),
         (["Hi.", "--out", "x.mp4", "--flag", "1"], 2, "--flag"),
-        (["Hi."], 2, "say where the clip goes"),
-        (["Hi.", "--file", "x.txt", "--out", "x.mp4"], 2, "not both"),
+        (["Hi."], 2, "there is no output; add --out"),
+        (["Hi.", "--file", "x.txt", "--out", "x.mp4"], 2, "--file cannot be combined with a text"),
         (["--file", "none.txt", "--out", "x.mp4"], 2, "cannot read the text from none.txt"),
         (["--file", "latin.txt", "--out", "x.mp4"], 2, "latin.txt is not UTF-8 text (byte 1)"),
     ],
@@ -162,9 +162,9 @@ def test_bad_input_gets_one_sentence_and_leaves_nothing(
     write_tensors(here / "old.talker", "talker", 0, {}, {})
     before = set(here.iterdir())
     assert run(arguments) == code
-    told = capsys.readouterr()
-    assert reason in told.err
-    assert len(told.err.strip().splitlines()) == 1
+    captured = capsys.readouterr()
+    assert reason in captured.err
+    assert len(captured.err.strip().splitlines()) == 1
     assert set(here.iterdir()) == before
 
 
@@ -179,10 +179,14 @@ def test_a_folder_that_cannot_be_written_is_named(here: Path, capsys: pytest.Cap
 
 def test_text_from_standard_input_and_from_a_file(here: Path) -> None:
     (here / "text.txt").write_text("\ufeffHello.", encoding="utf-8")
-    for words, given in ((["--file", "text.txt"], ""), ([], "Hello."), (["-"], "Hello.")):
-        out = here / f"{len(words)}{len(given)}.mp4"
+    for words, standard_input in ((["--file", "text.txt"], ""), ([], "Hello."), (["-"], "Hello.")):
+        out = here / f"{len(words)}{len(standard_input)}.mp4"
         done = subprocess.run(
-            [*COMMAND, *words, "--out", str(out), *SMALL], input=given, capture_output=True, text=True, check=False
+            [*COMMAND, *words, "--out", str(out), *SMALL],
+            input=standard_input,
+            capture_output=True,
+            text=True,
+            check=False,
         )
         assert done.returncode == 0, done.stderr
         assert re.search(r"wrote .*: \d+\.\d s, \d+ frames, made in \d+\.\d s \(\d+\.\d x real time\)", done.stderr)
@@ -197,9 +201,9 @@ def test_an_interruption_leaves_nothing(here: Path) -> None:
         time.sleep(0.05)
     assert list(here.glob(".x*"))
     process.send_signal(signal.SIGINT)
-    _, told = process.communicate(timeout=60)
+    _, captured = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "stopped; nothing was written" in told
+    assert "interrupted; no output was written" in captured
     assert list(here.iterdir()) == []
 
 

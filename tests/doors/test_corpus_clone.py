@@ -19,7 +19,13 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     few = replace(starter, utterances=starter.utterances[:4])
     kept, own = [*range(8), *range(20, 25)], starter.model
     model = replace(own, basis=own.basis[kept], spread=own.spread[kept], rest=own.rest[kept], n_speech=8)
-    narrow = replace(few, model=model, utterances=tuple(replace(u, shape=u.shape[:, kept]) for u in few.utterances))
+    narrow = replace(
+        few,
+        model=model,
+        network=None,
+        audio_maps={},
+        utterances=tuple(replace(u, shape=u.shape[:, kept]) for u in few.utterances),
+    )
     write_talker(tmp_path / "a.talker", few)
     write_talker(tmp_path / "b.talker", narrow)
     return tmp_path
@@ -27,8 +33,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_a_cloned_talker_is_written_and_can_be_shown(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["corpus", "clone", "a.talker", "b.talker", "--out", "c.talker"]) == 0
-    told = capsys.readouterr().err
-    assert re.search(r"wrote c.talker: 4 utterances, \d+\.\d% of frames at limits", told)
+    captured = capsys.readouterr().err
+    assert re.search(r"wrote c.talker: 4 utterances, \d+\.\d% of frames at limits", captured)
     assert run(["corpus", "show", "c.talker"]) == 0
     shown = capsys.readouterr().out
     assert "GRID s1 with the speech of GRID s1" in shown
@@ -52,7 +58,7 @@ def test_every_option_matters(here: Path, capsys: pytest.CaptureFixture[str]) ->
     assert more.model.n_speech > plain.model.n_speech == 8
 
 
-def test_a_cloned_talker_can_be_spokenreplace(here: Path) -> None:
+def test_a_cloned_talker_can_be_spoken(here: Path) -> None:
     assert run(["corpus", "clone", "grid_s1", "b.talker", "--out", "c.talker"]) == 0
     small = ["--size", "64x64", "--fps", "5", "--quiet"]
     assert run(["Place blue.", "--talker", "c.talker", "--out", "x.mp4", *small]) == 0
@@ -77,7 +83,7 @@ def test_bad_input_gets_one_sentence_and_leaves_nothing(
     (here / "junk.talker").write_bytes(b"no talker at all")
     before = set(here.iterdir())
     assert run(["corpus", "clone", *arguments]) == code
-    told = capsys.readouterr().err
-    assert reason in told
-    assert len(told.strip().splitlines()) == 1
+    captured = capsys.readouterr().err
+    assert reason in captured
+    assert len(captured.strip().splitlines()) == 1
     assert set(here.iterdir()) == before

@@ -69,12 +69,12 @@ def test_each_option_changes_the_figures(option: tuple[str, ...], here: Path) ->
 
 def test_folders_that_are_split_already(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert len(json.loads(measured("split.json", "--train", "some", "--test", "rest"))["scores"][0]["utterances"]) == 6
-    assert "wrote split.json: 6 utterances held out, 18 learnt from" in capsys.readouterr().err
+    assert "wrote split.json: 6 utterances held out, 18 for training" in capsys.readouterr().err
 
 
 def test_another_talker_is_told_apart(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    told = json.loads(measured("across.json", "--train", "all", "--cross-talker", "other"))
-    assert (told["is_across"], told["n_train"], told["n_test"]) == (True, 24, 4)
+    result = json.loads(measured("across.json", "--train", "all", "--cross-talker", "other"))
+    assert (result["is_across"], result["n_train"], result["n_test"]) == (True, 24, 4)
     assert "4 utterances of somebody else, 24 learnt from" in capsys.readouterr().err
 
 
@@ -99,20 +99,32 @@ def test_folds_are_told_at_the_terminal_and_in_every_file(here: Path, capsys: py
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        ((), "give --recordings to split, or both --train and --test"),
-        (("--train", "some"), "give --recordings to split, or both --train and --test"),
-        (("--recordings", "all", "--folds", "2", "--hold-out-words", "alpha"), "either --folds or --hold-out-words"),
-        (("--train", "some", "--test", "rest", "--folds", "2"), "--train and --test are split already"),
+        ((), "use either --recordings, or both --train and --test"),
+        (("--train", "some"), "use either --recordings, or both --train and --test"),
+        (
+            ("--recordings", "all", "--folds", "2", "--hold-out-words", "alpha"),
+            "--folds cannot be combined with --hold-out-words",
+        ),
+        (("--train", "some", "--test", "rest", "--folds", "2"), "cannot be combined with --train and --test"),
         (("--recordings", "all", "--hold-out", "24"), "1 to 23 can be held out, not 24"),
         (("--recordings", "all", "--folds", "1"), "24 utterances make 2 to 24 folds, not 1"),
         (("--recordings", "all", "--hold-out-words", "zebra"), "nobody says zebra"),
         (("--recordings", "all", "--tracks", "none.csv"), "there are no tracks none.csv"),
         (("--recordings", "all", "--out", "x.pdf"), "written as .html, .json, .csv, not x.pdf"),
-        (("--cross-talker", "other"), "with --cross-talker give either --recordings or --train"),
-        (("--cross-talker", "other", "--recordings", "all", "--folds", "2"), "leave out --test, --folds"),
-        (("--cross-talker", "other", "--train", "some", "--test", "rest"), "leave out --test, --folds"),
-        (("--cross-talker", "other", "--recordings", "all", "--own-durations"), "no --tracks and no --own-durations"),
-        (("--cross-talker", "other", "--recordings", "all", "--tracks", "curves.csv"), "no --tracks and no"),
+        (("--cross-talker", "other"), "--cross-talker needs one folder of training recordings"),
+        (
+            ("--cross-talker", "other", "--recordings", "all", "--folds", "2"),
+            "cannot be combined with --test, --folds or",
+        ),
+        (
+            ("--cross-talker", "other", "--train", "some", "--test", "rest"),
+            "cannot be combined with --test, --folds or",
+        ),
+        (("--cross-talker", "other", "--recordings", "all", "--own-durations"), "cannot be combined with --tracks"),
+        (
+            ("--cross-talker", "other", "--recordings", "all", "--tracks", "curves.csv"),
+            "cannot be combined with --tracks",
+        ),
         (("--cross-talker", "none.csv", "--recordings", "all"), "there is no capture none.csv"),
         (("--cross-talker", "rest", "--recordings", "all"), "u18 is learnt from and tested on"),
     ],
@@ -121,9 +133,9 @@ def test_refusals_are_one_sentence(
     arguments: tuple[str, ...], reason: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert evaluate(*arguments) == 2
-    said = capsys.readouterr().err
-    assert re.search(re.escape(reason), said)
-    assert said.count("\n") == 1
+    message = capsys.readouterr().err
+    assert re.search(re.escape(reason), message)
+    assert message.count("\n") == 1
 
 
 def test_own_durations_need_words(here: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:

@@ -177,7 +177,7 @@ def test_a_capture_becomes_a_style_of_the_starter_palette(
     capture = shared_recordings / "livelink" / "testset_arkit61_60fps.csv"
     cache = ["--cache", "cache", "--jobs", "1"]
     assert run(["corpus", "gestures", str(capture), "--style", "live", "--out", "live.palette", *cache]) == 0
-    assert "wrote live.palette: the style live of 1 recordings, 0.3 minutes; kept" in capsys.readouterr().err
+    assert "wrote live.palette: style live from 1 recordings, 0.3 minutes; modes keep" in capsys.readouterr().err
     palette = load_palette("live.palette")
     assert palette.names[-2:] == ("grid_s1", "live")
     assert palette.styles["live"].intensity.max() > 0  # its sound lies beside it

@@ -16,7 +16,7 @@ from tts2face import __version__, catalogue
 from tts2face.models.face_file import load_face
 from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
-from tts2face.voice.engine import load_voice
+from tts2face.voice.loading import load_voice
 
 LISTED = ["voices", "languages", "faces", "identities", "styles", "talkers"]
 
@@ -81,8 +81,10 @@ def test_the_version(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_the_package_is_a_command() -> None:
-    told = subprocess.run([sys.executable, "-m", "tts2face", "--version"], capture_output=True, text=True, check=True)
-    assert told.stdout.strip() == __version__
+    completed = subprocess.run(
+        [sys.executable, "-m", "tts2face", "--version"], capture_output=True, text=True, check=True
+    )
+    assert completed.stdout.strip() == __version__
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])

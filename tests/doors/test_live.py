@@ -44,7 +44,7 @@ def live(film: Path, bundle: Path) -> list[LivePose | None]:
 
 
 def test_a_person_is_learnt_and_then_followed(live: list[LivePose | None], film: Path, bundle: Path) -> None:
-    """Against the take read as a whole, which knows the future and more of her."""
+    """Compared with the take read as a whole, which includes later frames."""
     head = load_face("head")
     learnt = round(CALIBRATION_S * FPS)
     assert all(pose is None for pose in live[:learnt])
@@ -79,11 +79,11 @@ def test_an_actor_gives_each_pose_once(film: Path, bundle: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        (["take.mp4", "--camera", "0"], "give neither a take nor --out"),
-        (["--camera", "0", "--out", "m.mp4"], "give neither a take nor --out"),
-        (["--camera", "0", "--face", "self"], "and a head as --face"),
-        ([], "give a take and --out, or --camera"),
-        (["take.mp4"], "give a take and --out, or --camera"),
+        (["take.mp4", "--camera", "0"], "--camera cannot be combined with a take, --out"),
+        (["--camera", "0", "--out", "m.mp4"], "--camera cannot be combined with a take, --out"),
+        (["--camera", "0", "--face", "self"], "--out or --face self; remove them"),
+        ([], "add a take and --out, or use --camera"),
+        (["take.mp4"], "add a take and --out, or use --camera"),
     ],
 )
 def test_orders_that_make_no_sense(words: list[str], reason: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -90,14 +90,14 @@ def test_one_foreign_letter_is_read_and_a_word_is_refused(ready: Session) -> Non
 
 def test_a_file_with_marks_counts_characters_and_tells_the_times_of_names(ready: Session, tmp_path: Path) -> None:
     text = '<speak>Hello <mark name="here"/>there. <break time="1s"/>Bye.</speak>'
-    told: list[tuple[int, int]] = []
+    reported: list[tuple[int, int]] = []
     request = Request(text=text, fps=5.0)
-    written = ready.write(request, tmp_path / "a.mp4", picture=SMALL, on_progress=lambda *step: told.append(step))
+    written = ready.write(request, tmp_path / "a.mp4", picture=SMALL, on_progress=lambda *step: reported.append(step))
     (here,) = written.marks
     assert here.name == "here"
     assert 0.3 < here.seconds < 1.2
-    assert told[-1] == (len("Hello there. Bye."),) * 2
-    assert [done for done, _ in told] == sorted(done for done, _ in told)
+    assert reported[-1] == (len("Hello there. Bye."),) * 2
+    assert [done for done, _ in reported] == sorted(done for done, _ in reported)
     assert read_media_info(tmp_path / "a.mp4").duration == pytest.approx(written.seconds, abs=0.2)
 
 
@@ -112,11 +112,11 @@ def test_the_command_makes_the_pause(tmp_path: Path) -> None:
 
 
 def test_phones_are_those_of_the_words(capsys: pytest.CaptureFixture[str]) -> None:
-    told = []
+    reported = []
     for text in ("Hello there.", "Hello [pause 2] there."):
         assert run(["phones", text]) == 0
-        told.append(capsys.readouterr().out)
-    assert told[0] == told[1]
+        reported.append(capsys.readouterr().out)
+    assert reported[0] == reported[1]
 
 
 def test_phones_are_those_that_the_text_gives(capsys: pytest.CaptureFixture[str]) -> None:

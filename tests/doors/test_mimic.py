@@ -84,7 +84,7 @@ def test_a_film_without_sound_makes_a_silent_clip_and_says_so(
 ) -> None:
     written(here / "mute.mp4", [picture.pixels for picture in read_frames(film)][:20])
     assert run(["mimic", "mute.mp4", "--out", "m.mp4", "--size", "64x64", "--model", str(bundle)]) == 0
-    assert "holds no sound; the clip is silent" in capsys.readouterr().err
+    assert "contains no sound; the clip is silent" in capsys.readouterr().err
     assert (here / "m.mp4").exists()
 
 
@@ -129,10 +129,10 @@ def test_films_that_cannot_drive_a_face_are_refused(
     [
         (["--out", "m.txt"], "m.txt"),
         (["--out", "m.mp4", "--gain", "9"], "gain must lie from 0 to 4"),
-        (["--out", "m.mp4", "--face", "self"], "give both --face self and --talker"),
+        (["--out", "m.mp4", "--face", "self"], "--face self and --talker need each other"),
         (["--out", "m.mp4", "--audio", "x.wav"], "a film brings its own sound"),
         (["--out", "m.mp4", "--face", "nobody"], "nobody"),
-        (["--out", "m.mp4", "--append-missing"], "belongs to --face self"),
+        (["--out", "m.mp4", "--append-missing"], "needs --face self"),
     ],
 )
 def test_orders_that_make_no_sense_are_refused(
@@ -150,7 +150,7 @@ def test_orders_that_make_no_sense_are_refused(
         ("a,b\n1,2\n3,4\n", "needs the columns Timecode"),
         ("Timecode,BlendshapeCount,JawOpen\n10:00:00:00.0,61,0.1\n10:00:00:01.0,61\n", "line 3 of .* has 2 columns"),
         ("Timecode,BlendshapeCount,JawOpen\n10:00:00:00.0,61,x\n10:00:00:01.0,61,0\n", "line 2 of .* cannot be read"),
-        ("Timecode,BlendshapeCount,JawOpen\n10:00:00:02.0,61,0\n10:00:00:01.0,61,0\n", "do not run evenly"),
+        ("Timecode,BlendshapeCount,JawOpen\n10:00:00:02.0,61,0\n10:00:00:01.0,61,0\n", "must increase by at most"),
     ],
 )
 def test_captures_that_cannot_be_read_are_refused(

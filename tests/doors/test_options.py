@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from cli.flags import check_options
 from cli.main import app, run
-from cli.options import check_options
 from lexicon.errors import InputError
 from tts2face.render.output_path import check_output
 from tts2face.storage.output_names import check_name
@@ -46,7 +46,7 @@ def test_a_mistyped_option_is_not_spoken(
 ) -> None:
     assert run(words) == 2
     hint = f"did you mean {near}? " if near else ""
-    expected = f"tts2face: there is no option {option}; {hint}Text that begins with a dash goes after --\n"
+    expected = f"tts2face: there is no option {option}; {hint}Put text that begins with a hyphen after --\n"
     assert capsys.readouterr().err == expected
     assert not list(here.iterdir())
 
@@ -90,8 +90,8 @@ def test_text_behind_two_dashes_is_spoken(here: Path) -> None:
         (["corpus", "evaluate", "--recordings", "folder.json", "--out", "no/a.html"], 2, "no folder no"),
         (["Hi.", "--talker", "t" * 300, "--out", "x.mp4"], 2, "File name too long; check the path"),
         (["--audio", "t" * 300, "--out", "x.mp4"], 2, "File name too long; check the path"),
-        (["Hi.", "--dictionary", "/dev/zero", "--out", "x.mp4"], 3, "/dev/zero holds more than"),
-        (["Hi.", "--timeline", "/dev/zero", "--out", "x.mp4"], 3, "/dev/zero holds more than"),
+        (["Hi.", "--dictionary", "/dev/zero", "--out", "x.mp4"], 3, "/dev/zero contains more than"),
+        (["Hi.", "--timeline", "/dev/zero", "--out", "x.mp4"], 3, "/dev/zero contains more than"),
         (["Hi.", "--timeline", "digits.json", "--out", "x.mp4"], 3, "a number of 5000 characters is too long"),
         (
             ["Hi.", "--background", "bomb.png", "--out", "x.mp4"],
@@ -114,9 +114,9 @@ def test_what_cannot_be_done_is_refused_before_work_begins(
         Image.new("1", (11_000, 11_000)).save(here / "huge.png")
     before = set(here.iterdir())
     assert run(words) == code
-    told = capsys.readouterr().err
-    assert reason in told
-    assert len(told.strip().splitlines()) == 1
+    message = capsys.readouterr().err
+    assert reason in message
+    assert len(message.strip().splitlines()) == 1
     assert set(here.iterdir()) == before
 
 

@@ -27,7 +27,7 @@ COMMANDS = {
     "a report": ["corpus", "build", "in.mp4", "--out", "new.talker", "--report", "in.mp4"],
     "a transcript beside a film": ["corpus", "build", "in.mp4", "--out", "new.talker", "--report", "in.txt"],
     "the cloned talker": ["corpus", "clone", "in.talker", "grid_s1", "--out", "in.talker"],
-    "a talker that gets drives": ["corpus", "drives", ".", "--talker", "in.talker", "--out", "in.talker"],
+    "a talker that gets audio maps": ["corpus", "audio-maps", ".", "--talker", "in.talker", "--out", "in.talker"],
     "a palette that gets a style": ["corpus", "gestures", ".", "--style", "a", "--palette", "in.palette", "--out",
                                     "in.palette"],
     "a manifest": ["corpus", "evaluate", "--recordings", ".", "--out", "in.csv"],

@@ -1,4 +1,4 @@
-"""Recordings become a talker who speaks any text with her own face: the whole way, on real recordings."""
+"""From real recordings to a talker's own face that speaks any text."""
 
 import csv
 from pathlib import Path
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from corpus_tools.aam.appearance_transfer import build_appearance_transfer
+from corpus_tools.clone_talker import build_appearance_transfer
 from lexicon.errors import BackendError
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.models.talker import read_talker
@@ -113,29 +113,31 @@ def test_pictures_without_consent_are_refused(
 
 
 @pytest.mark.parametrize("source", ["grid_s1", "me"])
-def test_another_s_speech_on_her_own_face(source: str, talker: Path, tmp_path: Path) -> None:
-    """From a talker without pictures, and from one with them: the clone has hers, and the consent to show them."""
+def test_speech_of_another_talker_on_an_own_face(source: str, talker: Path, tmp_path: Path) -> None:
+    """The clone has the appearance of its target and the consent to show it, whatever the source has."""
     cloned, clip = tmp_path / "cloned.talker", tmp_path / "clip.mp4"
     given = str(talker) if source == "me" else source
     assert run(["corpus", "clone", given, str(talker), "--append-missing", "--out", str(cloned)]) == 0
     assert run(["Bob may.", "--talker", str(cloned), "--face", "self", "--out", str(clip), "--quiet"]) == 0
-    made, hers = read_talker(cloned), read_talker(talker)
-    assert made.metadata["consent"] == hers.metadata["consent"]
-    assert all(spoken.looks is not None for spoken in made.utterances)
+    clone, target = read_talker(cloned), read_talker(talker)
+    assert clone.metadata["consent"] == target.metadata["consent"]
+    assert all(utterance.looks is not None for utterance in clone.utterances)
     with av.open(str(clip)) as container:
         assert "Synthetic" in container.metadata["comment"]
         pictures = np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)])
     assert np.abs(np.diff(pictures.astype(int), axis=0)).mean() > 0.1
 
 
-def test_her_looks_carried_to_herself_stay(talker: Path) -> None:
+def test_appearance_transferred_to_the_same_talker_is_unchanged(talker: Path) -> None:
     """The basis is kept in 16-bit floating point, with three digits."""
-    hers = read_talker(talker)
-    carry = build_appearance_transfer(hers.appearance, hers.appearance)
+    appearance = read_talker(talker).appearance
+    carry = build_appearance_transfer(appearance, appearance)
     np.testing.assert_allclose(carry.relation, np.eye(len(carry.relation)), atol=0.01)
 
 
-def test_a_take_moves_her_lips_as_she_never_did(talker: Path, recordings: Path, bundle: Path, tmp_path: Path) -> None:
+def test_a_take_moves_the_lips_beyond_the_recordings(
+    talker: Path, recordings: Path, bundle: Path, tmp_path: Path
+) -> None:
     take = next((recordings / "clips").iterdir())
     made = {}
     for flags in ((), ("--append-missing",)):

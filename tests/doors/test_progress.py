@@ -16,9 +16,9 @@ def test_a_bar_starts_again_with_each_stage(
         assert stages is not None
         stages("reading recordings")(3, 4)
         stages("learning lips")(1, 2)
-    told = capsys.readouterr().err
-    assert "learning lips" in told
-    assert "50%" in told
+    output = capsys.readouterr().err
+    assert "learning lips" in output
+    assert "50%" in output
 
 
 @pytest.mark.parametrize("quiet", [True, False])

@@ -68,8 +68,10 @@ def test_the_table_has_a_line_a_trait(here: Path) -> None:
 def test_the_json_says_the_same_as_the_table(here: Path) -> None:
     content = json.loads(written("g.json"))
     rows = list(csv.DictReader(written("g.csv").decode().splitlines()))
-    told = [(style["name"], trait["name"], trait["field"]) for style in content["styles"] for trait in style["traits"]]
-    assert told == [(row["style"], row["trait"], float(row["w_field"])) for row in rows]
+    weights = [
+        (style["name"], trait["name"], trait["field"]) for style in content["styles"] for trait in style["traits"]
+    ]
+    assert weights == [(row["style"], row["trait"], float(row["w_field"])) for row in rows]
     calm = content["styles"][0]
     assert [trait["ju2008"] for trait in calm["traits"]] == [float(row["w_ju2008"]) for row in rows[:10]]
     assert set(calm["features"][0]["power"]) == set(calm["blinks_per_minute"]) == {"real", "field", "noise", "ju2008"}
@@ -105,20 +107,20 @@ def test_the_same_options_write_the_same(plain: bytes, here: Path) -> None:
         ("made.palette", "nowhere/g.html", (), "there is no folder nowhere"),
         ("made.palette", "g.html", ("--held-out", "1"), "one in 1 recordings cannot be held out"),
         ("made.palette", "g.html", ("--held-out", "50"), "of 60 recordings one in 50 cannot be held out"),
-        ("made.palette", "g.html", ("--held-out", "2.5"), '"2.5" is no whole number'),
+        ("made.palette", "g.html", ("--held-out", "2.5"), '"2.5" is not a whole number'),
         ("made.palette", "g.html", ("--halves", "0"), "at least 1 halving, not 0"),
-        ("made.palette", "g.html", ("--halves", "0.5"), '"0.5" is no whole number'),
+        ("made.palette", "g.html", ("--halves", "0.5"), '"0.5" is not a whole number'),
         ("made.palette", "g.html", ("--clips", "1"), "at least 2 clips, not 1"),
-        ("made.palette", "g.html", ("--clips", "x"), '"x" is no whole number'),
+        ("made.palette", "g.html", ("--clips", "x"), '"x" is not a whole number'),
         ("made.palette", "g.html", ("--seed", "-1"), "a seed is a whole number from 0, not -1"),
-        ("made.palette", "g.html", ("--seed", "0.5"), '"0.5" is no whole number'),
+        ("made.palette", "g.html", ("--seed", "0.5"), '"0.5" is not a whole number'),
     ],
 )
 def test_refusals_are_one_sentence_and_write_nothing(
     palette: str, out: str, more: tuple[str, ...], reason: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["report", "gestures", palette, "--out", out, *more]) == 2
-    said = capsys.readouterr().err
-    assert re.search(re.escape(reason), said)
-    assert said.count("\n") == 1
+    message = capsys.readouterr().err
+    assert re.search(re.escape(reason), message)
+    assert message.count("\n") == 1
     assert not Path(out).exists()

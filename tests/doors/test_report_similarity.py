@@ -134,8 +134,8 @@ def test_a_comparison_is_the_difference_of_the_matrices(here: Path) -> None:
         ("made.talker", "r.html", ("--classes", "four"), "--classes takes whole numbers with commas between"),
         ("made.talker", "r.html", ("--halves", "1"), "at least 2 random halves, not 1"),
         ("made.talker", "r.html", ("--classes", "4,2.5"), "--classes takes whole numbers with commas between"),
-        ("made.talker", "r.html", ("--halves", "2.5"), '"2.5" is no whole number'),
-        ("made.talker", "r.html", ("--seed", "0.5"), '"0.5" is no whole number'),
+        ("made.talker", "r.html", ("--halves", "2.5"), '"2.5" is not a whole number'),
+        ("made.talker", "r.html", ("--seed", "0.5"), '"0.5" is not a whole number'),
         ("made.talker", "r.html", ("--seed", "-1"), "a seed is a whole number from 0, not -1"),
         ("made.talker", "r.html", ("--labels", "sampa"), "labelled in ipa, arpabet or both, not 'sampa'"),
         ("made.talker", "r.html", ("--compare", "nobody"), "there is no talker 'nobody'"),
@@ -147,7 +147,7 @@ def test_refusals_are_one_sentence_and_write_nothing(
     talker: str, out: str, more: tuple[str, ...], reason: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["report", "similarity", talker, "--out", out, *more]) == 2
-    said = capsys.readouterr().err
-    assert re.search(re.escape(reason), said)
-    assert said.count("\n") == 1
+    message = capsys.readouterr().err
+    assert re.search(re.escape(reason), message)
+    assert message.count("\n") == 1
     assert not Path(out).exists()

@@ -57,8 +57,8 @@ def digest(clip: Clip) -> str:
     return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()
 
 
-# tests/doors/test_audio.py changes these; an idle face below
-ELSEWHERE = {"audio", "drive", "idle"}
+# tests/doors/test_audio.py changes these; idle animation below
+ELSEWHERE = {"audio", "audio_map", "idle"}
 
 
 @pytest.mark.parametrize("name", [option.name for option in fields(Request) if option.name not in ELSEWHERE])
@@ -86,8 +86,8 @@ def test_the_same_request_gives_the_same_bytes_in_another_process(clip: Clip) ->
 def test_a_voice_that_has_spoken_before_gives_the_same_bytes(clip: Clip, talker: Talker, face: Face) -> None:
     ready = Session(talker, face)
     for text in ("Something else was said. Bob may have been away.", TEXT):
-        said = concatenate_clips([piece.clip for piece in ready.stream(Request(text=text))])
-    assert digest(said) == digest(clip)
+        joined = concatenate_clips([piece.clip for piece in ready.stream(Request(text=text))])
+    assert digest(joined) == digest(clip)
 
 
 def test_a_stream_is_the_whole_in_pieces(clip: Clip, talker: Talker, face: Face) -> None:
@@ -159,12 +159,15 @@ def test_what_cannot_be_said_is_refused(change: dict, reason: str, talker: Talke
         ({"fps": float("nan")}, "fps must lie between"),
         ({"seed": -1}, "seed must be 0 or more, not -1"),
         ({"synthesis": "magic"}, "no synthesis 'magic'"),
-        ({"idle": 5.0}, "an idle face is silent; leave the text and --audio away"),
-        ({"idle": 5.0, "text": "", "voice": "espeak"}, "says nothing; leave --voice, --rate and --volume away"),
+        ({"idle": 5.0}, "--idle cannot be combined with text or --audio; remove one of them"),
+        (
+            {"idle": 5.0, "text": "", "voice": "espeak"},
+            "--voice, --rate and --volume have no effect with --idle; remove them",
+        ),
         ({"idle": 0.0, "text": ""}, "idle must lie between 0.1 and 3600, not 0"),
-        ({"gestures": "none", "style": "calm"}, "without gestures there is nothing to style"),
-        ({"gestures": "none", "pitch": True}, "without gestures there is nothing to style"),
-        ({"gestures": "noise", "pitch": True}, "noise hears no voice; leave --pitch or --noise away"),
+        ({"gestures": "none", "style": "calm"}, "have no effect with --gestures none"),
+        ({"gestures": "none", "pitch": True}, "have no effect with --gestures none"),
+        ({"gestures": "noise", "pitch": True}, "--pitch has no effect with --gestures noise; remove one of them"),
     ],
 )
 def test_options_out_of_range_are_refused(change: dict, reason: str) -> None:

@@ -22,7 +22,7 @@ def start(folder):
     (Path(folder) / str(os.getpid())).touch()
 
 if __name__ == "__main__":
-    from cli.stopping import raise_on_signals
+    from cli.process import raise_on_signals
     raise_on_signals()
     list(each_done([600.0, 600.0], time.sleep, start, (sys.argv[1],), 2))
 """
@@ -53,9 +53,9 @@ def speaking(here: Path) -> "subprocess.Popen[str]":
 def test_a_signal_leaves_nothing(tmp_path: Path, name: str, code: int) -> None:
     with speaking(tmp_path) as process:
         process.send_signal(getattr(signal, name))
-        _, told = process.communicate(timeout=PATIENCE_S)
+        _, message = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == code
-    assert "stopped; nothing was written" in told
+    assert "interrupted; no output was written" in message
     assert list(tmp_path.iterdir()) == []
 
 
@@ -69,8 +69,8 @@ def test_what_a_killed_command_left_is_removed_by_the_next_one(tmp_path: Path) -
 
 def is_running(number: int) -> bool:
     """Whether a process works; one that has ended and waits for its parent to notice does not."""
-    told = subprocess.run(["ps", "-o", "stat=", "-p", str(number)], capture_output=True, text=True, check=False)
-    return told.stdout.strip() not in {"", "Z"} and not told.stdout.startswith("Z")
+    status = subprocess.run(["ps", "-o", "stat=", "-p", str(number)], capture_output=True, text=True, check=False)
+    return status.stdout.strip() not in {"", "Z"} and not status.stdout.startswith("Z")
 
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP", "SIGKILL"])

@@ -12,7 +12,7 @@ from tts2face.models.talker import load_talker
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.session import Session
-from tts2face.voice.engine import load_voice
+from tts2face.voice.loading import load_voice
 
 SAID = "The young chef usually pushes five big maps before noon."
 WRONG = "Please wait for the beep, then say your name."

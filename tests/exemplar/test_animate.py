@@ -171,7 +171,7 @@ def test_refuses_impossible_requests(voice: ExemplarModel):
     with pytest.raises(InputError, match="smoothing_s must be 0 or more"):
         replace(SynthesisOptions(), smoothing_s=-0.1)
     with pytest.raises(InputError, match="begin at 0 s"):
-        speech_trajectory(SENTENCE.shifted(1.0), voice, fps=25.0, n_frames=30)
+        speech_trajectory(PhoneSequence(SENTENCE.phones, SENTENCE.edges + 1.0), voice, fps=25.0, n_frames=30)
     with pytest.raises(InputError, match="§"):
         moved(voice, sequence(["§"], [0.2]))
 

@@ -59,7 +59,7 @@ def test_praat_reads_nominal_times_and_their_note(tmp_path: Path) -> None:
 
 
 def test_words_in_disorder_are_refused() -> None:
-    with pytest.raises(InputError, match="word 'b' does not lie behind"):
+    with pytest.raises(InputError, match="the word 'b' overlaps the previous word"):
         textgrid(PHONES, [WordSpan("a", 1, 3), WordSpan("b", 2, 4)])
     with pytest.raises(InputError, match=r"word 'c' .* ends after the last phone"):
         textgrid(PHONES, [WordSpan("c", 1, 9)])

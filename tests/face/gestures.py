@@ -1,4 +1,4 @@
-"""A small palette on the starter talker's own face, and what a posed face does."""
+"""A small palette on the starter talker's landmarks, and landmarks of a posed face."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ def neutral() -> np.ndarray:
 
 
 def region(landmarks: tuple[int, ...]) -> FaceRegion:
-    """Two modes: all up, and the own left up with the right down."""
+    """Two modes: all landmarks up, and the left ones up with the right ones down."""
     sides = np.sign(neutral()[list(landmarks), 0])
     up, apart = np.zeros((2, len(landmarks), 3))
     up[:, 1], apart[:, 1] = 1 / np.sqrt(len(landmarks)), sides / np.sqrt(len(landmarks))

@@ -1,4 +1,4 @@
-"""The ``.face`` file: what it keeps, and what it refuses."""
+"""``.face`` files: round trip and validation."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -50,7 +50,7 @@ def written(tmp_path: Path) -> tuple[Face, Path]:
     return face, path
 
 
-def test_everything_comes_back(written: tuple[Face, Path]) -> None:
+def test_a_face_round_trips(written: tuple[Face, Path]) -> None:
     face, path = written
     read = read_face(path)
     for name in (
@@ -74,7 +74,7 @@ def test_everything_comes_back(written: tuple[Face, Path]) -> None:
     assert posed_vertices(read, weights) == pytest.approx(posed_vertices(face, weights), abs=0.005)
 
 
-def test_a_face_without_texture_comes_back(tmp_path: Path) -> None:
+def test_a_face_without_texture_round_trips(tmp_path: Path) -> None:
     write_face(tmp_path / "plain.face", small_face(with_texture=False))
     read = read_face(tmp_path / "plain.face")
     assert read.uv is None
@@ -99,7 +99,7 @@ def test_the_same_face_gives_the_same_bytes(written: tuple[Face, Path], tmp_path
     assert (tmp_path / "one.face").read_bytes() == (tmp_path / "two.face").read_bytes()
 
 
-def test_an_unknown_identity_is_refused_with_those_there_are(written: tuple[Face, Path]) -> None:
+def test_an_unknown_identity_is_refused_with_the_known_ones(written: tuple[Face, Path]) -> None:
     with pytest.raises(InputError, match="no identity 'younger'; it has: older"):
         read_face(written[1], "younger")
 

@@ -1,4 +1,4 @@
-"""How faces lie to each other, against motions that are known."""
+"""Landmark alignment, against known transforms."""
 
 import numpy as np
 import pytest
@@ -16,14 +16,14 @@ from tts2face.models.face_file import load_face
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_known_rotation_is_found_again(seed: int) -> None:
+def test_a_known_rotation_is_recovered(seed: int) -> None:
     generator = np.random.default_rng(seed)
     places = generator.normal(0, 40, (60, 3))
     turn = Rotation.random(random_state=seed).as_matrix()
     assert procrustes_rotation(places, 1.7 * places @ turn.T + [3, -5, 8]) == pytest.approx(turn, abs=1e-8)
 
 
-def test_known_sizes_are_found_again_and_held_within_bounds() -> None:
+def test_known_scales_are_recovered_and_clipped() -> None:
     places = np.random.default_rng(1).normal(0, 40, (60, 3))
     assert axis_scales(places, places * [1.2, 0.8, 1.0] + 7, (0.1, 9)) == pytest.approx([1.2, 0.8, 1.0])
     assert axis_scales(places, places * [1.2, 0.8, 1.0] + 7, (0.9, 1.1)) == pytest.approx([1.1, 0.9, 1.0])

@@ -1,4 +1,4 @@
-"""Gestures on real faces: lips stay in charge, lids meet, regions stay local."""
+"""Gestures on the shipped faces: lip contact, eyelid closure, and local regions."""
 
 from dataclasses import replace
 from functools import cache
@@ -26,13 +26,13 @@ from tts2face.types import HEAD_CHANNELS, Trajectory
 FACES = ("head", "cartoon")
 BILABIALS = "Bob may bump my pump; Pam probably maps a big bamboo bomb to Mum. You choose two blue shoes."
 CONTACT_MM = 0.3  # gaps up to this are closed lips: half a pixel of a face that fills 512 of them
-KEPT_MM = 0.05  # a contact may open, or lips sink into each other, by no more: nobody sees a tenth of a pixel
+KEPT_MM = 0.05  # tolerance of lip contact: a tenth of a pixel
 UPPER_LIDS, LOWER_LIDS = (386, 159), (374, 145)
 MASK = {name: i for i, name in enumerate(EXPRESSIONS)}
 
 
 @cache
-def ready(name: str) -> GestureFace:
+def prepared_face(name: str) -> GestureFace:
     return gesture_face(load_face(name), palette())
 
 
@@ -45,8 +45,8 @@ def silence(face: Face, n_frames: int = 1) -> Trajectory:
     return Trajectory(face.shape_names, np.zeros((n_frames, len(face.shape_names))), 25.0)
 
 
-def felt(n_frames: int, **weights: float) -> dict[str, np.ndarray]:
-    """Basis expressions held for all frames."""
+def expression_gestures(n_frames: int, **weights: float) -> dict[str, np.ndarray]:
+    """Constant weights of basis expressions for all frames."""
     values = np.zeros((n_frames, len(EXPRESSIONS)), np.float32)
     for name, weight in weights.items():
         values[:, MASK[name]] = weight
@@ -87,10 +87,10 @@ def lid_openings(face: Face, weights: np.ndarray) -> np.ndarray:
     ],
 )
 def test_an_expression_never_opens_closed_lips(name: str, weights: dict[str, float], gains: dict[str, float]) -> None:
-    """The paper's own warning (section 7). Real speech full of /p b m/."""
-    face, speech = ready(name), spoken(name)
+    """The case that the paper warns about (section 7), on speech with many /p b m/."""
+    face, speech = prepared_face(name), spoken(name)
     plain = gaps(face.face, face.perform(speech, {}).motion.values)
-    moved = gaps(face.face, face.perform(speech, felt(len(speech), **weights), gains).motion.values)
+    moved = gaps(face.face, face.perform(speech, expression_gestures(len(speech), **weights), gains).motion.values)
     closed = plain <= CONTACT_MM
     assert closed[:, 5].sum() > 20
     assert (moved - plain)[closed].max() < KEPT_MM
@@ -98,30 +98,31 @@ def test_an_expression_never_opens_closed_lips(name: str, weights: dict[str, flo
 
 
 @pytest.mark.parametrize("name", FACES)
-def test_neutral_gestures_leave_speech_as_it_is(name: str) -> None:
-    face, speech = ready(name), spoken(name)
-    calm = felt(len(speech), sad=0.05, happy=0.15, afraid=0.02, angry=0.05, surprised=0.1)
+def test_neutral_gestures_do_not_change_speech(name: str) -> None:
+    face, speech = prepared_face(name), spoken(name)
+    calm = expression_gestures(len(speech), sad=0.05, happy=0.15, afraid=0.02, angry=0.05, surprised=0.1)
     calm |= {"blink": np.zeros((len(speech), 2), np.float32), "cheeks": np.full((len(speech), 2), 0.5, np.float32)}
     plain, moved = (face.perform(speech, gestures).motion.values for gestures in ({}, calm))
     for measured in (lambda weights: gaps(face.face, weights)[:, 5], lambda weights: width(face.face, weights)):
         assert np.corrcoef(measured(plain), measured(moved))[0, 1] > 0.99
 
 
-def test_a_smile_leaves_rounded_lips_round() -> None:
-    face, speech = ready("head"), spoken("head")
+def test_a_smile_keeps_rounded_lips_round() -> None:
+    face, speech = prepared_face("head"), spoken("head")
     plain, smiling = (
-        width(face.face, face.perform(speech, gestures).motion.values) for gestures in ({}, felt(len(speech), happy=1))
+        width(face.face, face.perform(speech, gestures).motion.values)
+        for gestures in ({}, expression_gestures(len(speech), happy=1))
     )
     roundest = plain.argmin()
     rest = width(face.face, np.zeros((1, len(face.face.shape_names))))[0]
-    smile = width(face.face, face.perform(silence(load_face("head")), felt(1, happy=1)).motion.values)[0]
+    smile = width(face.face, face.perform(silence(load_face("head")), expression_gestures(1, happy=1)).motion.values)[0]
     assert plain[roundest] < rest - 3
     assert smiling[roundest] < smile - 6
 
 
 @pytest.mark.parametrize("name", FACES)
 def test_without_gestures_speech_passes_unchanged(name: str) -> None:
-    face, speech = ready(name), spoken(name)
+    face, speech = prepared_face(name), spoken(name)
     performed = face.perform(speech, {})
     assert np.array_equal(performed.motion.values[:, : face.n_speech_shapes], speech.values)
     assert not performed.motion.values[:, face.n_speech_shapes :].any()
@@ -130,7 +131,7 @@ def test_without_gestures_speech_passes_unchanged(name: str) -> None:
 
 
 def test_a_louder_jaw_opens_wider() -> None:
-    face, speech = ready("head"), spoken("head")
+    face, speech = prepared_face("head"), spoken("head")
     plain, loud, low = (gaps(face.face, face.perform(speech, {}, {"jaw": g}).motion.values)[:, 5] for g in (1, 1.5, 0))
     assert loud.max() > 1.2 * plain.max()
     assert low.max() < 0.7 * plain.max()
@@ -139,10 +140,10 @@ def test_a_louder_jaw_opens_wider() -> None:
 @pytest.mark.parametrize("name", FACES)
 @pytest.mark.parametrize("down", [-0.15, 0.0, 0.17, 0.3])
 @pytest.mark.parametrize("mood", [{}, {"happy": 1}, {"surprised": 1}, {"sad": 1}])
-def test_lids_shut_by_their_share_wherever_the_eyes_look(name: str, down: float, mood: dict[str, float]) -> None:
-    face = ready(name)
+def test_lids_close_by_their_share_for_any_gaze(name: str, down: float, mood: dict[str, float]) -> None:
+    face = prepared_face(name)
     shares = np.array([0, 0.25, 0.5, 0.75, 1], np.float32)
-    gestures = felt(5, **mood) | {
+    gestures = expression_gestures(5, **mood) | {
         "blink": np.column_stack([shares, shares]),
         "gaze": np.tile(np.array([down, 0], np.float32), (5, 1)),
     }
@@ -154,7 +155,7 @@ def test_lids_shut_by_their_share_wherever_the_eyes_look(name: str, down: float,
 
 
 def test_one_eye_winks_and_a_negative_share_opens_wider() -> None:
-    face = ready("head")
+    face = prepared_face("head")
     weights = face.perform(silence(load_face("head")), {"blink": np.array([[1, -0.3]], np.float32)}).motion.values
     rest = lid_openings(face.face, np.zeros_like(weights))[0]
     left, right = lid_openings(face.face, weights)[0]
@@ -164,8 +165,8 @@ def test_one_eye_winks_and_a_negative_share_opens_wider() -> None:
 
 @pytest.mark.parametrize("name", FACES)
 @pytest.mark.parametrize("gaze", [(0.17, 0.0), (-0.17, 0.0), (0.0, 0.17), (0.0, -0.17), (0.1, 0.12)])
-def test_eyes_look_where_they_are_told(name: str, gaze: tuple[float, float]) -> None:
-    face = ready(name)
+def test_eyes_turn_by_the_gaze_angles(name: str, gaze: tuple[float, float]) -> None:
+    face = prepared_face(name)
     weights = face.perform(silence(load_face(name)), {"gaze": np.array([gaze], np.float32)}).motion.values[0]
     turns = build_rig(face.face).eye_turns
     for turn in np.einsum("ekc,k->ec", turns, weights):
@@ -174,11 +175,9 @@ def test_eyes_look_where_they_are_told(name: str, gaze: tuple[float, float]) -> 
 
 @pytest.mark.parametrize("name", FACES)
 @pytest.mark.parametrize(("feature", "landmarks"), [("brows", BROWS), ("cheeks", CHEEKS)])
-def test_regions_move_their_landmarks_and_leave_lips_and_lids(
-    name: str, feature: str, landmarks: tuple[int, ...]
-) -> None:
-    """Landmarks rise 4 mm on the talker; a face moves in proportion to its size, and nothing far away does."""
-    face = ready(name)
+def test_regions_move_their_landmarks_and_not_lips_or_lids(name: str, feature: str, landmarks: tuple[int, ...]) -> None:
+    """Landmarks rise 4 mm on the talker; a face moves in proportion to its size, and distant vertices do not move."""
+    face = prepared_face(name)
     raised = np.array([[4 * np.sqrt(len(landmarks)), 0]], np.float32)
     weights = face.perform(silence(load_face(name)), {feature: raised}).motion.values
     moved = (posed_landmarks(face.face, weights) - landmark_positions(face.face))[0]
@@ -211,8 +210,8 @@ def test_regions_move_their_landmarks_and_leave_lips_and_lids(
 
 
 def test_the_head_moves_and_gains_multiply() -> None:
-    face = ready("head")
-    gestures = felt(2, happy=0.4) | {"head": np.full((2, 6), 0.1, np.float32)}
+    face = prepared_face("head")
+    gestures = expression_gestures(2, happy=0.4) | {"head": np.full((2, 6), 0.1, np.float32)}
     gestures |= {"brows": np.ones((2, 2), np.float32), "gaze": np.full((2, 2), 0.1, np.float32)}
     still = silence(load_face("head"), 2)
     doubled = face.perform(still, gestures, dict.fromkeys(("expression", "head", "brows", "gaze"), 2.0))
@@ -221,8 +220,8 @@ def test_the_head_moves_and_gains_multiply() -> None:
     assert np.array_equal(doubled.head.values, np.full((2, 6), 0.2, np.float32))
 
 
-def test_frames_do_not_know_each_other() -> None:
-    face, speech = ready("head"), spoken("head")
+def test_frames_are_independent() -> None:
+    face, speech = prepared_face("head"), spoken("head")
     values = np.random.default_rng(1).uniform(-0.1, 1.1, (len(speech), 5)).astype(np.float32)
     whole = face.perform(speech, {"expression": values}).motion.values
     part = face.perform(Trajectory(speech.channels, speech.values[40:50], speech.fps), {"expression": values[40:50]})
@@ -233,23 +232,25 @@ def test_frames_do_not_know_each_other() -> None:
 
 
 def renamed(face: Face, kept: tuple[str, ...]) -> Face:
-    """A rig with other names, but for shapes whose names begin so; its eyes do not turn."""
+    """A face with renamed shapes, except those with the prefixes `kept`, and without eye rotations."""
     names = tuple(name if name.startswith(kept) else f"rig_{i}" for i, name in enumerate(face.shape_names))
     return replace(face, shape_names=names, eyes=tuple(replace(eye, turns={}) for eye in face.eyes))
 
 
 @pytest.mark.parametrize("kept", [("jaw", "mouth"), ("jaw", "mouthClose", "mouthF", "mouthPucker", "eyeBlink")])
-def test_a_rig_with_other_names_gestures_as_the_one_it_is_made_of(kept: tuple[str, ...]) -> None:
-    """The default head with its shapes renamed: what is carried by landmarks does what its own shapes did."""
+def test_a_renamed_rig_moves_like_the_original(kept: tuple[str, ...]) -> None:
+    """The default head with renamed shapes: transferred shapes move it like its own."""
     head = load_face("head")
-    face, known = gesture_face(renamed(head, kept), palette()), ready("head")
+    face, known = gesture_face(renamed(head, kept), palette()), prepared_face("head")
     for name in EXPRESSIONS:
-        there, here = (
-            posed_landmarks(one.face, one.perform(silence(own), felt(1, **{name: 1})).motion.values)[0, :468]
-            for one, own in ((known, head), (face, renamed(head, kept)))
+        original, transferred = (
+            posed_landmarks(model.face, model.perform(silence(own), expression_gestures(1, **{name: 1})).motion.values)[
+                0, :468
+            ]
+            for model, own in ((known, head), (face, renamed(head, kept)))
         )
         rest = landmark_positions(head)[:468]
-        assert np.corrcoef((there - rest).ravel(), (here - rest).ravel())[0, 1] > 0.9
+        assert np.corrcoef((original - rest).ravel(), (transferred - rest).ravel())[0, 1] > 0.9
     shut = face.perform(silence(renamed(head, kept)), {"blink": np.ones((1, 2), np.float32)}).motion.values
     assert np.abs(lid_openings(face.face, shut)).max() < 0.8
     looking = face.perform(silence(renamed(head, kept)), {"gaze": np.array([[0.1, 0.1]], np.float32)}).motion.values[0]
@@ -280,8 +281,8 @@ def test_the_table_names_shapes_of_the_default_head() -> None:
     assert add_expression_shapes(load_face("head")).shape_names == load_face("head").shape_names
 
 
-def test_refuses_what_does_not_fit() -> None:
-    face = ready("head")
+def test_invalid_gestures_are_refused() -> None:
+    face = prepared_face("head")
     still = silence(load_face("head"))
     with pytest.raises(InputError, match="no feature 'ears'"):
         face.perform(still, {"ears": np.zeros((1, 2), np.float32)})

@@ -1,11 +1,11 @@
-"""The drawn head read by a network that never saw it: MediaPipe's blendshape scores (Kartynnik et al. 2019)."""
+"""The drawn head, evaluated by an independent network: MediaPipe's blendshape scores (Kartynnik et al. 2019)."""
 
 import numpy as np
 import pytest
 
 from lexicon.errors import Tts2faceError
 from tts2face.models.face_file import load_face
-from tts2face.render.draw import draw, mesh_renderer
+from tts2face.render.draw import mesh_renderer
 from tts2face.render.picture import Picture
 from tts2face.video.blendshapes import BLENDSHAPES
 
@@ -34,11 +34,11 @@ def scores(request, networks):
     """Function from shape weights to the network's scores by name."""
     tracker, reader = networks
     face = load_face(request.param)
-    stage = mesh_renderer(face, Picture(size="640x640"))
+    renderer = mesh_renderer(face, Picture(size="640x640"))
 
     def scored(weights):
         vector = np.array([weights.get(name, 0.0) for name in face.shape_names], np.float32)
-        points, found = tracker.read(draw(stage, vector))
+        points, found = tracker.read(renderer.draw(vector))
         assert found > 0.5
         return dict(zip(BLENDSHAPES, reader.blendshape_scores(points).tolist(), strict=True))
 

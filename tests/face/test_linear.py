@@ -1,4 +1,4 @@
-"""Posing a face: the compiled rig against the plain formula, rotations against scipy's, the neck that bends."""
+"""Deformation of a face: the compiled rig against the formula, rotations against scipy's, and the neck."""
 
 import dataclasses
 

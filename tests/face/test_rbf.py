@@ -50,20 +50,20 @@ def test_does_not_depend_on_the_unit_of_length() -> None:
     np.testing.assert_allclose(1000 * in_metres, fit_interpolant(centres, moved, WIDTH)(places), atol=1e-9)
 
 
-def test_nothing_moves_far_from_the_face_for_there_is_no_affine_term() -> None:
+def test_displacements_vanish_far_from_the_centres() -> None:
     centres, _ = scattered()
     field = fit_interpolant(centres, np.ones((len(centres), 3)), WIDTH)
     assert np.abs(field(np.array([[3000.0, 0.0, 0.0]]))).max() < 1e-12
 
 
-def test_many_places_are_those_one_by_one() -> None:
+def test_chunks_equal_single_evaluations() -> None:
     centres, moved = scattered(5)
     field = fit_interpolant(centres, moved, WIDTH)
     places = np.random.default_rng(6).uniform(-75, 75, (CHUNK_SIZE + 3, 3))
     np.testing.assert_allclose(field(places)[[0, -1]], np.concatenate([field(places[:1]), field(places[-1:])]), 1e-12)
 
 
-def test_refuses_what_has_no_answer() -> None:
+def test_invalid_centres_are_refused() -> None:
     centres, moved = scattered(3)
     with pytest.raises(InputError, match="must have the same rows"):
         fit_interpolant(centres, moved[:2], WIDTH)

@@ -1,4 +1,4 @@
-"""What everybody may rely on in the faces that come with the project."""
+"""Guaranteed properties of the shipped faces."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def test_is_small_enough(face):
     assert find_file(face.metadata["name"], "face").stat().st_size < 6_000_000
 
 
-def test_stands_between_its_eyes(face):
+def test_the_origin_lies_between_the_eyes(face):
     left, right = face.eyes
     assert np.allclose(left.centre + right.centre, 0, atol=0.5)
     assert left.centre[0] > 25
@@ -46,7 +46,7 @@ def test_stands_between_its_eyes(face):
 def test_lips_touch_at_rest_and_part_with_the_jaw(face):
     rest = landmarks(face, face.vertices)
     gap = rest[list(INNER_LIP_UPPER), 1] - rest[list(INNER_LIP_LOWER), 1]
-    assert np.abs(gap).max() < 1.5  # the landmarks lie on the lips' inner ring, which need not be where they touch
+    assert np.abs(gap).max() < 1.5  # the landmarks of the inner lip contour need not lie at the contact
     opened = landmarks(face, posed_vertices(face, weights(face, jawOpen=1.0)))
     assert opened[13, 1] - opened[14, 1] > 12
 

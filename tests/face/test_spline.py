@@ -13,14 +13,14 @@ SUPPORT = 30.0  # mm
 
 
 def brows(n: int = 20) -> tuple[np.ndarray, np.ndarray]:
-    """Places some 5 mm apart, as the landmarks of brows are, and how they move."""
+    """Points about 5 mm apart, like the landmarks of brows, and their displacements."""
     generator = np.random.default_rng(4)
     grid = np.stack(np.meshgrid(np.arange(5) * 5.0, np.arange(-(-n // 5)) * 5.0), axis=-1).reshape(-1, 2)[:n]
     places = np.column_stack([grid, 0.05 * grid[:, 0] ** 2]) + generator.normal(0, 0.5, (n, 3))
     return places, generator.normal(0, 3, (n, 3))
 
 
-def test_the_bell_is_the_cubic_b_spline() -> None:
+def test_the_basis_function_is_the_cubic_b_spline() -> None:
     share = np.linspace(0, 0.999, 101)
     known = 1.5 * BSpline.basis_element([-2, -1, 0, 1, 2])(2 * share)  # its value at 0 is 2/3
     np.testing.assert_allclose(cubic_bspline(share), known, atol=1e-12)
@@ -32,15 +32,15 @@ def test_takes_the_given_displacements_of_near_centres_exactly() -> None:
     np.testing.assert_allclose(fit_local_interpolant(centres, moved, SUPPORT)(centres), moved, atol=1e-9)
 
 
-def test_a_cubic_spline_on_a_line_comes_back() -> None:
-    """Centres at half the support are a spline's knots: the coefficients of its own basis are found again."""
+def test_a_cubic_spline_on_a_line_is_recovered() -> None:
+    """Centres at half the support are the knots of a spline, whose coefficients are recovered."""
     knots = np.arange(12.0)
     wanted = np.random.default_rng(2).normal(size=(len(knots), 2))
-    found = fit_local_interpolant(knots[:, None], sum_of_bells(knots, knots, wanted), 2.0)
+    found = fit_local_interpolant(knots[:, None], spline_sum(knots, knots, wanted), 2.0)
     np.testing.assert_allclose(found.coefficients, wanted, atol=1e-12)
 
 
-def sum_of_bells(x: np.ndarray, knots: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+def spline_sum(x: np.ndarray, knots: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
     bells = [1.5 * BSpline.basis_element(knot + np.arange(-2, 3), extrapolate=False)(x) for knot in knots]
     return np.nan_to_num(np.transpose(bells)) @ coefficients
 
@@ -61,8 +61,8 @@ def test_one_centre_is_the_product_of_splines_along_the_axes() -> None:
     np.testing.assert_allclose(field(place), np.array([[2.0, 0.0, -1.0]]) / 16, rtol=1e-12)
 
 
-def test_stays_calm_between_the_landmarks_of_a_dense_mesh() -> None:
-    """Splines of the distance, which are not positive definite in space, carry a blink of 13 mm off by 114 mm here."""
+def test_does_not_oscillate_between_the_landmarks_of_a_dense_mesh() -> None:
+    """Splines of the distance, which are not positive definite in space, turn a blink of 13 mm into 114 mm here."""
     head = load_face("head")
     places = landmark_positions(head)[:468:2]
     blink = landmark_motion(head, np.array([head.shape_names.index("eyeBlinkLeft")]))[:468:2, :, 0]
@@ -70,7 +70,7 @@ def test_stays_calm_between_the_landmarks_of_a_dense_mesh() -> None:
     assert np.abs(field).max() < 1.5 * np.abs(blink).max()
 
 
-def test_does_not_depend_on_the_unit_of_length_or_on_how_many_places_there_are() -> None:
+def test_does_not_depend_on_the_unit_of_length_or_the_number_of_points() -> None:
     centres, moved = brows()
     places = np.random.default_rng(6).uniform(-20, 40, (CHUNK_SIZE + 3, 3))
     field = fit_local_interpolant(centres, moved, SUPPORT)
@@ -79,7 +79,7 @@ def test_does_not_depend_on_the_unit_of_length_or_on_how_many_places_there_are()
     np.testing.assert_allclose(field(places)[[0, -1]], np.concatenate([field(places[:1]), field(places[-1:])]), 1e-12)
 
 
-def test_refuses_what_has_no_answer() -> None:
+def test_invalid_centres_are_refused() -> None:
     centres, moved = brows(3)
     with pytest.raises(InputError, match="must have the same rows"):
         fit_local_interpolant(centres, moved[:2], SUPPORT)
@@ -87,5 +87,5 @@ def test_refuses_what_has_no_answer() -> None:
         fit_local_interpolant(centres, moved * np.nan, SUPPORT)
     with pytest.raises(InputError, match="support must be above 0, not 0"):
         fit_local_interpolant(centres, moved, 0)
-    with pytest.raises(DataError, match="too near to each other"):
+    with pytest.raises(DataError, match="too close together"):
         fit_local_interpolant(centres[[0, 1, 0]], moved, SUPPORT)

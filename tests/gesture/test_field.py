@@ -50,7 +50,7 @@ def _brute_force(made, state, n_best: int) -> list[int]:
         if moment - start < history or end - moment <= future:
             continue
         rows = slice(moment - history, moment)
-        away = np.square(made.values[rows] - state.shown).sum() + np.square(made.heard[rows] - state.heard).sum()
+        away = np.square(made.values[rows] - state.shown).sum() + np.square(made.prosody[rows] - state.prosody).sum()
         found.append((float(away) / history, moment))
     best: list[int] = []
     for _, moment in sorted(found):
@@ -79,9 +79,9 @@ def test_the_search_finds_what_brute_force_finds(seed, monkeypatch):
     (expected,) = _brute_force(made, state, 1)
     _, behind = sample_field(made, state, np.zeros((1, 1), np.float32), np.array([0.5]))
     found = np.square(made.values[behind.moment - 5 : behind.moment] - state.shown).sum()
-    found += np.square(made.heard[behind.moment - 5 : behind.moment] - state.heard).sum()
+    found += np.square(made.prosody[behind.moment - 5 : behind.moment] - state.prosody).sum()
     nearest = np.square(made.values[expected - 5 : expected] - state.shown).sum()
-    nearest += np.square(made.heard[expected - 5 : expected] - state.heard).sum()
+    nearest += np.square(made.prosody[expected - 5 : expected] - state.prosody).sum()
     assert found <= SEARCH_SLACK**2 * nearest + 1e-6
 
 
@@ -97,7 +97,7 @@ def test_candidates_are_drawn_by_their_distance():
     away = []
     for moment in best:
         rows = slice(moment - 5, moment)
-        squares = np.square(made.values[rows] - state.shown).sum() + np.square(made.heard[rows] - state.heard).sum()
+        squares = np.square(made.values[rows] - state.shown).sum() + np.square(made.prosody[rows] - state.prosody).sum()
         away.append(squares / 5)
     shares = np.exp((away[0] - np.array(away)) / (0.5 * made.median_distance))
     expected = shares / shares.sum()
@@ -124,7 +124,7 @@ def test_without_leaps_a_recording_is_repeated():
     options = FieldOptions(history=5, future=20, alpha=(1.0,), continuity=0.0, sigma=1e-6)
     made = build_field(values, heard, lengths, options)
     state = FieldState(
-        made.values[20:25], made.heard[20:25], 24, np.zeros((2, 2), np.float32), np.zeros(0, np.int64), 0
+        made.values[20:25], made.prosody[20:25], 24, np.zeros((2, 2), np.float32), np.zeros(0, np.int64), 0
     )
     shown, behind = sample_field(made, state, heard[25:150], np.full(125, 0.5))
     assert behind.moment == 149
@@ -162,7 +162,7 @@ def test_another_style_goes_on_where_the_first_stood():
     state = resting(first, np.float32([1.0, 2.0]), np.float32([0.5]))
     there = transfer_state(state, first, second)
     np.testing.assert_allclose(there.shown * second.scale, state.shown * first.scale, rtol=1e-6)
-    np.testing.assert_allclose(there.heard / second.weights, state.heard / first.weights, rtol=1e-6)
+    np.testing.assert_allclose(there.prosody / second.weights, state.prosody / first.weights, rtol=1e-6)
 
 
 def test_too_short_recordings():
@@ -182,7 +182,7 @@ def test_sound_without_weight():
     [
         ({"history": 1}, "history is 2 to 60 frames"),
         ({"stride": 61}, "its stride 1 to 60"),
-        ({"memory": -1}, "remembers 0 to 1000 leaps, not -1"),
+        ({"memory": -1}, "memory of a field must be 0 to 1000 jumps, not -1"),
         ({"candidates": 17}, "1 to 16 candidates, not 17"),
         ({"alpha": (-1.0,)}, "alpha and settling time must not be negative"),
         ({"sigma": 0.0}, "its sigma must be above 0"),

@@ -52,10 +52,10 @@ def test_user_entries() -> None:
     ("line", "reason"),
     [
         ("word", "dictionary, line 2: 'word' has no pronunciation"),
-        ("word XX", "line 2: 'XX' is no ARPABET name"),
-        ("word /həˈloʊ", "line 2: IPA stands between two slashes"),
-        ("word /hЖ/", "line 2: 'Ж' .* is no phone"),
-        ("word //", "line 2: the pronunciation of 'word' holds no phone"),
+        ("word XX", "line 2: 'XX' is not an ARPABET name"),
+        ("word /həˈloʊ", "line 2: IPA must be enclosed in two slashes"),
+        ("word /hЖ/", "line 2: 'Ж' .* is not a phone"),
+        ("word //", "line 2: the pronunciation of 'word' contains no phone"),
         ("word " + "AA1 " * 41, "line 2: the pronunciation of 'word' has 41 phones; a word has at most 40"),
         ("word /" + "a" * 300 + "/", "line 2: the pronunciation of 'word' has 300 phones"),
     ],
@@ -66,7 +66,7 @@ def test_wrong_lines_are_named(line: str, reason: str) -> None:
 
 
 def test_a_dictionary_without_end_is_not_read() -> None:
-    with pytest.raises(DataError, match="/dev/zero holds more than 17 MB"):
+    with pytest.raises(DataError, match="/dev/zero contains more than 17 MB"):
         read_dictionary(Path("/dev/zero"))
 
 

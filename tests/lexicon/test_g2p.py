@@ -90,7 +90,7 @@ def test_there_are_many_languages() -> None:
 @pytest.mark.parametrize("language", ["en", "DE", "german", ""])
 def test_what_is_no_code_is_refused(language: str) -> None:
     check_language("de")
-    with pytest.raises(InputError, match=f"there is no language '{language}'; give a code such as en-us"):
+    with pytest.raises(InputError, match=f"there is no language '{language}'; use a code such as en-us"):
         check_language(language)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import DataError
-from lexicon.inputs import DEEPEST, check_regular_file, parse_json, read_bounded, read_json, read_text
+from lexicon.inputs import MAX_DEPTH, check_regular_file, parse_json, read_bounded, read_json, read_text
 
 
 @pytest.mark.parametrize(
@@ -15,16 +15,16 @@ from lexicon.inputs import DEEPEST, check_regular_file, parse_json, read_bounded
         ("[1", r"a\.json, line 1: not JSON"),
         ('{"a": 1,\n "b": }', r"a\.json, line 2: not JSON"),
         ("[" * 100_000, r"a\.json is nested too deep"),
-        ("[" * (DEEPEST + 1) + "]" * (DEEPEST + 1), r"a\.json is nested too deep: more than 64"),
+        ("[" * (MAX_DEPTH + 1) + "]" * (MAX_DEPTH + 1), r"a\.json is nested too deep: at most 64"),
         ('{"a": ' * 70 + "1" + "}" * 70, r"a\.json is nested too deep"),
         ('{"a": ' + "7" * 5000 + "}", r"a\.json: a number of 5000 characters is too long \(77777"),
         ('{"a": 0.' + "7" * 5000 + "}", "a number of 5002 characters is too long"),
         ('{"a": 1e999}', r"the number 1e999 is too large"),
         ('{"a": -1e999}', r"the number -1e999 is too large"),
-        ('{"a": NaN}', "NaN is no number of JSON"),
-        ('{"a": -Infinity}', "-Infinity is no number of JSON"),
-        ('{"a": {"b": 1, "b": 2}}', "'b' stands twice in one object"),
-        ('{"a": ["\\ud800"]}', r"holds \\ud800, half of a surrogate pair"),
+        ('{"a": NaN}', "NaN is not a JSON number"),
+        ('{"a": -Infinity}', "-Infinity is not a JSON number"),
+        ('{"a": {"b": 1, "b": 2}}', "'b' occurs twice in one object"),
+        ('{"a": ["\\ud800"]}', r"contains the unpaired surrogate \\ud800"),
         ('"' + '\\"' * 200_000, "not JSON"),
     ],
 )
@@ -34,7 +34,7 @@ def test_json_that_is_refused(content: str, reason: str) -> None:
 
 
 def test_json_that_is_read() -> None:
-    nested = "[" * DEEPEST + "]" * DEEPEST
+    nested = "[" * MAX_DEPTH + "]" * MAX_DEPTH
     assert parse_json(nested, "a.json") is not None
     brackets = '["' + "[{" * 200 + '", "\\"[", "\\ud83d\\ude00", 12345678901234567890, -1.5e3]'
     assert parse_json(brackets, "a.json") == ["[{" * 200, '"[', "😀", 12345678901234567890, -1500.0]
@@ -44,9 +44,9 @@ def test_files_are_read_to_a_size_and_no_further(tmp_path: Path) -> None:
     file = tmp_path / "a.txt"
     file.write_bytes(b"\xef\xbb\xbfHello")
     assert read_text(file, 8) == "Hello"
-    with pytest.raises(DataError, match=r"a\.txt holds more than 0 MB; split it"):
+    with pytest.raises(DataError, match=r"a\.txt contains more than 0 MB; split it"):
         read_text(file, 7)
-    with pytest.raises(DataError, match="zero holds more than 2 MB"), Path("/dev/zero").open("rb") as endless:
+    with pytest.raises(DataError, match="zero contains more than 2 MB"), Path("/dev/zero").open("rb") as endless:
         read_bounded(endless, "zero", 2_000_000)
     file.write_bytes(b"h\xe9")
     with pytest.raises(DataError, match=r"a\.txt is not UTF-8 text \(byte 1\)"):

@@ -51,5 +51,5 @@ def test_every_symbol_is_read_as_itself(symbol: str) -> None:
 
 
 def test_an_unknown_letter_is_named() -> None:
-    with pytest.raises(InputError, match=r"'Ж' \(CYRILLIC CAPITAL LETTER ZHE\) in 'aЖ' is no phone"):
+    with pytest.raises(InputError, match=r"'Ж' \(CYRILLIC CAPITAL LETTER ZHE\) in 'aЖ' is not a phone"):
         parse_ipa("aЖ")

@@ -10,11 +10,11 @@ from lexicon.errors import BackendError
 from lexicon.pronounce import pronounce
 from lexicon.writing_systems import check_script
 from tests.lexicon.japanese_readings import READINGS
-from tts2face.voice.engine import load_voice
+from tts2face.voice.loading import load_voice
 
 
 def spoken(text: str) -> str:
-    return re.sub(r"[\s、。？！]", "", japanese.with_kana(text))
+    return re.sub(r"[\s、。？！]", "", japanese.to_kana(text))
 
 
 def test_most_sentences_are_read_as_a_person_reads_them() -> None:
@@ -25,7 +25,7 @@ def test_most_sentences_are_read_as_a_person_reads_them() -> None:
 
 
 def test_phrases_are_apart_and_punctuation_stays() -> None:
-    assert japanese.with_kana("今日は、東京へ行きます。") == "キョーワ、 トーキョーエ イキマス。"
+    assert japanese.to_kana("今日は、東京へ行きます。") == "キョーワ、 トーキョーエ イキマス。"
 
 
 def test_long_texts_are_read_piece_by_piece() -> None:

@@ -43,14 +43,14 @@ def test_there_are_39_names_and_two_reduced_vowels() -> None:
 
 @pytest.mark.parametrize("name", ["XX", "P1", "AH3", ""])
 def test_an_unknown_arpabet_name_is_refused(name: str) -> None:
-    with pytest.raises(InputError, match=f"{name!r} is no ARPABET name"):
+    with pytest.raises(InputError, match=f"{name!r} is not an ARPABET name"):
         arpabet_to_ipa(name)
 
 
 def test_unknown_labels_are_named() -> None:
-    with pytest.raises(InputError, match="'Q' is no phone of the table"):
+    with pytest.raises(InputError, match="'Q' is not a phone of the table"):
         look_up_phone("Q")
-    with pytest.raises(InputError, match=r"'AA' is no phone.*did you mean ɑ"):
+    with pytest.raises(InputError, match=r"'AA' is not a phone.*did you mean ɑ"):
         phone_distance("p", "AA")
     with pytest.raises(InputError, match="ARPABET has no name for y"):
         ipa_to_arpabet("y")
@@ -131,7 +131,7 @@ def test_stand_ins(label: str, available: str, answer: tuple[str, ...]) -> None:
 
 
 def test_nothing_available_is_refused() -> None:
-    with pytest.raises(InputError, match="nothing can stand in for p"):
+    with pytest.raises(InputError, match="no phone can replace p"):
         nearest_phones("p", {SILENCE})
 
 
@@ -139,8 +139,8 @@ def test_nothing_available_is_refused() -> None:
     ("lines", "reason"),
     [
         ("p\tP\tstop\n", "line 2: 3 cells instead of 13"),
-        ("p\tP\tplop\tbilabial\tplosive\tvoiceless\t\t\t\t\t\t\tpea\n", "line 2: p has 'plop', which is none of"),
-        ("p\tP\tstop\tbilabial\tplosive\tvoiceless\t\t\t\t\t\t\tpea\n" * 2, "line 3: p stands there twice"),
+        ("p\tP\tplop\tbilabial\tplosive\tvoiceless\t\t\t\t\t\t\tpea\n", "line 2: p has the value 'plop'; use one of"),
+        ("p\tP\tstop\tbilabial\tplosive\tvoiceless\t\t\t\t\t\t\tpea\n" * 2, "line 3: p occurs twice"),
         ("pf\t\taffricate\tlabiodental\taffricate\tvoiceless\t\t\t\t\tp f\t\tPferd\n", "pf has the part p"),
     ],
 )

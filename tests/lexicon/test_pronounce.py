@@ -7,9 +7,8 @@ from lexicon.errors import InputError
 from lexicon.ipa import parse_ipa
 from lexicon.nominal_durations import nominal_phones
 from lexicon.phones import ARPABET, PHONES
-from lexicon.pronounce import pronounce
+from lexicon.pronounce import pronounce, split_syllables
 from lexicon.sequence import SILENCE
-from lexicon.syllables import split_syllables
 
 
 def _arpabet(text: str) -> list[str]:
@@ -106,7 +105,7 @@ def test_other_languages(text: str, language: str, n_words: int) -> None:
 @pytest.mark.parametrize("text", ["", " \n", "...!?", "“”", "()", "—"])
 @pytest.mark.parametrize("language", ["en-us", "de"])
 def test_text_without_a_word_is_refused(text: str, language: str) -> None:
-    with pytest.raises(InputError, match="no word to say"):
+    with pytest.raises(InputError, match="no word to speak"):
         pronounce(text, language)
 
 

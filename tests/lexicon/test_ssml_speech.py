@@ -9,16 +9,16 @@ from hypothesis import strategies as st
 
 from lexicon.dictionary import arpabet_segments, parse_dictionary
 from lexicon.errors import InputError
-from lexicon.given import given_words, pronounce_marked
+from lexicon.given_pronunciations import pronounce_marked, words_with_given_phones
 from lexicon.ipa import parse_ipa
 from lexicon.languages import language_code
 from lexicon.mark_parser import parse_marks
 from lexicon.marked_text import MarkedText, PhoneMark, StyleRun
-from lexicon.readable import check_readable
 from lexicon.say_as import KINDS, say_as
 from lexicon.sentences import split_sentences
 from lexicon.ssml_speech import VOICES
-from lexicon.ssml_values import LONGEST_ATTRIBUTE
+from lexicon.ssml_values import MAX_ATTRIBUTE_CHARACTERS
+from lexicon.writing_systems import check_readable
 from tts2face.voice.engine import VOICE_NAMES
 
 
@@ -68,7 +68,7 @@ def test_only_the_sentence_with_given_phones_is_spoken_word_by_word() -> None:
 
 
 def test_a_text_that_holds_the_names_used_within_is_read_too() -> None:
-    words = given_words("qzx qzxaaa cat", [PhoneMark(11, 14, parse_ipa("dɒɡ"))], "de")
+    words = words_with_given_phones("qzx qzxaaa cat", [PhoneMark(11, 14, parse_ipa("dɒɡ"))], "de")
     assert [(word.text, bool(word.segments)) for word in words] == [("qzx", False), ("qzxaaa", False), ("cat", True)]
 
 
@@ -146,7 +146,7 @@ def test_other_languages_read_what_needs_no_words() -> None:
 @pytest.mark.parametrize(
     ("kind", "written", "more", "reason"),
     [
-        ("ssn", "1", "", "cannot read as 'ssn'; choose cardinal"),
+        ("ssn", "1", "", "<say-as> has no kind 'ssn'; use cardinal"),
         ("cardinal", "many", "", "cannot read 'many' as a cardinal number; write it as in 1,234"),
         ("ordinal", "x", "", "as an ordinal number"),
         ("digits", "a1", "", "as digits"),
@@ -160,9 +160,9 @@ def test_other_languages_read_what_needs_no_words() -> None:
         ("date", "Foo 3", "md", "as a date of the format md"),
         ("date", "1/2/3", "mmm", "no format 'mmm' of dates"),
         ("currency", "much", "", "as money"),
-        ("currency", "XYZ 3", "", "no currency 'XYZ'"),
+        ("currency", "XYZ 3", "", "the currency 'XYZ' is not supported"),
         ("unit", "!", "", "as a measure"),
-        ("cardinal", " ", "", "needs 1 to 300 characters to read, not 0"),
+        ("cardinal", " ", "", "needs 1 to 300 characters, not 0"),
         ("characters", "a" * 301, "", "not 301"),
     ],
 )
@@ -172,7 +172,7 @@ def test_what_is_none_of_a_kind_is_refused(kind: str, written: str, more: str, r
 
 
 def test_other_languages_refuse_kinds_that_need_words() -> None:
-    with pytest.raises(InputError, match="<say-as> reads date in English only, not in de"):
+    with pytest.raises(InputError, match="<say-as> supports date in English only, not in de"):
         say_as("date", "1.2.2003", "dmy", "de")
 
 
@@ -251,25 +251,31 @@ def test_documents_may_name_the_voices_that_need_no_file() -> None:
 @pytest.mark.parametrize(
     ("inside", "reason"),
     [
-        ('<phoneme alphabet="x-sampa" ph="k">a</phoneme>', "no alphabet 'x-sampa' here; choose ipa, x-arpabet"),
+        (
+            '<phoneme alphabet="x-sampa" ph="k">a</phoneme>',
+            "not support the alphabet 'x-sampa'; use ipa, x-arpabet",
+        ),
         ("<phoneme>a</phoneme>", "a <phoneme> needs ph; write"),
-        ('<phoneme ph="%">a</phoneme>', r"'%' \(PERCENT SIGN\) in '%' is no phone"),
-        ('<phoneme ph="ˈ">a</phoneme>', "the <phoneme> of 'a' holds no phone"),
+        ('<phoneme ph="%">a</phoneme>', r"'%' \(PERCENT SIGN\) in '%' is not a phone"),
+        ('<phoneme ph="ˈ">a</phoneme>', "the <phoneme> of 'a' contains no phone"),
         ('<phoneme alphabet="x-arpabet" ph="QQ">a</phoneme>', "QQ"),
         ('<phoneme ph="{}">a</phoneme>'.format("a" * 501), "have 501 characters"),
         ('<phoneme ph="a">{}</phoneme>'.format("a" * 61), "words of at most 60 characters, not 61"),
-        ('<phoneme ph="a"><p/></phoneme>', "<phoneme> holds no elements"),
-        ('<phoneme ph="a" type="x">a</phoneme>', "<phoneme> has no attribute 'type' here"),
+        ('<phoneme ph="a"><p/></phoneme>', "<phoneme> cannot contain elements"),
+        ('<phoneme ph="a" type="x">a</phoneme>', "<phoneme> does not support the attribute 'type'"),
         ("<say-as>1</say-as>", "a <say-as> needs interpret-as; write"),
-        ('<say-as interpret-as="ssn">1</say-as>', "cannot read as 'ssn'"),
-        ('<voice name="en-US-JennyNeural">a</voice>', "no voice 'en-US-JennyNeural' here; choose heart, espeak"),
+        ('<say-as interpret-as="ssn">1</say-as>', "no kind 'ssn'"),
+        ('<voice name="en-US-JennyNeural">a</voice>', "no voice 'en-US-JennyNeural'; use heart, espeak"),
         ('<voice name="/etc/x.onnx">a</voice>', "no voice '/etc/x.onnx'"),
         ('<voice gender="robot">a</voice>', "no gender 'robot'"),
-        ('<voice age="9">a</voice>', "<voice> has no attribute 'age' here"),
+        ('<voice age="9">a</voice>', "<voice> does not support the attribute 'age'"),
         ('<voice name="heart" language="de">a</voice>', "heart speaks English, not de"),
-        ("<lang>a</lang>", "no language ''; `tts2face languages` lists all"),
+        ("<lang>a</lang>", "no language ''; `tts2face languages` lists all languages"),
         ('<lang xml:lang="tlh">a</lang>', "no language 'tlh'"),
-        (f'<sub alias="{"a" * (LONGEST_ATTRIBUTE + 1)}">a</sub>', "attribute alias of <sub> has 10001 characters"),
+        (
+            f'<sub alias="{"a" * (MAX_ATTRIBUTE_CHARACTERS + 1)}">a</sub>',
+            "attribute alias of <sub> has 10001 characters",
+        ),
     ],
 )
 def test_what_cannot_be_done_is_refused_with_its_line(inside: str, reason: str) -> None:

@@ -1,4 +1,4 @@
-"""Small model files, made by a script: a face with lips, a palette, a talker, and a talker with an appearance."""
+"""Small synthetic model files: a face with lips, a palette, a talker, and a talker with an appearance."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -20,7 +20,7 @@ INVENTORY = ("i", "m", "p", "s", SILENCE, "ɑ")
 
 
 def write_made_face(path: Path) -> None:
-    """A ball with eyes and all landmarks on its skin, two of its shapes moved by speech, and an identity."""
+    """A ball with eyes, all landmarks on its skin, two speech shapes and an identity."""
     face, rng = tiny_face(textured=True), np.random.default_rng(5)
     skin = face.triangles[: face.parts[0].count]
     weights = rng.dirichlet(np.ones(3), 478).astype(np.float32)
@@ -34,12 +34,12 @@ def write_made_face(path: Path) -> None:
 
 
 def write_made_palette(path: Path) -> None:
-    """Two styles; heads, brows and lids move."""
-    write_palette(path, made_palette(20))
+    """Two styles with motion of head, brows and lids."""
+    write_palette(path, made_palette(10))
 
 
 def write_made_talker(path: Path, *, has_face: bool) -> None:
-    """Six utterances of random shapes, a network of two layers and a drive; with a face in pictures if wanted."""
+    """Six utterances of random shapes, a network, an audio map; with `has_face` an appearance model."""
     rng = np.random.default_rng(6)
     talker = own_talker(has_face=has_face)
     n_looks = 0 if talker.appearance is None else len(talker.appearance.channels)
@@ -58,7 +58,9 @@ def write_made_talker(path: Path, *, has_face: bool) -> None:
     network = PhoneNetwork(INVENTORY, tuple(layers), tuple(layer[:, 0] for layer in layers))
     n = FEATURE_SIZES["mfcc"]
     weights = [rng.normal(0, 0.1, size).astype(np.float32) for size in ((4, 3 * n), (4,), (2, 4), (2,))]
-    drive = AudioMap("mfcc", 1, 1, np.zeros(n, np.float32), np.ones(n, np.float32), *weights, is_nonlinear=True)
+    audio_map = AudioMap("mfcc", 1, 1, np.zeros(n, np.float32), np.ones(n, np.float32), *weights, is_nonlinear=True)
     metadata = {"name": "Ada", "refused": [["u9", "no face"]], "phones_recognised": ["u1"]}
-    made = Talker(talker.fps, talker.model, tuple(utterances), metadata, talker.appearance, network, {"linear": drive})
-    write_talker(path, made)
+    written = Talker(
+        talker.fps, talker.model, tuple(utterances), metadata, talker.appearance, network, {"linear": audio_map}
+    )
+    write_talker(path, written)

@@ -1,4 +1,4 @@
-"""Structural mutations of model files: valid containers whose arrays or metadata hold something wrong."""
+"""Structural mutations of model files: valid containers with invalid arrays or metadata."""
 
 import json
 import math
@@ -19,7 +19,7 @@ WRONG = (
 
 
 def mutate(source: Path, kind: str, out: Path, seed: int) -> str:
-    """Write a copy of a model file with one thing changed, or two; returns what was changed."""
+    """Write a copy of a model file with one or two changes; returns their description."""
     rng = np.random.default_rng(seed)
     arrays, header = read_tensors(source, kind, 1)
     arrays = {name: np.array(array) for name, array in arrays.items()}
@@ -121,7 +121,7 @@ def _dtype(array: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, str
 
 
 def _change_metadata(header: dict, rng: np.random.Generator) -> str:
-    """Go down to a random place, and change what is there."""
+    """Change the value at a random path of the metadata."""
     at, path = header, []
     while True:
         key = rng.integers(len(at)) if isinstance(at, list) else str(rng.choice(list(at)))

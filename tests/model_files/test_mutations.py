@@ -1,4 +1,4 @@
-"""Model files with something wrong in them are refused with one DataError, or serve; nothing crashes or hangs."""
+"""Mutated model files are refused with a DataError or can be used; none crashes or hangs."""
 
 import json
 import os
@@ -11,7 +11,7 @@ import pytest
 from tests.model_files.made import write_made_face, write_made_palette, write_made_talker
 
 N_MUTATIONS = int(os.environ.get("TTS2FACE_MUTATIONS", "60"))  # of each kind; tests/bench tries 1000 of shipped files
-MOST_S = 2.0  # of processor time, beyond what the file as it is takes
+MOST_S = 2.0  # of processor time beyond that of the unchanged file
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -23,7 +23,7 @@ MADE = {"face": write_made_face, "palette": write_made_palette, "talker": write_
 
 
 @pytest.mark.parametrize("kind", MADE)
-def test_a_mutated_file_is_refused_or_serves(kind: str, tmp_path: Path) -> None:
+def test_a_mutated_file_is_refused_or_usable(kind: str, tmp_path: Path) -> None:
     file = tmp_path / f"made.{kind}"
     MADE[kind](file)
     words = [sys.executable, "-m", "tests.model_files.usage", kind, str(file), "0", str(N_MUTATIONS)]

@@ -1,7 +1,7 @@
-"""What every model file that loads must allow, and a process that tries it on mutations of a file.
+"""Use of a loaded model file, and a process that tries it on mutations of a file.
 
 ``python -m tests.model_files.usage KIND FILE FIRST LAST`` prints one JSON line for each mutation from FIRST to LAST,
-after one for the file as it is (seed -1); seconds are the process's own, which other work does not lengthen.
+after one for the unchanged file (seed -1); seconds are processor time.
 """
 
 import faulthandler
@@ -49,9 +49,9 @@ def use_face(path: Path) -> None:
     lips = build_retargeter(talker, face, contact=np.zeros(11)).retarget(
         Trajectory(speech_channels(talker.model), values, 25.0)
     )
-    stage = mesh_renderer(face, Picture(size="64x64", supersampling=1))
-    stage.draw(lips.values[2])
-    stage.draw(face.limits.max(axis=1), np.array([0.1, 0.2, 0.1, 1, 2, 3], np.float32))
+    renderer = mesh_renderer(face, Picture(size="64x64", supersampling=1))
+    renderer.draw(lips.values[2])
+    renderer.draw(face.limits.max(axis=1), np.array([0.1, 0.2, 0.1, 1, 2, 3], np.float32))
 
 
 def use_palette(path: Path) -> None:
@@ -60,26 +60,26 @@ def use_palette(path: Path) -> None:
     fields = GestureFields(palette, with_pitch=True)
     for name in (palette.names[0], palette.names[-1]):
         for stream in (GestureStream, NoiseStream):
-            made = stream(fields, style=name, seed=3, fps=30.0).next(SOUND, 45, Timeline())
-            assert all(np.isfinite(values).all() for values in made.values())
+            gestures = stream(fields, style=name, seed=3, fps=30.0).next(SOUND, 45, Timeline())
+            assert all(np.isfinite(values).all() for values in gestures.values())
 
 
 def use_talker(path: Path) -> None:
-    """Describe it, animate a few phones, carry them to a face, drive lips by features, and draw its own face."""
+    """Describe a talker, animate a few phones, retarget them, apply its audio maps, and draw its own face."""
     talker = read_talker(path)
     assert describe(talker).text()
-    voice = build_exemplar_model(talker)
-    selection = select_tokens(PHONES, voice)
-    lips = blend_trajectory(selection, voice, fps=25.0, n_frames=22)
+    exemplars = build_exemplar_model(talker)
+    selection = select_tokens(PHONES, exemplars)
+    lips = blend_trajectory(selection, exemplars, fps=25.0, n_frames=22)
     build_retargeter(talker, load_face("head")).retarget(lips)
-    for drive in talker.audio_maps.values():
-        assert np.isfinite(drive.parameters(np.ones((5, len(drive.mean)), np.float32))).all()
+    for audio_map in talker.audio_maps.values():
+        assert np.isfinite(audio_map.parameters(np.ones((5, len(audio_map.mean)), np.float32))).all()
     if talker.appearance is not None:
-        looks = appearance_trajectory(selection, build_appearance_exemplars(talker, voice), fps=25.0, n_frames=22)
-        stage = own_face_renderer(talker, Picture(size="64x64", supersampling=1))
+        looks = appearance_trajectory(selection, build_appearance_exemplars(talker, exemplars), fps=25.0, n_frames=22)
+        renderer = own_face_renderer(talker, Picture(size="64x64", supersampling=1))
         for number in (0, 10):
             motion = np.concatenate([lips.values[number], looks.values[number]])
-            draw_video_frame(stage, motion, stage.plate_frame(number / 25.0))
+            draw_video_frame(renderer, motion, renderer.plate_frame(number / 25.0))
 
 
 USES: dict[str, Callable[[Path], None]] = {"face": use_face, "palette": use_palette, "talker": use_talker}
@@ -97,7 +97,7 @@ def outcome(kind: str, path: Path) -> str:
 
 
 def main(kind: str, file: str, first: int, last: int) -> None:
-    """Try mutations of a file, and before them the file as it is."""
+    """Try the unchanged file, then its mutations."""
     warnings.simplefilter("ignore")
     source = Path(file)
     USES[kind](source)  # compiles

@@ -24,7 +24,7 @@ def measured(sound: Waveform) -> tuple[float, float]:
     found: dict[str, str] = {}
     while True:
         try:
-            found = dict(graph.linear_term().metadata) or found  # the last frame may be too short to have any
+            found = dict(graph.pull().metadata) or found  # the last frame may be too short to have any
         except (av.error.EOFError, av.error.BlockingIOError):
             break
     return float(found["lavfi.r128.I"]), 20 * float(np.log10(float(found["lavfi.r128.true_peak"])))

@@ -26,7 +26,7 @@ def distances(made: Field, shown: np.ndarray, heard: np.ndarray) -> dict[int, fl
     for moment in range(N * LENGTH):
         if moment % LENGTH >= H:
             before = slice(moment - H, moment)
-            of_sound = np.square(heard.astype(float) - made.heard[before]).sum()
+            of_sound = np.square(heard.astype(float) - made.prosody[before]).sum()
             found[moment] = float(of_sound + np.square(shown.astype(float) - made.values[before]).sum())
     return found
 
@@ -56,7 +56,7 @@ def test_every_frame_is_drawn_as_the_formula_says(seed: int) -> None:
     chances = generator.random(N_SHOWN)
     state = initial_state(made, 0.4)
     walk = sample_field_moments(made, state, sound, chances)
-    shown, driving = list(state.shown), [*state.heard, *(sound * made.weights)]
+    shown, driving = list(state.shown), [*state.prosody, *(sound * made.weights)]
     expected = []
     for frame in range(N_SHOWN):
         away = distances(made, np.array(shown[-H:]), np.array(driving[frame : frame + H]))
@@ -72,7 +72,7 @@ def test_sound_and_motion_weigh_alike() -> None:
     """alpha is 1 in units of variance: the windows' two terms have the same mean."""
     values, heard, lengths = recordings(4)
     made = build_field(values, heard, lengths, JU_2008)
-    assert np.square(made.heard - made.heard.mean(axis=0)).sum(axis=1).mean() == pytest.approx(1.0, rel=1e-3)
+    assert np.square(made.prosody - made.prosody.mean(axis=0)).sum(axis=1).mean() == pytest.approx(1.0, rel=1e-3)
     assert np.square(made.values - made.values.mean(axis=0)).sum(axis=1).mean() == pytest.approx(1.0, rel=1e-3)
 
 
@@ -80,8 +80,10 @@ def test_candidates_come_with_the_frequencies_of_the_formula() -> None:
     values, heard, lengths = recordings(5)
     made = build_field(values, heard, lengths, JU_2008)
     start = initial_state(made, 0.0)
-    state = FieldState(np.zeros_like(start.shown), np.zeros_like(start.heard), -1, start.offset, start.recent_jumps, 0)
-    away = distances(made, state.shown, state.heard)
+    state = FieldState(
+        np.zeros_like(start.shown), np.zeros_like(start.prosody), -1, start.offset, start.recent_jumps, 0
+    )
+    away = distances(made, state.shown, state.prosody)
     best = sorted(away, key=lambda moment: away[moment])[:N_BEST]
     weights = np.exp(
         -np.array([away[moment] - away[best[0]] for moment in best]) / (H * JU_2008.sigma * made.median_distance)

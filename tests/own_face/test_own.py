@@ -1,4 +1,4 @@
-"""Looks that go with lips, against a made talker whose looks are known functions of her shape."""
+"""Appearance regression, against a synthetic talker whose appearance is a known function of its shape."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from tts2face.own_face.appearance_regression import fit_appearance_regression
 from tts2face.types import Trajectory
 
 
-def test_looks_that_follow_the_lips_are_found_again():
+def test_a_linear_relation_is_recovered():
     generator = np.random.default_rng(0)
     talker = own_talker()
     mix, offset = generator.normal(size=(2, 4)), generator.normal(size=4)
@@ -21,24 +21,24 @@ def test_looks_that_follow_the_lips_are_found_again():
     looks = (shape[:, :2] @ mix + offset).astype(np.float32)
     phones = PhoneSequence([SILENCE], [0.0, 20.0])
     spoken = Utterance("a", phones, (), shape, np.zeros((500, 6), np.float32), np.zeros(500, np.float32), looks)
-    driven = fit_appearance_regression(replace(talker, utterances=(spoken,)))
-    motion = driven.motion(Trajectory(("shape0", "shape1"), [[0.5, -1.0], [0.0, 0.0]], 25.0))
+    regression = fit_appearance_regression(replace(talker, utterances=(spoken,)))
+    motion = regression.motion(Trajectory(("shape0", "shape1"), [[0.5, -1.0], [0.0, 0.0]], 25.0))
     assert motion.channels == ("shape0", "shape1", "face0", "face1", "mouth0", "mouth1")
     assert motion.values[0, :2].tolist() == [0.5, -1.0]
     assert np.abs(motion.values[:, 2:] - (np.array([[0.5, -1.0], [0.0, 0.0]]) @ mix + offset)).max() < 0.05
 
 
-def test_motion_of_somebody_else_is_refused():
+def test_motion_of_another_talker_is_refused():
     phones = PhoneSequence([SILENCE], [0.0, 0.4])
     still = np.zeros((10, 3), np.float32)
     spoken = Utterance(
         "a", phones, (), still, np.zeros((10, 6), np.float32), still[:, 0], np.zeros((10, 4), np.float32)
     )
-    driven = fit_appearance_regression(replace(own_talker(), utterances=(spoken,)))
-    with pytest.raises(InputError, match="clone it to her first"):
-        driven.motion(Trajectory(("jawOpen",), [[0.0]], 25.0))
+    regression = fit_appearance_regression(replace(own_talker(), utterances=(spoken,)))
+    with pytest.raises(InputError, match="transfer it to this talker first"):
+        regression.motion(Trajectory(("jawOpen",), [[0.0]], 25.0))
 
 
-def test_a_talker_without_pictures_has_no_own_face():
+def test_a_talker_without_appearance_is_refused():
     with pytest.raises(InputError, match="motion only"):
         fit_appearance_regression(own_talker(has_face=False))

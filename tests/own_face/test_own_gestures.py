@@ -1,4 +1,4 @@
-"""Gestures of a talker's own face, against a made talker whose blinks are known."""
+"""Gestures of a talker's own face, against a synthetic talker with known blinks."""
 
 from dataclasses import replace
 from functools import cache
@@ -21,12 +21,12 @@ from tts2face.retargeting.performer import EYELID_LANDMARKS
 from tts2face.types import Trajectory
 
 N_FRAMES = 400
-SHUT_BY = 0.85  # share of the opening that a blink takes, as trackers see it
+SHUT_BY = 0.85  # closure of a tracked blink
 
 
 @cache
 def blinker() -> Talker:
-    """The starter talker's shape at rest; two modes of speech, one of the upper lids; she blinks every 40 frames."""
+    """The starter talker's shape at rest; two modes of speech, one of the upper lids; a blink every 40 frames."""
     talker = own_talker()
     rest = neutral().astype(np.float64)
     basis = np.zeros((3, 478, 3))
@@ -55,7 +55,7 @@ def blinker() -> Talker:
 
 
 @cache
-def ready() -> OwnFaceGestures:
+def gesture_model() -> OwnFaceGestures:
     return build_own_face_gestures(blinker(), palette())
 
 
@@ -64,59 +64,59 @@ def spoken(n_frames: int = 1) -> Trajectory:
     return Trajectory(("shape0", "shape1", "face0", "face1", "mouth0", "mouth1"), values, 25.0)
 
 
-def felt(**gestures: list[float]) -> np.ndarray:
+def gesture_channels(**gestures: list[float]) -> np.ndarray:
     """Gesture channels of one frame."""
     values = {name: np.array([value], np.float32) for name, value in gestures.items()}
-    return ready().motion(spoken(), values).values[0, 6:]
+    return gesture_model().motion(spoken(), values).values[0, 6:]
 
 
 @pytest.mark.parametrize("share", [0.25, 0.5, 1.0])
-def test_lids_move_and_look_as_in_recorded_blinks(share: float) -> None:
-    moved, looks = ready().displacements(felt(blink=[share, share]), 0)
+def test_lids_move_and_change_texture_as_in_recorded_blinks(share: float) -> None:
+    moved, looks = gesture_model().displacements(gesture_channels(blink=[share, share]), 0)
     recorded = share * blinker().utterances[0].shape[6, 2] * blinker().model.basis[2, :468]
     assert np.abs(moved - recorded).max() < 0.1  # mm
     assert looks == pytest.approx([30 * share, 50 * share**2], abs=0.5)
 
 
-def test_lids_that_are_shut_on_the_video_stay_so() -> None:
+def test_lids_that_are_closed_on_the_video_stay_closed() -> None:
     for share in (0.0, 0.5, 1.0):
-        moved, looks = ready().displacements(felt(blink=[share, share]), 3)
+        moved, looks = gesture_model().displacements(gesture_channels(blink=[share, share]), 3)
         assert np.abs(moved).max() < 0.02
         assert np.abs(looks).max() < 0.2
 
 
-def test_brows_rise_and_lids_and_lips_stay() -> None:
-    moved, looks = ready().displacements(felt(brows=[4 * np.sqrt(len(BROWS)), 0]), 0)
+def test_brows_rise_without_lids_and_lips() -> None:
+    moved, looks = gesture_model().displacements(gesture_channels(brows=[4 * np.sqrt(len(BROWS)), 0]), 0)
     assert moved[list(BROWS), 1] == pytest.approx(np.full(len(BROWS), 4.0), abs=0.2)
     assert np.abs(moved[[*LID_LANDMARKS, *INNER_LIP_UPPER, *INNER_LIP_LOWER]]).max() < 1e-4
     assert not looks.any()
 
 
 @pytest.mark.parametrize("mood", range(len(EXPRESSIONS)))
-def test_expressions_leave_the_gap_of_the_lips(mood: int) -> None:
-    moved, _ = ready().displacements(felt(expression=np.eye(5)[mood].tolist()), 0)
+def test_expressions_do_not_change_the_lip_gap(mood: int) -> None:
+    moved, _ = gesture_model().displacements(gesture_channels(expression=np.eye(5)[mood].tolist()), 0)
     assert np.abs(moved).max() > 1
     assert np.abs(moved[INNER_LIP_UPPER, 1] - moved[INNER_LIP_LOWER, 1]).max() < 0.2
 
 
-def test_without_gestures_the_picture_is_the_same_and_with_them_another() -> None:
+def test_only_gestures_change_the_picture() -> None:
     talker, picture = blinker(), Picture(size="96x96")
-    plain, stage = own_face_renderer(talker, picture), own_face_renderer(talker, picture, ready())
+    plain, renderer = own_face_renderer(talker, picture), own_face_renderer(talker, picture, gesture_model())
     own = spoken()
-    assert stage.channels == plain.channels + ready().channels
-    still, blink = (ready().motion(own, g).values[0] for g in ({}, {"blink": np.ones((1, 2), np.float32)}))
-    assert np.array_equal(draw_video_frame(stage, still, 1), draw_video_frame(plain, own.values[0], 1))
-    assert not np.array_equal(draw_video_frame(stage, blink, 1), draw_video_frame(plain, own.values[0], 1))
+    assert renderer.channels == plain.channels + gesture_model().channels
+    still, blink = (gesture_model().motion(own, g).values[0] for g in ({}, {"blink": np.ones((1, 2), np.float32)}))
+    assert np.array_equal(draw_video_frame(renderer, still, 1), draw_video_frame(plain, own.values[0], 1))
+    assert not np.array_equal(draw_video_frame(renderer, blink, 1), draw_video_frame(plain, own.values[0], 1))
 
 
 def test_gains_multiply_and_gaze_and_head_have_no_effect() -> None:
     values = {"brows": np.ones((1, 2), np.float32), "head": np.ones((1, 6), np.float32)}
     values |= {"gaze": np.ones((1, 2), np.float32), "blink": np.full((1, 2), 0.4, np.float32)}
-    doubled = ready().motion(spoken(), values, {"brows": 2.0, "blink": 0.5}).values[0, 6:]
+    doubled = gesture_model().motion(spoken(), values, {"brows": 2.0, "blink": 0.5}).values[0, 6:]
     assert doubled.tolist() == pytest.approx([0, 0, 0, 0, 0, 2, 2, 0, 0, 0.2])
 
 
-def test_who_never_blinks_on_video_has_no_blinks_to_show() -> None:
+def test_a_talker_without_blinks_gets_no_lid_motion() -> None:
     talker = blinker()
     shape = talker.utterances[0].shape.copy()
     shape[:, 2] = 0
@@ -125,8 +125,8 @@ def test_who_never_blinks_on_video_has_no_blinks_to_show() -> None:
     assert not calm.lid_appearance.any()
 
 
-def test_refuses_what_does_not_fit() -> None:
+def test_invalid_gestures_are_refused() -> None:
     with pytest.raises(InputError, match=r"brows must be finite values \(1, 2\), not \(1, 3\)"):
-        ready().motion(spoken(), {"brows": np.zeros((1, 3), np.float32)})
+        gesture_model().motion(spoken(), {"brows": np.zeros((1, 3), np.float32)})
     with pytest.raises(InputError, match="motion only"):
         build_own_face_gestures(own_talker(has_face=False), palette())

@@ -1,4 +1,4 @@
-"""Soft shadows with a known answer: convex is bright, inside is dark, behind a wall the lamp is hidden."""
+"""Soft shadows with known results: convex, enclosed and occluded surfaces."""
 
 import dataclasses
 
@@ -13,8 +13,8 @@ from tts2face.render.surface import build_surface
 LAMPS = np.array([[0, 0, 1.0], [1.0, 0, 0], [0, 1.0, 0]])
 
 
-def of_parts(*bodies):
-    """A face of plain bodies without shapes."""
+def face_of_bodies(*bodies):
+    """A face that consists of spheres and has no shapes."""
     blank = tiny_face()
     starts = np.cumsum([0] + [len(points) for points, _ in bodies])
     vertices = np.vstack([points for points, _ in bodies]).astype(np.float32)
@@ -35,15 +35,15 @@ def of_parts(*bodies):
 
 
 def rest(*bodies):
-    face = of_parts(*bodies)
+    face = face_of_bodies(*bodies)
     return compute_exposure(face, build_surface(face), LAMPS, threads=1).rest
 
 
-def test_nothing_shades_a_lone_ball():
+def test_a_single_ball_has_no_shadow():
     assert rest(ball((0, 0, 0), 80, 16)).min() > 0.93
 
 
-def test_what_lies_inside_gets_no_light():
+def test_an_enclosed_ball_receives_no_light():
     shell, core = ball((0, 0, 0), 80, 16), ball((0, 0, 0), 30, 8)
     exposure = rest(shell, core)[len(shell[0]) :]
     assert exposure[:, 0].max() < 0.05
@@ -67,7 +67,7 @@ def test_directions_are_unit_vectors_spread_evenly():
 
 
 @pytest.mark.parametrize("threads", [2, 3])
-def test_threads_do_not_matter(threads):
+def test_exposure_does_not_depend_on_the_number_of_threads(threads):
     face = tiny_face()
     one, many = (compute_exposure(face, build_surface(face), LAMPS, n) for n in (1, threads))
     np.testing.assert_array_equal(one.rest, many.rest)

@@ -1,4 +1,4 @@
-"""Pictures: what each option changes, bytes whatever the threads, joined samples against full supersampling."""
+"""Pictures: the effect of each option, thread independence, merged samples against full supersampling."""
 
 from dataclasses import fields, replace
 
@@ -41,7 +41,7 @@ def test_every_option_changes_the_picture(option):
     assert before.shape != after.shape or np.abs(before.astype(int) - after).max() > 10
 
 
-def test_no_option_was_forgotten():
+def test_every_option_is_tested():
     assert {option.name for option in fields(Picture)} == set(OTHERS) | {"renderer"}  # both renderers: test_vtk.py
 
 
@@ -49,15 +49,15 @@ def test_no_option_was_forgotten():
 def test_bytes_do_not_depend_on_the_number_of_threads(threads):
     face = tiny_face()
     clip = clip_of(face, 7)
-    stage = mesh_renderer(face, SMALL)
-    one_by_one = [draw(stage, *pose) for pose in zip(clip.motion.values, clip.head.values, strict=True)]
-    together = list(stage.frames(clip, threads=threads))
+    renderer = mesh_renderer(face, SMALL)
+    one_by_one = [renderer.draw(*pose) for pose in zip(clip.motion.values, clip.head.values, strict=True)]
+    together = list(renderer.frames(clip, threads=threads))
     assert len(together) == 7
     assert all(np.array_equal(a, b) for a, b in zip(one_by_one, together, strict=True))
 
 
 @pytest.mark.parametrize("textured", [False, True])
-def test_joined_samples_look_like_every_sample_lit_alone(textured):
+def test_merged_samples_equal_samples_shaded_one_by_one(textured):
     face = tiny_face(textured=textured, n_rings=30)
     joined = draw(face, REST, picture=Picture(size="100x100", supersampling=3)).astype(float)
     single = draw(face, REST, picture=Picture(size="300x300", supersampling=1))
@@ -66,7 +66,7 @@ def test_joined_samples_look_like_every_sample_lit_alone(textured):
     assert np.abs(joined - srgb).mean() <= 2
 
 
-def test_a_colour_behind_is_that_colour_and_transparent_is_empty():
+def test_a_colour_background_and_a_transparent_one():
     face = tiny_face()
     assert tuple(draw(face, REST, picture=replace(SMALL, background="#204060"))[0, 0]) == (0x20, 0x40, 0x60)
     clear = draw(face, REST, picture=replace(SMALL, background="transparent"))
@@ -97,14 +97,14 @@ def test_coverage_is_the_share_of_samples_that_the_head_covers(yaw):
     assert np.abs(joined[:, :, 3] / 255 - covered).max() <= 0.01
 
 
-def test_an_image_behind_fills_the_picture(tmp_path):
+def test_an_image_background_fills_the_picture(tmp_path):
     Image.new("RGB", (40, 10), (10, 200, 30)).save(tmp_path / "wall.png")
     drawn = draw(tiny_face(), REST, picture=replace(SMALL, background=str(tmp_path / "wall.png")))
     for corner in (drawn[0, 0], drawn[-1, 0], drawn[0, -1]):
         assert tuple(corner) == (10, 200, 30)
 
 
-def test_an_image_that_is_none_is_refused(tmp_path):
+def test_a_file_that_is_no_image_is_refused(tmp_path):
     (tmp_path / "wall.png").write_bytes(b"no picture")
     with pytest.raises(DataError, match="cannot read the background image"):
         draw(tiny_face(), REST, picture=replace(SMALL, background=str(tmp_path / "wall.png")))
@@ -134,12 +134,12 @@ def test_a_nearer_camera_shows_a_larger_head():
     assert near > 2 * far
 
 
-def test_a_camera_inside_the_head_draws_what_lies_before_it():
+def test_a_camera_inside_the_head_draws_the_surface_in_front():
     drawn = draw(tiny_face(), REST, picture=replace(SMALL, camera="0,0,50"))
     assert np.ptp(drawn.reshape(-1, 3).astype(int), axis=0).max() > 0
 
 
-def test_translucent_lashes_let_what_is_behind_show_through():
+def test_translucent_lashes_are_blended_with_the_surface_behind():
     face = tiny_face()
     solid = replace(face, parts=(*face.parts[:-1], replace(face.parts[-1], opacity=1.0)))
     gone = replace(face, triangles=np.concatenate([face.triangles[:-2], np.zeros((2, 3), np.int32)]))
@@ -150,7 +150,7 @@ def test_translucent_lashes_let_what_is_behind_show_through():
     assert (np.abs(through - full)[changed].mean(axis=-1) > 5).mean() > 0.9
 
 
-def test_an_open_mouth_and_turned_eyes_show():
+def test_an_open_mouth_and_turned_eyes_change_the_picture():
     face = tiny_face()
     rest, moved = (draw(face, weights, picture=SMALL).astype(int) for weights in (REST, np.array([1.0, 0, 1, 1])))
     assert np.abs(rest - moved).max() > 60

@@ -1,4 +1,4 @@
-"""Compiled kernels find a place on machines where little can be written."""
+"""Cache folder of the compiled kernels where the package cannot be written."""
 
 import os
 from types import SimpleNamespace
@@ -37,7 +37,7 @@ def test_a_folder_that_others_can_write_is_not_trusted(tmp_path):
     assert found != taken
 
 
-def test_a_package_that_can_be_written_keeps_its_kernels(tmp_path, monkeypatch):
+def test_a_writable_package_needs_no_other_folder(tmp_path, monkeypatch):
     monkeypatch.delenv(CACHE_VARIABLE, raising=False)
     assert cache_folder(tmp_path) is None
 
@@ -48,7 +48,7 @@ def test_a_folder_below_a_file_cannot_be_written(tmp_path):
     assert compilation._can_write(tmp_path / "new" / "numba")
 
 
-def test_the_users_own_choice_stays(tmp_path, monkeypatch):
+def test_a_folder_that_the_user_sets_is_kept(tmp_path, monkeypatch):
     monkeypatch.setenv(CACHE_VARIABLE, "/chosen")
     monkeypatch.setattr(compilation, "_can_write", lambda folder: False)
     assert cache_folder(tmp_path) is None

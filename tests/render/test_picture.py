@@ -1,4 +1,4 @@
-"""Options that are refused, each for one reason."""
+"""Validation of the drawing options, and exact frame rates."""
 
 import pytest
 
@@ -15,7 +15,7 @@ def test_sizes_out_of_range_are_refused(size):
 
 
 @pytest.mark.parametrize("size", ["", "big", "512x", "x512", "-512x512", "5.5x6", "1x2x3"])
-def test_what_is_no_size_is_refused(size):
+def test_texts_that_are_no_size_are_refused(size):
     with pytest.raises(InputError, match="width x height"):
         Picture(size=size)
 

@@ -1,4 +1,4 @@
-"""A talker's own face: bent pictures against a slow exact one, and a plate that speech leaves alone."""
+"""A talker's own face: warps against a slow exact computation, and pixels of the plate that speech does not move."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_talker import SIZE, face_points, own_talker
 from tts2face.models.talker import Talker
-from tts2face.render import own_face as plate
+from tts2face.render import plate
 from tts2face.render.image_warp import draw_texture, warp_image
 from tts2face.render.own_face import draw_video_frame, own_face_renderer
 from tts2face.render.picture import Picture
@@ -29,7 +29,7 @@ def clip_of(channels: tuple[str, ...], values: np.ndarray) -> Clip:
     return Clip(Trajectory(channels, values, 25.0), head, speech)
 
 
-def test_bending_follows_the_corners_exactly():
+def test_a_warp_maps_the_corners_exactly():
     target = np.array([[5.2, 4.1], [40.7, 8.3], [12.9, 38.2]])
     source = np.array([[10.0, 10.0], [50.0, 14.0], [16.0, 48.0]])
     y, x = np.mgrid[:64, :64]
@@ -51,7 +51,7 @@ def test_bending_follows_the_corners_exactly():
                 assert (drawn[row, column] == -1).all()
 
 
-def test_a_texture_is_laid_where_its_points_are():
+def test_a_texture_is_drawn_at_its_points():
     places = np.array([[0.0, 0], [7, 0], [0, 7]])
     texture = np.mgrid[:8, :8].transpose(1, 2, 0)[:, :, [1, 0, 0]].astype(np.float32)
     drawn = np.zeros((16, 16, 3), np.float32)
@@ -59,11 +59,11 @@ def test_a_texture_is_laid_where_its_points_are():
     assert drawn[4, 6].tolist() == [3.0, 2.0, 2.0]
 
 
-def test_the_plate_s_own_parameters_leave_the_plate_alone_but_for_the_open_mouth():
+def test_the_parameters_of_the_plate_change_only_the_open_mouth():
     talker = own_talker()
-    stage = own_face_renderer(talker, Picture(size=f"{SIZE}x{SIZE}"))
-    drawn = draw_video_frame(stage, motion_of_plate(talker, 2), 2)
-    changed = np.abs(drawn.astype(int) - stage.plate[2]).max(axis=2) > 1
+    renderer = own_face_renderer(talker, Picture(size=f"{SIZE}x{SIZE}"))
+    drawn = draw_video_frame(renderer, motion_of_plate(talker, 2), 2)
+    changed = np.abs(drawn.astype(int) - renderer.plate[2]).max(axis=2) > 1
     y, x = np.nonzero(changed)
     lips = face_points()[list(MOUTH_LANDMARKS)]
     assert changed.any()
@@ -72,39 +72,39 @@ def test_the_plate_s_own_parameters_leave_the_plate_alone_but_for_the_open_mouth
     assert np.abs(drawn[int(lips[:, 1].mean()), int(lips[:, 0].mean())] - 30.0).max() <= 1
 
 
-def test_motion_moves_the_face_and_neither_corner_of_the_picture():
+def test_motion_moves_the_face_and_not_the_corner_of_the_picture():
     talker = own_talker()
-    stage = own_face_renderer(talker, Picture(size=f"{SIZE}x{SIZE}"))
+    renderer = own_face_renderer(talker, Picture(size=f"{SIZE}x{SIZE}"))
     motion = motion_of_plate(talker, 0)
     motion[0] += 40
-    moved = draw_video_frame(stage, motion, 0)
-    assert np.abs(moved.astype(int) - stage.plate[0]).max() > 10
-    assert np.array_equal(moved[:6, :6], stage.plate[0][:6, :6])
+    moved = draw_video_frame(renderer, motion, 0)
+    assert np.abs(moved.astype(int) - renderer.plate[0]).max() > 10
+    assert np.array_equal(moved[:6, :6], renderer.plate[0][:6, :6])
 
 
-def test_looks_change_the_texture_by_their_basis():
+def test_appearance_parameters_change_the_texture_by_their_basis():
     talker = own_talker()
-    stage = own_face_renderer(talker, Picture(size=f"{SIZE}x{SIZE}"))
+    renderer = own_face_renderer(talker, Picture(size=f"{SIZE}x{SIZE}"))
     motion = motion_of_plate(talker, 1)
     motion[2] += 2000
-    difference = draw_video_frame(stage, motion, 1).astype(float) - stage.plate[1]
+    difference = draw_video_frame(renderer, motion, 1).astype(float) - renderer.plate[1]
     wanted = 2000 * talker.appearance.face.basis[0]
     assert 0.3 * np.abs(wanted).max() < np.abs(difference).max() <= np.abs(wanted).max() + 1
 
 
 @pytest.mark.parametrize(("instant", "number"), [(0.0, 0), (0.08, 2), (0.12, 3), (0.16, 2), (0.24, 0), (0.28, 1)])
-def test_the_plate_goes_to_its_end_and_back(instant, number):
+def test_the_plate_plays_forwards_and_backwards(instant, number):
     assert own_face_renderer(own_talker(), Picture(size="96x96")).plate_frame(instant) == number
 
 
 def test_without_a_size_the_picture_is_as_large_as_the_video():
-    stage = own_face_renderer(own_talker(), Picture())
-    assert (stage.picture.width, stage.picture.height) == (SIZE, SIZE)
-    assert stage.scale == 1.0
-    assert stage.plate[0].shape == (SIZE, SIZE, 3)
+    renderer = own_face_renderer(own_talker(), Picture())
+    assert (renderer.picture.width, renderer.picture.height) == (SIZE, SIZE)
+    assert renderer.scale == 1.0
+    assert renderer.plate[0].shape == (SIZE, SIZE, 3)
 
 
-def test_many_large_frames_are_packed_and_look_the_same(monkeypatch):
+def test_large_frames_are_compressed_with_little_loss(monkeypatch):
     raw = own_face_renderer(own_talker(), Picture()).plate
     monkeypatch.setattr(plate, "MAX_RAW_BYTES", raw[0].size)
     packed = own_face_renderer(own_talker(), Picture()).plate
@@ -114,27 +114,27 @@ def test_many_large_frames_are_packed_and_look_the_same(monkeypatch):
         assert np.abs(packed[number].astype(int) - raw[number]).mean() <= 2  # of 255
 
 
-def test_a_clip_goes_on_where_the_one_before_it_ended():
+def test_a_clip_continues_the_video_of_the_previous_clip():
     talker = own_talker()
-    stage = own_face_renderer(talker, Picture(size="96x96"))
+    renderer = own_face_renderer(talker, Picture(size="96x96"))
     values = np.array([motion_of_plate(talker, 0)] * 4)
-    whole = list(stage.frames(clip_of(stage.channels, values), threads=2))
-    rest = list(stage.frames(clip_of(stage.channels, values[2:]), first=2))
+    whole = list(renderer.frames(clip_of(renderer.channels, values), threads=2))
+    rest = list(renderer.frames(clip_of(renderer.channels, values[2:]), first=2))
     assert np.array_equal(whole[2], rest[0])
     assert np.array_equal(whole[3], rest[1])
 
 
-def test_a_talker_without_pictures_is_refused():
+def test_a_talker_without_appearance_is_refused():
     with pytest.raises(InputError, match="Ada has motion only"):
         own_face_renderer(own_talker(has_face=False), Picture())
 
 
 def test_a_plate_is_not_transparent():
-    with pytest.raises(InputError, match="her own video"):
+    with pytest.raises(InputError, match="cannot have a transparent background"):
         own_face_renderer(own_talker(), Picture(background="transparent"))
 
 
 def test_a_clip_for_another_face_is_refused():
-    stage = own_face_renderer(own_talker(), Picture(size="96x96"))
+    renderer = own_face_renderer(own_talker(), Picture(size="96x96"))
     with pytest.raises(InputError, match="not in the channels"):
-        list(stage.frames(clip_of(("jawOpen",), np.zeros((1, 1)))))
+        list(renderer.frames(clip_of(("jawOpen",), np.zeros((1, 1)))))

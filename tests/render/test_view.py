@@ -1,4 +1,4 @@
-"""The window: what it needs, where its camera stands, and that it plays a clip on a display."""
+"""The window: its requirements, its camera, and playing a clip on a display."""
 
 from types import SimpleNamespace
 
@@ -27,7 +27,7 @@ def test_without_a_display_it_is_refused_before_anything_is_opened(monkeypatch):
     monkeypatch.setattr(view, "sys", SimpleNamespace(platform="linux"))
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    monkeypatch.setattr(view, "probe", lambda window: pytest.fail("no child is needed to know this"))
+    monkeypatch.setattr(view, "can_draw_with", lambda window: pytest.fail("no probe is needed without a display"))
     with pytest.raises(BackendError, match=r"this machine has no display; write a file with --out"):
         view.show_clip(clip_of(tiny_face()), tiny_face(), Picture())
 
@@ -35,19 +35,19 @@ def test_without_a_display_it_is_refused_before_anything_is_opened(monkeypatch):
 def test_a_display_that_vtk_cannot_use_is_refused(monkeypatch):
     monkeypatch.setattr(view, "require_pyvista", lambda purpose: None)
     monkeypatch.setenv("DISPLAY", ":77")
-    monkeypatch.setattr(view, "probe", lambda window: False)
+    monkeypatch.setattr(view, "can_draw_with", lambda window: False)
     with pytest.raises(BackendError, match="VTK cannot open a window on this display"):
         view.show_clip(clip_of(tiny_face()), tiny_face(), Picture())
 
 
-def test_without_pyvista_it_says_what_to_install(monkeypatch):
+def test_without_pyvista_the_error_names_what_to_install(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(BackendError, match=r"--view needs pyvista.*pip install 'tts2face\[view\]'"):
         view.show_clip(clip_of(tiny_face()), tiny_face(), Picture())
 
 
 @pytest.mark.parametrize("name", ["front", "three-quarter", "profile", "close", "-20,15,700"])
-def test_the_windows_camera_stands_where_the_pictures_camera_stands(name):
+def test_the_window_has_the_camera_of_the_picture(name):
     pyvista = pytest.importorskip("pyvista", reason="needs pyvista: pip install 'tts2face[view]'")
     wanted = camera_matrices(parse_camera(name), tiny_face(), (320, 240))
     plotter = SimpleNamespace(camera=pyvista.Camera())
@@ -56,7 +56,7 @@ def test_the_windows_camera_stands_where_the_pictures_camera_stands(name):
     assert np.tan(np.radians(plotter.camera.view_angle) / 2) == pytest.approx(120 / wanted.lens[0])
 
 
-def test_a_clip_plays_its_last_frame_stays_and_turning_lights_it_anew():
+def test_a_clip_plays_to_its_last_frame_and_turning_the_camera_relights_it():
     try:
         view.require_display("--view")
     except BackendError as missing:
@@ -80,22 +80,22 @@ def test_a_clip_plays_its_last_frame_stays_and_turning_lights_it_anew():
         player.close()
 
 
-def test_a_mirror_shows_what_came_last():
+def test_a_live_window_shows_the_newest_motion():
     try:
         view.require_display("--camera")
     except BackendError as missing:
         pytest.skip(f"needs a display and pyvista: {missing}")
     face = tiny_face()
-    came = [None, (np.array([1.0, 0, 0, 0], np.float32), np.zeros(6, np.float32)), None]
-    mirror = view.LiveWindow(face, Picture(size="128x128"), lambda: came.pop(0))
+    motions = [None, (np.array([1.0, 0, 0, 0], np.float32), np.zeros(6, np.float32)), None]
+    live_window = view.LiveWindow(face, Picture(size="128x128"), lambda: motions.pop(0))
     try:
-        mirror.plotter.show(auto_close=False, interactive=False)
+        live_window.plotter.show(auto_close=False, interactive=False)
         seen = []
         for moved in (False, True, False):
-            assert mirror.tick() == moved
-            mirror.plotter.render()
-            seen.append(np.asarray(mirror.plotter.screenshot(return_img=True)).astype(int))
+            assert live_window.tick() == moved
+            live_window.plotter.render()
+            seen.append(np.asarray(live_window.plotter.screenshot(return_img=True)).astype(int))
         assert np.abs(seen[0] - seen[1]).max() > 20
         np.testing.assert_array_equal(seen[1], seen[2])
     finally:
-        mirror.close()
+        live_window.close()

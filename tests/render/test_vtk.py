@@ -1,4 +1,4 @@
-"""Both renderers show the same head; a machine without GL is told so and nothing crashes."""
+"""Agreement of both renderers, and the error on a machine without GL."""
 
 import subprocess
 from types import SimpleNamespace
@@ -11,7 +11,7 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_face import tiny_face
 from tts2face.models.face_file import load_face
 from tts2face.render import vtk_renderer as vtk
-from tts2face.render.draw import draw, mesh_renderer
+from tts2face.render.draw import mesh_renderer
 from tts2face.render.picture import NUMBA, PYVISTA, Picture
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
@@ -41,7 +41,7 @@ def both(face, weights, head=TURNED * 0, **options):
 @pytest.mark.usefixtures("gl")
 @pytest.mark.parametrize("name", ["head", "cartoon"])
 @pytest.mark.parametrize(("jaw", "camera"), [(0.0, "front"), (0.6, "front"), (0.6, "three-quarter")])
-def test_the_shipped_heads_look_alike_in_both_renderers(name, jaw, camera):
+def test_both_renderers_agree_on_the_shipped_heads(name, jaw, camera):
     face = load_face(name)
     weights = np.zeros(len(face.shape_names))
     weights[face.shape_names.index("jawOpen")] = jaw
@@ -49,7 +49,7 @@ def test_the_shipped_heads_look_alike_in_both_renderers(name, jaw, camera):
     assert np.abs(ours - theirs).mean() <= BOUND
     on_head = np.abs(ours - ours[0, 0]).max(axis=2) > 40
     assert np.abs(ours - theirs)[on_head].mean() <= 4 * BOUND
-    assert np.abs((ours - theirs)[on_head].mean(axis=0)).max() <= BOUND  # neither is darker or redder
+    assert np.abs((ours - theirs)[on_head].mean(axis=0)).max() <= BOUND  # no difference in brightness or hue
 
 
 @pytest.mark.usefixtures("gl")
@@ -81,21 +81,21 @@ def test_a_clip_is_drawn_frame_by_frame_in_one_window():
     motion = np.linspace(0, 1, 3)[:, None] * [1, 0, 0, 0]
     speech = Speech(Waveform(np.zeros(2400), 24_000), PhoneSequence((SILENCE,), np.array([0.0, 0.1])), ())
     clip = Clip(Trajectory(face.shape_names, motion, 30), Trajectory(HEAD_CHANNELS, np.zeros((3, 6)), 30), speech)
-    stage = mesh_renderer(face, Picture(size="64x64", renderer=PYVISTA))
-    drawn = list(stage.frames(clip))
+    renderer = mesh_renderer(face, Picture(size="64x64", renderer=PYVISTA))
+    drawn = list(renderer.frames(clip))
     assert len(drawn) == 3
     for weights, picture in zip(motion, drawn, strict=True):
-        np.testing.assert_array_equal(picture, draw(stage, weights))
+        np.testing.assert_array_equal(picture, renderer.draw(weights))
     assert (drawn[0] != drawn[2]).any()
 
 
-def test_without_pyvista_one_sentence_says_what_to_install(monkeypatch):
+def test_without_pyvista_the_error_names_what_to_install(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(BackendError, match=r"--renderer pyvista needs pyvista.*pip install 'tts2face\[view\]'"):
         mesh_renderer(tiny_face(), Picture(renderer=PYVISTA))
 
 
-def test_without_gl_one_sentence_says_what_to_install(monkeypatch):
+def test_without_gl_the_error_names_what_to_install(monkeypatch):
     monkeypatch.setattr(vtk, "require_pyvista", lambda purpose: None)
     monkeypatch.setattr(vtk, "can_draw_with", lambda window: False)
     with pytest.raises(BackendError, match=r"neither a GPU nor software GL.*--renderer numba"):
@@ -111,21 +111,21 @@ def test_a_child_that_crashes_fails_or_hangs_means_no_gl(monkeypatch, code):
 
 
 @pytest.mark.usefixtures("_fresh_probe")
-def test_a_child_is_asked_once_and_with_the_window_class(monkeypatch):
-    asked = []
+def test_the_probe_runs_once_and_with_the_window_class(monkeypatch):
+    environments = []
 
     def run(command, env, **options):
-        asked.append(env)
+        environments.append(env)
         return subprocess.CompletedProcess(command, 0)
 
     monkeypatch.setattr(vtk.subprocess, "run", run)
     monkeypatch.setattr(vtk, "sys", SimpleNamespace(platform="linux", executable="python"))
     assert vtk.can_draw_with(vtk.OFF_SCREEN)
     assert vtk.can_draw_with(vtk.OFF_SCREEN)
-    assert [env["VTK_DEFAULT_OPENGL_WINDOW"] for env in asked] == ["vtkEGLRenderWindow"]
+    assert [env["VTK_DEFAULT_OPENGL_WINDOW"] for env in environments] == ["vtkEGLRenderWindow"]
 
 
-def test_the_environment_is_left_as_it_was(monkeypatch):
+def test_the_environment_is_restored(monkeypatch):
     monkeypatch.setattr(vtk, "sys", SimpleNamespace(platform="linux"))
     monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "mine")
     with vtk.use_window_class(vtk.OFF_SCREEN):

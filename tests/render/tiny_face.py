@@ -1,4 +1,4 @@
-"""A small face with a known answer: a ball of skin with two eyeballs, a tongue in a dent, and a sheet of lashes."""
+"""A small synthetic face: a ball of skin with two eyeballs, a tongue and a sheet of lashes."""
 
 import numpy as np
 
@@ -34,7 +34,7 @@ def at(*values):
 
 
 def tiny_face(textured=False, n_rings=14):
-    """The face; with `textured`, the skin is chequered by a texture."""
+    """The face; with `textured`, the skin has a chequered texture."""
     skin, skin_triangles = ball((0, -20, -60), RADIUS, n_rings)
     left, eye_triangles = ball((32, 0, 14), 13, 8)
     right, _ = ball((-32, 0, 14), 13, 8)

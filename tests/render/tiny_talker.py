@@ -1,4 +1,4 @@
-"""A made talker with pictures of 96 x 96, whose answers are known."""
+"""A synthetic talker with an appearance model and pictures of 96 x 96 pixels."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ SIZE = 96
 
 
 def face_points() -> np.ndarray:
-    """(468, 2) points in a picture of 96 x 96: an oval, lips apart, the rest anywhere between."""
+    """(468, 2) points in a picture of 96 x 96: face oval, parted lips, random points between."""
     shape = np.random.default_rng(3).uniform(-20, 20, (N_MESH_LANDMARKS, 2))
     angles = np.linspace(0, 2 * np.pi, len(FACE_OVAL), endpoint=False)
     shape[list(FACE_OVAL)] = 30 * np.stack([np.sin(angles), -np.cos(angles)], axis=1)

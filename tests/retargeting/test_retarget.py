@@ -1,4 +1,4 @@
-"""Motion from a talker to a face."""
+"""Retargeting from a talker to a face."""
 
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ SCALE = 1.5
 
 
 def rest_shape() -> np.ndarray:
-    """Landmarks on a curved plate, the mouth 50 mm wide, facing inner lips 0.4 mm apart."""
+    """Landmarks on a curved surface, the mouth 50 mm wide, facing inner lips 0.4 mm apart."""
     rng = np.random.default_rng(1)
     shape = rng.uniform(-60, 60, (N_LANDMARKS, 3))
     shape[:, 2] = 50 - 0.01 * (shape[:, 0] ** 2 + shape[:, 1] ** 2)
@@ -108,7 +108,7 @@ def test_agrees_with_scipy_within_limits(seed: int) -> None:
 @settings(deadline=None)
 @given(st.integers(0, 10_000))
 def test_inner_products_are_the_orthonormal_case_of_least_squares(seed: int) -> None:
-    """T07 eq. 5; and a flipped source vector flips its column only: signs look after themselves."""
+    """T07 eq. 5; flipping a source vector flips its column only, so that sign flips cancel out."""
     rng = np.random.default_rng(seed)
     source = np.linalg.qr(rng.normal(size=(30, 4)))[0].T
     target = np.linalg.qr(rng.normal(size=(30, 7)))[0].T
@@ -120,12 +120,12 @@ def test_inner_products_are_the_orthonormal_case_of_least_squares(seed: int) -> 
     assert flipped * np.array([-1, 1, 1, 1]) == pytest.approx(inner_product_map(source, target), abs=1e-12)
 
 
-def test_a_face_with_the_talkers_own_modes_moves_as_the_talker() -> None:
+def test_a_face_with_the_modes_of_the_talker_moves_like_the_talker() -> None:
     talker = talker_of()
     face = face_of(talker.model.basis * SCALE)
     motion = motion_of(talker)
     weights = build_retargeter(talker, face).retarget(motion).values
-    elsewhere = [landmark for landmark in MOUTH_REGION if landmark not in INNER_LIP_LOWER]  # contact closes those
+    elsewhere = [landmark for landmark in MOUTH_REGION if landmark not in INNER_LIP_LOWER]  # contact changes those
     moved = np.tensordot(weights, face.shapes, axes=1)[:, elsewhere]
     wanted = np.tensordot(motion.values, talker.model.basis * SCALE, axes=1)[:, elsewhere]
     assert np.abs(moved - wanted).max() < 0.05 * np.abs(wanted).max()
@@ -149,15 +149,15 @@ def test_lips_that_touch_on_the_talker_touch_on_the_face() -> None:
     assert abs(moved[UPPER_LIP_INNER_MID, 1] - moved[LOWER_LIP_INNER_MID, 1]) < 0.1
 
 
-def test_known_weights_are_found_again() -> None:
-    """Landmarks made from weights of the face's shapes, read by a talker whose modes are the shapes."""
+def test_known_weights_are_recovered() -> None:
+    """Landmarks of known shape weights, for a talker whose modes are the shapes."""
     talker = talker_of()
     shapes = talker.model.basis * SCALE
     turned = np.linalg.qr(np.random.default_rng(2).normal(size=(N_MODES, N_MODES)))[0]
     face = face_of(np.tensordot(turned, shapes, axes=1))
     motion = Trajectory(speech_channels(talker.model), [[12.0, 1.0, -2.0], [20.0, -1.0, 0.5]], 25.0)  # open lips
     weights = build_retargeter(talker, face).retarget(motion).values
-    closed = np.array([0.4 * np.sqrt(len(INNER_LIP_UPPER)), 0, 0])  # the face opens from lips that touch
+    closed = np.array([0.4 * np.sqrt(len(INNER_LIP_UPPER)), 0, 0])  # gaps of the face begin at contact
     assert weights == pytest.approx((motion.values + closed) @ turned.T, rel=0.01, abs=0.1)
 
 
@@ -167,12 +167,12 @@ def test_no_motion_gives_no_weights() -> None:
     assert np.abs(build_retargeter(talker, face_of(talker.model.basis)).retarget(still).values).max() < 1e-6
 
 
-def test_shapes_that_cannot_be_told_apart_are_refused() -> None:
-    with pytest.raises(DataError, match="cannot be told apart"):
+def test_linearly_dependent_shapes_are_refused() -> None:
+    with pytest.raises(DataError, match="linearly dependent"):
         bounded_least_squares(np.ones((2, 2)) - 2 * np.eye(2), np.ones((1, 2)), np.array([[0.0, 1.0], [0.0, 1.0]]))
 
 
-def test_limits_hold_and_frames_do_not_know_each_other() -> None:
+def test_limits_hold_and_frames_are_independent() -> None:
     talker = talker_of()
     ready = build_retargeter(talker, face_of(talker.model.basis, (-0.5, 2.0)))
     motion = motion_of(talker)

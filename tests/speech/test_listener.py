@@ -40,7 +40,7 @@ def blocks(*sizes: int) -> list[np.ndarray]:
 @pytest.mark.parametrize("kind", [*FEATURE_KINDS, "mfcc+lsf"])
 def test_features_of_blocks_are_those_of_the_whole(kind: str, fps: float, sizes: tuple[int, ...]) -> None:
     ear = StreamingFeatures(kind, fps)
-    found = np.concatenate([*(ear.hear(block) for block in blocks(*sizes)), ear.finish()])
+    found = np.concatenate([*(ear.add_samples(block) for block in blocks(*sizes)), ear.finish()])
     whole = speech_features(SOUND, kind, fps=fps, n_frames=frame_count(SOUND.duration, fps))
     np.testing.assert_array_equal(found, whole.values)
 
@@ -48,20 +48,20 @@ def test_features_of_blocks_are_those_of_the_whole(kind: str, fps: float, sizes:
 @pytest.mark.parametrize("sizes", [(800,), (7, 4001, 0, 350), (100_000,)])
 @pytest.mark.parametrize(("before", "after", "bends"), [(0, 0, False), (2, 3, False), (3, 1, True)])
 def test_lips_of_blocks_are_those_of_the_whole(before: int, after: int, bends: bool, sizes: tuple[int, ...]) -> None:
-    drive = taught("mfcc", before, after, bends=bends)
-    listener = StreamingAudioMap(drive, 25.0)
-    made = np.concatenate([*(listener.hear(block) for block in blocks(*sizes)), listener.finish()])
+    audio_map = taught("mfcc", before, after, bends=bends)
+    listener = StreamingAudioMap(audio_map, 25.0)
+    made = np.concatenate([*(listener.add_samples(block) for block in blocks(*sizes)), listener.finish()])
     features = speech_features(SOUND, "mfcc", fps=25.0, n_frames=frame_count(SOUND.duration, 25.0))
-    np.testing.assert_array_equal(made, drive.parameters(features.values))
+    np.testing.assert_array_equal(made, audio_map.parameters(features.values))
 
 
 def test_lips_come_no_later_than_stated() -> None:
-    drive = taught("lsf", 2, 3, bends=True)
-    listener = StreamingAudioMap(drive, 25.0)
+    audio_map = taught("lsf", 2, 3, bends=True)
+    listener = StreamingAudioMap(audio_map, 25.0)
     assert listener.look_ahead_s == pytest.approx(3 / 25 + 0.0427, abs=1e-3)
     known, heard = 0, 0
     for block in blocks(160):
-        known += len(listener.hear(block))
+        known += len(listener.add_samples(block))
         heard += len(block)
         frames_due = int(np.floor((heard / FEATURE_RATE - listener.look_ahead_s) * 25.0 + 1e-9)) + 1
         assert known >= max(frames_due, 0)
@@ -69,7 +69,7 @@ def test_lips_come_no_later_than_stated() -> None:
 
 def test_a_sound_shorter_than_the_look_ahead_has_lips() -> None:
     listener = StreamingAudioMap(taught("mfcc", 2, 5, bends=False), 25.0)
-    assert len(listener.hear(SOUND.samples[:1000])) == 0
+    assert len(listener.add_samples(SOUND.samples[:1000])) == 0
     made = listener.finish()
     assert made.shape == (2, 3)
     assert np.isfinite(made).all()
@@ -78,12 +78,12 @@ def test_a_sound_shorter_than_the_look_ahead_has_lips() -> None:
 def test_memory_does_not_grow_with_what_was_heard() -> None:
     ear = StreamingFeatures("level", 25.0)
     for block in blocks(1600) * 20:
-        ear.hear(block)
+        ear.add_samples(block)
     assert ear.n_samples == 20 * len(SOUND.samples)
     assert len(ear._kept) < 4000
 
 
 @pytest.mark.parametrize("block", [np.zeros((2, 10)), np.array([0.0, np.nan])])
 def test_what_is_no_sound_is_refused(block: np.ndarray) -> None:
-    with pytest.raises(InputError, match="row of finite samples"):
-        StreamingFeatures("mfcc", 25.0).hear(block)
+    with pytest.raises(InputError, match="vector of finite samples"):
+        StreamingFeatures("mfcc", 25.0).add_samples(block)

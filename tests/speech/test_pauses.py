@@ -62,5 +62,5 @@ def test_a_short_sound_is_one_stretch() -> None:
 
 
 def test_no_length() -> None:
-    with pytest.raises(InputError, match="must be longer than 0 s"):
+    with pytest.raises(InputError, match="must be above 0 s"):
         cut_at_pauses(spoken(1.0), longest=0)

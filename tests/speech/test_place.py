@@ -81,5 +81,5 @@ def test_silence_holds_all_words() -> None:
 
 
 def test_nothing_to_place() -> None:
-    with pytest.raises(InputError, match="needs words, and stretches"):
+    with pytest.raises(InputError, match="needs at least one word"):
         assign_words([], [["p"]])

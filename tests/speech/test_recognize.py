@@ -52,5 +52,5 @@ def test_silence_holds_no_word(recogniser: PhoneRecogniser) -> None:
 
 
 def test_a_sound_that_is_too_long(recogniser: PhoneRecogniser) -> None:
-    with pytest.raises(InputError, match="is heard in parts of at most 30 s"):
+    with pytest.raises(InputError, match="in sounds of at most 30 s"):
         recogniser.words(Waveform(np.zeros(round((MAX_SOUND_S + 1) * 16_000)), 16_000))

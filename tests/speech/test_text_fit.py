@@ -13,14 +13,14 @@ from tts2face.speech.text_fit import (
     LEAST_FOREIGN_CONFIDENCE,
     LEAST_LOCAL_CONFIDENCE,
     TextMismatch,
+    extend_range,
     find_misfits,
     mismatch_of,
-    surrounded,
 )
 from tts2face.speech.transcript_alignment import align_recording, pronounce_transcript
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
-from tts2face.voice.engine import load_voice
+from tts2face.voice.loading import load_voice
 
 RIGHT = ("Please wait for the beep, then say your name.", "The young chef usually pushes five big maps before noon.")
 WRONG = "She sold seven old houses near the river."
@@ -56,7 +56,7 @@ def test_other_languages_have_a_limit_of_their_own() -> None:
 
 
 def test_what_surrounds_a_span_is_cut_between_words() -> None:
-    first, last, begin, end = surrounded(alignment(*[-4000.0] * 20), 8, 10)
+    first, last, begin, end = extend_range(alignment(*[-4000.0] * 20), 8, 10)
     assert (first, last) == (5, 13)
     assert (begin, end) == pytest.approx((2.45, 6.45))
 

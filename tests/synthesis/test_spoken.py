@@ -24,10 +24,10 @@ from tts2face.synthesis.marked_speech import (
     marked_styles,
     resolve_recording_marks,
     speak_sentence,
+    voice_in,
 )
 from tts2face.synthesis.speech_joining import join_utterances, silent_speech, trim_silence
-from tts2face.voice.engine import load_voice
-from tts2face.voice.spans import voice_in
+from tts2face.voice.loading import load_voice
 
 
 def said(text: str, voice: object | None = None, **options: object) -> list[SpokenSentence]:
@@ -318,9 +318,9 @@ def test_in_a_recording_marks_come_with_their_words() -> None:
         ("<speak><prosody rate='2'>a</prosody></speak>", {"rate": 1.5}, r"a speed of 2 in the text times 1\.5 of"),
         ("<speak><prosody volume='x-loud'>a</prosody></speak>", {"volume": 1.5}, "a loudness of 2 in the text"),
         ("<speak xml:lang='de'>a</speak>", {}, "the text names the language de, not en-us"),
-        ("a [pause 1] b", {"audio": Path("a.wav")}, "a recording keeps its own pauses"),
-        ("<speak><emphasis>a</emphasis></speak>", {"audio": Path("a.wav")}, "a recording keeps its own pauses"),
-        ("<speak><lang xml:lang='de'>a</lang></speak>", {"audio": Path("a.wav")}, "a recording keeps its own pauses"),
+        ("a [pause 1] b", {"audio": Path("a.wav")}, "have no effect on a recording"),
+        ("<speak><emphasis>a</emphasis></speak>", {"audio": Path("a.wav")}, "have no effect on a recording"),
+        ("<speak><lang xml:lang='de'>a</lang></speak>", {"audio": Path("a.wav")}, "have no effect on a recording"),
     ],
 )
 def test_marks_that_go_with_no_request_are_refused(text: str, options: dict, reason: str) -> None:

@@ -35,11 +35,11 @@ def test_two_outputs_of_one_name_are_refused(take: Path) -> None:
 
 def test_a_folder_that_holds_an_input_is_refused(take: Path) -> None:
     (take.parent / "sub" / "sound.wav").touch()
-    with pytest.raises(InputError, match="would replace the folder that --audio lies in"):
+    with pytest.raises(InputError, match="would replace the folder that contains --audio"):
         refuse_overwriting({"--out": Path("sub")}, {"--audio": Path("sub/sound.wav")})
 
 
-def test_a_file_in_a_folder_of_inputs_is_refused_unless_it_can_be_no_input(take: Path) -> None:
+def test_a_possible_input_in_a_folder_of_inputs_is_refused(take: Path) -> None:
     for name in ("manifest.csv", "me.talker"):
         (take.parent / name).touch()
     with pytest.raises(InputError, match="would replace a file of --recordings"):
@@ -47,7 +47,7 @@ def test_a_file_in_a_folder_of_inputs_is_refused_unless_it_can_be_no_input(take:
     refuse_overwriting({"--out": Path("me.talker"), "--report": Path("new.csv")}, {"--recordings": take.parent})
 
 
-def test_other_files_and_names_of_what_is_shipped_are_allowed(take: Path) -> None:
+def test_other_files_and_names_of_shipped_files_are_allowed(take: Path) -> None:
     refuse_overwriting(
         {"--out": Path("new.mp4"), "--explain": None}, {"the take": take, "--audio": None, "--talker": "sub"}
     )

@@ -1,4 +1,4 @@
-"""Temporary files beside their place: taken away with their process, never another's."""
+"""Temporary files: removal of those of killed processes, and never of those of running ones."""
 
 import os
 import subprocess
@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tts2face.storage.files import write_atomically
-from tts2face.storage.temporary import OURS, Temporary
+from tts2face.storage.temporary import NAME_INFIX, Temporary
 
 pytest.importorskip("fcntl", reason="without file locks nothing that was left behind is removed")
 
@@ -34,7 +34,7 @@ def other_process(target: Path, kind: str) -> "subprocess.Popen[str]":
 
 
 @pytest.mark.parametrize("kind", ["file", "folder"])
-def test_what_a_killed_process_left_is_removed_and_what_a_living_one_writes_is_not(tmp_path: Path, kind: str) -> None:
+def test_only_files_of_killed_processes_are_removed(tmp_path: Path, kind: str) -> None:
     target = tmp_path / "clip.mp4"
     with other_process(target, kind) as child:
         (written,) = tmp_path.iterdir()
@@ -50,19 +50,19 @@ def test_what_a_killed_process_left_is_removed_and_what_a_living_one_writes_is_n
 
 
 def test_only_files_of_the_same_target_are_removed(tmp_path: Path) -> None:
-    for name in (f".other.mp4{OURS}abc", ".clip.mp4.abc", f"clip.mp4{OURS}abc"):
+    for name in (f".other.mp4{NAME_INFIX}abc", ".clip.mp4.abc", f"clip.mp4{NAME_INFIX}abc"):
         (tmp_path / name).touch()
-    (tmp_path / f".clip.mp4{OURS}abc").touch()
+    (tmp_path / f".clip.mp4{NAME_INFIX}abc").touch()
     with Temporary(tmp_path / "clip.mp4") as mine:
         mine.replace(tmp_path / "clip.mp4")
     assert sorted(path.name for path in tmp_path.iterdir()) == [
-        ".clip.mp4.abc", f".other.mp4{OURS}abc", "clip.mp4", f"clip.mp4{OURS}abc",
+        ".clip.mp4.abc", f".other.mp4{NAME_INFIX}abc", "clip.mp4", f"clip.mp4{NAME_INFIX}abc",
     ]  # fmt: skip
 
 
 def test_a_link_with_the_name_of_a_temporary_file_is_not_followed(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("keep")
-    (tmp_path / f".clip.mp4{OURS}abc").symlink_to(tmp_path / "mine.txt")
+    (tmp_path / f".clip.mp4{NAME_INFIX}abc").symlink_to(tmp_path / "mine.txt")
     write_atomically(tmp_path / "clip.mp4", b"new")
     assert (tmp_path / "mine.txt").read_text() == "keep"
 
@@ -75,7 +75,7 @@ def test_a_file_never_replaces_a_folder(tmp_path: Path) -> None:
     assert (tmp_path / "kept" / "inside").exists()
 
 
-def test_it_is_readable_as_a_file_of_the_user(tmp_path: Path) -> None:
+def test_it_has_the_permissions_of_a_usual_file(tmp_path: Path) -> None:
     write_atomically(tmp_path / "clip.mp4", b"new")
     assert (tmp_path / "clip.mp4").stat().st_mode & 0o777 == 0o644
 

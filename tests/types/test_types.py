@@ -1,4 +1,4 @@
-"""Sound, motion and the clip that joins them."""
+"""Waveform, Trajectory, Speech and Clip: validation, and joining of clips."""
 
 import numpy as np
 import pytest

@@ -38,7 +38,7 @@ def test_leaving_early_lets_the_camera_go(make_video) -> None:
 
 
 def test_where_nothing_films(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="nothing films at '97'"):
+    with pytest.raises(InputError, match="there is no camera '97'"):
         CaptureDevice("97")
     with pytest.raises(InputError, match="give a camera's number"):
         CaptureDevice(str(tmp_path / "none.mp4"))

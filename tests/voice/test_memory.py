@@ -6,7 +6,7 @@ import sys
 import pytest
 
 CODE = """
-from cli.memory import return_large_blocks
+from cli.process import return_large_blocks
 assert return_large_blocks()
 from tts2face.voice.neural import NeuralVoice
 

@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from lexicon.dictionary import MOST_PHONES, parse_dictionary
+from lexicon.dictionary import MAX_PHONES, parse_dictionary
 from lexicon.errors import BackendError, DataError, InputError
 from lexicon.ipa import Segment, parse_ipa
 from lexicon.phones import PHONES
 from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.synthesis.speech_joining import resampled_speech
 from tts2face.types import Speech, Waveform
-from tts2face.voice.engine import SpokenWord, Voice, apply_volume, load_voice
-from tts2face.voice.resample import resampled_speech
+from tts2face.voice.engine import SpokenWord, Voice, apply_volume
+from tts2face.voice.loading import load_voice
 
 SENTENCE = "Bob may move five big maps."
 WORDS = ["Bob", "may", "move", "five", "big", "maps"]
@@ -182,16 +183,16 @@ def test_letters_of_another_script_are_refused() -> None:
 @pytest.mark.parametrize("language", ["en-us", "de", "ru"])
 def test_the_longest_words_of_a_dictionary_are_spoken(language: str) -> None:
     longest = parse_dictionary(
-        "bob /" + "ˈɔu " * MOST_PHONES + "/"
+        "bob /" + "ˈɔu " * MAX_PHONES + "/"
     ).entries  # ɔu takes the most bytes of a stressed phone
-    assert len(longest["bob"]) == MOST_PHONES
+    assert len(longest["bob"]) == MAX_PHONES
     spoken = load_voice("espeak", language, longest).speak("bob bob")
     assert len(spoken.words) == 2
 
 
 def test_a_crash_of_espeak_is_said_to_be_one() -> None:
     words = [SpokenWord("bob", (Segment("b"),) * 300)]
-    with pytest.raises(BackendError, match=r"espeak-ng crashed \(signal 11\) on '\[\[bbb.*write it in another way"):
+    with pytest.raises(BackendError, match=r"espeak-ng crashed \(signal 11\) on '\[\[bbb.*change the spelling"):
         load_voice("espeak", "en-us").speak(words)
 
 
@@ -212,7 +213,7 @@ def test_unknown_voices_are_refused(name: str, language: str, reason: str) -> No
 def test_a_piper_voice_without_settings_is_refused(tmp_path) -> None:
     path = tmp_path / "voice.onnx"
     path.write_bytes(b"x")
-    with pytest.raises(DataError, match=r"put voice\.onnx\.json beside it"):
+    with pytest.raises(DataError, match=r"put voice\.onnx\.json into the same folder"):
         load_voice(str(path), "en-us")
 
 

@@ -1,4 +1,4 @@
-"""Lips that neither cross nor miss each other: the nearest parameters of a shape model with the wanted lip gaps."""
+"""Lip gaps of a shape model, and the nearest parameters whose gaps lie within limits: no crossing, kept contact."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,18 +9,16 @@ from tts2face.models.talker import ShapeModel
 
 FloatArray = NDArray[np.float64]
 
-INNER_UPPER_LIP, INNER_LOWER_LIP = (
-    list(INNER_LIP_UPPER[1:-1]),
-    list(INNER_LIP_LOWER[1:-1]),
-)  # at the corners both lips are one point
-MIN_LIP_GAP_MM = 0.01  # so that lips stay apart when parameters are rounded for a talker file
-CONTACT_SHARE = 0.01  # of the distance of the outer eye corners: tracked lips that touch are up to so far apart
-UNBOUNDED_MM = 1e3  # no lips are so far apart
-MAX_GAP_SLOPE = 10.0  # how much faster than the source's the gap may open beyond contact: 1 mm on, nothing is held back
+# Without the corners, where both lips share one point.
+INNER_UPPER_LIP, INNER_LOWER_LIP = list(INNER_LIP_UPPER[1:-1]), list(INNER_LIP_LOWER[1:-1])
+MIN_LIP_GAP_MM = 0.01  # margin for the rounding of parameters in a talker file
+CONTACT_SHARE = 0.01  # tracked gap of touching lips, relative to the distance of the outer eye corners
+UNBOUNDED_MM = 1e3  # a gap limit without effect
+MAX_GAP_SLOPE = 10.0  # largest ratio of target to source gap growth beyond contact; 1 mm beyond, it has no effect
 
 
 def facing_gaps(model: ShapeModel) -> FloatArray:
-    """(P, M + 1) heights of facing inner lip points over each other: ``gaps[:, :M] @ parameters + gaps[:, M]``, mm."""
+    """Gaps (P, M + 1) of facing inner lip points, mm: ``gaps[:, :M] @ parameters + gaps[:, M]``."""
     per_mode = (model.basis[:, INNER_UPPER_LIP, 1] - model.basis[:, INNER_LOWER_LIP, 1]).astype(np.float64).T
     return np.column_stack(
         [per_mode, (model.mean[INNER_UPPER_LIP, 1] - model.mean[INNER_LOWER_LIP, 1]).astype(np.float64)]
@@ -28,12 +26,12 @@ def facing_gaps(model: ShapeModel) -> FloatArray:
 
 
 def rest_with_open_lips(model: ShapeModel, limits: NDArray[np.floating]) -> FloatArray:
-    """(M,) parameters at rest; where tracked lips overlap there, as they may by some 0.1 mm, the nearest that do not.
+    """Parameters (M,) at rest; if tracked lips overlap there, by up to about 0.1 mm, the nearest ones without overlap.
 
     Raises
     ------
     DataError
-        The lips overlap wherever the limits let them go.
+        The lips overlap at all parameters within the limits.
     """
     gaps, rest = facing_gaps(model), model.rest.astype(np.float64)
     if (np.einsum("pm,m->p", gaps[:, :-1], rest) + gaps[:, -1] >= MIN_LIP_GAP_MM).all():
@@ -48,35 +46,36 @@ def contact_mm(model: ShapeModel) -> float:
     return CONTACT_SHARE * float(np.linalg.norm(model.mean[EYE_OUTER_LEFT] - model.mean[EYE_OUTER_RIGHT]))
 
 
-def gap_limits(seen: FloatArray, contact: float, at_rest: FloatArray) -> FloatArray:
-    """(T, P) gaps that may not be exceeded, for the gaps (T, P) of a source brought to the same size.
+def gap_limits(source_gaps: FloatArray, contact: float, at_rest: FloatArray) -> FloatArray:
+    """Upper limits (T, P) of the gaps for source gaps (T, P) at the same scale, mm.
 
-    Lips that touch on the source, which is up to `contact` apart, are no further apart, or as at rest.
+    Where the source's lips touch (gap up to `contact`), the limit is the source's gap, or the gap `at_rest` if larger.
     """
-    return np.maximum(seen + MAX_GAP_SLOPE * np.maximum(seen - contact, 0.0), at_rest)
+    return np.maximum(source_gaps + MAX_GAP_SLOPE * np.maximum(source_gaps - contact, 0.0), at_rest)
 
 
 def nearest_valid_parameters(wanted: FloatArray, limits: FloatArray, gaps: FloatArray, most: FloatArray) -> FloatArray:
-    """(T, M) parameters nearest to `wanted` within limits, with lips that do not cross and are not too far apart.
+    """Parameters (T, M) nearest to `wanted` within limits on parameters and lip gaps.
 
     Parameters
     ----------
     wanted : (T, M)
+        Target parameters.
     limits : (M,)
-        Largest size of each parameter.
+        Largest magnitude of each parameter.
     gaps : (P, M + 1)
-        As `facing_gaps` gives them.
+        As `facing_gaps` returns them.
     most : (T, P)
-        Each frame's largest gaps; the least is `MIN_LIP_GAP_MM`.
+        Upper limits of the gaps of each frame, mm; the lower limit is `MIN_LIP_GAP_MM`.
 
     Raises
     ------
     DataError
-        No parameters within the limits have such gaps.
+        No parameters within the limits satisfy the gap limits.
 
     Notes
     -----
-    The basis is orthonormal: the nearest parameters move the landmarks least. Least distance programming by
+    The basis is orthonormal, so the nearest parameters are the nearest shape. Least distance programming by
     non-negative least squares, exact up to rounding. Source: Lawson and Hanson 1974, "Solving least squares problems",
     chapter 23.
     """
@@ -85,16 +84,18 @@ def nearest_valid_parameters(wanted: FloatArray, limits: FloatArray, gaps: Float
     n_modes = len(limits)
     pairs, unit = gaps[:, :-1], np.eye(n_modes)
     sides = np.concatenate([pairs, -pairs, unit, -unit])
-    only = np.zeros(n_modes + 1)
-    only[-1] = 1.0
+    unit_target = np.zeros(n_modes + 1)
+    unit_target[-1] = 1.0
     found = np.zeros_like(wanted)
     for frame, start in enumerate(wanted):
-        here = pairs @ start + gaps[:, -1]
-        short = -np.concatenate([here - MIN_LIP_GAP_MM, most[frame] - here, start + limits, limits - start])
+        start_gaps = pairs @ start + gaps[:, -1]
+        short = -np.concatenate([start_gaps - MIN_LIP_GAP_MM, most[frame] - start_gaps, start + limits, limits - start])
         system = np.vstack([sides.T, short])
-        forces, left_over = nnls(system, only)
-        if left_over < 1e-9:
-            raise DataError("the target's lips cannot be as they must within its limits; build the talker again")
-        residual = system @ forces - only
+        multipliers, residual_norm = nnls(system, unit_target)
+        if residual_norm < 1e-9:
+            raise DataError(
+                "no parameters within the target's limits satisfy its lip gap limits; build the target talker again"
+            )
+        residual = system @ multipliers - unit_target
         found[frame] = start - residual[:-1] / residual[-1]
     return found

@@ -1,7 +1,8 @@
-"""Motion of one talker carried to another: the inner products of Theobald et al. 2007, eq. 5, within limits.
+"""Transfer of motion between talkers: the inner products of Theobald et al. 2007, eq. 5, within limits.
 
-Talkers share their landmarks and axes (`tts2face.models.landmarks`), so that their shape vectors span parts of one
-space once both faces have one size. Motion is counted from rest to rest: closed lips stay closed lips.
+Talkers have the same landmarks and axes (`tts2face.models.landmarks`), so that their shape vectors lie in one space
+once both faces are scaled to one size. Motion is measured from the rest of each talker, so that closed lips stay
+closed.
 """
 
 import math
@@ -27,39 +28,35 @@ from tts2face.types import Trajectory
 
 FloatArray = NDArray[np.float64]
 
-MAX_STANDARD_DEVIATIONS = (
-    3.0  # a mapped parameter stays within so many standard deviations of the target's mean; T07, section 3.1
-)
-MIN_COMPONENT_MM = (
-    0.5  # root of the sum over all landmarks; a component that moves less is not missed: 0.02 mm a landmark
-)
+MAX_STANDARD_DEVIATIONS = 3.0  # limit of a mapped parameter about the target's mean; T07, section 3.1
+MIN_COMPONENT_MM = 0.5  # root of the sum of squares over all landmarks: about 0.02 mm per landmark
 
-MIN_REAL_MOTION_MM = 1e-4  # far above the rounding of a basis kept as float32, far below any measured motion
-ROUNDING_TOLERANCE = 1e-12  # an entry of a unit vector below this is a rounding error of float64
+MIN_REAL_MOTION_MM = 1e-4  # above the rounding errors of a float32 basis, below any measured motion
+ROUNDING_TOLERANCE = 1e-12  # smaller entries of a unit vector are float64 rounding errors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ParameterTransfer:
-    """The prepared way from a source talker's shape parameters to a target's.
+    """Mapping from a source talker's shape parameters to a target's; built by `build_parameter_transfer`.
 
     Parameters
     ----------
     relation : (q, r)
-        R of T07, eq. 5, times `size` and the gain: the target's parameters per source parameter.
+        R of T07, eq. 5, times `size` and the gain: target parameters per source parameter.
     size
-        The target's face over the source's.
+        Ratio of face sizes, target to source.
     source_rest, target_rest : (r,), (q,)
-        Parameters at rest, the lips parted where they overlap.
+        Parameters at rest, with overlapping lips separated.
     n_source, n_target
-        Modes of either that speech moves.
+        Number of modes of each that speech moves.
     limits : (q,)
-        Largest size of each mapped parameter.
+        Largest magnitude of each mapped parameter.
     source_gaps, target_gaps : (P, r + 1), (P, q + 1)
-        Gaps of facing inner lip points in the target's size, as `facing_gaps` gives them.
+        Gaps of facing inner lip points at the target's scale, as `facing_gaps` returns them.
     resting_gaps : (P,)
-        The target's gaps at rest.
+        The target's gaps at rest, mm.
     contact
-        Gap up to which the source's lips touch, in the target's size.
+        Gap up to which the source's lips touch, in mm at the target's scale.
     """
 
     relation: FloatArray
@@ -75,12 +72,12 @@ class ParameterTransfer:
     contact: float
 
     def clone(self, motion: Trajectory) -> Trajectory:
-        """Motion of the source as the target makes it: speech parameters become speech parameters, all become all.
+        """Motion of the source in the target's parameters: speech parameters map to speech parameters, all to all.
 
         Raises
         ------
         InputError
-            The channels are not the source's shape parameters.
+            The channels are neither the source's speech parameters nor all of its shape parameters.
         """
         width = len(motion.channels)
         if motion.channels != _channels(width) or width not in {self.n_source, len(self.source_rest)}:
@@ -88,59 +85,59 @@ class ParameterTransfer:
                 f"channels {motion.channels[:1]}... ({width}) are not the source's {self.n_source} speech parameters "
                 f"or all {len(self.source_rest)} shape parameters; take a trajectory of the source talker"
             )
-        kept = self.n_target if width == self.n_source else len(self.target_rest)
-        return Trajectory(_channels(kept), self.parameters(motion.values)[:, :kept], motion.fps)
+        n_channels = self.n_target if width == self.n_source else len(self.target_rest)
+        return Trajectory(_channels(n_channels), self.parameters(motion.values)[:, :n_channels], motion.fps)
 
     def parameters(self, source: NDArray[np.floating]) -> NDArray[np.float32]:
-        """(T, q) parameters of the target for (T, m) of the source's first m modes; the other modes are at rest.
+        """Target parameters (T, q) for parameters (T, m) of the source's first m modes; other modes are at rest.
 
-        Each frame is the nearest to eq. 5 that keeps the limits, whose lips do not cross, and whose lips touch where
-        the source's do; it does not depend on other frames.
+        Each frame is the nearest to eq. 5 within the limits whose lips do not cross and touch where the source's lips
+        touch; frames are independent of each other.
         """
         wanted = self.clone_unlimited(source)
         limits = self.limits.astype(np.float64)
-        held = np.clip(wanted, -limits, limits)
+        limited = np.clip(wanted, -limits, limits)
         most = gap_limits(self._scaled_source_gaps(source), self.contact, self.resting_gaps)
-        gaps = ordered_product(held, self.target_gaps[:, :-1].T) + self.target_gaps[:, -1]
+        gaps = ordered_product(limited, self.target_gaps[:, :-1].T) + self.target_gaps[:, -1]
         wrong = np.flatnonzero(((gaps < MIN_LIP_GAP_MM) | (gaps > most)).any(axis=1))
-        held[wrong] = nearest_valid_parameters(wanted[wrong], limits, self.target_gaps, most[wrong])
-        return np.clip(held.astype(np.float32), -self.limits, self.limits)
+        limited[wrong] = nearest_valid_parameters(wanted[wrong], limits, self.target_gaps, most[wrong])
+        return np.clip(limited.astype(np.float32), -self.limits, self.limits)
 
     def clone_unlimited(self, source: NDArray[np.floating]) -> FloatArray:
-        """(T, q) parameters by eq. 5 alone, for (T, m) of the source's first m modes."""
+        """Target parameters (T, q) by eq. 5 without limits, for (T, m) of the source's first m modes."""
         n_modes = source.shape[1]
         moved = source.astype(np.float64) - self.source_rest[:n_modes]
         return self.target_rest + ordered_product(moved, self.relation[:, :n_modes].T)
 
     def _scaled_source_gaps(self, source: NDArray[np.floating]) -> FloatArray:
-        """(T, P) gaps of the source in the target's size."""
+        """Gaps (T, P) of the source at the target's scale, mm."""
         n_modes = source.shape[1]
         others = ordered_product(self.source_gaps[:, n_modes:-1], self.source_rest[n_modes:]) + self.source_gaps[:, -1]
         return ordered_product(source.astype(np.float64), self.source_gaps[:, :n_modes].T) + others
 
 
 def build_parameter_transfer(source: ShapeModel, target: ShapeModel, *, gain: float = 1.0) -> ParameterTransfer:
-    """Prepare the way from a source talker to a target.
+    """Parameter transfer from a source talker to a target.
 
     Parameters
     ----------
     gain
-        Factor on the displacement from rest, before the limits: above 1 amplifies, below 1 attenuates.
+        Factor on the displacement from rest, applied before the limits.
 
     Raises
     ------
     InputError
         The gain is negative or not finite.
     DataError
-        A model does not have the 478 landmarks, its rest lies beyond its limits, or its lips overlap everywhere.
+        A model does not have 478 landmarks, its rest is outside its limits, or its lips overlap at all parameters.
     """
     if not (math.isfinite(gain) and gain >= 0.0):
-        raise InputError(f"the gain must be 0 or more, not {gain}; 1 leaves the motion as large as it is")
+        raise InputError(f"the gain must be 0 or more, not {gain}; 1 keeps the size of the motion")
     size = face_size(target) / face_size(source)
     rests, target_gaps = (_rest_of_model(source), _rest_of_model(target)), facing_gaps(target)
     relation = np.round(
         inner_product_map(_flat_basis(source), _flat_basis(target)), 9
-    )  # last bits depend on the threads of BLAS
+    )  # the last bits depend on the threads of BLAS
     return ParameterTransfer(
         relation=gain * size * relation,
         size=size,
@@ -157,71 +154,74 @@ def build_parameter_transfer(source: ShapeModel, target: ShapeModel, *, gain: fl
 
 
 def append_missing_components(source: ShapeModel, target: ShapeModel, n: int | None = None) -> ShapeModel:
-    """The target's model with the components that the source moves and the target cannot.
+    """Target model extended by the components of the source's motion outside its span.
 
     Parameters
     ----------
     n
-        How many, those that move most first; all that move more than `MIN_COMPONENT_MM` when None.
+        Number of components, in order of decreasing motion; all above `MIN_COMPONENT_MM` when None.
 
     Returns
     -------
     ShapeModel
-        New modes of the mouth follow the target's mouth modes, the others come last; orthonormal as before. The
-        target does not know how far to go along them: their spread is the source's about its rest, in the target's
-        size; their rest is 0, so that the target rests as it did.
+        New mouth modes follow the target's mouth modes, other new modes come last; the basis stays orthonormal. The
+        spread of new modes is the source's about its rest at the target's scale; their rest is 0, so that the rest of
+        the target does not change.
 
     Raises
     ------
     InputError
-        The source has no such number of missing components.
+        `n` is negative or exceeds the number of missing components.
     DataError
-        A model does not have the 478 landmarks.
+        A model does not have 478 landmarks.
 
     Notes
     -----
-    Principal components of what is lost, weighted with the source's spread. Source: T07, section 3.1, last paragraph.
+    Principal components of the residual motion, weighted with the source's spread. Source: T07, section 3.1, last
+    paragraph.
     """
     size, own, speech = face_size(target) / face_size(source), _flat_basis(target), source.n_speech
     mouth, mouth_spread = _missing_components(source, slice(None, speech), own)
     other, other_spread = _missing_components(source, slice(speech, None), np.concatenate([own, mouth]))
     found = size * np.concatenate([mouth_spread, other_spread])
     if n is not None and not 0 <= n <= len(found):
-        raise InputError(f"{len(found)} components of the source are missing in the target, not {n}; ask for fewer")
+        raise InputError(
+            f"{len(found)} components of the source are missing in the target, not {n}; choose 0 to {len(found)}"
+        )
     n_added = int((found > MIN_COMPONENT_MM).sum()) if n is None else n
     chosen = np.sort(np.argsort(-found, kind="stable")[:n_added])
     of_mouth, others = chosen[chosen < len(mouth)], chosen[chosen >= len(mouth)]
     added = np.concatenate([mouth, other])
 
-    def joined(own_part: NDArray[np.float32], new: FloatArray) -> NDArray[np.float32]:
+    def interleave(own_part: NDArray[np.float32], new: FloatArray) -> NDArray[np.float32]:
         before, behind = own_part[: target.n_speech], own_part[target.n_speech :]
         return np.concatenate([before, new[of_mouth], behind, new[others]]).astype(np.float32)
 
-    basis = joined(own.astype(np.float32), added).reshape(-1, *target.mean.shape)
-    rest = joined(target.rest, np.zeros(len(found)))
-    return ShapeModel(target.mean, basis, joined(target.spread, found), target.n_speech + len(of_mouth), rest)
+    basis = interleave(own.astype(np.float32), added).reshape(-1, *target.mean.shape)
+    rest = interleave(target.rest, np.zeros(len(found)))
+    return ShapeModel(target.mean, basis, interleave(target.spread, found), target.n_speech + len(of_mouth), rest)
 
 
 def extend_talker(source: ShapeModel, target: Talker) -> Talker:
-    """The target with the components that the source moves and it cannot; its own utterances and plate leave them at 0.
+    """Target talker with the model of `append_missing_components`; its utterances and plate have 0 in new modes.
 
     Raises
     ------
     DataError
-        A model does not have the 478 landmarks.
+        A model does not have 478 landmarks.
     """
     model, before = append_missing_components(source, target.model), target.model
     n_mouth = model.n_speech - before.n_speech
     n_other = len(model.spread) - len(before.spread) - n_mouth
 
-    def widened(shape: NDArray[np.float32]) -> NDArray[np.float32]:
+    def insert_zeros(shape: NDArray[np.float32]) -> NDArray[np.float32]:
         mouth, other = (np.zeros((len(shape), n), np.float32) for n in (n_mouth, n_other))
         return np.concatenate([shape[:, : before.n_speech], mouth, shape[:, before.n_speech :], other], axis=1)
 
-    utterances = tuple(replace(spoken, shape=widened(spoken.shape)) for spoken in target.utterances)
+    utterances = tuple(replace(spoken, shape=insert_zeros(spoken.shape)) for spoken in target.utterances)
     appearance = target.appearance
     if appearance is not None:
-        appearance = replace(appearance, plate=replace(appearance.plate, shape=widened(appearance.plate.shape)))
+        appearance = replace(appearance, plate=replace(appearance.plate, shape=insert_zeros(appearance.plate.shape)))
     return replace(target, model=model, utterances=utterances, appearance=appearance, network=None, audio_maps={})
 
 
@@ -240,7 +240,7 @@ def face_size(model: ShapeModel) -> float:
 
 
 def parameter_limits(model: ShapeModel) -> NDArray[np.float32]:
-    """(M,) largest numbers that are not above `MAX_STANDARD_DEVIATIONS` times the spread."""
+    """Largest float32 values (M,) that do not exceed `MAX_STANDARD_DEVIATIONS` times the spread."""
     exact = MAX_STANDARD_DEVIATIONS * model.spread.astype(np.float64)
     rounded = exact.astype(np.float32)
     return np.where(rounded > exact, np.nextafter(rounded, np.float32(0)), rounded)
@@ -251,7 +251,8 @@ def _rest_of_model(model: ShapeModel) -> FloatArray:
     beyond = np.flatnonzero(np.abs(model.rest) > limits)
     if len(beyond):
         raise DataError(
-            f"a talker rests beyond {MAX_STANDARD_DEVIATIONS:g} spreads in mode {beyond[0]}; build it again"
+            f"the rest of a talker exceeds {MAX_STANDARD_DEVIATIONS:g} standard deviations in mode {beyond[0]}; "
+            "build it again"
         )
     return rest_with_open_lips(model, limits)
 
@@ -261,26 +262,24 @@ def _channels(n_modes: int) -> tuple[str, ...]:
 
 
 def _flat_basis(model: ShapeModel) -> FloatArray:
-    """(M, 3 L) basis vectors."""
+    """Basis vectors (M, 3 L)."""
     return model.basis.reshape(len(model.basis), -1).astype(np.float64)
 
 
 def _missing_components(source: ShapeModel, block: slice, span: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(k, 3 L) orthonormal components of some of the source's modes outside `span`, and how far it moves along them.
+    """Orthonormal components (k, 3 L) of a block of the source's modes outside `span`, and the motion along them (k,).
 
-    The distances are root mean squares from the source's rest. The largest entry of each component is positive.
+    The motion is the root mean square about the source's rest, mm. The largest entry of each component is positive.
     """
     modes = _flat_basis(source)[block]
-    for _ in range(2):  # once leaves rounding errors, twice is enough
+    for _ in range(2):  # the second pass removes the rounding errors of the first
         modes = modes - (modes @ span.T) @ span
     moved = np.concatenate([source.spread[block, None] * modes, source.rest[None, block] @ modes])
     _, distances, components = np.linalg.svd(moved, full_matrices=False)
-    real = distances > MIN_REAL_MOTION_MM  # what is below consists of rounding errors, which may point into the span
+    real = distances > MIN_REAL_MOTION_MM  # smaller ones are rounding errors and may lie in the span
     components, distances = components[real], distances[real]
     components = components - (components @ span.T) @ span
-    components[np.abs(components) < ROUNDING_TOLERANCE] = (
-        0.0  # mouth modes leave the rest of the face exactly where it is
-    )
+    components[np.abs(components) < ROUNDING_TOLERANCE] = 0.0  # mouth modes are exactly 0 on the rest of the face
     largest = components[np.arange(len(components)), np.abs(components).argmax(axis=1)]
     signed: FloatArray = components * np.sign(largest)[:, None]
     return signed, distances

@@ -1,4 +1,4 @@
-"""Phones become looks: the textures of the recorded exemplars that move the lips, blended like their motion."""
+"""Appearance parameters from phones, blended from the same exemplars as the lip motion."""
 
 from dataclasses import dataclass, replace
 
@@ -18,9 +18,18 @@ N_BLENDED_APPEARANCES = 3  # exemplars; more of them blur teeth and tongue (docs
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AppearanceExemplars:
-    """A talker's recorded looks, ready for synthesis.
+    """A talker's recorded appearance parameters, indexed for synthesis.
 
-    The `frames` of ``tokens`` are looks (F, A); ``rest`` (A,) are those of silence, ``spread`` (A,) their deviations.
+    Parameters
+    ----------
+    tokens
+        Phone tokens whose `frames` (F, A) are appearance parameters.
+    spread : (A,)
+        Standard deviation of each parameter.
+    rest : (A,)
+        Median over silent frames.
+    channels
+        A names.
     """
 
     tokens: Tokens
@@ -29,13 +38,13 @@ class AppearanceExemplars:
     channels: tuple[str, ...]
 
 
-def build_appearance_exemplars(talker: Talker, voice: ExemplarModel) -> AppearanceExemplars:
-    """Index the looks of a talker who has an appearance.
+def build_appearance_exemplars(talker: Talker, exemplars: ExemplarModel) -> AppearanceExemplars:
+    """Index the appearance parameters of a talker.
 
     Raises
     ------
     InputError
-        The talker has motion only.
+        The talker has no appearance model.
     """
     appearance = require_appearance(talker)
     frames = np.concatenate([spoken.looks for spoken in talker.utterances if spoken.looks is not None])
@@ -46,25 +55,25 @@ def build_appearance_exemplars(talker: Talker, voice: ExemplarModel) -> Appearan
     still = frames[silent] if silent.any() else frames
     rest = np.median(still, axis=0).astype(np.float32)
     return AppearanceExemplars(
-        replace(voice.tokens, frames=frames.astype(np.float32)), spread, rest, appearance.channels
+        replace(exemplars.tokens, frames=frames.astype(np.float32)), spread, rest, appearance.channels
     )
 
 
 def appearance_trajectory(
-    selection: TokenSelection, looks: AppearanceExemplars, *, fps: float, n_frames: int
+    selection: TokenSelection, appearance: AppearanceExemplars, *, fps: float, n_frames: int
 ) -> Trajectory:
-    """Looks for phones in time, from the very tokens that move the lips; arguments as `blend_trajectory`."""
+    """(n_frames, A) appearance parameters from the tokens of the lip motion; arguments as `blend_trajectory`."""
     phones, targets = selection.phones, selection.targets
     options = replace(selection.options, k=min(selection.options.k, N_BLENDED_APPEARANCES), contacts=False)
     found = TokenRanking(selection.found.tokens[:, : options.k], selection.found.scores[:, : options.k])
     frame_times = np.arange(n_frames) / fps
     n_instants = int(np.ceil(max(phones.end, frame_times[-1]) * blending.CLOCK_HZ)) + 2
     weights = blending.exemplar_weights(found.scores, options.sharpness)
-    pieces = blending.average_tokens(looks.tokens, found.tokens, weights, looks.spread, options)
-    joined, told = blending.join_averages(pieces, targets, n_instants, options)
-    made = np.where(told[:, None], joined * looks.spread, looks.rest)
-    made = blending.gaussian_smooth(made, options.smoothing_s, blending.CLOCK_HZ)
-    return Trajectory(looks.channels, read_at_frames(made, phones, frame_times, looks.rest), fps)
+    pieces = blending.average_tokens(appearance.tokens, found.tokens, weights, appearance.spread, options)
+    joined, is_covered = blending.join_averages(pieces, targets, n_instants, options)
+    values = np.where(is_covered[:, None], joined * appearance.spread, appearance.rest)
+    values = blending.gaussian_smooth(values, options.smoothing_s, blending.CLOCK_HZ)
+    return Trajectory(appearance.channels, read_at_frames(values, phones, frame_times, appearance.rest), fps)
 
 
 def _silent_frames(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.bool_]:

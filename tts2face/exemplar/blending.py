@@ -1,4 +1,4 @@
-"""Exemplars become one motion: warped, averaged, joined, smoothed (T07 section 3.3)."""
+"""Blending of exemplars to one trajectory: time warping, averaging, joining, smoothing (T07 section 3.3)."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ from tts2face.exemplar.tokens import Tokens
 CLOCK_HZ = 100.0  # instants at which motion is made; lips move below 15 Hz, so nothing is lost
 N_KNOTS = 8  # samples a phone; 10 are no better (docs/decisions/007-exemplar-method.md)
 ALIGN_BAND = 1  # knots by which an exemplar's event may lie off the best one's; 2 lose .002 of r opening
-MIN_DEVIATION = 0.15  # of a parameter's spread: exemplars that happen to agree are not surer than this
+MIN_DEVIATION = 0.15  # lower limit of the deviation between exemplars, relative to a parameter's spread
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,16 +106,26 @@ def _add_weighted(piece, weight, mean, square):  # type: ignore[no-untyped-def]
 def join_averages(
     pieces: AveragedTokens, targets: Targets, n_instants: int, options: SynthesisOptions
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """(n, D) motion at the instants ``i / CLOCK_HZ`` in units of the spread, and (n,) whether any piece tells it.
+    """Join averaged tokens by weighted overlap-add.
 
-    Overlapping pieces are averaged: each counts fully within its phone and falls to nothing towards the far edges of
-    the phone's neighbours, times the inverse variance of its exemplars to the power `options.precision`.
+    Returns
+    -------
+    joined : (n, D)
+        Motion at the times ``i / CLOCK_HZ`` in units of the spread.
+    is_covered : (n,)
+        Whether any token covers the time.
+
+    Notes
+    -----
+    The weight of a token is 1 within its phone and falls linearly to 0 at the far edges of the neighbouring phones,
+    times the inverse variance of its exemplars to the power `options.precision`.
     """
     total = np.zeros((n_instants, pieces.mean.shape[2]), np.float32)
     weight = np.zeros_like(total)
     _overlap_add((pieces.mean, pieces.variance, targets.spans), options.overlap, options.precision, total, weight)
-    told = weight[:, 0] > 0
-    return np.where(told[:, None], total / np.where(told[:, None], weight, 1.0), 0.0).astype(np.float32), told
+    is_covered = weight[:, 0] > 0
+    safe_weight = np.where(is_covered[:, None], weight, 1.0)
+    return np.where(is_covered[:, None], total / safe_weight, 0.0).astype(np.float32), is_covered
 
 
 @kernel
@@ -145,9 +155,9 @@ def _overlap_add(pieces, overlap, precision, total, weight):  # type: ignore[no-
 
 
 def gaussian_smooth(values: NDArray[np.floating], sigma_s: float, rate_hz: float) -> NDArray[np.float32]:
-    """(T, D) values at `rate_hz`, smoothed by a Gaussian of `sigma_s` seconds; beyond the ends they stand still.
+    """Smooth (T, D) values at `rate_hz` by a Gaussian with a standard deviation of `sigma_s` seconds.
 
-    The width is in seconds, so the same motion at another rate is smoothed alike.
+    The values are held beyond the ends. `sigma_s` = 0 returns a copy.
     """
     if sigma_s == 0:
         return np.array(values, np.float32)

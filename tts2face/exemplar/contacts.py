@@ -1,4 +1,4 @@
-"""Lips that meet in the recordings meet in the result: averaging opens closures, this closes them again."""
+"""Preservation of lip contacts, which averaging of exemplars would open."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,10 +13,14 @@ from tts2face.exemplar.tokens import Tokens
 
 @dataclass(frozen=True, slots=True)
 class ContactRule:
-    """What counts as a contact of the lips.
+    """Definition of a lip contact.
 
-    ``closer`` is the share of the exemplars, the closest by weight, that tell its pose; ``enough`` the share whose gap
-    is gap enough: only a motion that stays farther apart is drawn to the pose.
+    Parameters
+    ----------
+    pose_share
+        Share of the exemplars, by weight and with the smallest gaps, whose average is the pose of the contact.
+    enough
+        Share of the exemplars whose largest gap is the threshold: only motion with a larger gap is corrected.
     """
 
     pose_share: float
@@ -51,17 +55,14 @@ class LipGap:
 
 
 def contact_rule(label: str) -> ContactRule | None:
-    """What counts as a phone's contact; None for a phone without one."""
+    """Contact rule of a phone; None for a phone without lip contact."""
     phone = look_up_phone(label)
     return None if phone.manner in MANNERS_WITHOUT_CONTACT else CONTACT_RULES.get(phone.place)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contacts:
-    """Lip contacts to be kept.
-
-    Spans (C, 2) in seconds of the phones that make them, poses (C, D), and gaps (C,) in mm that are enough.
-    """
+    """C lip contacts: spans (C, 2) of their phones in seconds, poses (C, D), and gap thresholds (C,) in mm."""
 
     spans: NDArray[np.float64]
     poses: NDArray[np.float32]
@@ -80,10 +81,10 @@ class ChosenExemplars:
 def find_contacts(
     exemplars: ChosenExemplars, gap: LipGap, spans: NDArray[np.float64], rules: Sequence[ContactRule]
 ) -> Contacts:
-    """The contacts of N phones with spans (N, 2) in seconds, by a rule for each.
+    """Contacts of N phones with spans (N, 2) in seconds and one rule each.
 
-    A pose is the average of the closer exemplars, each at the frame where its own lips are closest: a tenth of the
-    recorded contacts is missed between two frames or by the alignment, and would hold the lips open.
+    A pose averages the exemplars with the smallest gaps, each at its own frame of least gap. The other exemplars are
+    excluded because a tenth of the recorded contacts falls between two frames or is missed by the alignment.
     """
     tokens, chosen, weights = exemplars.tokens, exemplars.chosen, exemplars.weights
     rows, squared = np.zeros(chosen.shape, np.int64), np.full(chosen.shape, np.inf)
@@ -139,10 +140,10 @@ def _closest_row(frames, low, high, gap):  # type: ignore[no-untyped-def]
 def enforce_contacts(
     values: NDArray[np.float32], contacts: Contacts, gap: LipGap, rate_hz: float
 ) -> NDArray[np.float32]:
-    """(T, D) values at `rate_hz` whose lips come close enough in every contact.
+    """(T, D) values at `rate_hz` with the lip gap reduced to the threshold of each contact.
 
-    Where the lips are closest already, the motion is drawn to the exemplars' pose: fully for `CONTACT_HOLD_S`,
-    easing in and out over `CONTACT_EASE_S`. A contact that is closed enough is left alone.
+    Around the time of least gap, the motion is replaced by the pose of the contact for `CONTACT_HOLD_S`, with
+    transitions of `CONTACT_EASE_S`. Contacts whose gap is below the threshold are unchanged.
     """
     kept = values.copy()
     times = np.arange(len(values)) / rate_hz

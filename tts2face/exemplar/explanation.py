@@ -1,4 +1,4 @@
-"""Why the lips move as they do: for each phone, which recorded tokens were used."""
+"""Explanation of synthesised lip motion: the recorded tokens used for each phone."""
 
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -12,10 +12,10 @@ from tts2face.exemplar.synthesis import ExemplarModel, TokenSelection
 
 @dataclass(frozen=True, slots=True)
 class UsedToken:
-    """A recorded phone that served.
+    """A recorded token used for a phone.
 
-    ``start`` and ``end`` in seconds of the utterance's clock; ``left`` and ``right`` are the phones around it, in order
-    of speech; ``score`` is its context score, ``weight`` its share of the average.
+    ``start`` and ``end`` are seconds of the utterance; ``left`` and ``right`` are the neighbouring phones in temporal
+    order; ``score`` is the context score, ``weight`` the weight in the average.
     """
 
     utterance: str
@@ -29,10 +29,10 @@ class UsedToken:
 
 @dataclass(frozen=True, slots=True)
 class PhoneExplanation:
-    """A phone, what was shown for it, in which context, and the tokens used, best first.
+    """A phone, the recorded phone used for it, its context, and the tokens used, best first.
 
-    ``shown`` differs from ``phone`` where the talker never said it. A phone without a shape of its own (h) and silence
-    far from speech are shown by no token and do not appear.
+    ``shown`` differs from ``phone`` if the talker's recordings lack the phone. Phones without a lip shape (h) and
+    silence far from speech use no token and are omitted.
     """
 
     phone: str
@@ -44,8 +44,8 @@ class PhoneExplanation:
     tokens: tuple[UsedToken, ...]
 
 
-def explain_selection(selection: TokenSelection, voice: ExemplarModel) -> tuple[PhoneExplanation, ...]:
-    """For each phone of a selection, the recorded tokens that move the lips."""
+def explain_selection(selection: TokenSelection, exemplars: ExemplarModel) -> tuple[PhoneExplanation, ...]:
+    """Recorded tokens used for each phone of a selection."""
     phones, targets, found, options = selection.phones, selection.targets, selection.found, selection.options
     weights = exemplar_weights(found.scores, options.sharpness)
     padded = (SILENCE,) * options.context + targets.labels + (SILENCE,) * options.context
@@ -53,7 +53,7 @@ def explain_selection(selection: TokenSelection, voice: ExemplarModel) -> tuple[
     for at, (label, source) in enumerate(zip(targets.labels, targets.source, strict=True)):
         here = at + options.context
         used = tuple(
-            _token_record(voice, int(token), float(score), float(weight), options.context)
+            _token_record(exemplars, int(token), float(score), float(weight), options.context)
             for token, score, weight in zip(found.tokens[at], found.scores[at], weights[at], strict=True)
             if token >= 0
         )
@@ -63,21 +63,21 @@ def explain_selection(selection: TokenSelection, voice: ExemplarModel) -> tuple[
     return tuple(shown)
 
 
-def _token_record(voice: ExemplarModel, token: int, score: float, weight: float, n_context: int) -> UsedToken:
-    tokens = voice.tokens
+def _token_record(exemplars: ExemplarModel, token: int, score: float, weight: float, n_context: int) -> UsedToken:
+    tokens = exemplars.tokens
     around = [tokens.inventory[number] for number in tokens.context[token, : 2 * n_context]]
     _, start, end, _ = np.round(tokens.spans[token], 4).tolist()
-    name = voice.names[tokens.utterance[token]]
+    name = exemplars.names[tokens.utterance[token]]
     return UsedToken(name, start, end, tuple(around[0::2][::-1]), tuple(around[1::2]), score, weight)
 
 
 def explanation_json(shown: tuple[PhoneExplanation, ...]) -> list[dict[str, Any]]:
-    """Plain lists and dictionaries."""
+    """The explanation as lists and dictionaries for JSON."""
     return [asdict(phone) for phone in shown]
 
 
 def explanation_text(shown: tuple[PhoneExplanation, ...], *, n_tokens: int = 5) -> str:
-    """One paragraph a phone with its best tokens, for people."""
+    """The explanation as text, one paragraph for each phone with its best `n_tokens` tokens."""
     lines = []
     for phone in shown:
         name = phone.phone if phone.phone == phone.shown else f"{phone.phone} (shown by {phone.shown})"

@@ -1,4 +1,4 @@
-"""How lip motion is made from exemplars."""
+"""Options of lip synthesis from exemplars."""
 
 from dataclasses import dataclass
 
@@ -12,28 +12,27 @@ class SynthesisOptions:
     Parameters
     ----------
     context
-        Phones either side that judge an exemplar.
+        Number of phones on either side that enter the context score.
     k
-        Exemplars averaged for each phone.
+        Number of exemplars averaged for each phone.
     duration
-        Weight of unlike durations against the context score; 0 leaves durations out.
+        Weight of duration differences in the score; 0 to ignore durations.
     sharpness
-        An exemplar whose score is lower by s counts ``exp(-sharpness s)`` as much as the best one.
+        Weight of an exemplar is ``exp(-sharpness s)`` for a score that is lower than the best one by s.
     overlap
-        Exemplars reach into their neighbours, so that each instant is told by three phones; else they stand edge to
-        edge.
+        Whether exemplars extend into the neighbouring phones, so that three phones contribute at each time.
     precision
-        Where exemplars overlap, each counts by its inverse variance to this power; 0 = all alike.
+        Exponent of the inverse variance by which overlapping exemplars are weighted; 0 for equal weights.
     align
-        Exemplars are warped onto the best one so that events coincide before they are averaged.
+        Whether exemplars are time-warped to the best one before they are averaged.
     network
-        Share of the talker's networks, where it has some, in what the exemplars tell; 0 leaves them out.
+        Weight of the talker's phone network, if it has one, against the exemplars; 0 for exemplars only.
     articulation
-        Factor on the motion about the talker's mean speaking pose; averaging shrinks what it averages.
+        Factor of the motion relative to the talker's mean speaking pose, which compensates the shrinkage by averaging.
     smoothing_s
-        Standard deviation of the Gaussian that smooths the whole, seconds; 0 = none.
+        Standard deviation in seconds of the final Gaussian smoothing; 0 for none.
     contacts
-        Lips that close in the exemplars of a phone made with the lips close in the result.
+        Whether lip contacts of the exemplars are enforced in the result.
 
     Raises
     ------
@@ -54,7 +53,7 @@ class SynthesisOptions:
     contacts: bool = True
 
     def __post_init__(self) -> None:
-        """Refuse numbers outside their range; `context` and `k` are checked by the search."""
+        """Reject numbers outside their range; `context` and `k` are checked by the search."""
         for name in ("duration", "sharpness", "precision", "articulation", "smoothing_s"):
             value = getattr(self, name)
             if not 0 <= value < 100:

@@ -1,4 +1,4 @@
-"""The phones to be shown, told in phones that the talker said."""
+"""Conversion of a phone sequence to phones of the talker's recordings."""
 
 import functools
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from lexicon.phones import nearest_phones
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar.tokens import PAUSE_REACH_S, spans_with_reach
 
-# Sounds of the throat have no shape of their own: lips and tongue already stand as for what follows.
+# Glottal sounds have no lip shape: lips and tongue are already in the position of the next phone.
 TRANSPARENT_PHONES = frozenset({"h", "ɦ", "ʔ"})
 
 
@@ -19,7 +19,7 @@ MIN_TARGET_GAP_S = 1e-6  # between targets: less is rounding
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Targets:
-    """N phones that the talker said, in order.
+    """N phones of the talker's inventory, in temporal order.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Targets:
 
 @functools.lru_cache(maxsize=4096)
 def substitute_phones(label: str, inventory: tuple[str, ...]) -> tuple[str, ...]:
-    """What the talker shows for a phone: itself, its nearest, its parts' nearest; nothing for a transparent one.
+    """Phones of the inventory for a phone: itself, the nearest one, or those of its parts; none for a transparent one.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Recorded motion read at any instant: a smooth curve through the recorded frames."""
+"""Interpolation of recorded motion at any time."""
 
 import numpy as np
 from numpy.typing import NDArray

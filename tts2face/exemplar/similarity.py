@@ -20,7 +20,7 @@ SHARPNESS = 1.4  # similarity at the mean distance between phones is exp(-SHARPN
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PhoneSimilarity:
-    """How alike P phones look: `matrix` (P, P) in [0, 1], symmetric, 1 on the diagonal."""
+    """Visual similarity of P phones: `matrix` (P, P) in [0, 1], symmetric, 1 on the diagonal."""
 
     phones: tuple[str, ...]
     matrix: NDArray[np.float64]
@@ -82,10 +82,11 @@ def phone_similarity(
     weight = share * consistency
     squared = (weight * np.square(mean[:, None] - mean[None, :])).sum((2, 3)) / weight.sum((2, 3))
     distance = np.sqrt(squared)
-    said = counts > 0
-    between = distance[np.ix_(said, said)]
-    scale = between.sum() / max(1, said.sum() * (said.sum() - 1))
-    matrix = np.where(np.outer(said, said), np.exp(-SHARPNESS * distance / (scale if scale > 0 else 1.0)), 0.0)
+    has_tokens = counts > 0
+    between = distance[np.ix_(has_tokens, has_tokens)]
+    scale = between.sum() / max(1, has_tokens.sum() * (has_tokens.sum() - 1))
+    similarity = np.exp(-SHARPNESS * distance / (scale if scale > 0 else 1.0))
+    matrix = np.where(np.outer(has_tokens, has_tokens), similarity, 0.0)
     np.fill_diagonal(matrix, 1.0)
     return PhoneSimilarity(phones, matrix)
 

@@ -1,4 +1,4 @@
-"""Phones become lip motion: the talker's recorded exemplars, chosen, blended and brought to rest in silence."""
+"""Lip synthesis from phones: selection and blending of recorded exemplars, with rest in silence."""
 
 from dataclasses import dataclass
 
@@ -26,18 +26,18 @@ from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker, speech_channels
 from tts2face.types import Trajectory
 
-RELEASE_FROM_S = 0.08  # this far from speech the face begins to leave what the exemplars did ...
-REST_FROM_S = 0.20  # ... and this far it is at rest; recorded lips settle within 0.2 s
-MIN_EASE_S = 0.06  # a chunk that begins or ends within speech still eases from and to rest over this time
+RELEASE_FROM_S = 0.08  # distance from speech at which the transition to rest begins
+REST_FROM_S = 0.20  # distance from speech at which the face is at rest; recorded lips settle within 0.2 s
+MIN_EASE_S = 0.06  # transition from and to rest if a clip begins or ends within speech
 DEFAULT_OPTIONS = SynthesisOptions()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExemplarModel:
-    """A talker made ready for synthesis: tokens, their index, the similarity of phones, the pose at rest.
+    """A talker indexed for synthesis: tokens, their index, phone similarity, and reference poses.
 
-    ``spread``, ``rest`` and ``speaking``, the mean pose while speaking, are (D,), of the speech parameters; ``names``
-    are the utterances'.
+    ``spread``, ``rest`` and ``mean_speaking_pose`` (D,) are standard deviation, rest pose and mean pose in speech of
+    the D speech parameters; ``channels`` are their names, ``names`` those of the utterances.
     """
 
     tokens: Tokens
@@ -53,7 +53,7 @@ class ExemplarModel:
 
 
 def build_exemplar_model(talker: Talker) -> ExemplarModel:
-    """Index a talker's tokens and measure the similarity of the phones; once for any number of texts."""
+    """Index a talker's tokens and compute the similarity of its phones."""
     model, n_speech = talker.model, talker.model.n_speech
     tokens = collect_tokens(talker)
     spread = np.maximum(model.spread[:n_speech], 1e-6).astype(np.float32)
@@ -91,9 +91,9 @@ def mean_speaking_pose(talker: Talker) -> NDArray[np.float32]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TokenSelection:
-    """The recorded tokens that show N phones in time: the answer of one search, from which every motion is made.
+    """Result of the token search for a phone sequence, from which lip motion and appearance are blended.
 
-    ``targets`` are the phones to be shown, ``found`` their best tokens, both for ``phones`` and ``options``.
+    ``targets`` are the ``phones`` converted to the talker's inventory, ``found`` their best tokens by ``options``.
     """
 
     phones: PhoneSequence
@@ -103,7 +103,7 @@ class TokenSelection:
 
 
 def select_tokens(
-    phones: PhoneSequence, voice: ExemplarModel, options: SynthesisOptions = DEFAULT_OPTIONS
+    phones: PhoneSequence, exemplars: ExemplarModel, options: SynthesisOptions = DEFAULT_OPTIONS
 ) -> TokenSelection:
     """Search the recorded tokens for each phone.
 
@@ -114,7 +114,7 @@ def select_tokens(
     """
     if phones.start != 0.0:
         raise InputError(f"phones to be animated begin at 0 s, not at {phones.start} s; shift them first")
-    tokens = voice.tokens
+    tokens = exemplars.tokens
     number = {label: at for at, label in enumerate(tokens.inventory)}
     targets = build_targets(phones, tokens.inventory)
     labels = np.array([number[label] for label in targets.labels], np.int32)
@@ -122,7 +122,7 @@ def select_tokens(
     wanted = TokenQuery(labels, around, log_durations(targets.spans))
     found = best_tokens(
         wanted,
-        voice.index,
+        exemplars.index,
         context=options.context,
         k=options.k,
         duration=options.duration,
@@ -132,17 +132,17 @@ def select_tokens(
 
 def speech_trajectory(
     phones: PhoneSequence,
-    voice: ExemplarModel,
+    exemplars: ExemplarModel,
     *,
     fps: float,
     n_frames: int,
     options: SynthesisOptions = DEFAULT_OPTIONS,
 ) -> Trajectory:
     """Motion of the talker's speech parameters for phones in time: `select_tokens`, then `blend_trajectory`."""
-    return blend_trajectory(select_tokens(phones, voice, options), voice, fps=fps, n_frames=n_frames)
+    return blend_trajectory(select_tokens(phones, exemplars, options), exemplars, fps=fps, n_frames=n_frames)
 
 
-def blend_trajectory(selection: TokenSelection, voice: ExemplarModel, *, fps: float, n_frames: int) -> Trajectory:
+def blend_trajectory(selection: TokenSelection, exemplars: ExemplarModel, *, fps: float, n_frames: int) -> Trajectory:
     """Motion of the talker's speech parameters from selected tokens; the first and the last frame are at rest.
 
     Notes
@@ -152,14 +152,14 @@ def blend_trajectory(selection: TokenSelection, voice: ExemplarModel, *, fps: fl
     """
     frame_times = np.arange(n_frames) / fps
     n_instants = int(np.ceil(max(selection.phones.end, frame_times[-1]) * blending.CLOCK_HZ)) + 2
-    made = _blend_motion(selection.targets, selection.found, voice, n_instants, selection.options)
-    return Trajectory(voice.channels, read_at_frames(made, selection.phones, frame_times, voice.rest), fps)
+    made = _blend_motion(selection.targets, selection.found, exemplars, n_instants, selection.options)
+    return Trajectory(exemplars.channels, read_at_frames(made, selection.phones, frame_times, exemplars.rest), fps)
 
 
 def read_at_frames(
     made: NDArray[np.float32], phones: PhoneSequence, times: NDArray[np.float64], rest: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """(T, D) what was made at the instants of the clock (n, D), read at T times and drawn to rest in silence."""
+    """Resample motion (n, D) at `CLOCK_HZ` to T times (T, D), blended with the rest pose in silence."""
     at = times * blending.CLOCK_HZ
     low = at.astype(np.int64)
     part = (at - low)[:, None].astype(np.float32)
@@ -170,32 +170,32 @@ def read_at_frames(
 
 
 def _blend_motion(
-    targets: Targets, found: TokenRanking, voice: ExemplarModel, n_instants: int, options: SynthesisOptions
+    targets: Targets, found: TokenRanking, exemplars: ExemplarModel, n_instants: int, options: SynthesisOptions
 ) -> NDArray[np.float32]:
     """(n, D) motion at the instants of the clock."""
     weights = blending.exemplar_weights(found.scores, options.sharpness)
-    pieces = blending.average_tokens(voice.tokens, found.tokens, weights, voice.spread, options)
-    joined, told = blending.join_averages(pieces, targets, n_instants, options)
-    said = joined * voice.spread
-    if voice.network is not None and options.network > 0:
+    pieces = blending.average_tokens(exemplars.tokens, found.tokens, weights, exemplars.spread, options)
+    joined, is_covered = blending.join_averages(pieces, targets, n_instants, options)
+    speech = joined * exemplars.spread
+    if exemplars.network is not None and options.network > 0:
         instants = np.arange(n_instants) / blending.CLOCK_HZ
-        told_by_network = voice.network.parameters(target_phones(targets), instants)
-        said = (1 - options.network) * said + options.network * told_by_network
-    said = voice.mean_speaking_pose + options.articulation * (said - voice.mean_speaking_pose)
-    motion = np.where(told[:, None], said, voice.rest).astype(np.float32)
+        predicted = exemplars.network.parameters(target_phones(targets), instants)
+        speech = (1 - options.network) * speech + options.network * predicted
+    speech = exemplars.mean_speaking_pose + options.articulation * (speech - exemplars.mean_speaking_pose)
+    motion = np.where(is_covered[:, None], speech, exemplars.rest).astype(np.float32)
     motion = blending.gaussian_smooth(motion, options.smoothing_s, blending.CLOCK_HZ)
     if not options.contacts:
         return motion
     rules = [contact_rule(label) for label in targets.labels]
     touching = np.array([rule is not None for rule in rules])
-    exemplars = ChosenExemplars(voice.tokens, found.tokens[touching], weights[touching])
+    chosen = ChosenExemplars(exemplars.tokens, found.tokens[touching], weights[touching])
     kept = [rule for rule in rules if rule is not None]
-    contacts = find_contacts(exemplars, voice.lip_gap, targets.spans[touching, 1:3], kept)
-    return enforce_contacts(motion, contacts, voice.lip_gap, blending.CLOCK_HZ)
+    contacts = find_contacts(chosen, exemplars.lip_gap, targets.spans[touching, 1:3], kept)
+    return enforce_contacts(motion, contacts, exemplars.lip_gap, blending.CLOCK_HZ)
 
 
 def rest_weights(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(T,) how far the face is drawn to its rest at each of T instants: 0 in speech, 1 in silence, 1 at both ends."""
+    """(T,) weights of the rest pose at T times in seconds: 0 in speech, 1 in silence and at both ends."""
     sounding = np.array([label != SILENCE for label in phones.phones])
     if not sounding.any():
         return np.ones(len(times))
@@ -216,6 +216,6 @@ def rest_weights(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[n
 
 
 def _smoothstep(part: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rise from 0 to 1 without a corner."""
+    """Cubic smoothstep from 0 to 1."""
     part = np.clip(part, 0.0, 1.0)
     return np.asarray(part * part * (3.0 - 2.0 * part))

@@ -1,4 +1,4 @@
-"""Time warping: the cheapest way to lay one motion over another so that their events coincide."""
+"""Dynamic time warping of trajectories."""
 
 import numpy as np
 from numpy.typing import NDArray

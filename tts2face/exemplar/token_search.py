@@ -1,4 +1,4 @@
-"""Which recorded tokens fit a phone best, judged by the phones around it (T07 section 3.3)."""
+"""Search for the recorded tokens in the most similar phone contexts (T07 section 3.3)."""
 
 from dataclasses import dataclass
 
@@ -15,9 +15,9 @@ _ROUNDING = 1e-9  # a bound may fall below the score it bounds by rounding; scor
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TokenQuery:
-    """N phones to be found: labels (N,), contexts (N, 2 `MAX_CONTEXT`) and log durations (N, 3).
+    """N query phones: labels (N,), contexts (N, 2 `MAX_CONTEXT`) and log durations (N, 3).
 
-    Columns of `log_durations`: the phone before, the phone itself, the phone behind, each as far as it is reached into.
+    Columns of `log_durations`: the previous phone, the phone itself, the next phone; neighbours up to their reach.
     """
 
     phone: NDArray[np.int32]
@@ -82,7 +82,7 @@ def context_weights(n_context: int) -> NDArray[np.float64]:
 
 
 def best_tokens(wanted: TokenQuery, index: ContextIndex, *, context: int, k: int, duration: float) -> TokenRanking:
-    """The k tokens of each wanted phone that lie in the most similar surroundings.
+    """The k tokens of each query phone with the most similar contexts.
 
     Score = sum over d = 1..context of [S(left_d, its left_d) + S(right_d, its right_d)] / (d + 1), less, where
     `duration` is above 0, ``duration`` x (|log ratio of durations| + half of the neighbours' ones). Equal scores go to
@@ -95,9 +95,9 @@ def best_tokens(wanted: TokenQuery, index: ContextIndex, *, context: int, k: int
 
     Notes
     -----
-    Exactly the answer of scoring every token. Groups of tokens with the same neighbours are visited from the highest
-    bound of their score downwards, until the bound falls below the k-th best, and within a group tokens from the wanted
-    duration outwards: those that cannot win are not scored. More recordings of the same contexts cost next to nothing.
+    The result equals that of an exhaustive search. Groups of tokens with the same neighbours are visited in descending
+    order of the upper bound of their scores, until the bound falls below the k-th best score; within a group, tokens
+    are visited by increasing difference from the query's duration.
     """
     if not 1 <= context <= MAX_CONTEXT:
         raise InputError(f"context must be 1 to {MAX_CONTEXT} phones, not {context}")

@@ -1,4 +1,4 @@
-"""Tokens: every phone that a talker was recorded saying, with its place in the recorded motion."""
+"""Phone tokens of a talker's recordings, with their positions in the recorded motion."""
 
 from dataclasses import dataclass
 
@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from lexicon.sequence import SILENCE
 from tts2face.models.talker import Talker
 
-MAX_CONTEXT = 6  # phones either side that a token remembers
-PAUSE_REACH_S = 0.25  # how far from speech a silence belongs to it: lips open and come to rest within this time
+MAX_CONTEXT = 6  # stored context phones on either side
+PAUSE_REACH_S = 0.25  # part of a silence that belongs to the adjacent speech, in which lips open or come to rest
 
 
 @dataclass(frozen=True, slots=True, eq=False)

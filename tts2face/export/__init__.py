@@ -1,1 +1,1 @@
-"""A clip in other formats."""
+"""Export of words and phones in text formats."""

@@ -1,4 +1,4 @@
-"""Words and phones as text: a table to read, JSON, and a Praat TextGrid; with a voice's times or nominal ones."""
+"""Words and phones as tables, JSON and Praat TextGrids, with the times of a voice or nominal durations."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,7 +16,7 @@ Interval = tuple[float, float, str]
 
 
 def pronunciation_table(spoken: "Pronunciation") -> str:
-    """One line a word, in aligned columns: what is written, what is said, IPA, and ARPABET where it is English."""
+    """Table with one line for each word: written form, spoken form, IPA, and ARPABET for English."""
     rows = [("written", "said", "IPA", "ARPABET")]
     rows += [(w.source, w.text + w.mark, w.ipa, " ".join(w.arpabet)) for w in spoken.words]
     widths = [max(len(row[column]) for row in rows) for column in range(3)]
@@ -40,13 +40,13 @@ def _word_json(word: "Word") -> dict[str, Any]:
 
 
 def pronunciation_json(spoken: "Pronunciation") -> str:
-    """The same as JSON, with stress and syllables (half-open ranges of the word's phones)."""
+    """Words as JSON with phones, stress and syllables (half-open ranges of the word's phones)."""
     content = {"text": spoken.text, "language": spoken.language, "words": [_word_json(word) for word in spoken.words]}
     return json.dumps(content, ensure_ascii=False, indent=2) + "\n"
 
 
 def pronunciation_textgrid(spoken: "Pronunciation") -> str:
-    """A TextGrid of a text that no voice has spoken: nominal durations, and a tier that says so."""
+    """TextGrid with nominal durations, for a text without synthesised speech, and a tier that states this."""
     from lexicon.nominal_durations import nominal_phones
 
     phones, words = nominal_phones(spoken)
@@ -63,7 +63,7 @@ def _word_at_phone(words: Sequence["WordSpan"]) -> dict[int, str]:
 
 
 def timed_table(phones: "PhoneSequence", words: Sequence["WordSpan"]) -> str:
-    """One line a phone: start and end in seconds, phone, word; between tabs, with a header."""
+    """Tab-separated table with one line for each phone: start and end in seconds, phone, word."""
     word_of = _word_at_phone(words)
     lines = ["start_s\tend_s\tphone\tword"]
     for at, phone in enumerate(phones.phones):
@@ -72,7 +72,7 @@ def timed_table(phones: "PhoneSequence", words: Sequence["WordSpan"]) -> str:
 
 
 def timed_json(phones: "PhoneSequence", words: Sequence["WordSpan"]) -> str:
-    """Phones, the edges in seconds that they share, and words as half-open ranges of phones."""
+    """JSON with N phones, their N + 1 edges in seconds, and words as half-open ranges of phones."""
     content = {
         "phones": list(phones.phones),
         "edges_s": [float(edge) for edge in phones.edges],
@@ -82,11 +82,11 @@ def timed_json(phones: "PhoneSequence", words: Sequence["WordSpan"]) -> str:
 
 
 def _word_intervals(phones: "PhoneSequence", words: Sequence["WordSpan"]) -> Iterator[Interval]:
-    """Words and the empty stretches between them, without gap."""
+    """Yield contiguous intervals of the words and of the empty spans between them."""
     at = 0
     for word in words:
         if word.first < at or word.last > len(phones):
-            raise InputError(f"word {word.text!r} does not lie behind the word before it, or ends after the last phone")
+            raise InputError(f"the word {word.text!r} overlaps the previous word or ends after the last phone")
         if word.first > at:
             yield float(phones.edges[at]), float(phones.edges[word.first]), ""
         yield float(phones.edges[word.first]), float(phones.edges[word.last]), word.text
@@ -109,7 +109,7 @@ def _tier(number: int, name: str, intervals: Sequence[Interval]) -> Iterator[str
 
 
 def textgrid(phones: "PhoneSequence", words: Sequence["WordSpan"], *, note: str = "") -> str:
-    """A Praat TextGrid with the tiers words and phones, and a tier ``note`` where there is one; save it as UTF-8.
+    """Praat TextGrid with the tiers ``words`` and ``phones``, and ``note`` if a note is given; to be saved as UTF-8.
 
     Raises
     ------

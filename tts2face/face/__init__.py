@@ -1,1 +1,1 @@
-"""Linear face models and the way of motion onto them."""
+"""Linear face models: deformation, expressions, lip and lid constraints, and transfer of motion to them."""

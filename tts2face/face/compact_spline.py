@@ -1,10 +1,10 @@
-"""Local interpolation: displacements known at a few places, carried to their surroundings and no further.
+"""Local interpolation of displacements that are known at a few points, with compact support.
 
-Ju and Lee 2008, section 5.2: bell-shaped cubic B-splines as basis functions, without a linear term, whose reach would
-be infinite. The paper takes the spline of the distance. In space that function is not positive definite: on the
-landmarks of a dense face mesh its equations come near to having no answer, and skin between landmarks flies off by
-centimetres. Here a centre's function is the product of the splines along the axes, whose spectrum, powers of sinc**4,
-is never negative: there is always one answer, and it stays calm between the centres.
+Ju and Lee 2008, section 5.2: bell-shaped cubic B-splines as basis functions, without a linear term, whose support
+would be infinite. The paper takes the spline of the distance, which is not positive definite in three dimensions: on
+the landmarks of a dense face mesh its equations are nearly singular, and skin between landmarks moves by centimetres.
+Here the basis function of a centre is the product of the splines along the axes. Its spectrum, powers of sinc**4, is
+never negative: the solution is unique and does not oscillate between the centres.
 """
 
 from dataclasses import dataclass
@@ -17,8 +17,10 @@ from tts2face.face.rbf import check_centres
 
 FloatArray = NDArray[np.float64]
 
-MAX_CONDITION = 1e9  # of the matrix of centres: beyond it, half of the digits of the coefficients would be noise
-CHUNK_SIZE = 4096  # places evaluated at once, to bound memory
+MAX_CONDITION = (
+    1e9  # of the interpolation matrix; beyond it, half of the digits of the coefficients are rounding errors
+)
+CHUNK_SIZE = 4096  # points evaluated at once, which bounds memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,8 +30,9 @@ class LocalInterpolant:
     Parameters
     ----------
     centres : (N, D)
-        Where the displacement is known.
+        Points where the displacement is known.
     coefficients : (N, E)
+        a_i.
     support
         Distance from a centre, along any axis, at which its influence ends; in the unit of the centres.
     """
@@ -39,7 +42,7 @@ class LocalInterpolant:
     support: float
 
     def __call__(self, places: NDArray[np.floating]) -> FloatArray:
-        """(P, E) displacements at places (P, D); exactly 0 beyond the support of every centre."""
+        """Displacements (P, E) at points (P, D); exactly 0 beyond the support of every centre."""
         found = np.zeros((len(places), self.coefficients.shape[1]))
         for first in range(0, len(places), CHUNK_SIZE):
             span = slice(first, first + CHUNK_SIZE)
@@ -50,27 +53,30 @@ class LocalInterpolant:
 def fit_local_interpolant(
     centres: NDArray[np.floating], displacements: NDArray[np.floating], support: float
 ) -> LocalInterpolant:
-    """The local function that takes the given displacements at the centres exactly.
+    """Local interpolant that equals the given displacements at the centres.
 
     Parameters
     ----------
     centres : (N, D)
+        Distinct points.
     displacements : (N, E)
+        Values at the centres.
     support
         Distance along any axis at which a centre's influence ends, in the unit of the centres.
 
     Raises
     ------
     InputError
-        Numbers of centres and displacements differ, there is none, one is not finite, or the support is not above 0.
+        The numbers of centres and displacements differ or are 0, a value is not finite, or the support is not
+        positive.
     DataError
-        Centres lie so near to each other that the displacements between them would be noise.
+        Centres are so close together that the equations are ill-conditioned.
 
     Examples
     --------
     >>> import numpy as np
-    >>> moved = local_interpolant(np.array([[0.0], [5.0]]), np.array([[1.0], [2.0]]), 20.0)
-    >>> moved(np.array([[0.0], [5.0], [25.0]])).round(9).ravel().tolist()
+    >>> field = fit_local_interpolant(np.array([[0.0], [5.0]]), np.array([[1.0], [2.0]]), 20.0)
+    >>> field(np.array([[0.0], [5.0], [25.0]])).round(9).ravel().tolist()
     [1.0, 2.0, 0.0]
     """
     places, wanted = check_centres(centres, displacements)
@@ -78,7 +84,7 @@ def fit_local_interpolant(
         raise InputError(f"the support must be above 0, not {support}")
     matrix = _basis_values(places, places, support)
     if np.linalg.cond(matrix) > MAX_CONDITION:
-        raise DataError("centres lie too near to each other for their support; leave some out, or make it smaller")
+        raise DataError("centres are too close together for their support; remove some centres or reduce the support")
     coefficients: FloatArray = np.linalg.solve(matrix, wanted).astype(np.float64)
     return LocalInterpolant(places, coefficients, float(support))
 
@@ -91,7 +97,7 @@ def cubic_bspline(share: NDArray[np.floating]) -> FloatArray:
 
 
 def _basis_values(places: NDArray[np.floating], centres: FloatArray, support: float) -> FloatArray:
-    """(P, N) values of every centre's function at places (P, D)."""
+    """Values (P, N) of every centre's basis function at points (P, D)."""
     values: FloatArray = np.ones((len(places), len(centres)))
     for axis in range(centres.shape[1]):
         values *= cubic_bspline(np.abs(np.subtract.outer(places[:, axis], centres[:, axis])) / support)

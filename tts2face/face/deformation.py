@@ -1,4 +1,4 @@
-"""A face posed: rest plus weighted shapes, eyeballs that turn, and the head that moves about its pivot."""
+"""Deformation of a face: rest plus weighted shapes, eyeball rotations, and head motion about the pivot."""
 
 import math
 from dataclasses import dataclass
@@ -12,14 +12,14 @@ from tts2face.models.face import Face
 from tts2face.models.landmarks import CHIN
 from tts2face.types import HEAD_CHANNELS
 
-REST_HEAD = np.zeros(len(HEAD_CHANNELS), np.float32)  # the head pose of the face at rest
-CHIN_MARGIN_MM = 8.0  # flesh under the chin that still turns with the skull
-MIN_NECK_MM = 20.0  # a mesh that ends nearer to the chin has no neck to bend and turns as a whole
+REST_HEAD = np.zeros(len(HEAD_CHANNELS), np.float32)  # head pose at rest
+CHIN_MARGIN_MM = 8.0  # height below the chin that still moves rigidly with the head
+MIN_NECK_MM = 20.0  # meshes with a shorter neck move rigidly as a whole
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FaceRig:
-    """A face made ready to be posed many times.
+    """Rig of a face: its arrays in the form that posing takes.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class FaceRig:
     pivot : (3,)
         The point about which the head turns.
     follow : (V,)
-        Share of the head's motion that each vertex takes: 1 down to the chin, falling to 0 at the end of the neck.
+        Share of the head motion that each vertex follows: 1 down to the chin, falling to 0 at the end of the neck.
     """
 
     rest: NDArray[np.float32]
@@ -46,19 +46,19 @@ class FaceRig:
     follow: NDArray[np.float32]
 
     def pose(self, weights: NDArray[np.floating], head: NDArray[np.floating] = REST_HEAD) -> NDArray[np.float32]:
-        """(V, 3) vertices for (K,) weights and a (6,) head pose of `HEAD_CHANNELS`."""
+        """Vertices (V, 3), mm, for shape weights (K,) and a head pose (6,) of `HEAD_CHANNELS`."""
         vertices = np.zeros_like(self.rest)
-        moved = head_transform(head, self.pivot)
+        transform = head_transform(head, self.pivot)
         eyes = eye_rotations(self.eye_turns, np.asarray(weights))
         _apply_shapes(self.rest, self.starts, self.indices, self.deltas, np.asarray(weights, np.float32), vertices)
         _turn_eyes(self.eye_spans, self.eye_centres, eyes, vertices)
         if np.asarray(head).any():
-            _move_head(moved, self.follow, vertices)
+            _move_head(transform, self.follow, vertices)
         return vertices
 
 
 def build_rig(face: Face) -> FaceRig:
-    """The rig of a face; only the vertices that a shape moves are kept."""
+    """Rig of a face; shapes keep only the vertices that they move."""
     moved = [np.flatnonzero(np.any(shape != 0, axis=1)).astype(np.int32) for shape in face.shapes]
     starts = np.concatenate([[0], np.cumsum([len(indices) for indices in moved])]).astype(np.int64)
     deltas = [shape[indices] for shape, indices in zip(face.shapes, moved, strict=True)]
@@ -80,7 +80,7 @@ def build_rig(face: Face) -> FaceRig:
 
 
 def posed_vertices(face: Face, weights: NDArray[np.floating]) -> NDArray[np.float32]:
-    """(V, 3) vertices of a face for (K,) weights of its shapes, the head at rest.
+    """Vertices (V, 3) of a face, mm, for shape weights (K,), with the head at rest.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def posed_vertices(face: Face, weights: NDArray[np.floating]) -> NDArray[np.floa
 
 
 def head_share(face: Face) -> NDArray[np.float32]:
-    """(V,) share of the head's motion that each vertex takes, so that a neck bends and its end stays."""
+    """Share (V,) of the head motion that each vertex follows: 1 on the head, falling to 0 at the end of the neck."""
     height = face.vertices[:, 1]
     chin = np.flatnonzero(face.landmarks == CHIN)
     if not len(chin):
@@ -117,7 +117,7 @@ def head_share(face: Face) -> NDArray[np.float32]:
 
 
 def rotation_matrix(turn: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(3, 3) rotation for a rotation vector in radians (Rodrigues)."""
+    """Rotation matrix (3, 3) of a rotation vector (3,) in radians (Rodrigues)."""
     angle = float(np.linalg.norm(turn))
     if angle == 0.0:
         return np.eye(3)
@@ -128,21 +128,21 @@ def rotation_matrix(turn: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def head_rotation(pitch: float, yaw: float, roll: float) -> NDArray[np.float64]:
-    """(3, 3) rotation of the head: roll about z first, then pitch about x, then yaw about y; radians."""
+    """Rotation matrix (3, 3) of the head: roll about z first, then pitch about x, then yaw about y; radians."""
     about_x, about_y, about_z = np.eye(3) * [[pitch], [yaw], [roll]]
     return rotation_matrix(about_y) @ rotation_matrix(about_x) @ rotation_matrix(about_z)
 
 
 def head_transform(head: NDArray[np.floating], pivot: NDArray[np.floating]) -> NDArray[np.float32]:
-    """(3, 4) rigid motion of a (6,) head pose about the pivot: rotation and shift in one matrix."""
+    """Rigid transform (3, 4) of a head pose (6,) about the pivot (3,): rotation and translation."""
     pitch, yaw, roll, *shift = (float(value) for value in head)
     rotation = head_rotation(pitch, yaw, roll)
-    moved = np.column_stack([rotation, pivot - rotation @ pivot + shift])
-    return moved.astype(np.float32)
+    transform = np.column_stack([rotation, pivot - rotation @ pivot + shift])
+    return transform.astype(np.float32)
 
 
 def eye_rotations(turns: NDArray[np.float32], weights: NDArray[np.floating]) -> NDArray[np.float32]:
-    """(E, 3, 3) rotations of the eyeballs."""
+    """Rotation matrices (E, 3, 3) of the eyeballs for rotation vectors per weight (E, K, 3) and weights (K,)."""
     vectors = np.einsum("ekc,k->ec", turns, weights)
     return np.array([rotation_matrix(vector) for vector in vectors], np.float32).reshape(-1, 3, 3)
 
@@ -173,9 +173,9 @@ def _turn_eyes(spans, centres, rotations, vertices):  # type: ignore[no-untyped-
 
 
 @kernel
-def _move_head(moved, follow, vertices):  # type: ignore[no-untyped-def]
+def _move_head(transform, follow, vertices):  # type: ignore[no-untyped-def]
     for v in range(len(vertices)):
         x, y, z = vertices[v, 0], vertices[v, 1], vertices[v, 2]
         for c in range(3):
-            there = moved[c, 0] * x + moved[c, 1] * y + moved[c, 2] * z + moved[c, 3]
-            vertices[v, c] += follow[v] * (there - vertices[v, c])
+            target = transform[c, 0] * x + transform[c, 1] * y + transform[c, 2] * z + transform[c, 3]
+            vertices[v, c] += follow[v] * (target - vertices[v, c])

@@ -1,7 +1,7 @@
-"""The basis expressions B_i of a face, from a table that an animator can correct (expressions.tsv).
+"""Basis expressions B_i of a face, from an editable table (expressions.tsv).
 
-Ju and Lee 2008, sections 5 and 7: expressions are designed on each synthetic face, over the whole of it and with closed
-lips; weights are what faces share.
+Ju and Lee 2008, sections 5 and 7: expressions are designed on each synthetic face, over the whole face
+and with closed lips; faces share the weights.
 """
 
 import csv
@@ -21,8 +21,10 @@ from tts2face.models.face import Face
 from tts2face.models.palette import EXPRESSIONS
 
 EXPRESSION_TABLE = "expressions.tsv"
-BOTH_SIDES = "*"  # at the end of a name: this shape of the left and of the right
-GAZE_SHAPES = tuple(f"eyeLook{way}{side}" for way in ("Up", "Down", "In", "Out") for side in ("Left", "Right"))
+BOTH_SIDES = "*"  # suffix of a name: both the left and the right shape
+GAZE_SHAPES = tuple(
+    f"eyeLook{direction}{side}" for direction in ("Up", "Down", "In", "Out") for side in ("Left", "Right")
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -34,53 +36,54 @@ def expression_table() -> Mapping[str, tuple[float, ...]]:
     Raises
     ------
     DataError
-        The table is not as it should be.
+        The columns of the table are not `EXPRESSIONS`, or a cell is not a number.
     """
     rows = list(
         csv.reader(files("tts2face.face").joinpath(EXPRESSION_TABLE).read_text("utf-8").splitlines(), delimiter="\t")
     )
     if tuple(rows[0][1:]) != EXPRESSIONS:
         raise DataError(
-            f"{EXPRESSION_TABLE} must have the columns {', '.join(EXPRESSIONS)}, not {', '.join(rows[0][1:])}"
+            f"{EXPRESSION_TABLE} must have the columns {', '.join(EXPRESSIONS)}, not {', '.join(rows[0][1:])}; "
+            "correct its first row"
         )
     table: dict[str, tuple[float, ...]] = {}
     for name, *cells in rows[1:]:
         try:
             weights = tuple(float(cell or 0.0) for cell in cells)
-        except ValueError as broken:
+        except ValueError as error:
             raise DataError(
-                f"{EXPRESSION_TABLE} holds something that is no weight in the row {name}: {broken}"
-            ) from broken
+                f"the row {name} of {EXPRESSION_TABLE} has a cell that is not a number: {error}; correct the table"
+            ) from error
         sides = ("Left", "Right") if name.endswith(BOTH_SIDES) else ("",)
         table |= {name.removesuffix(BOTH_SIDES) + side: weights for side in sides}
     return table
 
 
 def add_expression_shapes(face: Face) -> Face:
-    """A face with every shape of expressions, lids and gaze: those that it lacks are carried from the default head."""
+    """Face with all shapes of expressions, lids and gaze; missing ones are transferred from the default head."""
     return add_missing_shapes(face, (*expression_table(), *BLINK_SHAPES, *WIDE_SHAPES, *GAZE_SHAPES))
 
 
 def expression_weights(face: Face, mouth: LipConstraints) -> FloatArray:
-    """(5, K) weights of `EXPRESSIONS` on a face of `add_expression_shapes`; closed lips stay closed."""
+    """Shape weights (5, K) of `EXPRESSIONS` on a face of `add_expression_shapes`; closed lips stay closed."""
     table = expression_table()
     none = (0.0,) * len(EXPRESSIONS)
-    drawn = np.array([table.get(name, none) for name in face.shape_names]).T
-    held = mouth.held(np.zeros_like(drawn), drawn)
-    return build_eyelid_model(face).close(held, np.zeros((len(held), 2)))
+    designed = np.array([table.get(name, none) for name in face.shape_names]).T
+    weights = mouth.combine(np.zeros_like(designed), designed)
+    return build_eyelid_model(face).close(weights, np.zeros((len(weights), 2)))
 
 
 def expression_landmarks(face: Face) -> FloatArray:
-    """(5, 478, 3) motion of the landmarks in each of `EXPRESSIONS`, mm; 0 for the irises and landmarks that it lacks.
+    """Landmark motion (5, 478, 3) of each of `EXPRESSIONS`, mm; 0 for irises and missing landmarks.
 
     Raises
     ------
     DataError
         The face lacks the landmarks of lips or lids.
     """
-    whole = add_expression_shapes(face)
-    weights = expression_weights(whole, build_lip_constraints(whole))
-    motion = scatter_landmarks(whole, landmark_motion(whole, np.arange(len(whole.shape_names))))
+    complete_face = add_expression_shapes(face)
+    weights = expression_weights(complete_face, build_lip_constraints(complete_face))
+    motion = scatter_landmarks(complete_face, landmark_motion(complete_face, np.arange(len(complete_face.shape_names))))
     moved: FloatArray = np.nan_to_num(np.einsum("lck,ek->elc", motion, weights))
     moved[:, N_SKIN:] = 0.0
     return moved

@@ -1,7 +1,7 @@
-"""Lids that shut on every face: fitted to where they are fully open and fully closed.
+"""Eyelid model of a face: blinks as shares of the eye opening.
 
 Ju and Lee 2008, section 5.2: an affine transform between the lids of two faces, so that they match at wide opening and
-at closing. Shares of the opening are carried, so that lids meet whatever else moves them, and never cross.
+at closing. Blinks are transferred as shares of the opening, so that lids meet and never cross under any other shape.
 """
 
 from dataclasses import dataclass
@@ -14,31 +14,32 @@ from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scat
 from tts2face.models.face import Face
 from tts2face.numeric import ordered_product
 
-SIDES = ("Left", "Right")  # the face's own, in the order of `tts2face.models.palette.EYE_CHANNELS`
+SIDES = ("Left", "Right")  # of the face itself, in the order of `tts2face.models.palette.EYE_CHANNELS`
 # Upper and lower lid of each eye, at the middle and halfway to the nose: where they meet last.
 LID_LANDMARK_PAIRS = (((386, 385), (374, 380)), ((159, 158), (145, 153)))
 BLINK_SHAPES, WIDE_SHAPES = ("eyeBlinkLeft", "eyeBlinkRight"), ("eyeWideLeft", "eyeWideRight")
 NARROWING_SHAPES = (("eyeSquintLeft", "cheekSquintLeft"), ("eyeSquintRight", "cheekSquintRight"))
-MAX_NARROWING = 0.6  # of the opening that squinting may take, so that lids that nobody shuts do not meet
+MAX_NARROWING = 0.6  # largest share of the opening that squinting may close
 
 FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EyelidModel:
-    """What lids do for weights of a face's shapes.
+    """Eye opening as a linear function of a face's shape weights.
 
     Parameters
     ----------
     opening : (2,)
-        Of each eye at rest, mm.
+        Opening of each eye at rest, mm.
     per_weight : (2, K)
-        Widening per weight of each shape, mm.
+        Change of the opening per weight of each shape, mm.
     blink, wide : (2,)
-        Numbers of the shapes that shut and widen each eye.
+        Indices of the shapes that close and widen each eye.
     narrowing : (2, n)
-        Those that narrow it.
+        Indices of the shapes that narrow each eye.
     limits : (K, 2)
+        Least and greatest weight of each shape.
     """
 
     opening: FloatArray
@@ -49,9 +50,9 @@ class EyelidModel:
     limits: FloatArray
 
     def close(self, weights: FloatArray, shares: FloatArray) -> FloatArray:
-        """(T, K) weights with the lids shut by (T, 2) shares of their opening: 0 as the weights leave them, 1 shut.
+        """Weights (T, K) with the lids closed by shares (T, 2) of their opening: 0 keeps it, 1 closes the eye.
 
-        What squints or widens an eye gives way as it shuts.
+        Negative shares widen. Shapes that narrow or widen an eye are attenuated by the share.
         """
         lids = weights.copy()
         for eye in range(len(SIDES)):
@@ -65,21 +66,21 @@ class EyelidModel:
         return lids
 
     def _limit_narrowing(self, lids: FloatArray, eye: int) -> None:
-        """Hold squinting within what is open, in place."""
+        """Limit the narrowing shapes to `MAX_NARROWING` of the opening, in place."""
         columns = self.narrowing[eye]
-        taken = -ordered_product(lids[:, columns], self.per_weight[eye, columns])
-        others = self.opening[eye] + ordered_product(lids, self.per_weight[eye]) + taken
-        most = MAX_NARROWING * np.maximum(others, 0.0)
-        lids[:, columns] *= np.where(taken > most, most / np.maximum(taken, 1e-9), 1.0)[:, None]
+        narrowed = -ordered_product(lids[:, columns], self.per_weight[eye, columns])
+        opening = self.opening[eye] + ordered_product(lids, self.per_weight[eye]) + narrowed
+        allowed = MAX_NARROWING * np.maximum(opening, 0.0)
+        lids[:, columns] *= np.where(narrowed > allowed, allowed / np.maximum(narrowed, 1e-9), 1.0)[:, None]
 
 
 def build_eyelid_model(face: Face) -> EyelidModel:
-    """The lids of a face that has the shapes `BLINK_SHAPES`, `WIDE_SHAPES` and `NARROWING_SHAPES`.
+    """Eyelid model of a face with the shapes `BLINK_SHAPES`, `WIDE_SHAPES` and `NARROWING_SHAPES`.
 
     Raises
     ------
     DataError
-        It lacks their landmarks, or its shapes do not move them.
+        The face lacks landmarks of its lids, or its blink and wide shapes do not close and open them.
     """
     places = scatter_landmarks(face, landmark_positions(face))[:, 1]
     motion = scatter_landmarks(face, landmark_motion(face, np.arange(len(face.shape_names))))[:, 1]
@@ -93,7 +94,7 @@ def build_eyelid_model(face: Face) -> EyelidModel:
         raise DataError("the face lacks landmarks of its lids; build it with its landmark table")
     if not all((per_weight[eye, blink[eye]] < 0) and (per_weight[eye, wide[eye]] > 0) for eye in range(len(SIDES))):
         raise DataError(
-            f"{BLINK_SHAPES[0]} does not shut the face's lids, or {WIDE_SHAPES[0]} does not open them; build it again"
+            f"{BLINK_SHAPES[0]} does not close the face's lids, or {WIDE_SHAPES[0]} does not open them; build it again"
         )
     return EyelidModel(
         opening=opening,

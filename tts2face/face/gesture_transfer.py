@@ -1,4 +1,4 @@
-"""Gestures on any face: expressions, brows, lids, cheeks, gaze and head laid over its speech.
+"""Gesture transfer to a mesh face: expressions, brows, lids, cheeks, gaze and head, added to speech.
 
 Ju and Lee 2008, section 5: ``F(t) = R(t) (N + sum_i c_i B_i + sum_l d_l P_l + sum_j D_j) + T(t)``. Weights c of the
 basis expressions are shared between faces; D_j move landmarks, scaled to the face and spread around them (5.2).
@@ -24,19 +24,19 @@ from tts2face.models.palette import FEATURES, FIXED_CHANNELS, REGION_FEATURES, F
 from tts2face.numeric import ordered_product
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
-# Weights of an expression from which the mouth begins to answer, and answers in full: a neutral speaker reads as up to
-# .1 sad or angry (99th percentile of 40 minutes), and the mouth's part of that is in the recorded lips already.
+# Expression weights at which the mouth begins to respond and responds in full: a neutral speaker scores up to 0.1 sad
+# or angry (99th percentile of 40 minutes), and the recorded lips already contain the mouth's part of it.
 MOUTH_RESPONSE_RANGE = (0.05, 0.2)
 SPEECH_GAINS = ("jaw", "lips")
-GAIN_NAMES = (*FEATURES, *SPEECH_GAINS)  # whose motion may be multiplied
-MAX_MODE_MM = 10.0  # of a landmark by one mode: brows rise 10 mm at most
-# What stays still while a region moves: the rims of the lids, and the lips. Lids and lips have features of their own.
+GAIN_NAMES = (*FEATURES, *SPEECH_GAINS)  # whose motion has a gain
+MAX_MODE_MM = 10.0  # largest displacement of a landmark by one mode: brows rise up to 10 mm
+# Landmarks that stay still while a region moves: rims of the lids, and lips, which have features of their own.
 LID_LANDMARKS = (
     33, 246, 161, 160, 159, 158, 157, 173, 133, 155, 154, 153, 145, 144, 163, 7,
     263, 466, 388, 387, 386, 385, 384, 398, 362, 382, 381, 380, 374, 373, 390, 249,
 )  # fmt: skip
 LIP_LANDMARKS = (*OUTER_LIP_UPPER, *OUTER_LIP_LOWER, *INNER_LIP_UPPER, *INNER_LIP_LOWER)
-# Added to a region when its size is fitted: corners of the eyes, root and base of the nose.
+# Landmarks added to a region for the fit of its size: corners of the eyes, root and base of the nose.
 FIT_LANDMARKS = (33, 133, 362, 263, 168, 6, 2)
 DEFAULT_GAZE_TURN = 0.4  # rad per weight of a gaze shape on a face whose eyes are part of its shapes
 
@@ -47,7 +47,7 @@ NO_GAINS: Mapping[str, float] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FaceMotion:
-    """A face that speaks and moves: weights (T, K) of the shapes of `GestureFace.face`, and its head (T, 6)."""
+    """Shape weights (T, K) of `GestureFace.face` and head pose (T, 6) of speech with gestures."""
 
     motion: Trajectory
     head: Trajectory
@@ -55,22 +55,22 @@ class FaceMotion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GestureFace:
-    """A face made ready for gestures; `gesture_face` makes it.
+    """Face prepared for the gestures of a palette; built by `gesture_face`.
 
     Parameters
     ----------
     face
-        The given face, with further shapes behind its own; draw this one.
-    n_own
+        The given face with gesture shapes appended.
+    n_speech_shapes
         Number of shapes of the given face.
     expressions : (5, K)
-        Weights of the shapes in each of `tts2face.models.palette.EXPRESSIONS`.
+        Shape weights of each of `tts2face.models.palette.EXPRESSIONS`.
     regions
-        Numbers of the shapes of each region's modes.
+        Range of the shapes of each region's modes.
     gaze : (4, K)
-        Weight per radian of looking down, up, to the own left and to the right.
+        Weights per radian of gaze down, up, to the face's own left and to its right.
     mouth, lids
-        What lips and lids do.
+        Constraints of lips and lids.
     """
 
     face: Face
@@ -84,62 +84,59 @@ class GestureFace:
     def perform(
         self, speech: Trajectory, gestures: Mapping[str, Float32Array], gains: Mapping[str, float] = NO_GAINS
     ) -> FaceMotion:
-        """Speech with gestures.
+        """Shape weights and head pose of speech with gestures.
 
         Parameters
         ----------
-        speech : (T, n_own)
-            Weights of the shapes of the given face, as `tts2face.retargeting.to_face.Retargeter` makes them.
+        speech : (T, n_speech_shapes)
+            Weights of the shapes of the given face, as `tts2face.retargeting.to_face.Retargeter` returns them.
         gestures
-            (T, k) values of features of the palette, in its units; nothing moves where one is absent.
+            (T, k) values of each feature of the palette, in its units; missing features are at rest.
         gains
-            Factors by which the motion of features is multiplied, and of ``jaw`` and ``lips`` the speech's; closed
-            lips stay closed.
+            Factors on the motion of features, and on the speech motion of ``jaw`` and ``lips``; closed lips stay
+            closed.
 
         Raises
         ------
         InputError
-            The speech is not in the given face's shapes, a feature or gain does not exist, is not finite, or does
-            not fit the speech's frames.
+            The speech is not in the given face's shapes, or a feature or gain does not exist, is not finite, or
+            differs from the speech in its number of frames.
         """
         self._check(speech, gestures, gains)
         spoken = np.zeros((len(speech), len(self.face.shape_names)))
         spoken[:, : self.n_speech_shapes] = speech.values
-        felt = {name: gains.get(name, 1.0) * values.astype(np.float64) for name, values in gestures.items()}
+        features = {name: gains.get(name, 1.0) * values.astype(np.float64) for name, values in gestures.items()}
         spoken = self._scale_speech(spoken, gains)
-        added = self._gesture_weights(spoken, felt)
-        shares = felt.get("blink", np.zeros((len(speech), 2)))
+        added = self._gesture_weights(spoken, features)
+        shares = features.get("blink", np.zeros((len(speech), 2)))
         added = self.lids.close(spoken + added, shares) - spoken
-        weights = self.mouth.held(spoken, added)
-        for (
-            name,
-            columns,
-        ) in self.regions.items():  # they leave lids and lips alone, and lids and lips know nothing of them
-            if name in felt:
-                weights[:, columns] = np.clip(felt[name], *self.face.limits[columns].T.astype(np.float64))
-        head = felt.get("head", np.zeros((len(speech), len(HEAD_CHANNELS))))
+        weights = self.mouth.combine(spoken, added)
+        for name, columns in self.regions.items():  # region shapes do not move lids or lips
+            if name in features:
+                weights[:, columns] = np.clip(features[name], *self.face.limits[columns].T.astype(np.float64))
+        head = features.get("head", np.zeros((len(speech), len(HEAD_CHANNELS))))
         return FaceMotion(
             Trajectory(self.face.shape_names, weights, speech.fps), Trajectory(HEAD_CHANNELS, head, speech.fps)
         )
 
     def _scale_speech(self, spoken: FloatArray, gains: Mapping[str, float]) -> FloatArray:
-        """Speech with its jaw and lips multiplied."""
+        """Speech weights (T, K) with the gains of jaw and lips applied."""
         jaw, lips = (
             np.where([shape.startswith(prefix) for shape in self.face.shape_names], gains.get(name, 1.0), 1.0)
             for name, prefix in zip(SPEECH_GAINS, SPEECH_SHAPE_PREFIXES, strict=True)
         )
         return self.mouth.amplify(spoken, jaw, lips)
 
-    def _gesture_weights(self, spoken: FloatArray, felt: Mapping[str, FloatArray]) -> FloatArray:
-        """(T, K) what expression and gaze add to speech; apart from the mouth within the shapes' limits."""
+    def _gesture_weights(self, spoken: FloatArray, features: Mapping[str, FloatArray]) -> FloatArray:
+        """Weights (T, K) that expression and gaze add to speech; clipped to the limits, except for the mouth's."""
         added = np.zeros_like(spoken)
-        if "expression" in felt:
-            added += ordered_product(felt["expression"], self.expressions)
+        if "expression" in features:
+            added += ordered_product(features["expression"], self.expressions)
             lips = self.mouth.moving
-            added[:, lips] = ordered_product(mouth_response(felt["expression"]), self.expressions[:, lips])
+            added[:, lips] = ordered_product(mouth_response(features["expression"]), self.expressions[:, lips])
             added = self.mouth.attenuate_on_rounded_lips(spoken, added)
-        if "gaze" in felt:
-            down, left = felt["gaze"].T
+        if "gaze" in features:
+            down, left = features["gaze"].T
             turned = np.stack([np.maximum(down, 0), np.maximum(-down, 0), np.maximum(left, 0), np.maximum(-left, 0)])
             added += ordered_product(turned.T, self.gaze)
         others = np.setdiff1d(np.arange(spoken.shape[1]), self.mouth.moving)
@@ -155,7 +152,7 @@ class GestureFace:
 
 
 def mouth_response(expression: FloatArray) -> FloatArray:
-    """Weights of expressions (T, 5) as the mouth answers them, whose motion in a neutral face is speech already."""
+    """Expression weights (T, 5) for the mouth: attenuated below `MOUTH_RESPONSE_RANGE`, where speech contains them."""
     low, high = MOUTH_RESPONSE_RANGE
     share = np.clip((np.abs(expression) - low) / (high - low), 0.0, 1.0)
     return np.asarray(expression * share * share * (3.0 - 2.0 * share))
@@ -164,12 +161,12 @@ def mouth_response(expression: FloatArray) -> FloatArray:
 def check_gestures(
     gestures: Mapping[str, Float32Array], gains: Mapping[str, float], n_frames: int, regions: Mapping[str, int]
 ) -> None:
-    """Refuse gestures that are none, or do not fit the frames or the palette; `regions` are numbers of modes.
+    """Check gestures and gains against the frames and the palette; `regions` holds the number of modes per region.
 
     Raises
     ------
     InputError
-        A feature or gain does not exist, is not finite, or has other sizes.
+        A feature or gain does not exist, is not finite, or has the wrong shape.
     """
     widths = {name: len(channels) for name, channels in FIXED_CHANNELS.items()} | dict(regions)
     for name, values in gestures.items():
@@ -186,45 +183,47 @@ def check_gestures(
 
 
 def gesture_face(face: Face, palette: Palette) -> GestureFace:
-    """Prepare a face for the gestures of a palette.
+    """Face prepared for the gestures of a palette.
 
-    ARKit shapes that the face lacks are carried from the default head by the landmarks; each mode of the palette's
+    ARKit shapes that the face lacks are transferred from the default head by the landmarks; each mode of the palette's
     regions becomes a shape such as ``brows0``.
 
     Raises
     ------
     DataError
-        The face lacks landmarks of the eyes or lips, or a shape that speech could move.
+        The face lacks landmarks of the eyes or lips, or has no shape that speech moves.
     """
-    build_lip_constraints(face)  # refuses a face without lips before anything is carried to it
-    whole = add_expression_shapes(face)
+    build_lip_constraints(face)  # raises for a face without lips before the transfer
+    extended_face = add_expression_shapes(face)
     regions: dict[str, slice] = {}
     for name in REGION_FEATURES:
-        shapes = region_shapes(whole, palette.neutral.astype(np.float64), palette.regions[name])
-        first = len(whole.shape_names)
+        shapes = region_shapes(extended_face, palette.neutral.astype(np.float64), palette.regions[name])
+        first = len(extended_face.shape_names)
         regions[name] = slice(first, first + len(shapes))
         size = np.linalg.norm(palette.regions[name].modes, axis=2).max(axis=1)
-        most = MAX_MODE_MM / np.maximum(size.astype(np.float64), 1e-6)
-        whole = append_shapes(whole, palette.channels(name), shapes, np.column_stack([-most, most]))
-    mouth = build_lip_constraints(whole)
+        largest_weight = MAX_MODE_MM / np.maximum(size.astype(np.float64), 1e-6)
+        extended_face = append_shapes(
+            extended_face, palette.channels(name), shapes, np.column_stack([-largest_weight, largest_weight])
+        )
+    mouth = build_lip_constraints(extended_face)
     return GestureFace(
-        face=whole,
+        face=extended_face,
         n_speech_shapes=len(face.shape_names),
-        expressions=expression_weights(whole, mouth),
+        expressions=expression_weights(extended_face, mouth),
         regions=regions,
-        gaze=gaze_weights(whole),
+        gaze=gaze_weights(extended_face),
         mouth=mouth,
-        lids=build_eyelid_model(whole),
+        lids=build_eyelid_model(extended_face),
     )
 
 
 def region_shapes(face: Face, neutral: FloatArray, region: FaceRegion) -> Float32Array:
-    """(k, V, 3) shapes of a region's modes on a face, mm per mm.
+    """Shapes (k, V, 3) of a region's modes on a face, mm per mm.
 
     Notes
     -----
-    The modes are turned as the face lies to `neutral` (478, 3), scaled by an affine fit of each axis on the region and
-    its frame of eye corners and nose, and spread by compact cubic B-splines.
+    The modes are rotated by the Procrustes fit of the face to `neutral` (478, 3), scaled by a fit of each axis on the
+    region, eye corners and nose, and interpolated over the skin by compact cubic B-splines.
     """
     places = scatter_landmarks(face, landmark_positions(face))
     own = {*region.landmarks.tolist()}
@@ -233,20 +232,20 @@ def region_shapes(face: Face, neutral: FloatArray, region: FaceRegion) -> Float3
 
 
 def fit_modes(places: FloatArray, neutral: FloatArray, region: FaceRegion) -> FloatArray:
-    """(k, L, 3) a region's modes in the size of landmarks (478, 3), of which some may be NaN."""
-    seen: NDArray[np.bool_] = np.isfinite(places[:, 0])
-    skin = np.flatnonzero(seen[:N_SKIN])
+    """Modes (k, L, 3) of a region, rotated and scaled to the landmarks `places` (478, 3), some of which may be NaN."""
+    known: NDArray[np.bool_] = np.isfinite(places[:, 0])
+    skin = np.flatnonzero(known[:N_SKIN])
     turn = procrustes_rotation(neutral[skin], places[skin])
-    fitted = np.array([number for number in (*region.landmarks, *FIT_LANDMARKS) if seen[number]])
+    fitted = np.array([number for number in (*region.landmarks, *FIT_LANDMARKS) if known[number]])
     sizes = axis_scales(ordered_product(neutral[fitted], turn.T), places[fitted], SCALE_LIMITS)
     return ordered_product(region.modes.astype(np.float64), turn.T) * sizes
 
 
 def gaze_weights(face: Face) -> FloatArray:
-    """(4, K) weight of each gaze shape per radian of looking down, up, to the face's own left, and right.
+    """Weights (4, K) of the gaze shapes per radian of gaze down, up, to the face's own left and to its right.
 
-    Eyes that turn take their own angles; shapes that move eyes as part of the skin are taken to turn them by
-    `DEFAULT_GAZE_TURN`.
+    Shapes that rotate eyeballs have known angles; shapes that move the eyes as part of the skin are assumed to rotate
+    them by `DEFAULT_GAZE_TURN` at weight 1.
     """
     directions = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])  # about x and y
     weights = np.zeros((4, len(face.shape_names)))
@@ -260,7 +259,7 @@ def gaze_weights(face: Face) -> FloatArray:
 
 
 def _default_gaze_axis(name: str) -> FloatArray:
-    """Rotation axis (3,) of a gaze shape by its name."""
+    """Signed rotation axis (3,) of a gaze shape, derived from its name."""
     if "Up" in name or "Down" in name:
         return np.array([1.0 if "Down" in name else -1.0, 0.0, 0.0])
     to_left = ("Out" in name) == name.endswith("Left")

@@ -1,4 +1,4 @@
-"""How the shapes of a face move its mouth: the shapes that speech moves, and the normal matrix of visible changes."""
+"""Mouth of a face: the shapes that speech moves, and the normal matrix of its visible changes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,48 +15,56 @@ from tts2face.models.landmarks import (
 from tts2face.numeric import ordered_product
 
 FloatArray = NDArray[np.float64]
-SPEECH_SHAPE_PREFIXES = ("jaw", "mouth")  # how the names of the shapes that speech moves begin
+SPEECH_SHAPE_PREFIXES = ("jaw", "mouth")  # name prefixes of the shapes that speech moves
 CORNERS_LEFT, CORNERS_RIGHT = (OUTER_LIP_UPPER[-1], INNER_LIP_UPPER[-1]), (OUTER_LIP_UPPER[0], INNER_LIP_UPPER[0])
-CHIN_LANDMARKS = (175, 199, 171, 396, 208, 428)  # where the skin lies on the bone of the jaw
+CHIN_LANDMARKS = (175, 199, 171, 396, 208, 428)  # skin over the bone of the jaw
 MIDDLE_PAIR = INNER_LIP_UPPER.index(UPPER_LIP_INNER_MID)
-LIP_WEIGHT = 10.0  # a lip landmark against one of the jaw or cheek
-DEPTH_WEIGHT = 0.1  # z against x and y: a single camera sees depth with some ten times their error
-WIDTH_WEIGHT = 60.0  # the mouth's width, likewise: rounding is the other thing that a viewer reads from lips
-CHIN_WEIGHT = 600.0  # the drop of the chin, likewise: it sets how far the teeth go apart
-REGULARISATION = 0.005  # share of the mean curvature that draws every weight to 0: makes the answer unique and calm
+LIP_WEIGHT = 10.0  # of a lip landmark, relative to one of the jaw or cheek
+DEPTH_WEIGHT = 0.1  # of z, relative to x and y: a single camera measures depth with about ten times their error
+WIDTH_WEIGHT = 60.0  # of the mouth's width, relative to a landmark: viewers read rounding from it
+CHIN_WEIGHT = 600.0  # of the drop of the chin, relative to a landmark: it sets the distance of the teeth
+REGULARISATION = 0.005  # ridge term as a share of the mean curvature: makes the solution unique and smooth
 
 
 def mouth_curvature(moved: FloatArray, common: list[int]) -> FloatArray:
-    """(k, k) normal matrix of what is seen of a mouth, its lip gaps excepted, and of the effort.
+    """Normal matrix (k, k) of the visible changes of a mouth without its lip gaps, plus a ridge term.
 
     Parameters
     ----------
     moved : (L, 3, k)
         Motion of the landmarks `common` per weight, mm.
+    common
+        Landmark index of each row of `moved`.
     """
     at = {landmark: row for row, landmark in enumerate(common)}
     curvature: FloatArray = np.einsum("ldk,ldj->kj", moved * landmark_weights(common)[..., None], moved)
-    effort = REGULARISATION * np.trace(curvature) / moved.shape[-1]
+    ridge = REGULARISATION * np.trace(curvature) / moved.shape[-1]
     left, right = ([at[corner] for corner in corners] for corners in (CORNERS_LEFT, CORNERS_RIGHT))
     widened = moved[left, 0] - moved[right, 0]
-    curvature += WIDTH_WEIGHT * ordered_product(widened.T, widened) + effort * np.eye(moved.shape[-1])
+    curvature += WIDTH_WEIGHT * ordered_product(widened.T, widened) + ridge * np.eye(moved.shape[-1])
     dropped = moved[[at[landmark] for landmark in CHIN_LANDMARKS if landmark in at], 1].mean(axis=0)
     curvature += CHIN_WEIGHT * np.outer(dropped, dropped)
     return curvature
 
 
 def require_lips(face: Face, moving: NDArray[np.int64]) -> None:
-    """Refuse a face that lacks lips' landmarks, or has no shapes that move them (DataError)."""
+    """Check that a face has landmarks of the lips and shapes that move them.
+
+    Raises
+    ------
+    DataError
+        A landmark of the lips is missing, or `moving` is empty.
+    """
     known = set(face.landmarks.tolist())
     lips = (*INNER_LIP_UPPER, *INNER_LIP_LOWER, *OUTER_LIP_UPPER, *OUTER_LIP_LOWER)
     missing = [landmark for landmark in lips if landmark not in known]
     if missing or not len(moving):
         what = f"landmark {missing[0]} of the lips" if missing else "shapes named jaw... or mouth..."
-        raise DataError(f"the face lacks {what}, so no speech can move it; build it with its landmark table")
+        raise DataError(f"the face lacks {what}, so speech cannot move it; build it with its landmark table")
 
 
 def landmark_weights(common: list[int]) -> FloatArray:
-    """(L, 3) weight of each landmark coordinate."""
+    """Weights (L, 3) of the coordinates of the landmarks `common`."""
     lips = {*INNER_LIP_UPPER, *INNER_LIP_LOWER, *OUTER_LIP_UPPER, *OUTER_LIP_LOWER}
     per_landmark = np.array([LIP_WEIGHT if landmark in lips else 1.0 for landmark in common])
     weights: FloatArray = per_landmark[:, None] * np.array([1.0, 1.0, DEPTH_WEIGHT])

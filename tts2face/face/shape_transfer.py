@@ -1,4 +1,4 @@
-"""Motion of landmarks carried to the skin of a face, and shapes that a face lacks carried from the default head."""
+"""Transfer of landmark motion to the skin of a face, and of missing shapes from the default head."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,27 +15,25 @@ from tts2face.models.face_file import load_face
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS
 
 DEFAULT_FACE = "head"
-SOFT_PARTS = ("lash", "brow")  # parts that go with the skin, by what their names hold
-SUPPORT = 0.3  # of the distance of the outer eye corners, some 27 mm: from a brow to its lid and no further
-MERGE_DISTANCE = 0.02  # of that distance: landmarks nearer than 2 mm, as those of closed lips, are one centre
-DIGITS = 5  # of a displacement in mm; the last bits of a solver depend on its threads
-MAX_CARRIED_WEIGHT = 1.5  # a carried shape reaches further than on the default head where a face is made so
-EYEBALL_RETRACTION_FACTOR = (
-    1.5  # times as far as on the default head do eyeballs go in: carried lids follow the eyeball less closely
-)
-SCALE_LIMITS = (0.4, 2.5)  # a face's features against another's, axis by axis; beyond that landmarks are wrong
+SOFT_PARTS = ("lash", "brow")  # substrings of the names of parts that move with the skin
+SUPPORT = 0.3  # relative to the distance of the outer eye corners, about 27 mm: from a brow to its lid
+MERGE_DISTANCE = 0.02  # relative to the same distance: landmarks closer than 2 mm, as on closed lips, are merged
+DIGITS = 5  # decimals of a displacement in mm; the last bits of a solver depend on its threads
+MAX_CARRIED_WEIGHT = 1.5  # upper limit of transferred shapes, whose effect may be smaller than on the default head
+EYEBALL_RETRACTION_FACTOR = 1.5  # relative to the default head: transferred lids follow the eyeball less closely
+SCALE_LIMITS = (0.4, 2.5)  # of facial features between two faces, per axis; beyond them the landmarks are wrong
 
 Float32Array = NDArray[np.float32]
 FloatArray = NDArray[np.float64]
 
 
 def eye_distance(face: Face) -> float:
-    """Distance of the outer eye corners, mm: the size of a face.
+    """Distance of the outer eye corners, mm; the measure of the size of a face.
 
     Raises
     ------
     DataError
-        The face lacks their landmarks.
+        The face lacks landmarks 33 or 263.
     """
     places = scatter_landmarks(face, landmark_positions(face))
     distance = float(np.linalg.norm(places[EYE_OUTER_LEFT] - places[EYE_OUTER_RIGHT]))
@@ -45,7 +43,7 @@ def eye_distance(face: Face) -> float:
 
 
 def soft_vertices(face: Face) -> NDArray[np.int64]:
-    """Numbers of the vertices that gestures move: the parts that bear landmarks, lashes and brows; not the eyeballs."""
+    """Indices of the vertices that gestures move: parts with landmarks, lashes and brows; not the eyeballs."""
     on_skin = np.zeros(len(face.vertices), bool)
     on_skin[face.landmark_vertices[face.landmarks < N_SKIN]] = True
     soft = np.zeros(len(face.vertices), bool)
@@ -61,9 +59,9 @@ def soft_vertices(face: Face) -> NDArray[np.int64]:
 def spread_landmark_motion(
     face: Face, landmarks: NDArray[np.integer], motion: FloatArray, still: Sequence[int] = ()
 ) -> Float32Array:
-    """(k, V, 3) displacement of the vertices for k motions (k, L, 3) of landmarks, mm.
+    """Vertex displacements (k, V, 3) for k motions (k, L, 3) of the landmarks, mm.
 
-    Landmarks that the face lacks are left out; those of `still` stay where they are.
+    Landmarks that the face lacks are skipped; those in `still` have displacement 0.
     """
     places = scatter_landmarks(face, landmark_positions(face))
     wanted = np.zeros((N_LANDMARKS, *motion.transpose(1, 0, 2).shape[1:]))
@@ -81,7 +79,7 @@ def spread_landmark_motion(
 
 
 def append_shapes(face: Face, names: Sequence[str], shapes: Float32Array, limits: NDArray[np.floating]) -> Face:
-    """A face with more shapes (k, V, 3), and their limits (k, 2)."""
+    """Face with further shapes (k, V, 3), mm per weight, and their limits (k, 2)."""
     return replace(
         face,
         shape_names=(*face.shape_names, *names),
@@ -91,17 +89,17 @@ def append_shapes(face: Face, names: Sequence[str], shapes: Float32Array, limits
 
 
 def add_missing_shapes(face: Face, names: Sequence[str]) -> Face:
-    """A face with all the named ARKit shapes: those that it lacks move its landmarks as on the default head.
+    """Face with all the named ARKit shapes; missing ones move its landmarks as on the default head.
 
-    Sizes are fitted axis by axis. Eyeballs that nothing turns turn with the carried gaze shapes.
+    Sizes are fitted per axis. Eyeballs without rotations take those of the transferred gaze shapes.
     """
     missing = [name for name in dict.fromkeys(names) if name not in face.shape_names]
     if not missing:
         return face
     head = default_head()
     common = np.intersect1d(face.landmarks[face.landmarks < N_SKIN], head.landmarks)
-    here, there = (scatter_landmarks(one, landmark_positions(one)) for one in (face, head))
-    sizes = axis_scales(there[common], here[common], SCALE_LIMITS)
+    places, head_places = (scatter_landmarks(model, landmark_positions(model)) for model in (face, head))
+    sizes = axis_scales(head_places[common], places[common], SCALE_LIMITS)
     motion = scatter_landmarks(
         head, landmark_motion(head, np.array([head.shape_names.index(name) for name in missing]))
     )
@@ -115,7 +113,7 @@ def add_missing_shapes(face: Face, names: Sequence[str]) -> Face:
 
 
 def _merge_places(places: FloatArray, values: FloatArray, apart: float) -> tuple[FloatArray, FloatArray]:
-    """Places no two of which are nearer than `apart`, and the mean values of those that each stands for."""
+    """Points (M, 3) at least `apart` from each other, and the mean values (M, E) of those merged into each."""
     kept: list[int] = []
     member = np.zeros(len(places), np.int64)
     for number, place in enumerate(places):
@@ -132,7 +130,7 @@ def _merge_places(places: FloatArray, values: FloatArray, apart: float) -> tuple
 
 
 def _eyeball_retraction(eye: Eye, names: Sequence[str]) -> FloatArray:
-    """(k, 3) how far the default head's shapes shift the eyeball of this side, mm: lids that shut slide over it."""
+    """Displacement (k, 3) of this side's eyeball for the default head's shapes, mm: it gives way to closing lids."""
     head, model = default_head(), _default_head_eye(eye)
     shifts = [head.shapes[head.shape_names.index(name), model.first : model.first + model.count] for name in names]
     return EYEBALL_RETRACTION_FACTOR * np.stack([shift.mean(axis=0, dtype=np.float64) for shift in shifts])
@@ -151,5 +149,5 @@ def _default_head_eye(eye: Eye) -> Eye:
 
 @cache
 def default_head() -> Face:
-    """The head from which motion is carried."""
+    """Default head, the source of transferred shapes; loaded once."""
     return load_face(DEFAULT_FACE)

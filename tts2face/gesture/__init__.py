@@ -1,1 +1,1 @@
-"""Expression, brows, blinks, cheeks, gaze and head: gestures that go with speech, or with silence."""
+"""Gesture synthesis for speech and silence: expression, brows, blinks, cheeks, gaze and head."""

@@ -1,4 +1,4 @@
-"""Smooth beginnings and ends: how much of a span is on at each instant."""
+"""Smooth transitions of spans and key frames."""
 
 from itertools import pairwise
 
@@ -9,10 +9,10 @@ FloatArray = NDArray[np.float64]
 
 
 def span_weights(times: ArrayLike, start: float, end: float, ease_s: float) -> FloatArray:
-    """Share (T,) of a span that is on at each of T times: 0 outside, 1 inside, half at its edges.
+    """(T,) weights of a span at T times in seconds: 0 outside, 1 inside, 0.5 at its edges.
 
-    The span's step smoothed by a raised cosine `ease_s` wide, so that the shares of spans that meet add up to 1. A span
-    from 0 s or before has been on all along, one until infinity stays.
+    The edges are smoothed by a raised cosine of width `ease_s`, so that the weights of adjacent spans add up to 1. A
+    span that starts at or before 0 s has no rising edge, an infinite one no falling edge.
     """
     seconds = np.asarray(times, np.float64)
     begun = np.ones(seconds.shape) if start <= 0.0 else _raised_cosine_integral((seconds - start) / ease_s)
@@ -21,13 +21,13 @@ def span_weights(times: ArrayLike, start: float, end: float, ease_s: float) -> F
 
 
 def _raised_cosine_integral(share: FloatArray) -> FloatArray:
-    """From 0 at -1/2 to 1 at 1/2: the integral of a raised cosine."""
+    """Integral of a raised cosine: 0 at -1/2, 1 at 1/2."""
     at = np.clip(2 * share, -1.0, 1.0)
     return 0.5 * (1 + at + np.sin(np.pi * at) / np.pi)
 
 
 def interpolate_keys(times: ArrayLike, keys: tuple[tuple[float, float], ...]) -> FloatArray:
-    """Values (T,) on a curve through (time, value) keys that stands still at each; constant outside them."""
+    """(T,) values at T times of a curve through (time, value) keys with zero slope at each; constant outside."""
     seconds = np.asarray(times, np.float64)
     curve = np.full(seconds.shape, keys[0][1])
     for (begin, low), (end, high) in pairwise(keys):

@@ -1,7 +1,7 @@
-"""Markov random fields over recorded gestures: each frame is drawn from moments like the present one.
+"""Markov random fields over recorded gestures (Ju and Lee 2008, section 5.1).
 
-Ju and Lee 2008, section 5.1: the next value is that of a recorded moment whose last frames, and the sound in them, are
-most like those just shown; one of the few best, drawn with a probability that falls with its distance.
+The next frame is sampled from the recorded frames ("moments") whose preceding motion and sound are most similar to the
+frames just generated; the probability of each candidate decreases with its distance.
 """
 
 from dataclasses import dataclass, replace
@@ -15,42 +15,42 @@ from tts2face.gesture.field_kernels import MIN_MOMENT_GAP, SEARCH_SLACK, generat
 from tts2face.gesture.kd_tree import KdTree, build_tree
 from tts2face.models.palette import GESTURE_FPS
 
-N_SEARCH_AXES = 8  # of the search: the windows' principal axes
-AXES_STRIDE = 8  # every so many windows tell the axes; all of them tell the same
-N_DISTANCE_SAMPLES = 200  # moments whose nearest ones are looked for
+N_SEARCH_AXES = 8  # principal axes of the windows in which the search tree is built
+AXES_STRIDE = 8  # the axes are computed from every eighth window; all windows give the same axes
+N_DISTANCE_SAMPLES = 200  # moments from which the median nearest distance is estimated
 Float32Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FieldOptions:
-    """How a field chooses; the defaults were chosen on recordings (docs/gestures.md).
+    """Sampling options of a field; the defaults were tuned on recordings (docs/gestures.md).
 
     Parameters
     ----------
     history
-        Frames that are compared; h of the paper.
+        Number of preceding frames that are compared; h of the paper.
     candidates
-        Moments among which is drawn.
+        Number of moments from which one is sampled.
     alpha
-        Weight of each sound feature against the motion, both in units of their variance.
+        Weight of each sound feature relative to the motion, both in units of their variance.
     sigma
-        A moment that is farther by sigma is e times less likely; in units of how far the recorded moment lies that is
-        most like another one (median).
+        Distance that lowers the probability of a moment by the factor e, in units of the median distance between a
+        recorded moment and its nearest neighbour.
     stride
-        Frames from draw to draw; the paper draws every frame.
+        Frames between samples; the paper samples every frame.
     continuity
-        The moment that goes on from the last one counts as nearer by this factor: 1 as in the paper; less leaps less.
+        Factor on the distance of the moment that continues the recording: 1 as in the paper, less for fewer jumps.
     future
-        Frames that must follow a moment in its recording to be leapt to: at a recording's end there is no way on.
+        Number of frames that must follow a moment in its recording for a jump to it.
     settle_s
-        Time constant of the spring that takes what is left of a leap away: after three of it a fifth is left. 0 for
-        none: frames are those of the recordings.
+        Time constant in seconds of the spring by which the offset after a jump decays, to a fifth after three time
+        constants; 0 for no offset, so that the recorded values are used unchanged.
     memory
-        Leaps after which the same moment may be leapt to again: without it silence ends in a loop.
+        Number of jumps before the same moment can be chosen again; without it, silence ends in a loop.
     apart
-        Least number of frames between two candidates of one recording; 1 makes every frame a candidate of its own.
+        Least number of frames between two candidates of one recording; with 1, every frame is a separate candidate.
     search_error
-        Candidates are at most this factor farther than the best ones; 1 is an exact search.
+        Largest factor by which the distance of the candidates found exceeds the best ones; 1 for an exact search.
 
     Raises
     ------
@@ -75,9 +75,9 @@ class FieldOptions:
         if not 2 <= self.history <= 60 or not 1 <= self.stride <= 60 or not 0 <= self.future <= 600:
             raise InputError("a field's history is 2 to 60 frames, its stride 1 to 60, its future 0 to 600")
         if not 0 <= self.memory <= 1000:
-            raise InputError(f"a field remembers 0 to 1000 leaps, not {self.memory}")
+            raise InputError(f"the memory of a field must be 0 to 1000 jumps, not {self.memory}")
         if not 1 <= self.candidates <= 16:
-            raise InputError(f"a field draws among 1 to 16 candidates, not {self.candidates}")
+            raise InputError(f"the candidates of a field must be 1 to 16, not {self.candidates}")
         if min(self.alpha, default=0.0) < 0 or not self.sigma > 0 or not self.settle_s >= 0:
             raise InputError("a field's alpha and settling time must not be negative, its sigma must be above 0")
         if not 0 <= self.continuity <= 1:
@@ -88,26 +88,28 @@ class FieldOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Field:
-    """A feature of a style, made ready to be continued.
+    """Indexed recordings of one feature of a style.
 
     Parameters
     ----------
     values : (T, D)
-        Recorded motion over `scale`.
-    heard : (T, E)
-        Recorded sound features times `weights`.
+        Recorded motion divided by `scale`.
+    prosody : (T, E)
+        Recorded sound features multiplied by `weights`.
     starts : (T,)
-        First frame of the recording that each frame belongs to.
+        First frame of each frame's recording.
     axes : (p, h (E + D))
-        Directions of the search.
+        Orthonormal axes of the search tree.
+    tree
+        Search tree over the windows projected to `axes`.
     scale, weights : float, (E,)
-        What motion is divided by, and sound multiplied by.
-    nearness
-        Mean squared distance of a moment from the one most like it; median.
+        Divisor of the motion, and factors of the sound features.
+    median_distance
+        Median over moments of the mean squared distance to the nearest other moment.
     """
 
     values: Float32Array
-    heard: Float32Array
+    prosody: Float32Array
     starts: NDArray[np.int32]
     axes: Float32Array
     tree: KdTree
@@ -119,24 +121,24 @@ class Field:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FieldState:
-    """Where a field stands.
+    """State of the sampling of a field.
 
     Parameters
     ----------
-    shown, heard : (h, D), (h, E)
-        The last frames, scaled and weighted as the field's.
+    shown, prosody : (h, D), (h, E)
+        Motion and sound features of the last h generated frames, scaled and weighted as those of the field.
     moment
-        The recorded frame that was shown last, -1 for none.
+        Recorded frame that was used last, -1 for none.
     offset : (2, D)
-        What is left of leaps, and its change a frame.
-    recent : (m,)
-        Moments that were leapt to last, the oldest first.
+        Residual offset after a jump and its per-frame velocity.
+    recent_jumps : (m,)
+        Targets of the last m jumps, the oldest first.
     n_frames
-        Frames shown so far.
+        Number of frames generated so far.
     """
 
     shown: Float32Array
-    heard: Float32Array
+    prosody: Float32Array
     moment: int
     offset: Float32Array
     recent_jumps: NDArray[np.int64]
@@ -145,15 +147,17 @@ class FieldState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FieldSample:
-    """Frames (n, D) in the units of the recordings, the recorded moment (n,) of each, and the state behind them."""
+    """Generated frames (n, D) in the units of the recordings, the moment (n,) of each, and the state after them."""
 
     values: Float32Array
     moments: NDArray[np.int64]
     state: FieldState
 
 
-def build_field(values: Float32Array, heard: Float32Array, lengths: NDArray[np.int32], options: FieldOptions) -> Field:
-    """Index recorded motion (T, D) with the sound (T, E) that went with it; recordings of `lengths` (R,) frames.
+def build_field(
+    values: Float32Array, prosody: Float32Array, lengths: NDArray[np.int32], options: FieldOptions
+) -> Field:
+    """Index recorded motion (T, D) and its sound features (T, E); `lengths` (R,) are the frames of each recording.
 
     Raises
     ------
@@ -162,8 +166,8 @@ def build_field(values: Float32Array, heard: Float32Array, lengths: NDArray[np.i
     DataError
         No recording is long enough.
     """
-    if len(options.alpha) < heard.shape[1]:
-        raise InputError(f"{heard.shape[1]} sound features need as many weights, not {len(options.alpha)}")
+    if len(options.alpha) < prosody.shape[1]:
+        raise InputError(f"{prosody.shape[1]} sound features need as many weights, not {len(options.alpha)}")
     starts = np.repeat(np.cumsum(lengths) - lengths, lengths).astype(np.int32)
     frames = np.arange(len(values))
     left = starts + np.repeat(lengths, lengths) - frames
@@ -174,10 +178,10 @@ def build_field(values: Float32Array, heard: Float32Array, lengths: NDArray[np.i
             f"no recording of the style has {least} frames ({least / GESTURE_FPS:.1f} s); record longer ones"
         )
     scale = float(np.sqrt(np.square(values - values.mean(axis=0)).sum(axis=1).mean())) or 1.0
-    spread = np.maximum(heard.std(axis=0), 1e-6)
-    weights = (np.sqrt(np.array(options.alpha[: heard.shape[1]])) / spread).astype(np.float32)
+    spread = np.maximum(prosody.std(axis=0), 1e-6)
+    weights = (np.sqrt(np.array(options.alpha[: prosody.shape[1]])) / spread).astype(np.float32)
     scaled = np.ascontiguousarray(values / np.float32(scale), np.float32)
-    weighted = np.ascontiguousarray(heard * weights, np.float32)
+    weighted = np.ascontiguousarray(prosody * weights, np.float32)
     axes = _principal_axes(_history_windows(scaled, weighted, usable[::AXES_STRIDE], options.history))
     tree = build_tree(_history_windows(scaled, weighted, usable, options.history) @ axes.T)
     tree.order[:] = usable[tree.order]
@@ -193,7 +197,7 @@ def _median_nearest_distance(made: Field, usable: NDArray[np.int64]) -> float:
 
 
 def _field_arrays(made: Field) -> tuple[Float32Array, Float32Array, NDArray[np.int32]]:
-    return made.values, made.heard, made.starts
+    return made.values, made.prosody, made.starts
 
 
 def _tree_arrays(tree: KdTree) -> tuple[NDArray[Any], ...]:
@@ -201,11 +205,11 @@ def _tree_arrays(tree: KdTree) -> tuple[NDArray[Any], ...]:
 
 
 def _history_windows(
-    values: Float32Array, heard: Float32Array, frames: NDArray[np.int64], history: int
+    values: Float32Array, prosody: Float32Array, frames: NDArray[np.int64], history: int
 ) -> Float32Array:
-    """(N, h (E + D)) what was heard and shown before each of N frames."""
+    """(N, h (E + D)) sound features and motion of the h frames before each of N frames."""
     rows = frames[:, None] + np.arange(-history, 0)
-    return np.concatenate([heard[rows].reshape(len(rows), -1), values[rows].reshape(len(rows), -1)], axis=1)
+    return np.concatenate([prosody[rows].reshape(len(rows), -1), values[rows].reshape(len(rows), -1)], axis=1)
 
 
 def _principal_axes(windows: Float32Array) -> Float32Array:
@@ -215,12 +219,12 @@ def _principal_axes(windows: Float32Array) -> Float32Array:
 
 
 def _no_recent_jumps(made: Field) -> NDArray[np.int64]:
-    """No leaps to remember; of few recordings fewer, so that some moment is always left."""
+    """Empty list of jump targets; shorter for short recordings, so that some moment can always be chosen."""
     return np.full(min(made.options.memory, len(made.tree.order) // (8 * MIN_MOMENT_GAP)), -MIN_MOMENT_GAP, np.int64)
 
 
 def _spring(settle_s: float) -> tuple[np.float32, np.float32]:
-    """Stiffness of a critically damped spring and what it keeps of a leap in a frame; 0 and 0 for no spring."""
+    """Stiffness of a critically damped spring and its decay per frame; 0 and 0 for no spring."""
     if settle_s == 0:
         return np.float32(0.0), np.float32(0.0)
     stiffness = np.float32(1.0 / (settle_s * GESTURE_FPS))
@@ -228,50 +232,52 @@ def _spring(settle_s: float) -> tuple[np.float32, np.float32]:
 
 
 def initial_state(field: Field, chance: float) -> FieldState:
-    """The state after the first frames of one of the recordings; `chance` in [0, 1) tells which."""
+    """State after the first frames of a recording, which the uniform number `chance` in [0, 1) selects."""
     history = field.options.history
     first = np.sort(field.tree.order[field.tree.order - field.starts[field.tree.order] == history])
     moment = int(first[int(chance * len(first))])
     rows = slice(moment - history, moment)
     nothing = np.zeros((2, field.values.shape[1]), np.float32)
     return FieldState(
-        field.values[rows].copy(), field.heard[rows].copy(), moment - 1, nothing, _no_recent_jumps(field), 0
+        field.values[rows].copy(), field.prosody[rows].copy(), moment - 1, nothing, _no_recent_jumps(field), 0
     )
 
 
 def transfer_state(state: FieldState, before: Field, after: Field) -> FieldState:
-    """The state of one style's field, from which another style's field of the same feature goes on."""
+    """Convert the state of a field to the scale of another style's field of the same feature."""
     shown = state.shown * np.float32(before.scale / after.scale)
-    heard = state.heard / np.maximum(before.weights, np.float32(1e-9)) * after.weights
+    prosody = state.prosody / np.maximum(before.weights, np.float32(1e-9)) * after.weights
     recent = _no_recent_jumps(after)
-    return FieldState(shown, heard.astype(np.float32), -1, np.zeros_like(state.offset), recent, state.n_frames)
+    return FieldState(shown, prosody.astype(np.float32), -1, np.zeros_like(state.offset), recent, state.n_frames)
 
 
 def sample_field(
-    field: Field, state: FieldState, heard: Float32Array, chances: NDArray[np.float64]
+    field: Field, state: FieldState, prosody: Float32Array, chances: NDArray[np.float64]
 ) -> tuple[Float32Array, FieldState]:
-    """The next n frames (n, D), in the units of the recordings, and the state behind them; in parts as at once.
+    """Sample the next frames (n, D), in the units of the recordings, and the state after them.
+
+    The result is independent of the division of the n frames into calls.
 
     Parameters
     ----------
-    heard : (n, E)
-        Sound features of these frames; each frame is chosen by those before it.
+    prosody : (n, E)
+        Sound features of these frames; each frame depends on those before it.
     chances : (n,)
-        Uniform in [0, 1), one for each frame.
+        Uniform random numbers in [0, 1), one for each frame.
     """
-    made = sample_field_moments(field, state, heard, chances)
+    made = sample_field_moments(field, state, prosody, chances)
     return made.values, made.state
 
 
 def sample_field_moments(
-    field: Field, state: FieldState, heard: Float32Array, chances: NDArray[np.float64]
+    field: Field, state: FieldState, prosody: Float32Array, chances: NDArray[np.float64]
 ) -> FieldSample:
-    """As `sample_field`, with the recorded moments that were shown."""
+    """As `sample_field`, with the recorded moment of each frame."""
     if not len(chances):
         return FieldSample(np.zeros((0, state.offset.shape[1]), np.float32), np.zeros(0, np.int64), state)
     options, history = field.options, field.options.history
     shown = np.concatenate([state.shown, np.zeros((len(chances), state.offset.shape[1]), np.float32)])
-    sound = np.concatenate([state.heard, (heard * field.weights).astype(np.float32)])
+    sound = np.concatenate([state.prosody, (prosody * field.weights).astype(np.float32)])
     moments, offset, recent = np.zeros(len(chances), np.int64), state.offset.copy(), state.recent_jumps.copy()
     stiffness, fade = _spring(options.settle_s)
     generate_frames(

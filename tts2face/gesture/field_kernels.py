@@ -1,20 +1,20 @@
-"""Compiled loops of `tts2face.gesture.field`: search, draw, show."""
+"""Compiled kernels of `tts2face.gesture.field`: search of similar moments and sampling."""
 
 import numpy as np
 
 from tts2face.compilation import kernel
 
 SEARCH_SLACK = (
-    1.1  # default search error: moments found are at most so much farther than the best (Ju and Lee 2008 use ANN)
+    1.1  # default factor by which distances of moments found may exceed the best ones (Ju and Lee 2008 use ANN)
 )
-MIN_MOMENT_GAP = 10  # default least number of frames between two moments that count as different
+MIN_MOMENT_GAP = 10  # default least number of frames between two candidates of one recording
 
 
 @kernel
-def nearest_distances(corpus, tree, axes, history, asked):  # type: ignore[no-untyped-def]
-    """Write how far the nearest different moment lies from each of some."""
+def nearest_distances(corpus, tree, axes, history, queries):  # type: ignore[no-untyped-def]
+    """Write the distance of each moment from its nearest other moment."""
     values, recorded, _ = corpus
-    moments, away = asked
+    moments, away = queries
     best, distance = np.zeros(2, np.int64), np.zeros(2)
     stack, bounds = np.zeros(128, np.int64), np.zeros(128)
     query = np.zeros(len(axes), np.float32)
@@ -30,39 +30,42 @@ def nearest_distances(corpus, tree, axes, history, asked):  # type: ignore[no-un
 
 @kernel
 def generate_frames(corpus, tree, axes, options, track):  # type: ignore[no-untyped-def]
-    """Write the frames shown and the moments they come from.
+    """Write the generated frames and their moments.
 
-    What is left of a leap goes as a critically damped spring, so that neither place nor speed jumps (Bollo 2018).
+    The offset after a jump decays as a critically damped spring, so that position and velocity are continuous (Bollo
+    2018).
     """
     values, _, starts = corpus
     history, n_candidates, sigma, stride, continuity, stiffness, fade, rule = options
-    shown, heard, moments, offset, recent, moment, n_before, chances = track
+    shown, prosody, moments, offset, recent, moment, n_before, chances = track
     none = recent[:0]
     best, distance = np.zeros(n_candidates, np.int64), np.zeros(n_candidates)
     stack, bounds = np.zeros(128, np.int64), np.zeros(128)
     query = np.zeros(len(axes), np.float32)
     for i in range(len(chances)):
         following = moment + 1
-        goes_on = moment >= 0 and following < len(values) and starts[following] == starts[moment]
+        can_continue = moment >= 0 and following < len(values) and starts[following] == starts[moment]
         chosen = following
-        if not goes_on or (n_before + i) % stride == 0:
+        if not can_continue or (n_before + i) % stride == 0:
             best[:], distance[:] = -1, np.inf
-            if goes_on:
-                away = continuity * _window_distance(corpus, (shown, heard, i, history), following, np.inf)
+            if can_continue:
+                away = continuity * _window_distance(corpus, (shown, prosody, i, history), following, np.inf)
                 _insert_moment(following, away, (starts, none, rule[0]), (best, distance))
-            _project_window((shown, heard, i, history), axes, query)
-            _search_tree(corpus, tree, (shown, heard, i, history), query, (recent, best, distance, rule, stack, bounds))
+            _project_window((shown, prosody, i, history), axes, query)
+            _search_tree(
+                corpus, tree, (shown, prosody, i, history), query, (recent, best, distance, rule, stack, bounds)
+            )
             chosen = _draw_pose(best, distance, sigma, chances[i])
         last = i + history - 1
         for d in range(values.shape[1]):
-            if not goes_on or chosen != following:
+            if not can_continue or chosen != following:
                 offset[0, d] = shown[last, d] - values[chosen - 1, d]
                 offset[1, d] = shown[last, d] - shown[last - 1, d] - values[chosen - 1, d] + values[chosen - 2, d]
             pull = offset[1, d] + offset[0, d] * stiffness
             offset[0, d] = (offset[0, d] + pull) * fade
             offset[1, d] = (offset[1, d] - pull * stiffness) * fade
             shown[i + history, d] = values[chosen, d] + offset[0, d]
-        if len(recent) and (not goes_on or chosen != following):
+        if len(recent) and (not can_continue or chosen != following):
             recent[:-1] = recent[1:].copy()
             recent[-1] = chosen
         moment = moments[i] = chosen
@@ -70,7 +73,7 @@ def generate_frames(corpus, tree, axes, options, track):  # type: ignore[no-unty
 
 @kernel
 def _draw_pose(best, distance, sigma, chance):  # type: ignore[no-untyped-def]
-    """One of the moments found, by the chance."""
+    """Sample one of the candidates by a uniform random number."""
     total = 0.0
     for c in range(len(best)):
         if best[c] >= 0:
@@ -87,7 +90,7 @@ def _draw_pose(best, distance, sigma, chance):  # type: ignore[no-untyped-def]
 
 @kernel
 def _insert_moment(moment, away, known, found):  # type: ignore[no-untyped-def]
-    """Keep a moment among the best ones if it is nearer than those within `apart` frames of it, and not recent."""
+    """Insert a moment into the best ones if it is nearer than those within `apart` frames and not a recent target."""
     starts, recent, apart = known
     best, distance = found
     at = len(best) - 1
@@ -110,9 +113,9 @@ def _insert_moment(moment, away, known, found):  # type: ignore[no-untyped-def]
 
 @kernel
 def _window_distance(corpus, window, moment, limit):  # type: ignore[no-untyped-def]
-    """Mean squared distance of what was shown and heard from what came before a moment; any number above `limit`."""
+    """Mean squared distance between a window and that before a moment; stops early above `limit`."""
     values, recorded, _ = corpus
-    shown, heard, i, history = window
+    shown, prosody, i, history = window
     total, most = 0.0, limit * history
     for j in range(history):
         row, there = i + history - 1 - j, moment - 1 - j
@@ -120,7 +123,7 @@ def _window_distance(corpus, window, moment, limit):  # type: ignore[no-untyped-
             gap = shown[row, d] - values[there, d]
             total += gap * gap
         for e in range(recorded.shape[1]):
-            gap = heard[row, e] - recorded[there, e]
+            gap = prosody[row, e] - recorded[there, e]
             total += gap * gap
         if total > most:
             break
@@ -129,23 +132,23 @@ def _window_distance(corpus, window, moment, limit):  # type: ignore[no-untyped-
 
 @kernel
 def _project_window(window, axes, query):  # type: ignore[no-untyped-def]
-    shown, heard, i, history = window
-    n_heard, n_shown = heard.shape[1], shown.shape[1]
+    shown, prosody, i, history = window
+    n_prosody, n_shown = prosody.shape[1], shown.shape[1]
     for p in range(len(axes)):
         total = 0.0
         for j in range(history):
-            for e in range(n_heard):
-                total += axes[p, j * n_heard + e] * heard[i + j, e]
+            for e in range(n_prosody):
+                total += axes[p, j * n_prosody + e] * prosody[i + j, e]
             for d in range(n_shown):
-                total += axes[p, history * n_heard + j * n_shown + d] * shown[i + j, d]
+                total += axes[p, history * n_prosody + j * n_shown + d] * shown[i + j, d]
         query[p] = total
 
 
 @kernel
 def _search_tree(corpus, tree, window, query, found):  # type: ignore[no-untyped-def]
-    """Offer every moment that may be among the best ones; the nearer half of each node first.
+    """Search the tree for the best moments; the nearer child of each node first.
 
-    A place's distance from the query is at most that of the windows: the axes are orthonormal.
+    Since the axes are orthonormal, projected distances are lower bounds of the distances between windows.
     """
     places, order, spans, axes, cuts = tree
     recent, best, distance, (apart, error), stack, bounds = found

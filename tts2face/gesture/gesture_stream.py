@@ -1,4 +1,4 @@
-"""Gestures for speech: every feature is a Markov random field of its own, with its own style, clock and chances."""
+"""Gestures for speech: one Markov random field for each feature, with its own style, time axis and random stream."""
 
 from bisect import bisect_right
 from collections.abc import Mapping
@@ -17,9 +17,9 @@ from tts2face.interpolation import interpolate_cubic
 from tts2face.models.palette import FEATURES, GESTURE_FPS, FeatureChange, Palette, Style
 from tts2face.types import Waveform
 
-N_LOOKAHEAD_FRAMES = 2  # frames of a field behind an instant, which its cubic needs
+N_LOOKAHEAD_FRAMES = 2  # frames after a time that cubic interpolation needs
 NO_CHANGE = FeatureChange()
-# Chosen within three quarters of the recordings of GRID s1 (docs/gestures.md); the others take the options of brows.
+# Tuned on three quarters of the recordings of GRID s1 (docs/gestures.md); all other features use the defaults.
 OPTIONS: Mapping[str, FieldOptions] = MappingProxyType(
     {
         "expression": FieldOptions(alpha=(3.0, 1.0), sigma=0.05, stride=4),
@@ -42,7 +42,7 @@ GestureValues = Mapping[str, Float32Array]  # (T, k) values of each feature
 
 @dataclass(slots=True, eq=False)
 class GestureFields:
-    """Fields of a palette, made when they are first needed; serves any number of clips."""
+    """Fields of a palette, built at their first use; for any number of clips."""
 
     palette: Palette
     options: Mapping[str, FieldOptions] = field(default_factory=lambda: OPTIONS)
@@ -50,16 +50,16 @@ class GestureFields:
     _made: dict[tuple[str, str], Field] = field(default_factory=dict)
 
     def of(self, source: str, feature: str) -> Field:
-        """The field of a measured style's feature."""
+        """Field of a feature of a recorded style."""
         if (source, feature) not in self._made:
             style = self.palette.styles[source]
-            heard = np.stack([style.intensity, style.pitch], axis=1)[:, : 2 if self.with_pitch else 1]
+            prosody = np.stack([style.intensity, style.pitch], axis=1)[:, : 2 if self.with_pitch else 1]
             options = self.options.get(feature, FieldOptions())
-            self._made[source, feature] = build_field(style.motion[feature], heard, style.lengths, options)
+            self._made[source, feature] = build_field(style.motion[feature], prosody, style.lengths, options)
         return self._made[source, feature]
 
     def source(self, style: str, feature: str) -> str:
-        """The measured style whose recordings a style's feature is drawn from; another where nobody saw the feature."""
+        """Recorded style from which a style's feature is sampled; another one if that style lacks the feature."""
         styles, derived = self.palette.styles, self.palette.derivations
         name = derived[style].source if style in derived else self.palette.require(style)
         if feature in styles[name].motion:
@@ -67,12 +67,12 @@ class GestureFields:
         return next(other for other, recorded in styles.items() if feature in recorded.motion)
 
     def change(self, style: str, feature: str) -> FeatureChange:
-        """What a style does to the feature of its source."""
+        """Change of a feature by which a derived style differs from its source."""
         derived = self.palette.derivations.get(style)
         return NO_CHANGE if derived is None else derived.changes.get(feature, NO_CHANGE)
 
     def apply_change(self, style: str, feature: str, values: Float32Array) -> Float32Array:
-        """Values (T, k) of a feature's source with the gain and offset of a style."""
+        """Apply the gain and offset of a style to values (T, k) of its source."""
         change = self.change(style, feature)
         middle = style_median(self.palette.styles[self.source(style, feature)], feature)
         offset = np.array([change.offset.get(channel, 0.0) for channel in self.palette.channels(feature)], np.float32)
@@ -80,15 +80,15 @@ class GestureFields:
 
     @property
     def features(self) -> tuple[str, ...]:
-        """Features that any style of the palette shows."""
+        """Features of which any style of the palette has recordings."""
         return tuple(name for name in FEATURES if any(name in style.motion for style in self.palette.styles.values()))
 
 
 class GestureStream:
-    """The gestures of one clip, piece by piece; in pieces as at once.
+    """Gestures of one clip, generated piece by piece; the result is independent of the division into pieces.
 
-    Every feature has a random stream of its own from the seed and its name: to leave one out or to give it another
-    style changes no other.
+    The random stream of each feature is seeded by the seed and the feature's name, so that a change of one feature does
+    not affect the others.
     """
 
     def __init__(self, fields: GestureFields, *, style: str, seed: int, fps: float) -> None:
@@ -98,22 +98,27 @@ class GestureStream:
         self._n_frames = 0
 
     def next(self, sound: Waveform, n_frames: int, timeline: Timeline) -> GestureValues:
-        """Values of every feature for the next n frames, in which a sound is heard.
+        """Values (n_frames, k) of each feature for the next frames.
 
-        Expressions and nods of the timeline, whose clock is the clip's, are in it; its gains of features, too.
+        Parameters
+        ----------
+        sound
+            Sound of these frames.
+        timeline
+            Styles, expressions, nods and gains, in seconds of the whole clip; all of them are applied.
         """
         begin = self._n_frames / self._fps
         times = (self._n_frames + np.arange(n_frames)) / self._fps
         self._n_frames += n_frames
-        made, heard = {}, _SoundFeatures(sound, begin, with_pitch=self._fields.with_pitch)
+        made, prosody = {}, _SoundFeatures(sound, begin, with_pitch=self._fields.with_pitch)
         for name, track in self._tracks.items():
-            track.extend(heard, float(times[-1]), timeline)
+            track.extend(prosody, float(times[-1]), timeline)
             made[name] = apply_timeline(name, track.at(times, timeline), times, timeline)
         return made
 
 
 def apply_timeline(feature: str, values: Float32Array, times: NDArray[np.float64], timeline: Timeline) -> Float32Array:
-    """Values (T, k) of a feature with the gain, expressions and nods of a timeline."""
+    """Apply the gain, expressions and nods of a timeline to values (T, k) of a feature."""
     values = np.asarray(values * np.float32(timeline.gains.of(feature)), np.float32)
     if feature == "expression":
         values = values + timeline.expression_weights(times).astype(np.float32)
@@ -123,7 +128,7 @@ def apply_timeline(feature: str, values: Float32Array, times: NDArray[np.float64
 
 
 class _SoundFeatures:
-    """What a sound that begins at an instant tells; features on the same clock measure it once."""
+    """Prosodic features of a sound that starts at `begin` seconds, cached by the times of the request."""
 
     def __init__(self, sound: Waveform, begin: float, *, with_pitch: bool) -> None:
         self._sound, self._begin, self._with_pitch = sound, begin, with_pitch
@@ -138,7 +143,7 @@ class _SoundFeatures:
 
 
 class _FeatureTrack:
-    """One feature of a clip: frames of its fields on a clock that runs at the style's tempo."""
+    """One feature of a clip: frames of its fields at times that follow the style's tempo."""
 
     def __init__(self, fields: GestureFields, feature: str, style: str, seed: int) -> None:
         self._fields, self._feature, self._style = fields, feature, style
@@ -150,7 +155,7 @@ class _FeatureTrack:
         self._values = np.zeros((0, made.values.shape[1]), np.float32)
 
     def extend(self, sound: "_SoundFeatures", end: float, timeline: Timeline) -> None:
-        """Add frames up to `N_LOOKAHEAD_FRAMES` an instant."""
+        """Generate frames up to `N_LOOKAHEAD_FRAMES` after `end` seconds."""
         first = len(self._times)
         while len(self._times) <= N_LOOKAHEAD_FRAMES or self._times[-1 - N_LOOKAHEAD_FRAMES] <= end:
             tempo = 1.0
@@ -165,22 +170,22 @@ class _FeatureTrack:
             self._fields.source(style, self._feature)
             for style in timeline.style_at(self._feature, new, default=self._style)
         ]
-        heard = sound.at(new)
+        prosody = sound.at(new)
         chances = self._generator.random(len(new))
         borders = [0, *(i for i in range(1, len(new)) if styles[i] != styles[i - 1]), len(new)]
-        parts = [self._sample(styles[low], heard[low:high], chances[low:high]) for low, high in pairwise(borders)]
+        parts = [self._sample(styles[low], prosody[low:high], chances[low:high]) for low, high in pairwise(borders)]
         self._values = np.concatenate([self._values, *parts])
 
-    def _sample(self, source: str, heard: Float32Array, chances: NDArray[np.float64]) -> Float32Array:
+    def _sample(self, source: str, prosody: Float32Array, chances: NDArray[np.float64]) -> Float32Array:
         made = self._fields.of(source, self._feature)
         if source != self._source:
             self._state = transfer_state(self._state, self._fields.of(self._source, self._feature), made)
             self._source = source
-        values, self._state = sample_field(made, self._state, heard, chances)
+        values, self._state = sample_field(made, self._state, prosody, chances)
         return values
 
     def at(self, times: NDArray[np.float64], timeline: Timeline) -> Float32Array:
-        """(T, k) values at instants, changed as the styles state; older frames are forgotten."""
+        """(T, k) values at T times with the changes of the styles; frames before the last time are discarded."""
         clock = np.array(self._times)
         values = interpolate_cubic(self._values, np.interp(times, clock, np.arange(len(clock))))
         shares = timeline.style_shares(self._feature, times, default=self._style)
@@ -193,5 +198,5 @@ class _FeatureTrack:
 
 
 def style_median(style: Style, feature: str) -> Float32Array:
-    """(k,) median of a style's feature: where the face mostly is."""
+    """(k,) median of the recordings of a style's feature."""
     return np.asarray(np.median(style.motion[feature], axis=0), np.float32)

@@ -1,4 +1,4 @@
-"""Styles, gains and expressions as people write them: ``brows=annoyed,head=delighted``, ``happy=0.6@1.2-3.4``."""
+"""Parsers of styles, gains and expressions: ``brows=annoyed,head=delighted``, ``happy=0.6@1.2-3.4``."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -95,7 +95,7 @@ def _parse_number(written: str, hint: str) -> float:
     try:
         number = float(written)
     except ValueError as wrong:
-        raise InputError(f"{written.strip()!r} is no number; {hint}") from wrong
+        raise InputError(f"{written.strip()!r} is not a number; {hint}") from wrong
     if not math.isfinite(number):
-        raise InputError(f"{written.strip()!r} is no finite number; {hint}")
+        raise InputError(f"{written.strip()!r} is not a finite number; {hint}")
     return number

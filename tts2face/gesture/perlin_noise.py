@@ -1,6 +1,6 @@
-"""Gestures from noise functions, to compare with: Perlin 1985 and 1995, who moved heads and brows so.
+"""Gestures from noise, as a baseline for comparison (Perlin 1985, 1995).
 
-They know how far and how often a person moves, but not when and how.
+Amplitudes and blink rates are those of the recordings; the timing is independent of the sound.
 """
 
 from zlib import crc32
@@ -28,7 +28,7 @@ class NoiseStream:
         self._n_frames = 0
 
     def next(self, sound: Waveform, n_frames: int, timeline: Timeline) -> GestureValues:
-        """Values of every feature for the next n frames; the sound changes nothing."""
+        """Values (n_frames, k) of each feature for the next frames; the sound is not used."""
         times = (self._n_frames + np.arange(n_frames)) / self._fps
         self._n_frames += n_frames
         return {
@@ -62,7 +62,7 @@ def perlin_noise(times: NDArray[np.float64], key: int) -> NDArray[np.float64]:
 
 
 def blink_closure(times: NDArray[np.float64], rate: float, key: int) -> NDArray[np.float64]:
-    """(T,) share by which lids are shut: raised cosines that begin at random, `rate` a second in the mean."""
+    """(T,) closure of the lids in [0, 1]: raised cosines at random times, on average `rate` per second."""
     cell = BLINK_DURATION_S / 2
     first = int(np.floor(times[0] / cell)) - 2
     numbers = np.arange(first, int(np.floor(times[-1] / cell)) + 1)
@@ -75,13 +75,13 @@ def blink_closure(times: NDArray[np.float64], rate: float, key: int) -> NDArray[
 
 
 def blinks_per_second(shut: Float32Array) -> float:
-    """How often the lids (T, 2) of a style's recordings shut."""
+    """Mean number of blinks per second in recorded lid closures (T, 2)."""
     is_shut = shut.mean(axis=1) > CLOSED_SHARE
     return float((np.diff(is_shut.astype(np.int8)) > 0).sum()) * GESTURE_FPS / max(len(shut), 1)
 
 
 def _hash_noise(numbers: NDArray[np.int64], key: int, octave: int) -> NDArray[np.float64]:
-    """(N,) numbers in [-1, 1) that a whole number always gets again (SplitMix64; Steele, Lea and Flood 2014)."""
+    """(N,) hash values in [-1, 1) of N integers (SplitMix64; Steele, Lea and Flood 2014)."""
     mixed = numbers.astype(np.uint64) * np.uint64(3) + np.uint64(octave) + np.uint64((key * 0x9E3779B97F4A7C15) % 2**64)
     for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB), (31, 1)):
         mixed = (mixed ^ (mixed >> np.uint64(shift))) * np.uint64(factor)

@@ -1,4 +1,4 @@
-"""What a voice tells a face besides its words: how loud and how high it is, against its own mean."""
+"""Prosodic features of speech: intensity and pitch relative to the speaker's own level and median."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,8 +7,8 @@ from tts2face.speech.features import speech_level
 from tts2face.speech.loudness import intensity, pitch
 from tts2face.types import Waveform
 
-QUIET_DB, LOUD_DB = -35.0, 10.0  # against the mean level of speech; what lies beyond tells nothing more
-AUDIBLE_DB = 30.0  # a sound whose loudest instant is below, against 20 micropascals, holds no speech
+QUIET_DB, LOUD_DB = -35.0, 10.0  # limits relative to the mean level of speech; values beyond are clipped
+AUDIBLE_DB = 30.0  # relative to 20 micropascals; a sound with a lower maximum contains no speech
 HIGH_SEMITONES = 12.0
 SILENT_PROSODY = np.array([QUIET_DB, 0.0], np.float32)
 MIN_PITCH_SOUND_S = 0.1  # shorter sounds have no pitch
@@ -17,20 +17,20 @@ Float32Array = NDArray[np.float32]
 
 
 def prosody_features(sound: Waveform, times: NDArray[np.float64], *, with_pitch: bool) -> Float32Array:
-    """(T, 1 or 2) intensity in dB against the sound's speech, and pitch in semitones against its median.
+    """(T, 1 or 2) intensity in dB relative to the mean level of speech, and pitch in semitones relative to the median.
 
-    Instants beyond the sound are silent.
+    Times (T,) are in seconds; those outside the sound count as silence.
     """
-    heard = np.tile(SILENT_PROSODY[: 2 if with_pitch else 1], (len(times), 1))
+    features = np.tile(SILENT_PROSODY[: 2 if with_pitch else 1], (len(times), 1))
     if sound.duration < MIN_PITCH_SOUND_S:
-        return heard
+        return features
     grid = np.arange(0.0, sound.duration, 0.02)
     levels = intensity(sound, grid)
     inside = (times >= 0.0) & (times < sound.duration)
     if levels.max() < AUDIBLE_DB:
-        return heard
+        return features
     level = speech_level(levels[:, None])
-    heard[inside, 0] = np.clip(intensity(sound, times[inside]) - level, QUIET_DB, LOUD_DB)
+    features[inside, 0] = np.clip(intensity(sound, times[inside]) - level, QUIET_DB, LOUD_DB)
     if with_pitch:
-        heard[inside, 1] = np.clip(pitch(sound, times[inside]), -HIGH_SEMITONES, HIGH_SEMITONES)
-    return heard
+        features[inside, 1] = np.clip(pitch(sound, times[inside]), -HIGH_SEMITONES, HIGH_SEMITONES)
+    return features

@@ -1,4 +1,4 @@
-"""What a timeline holds: styles and expressions over spans of time, nods, and gains; and how spans are put together.
+"""Elements of a timeline: style spans, expression spans, nods and gains, and operations on spans.
 
 Times are seconds; spans are half open.
 """
@@ -49,7 +49,7 @@ class StyleSpan:
 
     @property
     def lane(self) -> str:
-        """What no other span may hold at the same time."""
+        """Key by which overlaps are rejected: the feature."""
         return self.feature
 
 
@@ -65,7 +65,7 @@ class ExpressionSpan:
     def __post_init__(self) -> None:
         """Refuse unknown expressions, weights out of range, and times that do not run forward."""
         if self.expression == "neutral":
-            raise InputError("neutral is the face at rest, of which nothing can be added; leave it away")
+            raise InputError("the expression neutral has no effect because it is the face at rest; remove it")
         if self.expression not in EXPRESSIONS:
             raise InputError(f"there is no expression {self.expression!r}; choose {', '.join(EXPRESSIONS)}")
         _check_range(f"the weight of {self.expression}", self.weight, EXPRESSION_WEIGHT_LIMITS)
@@ -73,13 +73,13 @@ class ExpressionSpan:
 
     @property
     def lane(self) -> str:
-        """What no other span may hold at the same time."""
+        """Key by which overlaps are rejected: the expression."""
         return self.expression
 
 
 @dataclass(frozen=True, slots=True)
 class Nod:
-    """The head begins to nod at a time; size 1 goes 6 degrees down."""
+    """A nod that starts at `time` seconds; size 1 is 6 degrees."""
 
     time: float
     size: float = 1.0
@@ -93,7 +93,7 @@ class Nod:
 
 @dataclass(frozen=True, slots=True)
 class Gains:
-    """How far each feature moves, as a factor of its style's motion; jaw and lips: of the speech's."""
+    """Factors of the motion of features; those of jaw and lips apply to the speech motion."""
 
     factors: Mapping[str, float] = field(default_factory=dict)
 
@@ -168,12 +168,12 @@ def cut_spans(spans: Iterable[AnySpan], start: float, end: float) -> tuple[AnySp
 
 
 def overlay_spans(under: Sequence[AnySpan], over: Sequence[AnySpan]) -> tuple[AnySpan, ...]:
-    """Spans with others painted over them."""
-    left = list(under)
+    """Spans `under`, replaced by the spans `over` where both overlap."""
+    merged = list(under)
     for top in over:
-        mine = [span for span in left if span.lane == top.lane]
-        left = [span for span in left if span.lane != top.lane]
-        left.extend(cut_spans(mine, -1.0, top.start))
-        left.extend(cut_spans(mine, top.end, math.inf))
-    left.extend(over)
-    return tuple(left)
+        same_lane = [span for span in merged if span.lane == top.lane]
+        merged = [span for span in merged if span.lane != top.lane]
+        merged.extend(cut_spans(same_lane, -1.0, top.start))
+        merged.extend(cut_spans(same_lane, top.end, math.inf))
+    merged.extend(over)
+    return tuple(merged)

@@ -1,4 +1,4 @@
-"""The Timeline: which style each feature of the face follows when, and what is done beside: expressions, nods, gains.
+"""The timeline of a clip: styles of each feature over time, expressions, nods and gains.
 
 Times are seconds on the clock of the whole clip; spans are half open.
 """
@@ -40,14 +40,23 @@ MAX_OVERRUN_S = 0.05  # a span may end this much behind the clip: people round t
 
 @dataclass(frozen=True, slots=True)
 class Timeline:
-    """How the face is to behave over a clip.
+    """Requested gestures of a clip.
 
     Parameters
     ----------
     style
-        Style of each feature outside its spans; a feature without one is left to whoever animates.
+        Style of each feature outside its spans; features without an entry use the default style.
     spans, expressions
-        In order of time; those of one feature or expression may touch but not overlap.
+        Spans, sorted by time; those of one feature or expression may be adjacent but not overlap.
+    nods
+        Nods, sorted by time.
+    gains
+        Factors of the motion of features.
+
+    Raises
+    ------
+    InputError
+        A feature is unknown, a style has no name, or spans overlap.
     """
 
     style: Mapping[str, str] = field(default_factory=dict)
@@ -68,12 +77,12 @@ class Timeline:
 
     @property
     def style_names(self) -> tuple[str, ...]:
-        """Every style that is asked for, once, in order of first use."""
+        """Names of all requested styles in order of first use."""
         return tuple(dict.fromkeys([*self.style.values(), *(span.style for span in self.spans)]))
 
     @property
     def end(self) -> float:
-        """Last second at which anything is asked for; infinite ends count from where they begin."""
+        """Latest time in seconds of any element; spans without an end count by their start."""
         ends = [span.start if math.isinf(span.end) else span.end for span in self._all_spans]
         return max([0.0, *ends, *(nod.time for nod in self.nods)])
 
@@ -82,7 +91,7 @@ class Timeline:
         return (*self.spans, *self.expressions)
 
     def style_at(self, feature: str, times: ArrayLike, *, default: str) -> tuple[str, ...]:
-        """A feature's style at each of T times, without blending; `default` where none was chosen."""
+        """Style of a feature at each of T times, without blending; `default` if none is requested."""
         seconds = np.atleast_1d(np.asarray(times, np.float64))
         base = self.style.get(check_feature(feature), default)
         mine = [span for span in self.spans if span.feature == feature]
@@ -93,9 +102,9 @@ class Timeline:
         )
 
     def style_shares(self, feature: str, times: ArrayLike, *, default: str) -> dict[str, FloatArray]:
-        """Share (T,) of each style in a feature at T times; they add up to 1, and blend at edges.
+        """(T,) weights of each style of a feature at T times, with sum 1.
 
-        Over `BLEND_S`; expressions, which are slow, over `ONSET_S`.
+        Styles are cross-faded within `BLEND_S` (those of the feature ``expression`` within `ONSET_S`).
         """
         seconds = np.atleast_1d(np.asarray(times, np.float64))
         base = self.style.get(check_feature(feature), default)
@@ -126,7 +135,7 @@ class Timeline:
         return down + up
 
     def merge(self, other: "Timeline", shift: float = 0.0) -> "Timeline":
-        """Both, the other `shift` seconds later; where they name one thing twice the other wins."""
+        """Merge with another timeline, delayed by `shift` seconds, which takes precedence where both overlap."""
         later = other.shifted(shift)
         return Timeline(
             {**self.style, **later.style},
@@ -137,7 +146,7 @@ class Timeline:
         )
 
     def shifted(self, seconds: float) -> "Timeline":
-        """The same, so many seconds later."""
+        """The same timeline, delayed by `seconds`."""
         return replace(
             self,
             spans=tuple(shift_span(span, seconds) for span in self.spans),
@@ -146,7 +155,7 @@ class Timeline:
         )
 
     def restrict(self, start: float, end: float) -> "Timeline":
-        """What is asked for in [start, end), spans cut to it; on the same clock."""
+        """The elements within [start, end), with spans cut to this range; times are unchanged."""
         return replace(
             self,
             spans=cut_spans(self.spans, start, end),

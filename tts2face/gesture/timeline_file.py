@@ -1,4 +1,4 @@
-"""Timelines in files: JSON (docs/file-formats.md), read with one sentence for each thing that can be wrong."""
+"""Reader of timeline files in JSON (docs/file-formats.md)."""
 
 import json
 import math
@@ -39,8 +39,8 @@ def read_timeline(path: Path) -> Timeline:
 
 def parse_timeline(content: str, name: str = "timeline") -> Timeline:
     """A timeline from the text of a JSON file; errors as `read_timeline`."""
-    told = parse_json(content, name)
-    parts = _add_place_to_errors(name, lambda: _check_object(told, {}, dict.fromkeys(TIMELINE_KEYS)))
+    data = parse_json(content, name)
+    parts = _add_place_to_errors(name, lambda: _check_object(data, {}, dict.fromkeys(TIMELINE_KEYS)))
     spans = _parse_each(f"{name}, spans", parts["spans"], _parse_spans)
     expressions = _parse_each(f"{name}, expressions", parts["expressions"], _parse_expression)
     nods = _parse_each(f"{name}, nods", parts["nods"], _parse_nod)
@@ -58,64 +58,64 @@ def _add_place_to_errors(place: str, make: Callable[[], Made]) -> Made:
         raise DataError(f"{place}: {wrong}") from wrong
 
 
-def _parse_each(place: str, told: Any, make: Callable[[Any], Made]) -> list[Made]:
-    if told is None:
+def _parse_each(place: str, content: Any, make: Callable[[Any], Made]) -> list[Made]:
+    if content is None:
         return []
-    if not isinstance(told, list):
-        raise DataError(f"{place} must be a list in square brackets, not {_format_value(told)}")
-    return [_add_place_to_errors(f"{place}[{number}]", partial(make, one)) for number, one in enumerate(told)]
+    if not isinstance(content, list):
+        raise DataError(f"{place} must be a list in square brackets, not {_format_value(content)}")
+    return [_add_place_to_errors(f"{place}[{number}]", partial(make, one)) for number, one in enumerate(content)]
 
 
-def _parse_spans(told: Any) -> tuple[StyleSpan, ...]:
-    parts = _check_object(told, {"feature": str, "style": str, "start": float}, {"end": math.inf})
+def _parse_spans(content: Any) -> tuple[StyleSpan, ...]:
+    parts = _check_object(content, {"feature": str, "style": str, "start": float}, {"end": math.inf})
     end = _check_type("end", parts["end"], float)
     return tuple(
         StyleSpan(feature, parts["style"], parts["start"], end) for feature in expand_feature(parts["feature"])
     )
 
 
-def _parse_expression(told: Any) -> ExpressionSpan:
-    parts = _check_object(told, {"expression": str, "weight": float}, {"start": 0.0, "end": math.inf})
+def _parse_expression(content: Any) -> ExpressionSpan:
+    parts = _check_object(content, {"expression": str, "weight": float}, {"start": 0.0, "end": math.inf})
     start, end = (_check_type(name, parts[name], float) for name in ("start", "end"))
     return ExpressionSpan(parts["expression"], parts["weight"], start, end)
 
 
-def _parse_nod(told: Any) -> Nod:
-    parts = _check_object(told, {"time": float}, {"size": 1.0})
+def _parse_nod(content: Any) -> Nod:
+    parts = _check_object(content, {"time": float}, {"size": 1.0})
     return Nod(parts["time"], _check_type("size", parts["size"], float))
 
 
-def _parse_styles(told: Any) -> Mapping[str, str]:
-    if told is None:
+def _parse_styles(content: Any) -> Mapping[str, str]:
+    if content is None:
         return {}
-    if isinstance(told, str):
-        return parse_style(told)
-    if not isinstance(told, dict):
-        raise InputError(f"give a name, or a style for each feature, not {_format_value(told)}")
-    named = {name: _check_type(name, style, str) for name, style in told.items()}
+    if isinstance(content, str):
+        return parse_style(content)
+    if not isinstance(content, dict):
+        raise InputError(f"give a name, or a style for each feature, not {_format_value(content)}")
+    named = {name: _check_type(name, style, str) for name, style in content.items()}
     base = named.pop(ALL_FEATURES, None)
     return {**(dict.fromkeys(FEATURES, base) if base else {}), **{check_feature(name): named[name] for name in named}}
 
 
-def _parse_gains(told: Any) -> Gains:
-    if told is None:
+def _parse_gains(content: Any) -> Gains:
+    if content is None:
         return Gains()
-    if not isinstance(told, dict):
-        raise InputError(f"give a factor for each feature, not {_format_value(told)}")
-    return Gains({name: _check_type(name, factor, float) for name, factor in told.items()})
+    if not isinstance(content, dict):
+        raise InputError(f"give a factor for each feature, not {_format_value(content)}")
+    return Gains({name: _check_type(name, factor, float) for name, factor in content.items()})
 
 
-def _check_object(told: Any, required: Mapping[str, type], optional: Mapping[str, Any]) -> dict[str, Any]:
+def _check_object(content: Any, required: Mapping[str, type], optional: Mapping[str, Any]) -> dict[str, Any]:
     """The parts of a JSON object: all that are required, of their type, and no unknown one."""
-    if not isinstance(told, dict):
-        raise InputError(f"give an object in curly brackets, not {_format_value(told)}")
-    for name in told:
+    if not isinstance(content, dict):
+        raise InputError(f"give an object in curly brackets, not {_format_value(content)}")
+    for name in content:
         if name not in required and name not in optional:
             raise InputError(f"there is no {name!r} here; choose {', '.join([*required, *optional])}")
     for name in required:
-        if name not in told:
+        if name not in content:
             raise InputError(f"{name} is missing")
-    return {**optional, **told, **{name: _check_type(name, told[name], kind) for name, kind in required.items()}}
+    return {**optional, **content, **{name: _check_type(name, content[name], kind) for name, kind in required.items()}}
 
 
 def _check_type(name: str, value: Any, kind: type) -> Any:

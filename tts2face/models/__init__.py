@@ -1,1 +1,1 @@
-"""Talker, face and palette, and the files that hold them."""
+"""Data models of talkers, faces and palettes, and their file formats."""

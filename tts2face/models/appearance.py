@@ -1,8 +1,8 @@
-"""How a talker looks: texture models over the landmarks, and a stretch of her own video to draw them on.
+"""Appearance model of a talker: texture models over the landmarks, and a segment of its video as the background.
 
 The appearance model of Theobald et al. 2007, section 2: the picture inside the landmarks' mesh, warped to a reference
-shape, is ``mean + sum_i b_i basis_i`` (eq. 2). The inside of the mouth has a model of its own, so that teeth and tongue
-stay sharp (design of Cosker et al. 2004; decided by measurement, docs/decisions/032-own-face.md).
+shape, is ``mean + sum_i b_i basis_i`` (eq. 2). The inside of the mouth has a separate model, so that teeth and tongue
+stay sharp (design of Cosker et al. 2004; measured in docs/decisions/032-own-face.md).
 """
 
 from collections.abc import Mapping
@@ -14,24 +14,25 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 
-STEPS_PER_PARAMETER = 1000.0  # looks are kept as 16-bit integers in steps of this part of their spread
+STEPS_PER_PARAMETER = 1000.0  # appearance parameters are stored as 16-bit integers in steps of spread / 1000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TextureModel:
-    """Pictures on one reference shape: ``texture = mean + sum_i b_i basis_i``, sRGB values from 0 to 255.
+    """Linear texture model on a reference shape: ``texture = mean + sum_i b_i basis_i``, sRGB values from 0 to 255.
 
     Parameters
     ----------
     reference : (N, 2)
-        Places of the model's points in the texture, pixels (x right, y down, from the top left pixel's centre).
+        Positions of the model's points in the texture, pixels (x right, y down, from the centre of the top left one).
     triangles : (F, 3)
-        Of the points.
+        Point indices.
     size
         (width, height) of the texture, pixels.
     pixels : (P,)
-        The texture's pixels that lie in the mesh, as ``y * width + x``.
+        Texture pixels inside the mesh, as ``y * width + x``.
     mean : (P, 3)
+        Mean colours.
     basis : (A, P, 3)
         Orthonormal as rows of (A, 3 P).
     spread : (A,)
@@ -47,7 +48,7 @@ class TextureModel:
     spread: NDArray[np.float32]
 
     def __post_init__(self) -> None:
-        """Refuse parts that do not fit each other."""
+        """Check that the shapes of all arrays agree."""
         n_modes, n_pixels = self.basis.shape[:2]
         fits = self.mean.shape == (n_pixels, 3) and self.pixels.shape == (n_pixels,) and self.spread.shape == (n_modes,)
         if not fits or self.basis.shape[2:] != (3,) or self.reference.shape[1:] != (2,):
@@ -59,12 +60,12 @@ class TextureModel:
         return len(self.basis)
 
     def parameters(self, textures: NDArray[np.floating]) -> NDArray[np.float32]:
-        """(T, A) parameters of (T, P, 3) textures."""
+        """Parameters (T, A) of textures (T, P, 3)."""
         offsets = (textures.astype(np.float32) - self.mean).reshape(len(textures), -1)
         return np.asarray(offsets @ self.basis.reshape(self.n_modes, -1).T, np.float32)
 
     def textures(self, parameters: NDArray[np.floating]) -> NDArray[np.float32]:
-        """(T, P, 3) textures of (T, a) parameters of the first a modes."""
+        """Textures (T, P, 3) for parameters (T, a) of the first a modes."""
         n_modes = parameters.shape[1]
         moved = parameters.astype(np.float32) @ self.basis[:n_modes].reshape(n_modes, -1)
         return self.mean + moved.reshape(len(parameters), *self.mean.shape)
@@ -72,16 +73,16 @@ class TextureModel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plate:
-    """A stretch of the talker's own video on which synthesised frames are drawn.
+    """Segment of the talker's video on which synthesised frames are drawn.
 
     Parameters
     ----------
     video
-        The stretch as an MP4 file's bytes, (H, W) as recorded.
+        Bytes of an MP4 file with T frames at the recorded size.
     points : (T, N, 2)
-        Landmarks and then the ring around them, pixels.
+        Landmarks followed by the ring around them, pixels.
     axes : (T, 2, 3)
-        Picture pixels (right, down) for a millimetre along each landmark axis: the head's pose without its place.
+        Pixels (right, down) per millimetre along each landmark axis: the head rotation and scale.
     shape : (T, M)
         Parameters of the talker's shape model.
     looks : (T, A)
@@ -97,20 +98,20 @@ class Plate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Appearance:
-    """A talker's face in pictures.
+    """Texture models of a talker's face and inner mouth, and the plate that they are drawn on.
 
     Parameters
     ----------
     face
         Texture model of the landmarks' mesh, whose points are the landmarks and a ring around them.
     mouth
-        Texture model of what lies between the inner lips; its points are `mouth_points`.
+        Texture model of the area between the inner lips; its points are `mouth_points`.
     mouth_points : (R,)
-        Landmarks of the inner lips' ring, in the order of the mouth's reference.
+        Landmark indices of the inner lip contour, in the order of the mouth's reference.
     moved_by_speech : (P,)
-        Of the face texture's pixels: 1 where speech changes the picture, 0 where the plate's own picture stays.
+        Weight of each face texture pixel: 1 where speech changes the picture, 0 where the plate is unchanged.
     plate
-        Where it is drawn.
+        Background video.
     """
 
     face: TextureModel
@@ -121,18 +122,18 @@ class Appearance:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of the looks: parameters of the face's texture, then of the mouth's."""
+        """Names of the appearance parameters: those of the face texture, then those of the mouth texture."""
         faces = tuple(f"face{i}" for i in range(self.face.n_modes))
         return faces + tuple(f"mouth{i}" for i in range(self.mouth.n_modes))
 
     @property
     def spread(self) -> NDArray[np.float32]:
-        """(A + B,) standard deviations of the looks."""
+        """Standard deviations (A + B,) of the appearance parameters."""
         return np.concatenate([self.face.spread, self.mouth.spread])
 
 
 def nearest_pixels(model: TextureModel) -> NDArray[np.int64]:
-    """(h w,) for each pixel of a texture the nearest one of its mesh, as a place in `model.pixels`."""
+    """Index (h w,) into `model.pixels` of the mesh pixel nearest to each texture pixel."""
     from scipy.ndimage import distance_transform_edt
 
     width, height = model.size
@@ -146,7 +147,7 @@ def nearest_pixels(model: TextureModel) -> NDArray[np.int64]:
 
 
 def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
-    """The appearance as arrays of a talker's file; `appearance_from_arrays` reads them."""
+    """Arrays of an appearance for a talker file; inverse of `appearance_from_arrays`."""
     arrays: dict[str, NDArray[Any]] = {
         "appearance.mouth_points": appearance.mouth_points,
         "appearance.moved_by_speech": appearance.moved_by_speech.astype(np.float16),
@@ -167,7 +168,7 @@ def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
 
 
 def appearance_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Appearance | None:
-    """The appearance in a talker's file, None where the talker has motion only.
+    """Appearance in the arrays of a talker file, or None.
 
     Raises
     ------
@@ -178,8 +179,8 @@ def appearance_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Appearance | N
         return None
 
     def model(name: str) -> TextureModel:
-        def part(what: str) -> NDArray[Any]:
-            return arrays[f"appearance.{name}.{what}"]
+        def part(key: str) -> NDArray[Any]:
+            return arrays[f"appearance.{name}.{key}"]
 
         width, height = (int(side) for side in part("size"))
         return TextureModel(

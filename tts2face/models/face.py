@@ -1,4 +1,4 @@
-"""The Face: what is animated and shown."""
+"""Linear face model with everything needed to draw it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,10 +12,10 @@ from lexicon.errors import DataError
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A named piece of the surface with one material: the triangles [first, first + count) of the face.
+    """Named part of the surface with one material: the triangles [first, first + count) of the face.
 
-    ``specular`` is the strength of the highlight (0 = matt), ``shininess`` its Blinn-Phong exponent, ``wrap`` how far
-    light reaches around the shape (0 = hard, 1 = very soft, a stand-in for scattering under skin), ``opacity`` in
+    ``specular`` is the strength of the highlight (0 = matt), ``shininess`` its Blinn-Phong exponent, ``wrap`` the wrap
+    of diffuse light around the shape (0 = hard, 1 = very soft, like subsurface scattering), ``opacity`` is in
     (0, 1]. ``textured`` parts take their colour from the texture, the others from the vertex colours.
     """
 
@@ -31,7 +31,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Eye:
-    """An eyeball that turns rigidly about its centre: the vertices [first, first + count).
+    """Eyeball that rotates rigidly about its centre (3,), mm: the vertices [first, first + count).
 
     ``turns`` gives for each gaze shape (ARKit ``eyeLook...``) the rotation vector (3,), radians, at weight 1.
     """
@@ -59,19 +59,19 @@ class Face:
     shape_names, shapes : (K,), (K, V, 3)
         Named basis (ARKit-52 names); displacement in mm at weight 1.
     limits : (K, 2)
-        Lowest and highest weight that looks right.
+        Least and greatest plausible weight.
     eyes
-        Eyeballs; `shapes` does not move them for the gaze shapes, `turns` does.
+        Eyeballs; gaze shapes rotate them by `Eye.turns`, not by `shapes`.
     colours : (V, 3)
         sRGB, 0-255.
     uv, texture : (V, 2), (H, W, 3)
-        Texture coordinates in [0, 1], (0, 0) the centre of the top left pixel's corner, and sRGB pixels; or None.
+        Texture coordinates in [0, 1] from the top left corner of the texture, and its sRGB pixels; or None.
     landmarks, landmark_vertices, landmark_weights : (L,), (L, 3), (L, 3)
         Landmark `landmarks[i]` of `tts2face.models.landmarks` lies at the barycentric weights of three vertices.
     pivot : (3,)
         The point about which the head turns.
     metadata
-        name, licence, attribution, command that made it.
+        Name, licence, attribution, and the command that built it.
     """
 
     vertices: NDArray[np.float32]
@@ -91,7 +91,7 @@ class Face:
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Refuse arrays that do not fit each other, then lock them."""
+        """Check that the arrays agree, then make them read-only."""
         n_vertices, n_shapes = len(self.vertices), len(self.shape_names)
         fits = (
             self.vertices.shape == (n_vertices, 3)
@@ -105,7 +105,9 @@ class Face:
         if not fits:
             raise DataError("the face's vertices, shapes, colours and landmarks do not fit each other; build it again")
         if self.triangles.size and not 0 <= int(self.triangles.min()) <= int(self.triangles.max()) < n_vertices:
-            raise DataError(f"a triangle of the face names a vertex beyond its {n_vertices}; build it again")
+            raise DataError(
+                f"a triangle of the face has a vertex index beyond its {n_vertices} vertices; build it again"
+            )
         for name in ("vertices", "triangles", "shapes", "limits", "colours", "uv", "texture", "pivot",
                      "landmarks", "landmark_vertices", "landmark_weights"):  # fmt: skip
             array = getattr(self, name)

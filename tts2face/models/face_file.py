@@ -1,4 +1,4 @@
-"""The ``.face`` file: a face kept compactly, with presets of its identity."""
+"""Reading and writing of ``.face`` files: a face in compact form, with identity presets."""
 
 import io
 from collections.abc import Mapping
@@ -17,15 +17,15 @@ from tts2face.storage.tensors import read_tensors, write_tensors
 
 KIND = "face"
 FORMAT_VERSION = 1
-STEPS_PER_SHAPE = 32000.0  # a shape's largest displacement in 16-bit steps: below 0.002 mm for 60 mm
+STEPS_PER_SHAPE = 32000.0  # 16-bit steps of a shape's largest displacement: below 0.002 mm for 60 mm
 JPEG_QUALITY = 92
-MOST_TEXTURE = 8192  # pixels along a side: 200 MB when decoded
-MAX_BRIGHTENED_LEVEL = 150  # a tint lightens texels up to this and no further: skin at the edge of dark hair stays skin
+MAX_TEXTURE_SIDE_PX = 8192  # pixels per side: 200 MB when decoded
+MAX_BRIGHTENED_LEVEL = 150  # upper limit of texels brightened by a tint: keeps skin colours at the edge of dark hair
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Identity:
-    """A preset of age, sex and ancestry.
+    """Identity preset: age, sex and ancestry.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Identity:
     tints
         Part name -> three factors of its sRGB colours, vertex colours and texture alike.
     summary
-        One line that says who it is.
+        One-line description.
     """
 
     displacement: NDArray[np.float32]
@@ -82,14 +82,14 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
 
 
 def read_face(path: Path, identity: str | None = None) -> Face:
-    """Read a ``.face`` file, as it is or with one of its identity presets.
+    """Read a ``.face`` file, with an identity preset if given.
 
     Raises
     ------
     InputError
-        There is no such file, or it has no such identity.
+        The file or the identity does not exist.
     DataError
-        It is damaged, not a face, of another version, or holds what no face can (`tts2face.models.face_layout`).
+        The file is damaged, of another kind or version, or invalid (`tts2face.models.face_layout`).
     """
     arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
     check_face(path, arrays, header)
@@ -102,14 +102,14 @@ def read_face(path: Path, identity: str | None = None) -> Face:
 
 
 def list_identities(path: Path) -> dict[str, str]:
-    """Names and summaries of a face file's identity presets."""
+    """Names and summaries of a face file's identity presets; errors as `read_face`."""
     arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
     check_face(path, arrays, header)
     return {name: summary for name, _, summary in header["identities"]}
 
 
 def load_face(name: str, identity: str | None = None) -> Face:
-    """A shipped face by name (head, cartoon), or one from a file; errors as `find_file` and `read_face`."""
+    """Load a shipped face by name (head, cartoon), or one from a file; errors as `find_file` and `read_face`."""
     return read_face(find_file(name, KIND), identity)
 
 
@@ -122,14 +122,14 @@ def _pack_shapes(shapes: NDArray[np.floating]) -> dict[str, NDArray[Any]]:
     steps, sizes, moved = [], [], []
     for shape in shapes:
         quantised, step = _quantise(shape)
-        here = np.flatnonzero(quantised.any(axis=1))
-        steps.append(quantised[here])
+        rows = np.flatnonzero(quantised.any(axis=1))
+        steps.append(quantised[rows])
         sizes.append(step)
-        moved.append(here.astype(np.int32))
+        moved.append(rows.astype(np.int32))
     return {
         "shape_deltas": np.concatenate([np.zeros((0, 3), np.int16), *steps]),
         "shape_vertices": np.concatenate([np.zeros(0, np.int32), *moved]),
-        "shape_counts": np.array([len(here) for here in moved], np.int32),
+        "shape_counts": np.array([len(rows) for rows in moved], np.int32),
         "shape_steps": np.array(sizes, np.float32),
     }
 
@@ -139,8 +139,8 @@ def _unpack_shapes(arrays: Mapping[str, NDArray[Any]], n_vertices: int) -> NDArr
     shapes = np.zeros((len(counts), n_vertices, 3), np.float32)
     bounds = np.concatenate([[0], np.cumsum(counts)])
     for number, step in enumerate(steps):
-        here = slice(bounds[number], bounds[number + 1])
-        shapes[number, arrays["shape_vertices"][here]] = arrays["shape_deltas"][here] * step
+        span = slice(bounds[number], bounds[number + 1])
+        shapes[number, arrays["shape_vertices"][span]] = arrays["shape_deltas"][span] * step
     return shapes
 
 
@@ -157,11 +157,13 @@ def _decode_jpeg(content: NDArray[np.uint8], path: Path) -> NDArray[np.uint8]:
 
     try:
         with Image.open(io.BytesIO(content.tobytes()), formats=["JPEG"]) as image:
-            if max(image.size) > MOST_TEXTURE:
-                raise DataError(f"{path}: the texture has {image.size} pixels; make it at most {MOST_TEXTURE} wide")
+            if max(image.size) > MAX_TEXTURE_SIDE_PX:
+                raise DataError(
+                    f"{path}: the texture has {image.size} pixels; reduce it to at most {MAX_TEXTURE_SIDE_PX} per side"
+                )
             return np.array(image.convert("RGB"))
-    except (OSError, SyntaxError) as broken:
-        raise DataError(f"{path}: the texture cannot be decoded ({broken}); build or copy the face again") from broken
+    except (OSError, SyntaxError) as error:
+        raise DataError(f"{path}: the texture cannot be decoded ({error}); build or copy the face again") from error
 
 
 def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> Face:
@@ -194,7 +196,7 @@ def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, A
 
 
 def _part_texel_weights(face: Face, part: Part, shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """(H, W) 1 on the texels of a part, a little less across its edge, 0 elsewhere."""
+    """Weights (H, W): 1 on the texels of a part, 0 elsewhere, with a soft edge."""
     from PIL import Image, ImageDraw, ImageFilter
 
     mask = Image.new("L", (shape[1], shape[0]))

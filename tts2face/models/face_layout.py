@@ -1,4 +1,4 @@
-"""What a ``.face`` file must hold (docs/file-formats.md), checked once when it is read."""
+"""Schema of ``.face`` files (docs/file-formats.md), checked when a file is read."""
 
 import math
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.storage.schema import (
-    MOST_MM,
+    MAX_MM,
     Check,
     Contents,
     Tensor,
@@ -26,14 +26,18 @@ from tts2face.storage.schema import (
     whole,
 )
 
-MOST_WEIGHT = 100.0  # of a shape; sliders go from 0 to 1, those of carried gestures to some 30
-MOST_STEP_MM = 0.1  # 16 bits of it are 3 m
-MOST_CELLS = 100_000_000  # shapes x vertices: 1.2 GB when read; a head has 1.4 million
-LEAST_EXTENT_MM = 1.0  # of a face from side to side and from top to bottom
-SUM_WITHIN = 1e-3  # of barycentric weights; 32-bit rounding is 1e-7
+MAX_WEIGHT = 100.0  # of a shape; common shapes have 0 to 1, gesture modes up to about 30
+MAX_STEP_MM = 0.1  # 16 bits of it are 3 m
+MAX_CELLS = 100_000_000  # shapes x vertices: 1.2 GB when read; a head has 1.4 million
+MIN_EXTENT_MM = 1.0  # least width and height of a face
+SUM_WITHIN = 1e-3  # tolerance of the sum of barycentric weights; 32-bit rounding is 1e-7
 N_CORNERS = 3
+# Triangles' area over that of the box around them: 0.5 of a head; shuffled vertices have 200, and take minutes to draw.
+MOST_AREA = 10.0
+MEASURED = 4000  # triangles, spread over all, of which the area is measured: all of a head would take 10 ms
+WIDE_OPEN = "jawOpen"  # the shape with which a face is drawn besides at rest before its first picture
 
-_INDEX, _POINT = whole(0, 2**31 - 1), listed(number(-MOST_MM, MOST_MM), 3)
+_INDEX, _POINT = whole(0, 2**31 - 1), listed(number(-MAX_MM, MAX_MM), 3)
 _PART = record(
     {"name": text, "first": _INDEX, "count": _INDEX},
     {
@@ -58,11 +62,11 @@ METADATA: Mapping[str, Check] = {
 TENSORS: Mapping[str, Tensor] = {
     "vertices": millimetres("vertices", 3),
     "triangles": Tensor("int32", ("triangles", N_CORNERS)),
-    "shape_steps": Tensor("float32", ("shapes",), 0.0, MOST_STEP_MM, may_be_empty=True),
+    "shape_steps": Tensor("float32", ("shapes",), 0.0, MAX_STEP_MM, may_be_empty=True),
     "shape_counts": Tensor("int32", ("shapes",), 0, may_be_empty=True),
     "shape_vertices": Tensor("int32", ("moved vertices",), may_be_empty=True),
     "shape_deltas": Tensor("int16", ("moved vertices", 3), may_be_empty=True),
-    "limits": Tensor("float32", ("shapes", 2), -MOST_WEIGHT, MOST_WEIGHT, may_be_empty=True),
+    "limits": Tensor("float32", ("shapes", 2), -MAX_WEIGHT, MAX_WEIGHT, may_be_empty=True),
     "colours": Tensor("uint8", ("vertices", 3)),
     "uv": Tensor("uint16", ("vertices", 2), is_optional=True),
     "texture": Tensor("uint8", ("bytes",), is_optional=True),
@@ -74,19 +78,19 @@ TENSORS: Mapping[str, Tensor] = {
 
 
 def check_face(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> None:
-    """Refuse a face's file whose arrays or metadata are not what they must be.
+    """Check the arrays and metadata of a face file.
 
     Raises
     ------
     DataError
-        A part is missing, of another type or shape, out of range, not finite, or does not fit the others.
+        A part is missing, has the wrong type or shape, is out of range or not finite, or contradicts another part.
     """
     contents = Contents(path, "face", arrays, header)
     contents.metadata(METADATA)
     contents.tensors(TENSORS)
     presets = range(len(header["identities"]))
     contents.tensors({f"identity{n}": Tensor("int16", ("vertices", 3)) for n in presets})
-    contents.tensors({f"identity{n}_step": Tensor("float32", (1,), 0.0, MOST_STEP_MM) for n in presets})
+    contents.tensors({f"identity{n}_step": Tensor("float32", (1,), 0.0, MAX_STEP_MM) for n in presets})
     contents.only_known()
     n_vertices = contents.sizes["vertices"]
     for name in ("triangles", "shape_vertices", "landmark_vertices"):
@@ -97,13 +101,16 @@ def check_face(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[s
     _check_places(contents)
     _check_shapes(contents, n_vertices)
     _check_parts(contents, n_vertices)
+    _check_area(contents)
 
 
 def _check_places(contents: Contents) -> None:
     across, up, _ = (float(size) for size in np.ptp(contents.arrays["vertices"], axis=0))
-    contents.require(min(across, up) >= LEAST_EXTENT_MM, f"vertices span {across:g} x {up:g} mm, which is no face")
+    contents.require(
+        min(across, up) >= MIN_EXTENT_MM, f"vertices span {across:g} x {up:g} mm; a face needs 1 mm or more"
+    )
     off = np.abs(contents.arrays["landmark_weights"].sum(axis=1) - 1.0).max(initial=0.0)
-    contents.require(float(off) <= SUM_WITHIN, f"landmark_weights of a landmark add up to 1 but for {off:g}")
+    contents.require(float(off) <= SUM_WITHIN, f"landmark_weights of a landmark add up to 1 with an error of {off:g}")
 
 
 def _check_shapes(contents: Contents, n_vertices: int) -> None:
@@ -112,11 +119,13 @@ def _check_shapes(contents: Contents, n_vertices: int) -> None:
     n_shapes = contents.sizes["shapes"]
     contents.require(len(names) == n_shapes, f"has {len(names)} shape_names, but {n_shapes} shape_steps")
     contents.require(len(set(names)) == len(names), "has two shapes of the same name")
-    contents.require(n_shapes * n_vertices <= MOST_CELLS, f"has {n_shapes} shapes of {n_vertices} vertices: too many")
+    contents.require(n_shapes * n_vertices <= MAX_CELLS, f"has {n_shapes} shapes of {n_vertices} vertices: too many")
     moved, total = contents.sizes["moved vertices"], int(arrays["shape_counts"].sum(dtype=np.int64))
     contents.require(total == moved, f"shape_counts adds up to {total}, but there are {moved} moved vertices")
     reversed_ = np.flatnonzero(arrays["limits"][:, 0] > arrays["limits"][:, 1])
-    contents.require(not len(reversed_), f"limits of the shape {names[reversed_[0]] if len(reversed_) else ''} fall")
+    contents.require(
+        not len(reversed_), f"limits of the shape {names[reversed_[0]] if len(reversed_) else ''} are reversed"
+    )
 
 
 def _check_parts(contents: Contents, n_vertices: int) -> None:
@@ -130,6 +139,28 @@ def _check_parts(contents: Contents, n_vertices: int) -> None:
         end = eye["first"] + eye["count"]
         contents.require(eye["count"] > 0 and end <= n_vertices, f"eye {number_} reaches beyond {n_vertices} vertices")
         unknown = sorted(eye["turns"].keys() - set(header["shape_names"]))
-        contents.require(not unknown, f"eye {number_} turns with {unknown[:1]}, which is none of its shapes")
+        contents.require(not unknown, f"eye {number_} turns with {unknown[:1]}, which is not one of its shapes")
     names = [name for name, _, _ in header["identities"]]
     contents.require(len(set(names)) == len(names), "has two identities of the same name")
+
+
+def _check_area(contents: Contents) -> None:
+    """Refuse a face whose triangles, at rest or with its jaw wide open, lie crosswise through each other."""
+    arrays, names = contents.arrays, contents.header["shape_names"]
+    poses = {"at rest": arrays["vertices"]}
+    if WIDE_OPEN in names:
+        number_ = names.index(WIDE_OPEN)
+        first = int(arrays["shape_counts"][:number_].sum(dtype=np.int64))
+        moved = slice(first, first + int(arrays["shape_counts"][number_]))
+        opened = arrays["vertices"].copy()
+        opened[arrays["shape_vertices"][moved]] += arrays["shape_deltas"][moved] * arrays["shape_steps"][number_]
+        poses[f"with {WIDE_OPEN}"] = opened
+    size = np.ptp(arrays["vertices"], axis=0).astype(np.float64)
+    box = 2.0 * float(size @ np.roll(size, 1))
+    every = len(arrays["triangles"]) // MEASURED + 1
+    for pose, vertices in poses.items():
+        a, b, c = (vertices[corner] for corner in arrays["triangles"][::every].T)
+        (ux, uy, uz), (vx, vy, vz) = (b - a).T, (c - a).T
+        squared = (uy * vz - uz * vy) ** 2 + (uz * vx - ux * vz) ** 2 + (ux * vy - uy * vx) ** 2
+        share = every * float(np.sqrt(squared).sum(dtype=np.float64)) / 2.0 / box
+        contents.require(share <= MOST_AREA, f"triangles {pose} cover {share:.0f} times the box around the face")

@@ -1,7 +1,7 @@
-"""The landmarks that talkers and faces have in common: the 478 points of the MediaPipe face mesh.
+"""Landmarks common to talkers and faces: the 478 points of the MediaPipe face mesh.
 
 Indices follow the topology of Kartynnik et al. 2019, "Real-time facial surface geometry from monocular video on
-mobile GPUs" (468 points) with ten iris points behind it. "Left" and "right" are the person's own. Landmark
+mobile GPUs" (468 points), followed by ten iris points. "Left" and "right" are the person's own. Landmark
 coordinates: x to the person's left, y up, z out of the face, millimetres, head pose removed.
 """
 
@@ -27,7 +27,7 @@ FACE_OVAL = (
     136, 172, 58, 132, 93, 234, 127, 162, 21, 54, 103, 67, 109,
 )  # fmt: skip
 
-# What speech moves: every point of the canonical mesh lower than 0.5 mm under the base of the nose (landmark 2).
+# Points that speech moves: every point of the canonical mesh lower than 0.5 mm under the base of the nose (landmark 2).
 # This is region P of Ju and Lee 2008, Fig. 5; its complement carries expression.
 MOUTH_REGION = (
     0, 11, 12, 13, 14, 15, 16, 17, 18, 32, 37, 38, 39, 40, 41, 42, 43, 57, 58, 61, 62, 72, 73, 74, 76, 77, 78, 80, 81,

@@ -1,7 +1,7 @@
-"""The Palette: how people move their faces while they speak, as styles by name, and the file that keeps it.
+"""Gesture palettes: recorded facial gestures of speakers as named styles, and the ``.palette`` file format.
 
-After Ju and Lee 2008: a style is one person's recorded gestures, apart from lips and words. All is kept as motion of
-one common face, so that styles of different people can be mixed.
+After Ju and Lee 2008: a style holds one speaker's recorded gestures without the speech motion of the lips. All styles
+are motion of one common face, so that styles of different speakers can be mixed.
 """
 
 from collections.abc import Mapping
@@ -21,14 +21,14 @@ from tts2face.types import HEAD_CHANNELS
 
 KIND = "palette"
 FORMAT_VERSION = 1
-GESTURE_FPS = 30.0  # Ju and Lee 2008, section 3; every style is kept at this rate
-STEPS_PER_SPREAD = 2000.0  # of 16-bit integers: finer than any tracker's noise
+GESTURE_FPS = 30.0  # Ju and Lee 2008, section 3; the frame rate of every style
+STEPS_PER_SPREAD = 2000.0  # 16-bit steps per standard deviation: finer than the noise of trackers
 
 EXPRESSIONS = ("sad", "happy", "afraid", "angry", "surprised")  # neutral, the sixth, is the face at rest
-EYE_CHANNELS = ("left", "right")  # the person's own
-# What gestures consist of, and the channels that are the same in every palette; "brows" and "cheeks" have as many
-# modes as the palette's regions. Units: weights of basis expressions; shares by which lids are shut; radians (down, to
-# own left); radians and mm.
+EYE_CHANNELS = ("left", "right")  # of the speaker
+# Channels of the features that are the same in every palette; "brows" and "cheeks" have one channel per mode of the
+# palette's regions. Units: weights of basis expressions; closure of the lids (0 to 1); radians (down, to the own left);
+# radians and mm.
 FIXED_CHANNELS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {"expression": EXPRESSIONS, "blink": EYE_CHANNELS, "gaze": ("pitch", "yaw"), "head": HEAD_CHANNELS}
 )
@@ -45,7 +45,7 @@ class FaceRegion:
     Parameters
     ----------
     landmarks : (L,)
-        Numbers of `tts2face.models.landmarks`.
+        Indices of `tts2face.models.landmarks`.
     modes : (k, L, 3)
         Orthonormal as rows of (k, 3 L); values d are in mm.
     """
@@ -56,20 +56,20 @@ class FaceRegion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Style:
-    """Recorded gestures of one person in one mood; recordings one behind the other, at `GESTURE_FPS`.
+    """Recorded gestures of one speaker in one mood: concatenated recordings at `GESTURE_FPS`.
 
     Parameters
     ----------
     lengths : (R,)
         Frames of each recording.
     intensity : (T,)
-        dB of the sound against the mean level of its speech; silence is far below 0.
+        Sound level in dB relative to the mean level of the speech; silence is far below 0.
     pitch : (T,)
-        Semitones against the recording's median; 0 where nothing is voiced.
+        Semitones relative to the median of the recording; 0 on unvoiced frames.
     motion
-        (T, k) values of each feature that was seen; of `FEATURES`.
+        (T, k) values of each recorded feature of `FEATURES`.
     metadata
-        At least sources, licence, attribution, command.
+        At least sources, licence, attribution and command.
     """
 
     lengths: NDArray[np.int32]
@@ -79,7 +79,7 @@ class Style:
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Refuse parts that are not on one clock."""
+        """Check that all parts have the same number of frames."""
         n_frames = int(self.lengths.sum())
         if n_frames == 0 or not len(self.intensity) == len(self.pitch) == n_frames:
             raise DataError("a style's recordings, intensity and pitch differ in length; build the palette again")
@@ -89,16 +89,16 @@ class Style:
 
     @property
     def seconds(self) -> float:
-        """Duration of all recordings."""
+        """Duration of all recordings in seconds."""
         return float(self.lengths.sum()) / GESTURE_FPS
 
 
 @dataclass(frozen=True, slots=True)
 class FeatureChange:
-    """What is done to a feature of a measured style.
+    """Change of a feature of a recorded style.
 
-    ``gain`` multiplies the motion about its mean, ``offset`` is added to channels by name, ``tempo`` above 1 plays
-    faster.
+    ``gain`` multiplies the motion about its mean, ``offset`` is added to channels by name, ``tempo`` multiplies the
+    playback speed.
     """
 
     gain: float = 1.0
@@ -108,7 +108,7 @@ class FeatureChange:
 
 @dataclass(frozen=True, slots=True)
 class Derivation:
-    """A style that nobody recorded: a measured one, changed as stated."""
+    """Derived style: the recorded style ``source`` with changes by feature."""
 
     source: str
     changes: Mapping[str, FeatureChange]
@@ -117,16 +117,16 @@ class Derivation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Palette:
-    """Styles by name.
+    """Recorded and derived gesture styles by name.
 
     Parameters
     ----------
     neutral : (478, 3)
-        The face whose motion the values are: landmarks at rest, mm, axes as in `tts2face.models.landmarks`.
+        Landmarks at rest of the face that all styles move, mm; axes as in `tts2face.models.landmarks`.
     regions
         Region of each of `REGION_FEATURES`.
     styles, derivations
-        Measured styles, and those derived from them.
+        Recorded styles, and those derived from them.
     """
 
     neutral: Float32Array
@@ -136,7 +136,7 @@ class Palette:
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Refuse a palette without styles, styles of other sizes, and derivations from nothing."""
+        """Check that there are styles, that their channels agree, and that the source of each derived style exists."""
         if not self.styles:
             raise DataError("the palette holds no style; build it with `tts2face corpus gestures`")
         for name, style in self.styles.items():
@@ -149,7 +149,7 @@ class Palette:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All styles, the derived ones first."""
+        """Names of all styles, the derived ones first."""
         return (*self.derivations, *self.styles)
 
     def channels(self, feature: str) -> tuple[str, ...]:
@@ -159,12 +159,12 @@ class Palette:
         return FIXED_CHANNELS[feature]
 
     def require(self, name: str) -> str:
-        """The name of a style.
+        """Return the name of an existing style.
 
         Raises
         ------
         InputError
-            There is none of this name.
+            The palette has no style of this name.
         """
         if name not in self.names:
             raise InputError(f"there is no style {name!r} in the palette; it has {', '.join(self.names)}")
@@ -211,10 +211,9 @@ def read_palette(path: Path) -> Palette:
     Raises
     ------
     InputError
-        There is no such file.
+        The file does not exist.
     DataError
-        It is damaged, not a palette, of another version, recorded at another rate, or holds what no palette can
-        (`tts2face.models.palette_layout`).
+        The file is damaged, of another kind, version or frame rate, or invalid (`tts2face.models.palette_layout`).
     """
     arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
     check_palette(path, arrays, header, {name: FIXED_CHANNELS.get(name) for name in FEATURES})
@@ -224,7 +223,7 @@ def read_palette(path: Path) -> Palette:
 
 
 def load_palette(name: str) -> Palette:
-    """A shipped palette by name, or one from a ``.palette`` file; errors as `find_file` and `read_palette`."""
+    """Load a shipped palette by name, or one from a ``.palette`` file; errors as `find_file` and `read_palette`."""
     return read_palette(find_file(name, KIND))
 
 
@@ -238,11 +237,11 @@ def _palette_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str
         styles={name: _style_from_arrays(name, arrays, metadata) for name, metadata in header["styles"].items()},
         derivations={
             name: Derivation(
-                told["source"],
-                {feature: FeatureChange(**change) for feature, change in told["changes"].items()},
-                told["summary"],
+                derived["source"],
+                {feature: FeatureChange(**change) for feature, change in derived["changes"].items()},
+                derived["summary"],
             )
-            for name, told in header["derivations"].items()
+            for name, derived in header["derivations"].items()
         },
         metadata=header["metadata"],
     )

@@ -1,4 +1,4 @@
-"""What a ``.palette`` file must hold (docs/file-formats.md), checked once when it is read."""
+"""Schema of ``.palette`` files (docs/file-formats.md), checked when a file is read."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.storage.schema import Check, Contents, Tensor, free, millimetres, number, record, refuse, table, text
 
-MOST_MODES = 64  # of a region
-MOST_VALUE = 1e4  # of any motion: mm, radians, or weights; 16 bits in steps of 1/2000 of the spread reach 16 spreads
+MAX_MODES = 64  # of a region
+MAX_VALUE = 1e4  # of any motion: mm, radians, or weights; 16 bits in steps of 1/2000 of the spread reach 16 spreads
 LOUDNESS_DB = 400.0  # of either sign
 SEMITONES = 120.0  # ten octaves
-MOST_GAIN = 100.0
-# A tempo of 0.05 makes 30 frames last 20 s; one of 20 makes 600 frames a second, which is all that a clip takes.
+MAX_GAIN = 100.0
+# A tempo of 0.05 stretches 30 frames to 20 s; one of 20 gives 600 frames/s, the most that a clip can use.
 SLOWEST, FASTEST = 0.05, 20.0
 
 _CHANGE = record(
     {},
     {
-        "gain": number(-MOST_GAIN, MOST_GAIN),
-        "offset": table(number(-MOST_VALUE, MOST_VALUE)),
+        "gain": number(-MAX_GAIN, MAX_GAIN),
+        "offset": table(number(-MAX_VALUE, MAX_VALUE)),
         "tempo": number(SLOWEST, FASTEST),
     },
 )
@@ -40,17 +40,17 @@ def check_palette(
     header: Mapping[str, Any],
     channels: Mapping[str, tuple[str, ...] | None],
 ) -> None:
-    """Refuse a palette's file whose arrays or metadata are not what they must be.
+    """Check the arrays and metadata of a palette file.
 
     Parameters
     ----------
     channels
-        Channels of each feature; None where they are the modes of a region of that name.
+        Channels of each feature; None for the modes of a region of that name.
 
     Raises
     ------
     DataError
-        A part is missing, of another type or shape, out of range, not finite, or does not fit the others.
+        A part is missing, has the wrong type or shape, is out of range or not finite, or contradicts another part.
     """
     contents = Contents(path, "palette", arrays, header)
     contents.metadata(METADATA)
@@ -76,41 +76,41 @@ def _check_region(contents: Contents, name: str) -> None:
     contents.indices(landmarks, N_LANDMARKS, "landmarks of the face mesh")
     contents.distinct(landmarks)
     n_modes = contents.sizes[f"modes of {name}"]
-    contents.require(n_modes <= MOST_MODES, f"{modes} are {n_modes}; at most {MOST_MODES} are possible")
+    contents.require(n_modes <= MAX_MODES, f"{modes} are {n_modes}; at most {MAX_MODES} are possible")
     contents.orthonormal(modes)
 
 
 def _check_style(contents: Contents, style: str, widths: Mapping[str, int | str]) -> None:
-    here, frames = f"style.{style}", f"frames of {style}"
+    prefix, frames = f"style.{style}", f"frames of {style}"
     contents.tensors(
         {
-            f"{here}.intensity": Tensor("float16", (frames,), -LOUDNESS_DB, LOUDNESS_DB),
-            f"{here}.pitch": Tensor("float16", (frames,), -SEMITONES, SEMITONES),
-            f"{here}.lengths": Tensor("int32", (f"recordings of {style}",), 1),
+            f"{prefix}.intensity": Tensor("float16", (frames,), -LOUDNESS_DB, LOUDNESS_DB),
+            f"{prefix}.pitch": Tensor("float16", (frames,), -SEMITONES, SEMITONES),
+            f"{prefix}.lengths": Tensor("int32", (f"recordings of {style}",), 1),
         }
     )
-    contents.sums_to(f"{here}.lengths", contents.sizes[frames], "frames of intensity")
+    contents.sums_to(f"{prefix}.lengths", contents.sizes[frames], "frames of intensity")
     for feature, width in widths.items():
-        values, step = f"{here}.{feature}", f"{here}.{feature}.step"
+        values, step = f"{prefix}.{feature}", f"{prefix}.{feature}.step"
         present = values in contents.arrays
         contents.tensors(
             {
                 values: Tensor("int16", (frames, width), is_optional=True),
-                step: Tensor("float32", (width,), 0.0, MOST_VALUE, is_optional=not present),
+                step: Tensor("float32", (width,), 0.0, MAX_VALUE, is_optional=not present),
             }
         )
         if present:
             steps = contents.arrays[step]
-            contents.require(bool((steps > 0).all()), f"{step} holds 0; a step is above it")
+            contents.require(bool((steps > 0).all()), f"{step} holds 0; steps must be above 0")
             most = float(np.abs(contents.arrays[values].astype(np.int32)).max() * np.float64(steps.max()))
-            contents.require(most <= MOST_VALUE, f"{values} in steps of {step} reaches {most:g}, beyond {MOST_VALUE:g}")
+            contents.require(most <= MAX_VALUE, f"{values} in steps of {step} reaches {most:g}, beyond {MAX_VALUE:g}")
 
 
 def _check_derivations(contents: Contents, channels: Mapping[str, tuple[str, ...] | None]) -> None:
     header = contents.header
     contents.require(bool(header["styles"]), "holds no style")
-    twice = sorted(header["styles"].keys() & header["derivations"].keys())
-    contents.require(not twice, f"has a measured and a derived style of the name {twice[:1]}")
+    duplicates = sorted(header["styles"].keys() & header["derivations"].keys())
+    contents.require(not duplicates, f"has a recorded and a derived style of the name {duplicates[:1]}")
     for name, derived in header["derivations"].items():
         for feature, change in derived["changes"].items():
             where = f"{contents.path}: the derived style {name!r} changes"

@@ -1,7 +1,7 @@
-"""Small networks that see the phones in a window about each instant and tell the lips' parameters.
+"""Small networks that predict speech parameters from the phones in a window around each instant.
 
-They know less about articulation than recorded examples do, and more about contexts that were never recorded: blended
-with examples (`tts2face.exemplar`) they make both better. After Taylor et al. 2017.
+They reproduce articulation less precisely than recorded exemplars, but generalise to contexts that were not recorded;
+blended with exemplars (`tts2face.exemplar`) they improve both. After Taylor et al. 2017.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,25 +16,26 @@ from lexicon.phones import nearest_phones
 from lexicon.sequence import PhoneSequence
 from tts2face.compilation import kernel
 
-PHONE_WINDOW_S = 0.28  # either side
+PHONE_WINDOW_S = 0.28  # window on either side
 STEP_S = 0.04
-NEIGHBOURS = (-3, -2, -1, 1, 2, 3)  # phones about the one that sounds
+NEIGHBOURS = (-3, -2, -1, 1, 2, 3)  # phones relative to the present one
 NETWORK_PREFIX = "network."
 N_PHONES_SEEN = 2 * round(PHONE_WINDOW_S / STEP_S) + 1 + len(NEIGHBOURS)
-N_PLACE = 4  # numbers of the place within the present phone
+N_PLACE = 4  # values that describe the position within the present phone
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PhoneNetwork:
-    """Networks of the same size, whose answers are averaged.
+    """Ensemble of networks of the same size, whose outputs are averaged.
 
     Parameters
     ----------
     inventory
-        Phones that they know.
+        Phone labels of the inputs.
     weights : (N, F, H), (N, H, H'), ..., (N, H', D)
-        Of the layers, for each of N networks; rectified linear units but for the last.
+        Weights of the layers of N networks; rectified linear units except in the last layer.
     biases : (N, H), ...
+        Biases of the layers.
     """
 
     inventory: tuple[str, ...]
@@ -44,80 +45,87 @@ class PhoneNetwork:
     def parameters(
         self, phones: PhoneSequence, times: NDArray[np.floating], members: slice = slice(None)
     ) -> NDArray[np.float32]:
-        """(T, D) speech parameters at instants in seconds (T,); of some of the networks where `members` says so."""
-        shown, place = window_features(phones, np.asarray(times, np.float64), self.inventory)
-        rows = shown + len(self.inventory) * np.arange(shown.shape[1])
-        told = np.zeros((len(times), self.weights[-1].shape[2]), np.float32)
+        """Speech parameters (T, D) at instants `times` (T,) in seconds, averaged over the networks `members`.
+
+        Raises
+        ------
+        InputError
+            There are no phones, or a label is not in the phone table.
+        """
+        labels, position = window_features(phones, np.asarray(times, np.float64), self.inventory)
+        rows = labels + len(self.inventory) * np.arange(labels.shape[1])
+        output = np.zeros((len(times), self.weights[-1].shape[2]), np.float32)
         for member in range(len(self.weights[0]))[members]:
             weights, biases = (tuple(layer[member] for layer in layers) for layers in (self.weights, self.biases))
-            hidden = np.maximum(_first_layer(rows, place, weights[0], biases[0]), np.float32(0.0))
+            hidden = np.maximum(_first_layer(rows, position, weights[0], biases[0]), np.float32(0.0))
             for inner, bias in zip(weights[1:-1], biases[1:-1], strict=True):
                 hidden = np.maximum(_hidden_layer(hidden, inner, bias), np.float32(0.0))
-            told += _hidden_layer(hidden, weights[-1], biases[-1])
-        return told / np.float32(len(range(len(self.weights[0]))[members]))
+            output += _hidden_layer(hidden, weights[-1], biases[-1])
+        return output / np.float32(len(range(len(self.weights[0]))[members]))
 
 
 @kernel
-def _first_layer(rows, place, weights, biases):  # type: ignore[no-untyped-def]
-    """(T, H) of inputs that are ones in some rows of the weights (T, C), and numbers (T, 4) for the last rows.
+def _first_layer(rows, position, weights, biases):  # type: ignore[no-untyped-def]
+    """First layer (T, H) for one-hot inputs at `rows` (T, C) of the weights and values (T, 4) for the last rows.
 
-    Sums run in one order, so that every machine and number of threads gives the same bits.
+    The order of the sums is fixed, so that results do not depend on the machine or the number of threads.
     """
-    first = len(weights) - place.shape[1]
-    told = np.zeros((len(rows), weights.shape[1]), np.float32)
+    first = len(weights) - position.shape[1]
+    output = np.zeros((len(rows), weights.shape[1]), np.float32)
     for t in range(len(rows)):
-        told[t] = biases
+        output[t] = biases
         for row in rows[t]:
-            told[t] += weights[row]
-        for k in range(place.shape[1]):
-            told[t] += place[t, k] * weights[first + k]
-    return told
+            output[t] += weights[row]
+        for k in range(position.shape[1]):
+            output[t] += position[t, k] * weights[first + k]
+    return output
 
 
 @kernel
-def _hidden_layer(seen, weights, biases):  # type: ignore[no-untyped-def]
-    """(T, H') of inputs (T, H), summed in one order."""
-    told = np.zeros((len(seen), weights.shape[1]), np.float32)
-    for t in range(len(seen)):
-        told[t] = biases
+def _hidden_layer(inputs, weights, biases):  # type: ignore[no-untyped-def]
+    """Layer (T, H') of inputs (T, H), summed in a fixed order."""
+    output = np.zeros((len(inputs), weights.shape[1]), np.float32)
+    for t in range(len(inputs)):
+        output[t] = biases
         for k in range(len(weights)):
-            if seen[t, k] != 0.0:
-                told[t] += seen[t, k] * weights[k]
-    return told
+            if inputs[t, k] != 0.0:
+                output[t] += inputs[t, k] * weights[k]
+    return output
 
 
 def window_features(
     phones: PhoneSequence, times: NDArray[np.float64], inventory: Sequence[str]
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """(T, C) numbers of the phones that sound about each instant and of those about the present one; its place (T, 4).
+    """Phone indices (T, C) in the window around each instant, and the position (T, 4) within the present phone.
 
-    The place: part of the phone that has passed, seconds since it began, until it ends, and that it takes.
+    Columns of the indices: phones at `STEP_S` intervals, then the neighbours of the present phone. Columns of the
+    position: elapsed share of the phone, seconds since its start, seconds until its end, and its duration in seconds.
 
     Raises
     ------
     InputError
-        A label is not in the phone table.
+        There are no phones, or a label is not in the phone table.
     """
     if not len(phones):
-        raise InputError("a window needs phones to look at")
+        raise InputError("the phone sequence is empty; pass at least one phone")
     number = {label: at for at, label in enumerate(inventory)}
     labels = np.array([number[nearest_phones(label, inventory)[0]] for label in phones.phones])
     offsets = np.arange(-round(PHONE_WINDOW_S / STEP_S), round(PHONE_WINDOW_S / STEP_S) + 1) * STEP_S
     starts, ends = phones.edges[:-1], phones.edges[1:]
 
-    def sounding(at: NDArray[np.float64]) -> NDArray[np.int64]:
+    def phone_index(at: NDArray[np.float64]) -> NDArray[np.int64]:
         return np.clip(np.searchsorted(phones.edges, at, side="right") - 1, 0, len(labels) - 1)
 
-    now = sounding(times)
-    shown = [labels[sounding(times + offset)] for offset in offsets]
-    shown += [labels[np.clip(now + step, 0, len(labels) - 1)] for step in NEIGHBOURS]
-    since, until = times - starts[now], ends[now] - times
-    place = np.column_stack([since / (ends - starts)[now], since, until, (ends - starts)[now]])
-    return np.stack(shown, axis=1), place.astype(np.float32)
+    present = phone_index(times)
+    columns = [labels[phone_index(times + offset)] for offset in offsets]
+    columns += [labels[np.clip(present + step, 0, len(labels) - 1)] for step in NEIGHBOURS]
+    since, until = times - starts[present], ends[present] - times
+    position = np.column_stack([since / (ends - starts)[present], since, until, (ends - starts)[present]])
+    return np.stack(columns, axis=1), position.astype(np.float32)
 
 
 def network_arrays(network: PhoneNetwork) -> dict[str, NDArray[Any]]:
-    """The networks as arrays of a talker's file, in 16 bits; `network_from_arrays` reads them."""
+    """Arrays of the networks for a talker file, weights in 16 bits; inverse of `network_from_arrays`."""
     arrays: dict[str, NDArray[Any]] = {}
     for at, (weights, biases) in enumerate(zip(network.weights, network.biases, strict=True)):
         arrays[f"{NETWORK_PREFIX}weights{at}"] = weights.astype(np.float16)
@@ -126,7 +134,7 @@ def network_arrays(network: PhoneNetwork) -> dict[str, NDArray[Any]]:
 
 
 def network_from_arrays(arrays: Mapping[str, NDArray[Any]], inventory: Sequence[str]) -> PhoneNetwork | None:
-    """The networks in a talker's file, None where it has none.
+    """Networks in the arrays of a talker file, or None.
 
     Raises
     ------

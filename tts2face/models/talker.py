@@ -1,4 +1,4 @@
-"""The Talker: everything learnt from the recordings of one person, and the file that keeps it."""
+"""Talker model, built from the recordings of one person, and the ``.talker`` file format."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -32,7 +32,7 @@ class ShapeModel:
     mean : (L, 3)
         Millimetres; axes as in `tts2face.models.landmarks`.
     basis : (M, L, 3)
-        Orthonormal as rows of (M, 3 L), so that inner products carry parameters between models (T07 eq. 5).
+        Orthonormal as rows of (M, 3 L), so that inner products map parameters between models (T07 eq. 5).
         The first `n_speech` move only the mouth region; the others move only the rest of the face.
     spread : (M,)
         Standard deviation of each parameter over the training frames, millimetres.
@@ -49,7 +49,7 @@ class ShapeModel:
     rest: NDArray[np.float32]
 
     def __post_init__(self) -> None:
-        """Refuse parts that do not fit each other."""
+        """Check that the shapes of all arrays agree, then make them read-only."""
         modes, landmarks = self.basis.shape[:2]
         fits = self.mean.shape == (landmarks, 3) and self.basis.shape[2:] == (3,)
         if not fits or not self.spread.shape == self.rest.shape == (modes,) or not 0 < self.n_speech <= modes:
@@ -58,25 +58,25 @@ class ShapeModel:
             array.setflags(write=False)
 
     def shapes(self, parameters: NDArray[np.floating]) -> NDArray[np.float32]:
-        """(T, L, 3) landmarks for (T, m) parameters of the first m modes."""
+        """Landmarks (T, L, 3), mm, for parameters (T, m) of the first m modes."""
         n_modes = parameters.shape[1]
         flat = self.basis[:n_modes].reshape(n_modes, -1)
         moved = parameters.astype(np.float32) @ flat
         return self.mean + moved.reshape(len(parameters), *self.mean.shape)
 
     def parameters(self, shapes: NDArray[np.floating]) -> NDArray[np.float32]:
-        """(T, M) parameters of (T, L, 3) landmarks."""
+        """Parameters (T, M) of landmarks (T, L, 3), mm."""
         offsets = (shapes - self.mean).astype(np.float32).reshape(len(shapes), self.mean.size)
         return offsets @ self.basis.reshape(len(self.basis), -1).T
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Utterance:
-    """One recording as the talker keeps it.
+    """Recorded utterance of a talker.
 
     ``shape`` (T, M) are shape parameters, ``head`` (T, 6) the head pose (`HEAD_CHANNELS`, relative to the talker's
-    mean pose), ``intensity`` (T,) dB of the sound; all on the frames of the video, frame i at ``i / fps`` of the
-    clock of ``phones``. ``looks`` (T, A) are parameters of the talker's appearance, None without one.
+    mean pose), ``intensity`` (T,) the sound level in dB; frame i is at ``i / fps`` seconds on the clock of ``phones``.
+    ``looks`` (T, A) are appearance parameters, None without an appearance model.
     """
 
     name: str
@@ -90,11 +90,11 @@ class Utterance:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Talker:
-    """A person's visual speech: shape model, utterances, where they come from, and with consent how she looks.
+    """Visual speech of one person: shape model, utterances, metadata and, with consent, an appearance model.
 
-    ``metadata`` holds at least name, language, sources, licence, attribution, command, created. ``network`` tells the
-    lips' parameters from phones alone, None where there was too little to learn from; ``drives`` are learnt maps from
-    sound to them, by name, none where the talker was learnt without sound.
+    ``metadata`` holds at least name, language, sources, licence, attribution, command and created. ``network`` predicts
+    speech parameters from phones, None if there was too little training data; ``audio_maps`` predict them from sound,
+    by name, empty if the talker was built without sound.
     """
 
     fps: float
@@ -106,33 +106,35 @@ class Talker:
     audio_maps: Mapping[str, AudioMap] = field(default_factory=dict)
 
     def speech_trajectory(self, utterance: Utterance) -> Trajectory:
-        """Speech parameters of a recorded utterance."""
+        """Speech parameters (T, S) of a recorded utterance."""
         n = self.model.n_speech
         return Trajectory(speech_channels(self.model), utterance.shape[:, :n], self.fps)
 
 
 def speech_channels(model: ShapeModel) -> tuple[str, ...]:
-    """Names of the parameters that speech moves."""
+    """Names (S,) of the shape parameters that speech moves."""
     return tuple(f"shape{i}" for i in range(model.n_speech))
 
 
 def require_appearance(talker: Talker) -> Appearance:
-    """How a talker looks.
+    """Appearance model of a talker.
 
     Raises
     ------
     InputError
-        The talker has motion only.
+        The talker has no appearance model.
     """
     if talker.appearance is None:
-        raise InputError(f"the talker {talker.metadata.get('name', '')} has motion only; build one with --appearance")
+        raise InputError(
+            f"the talker {talker.metadata.get('name', '')} has motion only and no own face; build one with --appearance"
+        )
     return talker.appearance
 
 
 def write_talker(path: Path, talker: Talker) -> None:
     """Write a ``.talker`` file (docs/file-formats.md).
 
-    Shape parameters become 16-bit integers in steps of 1/2000 of their spread, finer than the tracker's noise.
+    Shape parameters are stored as 16-bit integers in steps of 1/2000 of their spread, finer than the tracker's noise.
     """
     utterances = talker.utterances
     inventory = sorted({phone for utterance in utterances for phone in utterance.phones.phones})
@@ -181,9 +183,9 @@ def read_talker(path: Path) -> Talker:
     Raises
     ------
     InputError
-        There is no such file.
+        The file does not exist.
     DataError
-        It is damaged, not a talker, of another version, or holds what no talker can (`tts2face.models.talker_layout`).
+        The file is damaged, of another kind or version, or invalid (`tts2face.models.talker_layout`).
     """
     arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
     check_talker(path, arrays, header)
@@ -191,7 +193,7 @@ def read_talker(path: Path) -> Talker:
 
 
 def load_talker(name: str) -> Talker:
-    """A shipped talker by name, or one from a ``.talker`` file; errors as `find_file` and `read_talker`."""
+    """Load a shipped talker by name, or one from a ``.talker`` file; errors as `find_file` and `read_talker`."""
     return read_talker(find_file(name, KIND))
 
 
@@ -212,7 +214,9 @@ def _talker_from_arrays(arrays: dict[str, NDArray[Any]], header: dict[str, Any])
         labels = [inventory[number] for number in arrays["phones"][phones[i] : phones[i + 1]]]
         sequence = PhoneSequence(labels, arrays["edges"][phones[i] + i : phones[i + 1] + i + 1])
         spans = tuple(WordSpan(text, first, last) for text, first, last in words)
-        here = slice(frames[i], frames[i + 1])
-        seen = None if looks is None else looks[here]
-        utterances.append(Utterance(name, sequence, spans, shape[here], head[here], intensity[here], seen))
+        span = slice(frames[i], frames[i + 1])
+        appearance_parameters = None if looks is None else looks[span]
+        utterances.append(
+            Utterance(name, sequence, spans, shape[span], head[span], intensity[span], appearance_parameters)
+        )
     return Talker(fps, model, tuple(utterances), header, appearance, network, audio_maps_from_arrays(arrays))

@@ -1,4 +1,4 @@
-"""What a ``.talker`` file must hold (docs/file-formats.md), checked once when it is read."""
+"""Schema of ``.talker`` files (docs/file-formats.md), checked when a file is read."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from lexicon.phones import PHONES
 from lexicon.sequence import SILENCE
-from tts2face.models.audio_map import FEATURE_SIZES, MOST_CONTEXT
+from tts2face.models.audio_map import AUDIO_MAP_PREFIX, FEATURE_SIZES, MAX_CONTEXT
 from tts2face.models.landmarks import FACE_OVAL, N_LANDMARKS
 from tts2face.models.phone_network import N_PHONES_SEEN, N_PLACE
 from tts2face.storage.schema import (
-    MOST_MM,
+    MAX_MM,
     Check,
     Contents,
     Tensor,
@@ -29,11 +29,11 @@ from tts2face.storage.schema import (
 )
 from tts2face.types import HEAD_CHANNELS
 
-MOST_WEIGHT = 1e6  # of a network, and of a feature of sound
-MOST_PX = 1e5
-MOST_TEXTURE = 4096  # pixels along a side
-N_MESH = 468  # points of a face in pictures: the landmarks but for the irises
-ROUNDING_S, BEYOND_S = 1e-6, 1.0  # phones lie this far at most before and behind the frames of their utterance
+MAX_WEIGHT = 1e6  # of a network or an audio map
+MAX_PX = 1e5
+MAX_TEXTURE_SIDE_PX = 4096  # pixels per side
+N_MESH = 468  # mesh points of an appearance model: the landmarks without the irises
+ROUNDING_S, BEYOND_S = 1e-6, 1.0  # largest excess of phones before and after the frames of their utterance
 
 METADATA: Mapping[str, Check] = {
     "fps": number(1.0, 1000.0),
@@ -50,10 +50,10 @@ OPTIONAL_METADATA: Mapping[str, Check] = {
 TENSORS: Mapping[str, Tensor] = {
     "mean": millimetres(N_LANDMARKS, 3),
     "basis": Tensor("float32", ("modes", N_LANDMARKS, 3), -1.01, 1.01),
-    "spread": Tensor("float32", ("modes",), 0.0, MOST_MM),
+    "spread": Tensor("float32", ("modes",), 0.0, MAX_MM),
     "rest": millimetres("modes"),
     "shape": Tensor("int16", ("frames", "modes")),
-    "head": Tensor("float16", ("frames", len(HEAD_CHANNELS)), -MOST_MM, MOST_MM),
+    "head": Tensor("float16", ("frames", len(HEAD_CHANNELS)), -MAX_MM, MAX_MM),
     "intensity": Tensor("float16", ("frames",), -1000.0, 1000.0),
     "n_frames": Tensor("int32", ("utterances",), 1),
     "n_phones": Tensor("int32", ("utterances",), 1),
@@ -63,12 +63,12 @@ TENSORS: Mapping[str, Tensor] = {
 
 
 def check_talker(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> None:
-    """Refuse a talker's file whose arrays or metadata are not what they must be.
+    """Check the arrays and metadata of a talker file.
 
     Raises
     ------
     DataError
-        A part is missing, of another type or shape, out of range, not finite, or does not fit the others.
+        A part is missing, has the wrong type or shape, is out of range or not finite, or contradicts another part.
     """
     contents = Contents(path, "talker", arrays, header)
     _check_metadata(contents)
@@ -81,8 +81,8 @@ def check_talker(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping
         _check_appearance(contents)
     if any(name.startswith("network.") for name in arrays):
         _check_network(contents)
-    for drive in sorted({name.split(".")[1] for name in arrays if name.startswith("drive.")}):
-        _check_drive(contents, f"drive.{drive}")
+    for name in sorted({name.split(".")[1] for name in arrays if name.startswith(AUDIO_MAP_PREFIX)}):
+        _check_audio_map(contents, f"{AUDIO_MAP_PREFIX}{name}")
     contents.only_known()
 
 
@@ -97,17 +97,22 @@ def _check_metadata(contents: Contents) -> None:
         phones = header.get(name, [SILENCE])
         unknown = [phone for phone in phones if phone not in PHONES]
         contents.require(not unknown, f"{name} holds {unknown[:1]}, which is no phone of the phone table")
-        contents.require(len(set(phones)) == len(phones), f"{name} holds a phone twice")
+        contents.require(len(set(phones)) == len(phones), f"{name} holds a duplicate phone")
 
 
 def _utterance_rows(value: Any, where: str) -> None:
-    """Check names and words; in one loop, for a talker has tens of thousands of words."""
+    """Check names and words of utterances; one loop, because talkers have tens of thousands of words."""
     if type(value) is not list:
         refuse(f"{where} is not a list", "talker")
-    for at, one in enumerate(value):
-        if type(one) is not list or len(one) != 2 or type(one[0]) is not str or type(one[1]) is not list:
+    for at, utterance in enumerate(value):
+        if (
+            type(utterance) is not list
+            or len(utterance) != 2
+            or type(utterance[0]) is not str
+            or type(utterance[1]) is not list
+        ):
             refuse(f"{where}[{at}] is not a name with a list of words", "talker")
-        for word in one[1]:
+        for word in utterance[1]:
             fits = type(word) is list and len(word) == 3 and type(word[0]) is str
             if not fits or type(word[1]) is not int or type(word[2]) is not int or not 0 <= word[1] < word[2] < 2**31:
                 refuse(f"{where}[{at}] holds a word that is not a text with its first and last phone", "talker")
@@ -131,7 +136,7 @@ def _check_utterances(contents: Contents) -> None:
     contents.require(not len(falls), f"edges do not increase at {falls[:1]}")
     late = np.flatnonzero(arrays["edges"][ends - 1] > arrays["n_frames"] / contents.header["fps"] + BEYOND_S)
     if len(late):
-        contents.fail(f"phones of the utterance {utterances[late[0]][0]!r} end behind its frames")
+        contents.fail(f"phones of the utterance {utterances[late[0]][0]!r} end after its frames")
     reach = np.zeros(n, np.int64) + [max((word[2] for word in words), default=0) for _, words in utterances]
     beyond = np.flatnonzero(reach > arrays["n_phones"])
     if len(beyond):
@@ -150,36 +155,41 @@ def _check_appearance(contents: Contents) -> None:
         _check_texture(contents, name)
     n_points = N_MESH + len(FACE_OVAL)
     contents.indices("appearance.mouth_points", N_MESH, "points of the face")
-    looks = contents.sizes["looks of face"]
+    n_face = contents.sizes["face parameters"]
     contents.tensors(
         {
             "appearance.plate.video": Tensor("uint8", ("bytes",)),
-            "appearance.plate.points": Tensor("float32", ("plate", n_points, 2), -MOST_PX, MOST_PX),
-            "appearance.plate.axes": Tensor("float32", ("plate", 2, 3), -MOST_PX, MOST_PX),
+            "appearance.plate.points": Tensor("float32", ("plate", n_points, 2), -MAX_PX, MAX_PX),
+            "appearance.plate.axes": Tensor("float32", ("plate", 2, 3), -MAX_PX, MAX_PX),
             "appearance.plate.shape": millimetres("plate", "modes", most=1e6),
-            "appearance.plate.looks": Tensor("float32", ("plate", "looks of face"), -MOST_WEIGHT, MOST_WEIGHT),
-            "looks": Tensor("int16", ("frames", looks + contents.sizes["looks of mouth"])),
+            "appearance.plate.looks": Tensor("float32", ("plate", "face parameters"), -MAX_WEIGHT, MAX_WEIGHT),
+            "looks": Tensor("int16", ("frames", n_face + contents.sizes["mouth parameters"])),
         }
     )
 
 
 def _check_texture(contents: Contents, name: str) -> None:
-    here, points, pixels, looks = f"appearance.{name}", f"points of {name}", f"pixels of {name}", f"looks of {name}"
+    prefix, points, pixels, parameters = (
+        f"appearance.{name}",
+        f"points of {name}",
+        f"pixels of {name}",
+        f"{name} parameters",
+    )
     contents.tensors(
         {
-            f"{here}.size": Tensor("int32", (2,), 1, MOST_TEXTURE),
-            f"{here}.reference": Tensor("float32", (points, 2), -MOST_PX, MOST_PX),
-            f"{here}.triangles": Tensor("int32", (f"triangles of {name}", 3)),
-            f"{here}.pixels": Tensor("int32", (pixels,)),
-            f"{here}.mean": Tensor("float16", (pixels, 3), -1e4, 1e4),
-            f"{here}.basis": Tensor("float16", (looks, pixels, 3), -1.01, 1.01),
-            f"{here}.spread": Tensor("float32", (looks,), 0.0, MOST_WEIGHT),
+            f"{prefix}.size": Tensor("int32", (2,), 1, MAX_TEXTURE_SIDE_PX),
+            f"{prefix}.reference": Tensor("float32", (points, 2), -MAX_PX, MAX_PX),
+            f"{prefix}.triangles": Tensor("int32", (f"triangles of {name}", 3)),
+            f"{prefix}.pixels": Tensor("int32", (pixels,)),
+            f"{prefix}.mean": Tensor("float16", (pixels, 3), -1e4, 1e4),
+            f"{prefix}.basis": Tensor("float16", (parameters, pixels, 3), -1.01, 1.01),
+            f"{prefix}.spread": Tensor("float32", (parameters,), 0.0, MAX_WEIGHT),
         }
     )
-    width, height = (int(side) for side in contents.arrays[f"{here}.size"])
-    contents.indices(f"{here}.triangles", contents.sizes[points], "points")
-    contents.indices(f"{here}.pixels", width * height, "pixels")
-    contents.distinct(f"{here}.pixels")
+    width, height = (int(side) for side in contents.arrays[f"{prefix}.size"])
+    contents.indices(f"{prefix}.triangles", contents.sizes[points], "points")
+    contents.indices(f"{prefix}.pixels", width * height, "pixels")
+    contents.distinct(f"{prefix}.pixels")
 
 
 def _check_network(contents: Contents) -> None:
@@ -195,35 +205,37 @@ def _check_network(contents: Contents) -> None:
         contents.tensors(
             {
                 f"network.weights{at}": Tensor("float16", shape),
-                f"network.biases{at}": Tensor("float32", (shape[0], shape[2]), -MOST_WEIGHT, MOST_WEIGHT),
+                f"network.biases{at}": Tensor("float32", (shape[0], shape[2]), -MAX_WEIGHT, MAX_WEIGHT),
             }
         )
 
 
-def _check_drive(contents: Contents, here: str) -> None:
+def _check_audio_map(contents: Contents, prefix: str) -> None:
     contents.tensors(
         {
-            f"{here}.feature": Tensor("uint8", (f"{here} text",), 43, 122),
-            f"{here}.context": Tensor("int32", (3,), 0, MOST_CONTEXT),
-            f"{here}.loudness": Tensor("float32", (1,), -1000.0, 1000.0, may_be_nan=True),
+            f"{prefix}.feature": Tensor("uint8", (f"{prefix} text",), 43, 122),
+            f"{prefix}.context": Tensor("int32", (3,), 0, MAX_CONTEXT),
+            f"{prefix}.loudness": Tensor("float32", (1,), -1000.0, 1000.0, may_be_nan=True),
         }
     )
-    feature = contents.arrays[f"{here}.feature"].tobytes().decode("ascii")
+    feature = contents.arrays[f"{prefix}.feature"].tobytes().decode("ascii")
     kinds = feature.split("+")
     if any(kind not in FEATURE_SIZES for kind in kinds):
-        contents.fail(f"{here}.feature is {feature!r}, not a sum of {', '.join(FEATURE_SIZES)}")
-    before, after, bends = (int(number_) for number_ in contents.arrays[f"{here}.context"])
-    contents.require(bends in (0, 1), f"{here}.context ends with {bends}, not 0 or 1")
-    n_features, hidden = sum(FEATURE_SIZES[kind] for kind in kinds), f"{here} units"
-    weights, n_speech = (-MOST_WEIGHT, MOST_WEIGHT), contents.header["n_speech"]
+        contents.fail(f"{prefix}.feature is {feature!r}, not a sum of {', '.join(FEATURE_SIZES)}")
+    before, after, is_nonlinear = (int(number_) for number_ in contents.arrays[f"{prefix}.context"])
+    contents.require(is_nonlinear in (0, 1), f"{prefix}.context ends with {is_nonlinear}, not 0 or 1")
+    n_features, hidden = sum(FEATURE_SIZES[kind] for kind in kinds), f"{prefix} units"
+    weights, n_speech = (-MAX_WEIGHT, MAX_WEIGHT), contents.header["n_speech"]
     contents.tensors(
         {
-            f"{here}.mean": Tensor("float32", (n_features,), *weights),
-            f"{here}.spread": Tensor("float32", (n_features,), 0.0, MOST_WEIGHT),
-            f"{here}.inner": Tensor("float32", (hidden, (before + 1 + after) * n_features), *weights),
-            f"{here}.bias": Tensor("float32", (hidden,), *weights),
-            f"{here}.outer": Tensor("float32", (n_speech, hidden), *weights),
-            f"{here}.offset": Tensor("float32", (n_speech,), *weights),
+            f"{prefix}.mean": Tensor("float32", (n_features,), *weights),
+            f"{prefix}.spread": Tensor("float32", (n_features,), 0.0, MAX_WEIGHT),
+            f"{prefix}.inner": Tensor("float32", (hidden, (before + 1 + after) * n_features), *weights),
+            f"{prefix}.bias": Tensor("float32", (hidden,), *weights),
+            f"{prefix}.outer": Tensor("float32", (n_speech, hidden), *weights),
+            f"{prefix}.offset": Tensor("float32", (n_speech,), *weights),
         }
     )
-    contents.require(bool((contents.arrays[f"{here}.spread"] > 0).all()), f"{here}.spread holds 0; it is above it")
+    contents.require(
+        bool((contents.arrays[f"{prefix}.spread"] > 0).all()), f"{prefix}.spread holds 0; it must be above 0"
+    )

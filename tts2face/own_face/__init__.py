@@ -1,1 +1,1 @@
-"""A talker's own face, drawn on the talker's own video."""
+"""Appearance and gestures of a talker's own face."""

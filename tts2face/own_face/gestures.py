@@ -1,6 +1,6 @@
-"""Gestures of a talker's own face, on her own video: landmarks that move, and lids whose looks go along.
+"""Gestures of a talker's own face on its video: landmark motion, and the texture change of the lids.
 
-Her lids move, and look, as they did in the blinks of her recordings. Gaze and head stay those of her video.
+Lids move and change their texture as in the recorded blinks of the talker. Gaze and head pose are those of the video.
 """
 
 from collections.abc import Mapping
@@ -23,18 +23,12 @@ from tts2face.retargeting.performer import EYELID_LANDMARKS, eye_aperture
 from tts2face.types import Trajectory
 
 LID_CHANNEL = "lids"
-OPEN_QUANTILE, CLOSED_QUANTILE = (
-    0.7,
-    0.005,
-)  # quantiles of the opening of lids over all frames: open ones, and those in blinks
-MIN_BLINK_CLOSURE = 0.5  # share of the opening that must be lost in blinks; who never blinks on video has none to show
-MIN_LID_CLOSURE = -0.3  # share of lids opened wide
+OPEN_QUANTILE, CLOSED_QUANTILE = 0.7, 0.005  # quantiles of the lid opening over all frames: open eyes and blinks
+MIN_BLINK_CLOSURE = 0.5  # least closure in recorded blinks; talkers without blinks get no lid motion
+MIN_LID_CLOSURE = -0.3  # closure of lids opened wide
 RIDGE = 1e-5
-LID_INNER_RADIUS, LID_OUTER_RADIUS = (
-    0.7,
-    1.1,
-)  # of an eye's width from its middle: how far lids change their looks in full, and at all
-EXPRESSION_SHARE = 0.6  # of an expression is shown: folds and teeth that go with the rest are not known from speech
+LID_INNER_RADIUS, LID_OUTER_RADIUS = 0.7, 1.1  # relative to the eye width: lid texture changes in full, and ends
+EXPRESSION_SHARE = 0.6  # of an expression that is applied: its folds and teeth do not occur in recorded speech
 
 Float32Array = NDArray[np.float32]
 FloatArray = NDArray[np.float64]
@@ -42,22 +36,23 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OwnFaceGestures:
-    """What gestures do to a talker's own face; N points of her mesh.
+    """Gesture model of a talker's own face; N points of its mesh.
 
     Parameters
     ----------
     channels
-        Of `motion`, behind those of speech and looks: expressions, modes of brows and cheeks, and the lids' share.
+        Gesture channels, which follow those of speech and appearance: expressions, modes of brows and cheeks, and
+        the lid closure.
     regions
         Number of modes of each region.
     modes : (G, N, 3)
         Motion of the points for each channel but the last, mm.
-    lids, lid_looks : (2, N, 3), (2, A)
-        Motion and change of looks (the face texture's parameters) of lids shut by a share s: times s and s squared.
+    lids, lid_appearance : (2, N, 3), (2, A)
+        Coefficients of s and s squared of point motion, mm, and of face texture parameters, for lid closure s.
     lid_pixels : (P,)
-        Of the face texture's pixels: 1 where lids change the picture, 0 where they do not.
-    plate_shares : (T,)
-        By how much her lids are shut on each frame of the plate; below 0 wider than usual.
+        Weight of each face texture pixel: 1 where lids change the picture, 0 where they do not.
+    plate_lid_closure : (T,)
+        Lid closure on each frame of the plate; negative when wider than usual.
     """
 
     channels: tuple[str, ...]
@@ -71,14 +66,14 @@ class OwnFaceGestures:
     def motion(
         self, own: Trajectory, gestures: Mapping[str, Float32Array], gains: Mapping[str, float] = NO_GAINS
     ) -> Trajectory:
-        """Speech and looks (T, S + A) with gestures: more channels for `tts2face.render.own_face.PlateStage`.
+        """Speech and appearance (T, S + A) with gesture channels appended (T, S + A + G).
 
         Parameters
         ----------
         gestures
-            (T, k) values of features of the palette; gaze and head have no effect, and both eyes blink together.
+            (T, k) values of each feature of the palette; gaze and head have no effect, and both eyes blink together.
         gains
-            Factors on the motion of features; those of jaw and lips have no effect.
+            Factors on the motion of features; ``jaw`` and ``lips`` have no effect.
 
         Raises
         ------
@@ -86,54 +81,57 @@ class OwnFaceGestures:
             As `tts2face.face.gesture_transfer.check_gestures`.
         """
         check_gestures(gestures, gains, len(own), self.regions)
-        felt = np.zeros((len(own), len(self.channels)))
+        values = np.zeros((len(own), len(self.channels)))
         widths = {"expression": len(EXPRESSIONS), **self.regions}
         first = 0
         for name, width in widths.items():
             if name in gestures:
-                felt[:, first : first + width] = gains.get(name, 1.0) * gestures[name]
+                values[:, first : first + width] = gains.get(name, 1.0) * gestures[name]
             first += width
-        felt[:, : len(EXPRESSIONS)] *= EXPRESSION_SHARE
+        values[:, : len(EXPRESSIONS)] *= EXPRESSION_SHARE
         if "blink" in gestures:
-            felt[:, -1] = np.clip(gains.get("blink", 1.0) * gestures["blink"].mean(axis=1), 0.0, 1.0)
-        return Trajectory(own.channels + self.channels, np.concatenate([own.values, felt], axis=1), own.fps)
+            values[:, -1] = np.clip(gains.get("blink", 1.0) * gestures["blink"].mean(axis=1), 0.0, 1.0)
+        return Trajectory(own.channels + self.channels, np.concatenate([own.values, values], axis=1), own.fps)
 
-    def displacements(self, felt: NDArray[np.floating], number: int) -> tuple[Float32Array, Float32Array]:
-        """Motion of the points (N, 3), mm, and change of the face's looks (A,), on a frame of the plate."""
+    def displacements(self, gestures: NDArray[np.floating], number: int) -> tuple[Float32Array, Float32Array]:
+        """Point motion (N, 3), mm, and change of the face texture parameters (A,) on a frame of the plate.
+
+        `gestures` (G,) are the gesture channels of one frame, `number` is the index of the plate's frame.
+        """
         before = float(self.plate_lid_closure[number])
-        after = before + float(felt[-1]) * (1.0 - before)
+        after = before + float(gestures[-1]) * (1.0 - before)
         powers = np.array([after - before, after**2 - before**2], np.float32)
-        points = np.tensordot(felt[:-1].astype(np.float32), self.modes, axes=1)
+        points = np.tensordot(gestures[:-1].astype(np.float32), self.modes, axes=1)
         return points + np.tensordot(powers, self.lids, axes=1), powers @ self.lid_appearance
 
 
 def build_own_face_gestures(talker: Talker, palette: Palette) -> OwnFaceGestures:
-    """Prepare a talker's own face for the gestures of a palette.
+    """Gesture model of a talker's own face for the gestures of a palette.
 
     Raises
     ------
     InputError
-        The talker has motion only.
+        The talker has no appearance model.
     """
     appearance, model = require_appearance(talker), talker.model
     rest = (model.mean + np.einsum("m,mld->ld", model.rest, model.basis)).astype(np.float64)
     n_mesh = len(appearance.face.reference)
     expressions = _expression_modes(rest)
     regions = [_region_modes(rest, palette, name) for name in REGION_FEATURES]
-    lids, looks, plate_shares = _lid_model(talker, appearance)
+    lids, lid_appearance, plate_closure = _lid_model(talker, appearance)
     return OwnFaceGestures(
         channels=(*EXPRESSIONS, *(c for name in REGION_FEATURES for c in palette.channels(name)), LID_CHANNEL),
         regions={name: len(palette.regions[name].modes) for name in REGION_FEATURES},
         modes=np.concatenate([expressions, *regions])[:, :n_mesh].astype(np.float32),
         lids=lids[:, :n_mesh].astype(np.float32),
-        lid_appearance=looks.astype(np.float32),
+        lid_appearance=lid_appearance.astype(np.float32),
         lid_pixels=_lid_pixel_weights(appearance),
-        plate_lid_closure=plate_shares.astype(np.float32),
+        plate_lid_closure=plate_closure.astype(np.float32),
     )
 
 
 def _expression_modes(rest: FloatArray) -> FloatArray:
-    """(5, 478, 3) the default head's basis expressions in the size of a talker, who rests so."""
+    """Basis expressions (5, 478, 3) of the default head at the scale of a talker with landmarks `rest` (478, 3)."""
     head = default_head()
     places = scatter_landmarks(head, landmark_positions(head))
     turn = procrustes_rotation(places, rest)
@@ -143,7 +141,7 @@ def _expression_modes(rest: FloatArray) -> FloatArray:
 
 
 def _region_modes(rest: FloatArray, palette: Palette, name: str) -> FloatArray:
-    """(k, 478, 3) a region's modes on all landmarks; rims of the lids and lips stay."""
+    """Modes (k, 478, 3) of a region on all landmarks; rims of the lids and lips do not move."""
     region = palette.regions[name]
     modes = fit_modes(rest, palette.neutral.astype(np.float64), region)
     still = [number for number in sorted({*LID_LANDMARKS, *LIP_LANDMARKS}) if number not in region.landmarks]
@@ -155,11 +153,11 @@ def _region_modes(rest: FloatArray, palette: Palette, name: str) -> FloatArray:
 
 
 def _lid_model(talker: Talker, appearance: Appearance) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Lids' motion (2, 478, 3) and looks (2, A) by share and its square, and shares on the plate (T,)."""
+    """Motion (2, 478, 3) and texture parameters (2, A) of lids by closure and its square; plate closure (T,)."""
     model, n_face = talker.model, appearance.face.n_modes
-    seen = [spoken for spoken in talker.utterances if spoken.looks is not None]
-    shapes = np.concatenate([spoken.shape for spoken in seen])
-    looks = np.concatenate([spoken.looks[:, :n_face] for spoken in seen if spoken.looks is not None])
+    recorded = [utterance for utterance in talker.utterances if utterance.looks is not None]
+    shapes = np.concatenate([utterance.shape for utterance in recorded])
+    texture = np.concatenate([utterance.looks[:, :n_face] for utterance in recorded if utterance.looks is not None])
     openings = _mean_eye_openings(model, shapes)
     opened, shut = np.quantile(openings, [OPEN_QUANTILE, CLOSED_QUANTILE])
     still, plate = model.basis[model.n_speech :].astype(np.float64), _mean_eye_openings(model, appearance.plate.shape)
@@ -172,20 +170,20 @@ def _lid_model(talker: Talker, appearance: Appearance) -> tuple[FloatArray, Floa
     normal = ordered_product(terms.T, terms) + RIDGE * len(terms) * np.diag([0.0, 1.0, 1.0])
     motion, change = (
         np.linalg.solve(normal, ordered_product(terms.T, values.astype(np.float64)))[1:]
-        for values in (shapes[:, model.n_speech :], looks)
+        for values in (shapes[:, model.n_speech :], texture)
     )
     return ordered_product(motion, still.reshape(len(still), -1)).reshape(2, -1, 3), change.astype(np.float64), on_plate
 
 
 def _mean_eye_openings(model: ShapeModel, shapes: Float32Array) -> FloatArray:
-    """(T,) mean opening of both eyes over their width."""
+    """Mean opening (T,) of both eyes, relative to their width."""
     landmarks = model.shapes(shapes)
     left, right = (eye_aperture(landmarks, side) for side in EYELID_LANDMARKS)
     return (left + right) / 2
 
 
 def _lid_pixel_weights(appearance: Appearance) -> Float32Array:
-    """(P,) where lids change the picture of a face, fading outwards."""
+    """Weights (P,) of the face texture pixels that lids change, fading outwards."""
     width = appearance.face.size[0]
     places = np.stack([appearance.face.pixels % width, appearance.face.pixels // width], axis=1)
     share = np.zeros(len(places))

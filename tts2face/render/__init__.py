@@ -1,1 +1,1 @@
-"""Pictures and video of a clip."""
+"""Rendering of clips to pictures, video files and windows."""

@@ -1,4 +1,4 @@
-"""Where the camera may stand: named views, or angles and a distance."""
+"""Camera positions: named views, or angles and a distance."""
 
 import math
 from dataclasses import dataclass
@@ -8,10 +8,10 @@ from lexicon.errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class CameraView:
-    """A view of the head.
+    """Position of the camera relative to the head.
 
-    Degrees towards the face's own left and from above; mm from its middle (0: as far as frames it well); share of the
-    head that is shown.
+    ``yaw_deg`` is positive towards the face's own left, ``pitch_deg`` positive from above; ``distance`` is in mm from
+    the centre of the head, 0 for the distance that frames it; ``share`` is the visible share of the framing box.
     """
 
     yaw_deg: float
@@ -31,7 +31,7 @@ MIN_DISTANCE_MM = 50.0
 
 
 def parse_camera(text: str) -> CameraView:
-    """The camera of a name, or of ``yaw,pitch`` or ``yaw,pitch,distance`` in degrees and mm.
+    """Camera view of a name, or of ``yaw,pitch`` or ``yaw,pitch,distance`` in degrees and mm.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Frames of a mesh face as pictures, drawn one after the other and never kept."""
+"""Rendering of a mesh face: the frames of a clip one by one, or a single picture."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ from tts2face.types import Clip
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshRenderer:
-    """Draws a mesh face; a `tts2face.render.renderer.FrameRenderer`."""
+    """Renderer of a mesh face; implements `tts2face.render.renderer.FrameRenderer`."""
 
     scene: Scene
 
@@ -32,36 +32,50 @@ class MeshRenderer:
 
     @property
     def notice(self) -> str:
-        """What every file says about itself: nothing, unless the head is a real person's likeness."""
+        """Comment for every written file; empty unless the face is the likeness of a real person."""
         metadata = self.scene.face.metadata
         return SYNTHETIC_NOTICE.format(name=metadata.get("name", "a person")) if "consent" in metadata else ""
 
     def frames(self, clip: Clip, *, threads: int | None = None, first: int = 0) -> Iterator[NDArray[np.uint8]]:
-        """Pictures of a clip's frames; its motion is in the face's first shapes, and the others stay at rest."""
-        del first  # a head looks the same at any time
+        """Pictures (H, W, 3 or 4) of a clip's frames in order.
+
+        The clip's channels are the first shapes of the face; weights of further shapes are 0.
+
+        Raises
+        ------
+        InputError
+            The clip's channels are not the first shapes of the face.
+        """
+        del first  # a mesh has no background video
         values = self._weights(clip)
         poses = zip(values, clip.head.values, strict=True)
         if self.picture.renderer == PYVISTA:
             yield from vtk_renderer.render_frames(self.scene, poses)
             return
         n_threads = threads or available_cores()
-        rooms = deque(self._room() for _ in range(n_threads))
+        free_buffers = deque(self._allocate_buffers() for _ in range(n_threads))
 
         def draw_one(pose: tuple[NDArray[np.float32], NDArray[np.float32]]) -> NDArray[np.uint8]:
-            room = rooms.popleft()
+            buffers = free_buffers.popleft()
             try:
-                return self._draw(*pose, room)
+                return self._draw(*pose, buffers)
             finally:
-                rooms.append(room)
+                free_buffers.append(buffers)
 
         yield from map_in_order(draw_one, poses, n_threads)
 
     def frame(self, clip: Clip, number: int) -> NDArray[np.uint8]:
-        """The picture of one frame of a clip."""
+        """Picture (H, W, 3 or 4) of one frame of a clip."""
         return self.draw(self._weights(clip)[number], clip.head.values[number])
 
     def draw(self, weights: NDArray[np.floating], head: NDArray[np.floating] = REST_HEAD) -> NDArray[np.uint8]:
-        """One picture of the face for the weights (K,) of its shapes and a head pose (6,)."""
+        """Picture (H, W, 3 or 4) of the face for shape weights (K,) and a head pose (6,).
+
+        Raises
+        ------
+        InputError
+            The number of weights is not the number of the face's shapes.
+        """
         n_shapes = len(self.scene.face.shape_names)
         if np.shape(weights) != (n_shapes,):
             raise InputError(f"the face has {n_shapes} shapes, not weights of shape {np.shape(weights)}")
@@ -69,39 +83,41 @@ class MeshRenderer:
         if self.picture.renderer == PYVISTA:
             (drawn,) = vtk_renderer.render_frames(self.scene, [pose])
             return drawn
-        return self._draw(*pose, self._room())
+        return self._draw(*pose, self._allocate_buffers())
 
     def _weights(self, clip: Clip) -> NDArray[np.float32]:
         names = self.scene.face.shape_names
-        n_moved = len(clip.motion.channels)
-        if clip.motion.channels != names[:n_moved]:
+        n_channels = len(clip.motion.channels)
+        if clip.motion.channels != names[:n_channels]:
             raise InputError(
                 "the clip's motion is not in the shapes of this face; make the clip with a session of this face"
             )
-        if n_moved == len(names):
+        if n_channels == len(names):
             return clip.motion.values
-        return np.pad(clip.motion.values, ((0, 0), (0, len(names) - n_moved)))
+        return np.pad(clip.motion.values, ((0, 0), (0, len(names) - n_channels)))
 
-    def _room(self) -> DrawingBuffers:
+    def _allocate_buffers(self) -> DrawingBuffers:
         picture = self.picture
         return allocate_buffers(self.scene.surface, (picture.width, picture.height), picture.supersampling)
 
-    def _draw(self, weights: NDArray[np.float32], head: NDArray[np.float32], room: DrawingBuffers) -> NDArray[np.uint8]:
+    def _draw(
+        self, weights: NDArray[np.float32], head: NDArray[np.float32], buffers: DrawingBuffers
+    ) -> NDArray[np.uint8]:
         scene, picture = self.scene, self.picture
         drawn = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
         drawn[:, :, :3] = scene.background
         points = scene.surface.rig.pose(weights, head)
-        draw_surface(points, scene.surface, scene.optics, (scene.lights, scene.exposure.at(weights)), room, drawn)
+        draw_surface(points, scene.surface, scene.optics, (scene.lights, scene.exposure.at(weights)), buffers, drawn)
         return drawn
 
 
 def mesh_renderer(face: Face, picture: Picture) -> MeshRenderer:
-    """The renderer of a face; make it once, draw many times.
+    """Renderer of a face; build it once and draw many frames.
 
     Raises
     ------
     BackendError
-        The picture wants a renderer that this machine lacks.
+        The renderer that the picture names is not available on this machine.
     """
     if picture.renderer == PYVISTA:
         vtk_renderer.require_gl()
@@ -114,16 +130,16 @@ def draw(
     head: NDArray[np.floating] = REST_HEAD,
     picture: Picture | None = None,
 ) -> NDArray[np.uint8]:
-    """One picture of a face.
+    """Picture of a face for one set of shape weights.
 
     Parameters
     ----------
     weights : (K,)
-        Of the face's shapes.
+        Weights of the face's shapes.
     head : (6,)
-        Pose of `tts2face.types.HEAD_CHANNELS`.
+        Head pose in the order of `tts2face.types.HEAD_CHANNELS`.
     picture
-        How to draw; the default options without it.
+        Drawing options; the defaults when None.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""An encoder at work in a thread of its own, behind a short queue."""
+"""An encoder that runs in its own thread behind a bounded queue."""
 
 import contextlib
 import queue
@@ -8,31 +8,31 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-QUEUE_LENGTH = 8  # pictures that may wait
-POLL_INTERVAL_S = 0.05  # between looks at whether the encoder still works
+QUEUE_LENGTH = 8  # pictures that may be queued
+POLL_INTERVAL_S = 0.05  # interval at which the state of the encoder is checked
 
 Pixels = NDArray[np.uint8] | None
 SoundBlock = NDArray[np.float32] | None
 
 
 class Sink(Protocol):
-    """Something that takes pictures and sound in turn."""
+    """Receiver of pictures and sound in order of time."""
 
     def picture(self, pixels: NDArray[np.uint8]) -> None:
-        """Append one picture."""
+        """Append one picture (H, W, 3 or 4)."""
 
     def sound(self, samples: NDArray[np.float32]) -> None:
-        """Append mono samples."""
+        """Append mono samples (n,)."""
 
     def finish(self) -> None:
-        """Complete what is written."""
+        """Complete and close the output."""
 
     def abandon(self) -> None:
-        """Let go of what is written so far."""
+        """Close the output without completing it."""
 
 
 class EncoderThread:
-    """Feeds a sink from a thread; what goes wrong there is raised by the next call here."""
+    """Feeds a sink from a thread; an error in the thread is raised by the next call of `put` or `finish`."""
 
     def __init__(self, sink: Sink) -> None:
         self._sink, self._stopped = sink, False
@@ -49,7 +49,7 @@ class EncoderThread:
                 self._sink.sound(samples)
 
     def put(self, pixels: Pixels = None, samples: SoundBlock = None) -> None:
-        """Append a picture, and the sound that belongs to it; waits while the queue is full."""
+        """Append a picture and the samples of its frame; blocks while the queue is full."""
         self._put((pixels, samples))
 
     def _put(self, item: tuple[Pixels, SoundBlock] | None) -> None:
@@ -61,16 +61,16 @@ class EncoderThread:
         return self._work.result()
 
     def finish(self) -> None:
-        """Wait for the encoder, then complete the file."""
+        """Wait for the encoder, then complete the output."""
         self._put(None)
         self._work.result()
         self._pool.shutdown()
         self._sink.finish()
 
     def abandon(self) -> None:
-        """Stop the encoder where it is and let go of the file."""
+        """Stop the encoder at once and close the output without completing it."""
         self._stopped = True
-        while not self._work.done():  # it may end by an error of its own with a full queue that nobody empties
+        while not self._work.done():  # the queue may be full and the thread ended by an error
             with contextlib.suppress(queue.Full):
                 self._queue.put_nowait(None)
             wait([self._work], POLL_INTERVAL_S)

@@ -1,6 +1,6 @@
-"""What lies under the pixels of a band: the samples of a pixel, joined where they lie on one smooth surface.
+"""Fragments of a band of pixels: the samples of a pixel merged where they lie on one smooth surface.
 
-Lighting one fragment in place of its samples makes the picture of full supersampling for a third of its time.
+Lighting one fragment instead of its samples takes a third of the time of full supersampling.
 """
 
 from typing import Any
@@ -13,7 +13,7 @@ from tts2face.render.raster import NO_TRIANGLE
 
 Array = NDArray[Any]
 
-MIN_NORMAL_COSINE = np.float32(0.85)  # cosine between normals down to which samples of a part are lit together
+MIN_NORMAL_COSINE = np.float32(0.85)  # least cosine between the normals of samples that are merged
 BACK_LIGHT_SHARE = np.float32(0.3)  # share of the light that reaches the back of a closed part
 SPECULAR, SHININESS, WRAP, OPACITY, TEXTURED, OPEN_SURFACE = range(6)  # columns of the material table
 CAMERA, NORMAL, EXPOSURE, COLOUR, UV = 0, 3, 6, 10, 13  # columns of the vertex table: 3, 3, 4, 3, 2 numbers
@@ -28,7 +28,7 @@ PIXEL_X, PIXEL_Y, PIXEL_ENDS = 0, 1, 2  # columns of the pixel table; from 2 on:
 
 @kernel
 def face_normals(vertex: Array, triangles: Array, normals: Array) -> None:
-    """Write (F, 3) normals of triangles in camera space, as long as twice their area."""
+    """Write normals (F, 3) of triangles in camera space, each of a length of twice the triangle's area."""
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ux, uy, uz = vertex[b, 0] - vertex[a, 0], vertex[b, 1] - vertex[a, 1], vertex[b, 2] - vertex[a, 2]
@@ -38,7 +38,7 @@ def face_normals(vertex: Array, triangles: Array, normals: Array) -> None:
 
 @kernel
 def vertex_normals(flat: Array, starts: Array, members: Array, vertex: Array) -> None:
-    """Write unit normals: the sum over the triangles ``members[starts[v]:starts[v + 1]]`` around each vertex."""
+    """Write unit vertex normals: the normalised sum over the triangles ``members[starts[v]:starts[v + 1]]``."""
     for v in range(len(vertex)):
         x, y, z = np.float32(0), np.float32(0), np.float32(0)
         for i in range(starts[v], starts[v + 1]):
@@ -50,7 +50,7 @@ def vertex_normals(flat: Array, starts: Array, members: Array, vertex: Array) ->
 
 @kernel
 def is_same_surface(number: int, other: int, flat: Array, part_of: Array) -> bool:
-    """Whether two seen triangles lie on one smooth surface: the same part, the same side of it, near normals."""
+    """Whether two visible triangles lie on one smooth surface: same part, same side, similar normals."""
     if (number < 0) != (other < 0):
         return number == other
     t, u = (number, other) if number >= 0 else (~number, ~other)
@@ -67,12 +67,12 @@ def is_same_surface(number: int, other: int, flat: Array, part_of: Array) -> boo
 def find_fragments(
     owner: Array, n_layers: int, place: tuple[int, int, int], facets: tuple[Any, Any], found: Any, pixels: Array
 ) -> int:
-    """List for each pixel of a band the smooth surfaces under it; returns how many pixels are not empty.
+    """Find the fragments of each pixel of a band; returns the number of pixels that are not empty.
 
     Parameters
     ----------
     owner : (3, R, W)
-        Of `draw_band`.
+        Visible triangle of each sample and layer, as `draw_band` writes it.
     place
         The band's first row of samples, its number of rows, samples along a pixel's side.
     facets
@@ -133,7 +133,7 @@ def find_fragments(
 
 @kernel
 def texel(texture: Array, linear: Array, u: float, v: float, c: int) -> Any:
-    """One channel of the bilinear colour of a texture in linear light."""
+    """Bilinear value of channel `c` of a texture at (u, v), in linear light."""
     height, width = texture.shape[0], texture.shape[1]
     one, half, zero = np.float32(1), np.float32(0.5), np.float32(0)
     x = min(max(u * np.float32(width) - half, zero), np.float32(width - 1))
@@ -148,14 +148,14 @@ def texel(texture: Array, linear: Array, u: float, v: float, c: int) -> Any:
 
 @kernel
 def evaluate_fragments(found: Any, n_fragments: int, vertex: Array, scene: Any, lens: Array, table: Array) -> None:
-    """Write what each fragment's first triangle is like at the middle of its samples (Moeller and Trumbore 1997).
+    """Interpolate vertex attributes at the centre of each fragment's samples (Moeller and Trumbore 1997).
 
     Parameters
     ----------
     scene
         Triangles (F, 3), part of each (F,), materials (P, 6), texture (H, W, 3), linear table (256,).
     table : (17, G)
-        Out: the rows named above.
+        Out: the attributes in the rows named at the top of this module.
     """
     number_of, spread = found
     triangles, part_of, materials, texture, linear = scene

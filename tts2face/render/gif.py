@@ -1,4 +1,4 @@
-"""An animated GIF with one good palette for all its pictures; it has no sound."""
+"""Animated GIF with one palette for all pictures; sound is discarded."""
 
 from collections.abc import Sequence
 from fractions import Fraction
@@ -8,19 +8,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-TICKS_PER_SECOND = 100  # a GIF's clock, per second
-MIN_TICKS = 2  # a shorter stay is played as a tenth of a second by browsers
-COLOUR_BITS = 6  # of each channel by which a colour finds its place in the palette
+TICKS_PER_SECOND = 100  # ticks of a GIF's clock per second
+MIN_TICKS = 2  # browsers play shorter delays as 0.1 s
+COLOUR_BITS = 6  # bits of each channel in the colour lookup table
 BAYER = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]], np.int16)
-DITHER_AMPLITUDE = 10  # 8-bit steps between the extremes of the ordered dither: still where the picture is still
-OPAQUE_COVERAGE = 128  # coverage from which a pixel is drawn
+DITHER_AMPLITUDE = (
+    10  # 8-bit steps between the extremes of the ordered dither, which does not flicker on still pictures
+)
+OPAQUE_COVERAGE = 128  # least coverage of an opaque pixel
 
 
 class GifWriter:
-    """A GIF being written."""
+    """Sink that writes a GIF."""
 
     def __init__(self, path: Path, swatches: Sequence[NDArray[np.uint8]], fps: Fraction, notice: str = "") -> None:
-        """Open a file that says `notice`; the palette serves the colours of some pictures, the swatches."""
+        """Open a file with the comment `notice`; the palette is computed from the pictures `swatches`."""
         import av
 
         self._path, self._notice = path, notice
@@ -29,15 +31,15 @@ class GifWriter:
         self._palette, self._nearest = _colour_table(swatches, 256 if channels == 3 else 255)
         pattern = np.tile(BAYER, (-(-height // 4), -(-width // 4)))[:height, :width, None]
         self._dither = (pattern * DITHER_AMPLITUDE // 16 - DITHER_AMPLITUDE // 2).astype(np.int16)
-        stay = max(MIN_TICKS, round(TICKS_PER_SECOND / fps))  # of the last picture
-        options = {"loop": "0", "final_delay": str(stay)}
+        delay = max(MIN_TICKS, round(TICKS_PER_SECOND / fps))  # of the last picture
+        options = {"loop": "0", "final_delay": str(delay)}
         self._container: Any = av.open(str(path), "w", format="gif", options=options)
         self._video: Any = self._container.add_stream("gif", rate=fps)
         self._video.width, self._video.height, self._video.pix_fmt = width, height, "pal8"
         self._video.codec_context.time_base = Fraction(1, TICKS_PER_SECOND)
 
     def picture(self, pixels: NDArray[np.uint8]) -> None:
-        """Append one picture, unless it would stay for too short."""
+        """Append one picture (H, W, 3 or 4); pictures shorter than `MIN_TICKS` are skipped."""
         import av
 
         tick = round(self._n_frames * TICKS_PER_SECOND / self._fps)
@@ -51,45 +53,50 @@ class GifWriter:
         ]
         if pixels.shape[2] == 4:
             indices[pixels[:, :, 3] < OPAQUE_COVERAGE] = 255
-        coloured: Any = (indices, self._palette)  # PyAV takes a pair for pal8; its stubs do not say so
-        frame = av.VideoFrame.from_ndarray(coloured, format="pal8")
+        indexed: Any = (indices, self._palette)  # PyAV takes a pair for pal8; its stubs do not say so
+        frame = av.VideoFrame.from_ndarray(indexed, format="pal8")
         frame.pts, frame.time_base = tick, Fraction(1, TICKS_PER_SECOND)
         self._container.mux(self._video.encode(frame))
 
     def sound(self, samples: NDArray[np.float32]) -> None:
-        """Leave the sound out."""
+        """Discard the samples; a GIF has no sound."""
 
     def finish(self) -> None:
-        """Write what the encoder still holds and close the file."""
+        """Flush the encoder and close the file."""
         self._container.mux(self._video.encode(None))
         self._container.close()
         if self._notice:
             _write_comment(self._path, self._notice)
 
     def abandon(self) -> None:
-        """Close the file unfinished."""
+        """Close the file without completing it."""
         self._container.close()
 
 
 def _write_comment(path: Path, notice: str) -> None:
-    """Put a comment (GIF89a, section 24) before the last byte of a file, the trailer; the muxer writes none."""
-    said = notice.encode("ascii", "replace")[:255]
+    """Insert a comment (GIF89a, section 24) before the trailer byte of a file; the muxer writes no comments."""
+    comment = notice.encode("ascii", "replace")[:255]
     with path.open("r+b") as file:
         file.seek(-1, 2)
         trailer = file.read(1)
         file.seek(-1, 2)
-        file.write(b"\x21\xfe" + bytes([len(said)]) + said + b"\x00" + trailer)
+        file.write(b"\x21\xfe" + bytes([len(comment)]) + comment + b"\x00" + trailer)
 
 
 def _colour_table(swatches: Sequence[NDArray[np.uint8]], n_colours: int) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """(256, 4) alpha, red, green, blue by median cut, and the nearest entry for every colour of `COLOUR_BITS` bits."""
+    """Palette (256, 4) of alpha, red, green, blue by median cut, and the nearest entry of every quantised colour.
+
+    The second array has ``2 ** (3 * COLOUR_BITS)`` entries.
+    """
     from PIL import Image
     from scipy.spatial import cKDTree
 
-    seen = np.concatenate([swatch[:, :, :3].reshape(-1, 3) for swatch in swatches])
-    mosaic = Image.fromarray(seen[:: max(1, len(seen) // 400_000)][None])
-    chosen = mosaic.quantize(n_colours, Image.Quantize.MEDIANCUT, kmeans=1, dither=Image.Dither.NONE).getpalette() or []
-    colours = np.array(chosen, np.uint8).reshape(-1, 3)[:n_colours]
+    colours_seen = np.concatenate([swatch[:, :, :3].reshape(-1, 3) for swatch in swatches])
+    mosaic = Image.fromarray(colours_seen[:: max(1, len(colours_seen) // 400_000)][None])
+    entries = (
+        mosaic.quantize(n_colours, Image.Quantize.MEDIANCUT, kmeans=1, dither=Image.Dither.NONE).getpalette() or []
+    )
+    colours = np.array(entries, np.uint8).reshape(-1, 3)[:n_colours]
     palette = np.zeros((256, 4), np.uint8)
     palette[: len(colours), 0], palette[: len(colours), 1:] = 255, colours
     levels = np.indices((1 << COLOUR_BITS,) * 3).reshape(3, -1).T * (1 << (8 - COLOUR_BITS)) + (1 << (7 - COLOUR_BITS))

@@ -1,6 +1,7 @@
-"""Pictures bent over triangles: a plate that gives way, with a change of its texture, and a texture on its own.
+"""Piecewise affine warps: a plate with an added texture change, or a texture alone, drawn triangle by triangle.
 
-Pixels are counted from the top left one's centre. Every kernel runs without the interpreter's lock on one thread.
+Pixel coordinates have their origin at the centre of the top left pixel. Every kernel releases the interpreter's lock
+and runs on one thread.
 """
 
 from typing import Any
@@ -13,14 +14,12 @@ from tts2face.interpolation import interpolate_bilinear
 
 Array = NDArray[Any]
 
-EDGE_TOLERANCE = (
-    -1e-6
-)  # barycentric coordinates down to here belong to a triangle, so that no pixel is left between two
+EDGE_TOLERANCE = -1e-6  # least barycentric coordinate inside a triangle: leaves no gap between neighbours
 
 
 @inlined_kernel
 def triangle_corner(points: Array, triangle: Array, k: int) -> tuple[float, float]:
-    """Place of a triangle's corner."""
+    """Coordinates (x, y) of corner k of a triangle."""
     return points[triangle[k], 0], points[triangle[k], 1]
 
 
@@ -28,20 +27,21 @@ def triangle_corner(points: Array, triangle: Array, k: int) -> tuple[float, floa
 def warp_image(
     triangles: Array, target: Array, source: Array, plate: Array, change: tuple[Any, Any], frame: Array
 ) -> None:
-    """Draw the plate's triangles at new places.
+    """Draw the triangles of a plate at target positions, with an added texture change.
 
     Parameters
     ----------
     triangles : (F, 3)
-        Those drawn last lie on top.
+        Point indices; later triangles cover earlier ones.
     target, source : (N, 2), (N, 2)
-        The points in the frame and in the plate, pixels.
+        Point positions in the frame and in the plate, pixels.
     plate : (H, W, 3)
+        Source picture.
     change
-        A texture (h, w, 3) that is added, and the points' places in it (M, 2), M <= N; triangles of other points are
-        only bent.
+        Texture (h, w, 3) to add, and the positions (M, 2), M <= N, of the first M points in it; triangles with other
+        points are warped without it.
     frame : (H', W', 3) float32
-        Drawn into.
+        Out: the picture, written in place.
     """
     texture, places = change
     height, width = frame.shape[0], frame.shape[1]
@@ -76,7 +76,7 @@ def warp_image(
 
 @kernel
 def draw_texture(triangles: Array, target: Array, texture: Array, places: Array, frame: Array) -> None:
-    """Draw a texture's triangles, at `places` in the texture and `target` in the frame; see `warp_image`."""
+    """Draw the triangles of a texture from `places` in the texture to `target` in the frame; see `warp_image`."""
     height, width = frame.shape[0], frame.shape[1]
     for f in range(len(triangles)):
         triangle = triangles[f]

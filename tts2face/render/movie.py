@@ -1,4 +1,4 @@
-"""One movie file: MP4 (H.264 and AAC) or WebM (VP9 and Opus), fed frame by frame."""
+"""Movie files, written frame by frame: MP4 (H.264 and AAC) or WebM (VP9 and Opus)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-SOUND_RATE = 48_000  # Hz; what players and editors expect, and Opus demands
+SOUND_RATE = 48_000  # Hz; the usual rate of players and editors, required by Opus
 BT709, LIMITED_RANGE = 1, 1  # H.273 code points: primaries, transfer and matrix of BT.709; studio range
 
 
 @dataclass(frozen=True, slots=True)
 class MovieKind:
-    """Codecs of a movie and their settings."""
+    """Container, codecs and their options."""
 
     container: str
     video: str
@@ -41,12 +41,15 @@ WEBM_MOVIE = MovieKind(
 
 
 class MovieWriter:
-    """A movie being written: pictures and sound in, a finished file after `finish`."""
+    """Sink that encodes pictures and sound; `finish` completes the file."""
 
     def __init__(
         self, path: Path, kind: MovieKind, shape: tuple[int, ...], clock: tuple[Fraction, int], notice: str = ""
     ) -> None:
-        """Open a file for pictures of `shape` (H, W, 3 or 4) and mono sound at `clock` (fps, Hz); it says `notice`."""
+        """Open a file for pictures of `shape` (H, W, 3 or 4) and mono sound at `clock` (fps, Hz).
+
+        `notice` becomes the comment in its metadata.
+        """
         import av
 
         self._has_alpha = shape[2] == 4
@@ -61,8 +64,8 @@ class MovieWriter:
         video.width, video.height = shape[1], shape[0]
         video.pix_fmt = "yuva420p" if self._has_alpha else "yuv420p"
         video.codec_context.time_base = 1 / fps
-        video.codec_context.thread_count = 1  # drawing fills the other cores; more threads here cost twice the work
-        video.codec_context.bit_rate = 0  # the quality of `crf` rules alone
+        video.codec_context.thread_count = 1  # drawing uses the other cores; more threads double the work here
+        video.codec_context.bit_rate = 0  # constant quality by `crf`
         video.codec_context.color_primaries = video.codec_context.color_trc = BT709
         video.codec_context.colorspace, video.codec_context.color_range = BT709, LIMITED_RANGE
         if self._has_alpha:
@@ -72,7 +75,7 @@ class MovieWriter:
         self._video, self._audio = video, audio
 
     def picture(self, pixels: NDArray[np.uint8]) -> None:
-        """Append one picture."""
+        """Append one picture (H, W, 3 or 4)."""
         import av
 
         if self._has_alpha:
@@ -86,7 +89,7 @@ class MovieWriter:
         self._container.mux(self._video.encode(frame))
 
     def _fill_transparent(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Pixels whose empty places have a colour of the head, so that coding does not darken its outline."""
+        """Pixels with empty ones filled by the mean colour of the head, so that coding does not darken its outline."""
         empty = pixels[:, :, 3] == 0
         if self._fill_colour is None and not empty.all():
             self._fill_colour = pixels[~empty][:, :3].mean(axis=0).astype(np.uint8)
@@ -96,7 +99,7 @@ class MovieWriter:
         return filled
 
     def sound(self, samples: NDArray[np.float32]) -> None:
-        """Append mono samples."""
+        """Append mono samples (n,) in [-1, 1]."""
         import av
 
         frame = av.AudioFrame.from_ndarray(np.ascontiguousarray(samples[None, :]), format="fltp", layout="mono")
@@ -105,11 +108,11 @@ class MovieWriter:
         self._container.mux(self._audio.encode(frame))
 
     def finish(self) -> None:
-        """Write what the encoders still hold and close the file."""
+        """Flush the encoders and close the file."""
         self._container.mux(self._video.encode(None))
         self._container.mux(self._audio.encode(None))
         self._container.close()
 
     def abandon(self) -> None:
-        """Close the file unfinished."""
+        """Close the file without completing it."""
         self._container.close()

@@ -1,4 +1,4 @@
-"""Where pictures go: a file or folder that appears under its name only when it is complete."""
+"""Output paths: their kind, their checks, and the temporary file or folder that replaces them when complete."""
 
 import contextlib
 import os
@@ -15,7 +15,7 @@ FILE_SUFFIXES = (MP4, WEBM, GIF)
 
 
 def output_kind(path: Path | str) -> str:
-    """What a path asks for: one of `FILE_SUFFIXES`, or `FOLDER`.
+    """Kind of an output path: one of `FILE_SUFFIXES`, or `FOLDER`.
 
     Raises
     ------
@@ -34,28 +34,28 @@ def output_kind(path: Path | str) -> str:
 
 
 def check_output(path: Path | str) -> Path:
-    """The path of what shall be written.
+    """Checked path of an output.
 
     Raises
     ------
     InputError
-        The suffix is unknown, the folder around it does not exist, the name is only a suffix or too long, or it belongs
-        to something else.
+        The suffix is unknown, the parent folder does not exist, the name is only a suffix or too long, or the path is
+        a folder of other files.
     BackendError
-        The folder around it cannot be written.
+        The parent folder cannot be written.
     """
-    where = Path(path)
-    check_name(where)
+    output = Path(path)
+    check_name(output)
     kind = output_kind(path)
-    if kind == FOLDER and where.exists() and not (where.is_dir() and is_png_folder(where)):
-        raise InputError(f"{where} holds other things than pictures of a clip; choose another folder")
-    if kind != FOLDER and where.is_dir():
-        raise InputError(f"{where} is a folder; choose another name")
-    return where
+    if kind == FOLDER and output.exists() and not (output.is_dir() and is_png_folder(output)):
+        raise InputError(f"{output} contains files other than the pictures of a clip; choose another folder")
+    if kind != FOLDER and output.is_dir():
+        raise InputError(f"{output} is a folder; choose another name")
+    return output
 
 
 def make_temporary(path: Path, kind: str) -> Temporary:
-    """A new, empty, hidden file or folder beside a path.
+    """New, empty, hidden file or folder in the same folder as a path.
 
     Raises
     ------
@@ -66,23 +66,29 @@ def make_temporary(path: Path, kind: str) -> Temporary:
         return Temporary(path, is_folder=kind == FOLDER)
 
 
-def move_into_place(beside: Temporary, path: Path) -> None:
-    """Let what was written beside appear under its name, in place of what was there."""
-    with translate_disk_errors(path):
-        beside.replace(path)
-
-
-@contextlib.contextmanager
-def translate_disk_errors(path: Path) -> Iterator[None]:
-    """Say in one sentence why the disk refused.
+def move_into_place(temporary: Temporary, path: Path) -> None:
+    """Rename a temporary file or folder to `path`, replacing what exists there.
 
     Raises
     ------
     BackendError
-        It did.
+        The folder cannot be written.
+    """
+    with translate_disk_errors(path):
+        temporary.replace(path)
+
+
+@contextlib.contextmanager
+def translate_disk_errors(path: Path) -> Iterator[None]:
+    """Translate errors of the operating system into a `BackendError` with the reason.
+
+    Raises
+    ------
+    BackendError
+        An OSError occurred within the block.
     """
     try:
         yield
-    except OSError as refused:
-        reason = os.strerror(refused.errno) if refused.errno else str(refused)
-        raise BackendError(f"cannot write {path}: {reason}; free some space or choose another folder") from refused
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise BackendError(f"cannot write {path}: {reason}; free some space or choose another folder") from error

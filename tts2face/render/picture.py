@@ -1,4 +1,4 @@
-"""The Picture: the single list of options for how a clip is drawn. Imports nothing heavy."""
+"""Drawing options of a clip; a module without heavy imports."""
 
 import re
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ COLOURS = {
     "black": "000000", "white": "ffffff", "grey": "808080", "gray": "808080", "red": "c8282d", "green": "00b140",
     "blue": "0047bb", "navy": "14213d", "sky": "9ec9e8", "teal": "127475", "yellow": "f2c14e", "orange": "e07a1f",
     "pink": "f4b6c2", "purple": "5f4b8b", "brown": "6b4f3a", "cream": "f6f0e2",
-}  # fmt: skip  # sRGB; green and blue are those of studio walls for keying
+}  # fmt: skip  # sRGB; green and blue are the usual chroma key colours
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Picture:
-    """How a clip is drawn.
+    """Drawing options of a clip.
 
     Raises
     ------
@@ -33,7 +33,7 @@ class Picture:
 
     size: str = option(
         "auto",
-        "Width x height in pixels, even numbers from 16 to 4096; auto: 512x512, or those of a talker's own video.",
+        "Width x height in pixels, even numbers from 16 to 4096; auto: 512x512, or the size of a talker's own video.",
     )
     camera: str = option("front", "front, three-quarter, profile, close, or yaw,pitch[,distance] in degrees and mm.")
     background: str = option("studio", "studio, transparent, a colour (name or #rrggbb), or an image file.")
@@ -41,7 +41,7 @@ class Picture:
     renderer: str = option("numba", "numba (any machine) or pyvista (VTK, with a GPU or software GL).")
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be drawn."""
+        """Validate every option."""
         parse_size(self.size)
         parse_camera(self.camera)
         parse_background(self.background)
@@ -62,27 +62,27 @@ class Picture:
 
     @property
     def view(self) -> CameraView:
-        """The camera that `camera` names."""
+        """Camera view that `camera` names."""
         return parse_camera(self.camera)
 
     @property
     def is_transparent(self) -> bool:
-        """Whether pictures have a fourth channel, their coverage."""
+        """Whether pictures have a fourth channel with their coverage."""
         return self.background == TRANSPARENT
 
     @property
     def channels(self) -> int:
-        """Channels of a picture: 3, or 4 with coverage."""
+        """Number of channels of a picture: 3, or 4 with coverage."""
         return 4 if self.is_transparent else 3
 
 
 def parse_size(size: str) -> tuple[int, int]:
-    """Width and height of a size such as ``640x480`` or ``512``; those of ``auto`` are `DEFAULT_SIZE`.
+    """Width and height in pixels of a size such as ``640x480`` or ``512``; `DEFAULT_SIZE` for ``auto``.
 
     Raises
     ------
     InputError
-        It is not a size, or a side is odd or out of range.
+        The text is not a size, or a side is odd or out of range.
     """
     if size.strip() == AUTO_SIZE:
         return DEFAULT_SIZE
@@ -104,7 +104,7 @@ def parse_background(background: str) -> tuple[int, int, int] | Path | str:
     Raises
     ------
     InputError
-        It is none of them, or there is no such image.
+        The text is none of these, or the image does not exist.
     """
     if background in (STUDIO, TRANSPARENT):
         return background

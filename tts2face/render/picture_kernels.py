@@ -1,4 +1,4 @@
-"""One picture: the kernels of this room in their order, band by band."""
+"""Drawing of one picture: the rasterisation and shading kernels, band by band."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -24,17 +24,17 @@ from tts2face.render.resolve import compose_band
 from tts2face.render.shade import N_SCRATCH_ROWS, shade_fragments
 from tts2face.render.surface import Surface, encoding_table, linear_table
 
-BAND_SAMPLES = 65_536  # of a band of rows that is drawn, then lit; from 16,384 to 262,144 the time is the same
-TONE_STEPS = 8192  # entries of the table from linear light to 8 bits; fine enough for its darkest step
-ROW_PADDING = 80  # entries beyond the last of a table's row, so that its rows do not all begin in one set of the cache
+BAND_SAMPLES = 65_536  # per band of rows; the time is the same from 16,384 to 262,144
+TONE_STEPS = 8192  # entries of the table from linear light to 8 bits; resolves the darkest step
+ROW_PADDING = 80  # extra entries per table row, so that rows do not all start in one cache set
 TONE_TABLES = (linear_table(), encoding_table(TONE_STEPS))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawingBuffers:
-    """What one picture at a time needs while it is drawn; `tts2face.render.raster` and its neighbours name the parts.
+    """Buffers for drawing one picture at a time; `tts2face.render.raster` and `fragments` describe the arrays.
 
-    ``vertex`` holds colour and uv from the start.
+    ``side`` is the number of samples along a pixel's side; ``vertex`` is initialised with colours and uv.
     """
 
     side: int
@@ -54,11 +54,11 @@ class DrawingBuffers:
 
 
 def allocate_buffers(surface: Surface, size: tuple[int, int], side: int) -> DrawingBuffers:
-    """Room to draw a surface into pictures of `size` (width, height) px with side x side samples in a pixel."""
+    """Buffers for a surface, pictures of `size` (width, height) px, and side x side samples per pixel."""
     n_vertices, n_triangles = len(surface.rig.rest), len(surface.triangles)
     width, height = size[0] * side, size[1] * side
     rows = side * max(1, BAND_SAMPLES // (width * side))
-    n_most = N_LAYERS * width * rows + ROW_PADDING
+    max_fragments = N_LAYERS * width * rows + ROW_PADDING
     vertex = np.zeros((n_vertices, N_VERTEX_COLUMNS), np.float32)
     vertex[:, COLOUR : COLOUR + 3] = surface.colours
     vertex[:, UV : UV + 2] = surface.uv
@@ -72,10 +72,10 @@ def allocate_buffers(surface: Surface, size: tuple[int, int], side: int) -> Draw
         band_starts=np.zeros(-(-height // rows) + 1, np.int64),
         depth=np.zeros((N_LAYERS, rows, width), np.float32),
         owner=np.zeros((N_LAYERS, rows, width), np.int32),
-        found=(np.zeros(n_most, np.int32), np.zeros((n_most, 3), np.float32)),
-        fragments=np.zeros((N_ROWS, n_most), np.float32),
-        scratch=np.zeros((N_SCRATCH_ROWS, n_most), np.float32),
-        colour=np.zeros((3, n_most), np.float32),
+        found=(np.zeros(max_fragments, np.int32), np.zeros((max_fragments, 3), np.float32)),
+        fragments=np.zeros((N_ROWS, max_fragments), np.float32),
+        scratch=np.zeros((N_SCRATCH_ROWS, max_fragments), np.float32),
+        colour=np.zeros((3, max_fragments), np.float32),
         pixels=np.zeros((width * rows // side**2, PIXEL_ENDS + N_LAYERS + 1), np.int32),
     )
 
@@ -85,53 +85,76 @@ def draw_surface(
     surface: Surface,
     optics: CameraMatrices,
     lights: tuple[NDArray[np.float32], NDArray[np.float32]],
-    room: DrawingBuffers,
+    buffers: DrawingBuffers,
     picture: NDArray[np.uint8],
 ) -> None:
-    """Draw the surface, its vertices (V, 3) in the world, over the background that the picture holds.
+    """Draw a surface over the background in `picture`, in place.
 
-    `lights` are the table of `tts2face.render.shade.shade_fragments` and how much of each reaches every vertex (V, 4).
+    Parameters
+    ----------
+    points : (V, 3)
+        World positions of the vertices, mm.
+    lights
+        Light table of `tts2face.render.shade.shade_fragments`, and the exposure (V, 4) of each vertex.
+    picture : (H, W, 3 or 4)
+        Background on entry, sRGB; the drawn picture on return.
     """
-    room.vertex[:, EXPOSURE : EXPOSURE + 4] = lights[1]
-    lens, side = optics.lens, room.side
+    buffers.vertex[:, EXPOSURE : EXPOSURE + 4] = lights[1]
+    lens, side = optics.lens, buffers.side
     height, width = picture.shape[0] * side, picture.shape[1] * side
-    batch = project_surface(points, surface, (optics.view, optics.lens), room, (width, height))
-    face_normals(room.vertex, surface.triangles, room.flat)
-    vertex_normals(room.flat, surface.starts, surface.members, room.vertex)
-    geometry = (room.vertex, surface.triangles, surface.translucent, lens)
+    batch = project_surface(points, surface, (optics.view, optics.lens), buffers, (width, height))
+    face_normals(buffers.vertex, surface.triangles, buffers.flat)
+    vertex_normals(buffers.flat, surface.starts, surface.members, buffers.vertex)
+    geometry = (buffers.vertex, surface.triangles, surface.translucent, lens)
     scene = (surface.triangles, surface.part_of, surface.materials, surface.texture, TONE_TABLES[0])
-    facets = (room.flat, surface.part_of)
-    n_rows = room.depth.shape[1]
-    for band, (begin, end) in enumerate(zip(room.band_starts[:-1], room.band_starts[1:], strict=True)):
+    facets = (buffers.flat, surface.part_of)
+    n_rows = buffers.depth.shape[1]
+    for band, (begin, end) in enumerate(zip(buffers.band_starts[:-1], buffers.band_starts[1:], strict=True)):
         if begin == end:
             continue
         place = (band * n_rows, min(n_rows, height - band * n_rows), side)
         members = batch[begin:end]
-        n_translucent = draw_band(geometry, (room.corners, room.source, members), place[0], room.depth, room.owner)
+        n_translucent = draw_band(
+            geometry, (buffers.corners, buffers.source, members), place[0], buffers.depth, buffers.owner
+        )
         layers = N_LAYERS if n_translucent else 1
-        n_pixels = find_fragments(room.owner, layers, place, facets, room.found, room.pixels)
+        n_pixels = find_fragments(buffers.owner, layers, place, facets, buffers.found, buffers.pixels)
         if n_pixels == 0:
             continue
-        n_fragments = int(room.pixels[n_pixels - 1, PIXEL_ENDS + N_LAYERS])
-        evaluate_fragments(room.found, n_fragments, room.vertex, scene, lens, room.fragments)
-        shade_fragments(room.fragments, n_fragments, lights[0], room.scratch, room.colour)
-        shown = (room.fragments, room.colour)
+        n_fragments = int(buffers.pixels[n_pixels - 1, PIXEL_ENDS + N_LAYERS])
+        evaluate_fragments(buffers.found, n_fragments, buffers.vertex, scene, lens, buffers.fragments)
+        shade_fragments(buffers.fragments, n_fragments, lights[0], buffers.scratch, buffers.colour)
+        shading = (buffers.fragments, buffers.colour)
         compose_band(
-            room.owner, place, (room.pixels, n_pixels), (room.found[0], *facets), shown, (picture, TONE_TABLES)
+            buffers.owner,
+            place,
+            (buffers.pixels, n_pixels),
+            (buffers.found[0], *facets),
+            shading,
+            (picture, TONE_TABLES),
         )
 
 
 def project_surface(
-    points: NDArray[np.float32], surface: Surface, optics: tuple[Any, Any], room: DrawingBuffers, size: tuple[int, int]
+    points: NDArray[np.float32],
+    surface: Surface,
+    optics: tuple[Any, Any],
+    buffers: DrawingBuffers,
+    size: tuple[int, int],
 ) -> NDArray[np.int32]:
-    """Bring the surface before a camera (view, lens); returns the triangles of all bands, one band behind the other."""
+    """Project a surface for a camera (view, lens); returns the triangle indices of all bands, concatenated.
+
+    Writes ``vertex``, ``grid``, ``corners``, ``source`` and ``band_starts`` of `buffers`.
+    """
     view, lens = optics
-    transform_to_camera(points, view, lens, room.vertex, room.grid)
-    count = gather_triangles(room.vertex, room.grid, surface.triangles, (lens, size), room.corners, room.source)
-    n_rows = room.depth.shape[1]
+    transform_to_camera(points, view, lens, buffers.vertex, buffers.grid)
+    count = gather_triangles(
+        buffers.vertex, buffers.grid, surface.triangles, (lens, size), buffers.corners, buffers.source
+    )
+    n_rows = buffers.depth.shape[1]
     members = np.zeros(2 * len(surface.triangles), np.int32)
-    sort_into_bands(room.corners, count, n_rows, room.band_starts, members)
-    if room.band_starts[-1] > len(members):
-        members = np.zeros(room.band_starts[-1], np.int32)
-        sort_into_bands(room.corners, count, n_rows, room.band_starts, members)
+    sort_into_bands(buffers.corners, count, n_rows, buffers.band_starts, members)
+    if buffers.band_starts[-1] > len(members):
+        members = np.zeros(buffers.band_starts[-1], np.int32)
+        sort_into_bands(buffers.corners, count, n_rows, buffers.band_starts, members)
     return members

@@ -1,4 +1,4 @@
-"""A folder of .png pictures, numbered from 0, with the sound beside them as sound.wav."""
+"""Folder of .png pictures, numbered from 0, with the sound in sound.wav."""
 
 import wave
 from pathlib import Path
@@ -8,31 +8,31 @@ from numpy.typing import NDArray
 
 SOUND_NAME = "sound.wav"
 NUMBER_DIGITS = 6
-COMPRESSION = 3  # of zlib: twice as fast as the usual 6, 4 % larger
+COMPRESSION = 3  # zlib level: twice as fast as the default 6, 4 % larger
 
 
 class PngFolderWriter:
-    """Pictures being written to a folder."""
+    """Sink that writes pictures to a folder."""
 
     def __init__(self, folder: Path, sound_rate: int, notice: str = "") -> None:
-        """Begin in a folder that is there; every picture says `notice`."""
+        """Open an existing folder; `notice` becomes the comment of every picture."""
         self._folder, self._n_frames, self._notice = folder, 0, notice
         self._sound = wave.open(str(folder / SOUND_NAME), "wb")  # noqa: SIM115 - closed by finish or abandon
         self._sound.setparams((1, 2, sound_rate, 0, "NONE", "not compressed"))
 
     def picture(self, pixels: NDArray[np.uint8]) -> None:
-        """Write one picture."""
+        """Write one picture (H, W, 3 or 4)."""
         from PIL import Image, PngImagePlugin
 
-        said = PngImagePlugin.PngInfo()
+        comment = PngImagePlugin.PngInfo()
         if self._notice:
-            said.add_text("Comment", self._notice)
+            comment.add_text("Comment", self._notice)
         path = self._folder / f"{self._n_frames:0{NUMBER_DIGITS}d}.png"
-        Image.fromarray(pixels).save(path, compress_level=COMPRESSION, pnginfo=said)
+        Image.fromarray(pixels).save(path, compress_level=COMPRESSION, pnginfo=comment)
         self._n_frames += 1
 
     def sound(self, samples: NDArray[np.float32]) -> None:
-        """Append mono samples, as 16-bit numbers."""
+        """Append mono samples (n,) in [-1, 1] as 16-bit integers."""
         self._sound.writeframes(np.rint(samples * 32767).astype("<i2").tobytes())
 
     def finish(self) -> None:
@@ -40,12 +40,12 @@ class PngFolderWriter:
         self._sound.close()
 
     def abandon(self) -> None:
-        """Let go of the sound file."""
+        """Close the sound file."""
         self._sound.close()
 
 
 def is_png_folder(folder: Path) -> bool:
-    """Whether a folder holds nothing but what `PngFolderWriter` writes."""
+    """Whether a folder contains only files that `PngFolderWriter` writes."""
     return all(
         path.name == SOUND_NAME or (path.suffix == ".png" and path.stem.isdigit() and len(path.stem) >= NUMBER_DIGITS)
         for path in folder.iterdir()

@@ -1,10 +1,10 @@
-"""Which triangle is seen at which sample: exact edge functions on a fixed grid, depth by 1/z.
+"""Rasterisation: the visible triangle of each sample by exact edge functions on a fixed grid and a 1/z buffer.
 
-Corners are snapped to 1/256 of a sample and the edge functions are integers, so that two triangles that share an edge
-never both take a sample on it and never both leave it (top-left rule). Depth comes from the plane of the unsnapped
-triangle, which also holds for triangles that the near plane cuts. Every kernel runs without the interpreter's lock and
-on one thread: pictures are drawn side by side, so their bytes cannot depend on the number of threads. Camera space: x
-right, y down, z ahead, mm. Sources: Pineda 1988 (edge functions), Olano and Greer 1997 (planes of the uncut triangle).
+Corners are snapped to 1/256 of a sample and the edge functions are integers, so that a sample on an edge shared by two
+triangles belongs to exactly one of them (top-left rule). Depth is computed from the plane of the unsnapped triangle,
+which also holds for triangles that the near plane clips. Every kernel releases the interpreter's lock and runs on one
+thread; each picture is drawn by one thread, so its bytes do not depend on the number of threads. Camera space: x right,
+y down, z ahead, mm. Sources: Pineda 1988 (edge functions), Olano and Greer 1997 (planes of the uncut triangle).
 """
 
 from typing import Any
@@ -20,17 +20,17 @@ GRID_SHIFT = 8
 GRID = 1 << GRID_SHIFT  # steps of the snapping grid in one sample
 HALF_GRID = GRID >> 1
 NO_TRIANGLE = np.int32(2**31 - 1)  # no triangle at this sample
-BACK_BIAS = np.float32(1.0 - 3e-4)  # back faces lie 0.3 permille further away: a front face wins where both meet
-TILE_SAMPLES = 8  # samples along a side of the squares by which hidden back faces are left out
+BACK_BIAS = np.float32(1.0 - 3e-4)  # back faces are moved 0.3 permille away, so that front faces win at equal depth
+TILE_SAMPLES = 8  # samples along a side of the tiles that cull hidden back faces
 N_LAYERS = 3  # the opaque surface and the two nearest translucent ones before it
 
 
 @kernel
 def transform_to_camera(points: Array, view: Array, lens: Array, camera: Array, grid: Array) -> None:
-    """Write camera space and snapped picture place of (V, 3) world points; the latter only beyond the near plane.
+    """Write camera coordinates of (V, 3) world points, and snapped picture coordinates of those beyond the near plane.
 
-    `view` (3, 4) brings the world to camera space; `lens` is (focal length in samples, centre x, centre y, near plane).
-    The first three columns of `camera` are written.
+    `view` (3, 4) transforms world to camera space; `lens` is (focal length in samples, centre x, centre y, near plane).
+    The first three columns of `camera` and both of `grid` are written.
     """
     focal, middle_x, middle_y, near = lens[0], lens[1], lens[2], lens[3]
     for v in range(len(points)):
@@ -46,18 +46,18 @@ def transform_to_camera(points: Array, view: Array, lens: Array, camera: Array, 
 
 @kernel
 def clip_to_near_plane(camera: Array, grid: Array, triangle: Array, lens: Array, polygon: Array) -> int:
-    """Snapped corners of the part of a triangle beyond the near plane; returns how many (0, 3 or 4)."""
+    """Write the snapped corners of the part of a triangle beyond the near plane; returns their number (0, 3 or 4)."""
     near = lens[3]
     n_corners = 0
     for c in range(3):
-        here, after = triangle[c], triangle[(c + 1) % 3]
-        here_seen, after_seen = camera[here, 2] >= near, camera[after, 2] >= near
-        if here_seen:
-            polygon[n_corners, 0], polygon[n_corners, 1] = grid[here, 0], grid[here, 1]
+        a, b = triangle[c], triangle[(c + 1) % 3]
+        a_visible, b_visible = camera[a, 2] >= near, camera[b, 2] >= near
+        if a_visible:
+            polygon[n_corners, 0], polygon[n_corners, 1] = grid[a, 0], grid[a, 1]
             n_corners += 1
-        if here_seen == after_seen:
+        if a_visible == b_visible:
             continue
-        inside, outside = (here, after) if here_seen else (after, here)  # the same for both triangles of the edge
+        inside, outside = (a, b) if a_visible else (b, a)  # the same for both triangles of the edge
         depth_in, depth_out = np.float64(camera[inside, 2]), np.float64(camera[outside, 2])
         share = (depth_in - near) / (depth_in - depth_out)
         right = camera[inside, 0] + share * (camera[outside, 0] - camera[inside, 0])
@@ -70,7 +70,7 @@ def clip_to_near_plane(camera: Array, grid: Array, triangle: Array, lens: Array,
 
 @inlined_kernel
 def may_be_seen(low: int, high: int, n_samples: int) -> bool:
-    """Whether a sample's middle lies within a range of the grid and of the picture."""
+    """Whether the centre of a sample lies within a range of grid coordinates and within the picture."""
     return bool(max((low + HALF_GRID - 1) >> GRID_SHIFT, 0) <= min((high - HALF_GRID) >> GRID_SHIFT, n_samples - 1))
 
 
@@ -78,7 +78,7 @@ def may_be_seen(low: int, high: int, n_samples: int) -> bool:
 def gather_triangles(
     camera: Array, grid: Array, triangles: Array, optics: tuple[Any, Any], corners: Array, source: Array
 ) -> int:
-    """Triangles that may be seen, as snapped corners in one winding; returns how many.
+    """Write the snapped corners of potentially visible triangles in one winding; returns their number.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def gather_triangles(
     corners : (2 F, 6)
         Out: x, y of three corners on the grid, positive area.
     source : (2 F,)
-        Out: the triangle's number t, or ~t where its back is seen.
+        Out: the triangle's index t, or ~t where its back faces the camera.
     """
     lens, size = optics
     count = 0
@@ -120,7 +120,7 @@ def gather_triangles(
 
 @kernel
 def sort_into_bands(corners: Array, count: int, band_rows: int, starts: Array, members: Array) -> None:
-    """Triangles by the bands of rows that they touch, in their own order (counting sort).
+    """Sort triangles stably into the bands of rows that they overlap (counting sort).
 
     Band b is ``members[starts[b]:starts[b + 1]]``. With `members` too short, only `starts` is written.
     """
@@ -156,7 +156,7 @@ def edge_function(ax: int, ay: int, bx: int, by: int, px: int, py: int) -> int:
 
 @inlined_kernel
 def depth_plane(camera: Array, triangles: Array, t: int, lens: Array) -> tuple[float, float, float, float, float]:
-    """1/z of a triangle as a linear function of the sample's place: (per column, per row, at 0, least, most)."""
+    """1/z of a triangle as a linear function of the sample position: (per column, per row, at 0, least, greatest)."""
     a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     ax, ay, az = np.float64(camera[a, 0]), np.float64(camera[a, 1]), np.float64(camera[a, 2])
     e1x, e1y, e1z = camera[b, 0] - ax, camera[b, 1] - ay, camera[b, 2] - az
@@ -174,7 +174,7 @@ def depth_plane(camera: Array, triangles: Array, t: int, lens: Array) -> tuple[f
 
 @kernel
 def tile_depths(depth: Array, tiles: Array) -> None:
-    """Write for each tile of samples the 1/z before which everything in it lies; 0 where a sample is still free."""
+    """Write for each tile of samples its least 1/z: 0 where a sample of it is empty."""
     for r in range(tiles.shape[0]):
         for x in range(tiles.shape[1]):
             tiles[r, x] = np.float32(np.inf)
@@ -186,7 +186,7 @@ def tile_depths(depth: Array, tiles: Array) -> None:
 
 @kernel
 def clear_layer(depth: Array, owner: Array, layer: int) -> None:
-    """Empty a layer of a band."""
+    """Clear a layer of a band."""
     for r in range(depth.shape[1]):
         for x in range(depth.shape[2]):
             depth[layer, r, x], owner[layer, r, x] = np.float32(0), NO_TRIANGLE
@@ -194,18 +194,18 @@ def clear_layer(depth: Array, owner: Array, layer: int) -> None:
 
 @kernel
 def draw_band(geometry: Any, batch: Any, first_row: int, depth: Array, owner: Array) -> int:
-    """Clear a band of rows and draw its triangles, translucent ones last; returns how many of those there are.
+    """Clear a band of rows and draw its triangles, translucent ones last; returns the number of translucent ones.
 
     Parameters
     ----------
     geometry
-        Camera space (V, 3 or more), triangles (F, 3), marks of translucent ones (F,), lens.
+        Camera coordinates (V, 3 or more), triangles (F, 3), flags of translucent ones (F,), lens.
     batch
         Corners, source, and the rows of both that touch the band.
     first_row
         The band's first row of samples.
     depth, owner : (3, R, W)
-        1/z and number of the opaque surface and of the two nearest translucent ones before it.
+        Out: 1/z and triangle index of the opaque surface and of the two nearest translucent ones in front of it.
     """
     camera, triangles, translucent, lens = geometry
     corners, source, members = batch

@@ -1,4 +1,4 @@
-"""What every renderer does: frames of a clip become pictures."""
+"""Protocol of the renderers, which draw the frames of a clip as pictures."""
 
 from collections.abc import Iterator
 from typing import Protocol
@@ -13,24 +13,24 @@ SYNTHETIC_NOTICE = "Synthetic media: face and lip motion of {name} were generate
 
 
 class FrameRenderer(Protocol):
-    """Draws the frames of clips of one face, at one size; serves any number of clips and threads.
+    """Renderer of clips of one face at one picture size; may be used from several threads.
 
-    The bytes do not depend on the number of threads.
+    Pictures do not depend on the number of threads.
     """
 
     @property
     def picture(self) -> Picture:
-        """How the frames are drawn, with its size in pixels."""
+        """Drawing options of the frames."""
 
     @property
     def notice(self) -> str:
-        """What every file with these frames says about itself; empty unless a real person is shown."""
+        """Comment for every file with these frames; empty unless they show a real person."""
 
     def frames(self, clip: Clip, *, threads: int | None = None, first: int = 0) -> Iterator[NDArray[np.uint8]]:
         """Pictures (H, W, 3), or (H, W, 4) with coverage, of a clip's frames in order.
 
-        At most as many frames are drawn in advance as there are threads; `first` is the number of the clip's first
-        frame in the whole.
+        At most `threads` frames are drawn in advance; `first` is the index of the clip's first frame in a stream of
+        clips.
 
         Raises
         ------
@@ -39,4 +39,4 @@ class FrameRenderer(Protocol):
         """
 
     def frame(self, clip: Clip, number: int) -> NDArray[np.uint8]:
-        """The picture of one frame of a clip."""
+        """Picture of one frame of a clip."""

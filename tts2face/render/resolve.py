@@ -1,4 +1,4 @@
-"""From fragments to pixels: layers over each other and over the background, encoded as sRGB."""
+"""Compositing of fragments into pixels: layers over each other and over the background, encoded as sRGB."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ Array = NDArray[Any]
 
 @kernel
 def write_pixel(total: Array, tables: tuple[Any, Any], picture: Array, x: int, y: int) -> None:
-    """Lay light and coverage (4,) over the pixel that is there; with four channels, keep the coverage."""
+    """Composite light and coverage (4,) over a pixel; a picture of four channels stores the coverage."""
     linear, encoded = tables
     one, zero, half = np.float32(1), np.float32(0), np.float32(0.5)
     top = np.float32(len(encoded) - 1)
@@ -29,24 +29,28 @@ def write_pixel(total: Array, tables: tuple[Any, Any], picture: Array, x: int, y
 
 @kernel
 def mix_samples(
-    samples: tuple[Any, int, int, int], begins: Array, which: tuple[Any, Any, Any], shown: tuple[Any, Any], total: Array
+    samples: tuple[Any, int, int, int],
+    begins: Array,
+    which: tuple[Any, Any, Any],
+    shading: tuple[Any, Any],
+    total: Array,
 ) -> None:
-    """Write the mean over a pixel's samples of the layers over each other: light and coverage (4,).
+    """Write the mean over a pixel's samples of the composited layers: light and coverage (4,).
 
     Parameters
     ----------
     samples
-        Owner (3, R, W), the pixel's first row and column in it, samples along its side.
+        Visible triangles (3, R, W), the pixel's first row and column in them, samples along its side.
     begins : (4,)
-        First fragment of each layer, and the end.
+        First fragment of each layer, and the end of the last.
     which
         First triangle of each fragment, and the facets of `find_fragments`.
-    shown
+    shading
         Fragment table and colours.
     """
     owner, row, column, side = samples
     number_of, flat, part_of = which
-    table, colour = shown
+    table, colour = shading
     one = np.float32(1)
     for s in range(side * side):
         red, green, blue, coverage = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
@@ -76,7 +80,7 @@ def compose_band(
     place: tuple[int, int, int],
     pixels: tuple[Any, int],
     which: tuple[Any, Any, Any],
-    shown: tuple[Any, Any],
+    shading: tuple[Any, Any],
     out: tuple[Any, Any],
 ) -> None:
     """Write the pixels of a band.
@@ -86,16 +90,16 @@ def compose_band(
     place
         The band's first row of samples, its number of rows, samples along a pixel's side.
     pixels
-        Pixel table and how many of its rows count.
+        Pixel table and the number of its valid rows.
     which
         First triangle of each fragment, and the facets of `find_fragments`.
-    shown
+    shading
         Fragment table and colours.
     out
-        The picture, holding the background, and the tables between 8 bits and linear light.
+        Picture with the background, written in place, and the tables between 8 bits and linear light.
     """
     first_row, side = place[0], place[2]
-    table, colour = shown
+    table, colour = shading
     picture, tables = out
     share = np.float32(1) / np.float32(side * side)
     total = np.zeros(4, np.float32)
@@ -105,7 +109,7 @@ def compose_band(
         total[0] = total[1] = total[2] = total[3] = np.float32(0)
         if row[PIXEL_ENDS + 1] < end:
             samples = (owner, row[PIXEL_Y] * side - first_row, row[PIXEL_X] * side, side)
-            mix_samples(samples, row[PIXEL_ENDS:], which, shown, total)
+            mix_samples(samples, row[PIXEL_ENDS:], which, shading, total)
         else:
             for g in range(begin, end):
                 weight = table[AT_SHARE, g] * share

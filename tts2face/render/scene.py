@@ -1,23 +1,27 @@
-"""Everything that stays the same while a mesh face is drawn into pictures."""
+"""Scene of a mesh face: everything that is constant over the frames of a clip, including the background."""
 
 import os
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.face import Face
-from tts2face.render.background import draw_background
 from tts2face.render.camera import CameraMatrices, camera_matrices
-from tts2face.render.picture import Picture
+from tts2face.render.picture import STUDIO, Picture, parse_background
 from tts2face.render.soft_shadows import Exposure, compute_exposure
 from tts2face.render.studio_light import lamp_directions, light_table
 from tts2face.render.surface import Surface, build_surface
+from tts2face.storage.picture_files import opened_picture
+
+STUDIO_BRIGHT, STUDIO_DARK = (128.0, 137.0, 148.0), (52.0, 58.0, 67.0)  # sRGB at the centre of the wall and far from it
+STUDIO_CENTRE = (0.5, 0.42)  # of the bright area, as shares of width and height
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A face with its camera, lights, soft shadows and background; `build_scene` makes it."""
+    """A face with its camera, lights (L, 6), soft shadows and background (H, W, 3); built by `build_scene`."""
 
     face: Face
     picture: Picture
@@ -29,7 +33,13 @@ class Scene:
 
 
 def build_scene(face: Face, picture: Picture) -> Scene:
-    """The scene of a face and a picture; its soft shadows take most of a second."""
+    """Scene of a face and a picture; computing the soft shadows takes almost a second.
+
+    Raises
+    ------
+    DataError
+        The background image cannot be read.
+    """
     side = picture.supersampling
     surface, towards = build_surface(face), lamp_directions(picture.view)
     camera = camera_matrices(picture.view, face, (picture.width * side, picture.height * side))
@@ -38,5 +48,43 @@ def build_scene(face: Face, picture: Picture) -> Scene:
 
 
 def available_cores() -> int:
-    """Cores that this process may use."""
+    """Number of processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def draw_background(picture: Picture) -> NDArray[np.uint8]:
+    """Background (H, W, 3) of a picture, sRGB; black for a transparent picture.
+
+    Raises
+    ------
+    DataError
+        The image cannot be read or is too large.
+    """
+    kind = parse_background(picture.background)
+    if isinstance(kind, Path):
+        return _load_image(kind, picture.width, picture.height)
+    plain = np.zeros((picture.height, picture.width, 3), np.uint8)
+    if kind == STUDIO:
+        return _draw_studio(picture.width, picture.height)
+    if isinstance(kind, tuple):
+        plain[:] = kind
+    return plain
+
+
+def _draw_studio(width: int, height: int) -> NDArray[np.uint8]:
+    """Wall with a soft radial gradient; ordered dither hides the quantisation steps."""
+    across = ((np.arange(width) + 0.5) / width - STUDIO_CENTRE[0])[None, :] * min(1.6, max(1.0, width / height))
+    along = ((np.arange(height) + 0.5) / height - STUDIO_CENTRE[1])[:, None]
+    falloff = np.exp(-2.6 * (across**2 + along**2))[:, :, None]
+    wall = np.array(STUDIO_DARK) + (np.array(STUDIO_BRIGHT) - STUDIO_DARK) * falloff
+    bayer = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]]) / 16
+    dither = np.tile(bayer, (-(-height // 4), -(-width // 4)))[:height, :width, None]
+    return np.floor(wall + dither).astype(np.uint8)
+
+
+def _load_image(path: Path, width: int, height: int) -> NDArray[np.uint8]:
+    """Image scaled and cropped to fill the picture."""
+    from PIL import Image, ImageOps
+
+    with opened_picture(path, "the background image") as file:
+        return np.array(ImageOps.fit(file.convert("RGB"), (width, height), Image.Resampling.LANCZOS))

@@ -1,4 +1,4 @@
-"""The light that fragments send to the camera: soft lamps, light under skin, highlights, a bright sky; linear."""
+"""Shading of fragments in linear light: area lamps, subsurface scattering, highlights, sky and floor."""
 
 from typing import Any
 
@@ -19,22 +19,19 @@ from tts2face.render.fragments import (
 
 Array = NDArray[Any]
 
-SKIN_SCATTERING = np.array([1.0, 0.5, 0.36], np.float32)  # of red, green and blue light under skin, of the part's wrap
-INTERREFLECTION = np.float32(0.8)  # share of the light between walls of a hollow that stays in it
-SKY_GLOSS = np.float32(0.1)  # of the sky that a glossy part mirrors
-TONE_SHOULDER = np.float32(0.65)  # linear light from which bright places are pressed together, below 1
+SKIN_SCATTERING = np.array(
+    [1.0, 0.5, 0.36], np.float32
+)  # scattering of red, green and blue light under skin, relative to the part's wrap
+INTERREFLECTION = np.float32(0.8)  # share of the light that a cavity reflects between its walls
+SKY_GLOSS = np.float32(0.1)  # share of the sky that glossy parts reflect
+TONE_SHOULDER = np.float32(0.65)  # linear light above which highlights are compressed to below 1
 N_SCRATCH_ROWS = 9
-SKY_ROW, FLOOR_ROW, UP_ROW, FIRST_LIGHT_ROW = (
-    0,
-    1,
-    2,
-    3,
-)  # rows of the table of lights; a light has a direction and a colour
+SKY_ROW, FLOOR_ROW, UP_ROW, FIRST_LIGHT_ROW = range(4)  # rows of the light table; a light has direction and colour
 
 
 @vectorized_kernel
 def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour: Array) -> None:
-    """Write the light of n fragments.
+    """Compute the light of n fragments.
 
     Parameters
     ----------
@@ -43,9 +40,9 @@ def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour:
     lights : (L, 6)
         Sky and floor colour, direction up, then one row for each light: direction towards it, colour.
     scratch : (N_SCRATCH_ROWS, H)
-        Room for what is on the way.
+        Buffer for intermediate values.
     colour : (3, H)
-        Out: light in [0, 1) that a fragment adds, its opacity counted in.
+        Out: light in [0, 1) of each fragment, multiplied by its opacity.
     """
     one, zero = np.float32(1), np.float32(0)
     nx, ny, nz = table[AT_NORMAL], table[AT_NORMAL + 1], table[AT_NORMAL + 2]
@@ -61,16 +58,16 @@ def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour:
         gloss[i] = specular[i] * (one + np.float32(3) * edge * edge * edge)  # after Schlick 1994
         towards[i] = nx[i] * lights[UP_ROW, 0] + ny[i] * lights[UP_ROW, 1] + nz[i] * lights[UP_ROW, 2]
     for c in range(3):
-        matt, shine, albedo, seen = colour[c], scratch[6 + c], table[AT_ALBEDO + c], table[AT_EXPOSURE]
+        matt, shine, albedo, visible = colour[c], scratch[6 + c], table[AT_ALBEDO + c], table[AT_EXPOSURE]
         middle = np.float32(0.5) * (lights[SKY_ROW, c] + lights[FLOOR_ROW, c])
         swing = np.float32(0.5) * (lights[SKY_ROW, c] - lights[FLOOR_ROW, c])
         for i in range(n):
-            around = (middle + swing * towards[i]) * seen[i]
-            matt[i] = around / (one - (one - seen[i]) * albedo[i] * INTERREFLECTION)
+            around = (middle + swing * towards[i]) * visible[i]
+            matt[i] = around / (one - (one - visible[i]) * albedo[i] * INTERREFLECTION)
             shine[i] = SKY_GLOSS * around
     for k in range(FIRST_LIGHT_ROW, len(lights)):
         lx, ly, lz = lights[k, 0], lights[k, 1], lights[k, 2]
-        seen = table[AT_EXPOSURE + 1 + k - FIRST_LIGHT_ROW]
+        visible = table[AT_EXPOSURE + 1 + k - FIRST_LIGHT_ROW]
         for i in range(n):
             towards[i] = nx[i] * lx + ny[i] * ly + nz[i] * lz
             hx, hy, hz = lx + view_x[i], ly + view_y[i], lz + view_z[i]
@@ -79,12 +76,14 @@ def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour:
             base = one / (one + off * shininess[i] * np.float32(0.125))  # its eighth power is near exp(-off s)
             base *= base
             base *= base
-            lobe[i] = base * base * min(max(towards[i] * np.float32(4), zero), one) * seen[i]
+            lobe[i] = base * base * min(max(towards[i] * np.float32(4), zero), one) * visible[i]
         for c in range(3):
             matt, shine, strength, reach = colour[c], scratch[6 + c], lights[k, 3 + c], SKIN_SCATTERING[c]
             for i in range(n):
                 around_edge = wrap[i] * reach
-                soaked = seen[i] + around_edge * seen[i] * (one - seen[i])  # a shadow's edge is redder under skin
+                soaked = visible[i] + around_edge * visible[i] * (
+                    one - visible[i]
+                )  # scattering reddens the edge of a shadow on skin
                 matt[i] += strength * soaked * max(towards[i] + around_edge, zero) / (one + around_edge)
                 shine[i] += strength * lobe[i]
     for c in range(3):

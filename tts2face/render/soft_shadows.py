@@ -1,8 +1,8 @@
-"""How much of the sky and of each light reaches every vertex: the head's soft shadows, found once before drawing.
+"""Soft shadows: the share of sky light and of each lamp's light that reaches every vertex, computed once per scene.
 
-The head is looked at from many directions by the rasteriser itself; a vertex that is seen from a direction gets the
-light that comes from there. Shadows stay on the skin while the head moves a little, as they would under large lamps;
-between the mouth closed and wide open they are mixed by how far the shapes part the lips.
+The rasteriser draws the head from many directions; a vertex receives the light of the directions from which it is
+visible. Shadows are fixed to the skin, an approximation that holds for large lamps and small head motion, and are
+interpolated between the closed and the wide open mouth by the lip opening of the shape weights.
 """
 
 import math
@@ -22,21 +22,21 @@ from tts2face.render.raster import GRID_SHIFT, draw_band, transform_to_camera
 from tts2face.render.studio_light import LAMP_RADIUS_RAD
 from tts2face.render.surface import Surface
 
-VIEW_SAMPLES = 192  # samples along a side of the views: 1.5 mm of a head
+VIEW_SAMPLES = 192  # samples along a side of the views: 1.5 mm each on a head
 N_SKY, N_LAMP = 36, 7  # views for the sky and for each lamp
-LIFT_MM, SLACK_MM = 1.2, 1.2  # a vertex is looked for this far before the surface, and this far before what hides it
-VIEW_DISTANCE_MM = 20_000.0  # distance of the views: almost parallel light
-OPEN_JAW_WEIGHT = 0.6  # weight of the wide open mouth
-HIDDEN_EYE_LIGHT = 0.75  # light on the parts of an eyeball that come out when it turns, of its lit parts' light
-HIDDEN_TOOTH_LIGHT = 0.6  # likewise of teeth behind the lips of the open mouth: enamel scatters light along itself
-N_SMOOTHING_PASSES = 2  # means over neighbours, against the grain of few views
+LIFT_MM, SLACK_MM = 1.2, 1.2  # offset of a vertex along its normal, and depth tolerance of occlusion
+VIEW_DISTANCE_MM = 20_000.0  # distance of the cameras: almost parallel light
+OPEN_JAW_WEIGHT = 0.6  # jawOpen weight of the wide open mouth
+HIDDEN_EYE_LIGHT = 0.75  # least exposure of an eyeball, as a share of that of its lit parts: it turns
+HIDDEN_TOOTH_LIGHT = 0.6  # likewise of teeth behind the lips of the open mouth: enamel scatters light
+N_SMOOTHING_PASSES = 2  # smoothing passes over neighbours, against the noise of few views
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Exposure:
-    """Light that reaches each vertex: ``rest`` (V, 4) of the sky and of three lamps, plus ``gain`` with open mouth.
+    """Exposure of each vertex to the sky and to three lamps: ``rest`` (V, 4), plus ``gain`` (V, 4) with an open mouth.
 
-    ``opening`` (K,) is how far each shape at weight 1 opens the lips, of the wide open mouth.
+    ``opening`` (K,) is the lip opening of each shape at weight 1, relative to the wide open mouth.
     """
 
     rest: NDArray[np.float32]
@@ -44,30 +44,30 @@ class Exposure:
     opening: NDArray[np.float32]
 
     def at(self, weights: NDArray[np.floating]) -> NDArray[np.float32]:
-        """(V, 4) for the weights of the face's shapes; light enters through a slit faster than the slit opens."""
+        """Exposure (V, 4) for shape weights (K,); it grows with the square root of the lip opening."""
         opened = min(max(float(np.dot(self.opening, weights)), 0.0), 1.0)
         return self.rest + np.float32(math.sqrt(opened)) * self.gain
 
 
 def compute_exposure(face: Face, surface: Surface, lamps: NDArray[np.float64], threads: int) -> Exposure:
-    """Exposure of a face to the sky and to lamps in the directions (3, 3) of the world."""
+    """Exposure of a face to the sky and to lamps in the world directions `lamps` (3, 3)."""
     jaw = face.shape_names.index("jawOpen") if "jawOpen" in face.shape_names else -1
     poses = np.zeros((1 if jaw < 0 else 2, len(face.shape_names)), np.float32)
     if jaw >= 0:
         poses[1, jaw] = OPEN_JAW_WEIGHT
-    baked = [_rest_exposure(surface, surface.rig.pose(pose), lamps, threads) for pose in poses]
+    exposures = [_rest_exposure(surface, surface.rig.pose(pose), lamps, threads) for pose in poses]
     for part in face.parts:
         if part.name.startswith("teeth"):
             teeth = np.unique(face.triangles[part.first : part.first + part.count])
-            lit = HIDDEN_TOOTH_LIGHT * np.percentile(baked[-1][teeth], 90, axis=0)
-            baked[-1][teeth] = np.maximum(baked[-1][teeth], lit)
-    return Exposure(baked[0], baked[-1] - baked[0], lip_opening(face, jaw))
+            lit = HIDDEN_TOOTH_LIGHT * np.percentile(exposures[-1][teeth], 90, axis=0)
+            exposures[-1][teeth] = np.maximum(exposures[-1][teeth], lit)
+    return Exposure(exposures[0], exposures[-1] - exposures[0], lip_opening(face, jaw))
 
 
 def lip_opening(face: Face, jaw: int) -> NDArray[np.float32]:
-    """(K,) how far each shape parts the middle of the lips, of what the wide open jaw does.
+    """Lip opening (K,) of each shape at its middle, relative to that of the wide open jaw.
 
-    On a face without landmarks the jaw alone is known to.
+    `jaw` is the index of jawOpen, -1 without it. On a face without lip landmarks only the jaw opens the lips.
     """
     opening = np.zeros(len(face.shape_names), np.float32)
     if jaw >= 0:
@@ -84,7 +84,7 @@ def lip_opening(face: Face, jaw: int) -> NDArray[np.float32]:
 
 
 def sphere_directions(n: int) -> NDArray[np.float64]:
-    """(n, 3) directions spread evenly (Fibonacci lattice; Gonzalez 2010)."""
+    """Unit vectors (n, 3) distributed evenly over the sphere (Fibonacci lattice; Gonzalez 2010)."""
     height = 1 - (2 * np.arange(n) + 1) / n
     around = np.arange(n) * math.pi * (3 - math.sqrt(5))
     level = np.sqrt(1 - height**2)
@@ -92,7 +92,7 @@ def sphere_directions(n: int) -> NDArray[np.float64]:
 
 
 def cone_directions(axis: NDArray[np.float64], n: int, radius: float) -> NDArray[np.float64]:
-    """(n, 3) directions spread over a disc of a radius (rad) about an axis."""
+    """Unit vectors (n, 3) distributed evenly over a cone of half angle `radius` (rad) about an axis (3,)."""
     side = np.cross(axis, [0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [1.0, 0.0, 0.0])
     side /= np.linalg.norm(side)
     other = np.cross(axis, side)
@@ -110,14 +110,14 @@ def _rest_exposure(
     directions = np.concatenate(
         [sphere_directions(N_SKY), *(cone_directions(lamp, N_LAMP, LAMP_RADIUS_RAD) for lamp in lamps)]
     )
-    seen = _visibility(surface, points, normals, directions, threads)
+    visible = _visibility(surface, points, normals, directions, threads)
     weights = np.maximum(directions[:N_SKY] @ normals.T, 0.02)
     exposure = np.ones((len(points), 1 + len(lamps)), np.float32)
-    exposure[:, 0] = (weights * seen[:N_SKY]).sum(axis=0) / weights.sum(axis=0)
+    exposure[:, 0] = (weights * visible[:N_SKY]).sum(axis=0) / weights.sum(axis=0)
     for k, lamp in enumerate(lamps):
         of_lamp = slice(N_SKY + k * N_LAMP, N_SKY + (k + 1) * N_LAMP)
-        turned = np.clip((normals @ lamp + 0.15) / 0.4, 0.0, 1.0)  # turning away is no shadow
-        exposure[:, 1 + k] = 1 - turned + turned * seen[of_lamp].mean(axis=0)
+        turned = np.clip((normals @ lamp + 0.15) / 0.4, 0.0, 1.0)  # a vertex that faces away is not shadowed
+        exposure[:, 1 + k] = 1 - turned + turned * visible[of_lamp].mean(axis=0)
     smooth = _smooth_values(surface, exposure)
     for first, end in surface.rig.eye_spans:
         ball = smooth[first:end]
@@ -137,26 +137,26 @@ def _normals(surface: Surface, points: NDArray[np.float32]) -> NDArray[np.float3
 def _visibility(
     surface: Surface, points: Any, normals: Any, directions: NDArray[np.float64], threads: int
 ) -> NDArray[np.float32]:
-    """(D, V) 1 where a vertex is seen from a direction."""
+    """Visibility (D, V): 1 where a vertex is visible from a direction, else 0."""
     lifted = points + np.float32(LIFT_MM) * normals
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     radius = float(np.linalg.norm(points - middle, axis=1).max()) + LIFT_MM
-    seen = np.zeros((len(directions), len(points)), np.float32)
+    visible = np.zeros((len(directions), len(points)), np.float32)
 
-    def look(share: range) -> None:
-        room = allocate_buffers(surface, (VIEW_SAMPLES, VIEW_SAMPLES), 1)
-        grid, camera = np.zeros_like(room.grid), np.zeros((len(points), 3), np.float32)
-        for d in share:
+    def trace_views(numbers: range) -> None:
+        buffers = allocate_buffers(surface, (VIEW_SAMPLES, VIEW_SAMPLES), 1)
+        grid, camera = np.zeros_like(buffers.grid), np.zeros((len(points), 3), np.float32)
+        for d in numbers:
             view, lens = _shadow_view(directions[d], middle, radius)
-            members = project_surface(points, surface, (view, lens), room, (VIEW_SAMPLES, VIEW_SAMPLES))
-            geometry = (room.vertex, surface.triangles, surface.translucent, lens)
-            draw_band(geometry, (room.corners, room.source, members), 0, room.depth, room.owner)
+            members = project_surface(points, surface, (view, lens), buffers, (VIEW_SAMPLES, VIEW_SAMPLES))
+            geometry = (buffers.vertex, surface.triangles, surface.translucent, lens)
+            draw_band(geometry, (buffers.corners, buffers.source, members), 0, buffers.depth, buffers.owner)
             transform_to_camera(lifted, view, lens, camera, grid)
-            mark_visible(camera, grid, room.depth, np.float32(SLACK_MM), seen[d])
+            mark_visible(camera, grid, buffers.depth, np.float32(SLACK_MM), visible[d])
 
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(look, [range(i, len(directions), threads) for i in range(threads)]))
-    return seen
+        list(pool.map(trace_views, [range(i, len(directions), threads) for i in range(threads)]))
+    return visible
 
 
 def _shadow_view(direction: NDArray[np.float64], middle: Any, radius: float) -> tuple[NDArray[np.float64], Any]:
@@ -171,17 +171,17 @@ def _shadow_view(direction: NDArray[np.float64], middle: Any, radius: float) -> 
 
 
 @kernel
-def mark_visible(camera: Any, grid: Any, depth: Any, slack: Any, seen: Any) -> None:
-    """Mark in `seen` (V,) the vertices before which nothing nearer than `slack` mm lies."""
+def mark_visible(camera: Any, grid: Any, depth: Any, slack: Any, visible: Any) -> None:
+    """Set `visible` (V,) to 1 for vertices that no surface occludes by more than `slack` mm."""
     for v in range(len(camera)):
         x = min(max(grid[v, 0] >> GRID_SHIFT, 0), depth.shape[2] - 1)
         y = min(max(grid[v, 1] >> GRID_SHIFT, 0), depth.shape[1] - 1)
         if depth[0, y, x] * (camera[v, 2] - slack) <= np.float32(1):
-            seen[v] = np.float32(1)
+            visible[v] = np.float32(1)
 
 
 def _smooth_values(surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Values at vertices, each replaced by the mean over its triangles, a few times."""
+    """Vertex values (V, C), averaged `N_SMOOTHING_PASSES` times over adjacent triangles."""
     n_around = np.diff(surface.starts)
     inner = np.flatnonzero(n_around > 0)
     for _ in range(N_SMOOTHING_PASSES):

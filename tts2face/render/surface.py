@@ -1,4 +1,4 @@
-"""What stays the same from picture to picture: a face's triangles, colours and materials, ready for the kernels."""
+"""Surface of a face in the arrays that the kernels take: triangles, colours and materials."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from tts2face.face.deformation import FaceRig, build_rig
 from tts2face.models.face import Face
 
-OPEN_SHARE = 0.05  # parts with more than this share of free edges are sheets that both sides of are lit
+OPEN_SHARE = 0.05  # parts with a larger share of boundary edges are open sheets, lit from both sides
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
-    """A face made ready to be drawn.
+    """Constant arrays for drawing a face.
 
     ``triangles`` (F, 3); ``colours`` (V, 3) linear light; ``uv`` (V, 2), ``texture`` (H, W, 3) sRGB; ``part_of`` and
     ``translucent`` (F,); ``materials`` (P, 6) as `tts2face.render.fragments` names its columns; the triangles
@@ -35,7 +35,7 @@ class Surface:
 
 
 def build_surface(face: Face) -> Surface:
-    """The surface of a face."""
+    """Surface of a face."""
     parts = face.parts
     counts = [part.count for part in parts]
     part_of = np.repeat(np.arange(len(parts), dtype=np.int32), counts)
@@ -62,7 +62,7 @@ def linear_light(srgb: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 
 def linear_table() -> NDArray[np.float32]:
-    """(256,) linear light of each 8-bit sRGB value."""
+    """Linear light (256,) of each 8-bit sRGB value."""
     value = np.arange(256) / 255.0
     table: NDArray[np.float32] = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4).astype(
         np.float32
@@ -71,7 +71,7 @@ def linear_table() -> NDArray[np.float32]:
 
 
 def encoding_table(n_steps: int) -> NDArray[np.uint8]:
-    """(n_steps,) 8-bit sRGB values of linear light from 0 to 1 in equal steps."""
+    """8-bit sRGB values (n_steps,) of linear light from 0 to 1 in equal steps."""
     light = np.linspace(0.0, 1.0, n_steps)
     srgb = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
     return np.rint(255.0 * srgb).astype(np.uint8)
@@ -95,11 +95,13 @@ def _free_edge_share(triangles: NDArray[np.int32]) -> float:
 
 
 def _triangles_by_vertex(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> tuple[Any, Any]:
-    """Triangles around each vertex, vertices welded that lie and move together in one part."""
+    """Starts and indices of the triangles around each vertex; coincident vertices that move alike are welded."""
     n_vertices = len(face.vertices)
     vertex_part = np.full(n_vertices, -1)
     vertex_part[triangles.ravel()] = np.repeat(part_of, 3)
-    mix = np.cos(np.arange(1, len(face.shapes) + 1))  # any fixed numbers: tells apart vertices that move differently
+    mix = np.cos(
+        np.arange(1, len(face.shapes) + 1)
+    )  # arbitrary fixed weights that separate vertices with different motion
     key = np.column_stack([face.vertices, np.tensordot(mix, face.shapes, axes=1), vertex_part])
     _, weld = np.unique(np.rint(key * 1000).astype(np.int64), axis=0, return_inverse=True)
     corner = weld.ravel()[triangles.ravel()]

@@ -1,4 +1,4 @@
-"""The light of a face's vertices in 8-bit colours, for renderers that draw smooth colours between vertices."""
+"""Per-vertex lighting, for renderers that interpolate vertex colours."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -26,17 +26,17 @@ from tts2face.render.fragments import (
 from tts2face.render.shade import N_SCRATCH_ROWS, shade_fragments
 from tts2face.render.surface import Surface, encoding_table, linear_table
 
-SRGB_TABLE = (encoding_table(4096) / 255.0).astype(np.float32)  # sRGB in [0, 1] of linear light in equal steps
-SHADE_STEP, N_SHADES = 1.5, 6  # of colours of a texture that are drawn with one copy of it
+SRGB_TABLE = (encoding_table(4096) / 255.0).astype(np.float32)  # sRGB in [0, 1] for equal steps of linear light
+SHADE_STEP, N_SHADES = 1.5, 6  # brightness ratio and number of the copies of a texture
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VertexLight:
-    """Room to light the vertices of one surface again and again.
+    """Vertex lighting of one surface, with its buffers.
 
-    ``table`` (17, V) holds fragments as `tts2face.render.fragments` names them, one for each vertex; ``albedo`` (V, 3)
-    is their sRGB colour in [0, 1] without light, and ``divisor`` (V, 3) that colour where a texture is drawn, else the
-    opacity; ``front`` and ``back`` (V, 3) are the last light seen from outside and from inside, sRGB over the divisor.
+    ``table`` (17, V) holds one fragment per vertex in the rows of `tts2face.render.fragments`; ``albedo`` (V, 3) is the
+    unlit sRGB colour in [0, 1], ``divisor`` (V, 3) that colour on textured vertices, else the opacity; ``front`` and
+    ``back`` (V, 3) are the colours of outer and inner sides after the last `update`, sRGB divided by ``divisor``.
     """
 
     surface: Surface
@@ -52,9 +52,9 @@ class VertexLight:
     def update(
         self, points: NDArray[np.float32], view: NDArray[np.floating], lights: tuple[NDArray[Any], NDArray[Any]]
     ) -> None:
-        """Light the vertices (V, 3) of the world for a camera `view` (3, 4); writes ``front`` and ``back``.
+        """Light the vertices at world positions (V, 3) for a camera `view` (3, 4); writes ``front`` and ``back``.
 
-        `lights` are the table of `tts2face.render.shade.shade_fragments` in camera space and the exposure (V, 4).
+        `lights` holds the light table of `tts2face.render.shade.shade_fragments` in camera space and exposure (V, 4).
         """
         self.camera[:, :3] = points @ view[:, :3].T.astype(np.float32) + view[:, 3].astype(np.float32)
         face_normals(self.camera, self.surface.triangles, self.flat)
@@ -73,7 +73,7 @@ class VertexLight:
 
 
 def build_vertex_light(surface: Surface) -> VertexLight:
-    """Room to light a surface's vertices."""
+    """Vertex lighting of a surface."""
     n_vertices = len(surface.rig.rest)
     part_of = np.zeros(n_vertices, np.int32)
     part_of[surface.triangles.ravel()] = np.repeat(surface.part_of, 3)
@@ -108,15 +108,15 @@ def encode_srgb(linear: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def brighten(texture: NDArray[np.uint8], peak: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """A texture (H, W, 3) in which `peak` (3,), sRGB in [0, 1], is full brightness."""
+    """Texture (H, W, 3) scaled so that `peak` (3,), sRGB in [0, 1], becomes full brightness."""
     scaled: NDArray[np.uint8] = np.rint(np.minimum(texture / peak, 255.0)).astype(np.uint8)
     return scaled
 
 
 def triangle_shades(light_of: VertexLight) -> NDArray[np.int64]:
-    """(F,) shade of each triangle: 0 the brightest, each next one darker by a factor; -1 where no texture is drawn.
+    """Shade (F,) of each triangle: 0 is the brightest, each further one darker by `SHADE_STEP`; -1 without a texture.
 
-    A texture can only be darkened by the light that multiplies it, so each shade takes a texture brightened for it.
+    Light only darkens the texture that it multiplies; each shade is therefore drawn with a brightened copy.
     """
     surface = light_of.surface
     tone = light_of.albedo.mean(axis=1)[surface.triangles].max(axis=1)
@@ -127,7 +127,7 @@ def triangle_shades(light_of: VertexLight) -> NDArray[np.int64]:
 
 @kernel
 def sample_texture(texture: Any, linear: Any, uv: Any, textured: Any, albedo: Any) -> None:
-    """Write the texture's linear colour at the vertices that are textured."""
+    """Write the linear texture colour of textured vertices to `albedo` (V, 3)."""
     for v in range(len(textured)):
         if textured[v]:
             for c in range(3):

@@ -1,6 +1,6 @@
-"""The second renderer: VTK off screen, with a GPU or software GL, lit at the vertices by the project's own light.
+"""VTK renderer, off screen with a GPU or software GL; vertices are lit by `tts2face.render.shade`.
 
-VTK ends the process when it finds no GL at all, so a child process tries first.
+VTK ends the process when it finds no GL, so a child process probes it first.
 """
 
 import math
@@ -24,7 +24,7 @@ from tts2face.render.scene import Scene
 from tts2face.render.surface import Surface, encoding_table, linear_table
 from tts2face.render.vertices import VertexLight, brighten, build_vertex_light, triangle_shades
 
-OFF_SCREEN, ON_SCREEN = "vtkEGLRenderWindow", "vtkXOpenGLRenderWindow"  # the first falls back to OSMesa by itself
+OFF_SCREEN, ON_SCREEN = "vtkEGLRenderWindow", "vtkXOpenGLRenderWindow"  # the first falls back to OSMesa automatically
 OFF_SCREEN_CLASSES = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
 PROBE_TIMEOUT_S = 60.0
 PROBE_CODE = """
@@ -40,12 +40,12 @@ VTK_TONE_TABLES = (linear_table(), encoding_table(8192))
 
 
 def require_gl() -> None:
-    """Make sure that VTK can draw off screen here.
+    """Check that VTK can draw off screen on this machine.
 
     Raises
     ------
     BackendError
-        pyvista is not installed, or neither a GPU nor software GL is there.
+        pyvista is not installed, or there is neither a GPU nor software GL.
     """
     require_pyvista("--renderer pyvista")
     if not can_draw_with(OFF_SCREEN):
@@ -56,12 +56,12 @@ def require_gl() -> None:
 
 
 def require_pyvista(purpose: str) -> None:
-    """Make sure that pyvista is installed.
+    """Check that pyvista is installed.
 
     Raises
     ------
     BackendError
-        It is not.
+        pyvista is not installed; the message begins with `purpose`.
     """
     from importlib.util import find_spec
 
@@ -71,27 +71,27 @@ def require_pyvista(purpose: str) -> None:
 
 @cache
 def can_draw_with(window: str) -> bool:
-    """Whether a child process can draw with VTK in a window of a class; it is what crashes if VTK does."""
-    is_off_screen = window == OFF_SCREEN  # without a display VTK falls back to a window that nobody sees
+    """Whether VTK can draw in a window of the class `window`, tried once in a child process that may crash."""
+    is_off_screen = window == OFF_SCREEN  # without a display VTK falls back to an off-screen window
     code = PROBE_CODE.format(off_screen=is_off_screen, refused=() if is_off_screen else OFF_SCREEN_CLASSES)
     environment = os.environ | window_environment(window)
     try:
-        done = subprocess.run(
+        child = subprocess.run(
             [sys.executable, "-c", code], env=environment, capture_output=True, timeout=PROBE_TIMEOUT_S, check=False
         )
     except (OSError, subprocess.TimeoutExpired):
         return False
-    return done.returncode == 0
+    return child.returncode == 0
 
 
 def window_environment(window: str) -> dict[str, str]:
-    """The environment by which VTK makes windows of a class; elsewhere than on Linux it has but one."""
+    """Environment variables that select VTK's window class; empty on other systems than Linux, which have one class."""
     return {"VTK_DEFAULT_OPENGL_WINDOW": window} if sys.platform.startswith("linux") else {}
 
 
 @contextmanager
 def use_window_class(window: str) -> Iterator[None]:
-    """Make VTK's windows of a class within this context."""
+    """Select VTK's window class within this context."""
     choice = window_environment(window)
     before = {name: os.environ.get(name) for name in choice}
     os.environ.update(choice)
@@ -108,9 +108,9 @@ def use_window_class(window: str) -> Iterator[None]:
 def render_frames(
     scene: Scene, poses: Iterable[tuple[NDArray[np.float32], NDArray[np.float32]]]
 ) -> Iterator[NDArray[np.uint8]]:
-    """Pictures (H, W, 3 or 4) of a scene's face for weights (K,) and head poses (6,), one after the other.
+    """Pictures (H, W, 3 or 4) of a scene's face for pairs of weights (K,) and head poses (6,), in order.
 
-    One window is used for all of them, by the thread that takes the first.
+    All are drawn in one window by the thread that requests the first.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def render_frames(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlottedMesh:
-    """One mesh of a puppet: the vertices that it takes, the light that they show and how that is scaled."""
+    """One mesh of a plotted face: its vertex indices, the light of all vertices, and the scale of the light."""
 
     mesh: Any
     used: NDArray[np.integer]
@@ -147,7 +147,7 @@ class PlottedMesh:
     scale: NDArray[np.float32]
 
     def show(self, points: NDArray[np.float32]) -> None:
-        """Move the vertices and colour them."""
+        """Set vertex positions from `points` (V, 3), mm, and colours from the light."""
         colours = np.minimum(self.light_of[self.used] * (self.scale * 255), 255) + np.float32(0.5)
         self.mesh.points[:] = points[self.used]
         self.mesh.point_data["light"][:] = colours.astype(np.uint8)
@@ -157,7 +157,7 @@ class PlottedMesh:
 
 
 class PlottedFace:
-    """A face's meshes in a plotter: textured, plain and translucent ones, each with an outer and an inner side."""
+    """Meshes of a face in a plotter: textured, plain and translucent, each with an outer and an inner side."""
 
     def __init__(self, surface: Surface, plotter: Any) -> None:
         self._plotter, self._surface = plotter, surface
@@ -172,10 +172,10 @@ class PlottedFace:
     def show(
         self, points: NDArray[np.float32], view: NDArray[np.floating], lights: tuple[NDArray[Any], NDArray[Any]]
     ) -> None:
-        """Move the vertices and light them for a camera."""
+        """Set vertex positions (V, 3), mm, and light them for a camera `view` (3, 4)."""
         self._light.update(points, view, lights)
-        for sheet in self._meshes:
-            sheet.show(points)
+        for mesh in self._meshes:
+            mesh.show(points)
 
     def _add(self, chosen: NDArray[np.bool_], opacity: float, is_textured: bool) -> None:
         import pyvista
@@ -199,12 +199,12 @@ class PlottedFace:
 
 
 def aim_camera(plotter: Any, optics: CameraMatrices, height: int) -> None:
-    """Set a plotter's camera up as a camera whose pictures are `height` samples high."""
+    """Set the camera of a plotter from camera matrices for pictures of `height` samples."""
     view = optics.view
     place = -view[:, :3].T @ view[:, 3]
     camera = plotter.camera
     camera.position = tuple(place)
-    camera.focal_point = tuple(place + max(float(view[2, 3]), 1.0) * view[2, :3])  # before the point between the eyes
+    camera.focal_point = tuple(place + max(float(view[2, 3]), 1.0) * view[2, :3])  # at the depth of the origin
     camera.up = tuple(-view[1, :3])
     camera.view_angle = math.degrees(2 * math.atan(height / 2 / float(optics.lens[0])))
 
@@ -222,7 +222,7 @@ def _plotter(size: tuple[int, int], scene: Scene) -> Any:
 
 @kernel
 def sum_samples(samples: Any, place: tuple[int, int], side: int, linear: Any, total: Any) -> None:
-    """Write the sums of linear light and coverage (4,) of the samples from a row and a column on."""
+    """Write the sums (4,) of linear light and coverage over side x side samples from (row, column) `place`."""
     total[:] = np.float32(0)
     for row in range(place[0], place[0] + side):
         for column in range(place[1], place[1] + side):
@@ -233,7 +233,7 @@ def sum_samples(samples: Any, place: tuple[int, int], side: int, linear: Any, to
 
 @kernel
 def average_samples(samples: Any, side: int, tables: Any, picture: Any) -> None:
-    """Lay the mean of side x side samples (premultiplied sRGB and coverage) over the background in the picture."""
+    """Composite the mean of side x side samples (premultiplied sRGB and coverage) over the picture, in place."""
     one, half, share = np.float32(1), np.float32(0.5), np.float32(1.0 / (side * side))
     total = np.zeros(4, np.float32)
     for y in range(picture.shape[0]):

@@ -1,4 +1,4 @@
-"""A window in which a clip's head plays in real time; the mouse turns it, space starts it again, q closes it."""
+"""Window that plays a clip in real time: the mouse turns the camera, space restarts, q closes."""
 
 import os
 import sys
@@ -28,12 +28,12 @@ from tts2face.render.vtk_renderer import (
 )
 from tts2face.types import HEAD_CHANNELS, Clip
 
-WALL, WALL_TOP = "#3a4049", "#7d8793"  # behind the head, unless the picture names a colour
-TICK_MS = 10  # between looks at the clock
+WALL, WALL_TOP = "#3a4049", "#7d8793"  # gradient of the background unless the picture has a colour
+TICK_MS = 10  # interval of the timer
 
 
 def show_clip(clip: Clip, face: Face, picture: Picture) -> None:
-    """Play a clip's head in a window, without sound, until the window is closed.
+    """Play a clip in a window, without sound, until the window is closed.
 
     Raises
     ------
@@ -49,12 +49,12 @@ def show_clip(clip: Clip, face: Face, picture: Picture) -> None:
 
 
 def require_display(purpose: str) -> None:
-    """Make sure that a window can be opened here for an option.
+    """Check that a window can be opened on this machine.
 
     Raises
     ------
     BackendError
-        It cannot.
+        There is no display, or VTK cannot open a window on it; the message begins with `purpose`.
     """
     require_pyvista(purpose)
     is_linux = sys.platform.startswith("linux")
@@ -70,14 +70,14 @@ def require_display(purpose: str) -> None:
 
 
 def camera_matrix(camera: Any) -> NDArray[np.float64]:
-    """(3, 4) view of a pyvista camera as `tts2face.render.camera.CameraMatrices` has it: x right, y down, z ahead."""
+    """View (3, 4) of a pyvista camera in the axes of `tts2face.render.camera.CameraMatrices`."""
     matrix = camera.GetModelViewTransformMatrix()
     rows = np.array([[matrix.GetElement(row, column) for column in range(4)] for row in range(3)])
     return rows * [[1.0], [-1.0], [-1.0]]
 
 
 class HeadWindow(ABC):
-    """The window and the head in it."""
+    """Base of the windows that show a head; `tick` supplies the motion."""
 
     def __init__(self, face: Face, picture: Picture) -> None:
         import pyvista
@@ -94,16 +94,16 @@ class HeadWindow(ABC):
         aim_camera(self.plotter, self._optics, picture.height)
 
     def run(self) -> None:
-        """Show what `tick` moves until the window is closed; the last picture stays."""
+        """Call `tick` at every timer interval until the window is closed."""
         self.plotter.add_timer_event(max_steps=2**31 - 1, duration=TICK_MS, callback=self._tick)
         self.plotter.show(auto_close=False)
 
     @abstractmethod
     def tick(self) -> bool:
-        """Move the head to now; False where nothing has changed."""
+        """Pose the head for the present instant; returns whether the picture changed."""
 
     def pose(self, weights: NDArray[np.floating], head: NDArray[np.floating]) -> None:
-        """Move the head, lit for where the camera is now."""
+        """Pose the head by shape weights (K,) and head pose (6,), lit for the present camera."""
         view = camera_matrix(self.plotter.camera)
         lights = light_table(self._lamps, CameraMatrices(view, self._optics.lens))
         self._head.show(self._surface.rig.pose(weights, head), view, (lights, self._exposure.at(weights)))
@@ -126,47 +126,47 @@ class HeadWindow(ABC):
 
 
 class ClipPlayer(HeadWindow):
-    """The clock that plays a clip."""
+    """Window that plays a clip by the wall clock."""
 
     def __init__(self, clip: Clip, face: Face, picture: Picture) -> None:
         super().__init__(face, picture)
         self._clip = clip
         self.plotter.add_key_event("space", self.restart)
-        self._shown: tuple[int, int] | None = None
+        self._last_state: tuple[int, int] | None = None
         self.restart()
 
     def run(self) -> None:
-        """Play until the window is closed; the last picture stays."""
+        """Play until the window is closed; the last frame remains at the end."""
         self.restart()
         super().run()
 
     def restart(self) -> None:
-        """Begin with the first frame again."""
-        self._began = time.perf_counter()
+        """Play again from the first frame."""
+        self._started = time.perf_counter()
         self.show_at(0.0)
 
     def tick(self) -> bool:
-        """Move the head to the moment that the clock shows."""
-        return self.show_at(time.perf_counter() - self._began)
+        """Show the frame of the present instant; returns whether the picture changed."""
+        return self.show_at(time.perf_counter() - self._started)
 
     def show_at(self, seconds: float) -> bool:
-        """Move the head to a moment of the clip; False where nothing has changed."""
+        """Show the frame at an instant of the clip in seconds; returns whether the picture changed."""
         frame = min(int(seconds * self._clip.fps), len(self._clip.motion) - 1)
-        now = frame, int(self.plotter.camera.GetMTime())
-        if now == self._shown:
+        state = frame, int(self.plotter.camera.GetMTime())
+        if state == self._last_state:
             return False
-        self._shown = now
+        self._last_state = state
         self.pose(self._clip.motion.values[frame], self._clip.head.values[frame])
         return True
 
 
 class LiveWindow(HeadWindow):
-    """A head that shows what somebody does now.
+    """Window that shows captured motion as it arrives.
 
     Parameters
     ----------
     newest
-        Gives the weights and the head's pose to show, None where nothing new has come.
+        Returns the newest shape weights (K,) and head pose (6,), or None if there are no new ones.
     """
 
     def __init__(
@@ -177,8 +177,8 @@ class LiveWindow(HeadWindow):
         self.pose(np.zeros(len(face.shape_names), np.float32), np.zeros(len(HEAD_CHANNELS), np.float32))
 
     def tick(self) -> bool:
-        """Move the head to what came last."""
-        now = self._newest()
-        if now is not None:
-            self.pose(*now)
-        return now is not None
+        """Show the newest motion; returns whether there was any."""
+        motion = self._newest()
+        if motion is not None:
+            self.pose(*motion)
+        return motion is not None

@@ -1,4 +1,4 @@
-"""A performer's face carried to any face: lips by least squares on the landmarks, eyes and brows by their scores."""
+"""Retargeting of a performer to a face: lips by least squares on landmarks, eyes and brows by blendshape scores."""
 
 from dataclasses import dataclass
 
@@ -14,14 +14,11 @@ from tts2face.retargeting.to_face import Retargeter, build_retargeter
 from tts2face.types import Trajectory
 
 N_MOUTH_MODES = 20
-CLOSED_FRAME_SHARE = 0.15  # of the frames are taken for those with the lips closed
-MAX_CONTACT_MM = 1.5  # a gap that a tracker reads on touching lips is below this
-SCORE_DRIVEN_SHAPES = ("eye", "brow", "nose", "cheek")  # how the names begin of shapes that follow scores
-SCORE_DEAD_ZONE = 0.04  # scores rise by this much from noise alone
-OPEN_LID_QUANTILE, CLOSED_LID_SHARE = (
-    0.9,
-    0.25,
-)  # quantile of the apertures of an open eye; share of it that is left of a shut one
+CLOSED_FRAME_SHARE = 0.15  # share of the frames that count as having closed lips
+MAX_CONTACT_MM = 1.5  # upper limit of the tracked gap of touching lips
+SCORE_DRIVEN_SHAPES = ("eye", "brow", "nose", "cheek")  # name prefixes of the shapes that follow scores
+SCORE_DEAD_ZONE = 0.04  # amplitude of the noise of scores
+OPEN_LID_QUANTILE, CLOSED_LID_SHARE = 0.9, 0.25  # aperture quantile of an open eye; share of it of a closed eye
 # Upper and lower lid, outer and inner corner of each eye.
 EYELID_LANDMARKS = {
     "Left": ((386, 385, 387), (374, 380, 373), 263, 362),
@@ -33,7 +30,10 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PerformerRetargeter:
-    """The prepared way from one performer to one face."""
+    """Mapping from a performer's landmarks and scores to the weights of a face; built by `build_performer_retargeter`.
+
+    ``open_apertures`` holds the aperture of each open eye over its width, ``neutral_scores`` (B,) the median scores.
+    """
 
     model: ShapeModel
     lips: Retargeter
@@ -42,16 +42,16 @@ class PerformerRetargeter:
     neutral_scores: NDArray[np.float32]
 
     def weights(self, landmarks: NDArray[np.floating], scores: Trajectory, *, gain: float = 1.0) -> Trajectory:
-        """Weights of the face's shapes (T, K).
+        """Weights (T, K) of the face's shapes.
 
         Parameters
         ----------
         landmarks : (T, 478, 3)
             Millimetres, head pose removed.
-        scores
-            Blendshape scores by name.
+        scores : (T, B)
+            Blendshape scores by ARKit name.
         gain
-            Factor on the motion of lips and brows; lids and gaze keep their size.
+            Factor on the motion of lips and brows; lids and gaze are not scaled.
         """
         speech = self.lip_motion(landmarks, scores.fps, gain=gain)
         weights = np.array(self.lips.retarget(speech).values)
@@ -69,7 +69,7 @@ class PerformerRetargeter:
         return Trajectory(self.face.shape_names, weights, scores.fps)
 
     def lip_motion(self, landmarks: NDArray[np.floating], fps: float, *, gain: float = 1.0) -> Trajectory:
-        """Speech parameters of the performer's own model (T, S)."""
+        """Speech parameters (T, S) of the performer's own shape model."""
         rest = self.model.rest
         values = rest + gain * (self.model.parameters(landmarks) - rest)
         return Trajectory(speech_channels(self.model), values, fps)
@@ -80,7 +80,7 @@ class PerformerRetargeter:
 
 
 def build_performer_retargeter(landmarks: NDArray[np.floating], scores: Trajectory, face: Face) -> PerformerRetargeter:
-    """Prepare the way from a performer, known from some seconds of her face, to a face.
+    """Retargeter from a performer, given some seconds of landmarks and scores, to a face.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def build_performer_retargeter(landmarks: NDArray[np.floating], scores: Trajecto
     Raises
     ------
     DataError
-        There are too few frames, or the face lacks the lips' landmarks or shapes.
+        There are fewer than 2 frames, or the face lacks landmarks of the lips or shapes that move them.
     """
     model = lip_model(landmarks)
     gaps = lip_gaps(landmarks)
@@ -109,9 +109,9 @@ def build_performer_retargeter(landmarks: NDArray[np.floating], scores: Trajecto
 
 
 def match_shapes(captured: Trajectory, face: Face, *, gain: float = 1.0) -> Trajectory:
-    """Weights (T, K) of a face's shapes from captured weights of the same names, within their limits.
+    """Weights (T, K) of a face's shapes from captured weights of the same names, clipped to their limits.
 
-    Eyes turn as captured, whatever the gain; shapes that were not captured stay at 0.
+    The gain does not apply to eye shapes; shapes that were not captured have weight 0.
     """
     weights = np.zeros((len(captured), len(face.shape_names)), np.float32)
     for column, name in enumerate(face.shape_names):
@@ -123,16 +123,16 @@ def match_shapes(captured: Trajectory, face: Face, *, gain: float = 1.0) -> Traj
 
 
 def lip_model(landmarks: NDArray[np.floating]) -> ShapeModel:
-    """Principal components of the mouth region of (T, 478, 3) landmarks; at rest the lips are closed.
+    """Shape model of the mouth region of (T, 478, 3) landmarks by principal components; its rest has closed lips.
 
     Raises
     ------
     DataError
-        There are too few frames.
+        There are fewer than 2 frames.
     """
     n_modes = min(N_MOUTH_MODES, len(landmarks) - 1)
     if n_modes < 1:
-        raise DataError("one frame tells nothing of how a face moves; give a longer take")
+        raise DataError("a shape model needs at least 2 frames with a face; give a longer take")
     mean = landmarks.mean(axis=0, dtype=np.float64)
     region = np.isin(np.arange(N_LANDMARKS), MOUTH_REGION)
     offsets = (landmarks[:, region] - mean[region]).reshape(len(landmarks), -1)
@@ -155,13 +155,13 @@ def lip_model(landmarks: NDArray[np.floating]) -> ShapeModel:
 
 
 def lip_gaps(landmarks: NDArray[np.floating]) -> FloatArray:
-    """(T, P) height of each upper inner lip point above the one that faces it, mm."""
+    """Gaps (T, P) between facing upper and lower inner lip points, mm."""
     upper, lower = landmarks[:, list(INNER_LIP_UPPER), 1], landmarks[:, list(INNER_LIP_LOWER), 1]
     return np.asarray(upper - lower, np.float64)
 
 
 def eye_aperture(landmarks: NDArray[np.floating], side: str) -> FloatArray:
-    """(T,) distance of the lids over the width of an eye, ``Left`` or ``Right``."""
+    """Lid distance (T,) over the width of an eye; `side` is ``Left`` or ``Right``."""
     upper, lower, outer, inner = EYELID_LANDMARKS[side]
     height = np.linalg.norm(landmarks[:, list(upper)] - landmarks[:, list(lower)], axis=2).mean(axis=1)
     return np.asarray(height / np.linalg.norm(landmarks[:, outer] - landmarks[:, inner], axis=1), np.float64)

@@ -1,7 +1,7 @@
-"""Motion of a talker carried to a face, on the landmarks that both have.
+"""Retargeting of a talker's speech motion to a face by their common landmarks.
 
-Least squares within each shape's limits; Theobald et al. 2007, eq. 5 (inner products), is its case of an orthonormal
-target without limits.
+Bounded least squares within each shape's limits; Theobald et al. 2007, eq. 5 (inner products), is the special case of
+an orthonormal target basis without limits.
 """
 
 from dataclasses import dataclass
@@ -40,31 +40,33 @@ from tts2face.types import Trajectory
 FloatArray = NDArray[np.float64]
 
 BILABIALS = frozenset({"p", "b", "m"})
-CONTACT_PERCENTILE = 90  # percentile of the least gaps in bilabials: up to this gap the talker's lips touch
-MAX_CONTACT_MM = 1.5  # a tracker that reads more than this on touching lips is not to be trusted
-FULL_GAP_MM = 3.0  # this far beyond contact a gap is shown in full
-GAP_WEIGHT = 300.0  # the gap between facing lip points against one of the cheek: whether lips touch is what is seen
+CONTACT_PERCENTILE = 90  # of the smallest gaps in bilabials: the tracked gap up to which lips touch
+MAX_CONTACT_MM = 1.5  # upper limit of the tracked gap of touching lips; larger values are tracking errors
+FULL_GAP_MM = 3.0  # gap beyond contact from which it is reproduced in full
+GAP_WEIGHT = 300.0  # of a lip gap, relative to a landmark of the cheek: contact is the most visible
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Retargeter:
-    """The prepared way from a talker's speech parameters to a face's weights.
+    """Mapping from a talker's speech parameters to a face's shape weights; built by `build_retargeter`.
 
     Parameters
     ----------
     moving : (k,)
-        Numbers of the face's shapes that speech moves.
+        Indices of the face's shapes that speech moves.
+    limits : (k, 2)
+        Least and greatest weight of these shapes.
     curvature : (k, k)
         Normal matrix of the weighted least squares.
-    pull : (k, S + 1)
-        Linear term of landmarks and width: ``pull[:, :S] @ parameters + pull[:, S]``.
+    linear_term : (k, S + 1)
+        Linear term of landmarks and width: ``linear_term[:, :S] @ parameters + linear_term[:, S]``.
     gaps : (P, S + 1)
-        The talker's lip gaps in the face's size less `contact`: ``gaps[:, :S] @ parameters + gaps[:, S]``, mm.
+        The talker's lip gaps at the face's scale minus `contact`: ``gaps[:, :S] @ parameters + gaps[:, S]``, mm.
     contact, gap_rest : (P,)
-        Gaps that the tracker reads on touching lips; `gaps` at the talker's rest.
-    gap_pull, lip_pull : (k, P)
-        What a gap that shall be seen adds to the linear term, and what the landmarks of its two lips do per mm that
-        they shall go apart further than the talker's.
+        Tracked gaps of touching lips, mm; `gaps` at the talker's rest, mm.
+    gap_linear_term, lip_linear_term : (k, P)
+        Linear term per mm of target gap, and of the two lip landmarks per mm by which the target gap exceeds the
+        talker's.
     """
 
     shape_names: tuple[str, ...]
@@ -79,17 +81,17 @@ class Retargeter:
     lip_linear_term: FloatArray
 
     def retarget(self, speech: Trajectory) -> Trajectory:
-        """Weights of all shapes of the face, (T, K), for a trajectory of speech parameters, (T, S).
+        """Weights (T, K) of all shapes of the face for a trajectory of speech parameters (T, S).
 
-        Each frame is solved on its own: the answer does not depend on what came before.
+        Frames are solved independently of each other.
         """
         parameters = speech.values.astype(np.float64)
-        read = ordered_product(parameters, self.gaps[:, :-1].T) + self.gaps[:, -1]
-        over = np.maximum(read, 0.0)  # a face rests with its lips closed: its gaps are counted from there
-        shown = over + self.contact * np.minimum(over / FULL_GAP_MM, 1.0)
+        tracked_gaps = ordered_product(parameters, self.gaps[:, :-1].T) + self.gaps[:, -1]
+        beyond_contact = np.maximum(tracked_gaps, 0.0)  # gaps of the face are relative to its rest, where lips touch
+        target_gaps = beyond_contact + self.contact * np.minimum(beyond_contact / FULL_GAP_MM, 1.0)
         linear = ordered_product(parameters, self.linear_term[:, :-1].T) + self.linear_term[:, -1]
-        linear += ordered_product(shown, self.gap_linear_term.T) + ordered_product(
-            shown - read + self.gap_rest, self.lip_linear_term.T
+        linear += ordered_product(target_gaps, self.gap_linear_term.T) + ordered_product(
+            target_gaps - tracked_gaps + self.gap_rest, self.lip_linear_term.T
         )
         solved = bounded_least_squares(self.curvature, linear, self.limits)
         weights = np.zeros((len(parameters), len(self.shape_names)), np.float32)
@@ -98,17 +100,17 @@ class Retargeter:
 
 
 def build_retargeter(talker: Talker, face: Face, *, contact: FloatArray | None = None) -> Retargeter:
-    """Prepare the way from a talker to a face.
+    """Retargeter from a talker to a face.
 
     Parameters
     ----------
     contact : (P,)
-        Gaps, in the talker's mm, up to which facing lip points touch; `contact_gaps` of the talker without it.
+        Gaps, in the talker's mm, up to which facing lip points touch; `contact_gaps` of the talker when None.
 
     Raises
     ------
     DataError
-        The face lacks the lips' landmarks, or has no shape that speech could move.
+        The face lacks landmarks of the lips, has no shape that speech moves, or a mouth has no width.
     """
     moving = np.array([i for i, name in enumerate(face.shape_names) if name.startswith(SPEECH_SHAPE_PREFIXES)])
     require_lips(face, moving)
@@ -119,14 +121,14 @@ def build_retargeter(talker: Talker, face: Face, *, contact: FloatArray | None =
     moved = per_weight[[int(np.flatnonzero(face.landmarks == landmark)[0]) for landmark in common]]
     wanted = _displacements(talker, common, scale * turn)
     weighted = moved * landmark_weights(common)[..., None]
-    pull = np.einsum("ldk,lds->ks", weighted, wanted)
+    linear_term = np.einsum("ldk,lds->ks", weighted, wanted)
     left, right = ([at[corner] for corner in corners] for corners in (CORNERS_LEFT, CORNERS_RIGHT))
     upper, lower = ([at[lip] for lip in lips] for lips in (INNER_LIP_UPPER, INNER_LIP_LOWER))
     widened, opened = moved[left, 0] - moved[right, 0], moved[upper, 1] - moved[lower, 1]
-    pull += WIDTH_WEIGHT * ordered_product(widened.T, wanted[left, 0] - wanted[right, 0])
+    linear_term += WIDTH_WEIGHT * ordered_product(widened.T, wanted[left, 0] - wanted[right, 0])
     chin = [at[landmark] for landmark in CHIN_LANDMARKS if landmark in at]
     dropped = moved[chin, 1].mean(axis=0)
-    pull += CHIN_WEIGHT * np.outer(dropped, wanted[chin, 1].mean(axis=0))
+    linear_term += CHIN_WEIGHT * np.outer(dropped, wanted[chin, 1].mean(axis=0))
     contact = scale * (contact_gaps(talker) if contact is None else contact)
     gaps = _talker_gaps(talker, scale * turn[1], contact)
     return Retargeter(
@@ -134,7 +136,7 @@ def build_retargeter(talker: Talker, face: Face, *, contact: FloatArray | None =
         moving=moving,
         limits=face.limits[moving].astype(np.float64),
         curvature=mouth_curvature(moved, common) + GAP_WEIGHT * ordered_product(opened.T, opened),
-        linear_term=pull,
+        linear_term=linear_term,
         gaps=gaps,
         contact=contact,
         gap_rest=ordered_product(gaps[:, :-1], talker.model.rest[: talker.model.n_speech]) + gaps[:, -1],
@@ -144,17 +146,17 @@ def build_retargeter(talker: Talker, face: Face, *, contact: FloatArray | None =
 
 
 def inner_product_map(source: NDArray[np.floating], target: NDArray[np.floating]) -> FloatArray:
-    """R (q, r) that carries parameters of a source basis (r, D) to an orthonormal target basis (q, D).
+    """Matrix R (q, r) that maps parameters of a source basis (r, D) to an orthonormal target basis (q, D).
 
     Notes
     -----
-    Theobald et al. 2007, eq. 5: the inner products of the basis vectors. Signs look after themselves.
+    Theobald et al. 2007, eq. 5: the inner products of the basis vectors. A sign flip of a basis vector cancels out.
     """
     return np.asarray(target, np.float64) @ np.asarray(source, np.float64).T
 
 
 def _displacements(talker: Talker, common: list[int], onto_face: FloatArray) -> FloatArray:
-    """(L, 3, S + 1) motion of the talker's landmarks per parameter, and from rest to the origin of parameters, mm."""
+    """Motion (L, 3, S + 1) of the talker's landmarks per parameter, and from rest to parameters of 0, mm."""
     n_speech = talker.model.n_speech
     basis = talker.model.basis[:n_speech, common].astype(np.float64)
     wanted = np.einsum("slc,dc->lds", basis, onto_face)
@@ -163,7 +165,7 @@ def _displacements(talker: Talker, common: list[int], onto_face: FloatArray) -> 
 
 
 def _fit_face_axes(talker: Talker, face: Face, rest: FloatArray) -> tuple[FloatArray, float]:
-    """Rotation (3, 3) of the talker's axes into the face's, and the face's size over the talker's at the mouth."""
+    """Rotation (3, 3) of the talker's axes into the face's, and the ratio of mouth widths, face to talker."""
     model = talker.model
     own = (model.mean + np.einsum("m,mld->ld", model.rest, model.basis)).astype(np.float64)
     rows = {int(landmark): row for row, landmark in enumerate(face.landmarks)}
@@ -171,12 +173,12 @@ def _fit_face_axes(talker: Talker, face: Face, rest: FloatArray) -> tuple[FloatA
     own_width = np.linalg.norm(own[MOUTH_CORNER_LEFT] - own[MOUTH_CORNER_RIGHT])
     if not min(width, own_width) > 0:
         which = "face" if own_width > 0 else "talker"
-        raise DataError(f"the corners of the {which}'s mouth lie at one place; build the {which} again")
+        raise DataError(f"the corners of the {which}'s mouth coincide; build the {which} again")
     return procrustes_rotation(own[face.landmarks], rest), float(width / own_width)
 
 
 def _talker_gaps(talker: Talker, up: FloatArray, contact: FloatArray) -> FloatArray:
-    """(P, S + 1) gaps of facing inner lip points over `contact`, along `up`."""
+    """Gaps (P, S + 1) of facing inner lip points minus `contact`, along the direction `up` (3,)."""
     model, n_speech = talker.model, talker.model.n_speech
     upper, lower = list(INNER_LIP_UPPER), list(INNER_LIP_LOWER)
     basis = ordered_product((model.basis[:n_speech, upper] - model.basis[:n_speech, lower]).astype(np.float64), up)
@@ -185,18 +187,18 @@ def _talker_gaps(talker: Talker, up: FloatArray, contact: FloatArray) -> FloatAr
 
 
 def contact_gaps(talker: Talker) -> FloatArray:
-    """(P,) gaps, in the talker's mm, up to which its tracked facing lip points touch: most bilabials come so near.
+    """Tracked gaps (P,), in the talker's mm, up to which facing lip points touch.
 
-    Taken where each bilabial's middle pair is nearest; without bilabials in the corpus, 0.
+    A percentile over bilabials, each at the frame where its middle pair is closest; 0 without bilabials in the corpus.
     """
     model, n_speech = talker.model, talker.model.n_speech
     apart = model.basis[:n_speech, INNER_LIP_UPPER, 1] - model.basis[:n_speech, INNER_LIP_LOWER, 1]
     mean = (model.mean[list(INNER_LIP_UPPER), 1] - model.mean[list(INNER_LIP_LOWER), 1]).astype(np.float64)
-    least = [np.zeros((0, len(mean)))]
+    minima = [np.zeros((0, len(mean)))]
     for utterance in talker.utterances:
         gaps = ordered_product(utterance.shape[:, :n_speech].astype(np.float64), apart) + mean
-        least.append(_bilabial_minima(gaps, utterance.phones, talker.fps))
-    found = np.concatenate(least)
+        minima.append(_bilabial_minima(gaps, utterance.phones, talker.fps))
+    found = np.concatenate(minima)
     return (
         np.clip(np.percentile(found, CONTACT_PERCENTILE, axis=0), 0.0, MAX_CONTACT_MM)
         if len(found)
@@ -205,7 +207,7 @@ def contact_gaps(talker: Talker) -> FloatArray:
 
 
 def _bilabial_minima(gaps: FloatArray, phones: PhoneSequence, fps: float) -> FloatArray:
-    """(B, P) gaps of (T, P) at the frame of each bilabial where the middle pair is nearest."""
+    """Rows (B, P) of gaps (T, P): the frame of each bilabial at which the middle pair is closest."""
     rows = []
     for phone, start, end in zip(phones.phones, phones.edges[:-1], phones.edges[1:], strict=True):
         first, last = int(np.floor(start * fps)), int(np.ceil(end * fps)) + 1

@@ -1,1 +1,1 @@
-"""Listening: sound to phone edges and features."""
+"""Speech analysis: phone edges and features of sound."""

@@ -29,9 +29,9 @@ Floats = NDArray[np.float64]
 
 
 def integrated_loudness(sounds: Sequence[Waveform]) -> float:
-    """Gated loudness in LUFS of sounds taken together; `ABSOLUTE_GATE_LUFS` where nothing is louder than that.
+    """Joint gated loudness of sounds in LUFS; `ABSOLUTE_GATE_LUFS` if no block is louder than that.
 
-    Sounds shorter than a block of 400 ms count as if silence followed.
+    Sounds shorter than a block of 400 ms are padded with silence.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def true_peak(sound: Waveform) -> float:
 
 
 def oversampled_peaks(samples: NDArray[np.floating]) -> Floats:
-    """(n,) largest magnitude of the continuous signal from each sample to the next one."""
+    """(n,) largest magnitude of the continuous signal between each of n samples and the next one."""
     from scipy.signal import resample_poly
 
     if not len(samples):

@@ -1,7 +1,7 @@
-"""Forced alignment: where in a recording each phone of a known text sounds.
+"""Forced alignment of the phones of a known text with a recording.
 
-The acoustic model and the two-pass state alignment are PocketSphinx's (Huggins-Daines et al. 2006), whose model lies in
-its wheel. An `Aligner` serves one thread at a time.
+Acoustic model and two-pass state alignment are those of PocketSphinx (Huggins-Daines et al. 2006), whose wheel includes
+the model. An `Aligner` is not thread-safe.
 """
 
 from collections.abc import Sequence
@@ -16,18 +16,18 @@ from lexicon.phones import ARPABET, PHONES, nearest_phones
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.types import Waveform
 
-MODEL_RATE = 16000  # Hz, what the acoustic model was trained on
-FRAME_RATE = 200  # 1/s; 100 halves the time and doubles the edge error
+MODEL_RATE = 16000  # Hz, sample rate of the acoustic model's training data
+FRAME_RATE = 200  # Hz; 100 halves the run time and doubles the edge error
 MODEL_DELAY_S = (
-    0.009  # the model's frames lie this much early; measured on the TIMIT sample, confirmed on an Australian voice
+    0.009  # the model's frames are early by this time; measured on the TIMIT sample, confirmed on an Australian voice
 )
-PADDING_S = 0.1  # quiet noise before and behind, so that the first and last phone have a silence to begin from
-MARGIN_S = 0.15  # kept of the silence at either end: the model normalises by the mean, which more silence would shift
-AUDIBLE_SHARE = 0.01  # of the loudest window's level
+PADDING_S = 0.1  # low noise at both ends, as silence before the first and after the last phone
+MARGIN_S = 0.15  # silence retained at both ends; more of it would shift the mean by which the model normalises
+AUDIBLE_SHARE = 0.01  # relative to the level of the loudest window
 LEVEL_WINDOW_S = 0.01
-NOISE_LEVEL = 1e-4  # of full scale; digital silence has no logarithm
-PEAK_LEVEL = 0.7  # level at which the model hears the sound
-MIN_PHONE_S = 0.005  # one frame: shorter phones and silences are not found
+NOISE_LEVEL = 1e-4  # relative to full scale; digital silence has no logarithm
+PEAK_LEVEL = 0.7  # peak amplitude of the model's input
+MIN_PHONE_S = 0.005  # one frame; shorter phones and silences cannot be resolved
 SILENT_NAMES = frozenset({"SIL", "+NSN+", "+SPN+"})
 
 Pronunciations = Sequence[tuple[str, ...]]  # alternatives of one word, in phones of the table
@@ -35,11 +35,19 @@ Pronunciations = Sequence[tuple[str, ...]]  # alternatives of one word, in phone
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Alignment:
-    """Phones from 0 s to the end of the sound, one span for each word, and how well they fit.
+    """Result of a forced alignment.
 
-    ``confidence`` is the mean log likelihood per second of speech, relative to the best fitting state of the acoustic
-    model at each instant: 0 is perfect; a wrong text lies far below a right one. ``scores`` (N,) are the log
-    likelihoods of the phones, 0 for silences.
+    Parameters
+    ----------
+    phones
+        N phones from 0 s to the end of the sound.
+    words
+        One span of phones for each word.
+    confidence
+        Mean log likelihood per second of speech, relative to the best fitting state of the acoustic model in each
+        frame: at most 0, and much lower for a wrong text than for the right one.
+    scores : (N,)
+        Log likelihoods of the phones; 0 for silences.
     """
 
     phones: PhoneSequence
@@ -49,7 +57,7 @@ class Alignment:
 
 
 class Aligner:
-    """Finds the edges of the phones of a known text."""
+    """Forced aligner; not thread-safe."""
 
     def __init__(self) -> None:
         from pocketsphinx import Decoder
@@ -57,24 +65,24 @@ class Aligner:
         self._decoder: Any = Decoder(
             lm=None, loglevel="FATAL", bestpath=False, frate=FRAME_RATE, beam=1e-100, wbeam=1e-80, pbeam=1e-100
         )
-        self._known: dict[tuple[tuple[str, ...], ...], str] = {}
+        self._names: dict[tuple[tuple[str, ...], ...], str] = {}
 
     def align(self, sound: Waveform, words: Sequence[tuple[str, Pronunciations]]) -> Alignment:
-        """Edges of the phones of each word.
+        """Align the phones of words with a sound.
 
         Parameters
         ----------
         words
-            Written word and its pronunciations; of several the best fitting is taken.
+            Each written word with its alternative pronunciations, of which the best fitting one is chosen.
 
         Raises
         ------
         DataError
-            There is no word, or the sound does not hold these words.
+            There is no word, or the sound does not contain these words.
         """
         if not words:
             raise DataError("there is no word to align; give a transcript")
-        names = [self._word_name(tuple(tuple(way) for way in ways)) for _, ways in words]
+        names = [self._word_name(tuple(tuple(phones) for phones in alternatives)) for _, alternatives in words]
         part, begin = _trim_to_audible(sound)
         entries = self._decode(_pcm_bytes(part), " ".join(names))
         if [entry.name.split("(")[0] for entry in entries] != names:
@@ -82,19 +90,19 @@ class Aligner:
             raise DataError(f"only {found} of {len(names)} words could be aligned; check the transcript")
         return _build_alignment(entries, words, sound.duration, begin)
 
-    def _word_name(self, ways: tuple[tuple[str, ...], ...]) -> str:
-        """The decoder's name of a word with these pronunciations."""
-        if ways not in self._known:
-            name = f"w{len(self._known)}x"
-            for number, way in enumerate(ways):
-                spelt = name if number == 0 else f"{name}({number + 1})"
-                self._decoder.add_word(spelt, " ".join(acoustic_phones(way)), number == len(ways) - 1)
-            self._known[ways] = name
-        return self._known[ways]
+    def _word_name(self, pronunciations: tuple[tuple[str, ...], ...]) -> str:
+        """Name under which the decoder knows a word with these pronunciations."""
+        if pronunciations not in self._names:
+            name = f"w{len(self._names)}x"
+            for number, phones in enumerate(pronunciations):
+                label = name if number == 0 else f"{name}({number + 1})"
+                self._decoder.add_word(label, " ".join(acoustic_phones(phones)), number == len(pronunciations) - 1)
+            self._names[pronunciations] = name
+        return self._names[pronunciations]
 
     def _decode(self, pcm: bytes, text: str) -> "list[_DecodedWord]":
         decoder = self._decoder
-        decoder.reinit_feat()  # forgets the level of what was heard before: the same sound gives the same edges
+        decoder.reinit_feat()  # resets the running level normalisation: equal sounds give equal edges
         decoder.set_align_text(text)
         for second_pass in (False, True):
             try:
@@ -104,10 +112,10 @@ class Aligner:
                 decoder.process_raw(pcm, full_utt=True)
                 decoder.end_utt()
             except RuntimeError as failed:
-                raise DataError("the sound does not hold these words; check the transcript") from failed
+                raise DataError("the sound does not contain these words; check the transcript") from failed
         found = decoder.get_alignment()
         if found is None:
-            raise DataError("the sound does not hold these words; check the transcript")
+            raise DataError("the sound does not contain these words; check the transcript")
         entries = []
         for word in found:
             phones = [(phone.name, phone.start, phone.duration, phone.score) for phone in word]
@@ -118,19 +126,19 @@ class Aligner:
 
 @dataclass(frozen=True, slots=True)
 class _DecodedWord:
-    """A word as the decoder found it: phone names, first frame, frames, score."""
+    """A decoded word: name, first frame, number of frames and score of each phone."""
 
     name: str
     phones: list[tuple[str, int, int, int]]
 
     @property
-    def way(self) -> int:
-        """Which of the word's pronunciations fitted."""
+    def pronunciation(self) -> int:
+        """Index of the chosen pronunciation."""
         return int(self.name[self.name.index("(") + 1 : -1]) - 1 if "(" in self.name else 0
 
 
 def acoustic_phones(phones: Sequence[str]) -> list[str]:
-    """ARPABET names that the acoustic model knows, one for each phone, the nearest where it lacks one."""
+    """ARPABET names of the acoustic model's phones nearest to given phones."""
     names = []
     for phone in phones:
         nearest = nearest_phones(phone, _MODEL_PHONES)[0]
@@ -142,7 +150,7 @@ _MODEL_PHONES = frozenset(ARPABET.values())
 
 
 def _trim_to_audible(sound: Waveform) -> tuple[Waveform, float]:
-    """The part of a sound from a margin before to a margin behind what can be heard, and the second it begins at."""
+    """Audible part of a sound with a margin of `MARGIN_S` at both ends, and its start in seconds."""
     window = max(1, round(LEVEL_WINDOW_S * sound.rate))
     n_windows = len(sound.samples) // window
     levels = np.abs(sound.samples[: n_windows * window].reshape(n_windows, window)).max(axis=1, initial=0.0)
@@ -156,7 +164,7 @@ def _trim_to_audible(sound: Waveform) -> tuple[Waveform, float]:
 
 
 def _pcm_bytes(sound: Waveform) -> bytes:
-    """16-bit samples for the acoustic model, padded and at one level."""
+    """16-bit samples at `MODEL_RATE`, padded with noise and normalised to `PEAK_LEVEL`."""
     import soxr
 
     samples = sound.samples
@@ -164,30 +172,30 @@ def _pcm_bytes(sound: Waveform) -> bytes:
         samples = soxr.resample(samples, sound.rate, MODEL_RATE)
     level = PEAK_LEVEL / max(float(np.abs(samples).max(initial=0.0)), 1e-3)
     n_padding = round(PADDING_S * MODEL_RATE)
-    heard = np.random.default_rng(0).normal(0.0, NOISE_LEVEL, len(samples) + 2 * n_padding)
-    heard[n_padding : n_padding + len(samples)] += samples * level
-    pcm: NDArray[np.int16] = np.clip(heard * 32767, -32768, 32767).astype(np.int16)
+    padded = np.random.default_rng(0).normal(0.0, NOISE_LEVEL, len(samples) + 2 * n_padding)
+    padded[n_padding : n_padding + len(samples)] += samples * level
+    pcm: NDArray[np.int16] = np.clip(padded * 32767, -32768, 32767).astype(np.int16)
     return pcm.tobytes()
 
 
 def _build_alignment(
     entries: Sequence[_DecodedWord], words: Sequence[tuple[str, Pronunciations]], duration: float, begin: float
 ) -> Alignment:
-    """Edges on the clock of a whole sound, of which the decoder heard what begins at `begin`."""
+    """Alignment of a whole sound of `duration` seconds, whose decoded part starts at `begin` seconds."""
     labels: list[str] = []
     starts: list[float] = []
     spans: list[WordSpan] = []
     end = 0.0
     scores: dict[int, float] = {}  # by phone
     n_frames = 0
-    for entry, (text, ways) in zip(entries, words, strict=True):
+    for entry, (text, pronunciations) in zip(entries, words, strict=True):
         onset = begin + _frame_to_seconds(entry.phones[0][1])
-        if onset - end >= MIN_PHONE_S:  # silence, at the beginning too
+        if onset - end >= MIN_PHONE_S:  # a silence, also before the first word
             labels.append(SILENCE)
             starts.append(end)
         spans.append(WordSpan(text, len(labels), len(labels) + len(entry.phones)))
-        for phone, (_, first, count, fit) in zip(ways[entry.way], entry.phones, strict=True):
-            scores[len(labels)] = float(fit)
+        for phone, (_, first, count, score) in zip(pronunciations[entry.pronunciation], entry.phones, strict=True):
+            scores[len(labels)] = float(score)
             labels.append(phone)
             starts.append(begin + _frame_to_seconds(first))
             end = begin + _frame_to_seconds(first + count)
@@ -207,9 +215,10 @@ def _frame_to_seconds(frame: int) -> float:
 
 
 def enforce_increasing(edges: NDArray[np.float64], least: float = MIN_PHONE_S) -> NDArray[np.float64]:
-    """Edges of which each lies at least `least` seconds behind the one before; first and last stay.
+    """Move (N + 1,) edges so that successive ones differ by at least `least` seconds; the first and last are fixed.
 
-    Shorter phones borrow from their neighbours; where the whole is too short, all phones share it equally.
+    Phones that are too short are lengthened at the cost of their neighbours. If the total duration is less than
+    `least` for each phone, all phones get equal durations.
     """
     n = len(edges) - 1
     first, last = float(edges[0]), float(edges[-1])

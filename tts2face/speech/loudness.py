@@ -1,4 +1,4 @@
-"""How loud and how high a voice is, frame by frame: what gestures follow."""
+"""Intensity and pitch of a voice over time, by Praat."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,19 +6,19 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from tts2face.types import Waveform
 
-MIN_PITCH_HZ = 100.0  # of a voice: intensity is averaged over 3.2 periods of it, 32 ms (parselmouth's rule)
-MIN_INTENSITY_DB = 0.0  # digital silence has no level; it counts as the threshold of hearing
-PITCH_RANGE_HZ = (75.0, 600.0)  # Praat's own
-SEMITONES_PER_OCTAVE = 12.0  # in an octave
+MIN_PITCH_HZ = 100.0  # intensity is averaged over 3.2 periods of this pitch, 32 ms (Praat's rule)
+MIN_INTENSITY_DB = 0.0  # threshold of hearing, for digital silence, which has no level
+PITCH_RANGE_HZ = (75.0, 600.0)  # Praat's default
+SEMITONES_PER_OCTAVE = 12.0
 
 
 def intensity(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(T,) level of a sound in dB at instants (T,) in seconds.
+    """(T,) intensity of a sound in dB relative to 20 micropascals, at times (T,) in seconds.
 
     Raises
     ------
     DataError
-        The sound is too short to have a level.
+        The sound is shorter than the analysis window.
     """
     import parselmouth
 
@@ -36,12 +36,12 @@ def intensity(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32
 
 
 def pitch(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(T,) semitones against the sound's median pitch at instants (T,) in seconds; 0 where nothing is voiced.
+    """(T,) pitch in semitones relative to the sound's median, at times (T,) in seconds; 0 for unvoiced frames.
 
     Raises
     ------
     DataError
-        The sound is too short to have a pitch.
+        The sound is shorter than the analysis window.
     """
     import parselmouth
 

@@ -1,4 +1,4 @@
-"""Where a speaker pauses, and long recordings cut there."""
+"""Detection of pauses in speech, and division of long recordings at pauses."""
 
 from itertools import pairwise
 
@@ -9,18 +9,18 @@ from lexicon.errors import InputError
 from tts2face.types import Waveform
 
 LEVEL_WINDOW_S = 0.01
-SMOOTHING_WINDOWS = 3  # a stop's closure is not bridged, a click in a pause is
-QUIET_SHARE = 0.3  # of the way in dB from the noise to the speech; below it nobody speaks
+SMOOTHING_WINDOWS = 3  # enough to bridge a click in a pause, too few to bridge the closure of a stop
+QUIET_SHARE = 0.3  # threshold of pauses: share of the range in dB from noise to speech
 NOISE_QUANTILE, SPEECH_QUANTILE = 0.05, 0.95
-MIN_CONTRAST_DB = 6.0  # between them; with less there is no telling pauses from speech
+MIN_CONTRAST_DB = 6.0  # least range from noise to speech in which pauses can be detected
 MIN_PAUSE_S = 0.2  # longer than the closure of any stop (Crystal and House 1988)
-MIN_STRETCH_SHARE = 0.5  # of the longest stretch: none is shorter, but for the last
+MIN_STRETCH_SHARE = 0.5  # least length of a part, relative to the largest one; the last part may be shorter
 
 Span = tuple[float, float]
 
 
 def find_pauses(sound: Waveform) -> tuple[Span, ...]:
-    """Spans in seconds in which nobody speaks, each of `MIN_PAUSE_S` or more."""
+    """Spans (start, end) in seconds without speech, each at least `MIN_PAUSE_S` long."""
     levels = _window_levels(sound)
     if not len(levels):
         return ()
@@ -34,17 +34,17 @@ def find_pauses(sound: Waveform) -> tuple[Span, ...]:
 
 
 def cut_at_pauses(sound: Waveform, longest: float) -> tuple[Span, ...]:
-    """Spans in seconds that cover a sound, none longer than `longest`, cut in the middle of long pauses.
+    """Divide a sound into spans of at most `longest` seconds, cut in the middle of long pauses.
 
-    Where somebody speaks on without a pause the cut falls into the quietest moment.
+    Speech without a pause is cut at its quietest time.
 
     Raises
     ------
     InputError
-        The longest stretch is not positive.
+        `longest` is not above 0.
     """
     if longest <= 0:
-        raise InputError(f"a stretch of sound must be longer than {longest} s")
+        raise InputError(f"the longest part of a sound must be above 0 s, not {longest:g} s")
     found, levels, cuts = find_pauses(sound), _window_levels(sound), [0.0]
     while sound.duration - cuts[-1] > longest:
         earliest, latest = cuts[-1] + MIN_STRETCH_SHARE * longest, cuts[-1] + longest
@@ -60,7 +60,7 @@ def _quietest_instant(levels: NDArray[np.float64], earliest: float, latest: floa
 
 
 def _window_levels(sound: Waveform) -> NDArray[np.float64]:
-    """(T,) dB of full scale in windows of `LEVEL_WINDOW_S`."""
+    """(T,) levels in dB relative to full scale, in windows of `LEVEL_WINDOW_S`."""
     from scipy.ndimage import uniform_filter1d
 
     window = max(1, round(LEVEL_WINDOW_S * sound.rate))

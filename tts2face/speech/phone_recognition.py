@@ -1,7 +1,7 @@
-"""Phones heard in a recording of which nobody says what was spoken.
+"""Phone recognition in recordings without a transcript.
 
-The acoustic network is that of hama (Park 2026, Apache-2.0), which lies in its wheel. It hears which phones there are,
-not where; `tts2face.speech.forced_alignment` finds their edges.
+The acoustic network is that of hama (Park 2026, Apache-2.0), included in its wheel. It returns phones without times;
+`tts2face.speech.forced_alignment` computes their edges.
 """
 
 from typing import Any
@@ -10,20 +10,20 @@ from lexicon.errors import BackendError, InputError
 from lexicon.ipa import parse_ipa
 from tts2face.types import Waveform
 
-RECOGNISER_RATE = 16_000  # Hz, what the network was trained on
-MAX_SOUND_S = 30.0  # of sound at a time; memory grows with it
-WORD_BOUNDARY = "|"  # between words in the network's answer
+RECOGNISER_RATE = 16_000  # Hz, sample rate of the network's training data
+MAX_SOUND_S = 30.0  # longest sound in one call; memory grows with it
+WORD_BOUNDARY = "|"  # separates words in the network's output
 
 Phones = tuple[str, ...]
 
 
 class PhoneRecogniser:
-    """Hears English phones.
+    """Recogniser of English phones.
 
     Raises
     ------
     BackendError
-        The package hama is missing or has no engine for this machine.
+        The package hama is not installed or does not support this machine.
     """
 
     def __init__(self) -> None:
@@ -34,31 +34,33 @@ class PhoneRecogniser:
         except (ImportError, OSError, RuntimeError) as missing:
             raise BackendError(
                 "recordings without a transcript need the package hama (Linux or macOS): "
-                "pip install 'tts2face[capture]', or write what is said into a .txt beside the video"
+                "pip install 'tts2face[capture]', or give the words in a .txt file of the same name"
             ) from missing
         self._spellings: dict[str, Phones] = {}
 
     def words(self, sound: Waveform) -> tuple[Phones, ...]:
-        """Phones of each word heard in a sound of at most `MAX_SOUND_S`.
+        """Phones of each word in a sound.
 
         Raises
         ------
         InputError
-            The sound is longer.
+            The sound is longer than `MAX_SOUND_S`.
         """
         if sound.duration > MAX_SOUND_S + 1e-6:
-            raise InputError(f"a sound of {sound.duration:.1f} s is heard in parts of at most {MAX_SOUND_S:.0f} s")
+            raise InputError(
+                f"phones are recognised in sounds of at most {MAX_SOUND_S:.0f} s, not {sound.duration:.1f} s; divide it"
+            )
         if not len(sound.samples):
             return ()
-        heard = self._network.transcribe_waveform(sound.samples, sound.rate).word_phoneme_text
+        recognised = self._network.transcribe_waveform(sound.samples, sound.rate).word_phoneme_text
         words = (
             tuple(phone for token in word.split() for phone in self._phones(token))
-            for word in heard.split(WORD_BOUNDARY)
+            for word in recognised.split(WORD_BOUNDARY)
         )
         return tuple(word for word in words if word)
 
     def _phones(self, token: str) -> Phones:
-        """Phones of the table for one of the network's; none for signs that are no sound."""
+        """Phones of the phone table for a label of the network; none for labels that are not phones."""
         if token not in self._spellings:
             try:
                 self._spellings[token] = tuple(segment.phone for segment in parse_ipa(token))

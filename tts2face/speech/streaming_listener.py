@@ -1,6 +1,6 @@
-"""Speech heard block by block: features and lips of each frame as soon as they can be known.
+"""Block-wise computation of acoustic features and speech parameters with the least possible delay.
 
-What comes out does not depend on where the blocks are cut; all blocks together give what the whole sound gives.
+The output is independent of the block boundaries and equals that of the whole sound.
 """
 
 import numpy as np
@@ -22,96 +22,96 @@ SampleBlock = NDArray[np.floating]
 
 
 class StreamingFeatures:
-    """Turns blocks of sound at `FEATURE_RATE` into features of frames at a rate; frame i is the instant i / fps."""
+    """Converts blocks of sound at `FEATURE_RATE` to features of frames; frame i belongs to the time i / fps."""
 
     def __init__(self, kind: str, fps: float) -> None:
         if not fps > 0:
             raise InputError(f"frames per second must be above 0, not {fps}")
         self._measures, self._fps = feature_measures(kind), fps
-        self._kept: NDArray[np.float32] = np.zeros(0, np.float32)
-        self._buffer_start = 0  # the sample with which `_kept` begins
-        self._n_given = 0
+        self._buffer: NDArray[np.float32] = np.zeros(0, np.float32)
+        self._buffer_start = 0  # index of the first sample of the buffer
+        self._n_returned = 0
 
     @property
     def n_samples(self) -> int:
-        """Samples heard so far."""
-        return self._buffer_start + len(self._kept)
+        """Number of samples added so far."""
+        return self._buffer_start + len(self._buffer)
 
-    def hear(self, samples: SampleBlock) -> NDArray[np.float32]:
-        """(n, D) features of the frames that can be measured now, 43 ms of sound behind each.
+    def add_samples(self, samples: SampleBlock) -> NDArray[np.float32]:
+        """Add samples (m,); returns (n, D) features of all frames with at least 43 ms of sound after them.
 
         Raises
         ------
         InputError
-            The block is no row of finite samples.
+            The block is not a vector of finite samples.
         """
         if samples.ndim != 1 or not np.isfinite(samples).all():
-            raise InputError(f"a block of sound is a row of finite samples, not an array of shape {samples.shape}")
-        self._kept = np.concatenate([self._kept, samples.astype(np.float32)])
+            raise InputError(f"a block of sound must be a vector of finite samples; its shape is {samples.shape}")
+        self._buffer = np.concatenate([self._buffer, samples.astype(np.float32)])
         last = max(int((self.n_samples - HALF_WINDOW_SAMPLES - 2) * self._fps / FEATURE_RATE), -1)
         return self._features_until(last + 1)
 
     def finish(self) -> NDArray[np.float32]:
-        """(n, D) features of the frames that were left; the sound is followed by silence."""
+        """(n, D) features of the remaining frames, with silence after the end of the sound."""
         return self._features_until(frame_count(self.n_samples / FEATURE_RATE, self._fps))
 
     def _features_until(self, n_frames: int) -> NDArray[np.float32]:
-        """Features of the frames from the last given to the `n_frames`-th."""
-        found = [measure_windows(self._cells(range(0)), self._measures)] if n_frames <= self._n_given else []
-        while self._n_given < n_frames:
-            last = min(self._n_given + WINDOWS_AT_ONCE, n_frames)
-            found.append(measure_windows(self._cells(range(self._n_given, last)), self._measures))
-            self._n_given = last
+        """Features of the frames from the first one not yet returned up to frame `n_frames`, exclusive."""
+        found = [measure_windows(self._windows(range(0)), self._measures)] if n_frames <= self._n_returned else []
+        while self._n_returned < n_frames:
+            last = min(self._n_returned + WINDOWS_AT_ONCE, n_frames)
+            found.append(measure_windows(self._windows(range(self._n_returned, last)), self._measures))
+            self._n_returned = last
         self._drop_samples()
         return np.concatenate(found)
 
-    def _cells(self, frames: range) -> NDArray[np.float64]:
+    def _windows(self, frames: range) -> NDArray[np.float64]:
         centres = np.rint(np.arange(frames.start, frames.stop) / self._fps * FEATURE_RATE).astype(np.int64)
-        return analysis_windows(self._kept, centres - self._buffer_start)
+        return analysis_windows(self._buffer, centres - self._buffer_start)
 
     def _drop_samples(self) -> None:
-        """Drop what no frame to come needs."""
-        needed = round(self._n_given / self._fps * FEATURE_RATE) - HALF_WINDOW_SAMPLES
-        spare = min(max(needed - self._buffer_start, 0), len(self._kept))
-        self._kept, self._buffer_start = self._kept[spare:].copy(), self._buffer_start + spare
+        """Remove samples that no later frame needs."""
+        needed = round(self._n_returned / self._fps * FEATURE_RATE) - HALF_WINDOW_SAMPLES
+        spare = min(max(needed - self._buffer_start, 0), len(self._buffer))
+        self._buffer, self._buffer_start = self._buffer[spare:].copy(), self._buffer_start + spare
 
 
 class StreamingAudioMap:
-    """Turns blocks of sound at `FEATURE_RATE` into a talker's speech parameters at her frame rate."""
+    """Converts blocks of sound at `FEATURE_RATE` to speech parameters at the talker's frame rate."""
 
-    def __init__(self, drive: AudioMap, fps: float) -> None:
-        self._audio_map = drive
-        self._feature_stream = StreamingFeatures(drive.feature, fps)
+    def __init__(self, audio_map: AudioMap, fps: float) -> None:
+        self._audio_map = audio_map
+        self._feature_stream = StreamingFeatures(audio_map.feature, fps)
         self._fps = fps
-        self._features: NDArray[np.float32] = np.zeros((0, len(drive.mean)), np.float32)
+        self._features: NDArray[np.float32] = np.zeros((0, len(audio_map.mean)), np.float32)
 
     @property
     def look_ahead_s(self) -> float:
-        """Seconds of sound that must be heard behind a frame before its lips are known."""
+        """Seconds of sound after a frame that are needed to compute its parameters."""
         return self._audio_map.after / self._fps + (HALF_WINDOW_SAMPLES + 2) / FEATURE_RATE
 
-    def hear(self, samples: SampleBlock) -> NDArray[np.float32]:
-        """(n, S) parameters of the frames that can be known now.
+    def add_samples(self, samples: SampleBlock) -> NDArray[np.float32]:
+        """Add samples (m,); returns (n, S) parameters of all frames with enough sound after them.
 
         Raises
         ------
         InputError
-            The block is no row of finite samples.
+            The block is not a vector of finite samples.
         """
-        return self._map_features(self._feature_stream.hear(samples))
+        return self._map_features(self._feature_stream.add_samples(samples))
 
     def finish(self) -> NDArray[np.float32]:
-        """(n, S) parameters of the frames that were left; their last features go on behind the end."""
+        """(n, S) parameters of the remaining frames; the last features are held after the end."""
         rest = self._feature_stream.finish()
         known = np.concatenate([self._features, rest])
         tail = np.repeat(known[-1:], self._audio_map.after, axis=0)
         return self._map_features(np.concatenate([rest, tail]))
 
     def _map_features(self, features: NDArray[np.float32]) -> NDArray[np.float32]:
-        drive = self._audio_map
+        audio_map = self._audio_map
         if not len(self._features) and len(features):
-            features = np.concatenate([np.repeat(features[:1], drive.before, axis=0), features])
+            features = np.concatenate([np.repeat(features[:1], audio_map.before, axis=0), features])
         self._features = np.concatenate([self._features, features])
-        made = drive.inside(self._features)
+        made = audio_map.inside(self._features)
         self._features = self._features[len(made) :]
         return made

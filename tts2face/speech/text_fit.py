@@ -1,6 +1,6 @@
-"""Whether a recording says the text that was aligned with it, and where it does not.
+"""Detection of words that a recording does not contain, by the log likelihoods of their forced alignment.
 
-Forced alignment always places the words; how well they fit is told by the log likelihood of their phones.
+Forced alignment assigns times to all words of a text, whether the recording contains them or not.
 """
 
 from collections.abc import Sequence
@@ -14,17 +14,17 @@ from tts2face.speech.forced_alignment import Alignment
 LEAST_CONFIDENCE = (
     -6500.0
 )  # log likelihood per second of a whole utterance; docs/decisions/013-transcript-confidence.md
-CONTEXT_S = 1.5  # on either side of a span that is aligned again
-WINDOW_S = 1.0  # of speech that is judged together: two to four words; single words scatter by half as much again
+CONTEXT_S = 1.5  # context on either side of a span that is aligned a second time
+WINDOW_S = 1.0  # speech that is scored together, two to four words; scores of single words scatter 1.5 times as much
 # Log likelihood per second in the window; measured in docs/decisions/056-text-mismatch.md.
 LEAST_LOCAL_CONFIDENCE = -7000.0
-LEAST_FOREIGN_CONFIDENCE = -9000.0  # the acoustic model is English: right texts of other languages reach -8200
-LONGEST_GAP_S = 1.0  # spans closer than this are one
+LEAST_FOREIGN_CONFIDENCE = -9000.0  # the acoustic model is English: correct texts of other languages reach -8200
+LONGEST_GAP_S = 1.0  # spans with a smaller gap are merged
 
 
 @dataclass(frozen=True, slots=True)
 class TextMismatch:
-    """Words that a recording probably does not say, and the seconds of the recording at which they were placed."""
+    """Words that a recording probably does not contain, and the times in seconds to which they were aligned."""
 
     begin: float
     end: float
@@ -33,19 +33,19 @@ class TextMismatch:
 
     @property
     def sentence(self) -> str:
-        """One line for a person.."""
+        """Warning for the user, one line."""
         shown = " ".join(self.words if len(self.words) <= 8 else (*self.words[:4], "...", *self.words[-3:]))
         return (
             f"the text does not fit the recording from {self.begin:.1f} to {self.end:.1f} s ({shown}); check the words"
         )
 
     def shifted(self, seconds: float) -> "TextMismatch":
-        """The same that many seconds later."""
+        """The same mismatch, later by `seconds`."""
         return replace(self, begin=self.begin + seconds, end=self.end + seconds)
 
 
 def find_misfits(found: Alignment, *, is_english: bool) -> list[tuple[int, int]]:
-    """Ranges of words, half open, that fit worse than right texts do."""
+    """Half-open ranges of words whose log likelihood lies below that of correct texts."""
     least = LEAST_LOCAL_CONFIDENCE if is_english else LEAST_FOREIGN_CONFIDENCE
     edges, words, sums = found.phones.edges, found.words, _sums(found)
     misfits: list[tuple[int, int]] = []
@@ -58,11 +58,11 @@ def find_misfits(found: Alignment, *, is_english: bool) -> list[tuple[int, int]]
         else:
             misfits.append((first, last))
     fits = [bool(score / seconds >= least) for seconds, score in sums]
-    return [_trimmed(fits, *misfit) for misfit in misfits]
+    return [_trim_range(fits, *misfit) for misfit in misfits]
 
 
-def _trimmed(fits: Sequence[bool], first: int, last: int) -> tuple[int, int]:
-    """A range without the words at its ends that fit by themselves: windows reach beyond what is wrong."""
+def _trim_range(fits: Sequence[bool], first: int, last: int) -> tuple[int, int]:
+    """Remove words at the ends of a range that fit on their own, since windows reach beyond the wrong words."""
     while last - first > 1 and fits[first]:
         first += 1
     while last - first > 1 and fits[last - 1]:
@@ -71,14 +71,14 @@ def _trimmed(fits: Sequence[bool], first: int, last: int) -> tuple[int, int]:
 
 
 def mismatch_of(found: Alignment, first: int, last: int) -> TextMismatch:
-    """A range of an alignment's words as a mismatch, on the alignment's clock."""
+    """Mismatch of a range of an alignment's words; times are those of the alignment."""
     edges, words, sums = found.phones.edges, found.words[first:last], _sums(found)[first:last]
     begin, end = float(edges[words[0].first]), float(edges[words[-1].last])
     return TextMismatch(begin, end, tuple(word.text for word in words), float(sums[:, 1].sum() / sums[:, 0].sum()))
 
 
-def surrounded(found: Alignment, first: int, last: int) -> tuple[int, int, float, float]:
-    """A range of words with what is said within `CONTEXT_S` of it, and the seconds that these words lie in."""
+def extend_range(found: Alignment, first: int, last: int) -> tuple[int, int, float, float]:
+    """Extend a range of words by all words within `CONTEXT_S`; returns first, last, start and end in seconds."""
     edges, words = found.phones.edges, found.words
     begin, end = edges[words[first].first] - CONTEXT_S, edges[words[last - 1].last] + CONTEXT_S
     while first > 0 and edges[words[first - 1].first] >= begin:
@@ -98,7 +98,7 @@ def _sums(found: Alignment) -> NDArray[np.float64]:
 
 
 def _windows(sums: NDArray[np.float64]) -> list[tuple[int, int]]:
-    """For each word the range of words about it, the nearer side first, that lasts `WINDOW_S` or is all there is."""
+    """For each word the range of words around it that lasts `WINDOW_S`, or all words; grows at the nearer side."""
     ends = np.concatenate([[0.0], np.cumsum(sums[:, 0])])
     ranges = []
     for at in range(len(sums)):

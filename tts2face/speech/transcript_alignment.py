@@ -1,4 +1,4 @@
-"""What a transcript says, word by word, and where in a recording each phone of it sounds."""
+"""Alignment of a transcript with a recording of any length."""
 
 from collections.abc import Sequence
 from itertools import count
@@ -9,53 +9,68 @@ from lexicon.pronounce import Word, pronounce
 from lexicon.sequence import PhoneSequence, WordSpan, concatenate_phones
 from tts2face.speech.forced_alignment import Aligner, Alignment
 from tts2face.speech.pauses import cut_at_pauses
-from tts2face.speech.text_fit import TextMismatch, find_misfits, mismatch_of, surrounded
+from tts2face.speech.text_fit import TextMismatch, extend_range, find_misfits, mismatch_of
 from tts2face.types import Waveform
 
-Pronunciations = tuple[tuple[str, ...], ...]  # pronunciations of one word, each a row of phones
+Pronunciations = tuple[tuple[str, ...], ...]  # alternative pronunciations of one word
 PronouncedTranscript = tuple[tuple[str, Pronunciations], ...]
 
-MAX_ALIGNED_S = 60.0  # alignment takes memory with the square of the length: 234 MB
-MAX_STRETCH_S = 20.0  # of the parts into which longer recordings are cut
+MAX_ALIGNED_S = 60.0  # memory of the alignment grows with the square of the length; 234 MB at this one
+MAX_STRETCH_S = 20.0  # longest part into which longer recordings are divided
 
 
 def pronounce_transcript(text: str, language: str, own: Dictionary | None = None) -> PronouncedTranscript:
-    """The words of a text with their pronunciations; English ones with all that the dictionary knows.
+    """Words of a text with their pronunciations; English words with all alternatives of the dictionary.
+
+    Parameters
+    ----------
+    own
+        A user's dictionary, which takes precedence.
 
     Raises
     ------
     InputError
-        The text holds no word, or the language cannot read it.
+        The text has no word, or characters that the language does not read.
     BackendError
         A word needs espeak-ng, which is not installed.
     """
-    said = pronounce(text, language, own).words
-    return tuple((word.text, _pronunciations(word, language, own)) for word in said)
+    words = pronounce(text, language, own).words
+    return tuple((word.text, _pronunciations(word, language, own)) for word in words)
 
 
 def _pronunciations(word: Word, language: str, own: Dictionary | None) -> Pronunciations:
     if not language.startswith("en") or (own is not None and own.lookup(word.text) is not None):
         return (word.phones,)
-    ways = [word.phones]
+    alternatives = [word.phones]
     for number in count(2):
         found = cmudict_lookup(f"{word.text}({number})")
         if found is None:
             break
-        ways.append(tuple(segment.phone for segment in found))
-    return tuple(dict.fromkeys(ways))
+        alternatives.append(tuple(segment.phone for segment in found))
+    return tuple(dict.fromkeys(alternatives))
 
 
 def align_recording(
     sound: Waveform, words: PronouncedTranscript, *, is_english: bool = True
 ) -> tuple[PhoneSequence, tuple[WordSpan, ...], tuple[TextMismatch, ...]]:
-    """Phones and words on the clock of a sound, from 0 s to its end, and where the words do not fit it.
+    """Align words with a sound of any length.
+
+    Returns
+    -------
+    phones
+        Phones from 0 s to the end of the sound.
+    words
+        One span of phones for each word.
+    mismatches
+        Words that the sound probably does not contain.
 
     Raises
     ------
     DataError
-        The sound does not hold these words.
+        The sound does not contain these words.
     BackendError
-        It is longer than a minute, and nothing on this machine recognises phones, by which the words are placed.
+        The sound is longer than `MAX_ALIGNED_S` and the phone recogniser, which assigns words to its parts, is not
+        installed.
     """
     aligner = Aligner()
     if sound.duration <= MAX_ALIGNED_S:
@@ -66,13 +81,13 @@ def align_recording(
     spans: list[tuple[WordSpan, ...]] = []
     mismatches: list[TextMismatch] = []
     begin = 0.0
-    for part, said in zip(parts, _words_by_part(parts, words), strict=True):
-        if said:
-            found = aligner.align(part, said)
+    for part, part_words in zip(parts, _words_by_part(parts, words), strict=True):
+        if part_words:
+            found = aligner.align(part, part_words)
             phones.append(found.phones)
             spans.append(found.words)
-            fits = _mismatches(aligner, part, said, found, is_english=is_english)
-            mismatches += [one.shifted(begin) for one in fits]
+            part_mismatches = _mismatches(aligner, part, part_words, found, is_english=is_english)
+            mismatches += [mismatch.shifted(begin) for mismatch in part_mismatches]
         else:
             phones.append(PhoneSequence(["sil"], [0.0, part.duration]))
             spans.append(())
@@ -83,39 +98,39 @@ def align_recording(
 def _mismatches(
     aligner: Aligner, sound: Waveform, words: PronouncedTranscript, found: Alignment, *, is_english: bool
 ) -> tuple[TextMismatch, ...]:
-    """Spans that do not fit, each confirmed by aligning it again with what surrounds it.
+    """Mismatches of an alignment, each confirmed by a second alignment of the span and its context.
 
-    The acoustic model normalises by the mean of what it is given: pauses of a long recording lower all of its scores,
-    those of a few seconds cut out of it less.
+    The acoustic model normalises by the mean of its input, so that pauses lower all scores of a long recording; they
+    affect a short excerpt less.
     """
     confirmed: list[TextMismatch] = []
-    behind = 0.0  # where the last confirmed span ends
+    last_end = 0.0  # end of the last confirmed span
     for misfit in find_misfits(found, is_english=is_english):
-        first, last, begin, end = surrounded(found, *misfit)
-        if last - first == len(words):  # there is nothing else to compare with
+        first, last, begin, end = extend_range(found, *misfit)
+        if last - first == len(words):  # the excerpt would be the whole recording
             return (mismatch_of(found, *misfit),)
         try:
-            again = aligner.align(_cut_sound(sound, (begin, end)), words[first:last])
-        except DataError:  # not even found there
-            here = [mismatch_of(found, *misfit)]
+            excerpt = aligner.align(_cut_sound(sound, (begin, end)), words[first:last])
+        except DataError:  # the excerpt does not contain the words
+            mismatches = [mismatch_of(found, *misfit)]
         else:
-            misfits = find_misfits(again, is_english=is_english)
-            here = [mismatch_of(again, *span).shifted(begin) for span in misfits]
-        confirmed += [one for one in here if one.begin >= behind]
-        behind = max([behind, *(one.end for one in here)])
+            misfits = find_misfits(excerpt, is_english=is_english)
+            mismatches = [mismatch_of(excerpt, *span).shifted(begin) for span in misfits]
+        confirmed += [mismatch for mismatch in mismatches if mismatch.begin >= last_end]
+        last_end = max([last_end, *(mismatch.end for mismatch in mismatches)])
     return tuple(confirmed)
 
 
 def _words_by_part(parts: Sequence[Waveform], words: PronouncedTranscript) -> list[PronouncedTranscript]:
-    """The words that are said in each part."""
+    """Words of each part, assigned by phone recognition."""
     from tts2face.speech.phone_recognition import PhoneRecogniser
     from tts2face.speech.transcript_placement import assign_words
 
     recogniser = PhoneRecogniser()
-    heard = [[phone for word in recogniser.words(part) for phone in word] for part in parts]
-    if not any(heard):
-        raise DataError("no speech is heard; give a recording of somebody who speaks")
-    places = assign_words([ways[0] for _, ways in words], heard)
+    recognised = [[phone for word in recogniser.words(part) for phone in word] for part in parts]
+    if not any(recognised):
+        raise DataError("the recording contains no speech; give another recording")
+    places = assign_words([alternatives[0] for _, alternatives in words], recognised)
     return [tuple(word for word, place in zip(words, places, strict=True) if place == at) for at in range(len(parts))]
 
 

@@ -1,7 +1,7 @@
-"""Which words of a long text are said in which stretch of a long recording.
+"""Assignment of the words of a long text to the parts of a long recording.
 
-Phones heard and phones written are matched by the cheapest edits (Wagner and Fischer 1974), within a band, so that an
-hour of speech takes seconds and little memory.
+Recognised phones and phones of the text are matched by least edit distance (Wagner and Fischer 1974) within a band, so
+that an hour of speech takes seconds and little memory.
 """
 
 from collections.abc import Sequence
@@ -12,39 +12,39 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from tts2face.compilation import kernel
 
-BAND = 1500  # phones that the text may run ahead of or behind the sound: two minutes of speech
-SUBSTITUTION_COST = 1.0  # cost of a phone heard as another
-GAP_COST = 0.7  # of a phone that is not heard or not written; two of them cost more than one heard as another
-MATCHED, INSERTED, DELETED = 0, 1, 2  # steps back: both sequences, the heard one, the written one
+BAND = 1500  # largest offset in phones between text and sound: two minutes of speech
+SUBSTITUTION_COST = 1.0
+GAP_COST = 0.7  # of an inserted or deleted phone; two of them cost more than a substitution
+MATCHED, INSERTED, DELETED = 0, 1, 2  # steps back: in both sequences, in the recognised one, in the written one
 
 Phones = Sequence[str]
 
 
-def assign_words(words: Sequence[Phones], heard: Sequence[Phones]) -> NDArray[np.int64]:
-    """(W,) the stretch in which each word is said; they do not fall.
+def assign_words(words: Sequence[Phones], recognised: Sequence[Phones]) -> NDArray[np.int64]:
+    """(W,) index of the part of the recording that contains each word, non-decreasing.
 
     Parameters
     ----------
     words
-        Phones of each word as written.
-    heard
-        Phones heard in each stretch.
+        Phones of each of W written words.
+    recognised
+        Phones recognised in each part of the recording.
 
     Raises
     ------
     InputError
-        There is no word, or no stretch.
+        There is no word or no part.
     """
-    if not words or not heard:
-        raise InputError("placing words needs words, and stretches of sound")
+    if not words or not recognised:
+        raise InputError("the assignment needs at least one word and one part of a recording")
     numbers: dict[str, int] = {}
     written = np.array([numbers.setdefault(phone, len(numbers)) for word in words for phone in word], np.int64)
-    sounded = np.array([numbers.setdefault(phone, len(numbers)) for phones in heard for phone in phones], np.int64)
-    stretch_of_sounded = np.repeat(np.arange(len(heard)), [len(phones) for phones in heard])
+    sounded = np.array([numbers.setdefault(phone, len(numbers)) for phones in recognised for phone in phones], np.int64)
+    part_of_sounded = np.repeat(np.arange(len(recognised)), [len(phones) for phones in recognised])
     if not len(sounded) or not len(written):
         return np.zeros(len(words), np.int64)
     partner = _match_phones(written, sounded, max(BAND, abs(len(written) - len(sounded)) + BAND // 4))
-    places = stretch_of_sounded[np.clip(partner, 0, len(sounded) - 1)]
+    places = part_of_sounded[np.clip(partner, 0, len(sounded) - 1)]
     ends = np.cumsum([len(word) for word in words])
     found = [
         int(np.median(places[max(end - len(word), 0) : end])) if len(word) else int(places[min(end, len(places) - 1)])
@@ -55,7 +55,7 @@ def assign_words(words: Sequence[Phones], heard: Sequence[Phones]) -> NDArray[np
 
 @kernel
 def _match_phones(written: NDArray[np.int64], sounded: NDArray[np.int64], band: int) -> NDArray[np.int64]:
-    """(N,) index of the sounded phone that each written one is matched with, or of the one before it."""
+    """(N,) index of the recognised phone that is matched with each written one, or of the phone before it."""
     n, m, width = len(written), len(sounded), 2 * band + 1
     steps = np.full((n + 1, width), DELETED, np.uint8)
     before = np.full(width, np.inf, np.float32)
@@ -77,7 +77,7 @@ def _cost_row(
     lows: tuple[int, int],
     steps: NDArray[np.uint8],
 ) -> NDArray[np.float32]:
-    """Costs of one written phone's row of the band, from the row before; writes the steps that lead there."""
+    """Costs in the band of one written phone from those of the previous one; writes the optimal steps."""
     low, low_before = lows
     width = len(before)
     row = np.full(width, np.inf, np.float32)

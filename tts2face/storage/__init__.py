@@ -1,1 +1,1 @@
-"""Files: read and written whole, checked, named, and never one that is also an input."""
+"""File access: atomic writes, output names, protection of inputs, and checks of model files."""

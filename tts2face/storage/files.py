@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, and those that are shipped."""
+"""Atomic writing of files, and lookup of shipped files."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ SHIPPED_FOLDER = Path(__file__).parents[1] / "data"
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file beside `path`, then rename it, so that no half file is ever seen.
+    """Write a file atomically: to a temporary file in the same folder, which is then renamed to `path`.
 
     Raises
     ------
@@ -17,22 +17,22 @@ def write_atomically(path: Path, content: bytes) -> None:
         The folder cannot be written or the disk is full.
     """
     try:
-        with Temporary(path) as beside:
-            beside.path.write_bytes(content)
-            beside.replace(path)
-    except OSError as refused:
+        with Temporary(path) as temporary:
+            temporary.path.write_bytes(content)
+            temporary.replace(path)
+    except OSError as error:
         raise BackendError(
-            f"cannot write {path}: {refused.strerror}; free some space or choose another folder"
-        ) from refused
+            f"cannot write {path}: {error.strerror}; free some space or choose another folder"
+        ) from error
 
 
 def find_file(name: str, kind: str) -> Path:
-    """Where a talker, face or palette lies: a shipped one by name, or a path.
+    """Path of a talker, face or palette: a shipped one by name, or the given path.
 
     Raises
     ------
     InputError
-        There is neither.
+        There is neither a shipped file of this name nor such a path.
     """
     shipped = SHIPPED_FOLDER / f"{name}.{kind}"
     if shipped.parent == SHIPPED_FOLDER and shipped.is_file():

@@ -1,4 +1,4 @@
-"""Names of files to write, checked before the work whose result they take."""
+"""Checks of output paths, made before the computation whose result they receive."""
 
 import os
 import re
@@ -7,28 +7,28 @@ from pathlib import Path
 
 from lexicon.errors import BackendError, InputError
 
-LONGEST_NAME = 255  # bytes, where the file system does not say
-HIDDEN_EXTRA = 16  # bytes that the hidden name adds under which a file is first written: dots and random letters
+LONGEST_NAME = 255  # bytes; used if the file system does not report a limit
+HIDDEN_EXTRA = 16  # bytes that the name of the temporary file adds: dots and random letters
 _SUFFIX_ALONE = re.compile(r"\.\w{2,7}")
 
 
 def check_name(path: Path) -> None:
-    """Refuse a path at which no file or folder can be made.
+    """Check that a file or folder can be created at a path.
 
     Raises
     ------
     InputError
-        The name is only a suffix or too long, or the folder around it does not exist.
+        The name is only a suffix or too long, or the parent folder does not exist.
     BackendError
         The folder cannot be written.
     """
     _check_stem(path)
     try:
         is_folder = path.parent.is_dir()
-    except OSError as refused:
-        raise InputError(f"cannot write {shortened(path)}: {refused.strerror}; choose another folder") from refused
+    except OSError as error:
+        raise InputError(f"cannot write {shortened(path)}: {error.strerror}; choose another folder") from error
     if not is_folder:
-        raise InputError(f"there is no folder {path.parent} to write {path.name} to; make it first")
+        raise InputError(f"there is no folder {path.parent} to write {path.name} to; create it first")
     longest = _longest_name(path.parent) - HIDDEN_EXTRA
     if (length := len(os.fsencode(path.name))) > longest:
         raise InputError(f"the name {shortened(path)} has {length} bytes; use at most {longest}")
@@ -37,12 +37,12 @@ def check_name(path: Path) -> None:
 
 
 def check_file_name(path: Path, what: str, suffixes: Sequence[str]) -> None:
-    """Refuse a path at which no file of one of the suffixes can be written; errors as `check_name`.
+    """Check that a file with one of the suffixes can be written at a path; further errors as `check_name`.
 
     Raises
     ------
     InputError
-        It has another suffix, or is a folder.
+        The path has another suffix, or is a folder.
     """
     _check_stem(path)
     if path.suffix not in suffixes:
@@ -53,7 +53,7 @@ def check_file_name(path: Path, what: str, suffixes: Sequence[str]) -> None:
 
 
 def shortened(path: Path) -> str:
-    """A path's name for a message, cut where it is very long."""
+    """Name of a path for a message, shortened to at most 60 characters."""
     return path.name if len(path.name) <= 60 else f"{path.name[:40]}...{path.name[-10:]}"
 
 
@@ -65,5 +65,5 @@ def _check_stem(path: Path) -> None:
 def _longest_name(folder: Path) -> int:
     try:
         return os.pathconf(folder, "PC_NAME_MAX")
-    except (AttributeError, OSError, ValueError):  # no such question on Windows, or no answer
+    except (AttributeError, OSError, ValueError):  # not available on Windows, or unknown
         return LONGEST_NAME

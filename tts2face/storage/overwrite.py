@@ -1,4 +1,4 @@
-"""Inputs that an output would replace."""
+"""Protection of inputs against being overwritten by outputs."""
 
 import os
 from collections.abc import Mapping
@@ -6,26 +6,28 @@ from pathlib import Path
 
 from lexicon.errors import InputError
 
-MADE_HERE = frozenset({".talker", ".face", ".palette", ".html"})  # never read from a folder of recordings
+OUTPUT_SUFFIXES = frozenset(
+    {".talker", ".face", ".palette", ".html"}
+)  # outputs that are never inputs in a folder of recordings
 AnyPath = Path | str | None
 
 
 def refuse_overwriting(outputs: Mapping[str, AnyPath], inputs: Mapping[str, AnyPath]) -> None:
-    """Refuse outputs that would replace an input or each other.
+    """Check that no output replaces an input or another output.
 
-    Files are compared, not names: a relative path, a symbolic link and a hard link are recognised.
+    Files are compared instead of names: relative paths, symbolic links and hard links are recognised.
 
     Parameters
     ----------
     outputs, inputs
-        Paths by the name under which the user gave them, such as ``--out``; None where there is none. An input may be a
-        folder; text without a suffix is the name of something shipped, not a path.
+        Paths by option name, such as ``--out``; None is ignored. An input may be a folder; text without a suffix is
+        the name of a shipped file, not a path.
 
     Raises
     ------
     InputError
-        An output is an input, holds one, or replaces a file in a folder of inputs that may be one; or two outputs are
-        the same file.
+        An output is an input, contains one, or replaces a possible input in a folder of inputs; or two outputs are the
+        same file.
     """
     written = [(name, Path(path)) for name, path in outputs.items() if path is not None]
     read = [(name, Path(path)) for name, path in inputs.items() if path is not None and _is_path(path)]
@@ -37,8 +39,10 @@ def refuse_overwriting(outputs: Mapping[str, AnyPath], inputs: Mapping[str, AnyP
             if _is_same(output, given):
                 raise InputError(f"{name} {output} would replace {source}; choose another name")
             if output.is_dir() and _lies_in(given, output):
-                raise InputError(f"{name} {output} would replace the folder that {source} lies in; choose another name")
-            if given.is_dir() and output.exists() and output.suffix not in MADE_HERE and _lies_in(output, given):
+                raise InputError(
+                    f"{name} {output} would replace the folder that contains {source}; choose another name"
+                )
+            if given.is_dir() and output.exists() and output.suffix not in OUTPUT_SUFFIXES and _lies_in(output, given):
                 raise InputError(f"{name} {output} would replace a file of {source}; choose another name")
 
 
@@ -53,6 +57,6 @@ def _is_same(one: Path, other: Path) -> bool:
 
 
 def _lies_in(path: Path, folder: Path) -> bool:
-    """Whether a path lies in a folder, as it is written or behind its links."""
+    """Whether a path lies in a folder, as given or after resolving links."""
     inside = Path(os.path.realpath(folder))
     return inside in Path(os.path.realpath(path)).parents or inside in Path(os.path.abspath(path)).parents

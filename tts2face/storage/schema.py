@@ -1,7 +1,7 @@
-"""What a model file must hold, as tables: type, shape and range of each array, and types of its metadata.
+"""Schema checks of model files: type, shape and range of each array, and types of the metadata.
 
-Every check raises DataError with the file, what is wrong, which value, and what to do. A named dimension has one size
-in the whole file; it is at least 1 unless the array may be empty.
+Every check raises a DataError that names the file, the array or key, the value, and the remedy. A named dimension has
+one size in the whole file; it is at least 1 unless the array may be empty.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,29 +14,29 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 
-MOST_MM = 1e4  # of any coordinate: a head of 10 m is in another unit
-MOST_TEXT = 100_000  # characters of one text in the metadata
-MOST_DEPTH = 16  # levels of lists and objects in metadata whose form is free
-SHOWN = 60  # characters of a value in an error
-Check = Callable[[Any, str], None]  # raises DataError where a value, at a named place, is not what it must be
+MAX_MM = 1e4  # of any coordinate; larger values indicate another unit
+MAX_TEXT = 100_000  # characters of one text in the metadata
+MAX_DEPTH = 16  # levels of nesting in metadata of free form
+MAX_SHOWN_CHARACTERS = 60  # characters of a value in an error message
+Check = Callable[[Any, str], None]  # check(value, name) raises DataError if a value is invalid
 
 
 @dataclass(frozen=True, slots=True)
 class Tensor:
-    """What an array must be.
+    """Requirements of an array.
 
     Parameters
     ----------
     dtype
-        NumPy's name of the type of its numbers, such as ``float32``.
+        NumPy name of the data type, such as ``float32``.
     shape
-        Sizes, or names of sizes.
+        Sizes, or names of dimensions.
     low, high
-        Least and greatest number; no check of the range of integers without them. Numbers are always finite.
+        Least and greatest value; None for no limit. Values must be finite.
     may_be_empty, is_optional
         Whether dimensions may be 0, and whether the array may be absent.
     may_be_nan
-        Whether NaN stands for an unknown value.
+        Whether NaN is allowed for an unknown value.
     """
 
     dtype: str
@@ -48,14 +48,14 @@ class Tensor:
     may_be_nan: bool = False
 
 
-def millimetres(*shape: int | str, dtype: str = "float32", most: float = MOST_MM) -> Tensor:
-    """Lengths of either sign."""
+def millimetres(*shape: int | str, dtype: str = "float32", most: float = MAX_MM) -> Tensor:
+    """Requirements of an array of lengths or coordinates, mm, of magnitude up to `most`."""
     return Tensor(dtype, shape, -most, most)
 
 
 @dataclass(slots=True)
 class Contents:
-    """Arrays and metadata of a file while they are checked; ``sizes`` are the named dimensions seen so far."""
+    """Arrays and metadata of a file under check; ``sizes`` holds the named dimensions found so far."""
 
     path: Path
     kind: str
@@ -65,16 +65,16 @@ class Contents:
     known: set[str] = field(default_factory=set)
 
     def fail(self, what: str) -> NoReturn:
-        """Refuse the file."""
+        """Raise a DataError about the file."""
         refuse(f"{self.path}: {what}", self.kind)
 
     def require(self, holds: bool, what: str) -> None:
-        """Refuse the file unless a condition holds."""
+        """Raise a DataError about the file unless a condition holds."""
         if not holds:
             self.fail(what)
 
     def tensors(self, specs: Mapping[str, Tensor]) -> None:
-        """Check arrays by name."""
+        """Check arrays by name and record their dimensions."""
         for name, spec in specs.items():
             self.known.add(name)
             if name in self.arrays:
@@ -83,42 +83,42 @@ class Contents:
                 self.fail(f"lacks the array {name}")
 
     def metadata(self, specs: Mapping[str, Check]) -> None:
-        """Check keys of the metadata, all of them required; others must be JSON of limited depth."""
+        """Check the metadata: the keys of `specs` are required; others must be JSON of limited depth."""
         where = f"{self.path}: metadata"
         record(specs)({key: self.header[key] for key in specs if key in self.header}, where)
         for key in self.header.keys() - specs.keys():
-            anything(self.header[key], f"{where}: {_shown(key)}")
+            anything(self.header[key], f"{where}: {_abbreviate(key)}")
 
     def only_known(self) -> None:
-        """Refuse arrays that no table names."""
+        """Check that there are no arrays besides those checked before."""
         unknown = sorted(self.arrays.keys() - self.known)
         if unknown:
-            self.fail(f"holds the array {_shown(unknown[0])}, which no {self.kind} has")
+            self.fail(f"holds the array {_abbreviate(unknown[0])}, which no {self.kind} has")
 
     def indices(self, name: str, n: int, of_what: str) -> None:
-        """Check that an array's numbers are indices of n things."""
+        """Check that the values of an array are indices in [0, n); `of_what` names the indexed items."""
         values = self.arrays[name]
         if values.size and not 0 <= int(values.min()) <= int(values.max()) < n:
             wrong = values.min() if values.min() < 0 else values.max()
             self.fail(f"{name} holds {wrong}, beyond its {n} {of_what}")
 
     def sums_to(self, name: str, n: int, what: str) -> None:
-        """Check that counts, each at least 1, add up to a number."""
+        """Check that counts, each at least 1, add up to n."""
         values = self.arrays[name]
-        self.require(int(values.min(initial=1)) >= 1, f"{name} holds {values.min(initial=1)}; every count is above 0")
+        self.require(int(values.min(initial=1)) >= 1, f"{name} holds {values.min(initial=1)}; counts must be above 0")
         total = int(values.sum(dtype=np.int64))
         self.require(total == n, f"{name} adds up to {total}, but there are {n} {what}")
 
     def distinct(self, name: str) -> None:
-        """Check that no number of an array occurs twice."""
+        """Check that the values of an array are distinct."""
         values = self.arrays[name]
-        self.require(len(np.unique(values)) == values.size, f"{name} holds a number twice")
+        self.require(len(np.unique(values)) == values.size, f"{name} holds a duplicate number")
 
     def orthonormal(self, name: str) -> None:
-        """Check that the rows (k, ...) of an array are orthonormal, to 1 %."""
+        """Check that the rows (k, ...) of an array are orthonormal within 1 %."""
         rows = self.arrays[name].astype(np.float32).reshape(len(self.arrays[name]), -1)
-        away = float(np.abs(rows @ rows.T - np.eye(len(rows), dtype=np.float32)).max())
-        self.require(away < 0.01, f"{name} is not orthonormal: products of its rows are off by {away:.3g}")
+        error = float(np.abs(rows @ rows.T - np.eye(len(rows), dtype=np.float32)).max())
+        self.require(error < 0.01, f"{name} is not orthonormal: products of its rows differ by {error:.3g}")
 
     def _tensor(self, name: str, spec: Tensor) -> None:
         array = self.arrays[name]
@@ -148,107 +148,107 @@ class Contents:
 
 
 def text(value: Any, where: str) -> None:
-    """Check a text."""
-    if type(value) is not str or len(value) > MOST_TEXT:
-        refuse(f"{where} is {_shown(value)}, not a text of at most {MOST_TEXT} characters")
+    """Check that a value is a string of limited length."""
+    if type(value) is not str or len(value) > MAX_TEXT:
+        refuse(f"{where} is {_abbreviate(value)}, not a text of at most {MAX_TEXT} characters")
 
 
 def flag(value: Any, where: str) -> None:
-    """Check a truth value."""
+    """Check that a value is a Boolean."""
     if type(value) is not bool:
-        refuse(f"{where} is {_shown(value)}, not true or false")
+        refuse(f"{where} is {_abbreviate(value)}, not true or false")
 
 
 def whole(low: int, high: int) -> Check:
-    """Check of a whole number."""
+    """Check for an integer in [low, high]."""
 
     def check(value: Any, where: str) -> None:
         if type(value) is not int or not low <= value <= high:
-            refuse(f"{where} is {_shown(value)}, not a whole number from {low} to {high}")
+            refuse(f"{where} is {_abbreviate(value)}, not a whole number from {low} to {high}")
 
     return check
 
 
 def number(low: float, high: float) -> Check:
-    """Check of a number."""
+    """Check for a number in [low, high]."""
 
     def check(value: Any, where: str) -> None:
         if type(value) not in (int, float) or not low <= value <= high:
-            refuse(f"{where} is {_shown(value)}, not a number from {low:g} to {high:g}")
+            refuse(f"{where} is {_abbreviate(value)}, not a number from {low:g} to {high:g}")
 
     return check
 
 
 def listed(item: Check, length: int | None = None) -> Check:
-    """Check of a list, and of each of its items."""
+    """Check for a list, of a given length if any, whose items all pass `item`."""
 
     def check(value: Any, where: str) -> None:
         if type(value) is not list or length not in (None, len(value)):
-            refuse(f"{where} is {_shown(value)}, not a list{'' if length is None else f' of {length}'}")
-        for at, one in enumerate(value):
-            item(one, f"{where}[{at}]")
+            refuse(f"{where} is {_abbreviate(value)}, not a list{'' if length is None else f' of {length}'}")
+        for at, element in enumerate(value):
+            item(element, f"{where}[{at}]")
 
     return check
 
 
 def row(*items: Check) -> Check:
-    """Check of a list whose items differ in kind."""
+    """Check for a list with one check per item."""
 
     def check(value: Any, where: str) -> None:
         if type(value) is not list or len(value) != len(items):
-            refuse(f"{where} is {_shown(value)}, not a list of {len(items)}")
-        for at, (item, one) in enumerate(zip(items, value, strict=True)):
-            item(one, f"{where}[{at}]")
+            refuse(f"{where} is {_abbreviate(value)}, not a list of {len(items)}")
+        for at, (item, element) in enumerate(zip(items, value, strict=True)):
+            item(element, f"{where}[{at}]")
 
     return check
 
 
 def record(fields: Mapping[str, Check], optional: Mapping[str, Check] | None = None) -> Check:
-    """Check of an object with these keys and no others."""
+    """Check for an object with required and optional keys and no others."""
     every = {**fields, **(optional or {})}
 
     def check(value: Any, where: str) -> None:
         if type(value) is not dict:
-            refuse(f"{where} is {_shown(value)}, not an object")
+            refuse(f"{where} is {_abbreviate(value)}, not an object")
         for key in fields.keys() - value.keys():
             refuse(f"{where} lacks {key}")
-        for key, one in value.items():
+        for key, element in value.items():
             if key not in every:
-                refuse(f"{where} holds {_shown(key)}, which is not one of {', '.join(every)}")
-            every[key](one, f"{where}: {key}")
+                refuse(f"{where} holds {_abbreviate(key)}, which is not one of {', '.join(every)}")
+            every[key](element, f"{where}: {key}")
 
     return check
 
 
 def table(item: Check) -> Check:
-    """Check of an object with any keys, and of each of its values."""
+    """Check for an object with any keys whose values all pass `item`."""
 
     def check(value: Any, where: str) -> None:
         if type(value) is not dict:
-            refuse(f"{where} is {_shown(value)}, not an object")
-        for key, one in value.items():
-            item(one, f"{where}: {_shown(key)}")
+            refuse(f"{where} is {_abbreviate(value)}, not an object")
+        for key, element in value.items():
+            item(element, f"{where}: {_abbreviate(key)}")
 
     return check
 
 
-def anything(value: Any, where: str, depth: int = MOST_DEPTH) -> None:
-    """Check JSON of any form: its depth, and the length of its texts."""
+def anything(value: Any, where: str, depth: int = MAX_DEPTH) -> None:
+    """Check the nesting depth and the string lengths of JSON of any form."""
     if type(value) is str:
         text(value, where)
     if depth == 0 and isinstance(value, list | dict):
-        refuse(f"{where} is nested deeper than {MOST_DEPTH} levels")
-    for one in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
-        anything(one, where, depth - 1)
+        refuse(f"{where} is nested deeper than {MAX_DEPTH} levels")
+    for element in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        anything(element, where, depth - 1)
 
 
 def free(value: Any, where: str) -> None:
-    """Check an object of any keys."""
+    """Check for an object with any keys and values."""
     table(anything)(value, where)
 
 
 def refuse(what: str, kind: str = "file") -> NoReturn:
-    """Refuse a file.
+    """Raise a DataError that ends with the advice to build or copy the file again.
 
     Raises
     ------
@@ -258,10 +258,10 @@ def refuse(what: str, kind: str = "file") -> NoReturn:
     raise DataError(f"{what}; build or copy the {kind} again")
 
 
-def _shown(value: Any) -> str:
+def _abbreviate(value: Any) -> str:
     if isinstance(value, list | dict):
         return f"a {'list' if isinstance(value, list) else 'n object'} of {len(value)}".replace("a n ", "an ")
     if isinstance(value, int) and value.bit_length() > 200:
         return "a number of more than 60 digits"
-    written = repr(value[: SHOWN + 1] if isinstance(value, str) else value)
-    return written if len(written) <= SHOWN else written[:SHOWN] + "..."
+    shown = repr(value[: MAX_SHOWN_CHARACTERS + 1] if isinstance(value, str) else value)
+    return shown if len(shown) <= MAX_SHOWN_CHARACTERS else shown[:MAX_SHOWN_CHARACTERS] + "..."

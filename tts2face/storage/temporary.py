@@ -1,8 +1,8 @@
-"""Files that are written beside their place, and removed by the next run where a process was killed.
+"""Temporary files in the folder of their target, which a later run removes after a process was killed.
 
-Every one is locked by the process that writes it (``flock``), for as long as that process lives; one that nobody locks
-was left behind. The system releases the lock however a process ends. Where there are no such locks (Windows) nothing
-that was left behind is removed.
+The process that writes a temporary file holds a lock on it (``flock``), which the system releases when the process
+ends in any way; an unlocked temporary file is abandoned. On systems without such locks (Windows) abandoned files are
+not removed.
 """
 
 import contextlib
@@ -18,20 +18,20 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-OURS = ".tts2face-"  # in the names of all of them
-TAKEN = (BlockingIOError, FileNotFoundError)
-MOST_BYTES = 100  # of the target's name; file systems allow 255 for a whole name
+NAME_INFIX = ".tts2face-"  # part of the names of all temporary files
+LOCK_ERRORS = (BlockingIOError, FileNotFoundError)
+MAX_NAME_BYTES = 100  # of the target's name; file systems allow 255 in total
 
 
 class Temporary:
-    """A new, empty, hidden file or folder beside a target, locked by this process.
+    """New, empty, hidden file or folder in the folder of a target, locked by this process.
 
-    Making one removes what killed processes left beside the same target.
+    Creating one removes the abandoned temporary files of the same target.
 
     Parameters
     ----------
     target
-        What it is going to be.
+        Path that it replaces when complete.
 
     Raises
     ------
@@ -42,35 +42,35 @@ class Temporary:
     def __init__(self, target: Path, *, is_folder: bool = False) -> None:
         remove_left_behind(target)
         self._lock: int | None = None
-        self.path = _made(target, is_folder)
+        self.path = _create(target, is_folder)
         while fcntl is not None:
             try:
-                self._lock = _locked(self.path)
+                self._lock = _lock_file(self.path)
                 break
-            except TAKEN:  # by another process, which took it for left behind before it was locked
-                self.path = _made(target, is_folder)
-            except OSError:  # a file system without locks, on which nobody removes it either
+            except LOCK_ERRORS:  # another process removed it before it was locked
+                self.path = _create(target, is_folder)
+            except OSError:  # a file system without locks, where it is not removed
                 break
 
     def __enter__(self) -> "Temporary":
-        """Give itself."""
+        """Return itself."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Remove it unless it is in its place."""
+        """Remove it unless it was renamed to its target."""
         self.remove()
 
     def replace(self, target: Path) -> None:
-        """Rename it to the target; a folder replaces the folder that is there."""
+        """Rename it to the target; a folder replaces an existing folder."""
         if self.path.is_dir() and target.is_dir():
             shutil.rmtree(target)
         os.replace(self.path, target)
         self._release()
 
     def remove(self) -> None:
-        """Remove it unless it is in its place."""
+        """Remove it unless it was renamed to its target."""
         _remove(self.path)
         self._release()
 
@@ -81,49 +81,49 @@ class Temporary:
 
 
 def remove_left_behind(target: Path) -> None:
-    """Remove temporary files and folders of a target whose process is dead; those of living processes stay."""
+    """Remove the temporary files and folders of a target that no process has locked."""
     if fcntl is None:
         return
-    for found in _beside(target):
-        with contextlib.suppress(OSError):  # somebody writes it, or it may not be removed
-            lock = _locked(found)
+    for found in _temporaries_of(target):
+        with contextlib.suppress(OSError):  # another process writes it, or it cannot be removed
+            lock = _lock_file(found)
             try:
                 _remove(found)
             finally:
                 os.close(lock)
 
 
-def _beside(target: Path) -> list[Path]:
-    beginning = _beginning(target)
+def _temporaries_of(target: Path) -> list[Path]:
+    prefix = _name_prefix(target)
     try:
         with os.scandir(target.parent) as entries:
-            return [Path(entry.path) for entry in entries if entry.name.startswith(beginning)]
+            return [Path(entry.path) for entry in entries if entry.name.startswith(prefix)]
     except OSError:
         return []
 
 
-def _beginning(target: Path) -> str:
-    return f".{os.fsencode(target.name)[:MOST_BYTES].decode(errors='ignore')}{OURS}"
+def _name_prefix(target: Path) -> str:
+    return f".{os.fsencode(target.name)[:MAX_NAME_BYTES].decode(errors='ignore')}{NAME_INFIX}"
 
 
-def _made(target: Path, is_folder: bool) -> Path:
+def _create(target: Path, is_folder: bool) -> Path:
     if is_folder:
-        folder = Path(tempfile.mkdtemp(prefix=_beginning(target), dir=target.parent))
+        folder = Path(tempfile.mkdtemp(prefix=_name_prefix(target), dir=target.parent))
         folder.chmod(0o755)
         return folder
-    handle, name = tempfile.mkstemp(prefix=_beginning(target), dir=target.parent)
+    handle, name = tempfile.mkstemp(prefix=_name_prefix(target), dir=target.parent)
     os.close(handle)
     os.chmod(name, 0o644)
     return Path(name)
 
 
-def _locked(path: Path) -> int:
-    """An open file that locks a path.
+def _lock_file(path: Path) -> int:
+    """File descriptor that holds a lock on a path.
 
     Raises
     ------
     OSError
-        One of `TAKEN` where another process holds or has removed it.
+        One of `LOCK_ERRORS` if another process has locked or removed the path.
     """
     handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
     try:

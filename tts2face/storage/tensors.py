@@ -1,4 +1,4 @@
-"""Arrays and JSON metadata in one safetensors file: how a talker and a face are kept, without pickle."""
+"""Arrays and JSON metadata in one safetensors file, the container of all model files."""
 
 import json
 from collections.abc import Mapping
@@ -12,12 +12,12 @@ from lexicon.errors import DataError, InputError
 from lexicon.inputs import parse_json
 from tts2face.storage.files import write_atomically
 
-MOST_METADATA = 32_000_000  # characters; 800 utterances with their words take 150,000
+MAX_METADATA_CHARACTERS = 32_000_000  # characters; 800 utterances with their words have 150,000
 Arrays = Mapping[str, NDArray[Any]]
 
 
 def write_tensors(path: Path, kind: str, version: int, arrays: Arrays, metadata: Mapping[str, Any]) -> None:
-    """Write arrays and metadata beside `path`, then rename, so that no half file is ever seen.
+    """Write arrays and metadata to a file atomically; equal contents give equal bytes.
 
     Raises
     ------
@@ -32,7 +32,7 @@ def write_tensors(path: Path, kind: str, version: int, arrays: Arrays, metadata:
 
 
 def _sort_header(content: bytes) -> bytes:
-    """The same file with its header's keys in order: the library shuffles them, and equal talkers are equal bytes."""
+    """File content with the keys of its header sorted; the library writes them in random order."""
     start = 8 + int.from_bytes(content[:8], "little")
     text = json.dumps(json.loads(content[8:start]), ensure_ascii=False, sort_keys=True, separators=(",", ":"))
     header = text.encode()
@@ -46,7 +46,7 @@ def read_tensors(path: Path, kind: str, version: int) -> tuple[dict[str, NDArray
     Raises
     ------
     InputError
-        There is no such file.
+        The file does not exist.
     DataError
         The file is truncated, of another kind, or of another version.
     """
@@ -61,28 +61,32 @@ def read_tensors(path: Path, kind: str, version: int) -> tuple[dict[str, NDArray
                 raise DataError(f"{path} is not a {kind} file; give one that tts2face wrote")
             if header.get("version") != str(version):
                 raise DataError(
-                    f"{path} is a {kind} file of version {header.get('version')}, this one reads {version}; "
-                    "build it again"
+                    f"{path} is a {kind} file of version {header.get('version')}, not {version}; build it again"
                 )
             arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
             return arrays, _metadata(header["metadata"], path)
-    except (SafetensorError, KeyError, OSError, ValueError, TypeError, AttributeError) as broken:
-        if isinstance(broken, DataError):
+    except (SafetensorError, KeyError, OSError, ValueError, TypeError, AttributeError) as error:
+        if isinstance(error, DataError):
             raise
-        raise DataError(f"{path} is damaged or not a {kind} file; build or copy it again") from broken
+        raise DataError(f"{path} is damaged or not a {kind} file; build or copy it again") from error
 
 
 def _metadata(text: str, path: Path) -> dict[str, Any]:
-    """The metadata: a JSON object.
+    """Parsed metadata, a JSON object.
 
     Raises
     ------
     DataError
-        It is something else, or too long.
+        The text is not a JSON object, or is too long.
     """
-    if len(text) > MOST_METADATA:
-        raise DataError(f"{path}: the metadata have {len(text)} characters, more than {MOST_METADATA}; build it again")
-    found = parse_json(text, f"the metadata of {path}")
+    if len(text) > MAX_METADATA_CHARACTERS:
+        raise DataError(
+            f"{path}: the metadata have {len(text)} characters, more than {MAX_METADATA_CHARACTERS}; build it again"
+        )
+    try:
+        found = parse_json(text, "the metadata")
+    except DataError as broken:
+        raise DataError(f"{path}: the metadata cannot be read as JSON ({broken}); build or copy it again") from broken
     if not isinstance(found, dict):
         raise DataError(f"{path}: the metadata are a {type(found).__name__}, not an object; build or copy it again")
     return found

@@ -1,1 +1,1 @@
-"""What joins the rooms: text, recordings and performances become clips."""
+"""Synthesis of clips from text, recorded speech and recorded performances."""

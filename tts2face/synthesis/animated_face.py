@@ -1,7 +1,7 @@
-"""What can be animated and shown: one protocol, a mesh face and a talker's own face.
+"""Faces prepared for animation: a protocol with two implementations, a mesh and a talker's own face.
 
-An animated face belongs to one talker: it turns that talker's lip motion into motion of its own channels, lays gestures
-over it, and makes the renderer that draws its frames. No code outside this module asks which of the two it is.
+An animated face is prepared for one talker. It converts the talker's lip motion to its own channels, adds gestures, and
+creates the renderer of its frames. Code outside this module depends on the protocol only.
 """
 
 from collections.abc import Mapping
@@ -35,38 +35,44 @@ from tts2face.types import HEAD_CHANNELS, Trajectory
 from tts2face.video.livelink import FaceCapture
 from tts2face.video.take import Take
 
-FIXED_FEATURES = ("gaze", "head", *SPEECH_GAINS)  # on a talker's own video they cannot be moved
+FIXED_FEATURES = ("gaze", "head", *SPEECH_GAINS)  # features that a talker's own video fixes
 
 Gestures = Mapping[str, NDArray[np.float32]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FaceMotion:
-    """Motion (T, K) of a face's channels and of its head (T, 6), on one clock."""
+    """Motion (T, K) of a face's channels and (T, 6) of its head, at the same frames."""
 
     face: Trajectory
     head: Trajectory
 
 
 class AnimatedFace(Protocol):
-    """A face made ready for one talker; serves any number of clips and threads."""
+    """A face prepared for one talker; immutable, for any number of clips and threads."""
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of the channels that it can move. The motion of a clip is in all of them, or in the first ones."""
+        """Names of all channels. The motion of a clip has all of them, or the first ones."""
 
     @property
     def mesh(self) -> Face:
-        """The mesh with the shapes of all channels; InputError where the face has none."""
+        """Mesh with the shapes of all channels.
+
+        Raises
+        ------
+        InputError
+            The face has no mesh.
+        """
 
     def motion_of_tokens(self, selection: TokenSelection, *, fps: float, n_frames: int) -> Trajectory:
-        """Motion of speech from selected tokens of the talker."""
+        """Speech motion (`n_frames`, K) from selected tokens of the talker."""
 
     def motion_of_parameters(self, speech: Trajectory) -> Trajectory:
-        """Motion of speech from the talker's speech parameters (T, S)."""
+        """Speech motion (T, K) from the talker's speech parameters (T, S)."""
 
     def motion_of_take(self, take: Take, *, gain: float = 1.0) -> Trajectory:
-        """Motion of a performer in a video.
+        """Motion (T, K) of a performer tracked in a video; `gain` multiplies it.
 
         Raises
         ------
@@ -75,7 +81,7 @@ class AnimatedFace(Protocol):
         """
 
     def motion_of_capture(self, capture: FaceCapture, *, gain: float = 1.0) -> Trajectory:
-        """Motion of an ARKit capture: shapes of the same name take its weights, within their limits.
+        """Motion (T, K) of an ARKit capture: shapes of the same name take its weights, clipped to their limits.
 
         Raises
         ------
@@ -84,7 +90,7 @@ class AnimatedFace(Protocol):
         """
 
     def with_motion_of(self, take: Take) -> "AnimatedFace":
-        """The face with the motion of lips that a take shows and its talker's recordings lack (T07, section 3.1).
+        """Extend the face by the lip motion of a take that the talker's recordings lack (T07, section 3.1).
 
         Raises
         ------
@@ -93,144 +99,153 @@ class AnimatedFace(Protocol):
         """
 
     def check_gains(self, gains: Mapping[str, float]) -> None:
-        """Refuse gains of features that this face cannot move (InputError)."""
-
-    def add_gestures(self, speech: Trajectory, gestures: Gestures, gains: Mapping[str, float]) -> FaceMotion:
-        """Motion of speech with gestures.
-
-        Parameters
-        ----------
-        gestures
-            (T, k) values of features of the palette, in its units.
-        gains
-            Factors on the motion of features.
+        """Reject gains of features that this face cannot move.
 
         Raises
         ------
         InputError
-            The speech is not in the channels of this face, or a feature does not fit its frames.
+            The face cannot move a feature of `gains`.
+        """
+
+    def add_gestures(self, speech: Trajectory, gestures: Gestures, gains: Mapping[str, float]) -> FaceMotion:
+        """Add gestures to speech motion.
+
+        Parameters
+        ----------
+        speech : (T, K)
+            Speech motion in channels of this face.
+        gestures
+            (T, k) values of each feature of the palette, in the palette's units.
+        gains
+            Factors of the speech motion by feature (jaw, lips).
+
+        Raises
+        ------
+        InputError
+            The speech is not in the channels of this face, or a feature has another number of frames.
         """
 
     def renderer(self, picture: Picture) -> FrameRenderer:
-        """What draws this face.
+        """Create the renderer of this face.
 
         Raises
         ------
         InputError, BackendError
-            The face cannot be drawn in this way, or the machine lacks the renderer.
+            The face cannot be drawn with these options, or the renderer is not installed.
         """
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshFace:
-    """A mesh face: the talker's motion is retargeted to its shapes. Without a palette it has no gestures."""
+    """A mesh to whose shapes the talker's motion is retargeted; `gestures` is None without a palette."""
 
     face: Face
-    voice: ExemplarModel
+    exemplars: ExemplarModel
     retargeter: Retargeter
     gestures: GestureFace | None
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """The face's own shapes, then those that a palette adds."""
+        """Names of the face's own shapes, then of those that the palette adds."""
         return self.mesh.shape_names
 
     @property
     def mesh(self) -> Face:
-        """The face with the shapes of all channels."""
+        """Mesh with the shapes of all channels."""
         return self.face if self.gestures is None else self.gestures.face
 
     def motion_of_tokens(self, selection: TokenSelection, *, fps: float, n_frames: int) -> Trajectory:
-        """Motion of speech from selected tokens of the talker."""
-        return self.retargeter.retarget(blend_trajectory(selection, self.voice, fps=fps, n_frames=n_frames))
+        """Shape weights (`n_frames`, K) from selected tokens of the talker."""
+        return self.retargeter.retarget(blend_trajectory(selection, self.exemplars, fps=fps, n_frames=n_frames))
 
     def motion_of_parameters(self, speech: Trajectory) -> Trajectory:
-        """Motion of speech from the talker's speech parameters."""
+        """Shape weights (T, K) from the talker's speech parameters (T, S)."""
         return self.retargeter.retarget(speech)
 
     def motion_of_take(self, take: Take, *, gain: float = 1.0) -> Trajectory:
-        """Motion of a performer in a video: lips by least squares on landmarks, eyes and brows by their scores."""
+        """Shape weights (T, K) of a performer: lips by least squares on landmarks, eyes and brows from scores."""
         return build_performer_retargeter(take.landmarks, take.scores, self.face).weights(
             take.landmarks, take.scores, gain=gain
         )
 
     def motion_of_capture(self, capture: FaceCapture, *, gain: float = 1.0) -> Trajectory:
-        """Motion of an ARKit capture, by the names of shapes; eyes turn as captured, whatever the gain."""
+        """Shape weights (T, K) of an ARKit capture, matched by name; the gain does not apply to the gaze."""
         return match_shapes(capture.weights, self.face, gain=gain)
 
     def with_motion_of(self, take: Take) -> "AnimatedFace":
-        """A mesh has the shapes that its file holds (InputError)."""
+        """Raise InputError: the shapes of a mesh are fixed."""
         del take
         raise InputError("missing motion can be appended to a talker's own face only; choose --face self")
 
     def check_gains(self, gains: Mapping[str, float]) -> None:
-        """All features of a mesh can be moved."""
+        """Accept all gains: a mesh can move every feature."""
 
     def add_gestures(self, speech: Trajectory, gestures: Gestures, gains: Mapping[str, float]) -> FaceMotion:
-        """Motion of speech with gestures; closed lips stay closed."""
+        """Add gestures to speech motion; closed lips stay closed."""
         if self.gestures is None:
-            raise InputError("this face was made without a palette, so it has no gestures; make it with one")
+            raise InputError("this face was prepared without a palette and has no gestures; prepare it with a palette")
         performance = self.gestures.perform(speech, gestures, gains)
         return FaceMotion(performance.motion, performance.head)
 
     def renderer(self, picture: Picture) -> FrameRenderer:
-        """What draws the mesh."""
+        """Create the renderer of the mesh."""
         return mesh_renderer(self.mesh, picture)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OwnAppearanceFace:
-    """A talker's own face, drawn on the talker's own video; gaze and head move as in that video."""
+    """A talker's own face, drawn over the talker's video, which fixes the gaze and the head pose."""
 
     talker: Talker
-    voice: ExemplarModel
-    looks: AppearanceExemplars
+    exemplars: ExemplarModel
+    appearance: AppearanceExemplars
     regression: AppearanceRegression
     gestures: OwnFaceGestures | None
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Speech parameters, appearance parameters, and those of the gestures of a palette."""
+        """Names of the speech parameters, the appearance parameters, and the gesture parameters of the palette."""
         added = () if self.gestures is None else self.gestures.channels
         return self.regression.speech + self.regression.looks + added
 
     @property
     def mesh(self) -> Face:
-        """A talker's own face is drawn from pictures and has no mesh (InputError)."""
+        """Raise InputError: a talker's own face is drawn from pictures and has no mesh."""
         raise InputError("a talker's own face has no mesh; choose --face head, cartoon or a .face file")
 
     def motion_of_tokens(self, selection: TokenSelection, *, fps: float, n_frames: int) -> Trajectory:
-        """Motion of speech, and the appearance of the very tokens that move the lips."""
-        lips = blend_trajectory(selection, self.voice, fps=fps, n_frames=n_frames)
-        looks = appearance_trajectory(selection, self.looks, fps=fps, n_frames=n_frames)
-        return Trajectory(lips.channels + looks.channels, np.concatenate([lips.values, looks.values], axis=1), fps)
+        """Speech and appearance parameters (`n_frames`, K), both blended from the same selected tokens."""
+        lips = blend_trajectory(selection, self.exemplars, fps=fps, n_frames=n_frames)
+        appearance = appearance_trajectory(selection, self.appearance, fps=fps, n_frames=n_frames)
+        values = np.concatenate([lips.values, appearance.values], axis=1)
+        return Trajectory(lips.channels + appearance.channels, values, fps)
 
     def motion_of_parameters(self, speech: Trajectory) -> Trajectory:
-        """Motion of speech, with the appearance that goes with such lips in the recordings."""
+        """Speech parameters with appearance parameters regressed on them, (T, K)."""
         return self.regression.motion(speech)
 
     def motion_of_take(self, take: Take, *, gain: float = 1.0) -> Trajectory:
-        """Motion of a performer, cloned by inner products (Theobald et al. 2007, eq. 5)."""
+        """Motion (T, K) of a performer, cloned by inner products (Theobald et al. 2007, eq. 5)."""
         model = lip_model(take.landmarks)
         names = tuple(f"shape{i}" for i in range(model.n_speech))
         speech = Trajectory(names, model.parameters(take.landmarks), take.fps)
         return self.regression.motion(build_parameter_transfer(model, self.talker.model, gain=gain).clone(speech))
 
     def motion_of_capture(self, capture: FaceCapture, *, gain: float = 1.0) -> Trajectory:
-        """A capture has no landmarks to clone (InputError)."""
+        """Raise InputError: a capture has no landmarks to clone."""
         del capture, gain
         raise InputError(
-            "a Live Link Face capture holds no landmarks, which a talker's own face needs; choose --face head, cartoon "
+            "a Live Link Face capture has no landmarks, which a talker's own face needs; choose --face head, cartoon "
             "or a .face file"
         )
 
     def with_motion_of(self, take: Take) -> "AnimatedFace":
-        """The talker's own face, with more modes of its shape model."""
+        """Add the modes of a take that the shape model lacks."""
         talker = extend_talker(lip_model(take.landmarks), self.talker)
         return replace(self, talker=talker, regression=fit_appearance_regression(talker))
 
     def check_gains(self, gains: Mapping[str, float]) -> None:
-        """Refuse gains of what the talker's video shows as it is."""
+        """Reject gains of the features that the talker's video fixes (InputError)."""
         for name in gains:
             if name in FIXED_FEATURES:
                 raise InputError(
@@ -239,42 +254,41 @@ class OwnAppearanceFace:
                 )
 
     def add_gestures(self, speech: Trajectory, gestures: Gestures, gains: Mapping[str, float]) -> FaceMotion:
-        """Motion of speech with gestures of lids, brows, cheeks and expression; the head's channels stay 0."""
+        """Add gestures of lids, brows, cheeks and expression; all head channels are 0."""
         if self.gestures is None:
-            raise InputError("this face was made without a palette, so it has no gestures; make it with one")
+            raise InputError("this face was prepared without a palette and has no gestures; prepare it with a palette")
         return FaceMotion(self.gestures.motion(speech, gestures, gains), resting_head(len(speech), speech.fps))
 
     def renderer(self, picture: Picture) -> FrameRenderer:
-        """What draws the face on the talker's video."""
+        """Create the renderer that draws the face over the talker's video."""
         return own_face_renderer(self.talker, picture, self.gestures)
 
 
-def mesh_face(talker: Talker, voice: ExemplarModel, face: Face, palette: Palette | None) -> MeshFace:
-    """Prepare a mesh face for a talker, and for the gestures of a palette.
+def mesh_face(talker: Talker, exemplars: ExemplarModel, face: Face, palette: Palette | None) -> MeshFace:
+    """Prepare a mesh for a talker and, if given, for the gestures of a palette.
 
     Raises
     ------
     DataError
-        The face lacks landmarks of the lips or eyes, or shapes that speech could move.
+        The face lacks landmarks of the lips or eyes, or shapes that speech can move.
     """
     gestures = None if palette is None else gesture_face(face, palette)
-    return MeshFace(face, voice, build_retargeter(talker, face), gestures)
+    return MeshFace(face, exemplars, build_retargeter(talker, face), gestures)
 
 
-def own_appearance_face(talker: Talker, voice: ExemplarModel, palette: Palette | None) -> OwnAppearanceFace:
-    """Prepare a talker's own face, and for the gestures of a palette.
+def own_appearance_face(talker: Talker, exemplars: ExemplarModel, palette: Palette | None) -> OwnAppearanceFace:
+    """Prepare a talker's own face and, if given, the gestures of a palette.
 
     Raises
     ------
     InputError
-        The talker has motion only.
+        The talker has no appearance model.
     """
     gestures = None if palette is None else build_own_face_gestures(talker, palette)
-    return OwnAppearanceFace(
-        talker, voice, build_appearance_exemplars(talker, voice), fit_appearance_regression(talker), gestures
-    )
+    appearance = build_appearance_exemplars(talker, exemplars)
+    return OwnAppearanceFace(talker, exemplars, appearance, fit_appearance_regression(talker), gestures)
 
 
 def resting_head(n_frames: int, fps: float) -> Trajectory:
-    """A head that does not move."""
+    """Head pose (`n_frames`, 6) of a head that does not move: all zeros."""
     return Trajectory(HEAD_CHANNELS, np.zeros((n_frames, len(HEAD_CHANNELS)), np.float32), fps)

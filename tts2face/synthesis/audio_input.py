@@ -1,7 +1,7 @@
-"""A recording of a voice drives the lips: by its words where they are known, else by its sound alone.
+"""Lip motion for recorded speech, by forced alignment of its transcript or by an audio map.
 
-Long recordings are read in blocks, once for their loudness, once for their features and once for the sound of the
-clips, so that memory stays small.
+Long recordings are read in blocks, once each for their level, their features and the sound of the clips, so that memory
+use is bounded.
 """
 
 from collections.abc import Iterator
@@ -27,18 +27,18 @@ from tts2face.speech.transcript_alignment import align_recording, pronounce_tran
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, frame_count
 from tts2face.video.media import sound_blocks
 
-CLIP_RATE = 48_000  # Hz, of the sound in the clip
-MAX_CLIP_FRAMES = 300  # of the clips that a long recording is given on in
-MIN_RECORDING_S = 0.1  # shorter sounds hold no phone
-SILENCE_LEVEL = 1e-4  # of full scale: nobody is heard below
+CLIP_RATE = 48_000  # Hz, sample rate of the clips
+MAX_CLIP_FRAMES = 300  # frames of each clip into which a recording is divided
+MIN_RECORDING_S = 0.1  # shorter recordings contain no phone
+SILENCE_LEVEL = 1e-4  # peak amplitude, relative to full scale, below which a recording counts as silent
 DEFAULT_AUDIO_MAP = "network"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimedTranscript:
-    """What a recording says: its phones and words on its own clock; one silence where the words are not known.
+    """Phones and words of a recording with their times; a single silence if the words are unknown.
 
-    ``mismatches`` are the spans in which it probably says something else.
+    ``mismatches`` are spans in which the recording probably contains other words.
     """
 
     phones: PhoneSequence
@@ -47,36 +47,36 @@ class TimedTranscript:
 
     @property
     def duration(self) -> float:
-        """Seconds."""
+        """Duration in seconds."""
         return self.phones.end
 
 
 def select_audio_map(request: Request, talker: Talker) -> AudioMap:
-    """The drive that a request asks for, the talker's best by default.
+    """Audio map of a talker chosen by a request; `DEFAULT_AUDIO_MAP` if the request names none.
 
     Raises
     ------
     InputError
-        The talker was learnt without it.
+        The talker has no such audio map.
     """
-    name = request.drive or DEFAULT_AUDIO_MAP
+    name = request.audio_map or DEFAULT_AUDIO_MAP
     if name not in talker.audio_maps:
         raise InputError(
-            f"the talker {talker.metadata.get('name', '')} has no {name} drive, for it was learnt with too little "
-            "sound; say what is spoken with --text, or choose another talker"
+            f"the talker {talker.metadata.get('name', '')} has no {name} audio map because its recordings were too few "
+            "to learn one; give the words of the recording with --text, or choose another talker"
         )
     return talker.audio_maps[name]
 
 
 def align_transcript(request: Request, path: Path) -> TimedTranscript:
-    """Phones and words of a recording whose words are in the request.
+    """Align the text of a request with a recording.
 
     Raises
     ------
     InputError, DataError
-        The recording cannot be read, is silent or too short, or does not hold the words.
+        The recording cannot be read, is silent or too short, or does not contain the words.
     BackendError
-        It is longer than a minute, and nothing on this machine recognises phones.
+        The recording is longer than a minute and the phone recogniser is not installed.
     """
     own = read_dictionary(request.dictionary) if request.dictionary else None
     words = pronounce_transcript(request.text, request.language, own)
@@ -84,8 +84,10 @@ def align_transcript(request: Request, path: Path) -> TimedTranscript:
     return TimedTranscript(*align_recording(sound, words, is_english=request.language.startswith("en")))
 
 
-def map_audio_to_motion(path: Path, drive: AudioMap, talker: Talker, fps: float) -> tuple[TimedTranscript, Trajectory]:
-    """A recording whose words are not known, and the lips that go with its sound, at any frame rate.
+def map_audio_to_motion(
+    path: Path, audio_map: AudioMap, talker: Talker, fps: float
+) -> tuple[TimedTranscript, Trajectory]:
+    """Speech parameters (T, S) of a recording without a transcript, at `fps` frames per second.
 
     Raises
     ------
@@ -93,27 +95,27 @@ def map_audio_to_motion(path: Path, drive: AudioMap, talker: Talker, fps: float)
         The recording cannot be read, is silent or too short.
     """
     levels, _ = _features(path, "level", talker.fps, 1.0)
-    gain = drive.gain_for(speech_level(levels))
-    features, duration = _features(path, drive.feature, talker.fps, gain)
-    lips = resample_motion(drive.parameters(features), talker.fps, fps, frame_count(duration, fps))
+    gain = audio_map.gain_for(speech_level(levels))
+    features, duration = _features(path, audio_map.feature, talker.fps, gain)
+    lips = resample_motion(audio_map.parameters(features), talker.fps, fps, frame_count(duration, fps))
     phones = PhoneSequence([SILENCE], [0.0, duration])
     return TimedTranscript(phones, ()), Trajectory(speech_channels(talker.model), lips, fps)
 
 
 def _features(path: Path, kind: str, fps: float, gain: float) -> tuple[NDArray[np.float32], float]:
-    """(T, D) features of a recording made louder by a factor, and its seconds."""
-    ear = StreamingFeatures(kind, fps)
-    found = [ear.hear(np.clip(gain * block, -1.0, 1.0)) for block in _read_audible_blocks(path)]
-    return np.concatenate([*found, ear.finish()]), ear.n_samples / FEATURE_RATE
+    """(T, D) features of a recording multiplied by `gain`, and its duration in seconds."""
+    stream = StreamingFeatures(kind, fps)
+    features = [stream.add_samples(np.clip(gain * block, -1.0, 1.0)) for block in _read_audible_blocks(path)]
+    return np.concatenate([*features, stream.finish()]), stream.n_samples / FEATURE_RATE
 
 
 def resample_motion(values: NDArray[np.float32], rate: float, fps: float, n_frames: int) -> NDArray[np.float32]:
-    """(n_frames, D) values at another rate than (T, D) ones."""
+    """Resample (T, D) values at `rate` Hz to (n_frames, D) values at `fps` Hz; the last value is held."""
     return interpolate_cubic(values, np.minimum(np.arange(n_frames) / fps * rate, len(values) - 1))
 
 
-def recording_clips(path: Path, said: TimedTranscript, motion: Trajectory, *, volume: float) -> Iterator[Clip]:
-    """A recording's motion and sound as clips of at most `MAX_CLIP_FRAMES` frames, each with its phones."""
+def recording_clips(path: Path, transcript: TimedTranscript, motion: Trajectory, *, volume: float) -> Iterator[Clip]:
+    """Divide a recording's motion and sound into clips of at most `MAX_CLIP_FRAMES` frames, each with its phones."""
     fps = exact_rate(motion.fps)
     sound = _SampleReader(sound_blocks(path, CLIP_RATE))
     for first in range(0, len(motion), MAX_CLIP_FRAMES):
@@ -121,7 +123,7 @@ def recording_clips(path: Path, said: TimedTranscript, motion: Trajectory, *, vo
         begin, end = (first_sample(frame, CLIP_RATE, fps) for frame in (first, last))
         samples = np.clip(volume * sound.next(end - begin), -1.0, 1.0)
         seconds = (float(Fraction(first) / fps), len(samples) / CLIP_RATE)
-        phones, words = _phones_within(said, *seconds)
+        phones, words = _phones_within(transcript, *seconds)
         head = np.zeros((last - first, len(HEAD_CHANNELS)), np.float32)
         yield Clip(
             Trajectory(motion.channels, motion.values[first:last], motion.fps),
@@ -130,42 +132,44 @@ def recording_clips(path: Path, said: TimedTranscript, motion: Trajectory, *, vo
         )
 
 
-def _phones_within(said: TimedTranscript, begin: float, duration: float) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
-    """Phones of a span of seconds, on its own clock, and the words that lie in it with their first phone."""
-    edges = said.phones.edges - begin
-    inside = [at for at in range(len(said.phones)) if edges[at] < duration - 1e-6 and edges[at + 1] > 1e-6]
-    if not inside:  # behind the end of the sound
+def _phones_within(
+    transcript: TimedTranscript, begin: float, duration: float
+) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+    """Phones of a time span, relative to its start, and the words whose first phone lies in the span."""
+    edges = transcript.phones.edges - begin
+    inside = [at for at in range(len(transcript.phones)) if edges[at] < duration - 1e-6 and edges[at + 1] > 1e-6]
+    if not inside:  # after the end of the sound
         return PhoneSequence([SILENCE], [0.0, duration]), ()
     first, last = inside[0], inside[-1] + 1
     cut = edges[first : last + 1].copy()
     cut[0], cut[-1] = 0.0, duration
     words = tuple(
         WordSpan(word.text, word.first - first, min(word.last, last) - first)
-        for word in said.words
+        for word in transcript.words
         if first <= word.first < last
     )
-    return PhoneSequence(said.phones.phones[first:last], cut), words
+    return PhoneSequence(transcript.phones.phones[first:last], cut), words
 
 
 class _SampleReader:
-    """Sound that is read on and on; silence behind its end."""
+    """Sequential reader of sound blocks; returns silence after their end."""
 
     def __init__(self, blocks: Iterator[NDArray[np.float32]]) -> None:
-        self._blocks, self._kept = blocks, np.zeros(0, np.float32)
+        self._blocks, self._rest = blocks, np.zeros(0, np.float32)
 
     def next(self, n_samples: int) -> NDArray[np.float32]:
-        """The next samples."""
-        parts, n = [self._kept], len(self._kept)
+        """The next `n_samples` samples."""
+        parts, n = [self._rest], len(self._rest)
         while n < n_samples and (block := next(self._blocks, None)) is not None:
             parts.append(block)
             n += len(block)
         whole = np.concatenate([*parts, np.zeros(max(n_samples - n, 0), np.float32)])
-        self._kept = whole[n_samples:]
+        self._rest = whole[n_samples:]
         return whole[:n_samples]
 
 
 def _read_audible_blocks(path: Path) -> Iterator[NDArray[np.float32]]:
-    """Blocks of a recording at `FEATURE_RATE`; refused at its end when nobody could be heard."""
+    """Yield blocks of a recording at `FEATURE_RATE`; DataError after the last one if it is silent or too short."""
     n_samples, peak = 0, 0.0
     for block in sound_blocks(path, FEATURE_RATE):
         n_samples += len(block)

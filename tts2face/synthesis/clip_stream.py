@@ -1,4 +1,4 @@
-"""A prepared request becomes clips, piece by piece: spoken text, a recording, or an idle face."""
+"""Synthesis of a prepared request piece by piece: text, a recording, or idle animation."""
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack
@@ -37,23 +37,23 @@ from tts2face.voice.engine import Voice
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Piece:
-    """A part of a clip: a sentence of a text, or some seconds of a recording or of an idle face.
+    """A part of a clip: a sentence of a text, or some seconds of a recording or of idle animation.
 
     Parameters
     ----------
     clip
-        Motion, head pose and speech of this part, on its own clock.
+        Motion, head pose and speech; times are relative to the start of the piece.
     begin
-        Second of the whole clip at which the part begins.
+        Start of the piece in seconds of the whole clip.
     n_steps
-        How much of the whole it is: characters of the text, or thousandths of the recording.
+        Size of the piece: characters of the text, or thousandths of the recording or of the idle animation.
     timeline, marks
-        What the text's marks ask for in this part, and its named marks; on the clock of the whole clip.
+        Gestures requested by the marks of the text, and its named marks; in seconds of the whole clip.
     shown
-        For each phone, the recorded tokens that move the lips; on the clock of the whole clip. Empty for an idle face
-        and for a recording without words; the first piece of a recording holds those of the whole.
+        Returns for each phone the recorded tokens of its lip motion, in seconds of the whole clip. Empty for idle
+        animation and for a recording without words; the first piece of a recording returns those of all pieces.
     mismatches
-        Words that the recording probably does not say, where they begin in this part; on the clock of the whole clip.
+        Words that the recording probably does not contain and that start in this piece; in seconds of the whole clip.
     """
 
     clip: Clip
@@ -66,10 +66,11 @@ class Piece:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Performers:
-    """Who performs a request: the talker, the talker's exemplars, the face, and voices.
+class SynthesisModels:
+    """Models from which clips are synthesised: talker, the talker's exemplars, face, and voices.
 
-    ``voice`` lends the voice of a name and a language for the time of a ``with`` block.
+    ``voice`` takes a name and a language and returns a context manager whose ``with`` block has exclusive use of the
+    voice.
     """
 
     talker: Talker
@@ -78,50 +79,50 @@ class Performers:
     voice: Callable[[str | None, str], AbstractContextManager[Voice]]
 
 
-def pieces(prepared: PreparedRequest, performers: Performers, layer: GestureLayer | None) -> Iterator[Piece]:
-    """The clip of a request, piece by piece.
+def pieces(prepared: PreparedRequest, models: SynthesisModels, layer: GestureLayer | None) -> Iterator[Piece]:
+    """Synthesise the clip of a request piece by piece.
 
-    Each piece ends on a frame, so that a text or recording of any length stays in step in bounded memory. Those of a
-    text begin and end at rest.
+    Each piece ends on a frame boundary, so that sound and picture stay synchronous at any length, in bounded memory.
+    The pieces of a text begin and end with the face at rest.
 
     Parameters
     ----------
     layer
-        The gestures of this one clip; without them face and head do not move beside the lips.
+        Gestures of this clip; None for lip motion only.
     """
     if prepared.request.audio is not None:
-        yield from _recording_pieces(prepared, prepared.request.audio, performers, layer)
+        yield from _recording_pieces(prepared, prepared.request.audio, models, layer)
     else:
-        yield from _spoken_pieces(prepared, performers, layer)
+        yield from _spoken_pieces(prepared, models, layer)
     if layer is not None:
         layer.finish()
 
 
-def _spoken_pieces(prepared: PreparedRequest, performers: Performers, layer: GestureLayer | None) -> Iterator[Piece]:
+def _spoken_pieces(prepared: PreparedRequest, models: SynthesisModels, layer: GestureLayer | None) -> Iterator[Piece]:
     fps, first_frame = prepared.fps, 0
-    for said, n_steps in _sentences(prepared, performers):
-        speech, begin = pad_to_frame(said.speech, first_frame, fps), float(first_frame / fps)
-        timeline = said.timeline.restrict(0.0, speech.waveform.duration).shifted(begin)
+    for spoken, n_steps in _sentences(prepared, models):
+        speech, begin = pad_to_frame(spoken.speech, first_frame, fps), float(first_frame / fps)
+        timeline = spoken.timeline.restrict(0.0, speech.waveform.duration).shifted(begin)
         n_frames = frame_count(speech.waveform.duration, float(fps))
-        selection = select_tokens(speech.phones, performers.exemplars, prepared.options)
-        lips = performers.face.motion_of_tokens(selection, fps=float(fps), n_frames=n_frames)
-        clip = _with_sound(_with_gestures(speech, lips, timeline, layer), said.sound)
+        selection = select_tokens(speech.phones, models.exemplars, prepared.options)
+        lips = models.face.motion_of_tokens(selection, fps=float(fps), n_frames=n_frames)
+        clip = _with_sound(_with_gestures(speech, lips, timeline, layer), spoken.sound)
         first_frame += n_frames
-        marks = tuple(replace(mark, seconds=mark.seconds + begin) for mark in said.marks)
-        yield Piece(clip, begin, n_steps, timeline, marks, _explanation(selection, performers.exemplars, begin))
+        marks = tuple(replace(mark, seconds=mark.seconds + begin) for mark in spoken.marks)
+        yield Piece(clip, begin, n_steps, timeline, marks, _explanation(selection, models.exemplars, begin))
 
 
-def _sentences(prepared: PreparedRequest, performers: Performers) -> Iterator[tuple[SpokenSentence, int]]:
-    """Sentences of a text, and the characters of each; parts of an idle clip."""
+def _sentences(prepared: PreparedRequest, models: SynthesisModels) -> Iterator[tuple[SpokenSentence, int]]:
+    """Spoken sentences of a text with their numbers of characters, or parts of idle animation with their steps."""
     request = prepared.request
     if request.idle is not None:
         yield from silent_sentences(request.idle, prepared.fps, IDLE_STEPS)
         return
-    with ExitStack() as held:
+    with ExitStack() as stack:
 
         @cache
         def voice_of(name: str | None, language: str) -> Voice:
-            return held.enter_context(performers.voice(name, language))
+            return stack.enter_context(models.voice(name, language))
 
         voice = voice_of(request.voice, request.language)
         for sentence in prepared.sentences():
@@ -129,13 +130,14 @@ def _sentences(prepared: PreparedRequest, performers: Performers) -> Iterator[tu
 
 
 def _recording_pieces(
-    prepared: PreparedRequest, audio: Path, performers: Performers, layer: GestureLayer | None
+    prepared: PreparedRequest, audio: Path, models: SynthesisModels, layer: GestureLayer | None
 ) -> Iterator[Piece]:
-    """A recording in pieces: lips by examples where its words are known, else by an audio map."""
-    said, motion, shown = _recording_motion(prepared, audio, performers)
-    timeline, marks = resolve_recording_marks(prepared.text, said.phones, said.words, prepared.request.language)
+    """Pieces of a recording: lip motion from exemplars if its words are known, else from an audio map."""
+    transcript, motion, shown = _recording_motion(prepared, audio, models)
+    language = prepared.request.language
+    timeline, marks = resolve_recording_marks(prepared.text, transcript.phones, transcript.words, language)
     fps, before = float(prepared.fps), 0
-    for clip in recording_clips(audio, said, motion, volume=prepared.request.volume):
+    for clip in recording_clips(audio, transcript, motion, volume=prepared.request.volume):
         after = before + len(clip.motion)
         n_steps = RECORDING_STEPS * after // len(motion) - RECORDING_STEPS * before // len(motion)
         begin, end = before / fps, after / fps
@@ -147,33 +149,34 @@ def _recording_pieces(
             marked,
             tuple(mark for mark in marks if begin <= mark.seconds < end),
             shown if before == 0 else tuple,
-            tuple(one for one in said.mismatches if begin <= one.begin < end),
+            tuple(mismatch for mismatch in transcript.mismatches if begin <= mismatch.begin < end),
         )
         before = after
 
 
 def _recording_motion(
-    prepared: PreparedRequest, audio: Path, performers: Performers
+    prepared: PreparedRequest, audio: Path, models: SynthesisModels
 ) -> tuple[TimedTranscript, Trajectory, Callable[[], tuple[PhoneExplanation, ...]]]:
     fps, request = float(prepared.fps), prepared.request
     if not request.text.strip():
-        said, lips = map_audio_to_motion(audio, select_audio_map(request, performers.talker), performers.talker, fps)
-        return said, performers.face.motion_of_parameters(lips), tuple
-    said = align_transcript(replace(request, text=prepared.text.text), audio)
-    selection = select_tokens(said.phones, performers.exemplars, prepared.options)
-    motion = performers.face.motion_of_tokens(selection, fps=fps, n_frames=frame_count(said.duration, fps))
-    return said, motion, _explanation(selection, performers.exemplars, 0.0)
+        audio_map = select_audio_map(request, models.talker)
+        transcript, lips = map_audio_to_motion(audio, audio_map, models.talker, fps)
+        return transcript, models.face.motion_of_parameters(lips), tuple
+    transcript = align_transcript(replace(request, text=prepared.text.text), audio)
+    selection = select_tokens(transcript.phones, models.exemplars, prepared.options)
+    motion = models.face.motion_of_tokens(selection, fps=fps, n_frames=frame_count(transcript.duration, fps))
+    return transcript, motion, _explanation(selection, models.exemplars, 0.0)
 
 
 def _with_gestures(speech: Speech, lips: Trajectory, timeline: Timeline, layer: GestureLayer | None) -> Clip:
-    """A clip with its gestures; the head rests where there are none."""
+    """Clip of lip motion with gestures, or with a resting head if there is no gesture layer."""
     if layer is not None:
         return layer.add(speech, lips, timeline)
     return Clip(lips, resting_head(len(lips), lips.fps), speech)
 
 
 def _with_sound(clip: Clip, sound: Waveform) -> Clip:
-    """The clip with its final sound; the sound that its motion follows may be longer by a silence."""
+    """Replace the sound of a clip by its final sound, padded with silence to the same length."""
     speech = clip.speech
     samples = np.zeros_like(speech.waveform.samples)
     samples[: len(sound.samples)] = sound.samples
@@ -183,7 +186,7 @@ def _with_sound(clip: Clip, sound: Waveform) -> Clip:
 def _explanation(
     selection: TokenSelection, exemplars: ExemplarModel, begin: float
 ) -> Callable[[], tuple[PhoneExplanation, ...]]:
-    """The explanation of a selection on the clock of the whole clip, made when it is called for."""
+    """Function that explains a selection in seconds of the whole clip; it is evaluated only when called."""
 
     def shown() -> tuple[PhoneExplanation, ...]:
         phones = explain_selection(selection, exemplars)

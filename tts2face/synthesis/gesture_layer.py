@@ -1,4 +1,4 @@
-"""Gestures laid over speech: what a request asks for, over the whole of its clip."""
+"""Gestures of a request, added to the speech motion of its clip."""
 
 from concurrent.futures import Future, ThreadPoolExecutor
 
@@ -18,17 +18,17 @@ DEFAULT_STYLE = "neutral"
 
 
 def default_style(palette: Palette) -> str:
-    """The style of a clip for which none was chosen."""
+    """Name of the style for requests that choose none: neutral, or the palette's first recorded style."""
     return DEFAULT_STYLE if DEFAULT_STYLE in palette.names else next(iter(palette.styles))
 
 
 class GestureLayer:
-    """The gestures of one clip, added piece by piece.
+    """Gestures of one clip, added piece by piece.
 
     Raises
     ------
     InputError, DataError
-        The palette lacks a style that the request names, or the face cannot move what a gain asks for.
+        The palette lacks a style of the request, or the face cannot move a feature for which a gain is given.
     """
 
     def __init__(self, prepared: PreparedRequest, fields: GestureFields, face: AnimatedFace) -> None:
@@ -39,27 +39,28 @@ class GestureLayer:
             palette.require(style)
         face.check_gains(self._requested.gains.factors)
         kind: type[NoiseStream] | type[GestureStream] = NoiseStream if request.gestures == "noise" else GestureStream
-        starter = ThreadPoolExecutor(1)  # fields take half a second to make, in which a voice can be loaded and speak
-        self._stream: Future[GestureStream | NoiseStream] = starter.submit(
+        executor = ThreadPoolExecutor(1)  # building the fields takes 0.5 s, in parallel with loading the voice
+        self._stream: Future[GestureStream | NoiseStream] = executor.submit(
             kind, fields, style=default_style(palette), seed=request.seed, fps=float(prepared.fps)
         )
-        starter.shutdown(wait=False)
+        executor.shutdown(wait=False)
         self._marked = Timeline()
         self._seconds = 0.0
 
     def add(self, speech: Speech, lips: Trajectory, marks: Timeline) -> Clip:
-        """The next piece of the clip.
+        """Add gestures to the next piece of the clip.
 
         Parameters
         ----------
+        speech
+            Speech of the piece, whose loudness the gestures follow.
         lips : (T, K)
-            Motion of the face without gestures, T frames of it.
+            Speech motion of the piece.
         marks
-            What the piece's text asks for, on the clock of the whole clip.
+            Gestures requested by the marks of the piece's text, in seconds of the whole clip.
         """
-        self._marked = self._marked.restrict(self._seconds - 1.0, np.inf).merge(
-            marks
-        )  # a nod runs on for half a second
+        recent = self._marked.restrict(self._seconds - 1.0, np.inf)  # a nod of the last piece lasts half a second
+        self._marked = recent.merge(marks)
         timeline = self._requested.merge(self._marked)
         self._seconds += len(lips) / lips.fps
         gestures = _gaze_relative_to_head(self._stream.result().next(speech.waveform, len(lips), timeline))
@@ -68,18 +69,18 @@ class GestureLayer:
         return Clip(moved.face, moved.head, speech)
 
     def finish(self) -> None:
-        """Refuse what was asked for beyond the clip's end.
+        """Reject requested gestures beyond the end of the clip.
 
         Raises
         ------
         InputError
-            There is such a thing.
+            A span or nod of the request begins after the end.
         """
         self._requested.check_duration(self._seconds)
 
 
 def _gaze_relative_to_head(gestures: GestureValues) -> GestureValues:
-    """Gestures with the line of sight as the eyes must turn: they hold what they look at while the head moves."""
+    """Convert the gaze from world to head coordinates, so that fixations hold while the head moves."""
     if "gaze" not in gestures or "head" not in gestures:
         return gestures
     return {**gestures, "gaze": gestures["gaze"] - gestures["head"][:, :2]}

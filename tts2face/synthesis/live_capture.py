@@ -1,4 +1,4 @@
-"""A person before a camera drives a face while she moves; her first seconds teach how she moves."""
+"""Live facial capture: a performer before a camera animates a face, after some seconds of calibration."""
 
 import threading
 from collections import deque
@@ -18,14 +18,14 @@ from tts2face.video.media import TimedFrame
 from tts2face.video.pose import head_angles, remove_pose
 from tts2face.video.track import FaceTracker
 
-CALIBRATION_S = 5.0  # in which lips close and open, and eyes blink
+CALIBRATION_S = 5.0  # long enough for the lips to close and open and the eyes to blink
 MIN_CALIBRATION_FRAMES = 40  # frames with a face
-SCALE_WINDOW_S = 2.0  # over which the size of the face is averaged
+SCALE_WINDOW_S = 2.0  # window over which the size of the face is averaged
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LivePose:
-    """What a face shows at one moment: ``weights`` (K,) of its shapes and ``head`` (6,) as `HEAD_CHANNELS`."""
+    """One frame of captured motion: shape weights (K,) and head pose (6,) as `HEAD_CHANNELS`."""
 
     weights: NDArray[np.float32]
     head: NDArray[np.float32]
@@ -34,19 +34,19 @@ class LivePose:
 def track_poses(
     pictures: Iterable[TimedFrame], face: Face, tracker: FaceTracker, reader: BlendshapeReader, fps: float
 ) -> Iterator[LivePose | None]:
-    """A pose for each picture as soon as it comes; None while the person is learnt, or cannot be seen.
+    """Yield a pose for each picture as it arrives; None during calibration and for pictures without a face.
 
     Parameters
     ----------
     fps
-        About how many pictures come each second.
+        Approximate rate of the pictures in Hz.
 
     Raises
     ------
     DataError
         The face lacks landmarks or shapes.
     """
-    learning, ready = _Calibrator(), None
+    calibrator, calibration = _Calibrator(), None
     recent: deque[NDArray[np.float32]] = deque(maxlen=max(2, round(SCALE_WINDOW_S * fps)))
     waiting: deque[TimedFrame] = deque()
     for (points, _), _ in tracker.follow(_queue_frames(pictures, waiting)):
@@ -56,33 +56,33 @@ def track_poses(
             continue
         recent.append(points)
         scores = reader.blendshape_scores(points)
-        if ready is None:
-            learning.add(time, points, scores)
-            ready = learning.done(face, fps)
+        if calibration is None:
+            calibrator.add(time, points, scores)
+            calibration = calibrator.finish(face, fps)
             yield None
         else:
-            yield ready.pose(np.array(recent), scores, fps)
+            yield calibration.pose(np.array(recent), scores, fps)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Calibration:
-    """A person who was learnt: the way from her to the face, and how her head stood."""
+    """A calibrated performer: the retargeter from performer to face, and the median head pose (6,)."""
 
-    way: PerformerRetargeter
+    retargeter: PerformerRetargeter
     head: NDArray[np.float64]
 
     def pose(self, recent: NDArray[np.float32], scores: NDArray[np.float32], fps: float) -> LivePose:
-        """The pose of the last of the recent landmarks (T, 478, 3) in pixels."""
+        """Pose of the last frame of recent landmarks (T, 478, 3) in pixels, with its blendshape scores (52,)."""
         posed = remove_pose(recent, fps)
         now = Trajectory(BLENDSHAPES, scores[None], fps)
-        weights = self.way.weights(posed.landmarks[-1:], now).values[0]
+        weights = self.retargeter.weights(posed.landmarks[-1:], now).values[0]
         head = np.concatenate([head_angles(posed.rotations[-1:])[0], posed.translations[-1]]) - self.head
-        head[5] = 0.0  # sizes of moments far apart are not compared
+        head[5] = 0.0  # the distance is relative to the recent frames and drifts over longer times
         return LivePose(weights, head.astype(np.float32))
 
 
 class _Calibrator:
-    """The first seconds of a person."""
+    """Collects the frames of the first seconds."""
 
     def __init__(self) -> None:
         self._times: list[float] = []
@@ -90,13 +90,13 @@ class _Calibrator:
         self._scores: list[NDArray[np.float32]] = []
 
     def add(self, time: float, points: NDArray[np.float32], scores: NDArray[np.float32]) -> None:
-        """Take one more frame."""
+        """Add one frame: time in seconds, landmarks (478, 3) in pixels, blendshape scores (52,)."""
         self._times.append(time)
         self._points.append(points)
         self._scores.append(scores)
 
-    def done(self, face: Face, fps: float) -> _Calibration | None:
-        """The person, as soon as enough of her was seen."""
+    def finish(self, face: Face, fps: float) -> _Calibration | None:
+        """The calibration; None until `CALIBRATION_S` and `MIN_CALIBRATION_FRAMES` are reached."""
         if len(self._times) < MIN_CALIBRATION_FRAMES or self._times[-1] - self._times[0] < CALIBRATION_S:
             return None
         posed = remove_pose(np.array(self._points), fps)
@@ -106,7 +106,7 @@ class _Calibrator:
 
 
 class LiveCapture:
-    """A person who is watched in a thread of its own; a window asks for what she did last.
+    """Capture in a background thread, from which a window reads the latest pose.
 
     Raises
     ------
@@ -121,19 +121,19 @@ class LiveCapture:
         self._thread = threading.Thread(target=self._run, name="actor", daemon=True)
 
     def __enter__(self) -> "LiveCapture":
-        """Begin to watch."""
+        """Start the capture."""
         self._thread.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Stop watching."""
+        """Stop the capture and wait for its thread."""
         self._stopped = True
         self._thread.join()
 
     def latest_pose(self) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
-        """Weights and head of the last moment, once; None where nothing new has come."""
+        """Shape weights (K,) and head pose (6,) of the latest frame; None if no frame arrived since the last call."""
         last, self._last = self._last, None
         return None if last is None else (last.weights, last.head)
 
@@ -145,6 +145,7 @@ class LiveCapture:
 
 
 def _queue_frames(pictures: Iterable[TimedFrame], waiting: "deque[TimedFrame]") -> Iterator[NDArray[np.uint8]]:
+    """Yield the pixels of each picture and append the picture to `waiting`."""
     for picture in pictures:
         waiting.append(picture)
         yield picture.pixels

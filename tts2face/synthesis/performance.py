@@ -1,4 +1,4 @@
-"""A performer's take or an ARKit capture becomes clips of any face; the original sound is kept."""
+"""Transfer of a performer's video or an ARKit capture to a face; the original sound is retained."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -18,35 +18,35 @@ from tts2face.video.streaming_tracker import StreamingTracker
 from tts2face.video.take import Take, read_take
 
 CAPTURE_SUFFIX = ".csv"
-CAPTURE_FPS = 30.0  # captures run faster than videos need
+CAPTURE_FPS = 30.0  # default frame rate of captures, whose own is higher than a video needs
 GAINS = (0.0, 4.0)
 SOUND_RATE = 48_000  # Hz
-MAX_CLIP_FRAMES = 300  # of the clips that a long take is given on in
+MAX_CLIP_FRAMES = 300  # frames of each clip into which a take is divided
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Performance:
-    """A recorded person whose face drives another one.
+    """A recorded performance and the options of its transfer to a face.
 
     Parameters
     ----------
     take
         A video of one person, or a .csv table of Live Link Face.
     gain
-        Factor on the motion of lips and brows, 0 to 4.
+        Factor of the motion of lips and brows, 0 to 4.
     fps
-        Frames per second; without it the take's own, at most 30 of a capture.
+        Frames per second; None for the take's own rate, limited to 30 for a capture.
     audio
-        The sound that belongs to a capture.
+        Sound file that belongs to a capture.
     append_missing
-        Whether motion that the talker never made is added to the talker's own face.
+        Whether lip motion that the talker's recordings lack is added to the talker's own face.
     model
-        The face landmark models; found without it.
+        Path of the face landmark models; None for the installed ones.
 
     Raises
     ------
     InputError
-        The gain is out of range, or sound is given for a video, which has its own.
+        The gain is out of range, or `audio` is given for a video, which has its own sound.
     """
 
     take: Path
@@ -57,7 +57,7 @@ class Performance:
     model: Path | None = None
 
     def __post_init__(self) -> None:
-        """Refuse options that do not go together."""
+        """Reject options that exclude each other."""
         low, high = GAINS
         if not low <= self.gain <= high:
             raise InputError(f"the gain must lie between {low:g} and {high:g}, not {self.gain:g}")
@@ -67,7 +67,7 @@ class Performance:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PerformedTake:
-    """A take on a face: the face that shows it, its motion, and the sound; of no samples where there is none."""
+    """A take transferred to a face: the face, its motion, and the sound, which is empty if the take has none."""
 
     face: AnimatedFace
     motion: FaceMotion
@@ -82,19 +82,19 @@ class PerformedTake:
 def perform(
     performance: Performance, face: AnimatedFace, *, on_progress: Callable[[int, int], None] | None = None
 ) -> PerformedTake:
-    """Carry a recorded person's performance to a face.
+    """Transfer a recorded performance to a face.
 
     Parameters
     ----------
     on_progress
-        Called with frames read and of all, while a video is tracked.
+        Called with the number of frames tracked and their total, for a video.
 
     Raises
     ------
     InputError
-        The face cannot show such a take.
+        The take does not exist, or the face cannot show such a take.
     DataError
-        The take cannot be read, is too short, or shows no face, or several.
+        The take cannot be read, is too short, or shows no face or several.
     BackendError
         LiteRT, OpenCV or the landmark models are missing.
     """
@@ -104,27 +104,29 @@ def perform(
         motion = retarget_capture(take, face, gain=performance.gain)
         fps = performance.fps or min(motion.face.fps, CAPTURE_FPS)
         return PerformedTake(face, resample_take(motion, fps), sound)
-    seen = read_video_take(take, performance.model, on_progress=on_progress)
+    tracked = read_video_take(take, performance.model, on_progress=on_progress)
     if performance.append_missing:
-        face = face.with_motion_of(seen)
-    motion = retarget_take(seen, face, gain=performance.gain)
+        face = face.with_motion_of(tracked)
+    motion = retarget_take(tracked, face, gain=performance.gain)
     return PerformedTake(face, motion if performance.fps is None else resample_take(motion, performance.fps), sound)
 
 
 def is_capture(take: Path) -> bool:
-    """Whether a file is a table of a Live Link Face capture; anything else is read as a video."""
+    """Whether the suffix of a path is that of a Live Link Face table; other files are read as videos."""
     return take.suffix.lower() == CAPTURE_SUFFIX
 
 
 def read_video_take(
     video: Path, model: Path | None = None, *, on_progress: Callable[[int, int], None] | None = None
 ) -> Take:
-    """Landmarks, head pose and scores of a performer in a video.
+    """Track landmarks, head pose and blendshape scores of a performer in a video.
 
     Raises
     ------
+    InputError
+        The file does not exist.
     DataError
-        The video cannot be read, or shows no face, or several.
+        The video cannot be read, or shows no face or several.
     BackendError
         LiteRT, OpenCV or the landmark models are missing.
     """
@@ -132,25 +134,25 @@ def read_video_take(
 
 
 def retarget_take(take: Take, face: AnimatedFace, *, gain: float = 1.0) -> FaceMotion:
-    """The motion of a video take on a face."""
+    """Motion of a face from a tracked video."""
     return FaceMotion(face.motion_of_take(take, gain=gain), take.head)
 
 
 def retarget_capture(table: Path, face: AnimatedFace, *, gain: float = 1.0) -> FaceMotion:
-    """The motion of a Live Link Face capture on a face."""
+    """Motion of a face from a Live Link Face table."""
     capture = read_livelink(table)
     return FaceMotion(face.motion_of_capture(capture, gain=gain), capture.head)
 
 
 def sound_of_take(take: Path) -> Waveform:
-    """The sound of a video; none where the file holds no sound."""
+    """Sound of a video at `SOUND_RATE`; empty if the file has no sound."""
     if not is_capture(take) and read_media_info(take).rate:
         return read_sound(take, SOUND_RATE)
     return Waveform(np.zeros(0, np.float32), SOUND_RATE)
 
 
 def resample_take(motion: FaceMotion, fps: float) -> FaceMotion:
-    """Motion read at another frame rate, straight between its frames."""
+    """Resample motion to another frame rate by linear interpolation."""
     old = motion.face.fps
     if exact_rate(fps) == exact_rate(old):
         return motion
@@ -169,17 +171,17 @@ def resample_take(motion: FaceMotion, fps: float) -> FaceMotion:
 
 
 def take_clips(motion: FaceMotion, sound: Waveform) -> Iterator[Clip]:
-    """Motion and its sound as clips of at most `MAX_CLIP_FRAMES` frames; sound that is too short ends in silence."""
+    """Divide motion and sound into clips of at most `MAX_CLIP_FRAMES` frames; short sound is padded with silence."""
     fps = exact_rate(motion.face.fps)
     for first in range(0, len(motion.face), MAX_CLIP_FRAMES):
         last = min(first + MAX_CLIP_FRAMES, len(motion.face))
         begin, end = (first_sample(frame, sound.rate, fps) for frame in (first, last))
         samples = np.zeros(end - begin, np.float32)
-        heard = sound.samples[begin:end]
-        samples[: len(heard)] = heard
+        available = sound.samples[begin:end]
+        samples[: len(available)] = available
         speech = Speech(Waveform(samples, sound.rate), PhoneSequence([SILENCE], [0.0, len(samples) / sound.rate]), ())
-        here = slice(first, last)
-        yield Clip(_cut_trajectory(motion.face, here), _cut_trajectory(motion.head, here), speech)
+        frames = slice(first, last)
+        yield Clip(_cut_trajectory(motion.face, frames), _cut_trajectory(motion.head, frames), speech)
 
 
 def _cut_trajectory(trajectory: Trajectory, frames: slice) -> Trajectory:

@@ -1,4 +1,4 @@
-"""A request with its text, marks and timeline file read and checked, once."""
+"""Parsing and checking of a request's text, marks and timeline file."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -7,33 +7,35 @@ from fractions import Fraction
 from lexicon.errors import InputError
 from lexicon.mark_parser import parse_marks
 from lexicon.marked_text import MarkedText
-from lexicon.readable import check_readable
 from lexicon.sentences import Sentence, split_sentences
+from lexicon.writing_systems import check_readable
 from tts2face.clock import exact_rate
 from tts2face.exemplar.options import METHOD_OPTIONS, SynthesisOptions
-from tts2face.gesture.request_timeline import build_request_timeline
+from tts2face.gesture.notation import parse_expressions, parse_gains, parse_style
+from tts2face.gesture.spans import Gains
 from tts2face.gesture.timeline import Timeline
+from tts2face.gesture.timeline_file import read_timeline
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.storage.overwrite import AnyPath
 from tts2face.synthesis.marked_speech import check_marks
 
-RECORDING_STEPS = 1000  # of progress through a recording
-IDLE_STEPS = 1000  # through a silent clip
+RECORDING_STEPS = 1000  # steps of progress of a recording
+IDLE_STEPS = 1000  # steps of progress of idle animation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PreparedRequest:
-    """A request that can be fulfilled as far as its text and options tell; `prepare` makes it.
+    """A request with its parsed text, timeline and synthesis options, as `prepare` returns it.
 
     Parameters
     ----------
     text
-        The text without its marks, and the marks; empty for a recording without words and for an idle face.
+        Text and marks; empty for a recording without words and for idle animation.
     timeline
-        What the request's flags and timeline file ask of the gestures.
+        Gestures requested by the flags and the timeline file.
     options
-        How lips are made from recorded examples.
+        Options of lip synthesis from exemplars.
     """
 
     request: Request
@@ -48,26 +50,26 @@ class PreparedRequest:
 
     @property
     def n_steps(self) -> int:
-        """Steps of progress: characters of a text, or parts of a recording or of an idle clip."""
+        """Total steps of progress: characters of a text, or parts of a recording or of idle animation."""
         if self.request.audio is not None:
             return RECORDING_STEPS
         return IDLE_STEPS if self.request.idle is not None else max(len(self.text.text), 1)
 
     def sentences(self) -> Iterator[Sentence]:
-        """The sentences that a voice speaks one by one."""
+        """Sentences of the text in order."""
         return split_sentences(self.text, self.request.language)
 
 
 def prepare(request: Request) -> PreparedRequest:
-    """Read what a request gives as text and refuse what cannot be spoken or shown; cheap at any length.
+    """Parse and check the text, marks and timeline of a request, in time linear in the length of the text.
 
     Raises
     ------
     InputError
-        There is no word in the text, the language does not exist or cannot read it, a mark in it is wrong, there is no
-        such recording, or an option of the gestures cannot be read.
+        The text has no word or characters that the language does not read, a mark or a gesture option is invalid, or
+        the recording does not exist.
     DataError
-        The timeline file is wrong.
+        The timeline file is invalid.
     """
     if request.audio is not None and not request.audio.is_file():
         raise InputError(f"there is no recording {request.audio}; check the path")
@@ -86,8 +88,24 @@ def prepare(request: Request) -> PreparedRequest:
     return prepared
 
 
+def build_request_timeline(request: Request) -> Timeline:
+    """Timeline of a request's ``timeline`` file, overridden by its ``style``, ``gain`` and ``expression``.
+
+    Raises
+    ------
+    InputError, DataError
+        An option cannot be parsed, or the file is invalid.
+    """
+    flags = Timeline(
+        style=parse_style(request.style) if request.style is not None else {},
+        expressions=parse_expressions(request.expression) if request.expression is not None else (),
+        gains=parse_gains(request.gain) if request.gain is not None else Gains(),
+    )
+    return read_timeline(request.timeline).merge(flags) if request.timeline is not None else flags
+
+
 def synthesis_options(request: Request) -> SynthesisOptions:
-    """How lips are made from recorded examples: the method's options, with those that the request changes."""
+    """Synthesis options of the request's method, with the request's own `context` and `exemplars`."""
     options = METHOD_OPTIONS[request.synthesis]
     if request.context is not None:
         options = replace(options, context=request.context)
@@ -97,7 +115,7 @@ def synthesis_options(request: Request) -> SynthesisOptions:
 
 
 def input_paths(request: Request, picture: Picture) -> dict[str, AnyPath]:
-    """Files that a request and a picture read, by the name of their option."""
+    """Paths of the files that a request and a picture read, by the names of their options."""
     return {
         "audio": request.audio,
         "dictionary": request.dictionary,

@@ -1,4 +1,4 @@
-"""Utterances put together with silences between them, exact to the sample."""
+"""Concatenation of utterances with pauses between them, exact to the sample."""
 
 import math
 from collections.abc import Sequence
@@ -9,11 +9,26 @@ from numpy.typing import NDArray
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.types import Speech, Waveform, concatenate_speech
 
-FADE_S = 0.005  # at each end of a cut sound: none clicks
+FADE_S = 0.005  # linear fade at each cut, which avoids clicks
 
 
 def join_utterances(speeches: Sequence[Speech], gaps: Sequence[float]) -> tuple[Speech, list[float]]:
-    """Utterances with so many seconds of silence between them, and the second that is now each one's 0."""
+    """Concatenate utterances with given pauses.
+
+    Parameters
+    ----------
+    speeches
+        N utterances at one sample rate.
+    gaps
+        N - 1 pauses in seconds; silences at the ends of the utterances count as part of them.
+
+    Returns
+    -------
+    speech
+        The utterances in sequence.
+    begins
+        N offsets in seconds from times of the utterances to times of the whole.
+    """
     parts: list[Speech] = []
     begins: list[float] = []
     at = 0.0
@@ -33,7 +48,15 @@ def join_utterances(speeches: Sequence[Speech], gaps: Sequence[float]) -> tuple[
 
 
 def trim_silence(speech: Speech, *, before: float, behind: float) -> tuple[Speech, float]:
-    """Speech with at most so many seconds of silence at its ends, and the seconds taken from its beginning."""
+    """Limit the silence at the start and end of speech to `before` and `behind` seconds.
+
+    Returns
+    -------
+    speech
+        The trimmed speech.
+    cut
+        Seconds removed from the start.
+    """
     sound, phones = speech.waveform, speech.phones
     lead, trail = _silence_at_ends(speech)
     begin = round(max(lead - before, 0.0) * sound.rate)
@@ -47,14 +70,30 @@ def trim_silence(speech: Speech, *, before: float, behind: float) -> tuple[Speec
 
 
 def silent_speech(seconds: float, rate: int) -> Speech:
-    """Speech in which nothing is said."""
+    """Speech that consists of silence, of at least one sample."""
     n_samples = max(round(seconds * rate), 1)
     phones = PhoneSequence([SILENCE], [0.0, n_samples / rate])
     return Speech(Waveform(np.zeros(n_samples, np.float32), rate), phones, ())
 
 
+def resampled_speech(speech: Speech, rate: int) -> Speech:
+    """Resample speech to `rate` Hz; all phone edges but the last, the duration of the sound, are unchanged.
+
+    The sound is clipped to full scale. Source: soxr, quality HQ (De Jong, the SoX resampler library).
+    """
+    sound = speech.waveform
+    if sound.rate == rate:
+        return speech
+    import soxr
+
+    samples = np.clip(soxr.resample(sound.samples, sound.rate, rate, quality="HQ"), -1.0, 1.0)
+    edges = speech.phones.edges.copy()
+    edges[-1] = len(samples) / rate
+    return Speech(Waveform(samples, rate), PhoneSequence(speech.phones.phones, edges), speech.words)
+
+
 def _silence_at_ends(speech: Speech) -> tuple[float, float]:
-    """Seconds of silence at both ends."""
+    """Seconds of silence at the start and at the end."""
     labels, edges = speech.phones.phones, speech.phones.edges
     lead = float(edges[1]) if labels[0] == SILENCE else 0.0
     return lead, float(edges[-1] - edges[-2]) if labels[-1] == SILENCE else 0.0

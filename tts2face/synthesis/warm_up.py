@@ -1,7 +1,7 @@
-"""The first run on a machine compiles the kernels; afterwards they lie on disk.
+"""Compilation of all kernels at the first run on a machine; later runs load them from the disk cache.
 
-What moves the lips is compiled in a process of its own while this one compiles what draws: numba compiles one kernel
-at a time in a process.
+Motion kernels are compiled in a child process while this process compiles the drawing kernels, because numba compiles
+one kernel at a time in each process.
 """
 
 import subprocess
@@ -28,36 +28,39 @@ COMPILE_TIMEOUT_S = 120.0
 
 
 def kernels_are_compiled() -> bool:
-    """Whether the drawing kernels lie compiled on disk; without them the first picture takes some seconds longer."""
+    """Whether the drawing kernels are in the disk cache; compiling them delays the first picture by some seconds."""
     folder = Path(str(raster.draw_band.stats.cache_path))  # type: ignore[attr-defined]
     source = Path(raster.__file__).stat().st_mtime
     return any(index.stat().st_mtime >= source for index in folder.glob("raster.draw_band-*.nbi"))
 
 
 def compile_kernels() -> None:
-    """Compile all kernels that a clip needs. Where the other process fails they are compiled at their first use."""
+    """Compile all kernels that a clip needs.
+
+    If the child process fails, the motion kernels are compiled at their first use.
+    """
     face = load_face("head")
-    other = subprocess.Popen(
+    child = subprocess.Popen(
         [sys.executable, "-c", COMPILE_MOTION_CODE],
-        stdin=subprocess.PIPE,  # by whose end the other process knows that this one is dead
+        stdin=subprocess.PIPE,  # closes when this process ends, which ends the child
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
     try:
         draw(face, np.zeros(len(face.shape_names), np.float32), picture=Picture(size="64x64"))
-        other.wait(COMPILE_TIMEOUT_S)
+        child.wait(COMPILE_TIMEOUT_S)
     except subprocess.TimeoutExpired:
-        other.kill()
+        child.kill()
     finally:
-        if other.poll() is None:
-            other.kill()
-        other.wait()
-        if other.stdin is not None:
-            other.stdin.close()
+        if child.poll() is None:
+            child.kill()
+        child.wait()
+        if child.stdin is not None:
+            child.stdin.close()
 
 
 def compile_motion() -> None:
-    """Compile what turns phones into a face's weights and adds gestures, by moving the shipped faces a little."""
+    """Compile the kernels of lip synthesis, retargeting and gestures by synthesising one second of motion."""
     from tts2face.exemplar.synthesis import build_exemplar_model, speech_trajectory
     from tts2face.gesture.gesture_stream import GestureFields, GestureStream
     from tts2face.gesture.timeline import Timeline
@@ -67,8 +70,8 @@ def compile_motion() -> None:
     from tts2face.types import Waveform
 
     talker: Talker = load_talker("grid_s1")
-    way = build_retargeter(talker, load_face("head"))
+    retargeter = build_retargeter(talker, load_face("head"))
     phones = PhoneSequence([SILENCE, "p", "f", "ɑ", SILENCE], [0.0, 0.3, 0.4, 0.5, 0.7, 1.0])
-    way.retarget(speech_trajectory(phones, build_exemplar_model(talker), fps=30.0, n_frames=30))
+    retargeter.retarget(speech_trajectory(phones, build_exemplar_model(talker), fps=30.0, n_frames=30))
     gestures = GestureStream(GestureFields(load_palette("starter")), style="grid_s1", seed=0, fps=30.0)
     gestures.next(Waveform(np.zeros(1600), 16_000), 3, Timeline())

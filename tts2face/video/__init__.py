@@ -1,1 +1,1 @@
-"""Watching: pictures to landmarks and head pose."""
+"""Video analysis: landmarks and head pose of faces in pictures."""

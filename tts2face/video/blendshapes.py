@@ -1,4 +1,4 @@
-"""Blendshape scores of landmarks: how far a face smiles, opens its jaw or blinks, as an outside check of faces."""
+"""Blendshape scores of tracked landmarks: smile, jaw opening, blink and 49 others."""
 
 from pathlib import Path
 
@@ -34,12 +34,12 @@ INPUT_LANDMARKS = (
 
 
 class BlendshapeReader:
-    """Scores of the 52 `BLENDSHAPES`.
+    """Network that scores the 52 `BLENDSHAPES`.
 
     Parameters
     ----------
     model
-        Bundle of the networks; found as `tts2face.video.landmark_models.find_bundle` says when None.
+        Path of the model bundle; if None, see `tts2face.video.landmark_models.find_bundle`.
 
     Raises
     ------
@@ -51,7 +51,7 @@ class BlendshapeReader:
         self._network = load_network(find_bundle(model), "face_blendshapes")
 
     def blendshape_scores(self, landmarks: NDArray[np.floating]) -> NDArray[np.float32]:
-        """(52,) scores in [0, 1] of (478, 3) landmarks in pixels, as `FaceTracker` reads them.
+        """(52,) scores in [0, 1] of (478, 3) landmarks in pixels, as `FaceTracker` returns them.
 
         Raises
         ------

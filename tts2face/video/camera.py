@@ -1,4 +1,4 @@
-"""A camera as it films: its pictures as they come, the ones that came too late left out."""
+"""Live pictures of a camera; pictures that arrive while the consumer is busy are dropped."""
 
 import threading
 import time
@@ -9,18 +9,18 @@ from typing import Any
 from lexicon.errors import BackendError, InputError
 from tts2face.video.media import TimedFrame
 
-FRAME_TIMEOUT_S = 10.0  # without a picture the camera is gone
+FRAME_TIMEOUT_S = 10.0  # longest time without a picture, after which the capture ends
 
 
 class CaptureDevice:
-    """Pictures of a camera by number, of an address that sends video, or of a file at its own pace.
+    """Live pictures of a camera (by number), of a network stream (by URL), or of a file at its frame rate.
 
     Raises
     ------
     InputError
-        Nothing films there.
+        The source cannot be opened.
     BackendError
-        OpenCV is missing.
+        OpenCV is not installed.
     """
 
     def __init__(self, source: str) -> None:
@@ -28,10 +28,10 @@ class CaptureDevice:
             import cv2
         except ImportError as missing:
             raise BackendError("a camera needs opencv-python-headless: pip install 'tts2face[capture]'") from missing
-        cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # its warnings would hide our sentence
+        cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # OpenCV's warnings repeat our message
         self._device: Any = cv2.VideoCapture(int(source) if source.isdecimal() else source)
         if not self._device.isOpened():
-            raise InputError(f"nothing films at {source!r}; give a camera's number (0 is the first) or its address")
+            raise InputError(f"there is no camera {source!r}; give a camera's number (0 is the first) or its address")
         stated = float(self._device.get(cv2.CAP_PROP_FPS) or 0.0)
         self.fps = stated if 0 < stated <= 120 else 30.0
         self._pace = 0.0 if source.isdecimal() or "://" in source else 1.0 / self.fps
@@ -41,7 +41,7 @@ class CaptureDevice:
         self._thread = threading.Thread(target=self._read_frames, name="camera", daemon=True)
 
     def __enter__(self) -> "CaptureDevice":
-        """Begin to film."""
+        """Start the capture."""
         self._began = time.monotonic()
         self._thread.start()
         return self
@@ -49,13 +49,13 @@ class CaptureDevice:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Stop and let the camera go."""
+        """Stop the capture and release the camera."""
         self._ended = True
         self._thread.join()
         self._device.release()
 
     def pictures(self) -> Iterator[TimedFrame]:
-        """The newest picture each time one is asked for, with the seconds since the beginning; until filming ends."""
+        """Yield the newest picture, with seconds since the start of the capture, until the capture ends."""
         while True:
             with self._frame_arrived:
                 self._frame_arrived.wait_for(lambda: self._newest is not None or self._ended, FRAME_TIMEOUT_S)

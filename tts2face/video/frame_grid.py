@@ -1,18 +1,18 @@
-"""Tracked points on the even grid of the frames i / fps, and the gaps in them."""
+"""Resampling of tracked points to the uniform times i / fps, and interpolation of gaps."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 
-MAX_FILLED_GAP_S = 0.12  # frames without a face that are filled in; lips make no full movement in less
+MAX_FILLED_GAP_S = 0.12  # longest gap that is interpolated; lips make no complete movement in less
 SAME_INSTANT_S = 0.001  # times in a file are rounded to milliseconds
 
 
 def resample_to_grid(
     points: NDArray[np.float32], times: NDArray[np.float64], fps: float
 ) -> tuple[NDArray[np.float32], int]:
-    """Points at the instants i / fps between the first time and the last, and the first i.
+    """Points at the times i / fps between the first time and the last, and the first i.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def resample_to_grid(
         Times do not increase.
     """
     if (np.diff(times) <= 0).any():
-        raise DataError("frames do not follow each other in time; convert the recording with ffmpeg")
+        raise DataError("the times of the frames do not increase; convert the recording with ffmpeg")
     first = int(np.ceil((times[0] - SAME_INSTANT_S) * fps))
     last = int(np.floor((times[-1] + SAME_INSTANT_S) * fps))
     instants = np.arange(first, last + 1) / fps
@@ -47,7 +47,7 @@ def face_span(points: NDArray[np.float32]) -> tuple[int, int]:
 
 
 def fill_gaps(points: NDArray[np.float32], fps: float) -> tuple[NDArray[np.float32], int]:
-    """Points with short gaps bridged by straight lines, and the number of frames filled.
+    """Fill short gaps of NaN by linear interpolation; returns the points and the number of frames filled.
 
     Raises
     ------
@@ -60,6 +60,6 @@ def fill_gaps(points: NDArray[np.float32], fps: float) -> tuple[NDArray[np.float
     present = np.flatnonzero(~missing)
     longest = int(np.diff(present).max()) - 1
     if longest > round(MAX_FILLED_GAP_S * fps):
-        raise DataError(f"the face is out of sight for {longest / fps:.2f} s")
+        raise DataError(f"no face is visible for {longest / fps:.2f} s")
     grid, _ = resample_to_grid(points[present], present / fps, fps)
     return grid, int(missing.sum())

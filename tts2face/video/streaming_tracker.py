@@ -1,4 +1,4 @@
-"""Landmarks of a film read as it runs: one pass over the pictures, the numbers of `FaceTracker.track`."""
+"""Single-pass face tracking in videos, with the same results as the two passes of `FaceTracker.track`."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator
@@ -14,27 +14,27 @@ from tts2face.prefetch import Prefetch
 from tts2face.video.media import TimedFrame
 from tts2face.video.track import CROP_SMOOTHING_S, MIN_SCORE, Crop, FaceTracker, jittered_crops, smooth_crops
 
-MAX_SIDE_PX = 1280  # along the longer side; a face in a larger picture is larger than the networks' input anyway
-SMOOTHING_REACH = 4.0  # standard deviations over which squares are smoothed
-FACE_COUNT_INTERVAL_S = 0.5  # between looks for further faces
-CHANGE_STEP = 2  # every second pixel of every second row tells whether a picture differs from the one before
-MAX_PREFETCHED_FRAMES = 4  # pictures that are decoded and followed ahead
+MAX_SIDE_PX = 1280  # longer side; faces in larger pictures exceed the networks' input size in any case
+SMOOTHING_REACH = 4.0  # standard deviations at which the smoothing kernel of the crops is truncated
+FACE_COUNT_INTERVAL_S = 0.5  # between counts of the faces in a picture
+CHANGE_STEP = 2  # every second pixel of every second row is compared with the previous picture
+MAX_PREFETCHED_FRAMES = 4  # pictures that are decoded and followed in advance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedFrame:
-    """What one picture shows, at `time` seconds.
+    """Tracking result of the picture at `time` seconds.
 
     Parameters
     ----------
     points : (478, 3)
-        Pixels of the picture as `Tracking` has them; NaN without a face.
+        Landmarks in pixels as in `Tracking`; NaN without a face.
     score
         Probability that the landmarks lie on a face.
     n_faces
-        Faces in the picture, counted every `FACE_COUNT_INTERVAL_S`; None where they were not counted.
+        Number of faces, counted every `FACE_COUNT_INTERVAL_S`; None for pictures in between.
     change
-        Mean difference from the picture before, in steps of 8 bits; infinite for the first.
+        Mean absolute difference from the previous picture in 8-bit levels; infinite for the first picture.
     """
 
     time: float
@@ -46,7 +46,7 @@ class TrackedFrame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _CroppedFrame:
-    """A picture of at most `MAX_SIDE_PX`, `scale` of the one it was made from, and the face's square in it."""
+    """A picture scaled by `scale` to at most `MAX_SIDE_PX`, and the crop of its face."""
 
     picture: TimedFrame
     scale: float
@@ -56,7 +56,7 @@ class _CroppedFrame:
 
 
 class StreamingTracker:
-    """Reads the landmarks of films; needs two sets of networks, for following and reading go side by side.
+    """Face tracker for videos; holds two sets of networks, since following and reading run in parallel.
 
     Raises
     ------
@@ -68,10 +68,10 @@ class StreamingTracker:
         self._follower, self._reader = FaceTracker(model), FaceTracker(model)
 
     def track(self, pictures: Iterable[TimedFrame], fps: float) -> Iterator[TrackedFrame]:
-        """What each picture shows in turn, some 0.6 s behind, in memory that does not grow."""
+        """Yield the result of each picture in order, with a delay of about 0.6 s, in bounded memory."""
         reach = int(SMOOTHING_REACH * CROP_SMOOTHING_S * fps + 0.5)
         window: deque[_CroppedFrame] = deque()
-        at = 0  # place in the window of the picture to read next
+        at = 0  # index within the window of the next picture to read
         with Prefetch(self._crop_frames(pictures, fps), MAX_PREFETCHED_FRAMES) as followed:
             for found in followed:
                 window.append(found)
@@ -122,7 +122,7 @@ class StreamingTracker:
 
 
 def _shrink(pixels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float]:
-    """A picture of at most `MAX_SIDE_PX` along its longer side, and its size over that of the picture given."""
+    """Scale a picture down to at most `MAX_SIDE_PX` along its longer side; returns the picture and the factor."""
     height, width = pixels.shape[:2]
     if max(height, width) <= MAX_SIDE_PX:
         return pixels, 1.0
@@ -135,7 +135,7 @@ def _shrink(pixels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float]:
 
 
 def _enlarge(points: NDArray[np.float32], scale: float) -> NDArray[np.float32]:
-    """Points of a shrunk picture in the picture that it was made from; pixel centres lie at whole numbers."""
+    """Map points of a picture scaled by `scale` to the original; pixel centres have integer coordinates."""
     if scale == 1.0:
         return points
     centre = np.array([0.5, 0.5, 0.0], np.float32)

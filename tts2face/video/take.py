@@ -1,4 +1,4 @@
-"""A take: what a performer's face and head do in a video, frame by frame, ready to drive any face."""
+"""A take: tracked landmarks, head pose and blendshape scores of a performer in a video."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,27 +15,27 @@ from tts2face.video.media import read_frames, read_media_info
 from tts2face.video.pose import head_angles, remove_pose
 from tts2face.video.streaming_tracker import StreamingTracker, TrackedFrame
 
-MAX_COUNTS_WITH_TWO_FACES = 1  # a picture on the wall may be taken for a face once
-MIN_TRACKED_SHARE = 0.5  # of the frames must show a face
-PROFILE_RAD = 0.8  # median turn beyond which landmarks of the far side are guessed
+MAX_COUNTS_WITH_TWO_FACES = 1  # tolerates one false detection
+MIN_TRACKED_SHARE = 0.5  # least share of frames with a face
+PROFILE_RAD = 0.8  # median yaw beyond which the landmarks of the far side are unreliable
 
 Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Take:
-    """T frames of a performer; frame i is the instant i / fps of the video's clock.
+    """T frames of a performer; frame i belongs to the time i / fps of the video.
 
     Parameters
     ----------
     landmarks : (T, 478, 3)
         Millimetres, head pose removed; axes as in `tts2face.models.landmarks`.
-    head
-        `HEAD_CHANNELS` against the take's own middle: a performer sits askew before the camera as she likes.
-    scores
-        The 52 `BLENDSHAPES` as the network reads them.
-    n_guessed
-        Frames without a face, bridged from their neighbours.
+    head : (T, 6)
+        `HEAD_CHANNELS` relative to their medians in the take, which compensates an oblique camera.
+    scores : (T, 52)
+        `BLENDSHAPES` in [0, 1].
+    n_interpolated
+        Number of frames without a face, interpolated from their neighbours.
     """
 
     landmarks: NDArray[np.float32]
@@ -50,34 +50,34 @@ class Take:
 
 
 def read_take(
-    video: Path, film: StreamingTracker, reader: BlendshapeReader, *, on_progress: Progress | None = None
+    video: Path, tracker: StreamingTracker, reader: BlendshapeReader, *, on_progress: Progress | None = None
 ) -> Take:
-    """The take in a video.
+    """Track the performer in a video.
 
     Parameters
     ----------
     on_progress
-        Called with frames read and of all.
+        Called with the number of frames tracked and the estimated total.
 
     Raises
     ------
     InputError
-        There is no such file.
+        The file does not exist.
     DataError
-        It cannot be read as video, or shows no face, several faces, or one in profile.
+        The file cannot be read as video, or shows no face, several faces, or a face in profile.
     """
-    facts = read_media_info(video)
-    fps, of = facts.fps, max(1, round(facts.duration * facts.fps))
-    found: list[TrackedFrame] = []
+    info = read_media_info(video)
+    fps, n_frames = info.fps, max(1, round(info.duration * info.fps))
+    tracked: list[TrackedFrame] = []
     n_crowded = 0
-    for sight in film.track(read_frames(video), fps):
-        found.append(sight)
-        n_crowded += sight.n_faces is not None and sight.n_faces > 1
+    for frame in tracker.track(read_frames(video), fps):
+        tracked.append(frame)
+        n_crowded += frame.n_faces is not None and frame.n_faces > 1
         if n_crowded > MAX_COUNTS_WITH_TWO_FACES:
-            raise DataError(f"{video} shows two faces at {sight.time:.1f} s; crop it so that it shows one person")
+            raise DataError(f"{video} shows two faces at {frame.time:.1f} s; crop it so that it shows one person")
         if on_progress:
-            on_progress(min(len(found), of), of)
-    times, pixels = np.array([sight.time for sight in found]), np.array([sight.points for sight in found])
+            on_progress(min(len(tracked), n_frames), n_frames)
+    times, pixels = np.array([frame.time for frame in tracked]), np.array([frame.points for frame in tracked])
     seen = np.isfinite(pixels[:, 0, 0])
     if not seen.any():
         raise DataError(f"{video} shows no face; film one from the front, in the light")
@@ -93,14 +93,14 @@ def read_take(
         raise DataError(f"{video} shows the face in profile; film it from the front")
     head = np.column_stack([angles, posed.translations])
     head -= np.median(head, axis=0)
-    n_guessed = int((~seen).sum())
-    return Take(posed.landmarks, Trajectory(HEAD_CHANNELS, head, fps), Trajectory(BLENDSHAPES, read, fps), n_guessed)
+    n_missing = int((~seen).sum())
+    return Take(posed.landmarks, Trajectory(HEAD_CHANNELS, head, fps), Trajectory(BLENDSHAPES, read, fps), n_missing)
 
 
 def _interpolate_frames(
     values: NDArray[np.float32], known: NDArray[np.float64], times: NDArray[np.float64]
 ) -> NDArray[np.float32]:
-    """Values at `times` from those at `known` times: straight lines between, held at the ends."""
+    """Values at `times` from those at `known` times, by linear interpolation; held at the ends."""
     after = np.clip(np.searchsorted(known, times), 1, max(len(known) - 1, 1))
     if len(known) == 1:
         return np.repeat(values, len(times), axis=0)
@@ -110,7 +110,7 @@ def _interpolate_frames(
 
 
 def _align_to_start(values: NDArray[np.float32], first: int) -> NDArray[np.float32]:
-    """Rows on the video's clock: those before its first picture repeat it, those before 0 are left out."""
+    """Rows from time 0 on: the first row is repeated `first` times, or rows before 0 are removed."""
     if first >= 0:
         return np.concatenate([np.repeat(values[:1], first, axis=0), values])
     return values[-first:]

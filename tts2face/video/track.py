@@ -1,8 +1,8 @@
-"""Face landmarks in pictures: 478 points per frame with a score, no filter over time.
+"""Face tracking: 478 landmarks and a score for each picture, without temporal filtering.
 
-Networks: BlazeFace finds the face once, the face mesh (Kartynnik et al. 2019) reads each frame from a square around the
-previous frame's landmarks. A filter over time would blunt lip closures and lag (docs/decisions/010-landmarks-two-passes.md),
-so there is none.
+BlazeFace detects the face once; the face mesh network (Kartynnik et al. 2019) reads each picture from a square crop
+around the landmarks of the previous one. Temporal filtering would attenuate lip closures and add delay
+(docs/decisions/010-landmarks-two-passes.md).
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -18,23 +18,22 @@ from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMAR
 from tts2face.video.landmark_models import find_bundle, load_network
 
 N_MESH = 468  # landmarks of the face mesh; the iris points follow
-MIN_SCORE = 0.5  # the mesh network's own face probability; below it the landmarks are noise
+MIN_SCORE = 0.5  # face probability of the mesh network; below it the landmarks are noise
 MIN_CONTRAST = 2.0  # standard deviation of pixel values; a blank frame has 0, a dark face about 20
 DETECTOR_SIZE = 128  # pixels of the detector's square input
 MESH_SIZE = 256  # pixels of the mesh network's square input
 CROP_SCALE = 1.5  # side of the square over the longer side of the landmarks' box, as the mesh network was trained
 CROP_SMOOTHING_S = 0.16  # standard deviation; slower than speech, faster than a turn of the head
-CROP_STEP = 0.015  # of the square's side: the second pass's two squares lie this much either side
-APART = 0.4  # of a square's side: faces whose middles are nearer are one face found twice
-MIN_FACE_LOGIT = 0.0  # the detector's logit from which the best detection is a face
-MIN_FURTHER_FACE_LOGIT = 1.0  # and from which further ones count
-SAME_FACE_DISTANCE = 0.5  # of a face's size between the middles of two detections of it
+CROP_STEP = 0.015  # offset of the two crops of the second pass, relative to the side of the square
+MIN_FACE_LOGIT = 0.0  # detector logit from which the best detection is a face
+MIN_FURTHER_FACE_LOGIT = 1.0  # detector logit from which further detections count
+SAME_FACE_DISTANCE = 0.5  # detections whose centres are nearer, relative to the size of the face, are the same face
 DETECTOR_GRIDS = ((16, 2), (8, 6))  # cells per side and anchors per cell of BlazeFace's two feature maps
 
 
 @dataclass(frozen=True, slots=True)
 class Crop:
-    """A square of the picture, turned so that the eyes lie level: centre and side in pixels, angle in radians."""
+    """A square of the picture, rotated so that the eyes are level: centre and side in pixels, angle in radians."""
 
     x: float
     y: float
@@ -49,8 +48,8 @@ class Tracking:
     Parameters
     ----------
     points : (T, 478, 3)
-        Pixels: x right, y down from the top left pixel's centre, z away from the camera on the scale of x; NaN where
-        there is no face.
+        Pixels: x right and y down from the centre of the top left pixel, z away from the camera on the scale of x; NaN
+        for frames without a face.
     scores : (T,)
         Probability that the landmarks lie on a face; 0 for a blank frame.
     """
@@ -65,12 +64,12 @@ class Tracking:
 
 
 class FaceTracker:
-    """Reads landmarks; one face per picture, on one thread.
+    """Tracker of one face; not thread-safe.
 
     Parameters
     ----------
     model
-        Bundle of the networks; found as `tts2face.video.landmark_models.find_bundle` says when None.
+        Path of the model bundle; if None, see `tts2face.video.landmark_models.find_bundle`.
 
     Raises
     ------
@@ -86,12 +85,12 @@ class FaceTracker:
         self._anchors = _anchors()
 
     def track(self, pictures: Callable[[], Iterable[NDArray[np.uint8]]], fps: float) -> Tracking:
-        """Landmarks of each (H, W, 3) RGB picture in turn.
+        """Track the face in a sequence of (H, W, 3) RGB pictures.
 
         Parameters
         ----------
         pictures
-            Gives the pictures from the first on; it is called twice, so that none has to be kept.
+            Returns an iterator over all pictures; it is called twice, so that pictures need not be stored.
         fps
             Pictures per second.
 
@@ -102,9 +101,9 @@ class FaceTracker:
 
         Notes
         -----
-        The first pass follows the face. The second reads each picture again from squares whose place is smoothed
-        without lag, and averages them: the square's own jitter is noise on the landmarks, above all on z. The
-        landmarks are never smoothed over time.
+        The first pass follows the face. The second pass reads each picture from two crops whose positions are smoothed
+        with zero phase, and averages the landmarks, since jitter of the crop adds noise to them, mainly to z. The
+        landmarks themselves are not smoothed over time.
         """
         followed = [crop for _, crop in self.follow(pictures())]
         if not followed:
@@ -120,11 +119,11 @@ class FaceTracker:
         return Tracking(points, scores)
 
     def read(self, pixels: NDArray[np.uint8]) -> tuple[NDArray[np.float32], float]:
-        """(478, 3) landmarks of one picture and their score; NaN and 0 where there is no face."""
+        """(478, 3) landmarks of one picture and their score; NaN and 0 without a face."""
         return next((found, score) for (found, score), _ in self.follow([pixels]))
 
     def detect_face(self, pixels: NDArray[np.uint8]) -> Crop | None:
-        """Square around the most prominent face, or None."""
+        """Crop around the most prominent face of an (H, W, 3) picture, or None."""
         boxes, scores, shift, scale = self._detections(pixels)
         best = int(scores.argmax())
         if scores[best] < MIN_FACE_LOGIT:
@@ -136,7 +135,7 @@ class FaceTracker:
         return Crop(float(centre[0]), float(centre[1]), side, float(np.arctan2(level[1], level[0])))
 
     def count(self, pixels: NDArray[np.uint8]) -> int:
-        """How many faces a picture shows; detections nearer than half a face to a surer one are the same face."""
+        """Number of faces in a picture; overlapping detections are merged by `SAME_FACE_DISTANCE`."""
         boxes, scores, _, _ = self._detections(pixels)
         rows = boxes.reshape(len(boxes), 8, 2)
         centres, sizes = rows[:, 0] + self._anchors * DETECTOR_SIZE, rows[:, 1].max(axis=1)
@@ -152,7 +151,7 @@ class FaceTracker:
     def _detections(
         self, pixels: NDArray[np.uint8]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64], float]:
-        """Boxes (896, 16) and logits (896,) of the anchors, and the shift and scale of the detector's square."""
+        """Boxes (896, 16) and logits (896,) of the anchors, and shift and scale from the picture to the input."""
         height, width = pixels.shape[:2]
         scale = DETECTOR_SIZE / max(height, width)
         shift = np.array([DETECTOR_SIZE - scale * width, DETECTOR_SIZE - scale * height]) / 2
@@ -162,7 +161,7 @@ class FaceTracker:
         return boxes[0], logits[0, :, 0], shift, scale
 
     def read_crop(self, pixels: NDArray[np.uint8], crop: Crop) -> tuple[NDArray[np.float32], float]:
-        """(478, 3) landmarks in pixels of the picture, and their score, from one square of it."""
+        """(478, 3) landmarks in pixels of the picture, and their score, read from one crop."""
         scale = MESH_SIZE / crop.side
         cos, sin = np.cos(crop.angle) * scale, np.sin(crop.angle) * scale
         turn = np.array([[cos, sin], [-sin, cos]])
@@ -185,24 +184,24 @@ class FaceTracker:
     def follow(
         self, pictures: Iterable[NDArray[np.uint8]]
     ) -> Iterator[tuple[tuple[NDArray[np.float32], float], Crop | None]]:
-        """Landmarks and score of each picture in turn, as soon as it comes, and the square around them."""
+        """Yield landmarks and score of each picture as it arrives, and the crop for the next one."""
         crop: Crop | None = None
         for pixels in pictures:
             points, score = np.full((N_LANDMARKS, 3), np.nan, np.float32), 0.0
             if float(pixels.std()) >= MIN_CONTRAST:
-                crop = crop or self._found(pixels)
+                crop = crop or self._initial_crop(pixels)
                 if crop is not None:
                     points, score = self.read_crop(pixels, crop)
             crop = crop_around(points) if score >= MIN_SCORE else None
             yield (points, score), crop
 
-    def _found(self, pixels: NDArray[np.uint8]) -> Crop | None:
+    def _initial_crop(self, pixels: NDArray[np.uint8]) -> Crop | None:
         coarse = self.detect_face(pixels)
         return crop_around(self.read_crop(pixels, coarse)[0]) if coarse else None
 
 
 def crop_around(points: NDArray[np.floating]) -> Crop:
-    """Square from which the next frame is read, around (478, 3) landmarks in pixels."""
+    """Crop around (478, 3) landmarks in pixels, from which the next picture is read."""
     level = points[EYE_OUTER_LEFT, :2] - points[EYE_OUTER_RIGHT, :2]
     angle = float(np.arctan2(level[1], level[0]))
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
@@ -213,7 +212,7 @@ def crop_around(points: NDArray[np.floating]) -> Crop:
 
 
 def smooth_crops(crops: Sequence[Crop | None], fps: float) -> list[Crop | None]:
-    """Squares smoothed over time without lag, each run of pictures with a face by itself."""
+    """Smooth crops over time with zero phase; runs of pictures with a face are smoothed separately."""
     from scipy.ndimage import gaussian_filter1d
 
     smooth = list(crops)
@@ -228,7 +227,7 @@ def smooth_crops(crops: Sequence[Crop | None], fps: float) -> list[Crop | None]:
 
 
 def jittered_crops(crop: Crop) -> Iterator[Crop]:
-    """The two squares, a little either side of a crop, from which a picture is read."""
+    """Yield the two crops, offset by `CROP_STEP` in opposite directions, from which a picture is read."""
     for sign in (1.0, -1.0):
         step = sign * CROP_STEP * crop.side
         yield Crop(crop.x + step, crop.y + step, crop.side * (1.0 + 2.0 * sign * CROP_STEP), crop.angle)
@@ -248,7 +247,7 @@ def _opencv() -> Any:
         import cv2
     except ImportError as missing:
         raise BackendError(
-            "tracking a face needs the package opencv-python-headless: run `pip install 'tts2face[capture]'`"
+            "face tracking needs the package opencv-python-headless: run `pip install 'tts2face[capture]'`"
         ) from missing
     cv2.setNumThreads(1)  # recordings are tracked in parallel, one process each
     return cv2

@@ -1,1 +1,1 @@
-"""Voices: text to sound with phone edges."""
+"""Speech synthesis: text to sound with phone edges."""

@@ -1,4 +1,4 @@
-"""espeak-ng: a formant voice for every language, whose phoneme events are the phone edges."""
+"""espeak-ng, a formant synthesiser for all its languages; phone edges follow from its phoneme events."""
 
 import json
 import os
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from lexicon.errors import BackendError, InputError
 from lexicon.g2p import parse_espeak_word
 from lexicon.ipa import Segment
-from lexicon.japanese import has_kanji, with_kana
+from lexicon.japanese import has_kanji, to_kana
 from lexicon.languages import language_code
 from lexicon.phones import PHONES, nearest_phones
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
@@ -29,17 +29,17 @@ from tts2face.voice.engine import PronunciationMap, SpeechInput, SpokenWord, app
 
 CHILD = Path(__file__).with_name("espeak_child.py")
 WORD_EVENT, PHONEME_EVENT = 1, 7
-ANY_GENDER, FEMALE = 0, 2  # espeak_VOICE.gender; any is male where a language has both
+ANY_GENDER, FEMALE = 0, 2  # espeak_VOICE.gender; ANY_GENDER selects the male voice if a language has both
 LANGUAGE_SWITCH = re.compile(r"\([a-z0-9-]+\)")  # espeak-ng marks where a foreign word begins and ends: (en)...(fr)
-DEFAULT_WORDS_PER_MINUTE = 175  # espeak-ng's default; its events go wrong above 400
-CHILD_TIMEOUT_S = 60.0  # a sentence takes some 50 ms
-MAX_CLOSURE_S = 0.06  # the event of a stop stands at its burst; the closure before it is 38-46 ms
-CLOSED_LEVEL = 0.006  # of full scale: espeak-ng's closures are digital silence but for the tail of what went before
-QUIET_LEVEL = 0.03  # of full scale: what a pause may still hold of the phone before it
+DEFAULT_WORDS_PER_MINUTE = 175  # espeak-ng's default; the times of its events are wrong above 400
+CHILD_TIMEOUT_S = 60.0  # a sentence takes about 50 ms
+MAX_CLOSURE_S = 0.06  # the event of a stop marks its burst; the closure before it lasts 38-46 ms
+CLOSED_LEVEL = 0.006  # relative to full scale; closures are digital silence after the decay of the previous phone
+QUIET_LEVEL = 0.03  # relative to full scale; residual level of the previous phone in a pause
 LEVEL_WINDOW_S = 0.001
 MIN_EVENT_PAUSE_S = 0.03
-EDGE_SILENCE_S = 0.25  # put before and behind: espeak-ng begins at once, lips begin to move earlier
-# espeak-ng's own names of phonemes for [[...]] input (docs/phonemes.md of espeak-ng).
+EDGE_SILENCE_S = 0.25  # silence added at both ends, because lips start to move before the sound does
+# espeak-ng's phoneme mnemonics for [[...]] input (docs/phonemes.md of espeak-ng).
 MNEMONICS = MappingProxyType({
     "ɑ": "A:", "æ": "a", "ʌ": "V", "ɔ": "O:", "aʊ": "aU", "aɪ": "aI", "ɛ": "E", "ɝ": "3:", "eɪ": "eI", "ɪ": "I",
     "i": "i:", "oʊ": "oU", "ɔɪ": "OI", "ʊ": "U", "u": "u:", "ə": "@", "ɚ": "3", "b": "b", "tʃ": "tS", "d": "d",
@@ -51,7 +51,7 @@ STRESS_MARKS = MappingProxyType({1: "'", 2: ","})
 
 @dataclass(frozen=True, slots=True)
 class _PhonemeEvent:
-    """What one phoneme event says: phones, where they begin, and the word they belong to."""
+    """A phoneme event: its phones, its start in seconds, and the index of its word (-1 for none)."""
 
     phones: tuple[str, ...]
     start: float
@@ -59,7 +59,7 @@ class _PhonemeEvent:
 
 
 class EspeakVoice:
-    """A voice of espeak-ng, 22.05 kHz; every request runs in a process of its own."""
+    """A voice of espeak-ng at 22.05 kHz; each call of `speak` starts a child process."""
 
     def __init__(self, language: str, own_words: PronunciationMap, *, is_female: bool = False) -> None:
         self._language, self._own_words = language_code(language), own_words
@@ -68,46 +68,46 @@ class EspeakVoice:
 
     @property
     def sample_rate(self) -> int:
-        """Hz."""
+        """Sample rate in Hz."""
         return self._rate
 
-    def speak(self, spoken: SpeechInput, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
-        """Speech of a sentence; see `tts2face.voice.engine.Voice`. Nothing is random: `seed` changes nothing."""
-        text, words = self._written(spoken)
+    def speak(self, content: SpeechInput, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
+        """Synthesise a sentence; see `tts2face.voice.engine.Voice`. The voice is deterministic: `seed` is unused."""
+        text, words = self._espeak_text(content)
         header, samples = _run_child({
             "text": text, "language": self._language, "gender": self._gender, "has_phonemes": bool(words),
             "words_per_minute": round(DEFAULT_WORDS_PER_MINUTE * rate), "parent": os.getpid(),
         })  # fmt: skip
         sound = np.pad(samples / np.float32(32768), round(EDGE_SILENCE_S * self._rate)).astype(np.float32)
-        sounded, names = self._phoneme_events(header, text, sound)
+        events, names = self._phoneme_events(header, text, sound)
         if words:
-            sounded = _by_written_words(sounded, header, text)
-        if not any(phone != SILENCE for event in sounded for phone in event.phones):
+            events = _assign_written_words(events, header, text)
+        if not any(phone != SILENCE for event in events for phone in event.phones):
             raise InputError(f"there is nothing to say in {text[:40]!r}; give at least one word")
-        phones, spans = _phone_sequence(sounded, words or names, len(sound) / self._rate)
+        phones, spans = _phone_sequence(events, words or names, len(sound) / self._rate)
         return Speech(Waveform(apply_volume(sound, volume), self._rate), phones, spans)
 
-    def _written(self, spoken: SpeechInput) -> tuple[str, list[str]]:
-        """Text for espeak-ng; and the words, where they are given as phones."""
-        if isinstance(spoken, str):
-            check_script(spoken, self._language)
-            if self._language == "ja" and has_kanji(spoken):
-                spoken = with_kana(spoken)
-            plain = _without_brackets(spoken)
-            if not any(map(self._own, plain.split())):
+    def _espeak_text(self, content: SpeechInput) -> tuple[str, list[str]]:
+        """Input text for espeak-ng, and the written words if any is given as phones."""
+        if isinstance(content, str):
+            check_script(content, self._language)
+            if self._language == "ja" and has_kanji(content):
+                content = to_kana(content)
+            plain = _without_brackets(content)
+            if not any(map(self._look_up, plain.split())):
                 return plain, []
-            spoken = [SpokenWord(word, ()) for word in plain.split()]
-        words = [word if word.segments else self._read(word) for word in spoken]
+            content = [SpokenWord(word, ()) for word in plain.split()]
+        words = [word if word.segments else self._pronounce(word) for word in content]
         return " ".join(_word_mnemonic(word) for word in words), [word.text for word in words]
 
-    def _own(self, word: str) -> tuple[Segment, ...] | None:
+    def _look_up(self, word: str) -> tuple[Segment, ...] | None:
         return self._own_words.get(word.strip(".,;:!?\"'()").lower())
 
-    def _read(self, word: SpokenWord) -> SpokenWord:
-        """A word whose phones nobody gives: those of the user's dictionary, or none."""
+    def _pronounce(self, word: SpokenWord) -> SpokenWord:
+        """A word with its phones in the user's dictionary, or without phones."""
         check_script(word.text, self._language)
         text = "".join(_without_brackets(word.text).split())
-        return SpokenWord(text, self._own(text) or (), word.after)
+        return SpokenWord(text, self._look_up(text) or (), word.after)
 
     def _phoneme_events(
         self, header: dict[str, Any], text: str, sound: NDArray[np.float32]
@@ -118,8 +118,8 @@ class EspeakVoice:
             if kind == WORD_EVENT:
                 names.append(text[value[0] : value[0] + value[1]])
                 continue
-            written = LANGUAGE_SWITCH.sub("", value)
-            phones = tuple(segment.phone for segment in parse_espeak_word(written, self._language)) if written else ()
+            ipa = LANGUAGE_SWITCH.sub("", value)
+            phones = tuple(segment.phone for segment in parse_espeak_word(ipa, self._language)) if ipa else ()
             at = sample + round(EDGE_SILENCE_S * self._rate)
             start = at / self._rate
             if phones and PHONES[phones[0]].kind in {"stop", "affricate"}:
@@ -128,15 +128,15 @@ class EspeakVoice:
         return _drop_false_silences(found, sound, self._rate), names
 
 
-def _by_written_words(found: Sequence[_PhonemeEvent], header: Mapping[str, Any], text: str) -> list[_PhonemeEvent]:
-    """Events with the words between spaces in place of espeak-ng's own, which splits and joins words."""
+def _assign_written_words(found: Sequence[_PhonemeEvent], header: Mapping[str, Any], text: str) -> list[_PhonemeEvent]:
+    """Events with indices of the space-separated words instead of espeak-ng's own, which splits and joins words."""
     starts = [0, *(match.end() for match in re.finditer(" ", text))]
     owners = [bisect_right(starts, value[0]) - 1 for kind, _, value in header["events"] if kind == WORD_EVENT]
     return [replace(event, word=owners[event.word] if event.word >= 0 else -1) for event in found]
 
 
 def _drop_false_silences(found: Sequence[_PhonemeEvent], sound: NDArray[np.float32], rate: int) -> list[_PhonemeEvent]:
-    """Events less those that name no phone though something sounds (a mark of the phone before, such as ʲ)."""
+    """Remove events without a phone during which the sound is not quiet (modifiers of the last phone, such as ʲ)."""
     ends = [event.start for event in found[1:]] + [len(sound) / rate]
     return [
         event
@@ -175,7 +175,7 @@ def _run_child(request: Mapping[str, Any]) -> tuple[dict[str, Any], NDArray[np.i
     if answer.returncode < 0:
         raise BackendError(
             f"espeak-ng crashed (signal {-answer.returncode}) on {str(request['text'])[:40]!r}; "
-            "write it in another way, or choose another voice"
+            "change the spelling, or choose another voice"
         )
     if answer.returncode != 0:
         reason = answer.stderr.decode("utf-8", "replace").strip().splitlines()[-1:] or [f"exit {answer.returncode}"]
@@ -188,7 +188,7 @@ def _run_child(request: Mapping[str, Any]) -> tuple[dict[str, Any], NDArray[np.i
 
 
 def _closure_start(sound: NDArray[np.float32], burst: int, rate: int) -> float:
-    """Seconds at which the silence before a stop's burst begins, at most `MAX_CLOSURE_S` before it."""
+    """Start in seconds of the silence before a stop's burst, at most `MAX_CLOSURE_S` before it."""
     window = max(1, round(LEVEL_WINDOW_S * rate))
     earliest = max(0, burst - round(MAX_CLOSURE_S * rate))
     at = burst
@@ -198,16 +198,16 @@ def _closure_start(sound: NDArray[np.float32], burst: int, rate: int) -> float:
 
 
 def _phone_sequence(
-    sounded: Sequence[_PhonemeEvent], words: Sequence[str], duration: float
+    events: Sequence[_PhonemeEvent], words: Sequence[str], duration: float
 ) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
-    """Events to phones without gap; an event of several phones is shared equally among them."""
-    ends = [event.start for event in sounded[1:]] + [duration]
+    """Convert events to contiguous phones; the phones of one event have equal durations."""
+    ends = [event.start for event in events[1:]] + [duration]
     labels: list[str] = []
     starts: list[float] = []
     owners: list[int] = []
-    if sounded[0].start > MIN_EVENT_PAUSE_S and sounded[0].phones != (SILENCE,):
+    if events[0].start > MIN_EVENT_PAUSE_S and events[0].phones != (SILENCE,):
         labels, starts, owners = [SILENCE], [0.0], [-1]
-    for event, end in zip(sounded, ends, strict=True):
+    for event, end in zip(events, ends, strict=True):
         if end <= event.start or (event.phones == (SILENCE,) and labels[-1:] == [SILENCE]):
             continue
         length = (end - event.start) / len(event.phones)
@@ -219,6 +219,6 @@ def _phone_sequence(
     edges[0] = 0.0
     spans = []
     for word in sorted(set(owners) - {-1}):
-        mine = [at for at, owner in enumerate(owners) if owner == word]
-        spans.append(WordSpan(words[min(word, len(words) - 1)], mine[0], mine[-1] + 1))
+        indices = [at for at, owner in enumerate(owners) if owner == word]
+        spans.append(WordSpan(words[min(word, len(words) - 1)], indices[0], indices[-1] + 1))
     return PhoneSequence(labels, enforce_increasing(edges)), tuple(spans)

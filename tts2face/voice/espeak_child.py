@@ -1,8 +1,8 @@
-"""A process of its own that speaks one text with espeak-ng and ends.
+"""Child process that synthesises one text with espeak-ng.
 
-The library is not thread safe and does not repeat itself within a process. Reads one JSON request from standard input;
-writes one line of JSON (rate, events, number of bytes), then the samples as 16-bit little endian. Run as a file, with
-nothing but the standard library and espeakng_loader.
+A process serves one request because the library is not thread-safe and its output depends on earlier calls. The script
+reads a JSON request from standard input and writes one line of JSON (rate, events, number of bytes), then the samples
+as 16-bit little endian. It runs as a file and imports only the standard library and espeakng_loader.
 """
 
 import ctypes
@@ -18,7 +18,7 @@ WORD_EVENT, PHONEME_EVENT = 1, 7
 CHARACTERS_UTF8, PHONEMES_IN_BRACKETS, POSITION_IN_CHARACTERS = 1, 0x100, 1
 RATE_PARAMETER = 1
 DEFAULT_BUFFER_MS = 200
-WATCH_S = 0.2  # between looks at whether the parent lives
+POLL_INTERVAL_S = 0.2  # between checks whether the parent is running
 
 
 class _Name(ctypes.Union):
@@ -58,7 +58,7 @@ class _Voice(ctypes.Structure):
 
 
 def _start_library() -> tuple[Any, int]:
-    """espeak-ng ready to speak, and its sample rate."""
+    """Load and initialise espeak-ng; returns the library and its sample rate in Hz."""
     import espeakng_loader
 
     library = ctypes.CDLL(espeakng_loader.get_library_path())
@@ -80,7 +80,14 @@ def _decode_event(event: _Event) -> tuple[int, int, Any] | None:
 
 
 def speak(request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
-    """Header and samples for a request: text, language, gender, words_per_minute; has_phonemes: [[...]] holds some."""
+    """Synthesise a request; returns the header and the samples.
+
+    Parameters
+    ----------
+    request
+        ``text``, ``language``, ``gender``, ``words_per_minute``, and ``has_phonemes``: whether the text contains
+        mnemonics in [[...]].
+    """
     library, rate = _start_library()
     chunks: list[bytes] = []
     events: list[tuple[int, int, Any]] = []
@@ -111,14 +118,14 @@ def speak(request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
 
 
 def _exit_without(parent: int) -> None:
-    """End this process when its parent is dead: whoever adopts it has another number (POSIX)."""
+    """Exit when the parent has ended: an orphan gets another parent process id (POSIX)."""
     while os.getppid() == parent:
-        time.sleep(WATCH_S)
+        time.sleep(POLL_INTERVAL_S)
     os._exit(1)
 
 
 def main() -> None:
-    """Answer one request."""
+    """Read a request from standard input and write the result to standard output."""
     request = json.load(sys.stdin)
     if os.name == "posix":
         threading.Thread(target=_exit_without, args=(request["parent"],), daemon=True).start()

@@ -1,4 +1,4 @@
-"""One loudness for every voice: -16 LUFS by ITU-R BS.1770-4, with a limiter that keeps the true peak below -1 dB."""
+"""Loudness normalisation to -16 LUFS (ITU-R BS.1770-4) with a limiter that keeps the true peak below -1 dB."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,18 +9,26 @@ from numpy.typing import NDArray
 from tts2face.speech.bs1770 import ABSOLUTE_GATE_LUFS, integrated_loudness, oversampled_peaks
 from tts2face.types import Speech, Waveform
 
-LOUDNESS_LUFS = -16.0  # of mono speech on phones and computers (AES TD1004: -16 to -20)
-CEILING_DB = -1.5  # true peak of a clip; -1 dB then holds behind AAC too
-MOST_GAIN_DB = 40.0  # no speech lies lower; what does is noise
+LOUDNESS_LUFS = -16.0  # target for mono speech on phones and computers (AES TD1004: -16 to -20)
+CEILING_DB = -1.5  # true peak of a clip, which keeps it below -1 dB after AAC encoding as well
+MOST_GAIN_DB = 40.0  # upper limit; sound that needs more is noise
 LOOK_AHEAD_S = 0.005
 TOLERANCE_LU = 0.05
-MOST_STEPS = 12  # towards the loudness; speech of espeak-ng takes 5
+MOST_STEPS = 12  # iterations; speech of espeak-ng takes 5
 
 Floats = NDArray[np.float64]
 
 
 def level_speech(speeches: Sequence[Speech], gains: Sequence[Floats]) -> list[Speech]:
-    """Utterances at `LOUDNESS_LUFS` together, then times a relative gain each, (n,) or (1,), peaks limited."""
+    """Normalise utterances together to `LOUDNESS_LUFS`, apply a relative gain to each, and limit the peaks.
+
+    Parameters
+    ----------
+    speeches
+        N utterances.
+    gains
+        N arrays of shape (n,), one factor for each sample, or (1,).
+    """
     levelled = normalise_loudness([speech.waveform for speech in speeches])
     return [
         replace(speech, waveform=Waveform(limit_peaks(sound.samples * gain, sound.rate), sound.rate))
@@ -29,13 +37,13 @@ def level_speech(speeches: Sequence[Speech], gains: Sequence[Floats]) -> list[Sp
 
 
 def normalise_loudness(sounds: Sequence[Waveform]) -> list[Waveform]:
-    """Sounds times one gain, with which their integrated loudness together is `LOUDNESS_LUFS`, peaks limited.
+    """Multiply sounds by a common gain so that their joint integrated loudness is `LOUDNESS_LUFS`; limit the peaks.
 
-    Digital silence stays as it is.
+    Digital silence is returned unchanged.
 
     Notes
     -----
-    A limiter takes loudness away, so the gain is found by repeated measurement of what comes out of it.
+    Since the limiter reduces the loudness, the gain is iterated on the measured loudness of the limited sound.
     """
     loudness = integrated_loudness(sounds)
     if loudness <= ABSOLUTE_GATE_LUFS:
@@ -57,15 +65,15 @@ def normalise_loudness(sounds: Sequence[Waveform]) -> list[Waveform]:
 
 
 def limit_peaks(samples: NDArray[np.floating], rate: int) -> NDArray[np.float32]:
-    """(n,) samples whose true peaks are turned down to `CEILING_DB`; the same samples where none lies above it."""
+    """(n,) samples whose true peaks are limited to `CEILING_DB`; unchanged if no peak exceeds it."""
     limited: NDArray[np.float32] = (samples * _limiting_gain(oversampled_peaks(samples), rate)).astype(np.float32)
     return limited
 
 
 def _limiting_gain(peaks: Floats, rate: int) -> Floats:
-    """(n,) gain in (0, 1] that holds peaks at the ceiling: the least one needed nearby, smoothed over as long a time.
+    """(n,) gain in (0, 1] that limits peaks (n,) to the ceiling: a moving minimum, then a moving average.
 
-    Each value is a mean of gains that all suffice at its own instant, so that no peak passes.
+    Each value averages gains that all suffice at its sample, so that no peak exceeds the ceiling.
     """
     from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
@@ -74,8 +82,8 @@ def _limiting_gain(peaks: Floats, rate: int) -> Floats:
     if not len(needed) or needed.min() == 1.0:
         return needed
     half = max(round(LOOK_AHEAD_S * rate / 2), 1)
-    gain = minimum_filter1d(needed, 4 * half + 3, mode="constant", cval=1.0)  # a sample wider than the mean at each end
-    for _ in range(2):  # a triangle of 4 half + 1
+    gain = minimum_filter1d(needed, 4 * half + 3, mode="constant", cval=1.0)  # one sample wider than the average
+    for _ in range(2):  # triangular window of 4 half + 1 samples
         gain = uniform_filter1d(gain, 2 * half + 1, mode="nearest")
     smooth: Floats = gain
     return smooth

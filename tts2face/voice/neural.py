@@ -1,34 +1,52 @@
-"""The neural English voice ``heart`` of hibari-tts, with phone edges found in its own sound."""
+"""The neural English voice ``heart`` of hibari-tts, with phone edges by forced alignment of its sound."""
 
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError, InputError
+from lexicon.ipa import Segment
+from lexicon.phones import nearest_phones
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.speech.forced_alignment import Aligner, enforce_increasing
 from tts2face.telemetry import disable_telemetry
 from tts2face.types import Speech, Waveform, concatenate_speech
 from tts2face.voice.engine import PronunciationMap, SpeechInput, SpokenWord, apply_volume
-from tts2face.voice.heart_phonemes import letters_to_phones, segments_to_letters
 
-MAX_LETTERS = 400  # the model hears at most this many letters at once
+MAX_LETTERS = 400  # the model accepts at most this many letters in one call
 DURATION_STEP_S = 0.025  # length of one step of the model's durations
-BOUNDARY_DELAY_S = 0.045  # the model's own boundaries lie this much behind the sound (41-51 ms)
-DURATION_TENSOR = "/Cast_32_output_0"  # inner tensor of the ONNX graph: steps of 25 ms for each letter
-NO_LETTER = re.compile(r"[^\w'’-]+")  # what a word in the reader's brackets may not hold
-WORD_CHARACTER = re.compile(r"[^\W_]")
-"""Anything that must be heard: a letter or a digit."""
+BOUNDARY_DELAY_S = 0.045  # delay of the model's own boundaries against its sound (41-51 ms)
+DURATION_TENSOR = "/Cast_32_output_0"  # internal tensor of the ONNX graph: steps of 25 ms for each letter
+NO_LETTER = re.compile(r"[^\w'’-]+")  # characters that hibari does not accept in bracketed words
+WORD_CHARACTER = re.compile(r"[^\W_]")  # a letter or a digit, which must have a pronunciation
+# Letters of the misaki alphabet, in which the voice was trained, to phones of the table.
+PHONE_OF_LETTER = MappingProxyType({
+    "A": "eɪ", "I": "aɪ", "O": "oʊ", "Q": "oʊ", "W": "aʊ", "Y": "ɔɪ", "ʤ": "dʒ", "ʧ": "tʃ", "ə": "ə", "ɐ": "ə",
+    "ᵊ": "ə", "ᵻ": "ɪ", "ɪ": "ɪ", "i": "i", "ɛ": "ɛ", "æ": "æ", "a": "æ", "ɑ": "ɑ", "ɒ": "ɑ", "ɔ": "ɔ", "ʊ": "ʊ",
+    "u": "u", "ʌ": "ʌ", "ɜ": "ɝ", "ɚ": "ɚ", "e": "ɛ", "o": "ɔ", "ɹ": "ɹ", "r": "ɹ", "ð": "ð", "θ": "θ", "ʃ": "ʃ",
+    "ʒ": "ʒ", "ŋ": "ŋ", "j": "j", "ɡ": "ɡ", "T": "t", "ɾ": "t", "ʔ": "t", "h": "h", "x": "k", "b": "b", "d": "d",
+    "f": "f", "k": "k", "l": "l", "m": "m", "n": "n", "p": "p", "s": "s", "t": "t", "v": "v", "w": "w", "z": "z",
+})  # fmt: skip
+LETTERS_OF_PHONE = MappingProxyType({
+    "eɪ": "A", "aɪ": "I", "oʊ": "O", "aʊ": "W", "ɔɪ": "Y", "dʒ": "ʤ", "tʃ": "ʧ", "ə": "ə", "ɪ": "ɪ", "i": "i",
+    "ɛ": "ɛ", "æ": "æ", "ɑ": "ɑ", "ɔ": "ɔ", "ʊ": "ʊ", "u": "u", "ʌ": "ʌ", "ɝ": "ɜɹ", "ɚ": "əɹ", "ɹ": "ɹ", "ð": "ð",
+    "θ": "θ", "ʃ": "ʃ", "ʒ": "ʒ", "ŋ": "ŋ", "j": "j", "ɡ": "ɡ", "h": "h", "b": "b", "d": "d", "f": "f", "k": "k",
+    "l": "l", "m": "m", "n": "n", "p": "p", "s": "s", "t": "t", "v": "v", "w": "w", "z": "z",
+})  # fmt: skip
+RHOTIC_VOWELS = MappingProxyType({"ə": "ɚ", "ɝ": "ɝ", "ɚ": "ɚ"})  # vowels that merge with a following ɹ
+VOWELS = frozenset(phone for letter, phone in PHONE_OF_LETTER.items() if letter in "AIOQWYəɐᵊᵻɪiɛæaɑɒɔʊuʌɜɚeo")
+STRESS_MARKS = MappingProxyType({1: "ˈ", 2: "ˌ"})
 
 
 @dataclass(frozen=True, slots=True)
 class _Token:
-    """A written word with the letters that speak it, or punctuation, and whether a space follows."""
+    """A written word or punctuation, its letters in the voice's alphabet, and whether a space follows."""
 
     text: str
     letters: str
@@ -36,7 +54,7 @@ class _Token:
 
 
 class NeuralVoice:
-    """The voice ``heart``: American English, 24 kHz. One thread at a time."""
+    """The voice ``heart``: American English, 24 kHz. Not thread-safe."""
 
     def __init__(self, own_words: PronunciationMap) -> None:
         self._own_words = {word: segments_to_letters(segments) for word, segments in own_words.items()}
@@ -51,24 +69,25 @@ class NeuralVoice:
 
     @property
     def sample_rate(self) -> int:
-        """Hz."""
+        """Sample rate in Hz."""
         return int(self._model.sample_rate)
 
-    def speak(self, spoken: SpeechInput, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
-        """Speech of a sentence; see `tts2face.voice.engine.Voice`."""
-        parts = list(self._parts(spoken))
+    def speak(self, content: SpeechInput, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
+        """Synthesise a sentence; see `tts2face.voice.engine.Voice`."""
+        parts = list(self._parts(content))
         if not any(letters_to_phones(token.letters)[0] for part in parts for token in part):
             raise InputError("there is nothing to say in the text; give at least one word")
         return concatenate_speech([self._speak_tokens(part, rate, volume, seed) for part in parts])
 
-    def _parts(self, spoken: SpeechInput) -> Iterator[list[_Token]]:
-        if isinstance(spoken, str):
-            split = self._model.split_sentences(spoken)
+    def _parts(self, content: SpeechInput) -> Iterator[list[_Token]]:
+        """Yield the tokens of each part that the model synthesises in one call."""
+        if isinstance(content, str):
+            split = self._model.split_sentences(content)
             sentences = [self._tokens(self._insert_own_words(sentence)) for sentence in split]
-        elif all(word.segments for word in spoken):
-            sentences = [[_token_from_word(word) for word in spoken]]
+        elif all(word.segments for word in content):
+            sentences = [[_token_from_word(word) for word in content]]
         else:
-            sentences = [self._tokens(" ".join(self._in_text(word) for word in spoken))]
+            sentences = [self._tokens(" ".join(self._bracketed_word(word) for word in content))]
         for sentence in sentences:
             for part in _cut_tokens(sentence):
                 if any(token.letters.strip() for token in part):
@@ -77,36 +96,39 @@ class NeuralVoice:
     def _tokens(self, sentence: str) -> list[_Token]:
         from hibari.g2p.normalize import normalize
 
-        reader = self._model.g2p
-        read = reader.phonemize_tokens(reader.tokenize(normalize(sentence)))
-        tokens = [_Token(token.text, self._known(token.phonemes), bool(token.whitespace)) for token in read]
-        unsaid = [
+        g2p = self._model.g2p
+        phonemized = g2p.phonemize_tokens(g2p.tokenize(normalize(sentence)))
+        tokens = [_Token(token.text, self._known(token.phonemes), bool(token.whitespace)) for token in phonemized]
+        unpronounced = [
             token.text
             for token in tokens
             if WORD_CHARACTER.search(token.text) and not letters_to_phones(token.letters)[0]
         ]
-        if unsaid:
-            raise InputError(f"the voice heart cannot say {unsaid[0]!r}; write it in English words, or choose a voice")
+        if unpronounced:
+            raise InputError(
+                f"the voice heart cannot say {unpronounced[0]!r}; write it in English words, or choose another voice"
+            )
         return tokens
 
     def _insert_own_words(self, sentence: str) -> str:
-        """The sentence with a user's words as ``[word](/letters/)``, which the reader takes as they are."""
+        """Replace a user's words by ``[word](/letters/)``, hibari's notation for given pronunciations."""
 
-        def marked(match: "re.Match[str]") -> str:
+        def bracketed(match: "re.Match[str]") -> str:
             letters = self._own_words.get(match[0].lower())
             return match[0] if letters is None else f"[{match[0]}](/{letters}/)"
 
         plain = re.sub(r"[\[\]]", " ", sentence)
-        return re.sub(r"[^\W_]+(?:['’-][^\W_]+)*", marked, plain) if self._own_words else plain
+        return re.sub(r"[^\W_]+(?:['’-][^\W_]+)*", bracketed, plain) if self._own_words else plain
 
-    def _in_text(self, word: SpokenWord) -> str:
-        """A word as the reader takes it: with its phones where they are given."""
+    def _bracketed_word(self, word: SpokenWord) -> str:
+        """A word in hibari's notation, with its phones if it has any."""
         if not word.segments:
             return self._insert_own_words(word.text) + word.after
-        shown = NO_LETTER.sub("", word.text) or "word"
-        return f"[{shown}](/{segments_to_letters(word.segments)}/){word.after}"
+        label = NO_LETTER.sub("", word.text) or "word"
+        return f"[{label}](/{segments_to_letters(word.segments)}/){word.after}"
 
     def _known(self, letters: str | None) -> str:
+        """The letters that belong to the model's vocabulary."""
         return "".join(letter for letter in letters or "" if letter in self._model.vocab)
 
     def _speak_tokens(self, tokens: Sequence[_Token], rate: float, volume: float, seed: int) -> Speech:
@@ -114,12 +136,12 @@ class NeuralVoice:
         samples = self._model.from_phonemes(letters, speed=rate, seed=seed)
         sound = Waveform(apply_volume(samples, 1.0), self.sample_rate)
         try:
-            phones, spans = self._aligned(tokens, sound)
+            phones, spans = self._align(tokens, sound)
         except DataError:
             phones, spans = self._predict_phones(tokens, letters, rate, sound)
         return Speech(Waveform(apply_volume(samples, volume), self.sample_rate), phones, spans)
 
-    def _aligned(self, tokens: Sequence[_Token], sound: Waveform) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+    def _align(self, tokens: Sequence[_Token], sound: Waveform) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
         words = [(str(owner), [phones]) for owner, phones, _ in _spoken_words(tokens)]
         found = self._aligner.align(sound, words)
         return found.phones, _token_spans(found.words, tokens)
@@ -127,7 +149,7 @@ class NeuralVoice:
     def _predict_phones(
         self, tokens: Sequence[_Token], letters: str, rate: float, sound: Waveform
     ) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
-        """Phones where the model meant to put them, less its lateness: for sound that cannot be aligned."""
+        """Phone edges from the model's durations, corrected for its delay, for sound that cannot be aligned."""
         begins = np.concatenate([[0.0], np.cumsum(self._durations(letters, rate) * DURATION_STEP_S)])[1:]
         labels, starts, spans = [SILENCE], [0.0], []
         for owner, phones, places in _spoken_words(tokens):
@@ -140,22 +162,22 @@ class NeuralVoice:
         return PhoneSequence(labels, edges), _token_spans(spans, tokens)
 
     def _durations(self, letters: str, rate: float) -> NDArray[np.float64]:
-        """Steps of `DURATION_STEP_S` for the letters with one pad before and one behind."""
+        """(L + 2,) durations in steps of `DURATION_STEP_S` of L letters and the padding at both ends."""
         disable_telemetry()
         import onnxruntime
 
         graph = add_graph_output(Path(self._model.model_path).read_bytes(), DURATION_TENSOR)
         session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
-        given = {
+        inputs = {
             "ids": np.array([self._model.ids(letters)], np.int64),
             "speed": np.array([rate], np.float32),
         }
-        steps: NDArray[np.float64] = np.asarray(session.run([DURATION_TENSOR], given)[0], np.float64).ravel()
+        steps: NDArray[np.float64] = np.asarray(session.run([DURATION_TENSOR], inputs)[0], np.float64).ravel()
         return steps
 
 
 def _session_without_arena(path: str) -> Any:
-    """A session that frees what a sentence took; the arena keeps what the longest one took, up to 100 MB."""
+    """ONNX session that frees its memory after each sentence; an arena would retain up to 100 MB."""
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
@@ -170,7 +192,7 @@ def _token_from_word(word: SpokenWord) -> _Token:
 
 
 def _cut_tokens(tokens: Sequence[_Token]) -> Iterator[list[_Token]]:
-    """Stretches of at most `MAX_LETTERS` letters, cut behind a clause mark where there is one."""
+    """Divide tokens into parts of at most `MAX_LETTERS` letters, after a clause mark if the part has one."""
     part: list[_Token] = []
     length = 0
     for token in tokens:
@@ -187,9 +209,9 @@ def _cut_tokens(tokens: Sequence[_Token]) -> Iterator[list[_Token]]:
 
 
 def _spoken_words(tokens: Sequence[_Token]) -> Iterator[tuple[int, tuple[str, ...], tuple[int, ...]]]:
-    """For each spoken word the number of its token, its phones, and the place of each in the joined letters.
+    """Yield for each spoken word the index of its token, its phones, and their positions in the joined letters.
 
-    A token such as a number is spoken as several words.
+    A token such as a number consists of several spoken words.
     """
     at = 0
     for number, token in enumerate(tokens):
@@ -201,7 +223,7 @@ def _spoken_words(tokens: Sequence[_Token]) -> Iterator[tuple[int, tuple[str, ..
 
 
 def _token_spans(spans: Sequence[WordSpan], tokens: Sequence[_Token]) -> tuple[WordSpan, ...]:
-    """Spans named by token number to one span for each token, named by its text."""
+    """Merge the spans of each token, labelled by token index, into one span labelled by the token's text."""
     joined: dict[str, WordSpan] = {}
     for span in spans:
         first = joined[span.text].first if span.text in joined else span.first
@@ -210,7 +232,10 @@ def _token_spans(spans: Sequence[WordSpan], tokens: Sequence[_Token]) -> tuple[W
 
 
 def add_graph_output(model: bytes, tensor: str) -> bytes:
-    """An ONNX model with one more output: protocol buffers merge what is appended (ONNX IR, ``GraphProto.output``)."""
+    """Add an output tensor to a serialised ONNX model.
+
+    Protocol buffers merge appended messages, so that the output is appended as a ``GraphProto`` (ONNX IR).
+    """
     graph_field, output_field, name_field = 7, 12, 1
     message = _length_delimited(name_field, tensor.encode())
     return model + _length_delimited(graph_field, _length_delimited(output_field, message))
@@ -223,3 +248,39 @@ def _length_delimited(field: int, content: bytes) -> bytes:
 def _encode_varint(number: int) -> bytes:
     low, rest = number & 0x7F, number >> 7
     return bytes([low | 0x80]) + _encode_varint(rest) if rest else bytes([low])
+
+
+def letters_to_phones(letters: str) -> tuple[tuple[str, ...], tuple[int, ...]]:
+    """Phones of a word's letters, and the position of each phone's first letter.
+
+    əɹ is one phone (ɚ) unless a vowel follows; ɜɹ is always one (ɝ). Stress marks and length signs are skipped.
+    """
+    candidates = [(PHONE_OF_LETTER[letter], at) for at, letter in enumerate(letters) if letter in PHONE_OF_LETTER]
+    phones: list[str] = []
+    places: list[int] = []
+    for number, (phone, at) in enumerate(candidates):
+        follows = candidates[number + 1][0] if number + 1 < len(candidates) else ""
+        is_rhotic = phone == "ɹ" and phones and phones[-1] in RHOTIC_VOWELS
+        if is_rhotic and (phones[-1] != "ə" or follows not in VOWELS):
+            phones[-1] = RHOTIC_VOWELS[phones[-1]]
+            continue
+        phones.append(phone)
+        places.append(at)
+    return tuple(phones), tuple(places)
+
+
+def segments_to_letters(segments: Sequence[Segment]) -> str:
+    """Letters of phones in the voice's alphabet; a phone that the alphabet lacks is replaced by the nearest one.
+
+    Raises
+    ------
+    InputError
+        `segments` is empty.
+    """
+    if not segments:
+        raise InputError("a spoken word needs at least one phone")
+    letters = ""
+    for segment in segments:
+        for phone in nearest_phones(segment.phone, LETTERS_OF_PHONE.keys()):
+            letters += STRESS_MARKS.get(segment.stress, "") + LETTERS_OF_PHONE[phone]
+    return letters

@@ -1,4 +1,4 @@
-"""Any Piper voice by its path (extra ``[piper]``), with phone edges found in its own sound."""
+"""Piper voices from files (extra ``[piper]``), with phone edges by forced alignment of their sound."""
 
 import re
 from pathlib import Path
@@ -22,17 +22,27 @@ STRESS_MARKS = MappingProxyType({1: "ˈ", 2: "ˌ"})
 
 
 class PiperVoice:
-    """A Piper voice (VITS in ONNX) with the settings file that lies beside it."""
+    """A Piper voice (VITS in ONNX) with its settings file ``NAME.onnx.json`` in the same folder.
+
+    Raises
+    ------
+    InputError
+        The voice does not exist.
+    DataError
+        The settings are missing, or a file is damaged.
+    BackendError
+        piper-tts is not installed.
+    """
 
     def __init__(self, path: Path, language: str, own_words: PronunciationMap) -> None:
         if not path.is_file():
             raise InputError(f"there is no Piper voice {path}; check the path")
         settings = path.with_name(path.name + ".json")
         if not settings.is_file():
-            raise DataError(f"the Piper voice {path} lacks its settings; put {settings.name} beside it")
+            raise DataError(f"the Piper voice {path} lacks its settings; put {settings.name} into the same folder")
         disable_telemetry()
         try:
-            read_json(settings)  # piper itself reads it without limits
+            read_json(settings)  # checks size and nesting, which piper does not limit
         except OSError as refused:
             raise DataError(f"{settings} cannot be read ({refused.strerror}); check the file") from refused
         try:
@@ -42,54 +52,58 @@ class PiperVoice:
         try:
             self._model: Any = Loaded.load(str(path), config_path=str(settings))
         except (ValueError, KeyError, RuntimeError) as broken:
-            raise DataError(f"{path} is no Piper voice ({broken}); download it again") from broken
+            raise DataError(f"{path} is not a Piper voice ({broken}); download it again") from broken
         self._language = str(self._model.config.espeak_voice or language)
         self._own_words, self._aligner = own_words, Aligner()
 
     @property
     def sample_rate(self) -> int:
-        """Hz."""
+        """Sample rate in Hz."""
         return int(self._model.config.sample_rate)
 
-    def speak(self, spoken: SpeechInput, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
-        """Speech of a sentence; see `tts2face.voice.engine.Voice`. Spoken without noise: `seed` changes nothing."""
-        words = self._words(spoken)
+    def speak(self, content: SpeechInput, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
+        """Synthesise a sentence; see `tts2face.voice.engine.Voice`. The model runs without noise: `seed` is unused."""
+        words = self._words(content)
         if not words:
             raise InputError("there is nothing to say in the text; give at least one word")
-        text = self._marked(spoken) if isinstance(spoken, str) else " ".join(_bracketed_ipa(word) for word in words)
-        sound = Waveform(apply_volume(self._sound(text, rate), 1.0), self.sample_rate)
-        ways = [(word.text, [tuple(segment.phone for segment in word.segments)]) for word in words]
-        found = self._aligner.align(sound, ways)
+        if isinstance(content, str):
+            text = self._insert_own_words(content)
+        else:
+            text = " ".join(_bracketed_ipa(word) for word in words)
+        sound = Waveform(apply_volume(self._synthesise(text, rate), 1.0), self.sample_rate)
+        pronunciations = [(word.text, [tuple(segment.phone for segment in word.segments)]) for word in words]
+        found = self._aligner.align(sound, pronunciations)
         return Speech(Waveform(apply_volume(sound.samples, volume), self.sample_rate), found.phones, found.words)
 
-    def _words(self, spoken: SpeechInput) -> list[SpokenWord]:
-        if not isinstance(spoken, str):
-            return [part for word in spoken for part in ([word] if word.segments else self._read(word))]
-        check_script(spoken, self._language)
-        written = WORD.findall(spoken)
+    def _words(self, content: SpeechInput) -> list[SpokenWord]:
+        """Words with phones: those given, of the user's dictionary, or of espeak-ng."""
+        if not isinstance(content, str):
+            return [part for word in content for part in ([word] if word.segments else self._pronounce(word))]
+        check_script(content, self._language)
+        written = WORD.findall(content)
         own = {word: self._own_words.get(word.lower()) for word in written}
         words = []
-        for text, spoken_parts in zip(written, phonemize(written, self._language), strict=True):
-            read = [segment for part in spoken_parts for segment in parse_espeak_word(part, self._language)]
-            words.append(SpokenWord(text, own[text] or tuple(read)))
+        for text, parts in zip(written, phonemize(written, self._language), strict=True):
+            segments = [segment for part in parts for segment in parse_espeak_word(part, self._language)]
+            words.append(SpokenWord(text, own[text] or tuple(segments)))
         return [word for word in words if word.segments]
 
-    def _read(self, word: SpokenWord) -> list[SpokenWord]:
-        """The words of a text whose phones nobody gives."""
+    def _pronounce(self, word: SpokenWord) -> list[SpokenWord]:
+        """The spoken words of a written one without given phones."""
         *others, last = self._words(word.text) or [SpokenWord("", ())]
-        behind = "".join(re.findall("[.,;:!?]+$", word.text)) + word.after
-        return [*others, SpokenWord(last.text, last.segments, behind)] if last.segments else []
+        after = "".join(re.findall("[.,;:!?]+$", word.text)) + word.after
+        return [*others, SpokenWord(last.text, last.segments, after)] if last.segments else []
 
-    def _marked(self, text: str) -> str:
-        """The text with a user's words as ``[[IPA]]``, which Piper says as it stands."""
+    def _insert_own_words(self, text: str) -> str:
+        """Replace a user's words by ``[[IPA]]``, Piper's notation for given pronunciations."""
 
-        def marked(match: "re.Match[str]") -> str:
+        def bracketed(match: "re.Match[str]") -> str:
             segments = self._own_words.get(match[0].lower())
             return match[0] if segments is None else _bracketed_ipa(SpokenWord(match[0], segments))
 
-        return WORD.sub(marked, text)
+        return WORD.sub(bracketed, text)
 
-    def _sound(self, text: str, rate: float) -> NDArray[np.float32]:
+    def _synthesise(self, text: str, rate: float) -> NDArray[np.float32]:
         from piper import SynthesisConfig
 
         config = SynthesisConfig(length_scale=1.0 / rate, noise_scale=0.0, noise_w_scale=0.0)

@@ -13,9 +13,9 @@ from corpus_tools.decomposition.capture import (
     resample,
     resample_to_gesture_rate,
 )
+from corpus_tools.decomposition.capture_files import read_livelink_recording
 from corpus_tools.decomposition.face_motion import moved_landmarks, rest_landmarks
-from corpus_tools.decomposition.livelink import read_livelink_recording
-from corpus_tools.decomposition.video import read_sound_span
+from corpus_tools.decomposition.recording_files import read_sound_span
 from lexicon.errors import DataError, InputError
 from tts2face.face.deformation import posed_vertices
 from tts2face.models.face import Face
@@ -131,7 +131,9 @@ def test_sound_of_the_same_name_is_found(shared_recordings: Path, tmp_path: Path
 @pytest.mark.parametrize("begin", [0.5, -0.25])
 def test_a_film_brings_its_sound_on_the_clock_of_its_frames(begin: float, monkeypatch: pytest.MonkeyPatch) -> None:
     ramp = np.arange(64_000, dtype=np.float32) / 64_000
-    monkeypatch.setattr("corpus_tools.decomposition.video.read_sound", lambda path, rate: Waveform(ramp, rate))
+    monkeypatch.setattr(
+        "corpus_tools.decomposition.recording_files.read_sound", lambda path, rate: Waveform(ramp, rate)
+    )
     sound = read_sound_span(Path("film.mp4"), begin, 2.0)
     assert sound.duration == 2.0
     at = np.arange(len(sound.samples)) + round(begin * 16_000)

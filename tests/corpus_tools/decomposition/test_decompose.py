@@ -8,18 +8,19 @@ import pytest
 from corpus_tools.decomposition.basis_expressions import ExpressionBasis, transfer_basis
 from corpus_tools.decomposition.blend_weights import build_least_squares_estimator
 from corpus_tools.decomposition.capture import FaceRecording
+from corpus_tools.decomposition.capture_files import eye_motion
 from corpus_tools.decomposition.decompose import (
     IRIS_LANDMARKS,
     IRIS_SHIFT_PER_RAD,
     Decomposition,
     decompose,
+    feature_landmarks,
     gaze_angles,
+    region_landmarks,
     weight_displacements,
 )
 from corpus_tools.decomposition.derived_styles import read_derived_styles
 from corpus_tools.decomposition.face_motion import moved_landmarks, rest_landmarks
-from corpus_tools.decomposition.livelink import eye_motion
-from corpus_tools.decomposition.regions import feature_landmarks, region_landmarks
 from corpus_tools.decomposition.style import add_style, size_ratios
 from lexicon.errors import DataError, InputError
 from tts2face.face.expressions import expression_landmarks

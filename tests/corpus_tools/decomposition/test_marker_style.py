@@ -36,7 +36,7 @@ def recorded(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> StyleSo
     sound = 0.2 * np.sin(np.arange(len(made.points) * 100) / 8.0)
     write_c3d(tmp_path / "take.c3d", made.names, made.points, sound=sound)
     worn_how = MarkerOptions(neutral=folder / "neutral.csv")
-    return StyleSource(recordings=tmp_path / "take.c3d", stills=find_stills(folder), worn=worn_how)
+    return StyleSource(recordings=tmp_path / "take.c3d", stills=find_stills(folder), marker_options=worn_how)
 
 
 def test_markers_and_their_stills_become_a_style(recorded: StyleSource, made: Made, tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ def test_a_live_link_table_and_a_marker_table_are_told_apart(
     worn = write_table(tmp_path / "take.csv", made.names, made.points, first="frame")
     with pytest.raises(InputError, match="counts frames"):
         read_capture_file(worn, face)
-    assert read_capture_file(worn, face, worn=MarkerOptions(neutral=worn, fps=120.0)).missing_features == {"gaze"}
+    assert read_capture_file(worn, face, options=MarkerOptions(neutral=worn, fps=120.0)).missing_features == {"gaze"}
 
 
 def test_what_is_neither_is_refused(face: Face, tmp_path: Path) -> None:

@@ -2,10 +2,10 @@
 
 import pytest
 
-from corpus_tools.gesture_study.analysis import GestureStudy, Options, study
+from corpus_tools.gesture_study.analysis import GestureStudy, Options, study_gestures
 from tests.corpus_tools.gesture_study.made_palette import made_palette
 
 
 @pytest.fixture(scope="session")
 def found() -> GestureStudy:
-    return study("made", made_palette(), Options(one_in=4, halves=10, clips=2))
+    return study_gestures("made", made_palette(), Options(one_in=4, halves=10, clips=2))

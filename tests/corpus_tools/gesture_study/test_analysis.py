@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from corpus_tools.gesture_study.analysis import Options, StyleStudy, TraitComparison, study
+from corpus_tools.gesture_study.analysis import Options, StyleStudy, TraitComparison, study_gestures
 from corpus_tools.gesture_study.clips import (
     field_clip,
     hold_out,
@@ -12,8 +12,8 @@ from corpus_tools.gesture_study.clips import (
     replace_style,
     select_recordings,
 )
-from corpus_tools.gesture_study.measures import distance, split_recordings
-from corpus_tools.gesture_study.traits import brow_lift, traits_of
+from corpus_tools.gesture_study.measures import split_recordings, wasserstein
+from corpus_tools.gesture_study.traits import brow_lift, style_traits
 from lexicon.errors import InputError
 from tests.corpus_tools.gesture_study.made_palette import BLINK, N_FRAMES, made_palette, made_style
 from tts2face.gesture.gesture_stream import GestureFields, GestureStream, style_median
@@ -23,7 +23,7 @@ from tts2face.types import Waveform
 
 
 def compared(style: StyleStudy, name: str) -> TraitComparison:
-    return next(one for one in style.compared if one.trait.name == name)
+    return next(one for one in style.trait_comparisons if one.trait.name == name)
 
 
 def test_recordings_are_dealt_whole_and_once():
@@ -78,7 +78,7 @@ def test_noise_hears_nothing_and_differs_by_seed():
 
 def test_traits_have_the_units_that_they_say():
     palette = made_palette()
-    traits = {trait.name: trait for trait in traits_of(palette, palette.styles["calm"])}
+    traits = {trait.name: trait for trait in style_traits(palette, palette.styles["calm"])}
     turning = np.zeros((3, 6))
     turning[:, 1] = np.radians([0, 1, 3])
     np.testing.assert_allclose(traits["head speed"].of(turning), [30, 60])
@@ -92,7 +92,7 @@ def test_traits_have_the_units_that_they_say():
 
 def test_what_is_known_of_the_made_palette_is_found(found):
     calm, quick = found.styles
-    assert (calm.n_learnt, calm.n_held, calm.is_held_out) == (45, 15, True)
+    assert (calm.n_training, calm.n_held_out, calm.is_held_out) == (45, 15, True)
     intervals = compared(calm, "blink interval")
     np.testing.assert_allclose(intervals.real, 1.0, atol=1e-6)
     assert len(intervals.real) == 2 * 15
@@ -109,7 +109,7 @@ def test_a_field_is_nearer_than_noise(found):
     calm = found.styles[0]
     for name in ("head speed", "brow speed", "closing speed"):
         assert compared(calm, name).to_field < 0.5 * compared(calm, name).to_noise
-    by_feature = {one.feature: one for one in calm.moving}
+    by_feature = {one.feature: one for one in calm.motion_comparisons}
     real, field, noise, _ = by_feature["head"].with_intensity
     assert min(real, field) > noise + 0.1
     assert 0.3 < by_feature["head"].diversity[0] < 1.5
@@ -119,14 +119,14 @@ def test_published_fields_stand_beside_those_of_measured_styles(found):
     calm, quick = found.styles
     one = compared(calm, "head speed")
     assert len(one.published) == len(one.noise) / 2
-    assert one.to_published == pytest.approx(distance(one.real, one.published))
+    assert one.to_published == pytest.approx(wasserstein(one.real, one.published))
     assert one.to_published > 3 * one.to_field  # without a spring a leap is a jump
     assert len(calm.blinks_per_minute) == 4
-    assert all(len(one.spectra) == len(one.with_intensity) == 4 for one in calm.moving)
-    assert calm.moving[0].fast[2] > calm.moving[0].fast[0]
+    assert all(len(one.spectra) == len(one.with_intensity) == 4 for one in calm.motion_comparisons)
+    assert calm.motion_comparisons[0].fast_power[2] > calm.motion_comparisons[0].fast_power[0]
     assert not len(compared(quick, "head speed").published)
     assert np.isnan(compared(quick, "head speed").to_published)
-    assert len(quick.blinks_per_minute) == len(quick.moving[0].spectra) == 3
+    assert len(quick.blinks_per_minute) == len(quick.motion_comparisons[0].spectra) == 3
 
 
 def test_a_published_clip_consists_of_recorded_frames():
@@ -143,11 +143,11 @@ def test_a_published_clip_consists_of_recorded_frames():
 
 def test_long_clips_visit_more_and_more_and_do_not_repeat(found):
     calm, quick = found.styles
-    assert len(calm.long.visited) == 3
-    for shares in calm.long.visited.values():
+    assert len(calm.long_run.coverage) == 3
+    for shares in calm.long_run.coverage.values():
         assert 0 < shares[0] <= shares[1] <= shares[2] <= 1
-    assert all(len(one.speech) == 300 for one in calm.long.repeating.values())
-    assert not quick.long.visited
+    assert all(len(one.speech) == 300 for one in calm.long_run.repetition.values())
+    assert not quick.long_run.coverage
 
 
 def test_targets_are_those_of_measured_styles(found):
@@ -158,8 +158,8 @@ def test_targets_are_those_of_measured_styles(found):
 
 def test_few_recordings_are_compared_with_themselves():
     palette = made_palette(n=5)
-    (calm,) = study("few", replace_style(palette, "calm", palette.styles["calm"]), Options(clips=2)).styles[:1]
-    assert (calm.n_learnt, calm.n_held, calm.is_held_out) == (5, 5, False)
+    (calm,) = study_gestures("few", replace_style(palette, "calm", palette.styles["calm"]), Options(clips=2)).styles[:1]
+    assert (calm.n_training, calm.n_held_out, calm.is_held_out) == (5, 5, False)
 
 
 @pytest.mark.parametrize(

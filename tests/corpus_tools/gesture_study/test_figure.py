@@ -15,12 +15,12 @@ from corpus_tools.gesture_study.figure import (
     HEIGHT,
     N_BINS,
     WIDTH,
-    brief,
-    distribution,
+    autocorrelation_panel,
+    distribution_panel,
     panel_svg,
     panels_png,
-    power,
-    repetition,
+    spectrum_panel,
+    summary_panels,
 )
 from corpus_tools.report.drawing import PNG_SCALE, SERIES, load_matplotlib
 
@@ -44,8 +44,8 @@ def steps(axes):
 
 
 def test_a_distribution_is_in_percent_and_holds_what_is_beyond(calm):
-    compared = calm.compared[0]
-    found = steps(drawn(distribution(calm, compared)))
+    compared = calm.trait_comparisons[0]
+    found = steps(drawn(distribution_panel(calm, compared)))
     kinds = {
         "recorded": compared.real, "field": compared.field, "noise": compared.noise, "ju2008": compared.published,
     }  # fmt: skip
@@ -61,39 +61,43 @@ def test_a_distribution_is_in_percent_and_holds_what_is_beyond(calm):
 
 def test_a_derived_style_has_no_line_of_the_published_field(found):
     quick = found.styles[1]
-    assert set(steps(drawn(distribution(quick, quick.compared[0])))) == {"calm", "field", "noise"}
-    assert [line.get_label() for line in drawn(power(quick, quick.moving[0])).lines] == ["calm", "field", "noise"]
+    assert set(steps(drawn(distribution_panel(quick, quick.trait_comparisons[0])))) == {"calm", "field", "noise"}
+    assert [line.get_label() for line in drawn(spectrum_panel(quick, quick.motion_comparisons[0])).lines] == [
+        "calm",
+        "field",
+        "noise",
+    ]
 
 
 def test_a_trait_without_values_is_an_empty_plot(calm):
     none = np.zeros(0)
-    empty = SimpleNamespace(real=none, field=none, noise=none, published=none, trait=calm.compared[0].trait)
-    axes = drawn(distribution(calm, empty))
+    empty = SimpleNamespace(real=none, field=none, noise=none, published=none, trait=calm.trait_comparisons[0].trait)
+    axes = drawn(distribution_panel(calm, empty))
     assert not axes.patches
     assert axes.get_xlim() == (0, 1)
 
 
 def test_a_spectrum_names_powers_of_ten_and_its_unit(calm):
-    (moving,) = (one for one in calm.moving if one.feature == "head")
-    axes = drawn(power(calm, moving))
+    (moving,) = (one for one in calm.motion_comparisons if one.feature == "head")
+    axes = drawn(spectrum_panel(calm, moving))
     assert [line.get_label() for line in axes.lines] == ["recorded", "field", "noise", "ju2008"]
     for line, one in zip(axes.lines, moving.spectra, strict=True):
         np.testing.assert_array_equal(line.get_ydata(), one.power[1:])
     assert axes.get_ylabel() == "power, deg²/Hz"
-    words = re.findall(r">([^<>]+)</text>", panel_svg(power(calm, moving)))
+    words = re.findall(r">([^<>]+)</text>", panel_svg(spectrum_panel(calm, moving)))
     assert {"0.1", "1"} <= set(words)
     assert not [word for word in words if "$" in word or "^" in word]
 
 
 def test_repetition_is_over_seconds_of_lag(calm):
-    axes = drawn(repetition(calm, "head"))
+    axes = drawn(autocorrelation_panel(calm, "head"))
     line = axes.lines[1]
     assert line.get_xdata()[0] == 5.5
-    np.testing.assert_array_equal(line.get_ydata(), calm.long.repeating["head"].speech[5:])
+    np.testing.assert_array_equal(line.get_ydata(), calm.long_run.repetition["head"].speech[5:])
 
 
 def test_the_picture_shows_each_panel_in_its_place(calm):
-    panels = brief(calm)
+    panels = summary_panels(calm)
     with Image.open(BytesIO(panels_png("title", panels))) as image:
         rows = -(-len(panels) // COLUMNS)
         assert image.size == (COLUMNS * WIDTH * PNG_SCALE, (rows * HEIGHT + HEAD) * PNG_SCALE)

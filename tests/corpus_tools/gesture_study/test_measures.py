@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from corpus_tools.gesture_study.blinks import blinks_of, onsets_of
+from corpus_tools.gesture_study.blinks import blink_onsets, find_blinks
 from corpus_tools.gesture_study.measures import (
     autocorrelation,
-    between_frames,
     coverage,
-    distance,
     diversity,
-    halves,
+    frame_midpoints,
+    random_halves,
     ratio,
     spectrum,
     split_recordings,
+    wasserstein,
 )
 
 FPS = 10.0
@@ -28,7 +28,7 @@ ONE_BLINK = np.array([0, 0, 0, 0.5, 1, 0.75, 0.5, 0.25, 0, 0, 0])
 
 
 def test_a_blink_by_hand():
-    found = blinks_of(ONE_BLINK, lengths(11), FPS)
+    found = find_blinks(ONE_BLINK, lengths(11), FPS)
     # rises by .5 a frame: passes .2 at 2.4, full at 4; falls by .25 a frame: passes .2 at 4 + .8 / .25 = 7.2
     assert found.n == 1
     np.testing.assert_allclose(found.closing, [0.16])
@@ -42,17 +42,17 @@ def test_a_blink_by_hand():
 
 def test_both_lids_are_averaged():
     lids = np.stack([1.5 * ONE_BLINK, 0.5 * ONE_BLINK], axis=1)
-    np.testing.assert_allclose(blinks_of(lids, lengths(11), FPS).closing, [0.16])
+    np.testing.assert_allclose(find_blinks(lids, lengths(11), FPS).closing, [0.16])
 
 
 def test_onsets_lie_between_frames():
-    np.testing.assert_allclose(onsets_of(np.array([0.0, 0.4, 0.8, 0.0, 0.0, 1.0])), [1.25, 4.5])
+    np.testing.assert_allclose(blink_onsets(np.array([0.0, 0.4, 0.8, 0.0, 0.0, 1.0])), [1.25, 4.5])
 
 
 def test_intervals_do_not_cross_recordings():
     twice = np.concatenate([ONE_BLINK, ONE_BLINK])
-    np.testing.assert_allclose(blinks_of(twice, lengths(22), FPS).intervals, [1.1])
-    apart = blinks_of(twice, lengths(11, 11), FPS)
+    np.testing.assert_allclose(find_blinks(twice, lengths(22), FPS).intervals, [1.1])
+    apart = find_blinks(twice, lengths(11, 11), FPS)
     assert (apart.n, len(apart.intervals), len(apart.durations)) == (2, 0, 2)
 
 
@@ -66,23 +66,23 @@ def test_intervals_do_not_cross_recordings():
     ],
 )
 def test_which_blinks_count(lids, n_onsets, n_courses):
-    found = blinks_of(lids, lengths(len(lids)), FPS)
+    found = find_blinks(lids, lengths(len(lids)), FPS)
     assert (found.n, len(found.durations)) == (n_onsets, n_courses)
 
 
 def test_means_of_neighbours_stay_within_recordings():
-    np.testing.assert_allclose(between_frames(np.array([0, 2, 4, 10, 30]), lengths(3, 2)), [1, 3, 20])
+    np.testing.assert_allclose(frame_midpoints(np.array([0, 2, 4, 10, 30]), lengths(3, 2)), [1, 3, 20])
     assert [part.tolist() for part in split_recordings(np.arange(5), lengths(3, 2))] == [[0, 1, 2], [3, 4]]
 
 
 def test_distance_is_how_far_numbers_must_be_moved():
-    assert distance(np.array([0.0, 1.0]), np.array([2.0, 3.0])) == pytest.approx(2.0)
-    assert distance(np.array([0.0, 1.0]), np.array([1.0, 0.0])) == 0.0
-    assert np.isnan(distance(np.zeros(0), np.ones(3)))
+    assert wasserstein(np.array([0.0, 1.0]), np.array([2.0, 3.0])) == pytest.approx(2.0)
+    assert wasserstein(np.array([0.0, 1.0]), np.array([1.0, 0.0])) == 0.0
+    assert np.isnan(wasserstein(np.zeros(0), np.ones(3)))
 
 
 def test_halves_hold_everything_once():
-    made = list(halves(7, 20, np.random.default_rng(0)))
+    made = list(random_halves(7, 20, np.random.default_rng(0)))
     assert len(made) == 20
     assert all(sorted([*one, *other]) == list(range(7)) for one, other in made)
     assert len({tuple(sorted(one)) for one, _ in made}) > 5
@@ -95,7 +95,7 @@ def test_a_spectrum_finds_a_wave_and_its_power():
     assert found.hz[np.argmax(found.power)] == 2.0
     step = found.hz[1] - found.hz[0]
     assert found.power.sum() * step == pytest.approx(0.5 + 0.005, rel=0.02)  # a sine's power is half its height squared
-    assert found.fast == pytest.approx(0.005, rel=0.02)
+    assert found.fast_power == pytest.approx(0.005, rel=0.02)
 
 
 def test_recordings_too_short_for_a_spectrum_have_none():

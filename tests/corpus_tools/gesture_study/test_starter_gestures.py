@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from corpus_tools.gesture_study.analysis import MotionComparison, Options, StyleStudy, TraitComparison, study
+from corpus_tools.gesture_study.analysis import MotionComparison, Options, StyleStudy, TraitComparison, study_gestures
 from lexicon.errors import InputError
 from tts2face.models.palette import load_palette
 
@@ -17,20 +17,20 @@ def style() -> StyleStudy:
         palette = load_palette("starter")
     except InputError:
         pytest.skip("no starter palette is installed")
-    return study("starter", replace(palette, derivations={}), Options()).styles[0]
+    return study_gestures("starter", replace(palette, derivations={}), Options()).styles[0]
 
 
 def compared(style: StyleStudy, name: str) -> TraitComparison:
-    return next(one for one in style.compared if one.trait.name == name)
+    return next(one for one in style.trait_comparisons if one.trait.name == name)
 
 
 def moving(style: StyleStudy, feature: str) -> MotionComparison:
-    return next(one for one in style.moving if one.feature == feature)
+    return next(one for one in style.motion_comparisons if one.feature == feature)
 
 
 def test_hundreds_of_recordings_are_studied(style: StyleStudy) -> None:
     assert style.is_held_out
-    assert style.n_held > 100
+    assert style.n_held_out > 100
     assert len(compared(style, "blink interval").real) > 100
 
 
@@ -50,7 +50,7 @@ def test_heads_move_with_the_sound_as_real_ones_do(style: StyleStudy) -> None:
 
 @pytest.mark.parametrize("feature", ["head", "brows"])
 def test_nothing_trembles(feature: str, style: StyleStudy) -> None:
-    assert 0.7 < moving(style, feature).fast[0] < NO_JITTER
+    assert 0.7 < moving(style, feature).fast_power[0] < NO_JITTER
 
 
 @pytest.mark.parametrize("name", ["head speed", "brow height", "brow speed"])
@@ -60,11 +60,11 @@ def test_fields_are_nearer_than_the_published_ones(name: str, style: StyleStudy)
 
 
 def test_clips_of_ten_minutes_do_not_repeat_themselves(style: StyleStudy) -> None:
-    for found in style.long.repeating.values():
+    for found in style.long_run.repetition.values():
         _, speech, silence = found.highest
         assert max(speech, silence) < 0.5
 
 
 def test_another_seed_is_another_clip(style: StyleStudy) -> None:
-    for found in style.moving:
+    for found in style.motion_comparisons:
         assert found.diversity[0] > 0.4

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from corpus_tools.report.drawing import FIRST, PNG_SCALE, Tip, draw_png, draw_svg, drawn_figure, load_matplotlib
+from corpus_tools.report.drawing import FIRST, PNG_SCALE, Tip, draw_png, draw_svg, load_matplotlib, open_figure
 from lexicon.errors import BackendError
 from lexicon.phones import PHONES
 
@@ -72,7 +72,7 @@ def test_every_phone_can_be_drawn():
         return ()
 
     known: dict[int, int] = {}
-    with drawn_figure(glyphs, 100, 100):
+    with open_figure(glyphs, 100, 100):
         assert {letter for phone in PHONES for letter in phone if ord(letter) not in known} == set()
 
 

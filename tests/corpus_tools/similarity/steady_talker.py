@@ -20,13 +20,13 @@ POSITIONS = ("head", "middle", "tail")
 
 
 def made_model() -> ShapeModel:
-    """Mode 0 opens the lips by 1 mm a unit, mode 1 widens them by 1 mm, mode 2 lifts a point of the chin."""
+    """Mode 0 opens the lips by 1 mm a unit, mode 1 widens them by 1.4 mm, mode 2 lifts a point of the chin."""
     basis = np.zeros((3, N_LANDMARKS, 3), np.float32)
     basis[0, LOWER_LIP_INNER_MID, 1] = -1.0
-    basis[1, MOUTH_CORNER_LEFT, 0] = 0.5
-    basis[1, MOUTH_CORNER_RIGHT, 0] = -0.5
+    basis[1, MOUTH_CORNER_LEFT, 0] = np.sqrt(0.5)
+    basis[1, MOUTH_CORNER_RIGHT, 0] = -np.sqrt(0.5)
     basis[2, 200, 1] = 1.0
-    spread = np.array([6.0, 4.0, 1.0], np.float32)
+    spread = np.array([6.0, 4.0 * np.sqrt(0.5), 1.0], np.float32)
     return ShapeModel(np.zeros((N_LANDMARKS, 3), np.float32), basis, spread, 3, np.zeros(3, np.float32))
 
 
@@ -42,6 +42,7 @@ def made_talker(n_utterances: int = 60, seed: int = 1, gain: float = 1.0, phones
         poses = np.array([(*POSES.get(label, OTHER), 0.0) for label in labels])
         poses[[label in BLOCKS[0] for label in labels], 1] *= gain
         shape = poses[phone_at] + stream.normal(0.0, (0.5, 0.5, 1.0), (len(phone_at), 3))
+        shape[:, 1] *= np.sqrt(0.5)  # POSES are mm
         third = len(speech) // 3
         words = tuple(
             WordSpan(f"{POSITIONS[k]}{number % 4}", 1 + k * third, 1 + (k + 1) * third) for k in range(3)

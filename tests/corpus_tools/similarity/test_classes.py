@@ -7,7 +7,7 @@ from corpus_tools.similarity.classes import (
     VisemeClasses,
     best_classes,
     cluster_tree,
-    cut,
+    cut_into_classes,
     distances,
     silhouettes,
     viseme_classes,
@@ -68,7 +68,7 @@ def test_a_block_matrix_gives_its_blocks():
     matrix, block = block_similarity()
     distance = distances(matrix)
     tree = cluster_tree(distance)
-    labels = cut(tree, 3)
+    labels = cut_into_classes(tree, 3)
     assert all((labels[i] == labels[j]) == (block[i] == block[j]) for i in range(8) for j in range(8))
     curve = tuple(viseme_classes(distance, tree, n) for n in range(2, 8))
     assert best_classes(curve).n_classes == 3
@@ -80,7 +80,7 @@ def test_a_cut_gives_exactly_so_many_classes_numbered_along_the_dendrogram():
     matrix = stream.uniform(size=(9, 9))
     tree = cluster_tree(distances((matrix + matrix.T) / 2))
     for n in range(2, 10):
-        labels = cut(tree, n)[tree.order]
+        labels = cut_into_classes(tree, n)[tree.order]
         assert labels[0] == 0
         assert labels[-1] == n - 1
         assert set(np.diff(labels)) <= {0, 1}
@@ -90,7 +90,7 @@ def test_each_cut_splits_one_class_of_the_one_before():
     matrix = np.random.default_rng(5).uniform(size=(9, 9))
     tree = cluster_tree(distances((matrix + matrix.T) / 2))
     for n in range(2, 9):
-        coarse, fine = cut(tree, n), cut(tree, n + 1)
+        coarse, fine = cut_into_classes(tree, n), cut_into_classes(tree, n + 1)
         assert all(len(set(coarse[fine == label])) == 1 for label in range(n + 1))
 
 
@@ -103,7 +103,7 @@ def test_of_equal_silhouettes_the_fewest_classes_are_best():
 def test_refuses_numbers_of_classes_that_phones_cannot_make(n):
     matrix, _ = block_similarity()
     with pytest.raises(InputError, match=f"8 phones cannot make {n} classes; give a number from 2 to 8"):
-        cut(cluster_tree(distances(matrix)), n)
+        cut_into_classes(cluster_tree(distances(matrix)), n)
 
 
 def test_refuses_a_silhouette_of_one_class():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from corpus_tools.report.drawing import drawn_figure
+from corpus_tools.report.drawing import open_figure
 from corpus_tools.similarity.analysis import NamedTalker, Options, analyse
 from corpus_tools.similarity.classes import cluster_tree, distances
 from corpus_tools.similarity.figure import (
@@ -24,7 +24,7 @@ from corpus_tools.similarity.figure import (
     table_svg,
     tree_joins,
 )
-from corpus_tools.similarity.labels import label
+from corpus_tools.similarity.tokens import phone_label
 
 
 @pytest.fixture(scope="module")
@@ -77,8 +77,8 @@ def test_every_field_of_the_heat_map_tells_its_number(found):
 
 
 def test_labels():
-    assert [label("tʃ", labels) for labels in ("ipa", "arpabet", "both")] == ["tʃ", "CH", "tʃ CH"]
-    assert label("ø", "arpabet") == label("ø", "both") == "ø"
+    assert [phone_label("tʃ", labels) for labels in ("ipa", "arpabet", "both")] == ["tʃ", "CH", "tʃ CH"]
+    assert phone_label("ø", "arpabet") == phone_label("ø", "both") == "ø"
 
 
 @pytest.mark.parametrize("colours", [LIKENESS, FREEDOM])
@@ -130,7 +130,7 @@ def test_the_picture_shows_the_colours_of_the_table(found):
 
     table = similarity_figure(found, "arpabet")
     image = Image.open(BytesIO(table_png(table))).convert("RGB")
-    with drawn_figure(lambda figure: draw_table(figure, table), *image.size) as (_, tips):
+    with open_figure(lambda figure: draw_table(figure, table), *image.size) as (_, tips):
         middles = [tip.axes.transData.transform((tip.x + 0.5, tip.y + 0.5)) for tip in tips]
     expected = mpl.colormaps[LIKENESS](table.values.ravel(), bytes=True)[:, :3]
     for (x, y), colour in zip(middles, expected, strict=True):

@@ -1,4 +1,4 @@
-"""Names of letters, for single ones of a script that a text's language does not use (π, Ж, א)."""
+"""Names of single letters of writing systems that the language of a text does not use (π, Ж, א)."""
 
 import functools
 import re
@@ -14,9 +14,9 @@ _VOWELS = MappingProxyType({"a": "ah", "e": "eh", "i": "ee", "o": "oh", "u": "oo
 
 @functools.lru_cache(maxsize=2000)
 def letter_name(letter: str) -> str:
-    """What a letter is called: by the table of symbols, else by its Unicode name; empty where it has none.
+    """Name of a letter from the table of symbols, else from its Unicode name; empty if it has none.
 
-    Chinese characters have none: each is a word.
+    Chinese characters have none, as each is a word.
     """
     known = readings.read_table("symbols.tsv").get(letter)
     if known:
@@ -30,6 +30,6 @@ def letter_name(letter: str) -> str:
 
 
 def run_name(run: str) -> str:
-    """The name of a run of letters that is one letter; empty for words."""
+    """Name of a run that is a single letter; empty for words."""
     letter = unicodedata.normalize("NFKC", run)
     return letter_name(letter) if len(letter) == 1 else ""

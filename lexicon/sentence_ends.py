@@ -1,7 +1,7 @@
-"""Whether a full stop ends a sentence or belongs to an abbreviation, by tables.
+"""Decide by tables whether a full stop ends a sentence or belongs to an abbreviation.
 
-The rules of ``stops.tsv`` name, for an abbreviation of a language (``*``: of every language without an own table), what
-may follow it within a sentence:
+The rules of ``sentence_ends.tsv`` state, for an abbreviation of a language (``*``: of every language without a table of
+its own), what may follow it within a sentence:
 
 ========== ===============================================================================================
 ``never``  anything: the full stop ends no sentence (Dr. Smith)
@@ -26,40 +26,40 @@ _FIRST_WORD = re.compile(r"""["'“‘«(\[]*([^\W\d_]{1,40})""")
 _NUMBER = re.compile(r"""[#("'“‘]?(?:[0-9]|[IVXLC]{2,9}\b|[VX]\b)""")
 _DOTTED = re.compile(r"(?:[^\W\d_]\.)+[^\W\d_]")
 _ORDINAL = re.compile(r"[0-9]{1,2}")
-_LONGEST_WORD = 24  # characters before the full stop that are looked at; the longest abbreviation has 8
+_MAX_WORD_CHARACTERS = 24  # characters before the full stop that are searched; the longest abbreviation has 8
 _OF_CONTEXT = MappingProxyType({
     "title": "never", "number": "number", "doctor": "never", "saint": "start", "after": "start", "any": "number",
 })  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
-class _Stop:
+class _StopRule:
     rule: str
     words: frozenset[str] = frozenset()
 
 
 @functools.cache
-def _table() -> dict[str, dict[str, _Stop]]:
+def _rule_table() -> dict[str, dict[str, _StopRule]]:
     """Rules by language and abbreviation."""
-    found: dict[str, dict[str, _Stop]] = {}
-    lines = resources.files("lexicon").joinpath("stops.tsv").read_text(encoding="utf-8").splitlines()[1:]
+    found: dict[str, dict[str, _StopRule]] = {}
+    lines = resources.files("lexicon").joinpath("sentence_ends.tsv").read_text(encoding="utf-8").splitlines()[1:]
     for line in lines:
         language, written, rule, words = line.split("\t")
-        found.setdefault(language, {})[written] = _Stop(rule, frozenset(words.split()))
+        found.setdefault(language, {})[written] = _StopRule(rule, frozenset(words.split()))
     for written, (_, context) in readings.read_table("abbreviations.tsv").items():
         is_lower = written.islower() and context in {"any", "after"}
-        found["en"].setdefault(written, _Stop("number" if is_lower else _OF_CONTEXT[context]))
+        found["en"].setdefault(written, _StopRule("number" if is_lower else _OF_CONTEXT[context]))
     return found
 
 
 @functools.cache
 def sentence_starts() -> frozenset[str]:
-    """English words that begin sentences and seldom stand within one with a capital."""
-    return _table()["en"]["*"].words
+    """English words that begin sentences and are rarely capitalised within one."""
+    return _rule_table()["en"]["*"].words
 
 
 def starts_sentence(text: str) -> bool:
-    """The first word of a text is one that English sentences begin with."""
+    """Whether the first word of a text is one that begins English sentences."""
     word = _FIRST_WORD.match(text)
     return word is not None and word[1] in sentence_starts()
 
@@ -70,21 +70,21 @@ def ends_sentence(before: str, after: str, language: str) -> bool:
     Parameters
     ----------
     before, after
-        The text up to the full stop, without it, and behind the space that follows it; the last 24 and the first 40
-        characters suffice.
+        The text before the full stop, and after the space that follows it; the last 24 and the first 40 characters
+        suffice.
     """
     word = _last_word(before)
-    stop = _stop(word, language)
+    stop = _find_rule(word, language)
     if stop is None:
         is_first = len(word) == len(before.lstrip())
-        return _ends_unlisted(word, after, is_english=_primary(language) == "en", is_first=is_first)
-    return _ends_by(stop, after)
+        return _unlisted_ends_sentence(word, after, is_english=_primary(language) == "en", is_first=is_first)
+    return _rule_ends_sentence(stop, after)
 
 
 def is_abbreviated(before: str, after: str, language: str) -> bool:
     """Whether the full stop belongs to an abbreviation of the tables and ends no sentence; see `ends_sentence`."""
-    stop = _stop(_last_word(before), language)
-    return stop is not None and after != "" and not _ends_by(stop, after)
+    stop = _find_rule(_last_word(before), language)
+    return stop is not None and after != "" and not _rule_ends_sentence(stop, after)
 
 
 def _primary(language: str) -> str:
@@ -92,16 +92,16 @@ def _primary(language: str) -> str:
 
 
 def _last_word(before: str) -> str:
-    written = _WORD.search(before[-_LONGEST_WORD:])
+    written = _WORD.search(before[-_MAX_WORD_CHARACTERS:])
     return written.group() if written else ""
 
 
-def _stop(word: str, language: str) -> _Stop | None:
-    table = _table().get(_primary(language), _table()["*"])
+def _find_rule(word: str, language: str) -> _StopRule | None:
+    table = _rule_table().get(_primary(language), _rule_table()["*"])
     return table.get(word) or (table.get("#") if _ORDINAL.fullmatch(word) else None)
 
 
-def _ends_by(stop: _Stop, after: str) -> bool:
+def _rule_ends_sentence(stop: _StopRule, after: str) -> bool:
     if stop.rule == "number":
         return _NUMBER.match(after) is None
     if stop.rule == "start":
@@ -112,8 +112,8 @@ def _ends_by(stop: _Stop, after: str) -> bool:
     return False
 
 
-def _ends_unlisted(word: str, after: str, *, is_english: bool, is_first: bool) -> bool:
-    """Initials (J. K. Rowling, U.S.) end an English sentence before a word that begins one; other words always do."""
+def _unlisted_ends_sentence(word: str, after: str, *, is_english: bool, is_first: bool) -> bool:
+    """Whether an unlisted word ends a sentence: initials (U.S.) only before an English word that begins one."""
     is_initial = len(word) == 1 and word.isupper()
     is_dotted = _DOTTED.fullmatch(word) is not None and word[-1].isupper()
     if not is_initial and not is_dotted:

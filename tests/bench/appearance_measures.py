@@ -58,9 +58,9 @@ def measure_appearance(
     shape, lips, gap = shape_errors(held_out, components, mean)
     texture, mouth = texture_quality(held_out, learnt)
     return AppearanceMeasures(
-        shape_modes=n_modes_for_variance(components.explained()),
+        shape_modes=n_modes_for_variance(components.explained_variance()),
         texture_modes=n_modes_for_variance(texture_variance(learnt_from, learnt)),
-        mouth_modes=n_modes_for_variance(learnt.explained[1]),
+        mouth_modes=n_modes_for_variance(learnt.explained_variance[1]),
         held_out_shape_px=shape,
         held_out_lips_px=lips,
         held_out_gap_px=gap,
@@ -109,7 +109,7 @@ def texture_variance(recordings: Sequence[AppearanceRecording], learnt: LearnedA
         light = light_of(recording)
         for number, picture in enumerate(recording.pictures()):
             if number % every == 0:
-                rows.append(light.removed(frame.texture(picture, recording.points[number])).ravel())
+                rows.append(light.apply(frame.texture(picture, recording.points[number])).ravel())
     centred = np.array(rows) - np.mean(rows, axis=0)
     variances = np.linalg.eigvalsh((centred @ centred.T).astype(np.float64))[::-1]
     shares: NDArray[np.float64] = np.cumsum(variances) / variances.sum()
@@ -125,10 +125,10 @@ def texture_quality(recordings: Sequence[AppearanceRecording], learnt: LearnedAp
         gaps = _inner_lip_gaps(recording.points)
         for number, picture in enumerate(recording.pictures()):
             points = recording.points[number]
-            seen = light.removed(face.texture(picture, points))[None]
+            seen = light.apply(face.texture(picture, points))[None]
             face_errors.append(_mean_square(seen, appearance.face.textures(appearance.face.parameters(seen))))
             if gaps[number] >= np.median(gaps):
-                seen = light.removed(mouth.texture(picture, points[list(MOUTH_LANDMARKS)]))[None]
+                seen = light.apply(mouth.texture(picture, points[list(MOUTH_LANDMARKS)]))[None]
                 mouth_errors.append(_mean_square(seen, appearance.mouth.textures(appearance.mouth.parameters(seen))))
     return _peak_snr_db(face_errors), _peak_snr_db(mouth_errors)
 

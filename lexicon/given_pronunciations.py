@@ -1,4 +1,4 @@
-"""Words whose phones the text itself gives, within the words as they are said."""
+"""Words with phones given in the text (``<phoneme>``), within the normalised text."""
 
 import re
 import string
@@ -12,23 +12,23 @@ from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.ipa import Segment
 from lexicon.marked_text import MarkedText, PhoneMark
 from lexicon.pronounce import Pronunciation, Word, pronounce
-from lexicon.said import as_said
+from lexicon.spoken_form import spoken_form
 
-_STEM = "qzx"  # of the words that stand for given ones while a text is normalised; no word of any language
+_STEM = "qzx"  # of the placeholders of given words during normalisation; not a word of any language
 _MARKS = frozenset(".,;:!?")
 
 
 @dataclass(frozen=True, slots=True)
-class GivenWord:
-    """A word as it is said, the phones that are given for it (or none), and the punctuation behind it."""
+class TextWord:
+    """A normalised word, the phones given for it (or none), and the punctuation after it."""
 
     text: str
     segments: tuple[Segment, ...] = ()
     after: str = ""
 
 
-def given_words(written: str, phones: Sequence[PhoneMark], language: str) -> tuple[GivenWord, ...]:
-    """The words of a text as they are said, some with given phones.
+def words_with_given_phones(written: str, phones: Sequence[PhoneMark], language: str) -> tuple[TextWord, ...]:
+    """The normalised words of a text, some with given phones.
 
     Parameters
     ----------
@@ -40,24 +40,24 @@ def given_words(written: str, phones: Sequence[PhoneMark], language: str) -> tup
     InputError
         A word with given phones belongs to a number, an address or the like, which is read as a whole.
     """
-    names = _names(written, len(phones))
-    stands_for = re.compile(rf"{_stem(written)}[a-z]+")
-    said = as_said(_with_names(written, phones, names), language).split()
+    names = _placeholders(written, len(phones))
+    placeholder = re.compile(rf"{_placeholder_stem(written)}[a-z]+")
+    spoken = spoken_form(_insert_placeholders(written, phones, names), language).split()
     marks = dict(zip(names, phones, strict=True))
-    words: list[GivenWord] = []
-    for word in said:
-        match = stands_for.search(word.lower())
+    words: list[TextWord] = []
+    for word in spoken:
+        match = placeholder.search(word.lower())
         mark = marks.pop(match.group(), None) if match else None
         if match is None or mark is None:
-            words.append(GivenWord(word))
+            words.append(TextWord(word))
         else:
             after = "".join(character for character in word[match.end() :] if character in _MARKS)
-            words.append(GivenWord(written[mark.at : mark.end], mark.segments, after))
+            words.append(TextWord(written[mark.at : mark.end], mark.segments, after))
     if marks:
         mark = next(iter(marks.values()))
         raise InputError(
-            f"the phones of {written[mark.at : mark.end]!r} are given where it is part of a number or an address; "
-            "put a space around it"
+            f"the phones of {written[mark.at : mark.end]!r} are given, but it is part of a number or an address; "
+            "put spaces around it"
         )
     return tuple(words)
 
@@ -65,7 +65,7 @@ def given_words(written: str, phones: Sequence[PhoneMark], language: str) -> tup
 def pronounce_marked(
     text: MarkedText, language: str = DEFAULT_LANGUAGE, dictionary: Dictionary | None = None
 ) -> Pronunciation:
-    """As `lexicon.pronounce.pronounce`, with the phones that the text gives.
+    """As `lexicon.pronounce.pronounce`, with the phones given in the text.
 
     Raises
     ------
@@ -75,43 +75,49 @@ def pronounce_marked(
     phones = [mark for mark in text.marks if isinstance(mark, PhoneMark)]
     if not phones:
         return pronounce(text.text, language, dictionary)
-    names = _names(text.text, len(phones))
+    names = _placeholders(text.text, len(phones))
     known = dict(dictionary.entries) if dictionary else {}
     known |= {name: mark.segments for name, mark in zip(names, phones, strict=True)}
     written = {name: text.text[mark.at : mark.end] for name, mark in zip(names, phones, strict=True)}
-    found = pronounce(_with_names(text.text, phones, names), language, Dictionary(MappingProxyType(known)))
-    return replace(found, text=text.text, words=tuple(_renamed(word, written) for word in found.words))
+    pronunciation = pronounce(
+        _insert_placeholders(text.text, phones, names), language, Dictionary(MappingProxyType(known))
+    )
+    return replace(
+        pronunciation,
+        text=text.text,
+        words=tuple(_restore_spelling(word, written) for word in pronunciation.words),
+    )
 
 
-def _renamed(word: Word, written: dict[str, str]) -> Word:
+def _restore_spelling(word: Word, written: dict[str, str]) -> Word:
     name = written.get(word.text.lower())
     return word if name is None else replace(word, text=name, source=name)
 
 
-def _stem(written: str) -> str:
+def _placeholder_stem(written: str) -> str:
     stem, lower = _STEM, written.lower()
     while stem in lower:
         stem += "qx"
     return stem
 
 
-def _names(written: str, n: int) -> list[str]:
-    """Words that do not occur in a text: letters only, so that every normalisation leaves them as they are."""
-    stem, letters = _stem(written), string.ascii_lowercase
+def _placeholders(written: str, n: int) -> list[str]:
+    """Words that do not occur in a text; of letters only, so that normalisation does not change them."""
+    stem, letters = _placeholder_stem(written), string.ascii_lowercase
     return [
         stem + letters[k // 676 % 26] + letters[k // 26 % 26] + letters[k % 26] + "q" * (k // 17576) for k in range(n)
     ]
 
 
-def _with_names(written: str, phones: Sequence[PhoneMark], names: Sequence[str]) -> str:
+def _insert_placeholders(written: str, phones: Sequence[PhoneMark], names: Sequence[str]) -> str:
     return "".join(_pieces(written, phones, names))
 
 
 def _pieces(written: str, phones: Sequence[PhoneMark], names: Sequence[str]) -> Iterator[str]:
-    behind = 0
+    at = 0
     for mark, name in zip(phones, names, strict=True):
-        before = written[behind : mark.at]
-        shown = name.capitalize() if written[mark.at : mark.at + 1].isupper() else name
-        yield before + " " * before[-1:].isalnum() + shown + " " * written[mark.end : mark.end + 1].isalnum()
-        behind = mark.end
-    yield written[behind:]
+        before = written[at : mark.at]
+        placeholder = name.capitalize() if written[mark.at : mark.at + 1].isupper() else name
+        yield before + " " * before[-1:].isalnum() + placeholder + " " * written[mark.end : mark.end + 1].isalnum()
+        at = mark.end
+    yield written[at:]

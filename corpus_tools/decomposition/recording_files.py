@@ -1,0 +1,152 @@
+"""Reading of a folder of videos and facial captures as input of the decomposition."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from corpus_tools.decomposition.capture import FaceRecording
+from corpus_tools.decomposition.capture_files import CAPTURE_SUFFIXES, MarkerOptions, read_capture_file
+from corpus_tools.process_pool import map_unordered
+from corpus_tools.recordings.corpus_audio import SOUND_RATE
+from corpus_tools.recordings.corpus_video import CachedTracker
+from corpus_tools.recordings.folder import MANIFEST, VIDEO_SUFFIXES
+from corpus_tools.recordings.limits import check_limits, head_turn_deg, picture_measures
+from corpus_tools.recordings.observe import Refusal
+from corpus_tools.run_options import Progress, RunOptions
+from lexicon.errors import DataError, InputError
+from lexicon.inputs import check_regular_file
+from tts2face.models.face import Face
+from tts2face.types import Waveform
+from tts2face.video.frame_grid import face_span, fill_gaps, resample_to_grid
+from tts2face.video.landmark_models import find_bundle
+from tts2face.video.media import read_sound
+from tts2face.video.pose import head_angles, remove_pose
+
+
+def read_video_recording(video: Path, tracker: CachedTracker) -> FaceRecording:
+    """The face in a video, from the first to the last frame with a face, and its sound.
+
+    Raises
+    ------
+    DataError
+        The video cannot be read, shows no face, or is unsuitable; the message states the reason.
+    """
+    seen = tracker.track(video)
+    points, first = resample_to_grid(seen.tracking.points, seen.times, seen.fps)
+    if np.isnan(points).all():
+        raise DataError("no frame shows a face")
+    start, end = face_span(points)
+    filled, n_filled = fill_gaps(points[start:end], seen.fps)
+    posed = remove_pose(filled, seen.fps)
+    angles = head_angles(posed.rotations)
+    check_limits(picture_measures(seen.n_faces, seen.changes, seen.times) | {"turn_deg": head_turn_deg(angles)})
+    place = posed.translations - np.median(posed.translations, axis=0)
+    begin = (first + start) / seen.fps
+    return FaceRecording(
+        name=video.stem,
+        fps=seen.fps,
+        landmarks=posed.landmarks,
+        head=np.column_stack([angles, place]).astype(np.float32),
+        sound=read_sound_span(video, begin, len(filled) / seen.fps),
+        notes=(f"{n_filled} frames without a face were interpolated",) if n_filled else (),
+    )
+
+
+def read_sound_span(video: Path, begin: float, seconds: float) -> Waveform:
+    """Sound of a video from `begin`; silence before the video's sound."""
+    sound = read_sound(video, SOUND_RATE)
+    samples = np.zeros(round(seconds * sound.rate), np.float32)
+    shift = round(begin * sound.rate)
+    source = sound.samples[max(shift, 0) :][: len(samples) - max(-shift, 0)]
+    samples[max(-shift, 0) :][: len(source)] = source
+    return Waveform(samples, sound.rate)
+
+
+def read_recordings(
+    recordings: Path, face: Face, markers: MarkerOptions, effort: RunOptions, on_progress: Progress | None
+) -> tuple[list[FaceRecording], list[Refusal]]:
+    """Recordings and refusals, each sorted by name.
+
+    Raises
+    ------
+    InputError
+        There is no recording.
+    BackendError
+        The landmark models are missing, the cache cannot be written, or a process died.
+    """
+    files = find_recording_files(recordings)
+    jobs = min(effort.n_processes(), len(files))
+    model = find_bundle(effort.model) if any(file.suffix.lower() in VIDEO_SUFFIXES for file in files) else None
+    ready = (effort.folder(), model, face, markers)
+    captured: list[FaceRecording] = []
+    refused: list[Refusal] = []
+    for number, outcome in enumerate(_read_files(files, ready, jobs), start=1):
+        if isinstance(outcome, Refusal):
+            refused.append(outcome)
+        else:
+            captured.append(outcome)
+        if on_progress:
+            on_progress(number, len(files))
+    return sorted(captured, key=lambda one: one.name), sorted(refused, key=lambda one: one.name)
+
+
+def find_recording_files(recordings: Path) -> list[Path]:
+    """Videos and captures in a folder and its subfolder ``clips``, or the given file.
+
+    Raises
+    ------
+    InputError
+        There is none.
+    """
+    known = VIDEO_SUFFIXES | CAPTURE_SUFFIXES
+    if recordings.is_file() and recordings.suffix.lower() in known:
+        return [recordings]
+    folders = [recordings, recordings / "clips"]
+    found = [file for folder in folders if folder.is_dir() for file in folder.iterdir() if file.suffix.lower() in known]
+    if not found:
+        raise InputError(
+            f"{recordings} contains no video and no capture ({', '.join(sorted(known))}); give a folder of them"
+        )
+    return sorted(file for file in found if file.name != MANIFEST)
+
+
+WorkerInputs = tuple[Path, Path | None, Face, MarkerOptions]
+FileOutcome = FaceRecording | Refusal
+
+
+def _read_files(files: Sequence[Path], ready: WorkerInputs, jobs: int) -> Iterator[FileOutcome]:
+    if jobs > 1:
+        yield from (outcome for _, outcome in map_unordered(files, _read_file, _start_worker, ready, jobs))
+        return
+    worker = _FileReader(*ready)
+    for file in files:
+        yield worker.read(file)
+
+
+class _FileReader:
+    def __init__(self, cache: Path, model: Path | None, face: Face, marker_options: MarkerOptions) -> None:
+        self._tracker = CachedTracker(cache, model) if model is not None else None
+        self._face, self._marker_options = face, marker_options
+
+    def read(self, file: Path) -> FileOutcome:
+        """A recording, or the reason for its refusal."""
+        try:
+            check_regular_file(file)
+            if self._tracker is not None and file.suffix.lower() in VIDEO_SUFFIXES:
+                return read_video_recording(file, self._tracker)
+            return read_capture_file(file, self._face, options=self._marker_options)
+        except DataError as reason:
+            return Refusal(file.stem, str(reason), file, 0.0)
+
+
+_worker: list[_FileReader] = []  # of this process; filled once by the pool
+
+
+def _start_worker(*ready: Any) -> None:
+    _worker.append(_FileReader(*ready))
+
+
+def _read_file(file: Path) -> FileOutcome:
+    return _worker[0].read(file)

@@ -1,1 +1,0 @@
-"""Readers of what is said in a recording, one file format each."""

@@ -1,0 +1,23 @@
+"""Spoken form of a text, the input of a voice, in every language."""
+
+from lexicon.foreign_letters import name_foreign_letters
+from lexicon.japanese import has_kanji, to_kana
+from lexicon.normalize import normalize
+
+
+def spoken_form(text: str, language: str) -> str:
+    """Spoken form of a text.
+
+    English is normalised, Japanese with Chinese characters is converted to kana, and single letters of other writing
+    systems are replaced by their names.
+
+    Raises
+    ------
+    BackendError
+        The text is Japanese with Chinese characters, and the library that reads them is not installed.
+    """
+    if language.startswith("en"):
+        return normalize(text)
+    if language == "ja" and has_kanji(text):
+        text = to_kana(text)
+    return name_foreign_letters(text, language)

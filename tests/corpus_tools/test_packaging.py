@@ -1,0 +1,67 @@
+"""Contents of a wheel: the builder of the shipped heads stays in the repository."""
+
+import ast
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+from setuptools.discovery import PEP420PackageFinder
+
+ROOT = Path(__file__).parents[2]
+BUILDER = "corpus_tools.head"
+WITHOUT_BUILDER = f"""
+import sys
+
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[:2] == {BUILDER.split(".")!r}:
+            raise ModuleNotFoundError(name)
+
+sys.meta_path.insert(0, Absent())
+import corpus_tools.dense.build_face
+try:
+    import {BUILDER}
+except ModuleNotFoundError:
+    print("without the builder")
+"""
+
+
+def shipped_packages() -> list[str]:
+    """Packages that setuptools finds, as when it builds a wheel."""
+    options = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]["find"]
+    return PEP420PackageFinder.find(str(ROOT), exclude=options["exclude"], include=options["include"])
+
+
+def imported_modules(path: Path) -> set[str]:
+    """Modules that a file imports anywhere, also inside functions."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {name.name for name in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module, *(f"{node.module}.{name.name}" for name in node.names)}
+    return found
+
+
+def test_a_wheel_has_no_head_builder() -> None:
+    packages = shipped_packages()
+    assert {"cli", "lexicon", "tts2face", "corpus_tools", "corpus_tools.dense", "corpus_tools.report"} <= set(packages)
+    assert not [name for name in packages if f"{name}.".startswith(f"{BUILDER}.")]
+
+
+def test_no_shipped_module_imports_the_head_builder() -> None:
+    files = [file for name in shipped_packages() for file in (ROOT / name.replace(".", "/")).glob("*.py")]
+    assert len(files) > 100
+    users = {
+        str(file.relative_to(ROOT)) for file in files for name in imported_modules(file) if name.startswith(BUILDER)
+    }
+    assert users == set()
+
+
+def test_corpus_face_imports_without_the_head_builder() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_BUILDER], cwd=ROOT, capture_output=True, text=True, check=False, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "without the builder"
