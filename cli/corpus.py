@@ -60,11 +60,11 @@ def build(  # noqa: PLR0913 - one parameter a flag
 ) -> None:
     """Build a talker from recordings. After an interruption, the same command resumes the build."""
     check_suffix(out, "talker")
-    if report is not None:
-        check_file_name(report, "a report", (".html", ".htm"))
     folder = recordings if recordings.is_dir() else recordings.parent  # transcripts are beside the video
     inputs = {"the recordings": recordings, "--provenance": provenance, "--model": model}
     refuse_overwriting({"--out": out, "--report": report}, inputs | {"the folder of recordings": folder})
+    if report is not None:
+        check_file_name(report, "a report", (".html", ".htm"))
     from corpus_tools.build_talker import build_talker
     from corpus_tools.run_options import RunOptions, ignore_stage
 

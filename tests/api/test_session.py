@@ -80,7 +80,7 @@ def test_a_stream_is_the_clip_in_pieces(session: tts2face.Session) -> None:
         (lambda session: session.clip("Hello.", stile="delighted"), "there is no option 'stile'"),
         (
             lambda session: session.clip(tts2face.Request(text="Hello."), seed=1),
-            "cannot be given with a complete request",
+            "with a complete request",
         ),
         (lambda session: session.clip("Hello.", style="gleeful"), "no style 'gleeful'"),
         (lambda session: session.write("Hello.", "a.mp4", sise="64x64"), "there is no option 'sise'"),

@@ -1,4 +1,4 @@
-"""How well appearance models do on recordings that they were not learnt from (T07 section 2)."""
+"""Accuracy of appearance models on held-out recordings (T07 section 2)."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -53,7 +53,7 @@ def measure_appearance(
     held_out: Sequence[AppearanceRecording],
     observations: Sequence[Observation],
 ) -> AppearanceMeasures:
-    """Figures of a model on recordings held out; closures and lag are those of all `observations`."""
+    """Accuracy of a model on held-out recordings; closures and lag of all `observations`."""
     components, mean = shape_components(learnt_from)
     shape, lips, gap = shape_errors(held_out, components, mean)
     texture, mouth = texture_quality(held_out, learnt)
@@ -134,7 +134,7 @@ def texture_quality(recordings: Sequence[AppearanceRecording], learnt: LearnedAp
 
 
 def bilabial_closure_share(observations: Sequence[Observation]) -> float:
-    """Share of /p b m/ in whose time, with `CLOSURE_MARGIN_S` either side, the inner lips were seen to close."""
+    """Share of /p b m/ during which, extended by `CLOSURE_MARGIN_S` on both sides, the inner lips close."""
     least = []
     for seen in observations:
         gap = np.linalg.norm(seen.landmarks[:, UPPER_LIP_INNER_MID] - seen.landmarks[:, LOWER_LIP_INNER_MID], axis=1)
@@ -148,7 +148,7 @@ def bilabial_closure_share(observations: Sequence[Observation]) -> float:
 
 
 def n_modes_for_variance(explained: NDArray[np.float64]) -> tuple[int, int]:
-    """Modes that explain 95 and 99 % of the variance; 0 where those that were kept do not."""
+    """Numbers of modes for 95 and 99 % of the variance; 0 if the kept modes have less."""
     needed = [int(np.searchsorted(explained, share)) + 1 for share in (0.95, 0.99)]
     reached = [count if count <= len(explained) else 0 for count in needed]
     return reached[0], reached[1]

@@ -72,7 +72,7 @@ def test_the_answer_says_what_it_is(measured: tuple[Evaluation, tuple[SplitResul
 
 
 def test_the_talker_herself_is_refused(train: list[Observation]) -> None:
-    with pytest.raises(InputError, match="u03 is learnt from and tested on"):
+    with pytest.raises(InputError, match="u03 is in both the training and the held-out part"):
         evaluate_across_talkers(train, train[3:5])
 
 
@@ -91,7 +91,7 @@ def livelink(shared_recordings: Path) -> Path:
     return shared_recordings / "livelink" / "testset_arkit61_60fps.csv"
 
 
-def test_a_real_capture_closes_its_lips_where_bilabials_are_heard(livelink: Path, tmp_path: Path) -> None:
+def test_a_real_capture_closes_its_lips_in_bilabials(livelink: Path, tmp_path: Path) -> None:
     pytest.importorskip("hama", reason="needs the extra [capture]")
     found = observe_livelink(livelink, RunOptions(tmp_path))
     assert len(found) >= 4
@@ -104,7 +104,10 @@ def test_a_real_capture_closes_its_lips_where_bilabials_are_heard(livelink: Path
 
 @pytest.mark.parametrize(
     ("sounds", "reason"),
-    [((), r"no sound lies beside take\.csv"), (("a.wav", "b.flac"), r"beside take\.csv lie 2 sound files")],
+    [
+        ((), r"there is no sound file beside take\.csv"),
+        (("a.wav", "b.flac"), r"there are 2 sound files beside take\.csv"),
+    ],
 )
 def test_a_capture_needs_one_sound(sounds: tuple[str, ...], reason: str, tmp_path: Path) -> None:
     rows = [["Timecode", "BlendshapeCount", "JawOpen"], *([f"00:00:00:{at:02d}", "1", "0.1"] for at in range(20))]

@@ -1,4 +1,4 @@
-"""Looks carried between talkers, against textures whose answer is known."""
+"""Transfer of appearance parameters between talkers, against textures with a known result."""
 
 from dataclasses import replace
 
@@ -51,10 +51,10 @@ def test_paint_that_the_target_does_not_have_is_lost() -> None:
     assert abs(found[0, 0]) < 0.2
 
 
-def test_looks_stay_within_three_spreads_and_follow_the_gain() -> None:
+def test_parameters_stay_within_three_spreads_and_follow_the_gain() -> None:
     face = looking(painted(1.0, 48, 1.0))
     made = build_appearance_transfer(face, face)
-    looks = np.array([[4.0, 0.0, 0.0]])
-    np.testing.assert_allclose(made.parameters(looks, gain=2.0), 2 * made.parameters(looks), rtol=1e-6)
-    np.testing.assert_allclose(made.parameters(looks)[0, 0], 4.0, rtol=1e-4)
-    assert made.parameters(100 * looks)[0, 0] == 30.0
+    parameters = np.array([[4.0, 0.0, 0.0]])
+    np.testing.assert_allclose(made.parameters(parameters, gain=2.0), 2 * made.parameters(parameters), rtol=1e-6)
+    np.testing.assert_allclose(made.parameters(parameters)[0, 0], 4.0, rtol=1e-4)
+    assert made.parameters(100 * parameters)[0, 0] == 30.0

@@ -26,11 +26,11 @@ def test_good_measures_pass() -> None:
 @pytest.mark.parametrize(
     ("measure", "value", "reason"),
     [
-        ("confidence", -7300.0, "does not fit the transcript"),
+        ("confidence", -7300.0, "does not match the transcript"),
         ("recognised", -7300.0, "could not be recognised well"),
         ("clipped", 0.02, r"2\.0% of the speech is clipped"),
         ("snr_db", 6.0, "speech is 6 dB above the noise"),
-        ("crowded", 0.5, "50% of the pictures show more than one face"),
+        ("crowded", 0.5, "50% of the frames show more than one face"),
         ("turn_deg", 60.0, "turned away by 60 degrees"),
         ("frozen_s", 0.5, r"stands still for 0\.50 s"),
     ],
@@ -40,7 +40,7 @@ def test_a_measure_beyond_its_limit_is_refused(measure: str, value: float, reaso
         check_limits({**GOOD, measure: value})
 
 
-def test_every_limit_is_asked() -> None:
+def test_every_limit_is_checked() -> None:
     assert {limit.measure for limit in LIMITS} == {*GOOD, "recognised"}
 
 

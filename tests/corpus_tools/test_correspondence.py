@@ -47,7 +47,7 @@ def test_a_ring_stays_clear_of_a_ball() -> None:
 
 def test_a_hole_without_a_ring_is_refused() -> None:
     vertices, quads = funnel()
-    with pytest.raises(DataError, match="no ring of edges"):
+    with pytest.raises(DataError, match="no edge ring"):
         find_narrowest_ring(EdgeRings(quads, vertices), vertices, np.array([50.0, 0, 0]), 10.0)
 
 

@@ -141,7 +141,7 @@ def test_a_head_without_texture_is_refused(head: Face) -> None:
 def test_only_videos_are_looked_at(tmp_path: Path) -> None:
     note = tmp_path / "note.txt"
     note.write_text("no video")
-    with pytest.raises(InputError, match="is no video"):
+    with pytest.raises(InputError, match="is not a video"):
         find_videos(note)
     with pytest.raises(InputError, match="there is no folder"):
         find_videos(tmp_path / "nowhere")

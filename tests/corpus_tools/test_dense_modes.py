@@ -181,7 +181,7 @@ def test_no_mode_tears_the_lips_or_moves_upper_teeth(head: Face, model: DenseMod
 
 
 def test_the_edge_of_the_lower_lip_follows_the_jaw_evenly(head: Face) -> None:
-    """Between landmarks it moves as far as at them; asked with lips that hardly part it lags behind in teeth."""
+    """Between landmarks it moves as far as at them; evaluated with hardly open lips it is serrated."""
     jaw = head.shapes[head.shape_names.index("jawOpen")].astype(np.float64)
     moved, marks = face_landmarks(head, jaw), face_landmarks(head, head.vertices)
     lower = list(INNER_LIP_LOWER[3:-3])
@@ -202,7 +202,7 @@ def test_the_edge_of_the_lower_lip_follows_the_jaw_evenly(head: Face) -> None:
 def test_more_modes_than_frames_are_refused(
     n_modes: int, head: Face, fit: PictureFitter, seen: list[VideoLandmarks], talker
 ) -> None:
-    with pytest.raises(InputError, match=f"{n_modes} dense modes cannot be found in 59 frames; ask for 1 to 58"):
+    with pytest.raises(InputError, match=f"{n_modes} dense modes cannot be computed from 59 frames; choose 1 to 58"):
         dense_model(head, fit, seen, talker, n_modes)
 
 

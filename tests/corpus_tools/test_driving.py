@@ -1,4 +1,4 @@
-"""Drives learnt from recordings: what is heard stands on the frames of what is seen."""
+"""Audio maps learnt from recordings: sound features are on the frames of the landmarks."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +27,7 @@ ABOUT = dict.fromkeys(("name", "language", "sources", "licence", "attribution", 
 
 
 def test_features_stand_on_the_clock_of_the_landmarks(make_observation) -> None:
-    """An utterance that begins 0.4 s into its video, whose sound comes 0.2 s late: a click is heard in its place."""
+    """An utterance that begins 0.4 s into its video, whose sound comes 0.2 s late: a click stays at its instant."""
     seen = make_observation("a", 1)
     seen = replace(seen, quality=replace(seen.quality, cut=0.4, lag=0.2))
     samples = np.zeros(4 * FEATURE_RATE)
@@ -64,25 +64,27 @@ def corpus(make_observation, tmp_path: Path) -> list:
     return found
 
 
-def test_drives_follow_the_sound_that_they_were_taught(corpus: list) -> None:
+def test_audio_maps_follow_the_sound_they_were_trained_on(corpus: list) -> None:
     talker = learn_talker(corpus, n_speech=2, n_other=1, metadata=ABOUT)
-    told = []
+    calls = []
 
     def stages(name: str):
-        told.append((name, []))
-        return lambda done, of: told[-1][1].append((done, of))
+        calls.append((name, []))
+        return lambda done, of: calls[-1][1].append((done, of))
 
-    drives = learn_audio_maps(corpus, talker, network=NetworkMapOptions(n_hidden=4, before=1, after=1), stages=stages)
-    assert told == [
-        ("listening", [(n, 22) for n in range(1, 23)]),
-        ("learning drives", [(1, 2), (2, 2)]),
+    audio_maps = learn_audio_maps(
+        corpus, talker, network=NetworkMapOptions(n_hidden=4, before=1, after=1), stages=stages
+    )
+    assert calls == [
+        ("computing sound features", [(n, 22) for n in range(1, 23)]),
+        ("learning audio maps", [(1, 2), (2, 2)]),
     ]
-    assert set(drives) == {"linear", "network"}
-    heard = sound_features(corpus[:3], (AUDIO_MAP_FEATURES,))[AUDIO_MAP_FEATURES]
-    for drive in drives.values():
-        assert drive.feature == AUDIO_MAP_FEATURES
-        assert np.isfinite(drive.loudness)
-        made = drive.parameters(heard["u01"])
+    assert set(audio_maps) == {"linear", "network"}
+    features = sound_features(corpus[:3], (AUDIO_MAP_FEATURES,))[AUDIO_MAP_FEATURES]
+    for audio_map in audio_maps.values():
+        assert audio_map.feature == AUDIO_MAP_FEATURES
+        assert np.isfinite(audio_map.loudness)
+        made = audio_map.parameters(features["u01"])
         assert made.shape == (60, 2)
         real = talker.utterances[1].shape[:, :2]
         assert np.corrcoef((real - real.mean(0)).ravel(), (made - made.mean(0)).ravel())[0, 1] > 0.3  # measured: .5

@@ -15,7 +15,7 @@ N = 40
 
 @pytest.fixture
 def recorded(make_observation: Callable[..., Observation]) -> list[Observation]:
-    """One person in 40 recordings, the head another way in each, without a leak."""
+    """One person in 40 recordings, with another head pose in each, without pose-dependent errors."""
     generator = np.random.default_rng(0)
     seen = []
     for number in range(N):

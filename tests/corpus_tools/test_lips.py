@@ -1,4 +1,4 @@
-"""Networks from phones to lips: what they are told of phones, and that multiplying it out by phone changes nothing."""
+"""Networks from phones to lips: their phone features, and equality of the networks expanded to one-hot phones."""
 
 from collections.abc import Callable
 
@@ -28,8 +28,8 @@ def test_phones_are_told_by_what_the_mouth_does_first_and_last() -> None:
         "voicing first",
         "voicing last",
     ]
-    told = dict(zip(names, diphthong, strict=True))
-    assert told["opening first"] > told["opening last"] > 0
+    features = dict(zip(names, diphthong, strict=True))
+    assert features["opening first"] > features["opening last"] > 0
     assert feature_table(PHONES).shape == (len(PHONES), 2 * len(ARTICULATORY_WEIGHTS))
 
 
@@ -45,8 +45,8 @@ def test_weights_by_phone_tell_what_weights_by_feature_do(stream: np.random.Gene
     shown, place = stream.integers(0, 4, (5, N_SHOWN)), stream.normal(size=(5, 4)).astype(np.float32)
     table, ones = feature_table(KNOWN), np.eye(4, dtype=np.float32)
     weights = stream.normal(size=(N_SHOWN * table.shape[1] + 4, 6)).astype(np.float32)
-    told = encode_windows(shown, place, ones) @ expand_to_phones(weights, table, N_SHOWN)
-    np.testing.assert_allclose(told, encode_windows(shown, place, table) @ weights, rtol=1e-4, atol=1e-4)
+    expanded = encode_windows(shown, place, ones) @ expand_to_phones(weights, table, N_SHOWN)
+    np.testing.assert_allclose(expanded, encode_windows(shown, place, table) @ weights, rtol=1e-4, atol=1e-4)
     np.testing.assert_array_equal(
         expand_to_phones(weights[: 4 * N_SHOWN + 4], ones, N_SHOWN), weights[: 4 * N_SHOWN + 4]
     )

@@ -62,20 +62,20 @@ def test_a_long_gap():
         fill_gaps(points, FPS)
 
 
-def _heard() -> AlignedSpeech:
+def _aligned_speech() -> AlignedSpeech:
     phones = PhoneSequence([SILENCE, "b", "i", SILENCE], [0.0, 1.0, 1.1, 1.5, 3.0])
     return AlignedSpeech(phones, (WordSpan("b", 1, 3),), -3000.0, Waveform(np.zeros(100), 100), False)
 
 
 def test_a_cut_moves_phones_and_pictures_together():
-    phones, words = trim_to_picture(_heard(), 0.2, 2.0)
+    phones, words = trim_to_picture(_aligned_speech(), 0.2, 2.0)
     assert phones.phones == (SILENCE, "b", "i", SILENCE)
     np.testing.assert_allclose(phones.edges, [0, 0.8, 0.9, 1.3, 1.8])
     assert words == (WordSpan("b", 1, 3),)
 
 
 def test_a_silence_that_is_cut_away_leaves_no_phone():
-    phones, words = trim_to_picture(_heard(), 1.0, 1.5)
+    phones, words = trim_to_picture(_aligned_speech(), 1.0, 1.5)
     assert phones.phones == ("b", "i")
     np.testing.assert_allclose(phones.edges, [0, 0.1, 0.5])
     assert words == (WordSpan("b", 0, 2),)
@@ -83,5 +83,5 @@ def test_a_silence_that_is_cut_away_leaves_no_phone():
 
 @pytest.mark.parametrize(("begin", "stop"), [(1.05, 3.0), (0.0, 1.4)])
 def test_words_without_a_face(begin, stop):
-    with pytest.raises(DataError, match="words are spoken while no face is seen"):
-        trim_to_picture(_heard(), begin, stop)
+    with pytest.raises(DataError, match="there is speech while no face is visible"):
+        trim_to_picture(_aligned_speech(), begin, stop)

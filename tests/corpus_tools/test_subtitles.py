@@ -55,7 +55,7 @@ def test_only_what_is_spoken_counts(shown: str, spoken: str, tmp_path: Path) -> 
 def test_subtitles_of_nothing_but_noises(tmp_path: Path) -> None:
     path = tmp_path / "a.srt"
     path.write_text("1\n00:00:01,000 --> 00:00:03,000\n[music]\n", encoding="utf-8")
-    with pytest.raises(DataError, match="holds no subtitles"):
+    with pytest.raises(DataError, match="contains no subtitles"):
         read_cues(path)
 
 

@@ -56,7 +56,7 @@ def test_another_sound_is_a_fault(filmed: Callable[..., Observation]) -> None:
     seen, other = filmed("a", 0.0), filmed("b", 0.0, seed=2)
     fault = estimate_sync([replace(seen, intensity=other.intensity)]).problem
     assert fault is not None
-    assert "do not move with the sound" in fault
+    assert "does not match the sound" in fault
 
 
 def test_a_lag_at_the_border_is_a_fault(filmed: Callable[..., Observation]) -> None:

@@ -137,22 +137,22 @@ def test_damaged_subtitles_refuse_their_video_alone(write, tmp_path):
     (tmp_path / "whole.TextGrid").write_text(LONG_GRID)
     broken, whole = find_recordings(tmp_path)
     assert [word for word, _ in pronounce_recording(whole)] == ["say", "hi", "two"]
-    with pytest.raises(DataError, match="holds no subtitles"):
+    with pytest.raises(DataError, match="contains no subtitles"):
         pronounce_recording(broken)
 
 
 @pytest.mark.parametrize(
     ("suffix", "content", "reason"),
     [
-        (".txt", b"\x00\x01\x02" * 9, "holds zero bytes"),
-        (".txt", b"\x81\xfe", "is no text in UTF-8"),
+        (".txt", b"\x00\x01\x02" * 9, "contains zero bytes"),
+        (".txt", b"\x81\xfe", "is not text in UTF-8"),
         (".txt", b"a" * (MAX_BYTES + 1), "is larger than 8 MiB"),
-        (".srt", "Nothing here", "holds no subtitles"),
-        (".TextGrid", "hello", "is no TextGrid"),
+        (".srt", "Nothing here", "contains no subtitles"),
+        (".TextGrid", "hello", "is not a TextGrid"),
         (".TextGrid", LONG_GRID[:-30], "is a damaged TextGrid"),
-        (".TextGrid", LONG_GRID.replace('say ""hi"" [2]', ""), "holds no interval with a word"),
+        (".TextGrid", LONG_GRID.replace('say ""hi"" [2]', ""), "has no interval with a word"),
         (".align", "0 x bin", "line 1: '0 x bin' is not start, end and word"),
-        (".align", "0 100 sil", "holds no word"),
+        (".align", "0 100 sil", "contains no word"),
     ],
 )
 def test_what_cannot_be_read_is_refused(write, suffix, content, reason):

@@ -1,4 +1,4 @@
-"""Real recordings made unfit in one way each are refused for that; the others go on, at one frame rate."""
+"""Real recordings with one defect each are refused for it; the others are kept, at one frame rate."""
 
 import csv
 from pathlib import Path
@@ -13,7 +13,7 @@ from tts2face.video.media import read_frames, read_sound
 
 REASONS = {
     "crowd": "show more than one face",
-    "frozen": "the picture stands still for",
+    "frozen": "the picture is frozen for",
     "clipped": "of the speech is clipped",
     "noisy": "dB above the noise",
     "away": "no face is visible",

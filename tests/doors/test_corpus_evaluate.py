@@ -108,7 +108,7 @@ def test_folds_are_told_at_the_terminal_and_in_every_file(here: Path, capsys: py
         (("--train", "some", "--test", "rest", "--folds", "2"), "cannot be combined with --train and --test"),
         (("--recordings", "all", "--hold-out", "24"), "1 to 23 can be held out, not 24"),
         (("--recordings", "all", "--folds", "1"), "24 utterances make 2 to 24 folds, not 1"),
-        (("--recordings", "all", "--hold-out-words", "zebra"), "nobody says zebra"),
+        (("--recordings", "all", "--hold-out-words", "zebra"), "no utterance contains zebra"),
         (("--recordings", "all", "--tracks", "none.csv"), "there are no tracks none.csv"),
         (("--recordings", "all", "--out", "x.pdf"), "written as .html, .json, .csv, not x.pdf"),
         (("--cross-talker", "other"), "--cross-talker needs one folder of training recordings"),
@@ -126,7 +126,7 @@ def test_folds_are_told_at_the_terminal_and_in_every_file(here: Path, capsys: py
             "cannot be combined with --tracks",
         ),
         (("--cross-talker", "none.csv", "--recordings", "all"), "there is no capture none.csv"),
-        (("--cross-talker", "rest", "--recordings", "all"), "u18 is learnt from and tested on"),
+        (("--cross-talker", "rest", "--recordings", "all"), "u18 is in both the training and the held-out part"),
     ],
 )
 def test_refusals_are_one_sentence(

@@ -193,7 +193,7 @@ def test_a_capture_becomes_a_style_of_the_starter_palette(
 @pytest.mark.parametrize(
     ("arguments", "code", "reason"),
     [
-        (["none", "--out", "a.palette"], 2, "none holds no video and no capture"),
+        (["none", "--out", "a.palette"], 2, "none contains no video and no capture"),
         (["take.csv", "--out", "a.talker"], 2, "a palette is written as .palette"),
         (["take.csv", "--out", "a.palette", "--estimator", "guess"], 2, "no estimator 'guess'"),
         (["take.csv", "--out", "a.palette"], 3, "no recording could be used; the first: take"),

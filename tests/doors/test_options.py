@@ -85,7 +85,11 @@ def test_text_behind_two_dashes_is_spoken(here: Path) -> None:
         (["Hi.", "--out", "x.mp4", "--explain", "e.xml"], 2, "an explanation is written as .json, .txt, not e.xml"),
         (["Hi.", "--explain", "folder.json"], 2, "folder.json is a folder"),
         (["corpus", "build", "folder.json", "--out", "a.talker", "--report", "no/r.html"], 2, "no folder no"),
-        (["corpus", "build", "folder.json", "--out", "a.talker", "--report", "r.pdf"], 2, "a report is written as"),
+        (
+            ["corpus", "build", "folder.json", "--out", "a.talker", "--report", "r.pdf"],
+            2,
+            "a report cannot be written as",
+        ),
         (["corpus", "build", "folder.json", "--out", "no/a.talker"], 2, "no folder no"),
         (["corpus", "evaluate", "--recordings", "folder.json", "--out", "no/a.html"], 2, "no folder no"),
         (["Hi.", "--talker", "t" * 300, "--out", "x.mp4"], 2, "File name too long; check the path"),

@@ -135,9 +135,7 @@ def test_appearance_transferred_to_the_same_talker_is_unchanged(talker: Path) ->
     np.testing.assert_allclose(carry.relation, np.eye(len(carry.relation)), atol=0.01)
 
 
-def test_a_take_moves_the_lips_beyond_the_recordings(
-    talker: Path, recordings: Path, bundle: Path, tmp_path: Path
-) -> None:
+def test_a_take_moves_lips_beyond_recordings(talker: Path, recordings: Path, bundle: Path, tmp_path: Path) -> None:
     take = next((recordings / "clips").iterdir())
     made = {}
     for flags in ((), ("--append-missing",)):

@@ -15,9 +15,9 @@ def test_a_bar_starts_again_with_each_stage(
     with stage_bar() as stages:
         assert stages is not None
         stages("reading recordings")(3, 4)
-        stages("learning lips")(1, 2)
+        stages("learning phone network")(1, 2)
     output = capsys.readouterr().err
-    assert "learning lips" in output
+    assert "learning phone network" in output
     assert "50%" in output
 
 

@@ -162,7 +162,7 @@ def test_what_cannot_be_said_is_refused(change: dict, reason: str, talker: Talke
         ({"idle": 5.0}, "--idle cannot be combined with text or --audio; remove one of them"),
         (
             {"idle": 5.0, "text": "", "voice": "espeak"},
-            "--voice, --rate and --volume have no effect with --idle; remove them",
+            "--volume have no effect with --idle; remove them",
         ),
         ({"idle": 0.0, "text": ""}, "idle must lie between 0.1 and 3600, not 0"),
         ({"gestures": "none", "style": "calm"}, "have no effect with --gestures none"),

@@ -183,7 +183,7 @@ def test_sound_without_weight():
         ({"history": 1}, "history is 2 to 60 frames"),
         ({"stride": 61}, "its stride 1 to 60"),
         ({"memory": -1}, "memory of a field must be 0 to 1000 jumps, not -1"),
-        ({"candidates": 17}, "1 to 16 candidates, not 17"),
+        ({"candidates": 17}, "candidates of a field must be 1 to 16, not 17"),
         ({"alpha": (-1.0,)}, "alpha and settling time must not be negative"),
         ({"sigma": 0.0}, "its sigma must be above 0"),
         ({"settle_s": -0.1}, "alpha and settling time must not be negative"),

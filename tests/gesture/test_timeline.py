@@ -121,7 +121,7 @@ def test_a_timeline_can_be_moved() -> None:
         (lambda: StyleSpan("head", "a", math.nan, 1), "must begin at 0 s or later, not at nan"),
         (lambda: StyleSpan("head", "a", 2, 2), "must end after it begins, not run from 2 to 2 s"),
         (lambda: StyleSpan("head", "a", 2, math.nan), "must end after it begins"),
-        (lambda: ExpressionSpan("neutral", 1, 0, 1), "neutral is the face at rest"),
+        (lambda: ExpressionSpan("neutral", 1, 0, 1), "the expression neutral has no effect"),
         (lambda: ExpressionSpan("bored", 1, 0, 1), "no expression 'bored'; choose sad, happy"),
         (lambda: ExpressionSpan("sad", 1.6, 0, 1), "weight of sad must lie between -0.5 and 1.5, not 1.6"),
         (lambda: ExpressionSpan("sad", 1, 3, 1), "must end after it begins, not run from 3 to 1 s"),

@@ -151,7 +151,7 @@ def test_features_of_another_number_are_refused() -> None:
     [
         (lambda: learn_linear_map([], feature="mfcc"), "there is none"),
         (lambda: learn_network_map(lessons(1), feature="mfcc", options=NetworkMapOptions()), "at least 2 utterances"),
-        (lambda: NetworkMapOptions(n_hidden=0), "needs a hidden unit"),
+        (lambda: NetworkMapOptions(n_hidden=0), "needs at least one hidden unit"),
         (lambda: TrainingUtterance(np.zeros((3, 2)), np.zeros((4, 2))), "not 3 and 4"),
     ],
 )

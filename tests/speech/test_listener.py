@@ -80,7 +80,7 @@ def test_memory_does_not_grow_with_what_was_heard() -> None:
     for block in blocks(1600) * 20:
         ear.add_samples(block)
     assert ear.n_samples == 20 * len(SOUND.samples)
-    assert len(ear._kept) < 4000
+    assert len(ear._buffer) < 4000
 
 
 @pytest.mark.parametrize("block", [np.zeros((2, 10)), np.array([0.0, np.nan])])

@@ -54,12 +54,12 @@ def gap_limits(source_gaps: FloatArray, contact: float, at_rest: FloatArray) -> 
     return np.maximum(source_gaps + MAX_GAP_SLOPE * np.maximum(source_gaps - contact, 0.0), at_rest)
 
 
-def nearest_valid_parameters(wanted: FloatArray, limits: FloatArray, gaps: FloatArray, most: FloatArray) -> FloatArray:
-    """Parameters (T, M) nearest to `wanted` within limits on parameters and lip gaps.
+def nearest_valid_parameters(target: FloatArray, limits: FloatArray, gaps: FloatArray, most: FloatArray) -> FloatArray:
+    """Parameters (T, M) nearest to `target` within limits on parameters and lip gaps.
 
     Parameters
     ----------
-    wanted : (T, M)
+    target : (T, M)
         Target parameters.
     limits : (M,)
         Largest magnitude of each parameter.
@@ -86,8 +86,8 @@ def nearest_valid_parameters(wanted: FloatArray, limits: FloatArray, gaps: Float
     sides = np.concatenate([pairs, -pairs, unit, -unit])
     unit_target = np.zeros(n_modes + 1)
     unit_target[-1] = 1.0
-    found = np.zeros_like(wanted)
-    for frame, start in enumerate(wanted):
+    parameters = np.zeros_like(target)
+    for frame, start in enumerate(target):
         start_gaps = pairs @ start + gaps[:, -1]
         short = -np.concatenate([start_gaps - MIN_LIP_GAP_MM, most[frame] - start_gaps, start + limits, limits - start])
         system = np.vstack([sides.T, short])
@@ -97,5 +97,5 @@ def nearest_valid_parameters(wanted: FloatArray, limits: FloatArray, gaps: Float
                 "no parameters within the target's limits satisfy its lip gap limits; build the target talker again"
             )
         residual = system @ multipliers - unit_target
-        found[frame] = start - residual[:-1] / residual[-1]
-    return found
+        parameters[frame] = start - residual[:-1] / residual[-1]
+    return parameters

@@ -94,20 +94,20 @@ class ParameterTransfer:
         Each frame is the nearest to eq. 5 within the limits whose lips do not cross and touch where the source's lips
         touch; frames are independent of each other.
         """
-        wanted = self.clone_unlimited(source)
+        unlimited = self.clone_unlimited(source)
         limits = self.limits.astype(np.float64)
-        limited = np.clip(wanted, -limits, limits)
-        most = gap_limits(self._scaled_source_gaps(source), self.contact, self.resting_gaps)
+        limited = np.clip(unlimited, -limits, limits)
+        upper_gaps = gap_limits(self._scaled_source_gaps(source), self.contact, self.resting_gaps)
         gaps = ordered_product(limited, self.target_gaps[:, :-1].T) + self.target_gaps[:, -1]
-        wrong = np.flatnonzero(((gaps < MIN_LIP_GAP_MM) | (gaps > most)).any(axis=1))
-        limited[wrong] = nearest_valid_parameters(wanted[wrong], limits, self.target_gaps, most[wrong])
+        wrong = np.flatnonzero(((gaps < MIN_LIP_GAP_MM) | (gaps > upper_gaps)).any(axis=1))
+        limited[wrong] = nearest_valid_parameters(unlimited[wrong], limits, self.target_gaps, upper_gaps[wrong])
         return np.clip(limited.astype(np.float32), -self.limits, self.limits)
 
     def clone_unlimited(self, source: NDArray[np.floating]) -> FloatArray:
         """Target parameters (T, q) by eq. 5 without limits, for (T, m) of the source's first m modes."""
         n_modes = source.shape[1]
-        moved = source.astype(np.float64) - self.source_rest[:n_modes]
-        return self.target_rest + ordered_product(moved, self.relation[:, :n_modes].T)
+        displacement = source.astype(np.float64) - self.source_rest[:n_modes]
+        return self.target_rest + ordered_product(displacement, self.relation[:, :n_modes].T)
 
     def _scaled_source_gaps(self, source: NDArray[np.floating]) -> FloatArray:
         """Gaps (T, P) of the source at the target's scale, mm."""
@@ -183,13 +183,14 @@ def append_missing_components(source: ShapeModel, target: ShapeModel, n: int | N
     size, own, speech = face_size(target) / face_size(source), _flat_basis(target), source.n_speech
     mouth, mouth_spread = _missing_components(source, slice(None, speech), own)
     other, other_spread = _missing_components(source, slice(speech, None), np.concatenate([own, mouth]))
-    found = size * np.concatenate([mouth_spread, other_spread])
-    if n is not None and not 0 <= n <= len(found):
+    magnitudes = size * np.concatenate([mouth_spread, other_spread])
+    if n is not None and not 0 <= n <= len(magnitudes):
         raise InputError(
-            f"{len(found)} components of the source are missing in the target, not {n}; choose 0 to {len(found)}"
+            f"{len(magnitudes)} components of the source are missing in the target, not {n}; "
+            f"choose 0 to {len(magnitudes)}"
         )
-    n_added = int((found > MIN_COMPONENT_MM).sum()) if n is None else n
-    chosen = np.sort(np.argsort(-found, kind="stable")[:n_added])
+    n_added = int((magnitudes > MIN_COMPONENT_MM).sum()) if n is None else n
+    chosen = np.sort(np.argsort(-magnitudes, kind="stable")[:n_added])
     of_mouth, others = chosen[chosen < len(mouth)], chosen[chosen >= len(mouth)]
     added = np.concatenate([mouth, other])
 
@@ -198,8 +199,8 @@ def append_missing_components(source: ShapeModel, target: ShapeModel, n: int | N
         return np.concatenate([before, new[of_mouth], behind, new[others]]).astype(np.float32)
 
     basis = interleave(own.astype(np.float32), added).reshape(-1, *target.mean.shape)
-    rest = interleave(target.rest, np.zeros(len(found)))
-    return ShapeModel(target.mean, basis, interleave(target.spread, found), target.n_speech + len(of_mouth), rest)
+    rest = interleave(target.rest, np.zeros(len(magnitudes)))
+    return ShapeModel(target.mean, basis, interleave(target.spread, magnitudes), target.n_speech + len(of_mouth), rest)
 
 
 def extend_talker(source: ShapeModel, target: Talker) -> Talker:
@@ -218,7 +219,7 @@ def extend_talker(source: ShapeModel, target: Talker) -> Talker:
         mouth, other = (np.zeros((len(shape), n), np.float32) for n in (n_mouth, n_other))
         return np.concatenate([shape[:, : before.n_speech], mouth, shape[:, before.n_speech :], other], axis=1)
 
-    utterances = tuple(replace(spoken, shape=insert_zeros(spoken.shape)) for spoken in target.utterances)
+    utterances = tuple(replace(utterance, shape=insert_zeros(utterance.shape)) for utterance in target.utterances)
     appearance = target.appearance
     if appearance is not None:
         appearance = replace(appearance, plate=replace(appearance.plate, shape=insert_zeros(appearance.plate.shape)))
@@ -274,8 +275,8 @@ def _missing_components(source: ShapeModel, block: slice, span: FloatArray) -> t
     modes = _flat_basis(source)[block]
     for _ in range(2):  # the second pass removes the rounding errors of the first
         modes = modes - (modes @ span.T) @ span
-    moved = np.concatenate([source.spread[block, None] * modes, source.rest[None, block] @ modes])
-    _, distances, components = np.linalg.svd(moved, full_matrices=False)
+    displacement = np.concatenate([source.spread[block, None] * modes, source.rest[None, block] @ modes])
+    _, distances, components = np.linalg.svd(displacement, full_matrices=False)
     real = distances > MIN_REAL_MOTION_MM  # smaller ones are rounding errors and may lie in the span
     components, distances = components[real], distances[real]
     components = components - (components @ span.T) @ span

@@ -41,13 +41,13 @@ class LocalInterpolant:
     coefficients: FloatArray
     support: float
 
-    def __call__(self, places: NDArray[np.floating]) -> FloatArray:
+    def __call__(self, points: NDArray[np.floating]) -> FloatArray:
         """Displacements (P, E) at points (P, D); exactly 0 beyond the support of every centre."""
-        found = np.zeros((len(places), self.coefficients.shape[1]))
-        for first in range(0, len(places), CHUNK_SIZE):
+        values = np.zeros((len(points), self.coefficients.shape[1]))
+        for first in range(0, len(points), CHUNK_SIZE):
             span = slice(first, first + CHUNK_SIZE)
-            found[span] = _basis_values(places[span], self.centres, self.support) @ self.coefficients
-        return found
+            values[span] = _basis_values(points[span], self.centres, self.support) @ self.coefficients
+        return values
 
 
 def fit_local_interpolant(
@@ -79,14 +79,14 @@ def fit_local_interpolant(
     >>> field(np.array([[0.0], [5.0], [25.0]])).round(9).ravel().tolist()
     [1.0, 2.0, 0.0]
     """
-    places, wanted = check_centres(centres, displacements)
+    points, targets = check_centres(centres, displacements)
     if not support > 0:
         raise InputError(f"the support must be above 0, not {support}")
-    matrix = _basis_values(places, places, support)
+    matrix = _basis_values(points, points, support)
     if np.linalg.cond(matrix) > MAX_CONDITION:
         raise DataError("centres are too close together for their support; remove some centres or reduce the support")
-    coefficients: FloatArray = np.linalg.solve(matrix, wanted).astype(np.float64)
-    return LocalInterpolant(places, coefficients, float(support))
+    coefficients: FloatArray = np.linalg.solve(matrix, targets).astype(np.float64)
+    return LocalInterpolant(points, coefficients, float(support))
 
 
 def cubic_bspline(share: NDArray[np.floating]) -> FloatArray:
@@ -96,9 +96,9 @@ def cubic_bspline(share: NDArray[np.floating]) -> FloatArray:
     return values
 
 
-def _basis_values(places: NDArray[np.floating], centres: FloatArray, support: float) -> FloatArray:
+def _basis_values(points: NDArray[np.floating], centres: FloatArray, support: float) -> FloatArray:
     """Values (P, N) of every centre's basis function at points (P, D)."""
-    values: FloatArray = np.ones((len(places), len(centres)))
+    values: FloatArray = np.ones((len(points), len(centres)))
     for axis in range(centres.shape[1]):
-        values *= cubic_bspline(np.abs(np.subtract.outer(places[:, axis], centres[:, axis])) / support)
+        values *= cubic_bspline(np.abs(np.subtract.outer(points[:, axis], centres[:, axis])) / support)
     return values

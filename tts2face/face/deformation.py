@@ -59,9 +59,9 @@ class FaceRig:
 
 def build_rig(face: Face) -> FaceRig:
     """Rig of a face; shapes keep only the vertices that they move."""
-    moved = [np.flatnonzero(np.any(shape != 0, axis=1)).astype(np.int32) for shape in face.shapes]
-    starts = np.concatenate([[0], np.cumsum([len(indices) for indices in moved])]).astype(np.int64)
-    deltas = [shape[indices] for shape, indices in zip(face.shapes, moved, strict=True)]
+    moved_vertices = [np.flatnonzero(np.any(shape != 0, axis=1)).astype(np.int32) for shape in face.shapes]
+    starts = np.concatenate([[0], np.cumsum([len(indices) for indices in moved_vertices])]).astype(np.int64)
+    deltas = [shape[indices] for shape, indices in zip(face.shapes, moved_vertices, strict=True)]
     turns = np.zeros((len(face.eyes), len(face.shape_names), 3), np.float32)
     for number, eye in enumerate(face.eyes):
         for name, turn in eye.turns.items():
@@ -69,7 +69,7 @@ def build_rig(face: Face) -> FaceRig:
     return FaceRig(
         rest=np.array(face.vertices, np.float32),
         starts=starts,
-        indices=np.concatenate([np.zeros(0, np.int32), *moved]),
+        indices=np.concatenate([np.zeros(0, np.int32), *moved_vertices]),
         deltas=np.concatenate([np.zeros((0, 3), np.float32), *deltas]).astype(np.float32),
         eye_spans=np.array([(eye.first, eye.first + eye.count) for eye in face.eyes], np.int64).reshape(-1, 2),
         eye_centres=np.array([eye.centre for eye in face.eyes], np.float32).reshape(-1, 3),

@@ -61,8 +61,8 @@ class EyelidModel:
             opening = np.maximum(self.opening[eye] + ordered_product(lids, self.per_weight[eye]), 0.0)
             for column, share in ((self.blink[eye], shares[:, eye]), (self.wide[eye], shares[:, eye])):
                 per_weight = self.per_weight[eye, column]
-                moved = -opening * (np.maximum(share, 0.0) if per_weight < 0 else np.minimum(share, 0.0)) / per_weight
-                lids[:, column] = np.clip(lids[:, column] + moved, *self.limits[column])
+                change = -opening * (np.maximum(share, 0.0) if per_weight < 0 else np.minimum(share, 0.0)) / per_weight
+                lids[:, column] = np.clip(lids[:, column] + change, *self.limits[column])
         return lids
 
     def _limit_narrowing(self, lids: FloatArray, eye: int) -> None:

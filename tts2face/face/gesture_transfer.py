@@ -172,9 +172,9 @@ def check_gestures(
     for name, values in gestures.items():
         if name not in widths:
             raise InputError(f"there is no feature {name!r}; give {', '.join(FEATURES)}")
-        wanted = (n_frames, widths[name])
-        if values.shape != wanted or not np.isfinite(values).all():
-            raise InputError(f"{name} must be finite values {wanted}, not {values.shape}")
+        expected = (n_frames, widths[name])
+        if values.shape != expected or not np.isfinite(values).all():
+            raise InputError(f"{name} must be finite values {expected}, not {values.shape}")
     for name, gain in gains.items():
         if name not in GAIN_NAMES:
             raise InputError(f"there is no gain for {name!r}; give {', '.join(GAIN_NAMES)}")

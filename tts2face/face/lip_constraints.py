@@ -57,21 +57,21 @@ class LipConstraints:
     width: FloatArray
     limits: FloatArray
 
-    def combine(self, spoken: FloatArray, added: FloatArray) -> FloatArray:
-        """Weights (T, K) of speech weights `spoken` (T, K) with gesture weights `added` (T, K), lips constrained.
+    def combine(self, speech: FloatArray, added: FloatArray) -> FloatArray:
+        """Weights (T, K) of speech weights `speech` (T, K) with gesture weights `added` (T, K), lips constrained.
 
         Where the lips touch, the gap is that of speech; the wider the gap, the more it follows the gesture, and half
         of it always remains. Frames without a gesture are unchanged.
         """
-        gaps, widened = ordered_product(spoken, self.gaps.T), ordered_product(added, self.gaps.T)
-        wanted = gaps + _smoothstep(gaps / FULL_EXPRESSION_GAP_MM) * widened
-        return self._solve(spoken, added, np.maximum(wanted, np.where(gaps > 0, MIN_GAP_SHARE * gaps, gaps)))
+        gaps, widened = ordered_product(speech, self.gaps.T), ordered_product(added, self.gaps.T)
+        target_gaps = gaps + _smoothstep(gaps / FULL_EXPRESSION_GAP_MM) * widened
+        return self._solve(speech, added, np.maximum(target_gaps, np.where(gaps > 0, MIN_GAP_SHARE * gaps, gaps)))
 
-    def _solve(self, spoken: FloatArray, added: FloatArray, wanted: FloatArray) -> FloatArray:
-        """Weights (T, K) nearest to the sum whose gaps beyond rest are `wanted` (T, P), mm."""
-        total = spoken + added
+    def _solve(self, speech: FloatArray, added: FloatArray, target_gaps: FloatArray) -> FloatArray:
+        """Weights (T, K) nearest to the sum whose gaps beyond rest are `target_gaps` (T, P), mm."""
+        total = speech + added
         moving = np.isin(np.arange(total.shape[1]), self.moving)
-        remaining = wanted - ordered_product(np.where(moving, 0.0, total), self.gaps.T)
+        remaining = target_gaps - ordered_product(np.where(moving, 0.0, total), self.gaps.T)
         opened = self.gaps[:, self.moving]
         linear = ordered_product(total[:, self.moving], self.curvature) + GAP_CONSTRAINT_WEIGHT * ordered_product(
             remaining, opened
@@ -81,35 +81,35 @@ class LipConstraints:
         total[np.ix_(changed, moving)] = bounded_least_squares(curvature, linear[changed], self.limits)
         return np.asarray(total, np.float64)
 
-    def amplify(self, spoken: FloatArray, jaw: FloatArray, lips: FloatArray) -> FloatArray:
+    def amplify(self, speech: FloatArray, jaw: FloatArray, lips: FloatArray) -> FloatArray:
         """Speech weights (T, K) with jaw and lip motion multiplied by factors (K,), 1 for other shapes.
 
         All gaps grow by the same share, so that closed lips stay closed. Where the lips counteract the jaw, its gain
         is limited by the gap, because otherwise the upper lip would have to follow it.
         """
-        gap = np.maximum(ordered_product(spoken, self.gaps[MIDDLE_PAIR]), 0.0)
+        gap = np.maximum(ordered_product(speech, self.gaps[MIDDLE_PAIR]), 0.0)
         by_jaw = np.maximum(
-            ordered_product(np.where(jaw == 1.0, 0.0, spoken), self.gaps[MIDDLE_PAIR]), GAP_TOLERANCE_MM
+            ordered_product(np.where(jaw == 1.0, 0.0, speech), self.gaps[MIDDLE_PAIR]), GAP_TOLERANCE_MM
         )
-        added = spoken * (jaw - 1.0) * np.minimum(gap / by_jaw, 1.0)[:, None] + spoken * (lips - 1.0)
+        added = speech * (jaw - 1.0) * np.minimum(gap / by_jaw, 1.0)[:, None] + speech * (lips - 1.0)
         largest_gain = max(float(jaw.max()), float(lips.max()))
         grown = np.clip(
             ordered_product(added, self.gaps[MIDDLE_PAIR]) / np.maximum(gap, GAP_TOLERANCE_MM), -1.0, largest_gain - 1.0
         )
-        gaps = ordered_product(spoken, self.gaps.T)
+        gaps = ordered_product(speech, self.gaps.T)
         return self._solve(
-            spoken, added, gaps + grown[:, None] * _smoothstep(gaps / FULL_GROWTH_GAP_MM) * np.maximum(gaps, 0.0)
+            speech, added, gaps + grown[:, None] * _smoothstep(gaps / FULL_GROWTH_GAP_MM) * np.maximum(gaps, 0.0)
         )
 
-    def rounding(self, spoken: FloatArray) -> FloatArray:
+    def rounding(self, speech: FloatArray) -> FloatArray:
         """Rounding (T,) of the mouth: 0 as wide as at rest, 1 when narrower by `FULL_ROUNDING_MM`."""
-        return _smoothstep(-ordered_product(spoken, self.width) / FULL_ROUNDING_MM)
+        return _smoothstep(-ordered_product(speech, self.width) / FULL_ROUNDING_MM)
 
-    def attenuate_on_rounded_lips(self, spoken: FloatArray, added: FloatArray) -> FloatArray:
+    def attenuate_on_rounded_lips(self, speech: FloatArray, added: FloatArray) -> FloatArray:
         """Gesture weights (T, K), reduced on rounded lips."""
-        kept = 1.0 - ROUNDING_ATTENUATION * self.rounding(spoken)
+        factor = 1.0 - ROUNDING_ATTENUATION * self.rounding(speech)
         softened = added.copy()
-        softened[:, self.moving] *= kept[:, None]
+        softened[:, self.moving] *= factor[:, None]
         return softened
 
 

@@ -37,13 +37,13 @@ class Interpolant:
     coefficients: FloatArray
     decay_length: float
 
-    def __call__(self, places: NDArray[np.floating]) -> FloatArray:
+    def __call__(self, points: NDArray[np.floating]) -> FloatArray:
         """Displacements (P, E) at points (P, D)."""
-        found = np.zeros((len(places), self.coefficients.shape[1]))
-        for first in range(0, len(places), CHUNK_SIZE):
+        values = np.zeros((len(points), self.coefficients.shape[1]))
+        for first in range(0, len(points), CHUNK_SIZE):
             span = slice(first, first + CHUNK_SIZE)
-            found[span] = rbf_values(places[span], self.centres, self.decay_length) @ self.coefficients
-        return found
+            values[span] = rbf_values(points[span], self.centres, self.decay_length) @ self.coefficients
+        return values
 
 
 def fit_interpolant(
@@ -77,14 +77,14 @@ def fit_interpolant(
     from scipy.linalg import solve
     from scipy.spatial.distance import pdist
 
-    places, wanted = check_centres(centres, displacements)
+    points, targets = check_centres(centres, displacements)
     if not face_width > 0:
         raise InputError(f"the face's width must be above 0, not {face_width}")
     decay_length = DECAY_LENGTH / FACE_WIDTH * face_width
-    if len(places) > 1 and float(pdist(places).min()) < MIN_CENTRE_DISTANCE * decay_length:
+    if len(points) > 1 and float(pdist(points).min()) < MIN_CENTRE_DISTANCE * decay_length:
         raise DataError("two centres lie in one place; pass one displacement for each point")
-    coefficients = solve(rbf_values(places, places, decay_length), wanted, assume_a="pos")
-    return Interpolant(places, coefficients, decay_length)
+    coefficients = solve(rbf_values(points, points, decay_length), targets, assume_a="pos")
+    return Interpolant(points, coefficients, decay_length)
 
 
 def check_centres(centres: NDArray[np.floating], displacements: NDArray[np.floating]) -> tuple[FloatArray, FloatArray]:
@@ -95,17 +95,19 @@ def check_centres(centres: NDArray[np.floating], displacements: NDArray[np.float
     InputError
         Their numbers differ or are 0, or a value is not finite.
     """
-    places, wanted = np.asarray(centres, np.float64), np.asarray(displacements, np.float64)
-    if places.ndim != 2 or wanted.ndim != 2 or len(places) != len(wanted) or not len(places):
-        raise InputError(f"centres {places.shape} and displacements {wanted.shape} must have the same rows, at least 1")
-    if not (np.isfinite(places).all() and np.isfinite(wanted).all()):
+    points, targets = np.asarray(centres, np.float64), np.asarray(displacements, np.float64)
+    if points.ndim != 2 or targets.ndim != 2 or len(points) != len(targets) or not len(points):
+        raise InputError(
+            f"centres {points.shape} and displacements {targets.shape} must have the same rows, at least 1"
+        )
+    if not (np.isfinite(points).all() and np.isfinite(targets).all()):
         raise InputError("centres and displacements must be finite; remove points that were not tracked")
-    return places, wanted
+    return points, targets
 
 
-def rbf_values(places: NDArray[np.floating], centres: NDArray[np.floating], decay_length: float) -> FloatArray:
+def rbf_values(points: NDArray[np.floating], centres: NDArray[np.floating], decay_length: float) -> FloatArray:
     """Values (P, N) of ``exp(-r / decay_length)`` for the distances r of points (P, D) from centres (N, D)."""
     from scipy.spatial.distance import cdist
 
-    values: FloatArray = np.exp(-cdist(places, centres) / decay_length)
+    values: FloatArray = np.exp(-cdist(points, centres) / decay_length)
     return values

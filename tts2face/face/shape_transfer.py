@@ -64,17 +64,19 @@ def spread_landmark_motion(
     Landmarks that the face lacks are skipped; those in `still` have displacement 0.
     """
     places = scatter_landmarks(face, landmark_positions(face))
-    wanted = np.zeros((N_LANDMARKS, *motion.transpose(1, 0, 2).shape[1:]))
-    wanted[landmarks] = motion.transpose(1, 0, 2)
+    displacements = np.zeros((N_LANDMARKS, *motion.transpose(1, 0, 2).shape[1:]))
+    displacements[landmarks] = motion.transpose(1, 0, 2)
     numbers = [int(number) for number in (*landmarks, *still) if np.isfinite(places[number]).all()]
     shapes = np.zeros((len(motion), *face.vertices.shape), np.float32)
     if not numbers:
         return shapes
     size = eye_distance(face)
-    centres, moved = _merge_places(places[numbers], wanted[numbers].reshape(len(numbers), -1), MERGE_DISTANCE * size)
+    centres, merged = _merge_places(
+        places[numbers], displacements[numbers].reshape(len(numbers), -1), MERGE_DISTANCE * size
+    )
     soft = soft_vertices(face)
-    carried = fit_local_interpolant(centres, moved, SUPPORT * size)(face.vertices[soft])
-    shapes[:, soft] = np.round(carried, DIGITS).reshape(len(soft), -1, 3).transpose(1, 0, 2)
+    interpolated = fit_local_interpolant(centres, merged, SUPPORT * size)(face.vertices[soft])
+    shapes[:, soft] = np.round(interpolated, DIGITS).reshape(len(soft), -1, 3).transpose(1, 0, 2)
     return shapes
 
 

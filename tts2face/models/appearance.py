@@ -67,8 +67,8 @@ class TextureModel:
     def textures(self, parameters: NDArray[np.floating]) -> NDArray[np.float32]:
         """Textures (T, P, 3) for parameters (T, a) of the first a modes."""
         n_modes = parameters.shape[1]
-        moved = parameters.astype(np.float32) @ self.basis[:n_modes].reshape(n_modes, -1)
-        return self.mean + moved.reshape(len(parameters), *self.mean.shape)
+        offsets = parameters.astype(np.float32) @ self.basis[:n_modes].reshape(n_modes, -1)
+        return self.mean + offsets.reshape(len(parameters), *self.mean.shape)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -135,7 +135,7 @@ def audio_maps_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Audi
         A part is missing.
     """
     names = sorted({key.split(".")[1] for key in arrays if key.startswith(AUDIO_MAP_PREFIX)})
-    found = {}
+    audio_maps = {}
     for name in names:
         before, after, is_nonlinear = (int(number) for number in arrays[f"{AUDIO_MAP_PREFIX}{name}.context"])
         parts = {
@@ -144,5 +144,5 @@ def audio_maps_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Audi
         }
         feature = arrays[f"{AUDIO_MAP_PREFIX}{name}.feature"].tobytes().decode()
         loudness = float(arrays[f"{AUDIO_MAP_PREFIX}{name}.loudness"][0])
-        found[name] = AudioMap(feature, before, after, **parts, is_nonlinear=bool(is_nonlinear), loudness=loudness)
-    return found
+        audio_maps[name] = AudioMap(feature, before, after, **parts, is_nonlinear=bool(is_nonlinear), loudness=loudness)
+    return audio_maps

@@ -15,8 +15,8 @@ class Part:
     """Named part of the surface with one material: the triangles [first, first + count) of the face.
 
     ``specular`` is the strength of the highlight (0 = matt), ``shininess`` its Blinn-Phong exponent, ``wrap`` the wrap
-    of diffuse light around the shape (0 = hard, 1 = very soft, like subsurface scattering), ``opacity`` is in
-    (0, 1]. ``textured`` parts take their colour from the texture, the others from the vertex colours.
+    of diffuse light around the shape (0 = hard, 1 = very soft, an approximation of subsurface scattering), ``opacity``
+    is in (0, 1]. ``textured`` parts take their colour from the texture, the others from the vertex colours.
     """
 
     name: str

@@ -210,7 +210,7 @@ def _part_texel_weights(face: Face, part: Part, shape: tuple[int, ...]) -> NDArr
 
 
 def _apply_identity(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], number: int) -> Face:
-    moved = arrays[f"identity{number}"] * arrays[f"identity{number}_step"][0]
+    displacement = arrays[f"identity{number}"] * arrays[f"identity{number}_step"][0]
     name, tints, _ = header["identities"][number]
     colours, texture = face.colours.copy(), None if face.texture is None else face.texture.copy()
     for part in face.parts:
@@ -222,12 +222,14 @@ def _apply_identity(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapp
             tinted = texture * (1 + share * (tint - 1))
             texture = np.clip(tinted, 0, np.maximum(texture, MAX_BRIGHTENED_LEVEL)).astype(np.uint8)
     eyes = [
-        replace(eye, centre=eye.centre + moved[eye.first : eye.first + eye.count].mean(axis=0).astype(np.float32))
+        replace(
+            eye, centre=eye.centre + displacement[eye.first : eye.first + eye.count].mean(axis=0).astype(np.float32)
+        )
         for eye in face.eyes
     ]
     return replace(
         face,
-        vertices=(face.vertices + moved).astype(np.float32),
+        vertices=(face.vertices + displacement).astype(np.float32),
         eyes=tuple(eyes),
         colours=colours,
         texture=texture,

@@ -102,8 +102,10 @@ def _check_style(contents: Contents, style: str, widths: Mapping[str, int | str]
         if present:
             steps = contents.arrays[step]
             contents.require(bool((steps > 0).all()), f"{step} holds 0; steps must be above 0")
-            most = float(np.abs(contents.arrays[values].astype(np.int32)).max() * np.float64(steps.max()))
-            contents.require(most <= MAX_VALUE, f"{values} in steps of {step} reaches {most:g}, beyond {MAX_VALUE:g}")
+            largest = float(np.abs(contents.arrays[values].astype(np.int32)).max() * np.float64(steps.max()))
+            contents.require(
+                largest <= MAX_VALUE, f"{values} in steps of {step} reaches {largest:g}, beyond {MAX_VALUE:g}"
+            )
 
 
 def _check_derivations(contents: Contents, channels: Mapping[str, tuple[str, ...] | None]) -> None:

@@ -61,8 +61,8 @@ class ShapeModel:
         """Landmarks (T, L, 3), mm, for parameters (T, m) of the first m modes."""
         n_modes = parameters.shape[1]
         flat = self.basis[:n_modes].reshape(n_modes, -1)
-        moved = parameters.astype(np.float32) @ flat
-        return self.mean + moved.reshape(len(parameters), *self.mean.shape)
+        offsets = parameters.astype(np.float32) @ flat
+        return self.mean + offsets.reshape(len(parameters), *self.mean.shape)
 
     def parameters(self, shapes: NDArray[np.floating]) -> NDArray[np.float32]:
         """Parameters (T, M) of landmarks (T, L, 3), mm."""

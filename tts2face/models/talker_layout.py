@@ -127,8 +127,8 @@ def _check_utterances(contents: Contents) -> None:
     contents.sums_to("n_phones", sizes["phones"], "phones")
     contents.require(sizes["edges"] == sizes["phones"] + n, f"has {sizes['edges']} edges of {sizes['phones']} phones")
     contents.indices("phones", len(inventory), "phones of the inventory")
-    spoken = np.array([phone != SILENCE for phone in inventory], bool)
-    contents.require(bool(spoken[arrays["phones"]].any()), "holds no phone but silence")
+    is_speech = np.array([phone != SILENCE for phone in inventory], bool)
+    contents.require(bool(is_speech[arrays["phones"]].any()), "holds no phone but silence")
     ends = np.cumsum(arrays["n_phones"] + 1)
     steps = np.diff(arrays["edges"])
     steps[ends[:-1] - 1] = 1.0  # from an utterance to the next

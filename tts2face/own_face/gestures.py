@@ -145,9 +145,9 @@ def _region_modes(rest: FloatArray, palette: Palette, name: str) -> FloatArray:
     region = palette.regions[name]
     modes = fit_modes(rest, palette.neutral.astype(np.float64), region)
     still = [number for number in sorted({*LID_LANDMARKS, *LIP_LANDMARKS}) if number not in region.landmarks]
-    moved = np.concatenate([modes, np.zeros((len(modes), len(still), 3))], axis=1)
+    constrained = np.concatenate([modes, np.zeros((len(modes), len(still), 3))], axis=1)
     size = float(np.linalg.norm(rest[EYE_OUTER_LEFT] - rest[EYE_OUTER_RIGHT]))
-    flat = moved.transpose(1, 0, 2).reshape(-1, 3 * len(modes))
+    flat = constrained.transpose(1, 0, 2).reshape(-1, 3 * len(modes))
     field = fit_local_interpolant(rest[[*region.landmarks, *still]], flat, SUPPORT * size)
     return field(rest).reshape(len(rest), -1, 3).transpose(1, 0, 2)
 

@@ -81,8 +81,8 @@ class MeshRenderer:
             raise InputError(f"the face has {n_shapes} shapes, not weights of shape {np.shape(weights)}")
         pose = np.asarray(weights, np.float32), np.asarray(head, np.float32)
         if self.picture.renderer == PYVISTA:
-            (drawn,) = vtk_renderer.render_frames(self.scene, [pose])
-            return drawn
+            (pixels,) = vtk_renderer.render_frames(self.scene, [pose])
+            return pixels
         return self._draw(*pose, self._allocate_buffers())
 
     def _weights(self, clip: Clip) -> NDArray[np.float32]:
@@ -104,11 +104,11 @@ class MeshRenderer:
         self, weights: NDArray[np.float32], head: NDArray[np.float32], buffers: DrawingBuffers
     ) -> NDArray[np.uint8]:
         scene, picture = self.scene, self.picture
-        drawn = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
-        drawn[:, :, :3] = scene.background
+        pixels = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
+        pixels[:, :, :3] = scene.background
         points = scene.surface.rig.pose(weights, head)
-        draw_surface(points, scene.surface, scene.optics, (scene.lights, scene.exposure.at(weights)), buffers, drawn)
-        return drawn
+        draw_surface(points, scene.surface, scene.optics, (scene.lights, scene.exposure.at(weights)), buffers, pixels)
+        return pixels
 
 
 def mesh_renderer(face: Face, picture: Picture) -> MeshRenderer:

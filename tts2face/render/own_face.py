@@ -171,17 +171,17 @@ def draw_video_frame(renderer: OwnFaceRenderer, motion: NDArray[np.floating], nu
     plate = appearance.plate
     n_mesh = len(appearance.face.reference)
     offset = (motion[:n_speech] - plate.shape[number, :n_speech]).astype(np.float32)
-    moved = np.tensordot(offset, renderer.shapes.basis[:n_speech, :n_mesh], axes=1)
+    point_offsets = np.tensordot(offset, renderer.shapes.basis[:n_speech, :n_mesh], axes=1)
     change = np.tensordot(
         (motion[n_speech : n_speech + n_face] - plate.looks[number]).astype(np.float32), appearance.face.basis, axes=1
     )
     change *= appearance.moved_by_speech[:, None]
     if renderer.gestures is not None:
         displacement, appearance_change = renderer.gestures.displacements(motion[n_spoken:], number)
-        moved += displacement
+        point_offsets += displacement
         change += _lid_texture_change(renderer, number, appearance_change, float(motion[-1]))
     target = renderer.points[number].astype(np.float64)
-    target[:n_mesh] += renderer.scale * (moved @ plate.axes[number].T)
+    target[:n_mesh] += renderer.scale * (point_offsets @ plate.axes[number].T)
     mouth = appearance.mouth.textures(motion[None, n_speech + n_face : n_spoken])[0]
     textures = (
         _fill_texture(change, renderer.face_fill, appearance.face.size),
@@ -190,8 +190,8 @@ def draw_video_frame(renderer: OwnFaceRenderer, motion: NDArray[np.floating], nu
     frame = renderer.plate[number].astype(np.float32)
     _draw_mouth_and_face(renderer, number, target, textures, frame)
     _supersample_mouth(renderer, number, target, textures, frame)
-    drawn: NDArray[np.uint8] = np.clip(frame + 0.5, 0, 255).astype(np.uint8)
-    return drawn
+    pixels: NDArray[np.uint8] = np.clip(frame + 0.5, 0, 255).astype(np.uint8)
+    return pixels
 
 
 def _lid_texture_change(

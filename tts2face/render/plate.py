@@ -58,9 +58,9 @@ def texture_samples(model: TextureModel, chosen: NDArray[np.bool_]) -> TextureSa
         if abs(np.linalg.det(sides)) < 1e-9:
             continue
         along = (places - a) @ np.linalg.inv(sides).T
-        found = np.column_stack([1 - along.sum(axis=1), along])
-        better = found.min(axis=1) > weights.min(axis=1)
-        corners[better], weights[better] = triangle, found[better]
+        barycentric = np.column_stack([1 - along.sum(axis=1), along])
+        better = barycentric.min(axis=1) > weights.min(axis=1)
+        corners[better], weights[better] = triangle, barycentric[better]
     inside = weights.min(axis=1) > -1e-3
     return TextureSamples(pixels[inside], corners[inside], weights[inside].astype(np.float32))
 

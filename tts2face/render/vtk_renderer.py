@@ -110,7 +110,7 @@ def render_frames(
 ) -> Iterator[NDArray[np.uint8]]:
     """Pictures (H, W, 3 or 4) of a scene's face for pairs of weights (K,) and head poses (6,), in order.
 
-    All are drawn in one window by the thread that requests the first.
+    All are pixels in one window by the thread that requests the first.
 
     Raises
     ------
@@ -129,10 +129,10 @@ def render_frames(
             plotter.renderer.ResetCameraClippingRange()
             plotter.render()
             samples = np.asarray(plotter.screenshot(None, transparent_background=True, return_img=True))
-            drawn = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
-            drawn[:, :, :3] = scene.background
-            average_samples(samples, side, VTK_TONE_TABLES, drawn)
-            yield drawn
+            pixels = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
+            pixels[:, :, :3] = scene.background
+            average_samples(samples, side, VTK_TONE_TABLES, pixels)
+            yield pixels
     finally:
         plotter.close()
 

@@ -60,12 +60,12 @@ class PerformerRetargeter:
             if not name.startswith(SCORE_DRIVEN_SHAPES) or name not in scores.channels:
                 continue
             at = scores.channels.index(name)
-            moved = np.maximum(scores.values[:, at] - self.neutral_scores[at] - SCORE_DEAD_ZONE, 0.0)
+            weight = np.maximum(scores.values[:, at] - self.neutral_scores[at] - SCORE_DEAD_ZONE, 0.0)
             if name.startswith("eyeBlink"):
-                moved = lids[name.removeprefix("eyeBlink")]
+                weight = lids[name.removeprefix("eyeBlink")]
             elif not name.startswith("eye"):
-                moved = gain * moved
-            weights[:, column] = np.clip(moved, *self.face.limits[column])
+                weight = gain * weight
+            weights[:, column] = np.clip(weight, *self.face.limits[column])
         return Trajectory(self.face.shape_names, weights, scores.fps)
 
     def lip_motion(self, landmarks: NDArray[np.floating], fps: float, *, gain: float = 1.0) -> Trajectory:
@@ -117,8 +117,8 @@ def match_shapes(captured: Trajectory, face: Face, *, gain: float = 1.0) -> Traj
     for column, name in enumerate(face.shape_names):
         if name in captured.channels:
             size = 1.0 if name.startswith("eye") else gain
-            moved = captured.values[:, captured.channels.index(name)]
-            weights[:, column] = np.clip(size * moved, *face.limits[column])
+            weight = captured.values[:, captured.channels.index(name)]
+            weights[:, column] = np.clip(size * weight, *face.limits[column])
     return Trajectory(face.shape_names, weights, captured.fps)
 
 

@@ -118,24 +118,24 @@ def build_retargeter(talker: Talker, face: Face, *, contact: FloatArray | None =
     at = {landmark: row for row, landmark in enumerate(common)}
     rest, per_weight = landmark_positions(face), landmark_motion(face, moving)
     turn, scale = _fit_face_axes(talker, face, rest)
-    moved = per_weight[[int(np.flatnonzero(face.landmarks == landmark)[0]) for landmark in common]]
-    wanted = _displacements(talker, common, scale * turn)
-    weighted = moved * landmark_weights(common)[..., None]
-    linear_term = np.einsum("ldk,lds->ks", weighted, wanted)
+    shape_motion = per_weight[[int(np.flatnonzero(face.landmarks == landmark)[0]) for landmark in common]]
+    talker_motion = _displacements(talker, common, scale * turn)
+    weighted = shape_motion * landmark_weights(common)[..., None]
+    linear_term = np.einsum("ldk,lds->ks", weighted, talker_motion)
     left, right = ([at[corner] for corner in corners] for corners in (CORNERS_LEFT, CORNERS_RIGHT))
     upper, lower = ([at[lip] for lip in lips] for lips in (INNER_LIP_UPPER, INNER_LIP_LOWER))
-    widened, opened = moved[left, 0] - moved[right, 0], moved[upper, 1] - moved[lower, 1]
-    linear_term += WIDTH_WEIGHT * ordered_product(widened.T, wanted[left, 0] - wanted[right, 0])
+    widened, opened = shape_motion[left, 0] - shape_motion[right, 0], shape_motion[upper, 1] - shape_motion[lower, 1]
+    linear_term += WIDTH_WEIGHT * ordered_product(widened.T, talker_motion[left, 0] - talker_motion[right, 0])
     chin = [at[landmark] for landmark in CHIN_LANDMARKS if landmark in at]
-    dropped = moved[chin, 1].mean(axis=0)
-    linear_term += CHIN_WEIGHT * np.outer(dropped, wanted[chin, 1].mean(axis=0))
+    dropped = shape_motion[chin, 1].mean(axis=0)
+    linear_term += CHIN_WEIGHT * np.outer(dropped, talker_motion[chin, 1].mean(axis=0))
     contact = scale * (contact_gaps(talker) if contact is None else contact)
     gaps = _talker_gaps(talker, scale * turn[1], contact)
     return Retargeter(
         shape_names=face.shape_names,
         moving=moving,
         limits=face.limits[moving].astype(np.float64),
-        curvature=mouth_curvature(moved, common) + GAP_WEIGHT * ordered_product(opened.T, opened),
+        curvature=mouth_curvature(shape_motion, common) + GAP_WEIGHT * ordered_product(opened.T, opened),
         linear_term=linear_term,
         gaps=gaps,
         contact=contact,
@@ -159,9 +159,9 @@ def _displacements(talker: Talker, common: list[int], onto_face: FloatArray) -> 
     """Motion (L, 3, S + 1) of the talker's landmarks per parameter, and from rest to parameters of 0, mm."""
     n_speech = talker.model.n_speech
     basis = talker.model.basis[:n_speech, common].astype(np.float64)
-    wanted = np.einsum("slc,dc->lds", basis, onto_face)
-    at_rest = ordered_product(wanted, talker.model.rest[:n_speech].astype(np.float64))
-    return np.concatenate([wanted, -at_rest[..., None]], axis=2)
+    talker_motion = np.einsum("slc,dc->lds", basis, onto_face)
+    at_rest = ordered_product(talker_motion, talker.model.rest[:n_speech].astype(np.float64))
+    return np.concatenate([talker_motion, -at_rest[..., None]], axis=2)
 
 
 def _fit_face_axes(talker: Talker, face: Face, rest: FloatArray) -> tuple[FloatArray, float]:
@@ -198,10 +198,10 @@ def contact_gaps(talker: Talker) -> FloatArray:
     for utterance in talker.utterances:
         gaps = ordered_product(utterance.shape[:, :n_speech].astype(np.float64), apart) + mean
         minima.append(_bilabial_minima(gaps, utterance.phones, talker.fps))
-    found = np.concatenate(minima)
+    bilabial_gaps = np.concatenate(minima)
     return (
-        np.clip(np.percentile(found, CONTACT_PERCENTILE, axis=0), 0.0, MAX_CONTACT_MM)
-        if len(found)
+        np.clip(np.percentile(bilabial_gaps, CONTACT_PERCENTILE, axis=0), 0.0, MAX_CONTACT_MM)
+        if len(bilabial_gaps)
         else np.zeros(len(mean))
     )
 

@@ -124,15 +124,15 @@ class Contents:
         array = self.arrays[name]
         if array.dtype.name != spec.dtype:
             self.fail(f"{name} is {array.dtype.name}, not {spec.dtype}")
-        wanted = tuple(self.sizes.get(size, size) if isinstance(size, str) else size for size in spec.shape)
-        fits = array.ndim == len(wanted) and all(
-            isinstance(size, str) or size == n for size, n in zip(wanted, array.shape, strict=True)
+        expected = tuple(self.sizes.get(size, size) if isinstance(size, str) else size for size in spec.shape)
+        fits = array.ndim == len(expected) and all(
+            isinstance(size, str) or size == n for size, n in zip(expected, array.shape, strict=True)
         )
         if not fits:
-            self.fail(f"{name} has the shape {array.shape}, not ({', '.join(map(str, wanted))})")
+            self.fail(f"{name} has the shape {array.shape}, not ({', '.join(map(str, expected))})")
         if not spec.may_be_empty and 0 in array.shape:
             self.fail(f"{name} is empty")
-        self.sizes |= {size: n for size, n in zip(wanted, array.shape, strict=True) if isinstance(size, str)}
+        self.sizes |= {size: n for size, n in zip(expected, array.shape, strict=True) if isinstance(size, str)}
         if array.size and (spec.low is not None or array.dtype.kind == "f"):
             self._range(name, array, spec)
 

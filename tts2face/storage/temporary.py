@@ -84,11 +84,11 @@ def remove_left_behind(target: Path) -> None:
     """Remove the temporary files and folders of a target that no process has locked."""
     if fcntl is None:
         return
-    for found in _temporaries_of(target):
+    for abandoned_path in _temporaries_of(target):
         with contextlib.suppress(OSError):  # another process writes it, or it cannot be removed
-            lock = _lock_file(found)
+            lock = _lock_file(abandoned_path)
             try:
-                _remove(found)
+                _remove(abandoned_path)
             finally:
                 os.close(lock)
 

@@ -10,6 +10,7 @@ import numpy as np
 from lexicon.cleaning import canonical_text
 from lexicon.sentences import n_letters, text_prefix
 from lexicon.sequence import PhoneSequence, WordSpan
+from lexicon.spoken_form import spoken_form
 
 
 class WordTimes:
@@ -66,7 +67,7 @@ class WordTimes:
         return min(self._count_words(before) - is_inside, len(self._onsets))
 
     def _count_words(self, written: str) -> int:
-        normalised = as_said(written, self._language)
+        normalised = spoken_form(written, self._language)
         if not self._language.startswith("en"):
             normalised = canonical_text(normalised, keep_marks=True)
         return sum(any(letter.isalnum() for letter in word) for word in normalised.split())

@@ -22,12 +22,12 @@ def face() -> Face:
 
 
 @pytest.fixture(scope="session")
-def worn() -> MarkerSet:
+def marker_set() -> MarkerSet:
     return read_marker_set()
 
 
 @pytest.fixture(scope="session")
-def made(face: Face, worn: MarkerSet) -> Made:
+def made(face: Face, marker_set: MarkerSet) -> Made:
     """A made performance with a moving head; the face is at rest in the first half second."""
     t = np.arange(N_FRAMES) / FPS
     weights = np.zeros((N_FRAMES, len(face.shape_names)))
@@ -35,4 +35,4 @@ def made(face: Face, worn: MarkerSet) -> Made:
         weights[:, face.shape_names.index(name)] = most * np.sin(np.pi * (0.7 + 0.17 * number) * t) ** 2
     weights[t < 0.5] = 0.0
     head = np.stack([0.2 * np.sin(t), 0.3 * np.sin(1.3 * t), 0.1 * np.cos(t), *(15 * np.sin(k * t) for k in (1, 2, 3))])
-    return made_take(moved_landmarks(face, Trajectory(face.shape_names, weights, FPS)), head.T, face, worn)
+    return made_take(moved_landmarks(face, Trajectory(face.shape_names, weights, FPS)), head.T, face, marker_set)

@@ -33,17 +33,17 @@ def world_turn() -> np.ndarray:
     return turn * np.sign(np.linalg.det(turn))
 
 
-def made_take(landmarks: np.ndarray, head: np.ndarray, face: Face, worn: MarkerSet) -> Made:
+def made_take(landmarks: np.ndarray, head: np.ndarray, face: Face, marker_set: MarkerSet) -> Made:
     """A person `SIZE` times as large as the head, from landmarks (T, 478, 3) and head poses (T, 6)."""
-    on_face = landmarks[:, list(worn.landmarks.values())]
-    still = np.repeat(SKULL[None, : len(worn.head)], len(landmarks), axis=0)
+    on_face = landmarks[:, list(marker_set.landmarks.values())]
+    still = np.repeat(SKULL[None, : len(marker_set.head)], len(landmarks), axis=0)
     points = np.concatenate([on_face, still], axis=1) * SIZE
     turn, place = world_turn(), np.array([300.0, -1200.0, 90.0])
     seen = np.zeros_like(points)
     for frame, pose in enumerate(head):
         moved = head_transform(pose, face.pivot * SIZE).astype(float)
         seen[frame] = (points[frame] @ moved[:, :3].T + moved[:, 3]) @ turn.T + place
-    return Made((*worn.landmarks, *worn.head), seen, landmarks * SIZE, head)
+    return Made((*marker_set.landmarks, *marker_set.head), seen, landmarks * SIZE, head)
 
 
 def write_c3d(

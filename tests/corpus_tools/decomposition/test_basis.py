@@ -1,4 +1,4 @@
-"""Basis expressions: carried from a face by an affine map, or captured as pictures, instants and marker stills."""
+"""Basis expressions: transferred from a face by an affine map, or captured as pictures, instants and marker stills."""
 
 from pathlib import Path
 
@@ -141,16 +141,16 @@ def test_pictures_and_instants_are_read_by_the_tracker(
         read(Still(path))
 
 
-def test_marker_stills_make_a_basis_in_the_person_s_own_size(face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+def test_marker_stills_make_a_basis_in_the_person_s_own_size(face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
     weights = np.zeros((6, len(face.shape_names)))
     for row, shape in enumerate(SHOWN.values(), start=1):
         weights[row, face.shape_names.index(shape)] = 0.8
     shown = moved_landmarks(face, Trajectory(face.shape_names, weights, 30.0))
-    take = made_take(shown, np.linspace(0, 0.3, 36).reshape(6, 6), face, worn)
+    take = made_take(shown, np.linspace(0, 0.3, 36).reshape(6, 6), face, marker_set)
     for row, name in enumerate(("neutral", *EXPRESSIONS)):
         write_table(tmp_path / f"{name}.csv", take.names, take.points[row : row + 1].repeat(3, axis=0))
-    rest = read_marker_face(tmp_path / "neutral.csv", face, worn)
+    rest = read_marker_face(tmp_path / "neutral.csv", face, marker_set)
     found = basis_from_stills(find_stills(tmp_path), build_marker_reader(rest))
-    worn_at = list(worn.landmarks.values())
-    expected = (shown[1:] - rest_landmarks(face))[:, worn_at] * SIZE
-    assert np.abs(found.expressions[:, worn_at] - expected).max() < 0.2  # mm; axes found from the markers
+    landmark_numbers = list(marker_set.landmarks.values())
+    expected = (shown[1:] - rest_landmarks(face))[:, landmark_numbers] * SIZE
+    assert np.abs(found.expressions[:, landmark_numbers] - expected).max() < 0.2  # mm; axes found from the markers

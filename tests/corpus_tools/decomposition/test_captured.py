@@ -88,7 +88,7 @@ def test_landmarks_follow_the_face_s_own_posing(face: Face) -> None:
 
 
 def test_weights_of_other_shapes_are_refused(face: Face) -> None:
-    with pytest.raises(DataError, match="not of this face's shapes"):
+    with pytest.raises(DataError, match="not for the shapes of this face"):
         moved_landmarks(face, Trajectory(("jawOpen",), np.zeros((2, 1)), 30.0))
 
 
@@ -145,7 +145,7 @@ def test_one_sound_of_another_name_is_the_capture_s(tmp_path: Path) -> None:
     (tmp_path / "room.wav").write_bytes(b"")
     assert find_capture_sound(capture) == tmp_path / "room.wav"
     (tmp_path / "lapel.wav").write_bytes(b"")
-    with pytest.raises(InputError, match=r"beside take\.csv lie 2 sound files; name one as the capture"):
+    with pytest.raises(InputError, match=r"there are 2 sound files beside take\.csv; give one of them"):
         find_capture_sound(capture)
     (tmp_path / "take.wav").write_bytes(b"")
     assert find_capture_sound(capture) == tmp_path / "take.wav"

@@ -130,8 +130,8 @@ def test_the_line_of_sight_is_the_eyes_and_the_head_s(basis: ExpressionBasis) ->
 def test_a_capture_tells_its_eyes_itself(face: Face, basis: ExpressionBasis) -> None:
     looking = 0.5 + 0.5 * np.sin(2 * np.pi * 0.4 * TIMES)
     weights = _weights(face, eyeLookOutLeft=looking, eyeLookInRight=looking, eyeBlinkLeft=0.3 * looking)
-    told = replace(_captured(moved_landmarks(face, weights)), eyes=eye_motion(face, weights))
-    made = decompose(told, basis, build_least_squares_estimator(weight_displacements(basis.expressions)))
+    captured = replace(_captured(moved_landmarks(face, weights)), eyes=eye_motion(face, weights))
+    made = decompose(captured, basis, build_least_squares_estimator(weight_displacements(basis.expressions)))
     assert np.ptp(made.motion["gaze"][:, 1]) == pytest.approx(0.436, abs=0.005)  # rad of that shape (25 degrees)
     np.testing.assert_allclose(made.motion["blink"][:, 0], 0.3 * looking, atol=1e-6)
 
@@ -212,7 +212,7 @@ def test_the_paper_s_six_moods_are_derived() -> None:
 @pytest.mark.parametrize(
     ("line", "reason"),
     [
-        ("odd\tears\t1\t1\t\t", "odd changes 'ears', which is no feature"),
+        ("odd\tears\t1\t1\t\t", "odd changes 'ears', which is not a feature"),
         ("odd\thead\tfast\t1\t\t", "head of odd cannot be read"),
         ("odd\thead\t1\t1\tsmile=1\t", "head of odd cannot be read .*no channel 'smile'"),
     ],

@@ -22,12 +22,14 @@ from tts2face.types import Trajectory
 
 
 @pytest.fixture
-def recorded(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> StyleSource:
+def recorded(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> StyleSource:
     """Four seconds of markers at 120 frames a second with sound, and a folder of static captures."""
     whole = add_expression_shapes(face)
     shown = expression_weights(whole, build_lip_constraints(whole))[:, : len(face.shape_names)]
     weights = np.concatenate([np.zeros((1, shown.shape[1])), shown])
-    stills = made_take(moved_landmarks(face, Trajectory(face.shape_names, weights, 30.0)), np.zeros((6, 6)), face, worn)
+    stills = made_take(
+        moved_landmarks(face, Trajectory(face.shape_names, weights, 30.0)), np.zeros((6, 6)), face, marker_set
+    )
     folder = tmp_path / "stills"
     folder.mkdir()
     for row, name in enumerate(("neutral", *EXPRESSIONS)):
@@ -35,8 +37,8 @@ def recorded(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> StyleSo
     pytest.importorskip("ezc3d", reason="needs the extra [capture]")
     sound = 0.2 * np.sin(np.arange(len(made.points) * 100) / 8.0)
     write_c3d(tmp_path / "take.c3d", made.names, made.points, sound=sound)
-    worn_how = MarkerOptions(neutral=folder / "neutral.csv")
-    return StyleSource(recordings=tmp_path / "take.c3d", stills=find_stills(folder), marker_options=worn_how)
+    options = MarkerOptions(neutral=folder / "neutral.csv")
+    return StyleSource(recordings=tmp_path / "take.c3d", stills=find_stills(folder), marker_options=options)
 
 
 def test_markers_and_their_stills_become_a_style(recorded: StyleSource, made: Made, tmp_path: Path) -> None:
@@ -70,7 +72,7 @@ def test_epsilon_widens_the_limits_of_the_weights(recorded: StyleSource, tmp_pat
 
 def test_stills_of_two_kinds(recorded: StyleSource, tmp_path: Path) -> None:
     mixed = {**recorded.stills, "sad": Still(tmp_path / "sad.png")}
-    with pytest.raises(InputError, match="stills of markers need each other and the person at rest"):
+    with pytest.raises(InputError, match="marker stills cannot be mixed with pictures"):
         build_style(
             replace(recorded, stills=mixed), "x", tmp_path / "x.palette", base=None, effort=RunOptions(tmp_path, 1)
         )

@@ -1,4 +1,4 @@
-"""Marker capture: what was made is found again, through real C3D files and tables; damage is told in a sentence."""
+"""Marker capture: synthetic motion is recovered from C3D files and tables; damaged files give clear errors."""
 
 from pathlib import Path
 
@@ -31,22 +31,24 @@ def gap(landmarks: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.usefixtures("c3d")
-def test_a_c3d_file_gives_head_face_and_sound_again(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+def test_a_c3d_file_gives_head_face_and_sound_again(
+    made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path
+) -> None:
     sound = np.sin(np.arange(len(made.points) * 100) * 0.1) * 3.0
     path = write_c3d(tmp_path / "take.c3d", made.names, made.points / 1000, units="m", sound=sound)
-    found = read_marker_recording(path, face, worn, neutral=at_rest(made, tmp_path / "rest.csv"))
+    found = read_marker_recording(path, face, marker_set, neutral=at_rest(made, tmp_path / "rest.csv"))
     assert found.fps == FPS
     assert found.missing_features == {"gaze"}
     assert found.notes == ()
     assert found.sound is not None
     assert found.sound.duration == pytest.approx(len(made.points) / FPS, abs=0.001)
     assert np.abs(found.sound.samples).max() == pytest.approx(1.0)
-    worn_at = list(worn.landmarks.values())
+    landmark_numbers = list(marker_set.landmarks.values())
     truth = made.landmarks - made.landmarks[0]
     moved = found.landmarks - found.rest
     away = np.linalg.norm(moved - truth, axis=2)
     # The person's axes are found from the markers: a turn of 0.3 degrees moves 10 mm of motion by 0.05 mm.
-    assert away[:, worn_at].max() < 0.1
+    assert away[:, landmark_numbers].max() < 0.1
     # Between markers: a quarter of what moves at all.
     assert np.sqrt(np.square(away[:, :468]).mean()) < 0.25 * np.sqrt(np.square(truth[:, :468]).sum(axis=2).mean())
     turns = found.head[:, :3] - found.head[:, :3].mean(axis=0)
@@ -55,8 +57,8 @@ def test_a_c3d_file_gives_head_face_and_sound_again(made: Made, face: Face, worn
     assert np.abs(shifts - (made.head[:, 3:] - np.median(made.head[:, 3:], axis=0))).max() < 3.0
 
 
-def test_rest_is_the_person_s_own_size(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
-    rest = read_marker_face(at_rest(made, tmp_path / "rest.csv"), face, worn)
+def test_rest_is_the_person_s_own_size(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
+    rest = read_marker_face(at_rest(made, tmp_path / "rest.csv"), face, marker_set)
     eyes = np.linalg.norm(rest.spread.rest[33] - rest.spread.rest[263])
     assert eyes == pytest.approx(np.linalg.norm(made.landmarks[0, 33] - made.landmarks[0, 263]), abs=0.1)
     assert rest.spread.size == pytest.approx(1 / SIZE, rel=0.01)
@@ -67,58 +69,58 @@ def test_rest_is_the_person_s_own_size(made: Made, face: Face, worn: MarkerSet, 
 
 
 def test_lips_open_and_lids_close_although_no_marker_lies_inside_them(
-    made: Made, face: Face, worn: MarkerSet, tmp_path: Path
+    made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path
 ) -> None:
     path = write_table(tmp_path / "take.csv", made.names, made.points)
-    found = read_marker_recording(path, face, worn)
+    found = read_marker_recording(path, face, marker_set)
     assert np.corrcoef(gap(found.landmarks), gap(made.landmarks))[0, 1] > 0.95
     lids = [take[:, 159, 1] - take[:, 145, 1] for take in (found.landmarks, made.landmarks)]
     assert np.corrcoef(lids)[0, 1] > 0.95
     np.testing.assert_allclose(found.landmarks[:, 468:], found.landmarks[:1, 468:].repeat(len(found.landmarks), 0))
-    assert found.notes == ("the recording's median stands for the face at rest",)
+    assert found.notes == ("the median of the recording is used as the face at rest",)
 
 
-def test_gaps_are_filled_and_told(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
-    whole = read_marker_recording(write_table(tmp_path / "whole.csv", made.names, made.points), face, worn)
+def test_gaps_are_filled_and_reported(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
+    whole = read_marker_recording(write_table(tmp_path / "whole.csv", made.names, made.points), face, marker_set)
     points = made.points.copy()
     points[100:115, made.names.index("LBRO2")] = np.nan
     points[:5, made.names.index("JAW1")] = np.nan
     points[200:230, made.names.index("HED3")] = np.nan  # four others show the pose
-    found = read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+    found = read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
     assert "gaps were filled in LBRO2 (15 frames), JAW1 (5 frames)" in found.notes
     assert np.abs(found.landmarks - whole.landmarks).max() < 0.5
     np.testing.assert_allclose(found.head, whole.head, atol=1e-3)
 
 
-def test_a_long_gap_is_refused_with_its_time(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+def test_a_long_gap_is_refused_with_its_time(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
     points = made.points.copy()
     points[120:150, made.names.index("LBRO2")] = np.nan
-    with pytest.raises(DataError, match=r"take\.csv: the marker LBRO2 is out of sight for 0\.25 s from 1\.00 s on"):
-        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+    with pytest.raises(DataError, match=r"take\.csv: the marker LBRO2 is hidden for 0\.25 s from 1\.00 s on"):
+        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
 
 
-def test_a_marker_never_seen_is_refused(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+def test_a_marker_never_seen_is_refused(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
     points = made.points.copy()
     points[:, made.names.index("LBRO2")] = np.nan
-    with pytest.raises(DataError, match="LBRO2 is never seen"):
-        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+    with pytest.raises(DataError, match="LBRO2 is never visible"):
+        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
 
 
 def test_a_missing_marker_is_told_and_a_missing_region_refused(
-    made: Made, face: Face, worn: MarkerSet, tmp_path: Path
+    made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path
 ) -> None:
     one = [number for number, name in enumerate(made.names) if name != "LIP3"]
     found = read_marker_recording(
-        write_table(tmp_path / "one.csv", tuple(made.names[k] for k in one), made.points[:, one]), face, worn
+        write_table(tmp_path / "one.csv", tuple(made.names[k] for k in one), made.points[:, one]), face, marker_set
     )
-    assert "the file has no marker LIP3; its region goes by the others" in found.notes
+    assert "the file has no marker LIP3; its region is interpolated from the others" in found.notes
     none = [number for number, name in enumerate(made.names) if not name.startswith("LBRO")]
     path = write_table(tmp_path / "none.csv", tuple(made.names[k] for k in none), made.points[:, none])
     with pytest.raises(DataError, match=r"no marker of the region brow_left \(LBRO1, LBRO2"):
-        read_marker_recording(path, face, worn)
+        read_marker_recording(path, face, marker_set)
 
 
-def test_a_set_without_brows_tells_nothing_of_them(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+def test_a_set_without_brows_lacks_that_feature(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
     table = tmp_path / "set.tsv"
     lines = DEFAULT_MARKER_TABLE.read_text().splitlines()
     table.write_text("# no brows\n" + "\n".join(line for line in lines if "brow" not in line) + "\n")
@@ -127,56 +129,56 @@ def test_a_set_without_brows_tells_nothing_of_them(made: Made, face: Face, worn:
     assert read_marker_recording(path, face, fewer).missing_features == {"gaze", "brows", "expression"}
 
 
-def test_a_file_of_other_markers_is_refused(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+def test_a_file_of_other_markers_is_refused(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
     path = write_table(tmp_path / "take.csv", tuple(f"m{k}" for k in range(len(made.names))), made.points)
     with pytest.raises(DataError, match="none of the set's markers; it has m0, m1"):
-        read_marker_recording(path, face, worn)
+        read_marker_recording(path, face, marker_set)
 
 
-def test_a_wrong_unit_is_refused(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+def test_a_wrong_unit_is_refused(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
     path = write_table(tmp_path / "take.csv", made.names, made.points / 10)
-    with pytest.raises(DataError, match=r"0\.09\d+ times as far apart as on a face"):
-        read_marker_recording(path, face, worn)
+    with pytest.raises(DataError, match=r"are 0\.09\d+ times those on a face"):
+        read_marker_recording(path, face, marker_set)
 
 
-def test_a_head_that_is_not_rigid_is_refused(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+def test_a_head_that_is_not_rigid_is_refused(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
     points = made.points.copy()
     points[:, made.names.index("HED2")] += 80 * np.sin(np.arange(len(points)) / 20)[:, None]
-    with pytest.raises(DataError, match="do not move as one"):
-        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+    with pytest.raises(DataError, match="do not move rigidly"):
+        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
 
 
-def test_a_pose_that_no_three_markers_show_is_filled_in_and_told(
-    made: Made, face: Face, worn: MarkerSet, tmp_path: Path
+def test_a_pose_that_no_three_markers_show_is_interpolated_and_reported(
+    made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path
 ) -> None:
-    whole = read_marker_recording(write_table(tmp_path / "whole.csv", made.names, made.points), face, worn)
+    whole = read_marker_recording(write_table(tmp_path / "whole.csv", made.names, made.points), face, marker_set)
     points = made.points.copy()
-    head = [made.names.index(name) for name in worn.head]
+    head = [made.names.index(name) for name in marker_set.head]
     points[200:210, head[:5]] = np.nan
     points[300:, head[6]] = np.nan
-    found = read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, worn)
-    assert "the head's pose was filled in in 10 frames" in found.notes
+    found = read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
+    assert "the head's pose was interpolated in 10 frames" in found.notes
     assert np.degrees(np.abs(found.head - whole.head)[:, :3]).max() < 0.2  # over 0.08 s
     points[200:240, head[:5]] = np.nan
-    with pytest.raises(DataError, match=r"the head's pose is out of sight for 0\.33 s from 1\.67 s on"):
-        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+    with pytest.raises(DataError, match=r"the head's pose is hidden for 0\.33 s from 1\.67 s on"):
+        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
 
 
-def test_two_markers_show_no_head(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
-    kept = [k for k, name in enumerate(made.names) if name not in worn.head[2:]]
+def test_two_markers_show_no_head(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
+    kept = [k for k, name in enumerate(made.names) if name not in marker_set.head[2:]]
     path = write_table(tmp_path / "take.csv", tuple(made.names[k] for k in kept), made.points[:, kept])
     with pytest.raises(DataError, match="2 markers of the head are there"):
-        read_marker_recording(path, face, worn)
+        read_marker_recording(path, face, marker_set)
 
 
-def test_three_markers_show_no_face(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+def test_three_markers_show_no_face(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
     table = tmp_path / "set.tsv"
     brows = [line for line in DEFAULT_MARKER_TABLE.read_text().splitlines() if "BRO" in line or "\thead\t" in line]
     table.write_text("\n".join(["marker\tregion\tlandmark", *brows]) + "\n")
-    names = ("RBRO1", "RBRO2", "LBRO1", *worn.head)
+    names = ("RBRO1", "RBRO2", "LBRO1", *marker_set.head)
     kept = [made.names.index(name) for name in names]
     path = write_table(tmp_path / "take.csv", names, made.points[:, kept])
-    with pytest.raises(DataError, match="3 of the set's markers of the face; it takes at least 4"):
+    with pytest.raises(DataError, match="3 of the set's markers of the face; it needs at least 4"):
         read_marker_recording(path, face, read_marker_set(table))
 
 
@@ -193,12 +195,12 @@ def test_a_table_of_one_frame_is_a_still(made: Made, tmp_path: Path) -> None:
         np.testing.assert_allclose(take.points, made.points[:1], atol=1e-5)
 
 
-def test_head_markers_on_a_line_are_refused(made: Made, face: Face, worn: MarkerSet, tmp_path: Path) -> None:
+def test_head_markers_on_a_line_are_refused(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
     points = made.points.copy()
-    head = [made.names.index(name) for name in worn.head]
+    head = [made.names.index(name) for name in marker_set.head]
     points[:, head] = points[:, head[:1]] + np.arange(len(head))[:, None] * [10.0, 0.0, 0.0]
     with pytest.raises(DataError, match="on a line"):
-        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, worn)
+        read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
 
 
 @pytest.mark.usefixtures("c3d")
@@ -239,7 +241,7 @@ def test_a_c3d_file_that_breaks_off_is_refused(made: Made, tmp_path: Path, share
 
 def test_a_table_that_counts_frames_needs_a_rate(made: Made, tmp_path: Path) -> None:
     path = write_table(tmp_path / "take.csv", made.names, made.points[:9], first="frame")
-    with pytest.raises(InputError, match="give its frames a second"):
+    with pytest.raises(InputError, match="give its frame rate"):
         read_markers(path)
     take = read_markers(path, 120.0)
     np.testing.assert_allclose(take.points, made.points[:9], atol=1e-5)
@@ -261,12 +263,12 @@ def test_frames_that_a_table_leaves_out_are_gaps_and_rounded_times_do_no_harm(ma
     ("change", "reason"),
     [
         (lambda lines: ["clock" + lines[0][4:], *lines[1:]], "needs the columns time or frame"),
-        (lambda lines: [lines[0].replace("RBRO2_y", "RBRO2_w"), *lines[1:]], "look at RBRO2"),
+        (lambda lines: [lines[0].replace("RBRO2_y", "RBRO2_w"), *lines[1:]], "check RBRO2"),
         (lambda lines: [lines[0], lines[1] + ",1", *lines[2:]], "line 2 of .* has 227 columns, not 226"),
         (lambda lines: [lines[0], lines[1], "x" + lines[2][1:], *lines[3:]], "line 3 of .* cannot be read"),
-        (lambda lines: [lines[0], lines[2], lines[1], *lines[3:]], "must rise from row to row"),
+        (lambda lines: [lines[0], lines[2], lines[1], *lines[3:]], "must increase from row to row"),
         (lambda lines: [lines[0], *("0.004" + line[6:] if line[:6] == "0.0083" else line for line in lines[1:])],
-         "does not run evenly"),
+         "does not increase in even steps"),
     ],
 )  # fmt: skip
 def test_a_damaged_table_is_refused(made: Made, tmp_path: Path, change: object, reason: str) -> None:
@@ -277,16 +279,16 @@ def test_a_damaged_table_is_refused(made: Made, tmp_path: Path, change: object, 
 
 
 def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no file of markers"):
+    with pytest.raises(InputError, match="is not a marker file"):
         read_markers(tmp_path / "take.bvh")
     with pytest.raises(InputError, match="there is no capture"):
         read_markers(tmp_path / "take.csv")
 
 
-def test_the_shipped_set_is_the_paper_s_number_of_markers(worn: MarkerSet) -> None:
-    assert len(worn.face) == 68
-    assert len(worn.head) == 7
-    assert worn.missing_features == {"gaze"}
+def test_the_shipped_set_is_the_paper_s_number_of_markers(marker_set: MarkerSet) -> None:
+    assert len(marker_set.face) == 68
+    assert len(marker_set.head) == 7
+    assert marker_set.missing_features == {"gaze"}
 
 
 @pytest.mark.parametrize(

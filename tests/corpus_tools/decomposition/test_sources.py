@@ -1,4 +1,4 @@
-"""One way in for all captures: what a file is, it says itself."""
+"""Facial captures are recognised by their content."""
 
 from pathlib import Path
 
@@ -15,17 +15,17 @@ def test_a_live_link_table_and_a_marker_table_are_told_apart(
 ) -> None:
     arkit = read_capture_file(shared_recordings / "livelink" / "testset_arkit61_60fps.csv", face)
     assert arkit.missing_features == frozenset()
-    worn = write_table(tmp_path / "take.csv", made.names, made.points, first="frame")
-    with pytest.raises(InputError, match="counts frames"):
-        read_capture_file(worn, face)
-    assert read_capture_file(worn, face, options=MarkerOptions(neutral=worn, fps=120.0)).missing_features == {"gaze"}
+    table = write_table(tmp_path / "take.csv", made.names, made.points, first="frame")
+    with pytest.raises(InputError, match="has frame numbers"):
+        read_capture_file(table, face)
+    assert read_capture_file(table, face, options=MarkerOptions(neutral=table, fps=120.0)).missing_features == {"gaze"}
 
 
 def test_what_is_neither_is_refused(face: Face, tmp_path: Path) -> None:
     (tmp_path / "take.csv").write_text("a,b\n1,2\n3,4\n")
     with pytest.raises(DataError, match="needs the columns time or frame"):
         read_capture_file(tmp_path / "take.csv", face)
-    with pytest.raises(InputError, match=r"take\.bvh is no facial capture"):
+    with pytest.raises(InputError, match=r"take\.bvh is not a facial capture"):
         read_capture_file(tmp_path / "take.bvh", face)
     with pytest.raises(InputError, match="there is no capture"):
         read_capture_file(tmp_path / "none.csv", face)

@@ -63,8 +63,8 @@ def test_a_field_in_silence_does_what_a_stream_does():
 def test_a_derived_style_is_the_changed_clip_of_its_source():
     palette = made_palette()
     fields = GestureFields(palette)
-    heard = palette.styles["calm"].intensity[:300]
-    plain, larger = (field_clip(fields, style, "head", heard, 1).values for style in ("calm", "quick"))
+    intensity = palette.styles["calm"].intensity[:300]
+    plain, larger = (field_clip(fields, style, "head", intensity, 1).values for style in ("calm", "quick"))
     middle = style_median(palette.styles["calm"], "head")
     np.testing.assert_allclose(larger - middle, 2 * (plain - middle), atol=1e-5)
 
@@ -131,9 +131,9 @@ def test_published_fields_stand_beside_those_of_measured_styles(found):
 
 def test_a_published_clip_consists_of_recorded_frames():
     palette = made_palette()
-    heard = palette.styles["calm"].intensity[:200]
-    made = published_clip(palette, "calm", heard, 3)
-    again = published_clip(palette, "calm", heard, 3)
+    intensity = palette.styles["calm"].intensity[:200]
+    made = published_clip(palette, "calm", intensity, 3)
+    again = published_clip(palette, "calm", intensity, 3)
     for feature, values in made.items():
         np.testing.assert_array_equal(values, again[feature])
         recorded = palette.styles["calm"].motion[feature]

@@ -1,4 +1,4 @@
-"""A talker with a known answer: three looks, three phones of each, told apart by opening and width of the lips."""
+"""A talker with known classes: three mouth shapes with three phones each, distinct in lip opening and width."""
 
 import numpy as np
 

@@ -97,9 +97,9 @@ def test_a_talker_without_words_has_no_halves_of_words(talker):
 
 
 def test_progress_runs_to_its_end(talker):
-    told = []
-    analyse(NamedTalker("made", talker), Options(halves=2), on_progress=lambda done, of: told.append((done, of)))
-    assert told == [(done, 6) for done in range(1, 7)]
+    steps = []
+    analyse(NamedTalker("made", talker), Options(halves=2), on_progress=lambda done, of: steps.append((done, of)))
+    assert steps == [(done, 6) for done in range(1, 7)]
 
 
 def test_random_looks_do_not_agree(spoken):

@@ -1,4 +1,4 @@
-"""Classes and silhouettes against hands and a slow way; a block matrix gives its blocks."""
+"""Classes and silhouettes against hand-computed values and a brute-force version; a block matrix gives its blocks."""
 
 import numpy as np
 import pytest

@@ -70,10 +70,10 @@ def test_every_field_of_the_heat_map_tells_its_number(found):
     figure = similarity_figure(found, "both")
     titles = re.findall(r"<title>([^<]*) – ([^<]*): ([\d.]+)</title>", table_svg(figure))
     assert len(titles) == len(figure.names) ** 2
-    told = {(a, b): float(value) for a, b, value in titles}
+    shown = {(a, b): float(value) for a, b, value in titles}
     for i, a in enumerate(figure.names):
         for j, b in enumerate(figure.names):
-            assert told[a, b] == pytest.approx(figure.values[i, j], abs=5e-4)
+            assert shown[a, b] == pytest.approx(figure.values[i, j], abs=5e-4)
 
 
 def test_labels():

@@ -70,7 +70,7 @@ def test_articulatory_distances_are_the_phone_table_s():
 
 
 def test_refuses_tables_of_different_phones():
-    with pytest.raises(InputError, match=r"the same 3 items or more are needed, not \(4, 4\) and \(5, 5\)"):
+    with pytest.raises(InputError, match=r"the same 3 items or more, not \(4, 4\) and \(5, 5\)"):
         mantel(symmetric(1, 4), symmetric(1, 5), np.random.default_rng(0))
 
 
