@@ -16,8 +16,8 @@ from pathlib import Path
 import pytest
 from cyclopts import App
 
+from cli.flags import check_options, option_names
 from cli.main import app, run
-from cli.options import check_options, option_names
 from tests.docs.blocks import (
     CLI_PAGE,
     EXECUTED_PAGES,
