@@ -14,6 +14,7 @@ from pathlib import Path
 
 import av
 import numpy as np
+import pytest
 
 from tts2face.render.encode import write_clips
 from tts2face.render.picture import Picture
@@ -28,7 +29,7 @@ WORDS = (
     {"b": "blue", "g": "green", "r": "red", "w": "white"},
     {"a": "at", "b": "by", "i": "in", "w": "with"},
     {},
-    dict(zip("123456789z", "one two three four five six seven eight nine zero".split(), strict=True)),
+    dict(zip("123456789z", ["one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "zero"], strict=True)),
     {"a": "again", "n": "now", "p": "please", "s": "soon"},
 )
 FPS = 25
@@ -37,6 +38,15 @@ LEAD_S, TAIL_S = 0.6, 0.4  # silence before and after a sentence
 ALIGN_RATE = 25_000  # of GRID's word times, per second
 CAPTURE_FPS = 60
 CAPTURE_NAME = "take"
+
+ONLY_RENDERED = pytest.mark.parametrize("takes", ["rendered"], indirect=True, scope="session")
+"""For tests whose claim is not about real people and whose cost counts: they run on rendered takes alone."""
+
+
+def manifest_rows(folder: Path) -> list[dict[str, str]]:
+    """Rows of a folder's manifest."""
+    with (folder / "manifest.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
 
 
 def transcript(name: str) -> str:

@@ -213,12 +213,13 @@ def test_a_basis_out_of_range_is_refused_before_any_video(n_modes: int, tmp_path
     assert f"a basis has 0 to 100 dense modes, not {n_modes}" in capsys.readouterr().err
 
 
-def test_a_real_talkers_modes(real_folder: Path, face_model: Path, tmp_path: Path, capsys) -> None:
+@ONLY_RENDERED
+def test_a_talkers_modes(few_takes: Path, face_model: Path, tmp_path: Path, capsys) -> None:
     out = tmp_path / "me.face"
     words = [
         "corpus",
         "face",
-        str(real_folder),
+        str(few_takes),
         "--out",
         str(out),
         "--consent",

@@ -1,6 +1,7 @@
 """Faces that live, through the doors: styles, timelines, palettes, and what gestures may never do."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -171,13 +172,14 @@ def test_a_style_in_the_text_that_nobody_has(capsys: pytest.CaptureFixture[str],
 
 
 def test_a_capture_becomes_a_style_of_the_starter_palette(
-    shared_recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    capture: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    capture = shared_recordings / "livelink" / "testset_arkit61_60fps.csv"
     cache = ["--cache", "cache", "--jobs", "1"]
     assert run(["corpus", "gestures", str(capture), "--style", "live", "--out", "live.palette", *cache]) == 0
-    assert "wrote live.palette: the style live of 1 recordings, 0.3 minutes; kept" in capsys.readouterr().err
+    assert re.search(
+        r"wrote live\.palette: the style live of 1 recordings, 0\.[23] minutes; kept", capsys.readouterr().err
+    )
     palette = load_palette("live.palette")
     assert palette.names[-2:] == ("grid_s1", "live")
     assert palette.styles["live"].intensity.max() > 0  # its sound lies beside it

@@ -1,4 +1,4 @@
-"""Recordings become a talker who speaks any text with her own face: the whole way, on real recordings."""
+"""Recordings become a talker who speaks any text with an own face: the whole way, on rendered and real recordings."""
 
 import csv
 from pathlib import Path
@@ -10,6 +10,7 @@ import pytest
 from cli.main import run
 from corpus_tools.aam.appearance_transfer import build_appearance_transfer
 from lexicon.errors import BackendError
+from tests.rendered_takes import ONLY_RENDERED, manifest_rows
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.models.talker import read_talker
 from tts2face.video.landmark_models import find_bundle
@@ -29,10 +30,10 @@ def bundle() -> Path:
 
 
 @pytest.fixture(scope="module")
-def recordings(shared_recordings: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    source, folder = shared_recordings / "grid_s1", tmp_path_factory.mktemp("few")
-    with (source / "manifest.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))[::80][:N_RECORDINGS]
+def recordings(takes: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    source, folder = takes, tmp_path_factory.mktemp("few")
+    rows = manifest_rows(source)
+    rows = rows[:: max(1, len(rows) // N_RECORDINGS)][:N_RECORDINGS]
     (folder / "clips").mkdir()
     with (folder / "manifest.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]))
@@ -104,6 +105,7 @@ def test_what_an_own_face_cannot_do_is_refused(
     assert not list(tmp_path.iterdir())
 
 
+@ONLY_RENDERED
 def test_pictures_without_consent_are_refused(
     recordings: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -112,6 +114,7 @@ def test_pictures_without_consent_are_refused(
     assert not list(tmp_path.iterdir())
 
 
+@ONLY_RENDERED
 @pytest.mark.parametrize("source", ["grid_s1", "me"])
 def test_another_s_speech_on_her_own_face(source: str, talker: Path, tmp_path: Path) -> None:
     """From a talker without pictures, and from one with them: the clone has hers, and the consent to show them."""
@@ -128,6 +131,7 @@ def test_another_s_speech_on_her_own_face(source: str, talker: Path, tmp_path: P
     assert np.abs(np.diff(pictures.astype(int), axis=0)).mean() > 0.1
 
 
+@ONLY_RENDERED
 def test_her_looks_carried_to_herself_stay(talker: Path) -> None:
     """The basis is kept in 16-bit floating point, with three digits."""
     hers = read_talker(talker)
@@ -135,6 +139,7 @@ def test_her_looks_carried_to_herself_stay(talker: Path) -> None:
     np.testing.assert_allclose(carry.relation, np.eye(len(carry.relation)), atol=0.01)
 
 
+@ONLY_RENDERED
 def test_a_take_moves_her_lips_as_she_never_did(talker: Path, recordings: Path, bundle: Path, tmp_path: Path) -> None:
     take = next((recordings / "clips").iterdir())
     made = {}
