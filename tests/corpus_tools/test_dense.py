@@ -17,6 +17,7 @@ from corpus_tools.dense.video_landmarks import find_videos
 from corpus_tools.dense.visible_texels import build_canvas, polygon_depth
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, InputError
+from tests.rendered_takes import ONLY_RENDERED
 from tts2face.face.deformation import posed_vertices
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face

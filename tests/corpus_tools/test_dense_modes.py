@@ -24,6 +24,7 @@ from corpus_tools.dense.modes import (
 from corpus_tools.dense.skin_colour import PictureFitter, build_picture_fitter
 from corpus_tools.dense.video_landmarks import VideoLandmarks
 from lexicon.errors import InputError
+from tests.rendered_takes import ONLY_RENDERED
 from tts2face.face.deformation import posed_vertices
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face, read_face, write_face

@@ -255,7 +255,7 @@ def test_the_text_is_given_once(here: Path, capsys: pytest.CaptureFixture[str]) 
 @ONLY_RENDERED
 def test_an_explanation_needs_words(film: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["--audio", str(film), "--explain", "why.json"]) == 2
-    assert "or what --audio says" in capsys.readouterr().err
+    assert "or the words of --audio" in capsys.readouterr().err
 
 
 @ONLY_RENDERED

@@ -99,7 +99,10 @@ def test_recordings_agree_with_their_word_times(aligner: Aligner, takes: Path) -
             told.append([(word, [tuple(s.phone for s in cmudict_lookup(word) or ())]) for word in words])
         found = aligner.align(sound, told[0])
         right.append(found.confidence)
-        wrong.append(aligner.align(sound, told[1]).confidence)
+        try:
+            wrong.append(aligner.align(sound, told[1]).confidence)
+        except DataError:  # the words are not found at all
+            wrong.append(-np.inf)
         known = [line.split() for line in (takes / "align" / f"{row['clip']}.align").read_text().splitlines()]
         starts = {word: int(start) / 25000 for start, _, word in known}
         errors += [found.phones.edges[word.first] - starts[word.text] for word in found.words if word.text in starts]
