@@ -84,6 +84,8 @@ def test_good_recordings_are_kept_and_bad_ones_refused_with_their_reason(few_tak
 def test_an_observation_is_on_one_clock(few_takes, cache, face_model):
     one = observe(few_takes, effort=RunOptions(cache, 1, face_model)).kept[0]
     n_frames = len(list(read_frames(few_takes / "clips" / "bbaf2n.mkv")))
+    assert n_frames - 1 <= len(one.landmarks) <= n_frames  # the last frame may outlast the sound
+    n_frames = len(one.landmarks)
     assert one.landmarks.shape == (n_frames, 478, 3)
     assert one.head.shape == (n_frames, 6)
     assert one.intensity.shape == (n_frames,)
@@ -154,7 +156,7 @@ def test_a_talker_is_built_and_says_where_it_comes_from(few_takes, cache, tmp_pa
     assert list(told) == ["reading recordings", "learning lips"]  # three recordings teach no drive
     n_frames = sum(len(list(read_frames(path))) for path in few_takes.glob("clips/bb*.mkv"))
     assert (built.n_kept, [refusal.name for refusal in built.refused]) == (3, ["empty"])
-    assert built.minutes == pytest.approx(n_frames / 25 / 60)
+    assert built.minutes == pytest.approx(n_frames / 25 / 60, abs=3 / 25 / 60)
     talker = read_talker(out)
     assert talker.metadata["name"] == "s1"
     assert talker.metadata["licence"] == "CC BY 4.0"

@@ -1,5 +1,6 @@
 """A text that a recording does not say is noticed, and only where it is wrong."""
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,6 @@ import pytest
 
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tests.rendered_takes import manifest_rows
 from tts2face.speech.forced_alignment import Alignment
 from tts2face.speech.text_fit import (
     LEAST_FOREIGN_CONFIDENCE,
@@ -20,7 +20,7 @@ from tts2face.speech.text_fit import (
 from tts2face.speech.transcript_alignment import align_recording, pronounce_transcript
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
-from tts2face.voice.engine import load_voice
+from tts2face.voice.loading import load_voice
 
 RIGHT = ("Please wait for the beep, then say your name.", "The young chef usually pushes five big maps before noon.")
 WRONG = "She sold seven old houses near the river."
@@ -94,11 +94,12 @@ def test_one_wrong_sentence_among_right_ones() -> None:
 
 
 @pytest.mark.parametrize("n_sentences", [1, 6])
-def test_recordings(n_sentences: int, takes: Path) -> None:
-    """No warning with the right text; a sentence of another one is noticed, or refused."""
-    rows = manifest_rows(takes)
-    rows = (rows[50:800:125] if len(rows) >= 800 else rows)[:n_sentences]
-    samples = [read_sound(takes / "clips" / f"{row['clip']}.mkv", 16000).samples for row in rows]
+def test_real_recordings(n_sentences: int, shared_recordings: Path) -> None:
+    """GRID s1: no warning with the right text; a sentence of another one is noticed, or refused."""
+    folder = shared_recordings / "grid_s1"
+    with (folder / "manifest.csv").open() as file:
+        rows = list(csv.DictReader(file))[50:800:125][:n_sentences]
+    samples = [read_sound(folder / "clips" / f"{row['clip']}.mkv", 16000).samples for row in rows]
     sound = Waveform(np.concatenate(samples), 16000)
     texts = [row["transcript"] for row in rows]
     assert align_recording(sound, pronounce_transcript(". ".join(texts), "en-us"))[2] == ()
