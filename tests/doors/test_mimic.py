@@ -131,11 +131,11 @@ def test_films_that_cannot_drive_a_face_are_refused(
     ("words", "reason"),
     [
         (["--out", "m.txt"], "m.txt"),
-        (["--out", "m.mp4", "--gain", "9"], "the gain must lie between 0 and 4, not 9"),
+        (["--out", "m.mp4", "--gain", "9"], "gain must lie between 0 and 4"),
         (["--out", "m.mp4", "--face", "self"], "give both --face self and --talker"),
-        (["--out", "m.mp4", "--audio", "x.wav"], "has its own sound; --audio belongs to a Live Link Face"),
+        (["--out", "m.mp4", "--audio", "x.wav"], "has its own sound"),
         (["--out", "m.mp4", "--face", "nobody"], "nobody"),
-        (["--out", "m.mp4", "--append-missing"], "--append-missing needs --face self"),
+        (["--out", "m.mp4", "--append-missing"], "needs --face self"),
     ],
 )
 def test_orders_that_make_no_sense_are_refused(
