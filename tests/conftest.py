@@ -1,16 +1,66 @@
-"""What all tests share: the way to real recordings, which are not part of the project."""
+"""What all tests share: takes rendered by the project, and the way to real recordings, which are not part of it."""
 
+import os
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
-SHARED = Path(__file__).resolve().parents[2] / "shared"
+SHARED = Path(os.environ.get("TTS2FACE_SHARED", Path(__file__).resolve().parents[2] / "shared"))
 
 
 @pytest.fixture(scope="session")
 def shared_recordings() -> Path:
-    """Folder of real recordings that lies beside the project; absent outside the founders' machines."""
+    """Folder of real recordings that lies beside the project, or in TTS2FACE_SHARED."""
     folder = SHARED / "recordings"
     if not folder.is_dir():
-        pytest.skip(f"needs the recordings in {folder}, which are not part of the project")
+        pytest.skip("figures about real people: their recordings are not part of the project (TTS2FACE_SHARED)")
     return folder
+
+
+@pytest.fixture(scope="session")
+def run_folder(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Path:
+    """Temporary folder of the whole run, which the processes of pytest-xdist share."""
+    base = tmp_path_factory.getbasetemp()
+    return base.parent if hasattr(request.config, "workerinput") else base
+
+
+@pytest.fixture(scope="session")
+def rendered_takes(run_folder: Path) -> Path:
+    """Videos of a speaking head with transcripts and word times; see `tests.rendered_takes`."""
+    from tests.rendered_takes import made_once, render_takes
+
+    return made_once(run_folder / "rendered_takes", render_takes)
+
+
+@pytest.fixture(scope="session")
+def rendered_capture(run_folder: Path) -> Path:
+    """A Live Link Face capture of a speaking face; its sound lies beside it."""
+    from tests.rendered_takes import CAPTURE_NAME, made_once, write_capture
+
+    return made_once(run_folder / "rendered_capture", write_capture) / f"{CAPTURE_NAME}.csv"
+
+
+@pytest.fixture(scope="session", params=["rendered", "real"])
+def takes(request: pytest.FixtureRequest) -> Path:
+    """Recordings in the layout of GRID: rendered ones, and real ones where they are."""
+    if request.param == "rendered":
+        return request.getfixturevalue("rendered_takes")
+    return request.getfixturevalue("shared_recordings") / "grid_s1"
+
+
+@pytest.fixture(scope="session", params=["rendered", "real"])
+def capture(request: pytest.FixtureRequest) -> Path:
+    """A Live Link Face capture whose sound lies beside it: a rendered one, and a real one where it is."""
+    if request.param == "rendered":
+        return request.getfixturevalue("rendered_capture")
+    return request.getfixturevalue("shared_recordings") / "livelink" / "testset_arkit61_60fps.csv"
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Name what was skipped and why, one line for each reason."""
+    reasons = Counter(str(report.longrepr[2]) for report in terminalreporter.stats.get("skipped", []))
+    if reasons:
+        terminalreporter.section("skipped tests")
+    for reason, number in reasons.most_common():
+        terminalreporter.write_line(f"{number:4d}  {reason.removeprefix('Skipped: ')}")

@@ -1,4 +1,4 @@
-"""A made corpus with a known answer, and a small folder of real recordings."""
+"""A made corpus with a known answer, and a small folder of takes."""
 
 import shutil
 from collections.abc import Callable
@@ -28,13 +28,13 @@ def face_model() -> Path:
 
 
 @pytest.fixture
-def real_folder(tmp_path: Path, shared_recordings: Path) -> Path:
-    """Three recordings of GRID s1 in its own layout."""
+def few_takes(tmp_path: Path, takes: Path) -> Path:
+    """Three takes in the layout of GRID."""
     folder = tmp_path / "recordings"
     (folder / "clips").mkdir(parents=True)
     for clip in CLIPS:
-        shutil.copy(shared_recordings / "grid_s1" / "clips" / f"{clip}.mkv", folder / "clips")
-    lines = (shared_recordings / "grid_s1" / "manifest.csv").read_text().splitlines()
+        shutil.copy(takes / "clips" / f"{clip}.mkv", folder / "clips")
+    lines = (takes / "manifest.csv").read_text().splitlines()
     wanted = [line for line in lines if line.startswith(("clip,", *CLIPS))]
     (folder / "manifest.csv").write_text("\n".join(wanted) + "\n")
     return folder

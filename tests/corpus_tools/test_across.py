@@ -86,14 +86,9 @@ def test_landmarks_of_a_face_are_its_own_at_rest_and_follow_its_shapes() -> None
     assert opening[2] > opening[0] + 0.1
 
 
-@pytest.fixture(scope="module")
-def livelink(shared_recordings: Path) -> Path:
-    return shared_recordings / "livelink" / "testset_arkit61_60fps.csv"
-
-
-def test_a_real_capture_closes_its_lips_in_bilabials(livelink: Path, tmp_path: Path) -> None:
+def test_a_capture_closes_its_lips_where_bilabials_are_heard(capture: Path, tmp_path: Path) -> None:
     pytest.importorskip("hama", reason="needs the extra [capture]")
-    found = observe_livelink(livelink, RunOptions(tmp_path))
+    found = observe_livelink(capture, RunOptions(tmp_path))
     assert len(found) >= 4
     assert all(one.fps == 60.0 and one.is_recognised for one in found)
     curves = [LipCurves.of(one.landmarks).opening for one in found]

@@ -17,6 +17,7 @@ from corpus_tools.dense.video_landmarks import find_videos
 from corpus_tools.dense.visible_texels import build_canvas, polygon_depth
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, InputError
+from tests.rendered_takes import ONLY_RENDERED
 from tts2face.face.deformation import posed_vertices
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
@@ -147,11 +148,11 @@ def test_only_videos_are_looked_at(tmp_path: Path) -> None:
         find_videos(tmp_path / "nowhere")
 
 
-def test_a_real_talkers_head(real_folder: Path, face_model: Path, tmp_path: Path, head: Face) -> None:
+def test_a_talkers_head(few_takes: Path, face_model: Path, tmp_path: Path, head: Face) -> None:
     consent = consent_record("Speaker 1", "The corpus is published for research.", date="2026-01-31")
     out, steps = tmp_path / "me.face", []
     built = build_face(
-        real_folder,
+        few_takes,
         out,
         consent=consent,
         effort=RunOptions(tmp_path / "cache", 1, face_model),
@@ -175,9 +176,10 @@ def test_a_real_talkers_head(real_folder: Path, face_model: Path, tmp_path: Path
     assert np.abs(difference).mean() < 3  # JPEG's, no pixels of the talker's mouth
 
 
-def test_a_face_without_consent_is_refused(real_folder: Path, tmp_path: Path) -> None:
+@ONLY_RENDERED
+def test_a_face_without_consent_is_refused(few_takes: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-c", "import sys; from cli.main import run; sys.exit(run(sys.argv[1:]))"]
-    command += ["corpus", "face", str(real_folder), "--out", str(tmp_path / "me.face")]
+    command += ["corpus", "face", str(few_takes), "--out", str(tmp_path / "me.face")]
     asked = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
     assert asked.returncode == 2
     assert "state the consent" in asked.stderr

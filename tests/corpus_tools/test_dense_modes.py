@@ -24,6 +24,7 @@ from corpus_tools.dense.modes import (
 from corpus_tools.dense.skin_colour import PictureFitter, build_picture_fitter
 from corpus_tools.dense.video_landmarks import VideoLandmarks
 from lexicon.errors import InputError
+from tests.rendered_takes import ONLY_RENDERED
 from tts2face.face.deformation import posed_vertices
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face, read_face, write_face
@@ -213,12 +214,13 @@ def test_a_basis_out_of_range_is_refused_before_any_video(n_modes: int, tmp_path
     assert f"a basis has 0 to 100 dense modes, not {n_modes}" in capsys.readouterr().err
 
 
-def test_a_real_talkers_modes(real_folder: Path, face_model: Path, tmp_path: Path, capsys) -> None:
+@ONLY_RENDERED
+def test_a_talkers_modes(few_takes: Path, face_model: Path, tmp_path: Path, capsys) -> None:
     out = tmp_path / "me.face"
     words = [
         "corpus",
         "face",
-        str(real_folder),
+        str(few_takes),
         "--out",
         str(out),
         "--consent",

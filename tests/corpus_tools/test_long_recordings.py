@@ -1,6 +1,6 @@
-"""One long video of real speech: cut at pauses, phones recognised or words placed, a lag taken out."""
+"""One long video of speech: cut at pauses, phones recognised or words placed, a lag taken out."""
 
-import csv
+from itertools import cycle, islice
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from corpus_tools.report.recordings import recordings_page
 from corpus_tools.run_options import RunOptions
 from lexicon.sequence import SILENCE
 from tests.corpus_tools.films import joined
+from tests.rendered_takes import manifest_rows
 from tts2face.models.talker import read_talker
 
 N_CLIPS = 17
@@ -20,9 +21,8 @@ LATE_S = 0.2
 
 
 @pytest.fixture(scope="module")
-def rows(shared_recordings: Path) -> list[dict[str, str]]:
-    with (shared_recordings / "grid_s1" / "manifest.csv").open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))[:N_CLIPS]
+def rows(takes: Path) -> list[dict[str, str]]:
+    return list(islice(cycle(manifest_rows(takes)), N_CLIPS))
 
 
 @pytest.fixture(scope="module")
@@ -31,10 +31,10 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def folder(shared_recordings: Path, rows: list[dict[str, str]], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(takes: Path, rows: list[dict[str, str]], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A take of 51 s whose sound is late."""
     made = tmp_path_factory.mktemp("long")
-    clips = shared_recordings / "grid_s1" / "clips"
+    clips = takes / "clips"
     joined([clips / f"{row['clip']}.mkv" for row in rows], made / "take.mp4", late_s=LATE_S)
     return made
 

@@ -1,6 +1,5 @@
 """Subtitles beside videos: cues become recordings of parts of a video."""
 
-import csv
 from pathlib import Path
 
 import pytest
@@ -11,6 +10,7 @@ from corpus_tools.recordings.subtitles import read_cues
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError
 from tests.corpus_tools.films import joined
+from tests.rendered_takes import manifest_rows
 
 SRT = "1\n00:00:01,000 --> 00:00:02,000\n<i>Hello</i>\nthere.\n\n2\n00:00:02,100 --> 00:00:03,500\nIt is £5.\n"
 
@@ -77,13 +77,9 @@ def test_a_video_with_subtitles_is_a_recording_for_each_cue(tmp_path: Path) -> N
     assert group_by_video([*found, Recording("x", tmp_path / "x.mp4", "A.")])[0].recordings == found
 
 
-def test_one_long_video_with_subtitles_gives_what_its_parts_gave(
-    shared_recordings: Path, face_model: Path, tmp_path: Path
-) -> None:
-    source = shared_recordings / "grid_s1"
-    with (source / "manifest.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))[:3]
-    clips = [source / "clips" / f"{row['clip']}.mkv" for row in rows]
+def test_one_long_video_with_subtitles_gives_what_its_parts_gave(takes: Path, face_model: Path, tmp_path: Path) -> None:
+    rows = manifest_rows(takes)[:3]
+    clips = [takes / "clips" / f"{row['clip']}.mkv" for row in rows]
     (tmp_path / "long").mkdir()
     spans = joined(clips, tmp_path / "long" / "talk.mp4")
     lines = []

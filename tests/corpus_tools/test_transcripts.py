@@ -115,10 +115,9 @@ def test_word_times_are_samples_of_25_khz(write):
     assert cues_of(write(".align", ALIGN)) == (Cue(0.95, 1.18, "bin"), Cue(1.18, 1.36, "blue"))
 
 
-def test_all_grid_alignments_say_what_the_manifest_says(shared_recordings):
-    folder = shared_recordings / "grid_s1"
-    listed = {one.name: one.transcript for one in find_recordings(folder)}
-    aligned = {path.stem: read_transcript(path) for path in sorted((folder / "align").glob("*.align"))}
+def test_all_grid_alignments_say_what_the_manifest_says(takes):
+    listed = {one.name: one.transcript for one in find_recordings(takes)}
+    aligned = {path.stem: read_transcript(path) for path in sorted((takes / "align").glob("*.align"))}
     assert aligned
     assert aligned == {name: listed[name] for name in aligned}
 

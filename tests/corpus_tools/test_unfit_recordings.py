@@ -1,6 +1,5 @@
-"""Real recordings with one defect each are refused for it; the others are kept, at one frame rate."""
+"""Recordings made unfit in one way each are refused for that; the others go on, at one frame rate."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +8,7 @@ import pytest
 from corpus_tools.recordings.observe import Observations, observe
 from corpus_tools.run_options import RunOptions
 from tests.corpus_tools.films import doubled, film
+from tests.rendered_takes import manifest_rows
 from tts2face.video.media import read_frames, read_sound
 
 REASONS = {
@@ -23,11 +23,9 @@ REASONS = {
 
 
 @pytest.fixture(scope="module")
-def found(shared_recordings: Path, face_model: Path, tmp_path_factory: pytest.TempPathFactory) -> Observations:
-    source = shared_recordings / "grid_s1"
-    with (source / "manifest.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))[:2]
-    clip = source / "clips" / f"{rows[0]['clip']}.mkv"
+def found(rendered_takes: Path, face_model: Path, tmp_path_factory: pytest.TempPathFactory) -> Observations:
+    rows = manifest_rows(rendered_takes)[:2]
+    clip = rendered_takes / "clips" / f"{rows[0]['clip']}.mkv"
     pictures = [picture.pixels for picture in read_frames(clip)]
     sound = read_sound(clip, 16_000).samples
     grey = np.full_like(pictures[0], 90)

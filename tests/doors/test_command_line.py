@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import wave
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 
@@ -20,10 +21,14 @@ from lexicon import errors
 from tests.docs.blocks import lines_that_need_a_person
 from tts2face.render.picture import Picture
 from tts2face.request import Request
+from tts2face.video.landmark_models import find_bundle
 from tts2face.video.media import read_sound
 
 COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
 SMALL = ["--size", "64x64", "--fps", "5"]
+N_RECORDINGS = 6
+OUTPUTS = {".talker", ".palette", ".html", ".face"}  # what the README's commands write and others read
+BUILT_BY = {"me.talker": "--appearance", "mine.palette": "corpus gestures"}
 
 
 @pytest.fixture
@@ -36,53 +41,81 @@ def readme_commands() -> list[str]:
     return lines_that_need_a_person()
 
 
-def lay_out(here: Path, source: Path) -> None:
-    """The files that the README's commands read."""
-    (here / "chapter.txt").write_text("Chapter one. It was late.", encoding="utf-8")
-    (here / "speech.txt").write_text("bin blue at f two now", encoding="utf-8")
-    sound = read_sound(source / "clips" / "bbaf2n.mkv", 16_000)
-    with wave.open(str(here / "speech.wav"), "wb") as file:
+@pytest.fixture(scope="module")
+def materials(rendered_takes: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The files that the README's commands read, from rendered takes."""
+    folder = tmp_path_factory.mktemp("materials")
+    (folder / "chapter.txt").write_text("Chapter one. It was late.", encoding="utf-8")
+    (folder / "speech.txt").write_text("bin blue at f two now", encoding="utf-8")
+    take = rendered_takes / "clips" / "bbaf2n.mkv"
+    sound = read_sound(take, 16_000)
+    with wave.open(str(folder / "speech.wav"), "wb") as file:
         file.setparams((1, 2, sound.rate, 0, "NONE", ""))
         file.writeframes((sound.samples * 32767).astype("<i2").tobytes())
-    for film in ("take.mp4", "me.mp4"):
-        (here / film).symlink_to(source / "clips" / "bbaf2n.mkv")
-    few = here / "recordings"
+    for name in ("take.mp4", "me.mp4"):
+        (folder / name).symlink_to(take)
+    few = folder / "recordings"
     (few / "clips").mkdir(parents=True)
     (few / "align").mkdir()
-    rows = (source / "manifest.csv").read_text().splitlines()[:7]
-    (few / "manifest.csv").write_text("\n".join(rows))
+    rows = (rendered_takes / "manifest.csv").read_text(encoding="utf-8").splitlines()[: 1 + N_RECORDINGS]
+    (few / "manifest.csv").write_text("\n".join(rows), encoding="utf-8")
     for row in rows[1:]:
-        name = row.split(",")[0]
-        (few / "clips" / f"{name}.mkv").symlink_to(source / "clips" / f"{name}.mkv")
-        (few / "align" / f"{name}.align").symlink_to(source / "align" / f"{name}.align")
+        for part in (f"clips/{row.split(',')[0]}.mkv", f"align/{row.split(',')[0]}.align"):
+            (few / part).symlink_to(rendered_takes / part)
+    return folder
 
 
-@pytest.mark.parametrize("line", readme_commands())
-def test_every_command_of_the_readme_works(line: str, here: Path, shared_recordings: Path) -> None:
-    lay_out(here, shared_recordings / "grid_s1")
-    if "corpus" in line or "mimic" in line:
-        pytest.importorskip("ai_edge_litert", reason="needs the extra [capture]")
-        line = line.replace("--hold-out 100", "--hold-out 2")
-        if "show" in line:
-            line = line.replace("me.talker", "grid_s1")
-    for needed, making, sign in (
-        ("me.talker", "build", "--appearance"),
-        ("mine.palette", "gestures", "corpus gestures"),
-    ):
-        if needed in line and making not in line:
-            pytest.importorskip("ai_edge_litert", reason="needs the extra [capture]")
-            (first,) = (other for other in readme_commands() if sign in other)
-            subprocess.run([*COMMAND, *shlex.split(first)[1:]], check=True, capture_output=True)
-    echo, _, command = line.rpartition("| ")
-    standard_input = shlex.split(echo)[1] if echo else None
+@pytest.fixture(scope="module")
+def built(materials: Path) -> Callable[[str, str], None]:
+    """Makes a file that other commands of the README read, once, by the README's own command."""
+
+    def make(sign: str, name: str) -> None:
+        if (materials / name).exists():
+            return
+        (line,) = (other for other in readme_commands() if sign in other)
+        done = run_line(line, materials)
+        assert done.returncode == 0, done.stderr
+
+    return make
+
+
+def run_line(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """A command of the README, at a small size."""
+    echoed, _, command = line.rpartition("| ")
     words = shlex.split(command)[1:]
     if words[0] not in {"phones", "corpus", "report", "voices", "identities", "styles"}:
         words += SMALL
-    done = subprocess.run([*COMMAND, *words], input=standard_input, capture_output=True, text=True, check=False)
+    given = shlex.split(echoed)[1] if echoed else None
+    return subprocess.run([*COMMAND, *words], cwd=folder, input=given, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("line", readme_commands())
+def test_every_command_of_the_readme_works(
+    line: str, here: Path, materials: Path, built: Callable[[str, str], None]
+) -> None:
+    sources = {name: sign for name, sign in BUILT_BY.items() if name in line and sign not in line}
+    if "corpus" in line or "mimic" in line or sources:
+        require_landmark_model()
+    for name, sign in sources.items():
+        built(sign, name)
+    for path in materials.iterdir():
+        if path.suffix not in OUTPUTS or path.name in sources:
+            (here / path.name).symlink_to(path)
+    line = line.replace("--hold-out 100", "--hold-out 2")
+    done = run_line(line, here)
     assert done.returncode == 0, done.stderr
+    words = shlex.split(line)
     for flag in ("--out", "--explain", "--report"):
         if flag in words:
             assert (here / words[words.index(flag) + 1]).exists()
+
+
+def require_landmark_model() -> None:
+    pytest.importorskip("ai_edge_litert", reason="needs `pip install 'tts2face[capture]'`")
+    try:
+        find_bundle()
+    except errors.BackendError as missing:
+        pytest.skip(str(missing))
 
 
 def test_help_names_every_option_and_is_quick(capsys: pytest.CaptureFixture[str]) -> None:

@@ -145,13 +145,13 @@ def test_own_durations_need_words(here: Path, monkeypatch: pytest.MonkeyPatch, c
     assert "own durations need recordings whose words are known" in capsys.readouterr().err
 
 
-def test_real_recordings_are_shown_beside_the_head(
-    shared_recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_recordings_are_shown_beside_the_head(
+    rendered_takes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Six recordings, one held out, with the real voice: the page holds a film of it, and stays small."""
     pytest.importorskip("ai_edge_litert", reason="needs the extra [capture]")
     monkeypatch.chdir(tmp_path)
-    source, few = shared_recordings / "grid_s1", tmp_path / "few"
+    source, few = rendered_takes, tmp_path / "few"
     (few / "clips").mkdir(parents=True)
     rows = (source / "manifest.csv").read_text().splitlines()[:7]
     (few / "manifest.csv").write_text("\n".join(rows))

@@ -8,6 +8,7 @@ import pytest
 from cli.main import run
 from lexicon.errors import BackendError
 from tests.corpus_tools.films import joined
+from tests.rendered_takes import ONLY_RENDERED
 from tts2face.models.face_file import load_face
 from tts2face.synthesis.live_capture import CALIBRATION_S, LiveCapture, LivePose, track_poses
 from tts2face.synthesis.performance import retarget_take
@@ -31,8 +32,8 @@ def bundle() -> Path:
 
 
 @pytest.fixture(scope="module")
-def film(shared_recordings: Path, bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    clips = sorted((shared_recordings / "grid_s1" / "clips").iterdir())[:4]
+def film(takes: Path, bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    clips = sorted((takes / "clips").iterdir())[:4]
     out = tmp_path_factory.mktemp("film") / "person.mp4"
     joined(clips, out)
     return out
@@ -66,6 +67,7 @@ def test_without_a_face_the_head_waits(bundle: Path) -> None:
     assert found == [None] * 5
 
 
+@ONLY_RENDERED
 def test_an_actor_gives_each_pose_once(film: Path, bundle: Path) -> None:
     with LiveCapture(read_frames(film), load_face("head"), FPS, bundle) as actor:
         actor._thread.join()

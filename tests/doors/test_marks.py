@@ -131,8 +131,8 @@ def test_the_command_tells_when_names_are_reached(tmp_path: Path) -> None:
     assert done.stderr.rstrip().endswith("s: the place")
 
 
-def test_a_recording_s_words_carry_marks(ready: Session, shared_recordings: Path) -> None:
-    film = shared_recordings / "grid_s1" / "clips" / "bbaf2n.mkv"
+def test_a_recording_s_words_carry_marks(ready: Session, takes: Path) -> None:
+    film = takes / "clips" / "bbaf2n.mkv"
     found = list(
         ready.stream(Request(audio=film, text="bin [style:head=annoyed]blue at F[/style] two [nod]now", fps=60.0))
     )

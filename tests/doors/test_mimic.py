@@ -11,6 +11,7 @@ import pytest
 
 from cli.main import run
 from lexicon.errors import BackendError
+from tests.rendered_takes import ONLY_RENDERED
 from tts2face.retargeting.performer import eye_aperture
 from tts2face.video.landmark_models import find_bundle
 from tts2face.video.media import read_frames, read_media_info
@@ -30,8 +31,8 @@ def bundle() -> Path:
 
 
 @pytest.fixture(scope="module")
-def film(shared_recordings: Path) -> Path:
-    return shared_recordings / "grid_s1" / "clips" / "bbaf2n.mkv"
+def film(takes: Path) -> Path:
+    return takes / "clips" / "bbaf2n.mkv"
 
 
 @pytest.fixture
@@ -68,17 +69,17 @@ def test_lips_lids_and_head_of_the_clip_are_the_performer_s(face: str, film: Pat
             assert np.corrcoef(eye_aperture(source, side), eye_aperture(shown, side))[0, 1] > 0.8
 
 
-def test_a_capture_moves_the_shapes_of_its_names(shared_recordings: Path, here: Path) -> None:
-    folder = shared_recordings / "livelink"
-    rows = (folder / "testset_arkit61_60fps.csv").read_text().splitlines()
+def test_a_capture_moves_the_shapes_of_its_names(capture: Path, here: Path) -> None:
+    rows = capture.read_text().splitlines()
     (here / "short.csv").write_text("\n".join(rows[:121]) + "\n")
-    sound = str(folder / "testset_audio.flac")
+    (sound,) = map(str, capture.parent.glob("*.flac"))
     assert run(["mimic", "short.csv", "--audio", sound, "--out", "m.mp4", "--size", "64x64", "--quiet"]) == 0
     facts = read_media_info(here / "m.mp4")
     assert facts.fps == 30.0
     assert facts.duration == pytest.approx(2.0, abs=0.1)
 
 
+@ONLY_RENDERED
 def test_a_film_without_sound_makes_a_silent_clip_and_says_so(
     film: Path, bundle: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -99,6 +100,7 @@ def written(path: Path, pictures: list[np.ndarray]) -> None:
         container.mux(stream.encode(None))
 
 
+@ONLY_RENDERED
 def test_films_that_cannot_drive_a_face_are_refused(
     film: Path, bundle: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -124,12 +126,13 @@ def test_films_that_cannot_drive_a_face_are_refused(
         assert sorted(here.iterdir()) == before
 
 
+@ONLY_RENDERED
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
         (["--out", "m.txt"], "m.txt"),
         (["--out", "m.mp4", "--gain", "9"], "gain must lie between 0 and 4"),
-        (["--out", "m.mp4", "--face", "self"], "--face self and --talker need each other"),
+        (["--out", "m.mp4", "--face", "self"], "give both --face self and --talker"),
         (["--out", "m.mp4", "--audio", "x.wav"], "has its own sound"),
         (["--out", "m.mp4", "--face", "nobody"], "nobody"),
         (["--out", "m.mp4", "--append-missing"], "needs --face self"),
@@ -162,6 +165,7 @@ def test_captures_that_cannot_be_read_are_refused(
     assert [path.name for path in here.iterdir()] == ["x.csv"]
 
 
+@ONLY_RENDERED
 def test_a_copy_under_another_name_gives_the_same_bytes(film: Path, bundle: Path, here: Path) -> None:
     shutil.copy(film, here / "take.mkv")
     for source, out in ((str(film), "a"), ("take.mkv", "b")):

@@ -1,4 +1,4 @@
-"""From real recordings to a talker's own face that speaks any text."""
+"""Recordings become a talker who speaks any text with an own face: the whole way, on rendered and real recordings."""
 
 import csv
 from pathlib import Path
@@ -10,6 +10,7 @@ import pytest
 from cli.main import run
 from corpus_tools.clone_talker import build_appearance_transfer
 from lexicon.errors import BackendError
+from tests.rendered_takes import ONLY_RENDERED, manifest_rows
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.models.talker import read_talker
 from tts2face.video.landmark_models import find_bundle
@@ -29,10 +30,10 @@ def bundle() -> Path:
 
 
 @pytest.fixture(scope="module")
-def recordings(shared_recordings: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    source, folder = shared_recordings / "grid_s1", tmp_path_factory.mktemp("few")
-    with (source / "manifest.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))[::80][:N_RECORDINGS]
+def recordings(takes: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    source, folder = takes, tmp_path_factory.mktemp("few")
+    rows = manifest_rows(source)
+    rows = rows[:: max(1, len(rows) // N_RECORDINGS)][:N_RECORDINGS]
     (folder / "clips").mkdir()
     with (folder / "manifest.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]))
@@ -104,6 +105,7 @@ def test_what_an_own_face_cannot_do_is_refused(
     assert not list(tmp_path.iterdir())
 
 
+@ONLY_RENDERED
 def test_pictures_without_consent_are_refused(
     recordings: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -112,6 +114,7 @@ def test_pictures_without_consent_are_refused(
     assert not list(tmp_path.iterdir())
 
 
+@ONLY_RENDERED
 @pytest.mark.parametrize("source", ["grid_s1", "me"])
 def test_speech_of_another_talker_on_an_own_face(source: str, talker: Path, tmp_path: Path) -> None:
     """The clone has the appearance of its target and the consent to show it, whatever the source has."""
@@ -128,14 +131,16 @@ def test_speech_of_another_talker_on_an_own_face(source: str, talker: Path, tmp_
     assert np.abs(np.diff(pictures.astype(int), axis=0)).mean() > 0.1
 
 
-def test_appearance_transferred_to_the_same_talker_is_unchanged(talker: Path) -> None:
+@ONLY_RENDERED
+def test_her_looks_carried_to_herself_stay(talker: Path) -> None:
     """The basis is kept in 16-bit floating point, with three digits."""
     appearance = read_talker(talker).appearance
     carry = build_appearance_transfer(appearance, appearance)
     np.testing.assert_allclose(carry.relation, np.eye(len(carry.relation)), atol=0.01)
 
 
-def test_a_take_moves_lips_beyond_recordings(talker: Path, recordings: Path, bundle: Path, tmp_path: Path) -> None:
+@ONLY_RENDERED
+def test_a_take_moves_her_lips_as_she_never_did(talker: Path, recordings: Path, bundle: Path, tmp_path: Path) -> None:
     take = next((recordings / "clips").iterdir())
     made = {}
     for flags in ((), ("--append-missing",)):

@@ -48,8 +48,13 @@ def face() -> Face:
 
 
 @pytest.fixture(scope="module")
-def clip(talker: Talker, face: Face) -> Clip:
-    return Session(talker, face).clip(Request(text=TEXT))
+def session(talker: Talker, face: Face) -> Session:
+    return Session(talker, face)
+
+
+@pytest.fixture(scope="module")
+def clip(session: Session) -> Clip:
+    return session.clip(Request(text=TEXT))
 
 
 def digest(clip: Clip) -> str:
@@ -62,13 +67,13 @@ ELSEWHERE = {"audio", "audio_map", "idle"}
 
 
 @pytest.mark.parametrize("name", [option.name for option in fields(Request) if option.name not in ELSEWHERE])
-def test_every_option_changes_the_clip(name: str, clip: Clip, talker: Talker, face: Face, tmp_path: Path) -> None:
+def test_every_option_changes_the_clip(name: str, clip: Clip, session: Session, tmp_path: Path) -> None:
     own = tmp_path / "own.txt"
     own.write_text("bob  B IY1 M\n")
     plan = tmp_path / "plan.json"
     plan.write_text('{"nods": [{"time": 0.4}]}')
     value = {"dictionary": own, "timeline": plan}.get(name) or CHANGES[name]
-    changed = Session(talker, face).clip(replace(Request(text=TEXT), **{name: value}))
+    changed = session.clip(replace(Request(text=TEXT), **{name: value}))
     assert digest(changed) != digest(clip)
 
 
@@ -90,14 +95,13 @@ def test_a_voice_that_has_spoken_before_gives_the_same_bytes(clip: Clip, talker:
     assert digest(joined) == digest(clip)
 
 
-def test_a_stream_is_the_whole_in_pieces(clip: Clip, talker: Talker, face: Face) -> None:
-    pieces = list(Session(talker, face).stream(Request(text=TEXT)))
+def test_a_stream_is_the_whole_in_pieces(clip: Clip, session: Session) -> None:
+    pieces = list(session.stream(Request(text=TEXT)))
     assert len(pieces) == 2
     assert digest(concatenate_clips([piece.clip for piece in pieces])) == digest(clip)
 
 
-def test_every_method_of_gestures_is_another_clip_of_the_same_speech(clip: Clip, talker: Talker, face: Face) -> None:
-    session = Session(talker, face)
+def test_every_method_of_gestures_is_another_clip_of_the_same_speech(clip: Clip, session: Session) -> None:
     made = {method: session.clip(TEXT, gestures=method) for method in GESTURES}
     assert digest(made["fields"]) == digest(clip)
     assert len({digest(one) for one in made.values()}) == len(GESTURES)
@@ -107,8 +111,8 @@ def test_every_method_of_gestures_is_another_clip_of_the_same_speech(clip: Clip,
 
 
 @pytest.mark.parametrize(("seconds", "fps"), [(0.1, 30.0), (25.0, 29.97), (12.3, 7.0)])
-def test_an_idle_face_is_silent_for_as_long_as_it_says(seconds: float, fps: float, talker: Talker, face: Face) -> None:
-    pieces = list(Session(talker, face).stream(Request(idle=seconds, fps=fps)))
+def test_an_idle_face_is_silent_for_as_long_as_it_says(seconds: float, fps: float, session: Session) -> None:
+    pieces = list(session.stream(Request(idle=seconds, fps=fps)))
     clip = concatenate_clips([piece.clip for piece in pieces])
     assert clip.speech.waveform.duration == pytest.approx(seconds, abs=1.01 / fps)
     assert not clip.speech.waveform.samples.any()
@@ -118,17 +122,17 @@ def test_an_idle_face_is_silent_for_as_long_as_it_says(seconds: float, fps: floa
 
 
 @pytest.mark.parametrize("fps", [23.976, 24.0, 25.0, 29.97, 50.0, 59.94])
-def test_pieces_end_on_frames_at_any_rate(fps: float, talker: Talker, face: Face) -> None:
+def test_pieces_end_on_frames_at_any_rate(fps: float, session: Session) -> None:
     """Sound and picture of a long text stay together: each piece's sound is as long as its frames, to half a sample."""
-    pieces = list(Session(talker, face).stream(Request(text="One. Two. Three.", fps=fps)))
+    pieces = list(session.stream(Request(text="One. Two. Three.", fps=fps)))
     n_frames = sum(len(piece.clip.motion) for piece in pieces)
     n_samples = sum(len(piece.clip.speech.waveform.samples) for piece in pieces)
     rate = pieces[0].clip.speech.waveform.rate
     assert abs(n_samples / rate - n_frames / pieces[0].clip.fps) < 1 / rate
 
 
-def test_lips_rest_in_silence_and_at_both_ends(talker: Talker, face: Face) -> None:
-    weights = Session(talker, face).clip(Request(text=TEXT, gestures="none")).motion.values
+def test_lips_rest_in_silence_and_at_both_ends(session: Session) -> None:
+    weights = session.clip(Request(text=TEXT, gestures="none")).motion.values
     for frame in (0, -1):
         assert np.abs(weights[frame] - weights[0]).max() < 1e-4
     assert np.abs(np.diff(weights[:5], axis=0)).max() < 0.02
@@ -145,9 +149,9 @@ def test_lips_rest_in_silence_and_at_both_ends(talker: Talker, face: Face) -> No
         ({"dictionary": Path("missing.txt")}, "missing.txt cannot be read"),
     ],
 )
-def test_what_cannot_be_said_is_refused(change: dict, reason: str, talker: Talker, face: Face) -> None:
+def test_what_cannot_be_said_is_refused(change: dict, reason: str, session: Session) -> None:
     with pytest.raises((InputError, DataError), match=reason):
-        Session(talker, face).clip(replace(Request(text=TEXT), **change))
+        session.clip(replace(Request(text=TEXT), **change))
 
 
 @pytest.mark.parametrize(

@@ -33,10 +33,10 @@ def test_a_text_without_words_is_refused() -> None:
         pronounce_transcript("?!", "en-us")
 
 
-def test_long_recordings_are_aligned_part_by_part(shared_recordings: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_long_recordings_are_aligned_part_by_part(takes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Four sentences in a row: cut at pauses, the edges are those of one alignment of the whole."""
     pytest.importorskip("hama", reason="needs `pip install 'tts2face[capture]'`")
-    clips = shared_recordings / "grid_s1" / "clips"
+    clips = takes / "clips"
     names = {"bbaf2n": "bin blue at F two now", "bbaf3s": "bin blue at F three soon"}
     sounds = [read_sound(clips / f"{name}.mkv", 16000).samples for name in names]
     sound = Waveform(np.concatenate(sounds * 2), 16000)

@@ -101,9 +101,9 @@ def test_a_rate_that_counts_ticks_is_read_from_the_frames(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["bbaf2n.mkv", "copy.mp4"])
-def test_damaged_films_are_read_or_refused_in_bounded_memory_and_time(name, shared_recordings, tmp_path):
+def test_damaged_films_are_read_or_refused_in_bounded_memory_and_time(name, rendered_takes, tmp_path):
     """A crash, another exception than a refusal, or more memory than the child may have ends the child."""
-    film = shared_recordings / "grid_s1" / "clips" / "bbaf2n.mkv"
+    film = rendered_takes / "clips" / "bbaf2n.mkv"
     if name != film.name:
         joined([film], tmp_path / name)
         film = tmp_path / name

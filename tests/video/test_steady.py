@@ -6,11 +6,11 @@ from tts2face.video.media import TimedFrame, read_frames, read_media_info
 from tts2face.video.streaming_tracker import StreamingTracker
 from tts2face.video.track import FaceTracker
 
-CLIP = "grid_s1/clips/bbaf2n.mkv"
+CLIP = "clips/bbaf2n.mkv"
 
 
-def test_one_pass_reads_what_two_passes_read(shared_recordings: Path, face_model: Path) -> None:
-    film = shared_recordings / CLIP
+def test_one_pass_reads_what_two_passes_read(takes: Path, face_model: Path) -> None:
+    film = takes / CLIP
     fps = read_media_info(film).fps
     twice = FaceTracker(face_model).track(lambda: (picture.pixels for picture in read_frames(film)), fps)
     once = list(StreamingTracker(face_model).track(read_frames(film), fps))
@@ -23,8 +23,8 @@ def test_blank_pictures_hold_no_face(face_model: Path) -> None:
     assert all(np.isnan(sight.points).all() for sight in StreamingTracker(face_model).track(blank, 25.0))
 
 
-def test_faces_are_counted_and_changes_measured(shared_recordings: Path, face_model: Path) -> None:
-    plain = [picture.pixels for picture in read_frames(shared_recordings / CLIP)][:26]
+def test_faces_are_counted_and_changes_measured(takes: Path, face_model: Path) -> None:
+    plain = [picture.pixels for picture in read_frames(takes / CLIP)][:26]
     plain[5] = plain[4]
     both = [np.concatenate([pixels, pixels[:, ::-1]], axis=1) for pixels in plain]
     alone = list(StreamingTracker(face_model).track(_film(plain), 25.0))
@@ -37,10 +37,8 @@ def test_faces_are_counted_and_changes_measured(shared_recordings: Path, face_mo
     assert min(sight.change for sight in alone[6:]) > 0.1
 
 
-def test_landmarks_of_a_large_picture_lie_where_they_lie_in_a_small_one(
-    shared_recordings: Path, face_model: Path
-) -> None:
-    plain = [picture.pixels for picture in read_frames(shared_recordings / CLIP)][:3]
+def test_landmarks_of_a_large_picture_lie_where_they_lie_in_a_small_one(takes: Path, face_model: Path) -> None:
+    plain = [picture.pixels for picture in read_frames(takes / CLIP)][:3]
     large = [pixels.repeat(8, axis=0).repeat(8, axis=1) for pixels in plain]
     small, grown = (list(StreamingTracker(face_model).track(_film(pictures), 25.0)) for pictures in (plain, large))
     wanted = (small[1].points[:, :2] + 0.5) * 8 - 0.5

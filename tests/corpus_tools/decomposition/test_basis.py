@@ -115,14 +115,12 @@ def test_two_files_of_one_expression_and_a_folder_that_is_none_are_refused(tmp_p
         find_stills(tmp_path)
 
 
-def test_pictures_and_instants_are_read_by_the_tracker(
-    shared_recordings: Path, face_model: Path, tmp_path: Path
-) -> None:
+def test_pictures_and_instants_are_read_by_the_tracker(takes: Path, face_model: Path, tmp_path: Path) -> None:
     from PIL import Image
 
     from tts2face.video.media import read_frames
 
-    film = shared_recordings / "grid_s1" / "clips" / "bbaf2n.mkv"
+    film = takes / "clips" / "bbaf2n.mkv"
     pictures = list(read_frames(film))
     path = tmp_path / "sad.png"
     Image.fromarray(pictures[30].pixels).save(path)
@@ -131,7 +129,7 @@ def test_pictures_and_instants_are_read_by_the_tracker(
     np.testing.assert_array_equal(instant, read(Still(path)))
     eyes = np.linalg.norm(instant[33] - instant[263])
     assert eyes == pytest.approx(88.9, abs=4.0)  # mm of the canonical face
-    with pytest.raises(InputError, match=r"ends at 2\.96 s; 7 s is beyond it"):
+    with pytest.raises(InputError, match=rf"ends at {pictures[-1].time:.2f} s; 7 s is beyond it"):
         read(Still(film, 7.0))
     Image.fromarray(np.full((200, 200, 3), 90, np.uint8)).save(path)
     with pytest.raises(DataError, match=r"sad\.png shows no face"):

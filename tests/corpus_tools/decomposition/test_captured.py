@@ -17,6 +17,7 @@ from corpus_tools.decomposition.capture_files import read_livelink_recording
 from corpus_tools.decomposition.face_motion import moved_landmarks, rest_landmarks
 from corpus_tools.decomposition.recording_files import read_sound_span
 from lexicon.errors import DataError, InputError
+from tests.rendered_takes import write_sound
 from tts2face.face.deformation import posed_vertices
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_LANDMARKS
@@ -103,15 +104,14 @@ def test_a_face_without_all_landmarks_is_refused(face: Face) -> None:
         rest_landmarks(fewer)
 
 
-def test_a_live_link_capture_moves_the_face_with_its_head_and_sound(shared_recordings: Path, face: Face) -> None:
-    folder = shared_recordings / "livelink"
-    path = folder / "testset_arkit61_60fps.csv"
-    found = read_livelink_recording(path, face, sound=folder / "testset_audio.flac")
+def test_a_live_link_capture_moves_the_face_with_its_head_and_sound(capture: Path, face: Face) -> None:
+    (sound,) = capture.parent.glob("*.flac")
+    found = read_livelink_recording(capture, face, sound=sound)
     assert found.fps == 60.0
     assert found.missing_features == frozenset()
     assert found.sound is not None
     assert found.sound.duration == pytest.approx(len(found.landmarks) / found.fps, abs=0.3)
-    weights = match_shapes(read_livelink(path).weights, face).values
+    weights = retarget_capture(read_livelink(capture), face).face.values
     np.testing.assert_allclose(found.rest, rest_landmarks(face), atol=1e-4)
     jaw = weights[:, face.shape_names.index("jawOpen")]
     assert np.corrcoef(jaw, -found.landmarks[:, 152, 1])[0, 1] > 0.95
@@ -119,10 +119,10 @@ def test_a_live_link_capture_moves_the_face_with_its_head_and_sound(shared_recor
     assert len(read.landmarks) == (len(found.landmarks) + 1) // 2
 
 
-def test_sound_of_the_same_name_is_found(shared_recordings: Path, tmp_path: Path) -> None:
+def test_sound_of_the_same_name_is_found(tmp_path: Path) -> None:
     capture = tmp_path / "take.csv"
     assert read_capture_sound(capture) is None
-    (tmp_path / "take.flac").write_bytes((shared_recordings / "livelink" / "testset_audio.flac").read_bytes())
+    write_sound(tmp_path / "take.flac", 0.1 * np.sin(np.arange(22_050)), 44_100)
     found = read_capture_sound(capture)
     assert found is not None
     assert found.rate == 16_000

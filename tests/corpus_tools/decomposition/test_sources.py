@@ -11,9 +11,9 @@ from tts2face.models.face import Face
 
 
 def test_a_live_link_table_and_a_marker_table_are_told_apart(
-    shared_recordings: Path, made: Made, face: Face, tmp_path: Path
+    capture: Path, made: Made, face: Face, tmp_path: Path
 ) -> None:
-    arkit = read_capture_file(shared_recordings / "livelink" / "testset_arkit61_60fps.csv", face)
+    arkit = read_capture_file(capture, face)
     assert arkit.missing_features == frozenset()
     table = write_table(tmp_path / "take.csv", made.names, made.points, first="frame")
     with pytest.raises(InputError, match="has frame numbers"):
