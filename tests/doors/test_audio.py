@@ -81,20 +81,20 @@ def opening(motion: np.ndarray, talker: Talker) -> np.ndarray:
 
 @pytest.mark.parametrize(("audio_map", "least"), [("linear", 0.5), ("network", 0.65)])
 def test_lips_that_hear_a_new_sentence_move_as_the_speaker_s(
-    drive: str, least: float, shared_recordings: Path, held_out: Talker
+    audio_map: str, least: float, shared_recordings: Path, held_out: Talker
 ) -> None:
     talker, film = held_out, shared_recordings / "grid_s1" / "clips" / "bbaf2n.mkv"
-    _, lips = map_audio_to_motion(film, talker.audio_maps[drive], talker, talker.fps)
+    _, lips = map_audio_to_motion(film, talker.audio_maps[audio_map], talker, talker.fps)
     (real,) = (one.shape for one in talker.utterances if one.name == "bbaf2n")
     n = min(len(real), len(lips))
     assert np.corrcoef(opening(real[:n], talker), opening(lips.values[:n], talker))[0, 1] > least
 
 
-@pytest.mark.parametrize("drive", ["linear", "network"])
-def test_lips_open_with_the_sound_of_a_rendered_take(drive: str, rendered_takes: Path, talker: Talker) -> None:
+@pytest.mark.parametrize("audio_map", ["linear", "network"])
+def test_lips_open_with_the_sound_of_a_rendered_take(audio_map: str, rendered_takes: Path, talker: Talker) -> None:
     """Against the opening that the take's own phones give the talker."""
     film = rendered_takes / "clips" / "bbaf2n.mkv"
-    _, lips = map_audio_to_motion(film, talker.audio_maps[drive], talker, talker.fps)
+    _, lips = map_audio_to_motion(film, talker.audio_maps[audio_map], talker, talker.fps)
     found = opening(lips.values, talker)
     words = [line.split() for line in (rendered_takes / "align" / "bbaf2n.align").read_text().splitlines()]
     spoken = np.zeros(len(found), bool)
@@ -116,7 +116,7 @@ def test_with_the_words_lips_close_where_they_are_said(takes: Path, film: Path, 
 
 
 @ONLY_RENDERED
-def test_drives_and_words_give_different_lips(film: Path, session: Session) -> None:
+def test_audio_maps_and_words_give_different_lips(film: Path, session: Session) -> None:
     requests = (
         Request(audio=film),
         Request(audio=film, audio_map="network"),
@@ -238,12 +238,12 @@ def test_options_that_do_not_go_together_are_refused(options: dict, reason: str)
 
 
 @ONLY_RENDERED
-def test_a_recording_that_is_not_there_and_a_talker_without_drives_are_refused(
+def test_a_recording_that_is_not_there_and_a_talker_without_audio_maps_are_refused(
     film: Path, session: Session, talker: Talker
 ) -> None:
     with pytest.raises(InputError, match=r"there is no recording none\.wav"):
         session.clip(Request(audio=Path("none.wav")))
-    with pytest.raises(InputError, match="has no network drive"):
+    with pytest.raises(InputError, match="has no network audio map"):
         Session(replace(talker, audio_maps={}), "head").clip(Request(audio=film))
 
 

@@ -10,8 +10,8 @@ from lexicon.errors import BackendError
 from tests.corpus_tools.films import joined
 from tests.rendered_takes import ONLY_RENDERED
 from tts2face.models.face_file import load_face
+from tts2face.retargeting.performer import build_performer_retargeter
 from tts2face.synthesis.live_capture import CALIBRATION_S, LiveCapture, LivePose, track_poses
-from tts2face.synthesis.performance import retarget_take
 from tts2face.video.blendshapes import BlendshapeReader
 from tts2face.video.landmark_models import find_bundle
 from tts2face.video.media import TimedFrame, read_frames
@@ -51,9 +51,10 @@ def test_a_person_is_learnt_and_then_followed(live: list[LivePose | None], film:
     assert all(pose is None for pose in live[:learnt])
     followed = live[learnt + 1 :]
     assert all(pose is not None for pose in followed)
-    motion = retarget_take(read_take(film, StreamingTracker(bundle), BlendshapeReader(bundle)), head)
+    take = read_take(film, StreamingTracker(bundle), BlendshapeReader(bundle))
+    weights_of_take = build_performer_retargeter(take.landmarks, take.scores, head).weights(take.landmarks, take.scores)
     weights = np.array([pose.weights for pose in followed if pose is not None])
-    whole = motion.face.values[learnt + 1 : learnt + 1 + len(weights)]
+    whole = weights_of_take.values[learnt + 1 : learnt + 1 + len(weights)]
     for shape, least in (("jawOpen", 0.9), ("eyeBlinkLeft", 0.9), ("mouthPucker", 0.7)):
         column = head.shape_names.index(shape)
         assert np.corrcoef(weights[:, column], whole[:, column])[0, 1] > least, shape
