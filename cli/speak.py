@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tts2face.session import Session
     from tts2face.speech.text_fit import TextMismatch
     from tts2face.synthesis.clip_stream import Piece
+    from tts2face.synthesis.prepared_request import PreparedRequest
 
 OWN_FACE = "self"
 EXPLANATION_SUFFIXES = (".json", ".txt")
@@ -45,7 +46,7 @@ def run_request(request: Request, picture: Picture, options: SpeakOptions) -> No
     _check_options(request, picture, options)
     from tts2face.synthesis.prepared_request import prepare
 
-    prepare(request)  # refuses a wrong request before anything is loaded
+    prepared = prepare(request)  # a wrong request is refused before anything is loaded
     session = _open_session(options)
     explanations: list[PhoneExplanation] = []
 
@@ -54,9 +55,9 @@ def run_request(request: Request, picture: Picture, options: SpeakOptions) -> No
             explanations.extend(piece.shown())
 
     if options.out is not None:
-        _write_clip(session, (request, picture), options.out, (collect, options.quiet))
+        _write_clip(session, (prepared, picture), options.out, (collect, options.quiet))
     elif options.explain is not None:
-        for piece in session.stream(request):
+        for piece in session.stream(prepared):
             collect(piece)
             _warn_mismatches(piece.mismatches)
     if options.explain is not None:
@@ -64,7 +65,7 @@ def run_request(request: Request, picture: Picture, options: SpeakOptions) -> No
     if options.view:
         from tts2face.render.window import show_clip
 
-        show_clip(session.clip(request), session.mesh, picture)
+        show_clip(session.clip(prepared), session.mesh, picture)
 
 
 def _check_options(request: Request, picture: Picture, options: SpeakOptions) -> None:
@@ -97,7 +98,7 @@ def _check_overwriting(request: Request, picture: Picture, options: SpeakOptions
 
 def _write_clip(
     session: "Session",
-    request_and_picture: tuple[Request, Picture],
+    request_and_picture: "tuple[PreparedRequest, Picture]",
     out: Path,
     how: tuple[Callable[["Piece"], None], bool],
 ) -> None:

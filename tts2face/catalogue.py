@@ -89,7 +89,10 @@ def voices() -> tuple[VoiceEntry, ...]:
     english = tuple(code for code in codes if code in ENGLISH_CODES)
     return (
         VoiceEntry("heart", "hibari", english, _is_installed("hibari"), VOICE_NAMES["heart"]),
-        VoiceEntry("espeak", "espeak-ng", codes, _is_installed("espeakng_loader"), VOICE_NAMES["espeak"]),
+        *(
+            VoiceEntry(name, "espeak-ng", codes, _is_installed("espeakng_loader"), VOICE_NAMES[name])
+            for name in ("espeak", "espeak-female")
+        ),
         VoiceEntry("FILE.onnx", "piper", (), _is_installed("piper"), "any Piper voice by its path (extra [piper])"),
     )
 

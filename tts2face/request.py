@@ -95,6 +95,9 @@ class Request:
         from lexicon.languages import language_code
 
         object.__setattr__(self, "language", language_code(self.language))
+        for name in ("audio", "dictionary", "timeline"):
+            if isinstance(getattr(self, name), str):
+                object.__setattr__(self, name, Path(getattr(self, name)))
         _check_limits("rate", self.rate, RATE_LIMITS)
         _check_limits("volume", self.volume, VOLUME_LIMITS)
         _check_limits("fps", self.fps, FPS_LIMITS)

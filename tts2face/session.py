@@ -148,13 +148,13 @@ class Session:
         palette = self.palette
         return self._speech_face if palette is None else self._once("face", lambda: self._prepare_face(palette))
 
-    def clip(self, text: str | Request, **options: Any) -> Clip:
+    def clip(self, text: str | Request | PreparedRequest, **options: Any) -> Clip:
         """Synthesise the whole clip of a text or request.
 
         Parameters
         ----------
         text
-            Text to speak, or a complete request.
+            Text to speak, or a complete request, prepared or not.
         options
             Fields of `Request`, such as ``style="delighted"``; only with a text.
 
@@ -169,16 +169,16 @@ class Session:
         """
         return concatenate_clips([piece.clip for piece in self.stream(text, **options)])
 
-    def stream(self, text: str | Request, **options: Any) -> Iterator[Piece]:
+    def stream(self, text: str | Request | PreparedRequest, **options: Any) -> Iterator[Piece]:
         """Synthesise the clip of a text or request piece by piece, in bounded memory; arguments as for `clip`.
 
         The concatenated clips of the pieces equal the result of `clip`.
         """
-        return self._pieces(prepare(request_of(text, options)))
+        return self._pieces(prepare_request(text, options))
 
     def write(
         self,
-        text: str | Request,
+        text: str | Request | PreparedRequest,
         out: str | Path,
         *,
         picture: Picture | None = None,
@@ -212,7 +212,7 @@ class Session:
             As `clip`; or the file cannot be written.
         """
         picture_options = {name: options.pop(name) for name in _names(Picture) if name in options and picture is None}
-        prepared = prepare(request_of(text, options))
+        prepared = prepare_request(text, options)
         picture = picture or Picture(**picture_options)
         check_output(out)
         refuse_overwriting({"out": out}, input_paths(prepared.request, picture))
@@ -341,25 +341,25 @@ class Session:
                         del self._voices[oldest]
 
 
-def request_of(text: str | Request, options: dict[str, Any]) -> Request:
-    """Build the request of a text and options by name.
+def prepare_request(text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:
+    """Prepare a text with options by name, or a complete request, once.
 
     Raises
     ------
     InputError
-        An option does not exist, or options are given together with a complete request.
+        An option does not exist, or options are given together with a complete request; errors as `prepare`.
     """
     known = _names(Request)
     for name in options:
         if name not in known:
             raise InputError(f"there is no option {name!r}; the options are {', '.join(known)}")
-    if isinstance(text, Request):
-        if options:
-            raise InputError(
-                f"the option {next(iter(options))!r} cannot be given with a complete request; set it in the request"
-            )
-        return text
-    return Request(text=text, **options)
+    if isinstance(text, str):
+        return prepare(Request(text=text, **options))
+    if options:
+        raise InputError(
+            f"the option {next(iter(options))!r} cannot be given with a complete request; set it in the request"
+        )
+    return prepare(text) if isinstance(text, Request) else text
 
 
 def _names(options: type) -> tuple[str, ...]:
