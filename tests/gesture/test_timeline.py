@@ -272,11 +272,11 @@ def test_a_file_holds_a_timeline(tmp_path: Path) -> None:
         ('{"expressions": [{"expression": "sad", "weight": 9}]}', r"expressions\[0\]: the weight of sad must lie"),
         ('{"nods": [{"time": 1}, {"time": -1}]}', r"nods\[1\]: a nod needs a time of 0 s or more, not -1"),
         ('{"gains": {"head": 9}}', r"a\.json, gains: the gain of head must lie between 0 and 3, not 9"),
-        ('{"gains": {"head": 1, "head": 2}}', r"a\.json: 'head' stands twice"),
+        ('{"gains": {"head": 1, "head": 2}}', r"a\.json: the name 'head' occurs twice"),
         ('{"gains": {"head": ' + "1" * 5000 + "}}", r"a\.json: a number of 5000 characters is too long"),
-        ('{"gains": {"head": NaN}}', r"a\.json: NaN is no number of JSON"),
+        ('{"gains": {"head": NaN}}', r"a\.json: NaN is not a JSON number"),
         (b"\xff\xff", r"a\.json is not UTF-8 text \(byte 0\)"),
-        (b" " * 10_000_001, r"a\.json holds more than 10 MB"),
+        (b" " * 10_000_001, r"a\.json contains more than 10 MB"),
     ],
 )
 def test_files_that_are_wrong_are_refused(content: str | bytes, reason: str, tmp_path: Path) -> None:

@@ -155,8 +155,8 @@ def test_a_wrong_array_or_key(
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ('{"a": NaN}', "NaN is no number of JSON"),
-        ('{"a": 1, "a": 2}', "'a' stands twice in one object"),
+        ('{"a": NaN}', "NaN is not a JSON number"),
+        ('{"a": 1, "a": 2}', "'a' occurs twice in one object"),
         ("[" * 100_000 + "]" * 100_000, "cannot be read as JSON"),
         ('{"a": "\\ud800"}', "cannot be read as JSON"),
         ('{"a": ' + "9" * 5000 + "}", "cannot be read as JSON"),

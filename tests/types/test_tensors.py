@@ -16,7 +16,7 @@ from tts2face.storage.tensors import read_tensors
         ("[" * 100_000, "is nested too deep"),
         ('{"fps": ' + "3" * 5000 + "}", "a number of 5000 characters is too long"),
         ('{"fps": 1e999}', "the number 1e999 is too large"),
-        ('{"fps": 1, "fps": 2}', "'fps' stands twice"),
+        ('{"fps": 1, "fps": 2}', "'fps' occurs twice"),
         ("{", "line 1: not JSON"),
     ],
 )
