@@ -132,7 +132,7 @@ def test_films_that_cannot_drive_a_face_are_refused(
     [
         (["--out", "m.txt"], "m.txt"),
         (["--out", "m.mp4", "--gain", "9"], "gain must lie between 0 and 4"),
-        (["--out", "m.mp4", "--face", "self"], "give both --face self and --talker"),
+        (["--out", "m.mp4", "--face", "self"], "--face self and --talker need each other"),
         (["--out", "m.mp4", "--audio", "x.wav"], "has its own sound"),
         (["--out", "m.mp4", "--face", "nobody"], "nobody"),
         (["--out", "m.mp4", "--append-missing"], "needs --face self"),
