@@ -120,7 +120,7 @@ class Session:
         self._lock = threading.RLock()
         self._cache: dict[Hashable, Any] = {}
         self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
-        self._voices: OrderedDict[Hashable, list[Voice]] = OrderedDict()
+        self._unused_voices: list[tuple[Hashable, Voice]] = []  # the last ones returned, the newest at the end
         self._speech_face: AnimatedFace = self._prepare_face(None)
 
     @property
@@ -325,20 +325,15 @@ class Session:
         """A voice for exclusive use within a ``with`` block; loading one takes half a second."""
         key = (name, language, frozenset(dictionary.items()))
         with self._lock:
-            unused = self._voices.get(key)
-            voice = unused.pop() if unused else None
+            found = next((at for at, (kept, _) in enumerate(self._unused_voices) if kept == key), None)
+            voice = None if found is None else self._unused_voices.pop(found)[1]
         voice = voice or load_voice(name, language, dictionary)
         try:
             yield voice
         finally:
             with self._lock:
-                self._voices.setdefault(key, []).append(voice)
-                self._voices.move_to_end(key)
-                while sum(map(len, self._voices.values())) > MAX_VOICES:
-                    oldest = next(iter(self._voices))
-                    self._voices[oldest].pop()
-                    if not self._voices[oldest]:
-                        del self._voices[oldest]
+                self._unused_voices.append((key, voice))
+                del self._unused_voices[:-MAX_VOICES]
 
 
 def prepare_request(text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:

@@ -101,3 +101,9 @@ def test_a_session_without_a_palette_moves_lips_alone() -> None:
     clip = bare.clip("Bob may move.")
     assert clip.motion.channels == tts2face.load_face("head").shape_names
     assert not clip.head.values.any()
+
+
+def test_voices_in_use_do_not_count_among_those_kept(session: tts2face.Session) -> None:
+    text = '<speak>One. <voice name="heart">Two.</voice> <lang xml:lang="de">Drei.</lang> Four.</speak>'
+    spoken = [word.text for _ in range(2) for word in session.clip(text, voice="espeak").speech.words]
+    assert [word.strip(".") for word in spoken] == ["One", "Two", "Drei", "Four"] * 2
