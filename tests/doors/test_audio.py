@@ -21,6 +21,7 @@ from tts2face.types import Trajectory, concatenate_clips, frame_count
 from tts2face.video.media import read_media_info, read_sound, sound_blocks
 
 TEXT = "bin blue at F two now"
+REAL_TOLERANCE_S = 0.02  # of the phones that the talker was learnt with
 TOLERANCE_S = 0.08  # of the takes' own word times, which are automatic as well
 LEARNT_FROM = 60  # utterances: enough to be far better than nothing
 SUFFIXES = {".wav": "pcm_s16le", ".flac": "flac", ".mp3": "libmp3lame", ".m4a": "aac", ".ogg": "libopus"}
@@ -104,15 +105,21 @@ def test_lips_open_with_the_sound_of_a_rendered_take(audio_map: str, rendered_ta
     assert np.median(found[spoken]) > 2 * np.median(found[~spoken])
 
 
-def test_with_the_words_lips_close_where_they_are_said(takes: Path, film: Path, session: Session) -> None:
+def test_with_the_words_lips_close_where_they_are_said(
+    takes: Path, film: Path, session: Session, talker: Talker
+) -> None:
     clip = session.clip(Request(audio=film, text=TEXT, fps=25.0))
     assert [word.text for word in clip.speech.words] == TEXT.split()
     words = [line.split() for line in (takes / "align" / "bbaf2n.align").read_text().splitlines()]
     (begin,) = (int(begin) / 25_000 for begin, _, word in words if word == "bin")
+    tolerance = TOLERANCE_S
+    if takes.name == "grid_s1":  # its word times are not those of the talker's phones
+        (recorded,) = (one.phones for one in talker.utterances if one.name == "bbaf2n")
+        begin, tolerance = float(recorded.edges[recorded.phones.index("b")]), REAL_TOLERANCE_S
     said = [phone for phone in clip.speech.phones.phones if phone != "sil"]
     assert said[:3] == ["b", "ɪ", "n"]
     starts = clip.speech.phones.edges[clip.speech.phones.phones.index("b")]
-    assert abs(starts - begin) < TOLERANCE_S
+    assert abs(starts - begin) < tolerance
 
 
 @ONLY_RENDERED
@@ -249,7 +256,7 @@ def test_a_recording_that_is_not_there_and_a_talker_without_audio_maps_are_refus
 
 def test_the_text_is_given_once(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["Hi.", "--text", "Hi.", "--out", "a.mp4"]) == 2
-    assert "give the text once" in capsys.readouterr().err
+    assert "the text is given twice" in capsys.readouterr().err
 
 
 @ONLY_RENDERED

@@ -188,7 +188,7 @@ def test_the_phones_made_to_differ_differ_most(talker):
 
 
 def test_refuses_talkers_without_common_phones():
-    with pytest.raises(InputError, match="share 2 phones, and a comparison needs 4"):
+    with pytest.raises(InputError, match="have 2 phones in common; a comparison needs 4"):
         compare_tables(
             table("pbai", [0.5] * 6), table("pbou", [0.5] * 6), "two", np.random.default_rng(0)
         )  # fmt: skip
