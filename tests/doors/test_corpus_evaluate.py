@@ -75,7 +75,7 @@ def test_folders_that_are_split_already(here: Path, capsys: pytest.CaptureFixtur
 def test_another_talker_is_told_apart(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     result = json.loads(measured("across.json", "--train", "all", "--cross-talker", "other"))
     assert (result["is_across"], result["n_train"], result["n_test"]) == (True, 24, 4)
-    assert "4 utterances of another talker, 24 learnt from" in capsys.readouterr().err
+    assert "4 utterances of another talker, 24 for training" in capsys.readouterr().err
 
 
 def test_own_durations_are_told_at_the_terminal_and_in_every_file(
