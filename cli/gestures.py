@@ -83,7 +83,7 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
         write_message(f"rejected {refusal.name}: {refusal.reason}")
     for note in result.notes:
         write_message(note)
-    shares = ", ".join(f"{share:.0%} of the {feature}'s motion" for feature, share in result.kept.items())
+    shares = ", ".join(f"{share:.0%} of the motion of {feature}" for feature, share in result.kept.items())
     write_message(
         f"wrote {out}: style {style} from {result.n_kept} recordings, {result.minutes:.1f} minutes; modes keep {shares}"
     )

@@ -187,7 +187,7 @@ def test_a_capture_becomes_a_style_of_the_starter_palette(
     cache = ["--cache", "cache", "--jobs", "1"]
     assert run(["corpus", "gestures", str(capture), "--style", "live", "--out", "live.palette", *cache]) == 0
     assert re.search(
-        r"wrote live\.palette: the style live of 1 recordings, 0\.[23] minutes; kept", capsys.readouterr().err
+        r"wrote live\.palette: style live from 1 recordings, 0\.[23] minutes; modes keep", capsys.readouterr().err
     )
     palette = load_palette("live.palette")
     assert palette.names[-2:] == ("grid_s1", "live")

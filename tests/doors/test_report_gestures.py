@@ -47,7 +47,7 @@ def test_the_page_holds_everything_and_fetches_nothing(here: Path) -> None:
     for heading, n in (("Distributions", 2), ("Spectra, sound, seeds", 2), ("Clips of 10 minutes", 1)):
         assert html.count(f"<h3>{heading}</h3>") == n
     assert "Calm with a larger head and faster blinks." in html
-    assert "48 recordings learnt from, 12 held out." in html
+    assert "48 training recordings, 12 held out." in html
     assert not re.search(r"http|<(script|link|img)|url\((?!#)|@import|\bnan\b", html)
     # of each style 10 distributions and 2 spectra; of the measured one 3 of repetition
     assert html.count("<svg") == html.count("</svg>") == 2 * (10 + 2) + 3
