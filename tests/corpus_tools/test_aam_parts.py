@@ -144,7 +144,7 @@ def test_picture_axes_are_those_of_the_camera():
 def test_pictures_come_at_the_instants_of_the_frames(tmp_path, monkeypatch):
     shown = [type("Picture", (), {"time": t, "pixels": np.full((2, 2, 3), k, np.uint8)}) for k, t in
              enumerate([0.0, 0.04, 0.08, 0.2, 0.24])]  # fmt: skip
-    monkeypatch.setattr("corpus_tools.aam.source_videos.read_pictures", lambda path: iter(shown))
+    monkeypatch.setattr("corpus_tools.aam.source_videos.read_frames", lambda path: iter(shown))
     nothing = np.zeros((5, 478, 3), np.float32)
     film = AppearanceRecording(tmp_path / "x.mkv", 0.04, 25.0, nothing[:, :, :2], nothing, nothing[:, 0])
     assert [int(pixels[0, 0, 0]) for pixels in film.pictures()] == [1, 2, 2, 2, 3]
