@@ -13,7 +13,7 @@ from lexicon.errors import InputError
 from lexicon.nominal_durations import nominal_phones
 from lexicon.pronounce import pronounce
 from lexicon.sequence import PhoneSequence, WordSpan
-from tts2face.export.text import FORMATS, NOMINAL_NOTE, textgrid, timed_json, timed_table
+from tts2face.export.text import FORMATS, NOMINAL_NOTE, textgrid
 
 
 def _tier(grid: Any, number: int) -> list[tuple[float, float, str]]:
@@ -82,12 +82,3 @@ def test_table_of_a_pronunciation() -> None:
         "$5       five      ˈfaɪv    F AY1 V",
         "$5       dollars.  ˈdɑ.lɚz  D AA1 L ER0 Z",
     ]
-
-
-def test_timed_phones() -> None:
-    assert timed_table(PHONES, WORDS).splitlines()[:3] == [
-        "start_s\tend_s\tphone\tword", "0.000000\t0.100000\tsil\t", '0.100000\t0.250000\tp\tpa "x"',
-    ]  # fmt: skip
-    content = json.loads(timed_json(PHONES, WORDS))
-    assert content["edges_s"] == [0.0, 0.1, 0.25, 0.4, 0.5, 0.75, 1.0]
-    assert content["words"][1] == {"text": "ü", "first": 4, "last": 5}

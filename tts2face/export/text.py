@@ -58,29 +58,6 @@ FORMATS: Mapping[str, Callable[["Pronunciation"], str]] = MappingProxyType(
 )
 
 
-def _word_at_phone(words: Sequence["WordSpan"]) -> dict[int, str]:
-    return {at: word.text for word in words for at in range(word.first, word.last)}
-
-
-def timed_table(phones: "PhoneSequence", words: Sequence["WordSpan"]) -> str:
-    """Tab-separated table with one line for each phone: start and end in seconds, phone, word."""
-    word_of = _word_at_phone(words)
-    lines = ["start_s\tend_s\tphone\tword"]
-    for at, phone in enumerate(phones.phones):
-        lines.append(f"{phones.edges[at]:.6f}\t{phones.edges[at + 1]:.6f}\t{phone}\t{word_of.get(at, '')}")
-    return "\n".join(lines) + "\n"
-
-
-def timed_json(phones: "PhoneSequence", words: Sequence["WordSpan"]) -> str:
-    """JSON with N phones, their N + 1 edges in seconds, and words as half-open ranges of phones."""
-    content = {
-        "phones": list(phones.phones),
-        "edges_s": [float(edge) for edge in phones.edges],
-        "words": [{"text": word.text, "first": word.first, "last": word.last} for word in words],
-    }
-    return json.dumps(content, ensure_ascii=False, indent=2) + "\n"
-
-
 def _word_intervals(phones: "PhoneSequence", words: Sequence["WordSpan"]) -> Iterator[Interval]:
     """Yield contiguous intervals of the words and of the empty spans between them."""
     at = 0
