@@ -142,14 +142,14 @@ def test_a_drive_that_lost_a_part_is_refused() -> None:
 
 def test_features_of_another_number_are_refused() -> None:
     drive: AudioMap = learn_linear_map(lessons(), feature="mfcc")
-    with pytest.raises(InputError, match="hears 3 features a frame, not the shape"):
+    with pytest.raises(InputError, match="takes 3 features per frame, not the shape"):
         drive.parameters(np.zeros((10, 4)))
 
 
 @pytest.mark.parametrize(
     ("make", "reason"),
     [
-        (lambda: learn_linear_map([], feature="mfcc"), "there is none"),
+        (lambda: learn_linear_map([], feature="mfcc"), "needs training utterances with sound"),
         (lambda: learn_network_map(lessons(1), feature="mfcc", options=NetworkMapOptions()), "at least 2 utterances"),
         (lambda: NetworkMapOptions(n_hidden=0), "needs at least one hidden unit"),
         (lambda: TrainingUtterance(np.zeros((3, 2)), np.zeros((4, 2))), "not 3 and 4"),
