@@ -67,7 +67,7 @@ def test_the_answer_says_what_it_is(measured: tuple[Evaluation, tuple[SplitResul
     assert result.to_json()["is_across"]
     assert result.rows()[1][:2] == ("another talker", "mean face")
     html = evaluation_page(result, runs)
-    assert "8 utterances of somebody else with their own phone edges, 30 learnt from" in html
+    assert "8 utterances of another talker with their own phone edges, 30 training utterances" in html
     assert "gap of the lips (z)" in html
 
 
@@ -89,7 +89,7 @@ def test_landmarks_of_a_face_are_its_own_at_rest_and_follow_its_shapes() -> None
 def test_a_capture_closes_its_lips_where_bilabials_are_heard(capture: Path, tmp_path: Path) -> None:
     pytest.importorskip("hama", reason="needs the extra [capture]")
     found = observe_livelink(capture, RunOptions(tmp_path))
-    assert len(found) >= 4
+    assert len(found) >= 3
     assert all(one.fps == 60.0 and one.is_recognised for one in found)
     curves = [LipCurves.of(one.landmarks).opening for one in found]
     closed = [min_openings(curve, one.phones, 60.0) for curve, one in zip(curves, found, strict=True)]

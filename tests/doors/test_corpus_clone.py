@@ -52,7 +52,7 @@ def test_the_door_does_what_the_core_does(here: Path) -> None:
 def test_every_option_matters(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for out, flags in (("plain", []), ("gain", ["--gain", "0.5"]), ("more", ["--append-missing"])):
         assert run(["corpus", "clone", "a.talker", "b.talker", "--out", f"{out}.talker", *flags]) == 0
-    assert re.search(r"4 utterances, [1-9]\d* modes added", capsys.readouterr().err)
+    assert re.search(r"4 utterances, [1-9]\d* modes appended", capsys.readouterr().err)
     plain, gain, more = (read_talker(here / f"{out}.talker") for out in ("plain", "gain", "more"))
     assert abs(gain.utterances[0].shape[:, 0]).max() < abs(plain.utterances[0].shape[:, 0]).max()
     assert more.model.n_speech > plain.model.n_speech == 8

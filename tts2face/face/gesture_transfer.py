@@ -21,7 +21,7 @@ from tts2face.face.shape_transfer import SCALE_LIMITS, append_shapes, spread_lan
 from tts2face.models.face import Face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, OUTER_LIP_LOWER, OUTER_LIP_UPPER
 from tts2face.models.palette import FEATURES, FIXED_CHANNELS, REGION_FEATURES, FaceRegion, Palette
-from tts2face.numeric import ordered_product, smoothstep
+from tts2face.numeric import ordered_product
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
 # Expression weights at which the mouth begins to respond and responds in full: a neutral speaker scores up to 0.1 sad
@@ -155,7 +155,7 @@ def mouth_response(expression: FloatArray) -> FloatArray:
     """Expression weights (T, 5) for the mouth: attenuated below `MOUTH_RESPONSE_RANGE`, where speech contains them."""
     low, high = MOUTH_RESPONSE_RANGE
     share = np.clip((np.abs(expression) - low) / (high - low), 0.0, 1.0)
-    return np.asarray(expression * smoothstep(share))
+    return np.asarray(expression * share * share * (3.0 - 2.0 * share))
 
 
 def check_gestures(
