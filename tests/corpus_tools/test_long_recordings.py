@@ -21,8 +21,8 @@ LATE_S = 0.2
 
 
 @pytest.fixture(scope="module")
-def rows(takes: Path) -> list[dict[str, str]]:
-    return list(islice(cycle(manifest_rows(takes)), N_CLIPS))
+def rows(shared_recordings: Path) -> list[dict[str, str]]:
+    return list(islice(cycle(manifest_rows(shared_recordings / "grid_s1")), N_CLIPS))
 
 
 @pytest.fixture(scope="module")
@@ -31,10 +31,10 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def folder(takes: Path, rows: list[dict[str, str]], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(shared_recordings: Path, rows: list[dict[str, str]], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A take of 51 s whose sound is late."""
     made = tmp_path_factory.mktemp("long")
-    clips = takes / "clips"
+    clips = shared_recordings / "grid_s1" / "clips"
     joined([clips / f"{row['clip']}.mkv" for row in rows], made / "take.mp4", late_s=LATE_S)
     return made
 
@@ -93,4 +93,4 @@ def test_the_report_shows_every_recording_and_nothing_from_outside(read: Observa
     for colour in ("first", "second"):
         assert html.count(f"fill: none; stroke: var(--{colour})") == len(read.kept)
     assert "http" not in html
-    assert "Sound and picture were synchronised by +2" in html
+    assert "Audio delays corrected: +2" in html

@@ -32,8 +32,8 @@ def bundle() -> Path:
 
 
 @pytest.fixture(scope="module")
-def film(takes: Path, bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    clips = sorted((takes / "clips").iterdir())[:4]
+def film(shared_recordings: Path, bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    clips = sorted((shared_recordings / "grid_s1" / "clips").iterdir())[:4]
     out = tmp_path_factory.mktemp("film") / "person.mp4"
     joined(clips, out)
     return out

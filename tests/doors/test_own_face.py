@@ -140,7 +140,6 @@ def test_her_looks_carried_to_herself_stay(talker: Path) -> None:
 
 
 @ONLY_RENDERED
-@ONLY_RENDERED
 def test_a_take_moves_lips_as_the_talker_never_did(talker: Path, bundle: Path, tmp_path: Path) -> None:
     take = tmp_path / "surprised.mp4"
     speak = ["Oh no, wow.", "--expression", "surprised=1,happy=0.6", "--fps", "25", "--size", "360x360", "--quiet"]

@@ -16,7 +16,7 @@ PATIENCE_S = 120.0
 POOL = """
 import os, sys, time
 from pathlib import Path
-from corpus_tools.process_pool import each_done
+from corpus_tools.process_pool import map_unordered
 
 def start(folder):
     (Path(folder) / str(os.getpid())).touch()
@@ -24,7 +24,7 @@ def start(folder):
 if __name__ == "__main__":
     from cli.process import raise_on_signals
     raise_on_signals()
-    list(each_done([600.0, 600.0], time.sleep, start, (sys.argv[1],), 2))
+    list(map_unordered([600.0, 600.0], time.sleep, start, (sys.argv[1],), 2))
 """
 
 pytestmark = pytest.mark.skipif(
