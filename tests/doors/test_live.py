@@ -8,7 +8,6 @@ import pytest
 from cli.main import run
 from lexicon.errors import BackendError
 from tests.corpus_tools.films import joined
-from tests.rendered_takes import ONLY_RENDERED
 from tts2face.models.face_file import load_face
 from tts2face.retargeting.performer import build_performer_retargeter
 from tts2face.synthesis.live_capture import CALIBRATION_S, LiveCapture, LivePose, track_poses
@@ -68,7 +67,6 @@ def test_without_a_face_the_head_waits(bundle: Path) -> None:
     assert found == [None] * 5
 
 
-@ONLY_RENDERED
 def test_an_actor_gives_each_pose_once(film: Path, bundle: Path) -> None:
     with LiveCapture(read_frames(film), load_face("head"), FPS, bundle) as actor:
         actor._thread.join()
