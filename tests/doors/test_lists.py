@@ -55,11 +55,12 @@ def test_everything_that_is_listed_exists() -> None:
 
 
 def test_voices_say_what_they_speak_and_whether_they_are_installed() -> None:
-    heart, espeak, piper = catalogue.voices()
+    heart, espeak, female, piper = catalogue.voices()
     assert (heart.name, heart.languages, heart.is_installed) == ("heart", ("en-gb", "en-us"), True)
     assert (espeak.name, len(espeak.languages), espeak.is_installed) == ("espeak", len(catalogue.languages()), True)
     assert (piper.engine, piper.languages) == ("piper", ())
-    for voice in (heart, espeak):
+    assert (female.name, female.languages) == ("espeak-female", espeak.languages)
+    for voice in (heart, espeak, female):
         for language in voice.languages[:2]:
             assert load_voice(voice.name, language).sample_rate > 0
     with pytest.raises(InputError, match="speaks English, not de"):
