@@ -263,13 +263,15 @@ class Session:
         """
         check_output(out)
         picture = picture or Picture()
-        self._speech_face.renderer(picture)  # rejects invalid options before the video is tracked
+        renderer = self.renderer(picture, has_gestures=False)  # rejects invalid options before the video is tracked
         take = perform(performance, self._speech_face, on_progress=stages("tracking") if stages else None)
         n_frames = len(take.motion.face)
         draw = stages("drawing") if stages else None
         clips = take_clips(take.motion, take.sound)
         progress = (lambda done, _: draw(done, n_frames)) if draw else None
-        write_clips(out, clips, take.face.renderer(picture), on_progress=progress)
+        if take.face is not self._speech_face:  # missing motion was appended to it
+            renderer = take.face.renderer(picture)
+        write_clips(out, clips, renderer, on_progress=progress)
         return WrittenClip(Path(out), take.seconds, n_frames, is_silent=not len(take.sound.samples))
 
     def renderer(self, picture: Picture, *, has_gestures: bool = True) -> FrameRenderer:
