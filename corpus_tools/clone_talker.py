@@ -172,7 +172,11 @@ def _appearance_function(source: Talker, target: Talker, gain: float) -> Appeara
         return lambda spoken, shape: None
     if source.appearance is not None:
         transfer = build_appearance_transfer(source.appearance, target.appearance)
-        return lambda spoken, shape: None if spoken.looks is None else transfer.parameters(spoken.looks, gain=gain)
+        return lambda spoken, shape: (
+            None
+            if spoken.appearance_parameters is None
+            else transfer.parameters(spoken.appearance_parameters, gain=gain)
+        )
     own, channels = fit_appearance_regression(target), speech_channels(target.model)
 
     def with_lips(_spoken: Utterance, shape: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -186,7 +190,7 @@ def _transfer_utterance(utterance: Utterance, ready: ParameterTransfer, appearan
     head = utterance.head.copy()
     head[:, 3:] *= ready.size
     shape = ready.parameters(utterance.shape)
-    return replace(utterance, shape=shape, head=head, looks=appearance(utterance, shape))
+    return replace(utterance, shape=shape, head=head, appearance_parameters=appearance(utterance, shape))
 
 
 def _metadata(

@@ -272,7 +272,7 @@ def _build_plate(
         points=np.concatenate([points, face_ring(points)], axis=1).astype(np.float32),
         axes=camera_axes(recording.points[here], recording.landmarks[here]),
         shape=recording.shape[here],
-        looks=parameters[number][here, :n_face],
+        texture_parameters=parameters[number][here, :n_face],
     )
 
 

@@ -65,7 +65,7 @@ def read_sound_span(video: Path, begin: float, seconds: float) -> Waveform:
 
 
 def read_recordings(
-    recordings: Path, face: Face, markers: MarkerOptions, effort: RunOptions, on_progress: Progress | None
+    recordings: Path, face: Face, markers: MarkerOptions, run_options: RunOptions, on_progress: Progress | None
 ) -> tuple[list[FaceRecording], list[Refusal]]:
     """Recordings and refusals, each sorted by name.
 
@@ -77,9 +77,9 @@ def read_recordings(
         The landmark models are missing, the cache cannot be written, or a process died.
     """
     files = find_recording_files(recordings)
-    jobs = min(effort.n_processes(), len(files))
-    model = find_bundle(effort.model) if any(file.suffix.lower() in VIDEO_SUFFIXES for file in files) else None
-    ready = (effort.folder(), model, face, markers)
+    jobs = min(run_options.n_processes(), len(files))
+    model = find_bundle(run_options.model) if any(file.suffix.lower() in VIDEO_SUFFIXES for file in files) else None
+    ready = (run_options.folder(), model, face, markers)
     captured: list[FaceRecording] = []
     refused: list[Refusal] = []
     for number, outcome in enumerate(_read_files(files, ready, jobs), start=1):

@@ -43,20 +43,20 @@ class SpeakerScale:
         parts = []
         for seen in observations:
             here = speech_frames(seen.phones, len(seen.landmarks), seen.fps)
-            parts.append(LipCurves.of(seen.landmarks[here]).stacked())
+            parts.append(LipCurves.of(seen.landmarks[here]).values())
         frames = np.concatenate(parts)
         return cls(frames.mean(axis=0), np.maximum(frames.std(axis=0), 1e-9))
 
     def z_score(self, curves: LipCurves) -> LipCurves:
         """z-scored curves of this person."""
-        opening, width = ((curves.stacked() - self.mean) / self.spread).T
+        opening, width = ((curves.values() - self.mean) / self.spread).T
         return LipCurves(opening, width)
 
 
 def standardise_reference(real: ReferenceUtterance, scale: SpeakerScale) -> ReferenceUtterance:
     """A real utterance whose parameters are its z-scored curves."""
     curves = scale.z_score(real.curves)
-    return replace(real, curves=curves, parameters=curves.stacked().astype(np.float32))
+    return replace(real, curves=curves, parameters=curves.values().astype(np.float32))
 
 
 def compare_across_talkers(
@@ -64,7 +64,7 @@ def compare_across_talkers(
 ) -> UtteranceComparison:
     """Comparison of synthesised parameters (T, S) of one talker with a real utterance of another, both z-scored."""
     curves = scale.z_score(LipCurves.of(model.shapes(made)))
-    return UtteranceComparison(one, curves.stacked(), curves, np.ones(2))
+    return UtteranceComparison(one, curves.values(), curves, np.ones(2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

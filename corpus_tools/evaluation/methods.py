@@ -33,19 +33,19 @@ def build_methods(talker: Talker, options: Mapping[str, SynthesisOptions] | None
 def network_method(network: PhoneNetwork) -> SynthesisMethod:
     """The first of a talker's networks alone: a plain sliding-window network."""
 
-    def made(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
+    def motion(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
         return network.parameters(phones, np.arange(n_frames) / fps, slice(1))
 
-    return made
+    return motion
 
 
 def exemplar_method(voice: ExemplarModel, options: SynthesisOptions) -> SynthesisMethod:
     """Synthesis from exemplars."""
 
-    def made(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
+    def motion(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
         return speech_trajectory(phones, voice, fps=fps, n_frames=n_frames, options=options).values
 
-    return made
+    return motion
 
 
 def mean_pose_method(talker: Talker, voice: ExemplarModel) -> SynthesisMethod:
@@ -60,11 +60,11 @@ def mean_pose_method(talker: Talker, voice: ExemplarModel) -> SynthesisMethod:
             poses[label].append(pose)
     mean = {label: np.mean(seen, axis=0) for label, seen in poses.items() if seen}
 
-    def made(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
+    def motion(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
         targets = build_targets(phones, inventory)
         middles = targets.spans[:, 1:3].mean(axis=1)
         keys = np.stack([mean[label] for label in targets.labels])
         times = np.arange(n_frames) / fps
         return np.stack([np.interp(times, middles, keys[:, d]) for d in range(n_speech)], axis=1).astype(np.float32)
 
-    return made
+    return motion

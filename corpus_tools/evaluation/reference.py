@@ -33,7 +33,7 @@ class LipCurves:
         """Of (T, 478, 3) landmarks."""
         return cls(measures.lip_opening(landmarks), measures.lip_width(landmarks))
 
-    def stacked(self) -> NDArray[np.float64]:
+    def values(self) -> NDArray[np.float64]:
         """(T, 2) opening and width."""
         return np.stack([self.opening, self.width], axis=1)
 

@@ -96,9 +96,9 @@ def map_tracks(
     middle = wanted.mean(axis=0)
     fit = fit_ridge(terms / spread, wanted - middle)
 
-    def made(one: ReferenceUtterance) -> NDArray[np.float32]:
+    def mapped_parameters(one: ReferenceUtterance) -> NDArray[np.float32]:
         times = np.arange(len(one.parameters)) / one.observation.fps
         seen = tracks[one.observation.name].at(times) / spread
         return np.asarray(middle + (seen - fit.mean) @ fit.weights, np.float32)
 
-    return tuple(made(one) for one in real)
+    return tuple(mapped_parameters(one) for one in real)

@@ -146,7 +146,7 @@ def _reliability_row(name: str, split: Reliability | None) -> Sequence[str]:
         return (name, "0", "too few phones with tokens in both halves", "", "", "", "")
     r = split.correlations
     few, many = int(split.n_phones.min()), int(split.n_phones.max())
-    figures = (f"{value:.3f}" for value in (split.mean, r.min(), r.max(), split.corrected))
+    figures = (f"{value:.3f}" for value in (split.mean, r.min(), r.max(), split.full_length_reliability))
     return (name, str(len(r)), str(few) if few == many else f"{few} to {many}", *figures)
 
 

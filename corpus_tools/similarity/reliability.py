@@ -43,8 +43,8 @@ class Reliability:
         return float(self.correlations.mean())
 
     @property
-    def corrected(self) -> float:
-        """Expected correlation of two whole corpora."""
+    def full_length_reliability(self) -> float:
+        """Reliability of the whole corpus, by the Spearman-Brown formula."""
         return spearman_brown(self.mean)
 
 

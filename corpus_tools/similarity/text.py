@@ -109,7 +109,7 @@ def _reliability(split: Reliability | None) -> dict[str, Any] | None:
         return None
     return {
         "mean": round(split.mean, 4),
-        "spearman_brown": round(split.corrected, 4),
+        "spearman_brown": round(split.full_length_reliability, 4),
         "halves": _round_values(split.correlations),
         "halves_asked": split.n_requested,
         "phones_compared": split.n_phones.tolist(),

@@ -19,7 +19,7 @@ class RidgeFit:
     left_out_error: float
 
 
-def fit_ridge(terms: Floats, wanted: Floats, efforts: Sequence[float] = REGULARISATIONS) -> RidgeFit:
+def fit_ridge(terms: Floats, wanted: Floats, regularisations: Sequence[float] = REGULARISATIONS) -> RidgeFit:
     """The best regression of (R, V) values, whose mean is 0, on (R, K) terms.
 
     Each row's error when it is left out follows from its leverage. Source: Allen 1974 (PRESS).
@@ -28,7 +28,8 @@ def fit_ridge(terms: Floats, wanted: Floats, efforts: Sequence[float] = REGULARI
     centred = terms - mean
     normal, right = centred.T @ centred, centred.T @ wanted
     found = [
-        _fit_and_cross_validate(centred, wanted, normal + effort * np.eye(terms.shape[1]), right) for effort in efforts
+        _fit_and_cross_validate(centred, wanted, normal + regularisation * np.eye(terms.shape[1]), right)
+        for regularisation in regularisations
     ]
     error, weights = min(found, key=lambda one: one[0])
     return RidgeFit(mean, weights, error)

@@ -47,7 +47,9 @@ def build_appearance_exemplars(talker: Talker, exemplars: ExemplarModel) -> Appe
         The talker has no appearance model.
     """
     appearance = require_appearance(talker)
-    frames = np.concatenate([spoken.looks for spoken in talker.utterances if spoken.looks is not None])
+    frames = np.concatenate(
+        [spoken.appearance_parameters for spoken in talker.utterances if spoken.appearance_parameters is not None]
+    )
     spread = np.maximum(appearance.spread, 1e-6).astype(np.float32)
     silent = np.concatenate(
         [_silent_frames(spoken.phones, len(spoken.shape), talker.fps) for spoken in talker.utterances]

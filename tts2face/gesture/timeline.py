@@ -136,7 +136,7 @@ class Timeline:
 
     def merge(self, other: "Timeline", shift: float = 0.0) -> "Timeline":
         """Merge with another timeline, delayed by `shift` seconds, which takes precedence where both overlap."""
-        later = other.shifted(shift)
+        later = other.shift(shift)
         return Timeline(
             {**self.style, **later.style},
             overlay_spans(self.spans, later.spans),
@@ -145,7 +145,7 @@ class Timeline:
             Gains({**self.gains.factors, **later.gains.factors}),
         )
 
-    def shifted(self, seconds: float) -> "Timeline":
+    def shift(self, seconds: float) -> "Timeline":
         """The same timeline, delayed by `seconds`."""
         return replace(
             self,

@@ -39,7 +39,7 @@ class TextMismatch:
             f"the text does not fit the recording from {self.begin:.1f} to {self.end:.1f} s ({shown}); check the words"
         )
 
-    def shifted(self, seconds: float) -> "TextMismatch":
+    def shift(self, seconds: float) -> "TextMismatch":
         """The same mismatch, later by `seconds`."""
         return replace(self, begin=self.begin + seconds, end=self.end + seconds)
 

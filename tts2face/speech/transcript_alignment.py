@@ -87,7 +87,7 @@ def align_recording(
             phones.append(found.phones)
             spans.append(found.words)
             part_mismatches = _mismatches(aligner, part, part_words, found, is_english=is_english)
-            mismatches += [mismatch.shifted(begin) for mismatch in part_mismatches]
+            mismatches += [mismatch.shift(begin) for mismatch in part_mismatches]
         else:
             phones.append(PhoneSequence(["sil"], [0.0, part.duration]))
             spans.append(())
@@ -115,7 +115,7 @@ def _mismatches(
             mismatches = [mismatch_of(found, *misfit)]
         else:
             misfits = find_misfits(excerpt, is_english=is_english)
-            mismatches = [mismatch_of(excerpt, *span).shifted(begin) for span in misfits]
+            mismatches = [mismatch_of(excerpt, *span).shift(begin) for span in misfits]
         confirmed += [mismatch for mismatch in mismatches if mismatch.begin >= last_end]
         last_end = max([last_end, *(mismatch.end for mismatch in mismatches)])
     return tuple(confirmed)

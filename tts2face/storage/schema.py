@@ -179,7 +179,7 @@ def number(low: float, high: float) -> Check:
     return check
 
 
-def listed(item: Check, length: int | None = None) -> Check:
+def list_of(item: Check, length: int | None = None) -> Check:
     """Check for a list, of a given length if any, whose items all pass `item`."""
 
     def check(value: Any, where: str) -> None:

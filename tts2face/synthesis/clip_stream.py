@@ -102,7 +102,7 @@ def _spoken_pieces(prepared: PreparedRequest, models: SynthesisModels, layer: Ge
     fps, first_frame = prepared.fps, 0
     for spoken, n_steps in _sentences(prepared, models):
         speech, begin = pad_to_frame(spoken.speech, first_frame, fps), float(first_frame / fps)
-        timeline = spoken.timeline.restrict(0.0, speech.waveform.duration).shifted(begin)
+        timeline = spoken.timeline.restrict(0.0, speech.waveform.duration).shift(begin)
         n_frames = frame_count(speech.waveform.duration, float(fps))
         selection = select_tokens(speech.phones, models.exemplars, prepared.options)
         lips = models.face.motion_of_tokens(selection, fps=float(fps), n_frames=n_frames)
@@ -188,8 +188,8 @@ def _explanation(
 ) -> Callable[[], tuple[PhoneExplanation, ...]]:
     """Function that explains a selection in seconds of the whole clip; it is evaluated only when called."""
 
-    def shown() -> tuple[PhoneExplanation, ...]:
+    def explain() -> tuple[PhoneExplanation, ...]:
         phones = explain_selection(selection, exemplars)
         return tuple(replace(phone, start=phone.start + begin, end=phone.end + begin) for phone in phones)
 
-    return shown
+    return explain

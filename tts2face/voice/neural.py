@@ -113,12 +113,12 @@ class NeuralVoice:
     def _insert_own_words(self, sentence: str) -> str:
         """Replace a user's words by ``[word](/letters/)``, hibari's notation for given pronunciations."""
 
-        def bracketed(match: "re.Match[str]") -> str:
+        def add_brackets(match: "re.Match[str]") -> str:
             letters = self._own_words.get(match[0].lower())
             return match[0] if letters is None else f"[{match[0]}](/{letters}/)"
 
         plain = re.sub(r"[\[\]]", " ", sentence)
-        return re.sub(r"[^\W_]+(?:['’-][^\W_]+)*", bracketed, plain) if self._own_words else plain
+        return re.sub(r"[^\W_]+(?:['’-][^\W_]+)*", add_brackets, plain) if self._own_words else plain
 
     def _bracketed_word(self, word: SpokenWord) -> str:
         """A word in hibari's notation, with its phones if it has any."""
