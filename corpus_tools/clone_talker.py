@@ -125,13 +125,13 @@ def clone_talker(
     BackendError
         The file cannot be written.
     """
-    made = transfer_talker(load_talker(source), load_talker(target), gain=gain, append=append)
+    clone = transfer_talker(load_talker(source), load_talker(target), gain=gain, append=append)
     flags = [*(["--gain", f"{gain:g}"] if gain != 1.0 else []), *(["--append-missing"] if append else [])]
     words = ["tts2face", "corpus", "clone", Path(source).name, Path(target).name, "--out", out.name, *flags]
     dated = {"command": shlex.join(words), "created": created or datetime.now(UTC).date().isoformat()}
-    made = replace(made, talker=replace(made.talker, metadata={**made.talker.metadata, **dated}))
-    write_talker(out, made.talker)
-    return made
+    clone = replace(clone, talker=replace(clone.talker, metadata={**clone.talker.metadata, **dated}))
+    write_talker(out, clone.talker)
+    return clone
 
 
 def transfer_talker(source: Talker, target: Talker, *, gain: float = 1.0, append: bool = False) -> ClonedTalker:

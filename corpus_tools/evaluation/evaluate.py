@@ -60,10 +60,10 @@ def standardise_reference(real: ReferenceUtterance, scale: SpeakerScale) -> Refe
 
 
 def compare_across_talkers(
-    one: ReferenceUtterance, made: NDArray[np.float32], model: ShapeModel, scale: SpeakerScale
+    one: ReferenceUtterance, synthesised: NDArray[np.float32], model: ShapeModel, scale: SpeakerScale
 ) -> UtteranceComparison:
     """Comparison of synthesised parameters (T, S) of one talker with a real utterance of another, both z-scored."""
-    curves = scale.z_score(LipCurves.of(model.shapes(made)))
+    curves = scale.z_score(LipCurves.of(model.shapes(synthesised)))
     return UtteranceComparison(one, curves.values(), curves, np.ones(2))
 
 
@@ -76,7 +76,7 @@ class SplitResult:
 
     talker: Talker
     real: tuple[ReferenceUtterance, ...]
-    made: Mapping[str, tuple[NDArray[np.float32], ...]]
+    synthesised: Mapping[str, tuple[NDArray[np.float32], ...]]
     seconds: Mapping[str, float]
     own: Mapping[str, tuple[UtteranceComparison, ...]] = field(default_factory=dict)
     scale: SpeakerScale | None = None
@@ -88,7 +88,7 @@ class SplitResult:
 
     def curves(self, method: str, at: int) -> LipCurves:
         """Lip curves of a method, in the units of the real ones."""
-        curves = LipCurves.of(self.model.shapes(self.made[method][at]))
+        curves = LipCurves.of(self.model.shapes(self.synthesised[method][at]))
         return curves if self.scale is None else self.scale.z_score(curves)
 
 
@@ -156,17 +156,17 @@ def evaluate_split(
     methods = build_methods(talker, options)
     real = tuple(ReferenceUtterance.of(seen, talker.model) for seen in test)
     voiced = speak_references(voice, real) if voice is not None else ()
-    made, spent, own = {}, {}, {}
+    synthesised, spent, own = {}, {}, {}
     for number, (name, method) in enumerate(methods.items()):
-        made[name], spent[name] = _synthesise(method, real)
+        synthesised[name], spent[name] = _synthesise(method, real)
         if voiced:
             own[name] = _synthesise_own_durations(method, real, voiced, talker.model)
         if on_progress:
             on_progress(number + 1, len(methods))
     if tracks is not None:
-        made[TRACKS_METHOD], spent[TRACKS_METHOD] = map_tracks(tracks, talker, real), 0.0
-    made[CEILING_METHOD], spent[CEILING_METHOD] = tuple(one.parameters for one in real), 0.0
-    return SplitResult(talker, real, made, spent, own)
+        synthesised[TRACKS_METHOD], spent[TRACKS_METHOD] = map_tracks(tracks, talker, real), 0.0
+    synthesised[CEILING_METHOD], spent[CEILING_METHOD] = tuple(one.parameters for one in real), 0.0
+    return SplitResult(talker, real, synthesised, spent, own)
 
 
 def evaluate_across_talkers(
@@ -190,12 +190,12 @@ def evaluate_across_talkers(
     check_disjoint(train, others)
     train, others = correct_pose(train), correct_pose(others)
     talker = _train_talker(train)
-    hers, theirs = SpeakerScale.of(train), SpeakerScale.of(others)
-    real = tuple(standardise_reference(ReferenceUtterance.of(seen, talker.model), theirs) for seen in others)
-    made, spent = {}, {}
+    own_scale, other_scale = SpeakerScale.of(train), SpeakerScale.of(others)
+    real = tuple(standardise_reference(ReferenceUtterance.of(seen, talker.model), other_scale) for seen in others)
+    synthesised, spent = {}, {}
     methods = build_methods(talker, options)
     for number, (name, method) in enumerate(methods.items()):
-        made[name], spent[name] = _synthesise(method, real)
+        synthesised[name], spent[name] = _synthesise(method, real)
         if on_progress:
             on_progress(number + 1, len(methods))
     limits = Thresholds.of(real)
@@ -203,8 +203,8 @@ def evaluate_across_talkers(
         compute_scores(
             name,
             [
-                compare_across_talkers(one, values, talker.model, hers)
-                for one, values in zip(real, made[name], strict=True)
+                compare_across_talkers(one, values, talker.model, own_scale)
+                for one, values in zip(real, synthesised[name], strict=True)
             ],
             limits,
             spent[name],
@@ -212,7 +212,7 @@ def evaluate_across_talkers(
         for name in methods
     )
     result = Evaluation(len(train), len(others), scores, is_across=True)
-    return result, (SplitResult(talker, real, made, spent, scale=hers),)
+    return result, (SplitResult(talker, real, synthesised, spent, scale=own_scale),)
 
 
 def _train_talker(train: Sequence[Observation]) -> Talker:
@@ -223,8 +223,8 @@ def _synthesise(
     method: SynthesisMethod, real: Sequence[ReferenceUtterance]
 ) -> tuple[tuple[NDArray[np.float32], ...], float]:
     began = time.perf_counter()
-    made = tuple(method(one.observation.phones, len(one.parameters), one.observation.fps) for one in real)
-    return made, time.perf_counter() - began
+    synthesised = tuple(method(one.observation.phones, len(one.parameters), one.observation.fps) for one in real)
+    return synthesised, time.perf_counter() - began
 
 
 def _synthesise_own_durations(
@@ -242,17 +242,18 @@ def _pooled_scores(runs: Sequence[SplitResult], limits: Thresholds) -> tuple[Sco
     return tuple(
         score_splits(
             name,
-            [(each.model, each.real, each.made[name]) for each in runs],
+            [(each.model, each.real, each.synthesised[name]) for each in runs],
             limits,
             sum(r.seconds[name] for r in runs),
         )
-        for name in runs[0].made
+        for name in runs[0].synthesised
     )
 
 
 def _pooled_own_scores(runs: Sequence[SplitResult], limits: Thresholds) -> tuple[Scores, ...]:
     return tuple(
-        compute_scores(name, [judged for each in runs for judged in each.own[name]], limits) for name in runs[0].own
+        compute_scores(name, [comparison for each in runs for comparison in each.own[name]], limits)
+        for name in runs[0].own
     )
 
 

@@ -80,9 +80,9 @@ def check_disjoint(train: Sequence[Observation], test: Sequence[Observation]) ->
         )
 
 
-def _content_identity(seen: Observation) -> tuple[int, bytes]:
+def _content_identity(observation: Observation) -> tuple[int, bytes]:
     """Identity of an utterance's content, the same for copies under other names."""
-    return len(seen.landmarks), seen.landmarks[:: max(1, len(seen.landmarks) // 4), :20].tobytes()
+    return len(observation.landmarks), observation.landmarks[:: max(1, len(observation.landmarks) // 4), :20].tobytes()
 
 
 def _sort_by_name(observations: Sequence[Observation]) -> list[Observation]:

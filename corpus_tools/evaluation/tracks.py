@@ -91,10 +91,10 @@ def map_tracks(
         )
     n_speech = talker.model.n_speech
     terms = np.concatenate([tracks[one.name].at(np.arange(len(one.shape)) / talker.fps) for one in known])
-    wanted = np.concatenate([one.shape[:, :n_speech] for one in known]).astype(np.float64)
+    targets = np.concatenate([one.shape[:, :n_speech] for one in known]).astype(np.float64)
     spread = np.maximum(terms.std(axis=0), 1e-9)
-    middle = wanted.mean(axis=0)
-    fit = fit_ridge(terms / spread, wanted - middle)
+    middle = targets.mean(axis=0)
+    fit = fit_ridge(terms / spread, targets - middle)
 
     def mapped_parameters(one: ReferenceUtterance) -> NDArray[np.float32]:
         times = np.arange(len(one.parameters)) / one.observation.fps

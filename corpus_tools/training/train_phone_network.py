@@ -43,7 +43,7 @@ def add_phone_network(talker: Talker, *, on_progress: Progress | None = None) ->
     inventory = tuple(sorted({label for spoken in talker.utterances for label in spoken.phones.phones} | {SILENCE}))
     n_speech = talker.model.n_speech
     spread = np.maximum(talker.model.spread[:n_speech], 1e-6)
-    shown, place, wanted = [], [], []
+    shown, place, targets = [], [], []
     for spoken in talker.utterances:
         times = np.arange(len(spoken.shape)) / talker.fps
         near = (times >= spoken.phones.edges[1] - SILENCE_MARGIN_S) & (
@@ -52,12 +52,12 @@ def add_phone_network(talker: Talker, *, on_progress: Progress | None = None) ->
         labels, where = window_features(spoken.phones, times[near], inventory)
         shown.append(labels)
         place.append(where)
-        wanted.append(spoken.shape[near, :n_speech] / spread)
+        targets.append(spoken.shape[near, :n_speech] / spread)
     seen = np.concatenate(shown), np.concatenate(place)
     tables = [np.eye(len(inventory), dtype=np.float32)] * N_BY_LABEL + [feature_table(inventory)] * N_BY_FEATURES
     networks = []
     for seed, table in enumerate(tables):
-        networks.append(_train_network(*seen, np.concatenate(wanted), table, seed))
+        networks.append(_train_network(*seen, np.concatenate(targets), table, seed))
         if on_progress:
             on_progress(seed + 1, len(tables))
     weights, biases = (_stack_layers(layers) for layers in zip(*networks, strict=True))
@@ -88,14 +88,14 @@ def _stack_layers(members: Iterable[Iterable[Floats]]) -> list[Floats]:
 
 
 def _train_network(
-    shown: NDArray[np.integer], place: Floats, wanted: Floats, table: Floats, seed: int
+    shown: NDArray[np.integer], place: Floats, targets: Floats, table: Floats, seed: int
 ) -> tuple[list[Floats], list[Floats]]:
     """Weights and biases of one network for one-hot phones, trained on phones coded by the table."""
-    fitted = _fit_regressor(encode_windows(shown, place, table), wanted, seed)
+    fitted = _fit_regressor(encode_windows(shown, place, table), targets, seed)
     return [expand_to_phones(fitted.coefs_[0], table, shown.shape[1]), *fitted.coefs_[1:]], fitted.intercepts_
 
 
-def _fit_regressor(inputs: Any, wanted: Any, seed: int) -> Any:
+def _fit_regressor(inputs: Any, targets: Any, seed: int) -> Any:
     try:
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.neural_network import MLPRegressor
@@ -111,4 +111,4 @@ def _fit_regressor(inputs: Any, wanted: Any, seed: int) -> Any:
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # training ends after `MAX_EPOCHS`
-        return network.fit(inputs, wanted)
+        return network.fit(inputs, targets)

@@ -153,18 +153,18 @@ def blend_trajectory(selection: TokenSelection, exemplars: ExemplarModel, *, fps
     """
     frame_times = np.arange(n_frames) / fps
     n_instants = int(np.ceil(max(selection.phones.end, frame_times[-1]) * blending.CLOCK_HZ)) + 2
-    made = _blend_motion(selection.targets, selection.found, exemplars, n_instants, selection.options)
-    return Trajectory(exemplars.channels, read_at_frames(made, selection.phones, frame_times, exemplars.rest), fps)
+    motion = _blend_motion(selection.targets, selection.found, exemplars, n_instants, selection.options)
+    return Trajectory(exemplars.channels, read_at_frames(motion, selection.phones, frame_times, exemplars.rest), fps)
 
 
 def read_at_frames(
-    made: NDArray[np.float32], phones: PhoneSequence, times: NDArray[np.float64], rest: NDArray[np.float32]
+    motion: NDArray[np.float32], phones: PhoneSequence, times: NDArray[np.float64], rest: NDArray[np.float32]
 ) -> NDArray[np.float32]:
     """Resample motion (n, D) at `CLOCK_HZ` to T times (T, D), blended with the rest pose in silence."""
     at = times * blending.CLOCK_HZ
     low = at.astype(np.int64)
     part = (at - low)[:, None].astype(np.float32)
-    values = (1 - part) * made[low] + part * made[low + 1]
+    values = (1 - part) * motion[low] + part * motion[low + 1]
     pull = rest_weights(phones, times)[:, None].astype(np.float32)
     drawn: NDArray[np.float32] = (1 - pull) * values + pull * rest
     return drawn

@@ -185,19 +185,21 @@ def build_field(
     axes = _principal_axes(_history_windows(scaled, weighted, usable[::AXES_STRIDE], options.history))
     tree = build_tree(_history_windows(scaled, weighted, usable, options.history) @ axes.T)
     tree.order[:] = usable[tree.order]
-    made = Field(scaled, weighted, starts, axes, tree, scale, weights, 1.0, options)
-    return replace(made, median_distance=_median_nearest_distance(made, usable))
+    field = Field(scaled, weighted, starts, axes, tree, scale, weights, 1.0, options)
+    return replace(field, median_distance=_median_nearest_distance(field, usable))
 
 
-def _median_nearest_distance(made: Field, usable: NDArray[np.int64]) -> float:
+def _median_nearest_distance(field: Field, usable: NDArray[np.int64]) -> float:
     moments = usable[np.linspace(0, len(usable) - 1, min(N_DISTANCE_SAMPLES, len(usable))).astype(int)]
     away = np.zeros(len(moments))
-    nearest_distances(_field_arrays(made), _tree_arrays(made.tree), made.axes, made.options.history, (moments, away))
+    nearest_distances(
+        _field_arrays(field), _tree_arrays(field.tree), field.axes, field.options.history, (moments, away)
+    )
     return max(float(np.median(away[np.isfinite(away)])) if np.isfinite(away).any() else 1.0, 1e-9)
 
 
-def _field_arrays(made: Field) -> tuple[Float32Array, Float32Array, NDArray[np.int32]]:
-    return made.values, made.prosody, made.starts
+def _field_arrays(field: Field) -> tuple[Float32Array, Float32Array, NDArray[np.int32]]:
+    return field.values, field.prosody, field.starts
 
 
 def _tree_arrays(tree: KdTree) -> tuple[NDArray[Any], ...]:
@@ -218,9 +220,9 @@ def _principal_axes(windows: Float32Array) -> Float32Array:
     return np.ascontiguousarray(vectors[:, ::-1][:, :N_SEARCH_AXES].T, np.float32)
 
 
-def _no_recent_jumps(made: Field) -> NDArray[np.int64]:
+def _no_recent_jumps(field: Field) -> NDArray[np.int64]:
     """Empty list of jump targets; shorter for short recordings, so that some moment can always be chosen."""
-    return np.full(min(made.options.memory, len(made.tree.order) // (8 * MIN_MOMENT_GAP)), -MIN_MOMENT_GAP, np.int64)
+    return np.full(min(field.options.memory, len(field.tree.order) // (8 * MIN_MOMENT_GAP)), -MIN_MOMENT_GAP, np.int64)
 
 
 def _spring(settle_s: float) -> tuple[np.float32, np.float32]:
@@ -265,8 +267,8 @@ def sample_field(
     chances : (n,)
         Uniform random numbers in [0, 1), one for each frame.
     """
-    made = sample_field_moments(field, state, prosody, chances)
-    return made.values, made.state
+    sample = sample_field_moments(field, state, prosody, chances)
+    return sample.values, sample.state
 
 
 def sample_field_moments(

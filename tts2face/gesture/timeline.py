@@ -94,10 +94,10 @@ class Timeline:
         """Style of a feature at each of T times, without blending; `default` if none is requested."""
         seconds = np.atleast_1d(np.asarray(times, np.float64))
         base = self.style.get(check_feature(feature), default)
-        mine = [span for span in self.spans if span.feature == feature]
-        at = np.searchsorted([span.start for span in mine], seconds, side="right") - 1
+        spans = [span for span in self.spans if span.feature == feature]
+        at = np.searchsorted([span.start for span in spans], seconds, side="right") - 1
         return tuple(
-            mine[k].style if k >= 0 and second < mine[k].end else base
+            spans[k].style if k >= 0 and second < spans[k].end else base
             for k, second in zip(at.tolist(), seconds.tolist(), strict=True)
         )
 
