@@ -26,7 +26,7 @@ N_SHOWN = 3  # sentences of each kind
 WIDTH, HEIGHT = 1100, 236  # px of a plot
 N_BINS = 30
 ABOUT = {
-    False: "{n_test} held-out utterances, {n_train} training utterances; true phone edges.",
+    False: "{n_test} held-out utterances, {n_train} training utterances; recorded phone edges.",
     True: "{n_test} utterances of another talker with their own phone edges, {n_train} training utterances; each "
     "talker's curves are z-scored over the talker's speech.",
 }
@@ -42,9 +42,9 @@ def evaluation_page(result: Evaluation, runs: Sequence[SplitResult]) -> str:
     seen = SHOWN if SHOWN in compared else compared[-1]
     about = ABOUT[result.is_across].format(n_test=result.n_test, n_train=result.n_train)
     return page(
-        "Accuracy against real lips",
+        "Accuracy of synthesised lips",
         [
-            f"<p>{about} In brackets: {CONFIDENCE:.0%} bootstrap intervals over utterances.</p>",
+            f"<p>{about} Parentheses: {CONFIDENCE:.0%} bootstrap intervals over utterances.</p>",
             _figures(result.scores),
             *_own_durations(result.own),
             *_folds(result),

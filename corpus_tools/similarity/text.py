@@ -111,7 +111,7 @@ def _reliability(split: Reliability | None) -> dict[str, Any] | None:
         "mean": round(split.mean, 4),
         "spearman_brown": round(split.full_length_reliability, 4),
         "halves": _round_values(split.correlations),
-        "halves_asked": split.n_requested,
+        "halves_requested": split.n_requested,
         "phones_compared": split.n_phones.tolist(),
         "phones": dict(zip(split.phones, _round_values(split.per_phone), strict=True)),
         "left_out": list(split.left_out),

@@ -25,7 +25,7 @@ import sys
 from pathlib import Path
 from corpus_tools.run_options import RunOptions
 from corpus_tools.recordings.observe import observe
-observe(Path(sys.argv[1]), effort=RunOptions(Path(sys.argv[2]), 1, Path(sys.argv[3])))
+observe(Path(sys.argv[1]), run_options=RunOptions(Path(sys.argv[2]), 1, Path(sys.argv[3])))
 """
 
 
