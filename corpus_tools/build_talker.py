@@ -25,7 +25,7 @@ from tts2face.video.landmark_models import find_bundle
 
 PROVENANCE = "provenance.json"  # in the folder of recordings: their sources and licence
 PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
-MIN_STATEMENT_WORDS = 3  # shorter statements are taken for typing errors
+MIN_STATEMENT_WORDS = 3  # shorter statements are treated as typing errors
 NOT_STATED = "not stated"
 READING_STAGE = "reading recordings"  # name of the first stage
 CONTENT_WITH_PICTURES = (

@@ -26,7 +26,7 @@ class SpokenTokens:
     inventory : Q labels
         Silence is one of them.
     samples : (N, S, D)
-        Speech parameters of each token at S instants, as `phone_similarity` takes them.
+        Speech parameters of each token at S instants, in the form of `phone_similarity`.
     phone, utterance, word : (N,)
         Index into `inventory`; of the talker's utterance; of the different words, `NO_WORD` outside them.
     spread : (D,)

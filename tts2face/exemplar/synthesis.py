@@ -148,8 +148,9 @@ def blend_trajectory(selection: TokenSelection, exemplars: ExemplarModel, *, fps
 
     Notes
     -----
-    Time and memory grow linearly with the number of phones. The motion is made on a clock of its own and then read at
-    the frames, so that frame rates agree. In silence farther than `REST_FROM_S` from speech the face is at rest.
+    Time and memory grow linearly with the number of phones. The motion is computed at `CLOCK_HZ` and interpolated at
+    the frames, so that it does not depend on the frame rate. In silence farther than `REST_FROM_S` from speech the face
+    is at rest.
     """
     frame_times = np.arange(n_frames) / fps
     n_instants = int(np.ceil(max(selection.phones.end, frame_times[-1]) * blending.CLOCK_HZ)) + 2

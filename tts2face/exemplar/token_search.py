@@ -31,8 +31,8 @@ class ContextIndex:
 
     The tokens ``order[group_first[g]:group_first[g + 1]]`` form group g, the shortest first; the groups
     ``phone_first[p]:phone_first[p + 1]`` belong to phone p. ``likeness[g, c, q]`` is the highest similarity of label q
-    to what any token of group g has in context column c: it bounds a group's scores from above, and so do durations,
-    the farther from the wanted one.
+    to what any token of group g has in context column c: together with the difference of durations it bounds the
+    scores of a group from above.
     """
 
     order: NDArray[np.int32]
@@ -178,12 +178,12 @@ def _search_groups(query, index, likeness, rule, tokens, scores):  # type: ignor
 
 @kernel
 def _search_group(target, group, corpus, rule, found):  # type: ignore[no-untyped-def]
-    """Score the tokens of a group from the wanted duration to shorter and to longer ones, as long as they can win."""
+    """Score the tokens of a group outwards from the query's duration while they can enter the ranking."""
     context, durations, bound = target
     token_contexts, token_durations = corpus
     tokens, scores = found
     low, high = 0, len(group)
-    while low < high:  # the first token that is not shorter than wanted
+    while low < high:  # the first token that is not shorter than the query
         middle = (low + high) // 2
         if token_durations[group[middle], 1] < durations[1]:
             low = middle + 1

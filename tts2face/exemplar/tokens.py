@@ -24,7 +24,7 @@ class Tokens:
         Index into `inventory`, index of the talker's utterance.
     spans : (N, 4)
         Seconds on the utterance's clock: where the previous phone begins, this one begins, this one ends, the next one
-        ends. Silence is cut to the `PAUSE_REACH_S` beside speech, and so is the reach into a neighbour.
+        ends. Silence is limited to the `PAUSE_REACH_S` next to speech, as is the overlap with a neighbour.
     context : (N, 2 MAX_CONTEXT)
         Labels around the token: left at distance 1, right at 1, left at 2, ...; `SILENCE` beyond the utterance.
     frames, first_frame : (F, D), (U + 1,)
@@ -83,8 +83,8 @@ def phone_contexts(phone: NDArray[np.int32], utterance: NDArray[np.int32], silen
 def spoken_spans(phones: tuple[str, ...], edges: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N, 4) seconds at which the previous phone begins, each phone begins and ends, and the next one ends.
 
-    A silence at either end of the utterance keeps only the `PAUSE_REACH_S` beside speech; a neighbour is reached into
-    by at most that much.
+    A silence at either end of the utterance keeps only the `PAUSE_REACH_S` next to speech; the overlap with a
+    neighbour has at most that length.
     """
     starts, ends = edges[:-1].copy(), edges[1:].copy()
     if len(phones) > 1:

@@ -90,7 +90,7 @@ class Contents:
             anything(self.header[key], f"{where}: {_abbreviate(key)}")
 
     def only_known(self) -> None:
-        """Check that there are no arrays besides those checked before."""
+        """Check that there are no other arrays than those already checked."""
         unknown = sorted(self.arrays.keys() - self.known)
         if unknown:
             self.fail(f"holds the array {_abbreviate(unknown[0])}, which no {self.kind} has")
