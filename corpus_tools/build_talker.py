@@ -176,8 +176,8 @@ def add_audio_maps(
 
 def _reading_metadata(kept: Sequence[Observation]) -> dict[str, Any]:
     """Metadata about the recognition of phones and the correction of delays."""
-    recognised = [seen.name for seen in kept if seen.is_recognised]
-    lags = {seen.video.name: seen.quality.lag for seen in kept if seen.quality.lag}
+    recognised = [observation.name for observation in kept if observation.is_recognised]
+    lags = {observation.video.name: observation.quality.lag for observation in kept if observation.quality.lag}
     return {
         **({"phones_recognised": recognised} if recognised else {}),
         **({"sound_late_s": lags} if lags else {}),

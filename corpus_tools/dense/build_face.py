@@ -84,21 +84,21 @@ def build_face(
     stated = read_provenance(recordings / PROVENANCE, must_exist=False)
     eyes = CachedTracker(run_options.folder(), find_bundle(run_options.model))
     report = on_progress or (lambda done, of: None)
-    seen = track_videos(videos, eyes, lambda done, of: report(done, 2 * of))
+    landmarks = track_videos(videos, eyes, lambda done, of: report(done, 2 * of))
     head = read_face(find_file(SOURCE_FACE, "face"))
-    talker = resting_landmarks(seen)
+    talker = resting_landmarks(landmarks)
     rest = face_landmarks(head, head.vertices)[:N_MESH_LANDMARKS]
     target = align_to_head(talker, rest)
     used = np.flatnonzero(select_consistent_landmarks(rest, correct_lips_and_lids(rest, target)))
     shaped = adapt_head(head, talker)
     canvas = build_canvas(shaped)
     fit = build_picture_fitter(shaped, canvas.opened, used)
-    model = dense_model(shaped, mode_fitter(shaped, used), seen, talker, n_modes) if n_modes else None
+    model = dense_model(shaped, mode_fitter(shaped, used), landmarks, talker, n_modes) if n_modes else None
     painting = average_skin_colours(
         shaped,
         canvas,
         fit,
-        seen,
+        landmarks,
         lambda done, of: report(len(videos) + done * len(videos) // of, 2 * len(videos)),
     )
     face = paint_skin(shaped, canvas, painting)
@@ -118,4 +118,4 @@ def build_face(
     write_face(out, replace(face, metadata=metadata))
     reached = face_landmarks(shaped, shaped.vertices)[:N_MESH_LANDMARKS]
     again = align_to_head(talker, reached)
-    return BuiltFace(len(seen), len(videos), float(np.linalg.norm(again - reached, axis=1)[used].mean()), model)
+    return BuiltFace(len(landmarks), len(videos), float(np.linalg.norm(again - reached, axis=1)[used].mean()), model)

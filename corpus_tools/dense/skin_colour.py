@@ -136,10 +136,13 @@ def sample_picture(picture: NDArray[np.uint8], places: Floats) -> tuple[Floats, 
 
 def hair_vertices(face: Face, fit: PictureFitter, normals: Floats) -> NDArray[np.int64]:
     """Vertices in the hair above the forehead that are visible from the front."""
-    away = face.vertices - fit.marks[FOREHEAD_TOP]
+    offset = face.vertices - fit.marks[FOREHEAD_TOP]
     low, high, half = HAIR_REGION_MM
     is_hair = (
-        (away[:, 1] > low) & (away[:, 1] < high) & (np.abs(away[:, 0]) < half) & (normals[:, 2] > FACING_COSINES[0])
+        (offset[:, 1] > low)
+        & (offset[:, 1] < high)
+        & (np.abs(offset[:, 0]) < half)
+        & (normals[:, 2] > FACING_COSINES[0])
     )
     return np.flatnonzero(is_hair)
 

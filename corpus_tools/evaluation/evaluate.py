@@ -41,9 +41,9 @@ class SpeakerScale:
     def of(cls, observations: Sequence[Observation]) -> "SpeakerScale":
         """Statistics of one person's recordings over speech frames."""
         parts = []
-        for seen in observations:
-            here = speech_frames(seen.phones, len(seen.landmarks), seen.fps)
-            parts.append(LipCurves.of(seen.landmarks[here]).values())
+        for observation in observations:
+            here = speech_frames(observation.phones, len(observation.landmarks), observation.fps)
+            parts.append(LipCurves.of(observation.landmarks[here]).values())
         frames = np.concatenate(parts)
         return cls(frames.mean(axis=0), np.maximum(frames.std(axis=0), 1e-9))
 
@@ -151,10 +151,10 @@ def evaluate_split(
 ) -> SplitResult:
     """Learn a talker from `train` and synthesise the motion of `test` by every method."""
     leak = fit_pose_correction(train)
-    train, test = ([leak.apply(seen) for seen in part] for part in (train, test))
+    train, test = ([leak.apply(observation) for observation in part] for part in (train, test))
     talker = _train_talker(train)
     methods = build_methods(talker, options)
-    real = tuple(ReferenceUtterance.of(seen, talker.model) for seen in test)
+    real = tuple(ReferenceUtterance.of(observation, talker.model) for observation in test)
     voiced = speak_references(voice, real) if voice is not None else ()
     synthesised, spent, own = {}, {}, {}
     for number, (name, method) in enumerate(methods.items()):
@@ -191,7 +191,9 @@ def evaluate_across_talkers(
     train, others = correct_pose(train), correct_pose(others)
     talker = _train_talker(train)
     own_scale, other_scale = SpeakerScale.of(train), SpeakerScale.of(others)
-    real = tuple(standardise_reference(ReferenceUtterance.of(seen, talker.model), other_scale) for seen in others)
+    real = tuple(
+        standardise_reference(ReferenceUtterance.of(observation, talker.model), other_scale) for observation in others
+    )
     synthesised, spent = {}, {}
     methods = build_methods(talker, options)
     for number, (name, method) in enumerate(methods.items()):

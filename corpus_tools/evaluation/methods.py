@@ -52,11 +52,11 @@ def mean_pose_method(talker: Talker, voice: ExemplarModel) -> SynthesisMethod:
     """Baseline: linear interpolation between the mean poses of phones, placed at their middles."""
     n_speech, inventory = talker.model.n_speech, voice.tokens.inventory
     poses: dict[str, list[NDArray[np.float64]]] = {label: [] for label in inventory}
-    for spoken in talker.utterances:
-        frame_times = np.arange(len(spoken.shape)) / talker.fps
-        middles = (spoken.phones.edges[:-1] + spoken.phones.edges[1:]) / 2
-        read = np.stack([np.interp(middles, frame_times, spoken.shape[:, d]) for d in range(n_speech)], axis=1)
-        for label, pose in zip(spoken.phones.phones, read, strict=True):
+    for utterance in talker.utterances:
+        frame_times = np.arange(len(utterance.shape)) / talker.fps
+        middles = (utterance.phones.edges[:-1] + utterance.phones.edges[1:]) / 2
+        read = np.stack([np.interp(middles, frame_times, utterance.shape[:, d]) for d in range(n_speech)], axis=1)
+        for label, pose in zip(utterance.phones.phones, read, strict=True):
             poses[label].append(pose)
     mean = {label: np.mean(seen, axis=0) for label, seen in poses.items() if seen}
 

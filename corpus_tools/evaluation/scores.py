@@ -168,14 +168,14 @@ def compute_scores(
 
 
 def _utterance_statistics(comparison: UtteranceComparison, limits: Thresholds) -> UtteranceStatistics:
-    one, seen, n, here = comparison.real, comparison.curves, len(comparison.spread), comparison.real.evaluated
+    one, curves, n, here = comparison.real, comparison.curves, len(comparison.spread), comparison.real.evaluated
     phones, fps = one.observation.phones, one.observation.fps
     real, synthesised = one.parameters[here, :n], comparison.synthesised[here, :n]
-    peaks = [measures.peak_times(curve, phones, fps) for curve in (one.curves.opening, seen.opening)]
+    peaks = [measures.peak_times(curve, phones, fps) for curve in (one.curves.opening, curves.opening)]
     offsets = peaks[1] - peaks[0]
     return UtteranceStatistics(
-        _curve_moments(one.curves.opening[here], seen.opening[here]),
-        _curve_moments(one.curves.width[here], seen.width[here]),
+        _curve_moments(one.curves.opening[here], curves.opening[here]),
+        _curve_moments(one.curves.width[here], curves.width[here]),
         measures.rmse_z(real, synthesised, comparison.spread),
         measures.warping_cost(real, synthesised, comparison.spread, round(measures.DTW_BAND_S * fps)),
         _free_cost(comparison),
@@ -196,19 +196,19 @@ def _free_cost(comparison: UtteranceComparison) -> float | None:
 def _event_counts(comparison: UtteranceComparison, limits: Thresholds) -> Floats:
     """(4, 2) numbers of events and of opportunities, in the phones of the time axis of the synthesis."""
     own, fps = comparison.own, comparison.real.observation.fps
-    phones, seen = (own.phones, own.curves) if own else (comparison.real.observation.phones, comparison.curves)
+    phones, curves = (own.phones, own.curves) if own else (comparison.real.observation.phones, comparison.curves)
 
     def events(curve: NDArray[np.floating], labels: str, limit: float) -> tuple[float, float]:
         least = measures.min_openings(curve, phones, fps, PHONE_CLASSES[labels])
         return float((least <= limit).sum()), float(len(least))
 
-    middles = measures.midpoint_openings(seen.opening, phones, fps)
+    middles = measures.midpoint_openings(curves.opening, phones, fps)
     return np.array(
         [
-            events(seen.opening, "bilabial", limits.closed),
+            events(curves.opening, "bilabial", limits.closed),
             (float((middles <= limits.closed).sum()), float(len(middles))),
-            events(seen.opening, "labiodental", limits.labiodental),
-            events(seen.width, "rounded", limits.rounded),
+            events(curves.opening, "labiodental", limits.labiodental),
+            events(curves.width, "rounded", limits.rounded),
         ]
     )
 
@@ -267,34 +267,39 @@ def _weighted_medians(weights: Floats, offsets: Sequence[Floats]) -> Floats:
 
 
 def _class_scores(comparisons: Sequence[UtteranceComparison]) -> list[ClassScore]:
-    classes, away, opening = [], [], []
+    classes, errors, opening = [], [], []
     for each in comparisons:
         one, here, n = each.real, each.real.evaluated, len(each.spread)
         classes.append(one.classes[here])
-        away.append((each.synthesised - one.parameters)[here, :n] / each.spread)
+        errors.append((each.synthesised - one.parameters)[here, :n] / each.spread)
         opening.append((each.curves.opening - one.curves.opening)[here])
-    return _score_classes(np.concatenate(classes), np.concatenate(away), np.concatenate(opening))
+    return _score_classes(np.concatenate(classes), np.concatenate(errors), np.concatenate(opening))
 
 
-def _score_classes(classes: NDArray[np.str_], away: NDArray[np.float32], opening: Floats) -> list[ClassScore]:
+def _score_classes(classes: NDArray[np.str_], errors: NDArray[np.float32], opening: Floats) -> list[ClassScore]:
     found = []
     for name in (*PHONE_CLASSES, OTHER_CLASS):
         here = classes == name
         if here.any():
-            rmse = float(np.sqrt(np.square(away[here]).mean()))
+            rmse = float(np.sqrt(np.square(errors[here]).mean()))
             error, bias = float(np.abs(opening[here]).mean()), float(opening[here].mean())
             found.append(ClassScore(name, int(here.sum()), rmse, error, bias))
     return found
 
 
 def _utterance_score(tally: UtteranceStatistics, comparison: UtteranceComparison) -> UtteranceScore:
-    one, seen, here, curves = comparison.real, comparison.curves, comparison.real.evaluated, comparison.real.curves
+    one, synthesised, here, recorded = (
+        comparison.real,
+        comparison.curves,
+        comparison.real.evaluated,
+        comparison.real.curves,
+    )
     return UtteranceScore(
         one.observation.name,
-        measures.correlation(curves.opening[here], seen.opening[here]),
-        measures.correlation(curves.width[here], seen.width[here]),
+        measures.correlation(recorded.opening[here], synthesised.opening[here]),
+        measures.correlation(recorded.width[here], synthesised.width[here]),
         tally.rmse_z,
         tally.dtw_cost,
-        measures.range_ratio(curves.opening[here], seen.opening[here]),
+        measures.range_ratio(recorded.opening[here], synthesised.opening[here]),
         int(tally.opening[0]),
     )

@@ -84,7 +84,7 @@ def map_tracks(
     """
     if missing := [one.observation.name for one in real if one.observation.name not in tracks]:
         raise InputError(f"the tracks lack {missing[0]} ({len(missing)} of {len(real)} held-out utterances); add them")
-    known = [spoken for spoken in talker.utterances if spoken.name in tracks]
+    known = [utterance for utterance in talker.utterances if utterance.name in tracks]
     if len(known) < MIN_TRAINING_UTTERANCES:
         raise InputError(
             f"the tracks hold {len(known)} training utterances; their linear map needs {MIN_TRAINING_UTTERANCES}"

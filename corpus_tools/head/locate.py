@@ -111,14 +111,14 @@ def intersect_ray(origin: Floats, ray: Floats, corners: Floats) -> tuple[Floats,
     depth = (beside * two).sum(axis=1) / determinant
     inside = (second >= 0) & (third >= 0) & (second + third <= 1) & (depth > 0)
     if not inside.any():
-        away = np.linalg.norm(np.cross(off, ray), axis=1)
-        return corners[int(away.argmin()), 0], 0.0
+        distances = np.linalg.norm(np.cross(off, ray), axis=1)
+        return corners[int(distances.argmin()), 0], 0.0
     first = int(np.where(inside, depth, np.inf).argmin())
     along = -off @ ray
     grazed = along < depth[first] - GRAZE_MM[1]
-    away = np.linalg.norm(np.cross(off[grazed], ray), axis=1)
-    if away.size and away.min() < GRAZE_MM[0]:  # past the outline of the face onto what lies far behind it
-        return corners[grazed][int(away.argmin()), 0], 1.0
+    distances = np.linalg.norm(np.cross(off[grazed], ray), axis=1)
+    if distances.size and distances.min() < GRAZE_MM[0]:  # past the outline of the face onto what lies far behind it
+        return corners[grazed][int(distances.argmin()), 0], 1.0
     normal = np.cross(one[first], two[first])
     return origin + depth[first] * ray, -float(normal @ ray) / max(float(np.linalg.norm(normal)), 1e-30)
 

@@ -39,7 +39,7 @@ ABOUT_OWN = (
 def evaluation_page(result: Evaluation, runs: Sequence[SplitResult]) -> str:
     """The page (HTML)."""
     compared = [one.method for one in result.scores if one.method != CEILING_METHOD]
-    seen = SHOWN if SHOWN in compared else compared[-1]
+    method = SHOWN if SHOWN in compared else compared[-1]
     about = ABOUT[result.is_across].format(n_test=result.n_test, n_train=result.n_train)
     return page(
         "Accuracy of synthesised lips",
@@ -58,7 +58,7 @@ def evaluation_page(result: Evaluation, runs: Sequence[SplitResult]) -> str:
                     if one.method != CEILING_METHOD
                 }
             ),
-            *_sentences(result, runs, seen, PLAIN if PLAIN in compared and seen != PLAIN else None),
+            *_sentences(result, runs, method, PLAIN if PLAIN in compared and method != PLAIN else None),
         ],
     )
 

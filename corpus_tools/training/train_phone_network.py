@@ -38,26 +38,28 @@ def add_phone_network(talker: Talker, *, on_progress: Progress | None = None) ->
     BackendError
         scikit-learn is missing.
     """
-    if sum(len(spoken.shape) for spoken in talker.utterances) < MIN_FRAMES:
+    if sum(len(utterance.shape) for utterance in talker.utterances) < MIN_FRAMES:
         return talker
-    inventory = tuple(sorted({label for spoken in talker.utterances for label in spoken.phones.phones} | {SILENCE}))
+    inventory = tuple(
+        sorted({label for utterance in talker.utterances for label in utterance.phones.phones} | {SILENCE})
+    )
     n_speech = talker.model.n_speech
     spread = np.maximum(talker.model.spread[:n_speech], 1e-6)
     shown, place, targets = [], [], []
-    for spoken in talker.utterances:
-        times = np.arange(len(spoken.shape)) / talker.fps
-        near = (times >= spoken.phones.edges[1] - SILENCE_MARGIN_S) & (
-            times <= spoken.phones.edges[-2] + SILENCE_MARGIN_S
+    for utterance in talker.utterances:
+        times = np.arange(len(utterance.shape)) / talker.fps
+        near = (times >= utterance.phones.edges[1] - SILENCE_MARGIN_S) & (
+            times <= utterance.phones.edges[-2] + SILENCE_MARGIN_S
         )
-        labels, where = window_features(spoken.phones, times[near], inventory)
+        labels, where = window_features(utterance.phones, times[near], inventory)
         shown.append(labels)
         place.append(where)
-        targets.append(spoken.shape[near, :n_speech] / spread)
-    seen = np.concatenate(shown), np.concatenate(place)
+        targets.append(utterance.shape[near, :n_speech] / spread)
+    windows = np.concatenate(shown), np.concatenate(place)
     tables = [np.eye(len(inventory), dtype=np.float32)] * N_BY_LABEL + [feature_table(inventory)] * N_BY_FEATURES
     networks = []
     for seed, table in enumerate(tables):
-        networks.append(_train_network(*seen, np.concatenate(targets), table, seed))
+        networks.append(_train_network(*windows, np.concatenate(targets), table, seed))
         if on_progress:
             on_progress(seed + 1, len(tables))
     weights, biases = (_stack_layers(layers) for layers in zip(*networks, strict=True))

@@ -92,8 +92,8 @@ def find_contacts(
     sorted_weights = np.take_along_axis(weights, order, axis=1)
     closer_than = np.cumsum(sorted_weights, axis=1) - sorted_weights
     kept = np.zeros_like(weights)
-    tells = closer_than < np.array([rule.pose_share for rule in rules])[:, None]
-    np.put_along_axis(kept, order, np.where(tells, sorted_weights, 0.0), axis=1)
+    is_used = closer_than < np.array([rule.pose_share for rule in rules])[:, None]
+    np.put_along_axis(kept, order, np.where(is_used, sorted_weights, 0.0), axis=1)
     kept /= kept.sum(axis=1, keepdims=True)
     poses = np.asarray(np.einsum("nk,nkd->nd", kept, tokens.frames[rows]), np.float32)
     present = (closer_than <= np.array([rule.enough for rule in rules])[:, None]) & (sorted_weights > 0)
@@ -155,7 +155,7 @@ def enforce_contacts(
             continue
         reach = int((CONTACT_HOLD_S / 2 + CONTACT_EASE_S) * rate_hz)
         here = slice(max(0, at - reach), min(len(kept), at + reach + 1))
-        away = np.maximum(np.abs(times[here] - times[at]) - CONTACT_HOLD_S / 2, 0.0) / CONTACT_EASE_S
-        pull = (0.5 + 0.5 * np.cos(np.pi * np.minimum(away, 1.0)))[:, None].astype(np.float32)
+        distance = np.maximum(np.abs(times[here] - times[at]) - CONTACT_HOLD_S / 2, 0.0) / CONTACT_EASE_S
+        pull = (0.5 + 0.5 * np.cos(np.pi * np.minimum(distance, 1.0)))[:, None].astype(np.float32)
         kept[here] += pull * (pose - kept[here])
     return kept

@@ -52,8 +52,8 @@ def substitute_phones(label: str, inventory: tuple[str, ...]) -> tuple[str, ...]
 def build_targets(phones: PhoneSequence, inventory: tuple[str, ...]) -> Targets:
     """Targets of a phone sequence.
 
-    The time of a transparent phone is assigned to the next phone, or before silence to the last one.
-    A silence between speech that is longer than two reaches becomes two targets, one after the speech and one before it.
+    The time of a transparent phone is assigned to the next phone, or before silence to the last one. A
+    silence between speech that is longer than two reaches becomes two targets, one after the speech and one before it.
 
     Raises
     ------

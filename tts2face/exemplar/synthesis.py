@@ -72,7 +72,7 @@ def build_exemplar_model(talker: Talker) -> ExemplarModel:
             np.ascontiguousarray(model.basis[:n_speech, upper] - model.basis[:n_speech, lower]),
         ),
         speech_channels(model),
-        tuple(spoken.name for spoken in talker.utterances),
+        tuple(utterance.name for utterance in talker.utterances),
         talker.network,
     )
 
@@ -80,12 +80,12 @@ def build_exemplar_model(talker: Talker) -> ExemplarModel:
 def mean_speaking_pose(talker: Talker) -> NDArray[np.float32]:
     """(D,) mean speech parameters of the frames between the first phone and the last of every utterance."""
     n_speech, parts = talker.model.n_speech, []
-    for spoken in talker.utterances:
-        sounding = [at for at, label in enumerate(spoken.phones.phones) if label != SILENCE]
+    for utterance in talker.utterances:
+        sounding = [at for at, label in enumerate(utterance.phones.phones) if label != SILENCE]
         if sounding:
-            edges = spoken.phones.edges
+            edges = utterance.phones.edges
             begin, end = (int(edges[at] * talker.fps) for at in (sounding[0], sounding[-1] + 1))
-            parts.append(spoken.shape[begin : end + 1, :n_speech])
+            parts.append(utterance.shape[begin : end + 1, :n_speech])
     frames = np.concatenate(parts) if parts else np.zeros((1, n_speech))
     return np.asarray(frames.mean(axis=0, dtype=np.float64), np.float32)
 
@@ -205,8 +205,8 @@ def rest_weights(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[n
     next_start = np.searchsorted(starts, times, side="right")
     ahead = np.append(starts, np.inf)[next_start] - times
     behind = times - np.concatenate([[-np.inf], ends])[next_start]
-    away = np.minimum(ahead, np.maximum(behind, 0.0))
-    pull = _smoothstep((away - RELEASE_FROM_S) / (REST_FROM_S - RELEASE_FROM_S))
+    distance = np.minimum(ahead, np.maximum(behind, 0.0))
+    pull = _smoothstep((distance - RELEASE_FROM_S) / (REST_FROM_S - RELEASE_FROM_S))
     last = times[-1]
     onset = np.clip(starts[0], MIN_EASE_S, REST_FROM_S)
     offset = np.clip(last - ends[-1], MIN_EASE_S, REST_FROM_S)

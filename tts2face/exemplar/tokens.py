@@ -50,20 +50,22 @@ class Tokens:
 def collect_tokens(talker: Talker) -> Tokens:
     """Tokens of all utterances of a talker, in the talker's order."""
     n_speech = talker.model.n_speech
-    labels = [phone for spoken in talker.utterances for phone in spoken.phones.phones]
+    labels = [phone for utterance in talker.utterances for phone in utterance.phones.phones]
     inventory = tuple(sorted({*labels, SILENCE}))
     number = {label: at for at, label in enumerate(inventory)}
     phone = np.array([number[label] for label in labels], np.int32)
-    counts = [len(spoken.phones) for spoken in talker.utterances]
+    counts = [len(utterance.phones) for utterance in talker.utterances]
     utterance = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
-    lengths = [len(spoken.shape) for spoken in talker.utterances]
+    lengths = [len(utterance.shape) for utterance in talker.utterances]
     return Tokens(
         inventory,
         phone,
         utterance,
-        np.concatenate([spoken_spans(spoken.phones.phones, spoken.phones.edges) for spoken in talker.utterances]),
+        np.concatenate(
+            [spoken_spans(utterance.phones.phones, utterance.phones.edges) for utterance in talker.utterances]
+        ),
         phone_contexts(phone, utterance, number[SILENCE]),
-        np.concatenate([spoken.shape[:, :n_speech] for spoken in talker.utterances]).astype(np.float32),
+        np.concatenate([utterance.shape[:, :n_speech] for utterance in talker.utterances]).astype(np.float32),
         np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
         talker.fps,
     )

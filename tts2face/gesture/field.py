@@ -191,11 +191,11 @@ def build_field(
 
 def _median_nearest_distance(field: Field, usable: NDArray[np.int64]) -> float:
     moments = usable[np.linspace(0, len(usable) - 1, min(N_DISTANCE_SAMPLES, len(usable))).astype(int)]
-    away = np.zeros(len(moments))
+    distances = np.zeros(len(moments))
     nearest_distances(
-        _field_arrays(field), _tree_arrays(field.tree), field.axes, field.options.history, (moments, away)
+        _field_arrays(field), _tree_arrays(field.tree), field.axes, field.options.history, (moments, distances)
     )
-    return max(float(np.median(away[np.isfinite(away)])) if np.isfinite(away).any() else 1.0, 1e-9)
+    return max(float(np.median(distances[np.isfinite(distances)])) if np.isfinite(distances).any() else 1.0, 1e-9)
 
 
 def _field_arrays(field: Field) -> tuple[Float32Array, Float32Array, NDArray[np.int32]]:
@@ -215,8 +215,8 @@ def _history_windows(
 
 
 def _principal_axes(windows: Float32Array) -> Float32Array:
-    away = (windows - windows.mean(axis=0)).astype(np.float64)
-    _, vectors = np.linalg.eigh(np.asarray(away.T @ away))
+    centred = (windows - windows.mean(axis=0)).astype(np.float64)
+    _, vectors = np.linalg.eigh(np.asarray(centred.T @ centred))
     return np.ascontiguousarray(vectors[:, ::-1][:, :N_SEARCH_AXES].T, np.float32)
 
 

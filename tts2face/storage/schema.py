@@ -68,9 +68,9 @@ class Contents:
         """Raise a DataError about the file."""
         refuse(f"{self.path}: {what}", self.kind)
 
-    def require(self, holds: bool, what: str) -> None:
+    def require(self, condition: bool, what: str) -> None:
         """Raise a DataError about the file unless a condition holds."""
-        if not holds:
+        if not condition:
             self.fail(what)
 
     def tensors(self, specs: Mapping[str, Tensor]) -> None:

@@ -98,7 +98,9 @@ class NeuralVoice:
 
         g2p = self._model.g2p
         phonemized = g2p.phonemize_tokens(g2p.tokenize(normalize(sentence)))
-        tokens = [_Token(token.text, self._known(token.phonemes), bool(token.whitespace)) for token in phonemized]
+        tokens = [
+            _Token(token.text, self._known_phones(token.phonemes), bool(token.whitespace)) for token in phonemized
+        ]
         unpronounced = [
             token.text
             for token in tokens
@@ -127,7 +129,7 @@ class NeuralVoice:
         label = NO_LETTER.sub("", word.text) or "word"
         return f"[{label}](/{segments_to_letters(word.segments)}/){word.after}"
 
-    def _known(self, letters: str | None) -> str:
+    def _known_phones(self, letters: str | None) -> str:
         """The letters that belong to the model's vocabulary."""
         return "".join(letter for letter in letters or "" if letter in self._model.vocab)
 
