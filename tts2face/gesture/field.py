@@ -185,8 +185,8 @@ def build_field(
     axes = _principal_axes(_history_windows(scaled, weighted, usable[::AXES_STRIDE], options.history))
     tree = build_tree(_history_windows(scaled, weighted, usable, options.history) @ axes.T)
     tree.order[:] = usable[tree.order]
-    field = Field(scaled, weighted, starts, axes, tree, scale, weights, 1.0, options)
-    return replace(field, median_distance=_median_nearest_distance(field, usable))
+    made = Field(scaled, weighted, starts, axes, tree, scale, weights, 1.0, options)
+    return replace(made, median_distance=_median_nearest_distance(made, usable))
 
 
 def _median_nearest_distance(field: Field, usable: NDArray[np.int64]) -> float:
@@ -215,14 +215,14 @@ def _history_windows(
 
 
 def _principal_axes(windows: Float32Array) -> Float32Array:
-    centred = (windows - windows.mean(axis=0)).astype(np.float64)
-    _, vectors = np.linalg.eigh(np.asarray(centred.T @ centred))
+    away = (windows - windows.mean(axis=0)).astype(np.float64)
+    _, vectors = np.linalg.eigh(np.asarray(away.T @ away))
     return np.ascontiguousarray(vectors[:, ::-1][:, :N_SEARCH_AXES].T, np.float32)
 
 
-def _no_recent_jumps(field: Field) -> NDArray[np.int64]:
+def _no_recent_jumps(made: Field) -> NDArray[np.int64]:
     """Empty list of jump targets; shorter for short recordings, so that some moment can always be chosen."""
-    return np.full(min(field.options.memory, len(field.tree.order) // (8 * MIN_MOMENT_GAP)), -MIN_MOMENT_GAP, np.int64)
+    return np.full(min(made.options.memory, len(made.tree.order) // (8 * MIN_MOMENT_GAP)), -MIN_MOMENT_GAP, np.int64)
 
 
 def _spring(settle_s: float) -> tuple[np.float32, np.float32]:

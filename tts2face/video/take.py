@@ -78,16 +78,14 @@ def read_take(
         if on_progress:
             on_progress(min(len(tracked), n_frames), n_frames)
     times, pixels = np.array([frame.time for frame in tracked]), np.array([frame.points for frame in tracked])
-    is_visible = np.isfinite(pixels[:, 0, 0])
-    if not is_visible.any():
+    seen = np.isfinite(pixels[:, 0, 0])
+    if not seen.any():
         raise DataError(f"{video} shows no face; film one from the front, in the light")
-    if is_visible.mean() < MIN_TRACKED_SHARE:
-        raise DataError(
-            f"{video} shows a face in {is_visible.sum()} of {len(is_visible)} frames; film it from the front"
-        )
-    scores = np.array([reader.blendshape_scores(points) for points in pixels[is_visible]])
-    points, first = resample_to_grid(_interpolate_frames(pixels[is_visible], times[is_visible], times), times, fps)
-    read, _ = resample_to_grid(_interpolate_frames(scores, times[is_visible], times), times, fps)
+    if seen.mean() < MIN_TRACKED_SHARE:
+        raise DataError(f"{video} shows a face in {seen.sum()} of {len(seen)} frames; film it from the front")
+    scores = np.array([reader.blendshape_scores(points) for points in pixels[seen]])
+    points, first = resample_to_grid(_interpolate_frames(pixels[seen], times[seen], times), times, fps)
+    read, _ = resample_to_grid(_interpolate_frames(scores, times[seen], times), times, fps)
     points, read = _align_to_start(points, first), _align_to_start(read, first)
     posed = remove_pose(points, fps)
     angles = head_angles(posed.rotations)
@@ -95,7 +93,7 @@ def read_take(
         raise DataError(f"{video} shows the face in profile; film it from the front")
     head = np.column_stack([angles, posed.translations])
     head -= np.median(head, axis=0)
-    n_missing = int((~is_visible).sum())
+    n_missing = int((~seen).sum())
     return Take(posed.landmarks, Trajectory(HEAD_CHANNELS, head, fps), Trajectory(BLENDSHAPES, read, fps), n_missing)
 
 
