@@ -156,17 +156,17 @@ def evaluate_split(
     methods = build_methods(talker, options)
     real = tuple(ReferenceUtterance.of(observation, talker.model) for observation in test)
     voiced = speak_references(voice, real) if voice is not None else ()
-    synthesised, spent, own = {}, {}, {}
+    synthesised, synthesis_s, own = {}, {}, {}
     for number, (name, method) in enumerate(methods.items()):
-        synthesised[name], spent[name] = _synthesise(method, real)
+        synthesised[name], synthesis_s[name] = _synthesise(method, real)
         if voiced:
             own[name] = _synthesise_own_durations(method, real, voiced, talker.model)
         if on_progress:
             on_progress(number + 1, len(methods))
     if tracks is not None:
-        synthesised[TRACKS_METHOD], spent[TRACKS_METHOD] = map_tracks(tracks, talker, real), 0.0
-    synthesised[CEILING_METHOD], spent[CEILING_METHOD] = tuple(one.parameters for one in real), 0.0
-    return SplitResult(talker, real, synthesised, spent, own)
+        synthesised[TRACKS_METHOD], synthesis_s[TRACKS_METHOD] = map_tracks(tracks, talker, real), 0.0
+    synthesised[CEILING_METHOD], synthesis_s[CEILING_METHOD] = tuple(one.parameters for one in real), 0.0
+    return SplitResult(talker, real, synthesised, synthesis_s, own)
 
 
 def evaluate_across_talkers(
@@ -194,10 +194,10 @@ def evaluate_across_talkers(
     real = tuple(
         standardise_reference(ReferenceUtterance.of(observation, talker.model), other_scale) for observation in others
     )
-    synthesised, spent = {}, {}
+    synthesised, synthesis_s = {}, {}
     methods = build_methods(talker, options)
     for number, (name, method) in enumerate(methods.items()):
-        synthesised[name], spent[name] = _synthesise(method, real)
+        synthesised[name], synthesis_s[name] = _synthesise(method, real)
         if on_progress:
             on_progress(number + 1, len(methods))
     limits = Thresholds.of(real)
@@ -209,12 +209,12 @@ def evaluate_across_talkers(
                 for one, values in zip(real, synthesised[name], strict=True)
             ],
             limits,
-            spent[name],
+            synthesis_s[name],
         )
         for name in methods
     )
     result = Evaluation(len(train), len(others), scores, is_across=True)
-    return result, (SplitResult(talker, real, synthesised, spent, scale=own_scale),)
+    return result, (SplitResult(talker, real, synthesised, synthesis_s, scale=own_scale),)
 
 
 def _train_talker(train: Sequence[Observation]) -> Talker:

@@ -65,7 +65,7 @@ class Scores:
     """Scores of a method over all held-out utterances: r and range of pooled frames, means or shares otherwise.
 
     ``figures`` are those of `FIGURES` by name, ``free_cost`` only with a voice's own durations;
-    ``real_time_factor`` is the time spent over the utterances' duration.
+    ``real_time_factor`` is the synthesis time divided by the duration of the utterances.
     """
 
     method: str
@@ -138,14 +138,14 @@ def available_figures(scores: Sequence[Scores]) -> tuple[tuple[str, str, int], .
     return tuple(figure for figure in FIGURES if all(figure[0] in one.figures for one in scores))
 
 
-def score_splits(method: str, splits: Sequence[SplitMotion], limits: Thresholds, spent: float = 0.0) -> Scores:
-    """Scores of a method over the utterances of all splits; synthesis took `spent` seconds."""
+def score_splits(method: str, splits: Sequence[SplitMotion], limits: Thresholds, synthesis_s: float = 0.0) -> Scores:
+    """Scores of a method over the utterances of all splits; synthesis took `synthesis_s` seconds."""
     comparisons = [
         UtteranceComparison(one, values, LipCurves.of(model.shapes(values)), speech_spread(model))
         for model, real, synthesised in splits
         for one, values in zip(real, synthesised, strict=True)
     ]
-    return compute_scores(method, comparisons, limits, spent)
+    return compute_scores(method, comparisons, limits, synthesis_s)
 
 
 def speech_spread(model: ShapeModel) -> NDArray[np.float32]:
@@ -154,15 +154,15 @@ def speech_spread(model: ShapeModel) -> NDArray[np.float32]:
 
 
 def compute_scores(
-    method: str, comparisons: Sequence[UtteranceComparison], limits: Thresholds, spent: float = 0.0
+    method: str, comparisons: Sequence[UtteranceComparison], limits: Thresholds, synthesis_s: float = 0.0
 ) -> Scores:
-    """Scores of a method over compared utterances; synthesis took `spent` seconds."""
+    """Scores of a method over compared utterances; synthesis took `synthesis_s` seconds."""
     tallies = [_utterance_statistics(one, limits) for one in comparisons]
     return Scores(
         method,
         _estimate_figures(tallies),
         tuple(_class_scores(comparisons)),
-        spent / sum(one.real.seconds for one in comparisons),
+        synthesis_s / sum(one.real.seconds for one in comparisons),
         tuple(_utterance_score(tally, one) for tally, one in zip(tallies, comparisons, strict=True)),
     )
 

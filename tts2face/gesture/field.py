@@ -125,7 +125,7 @@ class FieldState:
 
     Parameters
     ----------
-    shown, prosody : (h, D), (h, E)
+    motion, prosody : (h, D), (h, E)
         Motion and sound features of the last h generated frames, scaled and weighted as those of the field.
     moment
         Recorded frame that was used last, -1 for none.
@@ -137,7 +137,7 @@ class FieldState:
         Number of frames generated so far.
     """
 
-    shown: Float32Array
+    motion: Float32Array
     prosody: Float32Array
     moment: int
     offset: Float32Array
@@ -247,10 +247,10 @@ def initial_state(field: Field, chance: float) -> FieldState:
 
 def transfer_state(state: FieldState, before: Field, after: Field) -> FieldState:
     """Convert the state of a field to the scale of another style's field of the same feature."""
-    shown = state.shown * np.float32(before.scale / after.scale)
+    motion = state.motion * np.float32(before.scale / after.scale)
     prosody = state.prosody / np.maximum(before.weights, np.float32(1e-9)) * after.weights
     recent = _no_recent_jumps(after)
-    return FieldState(shown, prosody.astype(np.float32), -1, np.zeros_like(state.offset), recent, state.n_frames)
+    return FieldState(motion, prosody.astype(np.float32), -1, np.zeros_like(state.offset), recent, state.n_frames)
 
 
 def sample_field(
@@ -278,7 +278,7 @@ def sample_field_moments(
     if not len(chances):
         return FieldSample(np.zeros((0, state.offset.shape[1]), np.float32), np.zeros(0, np.int64), state)
     options, history = field.options, field.options.history
-    shown = np.concatenate([state.shown, np.zeros((len(chances), state.offset.shape[1]), np.float32)])
+    motion = np.concatenate([state.motion, np.zeros((len(chances), state.offset.shape[1]), np.float32)])
     sound = np.concatenate([state.prosody, (prosody * field.weights).astype(np.float32)])
     moments, offset, recent = np.zeros(len(chances), np.int64), state.offset.copy(), state.recent_jumps.copy()
     stiffness, fade = _spring(options.settle_s)
@@ -296,8 +296,8 @@ def sample_field_moments(
             fade,
             (options.apart, options.search_error),
         ),
-        (shown, sound, moments, offset, recent, state.moment, state.n_frames, chances),
+        (motion, sound, moments, offset, recent, state.moment, state.n_frames, chances),
     )
-    behind = shown[-history:].copy(), sound[-history:].copy(), int(moments[-1]), offset, recent
+    behind = motion[-history:].copy(), sound[-history:].copy(), int(moments[-1]), offset, recent
     after = FieldState(*behind, state.n_frames + len(chances))
-    return FieldSample(shown[history:] * np.float32(field.scale), moments, after)
+    return FieldSample(motion[history:] * np.float32(field.scale), moments, after)
