@@ -213,10 +213,8 @@ def _event_counts(comparison: UtteranceComparison, limits: Thresholds) -> Floats
     )
 
 
-def _curve_moments(real: Floats, synthesised: Floats) -> Floats:
-    return np.array(
-        [len(real), real.sum(), synthesised.sum(), real @ real, synthesised @ synthesised, real @ synthesised]
-    )
+def _curve_moments(a: Floats, b: Floats) -> Floats:
+    return np.array([len(a), a.sum(), b.sum(), a @ a, b @ b, a @ b])
 
 
 def _estimate_figures(tallies: Sequence[UtteranceStatistics]) -> dict[str, IntervalEstimate]:
@@ -288,12 +286,8 @@ def _score_classes(classes: NDArray[np.str_], errors: NDArray[np.float32], openi
 
 
 def _utterance_score(tally: UtteranceStatistics, comparison: UtteranceComparison) -> UtteranceScore:
-    one, synthesised, here, recorded = (
-        comparison.real,
-        comparison.curves,
-        comparison.real.evaluated,
-        comparison.real.curves,
-    )
+    one, synthesised = comparison.real, comparison.curves
+    here, recorded = one.evaluated, one.curves
     return UtteranceScore(
         one.observation.name,
         measures.correlation(recorded.opening[here], synthesised.opening[here]),

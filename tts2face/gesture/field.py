@@ -191,11 +191,10 @@ def build_field(
 
 def _median_nearest_distance(field: Field, usable: NDArray[np.int64]) -> float:
     moments = usable[np.linspace(0, len(usable) - 1, min(N_DISTANCE_SAMPLES, len(usable))).astype(int)]
-    distances = np.zeros(len(moments))
-    nearest_distances(
-        _field_arrays(field), _tree_arrays(field.tree), field.axes, field.options.history, (moments, distances)
-    )
-    return max(float(np.median(distances[np.isfinite(distances)])) if np.isfinite(distances).any() else 1.0, 1e-9)
+    queries = moments, np.zeros(len(moments))
+    nearest_distances(_field_arrays(field), _tree_arrays(field.tree), field.axes, field.options.history, queries)
+    distances = queries[1][np.isfinite(queries[1])]
+    return max(float(np.median(distances)) if len(distances) else 1.0, 1e-9)
 
 
 def _field_arrays(field: Field) -> tuple[Float32Array, Float32Array, NDArray[np.int32]]:
