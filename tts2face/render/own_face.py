@@ -117,7 +117,7 @@ class OwnFaceRenderer:
         if clip.motion.channels != self.channels[:n_channels] or n_channels < self.n_spoken:
             raise InputError(
                 "the clip's motion is not in the channels of this talker's own face; make the clip with a session "
-                "of this talker and face own"
+                "of this talker with face=self"
             )
         return np.pad(clip.motion.values, ((0, 0), (0, len(self.channels) - n_channels)))
 
