@@ -97,10 +97,10 @@ def _codes_of_names() -> dict[str, tuple[str, ...]]:
     return found | {name: (code,) for name, code in CODES_OF_NAMES.items() if code in known}
 
 
-def _close_codes(wanted: str) -> list[str]:
-    """Codes whose spelling or name is similar to `wanted`."""
+def _close_codes(query: str) -> list[str]:
+    """Codes whose spelling or name is similar to `query`."""
     names = _codes_of_names()
-    near = [code for name, codes in names.items() if len(wanted) > 2 and name.startswith(wanted) for code in codes]
-    near += [code for name in difflib.get_close_matches(wanted, names, n=3, cutoff=0.7) for code in names[name]]
-    near += difflib.get_close_matches(wanted, list(languages()), n=3, cutoff=0.6)
+    near = [code for name, codes in names.items() if len(query) > 2 and name.startswith(query) for code in codes]
+    near += [code for name in difflib.get_close_matches(query, names, n=3, cutoff=0.7) for code in names[name]]
+    near += difflib.get_close_matches(query, list(languages()), n=3, cutoff=0.6)
     return list(dict.fromkeys(near))[:MAX_HINTS]

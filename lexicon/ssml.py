@@ -128,7 +128,7 @@ class _SsmlReader:
     def read(self, text: str) -> MarkedText:
         """Parse the whole document."""
         self._parser.Parse(text.removeprefix("\ufeff").lstrip(), True)
-        return self._builder.build(self._language, spoken=self._base)
+        return self._builder.build(self._language, base_language=self._base)
 
     def _doctype(self, *_: object) -> None:
         raise InputError("a document type declaration is not supported; remove <!DOCTYPE ...>")
