@@ -1,1 +1,1 @@
-"""Doors for people: flags, progress bars, exit codes."""
+"""Command line: flags, progress bars, exit codes."""

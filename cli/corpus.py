@@ -75,7 +75,7 @@ def build(  # noqa: PLR0913 - one parameter a flag
             out,
             name=name,
             provenance=provenance,
-            effort=RunOptions(cache, jobs, model),
+            run_options=RunOptions(cache, jobs, model),
             consent=consent_fields,
             report=report,
             stages=stages or ignore_stage,
@@ -134,7 +134,7 @@ def face(  # noqa: PLR0913 - one parameter a flag
     with progress_bar("fitting videos") as on_progress:
         run_options = RunOptions(cache, None, model)
         result = build_face(
-            recordings, out, consent=consent_fields, n_modes=basis, effort=run_options, on_progress=on_progress
+            recordings, out, consent=consent_fields, n_modes=basis, run_options=run_options, on_progress=on_progress
         )
     if result.model is not None:
         dense_basis = result.model
@@ -196,7 +196,9 @@ def audio_maps(
 
     with stage_bar() as stages:
         run_options = RunOptions(cache, jobs, model)
-        result = add_audio_maps(recordings, load_talker(talker), out, effort=run_options, stages=stages or ignore_stage)
+        result = add_audio_maps(
+            recordings, load_talker(talker), out, run_options=run_options, stages=stages or ignore_stage
+        )
     audio_maps = ", ".join(f"{name} (features: {one.feature})" for name, one in result.audio_maps.items())
     write_message(f"wrote {out}: audio maps {audio_maps}")
 

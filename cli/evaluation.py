@@ -148,7 +148,7 @@ def _read_observations(folder: Path, run_options: "RunOptions") -> "tuple[Observ
     from corpus_tools.recordings.observe import observe
 
     with progress_bar(f"reading {folder.name}") as on_progress:
-        found = observe(folder, effort=run_options, on_progress=on_progress)
+        found = observe(folder, run_options=run_options, on_progress=on_progress)
     for refusal in found.refused:
         write_message(f"rejected {refusal.name}: {refusal.reason}")
     return found.kept

@@ -76,7 +76,7 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
             base=base,
             estimator=estimator,
             epsilon=epsilon,
-            effort=RunOptions(cache, jobs, model),
+            run_options=RunOptions(cache, jobs, model),
             stages=stages or ignore_stage,
         )
     for refusal in result.refused:

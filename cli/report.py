@@ -48,7 +48,7 @@ def similarity(  # noqa: PLR0913 - one parameter a flag
         analysis = write_similarity(talker, out, options, other=compare, labels=labels, on_progress=on_progress)
     write_message(
         f"wrote {out}: {len(analysis.table.phones)} phones, best number of classes {analysis.best.n_classes}, "
-        f"reliability {analysis.by_utterances.corrected:.3f}"
+        f"reliability {analysis.by_utterances.full_length_reliability:.3f}"
     )
 
 

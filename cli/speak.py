@@ -52,7 +52,7 @@ def run_request(request: Request, picture: Picture, options: SpeakOptions) -> No
 
     def collect(piece: "Piece") -> None:
         if options.explain is not None:
-            explanations.extend(piece.shown())
+            explanations.extend(piece.explain())
 
     if options.out is not None:
         _write_clip(session, (prepared, picture), options.out, (collect, options.quiet))

@@ -1,1 +1,1 @@
-"""Recordings to talkers, heads to faces, and the measures of both."""
+"""Tools that build talkers, faces and palettes from recordings, and evaluate them."""

@@ -79,7 +79,7 @@ class BuiltStyle:
     kept: Mapping[str, float]
 
 
-def build_style(  # noqa: PLR0913 - the effort changes no motion
+def build_style(  # noqa: PLR0913 - run options change no motion
     recorded: StyleSource,
     style: str,
     out: Path,
@@ -87,7 +87,7 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
     base: Palette | None,
     estimator: str = ESTIMATORS[0],
     epsilon: float = 0.0,
-    effort: RunOptions | None = None,
+    run_options: RunOptions | None = None,
     stages: StageCallback = ignore_stage,
 ) -> BuiltStyle:
     """Learn a style from recordings and write a palette: `base` with the style, or the style and its derived styles.
@@ -114,7 +114,7 @@ def build_style(  # noqa: PLR0913 - the effort changes no motion
     )
     face = load_face("head")
     captured, refused = read_recordings(
-        recorded.recordings, face, recorded.marker_options, effort or RunOptions(), stages("reading recordings")
+        recorded.recordings, face, recorded.marker_options, run_options or RunOptions(), stages("reading recordings")
     )
     if not captured:
         raise DataError(f"no recording could be used; the first: {refused[0].name}: {refused[0].reason}")

@@ -25,7 +25,7 @@ from tts2face.video.landmark_models import find_bundle
 
 PROVENANCE = "provenance.json"  # in the folder of recordings: their sources and licence
 PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
-MIN_STATEMENT_WORDS = 3  # shorter statements are taken for typing errors
+MIN_STATEMENT_WORDS = 3  # shorter statements are treated as typing errors
 NOT_STATED = "not stated"
 READING_STAGE = "reading recordings"  # name of the first stage
 CONTENT_WITH_PICTURES = (
@@ -43,13 +43,13 @@ class BuiltTalker:
     refused: tuple[Refusal, ...]
 
 
-def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
+def build_talker(  # noqa: PLR0913 - run options and the date change no motion
     recordings: Path,
     out: Path,
     *,
     name: str | None = None,
     provenance: Path | None = None,
-    effort: RunOptions | None = None,
+    run_options: RunOptions | None = None,
     created: str | None = None,
     consent: Mapping[str, str] | None = None,
     report: Path | None = None,
@@ -84,7 +84,7 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
     if report is not None:
         load_matplotlib()  # reports a missing package before the recordings are read
     stated = read_provenance(provenance or recordings / PROVENANCE, must_exist=provenance is not None)
-    observations = observe(recordings, effort=effort, on_progress=stages(READING_STAGE))
+    observations = observe(recordings, run_options=run_options, on_progress=stages(READING_STAGE))
     talker_name = name or stated.get("name") or recordings.resolve().stem
     if report is not None:
         write_atomically(report, recordings_page(talker_name, observations).encode())
@@ -105,14 +105,16 @@ def build_talker(  # noqa: PLR0913 - the effort and the date change no motion
     talker = replace(talker, audio_maps=learn_audio_maps(steady, talker, stages=stages))
     if consent is not None:
         on_frames = stages("learning appearance")
-        talker = add_appearance(talker, observations.kept, effort=effort or RunOptions(), on_progress=on_frames)
+        talker = add_appearance(
+            talker, observations.kept, run_options=run_options or RunOptions(), on_progress=on_frames
+        )
     write_talker(out, talker)
     seconds = sum(len(utterance.shape) for utterance in talker.utterances) / talker.fps
     return BuiltTalker(len(talker.utterances), seconds / 60.0, observations.refused)
 
 
 def add_appearance(
-    talker: Talker, observations: Sequence[Observation], *, effort: RunOptions, on_progress: Progress | None = None
+    talker: Talker, observations: Sequence[Observation], *, run_options: RunOptions, on_progress: Progress | None = None
 ) -> Talker:
     """The talker with texture models, a plate, and the appearance parameters of every utterance.
 
@@ -131,14 +133,14 @@ def add_appearance(
     from corpus_tools.aam.source_videos import build_appearance_recording
     from corpus_tools.aam.train_appearance import learn_appearance
 
-    tracker = CachedTracker(effort.folder(), find_bundle(effort.model))
+    tracker = CachedTracker(run_options.folder(), find_bundle(run_options.model))
     recordings = [
         build_appearance_recording(observation, utterance.shape, tracker)
         for observation, utterance in zip(observations, talker.utterances, strict=True)
     ]
     learnt = learn_appearance(recordings, on_progress=on_progress)
     utterances = tuple(
-        replace(utterance, looks=parameters)
+        replace(utterance, appearance_parameters=parameters)
         for utterance, parameters in zip(talker.utterances, learnt.parameters, strict=True)
     )
     return replace(talker, utterances=utterances, appearance=learnt.appearance)
@@ -149,7 +151,7 @@ def add_audio_maps(
     talker: Talker,
     out: Path,
     *,
-    effort: RunOptions | None = None,
+    run_options: RunOptions | None = None,
     stages: StageCallback = ignore_stage,
 ) -> Talker:
     """Learn the audio maps of a talker from its recordings, and write the talker with them.
@@ -161,7 +163,7 @@ def add_audio_maps(
     DataError
         A recording holds no sound, or its frame rate is not the talker's.
     """
-    kept = correct_pose(check_any_kept(observe(recordings, effort=effort, on_progress=stages(READING_STAGE))))
+    kept = correct_pose(check_any_kept(observe(recordings, run_options=run_options, on_progress=stages(READING_STAGE))))
     if any(one.fps != talker.fps for one in kept):
         raise DataError(f"the recordings do not have the talker's {talker.fps:g} frames per second; convert them")
     audio_maps = learn_audio_maps(kept, talker, stages=stages)
@@ -174,8 +176,8 @@ def add_audio_maps(
 
 def _reading_metadata(kept: Sequence[Observation]) -> dict[str, Any]:
     """Metadata about the recognition of phones and the correction of delays."""
-    recognised = [seen.name for seen in kept if seen.is_recognised]
-    lags = {seen.video.name: seen.quality.lag for seen in kept if seen.quality.lag}
+    recognised = [observation.name for observation in kept if observation.is_recognised]
+    lags = {observation.video.name: observation.quality.lag for observation in kept if observation.quality.lag}
     return {
         **({"phones_recognised": recognised} if recognised else {}),
         **({"sound_late_s": lags} if lags else {}),

@@ -125,13 +125,13 @@ def clone_talker(
     BackendError
         The file cannot be written.
     """
-    made = transfer_talker(load_talker(source), load_talker(target), gain=gain, append=append)
+    clone = transfer_talker(load_talker(source), load_talker(target), gain=gain, append=append)
     flags = [*(["--gain", f"{gain:g}"] if gain != 1.0 else []), *(["--append-missing"] if append else [])]
     words = ["tts2face", "corpus", "clone", Path(source).name, Path(target).name, "--out", out.name, *flags]
     dated = {"command": shlex.join(words), "created": created or datetime.now(UTC).date().isoformat()}
-    made = replace(made, talker=replace(made.talker, metadata={**made.talker.metadata, **dated}))
-    write_talker(out, made.talker)
-    return made
+    clone = replace(clone, talker=replace(clone.talker, metadata={**clone.talker.metadata, **dated}))
+    write_talker(out, clone.talker)
+    return clone
 
 
 def transfer_talker(source: Talker, target: Talker, *, gain: float = 1.0, append: bool = False) -> ClonedTalker:
@@ -172,7 +172,11 @@ def _appearance_function(source: Talker, target: Talker, gain: float) -> Appeara
         return lambda spoken, shape: None
     if source.appearance is not None:
         transfer = build_appearance_transfer(source.appearance, target.appearance)
-        return lambda spoken, shape: None if spoken.looks is None else transfer.parameters(spoken.looks, gain=gain)
+        return lambda spoken, shape: (
+            None
+            if spoken.appearance_parameters is None
+            else transfer.parameters(spoken.appearance_parameters, gain=gain)
+        )
     own, channels = fit_appearance_regression(target), speech_channels(target.model)
 
     def with_lips(_spoken: Utterance, shape: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -186,7 +190,7 @@ def _transfer_utterance(utterance: Utterance, ready: ParameterTransfer, appearan
     head = utterance.head.copy()
     head[:, 3:] *= ready.size
     shape = ready.parameters(utterance.shape)
-    return replace(utterance, shape=shape, head=head, looks=appearance(utterance, shape))
+    return replace(utterance, shape=shape, head=head, appearance_parameters=appearance(utterance, shape))
 
 
 def _metadata(

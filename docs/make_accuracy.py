@@ -27,12 +27,12 @@ LANGUAGE = "en-us"
 TABLES = ("utterances", "own durations", "words", "another talker")
 
 
-def measured(recordings: Path, other: Path, effort: RunOptions) -> dict[str, Any]:
+def measured(recordings: Path, other: Path, run_options: RunOptions) -> dict[str, Any]:
     """The figures of both splits and of another talker, and the options that were measured."""
-    kept = observe(recordings, effort=effort).kept
+    kept = observe(recordings, run_options=run_options).kept
     utterances, _ = evaluate([split_randomly(kept, hold_out=HELD_OUT, seed=SEED)], voice=load_voice(None, LANGUAGE))
     words, _ = evaluate([split_by_words(kept, WORDS)])
-    across, _ = evaluate_across_talkers(kept, observe_livelink(other, effort))
+    across, _ = evaluate_across_talkers(kept, observe_livelink(other, run_options))
     return {
         "options": {name: asdict(options) for name, options in METHOD_OPTIONS.items()},
         "utterances": _plain(utterances.scores, utterances),

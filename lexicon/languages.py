@@ -57,18 +57,18 @@ def language_code(written: str) -> str:
     """
     if written == DEFAULT_LANGUAGE:  # espeak-ng need not be loaded
         return written
-    wanted = " ".join(written.casefold().split())
+    name = " ".join(written.casefold().split())
     by_code = {code.casefold(): code for code in languages()}
-    tag = _LOCALE_END.sub("", wanted).replace("_", "-")
+    tag = _LOCALE_END.sub("", name).replace("_", "-")
     if _SUBTAGS.fullmatch(tag):
         for shorter in _fallbacks(tag):
             code = CODES_OF_TAGS.get(shorter, shorter)
             if code.casefold() in by_code:
                 return by_code[code.casefold()]
-    named = _codes_of_names().get(wanted, ())
+    named = _codes_of_names().get(name, ())
     if len(named) == 1:
         return named[0]
-    close = [f"{code} ({languages()[code]})" for code in named or _close_codes(wanted)]
+    close = [f"{code} ({languages()[code]})" for code in named or _close_codes(name)]
     hint = f"did you mean {', '.join(close)}?" if close else "`tts2face languages` lists all languages"
     raise InputError(f"there is no language {written[:40]!r}; {hint}")
 
@@ -97,10 +97,10 @@ def _codes_of_names() -> dict[str, tuple[str, ...]]:
     return found | {name: (code,) for name, code in CODES_OF_NAMES.items() if code in known}
 
 
-def _close_codes(wanted: str) -> list[str]:
-    """Codes whose spelling or name is similar to `wanted`."""
+def _close_codes(query: str) -> list[str]:
+    """Codes whose spelling or name is similar to `query`."""
     names = _codes_of_names()
-    near = [code for name, codes in names.items() if len(wanted) > 2 and name.startswith(wanted) for code in codes]
-    near += [code for name in difflib.get_close_matches(wanted, names, n=3, cutoff=0.7) for code in names[name]]
-    near += difflib.get_close_matches(wanted, list(languages()), n=3, cutoff=0.6)
+    near = [code for name, codes in names.items() if len(query) > 2 and name.startswith(query) for code in codes]
+    near += [code for name in difflib.get_close_matches(query, names, n=3, cutoff=0.7) for code in names[name]]
+    near += difflib.get_close_matches(query, list(languages()), n=3, cutoff=0.6)
     return list(dict.fromkeys(near))[:MAX_HINTS]

@@ -204,8 +204,8 @@ class MarkedTextBuilder:
             raise InputError(f"{last.shown} contains no text; add words before its end")
         self._start_run(replace(last.before, start=self._length))
 
-    def build(self, language: str | None = None, *, spoken: str | None = None) -> MarkedText:
-        """The marked text; spans in the base language `spoken` get no language of their own.
+    def build(self, language: str | None = None, *, base_language: str | None = None) -> MarkedText:
+        """The marked text; spans in the base language `base_language` get no language of their own.
 
         Raises
         ------
@@ -216,7 +216,7 @@ class MarkedTextBuilder:
             raise InputError(f"{self._open_spans[-1].shown} is not closed; add its end")
         runs: list[StyleRun] = []
         for run in self._runs:
-            merged = replace(run, language=None) if run.language == spoken else run
+            merged = replace(run, language=None) if run.language == base_language else run
             if not runs or replace(runs[-1], start=run.start) != merged:
                 runs.append(merged)
         return MarkedText("".join(self._pieces), tuple(runs), tuple(self._marks), language)

@@ -167,10 +167,10 @@ def split_tokens(text: str) -> Iterator[WrittenForm]:
             previous = spoken[-1] if spoken[-1] in MARKS else spoken.rpartition(" ")[2]
 
 
-def join_words(spoken: list[str]) -> str:
+def join_words(words: list[str]) -> str:
     """Join words with single spaces and marks after their word; of adjacent marks the strongest is kept."""
     pieces: list[str] = []
-    for piece in spoken:
+    for piece in words:
         if piece not in MARKS:
             pieces += [" ", piece] if pieces else [piece]
         elif pieces and pieces[-1][-1] in MARKS:

@@ -105,8 +105,8 @@ def roman_value(numeral: str) -> int:
     """Value of a Roman numeral in standard spelling; 0 for any other string."""
     value = 0
     for letter, following in zip(numeral, [*numeral[1:], ""], strict=True):
-        worth = _ROMAN[letter]
-        value += -worth if following and _ROMAN[following] > worth else worth
+        amount = _ROMAN[letter]
+        value += -amount if following and _ROMAN[following] > amount else amount
     return value if 0 < value < 4000 and _roman_numeral(value) == numeral else 0
 
 
@@ -114,7 +114,7 @@ def _roman_numeral(value: int) -> str:
     pairs = [(1000, "M"), (900, "CM"), (500, "D"), (400, "CD"), (100, "C"), (90, "XC"), (50, "L"), (40, "XL")]
     pairs += [(10, "X"), (9, "IX"), (5, "V"), (4, "IV"), (1, "I")]
     written = ""
-    for worth, letters in pairs:
-        count, value = divmod(value, worth)
+    for amount, letters in pairs:
+        count, value = divmod(value, amount)
         written += letters * count
     return written

@@ -128,7 +128,7 @@ class _SsmlReader:
     def read(self, text: str) -> MarkedText:
         """Parse the whole document."""
         self._parser.Parse(text.removeprefix("\ufeff").lstrip(), True)
-        return self._builder.build(self._language, spoken=self._base)
+        return self._builder.build(self._language, base_language=self._base)
 
     def _doctype(self, *_: object) -> None:
         raise InputError("a document type declaration is not supported; remove <!DOCTYPE ...>")
@@ -182,12 +182,12 @@ class _SsmlReader:
     def _stretch(self, attributes: Attributes) -> None:
         tag = check_attributes(self._elements[-1], attributes, LANGUAGE).get(LANGUAGE)
         self._builder.add_text("\n\n")  # a blank line ends the sentence before
-        if tag is not None and primary_subtag(tag) != primary_subtag(self._spoken):
+        if tag is not None and primary_subtag(tag) != primary_subtag(self._current_language):
             self._spans[-1] = "lang"
             self._builder.open_voice("lang", f"<{self._elements[-1]}>", voice=None, language=language_code(tag))
 
     @property
-    def _spoken(self) -> str:
+    def _current_language(self) -> str:
         """Language at the current position."""
         return self._builder.language or self._base
 
@@ -197,7 +197,7 @@ class _SsmlReader:
 
     def _voice(self, attributes: Attributes) -> None:
         known = check_attributes("voice", attributes, "name", "gender", "language", "languages", LANGUAGE, "required")
-        voice, language = choose_voice(known, self._spoken)
+        voice, language = choose_voice(known, self._current_language)
         self._builder.open_voice("voice", "<voice>", voice=voice, language=language)
 
     def _open_replaced(self, attributes: Attributes) -> None:
@@ -213,7 +213,7 @@ class _SsmlReader:
         attributes, text = self._replaced_attributes, "".join(self._replaced_text)
         if kind == "say-as":
             self._builder.add_text(
-                say_as(attributes["interpret-as"].strip(), text, attributes.get("format", ""), self._spoken)
+                say_as(attributes["interpret-as"].strip(), text, attributes.get("format", ""), self._current_language)
             )
             return
         for number, (word, segments) in enumerate(

@@ -113,7 +113,7 @@ def languages() -> tuple[LanguageEntry, ...]:
 def faces() -> tuple[FaceEntry, ...]:
     """The shipped faces and the entry ``self`` for the talker's own face."""
     shipped = []
-    for path in _shipped("face"):
+    for path in _shipped_files("face"):
         _, header = _read(path, "face")
         names = tuple(name for name, _, _ in header["identities"])
         shipped.append(FaceEntry(path.stem, names, f"mesh with {len(header['shape_names'])} shapes"))
@@ -162,7 +162,7 @@ def talkers() -> tuple[TalkerEntry, ...]:
     from tts2face.models.talker import read_talker
 
     found = []
-    for path in _shipped("talker"):
+    for path in _shipped_files("talker"):
         talker = read_talker(path)
         seconds = sum(len(utterance.shape) for utterance in talker.utterances) / talker.fps
         found.append(
@@ -178,7 +178,7 @@ def talkers() -> tuple[TalkerEntry, ...]:
     return tuple(found)
 
 
-def _shipped(kind: str) -> list[Path]:
+def _shipped_files(kind: str) -> list[Path]:
     return sorted(SHIPPED_FOLDER.glob(f"*.{kind}"))
 
 

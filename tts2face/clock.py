@@ -44,8 +44,8 @@ def pad_to_frame(speech: Speech, first_frame: int, fps: Fraction) -> Speech:
     """
     rate, samples = speech.waveform.rate, speech.waveform.samples
     n_frames = frame_count(speech.waveform.duration, float(fps))
-    wanted = first_sample(first_frame + n_frames, rate, fps) - first_sample(first_frame, rate, fps)
-    padded = np.zeros(max(wanted, len(samples)), np.float32)
+    n_samples = first_sample(first_frame + n_frames, rate, fps) - first_sample(first_frame, rate, fps)
+    padded = np.zeros(max(n_samples, len(samples)), np.float32)
     padded[: len(samples)] = samples
     phones, edges = list(speech.phones.phones), list(speech.phones.edges)
     if phones[-1] != SILENCE and len(padded) > len(samples):

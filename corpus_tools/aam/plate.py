@@ -17,14 +17,14 @@ NEAR_LOSSLESS = {"crf": "8", "preset": "slow"}
 def choose_plate_frames(points: Sequence[NDArray[np.float32]]) -> tuple[int, int, int]:
     """Index of the recording with the least mouth motion and its range of frames, from landmarks (T, N, 2) of each."""
 
-    def unrest(places: NDArray[np.float32]) -> float:
+    def motion(places: NDArray[np.float32]) -> float:
         gap = np.linalg.norm(places[:, UPPER_LIP_INNER_MID] - places[:, LOWER_LIP_INNER_MID], axis=1)
         chin = np.linalg.norm(places[:, CHIN] - places[:, UPPER_LIP_INNER_MID], axis=1)
         return float(gap.mean() + chin.std())
 
     longest = max(len(places) for places in points)
     enough = [number for number, places in enumerate(points) if len(places) >= min(longest, MAX_PLATE_FRAMES) // 2]
-    number = min(enough, key=lambda at: unrest(points[at][:MAX_PLATE_FRAMES]))
+    number = min(enough, key=lambda at: motion(points[at][:MAX_PLATE_FRAMES]))
     return number, 0, min(len(points[number]), MAX_PLATE_FRAMES)
 
 

@@ -63,9 +63,11 @@ def build_appearance_recording(
     DataError
         The video can no longer be read.
     """
-    seen = tracker.track(observation.video)
-    points, first = resample_to_grid(seen.tracking.points, seen.times, seen.fps)
+    tracked = tracker.track(observation.video)
+    points, first = resample_to_grid(tracked.tracking.points, tracked.times, tracked.fps)
     begin = observation.quality.cut
-    start = round(begin * seen.fps) - first
-    here, _ = fill_gaps(points[start : start + len(observation.landmarks)], seen.fps)
-    return AppearanceRecording(observation.video, begin, seen.fps, here[:, :, :2].copy(), observation.landmarks, shape)
+    start = round(begin * tracked.fps) - first
+    here, _ = fill_gaps(points[start : start + len(observation.landmarks)], tracked.fps)
+    return AppearanceRecording(
+        observation.video, begin, tracked.fps, here[:, :, :2].copy(), observation.landmarks, shape
+    )

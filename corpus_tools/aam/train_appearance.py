@@ -138,7 +138,7 @@ def learn_appearance(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LightingReference:
-    """The light that textures are brought to: that of the plate, whose mean ``texture`` (P, 3) this is.
+    """Reference lighting of the textures: that of the plate, whose mean ``texture`` (P, 3) this is.
 
     ``still`` (P,) marks the pixels of the face's ``frame`` that speech leaves.
     """
@@ -272,7 +272,7 @@ def _build_plate(
         points=np.concatenate([points, face_ring(points)], axis=1).astype(np.float32),
         axes=camera_axes(recording.points[here], recording.landmarks[here]),
         shape=recording.shape[here],
-        looks=parameters[number][here, :n_face],
+        texture_parameters=parameters[number][here, :n_face],
     )
 
 

@@ -78,7 +78,7 @@ def resample_to_gesture_rate(captured: FaceRecording) -> FaceRecording:
     )
 
 
-def resample(values: NDArray[np.floating], fps: float, wanted: float) -> Floats:
+def resample(values: NDArray[np.floating], fps: float, target_fps: float) -> Floats:
     """Values (T, ...) at another frame rate, with the first frame at the same instant.
 
     Raises
@@ -91,27 +91,27 @@ def resample(values: NDArray[np.floating], fps: float, wanted: float) -> Floats:
     Values of the cubic spline through the frames; linear interpolation from 25 to 30 frames per second would smooth
     five frames of six. For a lower rate, means of the spline over each frame, to avoid aliasing.
     """
-    if not len(values) or not (fps > 0 and wanted > 0):
-        raise InputError(f"{fps:g} frames per second cannot be resampled to {wanted:g}; give rates above 0")
+    if not len(values) or not (fps > 0 and target_fps > 0):
+        raise InputError(f"{fps:g} frames per second cannot be resampled to {target_fps:g}; give rates above 0")
     flat = np.asarray(values, np.float64).reshape(len(values), -1)
-    n_frames = int(np.floor((len(values) - 1) / fps * wanted + RATE_TOLERANCE_FPS)) + 1
+    n_frames = int(np.floor((len(values) - 1) / fps * target_fps + RATE_TOLERANCE_FPS)) + 1
     read = np.zeros((n_frames, flat.shape[1]))
     for first in range(0, flat.shape[1], CHUNK_SIZE):
         columns = slice(first, first + CHUNK_SIZE)
-        read[:, columns] = _interpolate_frames(flat[:, columns], fps, wanted, n_frames)
+        read[:, columns] = _interpolate_frames(flat[:, columns], fps, target_fps, n_frames)
     return read.reshape(n_frames, *values.shape[1:])
 
 
-def _interpolate_frames(values: Floats, fps: float, wanted: float, n_frames: int) -> Floats:
+def _interpolate_frames(values: Floats, fps: float, target_fps: float, n_frames: int) -> Floats:
     from scipy.interpolate import make_interp_spline
 
-    instants, end = np.arange(n_frames) / wanted, (len(values) - 1) / fps
+    instants, end = np.arange(n_frames) / target_fps, (len(values) - 1) / fps
     if len(values) == 1:
         return values
     curve = make_interp_spline(np.arange(len(values)) / fps, values, k=min(3, len(values) - 1))
-    if wanted >= fps:
+    if target_fps >= fps:
         return np.asarray(curve(np.minimum(instants, end)))
-    begin, stop = np.clip(instants - 0.5 / wanted, 0, end), np.clip(instants + 0.5 / wanted, 0, end)
+    begin, stop = np.clip(instants - 0.5 / target_fps, 0, end), np.clip(instants + 0.5 / target_fps, 0, end)
     area = curve.antiderivative()
     return np.asarray((area(stop) - area(begin)) / (stop - begin)[:, None])
 

@@ -120,8 +120,8 @@ def eye_angles(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
         _, _, outer, inner = EYELID_LANDMARKS[side]
         corners = landmarks[:, [outer, inner]]
         width = np.linalg.norm(corners[:, 0] - corners[:, 1], axis=1)
-        away = landmarks[:, iris] - corners.mean(axis=1)
-        turned.append(np.stack([away[:, 1], away[:, 0]], axis=1) / width[:, None] / IRIS_SHIFT_PER_RAD)
+        offset = landmarks[:, iris] - corners.mean(axis=1)
+        turned.append(np.stack([offset[:, 1], offset[:, 0]], axis=1) / width[:, None] / IRIS_SHIFT_PER_RAD)
     return np.asarray(np.mean(turned, axis=0), np.float64)
 
 
@@ -130,12 +130,12 @@ def gaze_angles(turned: NDArray[np.float64], head: NDArray[np.floating], shut: F
 
     Frames in which lids hide the irises are interpolated linearly.
     """
-    sight = turned + head[:, :2]
+    gaze = turned + head[:, :2]
     seen = np.flatnonzero(shut.max(axis=1) < MAX_GAZE_LID_CLOSURE)
     if len(seen):
-        frames = np.arange(len(sight))
-        sight = np.stack([np.interp(frames, seen, sight[seen, axis]) for axis in range(2)], axis=1)
-    centred: Floats = (sight - np.median(sight, axis=0)).astype(np.float32)
+        frames = np.arange(len(gaze))
+        gaze = np.stack([np.interp(frames, seen, gaze[seen, axis]) for axis in range(2)], axis=1)
+    centred: Floats = (gaze - np.median(gaze, axis=0)).astype(np.float32)
     return centred
 
 

@@ -32,8 +32,8 @@ def read_derived_styles(source: str, table: Path = DERIVED_STYLE_TABLE) -> dict[
             raise DataError(f"{table.name}: {feature} of {style} cannot be read ({broken}); correct it") from broken
         reasons.setdefault(style, []).extend([row["why"]] if row["why"] else [])
     return {
-        style: Derivation(source, made, f"derived from {source}: {'; '.join(reasons[style])}")
-        for style, made in changes.items()
+        style: Derivation(source, changed, f"derived from {source}: {'; '.join(reasons[style])}")
+        for style, changed in changes.items()
     }
 
 

@@ -68,22 +68,22 @@ def fit_head_poses(
     """
     if len(names) < MIN_VISIBLE_MARKERS:
         raise DataError(f"the file has {len(names)} markers of the head; its pose needs at least {MIN_VISIBLE_MARKERS}")
-    seen = np.asarray(np.isfinite(points).all(axis=2))
-    posed = np.asarray(seen.sum(axis=1) >= MIN_VISIBLE_MARKERS)
+    is_visible = np.asarray(np.isfinite(points).all(axis=2))
+    posed = np.asarray(is_visible.sum(axis=1) >= MIN_VISIBLE_MARKERS)
     check_gap("head's pose", ~posed, fps)
-    head = _first_reference(points, seen) if reference is None else reference
+    head = _first_reference(points, is_visible) if reference is None else reference
     spreads = np.linalg.svd(head - head.mean(axis=0), compute_uv=False)
     if spreads[1] <= MAX_COLLINEAR_RATIO * spreads[0]:
         raise DataError("the head's markers are collinear and do not determine its pose; place them apart")
-    shown, seen = points[posed], seen[posed]
-    rotations, places = _fit_poses(shown, seen, head)
+    shown, is_visible = points[posed], is_visible[posed]
+    rotations, places = _fit_poses(shown, is_visible, head)
     for _ in range(N_ROUNDS if reference is None else 0):
         local = np.einsum("tij,tmi->tmj", rotations, np.nan_to_num(shown) - places[:, None])
-        head = np.einsum("tm,tmi->mi", seen, local) / seen.sum(axis=0)[:, None]
+        head = np.einsum("tm,tmi->mi", is_visible, local) / is_visible.sum(axis=0)[:, None]
         head = head - head.mean(axis=0)
-        rotations, places = _fit_poses(shown, seen, head)
+        rotations, places = _fit_poses(shown, is_visible, head)
     off = np.einsum("tij,mj->tmi", rotations, head) + places[:, None] - shown
-    misfit = float(np.sqrt(np.square(off[seen]).sum(axis=1).mean()))
+    misfit = float(np.sqrt(np.square(off[is_visible]).sum(axis=1).mean()))
     if misfit > MAX_MISFIT_MM:
         raise DataError(
             f"the head's markers do not move rigidly (deviation {misfit:.1f} mm); list only those on the skull as head"
@@ -105,18 +105,18 @@ def _interpolate_poses(rotations: Floats, places: Floats, posed: NDArray[np.bool
     return turned, np.stack([np.interp(frames, there, axis) for axis in places.T], axis=1)
 
 
-def _first_reference(points: Floats, seen: NDArray[np.bool_]) -> Floats:
-    whole = np.flatnonzero(seen.all(axis=1))
+def _first_reference(points: Floats, is_visible: NDArray[np.bool_]) -> Floats:
+    whole = np.flatnonzero(is_visible.all(axis=1))
     if not len(whole):
         raise DataError("no frame shows all markers of the head; remove rarely visible ones from the set")
     head: Floats = points[whole[0]] - points[whole[0]].mean(axis=0)
     return head
 
 
-def _fit_poses(points: Floats, seen: NDArray[np.bool_], head: Floats) -> tuple[Floats, Floats]:
+def _fit_poses(points: Floats, is_visible: NDArray[np.bool_], head: Floats) -> tuple[Floats, Floats]:
     """Rotations (T, 3, 3) and positions (T, 3) of the head, fitted jointly for frames with the same visible markers."""
     rotations, places = np.zeros((len(points), 3, 3)), np.zeros((len(points), 3))
-    patterns, which = np.unique(seen, axis=0, return_inverse=True)
+    patterns, which = np.unique(is_visible, axis=0, return_inverse=True)
     for number, pattern in enumerate(patterns):
         here = which.ravel() == number
         weights = np.full(int(pattern.sum()), 1.0 / pattern.sum())

@@ -178,10 +178,10 @@ def _build_even_take(
     if not np.isfinite(at).all() or (steps <= 0).any():
         raise DataError(f"the column {what} of {path} must increase from row to row; export it again")
     usual = 1.0 if what == "frame" else float(steps[steps < MIN_GAP_STEPS * np.median(steps)].mean())
-    away = steps / usual
-    if np.abs(away - np.rint(away)).max() > TIME_TOLERANCE_FRAMES:
+    n_frames = steps / usual
+    if np.abs(n_frames - np.rint(n_frames)).max() > TIME_TOLERANCE_FRAMES:
         raise DataError(f"the column {what} of {path} does not increase in even steps; export it again")
-    rows = np.concatenate([[0], np.cumsum(np.rint(away).astype(int))])
+    rows = np.concatenate([[0], np.cumsum(np.rint(n_frames).astype(int))])
     found = np.full((rows[-1] + 1, len(names), 3), np.nan)
     found[rows] = points
     rate = fps if what == "frame" and fps else float(np.round(rows[-1] / (at[-1] - at[0]), 2))

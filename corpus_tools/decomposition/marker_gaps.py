@@ -33,12 +33,12 @@ def fill_marker_gaps(tracks: Floats, names: Sequence[str], fps: float) -> tuple[
     """
     whole, counts = tracks.copy(), {}
     for marker, name in enumerate(names):
-        gone = np.asarray(np.isnan(tracks[:, marker]).any(axis=1))
-        if not gone.any():
+        is_missing = np.asarray(np.isnan(tracks[:, marker]).any(axis=1))
+        if not is_missing.any():
             continue
-        check_gap(f"marker {name}", gone, fps)
-        whole[gone, marker] = _interpolate_gaps(tracks[:, marker], gone)
-        counts[name] = int(gone.sum())
+        check_gap(f"marker {name}", is_missing, fps)
+        whole[is_missing, marker] = _interpolate_gaps(tracks[:, marker], is_missing)
+        counts[name] = int(is_missing.sum())
     if not counts:
         return whole, ()
     named = ", ".join(f"{name} ({count} frames)" for name, count in list(counts.items())[:MAX_QUOTED_MARKERS])
@@ -46,17 +46,17 @@ def fill_marker_gaps(tracks: Floats, names: Sequence[str], fps: float) -> tuple[
     return whole, (f"gaps were filled in {named}{more}",)
 
 
-def find_gaps(gone: NDArray[np.bool_]) -> NDArray[np.int64]:
+def find_gaps(is_missing: NDArray[np.bool_]) -> NDArray[np.int64]:
     """(G, 2) first frame and one past the last of each run of True in (T,)."""
-    borders = np.flatnonzero(np.diff(np.concatenate([[False], gone, [False]])))
+    borders = np.flatnonzero(np.diff(np.concatenate([[False], is_missing, [False]])))
     return borders.reshape(-1, 2)
 
 
-def check_gap(what: str, gone: NDArray[np.bool_], fps: float) -> None:
+def check_gap(what: str, is_missing: NDArray[np.bool_], fps: float) -> None:
     """Check that gaps, True in (T,), are short enough to be filled; errors as `fill_marker_gaps`."""
-    if gone.all():
+    if is_missing.all():
         raise DataError(f"the {what} is never visible; {MARKER_SET_ADVICE}, or capture it again")
-    begin, end = max(find_gaps(gone).tolist(), key=lambda gap: gap[1] - gap[0], default=(0, 0))
+    begin, end = max(find_gaps(is_missing).tolist(), key=lambda gap: gap[1] - gap[0], default=(0, 0))
     if (end - begin) / fps > MAX_MARKER_GAP_S:
         raise DataError(
             f"the {what} is hidden for {(end - begin) / fps:.2f} s from {begin / fps:.2f} s on, and gaps up to "
@@ -64,12 +64,12 @@ def check_gap(what: str, gone: NDArray[np.bool_], fps: float) -> None:
         )
 
 
-def _interpolate_gaps(track: Floats, gone: NDArray[np.bool_]) -> Floats:
+def _interpolate_gaps(track: Floats, is_missing: NDArray[np.bool_]) -> Floats:
     """(G, 3) positions in the frames of gaps."""
     from scipy.interpolate import PchipInterpolator
 
-    there = np.flatnonzero(~gone)
+    there = np.flatnonzero(~is_missing)
     if len(there) == 1:
-        return np.repeat(track[there], gone.sum(), axis=0)
-    at = np.clip(np.flatnonzero(gone), there[0], there[-1])
+        return np.repeat(track[there], is_missing.sum(), axis=0)
+    at = np.clip(np.flatnonzero(is_missing), there[0], there[-1])
     return np.asarray(PchipInterpolator(there, track[there])(at))

@@ -136,8 +136,10 @@ def check_regions(path: Path, take: MarkerTake, marker_set: MarkerSet) -> None:
 
 
 def _absent_markers(take: MarkerTake, marker_set: MarkerSet) -> tuple[str, ...]:
-    gone = [name for name in marker_set.regions if name not in take.names]
-    return (f"the file has no marker {', '.join(gone)}; its region is interpolated from the others",) if gone else ()
+    missing = [name for name in marker_set.regions if name not in take.names]
+    return (
+        (f"the file has no marker {', '.join(missing)}; its region is interpolated from the others",) if missing else ()
+    )
 
 
 def _face_in_head_axes(
@@ -145,10 +147,10 @@ def _face_in_head_axes(
 ) -> tuple[Floats, HeadPoses, tuple[str, ...]]:
     """(T, M, 3) markers of the face in the head's axes without gaps, the head's poses, and notes on filled gaps."""
     at = {name: number for number, name in enumerate(take.names)}
-    gone = [name for name in (*names, *head_names) if name not in at]
-    if gone:
+    missing = [name for name in (*names, *head_names) if name not in at]
+    if missing:
         raise DataError(
-            f"{path} lacks the marker {gone[0]}, which the face at rest has; capture both with the same markers"
+            f"{path} lacks the marker {missing[0]}, which the face at rest has; capture both with the same markers"
         )
     try:
         of_head = take.points[:, [at[name] for name in head_names]]

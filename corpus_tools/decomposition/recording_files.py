@@ -33,23 +33,25 @@ def read_video_recording(video: Path, tracker: CachedTracker) -> FaceRecording:
     DataError
         The video cannot be read, shows no face, or is unsuitable; the message states the reason.
     """
-    seen = tracker.track(video)
-    points, first = resample_to_grid(seen.tracking.points, seen.times, seen.fps)
+    tracked = tracker.track(video)
+    points, first = resample_to_grid(tracked.tracking.points, tracked.times, tracked.fps)
     if np.isnan(points).all():
         raise DataError("no frame shows a face")
     start, end = face_span(points)
-    filled, n_filled = fill_gaps(points[start:end], seen.fps)
-    posed = remove_pose(filled, seen.fps)
+    filled, n_filled = fill_gaps(points[start:end], tracked.fps)
+    posed = remove_pose(filled, tracked.fps)
     angles = head_angles(posed.rotations)
-    check_limits(picture_measures(seen.n_faces, seen.changes, seen.times) | {"turn_deg": head_turn_deg(angles)})
+    check_limits(
+        picture_measures(tracked.n_faces, tracked.changes, tracked.times) | {"turn_deg": head_turn_deg(angles)}
+    )
     place = posed.translations - np.median(posed.translations, axis=0)
-    begin = (first + start) / seen.fps
+    begin = (first + start) / tracked.fps
     return FaceRecording(
         name=video.stem,
-        fps=seen.fps,
+        fps=tracked.fps,
         landmarks=posed.landmarks,
         head=np.column_stack([angles, place]).astype(np.float32),
-        sound=read_sound_span(video, begin, len(filled) / seen.fps),
+        sound=read_sound_span(video, begin, len(filled) / tracked.fps),
         notes=(f"{n_filled} frames without a face were interpolated",) if n_filled else (),
     )
 
@@ -65,7 +67,7 @@ def read_sound_span(video: Path, begin: float, seconds: float) -> Waveform:
 
 
 def read_recordings(
-    recordings: Path, face: Face, markers: MarkerOptions, effort: RunOptions, on_progress: Progress | None
+    recordings: Path, face: Face, markers: MarkerOptions, run_options: RunOptions, on_progress: Progress | None
 ) -> tuple[list[FaceRecording], list[Refusal]]:
     """Recordings and refusals, each sorted by name.
 
@@ -77,9 +79,9 @@ def read_recordings(
         The landmark models are missing, the cache cannot be written, or a process died.
     """
     files = find_recording_files(recordings)
-    jobs = min(effort.n_processes(), len(files))
-    model = find_bundle(effort.model) if any(file.suffix.lower() in VIDEO_SUFFIXES for file in files) else None
-    ready = (effort.folder(), model, face, markers)
+    jobs = min(run_options.n_processes(), len(files))
+    model = find_bundle(run_options.model) if any(file.suffix.lower() in VIDEO_SUFFIXES for file in files) else None
+    ready = (run_options.folder(), model, face, markers)
     captured: list[FaceRecording] = []
     refused: list[Refusal] = []
     for number, outcome in enumerate(_read_files(files, ready, jobs), start=1):

@@ -11,7 +11,7 @@ from corpus_tools.decomposition.markers import MarkerFace, read_marker_still
 from corpus_tools.recordings.folder import VIDEO_SUFFIXES
 from lexicon.errors import DataError, InputError
 from tts2face.models.palette import EXPRESSIONS
-from tts2face.storage.picture_files import opened_picture
+from tts2face.storage.picture_files import open_picture
 from tts2face.video.media import TimedFrame, read_frames
 from tts2face.video.pose import remove_pose
 from tts2face.video.track import FaceTracker
@@ -143,7 +143,7 @@ def _read_pixels(still: Still) -> NDArray[np.uint8]:
         return _read_frame(still, still.at)
     from PIL import ImageOps
 
-    with opened_picture(still.path, "the still") as image:
+    with open_picture(still.path, "the still") as image:
         return np.array(ImageOps.exif_transpose(image).convert("RGB"))
 
 

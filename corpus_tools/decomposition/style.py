@@ -1,4 +1,4 @@
-"""A style learnt from recordings that were taken apart, and the palette it is put into."""
+"""A gesture style built from decomposed recordings, and its insertion into a palette."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

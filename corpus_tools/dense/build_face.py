@@ -49,7 +49,7 @@ def build_face(
     *,
     consent: Mapping[str, str],
     n_modes: int = 0,
-    effort: RunOptions | None = None,
+    run_options: RunOptions | None = None,
     on_progress: Progress | None = None,
 ) -> BuiltFace:
     """Adapt the default head to the talker in videos, and write it as a face.
@@ -63,8 +63,8 @@ def build_face(
         Consent of the person shown, from `corpus_tools.build_talker.consent_record`; kept in the file.
     n_modes
         Modes of the talker's own dense shape model, added as the shapes denseMean, dense1, dense2, ...
-    effort
-        Its cache and landmark models; the work is done in one process.
+    run_options
+        Cache folder and landmark models; one process is used.
     on_progress
         Called with the number of finished steps and of all steps, two for each video.
 
@@ -79,26 +79,26 @@ def build_face(
     """
     if not 0 <= n_modes <= MOST_MODES:
         raise InputError(f"a basis has 0 to {MOST_MODES} dense modes, not {n_modes}")
-    effort = effort or RunOptions()
+    run_options = run_options or RunOptions()
     videos = find_videos(recordings)
     stated = read_provenance(recordings / PROVENANCE, must_exist=False)
-    eyes = CachedTracker(effort.folder(), find_bundle(effort.model))
+    eyes = CachedTracker(run_options.folder(), find_bundle(run_options.model))
     report = on_progress or (lambda done, of: None)
-    seen = track_videos(videos, eyes, lambda done, of: report(done, 2 * of))
+    landmarks = track_videos(videos, eyes, lambda done, of: report(done, 2 * of))
     head = read_face(find_file(SOURCE_FACE, "face"))
-    talker = resting_landmarks(seen)
+    talker = resting_landmarks(landmarks)
     rest = face_landmarks(head, head.vertices)[:N_MESH_LANDMARKS]
     target = align_to_head(talker, rest)
     used = np.flatnonzero(select_consistent_landmarks(rest, correct_lips_and_lids(rest, target)))
     shaped = adapt_head(head, talker)
     canvas = build_canvas(shaped)
     fit = build_picture_fitter(shaped, canvas.opened, used)
-    model = dense_model(shaped, mode_fitter(shaped, used), seen, talker, n_modes) if n_modes else None
+    model = dense_model(shaped, mode_fitter(shaped, used), landmarks, talker, n_modes) if n_modes else None
     painting = average_skin_colours(
         shaped,
         canvas,
         fit,
-        seen,
+        landmarks,
         lambda done, of: report(len(videos) + done * len(videos) // of, 2 * len(videos)),
     )
     face = paint_skin(shaped, canvas, painting)
@@ -118,4 +118,4 @@ def build_face(
     write_face(out, replace(face, metadata=metadata))
     reached = face_landmarks(shaped, shaped.vertices)[:N_MESH_LANDMARKS]
     again = align_to_head(talker, reached)
-    return BuiltFace(len(seen), len(videos), float(np.linalg.norm(again - reached, axis=1)[used].mean()), model)
+    return BuiltFace(len(landmarks), len(videos), float(np.linalg.norm(again - reached, axis=1)[used].mean()), model)

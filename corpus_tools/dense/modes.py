@@ -66,9 +66,9 @@ class Components:
 
     def residual(self, displacements: Floats, n_modes: int) -> Floats:
         """(T, N, 3) residual of displacements (T, N, 3) after projection on the first modes."""
-        away = displacements - self.mean
-        parameters = np.tensordot(away, self.duals[:n_modes], axes=((1, 2), (1, 2)))
-        rest: Floats = away - np.tensordot(parameters, self.modes[:n_modes], axes=1)
+        centred = displacements - self.mean
+        parameters = np.tensordot(centred, self.duals[:n_modes], axes=((1, 2), (1, 2)))
+        rest: Floats = centred - np.tensordot(parameters, self.modes[:n_modes], axes=1)
         return rest
 
 
@@ -139,7 +139,7 @@ def mode_fitter(face: Face, used: NDArray[np.int64]) -> PictureFitter:
 
 
 def dense_model(
-    face: Face, fit: PictureFitter, seen: Sequence[VideoLandmarks], talker: NDArray[np.floating], n_modes: int
+    face: Face, fit: PictureFitter, landmarks: Sequence[VideoLandmarks], talker: NDArray[np.floating], n_modes: int
 ) -> DenseModel:
     """Fit the head's mesh to every frame of a talker's videos and find its modes.
 
@@ -159,7 +159,7 @@ def dense_model(
     InputError
         There are fewer frames or directions than modes, or `n_modes` is below 1.
     """
-    videos = [displacements(fit, one.landmarks, talker) for one in seen]
+    videos = [displacements(fit, one.landmarks, talker) for one in landmarks]
     frames = np.concatenate(videos)
     most = min(len(frames) - 1, MOST_MODES)
     if not 1 <= n_modes <= most:

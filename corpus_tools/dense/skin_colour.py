@@ -106,19 +106,19 @@ def average_skin_colours(
 
 
 def select_frames(
-    seen: Sequence[VideoLandmarks], on_progress: Progress
+    videos: Sequence[VideoLandmarks], on_progress: Progress
 ) -> Iterator[tuple[NDArray[np.uint8], NDArray[np.float32]]]:
     """Yield picture (H, W, 3) and landmarks (478, 3) of `N_FRAMES` frames spread over the videos, eyes open."""
-    per_video = int(np.ceil(N_FRAMES / len(seen)))
-    usual = float(np.nanmedian(np.concatenate([eye_opening(one.landmarks) for one in seen])))
-    for number, one in enumerate(seen):
+    per_video = int(np.ceil(N_FRAMES / len(videos)))
+    usual = float(np.nanmedian(np.concatenate([eye_opening(one.landmarks) for one in videos])))
+    for number, one in enumerate(videos):
         awake = np.flatnonzero(np.nan_to_num(eye_opening(one.landmarks)) > MIN_EYE_OPENING * usual)
         if len(awake):
             wanted = set(awake[np.linspace(0, len(awake) - 1, per_video).round().astype(int)].tolist())
             for at, picture in enumerate(read_frames(one.video)):
                 if at in wanted:
                     yield picture.pixels, one.points[at]
-        on_progress(number + 1, len(seen))
+        on_progress(number + 1, len(videos))
 
 
 def sample_picture(picture: NDArray[np.uint8], places: Floats) -> tuple[Floats, NDArray[np.bool_]]:
@@ -136,10 +136,13 @@ def sample_picture(picture: NDArray[np.uint8], places: Floats) -> tuple[Floats, 
 
 def hair_vertices(face: Face, fit: PictureFitter, normals: Floats) -> NDArray[np.int64]:
     """Vertices in the hair above the forehead that are visible from the front."""
-    away = face.vertices - fit.marks[FOREHEAD_TOP]
+    offset = face.vertices - fit.marks[FOREHEAD_TOP]
     low, high, half = HAIR_REGION_MM
     is_hair = (
-        (away[:, 1] > low) & (away[:, 1] < high) & (np.abs(away[:, 0]) < half) & (normals[:, 2] > FACING_COSINES[0])
+        (offset[:, 1] > low)
+        & (offset[:, 1] < high)
+        & (np.abs(offset[:, 0]) < half)
+        & (normals[:, 2] > FACING_COSINES[0])
     )
     return np.flatnonzero(is_hair)
 

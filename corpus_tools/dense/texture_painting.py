@@ -28,17 +28,17 @@ SHARP_TEXELS, SHARP_GAIN = 4.0, 0.7  # unsharp masking, Gaussian of this deviati
 MIN_TEXEL_WEIGHT = 0.02  # of the largest weight: texels below it are blended
 
 
-def paint_skin(face: Face, canvas: SkinCanvas, seen: SkinColours) -> Face:
+def paint_skin(face: Face, canvas: SkinCanvas, skin: SkinColours) -> Face:
     """The face with the talker's texture and hair colour."""
     texels = canvas.texels
     base = canvas.texture[texels.rows, texels.columns].astype(np.float64)
-    share = canvas.share * smooth_step(seen.weight / seen.weight.max(), 0.0, MIN_TEXEL_WEIGHT)
-    own = _remove_shading(canvas.texels.interpolate(vertex_normals(face)), seen.colour, share)
+    share = canvas.share * smooth_step(skin.weight / skin.weight.max(), 0.0, MIN_TEXEL_WEIGHT)
+    own = _remove_shading(canvas.texels.interpolate(vertex_normals(face)), skin.colour, share)
     share = soften_edges(_remove_fringe(face, canvas, own, share), texels, len(canvas.texture))
     hair = 1.0 - smooth_step(base @ LUMA, *HAIR_LUMA)
     tint = _skin_tint(face, canvas, own / np.maximum(base, 1.0), (share, base @ LUMA))
     usual = np.median(base[hair > 0.9], axis=0) if (hair > 0.9).any() else np.ones(3)
-    strands = np.clip(seen.hair / np.maximum(usual, 1.0), *TINT_BOUNDS) if np.isfinite(seen.hair).all() else np.ones(3)
+    strands = np.clip(skin.hair / np.maximum(usual, 1.0), *TINT_BOUNDS) if np.isfinite(skin.hair).all() else np.ones(3)
     tint = tint * (1 - hair)[:, None] + strands * hair[:, None]
     tint[canvas.in_mouth] = 1.0
     own = sharpen(own, share, texels, len(canvas.texture))
@@ -61,9 +61,9 @@ def _remove_shading(normals: Floats, colour: Floats, share: Floats) -> Floats:
     Source: the shading of a matt surface under distant light is nearly a quadratic function of its normal (Ramamoorthi
     and Hanrahan 2001); each colour channel has its own.
     """
-    seen = np.flatnonzero(share > 0.5)
-    brightness = colour[seen] @ LUMA
-    lit = seen[brightness > SKIN_LUMA * np.median(brightness)]
+    visible = np.flatnonzero(share > 0.5)
+    brightness = colour[visible] @ LUMA
+    lit = visible[brightness > SKIN_LUMA * np.median(brightness)]
     terms = np.column_stack([_shading_terms(normals), np.ones(len(normals))])
     slopes = np.linalg.lstsq(terms[lit], np.log(np.maximum(colour[lit], 1.0)), rcond=None)[0]
     shade = np.exp((terms - terms[lit].mean(axis=0)) @ slopes)

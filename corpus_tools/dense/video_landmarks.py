@@ -79,9 +79,9 @@ def track_videos(videos: Sequence[Path], eyes: CachedTracker, on_progress: Progr
     return tuple(kept)
 
 
-def resting_landmarks(seen: Sequence[VideoLandmarks]) -> Floats:
+def resting_landmarks(videos: Sequence[VideoLandmarks]) -> Floats:
     """(478, 3) mean landmarks in mm of the frames with closed lips and open eyes."""
-    landmarks = np.concatenate([one.landmarks for one in seen])
+    landmarks = np.concatenate([one.landmarks for one in videos])
     landmarks = landmarks[np.isfinite(landmarks[:, 0, 0])].astype(np.float64)
     eyes = np.linalg.norm(landmarks[:, EYE_OUTER_LEFT] - landmarks[:, EYE_OUTER_RIGHT], axis=1)
     gaps = np.linalg.norm(landmarks[:, UPPER_LIP_INNER_MID] - landmarks[:, LOWER_LIP_INNER_MID], axis=1) / eyes

@@ -41,30 +41,30 @@ class SpeakerScale:
     def of(cls, observations: Sequence[Observation]) -> "SpeakerScale":
         """Statistics of one person's recordings over speech frames."""
         parts = []
-        for seen in observations:
-            here = speech_frames(seen.phones, len(seen.landmarks), seen.fps)
-            parts.append(LipCurves.of(seen.landmarks[here]).stacked())
+        for observation in observations:
+            here = speech_frames(observation.phones, len(observation.landmarks), observation.fps)
+            parts.append(LipCurves.of(observation.landmarks[here]).values())
         frames = np.concatenate(parts)
         return cls(frames.mean(axis=0), np.maximum(frames.std(axis=0), 1e-9))
 
     def z_score(self, curves: LipCurves) -> LipCurves:
         """z-scored curves of this person."""
-        opening, width = ((curves.stacked() - self.mean) / self.spread).T
+        opening, width = ((curves.values() - self.mean) / self.spread).T
         return LipCurves(opening, width)
 
 
 def standardise_reference(real: ReferenceUtterance, scale: SpeakerScale) -> ReferenceUtterance:
     """A real utterance whose parameters are its z-scored curves."""
     curves = scale.z_score(real.curves)
-    return replace(real, curves=curves, parameters=curves.stacked().astype(np.float32))
+    return replace(real, curves=curves, parameters=curves.values().astype(np.float32))
 
 
 def compare_across_talkers(
-    one: ReferenceUtterance, made: NDArray[np.float32], model: ShapeModel, scale: SpeakerScale
+    one: ReferenceUtterance, synthesised: NDArray[np.float32], model: ShapeModel, scale: SpeakerScale
 ) -> UtteranceComparison:
     """Comparison of synthesised parameters (T, S) of one talker with a real utterance of another, both z-scored."""
-    curves = scale.z_score(LipCurves.of(model.shapes(made)))
-    return UtteranceComparison(one, curves.stacked(), curves, np.ones(2))
+    curves = scale.z_score(LipCurves.of(model.shapes(synthesised)))
+    return UtteranceComparison(one, curves.values(), curves, np.ones(2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +76,7 @@ class SplitResult:
 
     talker: Talker
     real: tuple[ReferenceUtterance, ...]
-    made: Mapping[str, tuple[NDArray[np.float32], ...]]
+    synthesised: Mapping[str, tuple[NDArray[np.float32], ...]]
     seconds: Mapping[str, float]
     own: Mapping[str, tuple[UtteranceComparison, ...]] = field(default_factory=dict)
     scale: SpeakerScale | None = None
@@ -88,7 +88,7 @@ class SplitResult:
 
     def curves(self, method: str, at: int) -> LipCurves:
         """Lip curves of a method, in the units of the real ones."""
-        curves = LipCurves.of(self.model.shapes(self.made[method][at]))
+        curves = LipCurves.of(self.model.shapes(self.synthesised[method][at]))
         return curves if self.scale is None else self.scale.z_score(curves)
 
 
@@ -151,22 +151,22 @@ def evaluate_split(
 ) -> SplitResult:
     """Learn a talker from `train` and synthesise the motion of `test` by every method."""
     leak = fit_pose_correction(train)
-    train, test = ([leak.apply(seen) for seen in part] for part in (train, test))
+    train, test = ([leak.apply(observation) for observation in part] for part in (train, test))
     talker = _train_talker(train)
     methods = build_methods(talker, options)
-    real = tuple(ReferenceUtterance.of(seen, talker.model) for seen in test)
+    real = tuple(ReferenceUtterance.of(observation, talker.model) for observation in test)
     voiced = speak_references(voice, real) if voice is not None else ()
-    made, spent, own = {}, {}, {}
+    synthesised, synthesis_s, own = {}, {}, {}
     for number, (name, method) in enumerate(methods.items()):
-        made[name], spent[name] = _synthesise(method, real)
+        synthesised[name], synthesis_s[name] = _synthesise(method, real)
         if voiced:
             own[name] = _synthesise_own_durations(method, real, voiced, talker.model)
         if on_progress:
             on_progress(number + 1, len(methods))
     if tracks is not None:
-        made[TRACKS_METHOD], spent[TRACKS_METHOD] = map_tracks(tracks, talker, real), 0.0
-    made[CEILING_METHOD], spent[CEILING_METHOD] = tuple(one.parameters for one in real), 0.0
-    return SplitResult(talker, real, made, spent, own)
+        synthesised[TRACKS_METHOD], synthesis_s[TRACKS_METHOD] = map_tracks(tracks, talker, real), 0.0
+    synthesised[CEILING_METHOD], synthesis_s[CEILING_METHOD] = tuple(one.parameters for one in real), 0.0
+    return SplitResult(talker, real, synthesised, synthesis_s, own)
 
 
 def evaluate_across_talkers(
@@ -190,12 +190,14 @@ def evaluate_across_talkers(
     check_disjoint(train, others)
     train, others = correct_pose(train), correct_pose(others)
     talker = _train_talker(train)
-    hers, theirs = SpeakerScale.of(train), SpeakerScale.of(others)
-    real = tuple(standardise_reference(ReferenceUtterance.of(seen, talker.model), theirs) for seen in others)
-    made, spent = {}, {}
+    own_scale, other_scale = SpeakerScale.of(train), SpeakerScale.of(others)
+    real = tuple(
+        standardise_reference(ReferenceUtterance.of(observation, talker.model), other_scale) for observation in others
+    )
+    synthesised, synthesis_s = {}, {}
     methods = build_methods(talker, options)
     for number, (name, method) in enumerate(methods.items()):
-        made[name], spent[name] = _synthesise(method, real)
+        synthesised[name], synthesis_s[name] = _synthesise(method, real)
         if on_progress:
             on_progress(number + 1, len(methods))
     limits = Thresholds.of(real)
@@ -203,16 +205,16 @@ def evaluate_across_talkers(
         compute_scores(
             name,
             [
-                compare_across_talkers(one, values, talker.model, hers)
-                for one, values in zip(real, made[name], strict=True)
+                compare_across_talkers(one, values, talker.model, own_scale)
+                for one, values in zip(real, synthesised[name], strict=True)
             ],
             limits,
-            spent[name],
+            synthesis_s[name],
         )
         for name in methods
     )
     result = Evaluation(len(train), len(others), scores, is_across=True)
-    return result, (SplitResult(talker, real, made, spent, scale=hers),)
+    return result, (SplitResult(talker, real, synthesised, synthesis_s, scale=own_scale),)
 
 
 def _train_talker(train: Sequence[Observation]) -> Talker:
@@ -223,8 +225,8 @@ def _synthesise(
     method: SynthesisMethod, real: Sequence[ReferenceUtterance]
 ) -> tuple[tuple[NDArray[np.float32], ...], float]:
     began = time.perf_counter()
-    made = tuple(method(one.observation.phones, len(one.parameters), one.observation.fps) for one in real)
-    return made, time.perf_counter() - began
+    synthesised = tuple(method(one.observation.phones, len(one.parameters), one.observation.fps) for one in real)
+    return synthesised, time.perf_counter() - began
 
 
 def _synthesise_own_durations(
@@ -242,17 +244,18 @@ def _pooled_scores(runs: Sequence[SplitResult], limits: Thresholds) -> tuple[Sco
     return tuple(
         score_splits(
             name,
-            [(each.model, each.real, each.made[name]) for each in runs],
+            [(each.model, each.real, each.synthesised[name]) for each in runs],
             limits,
             sum(r.seconds[name] for r in runs),
         )
-        for name in runs[0].made
+        for name in runs[0].synthesised
     )
 
 
 def _pooled_own_scores(runs: Sequence[SplitResult], limits: Thresholds) -> tuple[Scores, ...]:
     return tuple(
-        compute_scores(name, [judged for each in runs for judged in each.own[name]], limits) for name in runs[0].own
+        compute_scores(name, [comparison for each in runs for comparison in each.own[name]], limits)
+        for name in runs[0].own
     )
 
 

@@ -22,7 +22,7 @@ LIVELINK_SUFFIX = ".csv"
 MAX_UTTERANCE_S = 6.0  # cut at pauses into utterances of about a sentence, which the bootstrap resamples
 
 
-def observe_livelink(path: Path, effort: RunOptions) -> tuple[Observation, ...]:
+def observe_livelink(path: Path, run_options: RunOptions) -> tuple[Observation, ...]:
     """Utterances of a Live Link Face capture and the one sound file that lies beside it, in sync with it.
 
     Raises
@@ -40,7 +40,7 @@ def observe_livelink(path: Path, effort: RunOptions) -> tuple[Observation, ...]:
         raise InputError(f"there is no sound file beside {path.name}; put one there")
     face = load_face("head")
     motion = match_shapes(capture.weights, face)
-    aligner = CachedAligner(effort.folder())
+    aligner = CachedAligner(run_options.folder())
     found = []
     for number, span in enumerate(cut_at_pauses(aligner.sound(sound), MAX_UTTERANCE_S), start=1):
         begin, end = (round(second * motion.fps) for second in span)

@@ -74,24 +74,24 @@ def pearson(one: Values, other: Values) -> float:
     return float(a @ b) / norm if norm > 1e-9 * len(a) else float("nan")
 
 
-def correlation(real: Values, made: Values) -> float:
+def correlation(real: Values, synthesised: Values) -> float:
     """Pearson's r of two series (T,); 0 where one of them is constant."""
-    return float(np.nan_to_num(pearson(real, made)))
+    return float(np.nan_to_num(pearson(real, synthesised)))
 
 
-def range_ratio(real: Values, made: Values) -> float:
+def range_ratio(real: Values, synthesised: Values) -> float:
     """Standard deviation of the synthesised series over that of the real one; 1 is equal articulation."""
-    return float(made.std(dtype=np.float64) / real.std(dtype=np.float64))
+    return float(synthesised.std(dtype=np.float64) / real.std(dtype=np.float64))
 
 
-def rmse_z(real: Values, made: Values, spread: Values) -> float:
+def rmse_z(real: Values, synthesised: Values, spread: Values) -> float:
     """Root mean square difference of (T, D) parameters in units of their training spread (D,)."""
-    return float(np.sqrt(np.mean(np.square((real - made) / spread))))
+    return float(np.sqrt(np.mean(np.square((real - synthesised) / spread))))
 
 
-def warping_cost(real: Values, made: Values, spread: Values, band: int | None) -> float:
+def warping_cost(real: Values, synthesised: Values, spread: Values, band: int | None) -> float:
     """Mean distance of motions (T, D) and (U, D) in units of `spread` (D,), along the cheapest warp within a band."""
-    cost = frame_distances(real / spread, made / spread)
+    cost = frame_distances(real / spread, synthesised / spread)
     path = warp_path(cost, band=band)
     return path_cost(cost, path) / len(path)
 

@@ -33,38 +33,38 @@ def build_methods(talker: Talker, options: Mapping[str, SynthesisOptions] | None
 def network_method(network: PhoneNetwork) -> SynthesisMethod:
     """The first of a talker's networks alone: a plain sliding-window network."""
 
-    def made(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
+    def motion(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
         return network.parameters(phones, np.arange(n_frames) / fps, slice(1))
 
-    return made
+    return motion
 
 
 def exemplar_method(voice: ExemplarModel, options: SynthesisOptions) -> SynthesisMethod:
     """Synthesis from exemplars."""
 
-    def made(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
+    def motion(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
         return speech_trajectory(phones, voice, fps=fps, n_frames=n_frames, options=options).values
 
-    return made
+    return motion
 
 
 def mean_pose_method(talker: Talker, voice: ExemplarModel) -> SynthesisMethod:
     """Baseline: linear interpolation between the mean poses of phones, placed at their middles."""
     n_speech, inventory = talker.model.n_speech, voice.tokens.inventory
     poses: dict[str, list[NDArray[np.float64]]] = {label: [] for label in inventory}
-    for spoken in talker.utterances:
-        frame_times = np.arange(len(spoken.shape)) / talker.fps
-        middles = (spoken.phones.edges[:-1] + spoken.phones.edges[1:]) / 2
-        read = np.stack([np.interp(middles, frame_times, spoken.shape[:, d]) for d in range(n_speech)], axis=1)
-        for label, pose in zip(spoken.phones.phones, read, strict=True):
+    for utterance in talker.utterances:
+        frame_times = np.arange(len(utterance.shape)) / talker.fps
+        middles = (utterance.phones.edges[:-1] + utterance.phones.edges[1:]) / 2
+        read = np.stack([np.interp(middles, frame_times, utterance.shape[:, d]) for d in range(n_speech)], axis=1)
+        for label, pose in zip(utterance.phones.phones, read, strict=True):
             poses[label].append(pose)
     mean = {label: np.mean(seen, axis=0) for label, seen in poses.items() if seen}
 
-    def made(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
+    def motion(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
         targets = build_targets(phones, inventory)
         middles = targets.spans[:, 1:3].mean(axis=1)
         keys = np.stack([mean[label] for label in targets.labels])
         times = np.arange(n_frames) / fps
         return np.stack([np.interp(times, middles, keys[:, d]) for d in range(n_speech)], axis=1).astype(np.float32)
 
-    return made
+    return motion

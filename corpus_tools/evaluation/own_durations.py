@@ -70,10 +70,12 @@ def _speak_reference(voice: Voice, one: ReferenceUtterance) -> VoicedUtterance |
 
 def map_word_times(speech: Speech, phones: PhoneSequence, words: Sequence[WordSpan], fps: float) -> VoicedUtterance:
     """One utterance spoken by the voice, with the map of its word edges to those of the recording."""
-    ours, real = _word_edges(speech.phones, speech.words), _word_edges(phones, words)
+    synthesised, real = _word_edges(speech.phones, speech.words), _word_edges(phones, words)
     outside = np.array([-EXTRAPOLATION_S, EXTRAPOLATION_S])
-    ours, real = (np.concatenate([each[:1] + outside[:1], each, each[-1:] + outside[1:]]) for each in (ours, real))
-    return VoicedUtterance(speech.phones, frame_count(speech.waveform.duration, fps), ours, real)
+    synthesised, real = (
+        np.concatenate([each[:1] + outside[:1], each, each[-1:] + outside[1:]]) for each in (synthesised, real)
+    )
+    return VoicedUtterance(speech.phones, frame_count(speech.waveform.duration, fps), synthesised, real)
 
 
 def _word_edges(phones: PhoneSequence, words: Sequence[WordSpan]) -> NDArray[np.float64]:
@@ -89,10 +91,10 @@ def compare_own_durations(
 ) -> UtteranceComparison:
     """Comparison of a method's motion for the voice's phones with the real utterance."""
     fps, n_fine = one.observation.fps, OVERSAMPLING * (voiced.n_frames - 1) + 1
-    made = method(voiced.phones, n_fine, OVERSAMPLING * fps)
+    synthesised = method(voiced.phones, n_fine, OVERSAMPLING * fps)
     wanted = voiced.times(np.arange(len(one.parameters)) / fps)
-    columns = [np.interp(wanted, np.arange(n_fine) / (OVERSAMPLING * fps), column) for column in made.T]
-    there, ours = np.stack(columns, axis=1).astype(np.float32), made[::OVERSAMPLING]
+    columns = [np.interp(wanted, np.arange(n_fine) / (OVERSAMPLING * fps), column) for column in synthesised.T]
+    there, ours = np.stack(columns, axis=1).astype(np.float32), synthesised[::OVERSAMPLING]
     own = OwnDurationMotion(
         voiced.phones, speech_frames(voiced.phones, voiced.n_frames, fps), ours, LipCurves.of(model.shapes(ours))
     )

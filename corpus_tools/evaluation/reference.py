@@ -33,7 +33,7 @@ class LipCurves:
         """Of (T, 478, 3) landmarks."""
         return cls(measures.lip_opening(landmarks), measures.lip_width(landmarks))
 
-    def stacked(self) -> NDArray[np.float64]:
+    def values(self) -> NDArray[np.float64]:
         """(T, 2) opening and width."""
         return np.stack([self.opening, self.width], axis=1)
 
@@ -43,21 +43,21 @@ class ReferenceUtterance:
     """One held-out utterance: evaluated frames, speech parameters (T, S), curves, and the class of each frame (T,)."""
 
     observation: Observation
-    judged: slice
+    evaluated: slice
     parameters: NDArray[np.float32]
     curves: LipCurves
     classes: NDArray[np.str_]
 
     @classmethod
-    def of(cls, seen: Observation, model: ShapeModel) -> "ReferenceUtterance":
+    def of(cls, observation: Observation, model: ShapeModel) -> "ReferenceUtterance":
         """The utterance in the parameters of a model."""
-        n_frames = len(seen.landmarks)
+        n_frames = len(observation.landmarks)
         return cls(
-            seen,
-            measures.speech_frames(seen.phones, n_frames, seen.fps),
-            model.parameters(seen.landmarks)[:, : model.n_speech],
-            LipCurves.of(seen.landmarks),
-            frame_classes(seen.phones.phones, seen.phones.edges, np.arange(n_frames) / seen.fps),
+            observation,
+            measures.speech_frames(observation.phones, n_frames, observation.fps),
+            model.parameters(observation.landmarks)[:, : model.n_speech],
+            LipCurves.of(observation.landmarks),
+            frame_classes(observation.phones.phones, observation.phones.edges, np.arange(n_frames) / observation.fps),
         )
 
     @property

@@ -65,7 +65,7 @@ class Scores:
     """Scores of a method over all held-out utterances: r and range of pooled frames, means or shares otherwise.
 
     ``figures`` are those of `FIGURES` by name, ``free_cost`` only with a voice's own durations;
-    ``real_time_factor`` is the time spent over the utterances' duration.
+    ``real_time_factor`` is the synthesis time divided by the duration of the utterances.
     """
 
     method: str
@@ -104,11 +104,11 @@ class UtteranceStatistics:
 class OwnDurationMotion:
     """Motion for a voice's own durations, on its time axis: phones, parameters (U, S) and lip curves.
 
-    ``judged`` are its speech frames.
+    ``evaluated`` are its speech frames.
     """
 
     phones: PhoneSequence
-    judged: slice
+    evaluated: slice
     values: NDArray[np.floating]
     curves: LipCurves
 
@@ -122,7 +122,7 @@ class UtteranceComparison:
     """
 
     real: ReferenceUtterance
-    made: NDArray[np.floating]
+    synthesised: NDArray[np.floating]
     curves: LipCurves
     spread: NDArray[np.floating]
     own: OwnDurationMotion | None = None
@@ -138,14 +138,14 @@ def available_figures(scores: Sequence[Scores]) -> tuple[tuple[str, str, int], .
     return tuple(figure for figure in FIGURES if all(figure[0] in one.figures for one in scores))
 
 
-def score_splits(method: str, splits: Sequence[SplitMotion], limits: Thresholds, spent: float = 0.0) -> Scores:
-    """Scores of a method over the utterances of all splits; synthesis took `spent` seconds."""
-    judged = [
+def score_splits(method: str, splits: Sequence[SplitMotion], limits: Thresholds, synthesis_s: float = 0.0) -> Scores:
+    """Scores of a method over the utterances of all splits; synthesis took `synthesis_s` seconds."""
+    comparisons = [
         UtteranceComparison(one, values, LipCurves.of(model.shapes(values)), speech_spread(model))
-        for model, real, made in splits
-        for one, values in zip(real, made, strict=True)
+        for model, real, synthesised in splits
+        for one, values in zip(real, synthesised, strict=True)
     ]
-    return compute_scores(method, judged, limits, spent)
+    return compute_scores(method, comparisons, limits, synthesis_s)
 
 
 def speech_spread(model: ShapeModel) -> NDArray[np.float32]:
@@ -154,67 +154,67 @@ def speech_spread(model: ShapeModel) -> NDArray[np.float32]:
 
 
 def compute_scores(
-    method: str, judged: Sequence[UtteranceComparison], limits: Thresholds, spent: float = 0.0
+    method: str, comparisons: Sequence[UtteranceComparison], limits: Thresholds, synthesis_s: float = 0.0
 ) -> Scores:
-    """Scores of a method over compared utterances; synthesis took `spent` seconds."""
-    tallies = [_utterance_statistics(one, limits) for one in judged]
+    """Scores of a method over compared utterances; synthesis took `synthesis_s` seconds."""
+    tallies = [_utterance_statistics(one, limits) for one in comparisons]
     return Scores(
         method,
         _estimate_figures(tallies),
-        tuple(_class_scores(judged)),
-        spent / sum(one.real.seconds for one in judged),
-        tuple(_utterance_score(tally, one) for tally, one in zip(tallies, judged, strict=True)),
+        tuple(_class_scores(comparisons)),
+        synthesis_s / sum(one.real.seconds for one in comparisons),
+        tuple(_utterance_score(tally, one) for tally, one in zip(tallies, comparisons, strict=True)),
     )
 
 
-def _utterance_statistics(judged: UtteranceComparison, limits: Thresholds) -> UtteranceStatistics:
-    one, seen, n, here = judged.real, judged.curves, len(judged.spread), judged.real.judged
+def _utterance_statistics(comparison: UtteranceComparison, limits: Thresholds) -> UtteranceStatistics:
+    one, curves, n, here = comparison.real, comparison.curves, len(comparison.spread), comparison.real.evaluated
     phones, fps = one.observation.phones, one.observation.fps
-    real, made = one.parameters[here, :n], judged.made[here, :n]
-    peaks = [measures.peak_times(curve, phones, fps) for curve in (one.curves.opening, seen.opening)]
+    real, synthesised = one.parameters[here, :n], comparison.synthesised[here, :n]
+    peaks = [measures.peak_times(curve, phones, fps) for curve in (one.curves.opening, curves.opening)]
     offsets = peaks[1] - peaks[0]
     return UtteranceStatistics(
-        _curve_moments(one.curves.opening[here], seen.opening[here]),
-        _curve_moments(one.curves.width[here], seen.width[here]),
-        measures.rmse_z(real, made, judged.spread),
-        measures.warping_cost(real, made, judged.spread, round(measures.DTW_BAND_S * fps)),
-        _free_cost(judged),
-        _event_counts(judged, limits),
+        _curve_moments(one.curves.opening[here], curves.opening[here]),
+        _curve_moments(one.curves.width[here], curves.width[here]),
+        measures.rmse_z(real, synthesised, comparison.spread),
+        measures.warping_cost(real, synthesised, comparison.spread, round(measures.DTW_BAND_S * fps)),
+        _free_cost(comparison),
+        _event_counts(comparison, limits),
         np.abs(offsets[np.isfinite(offsets)]),
     )
 
 
-def _free_cost(judged: UtteranceComparison) -> float | None:
+def _free_cost(comparison: UtteranceComparison) -> float | None:
     """Warping cost, without a band, of motion on the voice's time axis."""
-    if judged.own is None:
+    if comparison.own is None:
         return None
-    n = len(judged.spread)
-    real = judged.real.parameters[judged.real.judged, :n]
-    return measures.warping_cost(real, judged.own.values[judged.own.judged, :n], judged.spread, None)
+    n = len(comparison.spread)
+    real = comparison.real.parameters[comparison.real.evaluated, :n]
+    return measures.warping_cost(real, comparison.own.values[comparison.own.evaluated, :n], comparison.spread, None)
 
 
-def _event_counts(judged: UtteranceComparison, limits: Thresholds) -> Floats:
+def _event_counts(comparison: UtteranceComparison, limits: Thresholds) -> Floats:
     """(4, 2) numbers of events and of opportunities, in the phones of the time axis of the synthesis."""
-    own, fps = judged.own, judged.real.observation.fps
-    phones, seen = (own.phones, own.curves) if own else (judged.real.observation.phones, judged.curves)
+    own, fps = comparison.own, comparison.real.observation.fps
+    phones, curves = (own.phones, own.curves) if own else (comparison.real.observation.phones, comparison.curves)
 
     def events(curve: NDArray[np.floating], labels: str, limit: float) -> tuple[float, float]:
         least = measures.min_openings(curve, phones, fps, PHONE_CLASSES[labels])
         return float((least <= limit).sum()), float(len(least))
 
-    middles = measures.midpoint_openings(seen.opening, phones, fps)
+    middles = measures.midpoint_openings(curves.opening, phones, fps)
     return np.array(
         [
-            events(seen.opening, "bilabial", limits.closed),
+            events(curves.opening, "bilabial", limits.closed),
             (float((middles <= limits.closed).sum()), float(len(middles))),
-            events(seen.opening, "labiodental", limits.labiodental),
-            events(seen.width, "rounded", limits.rounded),
+            events(curves.opening, "labiodental", limits.labiodental),
+            events(curves.width, "rounded", limits.rounded),
         ]
     )
 
 
-def _curve_moments(real: Floats, made: Floats) -> Floats:
-    return np.array([len(real), real.sum(), made.sum(), real @ real, made @ made, real @ made])
+def _curve_moments(a: Floats, b: Floats) -> Floats:
+    return np.array([len(a), a.sum(), b.sum(), a @ a, b @ b, a @ b])
 
 
 def _estimate_figures(tallies: Sequence[UtteranceStatistics]) -> dict[str, IntervalEstimate]:
@@ -246,10 +246,10 @@ def _estimate_figures(tallies: Sequence[UtteranceStatistics]) -> dict[str, Inter
 def _curve_figures(weights: Floats, moments: Sequence[Floats]) -> tuple[Floats, Floats]:
     """Pearson's r and the ratio of spreads for each row of weights (W, U)."""
     n, a, b, aa, bb, ab = (weights @ np.array(moments)).T
-    real, made = np.maximum(aa - a * a / n, 0.0), np.maximum(bb - b * b / n, 0.0)
-    moves = np.sqrt(real * made) > 1e-9 * n
-    r = np.where(moves, (ab - a * b / n) / np.where(moves, np.sqrt(real * made), 1.0), 0.0)
-    return r, np.sqrt(made / np.maximum(real, 1e-12))
+    real, synthesised = np.maximum(aa - a * a / n, 0.0), np.maximum(bb - b * b / n, 0.0)
+    moves = np.sqrt(real * synthesised) > 1e-9 * n
+    r = np.where(moves, (ab - a * b / n) / np.where(moves, np.sqrt(real * synthesised), 1.0), 0.0)
+    return r, np.sqrt(synthesised / np.maximum(real, 1e-12))
 
 
 def _weighted_medians(weights: Floats, offsets: Sequence[Floats]) -> Floats:
@@ -264,35 +264,36 @@ def _weighted_medians(weights: Floats, offsets: Sequence[Floats]) -> Floats:
     return np.asarray(values[order][np.minimum(at, len(values) - 1)])
 
 
-def _class_scores(judged: Sequence[UtteranceComparison]) -> list[ClassScore]:
-    classes, away, opening = [], [], []
-    for each in judged:
-        one, here, n = each.real, each.real.judged, len(each.spread)
+def _class_scores(comparisons: Sequence[UtteranceComparison]) -> list[ClassScore]:
+    classes, errors, opening = [], [], []
+    for each in comparisons:
+        one, here, n = each.real, each.real.evaluated, len(each.spread)
         classes.append(one.classes[here])
-        away.append((each.made - one.parameters)[here, :n] / each.spread)
+        errors.append((each.synthesised - one.parameters)[here, :n] / each.spread)
         opening.append((each.curves.opening - one.curves.opening)[here])
-    return _score_classes(np.concatenate(classes), np.concatenate(away), np.concatenate(opening))
+    return _score_classes(np.concatenate(classes), np.concatenate(errors), np.concatenate(opening))
 
 
-def _score_classes(classes: NDArray[np.str_], away: NDArray[np.float32], opening: Floats) -> list[ClassScore]:
+def _score_classes(classes: NDArray[np.str_], errors: NDArray[np.float32], opening: Floats) -> list[ClassScore]:
     found = []
     for name in (*PHONE_CLASSES, OTHER_CLASS):
         here = classes == name
         if here.any():
-            rmse = float(np.sqrt(np.square(away[here]).mean()))
+            rmse = float(np.sqrt(np.square(errors[here]).mean()))
             error, bias = float(np.abs(opening[here]).mean()), float(opening[here].mean())
             found.append(ClassScore(name, int(here.sum()), rmse, error, bias))
     return found
 
 
-def _utterance_score(tally: UtteranceStatistics, judged: UtteranceComparison) -> UtteranceScore:
-    one, seen, here, curves = judged.real, judged.curves, judged.real.judged, judged.real.curves
+def _utterance_score(tally: UtteranceStatistics, comparison: UtteranceComparison) -> UtteranceScore:
+    one, synthesised = comparison.real, comparison.curves
+    here, recorded = one.evaluated, one.curves
     return UtteranceScore(
         one.observation.name,
-        measures.correlation(curves.opening[here], seen.opening[here]),
-        measures.correlation(curves.width[here], seen.width[here]),
+        measures.correlation(recorded.opening[here], synthesised.opening[here]),
+        measures.correlation(recorded.width[here], synthesised.width[here]),
         tally.rmse_z,
         tally.dtw_cost,
-        measures.range_ratio(curves.opening[here], seen.opening[here]),
+        measures.range_ratio(recorded.opening[here], synthesised.opening[here]),
         int(tally.opening[0]),
     )

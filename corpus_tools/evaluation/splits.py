@@ -51,11 +51,11 @@ def split_by_words(observations: Sequence[Observation], words: Collection[str]) 
         A word does not occur, or every utterance contains one of them.
     """
     wanted = {word.lower() for word in words}
-    spoken = {word.text.lower() for seen in observations for word in seen.words}
+    spoken = {word.text.lower() for observation in observations for word in observation.words}
     if missing := sorted(wanted - spoken):
         raise InputError(f"no utterance contains {', '.join(missing)}; choose from: {', '.join(sorted(spoken)[:60])}")
     ordered = _sort_by_name(observations)
-    held = {at for at, seen in enumerate(ordered) if wanted & {word.text.lower() for word in seen.words}}
+    held = {at for at, observation in enumerate(ordered) if wanted & {word.text.lower() for word in observation.words}}
     if len(held) == len(ordered):
         raise InputError(f"every utterance contains one of {', '.join(sorted(wanted))}; hold out fewer words")
     return _split_at(ordered, held)
@@ -73,16 +73,16 @@ def check_disjoint(train: Sequence[Observation], test: Sequence[Observation]) ->
         raise InputError("there is no utterance to test")
     if not train:
         raise InputError("there is no utterance to learn from")
-    known = {_content_identity(seen) for seen in train}
-    if both := sorted(seen.name for seen in test if _content_identity(seen) in known):
+    known = {_content_identity(observation) for observation in train}
+    if both := sorted(observation.name for observation in test if _content_identity(observation) in known):
         raise InputError(
             f"{both[0]} is in both the training and the held-out part ({len(both)} in all); remove it from one"
         )
 
 
-def _content_identity(seen: Observation) -> tuple[int, bytes]:
+def _content_identity(observation: Observation) -> tuple[int, bytes]:
     """Identity of an utterance's content, the same for copies under other names."""
-    return len(seen.landmarks), seen.landmarks[:: max(1, len(seen.landmarks) // 4), :20].tobytes()
+    return len(observation.landmarks), observation.landmarks[:: max(1, len(observation.landmarks) // 4), :20].tobytes()
 
 
 def _sort_by_name(observations: Sequence[Observation]) -> list[Observation]:

@@ -84,21 +84,21 @@ def map_tracks(
     """
     if missing := [one.observation.name for one in real if one.observation.name not in tracks]:
         raise InputError(f"the tracks lack {missing[0]} ({len(missing)} of {len(real)} held-out utterances); add them")
-    known = [spoken for spoken in talker.utterances if spoken.name in tracks]
+    known = [utterance for utterance in talker.utterances if utterance.name in tracks]
     if len(known) < MIN_TRAINING_UTTERANCES:
         raise InputError(
             f"the tracks hold {len(known)} training utterances; their linear map needs {MIN_TRAINING_UTTERANCES}"
         )
     n_speech = talker.model.n_speech
     terms = np.concatenate([tracks[one.name].at(np.arange(len(one.shape)) / talker.fps) for one in known])
-    wanted = np.concatenate([one.shape[:, :n_speech] for one in known]).astype(np.float64)
+    targets = np.concatenate([one.shape[:, :n_speech] for one in known]).astype(np.float64)
     spread = np.maximum(terms.std(axis=0), 1e-9)
-    middle = wanted.mean(axis=0)
-    fit = fit_ridge(terms / spread, wanted - middle)
+    middle = targets.mean(axis=0)
+    fit = fit_ridge(terms / spread, targets - middle)
 
-    def made(one: ReferenceUtterance) -> NDArray[np.float32]:
+    def mapped_parameters(one: ReferenceUtterance) -> NDArray[np.float32]:
         times = np.arange(len(one.parameters)) / one.observation.fps
         seen = tracks[one.observation.name].at(times) / spread
         return np.asarray(middle + (seen - fit.mean) @ fit.weights, np.float32)
 
-    return tuple(made(one) for one in real)
+    return tuple(mapped_parameters(one) for one in real)

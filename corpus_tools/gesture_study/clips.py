@@ -73,16 +73,16 @@ def replace_style(palette: Palette, name: str, style: Style) -> Palette:
 def field_clip(fields: GestureFields, style: str, feature: str, intensity: Floats, seed: int) -> Clip:
     """A feature of a style, measured or derived, for an intensity (T,) at `GESTURE_FPS`."""
     source, tempo = fields.source(style, feature), fields.change(style, feature).tempo
-    made = fields.of(source, feature)
+    field = fields.of(source, feature)
     times = np.arange(0.0, len(intensity) * tempo + 2)  # in frames of the field; two more for the cubic
     intensities = np.interp(times / tempo, np.arange(len(intensity)), intensity).astype(np.float32)[:, None]
     generator = np.random.default_rng([seed, crc32(feature.encode())])  # as `tts2face.gesture.gesture_stream` draws
-    start = initial_state(made, generator.random())
-    walk = sample_field_moments(made, start, intensities, generator.random(len(intensities)))
-    values = walk.values[: len(intensity)]
+    start = initial_state(field, generator.random())
+    sample = sample_field_moments(field, start, intensities, generator.random(len(intensities)))
+    values = sample.values[: len(intensity)]
     if tempo != 1.0:
-        values = interpolate_cubic(walk.values, tempo * np.arange(len(intensity), dtype=np.float64))
-    return Clip(fields.apply_change(style, feature, values), walk.moments[: round(len(intensity) * tempo)])
+        values = interpolate_cubic(sample.values, tempo * np.arange(len(intensity), dtype=np.float64))
+    return Clip(fields.apply_change(style, feature, values), sample.moments[: round(len(intensity) * tempo)])
 
 
 def published_clip(palette: Palette, style: str, intensity: Floats, seed: int) -> Mapping[str, Floats]:

@@ -32,9 +32,9 @@ class Panel:
     draw: "Callable[[Axes], None]"
 
 
-def series_names(found: StyleStudy) -> tuple[str, ...]:
+def series_names(style: StyleStudy) -> tuple[str, ...]:
     """Names of the lines of a plot; only measured styles have one of the published field."""
-    return ("recorded", "field", "noise", "ju2008") if found.source is None else (found.source, "field", "noise")
+    return ("recorded", "field", "noise", "ju2008") if style.source is None else (style.source, "field", "noise")
 
 
 def panel_svg(panel: Panel) -> str:
@@ -61,12 +61,12 @@ def panels_png(title: str, panels: Sequence[Panel]) -> bytes:
     return draw_png(draw, COLUMNS * WIDTH, rows * HEIGHT + HEAD)
 
 
-def distribution_panel(found: StyleStudy, compared: TraitComparison) -> Panel:
+def distribution_panel(style: StyleStudy, compared: TraitComparison) -> Panel:
     """Histograms of a trait over common bins."""
     kinds = compared.real, compared.field, compared.noise, compared.published
     edges = np.linspace(*_limits(np.concatenate(kinds[:2])), N_BINS + 1)
     unit = f", {compared.trait.unit}" if compared.trait.unit else ""
-    names = series_names(found)
+    names = series_names(style)
 
     def draw(axes: "Axes") -> None:
         highest = 0.0
@@ -84,7 +84,7 @@ def distribution_panel(found: StyleStudy, compared: TraitComparison) -> Panel:
     return Panel(compared.trait.name, draw)
 
 
-def spectrum_panel(found: StyleStudy, moving: MotionComparison) -> Panel:
+def spectrum_panel(style: StyleStudy, moving: MotionComparison) -> Panel:
     """Power spectra without the mean, on a logarithmic scale."""
     title = f"{moving.feature}: power"
 
@@ -93,7 +93,7 @@ def spectrum_panel(found: StyleStudy, moving: MotionComparison) -> Panel:
 
         highest = [np.nanmax(one.power[1:]) for one in moving.spectra[:2] if np.isfinite(one.power[1:]).any()]
         top = float(np.ceil(np.log10(max(highest, default=1.0))))
-        for name, one, (colour, dash) in zip(series_names(found), moving.spectra, SERIES, strict=False):
+        for name, one, (colour, dash) in zip(series_names(style), moving.spectra, SERIES, strict=False):
             axes.plot(one.hz[1:], np.maximum(one.power[1:], 1e-30), color=colour, linestyle=dash, label=name)
         axes.set(
             title=title, xlabel="frequency, Hz", ylabel=f"power, {moving.unit}²/Hz" if moving.unit else "power, 1/Hz"
@@ -106,9 +106,9 @@ def spectrum_panel(found: StyleStudy, moving: MotionComparison) -> Panel:
     return Panel(title, draw)
 
 
-def autocorrelation_panel(found: StyleStudy, feature: str) -> Panel:
+def autocorrelation_panel(style: StyleStudy, feature: str) -> Panel:
     """Autocorrelation of ten minutes over the lag."""
-    one, title = found.long_run.repetition[feature], f"{feature}: autocorrelation"
+    one, title = style.long_run.repetition[feature], f"{feature}: autocorrelation"
     lags = np.arange(FROM_S, LAGS_S) + 0.5
     kinds = ("recordings, shuffled", one.real), ("field, speech", one.speech), ("field, silence", one.silence)
 
@@ -121,11 +121,11 @@ def autocorrelation_panel(found: StyleStudy, feature: str) -> Panel:
     return Panel(title, draw)
 
 
-def summary_panels(found: StyleStudy) -> Sequence[Panel]:
+def summary_panels(style: StyleStudy) -> Sequence[Panel]:
     """The panels of the summary picture."""
-    traits = [distribution_panel(found, one) for one in found.trait_comparisons if one.trait.name in SUMMARY_TRAITS]
-    spectra = [spectrum_panel(found, one) for one in found.motion_comparisons if one.feature in {"head", "brows"}]
-    return [*traits, *spectra] or [distribution_panel(found, found.trait_comparisons[0])]
+    traits = [distribution_panel(style, one) for one in style.trait_comparisons if one.trait.name in SUMMARY_TRAITS]
+    spectra = [spectrum_panel(style, one) for one in style.motion_comparisons if one.feature in {"head", "brows"}]
+    return [*traits, *spectra] or [distribution_panel(style, style.trait_comparisons[0])]
 
 
 def _limits(values: NDArray[np.float64]) -> tuple[float, float]:

@@ -28,12 +28,12 @@ from corpus_tools.report.page import note_paragraph, page, paragraphs, scroll_bo
 LAYOUT = "<style>.panels { display: flex; flex-wrap: wrap; gap: .5rem 1rem; }</style>"
 
 
-def gestures_page(found: GestureStudy) -> str:
+def gestures_page(study: GestureStudy) -> str:
     """The page (HTML)."""
-    parts = [LAYOUT, _method(found)]
-    for style in found.styles:
+    parts = [LAYOUT, _method(study)]
+    for style in study.styles:
         parts += _style(style)
-    return page(f"Gestures: {found.name}", parts)
+    return page(f"Gestures: {study.name}", parts)
 
 
 def format_number(value: float, digits: int = 2) -> str:
@@ -43,8 +43,8 @@ def format_number(value: float, digits: int = 2) -> str:
     return f"{value:.{digits}f}" if abs(value) >= 0.01 or value == 0 else f"{value:.1g}"
 
 
-def _method(found: GestureStudy) -> str:
-    options = found.options
+def _method(study: GestureStudy) -> str:
+    options = study.options
     return note_paragraph(
         f"One in {options.one_in} recordings is held out (seed {options.seed}). Fields are built from the others and "
         "sampled for the intensity of the held-out ones; noise does not depend on the sound. "
@@ -56,44 +56,44 @@ def _method(found: GestureStudy) -> str:
     )
 
 
-def _style(found: StyleStudy) -> list[str]:
+def _style(style: StyleStudy) -> list[str]:
     by_feature: dict[str, list[TraitComparison]] = {}
-    for one in found.trait_comparisons:
+    for one in style.trait_comparisons:
         by_feature.setdefault(one.trait.feature, []).append(one)
     return [
-        f"<h2>{escape(found.name)}</h2>",
-        _origin(found),
-        _distances(found),
+        f"<h2>{escape(style.name)}</h2>",
+        _origin(style),
+        _distances(style),
         "<h3>Distributions</h3>",
         note_paragraph("Values outside a plot count in its first or last bin."),
-        _panels(distribution_panel(found, one) for ones in by_feature.values() for one in ones),
+        _panels(distribution_panel(style, one) for ones in by_feature.values() for one in ones),
         "<h3>Spectra, sound, seeds</h3>",
-        _motion_table(found),
-        _panels(spectrum_panel(found, one) for one in found.motion_comparisons),
-        *_long_run(found),
+        _motion_table(style),
+        _panels(spectrum_panel(style, one) for one in style.motion_comparisons),
+        *_long_run(style),
     ]
 
 
-def _origin(found: StyleStudy) -> str:
-    rates = " / ".join(format_number(rate, 1) for rate in found.blinks_per_minute)
-    if found.source is not None:
+def _origin(style: StyleStudy) -> str:
+    rates = " / ".join(format_number(rate, 1) for rate in style.blinks_per_minute)
+    if style.source is not None:
         return paragraphs(
-            f"{found.summary[:1].upper()}{found.summary[1:]}.",
-            f"A derived style without recordings: compared with the motion of the field of {found.source}; no targets.",
-            f"Blinks per minute, {found.source} / field / noise: {rates}.",
+            f"{style.summary[:1].upper()}{style.summary[1:]}.",
+            f"A derived style without recordings: compared with the motion of the field of {style.source}; no targets.",
+            f"Blinks per minute, {style.source} / field / noise: {rates}.",
         )
     held = (
-        f"{found.n_training} training recordings, {found.n_held_out} held out."
-        if found.is_held_out
-        else f"{found.n_training} recordings, too few to hold any out: compared with the recordings of the fields."
+        f"{style.n_training} training recordings, {style.n_held_out} held out."
+        if style.is_held_out
+        else f"{style.n_training} recordings, too few to hold any out: compared with the recordings of the fields."
     )
     return paragraphs(
-        f"{found.minutes:.1f} minutes. {held}", f"Blinks per minute, recorded / field / noise / ju2008: {rates}."
+        f"{style.minutes:.1f} minutes. {held}", f"Blinks per minute, recorded / field / noise / ju2008: {rates}."
     )
 
 
-def _distances(found: StyleStudy) -> str:
-    real, *_ = series_names(found)
+def _distances(style: StyleStudy) -> str:
+    real, *_ = series_names(style)
     rows = [
         (
             one.trait.name,
@@ -107,9 +107,9 @@ def _distances(found: StyleStudy) -> str:
             format_number(ratio(one.to_field, one.halves)),
             format_number(ratio(one.to_field, one.to_noise)),
             format_number(ratio(one.to_published, one.halves)),
-            target_result(found, one),
+            target_result(style, one),
         )
-        for one in found.trait_comparisons
+        for one in style.trait_comparisons
     ]
     head = ("trait", "unit", "n", f"mean {real}", "field", "noise", "ju2008")
     distances = ("W halves", "W field", "W noise", "W ju2008")
@@ -117,24 +117,24 @@ def _distances(found: StyleStudy) -> str:
     return scroll_box(table((*head, *distances, *ratios, "target"), rows, numbers=range(2, 14)))
 
 
-def target_result(found: StyleStudy, one: TraitComparison) -> str:
+def target_result(style: StyleStudy, one: TraitComparison) -> str:
     """Whether a trait with a target meets it; empty without a target."""
-    if not one.trait.has_target or found.source is not None:
+    if not one.trait.has_target or style.source is not None:
         return ""
     return "met" if one.is_met else "missed"
 
 
-def _motion_table(found: StyleStudy) -> str:
-    real, *_ = series_names(found)
+def _motion_table(style: StyleStudy) -> str:
+    real, *_ = series_names(style)
     rows = [
         (
             one.feature,
             *(format_number(r) for r in _pad_columns(one.with_intensity, 4)),
-            _correlation_result(found, one),
+            _correlation_result(style, one),
             *(format_number(share) for share in _pad_columns(one.fast_power, 3)),
             *(format_number(share) for share in one.diversity),
         )
-        for one in found.motion_comparisons
+        for one in style.motion_comparisons
     ]
     above = f"power above {FAST_HZ:g} Hz / {real}"
     correlations = (f"r of speed with intensity: {real}", "field", "noise", "ju2008", "target")
@@ -149,22 +149,22 @@ def _pad_columns(values: tuple[float, ...], n: int) -> tuple[float, ...]:
     return (*values, *[float("nan")] * (n - len(values)))
 
 
-def _correlation_result(found: StyleStudy, one: MotionComparison) -> str:
-    if one.feature != "head" or found.source is not None:
+def _correlation_result(style: StyleStudy, one: MotionComparison) -> str:
+    if one.feature != "head" or style.source is not None:
         return ""
     return "met" if one.follows_sound else "missed"
 
 
-def _long_run(found: StyleStudy) -> list[str]:
-    if not found.long_run.coverage:
+def _long_run(style: StyleStudy) -> list[str]:
+    if not style.long_run.coverage:
         return []
     rows = [
         (
             feature,
-            *(f"{100 * share:.0f} %" for share in found.long_run.coverage[feature]),
-            *(format_number(highest) for highest in found.long_run.repetition[feature].highest),
+            *(f"{100 * share:.0f} %" for share in style.long_run.coverage[feature]),
+            *(format_number(highest) for highest in style.long_run.repetition[feature].highest),
         )
-        for feature in found.long_run.coverage
+        for feature in style.long_run.coverage
     ]
     after = [f"moments visited after {minutes} min" for minutes in VISITED_AFTER]
     highest = [f"highest r from {FROM_S} s: {kind}" for kind in ("recordings", "speech", "silence")]
@@ -172,7 +172,7 @@ def _long_run(found: StyleStudy) -> list[str]:
         f"<h3>Clips of {MINUTES} minutes</h3>",
         table(("feature", *after, *highest), rows, numbers=range(1, 7)),
         note_paragraph("A clip that repeats itself has r = 1 at the period of the repetition."),
-        _panels(autocorrelation_panel(found, feature) for feature in found.long_run.repetition),
+        _panels(autocorrelation_panel(style, feature) for feature in style.long_run.repetition),
     ]
 
 

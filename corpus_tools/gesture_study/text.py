@@ -17,12 +17,12 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 HEAD = ("style", "source", "trait", "unit", "n", "w_halves", "w_field", "w_noise", "w_ju2008", "target")
 
 
-def gestures_csv(found: GestureStudy) -> str:
+def gestures_csv(study: GestureStudy) -> str:
     """Distances of the traits of every style."""
     file = StringIO()
     rows = csv.writer(file, lineterminator="\n")
     rows.writerow(HEAD)
-    for style in found.styles:
+    for style in study.styles:
         for one in style.trait_comparisons:
             distances = [_cell(value) for value in (one.halves, one.to_field, one.to_noise, one.to_published)]
             trait = one.trait
@@ -32,49 +32,49 @@ def gestures_csv(found: GestureStudy) -> str:
     return file.getvalue()
 
 
-def gestures_json(found: GestureStudy) -> str:
+def gestures_json(study: GestureStudy) -> str:
     """All figures, and quantiles of the values."""
-    options = found.options
+    options = study.options
     content = {
-        "palette": found.name,
+        "palette": study.name,
         "held_out_one_in": options.one_in,
         "halves": options.halves,
         "clips": options.clips,
         "seed": options.seed,
         "quantiles": list(QUANTILES),
-        "styles": [_style(style) for style in found.styles],
+        "styles": [_style(style) for style in study.styles],
     }
     return json.dumps(content, ensure_ascii=False, indent=1) + "\n"
 
 
-def _style(found: StyleStudy) -> dict[str, Any]:
+def _style(style: StyleStudy) -> dict[str, Any]:
     return {
-        "name": found.name,
-        "derived_from": found.source,
-        "summary": found.summary,
-        "minutes": _round_number(found.minutes),
-        "recordings_learnt": found.n_training,
-        "recordings_held_out": found.n_held_out if found.is_held_out else 0,
-        "blinks_per_minute": _by_kind(found.blinks_per_minute),
-        "traits": [_trait_figures(found, one) for one in found.trait_comparisons],
-        "features": [_motion_figures(one) for one in found.motion_comparisons],
+        "name": style.name,
+        "derived_from": style.source,
+        "summary": style.summary,
+        "minutes": _round_number(style.minutes),
+        "recordings_learnt": style.n_training,
+        "recordings_held_out": style.n_held_out if style.is_held_out else 0,
+        "blinks_per_minute": _by_kind(style.blinks_per_minute),
+        "traits": [_trait_figures(style, one) for one in style.trait_comparisons],
+        "features": [_motion_figures(one) for one in style.motion_comparisons],
         "visited": {
             feature: {
                 f"{minutes} min": _round_number(share) for minutes, share in zip(VISITED_AFTER, shares, strict=True)
             }
-            for feature, shares in found.long_run.coverage.items()
+            for feature, shares in style.long_run.coverage.items()
         },
         "repetition": {
             feature: {
                 kind: _round_number(value)
                 for kind, value in zip(("real", "speech", "silence"), one.highest, strict=True)
             }
-            for feature, one in found.long_run.repetition.items()
+            for feature, one in style.long_run.repetition.items()
         },
     }
 
 
-def _trait_figures(found: StyleStudy, one: TraitComparison) -> dict[str, Any]:
+def _trait_figures(style: StyleStudy, one: TraitComparison) -> dict[str, Any]:
     kinds = {"real": one.real, "field": one.field, "noise": one.noise}
     if len(one.published):
         kinds["ju2008"] = one.published
@@ -87,7 +87,7 @@ def _trait_figures(found: StyleStudy, one: TraitComparison) -> dict[str, Any]:
         "field": _round_number(one.to_field),
         "noise": _round_number(one.to_noise),
         "ju2008": _round_number(one.to_published),
-        "target": target_result(found, one) or None,
+        "target": target_result(style, one) or None,
         "means": {kind: _round_number(float(values.mean())) if len(values) else None for kind, values in kinds.items()},
         "quantiles": {kind: _quantiles(values) for kind, values in kinds.items()},
     }

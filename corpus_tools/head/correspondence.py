@@ -69,8 +69,10 @@ def add_landmarks(face: Face, base: Floats, places: dict[int, Floats] | None = N
     wanted = np.array(list(table.values()))
     triangle, weights, distance = nearest_surface_points(wanted, base, skin)
     if distance.max() > FAR:
-        stray = list(table)[int(distance.argmax())]
-        raise DataError(f"landmark {stray} lies {distance.max():.3f} units off the skin; build the table for this mesh")
+        farthest = list(table)[int(distance.argmax())]
+        raise DataError(
+            f"landmark {farthest} lies {distance.max():.3f} units off the skin; build the table for this mesh"
+        )
     numbers, corners, shares = [np.array(list(table))], [skin[triangle]], [weights]
     for eye, iris in zip(sorted(face.eyes, key=lambda eye: float(eye.centre[0])), IRISES, strict=True):
         rows = iris_vertices(face, eye)

@@ -96,8 +96,8 @@ def lock_piece(
     chance = share * (share > 0.5)
     roots = generator.choice(len(skin_points), cut.n_locks, p=chance / chance.sum())
     place, normal = skin_points[roots], normals[roots]
-    away = place - CROWN
-    flow = away - (away * normal).sum(axis=1, keepdims=True) * normal
+    offset = place - CROWN
+    flow = offset - (offset * normal).sum(axis=1, keepdims=True) * normal
     flow /= np.maximum(np.linalg.norm(flow, axis=1, keepdims=True), 1e-6)
     aside = np.cross(normal, flow)
     flow = flow + generator.normal(0, 0.25, (len(roots), 1)) * aside

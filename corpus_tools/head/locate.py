@@ -54,13 +54,13 @@ MOUTH_REACH_MM, EYE_REACH_MM = 40.0, 30.0
 
 def locate_landmarks(face: Face, skin: Skin, cage: Cage, tracker: FaceTracker) -> dict[int, Floats]:
     """Position (3,) of each of the 468 mesh landmarks on the source's base mesh."""
-    twin = mirrored_landmarks(face, tracker)
+    mirrored = mirrored_landmarks(face, tracker)
     triangles = triangulate(skin.quads)
     views = [project_landmarks(face, picture, tracker) for picture in tracking_views()]
     on_face = median_places(np.stack([hits for hits, _ in views]), np.stack([reliable for _, reliable in views]))
     number, weights, _ = nearest_surface_points(on_face, skin.vertices, triangles)
     places = np.einsum("pk,pkd->pd", weights, skin.base[triangles[number]])
-    number, weights, _ = nearest_surface_points(symmetrise(places, twin), skin.base, triangles)
+    number, weights, _ = nearest_surface_points(symmetrise(places, mirrored), skin.base, triangles)
     places = np.einsum("pk,pkd->pd", weights, skin.base[triangles[number]])
     strips = EdgeRings(skin.quads, skin.base)
     _align_inner_lips(places, skin, strips)
@@ -68,7 +68,7 @@ def locate_landmarks(face: Face, skin: Skin, cage: Cage, tracker: FaceTracker) -
         ring = find_narrowest_ring(strips, skin.vertices, ball.centre, EYE_REACH_MM, ball.radius)
         for lid in {*lids[0], *lids[1]}:
             places[lid] = nearest_ring_point(skin, ring, on_face[lid])
-    return dict(enumerate(symmetrise(places, twin)))
+    return dict(enumerate(symmetrise(places, mirrored)))
 
 
 def tracking_views() -> Iterator[Picture]:
@@ -111,14 +111,14 @@ def intersect_ray(origin: Floats, ray: Floats, corners: Floats) -> tuple[Floats,
     depth = (beside * two).sum(axis=1) / determinant
     inside = (second >= 0) & (third >= 0) & (second + third <= 1) & (depth > 0)
     if not inside.any():
-        away = np.linalg.norm(np.cross(off, ray), axis=1)
-        return corners[int(away.argmin()), 0], 0.0
+        distances = np.linalg.norm(np.cross(off, ray), axis=1)
+        return corners[int(distances.argmin()), 0], 0.0
     first = int(np.where(inside, depth, np.inf).argmin())
     along = -off @ ray
     grazed = along < depth[first] - GRAZE_MM[1]
-    away = np.linalg.norm(np.cross(off[grazed], ray), axis=1)
-    if away.size and away.min() < GRAZE_MM[0]:  # past the outline of the face onto what lies far behind it
-        return corners[grazed][int(away.argmin()), 0], 1.0
+    distances = np.linalg.norm(np.cross(off[grazed], ray), axis=1)
+    if distances.size and distances.min() < GRAZE_MM[0]:  # past the outline of the face onto what lies far behind it
+        return corners[grazed][int(distances.argmin()), 0], 1.0
     normal = np.cross(one[first], two[first])
     return origin + depth[first] * ray, -float(normal @ ray) / max(float(np.linalg.norm(normal)), 1e-30)
 
@@ -146,15 +146,15 @@ def mirrored_landmarks(face: Face, tracker: FaceTracker) -> Ints:
         features.append(points - [(picture.width - 1) / 2, 0, 0])
     read = np.concatenate(features, axis=1)
     cost = np.linalg.norm(read[:, None] - (read * np.tile([-1.0, 1.0, 1.0], len(EXPRESSIONS)))[None], axis=2)
-    twin = np.asarray(linear_sum_assignment(cost)[1], np.int64)
-    if (twin[twin] != np.arange(N_MESH)).any():
+    mirrored = np.asarray(linear_sum_assignment(cost)[1], np.int64)
+    if (mirrored[mirrored] != np.arange(N_MESH)).any():
         raise DataError("landmarks do not pair up on the two halves of the face; check the rendered views of the head")
-    return twin
+    return mirrored
 
 
-def symmetrise(places: Floats, twin: Ints) -> Floats:
+def symmetrise(places: Floats, mirrored: Ints) -> Floats:
     """Symmetric positions: the mean of each landmark and the reflection of its mirror image."""
-    mean: Floats = (places + (places * [-1, 1, 1])[twin]) / 2
+    mean: Floats = (places + (places * [-1, 1, 1])[mirrored]) / 2
     return mean
 
 
@@ -174,12 +174,12 @@ def _align_inner_lips(places: Floats, skin: Skin, strips: EdgeRings) -> None:
     places[INNER_LIP_UPPER[0]], places[INNER_LIP_UPPER[-1]] = line[0], line[turn]
 
 
-def nearest_ring_point(skin: Skin, ring: Ints, seen: Floats) -> Floats:
+def nearest_ring_point(skin: Skin, ring: Ints, point: Floats) -> Floats:
     """Point (3,) of an edge ring, on the source's base mesh, nearest to a point in the frontal view."""
     after = np.roll(ring, -1)
     starts, along = skin.vertices[ring, :2], skin.vertices[after, :2] - skin.vertices[ring, :2]
-    share = np.clip(((seen[:2] - starts) * along).sum(axis=1) / (along**2).sum(axis=1), 0, 1)
-    at = int(np.linalg.norm(starts + share[:, None] * along - seen[:2], axis=1).argmin())
+    share = np.clip(((point[:2] - starts) * along).sum(axis=1) / (along**2).sum(axis=1), 0, 1)
+    at = int(np.linalg.norm(starts + share[:, None] * along - point[:2], axis=1).argmin())
     place: Floats = (1 - share[at]) * skin.base[ring[at]] + share[at] * skin.base[after[at]]
     return place
 

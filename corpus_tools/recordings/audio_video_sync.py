@@ -60,7 +60,7 @@ def estimate_sync_by_video(observations: Sequence[Observation]) -> Mapping[Path,
     for observation in observations:
         together.setdefault(observation.video, []).append(observation)
     short = [video for video, group in together.items() if _total_duration(group) < MIN_DURATION_S]
-    of_short = estimate_sync([seen for video in short for seen in together[video]])
+    of_short = estimate_sync([observation for video in short for observation in together[video]])
     return {video: of_short if video in short else estimate_sync(group) for video, group in together.items()}
 
 
@@ -68,9 +68,9 @@ def corrected_timings(observations: Sequence[Observation], found: Mapping[Path, 
     """Timing of the videos that must be read again: at the most common frame rate, with their lag corrected."""
     frames: Counter[float] = Counter()
     rates = {}
-    for seen in observations:
-        frames[seen.fps] += len(seen.landmarks)
-        rates[seen.video] = seen.fps
+    for observation in observations:
+        frames[observation.fps] += len(observation.landmarks)
+        rates[observation.video] = observation.fps
     common = min(frames, key=lambda fps: (-frames[fps], fps), default=None)
     wanted = {
         video: Timing(common if rates[video] != common else None, found[video].lag_correction_s) for video in rates
@@ -80,10 +80,12 @@ def corrected_timings(observations: Sequence[Observation], found: Mapping[Path, 
 
 def estimate_sync(observations: Iterable[Observation]) -> SyncEstimate:
     """Lag of the highest correlation of lips and loudness; lag and correlation are 0 without motion."""
-    found = [(curve, seen) for seen in observations if (curve := lag_correlations(seen)) is not None]
+    found = [
+        (curve, observation) for observation in observations if (curve := lag_correlations(observation)) is not None
+    ]
     if not found:
         return SyncEstimate(0.0, 0.0, 0.0)
-    lengths = [len(seen.landmarks) for _, seen in found]
+    lengths = [len(observation.landmarks) for _, observation in found]
     total = np.average([curve for curve, _ in found], axis=0, weights=lengths)
     at = int(total.argmax())
     offset = 0.0
@@ -94,19 +96,19 @@ def estimate_sync(observations: Iterable[Observation]) -> SyncEstimate:
     return SyncEstimate(
         float(LAGS_S[at] + offset * LAG_STEP_S - LIP_LEAD_S),
         float(total[at]),
-        _total_duration([seen for _, seen in found]),
+        _total_duration([observation for _, observation in found]),
     )
 
 
-def lag_correlations(seen: Observation) -> NDArray[np.float64] | None:
+def lag_correlations(observation: Observation) -> NDArray[np.float64] | None:
     """Correlations of the lips' speed with the change of loudness `LAGS_S` later; None with too few frames."""
-    opening = seen.landmarks[:, UPPER_LIP_INNER_MID] - seen.landmarks[:, LOWER_LIP_INNER_MID]
-    times = np.arange(len(opening)) / seen.fps
+    opening = observation.landmarks[:, UPPER_LIP_INNER_MID] - observation.landmarks[:, LOWER_LIP_INNER_MID]
+    times = np.arange(len(opening)) / observation.fps
     within = (times >= MAX_LAG_S) & (times <= times[-1] - MAX_LAG_S)
     if within.sum() < MIN_FRAMES:
         return None
     speed = np.gradient(np.linalg.norm(opening.astype(np.float64), axis=1))
-    rise = np.gradient(seen.intensity.astype(np.float64))
+    rise = np.gradient(observation.intensity.astype(np.float64))
     if speed[within].std() == 0:
         return None
     rows = np.array([np.interp(times[within] + lag, times, rise) for lag in LAGS_S])
@@ -118,4 +120,4 @@ def lag_correlations(seen: Observation) -> NDArray[np.float64] | None:
 
 
 def _total_duration(observations: Sequence[Observation]) -> float:
-    return float(sum(len(seen.landmarks) / seen.fps for seen in observations))
+    return float(sum(len(observation.landmarks) / observation.fps for observation in observations))

@@ -111,5 +111,5 @@ def picture_measures(
 
 def head_turn_deg(angles: NDArray[np.floating]) -> float:
     """Median angle in degrees between a face and the camera, from (T, 3) pitch, yaw and roll."""
-    away = np.arccos(np.clip(np.cos(angles[:, 0]) * np.cos(angles[:, 1]), -1.0, 1.0))
-    return float(np.degrees(np.median(away)))
+    angle = np.arccos(np.clip(np.cos(angles[:, 0]) * np.cos(angles[:, 1]), -1.0, 1.0))
+    return float(np.degrees(np.median(angle)))

@@ -93,15 +93,15 @@ def observe_recording(
     check_limits({"recognised" if sound.is_recognised else "confidence": sound.confidence})
     measures = sound_measures(sound.sound, sound.phones)
     check_limits(measures)
-    seen = tracker.track(recording.video)
-    filled, first, n_filled = _span_landmarks(seen, recording.span, timing)
-    fps = timing.fps or seen.fps
+    tracked = tracker.track(recording.video)
+    filled, first, n_filled = _span_landmarks(tracked, recording.span, timing)
+    fps = timing.fps or tracked.fps
     begin = first / fps
     start = begin + timing.lag - (recording.span[0] if recording.span else 0.0)  # in seconds of the sound
     phones, spans = trim_to_picture(sound, start, start + len(filled) / fps)
     posed = remove_pose(filled, fps)
-    here = (seen.times > begin - TIME_TOLERANCE_S) & (seen.times < begin + len(filled) / fps - TIME_TOLERANCE_S)
-    measures |= picture_measures(seen.n_faces[here], seen.changes[here], seen.times[here])
+    here = (tracked.times > begin - TIME_TOLERANCE_S) & (tracked.times < begin + len(filled) / fps - TIME_TOLERANCE_S)
+    measures |= picture_measures(tracked.n_faces[here], tracked.changes[here], tracked.times[here])
     measures["turn_deg"] = head_turn_deg(head_angles(posed.rotations))
     check_limits(measures)
     return Observation(
@@ -114,7 +114,7 @@ def observe_recording(
         intensity=intensity(sound.sound, start + np.arange(len(filled)) / fps),
         quality=Quality(
             confidence=sound.confidence,
-            score=_lowest_score(seen, here),
+            score=_lowest_score(tracked, here),
             n_filled=n_filled,
             cut=begin,
             lag=timing.lag,
@@ -126,7 +126,7 @@ def observe_recording(
 
 
 def _span_landmarks(
-    seen: TrackedVideo, span: tuple[float, float] | None, timing: Timing
+    tracked: TrackedVideo, span: tuple[float, float] | None, timing: Timing
 ) -> tuple[NDArray[np.float32], int, int]:
     """Landmarks of the frames of a span of the sound, the index of the first, and the number of interpolated ones.
 
@@ -135,13 +135,13 @@ def _span_landmarks(
     DataError
         The video has no frames or no face there, or the face is hidden for too long.
     """
-    fps = timing.fps or seen.fps
+    fps = timing.fps or tracked.fps
     begin, end = (0.0, np.inf) if span is None else (span[0] - timing.lag, span[1] - timing.lag)
-    near = (seen.times > begin - N_NEIGHBOUR_FRAMES / fps) & (seen.times < end + N_NEIGHBOUR_FRAMES / fps)
+    near = (tracked.times > begin - N_NEIGHBOUR_FRAMES / fps) & (tracked.times < end + N_NEIGHBOUR_FRAMES / fps)
     if near.sum() < MIN_FRAMES:
         where = "" if span is None else f" from {span[0]:.2f} s to {span[1]:.2f} s"
         raise DataError(f"the video has no frames{where}; check its length and the times")
-    points, first = resample_to_grid(seen.tracking.points[near], seen.times[near], fps)
+    points, first = resample_to_grid(tracked.tracking.points[near], tracked.times[near], fps)
     instants = (first + np.arange(len(points))) / fps
     inside = (instants > begin - TIME_TOLERANCE_S) & (instants < end + TIME_TOLERANCE_S)
     points, first = points[inside], first + int(inside.argmax())
@@ -183,5 +183,5 @@ def _head_motion(posed: PoseFreeLandmarks) -> NDArray[np.float32]:
     return np.column_stack([head_angles(posed.rotations), place]).astype(np.float32)
 
 
-def _lowest_score(seen: TrackedVideo, here: NDArray[np.bool_]) -> float:
-    return float(seen.tracking.scores[here & ~seen.tracking.is_missing].min(initial=1.0))
+def _lowest_score(tracked: TrackedVideo, here: NDArray[np.bool_]) -> float:
+    return float(tracked.tracking.scores[here & ~tracked.tracking.is_missing].min(initial=1.0))

@@ -54,7 +54,9 @@ RecordingOutcomes = list[Observation | Refusal]
 ShareCallback = Callable[[float], None]  # called with the finished share of a task
 
 
-def observe(recordings: Path, *, effort: RunOptions | None = None, on_progress: Progress | None = None) -> Observations:
+def observe(
+    recordings: Path, *, run_options: RunOptions | None = None, on_progress: Progress | None = None
+) -> Observations:
     """Observations of a folder at one frame rate with sound and picture synchronised, and reasons for refusals.
 
     Parameters
@@ -71,10 +73,10 @@ def observe(recordings: Path, *, effort: RunOptions | None = None, on_progress: 
     BackendError
         A package or the landmark models are missing, the cache cannot be written, or a process died.
     """
-    effort = effort or RunOptions()
-    processes, cache = effort.n_processes(), effort.folder()
+    run_options = run_options or RunOptions()
+    processes, cache = run_options.n_processes(), run_options.folder()
     tasks = group_by_video(find_recordings(recordings))
-    model = find_bundle(effort.model)
+    model = find_bundle(run_options.model)
     found: dict[Path, RecordingOutcomes] = {}
     for task, outcomes in _observe_tasks(tasks, cache, model, min(processes, len(tasks)), on_progress):
         found[task.video] = outcomes

@@ -26,7 +26,7 @@ N_SHOWN = 3  # sentences of each kind
 WIDTH, HEIGHT = 1100, 236  # px of a plot
 N_BINS = 30
 ABOUT = {
-    False: "{n_test} held-out utterances, {n_train} training utterances; true phone edges.",
+    False: "{n_test} held-out utterances, {n_train} training utterances; recorded phone edges.",
     True: "{n_test} utterances of another talker with their own phone edges, {n_train} training utterances; each "
     "talker's curves are z-scored over the talker's speech.",
 }
@@ -39,12 +39,12 @@ ABOUT_OWN = (
 def evaluation_page(result: Evaluation, runs: Sequence[SplitResult]) -> str:
     """The page (HTML)."""
     compared = [one.method for one in result.scores if one.method != CEILING_METHOD]
-    seen = SHOWN if SHOWN in compared else compared[-1]
+    method = SHOWN if SHOWN in compared else compared[-1]
     about = ABOUT[result.is_across].format(n_test=result.n_test, n_train=result.n_train)
     return page(
-        "Accuracy against real lips",
+        "Accuracy of synthesised lips",
         [
-            f"<p>{about} In brackets: {CONFIDENCE:.0%} bootstrap intervals over utterances.</p>",
+            f"<p>{about} Parentheses: {CONFIDENCE:.0%} bootstrap intervals over utterances.</p>",
             _figures(result.scores),
             *_own_durations(result.own),
             *_folds(result),
@@ -58,7 +58,7 @@ def evaluation_page(result: Evaluation, runs: Sequence[SplitResult]) -> str:
                     if one.method != CEILING_METHOD
                 }
             ),
-            *_sentences(result, runs, seen, PLAIN if PLAIN in compared and seen != PLAIN else None),
+            *_sentences(result, runs, method, PLAIN if PLAIN in compared and method != PLAIN else None),
         ],
     )
 
@@ -108,37 +108,37 @@ def _classes(scores: Sequence[Scores]) -> str:
     return table(heads, rows, numbers=range(2, 6))
 
 
-def _sentences(result: Evaluation, runs: Sequence[SplitResult], seen: str, plain: str | None) -> Iterator[str]:
+def _sentences(result: Evaluation, runs: Sequence[SplitResult], method: str, plain: str | None) -> Iterator[str]:
     """Curves of real and synthesised lips, as in T07, figs 6-8, and videos of the worst sentences."""
-    scores = next(one for one in result.scores if one.method == seen)
+    scores = next(one for one in result.scores if one.method == method)
     order = np.argsort([one.dtw_cost for one in scores.utterances], kind="stable")
     middle = len(order) // 2 - N_SHOWN // 2
     places = [(run, at) for run in runs for at in range(len(run.real))]
-    films = MethodVideos(seen)
+    videos = MethodVideos(method)
     for title, chosen in (
         ("Worst sentences", order[::-1][:N_SHOWN]),
         ("Median sentences", order[middle : middle + N_SHOWN]),
         ("Best sentences", order[:N_SHOWN]),
     ):
-        yield f"<h2>{title} of {seen}</h2>"
+        yield f"<h2>{title} of {method}</h2>"
         for number in chosen:
             run, at = places[number]
             cost = scores.utterances[number].dtw_cost
             yield f"<h3>{run.real[at].observation.name} (DTW cost {cost:.2f})</h3>"
-            yield _curves(run, at, [name for name in (seen, plain) if name])
+            yield _curves(run, at, [name for name in (method, plain) if name])
             if title.startswith("Worst"):
-                yield films.render_tag(run, at)
+                yield videos.render_tag(run, at)
 
 
 def _curves(run: SplitResult, at: int, names: Sequence[str]) -> str:
     one = run.real[at]
     times = np.arange(len(one.parameters)) / one.observation.fps
     unit = "/ eyes" if run.scale is None else "(z)"
-    made = {name: run.curves(name, at) for name in names}
+    synthesised = {name: run.curves(name, at) for name in names}
     plots = []
     for label, curve in ((f"lip gap {unit}", "opening"), (f"mouth width {unit}", "width")):
         values = {"real": getattr(one.curves, curve)}
-        values |= {name: getattr(curves, curve) for name, curves in made.items()}
+        values |= {name: getattr(curves, curve) for name, curves in synthesised.items()}
         plots.append(curves_plot(times, values, label, one.observation.phones))
     return "\n".join(plots)
 

@@ -46,8 +46,8 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Iterable[
     right = set(numbers)
 
     def row(cells: Sequence[str], tag: str) -> str:
-        made = (f"<{tag}{' class=n' if at in right else ''}>{escape(cell)}</{tag}>" for at, cell in enumerate(cells))
-        return f"<tr>{''.join(made)}</tr>"
+        row = (f"<{tag}{' class=n' if at in right else ''}>{escape(cell)}</{tag}>" for at, cell in enumerate(cells))
+        return f"<tr>{''.join(row)}</tr>"
 
     return "\n".join(["<table>", row(head, "th"), *(row(cells, "td") for cells in rows), "</table>"])
 

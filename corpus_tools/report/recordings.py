@@ -57,7 +57,7 @@ def recordings_page(name: str, found: Observations) -> str:
             *(_refused_item(refusal, pictures.get(refusal.name)) for refusal in found.refused),
             f"<h2>Kept ({len(found.kept)})</h2>",
             note_paragraph("Blue: lip gap relative to the eye distance. Ochre: sound intensity, 25 to 85 dB."),
-            *(_kept_item(seen, pictures.get(seen.name)) for seen in found.kept),
+            *(_kept_item(observation, pictures.get(observation.name)) for observation in found.kept),
         ],
     )
 
@@ -65,9 +65,9 @@ def recordings_page(name: str, found: Observations) -> str:
 def thumbnails(found: Observations) -> dict[str, NDArray[np.uint8]]:
     """A frame of each recording by name; recordings that cannot be read are missing."""
     wanted: dict[Path, list[tuple[float, str]]] = {}
-    for seen in found.kept:
-        middle = seen.quality.cut + len(seen.landmarks) / seen.fps / 2
-        wanted.setdefault(seen.video, []).append((middle, seen.name))
+    for observation in found.kept:
+        middle = observation.quality.cut + len(observation.landmarks) / observation.fps / 2
+        wanted.setdefault(observation.video, []).append((middle, observation.name))
     for refusal in found.refused:
         wanted.setdefault(refusal.video, []).append((refusal.at, refusal.name))
     return {
@@ -88,9 +88,9 @@ def _read_pictures(video: Path, moments: Sequence[tuple[float, str]]) -> Iterato
 
 
 def _summary(found: Observations) -> str:
-    minutes = sum(len(seen.landmarks) / seen.fps for seen in found.kept) / 60
-    recognised = sum(seen.is_recognised for seen in found.kept)
-    lags = sorted({seen.quality.lag for seen in found.kept} - {0.0})
+    minutes = sum(len(observation.landmarks) / observation.fps for observation in found.kept) / 60
+    recognised = sum(observation.is_recognised for observation in found.kept)
+    lags = sorted({observation.quality.lag for observation in found.kept} - {0.0})
     lines = [f"{len(found.kept)} recordings kept, {minutes:.1f} minutes; {len(found.refused)} refused."]
     if found.kept:
         lines.append(f"Frames per second: {found.kept[0].fps:g}.")
@@ -107,7 +107,7 @@ def _measures(kept: Sequence[Observation]) -> str:
     limits = {limit.measure: limit for limit in LIMITS}
     rows = []
     for measure, (label, unit, factor) in MEASURES.items():
-        values = factor * np.array([getattr(seen.quality, measure) for seen in kept], np.float64)
+        values = factor * np.array([getattr(observation.quality, measure) for observation in kept], np.float64)
         limit = limits.get(measure)
         bound = "" if limit is None else f"{'at least' if limit.is_minimum else 'at most'} {factor * limit.bound:g}"
         rows.append((label, unit, *(f"{value:.3g}" for value in np.quantile(values, [0, 0.5, 1])), bound))
@@ -115,7 +115,7 @@ def _measures(kept: Sequence[Observation]) -> str:
 
 
 def _phones(kept: Iterable[Observation]) -> str:
-    counts = Counter(phone for seen in kept for phone in seen.phones.phones if phone != SILENCE)
+    counts = Counter(phone for observation in kept for phone in observation.phones.phones if phone != SILENCE)
     spoken = ", ".join(f"{phone} {count}" for phone, count in counts.most_common()) or "none"
     missing = ", ".join(sorted({phone for phone in ARPABET.values() if phone not in counts})) or "none"
     return paragraphs(spoken, f"English phones that do not occur: {missing}")
@@ -125,14 +125,14 @@ def _refused_item(refusal: Refusal, picture: NDArray[np.uint8] | None) -> str:
     return _item(refusal.name, f'<p class="bad">{escape(refusal.reason)}</p>', picture)
 
 
-def _kept_item(seen: Observation, picture: NDArray[np.uint8] | None) -> str:
+def _kept_item(observation: Observation, picture: NDArray[np.uint8] | None) -> str:
     texts = []
     for measure, (label, unit, factor) in MEASURES.items():
-        value = factor * getattr(seen.quality, measure)
+        value = factor * getattr(observation.quality, measure)
         if measure in {"confidence", "snr_db", "turn_deg"} or (value != 0 and measure != "score"):
             texts.append(f"{label} {value:.3g} {unit}".strip())
-    how = " (phones recognised)" if seen.is_recognised else ""
-    return _item(seen.name, note_paragraph("; ".join(texts) + how) + utterance_curves(seen), picture)
+    how = " (phones recognised)" if observation.is_recognised else ""
+    return _item(observation.name, note_paragraph("; ".join(texts) + how) + utterance_curves(observation), picture)
 
 
 def _item(name: str, content: str, picture: NDArray[np.uint8] | None) -> str:
@@ -140,30 +140,30 @@ def _item(name: str, content: str, picture: NDArray[np.uint8] | None) -> str:
     return f'<section class="item"><div>{image}</div><div><b>{escape(name)}</b>{content}</div></section>'
 
 
-def utterance_curves(seen: Observation) -> str:
+def utterance_curves(observation: Observation) -> str:
     """Plot of lip gap and intensity over time, with words and phones above (SVG)."""
-    times = np.arange(len(seen.landmarks)) / seen.fps
-    width = len(times) / seen.fps * PX_PER_S + SIDES
+    times = np.arange(len(observation.landmarks)) / observation.fps
+    width = len(times) / observation.fps * PX_PER_S + SIDES
 
     def draw(figure: "Figure") -> tuple[()]:
         figure.set_layout_engine("none")
         axes = figure.add_axes((SIDES / 2 / width, 0.3, 1 - SIDES / width, 0.38))
-        axes.plot(times, np.clip(normalised_lip_gap(seen.landmarks), *GAP_RANGE), color=FIRST)
-        axes.set(xlim=(0, len(times) / seen.fps), ylim=GAP_RANGE, yticks=GAP_RANGE)
-        axes.set_xticks(np.arange(0, len(times) / seen.fps, TICK_S))
+        axes.plot(times, np.clip(normalised_lip_gap(observation.landmarks), *GAP_RANGE), color=FIRST)
+        axes.set(xlim=(0, len(times) / observation.fps), ylim=GAP_RANGE, yticks=GAP_RANGE)
+        axes.set_xticks(np.arange(0, len(times) / observation.fps, TICK_S))
         axes.set_xlabel("seconds", loc="left")
         axes.grid(visible=False)
         axes.set_ylabel("gap", color=FIRST)
         sound = axes.twinx()
-        sound.plot(times, np.clip(seen.intensity, *DB_RANGE), color=SECOND)
+        sound.plot(times, np.clip(observation.intensity, *DB_RANGE), color=SECOND)
         sound.set(ylim=DB_RANGE, yticks=DB_RANGE)
         sound.grid(visible=False)
         sound.set_ylabel("dB", color=SECOND)
-        label_phones(axes, seen.phones, times[-1])
-        edges = seen.phones.edges
-        for word in seen.words:
+        label_phones(axes, observation.phones, times[-1])
+        edges = observation.phones.edges
+        for word in observation.words:
             middle = (edges[word.first] + edges[word.last]) / 2
             axes.text(middle, 1.35, word.text, ha="center", transform=axes.get_xaxis_transform())
         return ()
 
-    return draw_svg(draw, width, HEIGHT, f"lips and sound of {seen.name}")
+    return draw_svg(draw, width, HEIGHT, f"lips and sound of {observation.name}")

@@ -46,25 +46,25 @@ class MethodVideos:
     def render_tag(self, run: SplitResult, at: int) -> str:
         """Video of one utterance (HTML); empty if the recording is missing or too short."""
         one = run.real[at]
-        seen = list(judged_pictures(one))
-        if len(seen) < one.judged.stop - one.judged.start:
+        observation = list(evaluated_pictures(one))
+        if len(observation) < one.evaluated.stop - one.evaluated.start:
             return ""
-        speech = Trajectory(speech_channels(run.model), run.made[self._method][at], one.observation.fps)
+        speech = Trajectory(speech_channels(run.model), run.synthesised[self._method][at], one.observation.fps)
         weights = build_retargeter(run.talker, self._face).retarget(speech).values
         sides = [
             np.concatenate([letterbox(pixels), self._renderer.draw(row)], axis=1)
-            for pixels, row in zip(seen, weights[one.judged], strict=False)
+            for pixels, row in zip(observation, weights[one.evaluated], strict=False)
         ]
         return video_tag(sides, one.observation.fps, NOTE.format(method=self._method))
 
 
-def judged_pictures(one: ReferenceUtterance) -> Iterator[NDArray[np.uint8]]:
+def evaluated_pictures(one: ReferenceUtterance) -> Iterator[NDArray[np.uint8]]:
     """The pictures of an utterance's evaluated frames; fewer if the video cannot be read."""
-    seen = one.observation
-    instants = seen.quality.cut + (np.arange(one.judged.start, one.judged.stop) - 0.5) / seen.fps
+    observation = one.observation
+    instants = observation.quality.cut + (np.arange(one.evaluated.start, one.evaluated.stop) - 0.5) / observation.fps
     at = 0
     try:
-        for picture in read_frames(seen.video):
+        for picture in read_frames(observation.video):
             while at < len(instants) and picture.time >= instants[at]:
                 yield picture.pixels
                 at += 1

@@ -143,7 +143,7 @@ def _class_numbers(options: Options, n_phones: int) -> tuple[int, ...]:
 
 
 def _split_halves(
-    spoken: SpokenTokens, options: Options, on_progress: Progress | None
+    tokens: SpokenTokens, options: Options, on_progress: Progress | None
 ) -> tuple[Reliability | None, Reliability | None, Reliability | None]:
     """Reliability by utterances, by words, and by utterances over the phones compared by words."""
     n, done = options.halves, 0
@@ -154,13 +154,13 @@ def _split_halves(
         if on_progress is not None:
             on_progress(done, 3 * n)
 
-    by_utterances = split_half(spoken, spoken.utterance, n, _stream(options, "utterances"), on_half=step)
-    by_words = split_half(spoken, spoken.word, n, _stream(options, "words"), on_half=step)
+    by_utterances = split_half(tokens, tokens.utterance, n, _stream(options, "utterances"), on_half=step)
+    by_words = split_half(tokens, tokens.word, n, _stream(options, "words"), on_half=step)
     if by_words is None:
         return by_utterances, None, None
     among = set(by_words.phones) - set(by_words.left_out)
     stream = _stream(options, "same phones")
-    return by_utterances, by_words, split_half(spoken, spoken.utterance, n, stream, among=among, on_half=step)
+    return by_utterances, by_words, split_half(tokens, tokens.utterance, n, stream, among=among, on_half=step)
 
 
 def _articulatory_agreement(

@@ -66,14 +66,14 @@ def movement_weights(model: ShapeModel) -> NDArray[np.float64]:
     )
 
 
-def movement_consistency(spoken: SpokenTokens, phones: tuple[str, ...], model: ShapeModel) -> Consistency:
+def movement_consistency(tokens: SpokenTokens, phones: tuple[str, ...], model: ShapeModel) -> Consistency:
     """Variation of each of the `MOVEMENTS` within the phones."""
-    return _consistency(spoken, phones, spoken.samples @ movement_weights(model).T, tuple(MOVEMENTS))
+    return _consistency(tokens, phones, tokens.samples @ movement_weights(model).T, tuple(MOVEMENTS))
 
 
-def mode_consistency(spoken: SpokenTokens, phones: tuple[str, ...], model: ShapeModel) -> Consistency:
+def mode_consistency(tokens: SpokenTokens, phones: tuple[str, ...], model: ShapeModel) -> Consistency:
     """Variation of each speech parameter within the phones, named by its largest movements."""
-    return _consistency(spoken, phones, spoken.samples.astype(np.float64), mode_names(model))
+    return _consistency(tokens, phones, tokens.samples.astype(np.float64), mode_names(model))
 
 
 def mode_names(model: ShapeModel) -> tuple[str, ...]:
@@ -87,15 +87,15 @@ def mode_names(model: ShapeModel) -> tuple[str, ...]:
 
 
 def _consistency(
-    spoken: SpokenTokens, phones: tuple[str, ...], values: NDArray[np.floating], names: tuple[str, ...]
+    tokens: SpokenTokens, phones: tuple[str, ...], values: NDArray[np.floating], names: tuple[str, ...]
 ) -> Consistency:
     """Standard deviations within and over phones of (N, S, K) values, averaged over the samples."""
-    sounding = spoken.phone != spoken.inventory.index(SILENCE)
+    sounding = tokens.phone != tokens.inventory.index(SILENCE)
     total = values[sounding].var(axis=0).mean(axis=0)
     within = np.zeros((len(phones), values.shape[2]))
     share = np.zeros(len(phones))
     for row, label in enumerate(phones):
-        own = values[spoken.phone == spoken.inventory.index(label)]
+        own = values[tokens.phone == tokens.inventory.index(label)]
         within[row] = own.var(axis=0).mean(axis=0)
         share[row] = len(own) / sounding.sum()
     whole = np.where(total > 0, total, 1.0)

@@ -61,31 +61,31 @@ def tree_joins(links: Floats) -> Floats:
     return np.stack([np.array(drawn["dcoord"]), rows], axis=2)
 
 
-def similarity_figure(found: Analysis, labels: str) -> TableFigure:
+def similarity_figure(analysis: Analysis, labels: str) -> TableFigure:
     """The similarity table in the dendrogram's order, with frames around the best classes."""
-    order, n_classes = found.tree.order, found.best.n_classes
+    order, n_classes = analysis.tree.order, analysis.best.n_classes
     n = len(order)
-    starts = [0, *(np.flatnonzero(np.diff(found.best.labels[order])) + 1).tolist(), n]
+    starts = [0, *(np.flatnonzero(np.diff(analysis.best.labels[order])) + 1).tolist(), n]
     return TableFigure(
-        f"Similarity of phones: {found.name}",
-        tuple(phone_label(found.table.phones[at], labels) for at in order),
-        found.table.matrix[np.ix_(order, order)],
+        f"Similarity of phones: {analysis.name}",
+        tuple(phone_label(analysis.table.phones[at], labels) for at in order),
+        analysis.table.matrix[np.ix_(order, order)],
         LIKENESS,
         (0.0, 1.0),
         f"similarity; dashed line and frames: {n_classes} classes",
         tuple(starts),
-        tree_joins(found.tree.links),
-        float(found.tree.links[n - n_classes - 1 : n - n_classes + 1, 2].mean()),
+        tree_joins(analysis.tree.links),
+        float(analysis.tree.links[n - n_classes - 1 : n - n_classes + 1, 2].mean()),
     )
 
 
-def difference_figure(found: Analysis, compared: Comparison, labels: str) -> TableFigure:
+def difference_figure(analysis: Analysis, compared: Comparison, labels: str) -> TableFigure:
     """The differences of two talkers, ordered by similarity of the differences."""
     distance = np.sqrt(np.square(compared.difference[:, None] - compared.difference[None, :]).sum(axis=2))
     order = cluster_tree(distance).order
     largest = max(0.1, float(np.ceil(np.abs(compared.difference).max() * 10) / 10))
     return TableFigure(
-        f"{found.name} minus {compared.other}",
+        f"{analysis.name} minus {compared.other}",
         tuple(phone_label(compared.phones[at], labels) for at in order),
         compared.difference[np.ix_(order, order)],
         DIFFERENCE,
@@ -157,15 +157,15 @@ def _draw_tree(axes: "Axes", joins: Floats, cut: float | None) -> None:
     axes.grid(visible=False)
 
 
-def silhouettes_svg(found: Analysis) -> str:
+def silhouettes_svg(analysis: Analysis) -> str:
     """Mean silhouette over the number of classes, the best one marked."""
-    numbers = [classes.n_classes for classes in found.curve]
-    heights = [classes.silhouette for classes in found.curve]
+    numbers = [classes.n_classes for classes in analysis.curve]
+    heights = [classes.silhouette for classes in analysis.curve]
 
     def draw(figure: "Figure") -> list[Tip]:
         axes = figure.subplots()
         axes.plot(numbers, heights, color=FIRST, marker="o", markersize=5)
-        axes.plot([found.best.n_classes], [found.best.silhouette], color=SECOND, marker="D", markersize=9)
+        axes.plot([analysis.best.n_classes], [analysis.best.silhouette], color=SECOND, marker="D", markersize=9)
         axes.set(xlabel="number of classes", ylabel="mean silhouette", xlim=(1, numbers[-1] + 1))
         axes.set_ylim(min(0.0, *heights), max(0.05, *heights) * 1.1)
         return [Tip(axes, n, value, f"{n} classes: {value:.3f}") for n, value in zip(numbers, heights, strict=True)]
@@ -173,11 +173,11 @@ def silhouettes_svg(found: Analysis) -> str:
     return draw_svg(draw, *SIZE, "mean silhouette over number of classes")
 
 
-def articulation_svg(found: Analysis, labels: str) -> str:
+def articulation_svg(analysis: Analysis, labels: str) -> str:
     """Similarity of all pairs of phones over their articulatory distance, with the least-squares line."""
-    phones = found.table.phones
+    phones = analysis.table.phones
     rows, columns = np.triu_indices(len(phones), 1)
-    apart, alike = found.articulation[rows, columns], upper_triangle(found.table.matrix)
+    apart, alike = analysis.articulation[rows, columns], upper_triangle(analysis.table.matrix)
     vowels = np.array([look_up_phone(phone).is_vowel for phone in phones]).astype(int)
     n_vowels = vowels[rows] + vowels[columns]
 

@@ -25,45 +25,45 @@ from corpus_tools.similarity.tokens import LEAST_TOKENS, phone_label
 N_DIFFERENT = 10
 
 
-def similarity_page(found: Analysis, labels: str) -> str:
+def similarity_page(analysis: Analysis, labels: str) -> str:
     """The page (HTML), phones labelled in ``ipa``, ``arpabet`` or ``both``."""
     parts = [
-        _summary(found),
+        _summary(analysis),
         "<h2>Phone by phone</h2>",
         note_paragraph("Without silence. Hover over a cell for its value."),
-        scroll_box(table_svg(similarity_figure(found, labels))),
+        scroll_box(table_svg(similarity_figure(analysis, labels))),
         "<h2>Most similar phones</h2>",
         note_paragraph(
             "Table 1 of Theobald et al. 2007. Agreement: correlation of a phone's similarities between random halves."
         ),
-        _neighbours(found, labels),
+        _neighbours(analysis, labels),
         "<h2>Viseme classes</h2>",
-        *_classes(found, labels),
+        *_classes(analysis, labels),
         "<h2>Reliability</h2>",
-        *_reliability(found, labels),
+        *_reliability(analysis, labels),
         "<h2>Similarity and articulation</h2>",
-        *_articulation(found, labels),
+        *_articulation(analysis, labels),
         "<h2>Movements that phones constrain</h2>",
-        *_consistency(found, labels),
+        *_consistency(analysis, labels),
     ]
-    if found.comparison is not None:
-        parts += [f"<h2>Compared with {escape(found.comparison.other)}</h2>", *_comparison(found, labels)]
-    return page(f"Similarity of phones: {found.name}", parts)
+    if analysis.comparison is not None:
+        parts += [f"<h2>Compared with {escape(analysis.comparison.other)}</h2>", *_comparison(analysis, labels)]
+    return page(f"Similarity of phones: {analysis.name}", parts)
 
 
-def _summary(found: Analysis) -> str:
-    n_tokens = int(found.table.counts.sum())
-    agree, words = found.by_utterances, found.by_words
+def _summary(analysis: Analysis) -> str:
+    n_tokens = int(analysis.table.counts.sum())
+    agree, words = analysis.by_utterances, analysis.by_words
     other_words = "" if words is None else f"; halves of the vocabulary by {words.mean:.3f}"
     return paragraphs(
-        f"{len(found.table.phones)} phones, {n_tokens} tokens, {found.n_utterances} utterances.",
-        f"Best number of viseme classes: {found.best.n_classes} (silhouette {found.best.silhouette:.2f}).",
+        f"{len(analysis.table.phones)} phones, {n_tokens} tokens, {analysis.n_utterances} utterances.",
+        f"Best number of viseme classes: {analysis.best.n_classes} (silhouette {analysis.best.silhouette:.2f}).",
         f"Reliability: halves of the utterances correlate by {agree.mean:.3f}{other_words}.",
-        f"Articulatory features: r = {found.articulatory[0][1].r:.2f}, p = {found.articulatory[0][1].p:.4f}.",
+        f"Articulatory features: r = {analysis.articulatory[0][1].r:.2f}, p = {analysis.articulatory[0][1].p:.4f}.",
     )
 
 
-def _neighbours(found: Analysis, labels: str) -> str:
+def _neighbours(analysis: Analysis, labels: str) -> str:
     rows = [
         (
             phone_label(phone, labels),
@@ -73,26 +73,26 @@ def _neighbours(found: Analysis, labels: str) -> str:
             f"{agreement:.2f}" if np.isfinite(agreement) else f"under {LEAST_TOKENS} tokens per half",
         )
         for phone, count, ranked, silence, agreement in zip(
-            found.table.phones,
-            found.table.counts,
-            found.neighbours,
-            found.table.silence,
-            found.by_utterances.per_phone,
+            analysis.table.phones,
+            analysis.table.counts,
+            analysis.neighbours,
+            analysis.table.silence,
+            analysis.by_utterances.per_phone,
             strict=True,
         )
     ]
-    ranks = [f"rank {place}" for place in range(1, len(found.neighbours[0]) + 1)]
+    ranks = [f"rank {place}" for place in range(1, len(analysis.neighbours[0]) + 1)]
     last = 2 + len(ranks)
     return table(("phone", "tokens", *ranks, "to silence", "agreement"), rows, numbers=(1, last, last + 1))
 
 
-def _classes(found: Analysis, labels: str) -> list[str]:
-    shown = {classes.n_classes: classes for classes in (found.best, *found.chosen)}
+def _classes(analysis: Analysis, labels: str) -> list[str]:
+    shown = {classes.n_classes: classes for classes in (analysis.best, *analysis.chosen)}
     rows = [
         (
-            f"{n} (best)" if n == found.best.n_classes else str(n),
+            f"{n} (best)" if n == analysis.best.n_classes else str(n),
             f"{classes.silhouette:.3f}",
-            class_members(found, classes, labels),
+            class_members(analysis, classes, labels),
         )
         for n, classes in sorted(shown.items())
     ]
@@ -101,39 +101,39 @@ def _classes(found: Analysis, labels: str) -> list[str]:
             "Average linkage on 1 - similarity, cut into the given number of classes. A phone's silhouette is near 1 "
             "if it is similar to its own class and dissimilar to the nearest other; 0 for a single phone."
         ),
-        silhouettes_svg(found),
+        silhouettes_svg(analysis),
         table(("classes", "silhouette", "phones"), rows, numbers=(1,)),
     ]
 
 
-def class_members(found: Analysis, classes: VisemeClasses, labels: str) -> str:
+def class_members(analysis: Analysis, classes: VisemeClasses, labels: str) -> str:
     """The phones of each class, in the dendrogram's order."""
     grouped: list[list[str]] = [[] for _ in range(classes.n_classes)]
-    for at in found.tree.order:
-        unbroken = phone_label(found.table.phones[at], labels).replace(" ", "\N{NO-BREAK SPACE}")
+    for at in analysis.tree.order:
+        unbroken = phone_label(analysis.table.phones[at], labels).replace(" ", "\N{NO-BREAK SPACE}")
         grouped[classes.labels[at]].append(unbroken)
     return "  |  ".join((", " if labels == "both" else " ").join(group) for group in grouped)
 
 
-def _reliability(found: Analysis, labels: str) -> list[str]:
+def _reliability(analysis: Analysis, labels: str) -> list[str]:
     splits: list[tuple[str, Reliability | None]] = [
-        ("utterances", found.by_utterances),
-        ("words", found.by_words),
-        ("utterances, phones of the words", found.by_utterances_same_phones),
+        ("utterances", analysis.by_utterances),
+        ("words", analysis.by_words),
+        ("utterances, phones of the words", analysis.by_utterances_same_phones),
     ]
     rows = [_reliability_row(name, split) for name, split in splits]
     left = [
         f"Not compared between halves of {name}, with fewer than {LEAST_TOKENS} tokens in a half: "
         f"{', '.join(phone_label(phone, labels) for phone in split.left_out)}."
         for name, split in splits
-        if split is not None and split.left_out and split is not found.by_utterances_same_phones
+        if split is not None and split.left_out and split is not analysis.by_utterances_same_phones
     ]
     head = ("halves of", "halves", "phones", "correlation", "lowest", "highest", "whole (Spearman-Brown)")
     return [
         note_paragraph(
-            f"The corpus is split in two at random, {found.options.halves} times; a table is computed from each half, "
-            "and the two are correlated over the pairs of phones. Halves of the utterances contain the same words: "
-            "they measure the effect of more recordings of the same kind. Halves of the words have no word in "
+            f"The corpus is split in two at random, {analysis.options.halves} times; a table is computed from each "
+            "half, and the two are correlated over the pairs of phones. Halves of the utterances contain the same "
+            "words: they measure the effect of more recordings of the same kind. Halves of the words have no word in "
             "common: they measure the effect of other words."
         ),
         table(head, rows, numbers=range(1, 7)),
@@ -146,14 +146,14 @@ def _reliability_row(name: str, split: Reliability | None) -> Sequence[str]:
         return (name, "0", "too few phones with tokens in both halves", "", "", "", "")
     r = split.correlations
     few, many = int(split.n_phones.min()), int(split.n_phones.max())
-    figures = (f"{value:.3f}" for value in (split.mean, r.min(), r.max(), split.corrected))
+    figures = (f"{value:.3f}" for value in (split.mean, r.min(), r.max(), split.full_length_reliability))
     return (name, str(len(r)), str(few) if few == many else f"{few} to {many}", *figures)
 
 
-def _articulation(found: Analysis, labels: str) -> list[str]:
+def _articulation(analysis: Analysis, labels: str) -> list[str]:
     agreements = [
         (name, str(agreement.n_pairs), f"{agreement.r:.3f}", f"{agreement.p:.4f}")
-        for name, agreement in found.articulatory
+        for name, agreement in analysis.articulatory
     ]
     return [
         note_paragraph(
@@ -162,14 +162,14 @@ def _articulation(found: Analysis, labels: str) -> list[str]:
         ),
         table(("phones", "pairs", "r", "p"), agreements, numbers=(1, 2, 3)),
         note_paragraph("One mark for each pair of phones; hover over it for their names."),
-        articulation_svg(found, labels),
+        articulation_svg(analysis, labels),
     ]
 
 
-def _consistency(found: Analysis, labels: str) -> list[str]:
-    movements, modes = found.movements, found.modes
-    order = found.tree.order
-    names = [phone_label(found.table.phones[at], labels) for at in order]
+def _consistency(analysis: Analysis, labels: str) -> list[str]:
+    movements, modes = analysis.movements, analysis.modes
+    order = analysis.tree.order
+    names = [phone_label(analysis.table.phones[at], labels) for at in order]
     rows = [
         (str(number), name, f"{spread:.2f}", f"{share:.2f}")
         for number, (name, spread, share) in enumerate(zip(modes.names, modes.spread, modes.free_share, strict=True))
@@ -194,8 +194,8 @@ def _consistency(found: Analysis, labels: str) -> list[str]:
     ]
 
 
-def _comparison(found: Analysis, labels: str) -> list[str]:
-    compared = found.comparison
+def _comparison(analysis: Analysis, labels: str) -> list[str]:
+    compared = analysis.comparison
     if compared is None:
         return []
     agreement = compared.agreement
@@ -209,9 +209,10 @@ def _comparison(found: Analysis, labels: str) -> list[str]:
             f"by {agreement.n_permutations} permutations, one-sided.",
         ),
         note_paragraph(
-            f"Similarity on {found.name} minus that on {compared.other}: orange where it is higher on {found.name}."
+            f"Similarity on {analysis.name} minus that on {compared.other}: orange where it is higher on "
+            f"{analysis.name}."
         ),
-        scroll_box(table_svg(difference_figure(found, compared, labels))),
+        scroll_box(table_svg(difference_figure(analysis, compared, labels))),
         "<h2>Phones and pairs with the largest differences</h2>",
         table(("phone", "mean difference"), phones, numbers=(1,)),
         note_paragraph("Pairs with signed differences:"),

@@ -43,8 +43,8 @@ class Reliability:
         return float(self.correlations.mean())
 
     @property
-    def corrected(self) -> float:
-        """Expected correlation of two whole corpora."""
+    def full_length_reliability(self) -> float:
+        """Reliability of the whole corpus, by the Spearman-Brown formula."""
         return spearman_brown(self.mean)
 
 
@@ -54,7 +54,7 @@ def spearman_brown(r: float) -> float:
 
 
 def split_half(
-    spoken: SpokenTokens,
+    tokens: SpokenTokens,
     units: NDArray[np.integer],
     n_halves: int,
     stream: np.random.Generator,
@@ -75,14 +75,14 @@ def split_half(
     """
     if n_halves < 2:
         raise InputError(f"a reliability needs at least 2 random halves, not {n_halves}")
-    phones = similarity_table(spoken).phones
+    phones = similarity_table(tokens).phones
     is_included = np.array([among is None or phone in among for phone in phones])
     numbers = np.unique(units[units >= 0])
     rows, correlations, sizes = [], [], []
     for _ in range(n_halves):
         chosen = stream.permutation(numbers)[: len(numbers) // 2]
         first = np.isin(units, chosen)
-        tables = similarity_table(spoken, first), similarity_table(spoken, ~first & (units >= 0))
+        tables = similarity_table(tokens, first), similarity_table(tokens, ~first & (units >= 0))
         if on_half is not None:
             on_half()
         enough = is_included & (np.minimum(tables[0].counts, tables[1].counts) >= LEAST_TOKENS)

@@ -19,10 +19,10 @@ from corpus_tools.similarity.tokens import LEAST_TOKENS, SimilarityTable, phone_
 from lexicon.phones import look_up_phone
 
 
-def table_csv(found: SimilarityTable, labels: str) -> str:
+def table_csv(table: SimilarityTable, labels: str) -> str:
     """One line for each phone: its label, its tokens, its similarity to each phone."""
-    counts = [[str(count)] for count in found.counts]
-    return _csv([phone_label(phone, labels) for phone in found.phones], ["tokens"], counts, found.matrix)
+    counts = [[str(count)] for count in table.counts]
+    return _csv([phone_label(phone, labels) for phone in table.phones], ["tokens"], counts, table.matrix)
 
 
 def difference_csv(compared: Comparison, labels: str) -> str:
@@ -42,43 +42,43 @@ def _csv(
     return file.getvalue()
 
 
-def analysis_json(found: Analysis) -> str:
+def analysis_json(analysis: Analysis) -> str:
     """All figures; similarities in the order of ``phones``."""
     content = {
-        "talker": found.name,
-        "utterances": found.n_utterances,
-        "seed": found.options.seed,
-        "phones": [{"ipa": phone, "arpabet": look_up_phone(phone).arpabet or None} for phone in found.table.phones],
-        "tokens": found.table.counts.tolist(),
-        "similarity": _round_values(found.table.matrix),
-        "similarity_to_silence": _round_values(found.table.silence),
+        "talker": analysis.name,
+        "utterances": analysis.n_utterances,
+        "seed": analysis.options.seed,
+        "phones": [{"ipa": phone, "arpabet": look_up_phone(phone).arpabet or None} for phone in analysis.table.phones],
+        "tokens": analysis.table.counts.tolist(),
+        "similarity": _round_values(analysis.table.matrix),
+        "similarity_to_silence": _round_values(analysis.table.silence),
         "neighbours": {
             phone: [{"phone": near, "similarity": round(value, 4)} for near, value in ranked]
-            for phone, ranked in zip(found.table.phones, found.neighbours, strict=True)
+            for phone, ranked in zip(analysis.table.phones, analysis.neighbours, strict=True)
         },
         "dendrogram": {
-            "order": [found.table.phones[at] for at in found.tree.order],
-            "links": _round_values(found.tree.links),
+            "order": [analysis.table.phones[at] for at in analysis.tree.order],
+            "links": _round_values(analysis.tree.links),
         },
         "classes": {
-            "best": found.best.n_classes,
-            "chosen": [_classes(found, classes) for classes in found.chosen],
-            "silhouettes": {str(classes.n_classes): round(classes.silhouette, 4) for classes in found.curve},
-            "best_classes": _classes(found, found.best),
+            "best": analysis.best.n_classes,
+            "chosen": [_classes(analysis, classes) for classes in analysis.chosen],
+            "silhouettes": {str(classes.n_classes): round(classes.silhouette, 4) for classes in analysis.curve},
+            "best_classes": _classes(analysis, analysis.best),
         },
         "reliability": {
             "least_tokens": LEAST_TOKENS,
-            "utterances": _reliability(found.by_utterances),
-            "words": _reliability(found.by_words),
-            "utterances_phones_of_words": _reliability(found.by_utterances_same_phones),
+            "utterances": _reliability(analysis.by_utterances),
+            "words": _reliability(analysis.by_words),
+            "utterances_phones_of_words": _reliability(analysis.by_utterances_same_phones),
         },
         "articulation": {
-            "agreement": {name: _agreement(agreement) for name, agreement in found.articulatory},
-            "distance": _round_values(found.articulation),
+            "agreement": {name: _agreement(agreement) for name, agreement in analysis.articulatory},
+            "distance": _round_values(analysis.articulation),
         },
-        "movements": _consistency(found, found.movements),
-        "modes": _consistency(found, found.modes),
-        "comparison": None if found.comparison is None else _comparison(found.comparison),
+        "movements": _consistency(analysis, analysis.movements),
+        "modes": _consistency(analysis, analysis.modes),
+        "comparison": None if analysis.comparison is None else _comparison(analysis.comparison),
     }
     return json.dumps(content, ensure_ascii=False, indent=1, allow_nan=False) + "\n"
 
@@ -90,12 +90,12 @@ def _round_values(values: NDArray[np.floating]) -> Any:
     return [round(float(value), 4) if np.isfinite(value) else None for value in values]
 
 
-def _classes(found: Analysis, classes: VisemeClasses) -> dict[str, Any]:
+def _classes(analysis: Analysis, classes: VisemeClasses) -> dict[str, Any]:
     groups = [
-        [found.table.phones[at] for at in found.tree.order if classes.labels[at] == number]
+        [analysis.table.phones[at] for at in analysis.tree.order if classes.labels[at] == number]
         for number in range(classes.n_classes)
     ]
-    silhouettes = dict(zip(found.table.phones, _round_values(classes.silhouettes), strict=True))
+    silhouettes = dict(zip(analysis.table.phones, _round_values(classes.silhouettes), strict=True))
     return {
         "n": classes.n_classes,
         "silhouette": round(classes.silhouette, 4),
@@ -109,9 +109,9 @@ def _reliability(split: Reliability | None) -> dict[str, Any] | None:
         return None
     return {
         "mean": round(split.mean, 4),
-        "spearman_brown": round(split.corrected, 4),
+        "spearman_brown": round(split.full_length_reliability, 4),
         "halves": _round_values(split.correlations),
-        "halves_asked": split.n_requested,
+        "halves_requested": split.n_requested,
         "phones_compared": split.n_phones.tolist(),
         "phones": dict(zip(split.phones, _round_values(split.per_phone), strict=True)),
         "left_out": list(split.left_out),
@@ -127,12 +127,12 @@ def _agreement(agreement: Agreement) -> dict[str, Any]:
     }
 
 
-def _consistency(found: Analysis, consistency: Consistency) -> dict[str, Any]:
+def _consistency(analysis: Analysis, consistency: Consistency) -> dict[str, Any]:
     return {
         "names": list(consistency.names),
         "spread_mm": _round_values(consistency.spread),
         "free_share": _round_values(consistency.free_share),
-        "free": dict(zip(found.table.phones, _round_values(consistency.free), strict=True)),
+        "free": dict(zip(analysis.table.phones, _round_values(consistency.free), strict=True)),
     }
 
 

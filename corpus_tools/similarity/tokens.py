@@ -26,7 +26,7 @@ class SpokenTokens:
     inventory : Q labels
         Silence is one of them.
     samples : (N, S, D)
-        Speech parameters of each token at S instants, as `phone_similarity` takes them.
+        Speech parameters of each token at S instants, in the form of `phone_similarity`.
     phone, utterance, word : (N,)
         Index into `inventory`; of the talker's utterance; of the different words, `NO_WORD` outside them.
     spread : (D,)
@@ -82,15 +82,15 @@ def _word_numbers(talker: Talker) -> NDArray[np.int64]:
     """(N,) index of the word, by its text, to which each token belongs."""
     numbers: dict[str, int] = {}
     words = []
-    for spoken in talker.utterances:
-        indices = np.full(len(spoken.phones), NO_WORD, np.int64)
-        for word in spoken.words:
+    for utterance in talker.utterances:
+        indices = np.full(len(utterance.phones), NO_WORD, np.int64)
+        for word in utterance.words:
             indices[word.first : word.last] = numbers.setdefault(word.text.lower(), len(numbers))
         words.append(indices)
     return np.concatenate(words)
 
 
-def similarity_table(spoken: SpokenTokens, chosen: NDArray[np.bool_] | None = None) -> SimilarityTable:
+def similarity_table(tokens: SpokenTokens, chosen: NDArray[np.bool_] | None = None) -> SimilarityTable:
     """Similarity of the sounding phones, in the phone table's order, from all tokens or the `chosen` (N,) ones.
 
     The figures are those that synthesis uses: silence is measured with the phones and then removed.
@@ -100,15 +100,15 @@ def similarity_table(spoken: SpokenTokens, chosen: NDArray[np.bool_] | None = No
     InputError
         A label of the talker is not in the phone table.
     """
-    selected = np.ones(len(spoken.phone), bool) if chosen is None else chosen
-    found = phone_similarity(spoken.samples[selected], spoken.phone[selected], spoken.inventory, spoken.spread)
-    counts = np.bincount(spoken.phone[selected], minlength=len(spoken.inventory))
+    selected = np.ones(len(tokens.phone), bool) if chosen is None else chosen
+    found = phone_similarity(tokens.samples[selected], tokens.phone[selected], tokens.inventory, tokens.spread)
+    counts = np.bincount(tokens.phone[selected], minlength=len(tokens.inventory))
     place = {label: at for at, label in enumerate(PHONES)}
-    sounding = [at for at, label in enumerate(spoken.inventory) if label != SILENCE]
-    order = sorted(sounding, key=lambda at: place[look_up_phone(spoken.inventory[at]).symbol])
-    silence = spoken.inventory.index(SILENCE)
+    sounding = [at for at, label in enumerate(tokens.inventory) if label != SILENCE]
+    order = sorted(sounding, key=lambda at: place[look_up_phone(tokens.inventory[at]).symbol])
+    silence = tokens.inventory.index(SILENCE)
     return SimilarityTable(
-        tuple(spoken.inventory[at] for at in order),
+        tuple(tokens.inventory[at] for at in order),
         counts[order].astype(np.int64),
         found.matrix[np.ix_(order, order)],
         found.matrix[order, silence],

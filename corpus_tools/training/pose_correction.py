@@ -62,11 +62,11 @@ def fit_pose_correction(observations: Sequence[PosedLandmarks]) -> PoseCorrectio
     angles, landmarks = _chunk_means(observations)
     centre, scale = angles.mean(axis=0), np.maximum(angles.std(axis=0), 1e-6)
     terms = angle_terms((angles - centre) / scale)
-    away = landmarks.reshape(len(landmarks), -1) - landmarks.reshape(len(landmarks), -1).mean(axis=0)
-    offsets = np.zeros((terms.shape[1], away.shape[1]))
+    centred = landmarks.reshape(len(landmarks), -1) - landmarks.reshape(len(landmarks), -1).mean(axis=0)
+    offsets = np.zeros((terms.shape[1], centred.shape[1]))
     if len(angles) >= MIN_CHUNKS:
-        fit = fit_ridge(terms, away)
-        if fit.left_out_error < float(np.square(away).sum()):
+        fit = fit_ridge(terms, centred)
+        if fit.left_out_error < float(np.square(centred).sum()):
             offsets = fit.weights
     return PoseCorrection(centre, scale, _keep_lip_contact(offsets.reshape(terms.shape[1], *landmarks.shape[1:])))
 
@@ -82,7 +82,7 @@ def _keep_lip_contact(offsets: Floats) -> Floats:
 def correct_pose(observations: Sequence[AnyPosedLandmarks]) -> tuple[AnyPosedLandmarks, ...]:
     """Observations of one person with the correction fitted to them applied."""
     leak = fit_pose_correction(observations) if observations else None
-    return tuple(leak.apply(seen) for seen in observations) if leak else ()
+    return tuple(leak.apply(observation) for observation in observations) if leak else ()
 
 
 def angle_terms(angles: NDArray[np.floating]) -> Floats:
@@ -94,9 +94,9 @@ def angle_terms(angles: NDArray[np.floating]) -> Floats:
 def _chunk_means(observations: Sequence[PosedLandmarks]) -> tuple[Floats, Floats]:
     """Mean angles (C, 3) and landmarks (C, L, 3) of every chunk."""
     angles, landmarks = [], []
-    for seen in observations:
-        n_chunks = max(1, round(len(seen.landmarks) / seen.fps / CHUNK_S))
-        for rows in np.array_split(np.arange(len(seen.landmarks)), n_chunks):
-            angles.append(seen.head[rows, :3].mean(axis=0, dtype=np.float64))
-            landmarks.append(seen.landmarks[rows].mean(axis=0, dtype=np.float64))
+    for observation in observations:
+        n_chunks = max(1, round(len(observation.landmarks) / observation.fps / CHUNK_S))
+        for rows in np.array_split(np.arange(len(observation.landmarks)), n_chunks):
+            angles.append(observation.head[rows, :3].mean(axis=0, dtype=np.float64))
+            landmarks.append(observation.landmarks[rows].mean(axis=0, dtype=np.float64))
     return np.array(angles), np.array(landmarks)

@@ -19,24 +19,25 @@ class RidgeFit:
     left_out_error: float
 
 
-def fit_ridge(terms: Floats, wanted: Floats, efforts: Sequence[float] = REGULARISATIONS) -> RidgeFit:
+def fit_ridge(terms: Floats, targets: Floats, regularisations: Sequence[float] = REGULARISATIONS) -> RidgeFit:
     """The best regression of (R, V) values, whose mean is 0, on (R, K) terms.
 
     Each row's error when it is left out follows from its leverage. Source: Allen 1974 (PRESS).
     """
     mean = terms.mean(axis=0)
     centred = terms - mean
-    normal, right = centred.T @ centred, centred.T @ wanted
+    normal, right = centred.T @ centred, centred.T @ targets
     found = [
-        _fit_and_cross_validate(centred, wanted, normal + effort * np.eye(terms.shape[1]), right) for effort in efforts
+        _fit_and_cross_validate(centred, targets, normal + regularisation * np.eye(terms.shape[1]), right)
+        for regularisation in regularisations
     ]
     error, weights = min(found, key=lambda one: one[0])
     return RidgeFit(mean, weights, error)
 
 
-def _fit_and_cross_validate(centred: Floats, wanted: Floats, normal: Floats, right: Floats) -> tuple[float, Floats]:
+def _fit_and_cross_validate(centred: Floats, targets: Floats, normal: Floats, right: Floats) -> tuple[float, Floats]:
     inverse = np.linalg.inv(normal)
     weights: Floats = inverse @ right
     leverage = np.einsum("rk,kj,rj->r", centred, inverse, centred) + 1.0 / len(centred)
-    errors = (wanted - centred @ weights) / (1.0 - leverage)[:, None]
+    errors = (targets - centred @ weights) / (1.0 - leverage)[:, None]
     return float(np.square(errors).sum()), weights

@@ -38,26 +38,28 @@ def add_phone_network(talker: Talker, *, on_progress: Progress | None = None) ->
     BackendError
         scikit-learn is missing.
     """
-    if sum(len(spoken.shape) for spoken in talker.utterances) < MIN_FRAMES:
+    if sum(len(utterance.shape) for utterance in talker.utterances) < MIN_FRAMES:
         return talker
-    inventory = tuple(sorted({label for spoken in talker.utterances for label in spoken.phones.phones} | {SILENCE}))
+    inventory = tuple(
+        sorted({label for utterance in talker.utterances for label in utterance.phones.phones} | {SILENCE})
+    )
     n_speech = talker.model.n_speech
     spread = np.maximum(talker.model.spread[:n_speech], 1e-6)
-    shown, place, wanted = [], [], []
-    for spoken in talker.utterances:
-        times = np.arange(len(spoken.shape)) / talker.fps
-        near = (times >= spoken.phones.edges[1] - SILENCE_MARGIN_S) & (
-            times <= spoken.phones.edges[-2] + SILENCE_MARGIN_S
+    shown, place, targets = [], [], []
+    for utterance in talker.utterances:
+        times = np.arange(len(utterance.shape)) / talker.fps
+        near = (times >= utterance.phones.edges[1] - SILENCE_MARGIN_S) & (
+            times <= utterance.phones.edges[-2] + SILENCE_MARGIN_S
         )
-        labels, where = window_features(spoken.phones, times[near], inventory)
+        labels, where = window_features(utterance.phones, times[near], inventory)
         shown.append(labels)
         place.append(where)
-        wanted.append(spoken.shape[near, :n_speech] / spread)
-    seen = np.concatenate(shown), np.concatenate(place)
+        targets.append(utterance.shape[near, :n_speech] / spread)
+    windows = np.concatenate(shown), np.concatenate(place)
     tables = [np.eye(len(inventory), dtype=np.float32)] * N_BY_LABEL + [feature_table(inventory)] * N_BY_FEATURES
     networks = []
     for seed, table in enumerate(tables):
-        networks.append(_train_network(*seen, np.concatenate(wanted), table, seed))
+        networks.append(_train_network(*windows, np.concatenate(targets), table, seed))
         if on_progress:
             on_progress(seed + 1, len(tables))
     weights, biases = (_stack_layers(layers) for layers in zip(*networks, strict=True))
@@ -88,14 +90,14 @@ def _stack_layers(members: Iterable[Iterable[Floats]]) -> list[Floats]:
 
 
 def _train_network(
-    shown: NDArray[np.integer], place: Floats, wanted: Floats, table: Floats, seed: int
+    shown: NDArray[np.integer], place: Floats, targets: Floats, table: Floats, seed: int
 ) -> tuple[list[Floats], list[Floats]]:
     """Weights and biases of one network for one-hot phones, trained on phones coded by the table."""
-    fitted = _fit_regressor(encode_windows(shown, place, table), wanted, seed)
+    fitted = _fit_regressor(encode_windows(shown, place, table), targets, seed)
     return [expand_to_phones(fitted.coefs_[0], table, shown.shape[1]), *fitted.coefs_[1:]], fitted.intercepts_
 
 
-def _fit_regressor(inputs: Any, wanted: Any, seed: int) -> Any:
+def _fit_regressor(inputs: Any, targets: Any, seed: int) -> Any:
     try:
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.neural_network import MLPRegressor
@@ -111,4 +113,4 @@ def _fit_regressor(inputs: Any, wanted: Any, seed: int) -> Any:
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # training ends after `MAX_EPOCHS`
-        return network.fit(inputs, wanted)
+        return network.fit(inputs, targets)

@@ -70,8 +70,8 @@ def test_a_stream_is_the_clip_in_pieces(session: tts2face.Session) -> None:
     whole = session.clip("Bob may move. We were away.", fps=25)
     assert [piece.begin for piece in pieces] == [0.0, len(pieces[0].clip.motion) / 25]
     assert np.array_equal(concatenate_clips([piece.clip for piece in pieces]).motion.values, whole.motion.values)
-    assert [phone.phone for phone in pieces[1].shown()][:3] == ["sil", "w", "i"]
-    assert pieces[1].shown()[0].start >= pieces[1].begin
+    assert [phone.phone for phone in pieces[1].explain()][:3] == ["sil", "w", "i"]
+    assert pieces[1].explain()[0].start >= pieces[1].begin
 
 
 @pytest.mark.parametrize(

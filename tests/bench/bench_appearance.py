@@ -38,7 +38,7 @@ def main() -> None:
         print(f"{what}: {time.perf_counter() - began:.1f} s")
         began = time.perf_counter()
 
-    kept = observe(options.recordings, effort=RunOptions(options.cache)).kept
+    kept = observe(options.recordings, run_options=RunOptions(options.cache)).kept
     stage("observing (from the cache where it was done before)")
     order = np.random.default_rng(options.seed).permutation(len(kept))
     learn = [kept[i] for i in order[: options.learn]]
@@ -57,7 +57,10 @@ def main() -> None:
     for name, value in measure_appearance(films, learnt, unseen, kept).as_dict().items():
         print(f"{name}: {value}")
     stage("measuring")
-    spoken = tuple(replace(one, looks=looks) for one, looks in zip(talker.utterances, learnt.parameters, strict=True))
+    spoken = tuple(
+        replace(one, appearance_parameters=looks)
+        for one, looks in zip(talker.utterances, learnt.parameters, strict=True)
+    )
     whole = replace(talker, utterances=spoken, appearance=learnt.appearance)
     path = Path("/tmp/bench_appearance.talker")
     write_talker(path, whole)
@@ -65,7 +68,7 @@ def main() -> None:
     path.unlink()
     for size in ("360x288", "512x512"):
         made = own_face_renderer(whole, Picture(size=size))
-        motion = np.concatenate([spoken[0].shape[30, :20], spoken[0].looks[30]])
+        motion = np.concatenate([spoken[0].shape[30, :20], spoken[0].appearance_parameters[30]])
         draw_video_frame(made, motion, 0)
         began = time.perf_counter()
         for number in range(len(made.plate)):

@@ -55,7 +55,7 @@ def driven(talker: Talker, name: str) -> list[Observation]:
 
 def targets(recordings: Path, cache: Path | None, talker: Talker) -> Iterator[tuple[str, ShapeModel]]:
     """Second talkers by name."""
-    kept = observe(recordings, effort=RunOptions(cache, 1)).kept
+    kept = observe(recordings, run_options=RunOptions(cache, 1)).kept
     yield "even half, 12 + 6 modes", learn_shapes(kept[::2], 12, 6)
     yield "odd half, 30 + 15 modes", learn_shapes(kept[1::2], 30, 15)
     for name in ("head", "cartoon"):

@@ -118,7 +118,7 @@ def test_pictures_of_the_source_are_left_behind_where_the_target_has_none() -> N
     made = transfer_talker(replace(source, appearance=SimpleNamespace()), target)
     assert made.lacks_appearance
     assert made.talker.appearance is None
-    assert all(utterance.looks is None for utterance in made.talker.utterances)
+    assert all(utterance.appearance_parameters is None for utterance in made.talker.utterances)
 
 
 def test_a_source_without_speech_is_refused() -> None:

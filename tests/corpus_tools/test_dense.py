@@ -155,7 +155,7 @@ def test_a_talkers_head(few_takes: Path, face_model: Path, tmp_path: Path, head:
         few_takes,
         out,
         consent=consent,
-        effort=RunOptions(tmp_path / "cache", 1, face_model),
+        run_options=RunOptions(tmp_path / "cache", 1, face_model),
         on_progress=lambda done, of: steps.append((done, of)),
     )
     face = read_face(out)

@@ -52,7 +52,7 @@ def test_intervals_hold_their_value(measured: tuple[Evaluation, tuple[SplitResul
 
 def test_classes_hold_every_judged_frame_once(measured: tuple[Evaluation, tuple[SplitResult, ...]]):
     result, (run,) = measured
-    n_frames = sum(one.judged.stop - one.judged.start for one in run.real)
+    n_frames = sum(one.evaluated.stop - one.evaluated.start for one in run.real)
     for one in result.scores:
         assert sum(some.n_frames for some in one.classes) == n_frames
         assert {some.phones for some in one.classes} <= {"bilabial", "labiodental", "rounded", "open", "other"}

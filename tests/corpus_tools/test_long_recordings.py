@@ -43,7 +43,7 @@ def folder(shared_recordings: Path, rows: list[dict[str, str]], tmp_path_factory
 def read(folder: Path, rows: list[dict[str, str]], cache: Path, face_model: Path) -> Observations:
     """The take with its text beside it."""
     (folder / "take.txt").write_text(". ".join(row["transcript"].replace(" a ", " ay ") for row in rows))
-    found = observe(folder / "take.mp4", effort=RunOptions(cache, 1, face_model))
+    found = observe(folder / "take.mp4", run_options=RunOptions(cache, 1, face_model))
     (folder / "take.txt").unlink()
     return found
 
@@ -73,7 +73,7 @@ def test_without_a_transcript_phones_are_recognised_and_marked(
 ) -> None:
     report = tmp_path / "report.html"
     out = tmp_path / "take.talker"
-    built = build_talker(folder, out, effort=RunOptions(cache, 1, face_model), created="2000-01-01", report=report)
+    built = build_talker(folder, out, run_options=RunOptions(cache, 1, face_model), created="2000-01-01", report=report)
     assert built.n_kept == len(read.kept)
     talker = read_talker(out)
     assert talker.metadata["phones_recognised"] == [seen.name for seen in read.kept]

@@ -25,7 +25,7 @@ import sys
 from pathlib import Path
 from corpus_tools.run_options import RunOptions
 from corpus_tools.recordings.observe import observe
-observe(Path(sys.argv[1]), effort=RunOptions(Path(sys.argv[2]), 1, Path(sys.argv[3])))
+observe(Path(sys.argv[1]), run_options=RunOptions(Path(sys.argv[2]), 1, Path(sys.argv[3])))
 """
 
 
@@ -62,7 +62,7 @@ def test_good_recordings_are_kept_and_bad_ones_refused_with_their_reason(few_tak
         file.write("other,yesterday my seventeen elephants remembered nothing whatsoever\n")
     seen = []
     found = observe(
-        few_takes, effort=RunOptions(cache, 1, face_model), on_progress=lambda done, of: seen.append((done, of))
+        few_takes, run_options=RunOptions(cache, 1, face_model), on_progress=lambda done, of: seen.append((done, of))
     )
     assert [one.name for one in found.kept] == ["bbaf2n", "bbaf3s", "bbaf5a"]
     reasons = {refusal.name: refusal.reason for refusal in found.refused}
@@ -82,7 +82,7 @@ def test_good_recordings_are_kept_and_bad_ones_refused_with_their_reason(few_tak
 
 
 def test_an_observation_is_on_one_clock(few_takes, cache, face_model):
-    one = observe(few_takes, effort=RunOptions(cache, 1, face_model)).kept[0]
+    one = observe(few_takes, run_options=RunOptions(cache, 1, face_model)).kept[0]
     n_frames = len(list(read_frames(few_takes / "clips" / "bbaf2n.mkv")))
     assert n_frames - 1 <= len(one.landmarks) <= n_frames  # the last frame may outlast the sound
     n_frames = len(one.landmarks)
@@ -99,8 +99,8 @@ def test_an_observation_is_on_one_clock(few_takes, cache, face_model):
 
 @ONLY_RENDERED
 def test_processes_change_nothing(few_takes, tmp_path, face_model):
-    alone = observe(few_takes, effort=RunOptions(tmp_path / "a", 1, face_model)).kept
-    together = observe(few_takes, effort=RunOptions(tmp_path / "b", 2, face_model)).kept
+    alone = observe(few_takes, run_options=RunOptions(tmp_path / "a", 1, face_model)).kept
+    together = observe(few_takes, run_options=RunOptions(tmp_path / "b", 2, face_model)).kept
     for one, other in zip(alone, together, strict=True):
         assert one.name == other.name
         np.testing.assert_array_equal(one.landmarks, other.landmarks)
@@ -123,18 +123,18 @@ def test_a_killed_run_goes_on_where_it_stopped(few_takes, tmp_path, face_model, 
     tracked = []
     sights = StreamingTracker.track
     monkeypatch.setattr(StreamingTracker, "track", lambda *args: tracked.append(1) or sights(*args))
-    assert len(observe(few_takes, effort=RunOptions(kept, 1, face_model)).kept) == 3
+    assert len(observe(few_takes, run_options=RunOptions(kept, 1, face_model)).kept) == 3
     assert len(tracked) == 3 - len(before)
     assert all(path.stat().st_mtime_ns == stamp for path, stamp in before.items())
 
 
 @ONLY_RENDERED
 def test_a_damaged_part_of_the_cache_is_made_again(few_takes, tmp_path, face_model):
-    effort = RunOptions(tmp_path / "cache", 1, face_model)
-    first = observe(few_takes, effort=effort).kept
+    run_options = RunOptions(tmp_path / "cache", 1, face_model)
+    first = observe(few_takes, run_options=run_options).kept
     for path in (tmp_path / "cache").iterdir():
         path.write_bytes(path.read_bytes()[:100])
-    again = observe(few_takes, effort=effort).kept
+    again = observe(few_takes, run_options=run_options).kept
     for one, other in zip(first, again, strict=True):
         np.testing.assert_array_equal(one.landmarks, other.landmarks)
 
@@ -150,8 +150,8 @@ def test_a_talker_is_built_and_says_where_it_comes_from(few_takes, cache, tmp_pa
         stages_seen[name] = (0, 1)
         return lambda done, of: stages_seen.update({name: (done, of)})
 
-    effort = RunOptions(cache, 1, face_model)
-    built = build_talker(few_takes, out, name="s1", effort=effort, created="2000-01-01", stages=stages)
+    run_options = RunOptions(cache, 1, face_model)
+    built = build_talker(few_takes, out, name="s1", run_options=run_options, created="2000-01-01", stages=stages)
     assert stages_seen["reading recordings"] == (400, 400)
     assert list(stages_seen) == ["reading recordings", "learning phone network"]  # too few recordings for audio maps
     n_frames = sum(len(list(read_frames(path))) for path in few_takes.glob("clips/bb*.mkv"))
@@ -170,7 +170,7 @@ def test_nothing_is_written_when_every_recording_is_refused(tmp_path, face_model
     folder.mkdir()
     (folder / "a.mkv").touch()
     with pytest.raises(InputError, match="no recording could be used"):
-        build_talker(folder, tmp_path / "x.talker", effort=RunOptions(tmp_path / "cache", 1, face_model))
+        build_talker(folder, tmp_path / "x.talker", run_options=RunOptions(tmp_path / "cache", 1, face_model))
     assert not (tmp_path / "x.talker").exists()
 
 
@@ -192,4 +192,4 @@ def test_a_provenance_that_is_not_there(tmp_path):
 @ONLY_RENDERED
 def test_no_job(few_takes, tmp_path):
     with pytest.raises(InputError, match="jobs must be 1 or more"):
-        observe(few_takes, effort=RunOptions(tmp_path, -1))
+        observe(few_takes, run_options=RunOptions(tmp_path, -1))

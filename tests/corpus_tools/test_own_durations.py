@@ -86,9 +86,9 @@ def test_what_lips_do_in_phones_is_looked_at_on_the_clock_of_the_voice(observati
     assert judged.own is not None
     np.testing.assert_allclose(judged.own.values[:, 0], np.arange(said.n_frames) / 25.0, atol=1e-5)
     begin, end = one.observation.phones.edges[[word.first, one.observation.words[-1].last]]
-    times = np.arange(len(judged.made)) / 25.0
+    times = np.arange(len(judged.synthesised)) / 25.0
     within = (times >= begin) & (times <= end)
-    np.testing.assert_allclose(judged.made[within, 0], 2 * times[within], atol=1e-3)
+    np.testing.assert_allclose(judged.synthesised[within, 0], 2 * times[within], atol=1e-3)
 
 
 def test_the_second_table_is_in_every_answer(observations: list[Observation]) -> None:

@@ -87,8 +87,8 @@ def test_one_long_video_with_subtitles_gives_what_its_parts_gave(takes: Path, fa
         start, end = begin + float(row["speech_start_s"]), begin + float(row["speech_end_s"])
         lines += [str(number), f"00:00:{start:06.3f} --> 00:00:{end:06.3f}".replace(".", ","), row["transcript"], ""]
     (tmp_path / "long" / "talk.srt").write_text("\n".join(lines), encoding="utf-8")
-    effort = RunOptions(tmp_path / "cache", 1, face_model)
-    cut = observe(tmp_path / "long", effort=effort)
+    run_options = RunOptions(tmp_path / "cache", 1, face_model)
+    cut = observe(tmp_path / "long", run_options=run_options)
     assert not cut.refused
     assert [one.name for one in cut.kept] == ["talk-0001", "talk-0002", "talk-0003"]
     for one, row, (begin, _) in zip(cut.kept, rows, spans, strict=True):

@@ -47,7 +47,7 @@ def found(rendered_takes: Path, face_model: Path, tmp_path_factory: pytest.TempP
     (folder / "wrong.txt").write_text("yesterday seventeen elephants remembered nothing")
     film(pictures, sound, folder / "second.mp4")
     (folder / "second.txt").write_text(rows[0]["transcript"])
-    return observe(folder, effort=RunOptions(folder / "cache", 2, face_model))
+    return observe(folder, run_options=RunOptions(folder / "cache", 2, face_model))
 
 
 def test_what_is_wrong_is_said(found: Observations) -> None:

@@ -69,7 +69,10 @@ def test_the_file_says_who_agreed_and_is_small(talker: Path) -> None:
     assert talker.stat().st_size < 25e6
     assert made.appearance is not None
     assert made.appearance.face.n_modes == 40
-    assert all(spoken.looks is not None and len(spoken.looks) == len(spoken.shape) for spoken in made.utterances)
+    assert all(
+        spoken.appearance_parameters is not None and len(spoken.appearance_parameters) == len(spoken.shape)
+        for spoken in made.utterances
+    )
 
 
 def test_the_clip_shows_a_face_whose_lips_part_and_close(pictures: np.ndarray, bundle: Path) -> None:
@@ -124,7 +127,7 @@ def test_speech_of_another_talker_on_an_own_face(source: str, talker: Path, tmp_
     assert run(["Bob may.", "--talker", str(cloned), "--face", "self", "--out", str(clip), "--quiet"]) == 0
     clone, target = read_talker(cloned), read_talker(talker)
     assert clone.metadata["consent"] == target.metadata["consent"]
-    assert all(utterance.looks is not None for utterance in clone.utterances)
+    assert all(utterance.appearance_parameters is not None for utterance in clone.utterances)
     with av.open(str(clip)) as container:
         assert "Synthetic" in container.metadata["comment"]
         pictures = np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)])

@@ -73,7 +73,7 @@ def test_the_json_says_the_same_as_the_matrix(here: Path) -> None:
     assert [phone["ipa"] for phone in content["phones"]] == rows[0][2:]
     np.testing.assert_array_equal(content["similarity"], np.array([row[2:] for row in rows[1:]], float))
     assert content["classes"]["best"] == 3
-    assert content["reliability"]["utterances"]["halves_asked"] == 3
+    assert content["reliability"]["utterances"]["halves_requested"] == 3
     assert content["comparison"] is None
     assert set(content["movements"]["names"]) >= {"opening", "width", "protrusion"}
 

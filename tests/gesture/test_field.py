@@ -50,7 +50,7 @@ def _brute_force(made, state, n_best: int) -> list[int]:
         if moment - start < history or end - moment <= future:
             continue
         rows = slice(moment - history, moment)
-        away = np.square(made.values[rows] - state.shown).sum() + np.square(made.prosody[rows] - state.prosody).sum()
+        away = np.square(made.values[rows] - state.motion).sum() + np.square(made.prosody[rows] - state.prosody).sum()
         found.append((float(away) / history, moment))
     best: list[int] = []
     for _, moment in sorted(found):
@@ -78,9 +78,9 @@ def test_the_search_finds_what_brute_force_finds(seed, monkeypatch):
     state = resting(made, generator.normal(size=2).astype(np.float32), np.float32([0.3]))
     (expected,) = _brute_force(made, state, 1)
     _, behind = sample_field(made, state, np.zeros((1, 1), np.float32), np.array([0.5]))
-    found = np.square(made.values[behind.moment - 5 : behind.moment] - state.shown).sum()
+    found = np.square(made.values[behind.moment - 5 : behind.moment] - state.motion).sum()
     found += np.square(made.prosody[behind.moment - 5 : behind.moment] - state.prosody).sum()
-    nearest = np.square(made.values[expected - 5 : expected] - state.shown).sum()
+    nearest = np.square(made.values[expected - 5 : expected] - state.motion).sum()
     nearest += np.square(made.prosody[expected - 5 : expected] - state.prosody).sum()
     assert found <= SEARCH_SLACK**2 * nearest + 1e-6
 
@@ -97,7 +97,9 @@ def test_candidates_are_drawn_by_their_distance():
     away = []
     for moment in best:
         rows = slice(moment - 5, moment)
-        squares = np.square(made.values[rows] - state.shown).sum() + np.square(made.prosody[rows] - state.prosody).sum()
+        squares = (
+            np.square(made.values[rows] - state.motion).sum() + np.square(made.prosody[rows] - state.prosody).sum()
+        )
         away.append(squares / 5)
     shares = np.exp((away[0] - np.array(away)) / (0.5 * made.median_distance))
     expected = shares / shares.sum()
@@ -161,7 +163,7 @@ def test_another_style_goes_on_where_the_first_stood():
     second = build_field(2.0 * values[::-1].copy(), heard[::-1].copy(), lengths, OPTIONS)
     state = resting(first, np.float32([1.0, 2.0]), np.float32([0.5]))
     there = transfer_state(state, first, second)
-    np.testing.assert_allclose(there.shown * second.scale, state.shown * first.scale, rtol=1e-6)
+    np.testing.assert_allclose(there.motion * second.scale, state.motion * first.scale, rtol=1e-6)
     np.testing.assert_allclose(there.prosody / second.weights, state.prosody / first.weights, rtol=1e-6)
 
 
@@ -234,5 +236,5 @@ def test_a_clip_begins_as_a_recording_did(chance: float):
     made = build_field(values, heard, lengths, OPTIONS)
     state = initial_state(made, chance)
     start = 60 * int(chance * 12)
-    np.testing.assert_array_equal(state.shown, made.values[start : start + OPTIONS.history])
+    np.testing.assert_array_equal(state.motion, made.values[start : start + OPTIONS.history])
     assert state.moment == start + OPTIONS.history - 1

@@ -108,7 +108,7 @@ def test_a_nod_goes_six_degrees_down_and_a_little_beyond_rest() -> None:
 
 
 def test_a_timeline_can_be_moved() -> None:
-    told = Timeline(spans=(StyleSpan("head", "a", 0.0, math.inf),), nods=(Nod(0.5),)).shifted(2.0)
+    told = Timeline(spans=(StyleSpan("head", "a", 0.0, math.inf),), nods=(Nod(0.5),)).shift(2.0)
     assert (told.spans[0].start, told.spans[0].end, told.nods[0].time) == (2.0, math.inf, 2.5)
 
 

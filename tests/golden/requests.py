@@ -83,7 +83,7 @@ def starter_with_pictures() -> Talker:
     assert appearance is not None
     n_modes = len(talker.model.basis)
     plate = replace(appearance.plate, shape=np.tile(talker.model.rest[:n_modes], (4, 1)))
-    spoken = tuple(replace(one, looks=one.shape[:, :4].astype(np.float32)) for one in talker.utterances)
+    spoken = tuple(replace(one, appearance_parameters=one.shape[:, :4].astype(np.float32)) for one in talker.utterances)
     return replace(talker, utterances=spoken, appearance=replace(appearance, plate=plate))
 
 

@@ -56,7 +56,7 @@ def test_every_frame_is_drawn_as_the_formula_says(seed: int) -> None:
     chances = generator.random(N_SHOWN)
     state = initial_state(made, 0.4)
     walk = sample_field_moments(made, state, sound, chances)
-    shown, driving = list(state.shown), [*state.prosody, *(sound * made.weights)]
+    shown, driving = list(state.motion), [*state.prosody, *(sound * made.weights)]
     expected = []
     for frame in range(N_SHOWN):
         away = distances(made, np.array(shown[-H:]), np.array(driving[frame : frame + H]))
@@ -81,9 +81,9 @@ def test_candidates_come_with_the_frequencies_of_the_formula() -> None:
     made = build_field(values, heard, lengths, JU_2008)
     start = initial_state(made, 0.0)
     state = FieldState(
-        np.zeros_like(start.shown), np.zeros_like(start.prosody), -1, start.offset, start.recent_jumps, 0
+        np.zeros_like(start.motion), np.zeros_like(start.prosody), -1, start.offset, start.recent_jumps, 0
     )
-    away = distances(made, state.shown, state.prosody)
+    away = distances(made, state.motion, state.prosody)
     best = sorted(away, key=lambda moment: away[moment])[:N_BEST]
     weights = np.exp(
         -np.array([away[moment] - away[best[0]] for moment in best]) / (H * JU_2008.sigma * made.median_distance)

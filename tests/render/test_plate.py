@@ -17,7 +17,7 @@ from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 def motion_of_plate(talker: Talker, number: int) -> np.ndarray:
     plate = talker.appearance.plate
-    return np.concatenate([plate.shape[number, :2], plate.looks[number], np.zeros(2)]).astype(np.float32)
+    return np.concatenate([plate.shape[number, :2], plate.texture_parameters[number], np.zeros(2)]).astype(np.float32)
 
 
 def clip_of(channels: tuple[str, ...], values: np.ndarray) -> Clip:

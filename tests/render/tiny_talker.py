@@ -60,7 +60,7 @@ def own_talker(*, has_face: bool = True) -> Talker:
         points=np.repeat(points[None], 4, axis=0).astype(np.float32),
         axes=np.tile(np.array([[1.0, 0, 0], [0, -1.0, 0]], np.float32), (4, 1, 1)),
         shape=generator.normal(0, 1, (4, 3)).astype(np.float32),
-        looks=generator.normal(0, 5, (4, 2)).astype(np.float32),
+        texture_parameters=generator.normal(0, 5, (4, 2)).astype(np.float32),
     )
     mouth = texture_model(shape[list(MOUTH_LANDMARKS)], mouth_triangles(), 24, 30.0)
     changed = np.ones(len(face.pixels), np.float32)

@@ -62,7 +62,7 @@ def test_what_surrounds_a_span_is_cut_between_words() -> None:
 
 
 def test_a_mismatch_says_where_and_what() -> None:
-    mismatch = TextMismatch(1.0, 2.5, ("one", "two"), -9000.0).shifted(2.0)
+    mismatch = TextMismatch(1.0, 2.5, ("one", "two"), -9000.0).shift(2.0)
     assert mismatch.sentence == ("the text does not fit the recording from 3.0 to 4.5 s (one two); check the words")
     long = TextMismatch(0.0, 9.0, tuple("abcdefghij"), -9000.0)
     assert "(a b c d ... h i j)" in long.sentence

@@ -47,10 +47,16 @@ def build_appearance_exemplars(talker: Talker, exemplars: ExemplarModel) -> Appe
         The talker has no appearance model.
     """
     appearance = require_appearance(talker)
-    frames = np.concatenate([spoken.looks for spoken in talker.utterances if spoken.looks is not None])
+    frames = np.concatenate(
+        [
+            utterance.appearance_parameters
+            for utterance in talker.utterances
+            if utterance.appearance_parameters is not None
+        ]
+    )
     spread = np.maximum(appearance.spread, 1e-6).astype(np.float32)
     silent = np.concatenate(
-        [_silent_frames(spoken.phones, len(spoken.shape), talker.fps) for spoken in talker.utterances]
+        [_silent_frames(utterance.phones, len(utterance.shape), talker.fps) for utterance in talker.utterances]
     )
     still = frames[silent] if silent.any() else frames
     rest = np.median(still, axis=0).astype(np.float32)

@@ -12,9 +12,9 @@ from tts2face.exemplar.recorded_motion import read_motion
 from tts2face.exemplar.time_warping import warp_to_reference
 from tts2face.exemplar.tokens import Tokens
 
-CLOCK_HZ = 100.0  # instants at which motion is made; lips move below 15 Hz, so nothing is lost
-N_KNOTS = 8  # samples a phone; 10 are no better (docs/decisions/007-exemplar-method.md)
-ALIGN_BAND = 1  # knots by which an exemplar's event may lie off the best one's; 2 lose .002 of r opening
+CLOCK_HZ = 100.0  # rate at which motion is computed; lip motion is below 15 Hz
+N_KNOTS = 8  # samples per phone; 10 are no better (docs/decisions/007-exemplar-method.md)
+ALIGN_BAND = 1  # maximum warp in knots relative to the best exemplar; 2 lose .002 of r opening
 MIN_DEVIATION = 0.15  # lower limit of the deviation between exemplars, relative to a parameter's spread
 
 

@@ -27,24 +27,22 @@ class ContactRule:
     enough: float
 
 
-# As many lips touch as in recordings (docs/decisions/039-phone-networks.md). Some bilabials close between two frames,
-# so not all exemplars tell the pose. Labiodentals leave a gap that varies: drawing each to the mean closes those that
-# were recorded open.
+# Chosen so that lips touch as often as in recordings (docs/decisions/039-phone-networks.md). Some bilabials close
+# between two frames, so not all exemplars determine the pose. The gap of labiodentals varies: blending each to the mean
+# would close those that were recorded open.
 CONTACT_RULES = {
     "bilabial": ContactRule(pose_share=0.7, enough=0.0),
     "labiodental": ContactRule(pose_share=1.0, enough=0.75),
 }
 MANNERS_WITHOUT_CONTACT = frozenset({"approximant"})  # narrowed, not closed
 CONTACT_MARGIN_S = 0.03  # a closure may lie this far outside its phone's edges (video frames are 40 ms, edges +- 10 ms)
-CONTACT_HOLD_S = (
-    0.03  # lips stay together at least this long: shorter, and the touch falls between two frames at 30 fps
-)
-CONTACT_EASE_S = 0.05  # way into and out of it; longer eats into the vowels (0.06: r of opening falls by .001)
+CONTACT_HOLD_S = 0.03  # minimum duration of a contact; a shorter one can fall between two frames at 30 fps
+CONTACT_EASE_S = 0.05  # transition before and after; a longer one changes vowels (0.06: r of opening falls by .001)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LipGap:
-    """Distance between two landmarks as a linear model sees it: ``|rest + parameters @ basis|``, (3,) and (D, 3)."""
+    """Distance between two landmarks under a linear model: ``|rest + parameters @ basis|``, (3,) and (D, 3)."""
 
     rest: NDArray[np.float32]
     basis: NDArray[np.float32]
@@ -94,8 +92,8 @@ def find_contacts(
     sorted_weights = np.take_along_axis(weights, order, axis=1)
     closer_than = np.cumsum(sorted_weights, axis=1) - sorted_weights
     kept = np.zeros_like(weights)
-    tells = closer_than < np.array([rule.pose_share for rule in rules])[:, None]
-    np.put_along_axis(kept, order, np.where(tells, sorted_weights, 0.0), axis=1)
+    is_used = closer_than < np.array([rule.pose_share for rule in rules])[:, None]
+    np.put_along_axis(kept, order, np.where(is_used, sorted_weights, 0.0), axis=1)
     kept /= kept.sum(axis=1, keepdims=True)
     poses = np.asarray(np.einsum("nk,nkd->nd", kept, tokens.frames[rows]), np.float32)
     present = (closer_than <= np.array([rule.enough for rule in rules])[:, None]) & (sorted_weights > 0)
@@ -157,7 +155,7 @@ def enforce_contacts(
             continue
         reach = int((CONTACT_HOLD_S / 2 + CONTACT_EASE_S) * rate_hz)
         here = slice(max(0, at - reach), min(len(kept), at + reach + 1))
-        away = np.maximum(np.abs(times[here] - times[at]) - CONTACT_HOLD_S / 2, 0.0) / CONTACT_EASE_S
-        pull = (0.5 + 0.5 * np.cos(np.pi * np.minimum(away, 1.0)))[:, None].astype(np.float32)
+        distance = np.maximum(np.abs(times[here] - times[at]) - CONTACT_HOLD_S / 2, 0.0) / CONTACT_EASE_S
+        pull = (0.5 + 0.5 * np.cos(np.pi * np.minimum(distance, 1.0)))[:, None].astype(np.float32)
         kept[here] += pull * (pose - kept[here])
     return kept

@@ -27,7 +27,7 @@ class Targets:
     spans : (N, 4)
         Seconds, as in `tts2face.exemplar.tokens.Tokens`; parts of silence far from speech belong to no target.
     source : (N,)
-        Index of the phone of the wanted sequence that each one stands for.
+        Index of the requested phone that each one replaces.
     """
 
     labels: tuple[str, ...]
@@ -52,8 +52,8 @@ def substitute_phones(label: str, inventory: tuple[str, ...]) -> tuple[str, ...]
 def build_targets(phones: PhoneSequence, inventory: tuple[str, ...]) -> Targets:
     """Targets of a phone sequence.
 
-    The time of a transparent phone goes to the next phone, or before silence to the last one. A silence between speech
-    that is longer than two reaches becomes two targets, one behind the speech and one before it.
+    The time of a transparent phone is assigned to the next phone, or before silence to the last one. A
+    silence between speech that is longer than two reaches becomes two targets, one after the speech and one before it.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def target_phones(targets: Targets) -> PhoneSequence:
     return PhoneSequence(labels, edges)
 
 
-TargetRow = tuple[str, float, float, int]  # label, start, end, index of the wanted phone
+TargetRow = tuple[str, float, float, int]  # label, start, end, index of the requested phone
 
 
 def _substitution_rows(phones: PhoneSequence, inventory: tuple[str, ...]) -> list[TargetRow]:

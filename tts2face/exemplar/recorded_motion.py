@@ -12,8 +12,8 @@ Float32Array = NDArray[np.float32]
 def read_motion(frames: Float32Array, first: int, last: int, at: float, out: Float32Array) -> None:
     """Write into `out` (D,) the value of rows [first, last) at frame position `at`, counted from `first`.
 
-    Catmull-Rom cubic through the frames (Catmull and Rom 1974): it passes through each of them and, unlike straight
-    lines, does not blunt what happens between two. Held beyond the ends.
+    Catmull-Rom cubic through the frames (Catmull and Rom 1974): it passes through each of them and, unlike linear
+    interpolation, preserves extrema between frames. Constant beyond the ends.
     """
     n = last - first
     at = min(max(at, 0.0), n - 1.0)

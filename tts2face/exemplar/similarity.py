@@ -1,4 +1,4 @@
-"""Similarity of phones as the talker's face shows them (T07 section 3.3, Table 1)."""
+"""Visual similarity of phones on the talker's face (T07 section 3.3, Table 1)."""
 
 from dataclasses import dataclass
 
@@ -13,9 +13,9 @@ N_TOKEN_SAMPLES = 5  # per token
 SAMPLED_PART = (
     0.2,
     0.8,
-)  # part of a phone that is sampled: beyond it, a corpus of few words shows its neighbours instead
-PRIOR_TOKENS = 10.0  # a phone with this many tokens takes half of its spread from all phones together
-SHARPNESS = 1.4  # similarity at the mean distance between phones is exp(-SHARPNESS); 1 to 3 animate alike
+)  # sampled part of a phone; outside of it, a corpus of few words reflects the neighbours
+PRIOR_TOKENS = 10.0  # number of tokens at which half of a phone's spread is that of all phones
+SHARPNESS = 1.4  # similarity at the mean distance between phones is exp(-SHARPNESS); 1 to 3 give similar motion
 
 
 @dataclass(frozen=True, slots=True, eq=False)

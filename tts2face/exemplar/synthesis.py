@@ -72,7 +72,7 @@ def build_exemplar_model(talker: Talker) -> ExemplarModel:
             np.ascontiguousarray(model.basis[:n_speech, upper] - model.basis[:n_speech, lower]),
         ),
         speech_channels(model),
-        tuple(spoken.name for spoken in talker.utterances),
+        tuple(utterance.name for utterance in talker.utterances),
         talker.network,
     )
 
@@ -80,12 +80,12 @@ def build_exemplar_model(talker: Talker) -> ExemplarModel:
 def mean_speaking_pose(talker: Talker) -> NDArray[np.float32]:
     """(D,) mean speech parameters of the frames between the first phone and the last of every utterance."""
     n_speech, parts = talker.model.n_speech, []
-    for spoken in talker.utterances:
-        sounding = [at for at, label in enumerate(spoken.phones.phones) if label != SILENCE]
+    for utterance in talker.utterances:
+        sounding = [at for at, label in enumerate(utterance.phones.phones) if label != SILENCE]
         if sounding:
-            edges = spoken.phones.edges
+            edges = utterance.phones.edges
             begin, end = (int(edges[at] * talker.fps) for at in (sounding[0], sounding[-1] + 1))
-            parts.append(spoken.shape[begin : end + 1, :n_speech])
+            parts.append(utterance.shape[begin : end + 1, :n_speech])
     frames = np.concatenate(parts) if parts else np.zeros((1, n_speech))
     return np.asarray(frames.mean(axis=0, dtype=np.float64), np.float32)
 
@@ -148,23 +148,24 @@ def blend_trajectory(selection: TokenSelection, exemplars: ExemplarModel, *, fps
 
     Notes
     -----
-    Time and memory grow linearly with the number of phones. The motion is made on a clock of its own and then read at
-    the frames, so that frame rates agree. In silence farther than `REST_FROM_S` from speech the face is at rest.
+    Time and memory grow linearly with the number of phones. The motion is computed at `CLOCK_HZ` and interpolated at
+    the frames, so that it does not depend on the frame rate. In silence farther than `REST_FROM_S` from speech the face
+    is at rest.
     """
     frame_times = np.arange(n_frames) / fps
     n_instants = int(np.ceil(max(selection.phones.end, frame_times[-1]) * blending.CLOCK_HZ)) + 2
-    made = _blend_motion(selection.targets, selection.found, exemplars, n_instants, selection.options)
-    return Trajectory(exemplars.channels, read_at_frames(made, selection.phones, frame_times, exemplars.rest), fps)
+    motion = _blend_motion(selection.targets, selection.found, exemplars, n_instants, selection.options)
+    return Trajectory(exemplars.channels, read_at_frames(motion, selection.phones, frame_times, exemplars.rest), fps)
 
 
 def read_at_frames(
-    made: NDArray[np.float32], phones: PhoneSequence, times: NDArray[np.float64], rest: NDArray[np.float32]
+    motion: NDArray[np.float32], phones: PhoneSequence, times: NDArray[np.float64], rest: NDArray[np.float32]
 ) -> NDArray[np.float32]:
     """Resample motion (n, D) at `CLOCK_HZ` to T times (T, D), blended with the rest pose in silence."""
     at = times * blending.CLOCK_HZ
     low = at.astype(np.int64)
     part = (at - low)[:, None].astype(np.float32)
-    values = (1 - part) * made[low] + part * made[low + 1]
+    values = (1 - part) * motion[low] + part * motion[low + 1]
     pull = rest_weights(phones, times)[:, None].astype(np.float32)
     drawn: NDArray[np.float32] = (1 - pull) * values + pull * rest
     return drawn
@@ -204,8 +205,8 @@ def rest_weights(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[n
     next_start = np.searchsorted(starts, times, side="right")
     ahead = np.append(starts, np.inf)[next_start] - times
     behind = times - np.concatenate([[-np.inf], ends])[next_start]
-    away = np.minimum(ahead, np.maximum(behind, 0.0))
-    pull = _smoothstep((away - RELEASE_FROM_S) / (REST_FROM_S - RELEASE_FROM_S))
+    distance = np.minimum(ahead, np.maximum(behind, 0.0))
+    pull = _smoothstep((distance - RELEASE_FROM_S) / (REST_FROM_S - RELEASE_FROM_S))
     last = times[-1]
     onset = np.clip(starts[0], MIN_EASE_S, REST_FROM_S)
     offset = np.clip(last - ends[-1], MIN_EASE_S, REST_FROM_S)

@@ -92,9 +92,9 @@ def _cheapest_path(cost, band):  # type: ignore[no-untyped-def]
 
 
 def warp_times(path: IntArray, n_target: int) -> FloatArray:
-    """(n_target,) source frame, whole or between two, that lies over each target frame.
+    """(n_target,) (fractional) source frame that is mapped to each target frame.
 
-    A target frame that meets several source frames takes their mean, so that the map rises and joins the ends.
+    A target frame with several source frames is mapped to their mean; the map is monotone and includes both ends.
     """
     counts = np.bincount(path[:, 1], minlength=n_target)
     times: FloatArray = np.bincount(path[:, 1], weights=path[:, 0], minlength=n_target) / counts
@@ -104,10 +104,10 @@ def warp_times(path: IntArray, n_target: int) -> FloatArray:
 
 @kernel
 def warp_to_reference(source, reference, scale, band, out):  # type: ignore[no-untyped-def]
-    """Write (S, D) source into `out`, resampled so that its events fall on those of an (S, D) reference.
+    """Write (S, D) source into `out`, resampled so that its events coincide with those of an (S, D) reference.
 
-    The arrays are in units that `scale` (D,) made out of millimetres; frames are compared in millimetres. The path
-    stays within `band` samples.
+    `scale` (D,) converts the arrays from millimetres to their units; frames are compared in millimetres. The path
+    is limited to `band` samples.
     """
     n, n_dims = source.shape
     cost = np.zeros((n, n))

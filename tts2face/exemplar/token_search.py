@@ -31,8 +31,8 @@ class ContextIndex:
 
     The tokens ``order[group_first[g]:group_first[g + 1]]`` form group g, the shortest first; the groups
     ``phone_first[p]:phone_first[p + 1]`` belong to phone p. ``likeness[g, c, q]`` is the highest similarity of label q
-    to what any token of group g has in context column c: it bounds a group's scores from above, and so do durations,
-    the farther from the wanted one.
+    to what any token of group g has in context column c: together with the difference of durations it bounds the
+    scores of a group from above.
     """
 
     order: NDArray[np.int32]
@@ -81,7 +81,7 @@ def context_weights(n_context: int) -> NDArray[np.float64]:
     return np.asarray(1.0 / (np.arange(1, n_context + 1) + 1.0))
 
 
-def best_tokens(wanted: TokenQuery, index: ContextIndex, *, context: int, k: int, duration: float) -> TokenRanking:
+def best_tokens(query: TokenQuery, index: ContextIndex, *, context: int, k: int, duration: float) -> TokenRanking:
     """The k tokens of each query phone with the most similar contexts.
 
     Score = sum over d = 1..context of [S(left_d, its left_d) + S(right_d, its right_d)] / (d + 1), less, where
@@ -105,10 +105,10 @@ def best_tokens(wanted: TokenQuery, index: ContextIndex, *, context: int, k: int
         raise InputError(f"the number of exemplars must be at least 1, not {k}")
     if not duration >= 0:
         raise InputError(f"the weight of durations must be 0 or more, not {duration}")
-    tokens = np.full((len(wanted.phone), k), -1, np.int32)
-    scores = np.full((len(wanted.phone), k), -np.inf)
+    tokens = np.full((len(query.phone), k), -1, np.int32)
+    scores = np.full((len(query.phone), k), -np.inf)
     _search_groups(
-        (wanted.phone, wanted.context, wanted.log_durations),
+        (query.phone, query.context, query.log_durations),
         (index.order, index.group_first, index.phone_first, index.context, index.log_durations),
         index.likeness,
         (index.similarity, context_weights(context), duration),
@@ -157,8 +157,8 @@ def _score_bound(target, likeness, rule):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _search_groups(wanted, index, likeness, rule, tokens, scores):  # type: ignore[no-untyped-def]
-    phone, contexts, durations = wanted
+def _search_groups(query, index, likeness, rule, tokens, scores):  # type: ignore[no-untyped-def]
+    phone, contexts, durations = query
     order, group_first, phone_first, token_contexts, token_durations = index
     for n in range(len(phone)):
         first, last = phone_first[phone[n]], phone_first[phone[n] + 1]
@@ -178,12 +178,12 @@ def _search_groups(wanted, index, likeness, rule, tokens, scores):  # type: igno
 
 @kernel
 def _search_group(target, group, corpus, rule, found):  # type: ignore[no-untyped-def]
-    """Score the tokens of a group from the wanted duration to shorter and to longer ones, as long as they can win."""
+    """Score the tokens of a group outwards from the query's duration while they can enter the ranking."""
     context, durations, bound = target
     token_contexts, token_durations = corpus
     tokens, scores = found
     low, high = 0, len(group)
-    while low < high:  # the first token that is not shorter than wanted
+    while low < high:  # the first token that is not shorter than the query
         middle = (low + high) // 2
         if token_durations[group[middle], 1] < durations[1]:
             low = middle + 1

@@ -24,7 +24,7 @@ class Tokens:
         Index into `inventory`, index of the talker's utterance.
     spans : (N, 4)
         Seconds on the utterance's clock: where the previous phone begins, this one begins, this one ends, the next one
-        ends. Silence is cut to the `PAUSE_REACH_S` beside speech, and so is the reach into a neighbour.
+        ends. Silence is limited to the `PAUSE_REACH_S` next to speech, as is the overlap with a neighbour.
     context : (N, 2 MAX_CONTEXT)
         Labels around the token: left at distance 1, right at 1, left at 2, ...; `SILENCE` beyond the utterance.
     frames, first_frame : (F, D), (U + 1,)
@@ -50,20 +50,22 @@ class Tokens:
 def collect_tokens(talker: Talker) -> Tokens:
     """Tokens of all utterances of a talker, in the talker's order."""
     n_speech = talker.model.n_speech
-    labels = [phone for spoken in talker.utterances for phone in spoken.phones.phones]
+    labels = [phone for utterance in talker.utterances for phone in utterance.phones.phones]
     inventory = tuple(sorted({*labels, SILENCE}))
     number = {label: at for at, label in enumerate(inventory)}
     phone = np.array([number[label] for label in labels], np.int32)
-    counts = [len(spoken.phones) for spoken in talker.utterances]
+    counts = [len(utterance.phones) for utterance in talker.utterances]
     utterance = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
-    lengths = [len(spoken.shape) for spoken in talker.utterances]
+    lengths = [len(utterance.shape) for utterance in talker.utterances]
     return Tokens(
         inventory,
         phone,
         utterance,
-        np.concatenate([spoken_spans(spoken.phones.phones, spoken.phones.edges) for spoken in talker.utterances]),
+        np.concatenate(
+            [spoken_spans(utterance.phones.phones, utterance.phones.edges) for utterance in talker.utterances]
+        ),
         phone_contexts(phone, utterance, number[SILENCE]),
-        np.concatenate([spoken.shape[:, :n_speech] for spoken in talker.utterances]).astype(np.float32),
+        np.concatenate([utterance.shape[:, :n_speech] for utterance in talker.utterances]).astype(np.float32),
         np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
         talker.fps,
     )
@@ -83,8 +85,8 @@ def phone_contexts(phone: NDArray[np.int32], utterance: NDArray[np.int32], silen
 def spoken_spans(phones: tuple[str, ...], edges: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N, 4) seconds at which the previous phone begins, each phone begins and ends, and the next one ends.
 
-    A silence at either end of the utterance keeps only the `PAUSE_REACH_S` beside speech; a neighbour is reached into
-    by at most that much.
+    A silence at either end of the utterance keeps only the `PAUSE_REACH_S` next to speech; the overlap with a
+    neighbour has at most that length.
     """
     starts, ends = edges[:-1].copy(), edges[1:].copy()
     if len(phones) > 1:

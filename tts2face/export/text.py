@@ -15,10 +15,10 @@ NOMINAL_NOTE = "nominal durations: no voice has spoken this"
 Interval = tuple[float, float, str]
 
 
-def pronunciation_table(spoken: "Pronunciation") -> str:
+def pronunciation_table(pronunciation: "Pronunciation") -> str:
     """Table with one line for each word: written form, spoken form, IPA, and ARPABET for English."""
     rows = [("written", "said", "IPA", "ARPABET")]
-    rows += [(w.source, w.text + w.mark, w.ipa, " ".join(w.arpabet)) for w in spoken.words]
+    rows += [(w.source, w.text + w.mark, w.ipa, " ".join(w.arpabet)) for w in pronunciation.words]
     widths = [max(len(row[column]) for row in rows) for column in range(3)]
     lines = [
         "  ".join([*(cell.ljust(width) for cell, width in zip(row[:3], widths, strict=True)), row[3]]) for row in rows
@@ -39,17 +39,21 @@ def _word_json(word: "Word") -> dict[str, Any]:
     }
 
 
-def pronunciation_json(spoken: "Pronunciation") -> str:
+def pronunciation_json(pronunciation: "Pronunciation") -> str:
     """Words as JSON with phones, stress and syllables (half-open ranges of the word's phones)."""
-    content = {"text": spoken.text, "language": spoken.language, "words": [_word_json(word) for word in spoken.words]}
+    content = {
+        "text": pronunciation.text,
+        "language": pronunciation.language,
+        "words": [_word_json(word) for word in pronunciation.words],
+    }
     return json.dumps(content, ensure_ascii=False, indent=2) + "\n"
 
 
-def pronunciation_textgrid(spoken: "Pronunciation") -> str:
+def pronunciation_textgrid(pronunciation: "Pronunciation") -> str:
     """TextGrid with nominal durations, for a text without synthesised speech, and a tier that states this."""
     from lexicon.nominal_durations import nominal_phones
 
-    phones, words = nominal_phones(spoken)
+    phones, words = nominal_phones(pronunciation)
     return textgrid(phones, words, note=NOMINAL_NOTE)
 
 
@@ -93,8 +97,10 @@ def textgrid(phones: "PhoneSequence", words: Sequence["WordSpan"], *, note: str 
     InputError
         The words overlap or reach beyond the last phone.
     """
-    spoken = [(float(phones.edges[at]), float(phones.edges[at + 1]), label) for at, label in enumerate(phones.phones)]
-    tiers = [("words", list(_word_intervals(phones, words))), ("phones", spoken)]
+    intervals = [
+        (float(phones.edges[at]), float(phones.edges[at + 1]), label) for at, label in enumerate(phones.phones)
+    ]
+    tiers = [("words", list(_word_intervals(phones, words))), ("phones", intervals)]
     if note:
         tiers.append(("note", [(phones.start, phones.end, note)]))
     lines = ['File type = "ooTextFile"', 'Object class = "TextGrid"', "", f"xmin = {phones.start!r}"]

@@ -119,29 +119,29 @@ class GestureFace:
             Trajectory(self.face.shape_names, weights, speech.fps), Trajectory(HEAD_CHANNELS, head, speech.fps)
         )
 
-    def _scale_speech(self, spoken: FloatArray, gains: Mapping[str, float]) -> FloatArray:
+    def _scale_speech(self, speech: FloatArray, gains: Mapping[str, float]) -> FloatArray:
         """Speech weights (T, K) with the gains of jaw and lips applied."""
         jaw, lips = (
             np.where([shape.startswith(prefix) for shape in self.face.shape_names], gains.get(name, 1.0), 1.0)
             for name, prefix in zip(SPEECH_GAINS, SPEECH_SHAPE_PREFIXES, strict=True)
         )
-        return self.mouth.amplify(spoken, jaw, lips)
+        return self.mouth.amplify(speech, jaw, lips)
 
-    def _gesture_weights(self, spoken: FloatArray, features: Mapping[str, FloatArray]) -> FloatArray:
+    def _gesture_weights(self, speech: FloatArray, features: Mapping[str, FloatArray]) -> FloatArray:
         """Weights (T, K) that expression and gaze add to speech; clipped to the limits, except for the mouth's."""
-        added = np.zeros_like(spoken)
+        added = np.zeros_like(speech)
         if "expression" in features:
             added += ordered_product(features["expression"], self.expressions)
             lips = self.mouth.moving
             added[:, lips] = ordered_product(mouth_response(features["expression"]), self.expressions[:, lips])
-            added = self.mouth.attenuate_on_rounded_lips(spoken, added)
+            added = self.mouth.attenuate_on_rounded_lips(speech, added)
         if "gaze" in features:
             down, left = features["gaze"].T
             turned = np.stack([np.maximum(down, 0), np.maximum(-down, 0), np.maximum(left, 0), np.maximum(-left, 0)])
             added += ordered_product(turned.T, self.gaze)
-        others = np.setdiff1d(np.arange(spoken.shape[1]), self.mouth.moving)
+        others = np.setdiff1d(np.arange(speech.shape[1]), self.mouth.moving)
         low, high = self.face.limits[others].T.astype(np.float64)
-        added[:, others] = np.clip(spoken[:, others] + added[:, others], low, high) - spoken[:, others]
+        added[:, others] = np.clip(speech[:, others] + added[:, others], low, high) - speech[:, others]
         return added
 
     def _check(self, speech: Trajectory, gestures: Mapping[str, Float32Array], gains: Mapping[str, float]) -> None:

@@ -22,7 +22,7 @@ from tts2face.models.landmarks import (
 )
 from tts2face.numeric import ordered_product, smoothstep
 
-FULL_EXPRESSION_GAP_MM = 4.0  # lips this far apart follow an expression in full; touching lips do not follow it
+FULL_EXPRESSION_GAP_MM = 4.0  # gap from which lips follow an expression in full; touching lips do not follow it
 MIN_GAP_SHARE = 0.5  # least share of the speech gap that an expression leaves open
 GAP_CONSTRAINT_WEIGHT = 1e5  # relative to a landmark of the cheek; 300 in retargeting, where gaps may deviate a little
 FULL_GROWTH_GAP_MM = 1.5  # gaps smaller than this are amplified by less than the gain

@@ -132,7 +132,7 @@ def _merge_places(places: FloatArray, values: FloatArray, apart: float) -> tuple
 
 
 def _eyeball_retraction(eye: Eye, names: Sequence[str]) -> FloatArray:
-    """Displacement (k, 3) of this side's eyeball for the default head's shapes, mm: it gives way to closing lids."""
+    """Displacement (k, 3) of this side's eyeball for the default head's shapes, mm; makes room for the lids."""
     head, model = default_head(), _default_head_eye(eye)
     shifts = [head.shapes[head.shape_names.index(name), model.first : model.first + model.count] for name in names]
     return EYEBALL_RETRACTION_FACTOR * np.stack([shift.mean(axis=0, dtype=np.float64) for shift in shifts])

@@ -125,7 +125,7 @@ class FieldState:
 
     Parameters
     ----------
-    shown, prosody : (h, D), (h, E)
+    motion, prosody : (h, D), (h, E)
         Motion and sound features of the last h generated frames, scaled and weighted as those of the field.
     moment
         Recorded frame that was used last, -1 for none.
@@ -137,7 +137,7 @@ class FieldState:
         Number of frames generated so far.
     """
 
-    shown: Float32Array
+    motion: Float32Array
     prosody: Float32Array
     moment: int
     offset: Float32Array
@@ -189,15 +189,16 @@ def build_field(
     return replace(made, median_distance=_median_nearest_distance(made, usable))
 
 
-def _median_nearest_distance(made: Field, usable: NDArray[np.int64]) -> float:
+def _median_nearest_distance(field: Field, usable: NDArray[np.int64]) -> float:
     moments = usable[np.linspace(0, len(usable) - 1, min(N_DISTANCE_SAMPLES, len(usable))).astype(int)]
-    away = np.zeros(len(moments))
-    nearest_distances(_field_arrays(made), _tree_arrays(made.tree), made.axes, made.options.history, (moments, away))
-    return max(float(np.median(away[np.isfinite(away)])) if np.isfinite(away).any() else 1.0, 1e-9)
+    queries = moments, np.zeros(len(moments))
+    nearest_distances(_field_arrays(field), _tree_arrays(field.tree), field.axes, field.options.history, queries)
+    distances = queries[1][np.isfinite(queries[1])]
+    return max(float(np.median(distances)) if len(distances) else 1.0, 1e-9)
 
 
-def _field_arrays(made: Field) -> tuple[Float32Array, Float32Array, NDArray[np.int32]]:
-    return made.values, made.prosody, made.starts
+def _field_arrays(field: Field) -> tuple[Float32Array, Float32Array, NDArray[np.int32]]:
+    return field.values, field.prosody, field.starts
 
 
 def _tree_arrays(tree: KdTree) -> tuple[NDArray[Any], ...]:
@@ -245,10 +246,10 @@ def initial_state(field: Field, chance: float) -> FieldState:
 
 def transfer_state(state: FieldState, before: Field, after: Field) -> FieldState:
     """Convert the state of a field to the scale of another style's field of the same feature."""
-    shown = state.shown * np.float32(before.scale / after.scale)
+    motion = state.motion * np.float32(before.scale / after.scale)
     prosody = state.prosody / np.maximum(before.weights, np.float32(1e-9)) * after.weights
     recent = _no_recent_jumps(after)
-    return FieldState(shown, prosody.astype(np.float32), -1, np.zeros_like(state.offset), recent, state.n_frames)
+    return FieldState(motion, prosody.astype(np.float32), -1, np.zeros_like(state.offset), recent, state.n_frames)
 
 
 def sample_field(
@@ -265,8 +266,8 @@ def sample_field(
     chances : (n,)
         Uniform random numbers in [0, 1), one for each frame.
     """
-    made = sample_field_moments(field, state, prosody, chances)
-    return made.values, made.state
+    sample = sample_field_moments(field, state, prosody, chances)
+    return sample.values, sample.state
 
 
 def sample_field_moments(
@@ -276,7 +277,7 @@ def sample_field_moments(
     if not len(chances):
         return FieldSample(np.zeros((0, state.offset.shape[1]), np.float32), np.zeros(0, np.int64), state)
     options, history = field.options, field.options.history
-    shown = np.concatenate([state.shown, np.zeros((len(chances), state.offset.shape[1]), np.float32)])
+    motion = np.concatenate([state.motion, np.zeros((len(chances), state.offset.shape[1]), np.float32)])
     sound = np.concatenate([state.prosody, (prosody * field.weights).astype(np.float32)])
     moments, offset, recent = np.zeros(len(chances), np.int64), state.offset.copy(), state.recent_jumps.copy()
     stiffness, fade = _spring(options.settle_s)
@@ -294,8 +295,8 @@ def sample_field_moments(
             fade,
             (options.apart, options.search_error),
         ),
-        (shown, sound, moments, offset, recent, state.moment, state.n_frames, chances),
+        (motion, sound, moments, offset, recent, state.moment, state.n_frames, chances),
     )
-    behind = shown[-history:].copy(), sound[-history:].copy(), int(moments[-1]), offset, recent
+    behind = motion[-history:].copy(), sound[-history:].copy(), int(moments[-1]), offset, recent
     after = FieldState(*behind, state.n_frames + len(chances))
-    return FieldSample(shown[history:] * np.float32(field.scale), moments, after)
+    return FieldSample(motion[history:] * np.float32(field.scale), moments, after)

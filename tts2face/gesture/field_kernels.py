@@ -14,7 +14,7 @@ MIN_MOMENT_GAP = 10  # default least number of frames between two candidates of 
 def nearest_distances(corpus, tree, axes, history, queries):  # type: ignore[no-untyped-def]
     """Write the distance of each moment from its nearest other moment."""
     values, recorded, _ = corpus
-    moments, away = queries
+    moments, cost = queries
     best, distance = np.zeros(2, np.int64), np.zeros(2)
     stack, bounds = np.zeros(128, np.int64), np.zeros(128)
     query = np.zeros(len(axes), np.float32)
@@ -25,7 +25,7 @@ def nearest_distances(corpus, tree, axes, history, queries):  # type: ignore[no-
         _search_tree(
             corpus, tree, window, query, (best[:0], best, distance, (MIN_MOMENT_GAP, SEARCH_SLACK), stack, bounds)
         )
-        away[n] = distance[1]
+        cost[n] = distance[1]
 
 
 @kernel
@@ -49,8 +49,8 @@ def generate_frames(corpus, tree, axes, options, track):  # type: ignore[no-unty
         if not can_continue or (n_before + i) % stride == 0:
             best[:], distance[:] = -1, np.inf
             if can_continue:
-                away = continuity * _window_distance(corpus, (shown, prosody, i, history), following, np.inf)
-                _insert_moment(following, away, (starts, none, rule[0]), (best, distance))
+                cost = continuity * _window_distance(corpus, (shown, prosody, i, history), following, np.inf)
+                _insert_moment(following, cost, (starts, none, rule[0]), (best, distance))
             _project_window((shown, prosody, i, history), axes, query)
             _search_tree(
                 corpus, tree, (shown, prosody, i, history), query, (recent, best, distance, rule, stack, bounds)
@@ -89,26 +89,26 @@ def _draw_pose(best, distance, sigma, chance):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _insert_moment(moment, away, known, found):  # type: ignore[no-untyped-def]
+def _insert_moment(moment, cost, known, found):  # type: ignore[no-untyped-def]
     """Insert a moment into the best ones if it is nearer than those within `apart` frames and not a recent target."""
     starts, recent, apart = known
     best, distance = found
     at = len(best) - 1
-    if away >= distance[at]:
+    if cost >= distance[at]:
         return
     for r in range(len(recent)):
         if abs(recent[r] - moment) < MIN_MOMENT_GAP:
             return
     for c in range(len(best)):
         if best[c] >= 0 and starts[best[c]] == starts[moment] and abs(best[c] - moment) < apart:
-            if away >= distance[c]:
+            if cost >= distance[c]:
                 return
             at = c
             break
-    while at > 0 and distance[at - 1] > away:
+    while at > 0 and distance[at - 1] > cost:
         best[at], distance[at] = best[at - 1], distance[at - 1]
         at -= 1
-    best[at], distance[at] = moment, away
+    best[at], distance[at] = moment, cost
 
 
 @kernel
@@ -173,5 +173,5 @@ def _search_tree(corpus, tree, window, query, found):  # type: ignore[no-untyped
                 squared += (query[p] - places[at, p]) ** 2
             if squared < distance[-1] * history:
                 moment = np.int64(order[at])
-                away = _window_distance(corpus, window, moment, distance[-1])
-                _insert_moment(moment, away, (corpus[2], recent, apart), (best, distance))
+                cost = _window_distance(corpus, window, moment, distance[-1])
+                _insert_moment(moment, cost, (corpus[2], recent, apart), (best, distance))

@@ -110,11 +110,11 @@ class GestureStream:
         begin = self._n_frames / self._fps
         times = (self._n_frames + np.arange(n_frames)) / self._fps
         self._n_frames += n_frames
-        made, prosody = {}, _SoundFeatures(sound, begin, with_pitch=self._fields.with_pitch)
+        values, prosody = {}, _SoundFeatures(sound, begin, with_pitch=self._fields.with_pitch)
         for name, track in self._tracks.items():
             track.extend(prosody, float(times[-1]), timeline)
-            made[name] = apply_timeline(name, track.at(times, timeline), times, timeline)
-        return made
+            values[name] = apply_timeline(name, track.at(times, timeline), times, timeline)
+        return values
 
 
 def apply_timeline(feature: str, values: Float32Array, times: NDArray[np.float64], timeline: Timeline) -> Float32Array:
@@ -149,10 +149,10 @@ class _FeatureTrack:
         self._fields, self._feature, self._style = fields, feature, style
         self._generator = np.random.default_rng([seed, crc32(feature.encode())])
         self._source = fields.source(style, feature)
-        made = fields.of(self._source, feature)
-        self._state = initial_state(made, self._generator.random())
+        field = fields.of(self._source, feature)
+        self._state = initial_state(field, self._generator.random())
         self._times: list[float] = []
-        self._values = np.zeros((0, made.values.shape[1]), np.float32)
+        self._values = np.zeros((0, field.values.shape[1]), np.float32)
 
     def extend(self, sound: "_SoundFeatures", end: float, timeline: Timeline) -> None:
         """Generate frames up to `N_LOOKAHEAD_FRAMES` after `end` seconds."""
@@ -177,11 +177,11 @@ class _FeatureTrack:
         self._values = np.concatenate([self._values, *parts])
 
     def _sample(self, source: str, prosody: Float32Array, chances: NDArray[np.float64]) -> Float32Array:
-        made = self._fields.of(source, self._feature)
+        field = self._fields.of(source, self._feature)
         if source != self._source:
-            self._state = transfer_state(self._state, self._fields.of(self._source, self._feature), made)
+            self._state = transfer_state(self._state, self._fields.of(self._source, self._feature), field)
             self._source = source
-        values, self._state = sample_field(made, self._state, prosody, chances)
+        values, self._state = sample_field(field, self._state, prosody, chances)
         return values
 
     def at(self, times: NDArray[np.float64], timeline: Timeline) -> Float32Array:

@@ -18,12 +18,12 @@ def expand_feature(name: str) -> tuple[str, ...]:
 def parse_style(written: str) -> Mapping[str, str]:
     """Style of each feature from ``delighted``, ``brows=annoyed,head=delighted`` or ``delighted,brows=annoyed``.
 
-    A name without feature counts for all that have none of their own.
+    A name without a feature applies to all other features.
 
     Raises
     ------
     InputError
-        A part is empty, names an unknown feature, or a feature stands twice.
+        A part is empty, names an unknown feature, or a feature occurs twice.
     """
     chosen: dict[str, str] = {}
     hint = "a style is a name, or features with styles such as brows=annoyed,head=delighted"
@@ -38,12 +38,12 @@ def parse_style(written: str) -> Mapping[str, str]:
 
 
 def parse_gains(written: str) -> Gains:
-    """Gains from ``head=1.5,blink=0.8,jaw=1.2``; ``all=0.5`` counts for all gestures that have none of their own.
+    """Gains from ``head=1.5,blink=0.8,jaw=1.2``; ``all=0.5`` applies to all other gestures.
 
     Raises
     ------
     InputError
-        A part is no feature with a number, or a feature stands twice, or a gain is out of range.
+        A part is no feature with a number, or a feature occurs twice, or a gain is out of range.
     """
     hint = "gains are written as head=1.5,blink=0.8"
     chosen: dict[str, float] = {}

@@ -69,8 +69,8 @@ def blink_closure(times: NDArray[np.float64], rate: float, key: int) -> NDArray[
     begins = numbers[(_hash_noise(numbers, key, 0) + 1) / 2 < rate * cell] * cell
     shut = np.zeros(len(times))
     for begin in begins:
-        away = np.abs(times - begin - BLINK_DURATION_S / 2) / (BLINK_DURATION_S / 2)
-        shut = np.maximum(shut, np.where(away < 1, 0.5 + 0.5 * np.cos(np.pi * away), 0.0))
+        distance = np.abs(times - begin - BLINK_DURATION_S / 2) / (BLINK_DURATION_S / 2)
+        shut = np.maximum(shut, np.where(distance < 1, 0.5 + 0.5 * np.cos(np.pi * distance), 0.0))
     return shut
 
 

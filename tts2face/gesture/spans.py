@@ -143,8 +143,8 @@ def sort_spans(spans: Iterable[AnySpan]) -> tuple[AnySpan, ...]:
     lanes: dict[str, list[AnySpan]] = {}
     for span in ordered:
         lanes.setdefault(span.lane, []).append(span)
-    for lane, mine in lanes.items():
-        for before, after in pairwise(mine):
+    for lane, lane_spans in lanes.items():
+        for before, after in pairwise(lane_spans):
             if after.start < before.end:
                 raise InputError(
                     f"two spans of {lane} overlap: {before.start:g}-{before.end:g} s and {after.start:g}-{after.end:g} "

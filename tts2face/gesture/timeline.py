@@ -27,15 +27,15 @@ from tts2face.gesture.spans import (
 )
 from tts2face.models.palette import EXPRESSIONS, Palette
 
-BLEND_S = 0.3  # from one style to the next: as long as a blink, so that no seam is seen
+BLEND_S = 0.3  # transition between two styles; as long as a blink
 # Of an expression: a smile's onset takes about as long whatever the occasion (Schmidt, Cohn and Tian 2003, Biological
-# Psychology 65); faster than this, moods that change within speech begin to look like pops.
+# Psychology 65); faster changes within speech appear as discontinuities.
 ONSET_S = 0.6
-# A nod: down within 0.18 s, back, a little beyond, and to rest. About 2 Hz, the ordinary head movements of speakers
-# (1.8-3.7 Hz: Hadar et al. 1983, Human Movement Science 2); seconds, and shares of NOD_RAD.
+# A nod: down within 0.18 s, back with a slight overshoot, and to rest. About 2 Hz, the ordinary head movements of
+# speakers (1.8-3.7 Hz: Hadar et al. 1983, Human Movement Science 2); seconds, and shares of NOD_RAD.
 NOD_KEYS = ((0.0, 0.0), (0.18, 1.0), (0.42, -0.1), (0.55, 0.0))
 NOD_RAD = math.radians(6.0)  # of a nod of size 1; radians, as a head moves with a stressed word
-MAX_OVERRUN_S = 0.05  # a span may end this much behind the clip: people round to tenths of a second
+MAX_OVERRUN_S = 0.05  # tolerance for spans that end after the clip: times are often rounded to tenths of a second
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,10 +94,10 @@ class Timeline:
         """Style of a feature at each of T times, without blending; `default` if none is requested."""
         seconds = np.atleast_1d(np.asarray(times, np.float64))
         base = self.style.get(check_feature(feature), default)
-        mine = [span for span in self.spans if span.feature == feature]
-        at = np.searchsorted([span.start for span in mine], seconds, side="right") - 1
+        spans = [span for span in self.spans if span.feature == feature]
+        at = np.searchsorted([span.start for span in spans], seconds, side="right") - 1
         return tuple(
-            mine[k].style if k >= 0 and second < mine[k].end else base
+            spans[k].style if k >= 0 and second < spans[k].end else base
             for k, second in zip(at.tolist(), seconds.tolist(), strict=True)
         )
 
@@ -126,7 +126,7 @@ class Timeline:
         return weights
 
     def nod_pitch(self, times: ArrayLike) -> FloatArray:
-        """Radians (T,) by which nods turn the head down at T times; of nods that meet the deeper one counts."""
+        """Radians (T,) by which nods turn the head down at T times; of overlapping nods the deeper one applies."""
         seconds = np.atleast_1d(np.asarray(times, np.float64))
         down, up = np.zeros(len(seconds)), np.zeros(len(seconds))
         for nod in self.nods:
@@ -136,7 +136,7 @@ class Timeline:
 
     def merge(self, other: "Timeline", shift: float = 0.0) -> "Timeline":
         """Merge with another timeline, delayed by `shift` seconds, which takes precedence where both overlap."""
-        later = other.shifted(shift)
+        later = other.shift(shift)
         return Timeline(
             {**self.style, **later.style},
             overlay_spans(self.spans, later.spans),
@@ -145,7 +145,7 @@ class Timeline:
             Gains({**self.gains.factors, **later.gains.factors}),
         )
 
-    def shifted(self, seconds: float) -> "Timeline":
+    def shift(self, seconds: float) -> "Timeline":
         """The same timeline, delayed by `seconds`."""
         return replace(
             self,
@@ -164,7 +164,7 @@ class Timeline:
         )
 
     def check(self, palette: Palette, duration: float) -> None:
-        """Refuse what a palette does not hold and what lies beyond a clip.
+        """Refuse styles that a palette lacks and times beyond the end of a clip.
 
         Raises
         ------
@@ -175,7 +175,7 @@ class Timeline:
         self.check_duration(duration)
 
     def check_styles(self, palette: Palette) -> None:
-        """Refuse styles that a palette does not hold; as `check`."""
+        """Refuse styles that a palette lacks; as `check`."""
         for name in self.style_names:
             palette.require(name)
 

@@ -85,7 +85,7 @@ class Plate:
         Pixels (right, down) per millimetre along each landmark axis: the head rotation and scale.
     shape : (T, M)
         Parameters of the talker's shape model.
-    looks : (T, A)
+    texture_parameters : (T, A)
         Parameters of the face's texture model.
     """
 
@@ -93,7 +93,7 @@ class Plate:
     points: NDArray[np.float32]
     axes: NDArray[np.float32]
     shape: NDArray[np.float32]
-    looks: NDArray[np.float32]
+    texture_parameters: NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -162,8 +162,9 @@ def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
             f"appearance.{name}.basis": model.basis.astype(np.float16),
             f"appearance.{name}.spread": model.spread,
         }
-    for part in ("video", "points", "axes", "shape", "looks"):
+    for part in ("video", "points", "axes", "shape"):
         arrays[f"appearance.plate.{part}"] = getattr(appearance.plate, part)
+    arrays["appearance.plate.looks"] = appearance.plate.texture_parameters
     return arrays
 
 
@@ -198,7 +199,7 @@ def appearance_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Appearance | N
         points=arrays["appearance.plate.points"],
         axes=arrays["appearance.plate.axes"],
         shape=arrays["appearance.plate.shape"],
-        looks=arrays["appearance.plate.looks"],
+        texture_parameters=arrays["appearance.plate.looks"],
     )
     return Appearance(
         face=model("face"),

@@ -16,7 +16,7 @@ from tts2face.storage.schema import (
     Tensor,
     flag,
     free,
-    listed,
+    list_of,
     millimetres,
     number,
     record,
@@ -37,7 +37,7 @@ MOST_AREA = 10.0
 MEASURED = 4000  # triangles, spread over all, of which the area is measured: all of a head would take 10 ms
 WIDE_OPEN = "jawOpen"  # the shape with which a face is drawn besides at rest before its first picture
 
-_INDEX, _POINT = whole(0, 2**31 - 1), listed(number(-MAX_MM, MAX_MM), 3)
+_INDEX, _POINT = whole(0, 2**31 - 1), list_of(number(-MAX_MM, MAX_MM), 3)
 _PART = record(
     {"name": text, "first": _INDEX, "count": _INDEX},
     {
@@ -49,14 +49,14 @@ _PART = record(
     },
 )
 _EYE = record(
-    {"first": _INDEX, "count": _INDEX, "centre": _POINT, "turns": table(listed(number(-math.pi, math.pi), 3))}
+    {"first": _INDEX, "count": _INDEX, "centre": _POINT, "turns": table(list_of(number(-math.pi, math.pi), 3))}
 )
-_IDENTITY = row(text, table(listed(number(0.0, 100.0), 3)), text)
+_IDENTITY = row(text, table(list_of(number(0.0, 100.0), 3)), text)
 METADATA: Mapping[str, Check] = {
-    "parts": listed(_PART),
-    "shape_names": listed(text),
-    "eyes": listed(_EYE),
-    "identities": listed(_IDENTITY),
+    "parts": list_of(_PART),
+    "shape_names": list_of(text),
+    "eyes": list_of(_EYE),
+    "identities": list_of(_IDENTITY),
     "metadata": free,
 }
 TENSORS: Mapping[str, Tensor] = {

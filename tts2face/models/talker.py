@@ -76,7 +76,7 @@ class Utterance:
 
     ``shape`` (T, M) are shape parameters, ``head`` (T, 6) the head pose (`HEAD_CHANNELS`, relative to the talker's
     mean pose), ``intensity`` (T,) the sound level in dB; frame i is at ``i / fps`` seconds on the clock of ``phones``.
-    ``looks`` (T, A) are appearance parameters, None without an appearance model.
+    ``appearance_parameters`` (T, A) are texture parameters, None without an appearance model.
     """
 
     name: str
@@ -85,7 +85,7 @@ class Utterance:
     shape: NDArray[np.float32]
     head: NDArray[np.float32]
     intensity: NDArray[np.float32]
-    looks: NDArray[np.float32] | None = None
+    appearance_parameters: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,8 +155,9 @@ def write_talker(path: Path, talker: Talker) -> None:
         "edges": np.concatenate([utterance.phones.edges for utterance in utterances]),
     }
     if talker.appearance is not None:
-        looks = np.concatenate([utterance.looks for utterance in utterances if utterance.looks is not None])
-        steps = looks / (talker.appearance.spread / STEPS_PER_PARAMETER)
+        parameters = [utterance.appearance_parameters for utterance in utterances]
+        recorded = np.concatenate([values for values in parameters if values is not None])
+        steps = recorded / (talker.appearance.spread / STEPS_PER_PARAMETER)
         arrays["looks"] = np.clip(np.rint(steps), -32768, 32767).astype(np.int16)
         arrays |= appearance_arrays(talker.appearance)
     if talker.network is not None:
@@ -208,14 +209,14 @@ def _talker_from_arrays(arrays: dict[str, NDArray[Any]], header: dict[str, Any])
     head, intensity = arrays["head"].astype(np.float32), arrays["intensity"].astype(np.float32)
     appearance = appearance_from_arrays(arrays)
     network = network_from_arrays(arrays, header.pop("network_inventory", ()))
-    looks = arrays["looks"] * (appearance.spread / STEPS_PER_PARAMETER) if appearance is not None else None
+    recorded = arrays["looks"] * (appearance.spread / STEPS_PER_PARAMETER) if appearance is not None else None
     utterances = []
     for i, (name, words) in enumerate(header.pop("utterances")):
         labels = [inventory[number] for number in arrays["phones"][phones[i] : phones[i + 1]]]
         sequence = PhoneSequence(labels, arrays["edges"][phones[i] + i : phones[i + 1] + i + 1])
         spans = tuple(WordSpan(text, first, last) for text, first, last in words)
         span = slice(frames[i], frames[i + 1])
-        appearance_parameters = None if looks is None else looks[span]
+        appearance_parameters = None if recorded is None else recorded[span]
         utterances.append(
             Utterance(name, sequence, spans, shape[span], head[span], intensity[span], appearance_parameters)
         )

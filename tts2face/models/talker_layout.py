@@ -18,7 +18,7 @@ from tts2face.storage.schema import (
     Contents,
     Tensor,
     anything,
-    listed,
+    list_of,
     millimetres,
     number,
     record,
@@ -38,14 +38,14 @@ ROUNDING_S, BEYOND_S = 1e-6, 1.0  # largest excess of phones before and after th
 METADATA: Mapping[str, Check] = {
     "fps": number(1.0, 1000.0),
     "n_speech": whole(1, 10_000),
-    "inventory": listed(text),
-    "head_channels": listed(text, len(HEAD_CHANNELS)),
+    "inventory": list_of(text),
+    "head_channels": list_of(text, len(HEAD_CHANNELS)),
 }
 OPTIONAL_METADATA: Mapping[str, Check] = {
-    "refused": listed(row(text, text)),
-    "phones_recognised": listed(text),
+    "refused": list_of(row(text, text)),
+    "phones_recognised": list_of(text),
     "consent": record({"name": anything, "statement": text, "date": text}),
-    "network_inventory": listed(text),
+    "network_inventory": list_of(text),
 }
 TENSORS: Mapping[str, Tensor] = {
     "mean": millimetres(N_LANDMARKS, 3),

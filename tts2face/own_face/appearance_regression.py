@@ -17,14 +17,14 @@ class AppearanceRegression:
     """Appearance parameters as linear functions of a talker's speech parameters.
 
     ``scale`` (S,) divides the parameters; ``weights`` (1 + S, A) map the constant and the scaled parameters to the
-    appearance parameters. Quadratic terms fit the inner mouth worse on held-out frames. ``speech`` and ``looks`` are
-    the names of the speech and appearance channels.
+    appearance parameters. Quadratic terms fit the inner mouth worse on held-out frames. ``speech_channels`` and
+    ``appearance_channels`` are the names of the speech and appearance parameters.
     """
 
     scale: NDArray[np.float32]
     weights: NDArray[np.float32]
-    speech: tuple[str, ...]
-    looks: tuple[str, ...]
+    speech_channels: tuple[str, ...]
+    appearance_channels: tuple[str, ...]
 
     def motion(self, speech: Trajectory) -> Trajectory:
         """Motion of `tts2face.render.own_face.OwnFaceRenderer`: speech (T, S), then appearance parameters (T, A).
@@ -34,12 +34,16 @@ class AppearanceRegression:
         InputError
             The trajectory is not in the talker's speech parameters.
         """
-        if speech.channels != self.speech:
+        if speech.channels != self.speech_channels:
             raise InputError(
                 "the motion is not in the speech parameters of this talker; transfer it to this talker first"
             )
         appearance = _regression_terms(speech.values / self.scale) @ self.weights
-        return Trajectory(self.speech + self.looks, np.concatenate([speech.values, appearance], axis=1), speech.fps)
+        return Trajectory(
+            self.speech_channels + self.appearance_channels,
+            np.concatenate([speech.values, appearance], axis=1),
+            speech.fps,
+        )
 
 
 def fit_appearance_regression(talker: Talker) -> AppearanceRegression:
@@ -57,10 +61,10 @@ def fit_appearance_regression(talker: Talker) -> AppearanceRegression:
     n_terms = _regression_terms(np.zeros((1, n_speech), np.float32)).shape[1]
     normal, right = np.zeros((n_terms, n_terms)), np.zeros((n_terms, n_appearance))
     for utterance in talker.utterances:
-        if utterance.looks is not None:
+        if utterance.appearance_parameters is not None:
             terms = _regression_terms(utterance.shape[:, :n_speech] / scale).astype(np.float64)
             normal += terms.T @ terms
-            right += terms.T @ utterance.looks
+            right += terms.T @ utterance.appearance_parameters
     ridge = RIDGE * np.trace(normal) / n_terms
     weights = np.linalg.solve(normal + ridge * np.eye(n_terms), right)
     return AppearanceRegression(scale, weights.astype(np.float32), speech_channels(talker.model), appearance.channels)

@@ -155,9 +155,15 @@ def _region_modes(rest: FloatArray, palette: Palette, name: str) -> FloatArray:
 def _lid_model(talker: Talker, appearance: Appearance) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Motion (2, 478, 3) and texture parameters (2, A) of lids by closure and its square; plate closure (T,)."""
     model, n_face = talker.model, appearance.face.n_modes
-    recorded = [utterance for utterance in talker.utterances if utterance.looks is not None]
+    recorded = [utterance for utterance in talker.utterances if utterance.appearance_parameters is not None]
     shapes = np.concatenate([utterance.shape for utterance in recorded])
-    texture = np.concatenate([utterance.looks[:, :n_face] for utterance in recorded if utterance.looks is not None])
+    texture = np.concatenate(
+        [
+            utterance.appearance_parameters[:, :n_face]
+            for utterance in recorded
+            if utterance.appearance_parameters is not None
+        ]
+    )
     openings = _mean_eye_openings(model, shapes)
     opened, shut = np.quantile(openings, [OPEN_QUANTILE, CLOSED_QUANTILE])
     still, plate = model.basis[model.n_speech :].astype(np.float64), _mean_eye_openings(model, appearance.plate.shape)

@@ -117,7 +117,7 @@ class OwnFaceRenderer:
         if clip.motion.channels != self.channels[:n_channels] or n_channels < self.n_spoken:
             raise InputError(
                 "the clip's motion is not in the channels of this talker's own face; make the clip with a session "
-                "of this talker and face own"
+                "of this talker with face=self"
             )
         return np.pad(clip.motion.values, ((0, 0), (0, len(self.channels) - n_channels)))
 
@@ -173,7 +173,9 @@ def draw_video_frame(renderer: OwnFaceRenderer, motion: NDArray[np.floating], nu
     offset = (motion[:n_speech] - plate.shape[number, :n_speech]).astype(np.float32)
     point_offsets = np.tensordot(offset, renderer.shapes.basis[:n_speech, :n_mesh], axes=1)
     change = np.tensordot(
-        (motion[n_speech : n_speech + n_face] - plate.looks[number]).astype(np.float32), appearance.face.basis, axes=1
+        (motion[n_speech : n_speech + n_face] - plate.texture_parameters[number]).astype(np.float32),
+        appearance.face.basis,
+        axes=1,
     )
     change *= appearance.moved_by_speech[:, None]
     if renderer.gestures is not None:
@@ -203,7 +205,9 @@ def _lid_texture_change(
     if renderer.gestures is None or renderer.eyes is None or closure <= 0:
         return change
     pixels = renderer.eyes.pixels
-    modelled = face.mean[pixels] + np.tensordot(renderer.appearance.plate.looks[number], face.basis[:, pixels], axes=1)
+    modelled = face.mean[pixels] + np.tensordot(
+        renderer.appearance.plate.texture_parameters[number], face.basis[:, pixels], axes=1
+    )
     residual = renderer.eyes.of(renderer.plate[number], renderer.points[number]) - modelled
     shut = np.tensordot(appearance_change, face.basis[:, pixels], axes=1) - closure * residual
     change[pixels] = renderer.gestures.lid_pixels[pixels, None] * shut

@@ -13,7 +13,7 @@ from tts2face.render.picture import STUDIO, Picture, parse_background
 from tts2face.render.soft_shadows import Exposure, compute_exposure
 from tts2face.render.studio_light import lamp_directions, light_table
 from tts2face.render.surface import Surface, build_surface
-from tts2face.storage.picture_files import opened_picture
+from tts2face.storage.picture_files import open_picture
 
 STUDIO_BRIGHT, STUDIO_DARK = (128.0, 137.0, 148.0), (52.0, 58.0, 67.0)  # sRGB at the centre of the wall and far from it
 STUDIO_CENTRE = (0.5, 0.42)  # of the bright area, as shares of width and height
@@ -86,5 +86,5 @@ def _load_image(path: Path, width: int, height: int) -> NDArray[np.uint8]:
     """Image scaled and cropped to fill the picture."""
     from PIL import Image, ImageOps
 
-    with opened_picture(path, "the background image") as file:
+    with open_picture(path, "the background image") as file:
         return np.array(ImageOps.fit(file.convert("RGB"), (width, height), Image.Resampling.LANCZOS))

@@ -81,10 +81,10 @@ def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour:
             matt, shine, strength, reach = colour[c], scratch[6 + c], lights[k, 3 + c], SKIN_SCATTERING[c]
             for i in range(n):
                 around_edge = wrap[i] * reach
-                soaked = visible[i] + around_edge * visible[i] * (
+                wrapped = visible[i] + around_edge * visible[i] * (
                     one - visible[i]
                 )  # scattering reddens the edge of a shadow on skin
-                matt[i] += strength * soaked * max(towards[i] + around_edge, zero) / (one + around_edge)
+                matt[i] += strength * wrapped * max(towards[i] + around_edge, zero) / (one + around_edge)
                 shine[i] += strength * lobe[i]
     for c in range(3):
         matt, shine, albedo, opacity = colour[c], scratch[6 + c], table[AT_ALBEDO + c], table[AT_OPACITY]

@@ -91,7 +91,7 @@ class Aligner:
         return _build_alignment(entries, words, sound.duration, begin)
 
     def _word_name(self, pronunciations: tuple[tuple[str, ...], ...]) -> str:
-        """Name under which the decoder knows a word with these pronunciations."""
+        """Name of a word with these pronunciations in the decoder's dictionary."""
         if pronunciations not in self._names:
             name = f"w{len(self._names)}x"
             for number, phones in enumerate(pronunciations):

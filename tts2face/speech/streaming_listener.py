@@ -112,6 +112,6 @@ class StreamingAudioMap:
         if not len(self._features) and len(features):
             features = np.concatenate([np.repeat(features[:1], audio_map.before, axis=0), features])
         self._features = np.concatenate([self._features, features])
-        made = audio_map.inside(self._features)
-        self._features = self._features[len(made) :]
-        return made
+        motion = audio_map.inside(self._features)
+        self._features = self._features[len(motion) :]
+        return motion

@@ -39,15 +39,15 @@ class TextMismatch:
             f"the text does not fit the recording from {self.begin:.1f} to {self.end:.1f} s ({shown}); check the words"
         )
 
-    def shifted(self, seconds: float) -> "TextMismatch":
+    def shift(self, seconds: float) -> "TextMismatch":
         """The same mismatch, later by `seconds`."""
         return replace(self, begin=self.begin + seconds, end=self.end + seconds)
 
 
-def find_misfits(found: Alignment, *, is_english: bool) -> list[tuple[int, int]]:
+def find_misfits(alignment: Alignment, *, is_english: bool) -> list[tuple[int, int]]:
     """Half-open ranges of words whose log likelihood lies below that of correct texts."""
     least = LEAST_LOCAL_CONFIDENCE if is_english else LEAST_FOREIGN_CONFIDENCE
-    edges, words, sums = found.phones.edges, found.words, _sums(found)
+    edges, words, sums = alignment.phones.edges, alignment.words, _sums(alignment)
     misfits: list[tuple[int, int]] = []
     for first, last in _windows(sums):
         seconds, score = sums[first:last].sum(axis=0)
@@ -70,30 +70,30 @@ def _trim_range(fits: Sequence[bool], first: int, last: int) -> tuple[int, int]:
     return first, last
 
 
-def mismatch_of(found: Alignment, first: int, last: int) -> TextMismatch:
+def mismatch_of(alignment: Alignment, first: int, last: int) -> TextMismatch:
     """Mismatch of a range of an alignment's words; times are those of the alignment."""
-    edges, words, sums = found.phones.edges, found.words[first:last], _sums(found)[first:last]
+    edges, words, sums = alignment.phones.edges, alignment.words[first:last], _sums(alignment)[first:last]
     begin, end = float(edges[words[0].first]), float(edges[words[-1].last])
     return TextMismatch(begin, end, tuple(word.text for word in words), float(sums[:, 1].sum() / sums[:, 0].sum()))
 
 
-def extend_range(found: Alignment, first: int, last: int) -> tuple[int, int, float, float]:
+def extend_range(alignment: Alignment, first: int, last: int) -> tuple[int, int, float, float]:
     """Extend a range of words by all words within `CONTEXT_S`; returns first, last, start and end in seconds."""
-    edges, words = found.phones.edges, found.words
+    edges, words = alignment.phones.edges, alignment.words
     begin, end = edges[words[first].first] - CONTEXT_S, edges[words[last - 1].last] + CONTEXT_S
     while first > 0 and edges[words[first - 1].first] >= begin:
         first -= 1
     while last < len(words) and edges[words[last].last] <= end:
         last += 1
-    before = edges[words[first - 1].last] if first > 0 else found.phones.start
-    behind = edges[words[last].first] if last < len(words) else found.phones.end
+    before = edges[words[first - 1].last] if first > 0 else alignment.phones.start
+    behind = edges[words[last].first] if last < len(words) else alignment.phones.end
     return first, last, float(edges[words[first].first] + before) / 2, float(edges[words[last - 1].last] + behind) / 2
 
 
-def _sums(found: Alignment) -> NDArray[np.float64]:
+def _sums(alignment: Alignment) -> NDArray[np.float64]:
     """(W, 2) seconds and log likelihood of each word."""
-    lengths, scores = np.diff(found.phones.edges), found.scores
-    sums = [[lengths[word.first : word.last].sum(), scores[word.first : word.last].sum()] for word in found.words]
+    lengths, scores = np.diff(alignment.phones.edges), alignment.scores
+    sums = [[lengths[word.first : word.last].sum(), scores[word.first : word.last].sum()] for word in alignment.words]
     return np.array(sums).reshape(-1, 2)
 
 

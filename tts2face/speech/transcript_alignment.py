@@ -87,7 +87,7 @@ def align_recording(
             phones.append(found.phones)
             spans.append(found.words)
             part_mismatches = _mismatches(aligner, part, part_words, found, is_english=is_english)
-            mismatches += [mismatch.shifted(begin) for mismatch in part_mismatches]
+            mismatches += [mismatch.shift(begin) for mismatch in part_mismatches]
         else:
             phones.append(PhoneSequence(["sil"], [0.0, part.duration]))
             spans.append(())
@@ -96,7 +96,7 @@ def align_recording(
 
 
 def _mismatches(
-    aligner: Aligner, sound: Waveform, words: PronouncedTranscript, found: Alignment, *, is_english: bool
+    aligner: Aligner, sound: Waveform, words: PronouncedTranscript, alignment: Alignment, *, is_english: bool
 ) -> tuple[TextMismatch, ...]:
     """Mismatches of an alignment, each confirmed by a second alignment of the span and its context.
 
@@ -105,17 +105,17 @@ def _mismatches(
     """
     confirmed: list[TextMismatch] = []
     last_end = 0.0  # end of the last confirmed span
-    for misfit in find_misfits(found, is_english=is_english):
-        first, last, begin, end = extend_range(found, *misfit)
+    for misfit in find_misfits(alignment, is_english=is_english):
+        first, last, begin, end = extend_range(alignment, *misfit)
         if last - first == len(words):  # the excerpt would be the whole recording
-            return (mismatch_of(found, *misfit),)
+            return (mismatch_of(alignment, *misfit),)
         try:
             excerpt = aligner.align(_cut_sound(sound, (begin, end)), words[first:last])
         except DataError:  # the excerpt does not contain the words
-            mismatches = [mismatch_of(found, *misfit)]
+            mismatches = [mismatch_of(alignment, *misfit)]
         else:
             misfits = find_misfits(excerpt, is_english=is_english)
-            mismatches = [mismatch_of(excerpt, *span).shifted(begin) for span in misfits]
+            mismatches = [mismatch_of(excerpt, *span).shift(begin) for span in misfits]
         confirmed += [mismatch for mismatch in mismatches if mismatch.begin >= last_end]
         last_end = max([last_end, *(mismatch.end for mismatch in mismatches)])
     return tuple(confirmed)

@@ -26,12 +26,12 @@ def check_name(path: Path) -> None:
     try:
         is_folder = path.parent.is_dir()
     except OSError as error:
-        raise InputError(f"cannot write {shortened(path)}: {error.strerror}; choose another folder") from error
+        raise InputError(f"cannot write {short_name(path)}: {error.strerror}; choose another folder") from error
     if not is_folder:
         raise InputError(f"there is no folder {path.parent} to write {path.name} to; create it first")
     longest = _longest_name(path.parent) - HIDDEN_EXTRA
     if (length := len(os.fsencode(path.name))) > longest:
-        raise InputError(f"the name {shortened(path)} has {length} bytes; use at most {longest}")
+        raise InputError(f"the name {short_name(path)} has {length} bytes; use at most {longest}")
     if not os.access(path.parent, os.W_OK | os.X_OK):
         raise BackendError(f"cannot write {path}: Permission denied; choose another folder")
 
@@ -46,13 +46,13 @@ def check_file_name(path: Path, what: str, suffixes: Sequence[str]) -> None:
     """
     _check_stem(path)
     if path.suffix not in suffixes:
-        raise InputError(f"{what} is written as {', '.join(suffixes)}, not {shortened(path)}")
+        raise InputError(f"{what} is written as {', '.join(suffixes)}, not {short_name(path)}")
     check_name(path)
     if path.is_dir():
         raise InputError(f"{path} is a folder; choose another name")
 
 
-def shortened(path: Path) -> str:
+def short_name(path: Path) -> str:
     """Name of a path for a message, shortened to at most 60 characters."""
     return path.name if len(path.name) <= 60 else f"{path.name[:40]}...{path.name[-10:]}"
 

@@ -15,7 +15,7 @@ MAX_PIXELS = 100_000_000  # 300 MB as RGB; a small file can declare any size
 
 
 @contextmanager
-def opened_picture(path: Path, what: str) -> Iterator["Picture"]:
+def open_picture(path: Path, what: str) -> Iterator["Picture"]:
     """Open a picture file; its pixels are decoded on first use within the block.
 
     Raises

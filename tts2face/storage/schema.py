@@ -68,9 +68,9 @@ class Contents:
         """Raise a DataError about the file."""
         refuse(f"{self.path}: {what}", self.kind)
 
-    def require(self, holds: bool, what: str) -> None:
+    def require(self, condition: bool, what: str) -> None:
         """Raise a DataError about the file unless a condition holds."""
-        if not holds:
+        if not condition:
             self.fail(what)
 
     def tensors(self, specs: Mapping[str, Tensor]) -> None:
@@ -90,7 +90,7 @@ class Contents:
             anything(self.header[key], f"{where}: {_abbreviate(key)}")
 
     def only_known(self) -> None:
-        """Check that there are no arrays besides those checked before."""
+        """Check that there are no other arrays than those already checked."""
         unknown = sorted(self.arrays.keys() - self.known)
         if unknown:
             self.fail(f"holds the array {_abbreviate(unknown[0])}, which no {self.kind} has")
@@ -179,7 +179,7 @@ def number(low: float, high: float) -> Check:
     return check
 
 
-def listed(item: Check, length: int | None = None) -> Check:
+def list_of(item: Check, length: int | None = None) -> Check:
     """Check for a list, of a given length if any, whose items all pass `item`."""
 
     def check(value: Any, where: str) -> None:

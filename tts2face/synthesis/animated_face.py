@@ -206,7 +206,7 @@ class OwnAppearanceFace:
     def channels(self) -> tuple[str, ...]:
         """Names of the speech parameters, the appearance parameters, and the gesture parameters of the palette."""
         added = () if self.gestures is None else self.gestures.channels
-        return self.regression.speech + self.regression.looks + added
+        return self.regression.speech_channels + self.regression.appearance_channels + added
 
     @property
     def mesh(self) -> Face:

@@ -49,7 +49,7 @@ class Piece:
         Size of the piece: characters of the text, or thousandths of the recording or of the idle animation.
     timeline, marks
         Gestures requested by the marks of the text, and its named marks; in seconds of the whole clip.
-    shown
+    explain
         Returns for each phone the recorded tokens of its lip motion, in seconds of the whole clip. Empty for idle
         animation and for a recording without words; the first piece of a recording returns those of all pieces.
     mismatches
@@ -61,7 +61,7 @@ class Piece:
     n_steps: int
     timeline: Timeline = field(default_factory=Timeline)
     marks: tuple[MarkTime, ...] = ()
-    shown: Callable[[], tuple[PhoneExplanation, ...]] = tuple
+    explain: Callable[[], tuple[PhoneExplanation, ...]] = tuple
     mismatches: tuple[TextMismatch, ...] = ()
 
 
@@ -102,7 +102,7 @@ def _spoken_pieces(prepared: PreparedRequest, models: SynthesisModels, layer: Ge
     fps, first_frame = prepared.fps, 0
     for spoken, n_steps in _sentences(prepared, models):
         speech, begin = pad_to_frame(spoken.speech, first_frame, fps), float(first_frame / fps)
-        timeline = spoken.timeline.restrict(0.0, speech.waveform.duration).shifted(begin)
+        timeline = spoken.timeline.restrict(0.0, speech.waveform.duration).shift(begin)
         n_frames = frame_count(speech.waveform.duration, float(fps))
         selection = select_tokens(speech.phones, models.exemplars, prepared.options)
         lips = models.face.motion_of_tokens(selection, fps=float(fps), n_frames=n_frames)
@@ -133,7 +133,7 @@ def _recording_pieces(
     prepared: PreparedRequest, audio: Path, models: SynthesisModels, layer: GestureLayer | None
 ) -> Iterator[Piece]:
     """Pieces of a recording: lip motion from exemplars if its words are known, else from an audio map."""
-    transcript, motion, shown = _recording_motion(prepared, audio, models)
+    transcript, motion, explain = _recording_motion(prepared, audio, models)
     language = prepared.request.language
     timeline, marks = resolve_recording_marks(prepared.text, transcript.phones, transcript.words, language)
     fps, before = float(prepared.fps), 0
@@ -148,7 +148,7 @@ def _recording_pieces(
             n_steps,
             marked,
             tuple(mark for mark in marks if begin <= mark.seconds < end),
-            shown if before == 0 else tuple,
+            explain if before == 0 else tuple,
             tuple(mismatch for mismatch in transcript.mismatches if begin <= mismatch.begin < end),
         )
         before = after
@@ -188,8 +188,8 @@ def _explanation(
 ) -> Callable[[], tuple[PhoneExplanation, ...]]:
     """Function that explains a selection in seconds of the whole clip; it is evaluated only when called."""
 
-    def shown() -> tuple[PhoneExplanation, ...]:
+    def explain() -> tuple[PhoneExplanation, ...]:
         phones = explain_selection(selection, exemplars)
         return tuple(replace(phone, start=phone.start + begin, end=phone.end + begin) for phone in phones)
 
-    return shown
+    return explain

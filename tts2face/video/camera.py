@@ -69,8 +69,8 @@ class CaptureDevice:
 
         n_read = 0
         while not self._ended:
-            worked, pixels = self._device.read()
-            if not worked:
+            is_read, pixels = self._device.read()
+            if not is_read:
                 break
             n_read += 1
             time.sleep(max(0.0, self._began + n_read * self._pace - time.monotonic()) if self._pace else 0.0)

@@ -106,7 +106,7 @@ def remove_pose(points: NDArray[np.floating], fps: float) -> PoseFreeLandmarks:
 def rigid_points() -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """(N,) landmark indices, (N, 3) positions in mm and (N,) weights with sum 1."""
     right = [(index, (x, y, z), weight) for index, _, x, y, z, weight in RIGID_POINTS]
-    left = [(twin, (-x, y, z), weight) for index, twin, x, y, z, weight in RIGID_POINTS if twin != index]
+    left = [(mirrored, (-x, y, z), weight) for index, mirrored, x, y, z, weight in RIGID_POINTS if mirrored != index]
     indices, places, weights = zip(*right, *left, strict=True)
     return np.array(indices), np.array(places), np.array(weights) / sum(weights)
 

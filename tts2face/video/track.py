@@ -143,8 +143,8 @@ class FaceTracker:
         for number in np.argsort(scores)[::-1]:
             if scores[number] < MIN_FURTHER_FACE_LOGIT:
                 break
-            away = [float(np.linalg.norm(centres[number] - centres[other])) / sizes[other] for other in kept]
-            if all(distance > SAME_FACE_DISTANCE for distance in away):
+            distances = [float(np.linalg.norm(centres[number] - centres[other])) / sizes[other] for other in kept]
+            if all(distance > SAME_FACE_DISTANCE for distance in distances):
                 kept.append(int(number))
         return len(kept)
 

@@ -98,7 +98,9 @@ class NeuralVoice:
 
         g2p = self._model.g2p
         phonemized = g2p.phonemize_tokens(g2p.tokenize(normalize(sentence)))
-        tokens = [_Token(token.text, self._known(token.phonemes), bool(token.whitespace)) for token in phonemized]
+        tokens = [
+            _Token(token.text, self._known_phones(token.phonemes), bool(token.whitespace)) for token in phonemized
+        ]
         unpronounced = [
             token.text
             for token in tokens
@@ -113,12 +115,12 @@ class NeuralVoice:
     def _insert_own_words(self, sentence: str) -> str:
         """Replace a user's words by ``[word](/letters/)``, hibari's notation for given pronunciations."""
 
-        def bracketed(match: "re.Match[str]") -> str:
+        def add_brackets(match: "re.Match[str]") -> str:
             letters = self._own_words.get(match[0].lower())
             return match[0] if letters is None else f"[{match[0]}](/{letters}/)"
 
         plain = re.sub(r"[\[\]]", " ", sentence)
-        return re.sub(r"[^\W_]+(?:['’-][^\W_]+)*", bracketed, plain) if self._own_words else plain
+        return re.sub(r"[^\W_]+(?:['’-][^\W_]+)*", add_brackets, plain) if self._own_words else plain
 
     def _bracketed_word(self, word: SpokenWord) -> str:
         """A word in hibari's notation, with its phones if it has any."""
@@ -127,7 +129,7 @@ class NeuralVoice:
         label = NO_LETTER.sub("", word.text) or "word"
         return f"[{label}](/{segments_to_letters(word.segments)}/){word.after}"
 
-    def _known(self, letters: str | None) -> str:
+    def _known_phones(self, letters: str | None) -> str:
         """The letters that belong to the model's vocabulary."""
         return "".join(letter for letter in letters or "" if letter in self._model.vocab)
 

@@ -97,11 +97,11 @@ class PiperVoice:
     def _insert_own_words(self, text: str) -> str:
         """Replace a user's words by ``[[IPA]]``, Piper's notation for given pronunciations."""
 
-        def bracketed(match: "re.Match[str]") -> str:
+        def replace_with_ipa(match: "re.Match[str]") -> str:
             segments = self._own_words.get(match[0].lower())
             return match[0] if segments is None else _bracketed_ipa(SpokenWord(match[0], segments))
 
-        return WORD.sub(bracketed, text)
+        return WORD.sub(replace_with_ipa, text)
 
     def _synthesise(self, text: str, rate: float) -> NDArray[np.float32]:
         from piper import SynthesisConfig

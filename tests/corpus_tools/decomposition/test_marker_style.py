@@ -43,7 +43,9 @@ def recorded(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> S
 
 def test_markers_and_their_stills_become_a_style(recorded: StyleSource, made: Made, tmp_path: Path) -> None:
     out = tmp_path / "worn.palette"
-    built = build_style(recorded, "worn", out, base=load_palette("starter"), effort=RunOptions(tmp_path / "cache", 1))
+    built = build_style(
+        recorded, "worn", out, base=load_palette("starter"), run_options=RunOptions(tmp_path / "cache", 1)
+    )
     style = read_palette(out).styles["worn"]
     assert (built.n_kept, int(style.lengths.sum())) == (1, 120)
     assert "gaze" not in style.motion
@@ -60,7 +62,7 @@ def test_epsilon_widens_the_limits_of_the_weights(recorded: StyleSource, tmp_pat
     weights = {}
     for epsilon in (0.0, 0.5):
         out = tmp_path / f"{epsilon}.palette"
-        build_style(recorded, "worn", out, base=None, epsilon=epsilon, effort=RunOptions(tmp_path / "cache", 1))
+        build_style(recorded, "worn", out, base=None, epsilon=epsilon, run_options=RunOptions(tmp_path / "cache", 1))
         style = read_palette(out).styles["worn"]
         weights[epsilon] = style.motion["expression"]
         assert ("--epsilon 0.5" in style.metadata["command"]) == (epsilon == 0.5)
@@ -74,6 +76,6 @@ def test_stills_of_two_kinds(recorded: StyleSource, tmp_path: Path) -> None:
     mixed = {**recorded.stills, "sad": Still(tmp_path / "sad.png")}
     with pytest.raises(InputError, match="marker stills cannot be mixed with pictures"):
         build_style(
-            replace(recorded, stills=mixed), "x", tmp_path / "x.palette", base=None, effort=RunOptions(tmp_path, 1)
+            replace(recorded, stills=mixed), "x", tmp_path / "x.palette", base=None, run_options=RunOptions(tmp_path, 1)
         )
     assert not (tmp_path / "x.palette").exists()

@@ -68,7 +68,7 @@ def test_halves_of_a_steady_talker_agree_and_each_holds_half(found):
     assert len(split.correlations) == split.n_requested == 4
     assert (split.n_phones == len(POSES) - 1).all()
     assert split.mean > 0.98
-    assert split.corrected == spearman_brown(split.mean)
+    assert split.full_length_reliability == spearman_brown(split.mean)
     assert split.left_out == ()
 
 

@@ -29,7 +29,7 @@ def test_reliability(found: Analysis, said: str) -> None:
     for split in (found.by_utterances, found.by_words, found.by_utterances_same_phones):
         assert split is not None
         low, high = short(split.correlations.min()), short(split.correlations.max())
-        assert f"| {short(split.mean)} | {low} - {high} | {short(split.corrected)} |" in said
+        assert f"| {short(split.mean)} | {low} - {high} | {short(split.full_length_reliability)} |" in said
 
 
 def test_classes(found: Analysis, said: str) -> None:
