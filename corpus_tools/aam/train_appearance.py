@@ -17,12 +17,9 @@ from corpus_tools.run_options import Progress
 from lexicon.errors import InputError
 from tts2face.models.appearance import Appearance, Plate, TextureModel
 from tts2face.models.landmarks import (
-    EYE_OUTER_LEFT,
-    EYE_OUTER_RIGHT,
     FACE_OVAL,
-    LOWER_LIP_INNER_MID,
     MOUTH_REGION,
-    UPPER_LIP_INNER_MID,
+    lip_opening,
 )
 
 GAIN_LIMITS = (0.5, 2.0)  # beyond them it is another scene, not another light
@@ -167,17 +164,10 @@ def reference_frames(
     every = max(1, n_frames // N_REFERENCE_SHAPES)
     points = np.concatenate([recording.points for recording in recordings])[::every]
     shapes, _ = align_shapes(points[:, :N_MESH_LANDMARKS])
-    gaps = normalised_lip_gap(shapes)
+    gaps = lip_opening(shapes)
     opened = shapes[gaps >= np.quantile(gaps, OPEN_LIP_QUANTILE)].mean(axis=0)
     face = build_reference_frame(opened, face_triangles(opened), options.side)
     return face, build_reference_frame(opened[list(MOUTH_LANDMARKS)], mouth_triangles(), options.mouth_side_px)
-
-
-def normalised_lip_gap(points: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(T,) distance of the inner lips over that of the outer eye corners, of (T, N, 2 or 3) points."""
-    lips = np.linalg.norm(points[:, UPPER_LIP_INNER_MID] - points[:, LOWER_LIP_INNER_MID], axis=1)
-    eyes = np.linalg.norm(points[:, EYE_OUTER_LEFT] - points[:, EYE_OUTER_RIGHT], axis=1)
-    return np.asarray(lips / eyes, np.float64)
 
 
 def _add_textures(
@@ -186,7 +176,7 @@ def _add_textures(
     light: LightingCorrection,
     grown: tuple[IncrementalPca, IncrementalPca],
 ) -> None:
-    gaps = normalised_lip_gap(recording.points)
+    gaps = lip_opening(recording.points)
     faces, mouths = [], []
     for number, picture in enumerate(recording.pictures()):
         points = recording.points[number]
@@ -228,7 +218,7 @@ def appearance_parameters(
     face, mouth = frames
     n_frames, n_face = len(recording.points), models[0].n_modes
     parameters = np.zeros((n_frames, n_face + models[1].n_modes), np.float32)
-    seen = normalised_lip_gap(recording.points) >= MIN_OPEN_GAP
+    seen = lip_opening(recording.points) >= MIN_OPEN_GAP
     for number, picture in enumerate(recording.pictures()):
         points = recording.points[number]
         parameters[number, :n_face] = models[0].parameters(light.apply(face.texture(picture, points))[None])[0]

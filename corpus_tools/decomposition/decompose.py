@@ -148,11 +148,6 @@ def _smooth(values: NDArray[np.floating]) -> Floats:
 REGION_TABLE = Path(__file__).with_name("regions.tsv")
 
 
-def region_landmarks() -> dict[str, NDArray[np.int32]]:
-    """Landmarks of each region, by name."""
-    return {row["region"]: np.array([int(n) for n in row["landmarks"].split()], np.int32) for row in _read_rows()}
-
-
 def feature_landmarks(feature: str) -> NDArray[np.int32]:
     """Landmarks of all regions of a feature, such as both brows."""
     found = [row["landmarks"].split() for row in _read_rows() if row["feature"] == feature]

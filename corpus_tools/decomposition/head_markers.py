@@ -30,14 +30,11 @@ class HeadPoses:
         The head's markers about their middle, mm.
     rotations, places : (T, 3, 3), (T, 3)
         ``world = rotations @ head + places``.
-    misfit_mm
-        Root mean square distance of the markers from the rigid head.
     """
 
     reference: Floats
     rotations: Floats
     places: Floats
-    misfit_mm: float
 
     def remove_from(self, points: Floats) -> Floats:
         """(T, M, 3) points in the head's own axes."""
@@ -89,7 +86,7 @@ def fit_head_poses(
             f"the head's markers do not move rigidly (deviation {misfit:.1f} mm); list only those on the skull as head"
         )
     notes = () if posed.all() else (f"the head's pose was interpolated in {int((~posed).sum())} frames",)
-    return HeadPoses(head, *_interpolate_poses(rotations, places, posed), misfit), notes
+    return HeadPoses(head, *_interpolate_poses(rotations, places, posed)), notes
 
 
 def _interpolate_poses(rotations: Floats, places: Floats, posed: NDArray[np.bool_]) -> tuple[Floats, Floats]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from corpus_tools.decomposition.decompose import Decomposition, feature_landmarks
 from lexicon.errors import InputError
 from tts2face.models.palette import FEATURES, REGION_FEATURES, FaceRegion, Palette, Style
+from tts2face.numeric import fix_signs, principal_axes
 
 KEPT_VARIANCE = 0.95  # of a region's motion that its modes keep: the rest is the tracker's
 MAX_MODES = 10
@@ -92,10 +93,8 @@ def size_ratios(person: NDArray[np.floating], common: NDArray[np.floating]) -> N
 def _build_region(feature: str, displaced: NDArray[np.floating]) -> FaceRegion:
     """Principal modes of a region's displacements (T, L, 3) about none; each one's largest entry is positive."""
     flat = displaced.reshape(len(displaced), -1).astype(np.float64)
-    variances, vectors = np.linalg.eigh(np.einsum("ti,tj->ij", flat, flat))
-    variances, vectors = np.maximum(variances[::-1], 0.0), vectors[:, ::-1].T
+    variances, vectors = principal_axes(np.einsum("ti,tj->ij", flat, flat), flat.shape[1])
     share = np.cumsum(variances) / max(float(variances.sum()), 1e-12)
     n_modes = min(int(np.searchsorted(share, KEPT_VARIANCE)) + 1, MAX_MODES)
-    modes = vectors[:n_modes]
-    modes = modes * np.sign(modes[np.arange(n_modes), np.abs(modes).argmax(axis=1)])[:, None]
-    return FaceRegion(feature_landmarks(feature), modes.reshape(n_modes, -1, 3).astype(np.float32))
+    modes = fix_signs(vectors[:n_modes]).reshape(n_modes, -1, 3)
+    return FaceRegion(feature_landmarks(feature), modes.astype(np.float32))

@@ -45,10 +45,7 @@ class EyeSocket:
     def keep_distance(self, places: Floats, moved: Floats) -> Floats:
         """(P, 3) moved positions with the scaled distance from the eyeball that positions (P, 3) near it had."""
         off = np.linalg.norm(places - self.before, axis=1)
-        share = np.clip(
-            (self.radius + FREE_SKIN_DISTANCE_MM - off) / (FREE_SKIN_DISTANCE_MM - FULL_EYE_DISTANCE_MM), 0.0, 1.0
-        )
-        share = smoothstep(share)
+        share = smoothstep((self.radius + FREE_SKIN_DISTANCE_MM - off) / (FREE_SKIN_DISTANCE_MM - FULL_EYE_DISTANCE_MM))
         towards = moved - self.after
         length = np.maximum(np.linalg.norm(towards, axis=1), 1e-9)
         wanted = self.scale * off / length

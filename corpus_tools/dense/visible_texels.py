@@ -74,12 +74,12 @@ def build_canvas(face: Face) -> SkinCanvas:
 def _front_share(face: Face, texels: Texels, opened: Floats) -> Floats:
     place = texels.interpolate(opened)
     marks = face_landmarks(face, opened)[:N_MESH_LANDMARKS]
-    share = smooth_step(polygon_depth(place[:, :2], marks[list(FACE_OVAL), :2], RIM_MM[1] + 1), *RIM_MM)
+    share = smoothstep(polygon_depth(place[:, :2], marks[list(FACE_OVAL), :2], RIM_MM[1] + 1), *RIM_MM)
     share[place[:, 2] < float(marks[list(FACE_OVAL), 2].min())] = 0.0
     share[_is_hidden(place)] = 0.0
-    share *= smooth_step(-polygon_depth(place[:, :2], marks[list(INNER_LIPS), :2], LIP_MM[1] + 1), *LIP_MM)
+    share *= smoothstep(-polygon_depth(place[:, :2], marks[list(INNER_LIPS), :2], LIP_MM[1] + 1), *LIP_MM)
     for lids in LID_LANDMARKS:
-        share *= smooth_step(-polygon_depth(place[:, :2], marks[list(lids), :2], LID_MM[1] + 1), *LID_MM)
+        share *= smoothstep(-polygon_depth(place[:, :2], marks[list(lids), :2], LID_MM[1] + 1), *LID_MM)
     return share
 
 
@@ -110,13 +110,6 @@ def polygon_depth(places: Floats, polygon: Floats, most: float) -> Floats:
     depth[near] = np.where(inside, least, -least)
     clipped: Floats = np.clip(depth, -most, most)
     return clipped
-
-
-def smooth_step(values: Floats, low: float, high: float) -> Floats:
-    """Smooth step from 0 at `low` to 1 at `high`."""
-    t = np.clip((values - low) / (high - low), 0.0, 1.0)
-    smooth: Floats = smoothstep(t)
-    return smooth
 
 
 def soften_edges(share: Floats, texels: Texels, side: int) -> Floats:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from corpus_tools.build_palette import ESTIMATORS, StyleSource, build_basis, build_estimator
-from corpus_tools.decomposition.blend_weights import approximation_error, moving_average
+from corpus_tools.decomposition.blend_weights import moving_average
 from corpus_tools.decomposition.capture import FaceRecording, resample_to_gesture_rate
 from corpus_tools.decomposition.capture_files import read_livelink_recording
 from corpus_tools.decomposition.decompose import weight_displacements
@@ -21,6 +21,7 @@ from corpus_tools.dense.video_landmarks import find_videos
 from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.run_options import RunOptions
 from corpus_tools.training.pose_correction import fit_pose_correction
+from tests.corpus_tools.decomposition.weight_errors import approximation_error
 from tts2face.face.landmark_fit import N_SKIN
 from tts2face.models.face_file import load_face
 from tts2face.models.palette import GESTURE_FPS

@@ -18,7 +18,6 @@ from corpus_tools.decomposition.blend_weights import (
     N_NEAREST,
     N_SAMPLES,
     Estimator,
-    approximation_error,
     build_least_squares_estimator,
     build_nearest_samples_estimator,
     moving_average,
@@ -28,6 +27,7 @@ from corpus_tools.decomposition.capture_files import read_livelink_recording
 from corpus_tools.decomposition.face_motion import rest_landmarks
 from corpus_tools.recordings.observe import observe
 from corpus_tools.training.pose_correction import correct_pose
+from tests.corpus_tools.decomposition.weight_errors import approximation_error
 from tts2face.face.expressions import expression_landmarks
 from tts2face.face.landmark_fit import N_SKIN
 from tts2face.models.face_file import load_face

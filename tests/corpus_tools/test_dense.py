@@ -17,8 +17,8 @@ from corpus_tools.dense.video_landmarks import find_videos
 from corpus_tools.dense.visible_texels import build_canvas, polygon_depth
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, InputError
+from tests.face.posing import posed_vertices
 from tests.rendered_takes import ONLY_RENDERED
-from tts2face.face.deformation import posed_vertices
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS

@@ -24,8 +24,8 @@ from corpus_tools.dense.modes import (
 from corpus_tools.dense.skin_colour import PictureFitter, build_picture_fitter
 from corpus_tools.dense.video_landmarks import VideoLandmarks
 from lexicon.errors import InputError
+from tests.face.posing import posed_vertices
 from tests.rendered_takes import ONLY_RENDERED
-from tts2face.face.deformation import posed_vertices
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face, read_face, write_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER

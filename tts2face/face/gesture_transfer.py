@@ -155,7 +155,9 @@ def mouth_response(expression: FloatArray) -> FloatArray:
     """Expression weights (T, 5) for the mouth: attenuated below `MOUTH_RESPONSE_RANGE`, where speech contains them."""
     low, high = MOUTH_RESPONSE_RANGE
     share = np.clip((np.abs(expression) - low) / (high - low), 0.0, 1.0)
-    return np.asarray(expression * share * share * (3.0 - 2.0 * share))
+    return np.asarray(
+        expression * share * share * (3.0 - 2.0 * share)
+    )  # not `smoothstep`: this order rounds differently
 
 
 def check_gestures(

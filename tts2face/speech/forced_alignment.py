@@ -28,7 +28,6 @@ LEVEL_WINDOW_S = 0.01
 NOISE_LEVEL = 1e-4  # relative to full scale; digital silence has no logarithm
 PEAK_LEVEL = 0.7  # peak amplitude of the model's input
 MIN_PHONE_S = 0.005  # one frame; shorter phones and silences cannot be resolved
-SILENT_NAMES = frozenset({"SIL", "+NSN+", "+SPN+"})
 
 Pronunciations = Sequence[tuple[str, ...]]  # alternatives of one word, in phones of the table
 

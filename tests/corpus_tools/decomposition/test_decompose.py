@@ -16,7 +16,6 @@ from corpus_tools.decomposition.decompose import (
     decompose,
     feature_landmarks,
     gaze_angles,
-    region_landmarks,
     weight_displacements,
 )
 from corpus_tools.decomposition.derived_styles import read_derived_styles
@@ -59,12 +58,9 @@ def _parts(landmarks: np.ndarray, basis: ExpressionBasis, head: np.ndarray | Non
 
 
 def test_no_landmark_lies_in_two_regions_or_in_the_lips() -> None:
-    found = region_landmarks()
-    assert list(found) == ["brow_left", "brow_right", "eye_left", "eye_right", "nose_cheeks"]
-    every = np.concatenate(list(found.values()))
-    assert len(set(every.tolist())) == len(every)
-    assert not set(every.tolist()) & set(MOUTH_REGION)
-    assert feature_landmarks("brows").tolist() == [*found["brow_left"], *found["brow_right"]]
+    every = np.concatenate([feature_landmarks(feature) for feature in ("brows", "blink", "cheeks")]).tolist()
+    assert len(set(every)) == len(every)
+    assert not set(every) & set(MOUTH_REGION)
 
 
 def test_a_slow_expression_is_told_by_its_weight(basis: ExpressionBasis) -> None:
