@@ -59,3 +59,10 @@ def interpolate_linear(
     share = np.clip((at - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0)
     share = share.reshape(-1, *[1] * (values.ndim - 1)).astype(np.float32)
     return np.asarray(values[after - 1] * (1 - share) + values[after] * share, np.float32)
+
+
+def interpolate_columns(
+    values: NDArray[np.floating], times: NDArray[np.floating], at: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """(N, D) values at N instants from (T, D) at increasing times (T,), as float64; constant before and after."""
+    return np.stack([np.interp(at, times, column) for column in values.T], axis=1)

@@ -15,6 +15,7 @@ from corpus_tools.decomposition.basis_expressions import ExpressionBasis
 from corpus_tools.decomposition.blend_weights import Estimator, moving_average
 from corpus_tools.decomposition.capture import FaceRecording, resample_to_gesture_rate
 from tts2face.gesture.prosody import SILENT_PROSODY, prosody_features
+from tts2face.interpolation import interpolate_columns
 from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS
 from tts2face.models.palette import FEATURES, GESTURE_FPS, REGION_FEATURES
 from tts2face.retargeting.performer import EYELID_LANDMARKS, eye_aperture
@@ -134,7 +135,7 @@ def gaze_angles(turned: NDArray[np.float64], head: NDArray[np.floating], shut: F
     seen = np.flatnonzero(shut.max(axis=1) < MAX_GAZE_LID_CLOSURE)
     if len(seen):
         frames = np.arange(len(sight))
-        sight = np.stack([np.interp(frames, seen, sight[seen, axis]) for axis in range(2)], axis=1)
+        sight = interpolate_columns(sight[seen], seen, frames)
     centred: Floats = (sight - np.median(sight, axis=0)).astype(np.float32)
     return centred
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.decomposition.marker_gaps import check_gap
 from lexicon.errors import DataError
+from tts2face.interpolation import interpolate_columns
 from tts2face.video.pose import similarity_transforms
 
 MIN_VISIBLE_MARKERS = 3  # markers that show a pose
@@ -99,7 +100,7 @@ def _interpolate_poses(rotations: Floats, places: Floats, posed: NDArray[np.bool
     frames = np.arange(len(posed))
     turned = Slerp(there, Rotation.from_matrix(rotations))(np.clip(frames, there[0], there[-1])).as_matrix()
     turned[there] = rotations
-    return turned, np.stack([np.interp(frames, there, axis) for axis in places.T], axis=1)
+    return turned, interpolate_columns(places, there, frames)
 
 
 def _first_reference(points: Floats, seen: NDArray[np.bool_]) -> Floats:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.decomposition.decompose import Decomposition, feature_landmarks
 from lexicon.errors import InputError
+from tts2face.face.landmark_fit import axis_ratios
 from tts2face.models.palette import FEATURES, REGION_FEATURES, FaceRegion, Palette, Style
 from tts2face.numeric import fix_signs, principal_axes
 
@@ -53,7 +54,7 @@ def add_style(
     if base is None and missing:
         raise InputError(f"the recordings do not show {missing[0]}; a palette begins with recordings that do")
     common = base.neutral if base is not None else np.asarray(neutral, np.float32)
-    sizes = size_ratios(neutral, common)
+    sizes = axis_ratios(neutral, common)
     moved = {
         feature: np.concatenate([one.motion[feature] for one in parts]) * sizes
         for feature in REGION_FEATURES
@@ -81,13 +82,6 @@ def add_style(
     if base is None:
         return LearnedStyle(Palette(common, regions, {name: style}, {}, {}), kept)
     return LearnedStyle(replace(base, styles={**base.styles, name: style}), kept)
-
-
-def size_ratios(person: NDArray[np.floating], common: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(3,) factors of width, height and depth by which one face at rest (478, 3) becomes as large as another."""
-    here, there = (np.asarray(face, np.float64) for face in (person, common))
-    here, there = here - here.mean(axis=0), there - there.mean(axis=0)
-    return np.asarray((here * there).sum(axis=0) / np.square(here).sum(axis=0))
 
 
 def _build_region(feature: str, displaced: NDArray[np.floating]) -> FaceRegion:

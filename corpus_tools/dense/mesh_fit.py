@@ -7,13 +7,12 @@ from numpy.typing import NDArray
 
 from tts2face.face.rbf import Interpolant, fit_interpolant
 from tts2face.models.face import Eye, Face
-from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER, N_MESH_LANDMARKS
 from tts2face.numeric import smoothstep
 from tts2face.video.pose import similarity_transforms
 
 Floats = NDArray[np.float64]
 
-N_MESH_LANDMARKS = 468  # the iris landmarks after them depend on gaze, not on the shape of the face
 OPEN_JAW_WEIGHT = 0.12  # weight of jawOpen at which the warp is fitted; with closed lips the mouth would tear
 # The edge of the lids, once around, from the outer corner; the person's right eye, then the left.
 LID_LANDMARKS = (

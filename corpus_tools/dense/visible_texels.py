@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.mesh_fit import LID_LANDMARKS, N_MESH_LANDMARKS, OPEN_JAW_WEIGHT, face_landmarks
+from corpus_tools.dense.mesh_fit import LID_LANDMARKS, OPEN_JAW_WEIGHT, face_landmarks
 from corpus_tools.dense.texels import ISLANDS_TOP, Texels, find_texels
 from lexicon.errors import DataError
 from tts2face.models.face import Face
-from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER, N_MESH_LANDMARKS
 from tts2face.numeric import smoothstep
 
 Floats = NDArray[np.float64]

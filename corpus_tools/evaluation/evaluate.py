@@ -173,7 +173,6 @@ def evaluate_across_talkers(
     train: Sequence[Observation],
     others: Sequence[Observation],
     *,
-    options: Mapping[str, SynthesisOptions] | None = None,
     on_progress: Progress | None = None,
 ) -> tuple[Evaluation, tuple[SplitResult, ...]]:
     """Scores of every method, learnt from one person, on utterances of another with the latter's phone edges.
@@ -193,7 +192,7 @@ def evaluate_across_talkers(
     hers, theirs = SpeakerScale.of(train), SpeakerScale.of(others)
     real = tuple(standardise_reference(ReferenceUtterance.of(seen, talker.model), theirs) for seen in others)
     made, spent = {}, {}
-    methods = build_methods(talker, options)
+    methods = build_methods(talker)
     for number, (name, method) in enumerate(methods.items()):
         made[name], spent[name] = _synthesise(method, real)
         if on_progress:

@@ -86,11 +86,9 @@ def min_openings(
     return np.array(least, np.float64)
 
 
-def midpoint_openings(
-    opening: Values, phones: PhoneSequence, fps: float, labels: Collection[str] | None = None
-) -> NDArray[np.float64]:
-    """Opening in the middle of each phone with one of the labels; by default the open vowels."""
-    labels = open_vowels() if labels is None else labels
+def midpoint_openings(opening: Values, phones: PhoneSequence, fps: float) -> NDArray[np.float64]:
+    """Opening in the middle of each open vowel."""
+    labels = open_vowels()
     middles = (phones.edges[:-1] + phones.edges[1:]) / 2
     wanted = np.array([label in labels for label in phones.phones])
     return np.asarray(np.interp(middles[wanted], np.arange(len(opening)) / fps, opening))

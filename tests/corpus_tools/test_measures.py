@@ -82,7 +82,6 @@ def test_least_opening_looks_a_little_beyond_the_phone():
 def test_open_vowels_are_read_in_their_middle():
     opening = np.arange(60) / 50.0  # equals its own time
     np.testing.assert_allclose(measures.midpoint_openings(opening, SPEECH, 50.0), [0.6])
-    np.testing.assert_allclose(measures.midpoint_openings(opening, SPEECH, 50.0, ("p", "s")), [0.45, 0.75])
 
 
 def test_knows_the_open_vowels():

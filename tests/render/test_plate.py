@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from corpus_tools.aam.mesh import MOUTH_LANDMARKS
+from corpus_tools.aam.reference_frame import MOUTH_LANDMARKS
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_talker import SIZE, face_points, own_talker

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 N_LANDMARKS = 478
+N_MESH_LANDMARKS = 468  # landmarks of the skin; those after them lie on the irises and depend on gaze
 
 UPPER_LIP_INNER_MID = 13
 LOWER_LIP_INNER_MID = 14

@@ -20,9 +20,10 @@ from corpus_tools.decomposition.decompose import (
 )
 from corpus_tools.decomposition.derived_styles import read_derived_styles
 from corpus_tools.decomposition.face_motion import moved_landmarks, rest_landmarks
-from corpus_tools.decomposition.style import add_style, size_ratios
+from corpus_tools.decomposition.style import add_style
 from lexicon.errors import DataError, InputError
 from tts2face.face.expressions import expression_landmarks
+from tts2face.face.landmark_fit import axis_ratios
 from tts2face.models.face import Face
 from tts2face.models.landmarks import MOUTH_REGION
 from tts2face.models.palette import EXPRESSIONS, REGION_FEATURES
@@ -170,7 +171,7 @@ def test_a_person_of_another_size_moves_the_common_face_alike(basis: ExpressionB
     for feature in REGION_FEATURES:
         small, large = (second.palette.styles[name].motion[feature] for name in ("small", "large"))
         np.testing.assert_allclose(large, small, atol=0.02 * np.abs(small).max())
-    np.testing.assert_allclose(size_ratios(1.3 * basis.rest, basis.rest), 1 / 1.3, rtol=1e-12)
+    np.testing.assert_allclose(axis_ratios(1.3 * basis.rest, basis.rest), 1 / 1.3, rtol=1e-12)
 
 
 def test_modes_are_orthonormal(basis: ExpressionBasis) -> None:
