@@ -199,12 +199,3 @@ def reduce_basis(basis: NDArray[np.floating], slack: float = 0.0) -> ReducedBasi
         raise DataError("the basis expressions are linearly dependent; capture distinct expressions")
     axes, upper = np.linalg.qr(flat.T)
     return ReducedBasis(np.asarray(axes), np.asarray(upper).T, slack)
-
-
-def approximation_error(
-    displacements: NDArray[np.floating], basis: NDArray[np.floating], weights: NDArray[np.floating]
-) -> Floats:
-    """(T,) root mean square over landmarks, in mm, of the residual of displacements (T, L, 3) for weights (T, B)."""
-    residual = np.asarray(displacements, np.float64) - np.tensordot(weights, np.asarray(basis, np.float64), axes=1)
-    error: Floats = np.sqrt(np.square(residual).sum(axis=-1).mean(axis=-1))
-    return error

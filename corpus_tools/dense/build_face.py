@@ -11,7 +11,6 @@ import numpy as np
 from corpus_tools.build_talker import NOT_STATED, PROVENANCE, read_provenance
 from corpus_tools.dense.adapt_head import adapt_head
 from corpus_tools.dense.mesh_fit import (
-    N_MESH_LANDMARKS,
     align_to_head,
     correct_lips_and_lids,
     face_landmarks,
@@ -26,6 +25,7 @@ from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.run_options import Progress, RunOptions
 from lexicon.errors import InputError
 from tts2face.models.face_file import read_face, write_face
+from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.storage.files import find_file
 from tts2face.video.landmark_models import find_bundle
 

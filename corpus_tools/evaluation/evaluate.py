@@ -173,7 +173,6 @@ def evaluate_across_talkers(
     train: Sequence[Observation],
     others: Sequence[Observation],
     *,
-    options: Mapping[str, SynthesisOptions] | None = None,
     on_progress: Progress | None = None,
 ) -> tuple[Evaluation, tuple[SplitResult, ...]]:
     """Scores of every method, learnt from one person, on utterances of another with the latter's phone edges.
@@ -195,7 +194,7 @@ def evaluate_across_talkers(
         standardise_reference(ReferenceUtterance.of(observation, talker.model), other_scale) for observation in others
     )
     synthesised, synthesis_s = {}, {}
-    methods = build_methods(talker, options)
+    methods = build_methods(talker)
     for number, (name, method) in enumerate(methods.items()):
         synthesised[name], synthesis_s[name] = _synthesise(method, real)
         if on_progress:

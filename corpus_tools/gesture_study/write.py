@@ -11,7 +11,6 @@ from corpus_tools.gesture_study.text import gestures_csv, gestures_json
 from corpus_tools.report.page import report_writer
 from tts2face.models.palette import load_palette
 from tts2face.storage.files import write_atomically
-from tts2face.storage.output_names import check_name
 
 
 def write_gestures(palette: str, out: Path, options: Options, *, on_progress: Progress | None = None) -> GestureStudy:
@@ -27,7 +26,6 @@ def write_gestures(palette: str, out: Path, options: Options, *, on_progress: Pr
         matplotlib is not installed, or the file cannot be written.
     """
     writer = report_writer(out, WRITERS)
-    check_name(out)
     found = study_gestures(palette, load_palette(palette), options, on_progress)
     write_atomically(out, writer(found))
     return found

@@ -12,7 +12,6 @@ from corpus_tools.similarity.text import analysis_json, difference_csv, table_cs
 from corpus_tools.similarity.tokens import check_labels
 from tts2face.models.talker import load_talker
 from tts2face.storage.files import write_atomically
-from tts2face.storage.output_names import check_name
 
 
 def write_similarity(
@@ -38,7 +37,6 @@ def write_similarity(
     """
     writer = report_writer(out, WRITERS)
     check_labels(labels)
-    check_name(out)
     against = None if other is None else NamedTalker(other, load_talker(other))
     found = analyse(NamedTalker(talker, load_talker(talker)), options, against, on_progress)
     write_atomically(out, writer(found, labels))

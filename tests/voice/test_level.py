@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tests.oracles.loudness_meter import measured
-from tts2face.speech.bs1770 import integrated_loudness, oversampled_peaks, true_peak
+from tests.oracles.loudness_meter import measured, true_peak
+from tts2face.speech.bs1770 import integrated_loudness, oversampled_peaks
 from tts2face.types import Speech, Waveform
 from tts2face.voice.level import (
     CEILING_DB,

@@ -8,12 +8,12 @@ from scipy.optimize import lsq_linear
 
 from corpus_tools.decomposition.blend_weights import (
     N_AVERAGED,
-    approximation_error,
     build_least_squares_estimator,
     build_nearest_samples_estimator,
     moving_average,
 )
 from lexicon.errors import DataError, InputError
+from tests.corpus_tools.decomposition.weight_errors import approximation_error
 
 N_LANDMARKS = 30
 
