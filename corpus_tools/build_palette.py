@@ -29,7 +29,7 @@ from corpus_tools.decomposition.recording_files import read_recordings
 from corpus_tools.decomposition.stills import NEUTRAL, PictureReader, Still, build_marker_reader
 from corpus_tools.decomposition.style import add_style
 from corpus_tools.recordings.observe import Refusal
-from corpus_tools.run_options import Progress, RunOptions, StageCallback, ignore_stage
+from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.pose_correction import fit_pose_correction
 from lexicon.errors import DataError, InputError
 from tts2face.face.expressions import expression_landmarks
@@ -39,6 +39,7 @@ from tts2face.models.face_file import load_face
 from tts2face.models.landmarks import inner_lip_gaps
 from tts2face.models.palette import Palette, write_palette
 from tts2face.retargeting.performer import CLOSED_FRAME_SHARE, eye_aperture
+from tts2face.types import Progress
 
 ESTIMATORS = ("least-squares", "samples")
 SAMPLES_SEED = 2008

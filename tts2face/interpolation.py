@@ -61,8 +61,6 @@ def interpolate_linear(
     return np.asarray(values[after - 1] * (1 - share) + values[after] * share, np.float32)
 
 
-def interpolate_columns(
-    values: NDArray[np.floating], times: NDArray[np.floating], at: NDArray[np.floating]
-) -> NDArray[np.float64]:
+def interpolate_columns(values: NDArray[np.floating], times: Array, at: Array) -> NDArray[np.float64]:
     """(N, D) values at N instants from (T, D) at increasing times (T,), as float64; constant before and after."""
     return np.stack([np.interp(at, times, column) for column in values.T], axis=1)

@@ -19,15 +19,10 @@ from corpus_tools.aam.reference_frame import (
     mouth_triangles,
 )
 from corpus_tools.aam.source_videos import AppearanceRecording
-from corpus_tools.run_options import Progress
 from lexicon.errors import InputError
 from tts2face.models.appearance import Appearance, Plate, TextureModel
-from tts2face.models.landmarks import (
-    FACE_OVAL,
-    MOUTH_REGION,
-    N_MESH_LANDMARKS,
-    lip_opening,
-)
+from tts2face.models.landmarks import FACE_OVAL, MOUTH_REGION, N_MESH_LANDMARKS, lip_opening
+from tts2face.types import Progress
 
 GAIN_LIMITS = (0.5, 2.0)  # beyond them it is another scene, not another light
 Floats = NDArray[np.float32]

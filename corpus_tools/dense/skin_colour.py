@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from corpus_tools.dense.mesh_fit import face_landmarks, face_width
 from corpus_tools.dense.video_landmarks import VideoLandmarks, eye_opening
 from corpus_tools.dense.visible_texels import SkinCanvas
-from corpus_tools.run_options import Progress
 from lexicon.errors import DataError
 from tts2face.face.rbf import DECAY_LENGTH, FACE_WIDTH, rbf_values
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.numeric import smoothstep
+from tts2face.types import Progress
 from tts2face.video.media import read_frames
 from tts2face.video.pose import similarity_transforms
 

@@ -9,11 +9,9 @@ from numpy.typing import NDArray
 
 from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.folder import VIDEO_SUFFIXES, find_recordings
-from corpus_tools.run_options import Progress
 from lexicon.errors import DataError, InputError
-from tts2face.models.landmarks import (
-    lip_opening,
-)
+from tts2face.models.landmarks import lip_opening
+from tts2face.types import Progress
 from tts2face.video.pose import remove_pose
 
 Floats = NDArray[np.float64]

@@ -16,12 +16,12 @@ from corpus_tools.evaluation.splits import Split, check_disjoint
 from corpus_tools.evaluation.tables import Evaluation, Fold
 from corpus_tools.evaluation.tracks import ExternalTrack, map_tracks
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.run_options import Progress
 from corpus_tools.training.pose_correction import correct_pose, fit_pose_correction
 from corpus_tools.training.train_phone_network import add_phone_network
 from corpus_tools.training.train_talker import learn_talker
 from tts2face.exemplar.options import SynthesisOptions
 from tts2face.models.talker import ShapeModel, Talker
+from tts2face.types import Progress
 from tts2face.voice.engine import Voice
 
 EVALUATION_METADATA = {

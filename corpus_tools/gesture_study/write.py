@@ -4,13 +4,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from corpus_tools.gesture_study.analysis import GestureStudy, Options, Progress, study_gestures
+from corpus_tools.gesture_study.analysis import GestureStudy, Options, study_gestures
 from corpus_tools.gesture_study.figure import panels_png, summary_panels
 from corpus_tools.gesture_study.page import gestures_page
 from corpus_tools.gesture_study.text import gestures_csv, gestures_json
 from corpus_tools.report.page import report_writer
 from tts2face.models.palette import load_palette
 from tts2face.storage.files import write_atomically
+from tts2face.types import Progress
 
 
 def write_gestures(palette: str, out: Path, options: Options, *, on_progress: Progress | None = None) -> GestureStudy:

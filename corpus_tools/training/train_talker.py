@@ -9,11 +9,7 @@ from numpy.typing import NDArray
 from corpus_tools.recordings.observation import Observation
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE
-from tts2face.models.landmarks import (
-    MOUTH_REGION,
-    N_LANDMARKS,
-    lip_opening,
-)
+from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS, lip_opening
 from tts2face.models.talker import ShapeModel, Talker, Utterance
 from tts2face.numeric import fix_signs, nearest_rotation, principal_axes
 from tts2face.video.pose import head_angles

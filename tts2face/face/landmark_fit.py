@@ -41,7 +41,7 @@ def procrustes_rotation(source: FloatArray, target: FloatArray) -> FloatArray:
 
 def axis_scales(source: FloatArray, target: FloatArray, bounds: tuple[float, float]) -> FloatArray:
     """Factors s (3,) of the least-squares fit ``target = s * source + shift`` per axis, clipped to `bounds`."""
-    clipped: FloatArray = np.round(np.clip(axis_ratios(source, target), *bounds), DIGITS)
+    clipped: FloatArray = np.clip(axis_ratios(source, target), *bounds).round(DIGITS)
     return clipped
 
 

@@ -1,7 +1,7 @@
 """Encoding of clips while they are drawn: .mp4, .webm, .gif, or a folder of .png pictures."""
 
 import contextlib
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
 
@@ -25,11 +25,9 @@ from tts2face.render.output_path import (
 from tts2face.render.png_folder import PngFolderWriter
 from tts2face.render.renderer import FrameRenderer
 from tts2face.storage.temporary import Temporary
-from tts2face.types import Clip
+from tts2face.types import Clip, Progress
 
 N_SWATCHES = 6  # frames of the first clip from which the palette of a GIF is computed
-
-Progress = Callable[[int, int], None]
 
 
 class ClipWriter:

@@ -1,6 +1,5 @@
 """A take: tracked landmarks, head pose and blendshape scores of a performer in a video."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +8,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.interpolation import interpolate_linear
-from tts2face.types import HEAD_CHANNELS, Trajectory
+from tts2face.types import HEAD_CHANNELS, Progress, Trajectory
 from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.frame_grid import resample_to_grid
 from tts2face.video.media import read_frames, read_media_info
@@ -19,8 +18,6 @@ from tts2face.video.streaming_tracker import StreamingTracker, TrackedFrame
 MAX_COUNTS_WITH_TWO_FACES = 1  # tolerates one false detection
 MIN_TRACKED_SHARE = 0.5  # least share of frames with a face
 PROFILE_RAD = 0.8  # median yaw beyond which the landmarks of the far side are unreliable
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
