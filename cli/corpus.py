@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from cli.flags import parse_whole_number
+from cli.flags import switch, whole_number
 from cli.process import write_message
 from cli.progress import progress_bar, stage_bar
 from tts2face.storage.output_names import check_file_name
@@ -15,10 +15,16 @@ from tts2face.storage.overwrite import refuse_overwriting
 
 corpus = App(name="corpus", help="Build, show and evaluate talkers.")
 
-Jobs = Annotated[
-    int | None, Parameter(help="Number of processes; by default one per core.", converter=parse_whole_number)
-]
+Jobs = Annotated[int | None, whole_number("Number of processes; by default one per core.")]
 Cache = Annotated[Path | None, Parameter(help="Folder for intermediate results; by default the user's cache folder.")]
+OutTalker = Annotated[Path, Parameter(help="Output talker (.talker).", alias="-o")]
+TalkerName = Annotated[str, Parameter(help="A shipped talker or a .talker file.")]
+Provenance = Annotated[
+    Path | None,
+    Parameter(
+        help="JSON with name, language, sources, licence and attribution; by default provenance.json of the folder."
+    ),
+]
 Model = Annotated[Path | None, Parameter(help="Path of face_landmarker.task; by default found or set up.")]
 
 
@@ -35,17 +41,10 @@ def build(  # noqa: PLR0913 - one parameter a flag
     recordings: Annotated[Path, Parameter(help="Folder of videos, or one video, with transcripts beside them.")],
     /,
     *,
-    out: Annotated[Path, Parameter(help="Output talker (.talker).", alias="-o")],
+    out: OutTalker,
     name: Annotated[str | None, Parameter(help="Name of the talker; by default the folder's name.")] = None,
-    provenance: Annotated[
-        Path | None,
-        Parameter(
-            help="JSON with name, language, sources, licence and attribution; by default provenance.json of the folder."
-        ),
-    ] = None,
-    appearance: Annotated[
-        bool, Parameter(help="Also train the talker's appearance model, for `--face self`.", negative="")
-    ] = False,
+    provenance: Provenance = None,
+    appearance: Annotated[bool, switch("Also train the talker's appearance model, for `--face self`.")] = False,
     consent: Annotated[
         str | None,
         Parameter(help="With --appearance: statement of consent of the person shown, stored with name and date."),
@@ -116,9 +115,8 @@ def face(  # noqa: PLR0913 - one parameter a flag
     ] = None,
     basis: Annotated[
         int,
-        Parameter(
-            help="Modes of the person's own dense shape model to add, as the shapes denseMean, dense1, dense2, ...",
-            converter=parse_whole_number,
+        whole_number(
+            "Modes of the person's own dense shape model to add, as the shapes denseMean, dense1, dense2, ..."
         ),
     ] = 0,
     cache: Cache = None,
@@ -153,13 +151,11 @@ def clone(
     target: Annotated[str, Parameter(help="Target shape model: a shipped talker or a .talker file.")],
     /,
     *,
-    out: Annotated[Path, Parameter(help="Output talker (.talker).", alias="-o")],
+    out: OutTalker,
     gain: Annotated[
         float, Parameter(help="Factor on the displacement from rest; 1.2 amplifies, 0.8 attenuates.")
     ] = 1.0,
-    append_missing: Annotated[
-        bool, Parameter(help="Append modes for motion outside the target's shape basis.", negative="")
-    ] = False,
+    append_missing: Annotated[bool, switch("Append modes for motion outside the target's shape basis.")] = False,
 ) -> None:
     """Transfer speech motion between talkers: write a talker with the target's face and the source's motion."""
     check_suffix(out, "talker")
@@ -181,8 +177,8 @@ def audio_maps(
     recordings: Annotated[Path, Parameter(help="Folder of recordings from which the talker was built.")],
     /,
     *,
-    talker: Annotated[str, Parameter(help="A shipped talker or a .talker file.")],
-    out: Annotated[Path, Parameter(help="Output talker (.talker).", alias="-o")],
+    talker: TalkerName,
+    out: OutTalker,
     jobs: Jobs = None,
     cache: Cache = None,
     model: Model = None,
@@ -204,7 +200,7 @@ def audio_maps(
 
 
 @corpus.command
-def show(talker: Annotated[str, Parameter(help="A shipped talker or a .talker file.")], /) -> None:
+def show(talker: TalkerName, /) -> None:
     """Print the contents of a talker: utterances, phones, modes, provenance."""
     from corpus_tools.show_talker import describe
     from tts2face.models.talker import load_talker
@@ -218,16 +214,9 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
     recordings: Annotated[
         Path | None, Parameter(help="Folder of recordings to split into training and held-out utterances.")
     ] = None,
-    hold_out: Annotated[
-        int, Parameter(help="Number of utterances held out of --recordings.", converter=parse_whole_number)
-    ] = 100,
-    seed: Annotated[
-        int, Parameter(help="Seed of the random choice of held-out utterances.", converter=parse_whole_number)
-    ] = 0,
-    folds: Annotated[
-        int | None,
-        Parameter(help="Number of folds for cross-validation, instead of --hold-out.", converter=parse_whole_number),
-    ] = None,
+    hold_out: Annotated[int, whole_number("Number of utterances held out of --recordings.")] = 100,
+    seed: Annotated[int, whole_number("Seed of the random choice of held-out utterances.")] = 0,
+    folds: Annotated[int | None, whole_number("Number of folds for cross-validation, instead of --hold-out.")] = None,
     hold_out_words: Annotated[
         str | None,
         Parameter(
@@ -241,10 +230,7 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
         Parameter(help="Test on recordings of another talker, or a Live Link Face .csv with its sound; z-scored."),
     ] = None,
     own_durations: Annotated[
-        bool,
-        Parameter(
-            help="Also evaluate synthesis from text with the durations of the default English voice.", negative=""
-        ),
+        bool, switch("Also evaluate synthesis from text with the durations of the default English voice.")
     ] = False,
     tracks: Annotated[
         Path | None,

@@ -18,6 +18,16 @@ END_OF_OPTIONS = "--"  # everything after it is text or a path
 _SHORT_OPTION = re.compile(r"-[A-Za-z]")
 
 
+def switch(help_text: str) -> Parameter:
+    """A flag without a value and without a negative form."""
+    return Parameter(help=help_text, negative="")
+
+
+def whole_number(help_text: str) -> Parameter:
+    """A flag with a whole number."""
+    return Parameter(help=help_text, converter=parse_whole_number)
+
+
 def parse_whole_number(_: Any, tokens: "Sequence[Token]") -> int:
     """Value of an integer flag; cyclopts itself rounds 2.5 to 2."""
     try:

@@ -5,7 +5,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from cli.corpus import Cache, Jobs, Model, check_suffix, corpus
+from cli.corpus import Cache, Jobs, Model, Provenance, check_suffix, corpus
+from cli.flags import switch
 from cli.process import write_message
 from cli.progress import stage_bar
 from tts2face.storage.overwrite import refuse_overwriting
@@ -21,9 +22,7 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
     palette: Annotated[
         str, Parameter(help="Palette to which the style is added: a shipped palette or a .palette file.")
     ] = "starter",
-    alone: Annotated[
-        bool, Parameter(help="Write a palette of this style only, with the six derived moods.", negative="")
-    ] = False,
+    alone: Annotated[bool, switch("Write a palette of this style only, with the six derived moods.")] = False,
     stills: Annotated[
         Path | None, Parameter(help="Folder of stills of the person: neutral.png, sad.png, happy.png, ...")
     ] = None,
@@ -41,12 +40,7 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
     epsilon: Annotated[
         float, Parameter(help="Slack of the expression weights beyond [0, 1], from 0 to 1; 0 is the most stable.")
     ] = 0.0,
-    provenance: Annotated[
-        Path | None,
-        Parameter(
-            help="JSON with name, language, sources, licence and attribution; by default provenance.json of the folder."
-        ),
-    ] = None,
+    provenance: Provenance = None,
     jobs: Jobs = None,
     cache: Cache = None,
     model: Model = None,

@@ -9,7 +9,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 import cli.gestures  # noqa: F401 - adds its command to `corpus`
 from cli.corpus import corpus
-from cli.flags import add_option_flags, check_options, options_from_flags
+from cli.flags import add_option_flags, check_options, options_from_flags, switch
 from cli.lists import LISTS
 from cli.mimic import mimic
 from cli.process import (
@@ -109,10 +109,10 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     explain: Annotated[
         Path | None, Parameter(help="Write the recorded phones used for each phone (.json or .txt).")
     ] = None,
-    view: Annotated[bool, Parameter(help="Show the head in a window (extra [view]).", negative="")] = False,
-    quiet: Annotated[bool, Parameter(help="Print no progress bar and no summary.", negative="")] = False,
-    noise: Annotated[bool, Parameter(help="Short for --gestures noise.", negative="")] = False,
-    no_gestures: Annotated[bool, Parameter(help="Short for --gestures none.", negative="")] = False,
+    view: Annotated[bool, switch("Show the head in a window (extra [view]).")] = False,
+    quiet: Annotated[bool, switch("Print no progress bar and no summary.")] = False,
+    noise: Annotated[bool, switch("Short for --gestures noise.")] = False,
+    no_gestures: Annotated[bool, switch("Short for --gestures none.")] = False,
     **options: Any,
 ) -> None:
     """Synthesise a talking face from text."""

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from cli.flags import switch
 from cli.process import write_message
 from cli.progress import stage_bar
 from lexicon.errors import InputError
@@ -35,7 +36,7 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     talker: Annotated[Path | None, Parameter(help="With --face self: talker whose own face is shown.")] = None,
     gain: Annotated[float, Parameter(help="Factor on the motion of lips and brows.")] = 1.0,
     append_missing: Annotated[
-        bool, Parameter(help="With --face self: append modes for motion outside the talker's shape basis.", negative="")
+        bool, switch("With --face self: append modes for motion outside the talker's shape basis.")
     ] = False,
     fps: Annotated[
         float | None, Parameter(help="Frames per second; by default the take's own rate, at most 30 for a capture.")
@@ -46,7 +47,7 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     ] = "auto",
     background: Annotated[str, Parameter(help="studio, transparent, a colour, or an image file.")] = "studio",
     model: Annotated[Path | None, Parameter(help="Path of face_landmarker.task; by default found or set up.")] = None,
-    quiet: Annotated[bool, Parameter(help="Print no progress bar and no summary.", negative="")] = False,
+    quiet: Annotated[bool, switch("Print no progress bar and no summary.")] = False,
 ) -> None:
     """Transfer recorded motion of lips, eyes, brows and head to a face; the sound is copied."""
     began = time.perf_counter()

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from cli.flags import parse_whole_number
+from cli.flags import whole_number
 from cli.process import write_message
 from cli.progress import progress_bar
 from lexicon.errors import InputError
@@ -24,15 +24,8 @@ def similarity(  # noqa: PLR0913 - one parameter a flag
         str | None,
         Parameter(help="Numbers of viseme classes to list; by default those of 4,6,8,10,12 that the phones allow."),
     ] = None,
-    halves: Annotated[
-        int,
-        Parameter(
-            help="Number of random split halves of the corpus to compare (.html, .json).", converter=parse_whole_number
-        ),
-    ] = 20,
-    seed: Annotated[
-        int, Parameter(help="Seed of the random halves and permutations (.html, .json).", converter=parse_whole_number)
-    ] = 0,
+    halves: Annotated[int, whole_number("Number of random split halves of the corpus to compare (.html, .json).")] = 20,
+    seed: Annotated[int, whole_number("Seed of the random halves and permutations (.html, .json).")] = 0,
     compare: Annotated[
         str | None, Parameter(help="Second talker to compare with; .csv and .png then contain the difference.")
     ] = None,
@@ -58,21 +51,10 @@ def gestures(
     /,
     *,
     out: Annotated[Path, Parameter(help="Output: .html, .csv, .json or .png.", alias="-o")],
-    held_out: Annotated[
-        int, Parameter(help="Hold out one in this many recordings for the comparison.", converter=parse_whole_number)
-    ] = 5,
-    halves: Annotated[
-        int,
-        Parameter(
-            help="Number of random split halves of the held-out recordings to compare.", converter=parse_whole_number
-        ),
-    ] = 50,
-    clips: Annotated[
-        int, Parameter(help="Number of clips, of different seeds, made by each method.", converter=parse_whole_number)
-    ] = 3,
-    seed: Annotated[
-        int, Parameter(help="Seed of the random choice of recordings, halves and clips.", converter=parse_whole_number)
-    ] = 0,
+    held_out: Annotated[int, whole_number("Hold out one in this many recordings for the comparison.")] = 5,
+    halves: Annotated[int, whole_number("Number of random split halves of the held-out recordings to compare.")] = 50,
+    clips: Annotated[int, whole_number("Number of clips, of different seeds, made by each method.")] = 3,
+    seed: Annotated[int, whole_number("Seed of the random choice of recordings, halves and clips.")] = 0,
 ) -> None:
     """Compare each style's gestures with motion from its fields, noise and published fields for the same sound."""
     refuse_overwriting({"--out": out}, {"the palette": palette})

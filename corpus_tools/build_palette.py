@@ -29,15 +29,17 @@ from corpus_tools.decomposition.recording_files import read_recordings
 from corpus_tools.decomposition.stills import NEUTRAL, PictureReader, Still, build_marker_reader
 from corpus_tools.decomposition.style import add_style
 from corpus_tools.recordings.observe import Refusal
-from corpus_tools.run_options import Progress, RunOptions, StageCallback, ignore_stage
+from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.pose_correction import fit_pose_correction
 from lexicon.errors import DataError, InputError
 from tts2face.face.expressions import expression_landmarks
 from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face
+from tts2face.models.landmarks import inner_lip_gaps
 from tts2face.models.palette import Palette, write_palette
-from tts2face.retargeting.performer import CLOSED_FRAME_SHARE, eye_aperture, lip_gaps
+from tts2face.retargeting.performer import CLOSED_FRAME_SHARE, eye_aperture
+from tts2face.types import Progress
 
 ESTIMATORS = ("least-squares", "samples")
 SAMPLES_SEED = 2008
@@ -198,7 +200,7 @@ def person_at_rest(captured: Sequence[FaceRecording]) -> NDArray[np.float64]:
     frames = frames[:: max(1, len(frames) // N_REST_FRAMES)]
     opened = np.minimum(eye_aperture(frames, "Left"), eye_aperture(frames, "Right"))
     is_open = opened >= MIN_OPEN_LIDS * np.median(opened)
-    gaps = lip_gaps(frames)[:, MIDDLE_PAIR]
+    gaps = inner_lip_gaps(frames)[:, MIDDLE_PAIR]
     closed = gaps <= np.quantile(gaps[is_open], CLOSED_FRAME_SHARE)
     return np.asarray(np.median(frames[is_open & closed], axis=0), np.float64)
 

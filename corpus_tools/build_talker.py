@@ -12,7 +12,7 @@ from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import Refusal, check_any_kept, observe
 from corpus_tools.report.drawing import load_matplotlib
 from corpus_tools.report.recordings import recordings_page
-from corpus_tools.run_options import Progress, RunOptions, StageCallback, ignore_stage
+from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.pose_correction import correct_pose
 from corpus_tools.training.train_audio_map import learn_audio_maps
 from corpus_tools.training.train_phone_network import add_phone_network
@@ -21,6 +21,7 @@ from lexicon.errors import DataError, InputError
 from lexicon.inputs import read_json
 from tts2face.models.talker import Talker, write_talker
 from tts2face.storage.files import write_atomically
+from tts2face.types import Progress
 from tts2face.video.landmark_models import find_bundle
 
 PROVENANCE = "provenance.json"  # in the folder of recordings: their sources and licence

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lexicon.errors import BackendError, InputError
+from tts2face.types import Progress
 from tts2face.video.landmark_models import user_cache
 
-Progress = Callable[[int, int], None]  # number of finished steps, number of all steps
 StageCallback = Callable[[str], Progress]  # name of a stage -> its progress callback
 
 

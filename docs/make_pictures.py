@@ -13,13 +13,13 @@ from corpus_tools.similarity.analysis import Options
 from corpus_tools.similarity.write import write_similarity
 from lexicon.phones import ipa_to_arpabet
 from lexicon.sequence import SILENCE
-from tts2face.models.face_file import list_identities, load_face
+from tts2face.catalogue import identities
+from tts2face.models.face_file import load_face
 from tts2face.models.talker import load_talker
 from tts2face.render.draw import draw
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.session import Session
-from tts2face.storage.files import find_file
 
 HERE = Path(__file__).parent / "pictures"
 SENTENCE = "We were away a year ago, but Bob may move five big maps."
@@ -68,7 +68,7 @@ def clip_sheet() -> Image.Image:
 def faces_sheet() -> Image.Image:
     """The shipped faces and the identities of the head, at rest."""
     chosen: list[tuple[str, str | None]] = [("head", None), ("cartoon", None)]
-    chosen += [("head", name) for name in list_identities(find_file("head", "face"))]
+    chosen += [("head", name) for name in (entry.name for entry in identities())]
     pictures = []
     for name, identity in chosen:
         face = load_face(name, identity)

@@ -14,7 +14,6 @@ _AREA_CODE = re.compile(r"\(([0-9]{2,4})\) ?(?=[0-9]{3}[ .-][0-9]{4})")
 _SINGLE_QUOTES = "‘’‚‛′`´ʹʻʼʽˈ"
 _DOUBLE_QUOTES = '“”„‟«»″‹›"「」『』〈〉《》'
 _BRACKETS = "()[]{}"
-_DASHES = "–—―‐‑‒−⁃"
 _DROPPED_CHARACTERS = "™®*_~|\\•·●○◦▪▫■□★☆◆◇►▶◀»※†‡\u20e3"
 _FULL_STOPS = "。｡।॥۔።"
 _TRANSLATION = (

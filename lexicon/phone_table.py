@@ -111,8 +111,8 @@ def _parse_row(line: str, where: str) -> Phone:
     return phone
 
 
-def read_phones(text: str, name: str = "phones.tsv") -> dict[str, Phone]:
-    """Phones by symbol, from the lines of a table with the header of `phones.tsv`.
+def read_phones(text: str) -> dict[str, Phone]:
+    """Phones by symbol, from the text of `phones.tsv`.
 
     Raises
     ------
@@ -121,12 +121,12 @@ def read_phones(text: str, name: str = "phones.tsv") -> dict[str, Phone]:
     """
     phones: dict[str, Phone] = {}
     for number, line in enumerate(text.splitlines()[1:], start=2):
-        phone = _parse_row(line, f"{name}, line {number}")
+        phone = _parse_row(line, f"phones.tsv, line {number}")
         if phone.symbol in phones:
-            raise DataError(f"{name}, line {number}: {phone.symbol} occurs twice; remove one line")
+            raise DataError(f"phones.tsv, line {number}: {phone.symbol} occurs twice; remove one line")
         phones[phone.symbol] = phone
     for phone in phones.values():
         for part in phone.parts:
             if part not in phones:
-                raise DataError(f"{name}: {phone.symbol} has the part {part}, which has no line of its own; add it")
+                raise DataError(f"phones.tsv: {phone.symbol} has the part {part}, which has no line of its own; add it")
     return phones

@@ -1,4 +1,4 @@
-"""Bilinear interpolation of pictures and cubic interpolation of trajectories."""
+"""Interpolation of pictures (bilinear) and of trajectories (linear, cubic)."""
 
 from typing import Any
 
@@ -47,3 +47,20 @@ def interpolate_cubic(values: NDArray[np.float32], at: NDArray[np.float64]) -> N
     slope_here, slope_after = (after - before) / 2, (beyond - here) / 2
     bend, twist = 3 * (after - here) - 2 * slope_here - slope_after, 2 * (here - after) + slope_here + slope_after
     return np.asarray(here + part * (slope_here + part * (bend + part * twist)), np.float32)
+
+
+def interpolate_linear(
+    values: NDArray[np.float32], times: NDArray[np.float64], at: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """Values (N, ...) at N instants from (T, ...) at increasing times (T,); constant before and after."""
+    if len(times) == 1:
+        return np.repeat(values, len(at), axis=0)
+    after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
+    share = np.clip((at - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0)
+    share = share.reshape(-1, *[1] * (values.ndim - 1)).astype(np.float32)
+    return np.asarray(values[after - 1] * (1 - share) + values[after] * share, np.float32)
+
+
+def interpolate_columns(values: NDArray[np.floating], times: Array, at: Array) -> NDArray[np.float64]:
+    """(N, D) values at N instants from (T, D) at increasing times (T,), as float64; constant before and after."""
+    return np.stack([np.interp(at, times, column) for column in values.T], axis=1)

@@ -15,8 +15,9 @@ def ordered_product(a: NDArray[np.floating], b: NDArray[np.floating]) -> FloatAr
     return summed
 
 
-def smoothstep(share: NDArray[AnyFloat]) -> NDArray[AnyFloat]:
-    """``3 s^2 - 2 s^3``: from 0 to 1 with zero slope at both ends, for shares in [0, 1]."""
+def smoothstep(values: NDArray[AnyFloat], low: float = 0.0, high: float = 1.0) -> NDArray[AnyFloat]:
+    """``3 s^2 - 2 s^3``: from 0 at `low` to 1 at `high` without slope at both, constant outside; `high` may be less."""
+    share = np.clip((values - low) / (high - low), 0.0, 1.0)
     curve: NDArray[AnyFloat] = share * share * (3.0 - 2.0 * share)
     return curve
 
@@ -27,3 +28,16 @@ def nearest_rotation(matrix: NDArray[np.floating]) -> FloatArray:
     signs = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
     rotation: FloatArray = left @ signs @ right
     return rotation
+
+
+def principal_axes(scatter: NDArray[np.floating], n_axes: int) -> tuple[FloatArray, FloatArray]:
+    """The `n_axes` largest variances and unit axes (n_axes, D) of a scatter matrix (D, D), largest first."""
+    variances, vectors = np.linalg.eigh(scatter)
+    return np.maximum(variances[::-1][:n_axes], 0.0), vectors[:, ::-1][:, :n_axes].T
+
+
+def fix_signs(axes: NDArray[AnyFloat]) -> NDArray[AnyFloat]:
+    """Axes (K, D) with the sign that makes the largest entry of each positive: the same for the same data."""
+    largest = axes[np.arange(len(axes)), np.abs(axes).argmax(axis=1)]
+    signed: NDArray[AnyFloat] = axes * np.sign(largest)[:, None]
+    return signed

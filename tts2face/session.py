@@ -31,7 +31,7 @@ from tts2face.synthesis.gesture_layer import GestureLayer
 from tts2face.synthesis.marked_speech import MarkTime
 from tts2face.synthesis.performance import Performance, perform, take_clips
 from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, prepare
-from tts2face.types import Clip, concatenate_clips
+from tts2face.types import Clip, Progress, concatenate_clips
 from tts2face.voice.engine import PronunciationMap, Voice
 from tts2face.voice.loading import load_voice
 
@@ -41,7 +41,6 @@ MAX_VOICES = 2  # unused voices in memory; about 100 MB each
 MAX_RENDERERS = 2  # renderers in memory, one for each picture; about 30 MB each
 N_PIECES_AHEAD = 2  # pieces synthesised before they are drawn
 
-Progress = Callable[[int, int], None]
 Value = TypeVar("Value")
 
 

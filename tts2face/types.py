@@ -4,7 +4,7 @@ Units: seconds, millimetres, radians. Frame i is the instant i / fps.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +33,9 @@ def _checked_read_only(values: ArrayLike, what: str, ndim: int) -> NDArray[np.fl
         raise InputError(f"{what} must be finite; it holds NaN or infinity")
     array.setflags(write=False)
     return array
+
+
+Progress = Callable[[int, int], None]  # number of finished steps, number of all steps
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.numeric import fix_signs
+
 Floats = NDArray[np.float32]
 
 
@@ -72,5 +74,4 @@ def _truncated_svd(rows: Floats, n_kept: int) -> tuple[Floats, NDArray[np.float6
         basis = (vectors[:, order] / scales).T.astype(np.float32) @ rows
     else:
         basis = vectors[:, order].T.astype(np.float32)
-    signs = np.sign(basis[np.arange(len(basis)), np.abs(basis).argmax(axis=1)])
-    return np.asarray(basis * signs[:, None], np.float32), scales
+    return fix_signs(basis), scales

@@ -8,22 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.aam.block_pca import IncrementalPca
-from corpus_tools.aam.mesh import MOUTH_LANDMARKS, N_MESH_LANDMARKS, face_ring, face_triangles, mouth_triangles
 from corpus_tools.aam.plate import choose_plate_frames, encode_plate_video
 from corpus_tools.aam.procrustes import align_shapes
-from corpus_tools.aam.reference_frame import ReferenceFrame, build_reference_frame
+from corpus_tools.aam.reference_frame import (
+    MOUTH_LANDMARKS,
+    ReferenceFrame,
+    build_reference_frame,
+    face_ring,
+    face_triangles,
+    mouth_triangles,
+)
 from corpus_tools.aam.source_videos import AppearanceRecording
-from corpus_tools.run_options import Progress
 from lexicon.errors import InputError
 from tts2face.models.appearance import Appearance, Plate, TextureModel
-from tts2face.models.landmarks import (
-    EYE_OUTER_LEFT,
-    EYE_OUTER_RIGHT,
-    FACE_OVAL,
-    LOWER_LIP_INNER_MID,
-    MOUTH_REGION,
-    UPPER_LIP_INNER_MID,
-)
+from tts2face.models.landmarks import FACE_OVAL, MOUTH_REGION, N_MESH_LANDMARKS, lip_opening
+from tts2face.types import Progress
 
 GAIN_LIMITS = (0.5, 2.0)  # beyond them it is another scene, not another light
 Floats = NDArray[np.float32]
@@ -65,17 +64,9 @@ BLOCK_FRAMES = 128  # frames per block of the incremental PCA
 N_SPARE_COMPONENTS = 20  # extra components during the incremental PCA
 MAX_STILL_WEIGHT = 0.02  # pixels with less change by speech are used to estimate lighting
 N_LIGHTING_FRAMES = 25  # from which a recording's lighting is estimated
+SIDE_PX, MOUTH_SIDE_PX = 128, 64  # longer sides of the textures
+N_MODES, N_MOUTH_MODES = 40, 20  # components of the textures
 N_SMOOTHINGS = 4  # smoothing steps of the speech weights over the mesh
-
-
-@dataclass(frozen=True, slots=True)
-class TextureOptions:
-    """Sizes of the textures and numbers of components."""
-
-    side: int = 128
-    modes: int = 40
-    mouth_side_px: int = 64
-    mouth_modes: int = 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +86,6 @@ class LearnedAppearance:
 
 def learn_appearance(
     recordings: Sequence[AppearanceRecording],
-    options: TextureOptions | None = None,
     *,
     on_progress: Progress | None = None,
 ) -> LearnedAppearance:
@@ -108,12 +98,11 @@ def learn_appearance(
     """
     if not recordings:
         raise InputError("no recording could be used; give at least one")
-    options = options or TextureOptions()
-    frames = reference_frames(recordings, options)
+    frames = reference_frames(recordings)
     moving = speech_weights(frames[0])
     stretch = choose_plate_frames([recording.points for recording in recordings])
     lights = LightingReference(frames[0], mean_texture(recordings[stretch[0]], frames[0]), moving < MAX_STILL_WEIGHT)
-    grown = IncrementalPca(options.modes + N_SPARE_COMPONENTS), IncrementalPca(options.mouth_modes + N_SPARE_COMPONENTS)
+    grown = IncrementalPca(N_MODES + N_SPARE_COMPONENTS), IncrementalPca(N_MOUTH_MODES + N_SPARE_COMPONENTS)
     steps, found = 2 * len(recordings), []
     for number, recording in enumerate(recordings):
         found.append(lights.of(recording))
@@ -121,8 +110,8 @@ def learn_appearance(
         if on_progress:
             on_progress(number + 1, steps)
     models = (
-        _build_texture_model(frames[0], grown[0], options.modes, "the face"),
-        _build_texture_model(frames[1], grown[1], options.mouth_modes, "the inside of the mouth"),
+        _build_texture_model(frames[0], grown[0], N_MODES, "the face"),
+        _build_texture_model(frames[1], grown[1], N_MOUTH_MODES, "the inside of the mouth"),
     )
     parameters = []
     for number, (recording, light) in enumerate(zip(recordings, found, strict=True)):
@@ -160,24 +149,17 @@ def mean_texture(recording: AppearanceRecording, frame: ReferenceFrame) -> NDArr
 
 
 def reference_frames(
-    recordings: Sequence[AppearanceRecording], options: TextureOptions
+    recordings: Sequence[AppearanceRecording],
 ) -> tuple[ReferenceFrame, ReferenceFrame]:
     """Reference frames of the face and of the inner mouth: the mean of the frames with lips well apart."""
     n_frames = sum(len(recording.points) for recording in recordings)
     every = max(1, n_frames // N_REFERENCE_SHAPES)
     points = np.concatenate([recording.points for recording in recordings])[::every]
     shapes, _ = align_shapes(points[:, :N_MESH_LANDMARKS])
-    gaps = normalised_lip_gap(shapes)
+    gaps = lip_opening(shapes)
     opened = shapes[gaps >= np.quantile(gaps, OPEN_LIP_QUANTILE)].mean(axis=0)
-    face = build_reference_frame(opened, face_triangles(opened), options.side)
-    return face, build_reference_frame(opened[list(MOUTH_LANDMARKS)], mouth_triangles(), options.mouth_side_px)
-
-
-def normalised_lip_gap(points: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(T,) distance of the inner lips over that of the outer eye corners, of (T, N, 2 or 3) points."""
-    lips = np.linalg.norm(points[:, UPPER_LIP_INNER_MID] - points[:, LOWER_LIP_INNER_MID], axis=1)
-    eyes = np.linalg.norm(points[:, EYE_OUTER_LEFT] - points[:, EYE_OUTER_RIGHT], axis=1)
-    return np.asarray(lips / eyes, np.float64)
+    face = build_reference_frame(opened, face_triangles(opened), SIDE_PX)
+    return face, build_reference_frame(opened[list(MOUTH_LANDMARKS)], mouth_triangles(), MOUTH_SIDE_PX)
 
 
 def _add_textures(
@@ -186,7 +168,7 @@ def _add_textures(
     light: LightingCorrection,
     grown: tuple[IncrementalPca, IncrementalPca],
 ) -> None:
-    gaps = normalised_lip_gap(recording.points)
+    gaps = lip_opening(recording.points)
     faces, mouths = [], []
     for number, picture in enumerate(recording.pictures()):
         points = recording.points[number]
@@ -228,7 +210,7 @@ def appearance_parameters(
     face, mouth = frames
     n_frames, n_face = len(recording.points), models[0].n_modes
     parameters = np.zeros((n_frames, n_face + models[1].n_modes), np.float32)
-    seen = normalised_lip_gap(recording.points) >= MIN_OPEN_GAP
+    seen = lip_opening(recording.points) >= MIN_OPEN_GAP
     for number, picture in enumerate(recording.pictures()):
         points = recording.points[number]
         parameters[number, :n_face] = models[0].parameters(light.apply(face.texture(picture, points))[None])[0]

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.decomposition.stills import NEUTRAL, Still, required_stills
 from lexicon.errors import DataError, InputError
-from tts2face.face.landmark_fit import N_SKIN
-from tts2face.models.landmarks import N_LANDMARKS
+from tts2face.models.landmarks import N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.models.palette import EXPRESSIONS
 
 MIN_EXPRESSION_MM = 0.3  # root mean square over landmarks; trackers differ by half of it from still to still
@@ -59,9 +58,9 @@ def transfer_basis(
     if shapes != ((len(EXPRESSIONS), N_LANDMARKS, 3), (N_LANDMARKS, 3), (N_LANDMARKS, 3)):
         raise InputError(f"expressions and faces at rest have the shapes {shapes}; all need {N_LANDMARKS} landmarks")
     own = np.asarray(rest, np.float64)
-    there = np.asarray(face_rest, np.float64)[:N_SKIN]
+    there = np.asarray(face_rest, np.float64)[:N_MESH_LANDMARKS]
     centred = there - there.mean(axis=0)
-    affine, *_ = np.linalg.lstsq(centred, own[:N_SKIN] - own[:N_SKIN].mean(axis=0), rcond=None)
+    affine, *_ = np.linalg.lstsq(centred, own[:N_MESH_LANDMARKS] - own[:N_MESH_LANDMARKS].mean(axis=0), rcond=None)
     return ExpressionBasis(own, np.asarray(expressions, np.float64) @ affine)
 
 
@@ -89,8 +88,8 @@ def basis_from_stills(
     needed = required_stills(stills, is_rest_known=rest is not None)
     own = np.asarray(read(stills[NEUTRAL]) if rest is None else rest, np.float64)
     expressions = np.stack([read(stills[name]) - own for name in needed if name != NEUTRAL])
-    expressions[:, N_SKIN:] = 0.0
-    sizes = np.sqrt(np.square(expressions[:, :N_SKIN]).sum(axis=2).mean(axis=1))
+    expressions[:, N_MESH_LANDMARKS:] = 0.0
+    sizes = np.sqrt(np.square(expressions[:, :N_MESH_LANDMARKS]).sum(axis=2).mean(axis=1))
     for name, size in zip(EXPRESSIONS, sizes, strict=True):
         if size < MIN_EXPRESSION_MM:
             raise DataError(f"{stills[name]} shows no {name} expression; capture a stronger one")

@@ -120,31 +120,15 @@ class NearestSamplesEstimator:
         return mixed
 
 
-def moving_average(motion: NDArray[np.floating], n_frames: int = N_AVERAGED) -> Floats:
-    """Centred mean of the `n_frames` frames about each; beyond a recording's ends its motion is mirrored.
+def moving_average(motion: NDArray[np.floating]) -> Floats:
+    """(T, ...) centred mean of the `N_AVERAGED` frames about each; beyond a recording's ends its motion is mirrored.
 
-    Parameters
-    ----------
-    motion : (T, ...)
-        At least one frame.
-    n_frames
-        Odd.
-
-    Raises
-    ------
-    InputError
-        `n_frames` is even or below 1, or there is no frame.
-
-    Notes
-    -----
     With mirrored ends all windows have the same length; windows that shorten towards an end would leave the lips of the
     first frame unsmoothed (docs/gestures.md).
     """
     from scipy.ndimage import uniform_filter1d
 
-    if n_frames < 1 or n_frames % 2 == 0 or not len(motion):
-        raise InputError(f"a moving average needs frames and an odd number of them, not {n_frames} of {len(motion)}")
-    mean: Floats = uniform_filter1d(np.asarray(motion, np.float64), n_frames, axis=0, mode="reflect")
+    mean: Floats = uniform_filter1d(np.asarray(motion, np.float64), N_AVERAGED, axis=0, mode="reflect")
     return mean
 
 
@@ -199,12 +183,3 @@ def reduce_basis(basis: NDArray[np.floating], slack: float = 0.0) -> ReducedBasi
         raise DataError("the basis expressions are linearly dependent; capture distinct expressions")
     axes, upper = np.linalg.qr(flat.T)
     return ReducedBasis(np.asarray(axes), np.asarray(upper).T, slack)
-
-
-def approximation_error(
-    displacements: NDArray[np.floating], basis: NDArray[np.floating], weights: NDArray[np.floating]
-) -> Floats:
-    """(T,) root mean square over landmarks, in mm, of the residual of displacements (T, L, 3) for weights (T, B)."""
-    residual = np.asarray(displacements, np.float64) - np.tensordot(weights, np.asarray(basis, np.float64), axes=1)
-    error: Floats = np.sqrt(np.square(residual).sum(axis=-1).mean(axis=-1))
-    return error

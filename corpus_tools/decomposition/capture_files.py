@@ -37,10 +37,8 @@ def is_livelink(path: Path) -> bool:
         return file.read(64).decode("utf-8-sig", errors="replace").lower().startswith(LIVELINK_FIRST_COLUMN)
 
 
-def read_capture_file(
-    path: Path, face: Face, *, sound: Path | None = None, options: MarkerOptions | None = None
-) -> FaceRecording:
-    """A facial capture as landmarks; its sound is that of the file, the given one, or a file of the same name.
+def read_capture_file(path: Path, face: Face, *, options: MarkerOptions | None = None) -> FaceRecording:
+    """A facial capture as landmarks; its sound is that of the file, or of a file of the same name.
 
     Raises
     ------
@@ -56,10 +54,10 @@ def read_capture_file(
             f"{path.name} is not a facial capture; supported suffixes are {', '.join(sorted(CAPTURE_SUFFIXES))}"
         )
     if is_livelink(path):
-        return read_livelink_recording(path, face, sound=sound)
+        return read_livelink_recording(path, face)
     options = options or MarkerOptions()
     return read_marker_recording(
-        path, face, read_marker_set(options.marker_table), neutral=options.neutral, sound=sound, fps=options.fps
+        path, face, read_marker_set(options.marker_table), neutral=options.neutral, fps=options.fps
     )
 
 

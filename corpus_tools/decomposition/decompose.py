@@ -15,6 +15,7 @@ from corpus_tools.decomposition.basis_expressions import ExpressionBasis
 from corpus_tools.decomposition.blend_weights import Estimator, moving_average
 from corpus_tools.decomposition.capture import FaceRecording, resample_to_gesture_rate
 from tts2face.gesture.prosody import SILENT_PROSODY, prosody_features
+from tts2face.interpolation import interpolate_columns
 from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS
 from tts2face.models.palette import FEATURES, GESTURE_FPS, REGION_FEATURES
 from tts2face.retargeting.performer import EYELID_LANDMARKS, eye_aperture
@@ -134,7 +135,7 @@ def gaze_angles(turned: NDArray[np.float64], head: NDArray[np.floating], shut: F
     seen = np.flatnonzero(shut.max(axis=1) < MAX_GAZE_LID_CLOSURE)
     if len(seen):
         frames = np.arange(len(gaze))
-        gaze = np.stack([np.interp(frames, seen, gaze[seen, axis]) for axis in range(2)], axis=1)
+        gaze = interpolate_columns(gaze[seen], seen, frames)
     centred: Floats = (gaze - np.median(gaze, axis=0)).astype(np.float32)
     return centred
 
@@ -146,11 +147,6 @@ def _smooth(values: NDArray[np.floating]) -> Floats:
 
 
 REGION_TABLE = Path(__file__).with_name("regions.tsv")
-
-
-def region_landmarks() -> dict[str, NDArray[np.int32]]:
-    """Landmarks of each region, by name."""
-    return {row["region"]: np.array([int(n) for n in row["landmarks"].split()], np.int32) for row in _read_rows()}
 
 
 def feature_landmarks(feature: str) -> NDArray[np.int32]:

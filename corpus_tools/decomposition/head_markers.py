@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.decomposition.marker_gaps import check_gap
 from lexicon.errors import DataError
+from tts2face.interpolation import interpolate_columns
 from tts2face.video.pose import similarity_transforms
 
 MIN_VISIBLE_MARKERS = 3  # markers that show a pose
@@ -30,14 +31,11 @@ class HeadPoses:
         The head's markers about their middle, mm.
     rotations, places : (T, 3, 3), (T, 3)
         ``world = rotations @ head + places``.
-    misfit_mm
-        Root mean square distance of the markers from the rigid head.
     """
 
     reference: Floats
     rotations: Floats
     places: Floats
-    misfit_mm: float
 
     def remove_from(self, points: Floats) -> Floats:
         """(T, M, 3) points in the head's own axes."""
@@ -89,7 +87,7 @@ def fit_head_poses(
             f"the head's markers do not move rigidly (deviation {misfit:.1f} mm); list only those on the skull as head"
         )
     notes = () if posed.all() else (f"the head's pose was interpolated in {int((~posed).sum())} frames",)
-    return HeadPoses(head, *_interpolate_poses(rotations, places, posed), misfit), notes
+    return HeadPoses(head, *_interpolate_poses(rotations, places, posed)), notes
 
 
 def _interpolate_poses(rotations: Floats, places: Floats, posed: NDArray[np.bool_]) -> tuple[Floats, Floats]:
@@ -102,7 +100,7 @@ def _interpolate_poses(rotations: Floats, places: Floats, posed: NDArray[np.bool
     frames = np.arange(len(posed))
     turned = Slerp(there, Rotation.from_matrix(rotations))(np.clip(frames, there[0], there[-1])).as_matrix()
     turned[there] = rotations
-    return turned, np.stack([np.interp(frames, there, axis) for axis in places.T], axis=1)
+    return turned, interpolate_columns(places, there, frames)
 
 
 def _first_reference(points: Floats, is_visible: NDArray[np.bool_]) -> Floats:

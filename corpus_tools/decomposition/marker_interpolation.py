@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.face.landmark_fit import N_SKIN
 from tts2face.face.rbf import fit_interpolant
 from tts2face.models.landmarks import (
     INNER_LIP_LOWER,
     INNER_LIP_UPPER,
     MOUTH_REGION,
+    N_MESH_LANDMARKS,
     OUTER_LIP_LOWER,
     OUTER_LIP_UPPER,
 )
@@ -134,5 +134,5 @@ def _landmark_groups(common: Floats) -> list[tuple[list[int], set[int]]]:
     pairs = [(upper, lower), *((set(up), set(down)) for up, down in zip(UPPER_LIDS, LOWER_LIDS, strict=True))]
     sides = [*pairs, *((down, up) for up, down in pairs)]
     apart = set().union(*(side for side, _ in sides))
-    others = [landmark for landmark in range(N_SKIN) if landmark not in apart]
+    others = [landmark for landmark in range(N_MESH_LANDMARKS) if landmark not in apart]
     return [(sorted(side), opposite) for side, opposite in sides] + [(others, set())]

@@ -14,11 +14,11 @@ from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.folder import MANIFEST, VIDEO_SUFFIXES
 from corpus_tools.recordings.limits import check_limits, head_turn_deg, picture_measures
 from corpus_tools.recordings.observe import Refusal
-from corpus_tools.run_options import Progress, RunOptions
+from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import check_regular_file
 from tts2face.models.face import Face
-from tts2face.types import Waveform
+from tts2face.types import Progress, Waveform
 from tts2face.video.frame_grid import face_span, fill_gaps, resample_to_grid
 from tts2face.video.landmark_models import find_bundle
 from tts2face.video.media import read_sound

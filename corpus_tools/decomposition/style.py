@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from corpus_tools.decomposition.decompose import Decomposition, feature_landmarks
 from lexicon.errors import InputError
+from tts2face.face.landmark_fit import axis_ratios
 from tts2face.models.palette import FEATURES, REGION_FEATURES, FaceRegion, Palette, Style
+from tts2face.numeric import fix_signs, principal_axes
 
 KEPT_VARIANCE = 0.95  # of a region's motion that its modes keep: the rest is the tracker's
 MAX_MODES = 10
@@ -52,7 +54,7 @@ def add_style(
     if base is None and missing:
         raise InputError(f"the recordings do not show {missing[0]}; a palette begins with recordings that do")
     common = base.neutral if base is not None else np.asarray(neutral, np.float32)
-    sizes = size_ratios(neutral, common)
+    sizes = axis_ratios(neutral, common)
     moved = {
         feature: np.concatenate([one.motion[feature] for one in parts]) * sizes
         for feature in REGION_FEATURES
@@ -82,20 +84,11 @@ def add_style(
     return LearnedStyle(replace(base, styles={**base.styles, name: style}), kept)
 
 
-def size_ratios(person: NDArray[np.floating], common: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(3,) factors of width, height and depth by which one face at rest (478, 3) becomes as large as another."""
-    here, there = (np.asarray(face, np.float64) for face in (person, common))
-    here, there = here - here.mean(axis=0), there - there.mean(axis=0)
-    return np.asarray((here * there).sum(axis=0) / np.square(here).sum(axis=0))
-
-
 def _build_region(feature: str, displaced: NDArray[np.floating]) -> FaceRegion:
     """Principal modes of a region's displacements (T, L, 3) about none; each one's largest entry is positive."""
     flat = displaced.reshape(len(displaced), -1).astype(np.float64)
-    variances, vectors = np.linalg.eigh(np.einsum("ti,tj->ij", flat, flat))
-    variances, vectors = np.maximum(variances[::-1], 0.0), vectors[:, ::-1].T
+    variances, vectors = principal_axes(np.einsum("ti,tj->ij", flat, flat), flat.shape[1])
     share = np.cumsum(variances) / max(float(variances.sum()), 1e-12)
     n_modes = min(int(np.searchsorted(share, KEPT_VARIANCE)) + 1, MAX_MODES)
-    modes = vectors[:n_modes]
-    modes = modes * np.sign(modes[np.arange(n_modes), np.abs(modes).argmax(axis=1)])[:, None]
-    return FaceRegion(feature_landmarks(feature), modes.reshape(n_modes, -1, 3).astype(np.float32))
+    modes = fix_signs(vectors[:n_modes]).reshape(n_modes, -1, 3)
+    return FaceRegion(feature_landmarks(feature), modes.astype(np.float32))

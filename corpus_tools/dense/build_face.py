@@ -11,7 +11,6 @@ import numpy as np
 from corpus_tools.build_talker import NOT_STATED, PROVENANCE, read_provenance
 from corpus_tools.dense.adapt_head import adapt_head
 from corpus_tools.dense.mesh_fit import (
-    N_MESH_LANDMARKS,
     align_to_head,
     correct_lips_and_lids,
     face_landmarks,
@@ -23,10 +22,12 @@ from corpus_tools.dense.texture_painting import paint_skin
 from corpus_tools.dense.video_landmarks import find_videos, resting_landmarks, track_videos
 from corpus_tools.dense.visible_texels import build_canvas
 from corpus_tools.recordings.corpus_video import CachedTracker
-from corpus_tools.run_options import Progress, RunOptions
+from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
 from tts2face.models.face_file import read_face, write_face
+from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.storage.files import find_file
+from tts2face.types import Progress
 from tts2face.video.landmark_models import find_bundle
 
 SOURCE_FACE = "head"  # the shipped face that is adapted

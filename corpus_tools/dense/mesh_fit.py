@@ -7,13 +7,12 @@ from numpy.typing import NDArray
 
 from tts2face.face.rbf import Interpolant, fit_interpolant
 from tts2face.models.face import Eye, Face
-from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER, N_MESH_LANDMARKS
 from tts2face.numeric import smoothstep
 from tts2face.video.pose import similarity_transforms
 
 Floats = NDArray[np.float64]
 
-N_MESH_LANDMARKS = 468  # the iris landmarks after them depend on gaze, not on the shape of the face
 OPEN_JAW_WEIGHT = 0.12  # weight of jawOpen at which the warp is fitted; with closed lips the mouth would tear
 # The edge of the lids, once around, from the outer corner; the person's right eye, then the left.
 LID_LANDMARKS = (
@@ -45,10 +44,7 @@ class EyeSocket:
     def keep_distance(self, places: Floats, moved: Floats) -> Floats:
         """(P, 3) moved positions with the scaled distance from the eyeball that positions (P, 3) near it had."""
         off = np.linalg.norm(places - self.before, axis=1)
-        share = np.clip(
-            (self.radius + FREE_SKIN_DISTANCE_MM - off) / (FREE_SKIN_DISTANCE_MM - FULL_EYE_DISTANCE_MM), 0.0, 1.0
-        )
-        share = smoothstep(share)
+        share = smoothstep((self.radius + FREE_SKIN_DISTANCE_MM - off) / (FREE_SKIN_DISTANCE_MM - FULL_EYE_DISTANCE_MM))
         towards = moved - self.after
         length = np.maximum(np.linalg.norm(towards, axis=1), 1e-9)
         wanted = self.scale * off / length

@@ -14,13 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.dense.adapt_head import EYE_PARTS, RIGID_MOUTH_PARTS
-from corpus_tools.dense.mesh_fit import N_MESH_LANDMARKS, face_landmarks, part_vertices
+from corpus_tools.dense.mesh_fit import face_landmarks, part_vertices
 from corpus_tools.dense.skin_colour import PictureFitter, build_picture_fitter
 from corpus_tools.dense.video_landmarks import VideoLandmarks
 from lexicon.errors import InputError
 from tts2face.face.mouth_model import CHIN_LANDMARKS
 from tts2face.face.shape_transfer import append_shapes
 from tts2face.models.face import Face
+from tts2face.models.landmarks import N_MESH_LANDMARKS
+from tts2face.numeric import principal_axes
 from tts2face.video.pose import similarity_transforms
 
 OPEN_JAW = 0.6  # weight of jawOpen at which eq. 4 is evaluated; at 0.12 the lower lip is serrated between landmarks
@@ -191,12 +193,10 @@ def components(frames: Floats, metric: Floats) -> Components:
     root = np.linalg.cholesky(metric).T
     mean = frames.mean(axis=0)
     rows = _times(root, frames - mean).reshape(len(frames), -1)
-    variances, vectors = np.linalg.eigh(rows.T @ rows / len(rows))
-    n_modes = min(len(frames) - 1, len(variances))
-    columns = vectors[:, ::-1].T[:n_modes].reshape(n_modes, *mean.shape)
+    variances, axes = principal_axes(rows.T @ rows / len(rows), min(len(frames) - 1, rows.shape[1]))
+    columns = axes.reshape(-1, *mean.shape)
     modes = _times(np.linalg.inv(root), columns)
     down = -np.sign(modes[..., 1].sum(axis=1))[:, None, None]  # at positive weights a mode moves the face down
-    variances = np.maximum(variances[::-1][:n_modes], 0.0)
     return Components(mean, down * modes, down * _times(root.T, columns), variances)
 
 

@@ -6,13 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.mesh_fit import N_MESH_LANDMARKS, face_landmarks, face_width
+from corpus_tools.dense.mesh_fit import face_landmarks, face_width
 from corpus_tools.dense.video_landmarks import VideoLandmarks, eye_opening
-from corpus_tools.dense.visible_texels import SkinCanvas, smooth_step
-from corpus_tools.run_options import Progress
+from corpus_tools.dense.visible_texels import SkinCanvas
 from lexicon.errors import DataError
 from tts2face.face.rbf import DECAY_LENGTH, FACE_WIDTH, rbf_values
 from tts2face.models.face import Face
+from tts2face.models.landmarks import N_MESH_LANDMARKS
+from tts2face.numeric import smoothstep
+from tts2face.types import Progress
 from tts2face.video.media import read_frames
 from tts2face.video.pose import similarity_transforms
 
@@ -91,7 +93,7 @@ def average_skin_colours(
         placed, turn = fit.fit(points)
         flat = placed[:, :2] * (1.0, -1.0)
         colour, inside = sample_picture(picture, np.einsum("pk,pkd->pd", weights, flat[corners]))
-        facing = smooth_step(own_normals @ turn[2], *FACING_COSINES) * inside
+        facing = smoothstep(own_normals @ turn[2], *FACING_COSINES) * inside
         total += facing[:, None] * colour
         weight += facing
         found, is_inside = sample_picture(picture, flat[crown])

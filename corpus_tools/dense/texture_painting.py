@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from corpus_tools.dense.mesh_fit import face_landmarks
 from corpus_tools.dense.skin_colour import SkinColours, vertex_normals
 from corpus_tools.dense.texels import Texels
-from corpus_tools.dense.visible_texels import SkinCanvas, smooth_step, soften_edges
+from corpus_tools.dense.visible_texels import SkinCanvas, soften_edges
 from tts2face.models.face import Face
+from tts2face.numeric import smoothstep
 
 Floats = NDArray[np.float64]
 
@@ -32,10 +33,10 @@ def paint_skin(face: Face, canvas: SkinCanvas, skin: SkinColours) -> Face:
     """The face with the talker's texture and hair colour."""
     texels = canvas.texels
     base = canvas.texture[texels.rows, texels.columns].astype(np.float64)
-    share = canvas.share * smooth_step(skin.weight / skin.weight.max(), 0.0, MIN_TEXEL_WEIGHT)
+    share = canvas.share * smoothstep(skin.weight / skin.weight.max(), 0.0, MIN_TEXEL_WEIGHT)
     own = _remove_shading(canvas.texels.interpolate(vertex_normals(face)), skin.colour, share)
     share = soften_edges(_remove_fringe(face, canvas, own, share), texels, len(canvas.texture))
-    hair = 1.0 - smooth_step(base @ LUMA, *HAIR_LUMA)
+    hair = 1.0 - smoothstep(base @ LUMA, *HAIR_LUMA)
     tint = _skin_tint(face, canvas, own / np.maximum(base, 1.0), (share, base @ LUMA))
     usual = np.median(base[hair > 0.9], axis=0) if (hair > 0.9).any() else np.ones(3)
     strands = np.clip(skin.hair / np.maximum(usual, 1.0), *TINT_BOUNDS) if np.isfinite(skin.hair).all() else np.ones(3)
@@ -86,8 +87,8 @@ def _remove_fringe(face: Face, canvas: SkinCanvas, own: Floats, share: Floats) -
     )
     luma = own @ LUMA
     usual = float(np.median(luma[share > 0.5]))
-    clear = smooth_step(luma / usual, *FRINGE_LUMA)
-    near = 1.0 - smooth_step(above, *FRINGE_MM)
+    clear = smoothstep(luma / usual, *FRINGE_LUMA)
+    near = 1.0 - smoothstep(above, *FRINGE_MM)
     picture = np.ones(canvas.texture.shape[:2])
     picture[canvas.texels.rows, canvas.texels.columns] = np.maximum(clear, near)
     grown = gaussian_filter(minimum_filter(picture, STRAND_TEXELS), STRAND_TEXELS / 3)

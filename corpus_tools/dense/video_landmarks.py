@@ -9,14 +9,9 @@ from numpy.typing import NDArray
 
 from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.folder import VIDEO_SUFFIXES, find_recordings
-from corpus_tools.run_options import Progress
 from lexicon.errors import DataError, InputError
-from tts2face.models.landmarks import (
-    EYE_OUTER_LEFT,
-    EYE_OUTER_RIGHT,
-    LOWER_LIP_INNER_MID,
-    UPPER_LIP_INNER_MID,
-)
+from tts2face.models.landmarks import lip_opening
+from tts2face.types import Progress
 from tts2face.video.pose import remove_pose
 
 Floats = NDArray[np.float64]
@@ -83,8 +78,7 @@ def resting_landmarks(videos: Sequence[VideoLandmarks]) -> Floats:
     """(478, 3) mean landmarks in mm of the frames with closed lips and open eyes."""
     landmarks = np.concatenate([one.landmarks for one in videos])
     landmarks = landmarks[np.isfinite(landmarks[:, 0, 0])].astype(np.float64)
-    eyes = np.linalg.norm(landmarks[:, EYE_OUTER_LEFT] - landmarks[:, EYE_OUTER_RIGHT], axis=1)
-    gaps = np.linalg.norm(landmarks[:, UPPER_LIP_INNER_MID] - landmarks[:, LOWER_LIP_INNER_MID], axis=1) / eyes
+    gaps = lip_opening(landmarks)
     limit = max(MAX_CLOSED_GAP, float(np.sort(gaps)[min(MIN_CLOSED_FRAMES, len(gaps)) - 1]))
     open_eyes = eye_opening(landmarks)
     still = gaps <= limit

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.mesh_fit import LID_LANDMARKS, N_MESH_LANDMARKS, OPEN_JAW_WEIGHT, face_landmarks
+from corpus_tools.dense.mesh_fit import LID_LANDMARKS, OPEN_JAW_WEIGHT, face_landmarks
 from corpus_tools.dense.texels import ISLANDS_TOP, Texels, find_texels
 from lexicon.errors import DataError
 from tts2face.models.face import Face
-from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER, N_MESH_LANDMARKS
 from tts2face.numeric import smoothstep
 
 Floats = NDArray[np.float64]
@@ -74,12 +74,12 @@ def build_canvas(face: Face) -> SkinCanvas:
 def _front_share(face: Face, texels: Texels, opened: Floats) -> Floats:
     place = texels.interpolate(opened)
     marks = face_landmarks(face, opened)[:N_MESH_LANDMARKS]
-    share = smooth_step(polygon_depth(place[:, :2], marks[list(FACE_OVAL), :2], RIM_MM[1] + 1), *RIM_MM)
+    share = smoothstep(polygon_depth(place[:, :2], marks[list(FACE_OVAL), :2], RIM_MM[1] + 1), *RIM_MM)
     share[place[:, 2] < float(marks[list(FACE_OVAL), 2].min())] = 0.0
     share[_is_hidden(place)] = 0.0
-    share *= smooth_step(-polygon_depth(place[:, :2], marks[list(INNER_LIPS), :2], LIP_MM[1] + 1), *LIP_MM)
+    share *= smoothstep(-polygon_depth(place[:, :2], marks[list(INNER_LIPS), :2], LIP_MM[1] + 1), *LIP_MM)
     for lids in LID_LANDMARKS:
-        share *= smooth_step(-polygon_depth(place[:, :2], marks[list(lids), :2], LID_MM[1] + 1), *LID_MM)
+        share *= smoothstep(-polygon_depth(place[:, :2], marks[list(lids), :2], LID_MM[1] + 1), *LID_MM)
     return share
 
 
@@ -110,13 +110,6 @@ def polygon_depth(places: Floats, polygon: Floats, most: float) -> Floats:
     depth[near] = np.where(inside, least, -least)
     clipped: Floats = np.clip(depth, -most, most)
     return clipped
-
-
-def smooth_step(values: Floats, low: float, high: float) -> Floats:
-    """Smooth step from 0 at `low` to 1 at `high`."""
-    t = np.clip((values - low) / (high - low), 0.0, 1.0)
-    smooth: Floats = smoothstep(t)
-    return smooth
 
 
 def soften_edges(share: Floats, texels: Texels, side: int) -> Floats:

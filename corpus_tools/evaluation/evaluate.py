@@ -16,12 +16,12 @@ from corpus_tools.evaluation.splits import Split, check_disjoint
 from corpus_tools.evaluation.tables import Evaluation, Fold
 from corpus_tools.evaluation.tracks import ExternalTrack, map_tracks
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.run_options import Progress
 from corpus_tools.training.pose_correction import correct_pose, fit_pose_correction
 from corpus_tools.training.train_phone_network import add_phone_network
 from corpus_tools.training.train_talker import learn_talker
 from tts2face.exemplar.options import SynthesisOptions
 from tts2face.models.talker import ShapeModel, Talker
+from tts2face.types import Progress
 from tts2face.voice.engine import Voice
 
 EVALUATION_METADATA = {
@@ -173,7 +173,6 @@ def evaluate_across_talkers(
     train: Sequence[Observation],
     others: Sequence[Observation],
     *,
-    options: Mapping[str, SynthesisOptions] | None = None,
     on_progress: Progress | None = None,
 ) -> tuple[Evaluation, tuple[SplitResult, ...]]:
     """Scores of every method, learnt from one person, on utterances of another with the latter's phone edges.
@@ -195,7 +194,7 @@ def evaluate_across_talkers(
         standardise_reference(ReferenceUtterance.of(observation, talker.model), other_scale) for observation in others
     )
     synthesised, synthesis_s = {}, {}
-    methods = build_methods(talker, options)
+    methods = build_methods(talker)
     for number, (name, method) in enumerate(methods.items()):
         synthesised[name], synthesis_s[name] = _synthesise(method, real)
         if on_progress:

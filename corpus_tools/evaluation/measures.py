@@ -1,7 +1,6 @@
 """Measures of the similarity of synthesised and real lip motion, as functions of arrays.
 
-Openings and widths are distances between landmarks over the distance of the outer eye corners; frame i is the instant
-i / fps of the phones' clock.
+Openings are those of `tts2face.models.landmarks.lip_opening`; frame i is the instant i / fps of the phones' clock.
 """
 
 from collections.abc import Collection
@@ -13,14 +12,6 @@ from lexicon.errors import InputError
 from lexicon.phones import look_up_phone, vowel_symbols
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar.time_warping import frame_distances, path_cost, warp_path
-from tts2face.models.landmarks import (
-    EYE_OUTER_LEFT,
-    EYE_OUTER_RIGHT,
-    LOWER_LIP_INNER_MID,
-    MOUTH_CORNER_LEFT,
-    MOUTH_CORNER_RIGHT,
-    UPPER_LIP_INNER_MID,
-)
 
 SPEECH_MARGIN_S = 0.1  # evaluated from this long before the first phone to this long after the last
 CLOSURE_MARGIN_S = 0.03  # a closure may lie this far outside its phone: frames are 40 ms, edges accurate to 10 ms
@@ -33,21 +24,6 @@ BILABIALS = ("p", "b", "m")
 OPEN_HEIGHTS = ("open", "near-open", "open-mid")
 
 Values = NDArray[np.floating]
-
-
-def lip_opening(landmarks: Values) -> NDArray[np.float64]:
-    """(T,) distance of the inner lips at their middle over the eye distance, of (T, 478, 3) landmarks."""
-    return _normalised_distance(landmarks, UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID)
-
-
-def lip_width(landmarks: Values) -> NDArray[np.float64]:
-    """(T,) distance of the mouth's corners over the eye distance, of (T, 478, 3) landmarks."""
-    return _normalised_distance(landmarks, MOUTH_CORNER_RIGHT, MOUTH_CORNER_LEFT)
-
-
-def _normalised_distance(landmarks: Values, one: int, other: int) -> NDArray[np.float64]:
-    eyes = np.linalg.norm(landmarks[:, EYE_OUTER_LEFT] - landmarks[:, EYE_OUTER_RIGHT], axis=1)
-    return np.asarray(np.linalg.norm(landmarks[:, one] - landmarks[:, other], axis=1) / eyes, np.float64)
 
 
 def speech_frames(phones: PhoneSequence, n_frames: int, fps: float) -> slice:
@@ -110,11 +86,9 @@ def min_openings(
     return np.array(least, np.float64)
 
 
-def midpoint_openings(
-    opening: Values, phones: PhoneSequence, fps: float, labels: Collection[str] | None = None
-) -> NDArray[np.float64]:
-    """Opening in the middle of each phone with one of the labels; by default the open vowels."""
-    labels = open_vowels() if labels is None else labels
+def midpoint_openings(opening: Values, phones: PhoneSequence, fps: float) -> NDArray[np.float64]:
+    """Opening in the middle of each open vowel."""
+    labels = open_vowels()
     middles = (phones.edges[:-1] + phones.edges[1:]) / 2
     wanted = np.array([label in labels for label in phones.phones])
     return np.asarray(np.interp(middles[wanted], np.arange(len(opening)) / fps, opening))

@@ -9,6 +9,7 @@ from lexicon.sequence import PhoneSequence
 from tts2face.exemplar.options import METHOD_OPTIONS, SynthesisOptions
 from tts2face.exemplar.phone_substitution import build_targets
 from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model, speech_trajectory
+from tts2face.interpolation import interpolate_columns
 from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker
 
@@ -55,7 +56,7 @@ def mean_pose_method(talker: Talker, voice: ExemplarModel) -> SynthesisMethod:
     for utterance in talker.utterances:
         frame_times = np.arange(len(utterance.shape)) / talker.fps
         middles = (utterance.phones.edges[:-1] + utterance.phones.edges[1:]) / 2
-        read = np.stack([np.interp(middles, frame_times, utterance.shape[:, d]) for d in range(n_speech)], axis=1)
+        read = interpolate_columns(utterance.shape[:, :n_speech], frame_times, middles)
         for label, pose in zip(utterance.phones.phones, read, strict=True):
             poses[label].append(pose)
     mean = {label: np.mean(seen, axis=0) for label, seen in poses.items() if seen}
@@ -65,6 +66,6 @@ def mean_pose_method(talker: Talker, voice: ExemplarModel) -> SynthesisMethod:
         middles = targets.spans[:, 1:3].mean(axis=1)
         keys = np.stack([mean[label] for label in targets.labels])
         times = np.arange(n_frames) / fps
-        return np.stack([np.interp(times, middles, keys[:, d]) for d in range(n_speech)], axis=1).astype(np.float32)
+        return interpolate_columns(keys[:, :n_speech], middles, times).astype(np.float32)
 
     return motion

@@ -18,6 +18,7 @@ from corpus_tools.evaluation.scores import OwnDurationMotion, UtteranceCompariso
 from lexicon.errors import InputError
 from lexicon.normalize import normalize
 from lexicon.sequence import PhoneSequence, WordSpan
+from tts2face.interpolation import interpolate_columns
 from tts2face.models.talker import ShapeModel
 from tts2face.types import Speech, frame_count
 from tts2face.voice.engine import Voice
@@ -93,8 +94,8 @@ def compare_own_durations(
     fps, n_fine = one.observation.fps, OVERSAMPLING * (voiced.n_frames - 1) + 1
     synthesised = method(voiced.phones, n_fine, OVERSAMPLING * fps)
     wanted = voiced.times(np.arange(len(one.parameters)) / fps)
-    columns = [np.interp(wanted, np.arange(n_fine) / (OVERSAMPLING * fps), column) for column in synthesised.T]
-    there, ours = np.stack(columns, axis=1).astype(np.float32), synthesised[::OVERSAMPLING]
+    there = interpolate_columns(synthesised, np.arange(n_fine) / (OVERSAMPLING * fps), wanted).astype(np.float32)
+    ours = synthesised[::OVERSAMPLING]
     own = OwnDurationMotion(
         voiced.phones, speech_frames(voiced.phones, voiced.n_frames, fps), ours, LipCurves.of(model.shapes(ours))
     )

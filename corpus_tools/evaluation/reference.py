@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from corpus_tools.evaluation import measures
 from corpus_tools.recordings.observation import Observation
 from lexicon.phones import PHONES
+from tts2face.models.landmarks import lip_opening, lip_width
 from tts2face.models.talker import ShapeModel
 
 # Phone classes by lip articulation; a frame belongs to the first class that contains its phone.
@@ -31,7 +32,7 @@ class LipCurves:
     @classmethod
     def of(cls, landmarks: NDArray[np.floating]) -> "LipCurves":
         """Of (T, 478, 3) landmarks."""
-        return cls(measures.lip_opening(landmarks), measures.lip_width(landmarks))
+        return cls(lip_opening(landmarks), lip_width(landmarks))
 
     def values(self) -> NDArray[np.float64]:
         """(T, 2) opening and width."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from corpus_tools.evaluation.reference import ReferenceUtterance
 from corpus_tools.training.ridge import fit_ridge
 from lexicon.errors import DataError, InputError
+from tts2face.interpolation import interpolate_columns
 from tts2face.models.talker import Talker
 
 UTTERANCE_COLUMN, TIME_COLUMN = "utterance", "time"
@@ -26,8 +27,7 @@ class ExternalTrack:
 
     def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """(N, C) values at other instants, interpolated linearly and constant beyond the ends."""
-        columns = [np.interp(times, self.times, column) for column in self.values.T]
-        return np.stack(columns, axis=1)
+        return interpolate_columns(self.values, self.times, times)
 
 
 def read_tracks(path: Path) -> Mapping[str, ExternalTrack]:

@@ -1,6 +1,6 @@
 """Comparison of each style's held-out recordings with motion generated for their sound by fields and by noise."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +24,7 @@ from corpus_tools.gesture_study.traits import Trait, in_display_units, style_tra
 from lexicon.errors import InputError
 from tts2face.gesture.gesture_stream import GestureFields
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
+from tts2face.types import Progress
 
 NEAR, HALF = 1.5, 0.5  # maximum distance of a field, relative to the distance between halves and to that of noise
 CORRELATION_WITHIN = 0.1
@@ -31,7 +32,6 @@ FEWEST = 10  # recordings; with fewer, none is held out
 N_TAKES = 60  # recordings whose distances are the reference of diversity
 
 Doubles = NDArray[np.float64]
-Progress = Callable[[int, int], None]
 Motion = Mapping[str, NDArray[np.floating]]
 
 

@@ -4,14 +4,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from corpus_tools.gesture_study.analysis import GestureStudy, Options, Progress, study_gestures
+from corpus_tools.gesture_study.analysis import GestureStudy, Options, study_gestures
 from corpus_tools.gesture_study.figure import panels_png, summary_panels
 from corpus_tools.gesture_study.page import gestures_page
 from corpus_tools.gesture_study.text import gestures_csv, gestures_json
 from corpus_tools.report.page import report_writer
 from tts2face.models.palette import load_palette
 from tts2face.storage.files import write_atomically
-from tts2face.storage.output_names import check_name
+from tts2face.types import Progress
 
 
 def write_gestures(palette: str, out: Path, options: Options, *, on_progress: Progress | None = None) -> GestureStudy:
@@ -27,7 +27,6 @@ def write_gestures(palette: str, out: Path, options: Options, *, on_progress: Pr
         matplotlib is not installed, or the file cannot be written.
     """
     writer = report_writer(out, WRITERS)
-    check_name(out)
     found = study_gestures(palette, load_palette(palette), options, on_progress)
     write_atomically(out, writer(found))
     return found

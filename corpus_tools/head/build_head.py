@@ -13,12 +13,12 @@ from corpus_tools.head.eyes import EyeStyle
 from corpus_tools.head.hair import Haircut
 from corpus_tools.head.head import ADULT, HeadStyle, assemble_head, build_reference
 from corpus_tools.head.identity import build_identities
-from corpus_tools.head.noise import ramp
 from corpus_tools.head.piece import assemble_face
 from corpus_tools.head.source import PACKAGE, SourceMesh, fetch_data, read_source
 from corpus_tools.head.texture import HeadColours, paint_texture
 from tts2face.models.face import Face
 from tts2face.models.face_file import Identity, write_face
+from tts2face.numeric import smoothstep
 
 Floats = NDArray[np.float64]
 
@@ -61,10 +61,10 @@ def _apply_proportions(points: Floats, eyes: list[Floats]) -> Floats:
     for centre in eyes:
         moved = _scale_about(moved, centre, EYE_GAIN, EYE_REACH_MM)
     moved = _scale_about(moved, NOSE, NOSE_GAIN, NOSE_REACH_MM)
-    low = ramp(-moved[:, 1], 25.0, 105.0)[:, None]
+    low = smoothstep(-moved[:, 1], 25.0, 105.0)[:, None]
     moved *= 1 - low * np.array([0.20, 0.0, 0.0])
-    moved[:, 1] += 9.0 * ramp(-moved[:, 1], 45.0, 110.0)
-    skull = ramp(moved[:, 1], 5.0, 90.0)[:, None]
+    moved[:, 1] += 9.0 * smoothstep(-moved[:, 1], 45.0, 110.0)
+    skull = smoothstep(moved[:, 1], 5.0, 90.0)[:, None]
     placed: Floats = moved * (1 + skull * np.array([0.07, 0.06, 0.05]))
     return placed
 

@@ -49,7 +49,7 @@ def write_places(places: dict[int, Floats], path: Path = TABLE) -> None:
         writer.writerows([number, *(f"{value:.6f}" for value in place)] for number, place in sorted(places.items()))
 
 
-def add_landmarks(face: Face, base: Floats, places: dict[int, Floats] | None = None) -> Face:
+def add_landmarks(face: Face, base: Floats) -> Face:
     """A face with landmarks: those of the table on the skin, those of the irises on the eyeballs.
 
     Parameters
@@ -64,7 +64,7 @@ def add_landmarks(face: Face, base: Floats, places: dict[int, Floats] | None = N
     DataError
         The table does not fit the mesh.
     """
-    table = read_places() if places is None else places
+    table = read_places()
     skin = face.triangles[(face.triangles < len(base)).all(axis=1)].astype(np.int64)
     wanted = np.array(list(table.values()))
     triangle, weights, distance = nearest_surface_points(wanted, base, skin)

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.head.noise import ramp, value_noise
+from corpus_tools.head.noise import value_noise
 from corpus_tools.head.piece import MaterialSpan, Piece
+from tts2face.numeric import smoothstep
 
 Floats = NDArray[np.float64]
 
@@ -39,16 +40,17 @@ def hair_share(places: Floats) -> Floats:
     ragged = 1.6 * np.sin(0.55 * places[:, 0] + 0.31 * places[:, 2]) + 1.1 * np.sin(
         1.3 * places[:, 0] - 0.9 * places[:, 2]
     )
-    share = ramp(places[:, 1] + ragged - line, -SOFT_MM / 2, SOFT_MM / 2)
+    share = smoothstep(places[:, 1] + ragged - line, -SOFT_MM / 2, SOFT_MM / 2)
     mirrored = np.column_stack([np.abs(places[:, 0]), places[:, 1:]])
     ear = np.linalg.norm((mirrored - EAR[0]) / EAR[1], axis=1)
-    return share * ramp(ear, 0.92, 1.12)
+    grown: Floats = share * smoothstep(ear, 0.92, 1.12)
+    return grown
 
 
 def hair_thickness(places: Floats, cut: Haircut, generator: np.random.Generator) -> Floats:
     """(P,) height of the hair above the skin, mm."""
-    up = ramp(places[:, 1], 20, 110)
-    back = ramp(-places[:, 2], 120, 190) * (1 - up)
+    up = smoothstep(places[:, 1], 20, 110)
+    back = smoothstep(-places[:, 2], 120, 190) * (1 - up)
     full = cut.side + (cut.top - cut.side) * up + (cut.nape - cut.side) * back
     inner = _inner_share(places)
     clumps = 1 + 0.22 * value_noise(strand_field(places, 9.0, 40.0), 1.0, generator)

@@ -41,7 +41,7 @@ class Preset:
 
 BROWN, DARK = (0.72, 0.50, 0.36), (0.46, 0.31, 0.22)  # eyes; the iris texture is light
 BLACK, BLOND, GREY = (0.45, 0.46, 0.52), (2.35, 2.75, 2.5), (2.0, 2.8, 3.8)  # hair
-YOUNG, MATURE, OLD, CHILD = {"young": 1.0}, {"young": 0.5, "old": 0.5}, {"old": 1.0}, {"child": 0.85, "young": 0.15}
+YOUNG, OLD, CHILD = {"young": 1.0}, {"old": 1.0}, {"child": 0.85, "young": 0.15}
 PRESETS: dict[str, Preset] = {
     "erik": Preset(
         "man, about 30, European",

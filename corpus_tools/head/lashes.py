@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from corpus_tools.head.cage import Cage
 from corpus_tools.head.piece import MaterialSpan, Piece
 from corpus_tools.head.skin import Skin
+from tts2face.interpolation import interpolate_columns
 
 Floats = NDArray[np.float64]
 
@@ -143,7 +144,7 @@ def _blades(
                 weights[5 * blade + vertex, grid[i + step[0], j + step[1]]] += part
     tangent = np.gradient(places[grid[0]], axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    aside = np.stack([np.interp(root, np.arange(n_along), tangent[:, k]) for k in range(3)], axis=1) * row.width / 2
+    aside = interpolate_columns(tangent, np.arange(n_along), root) * row.width / 2
     offset = np.stack([aside, -aside, 0.7 * aside, -0.7 * aside, 0 * aside], axis=1).reshape(-1, 3)
     one = np.array([(0, 1, 2), (1, 3, 2), (2, 3, 4)])
     return weights.tocsr(), offset, (one + 5 * np.arange(n)[:, None, None]).reshape(-1, 3)

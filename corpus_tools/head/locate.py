@@ -23,11 +23,11 @@ from corpus_tools.head.source import fetch_data, read_source
 from corpus_tools.head.subdivide import triangulate
 from lexicon.errors import DataError
 from tts2face.models.face import Face
-from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_MESH_LANDMARKS
 from tts2face.render.camera import camera_matrices
 from tts2face.render.draw import mesh_renderer
 from tts2face.render.picture import Picture
-from tts2face.video.track import N_MESH, FaceTracker
+from tts2face.video.track import FaceTracker
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -82,10 +82,12 @@ def tracking_views() -> Iterator[Picture]:
 def project_landmarks(face: Face, picture: Picture, tracker: FaceTracker) -> tuple[Floats, NDArray[np.bool_]]:
     """Positions (468, 3) in mm on the head of the landmarks tracked in a view, and which of them are reliable."""
     drawn = mesh_renderer(face, picture).draw(np.zeros(len(face.shape_names), np.float32))
-    points = tracker.track(lambda: [drawn], 25.0).points[0, :N_MESH, :2].astype(np.float64)
+    points = tracker.track(lambda: [drawn], 25.0).points[0, :N_MESH_LANDMARKS, :2].astype(np.float64)
     camera = camera_matrices(picture.view, face, (picture.width, picture.height))
     focal, middle_x, middle_y, _ = camera.lens
-    seen = np.column_stack([points[:, 0] + 0.5 - middle_x, points[:, 1] + 0.5 - middle_y, np.full(N_MESH, focal)])
+    seen = np.column_stack(
+        [points[:, 0] + 0.5 - middle_x, points[:, 1] + 0.5 - middle_y, np.full(N_MESH_LANDMARKS, focal)]
+    )
     rays = seen @ camera.view[:, :3]
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     origin = -camera.view[:, :3].T @ camera.view[:, 3]
@@ -142,12 +144,12 @@ def mirrored_landmarks(face: Face, tracker: FaceTracker) -> Ints:
     for shown in EXPRESSIONS:
         weights = np.array([shown.get(name, 0.0) for name in face.shape_names], np.float32)
         drawn = renderer.draw(weights)
-        points = tracker.track(lambda drawn=drawn: [drawn], 25.0).points[0, :N_MESH].astype(np.float64)  # type: ignore[misc]
+        points = tracker.track(lambda drawn=drawn: [drawn], 25.0).points[0, :N_MESH_LANDMARKS].astype(np.float64)  # type: ignore[misc]
         features.append(points - [(picture.width - 1) / 2, 0, 0])
     read = np.concatenate(features, axis=1)
     cost = np.linalg.norm(read[:, None] - (read * np.tile([-1.0, 1.0, 1.0], len(EXPRESSIONS)))[None], axis=2)
     mirrored = np.asarray(linear_sum_assignment(cost)[1], np.int64)
-    if (mirrored[mirrored] != np.arange(N_MESH)).any():
+    if (mirrored[mirrored] != np.arange(N_MESH_LANDMARKS)).any():
         raise DataError("landmarks do not pair up on the two halves of the face; check the rendered views of the head")
     return mirrored
 

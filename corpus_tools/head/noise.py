@@ -4,8 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from tts2face.numeric import smoothstep
-
 Floats = NDArray[np.float64]
 
 SIZE = 32  # lattice points along each axis; the field is periodic
@@ -23,12 +21,6 @@ def gaussian_bump(points: Floats, centre: tuple[float, ...], reach: tuple[float,
     mirrored = np.column_stack([np.abs(points[:, 0]), points[:, 1:]])[:, : len(centre)]
     falling: Floats = np.exp(-(((mirrored - np.array(centre)) / np.array(reach)) ** 2).sum(axis=1))
     return falling
-
-
-def ramp(values: Floats, low: float, high: float) -> Floats:
-    """Smooth step from 0 at `low` to 1 at `high`; `high` may be the smaller."""
-    share = np.clip((values - low) / (high - low), 0, 1)
-    return smoothstep(share)
 
 
 def stroke_cover(places: Floats, starts: Floats, ends: Floats, widths: Floats) -> Floats:

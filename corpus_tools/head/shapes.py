@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from corpus_tools.head.eyes import RECEDE_MM, ball_radius
-from corpus_tools.head.noise import ramp
 from corpus_tools.head.piece import Eyeball
 from corpus_tools.head.skin import Skin
 from tts2face.face.deformation import rotation_matrix
+from tts2face.numeric import smoothstep
 
 Floats = NDArray[np.float64]
 
@@ -32,7 +32,8 @@ def correct_shapes(skin: Skin) -> Skin:
     """The skin with smoother cheeks and stronger motion of brows and upper lids."""
     means = neighbour_means(skin)
     off = (skin.base - MOUTH) * [0.85, 1.25, 0.6]
-    share = ramp(np.linalg.norm(off, axis=1), NEAR, FAR) * ramp(skin.base[:, 1], BELOW_EYES, BELOW_EYES - 0.12)
+    below = smoothstep(skin.base[:, 1], BELOW_EYES, BELOW_EYES - 0.12)
+    share = smoothstep(np.linalg.norm(off, axis=1), NEAR, FAR) * below
     shapes = dict(skin.shapes)
     for name in SMOOTHED_SHAPES:
         smooth = shapes[name]

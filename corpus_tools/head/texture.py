@@ -10,10 +10,11 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinat
 from corpus_tools.dense.texels import find_texels
 from corpus_tools.head.hair import hair_share, strand_colour, strand_field
 from corpus_tools.head.layout import SIDE, layout_coordinates
-from corpus_tools.head.noise import gaussian_bump, ramp, stroke_cover, value_noise
+from corpus_tools.head.noise import gaussian_bump, stroke_cover, value_noise
 from corpus_tools.head.skin import Skin
 from corpus_tools.head.source import SourceMesh
 from corpus_tools.head.subdivide import triangulate
+from tts2face.numeric import smoothstep
 
 Floats = NDArray[np.float64]
 
@@ -103,7 +104,7 @@ def paint_texture(
     lips = _sample_mask(gaussian_filter(source.mask("lips"), 2.5), where)
     colour += _lip_share(lips)[:, None] * (_lip_colour(place, palette, generator) - colour)
     inside = np.maximum(_sample_mask(gaussian_filter(source.mask("inside-mouth"), 2.0), where), _in_mouth(where))
-    colour += ramp(inside, 0.15, 0.95)[:, None] * (np.array(palette.cavity) - colour)
+    colour += smoothstep(inside, 0.15, 0.95)[:, None] * (np.array(palette.cavity) - colour)
     brows = brow_cover(place, generator, palette.brow_thickness)
     colour += brows[:, None] * (np.array(palette.hair) * 0.9 - colour)
     hair = hair_share(place)
@@ -159,7 +160,7 @@ def _freckles(place: Floats, generator: np.random.Generator) -> Floats:
 
 
 def _lip_share(mask: Floats) -> Floats:
-    return 0.92 * ramp(mask, 0.22, 0.80)
+    return 0.92 * smoothstep(mask, 0.22, 0.80)
 
 
 def _lip_colour(place: Floats, palette: HeadColours, generator: np.random.Generator) -> Floats:

@@ -10,8 +10,9 @@ from corpus_tools.recordings.corpus_audio import MAX_UTTERANCE_S, CachedAligner
 from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.folder import Recording, find_recordings, pronounce_recording
 from corpus_tools.recordings.observation import Observation, Timing, observe_recording
-from corpus_tools.run_options import Progress, RunOptions
+from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, InputError
+from tts2face.types import Progress
 from tts2face.video.landmark_models import find_bundle
 
 STEPS_PER_VIDEO = 100  # of progress for each video

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.report.drawing import load_matplotlib
 from lexicon.errors import InputError
+from tts2face.storage.output_names import check_name
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #1d2329; --soft: #66707a; --line: #d5dae0; --paper: #fff;
@@ -89,15 +90,14 @@ def report_writer(out: Path, writers: Mapping[str, Writer]) -> Writer:
     Raises
     ------
     InputError
-        There is no writer for the suffix, or no folder for the file.
+        There is no writer for the suffix; or as `check_name`.
     BackendError
-        The format contains plots and matplotlib is not installed.
+        The format contains plots and matplotlib is not installed; or as `check_name`.
     """
     suffix = out.suffix.lower()
     if suffix not in writers:
         raise InputError(f"a report is written as {', '.join(writers)}, not {out.name}")
-    if not out.parent.is_dir():
-        raise InputError(f"there is no folder {out.parent}; make it or choose another")
+    check_name(out)
     if suffix in PLOT_SUFFIXES:
         load_matplotlib()
     return writers[suffix]

@@ -15,10 +15,10 @@ from corpus_tools.recordings.observe import Observations, Refusal
 from corpus_tools.report.drawing import FIRST, SECOND, draw_svg
 from corpus_tools.report.evaluation import label_phones
 from corpus_tools.report.page import note_paragraph, page, paragraphs, picture_tag, table
-from corpus_tools.training.train_talker import normalised_lip_gap
 from lexicon.errors import DataError, InputError
 from lexicon.phones import ARPABET
 from lexicon.sequence import SILENCE
+from tts2face.models.landmarks import lip_opening
 from tts2face.video.media import read_frames
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def utterance_curves(observation: Observation) -> str:
     def draw(figure: "Figure") -> tuple[()]:
         figure.set_layout_engine("none")
         axes = figure.add_axes((SIDES / 2 / width, 0.3, 1 - SIDES / width, 0.38))
-        axes.plot(times, np.clip(normalised_lip_gap(observation.landmarks), *GAP_RANGE), color=FIRST)
+        axes.plot(times, np.clip(lip_opening(observation.landmarks), *GAP_RANGE), color=FIRST)
         axes.set(xlim=(0, len(times) / observation.fps), ylim=GAP_RANGE, yticks=GAP_RANGE)
         axes.set_xticks(np.arange(0, len(times) / observation.fps, TICK_S))
         axes.set_xlabel("seconds", loc="left")

@@ -1,6 +1,5 @@
 """Analysis of a talker's phone similarity table."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -31,8 +30,8 @@ from lexicon.errors import InputError
 from lexicon.phones import look_up_phone
 from tts2face.exemplar.similarity import PhoneSimilarity
 from tts2face.models.talker import Talker
+from tts2face.types import Progress
 
-Progress = Callable[[int, int], None]
 USUAL_CLASSES = (4, 6, 8, 10, 12)
 STREAMS = MappingProxyType(
     {"utterances": 0, "words": 1, "articulation": 2, "comparison": 3, "same phones": 4}

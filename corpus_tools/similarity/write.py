@@ -5,14 +5,14 @@ from pathlib import Path
 from types import MappingProxyType
 
 from corpus_tools.report.page import report_writer
-from corpus_tools.similarity.analysis import Analysis, NamedTalker, Options, Progress, analyse
+from corpus_tools.similarity.analysis import Analysis, NamedTalker, Options, analyse
 from corpus_tools.similarity.figure import difference_figure, similarity_figure, table_png
 from corpus_tools.similarity.page import similarity_page
 from corpus_tools.similarity.text import analysis_json, difference_csv, table_csv
 from corpus_tools.similarity.tokens import check_labels
 from tts2face.models.talker import load_talker
 from tts2face.storage.files import write_atomically
-from tts2face.storage.output_names import check_name
+from tts2face.types import Progress
 
 
 def write_similarity(
@@ -38,7 +38,6 @@ def write_similarity(
     """
     writer = report_writer(out, WRITERS)
     check_labels(labels)
-    check_name(out)
     against = None if other is None else NamedTalker(other, load_talker(other))
     found = analyse(NamedTalker(talker, load_talker(talker)), options, against, on_progress)
     write_atomically(out, writer(found, labels))

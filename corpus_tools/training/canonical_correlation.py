@@ -1,6 +1,5 @@
 """Canonical correlation analysis (Hotelling 1936)."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,9 +23,6 @@ class CanonicalFactors:
         ``(a - mean_a) @ weights_a`` are factors of unit variance.
     weights_b : (E, K)
     mean_a, mean_b : (D,), (E,)
-    loadings_a : (D, K)
-        Correlation of each measurement with each factor of its own set.
-    loadings_b : (E, K)
     """
 
     correlations: NDArray[np.float64]
@@ -34,8 +30,6 @@ class CanonicalFactors:
     weights_b: NDArray[np.float64]
     mean_a: NDArray[np.float64]
     mean_b: NDArray[np.float64]
-    loadings_a: NDArray[np.float64]
-    loadings_b: NDArray[np.float64]
 
 
 def canonical_correlation(a: Values, b: Values) -> CanonicalFactors:
@@ -66,29 +60,7 @@ def canonical_correlation(a: Values, b: Values) -> CanonicalFactors:
         weights_b,
         a.mean(axis=0, dtype=np.float64),
         b.mean(axis=0, dtype=np.float64),
-        _loadings(centred_a, centred_a @ weights_a),
-        _loadings(centred_b, centred_b @ weights_b),
     )
-
-
-def sampled_correlations(
-    a: Values, b: Values, n_frames: Sequence[int], *, trials: int, rng: np.random.Generator
-) -> NDArray[np.float64]:
-    """(N, trials) first canonical correlation of as many randomly selected frames (T07 Fig. 5).
-
-    Raises
-    ------
-    InputError
-        More frames are requested than there are, or too few.
-    """
-    if max(n_frames) > len(a):
-        raise InputError(f"there are {len(a)} frames, not {max(n_frames)}; request fewer")
-    strengths = np.zeros((len(n_frames), trials))
-    for row, n in enumerate(n_frames):
-        for trial in range(trials):
-            chosen = rng.choice(len(a), n, replace=False)
-            strengths[row, trial] = canonical_correlation(a[chosen], b[chosen]).correlations[0]
-    return strengths
 
 
 def _orthonormal_basis(centred: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -101,8 +73,3 @@ def _orthonormal_basis(centred: NDArray[np.float64]) -> tuple[NDArray[np.float64
     left, sizes, right = np.linalg.svd(r)
     kept = sizes > RANK_TOLERANCE * sizes[0]
     return q @ left[:, kept], (right[kept].T / sizes[kept]) / scale[:, None]
-
-
-def _loadings(measured: NDArray[np.float64], factors: NDArray[np.float64]) -> NDArray[np.float64]:
-    sizes = np.linalg.norm(measured, axis=0)[:, None] * np.linalg.norm(factors, axis=0)
-    return np.asarray((measured.T @ factors) / np.where(sizes > 0.0, sizes, 1.0), np.float64)

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.run_options import Progress, StageCallback, ignore_stage
+from corpus_tools.run_options import StageCallback, ignore_stage
 from corpus_tools.training.linear_audio_map import TrainingUtterance, learn_linear_map
 from corpus_tools.training.network_audio_map import NetworkMapOptions, learn_network_map
 from tts2face.models.audio_map import AudioMap
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.speech.features import FEATURE_RATE, speech_features, speech_level
-from tts2face.types import Waveform
+from tts2face.types import Progress, Waveform
 from tts2face.video.media import read_sound
 
 # Chosen by inner cross-validation on the training utterances of GRID s1 (docs/accuracy.md, "Speech-driven").

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from corpus_tools.run_options import Progress
 from lexicon.errors import BackendError
 from lexicon.phones import phone_features
 from lexicon.sequence import SILENCE
 from tts2face.models.phone_network import PhoneNetwork, window_features
 from tts2face.models.talker import Talker
+from tts2face.types import Progress
 
 SILENCE_MARGIN_S = 0.2  # of silence around speech in the training data
 HIDDEN_UNITS = (128, 128)

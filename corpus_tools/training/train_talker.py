@@ -9,16 +9,9 @@ from numpy.typing import NDArray
 from corpus_tools.recordings.observation import Observation
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE
-from tts2face.models.landmarks import (
-    EYE_OUTER_LEFT,
-    EYE_OUTER_RIGHT,
-    LOWER_LIP_INNER_MID,
-    MOUTH_REGION,
-    N_LANDMARKS,
-    UPPER_LIP_INNER_MID,
-)
+from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS, lip_opening
 from tts2face.models.talker import ShapeModel, Talker, Utterance
-from tts2face.numeric import nearest_rotation
+from tts2face.numeric import fix_signs, nearest_rotation, principal_axes
 from tts2face.video.pose import head_angles
 
 REST_MARGIN_S = 0.2  # lips start to move this long before the first sound
@@ -107,18 +100,8 @@ def resting_frames(observation: Observation) -> NDArray[np.bool_]:
     phones = observation.phones
     speech = phones.edges[1] if phones.phones[0] == SILENCE else phones.edges[0]
     times = np.arange(len(observation.landmarks)) / observation.fps
-    still: NDArray[np.bool_] = (times < speech - REST_MARGIN_S) & (
-        normalised_lip_gap(observation.landmarks) < CLOSED_GAP
-    )
+    still: NDArray[np.bool_] = (times < speech - REST_MARGIN_S) & (lip_opening(observation.landmarks) < CLOSED_GAP)
     return still
-
-
-def normalised_lip_gap(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(T,) distance of the inner lips at their middle over the distance of the outer eye corners."""
-    apart: NDArray[np.floating] = landmarks[:, UPPER_LIP_INNER_MID] - landmarks[:, LOWER_LIP_INNER_MID]
-    eyes: NDArray[np.floating] = landmarks[:, EYE_OUTER_LEFT] - landmarks[:, EYE_OUTER_RIGHT]
-    gap: NDArray[np.float64] = np.linalg.norm(apart, axis=1) / np.linalg.norm(eyes, axis=1)
-    return gap
 
 
 def mean_rotation(observations: Sequence[Observation]) -> NDArray[np.float64]:
@@ -141,11 +124,8 @@ def _principal_components(
         offsets = (observation.landmarks - mean)[:, region].reshape(-1, n_values)
         scatter += offsets.T @ offsets
         n_frames += len(offsets)
-    variances, vectors = np.linalg.eigh(scatter / n_frames)
-    components = vectors[:, ::-1][:, :n_modes].T
-    largest = components[np.arange(n_modes), np.abs(components).argmax(axis=1)]
-    components = components * np.sign(largest)[:, None]
-    return components.reshape(n_modes, -1, 3), np.maximum(variances[::-1][:n_modes], 0.0)
+    variances, components = principal_axes(scatter / n_frames, n_modes)
+    return fix_signs(components).reshape(n_modes, -1, 3), variances
 
 
 def _build_utterance(observation: Observation, model: ShapeModel, turn: NDArray[np.float64]) -> Utterance:

@@ -7,14 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.aam.block_pca import IncrementalPca
-from corpus_tools.aam.mesh import MOUTH_LANDMARKS, N_MESH_LANDMARKS
 from corpus_tools.aam.procrustes import align_shapes, apply_similarities, fit_similarities
+from corpus_tools.aam.reference_frame import MOUTH_LANDMARKS
 from corpus_tools.aam.source_videos import AppearanceRecording
 from corpus_tools.aam.train_appearance import LearnedAppearance
 from corpus_tools.recordings.audio_video_sync import LIP_LEAD_S, estimate_sync
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.training.train_talker import CLOSED_GAP
-from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
+from tts2face.models.landmarks import (
+    INNER_LIP_LOWER,
+    INNER_LIP_UPPER,
+    LOWER_LIP_INNER_MID,
+    N_MESH_LANDMARKS,
+    UPPER_LIP_INNER_MID,
+)
 
 N_SHAPE_MODES = 20
 N_SAMPLED_TEXTURES = 1000  # frames from which the number of texture modes is read

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from corpus_tools.recordings.observation import Observation, Quality
 from corpus_tools.recordings.observe import observe
 from corpus_tools.run_options import RunOptions
-from corpus_tools.training.train_talker import CLOSED_GAP, learn_shapes, normalised_lip_gap
+from corpus_tools.training.train_talker import CLOSED_GAP, learn_shapes
 from tests.bench.bench_retarget import bilabial_frames, landmarks_of, opening
 from tts2face.cloning.lip_gaps import facing_gaps
 from tts2face.cloning.parameter_transfer import ParameterTransfer, append_missing_components, build_parameter_transfer
 from tts2face.models.face_file import load_face
-from tts2face.models.landmarks import MOUTH_REGION
+from tts2face.models.landmarks import MOUTH_REGION, lip_opening
 from tts2face.models.talker import ShapeModel, Talker, load_talker
 from tts2face.retargeting.to_face import build_retargeter
 
@@ -80,9 +80,7 @@ def least_squares(
 
 def closed(talker: Talker, shapes: list[NDArray[np.float32]], at: list[list[int]]) -> float:
     """Share of bilabials with closed lips."""
-    gaps = [
-        normalised_lip_gap(one[frames]) * np.sign(opening(one[frames])) for one, frames in zip(shapes, at, strict=True)
-    ]
+    gaps = [lip_opening(one[frames]) * np.sign(opening(one[frames])) for one, frames in zip(shapes, at, strict=True)]
     return float((np.concatenate(gaps) < CLOSED_GAP).mean())
 
 

@@ -6,10 +6,12 @@ inner cross-validation; ``--picture docs/pictures/cca_strength.svg`` draws the t
 
 import argparse
 import pickle
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from corpus_tools.evaluation import measures
 from corpus_tools.evaluation.evaluate import EVALUATION_METADATA
@@ -18,7 +20,7 @@ from corpus_tools.evaluation.scores import Scores, score_splits
 from corpus_tools.evaluation.splits import split_into_folds, split_randomly
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import observe
-from corpus_tools.training.canonical_correlation import sampled_correlations
+from corpus_tools.training.canonical_correlation import canonical_correlation
 from corpus_tools.training.linear_audio_map import learn_linear_map
 from corpus_tools.training.network_audio_map import NetworkMapOptions, learn_network_map
 from corpus_tools.training.pose_correction import fit_pose_correction
@@ -68,6 +70,18 @@ def main() -> None:
     if options.picture:
         options.picture.write_text(drawn(ties))
     bench.compare()
+
+
+def sampled_correlations(
+    a: NDArray[np.floating], b: NDArray[np.floating], n_frames: Sequence[int], *, trials: int, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """(N, trials) first canonical correlation of as many randomly selected frames (T07 Fig. 5)."""
+    strengths = np.zeros((len(n_frames), trials))
+    for row, n in enumerate(n_frames):
+        for trial in range(trials):
+            chosen = rng.choice(len(a), n, replace=False)
+            strengths[row, trial] = canonical_correlation(a[chosen], b[chosen]).correlations[0]
+    return strengths
 
 
 class Bench:

@@ -13,6 +13,7 @@ from sentences import sentences
 
 from corpus_tools.evaluation import measures
 from tts2face.exemplar.synthesis import build_exemplar_model, speech_trajectory
+from tts2face.models.landmarks import lip_opening, lip_width
 from tts2face.models.talker import Talker, load_talker
 from tts2face.synthesis.audio_input import map_audio_to_motion
 from tts2face.types import Speech, frame_count
@@ -28,7 +29,7 @@ def main() -> None:
     print("| voice | drive | loudness | r opening | r width | range ratio |\n| --- | --- | --- | --- | --- | --- |")
     for name in ("heart", "espeak"):
         voice = load_voice(name, "en-us", {})
-        said = [voice.speak(text, rate=1.0, volume=1.0, seed=0) for text in sentences(options.sentences)]
+        said = [voice.speak(text, rate=1.0, seed=0) for text in sentences(options.sentences)]
         for drive in ("linear", "network"):
             for is_matched in (False, True):
                 kept = talker.audio_maps[drive]
@@ -51,7 +52,7 @@ def compared(said: list[Speech], talker: Talker, drive: object) -> tuple[float, 
         talker.model.shapes(np.concatenate([one[:k] for one, k in zip(ways, n, strict=True)]))
         for ways in (exemplars, heard)
     ]
-    openings, widths = ([measure(one) for one in shapes] for measure in (measures.lip_opening, measures.lip_width))
+    openings, widths = ([measure(one) for one in shapes] for measure in (lip_opening, lip_width))
     return measures.correlation(*openings), measures.correlation(*widths), measures.range_ratio(*openings)
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from corpus_tools.build_palette import ESTIMATORS, StyleSource, build_basis, build_estimator
-from corpus_tools.decomposition.blend_weights import approximation_error, moving_average
+from corpus_tools.decomposition.blend_weights import moving_average
 from corpus_tools.decomposition.capture import FaceRecording, resample_to_gesture_rate
 from corpus_tools.decomposition.capture_files import read_livelink_recording
 from corpus_tools.decomposition.decompose import weight_displacements
@@ -21,8 +21,9 @@ from corpus_tools.dense.video_landmarks import find_videos
 from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.run_options import RunOptions
 from corpus_tools.training.pose_correction import fit_pose_correction
-from tts2face.face.landmark_fit import N_SKIN
+from tests.corpus_tools.decomposition.weight_errors import approximation_error
 from tts2face.models.face_file import load_face
+from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.video.landmark_models import find_bundle
 
@@ -40,7 +41,9 @@ def report(name: str, captured: list[FaceRecording]) -> None:
     for estimator in ESTIMATORS:
         for epsilon in EPSILONS:
             weights = build_estimator(estimator, basis, epsilon).weights(counted)
-            error = approximation_error(counted[:, :N_SKIN], expressions[:, :N_SKIN], weights).mean()
+            error = approximation_error(
+                counted[:, :N_MESH_LANDMARKS], expressions[:, :N_MESH_LANDMARKS], weights
+            ).mean()
             beyond = np.mean((weights < -1e-9) | (weights > 1 + 1e-9))
             parts = np.split(weights, np.cumsum([len(one) for one in slow])[:-1])
             spread = np.mean([part.std(axis=0).mean() for part in parts])
@@ -50,7 +53,7 @@ def report(name: str, captured: list[FaceRecording]) -> None:
 
 
 def root_mean_square(counted: np.ndarray) -> float:
-    return float(np.sqrt(np.square(counted[:, :N_SKIN]).sum(axis=2).mean(axis=1)).mean())
+    return float(np.sqrt(np.square(counted[:, :N_MESH_LANDMARKS]).sum(axis=2).mean(axis=1)).mean())
 
 
 def main() -> None:

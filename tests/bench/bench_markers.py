@@ -19,9 +19,8 @@ from corpus_tools.decomposition.marker_set import read_marker_set
 from corpus_tools.decomposition.markers import read_marker_recording
 from tests.corpus_tools.decomposition.made_markers import FPS, SIZE, made_take, write_c3d
 from tts2face.face.expressions import expression_landmarks
-from tts2face.face.landmark_fit import N_SKIN
 from tts2face.models.face_file import load_face
-from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
+from tts2face.models.landmarks import LOWER_LIP_INNER_MID, N_MESH_LANDMARKS, UPPER_LIP_INNER_MID
 from tts2face.models.palette import EXPRESSIONS
 
 DISTANCES = {
@@ -51,10 +50,13 @@ def main() -> None:
         rest = write_c3d(Path(folder) / "rest.c3d", still.names, still.points)
         found = resample_to_gesture_rate(read_marker_recording(path, face, marker_set, neutral=rest))
     truth = resample(made.landmarks, FPS, 30.0)
-    moved, wanted = found.landmarks[:, :N_SKIN] - found.landmarks.mean(axis=0)[:N_SKIN], truth - truth.mean(axis=0)
-    away = np.square(moved - wanted[:, :N_SKIN]).sum(axis=2)
+    moved, wanted = (
+        found.landmarks[:, :N_MESH_LANDMARKS] - found.landmarks.mean(axis=0)[:N_MESH_LANDMARKS],
+        truth - truth.mean(axis=0),
+    )
+    away = np.square(moved - wanted[:, :N_MESH_LANDMARKS]).sum(axis=2)
     off, marker_error = np.sqrt(away.mean()), np.sqrt(away[:, list(marker_set.landmarks.values())].mean())
-    size = np.sqrt(np.square(wanted[:, :N_SKIN]).sum(axis=2).mean())
+    size = np.sqrt(np.square(wanted[:, :N_MESH_LANDMARKS]).sum(axis=2).mean())
     print(f"motion {size:.2f} mm, error {off:.2f} mm, {marker_error:.3f} mm at markers")
     for name, (a, b) in DISTANCES.items():
         far = [np.linalg.norm(places[:, a] - places[:, b], axis=1) for places in (found.landmarks, truth)]
@@ -64,9 +66,9 @@ def main() -> None:
     angles = found.head[:, :3] - found.head[:, :3].mean(axis=0) - turned + turned.mean(axis=0)
     print(f"head: {np.degrees(np.abs(angles)).mean():.2f} degrees, at most {np.degrees(np.abs(angles)).max():.2f}")
     basis = transfer_basis(expression_landmarks(face), own, own * SIZE)
-    fitted = build_least_squares_estimator(basis.expressions[:, :N_SKIN], 0.25)
-    seen = fitted.weights(moving_average((found.landmarks - found.rest)[:, :N_SKIN]))
-    real = fitted.weights(moving_average((truth - own * SIZE)[:, :N_SKIN]))
+    fitted = build_least_squares_estimator(basis.expressions[:, :N_MESH_LANDMARKS], 0.25)
+    seen = fitted.weights(moving_average((found.landmarks - found.rest)[:, :N_MESH_LANDMARKS]))
+    real = fitted.weights(moving_average((truth - own * SIZE)[:, :N_MESH_LANDMARKS]))
     for at, name in enumerate(EXPRESSIONS):
         both = seen[:, at], real[:, at]
         print(f"{name}: r {np.corrcoef(*both)[0, 1]:.3f}, mean {both[0].mean():.2f} for {both[1].mean():.2f}")

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT
+from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT, inner_lip_gaps
 from tts2face.render.encode import write_clips
 from tts2face.render.picture import Picture
-from tts2face.retargeting.performer import eye_aperture, lip_gaps
+from tts2face.retargeting.performer import eye_aperture
 from tts2face.session import Session
 from tts2face.synthesis.performance import retarget_take, take_clips
 from tts2face.video.blendshapes import BlendshapeReader
@@ -37,7 +37,7 @@ def compared(take: Take, shown: tuple[np.ndarray, np.ndarray]) -> list[float]:
 
     def curves(landmarks: np.ndarray) -> list[np.ndarray]:
         width = np.linalg.norm(landmarks[:, MOUTH_CORNER_LEFT] - landmarks[:, MOUTH_CORNER_RIGHT], axis=1)
-        return [lip_gaps(landmarks)[:, 5], width, eye_aperture(landmarks, "Left")]
+        return [inner_lip_gaps(landmarks)[:, 5], width, eye_aperture(landmarks, "Left")]
 
     source, again = curves(take.landmarks), curves(shown[0])
     rates = [float(np.corrcoef(a, b)[0, 1]) for a, b in zip(source, again, strict=True)]

@@ -18,7 +18,6 @@ from corpus_tools.decomposition.blend_weights import (
     N_NEAREST,
     N_SAMPLES,
     Estimator,
-    approximation_error,
     build_least_squares_estimator,
     build_nearest_samples_estimator,
     moving_average,
@@ -28,9 +27,10 @@ from corpus_tools.decomposition.capture_files import read_livelink_recording
 from corpus_tools.decomposition.face_motion import rest_landmarks
 from corpus_tools.recordings.observe import observe
 from corpus_tools.training.pose_correction import correct_pose
+from tests.corpus_tools.decomposition.weight_errors import approximation_error
 from tts2face.face.expressions import expression_landmarks
-from tts2face.face.landmark_fit import N_SKIN
 from tts2face.models.face_file import load_face
+from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.models.palette import EXPRESSIONS, GESTURE_FPS
 
 SAMPLES = (50, 100, 200, 500, 1000, 2000, 5000)
@@ -46,9 +46,9 @@ class Faces:
     """Averaged displacements (T, L, 3) of a source, and the basis (5, L, 3) on it."""
 
     def __init__(self, name: str, seen: list[np.ndarray], basis: np.ndarray) -> None:
-        self.name, self.basis = name, basis[:, :N_SKIN]
-        self.raw = np.concatenate([one[::EVERY, :N_SKIN] for one in seen])
-        self.slow = np.concatenate([moving_average(one[:, :N_SKIN])[::EVERY] for one in seen])
+        self.name, self.basis = name, basis[:, :N_MESH_LANDMARKS]
+        self.raw = np.concatenate([one[::EVERY, :N_MESH_LANDMARKS] for one in seen])
+        self.slow = np.concatenate([moving_average(one[:, :N_MESH_LANDMARKS])[::EVERY] for one in seen])
 
     def error(self, estimator: Estimator) -> float:
         return float(approximation_error(self.slow, self.basis, estimator.weights(self.slow)).mean())
@@ -173,7 +173,7 @@ def sources(recordings: Path, observations: Path | None) -> tuple[Faces, Faces, 
     """GRID s1 and Live Link, and the latter's displacements at every frame."""
     face = load_face("head")
     own, expressions = rest_landmarks(face), expression_landmarks(face)
-    sizes = np.sqrt(np.square(expressions[:, :N_SKIN]).sum(axis=2).mean(axis=1))
+    sizes = np.sqrt(np.square(expressions[:, :N_MESH_LANDMARKS]).sum(axis=2).mean(axis=1))
     print("expressions, mm: " + ", ".join(f"{name} {size:.2f}" for name, size in zip(EXPRESSIONS, sizes, strict=True)))
     kept = pickle.loads(observations.read_bytes()).kept if observations else observe(recordings / "grid_s1").kept
     kept = correct_pose(kept)
@@ -183,7 +183,7 @@ def sources(recordings: Path, observations: Path | None) -> tuple[Faces, Faces, 
     take = resample_to_gesture_rate(
         read_livelink_recording(recordings / "livelink" / "testset_arkit61_60fps.csv", face)
     )
-    moved = take.landmarks[:, :N_SKIN] - own[:N_SKIN]
+    moved = take.landmarks[:, :N_MESH_LANDMARKS] - own[:N_MESH_LANDMARKS]
     return grid, Faces("Live Link Face, 20 s of speech", [moved], expressions), moved
 
 

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
 from lexicon.errors import DataError, InputError
-from tts2face.cloning.lip_gaps import INNER_LOWER_LIP, INNER_UPPER_LIP
 from tts2face.cloning.parameter_transfer import (
     append_missing_components,
     build_parameter_transfer,
@@ -19,6 +18,8 @@ from tts2face.cloning.parameter_transfer import (
 from tts2face.models.landmarks import (
     EYE_OUTER_LEFT,
     EYE_OUTER_RIGHT,
+    INNER_LIP_LOWER,
+    INNER_LIP_UPPER,
     LOWER_LIP_INNER_MID,
     MOUTH_REGION,
     N_LANDMARKS,
@@ -28,6 +29,7 @@ from tts2face.models.talker import ShapeModel, load_talker
 from tts2face.retargeting.to_face import inner_product_map
 from tts2face.types import Trajectory
 
+INNER_UPPER_LIP, INNER_LOWER_LIP = list(INNER_LIP_UPPER[1:-1]), list(INNER_LIP_LOWER[1:-1])
 seeds = st.integers(0, 100_000)
 some = settings(deadline=None, max_examples=30)
 MOUTH = np.isin(np.arange(N_LANDMARKS), MOUTH_REGION)

@@ -9,15 +9,18 @@ from scipy.optimize import minimize
 
 from lexicon.errors import DataError
 from tests.cloning.test_clone import gaps_of, opening_model, seeds, some
-from tts2face.cloning.lip_gaps import INNER_LOWER_LIP, MIN_LIP_GAP_MM, nearest_valid_parameters
+from tts2face.cloning.lip_gaps import MIN_LIP_GAP_MM, nearest_valid_parameters
 from tts2face.cloning.parameter_transfer import build_parameter_transfer
 from tts2face.face.bounded_least_squares import bounded_least_squares
+from tts2face.models.landmarks import INNER_LIP_LOWER
+
+N_GAPS = len(INNER_LIP_LOWER) - 2  # facing inner lip points without the corners
 
 
 def test_crossing_lips_are_separated_by_the_least_gap() -> None:
     """In closed form: a lower lip that would rise 2 mm stops where the lips are 0.01 mm apart."""
     model = opening_model()
-    values = np.array([[-2 * np.sqrt(len(INNER_LOWER_LIP)), 5.0], [6.0, 1.0]], np.float32)
+    values = np.array([[-2 * np.sqrt(N_GAPS), 5.0], [6.0, 1.0]], np.float32)
     mapped = build_parameter_transfer(model, model).parameters(values)
     assert gaps_of(model, mapped)[0] == pytest.approx(0.01, abs=1e-4)
     assert mapped[0, 1] == 5.0
@@ -27,7 +30,7 @@ def test_crossing_lips_are_separated_by_the_least_gap() -> None:
 def test_lips_that_overlap_at_rest_are_separated_at_rest() -> None:
     """By 0.31 mm in closed form; other frames keep their displacement from there."""
     model = opening_model(gap=-0.3)
-    parted = 0.31 * np.sqrt(len(INNER_LOWER_LIP))
+    parted = 0.31 * np.sqrt(N_GAPS)
     mapped = build_parameter_transfer(model, model).parameters(np.array([[0, 0], [-9, 3], [4, 4]], np.float32))
     assert mapped == pytest.approx(np.array([[parted, 0], [parted, 3], [4, 4]]), abs=1e-4)
     assert gaps_of(model, mapped).min() == pytest.approx(0.01, abs=1e-4)
@@ -71,7 +74,7 @@ def test_lip_gaps_are_corrected_by_the_least_motion(seed: int) -> None:
 
 def test_contact_of_the_source_is_kept_under_gain() -> None:
     """0.4 mm apart at rest; 0.8 mm, which is contact, stays 0.8 mm; 10 mm becomes 20 mm less the rest's 0.4."""
-    model, per_mm = opening_model(), np.sqrt(len(INNER_LOWER_LIP))
+    model, per_mm = opening_model(), np.sqrt(N_GAPS)
     values = np.array([[0.4 * per_mm, 2.0], [9.6 * per_mm, 2.0]], np.float32)
     mapped = build_parameter_transfer(model, replace(model, spread=np.full(2, 100, np.float32)), gain=2).parameters(
         values

@@ -53,7 +53,7 @@ class OwnVoice:
         self._known = {normalize(" ".join(word.text for word in one.words)): one for one in observations}
         self._stretch = stretch
 
-    def speak(self, spoken: str, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
+    def speak(self, spoken: str, *, rate: float = 1.0, seed: int = 0) -> Speech:
         one = self._known[spoken]
         edges = np.concatenate([[0.0], np.cumsum(self._stretch(one.phones.durations))])
         edges[-1] = np.ceil(edges[-1] * self.sample_rate) / self.sample_rate

@@ -4,9 +4,16 @@ import numpy as np
 import pytest
 
 from corpus_tools.aam.block_pca import IncrementalPca
-from corpus_tools.aam.mesh import MOUTH_LANDMARKS, face_ring, face_triangles, mouth_triangles, points_in_polygon
 from corpus_tools.aam.procrustes import align_shapes, apply_similarities, fit_similarities
-from corpus_tools.aam.reference_frame import barycentric_coordinates, build_reference_frame
+from corpus_tools.aam.reference_frame import (
+    MOUTH_LANDMARKS,
+    barycentric_coordinates,
+    build_reference_frame,
+    face_ring,
+    face_triangles,
+    mouth_triangles,
+    points_in_polygon,
+)
 from corpus_tools.aam.source_videos import AppearanceRecording
 from corpus_tools.aam.train_appearance import camera_axes, fit_lighting, speech_weights
 from corpus_tools.build_talker import consent_record

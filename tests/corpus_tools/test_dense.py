@@ -11,17 +11,17 @@ import pytest
 from corpus_tools.build_talker import consent_record
 from corpus_tools.dense.adapt_head import RIGID_MOUTH_PARTS, adapt_head
 from corpus_tools.dense.build_face import build_face
-from corpus_tools.dense.mesh_fit import N_MESH_LANDMARKS, OPEN_JAW_WEIGHT, align_to_head, face_landmarks, part_vertices
+from corpus_tools.dense.mesh_fit import OPEN_JAW_WEIGHT, align_to_head, face_landmarks, part_vertices
 from corpus_tools.dense.skin_colour import build_picture_fitter, vertex_normals
 from corpus_tools.dense.video_landmarks import find_videos
 from corpus_tools.dense.visible_texels import build_canvas, polygon_depth
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, InputError
+from tests.face.posing import posed_vertices
 from tests.rendered_takes import ONLY_RENDERED
-from tts2face.face.deformation import posed_vertices
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
-from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.storage.files import find_file
 
 LIPS_MM = 0.5  # facing lips that are nearer touch

@@ -7,7 +7,7 @@ import pytest
 
 from cli.main import run
 from corpus_tools.dense.adapt_head import EYE_PARTS
-from corpus_tools.dense.mesh_fit import N_MESH_LANDMARKS, face_landmarks, face_width, part_vertices
+from corpus_tools.dense.mesh_fit import face_landmarks, face_width, part_vertices
 from corpus_tools.dense.modes import (
     LIMIT,
     MEAN,
@@ -24,11 +24,11 @@ from corpus_tools.dense.modes import (
 from corpus_tools.dense.skin_colour import PictureFitter, build_picture_fitter
 from corpus_tools.dense.video_landmarks import VideoLandmarks
 from lexicon.errors import InputError
+from tests.face.posing import posed_vertices
 from tests.rendered_takes import ONLY_RENDERED
-from tts2face.face.deformation import posed_vertices
 from tts2face.models.face import Face
 from tts2face.models.face_file import load_face, read_face, write_face
-from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_MESH_LANDMARKS
 from tts2face.render.draw import draw
 from tts2face.render.picture import Picture
 from tts2face.video.media import read_frames

@@ -11,9 +11,10 @@ from corpus_tools.head.cage import fit_rotation, fit_sphere
 from corpus_tools.head.cloth import Sheet, clip_sheet
 from corpus_tools.head.lashes import strip_grid
 from corpus_tools.head.layout import layout_coordinates
-from corpus_tools.head.noise import ramp, stroke_cover
+from corpus_tools.head.noise import stroke_cover
 from corpus_tools.head.teeth import LOWER, UPPER, arch_piece
 from lexicon.errors import DataError
+from tts2face.numeric import smoothstep
 
 OBJ = """v 0 0 0
 v 1 0 0
@@ -116,7 +117,7 @@ def test_strokes_cover_their_line_and_no_more():
     places = np.array([[0.0, 0], [5, 0], [5, 2], [11, 0]])
     cover = stroke_cover(places, np.array([[0.0, 0]]), np.array([[10.0, 0]]), np.array([0.5]))
     assert cover.tolist() == [1, 1, 0, 0]
-    assert ramp(np.array([0.0, 0.5, 1]), 1, 0).tolist() == [1, 0.5, 0]
+    assert smoothstep(np.array([0.0, 0.5, 1]), 1, 0).tolist() == [1, 0.5, 0]
 
 
 @pytest.mark.parametrize("arch", [UPPER, LOWER])

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from corpus_tools.show_talker import describe
-from corpus_tools.training.train_talker import learn_talker, mean_rotation, normalised_lip_gap, resting_frames
+from corpus_tools.training.train_talker import learn_talker, mean_rotation, resting_frames
 from lexicon.errors import DataError, InputError
 from tts2face.face.deformation import head_rotation
-from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS
+from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS, lip_opening
 from tts2face.models.talker import read_talker, write_talker
 
 from .conftest import known_directions  # noqa: TID252 - a test's own data
@@ -54,7 +54,7 @@ def test_the_face_rests_where_the_lips_were_closed_before_speech(talker, observa
     assert [resting_frames(observation).sum() for observation in observations] == [20] * 8
     rest = talker.model.shapes(talker.model.rest[None])
     np.testing.assert_allclose(rest[0], observations[0].landmarks[0], atol=1e-2)
-    assert normalised_lip_gap(rest)[0] < 0.001
+    assert lip_opening(rest)[0] < 0.001
 
 
 def test_the_head_is_measured_from_its_mean_pose(talker, observations):

@@ -6,7 +6,8 @@ import numpy as np
 
 import tts2face
 from corpus_tools.show_talker import describe
-from corpus_tools.training.train_talker import CLOSED_GAP, normalised_lip_gap
+from corpus_tools.training.train_talker import CLOSED_GAP
+from tts2face.models.landmarks import lip_opening
 from tts2face.models.talker import load_talker
 
 PATH = Path(tts2face.__file__).parent / "data" / "grid_s1.talker"
@@ -32,11 +33,11 @@ def test_it_holds_the_corpus():
 
 def test_its_lips_close_at_rest_and_at_most_bilabials():
     talker = load_talker("grid_s1")
-    assert normalised_lip_gap(talker.model.shapes(talker.model.rest[None]))[0] < CLOSED_GAP
+    assert lip_opening(talker.model.shapes(talker.model.rest[None]))[0] < CLOSED_GAP
     least = []
     for utterance in talker.utterances[::8]:
         shapes = talker.model.shapes(utterance.shape)
-        times, gap = np.arange(len(shapes)) / talker.fps, normalised_lip_gap(shapes)
+        times, gap = np.arange(len(shapes)) / talker.fps, lip_opening(shapes)
         for phone, start, end in zip(
             utterance.phones.phones, utterance.phones.edges, utterance.phones.edges[1:], strict=False
         ):

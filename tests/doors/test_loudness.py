@@ -7,13 +7,13 @@ import av
 import numpy as np
 import pytest
 
-from tests.oracles.loudness_meter import measured
+from tests.oracles.loudness_meter import measured, true_peak
 from tts2face.models.face_file import load_face
 from tts2face.models.talker import load_talker
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.session import Session
-from tts2face.speech.bs1770 import integrated_loudness, true_peak
+from tts2face.speech.bs1770 import integrated_loudness
 from tts2face.synthesis.clip_stream import Piece
 from tts2face.types import Waveform, concatenate_clips
 from tts2face.voice import level

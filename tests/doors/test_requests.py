@@ -11,8 +11,7 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face
-from tts2face.models.face_file import load_face
-from tts2face.models.talker import Talker, load_talker
+from tts2face.models.talker import Talker
 from tts2face.request import GESTURES, Request
 from tts2face.session import Session
 from tts2face.types import Clip, concatenate_clips
@@ -35,21 +34,6 @@ CHANGES = {
     "gain": "head=2,blink=0",
     "expression": "happy=0.6@0.2-0.9",
 }
-
-
-@pytest.fixture(scope="module")
-def talker() -> Talker:
-    return load_talker("grid_s1")
-
-
-@pytest.fixture(scope="module")
-def face() -> Face:
-    return load_face("head")
-
-
-@pytest.fixture(scope="module")
-def session(talker: Talker, face: Face) -> Session:
-    return Session(talker, face)
 
 
 @pytest.fixture(scope="module")

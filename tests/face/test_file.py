@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.deformation import posed_vertices
+from tests.face.posing import posed_vertices
+from tts2face.catalogue import IdentityEntry, identities
 from tts2face.models.face import Eye, Face, Part
-from tts2face.models.face_file import Identity, list_identities, load_face, read_face, write_face
+from tts2face.models.face_file import Identity, load_face, read_face, write_face
 from tts2face.storage.files import find_file
 from tts2face.storage.tensors import write_tensors
 
@@ -89,7 +90,7 @@ def test_an_identity_moves_vertices_and_eyes_and_tints_its_part(written: tuple[F
     only_skin = np.setdiff1d(face.triangles[:12], face.triangles[12:])
     assert read.colours[only_skin] == pytest.approx(face.colours[only_skin] * np.array(TINT), abs=1)
     assert read.metadata["identity"] == "older"
-    assert list_identities(path) == {"older": "somebody else"}
+    assert identities(str(path)) == (IdentityEntry("older", str(path), "somebody else"),)
 
 
 def test_the_same_face_gives_the_same_bytes(written: tuple[Face, Path], tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tts2face.face.deformation import posed_vertices
+from tests.face.posing import posed_vertices
 from tts2face.face.landmark_fit import (
     axis_scales,
     landmark_motion,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from lexicon.errors import InputError
+from tests.face.posing import posed_vertices
 from tests.render.tiny_face import tiny_face
-from tts2face.face.deformation import build_rig, head_rotation, posed_vertices, rotation_matrix
+from tts2face.face.deformation import build_rig, head_rotation, rotation_matrix
 from tts2face.models.landmarks import CHIN
 
 WEIGHTS = np.array([0.4, -0.3, 1.0, 0.6])
@@ -61,8 +61,3 @@ def test_the_end_of_a_neck_stays_while_the_head_turns():
     np.testing.assert_allclose(moved[lowest], 0, atol=1e-5)
     expected = (head_rotation(0, 0.3, 0) - np.eye(3)) @ (face.vertices[highest] - face.pivot)
     np.testing.assert_allclose(moved[highest], expected, atol=1e-3)
-
-
-def test_weights_of_another_face_are_refused():
-    with pytest.raises(InputError, match="4 shapes, not weights of shape"):
-        posed_vertices(tiny_face(), np.zeros(5))

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from tts2face.face.deformation import posed_vertices
-from tts2face.models.face_file import list_identities, load_face, read_face
+from tests.face.posing import posed_vertices
+from tts2face.catalogue import identities
+from tts2face.models.face_file import load_face, read_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
 from tts2face.storage.files import find_file
 
@@ -73,9 +74,9 @@ def test_the_lower_teeth_and_the_tongue_follow_the_jaw(face):
 
 def test_every_identity_keeps_the_eyes_in_their_sockets():
     path = find_file("head", "face")
-    for name, summary in list_identities(path).items():
-        person = read_face(path, name)
-        assert summary
+    for entry in identities():
+        person = read_face(path, entry.name)
+        assert entry.summary
         for eye in person.eyes:
             front = person.vertices[eye.first : eye.first + eye.count, 2].max()
             radius = np.linalg.norm(person.vertices[eye.first] - eye.centre)

@@ -107,12 +107,16 @@ def test_candidates_are_drawn_by_their_distance():
     np.testing.assert_allclose(got, expected, atol=2 / 3000)
 
 
-def test_in_parts_as_at_once():
-    values, heard, lengths = _recordings(2)
+def _field_and_sound(seed, n_frames):
+    values, heard, lengths = _recordings(seed)
     made = build_field(values, heard, lengths, OPTIONS)
-    generator = np.random.default_rng(3)
-    sound, chances = generator.normal(size=(200, 1)).astype(np.float32), generator.random(200)
-    start = resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32))
+    generator = np.random.default_rng(seed + 1)
+    sound, chances = generator.normal(size=(n_frames, 1)).astype(np.float32), generator.random(n_frames)
+    return made, resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32)), sound, chances, lengths
+
+
+def test_in_parts_as_at_once():
+    made, start, sound, chances, _ = _field_and_sound(2, 200)
     whole, _ = sample_field(made, start, sound, chances)
     parts, state = [], start
     for low, high in ((0, 1), (1, 50), (50, 50), (50, 200)):
@@ -200,11 +204,7 @@ def test_options_out_of_range(wrong, reason):
 
 
 def test_a_walk_tells_which_moments_it_shows():
-    values, heard, lengths = _recordings(4)
-    made = build_field(values, heard, lengths, OPTIONS)
-    generator = np.random.default_rng(5)
-    sound, chances = generator.normal(size=(300, 1)).astype(np.float32), generator.random(300)
-    start = resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32))
+    made, start, sound, chances, lengths = _field_and_sound(4, 300)
     walk = sample_field_moments(made, start, sound, chances)
     np.testing.assert_array_equal(walk.values, sample_field(made, start, sound, chances)[0])
     assert walk.moments[-1] == walk.state.moment

@@ -20,12 +20,13 @@ from corpus_tools.show_talker import describe
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.model_files.mutations import mutate
+from tts2face.catalogue import identities
 from tts2face.exemplar.appearance_trajectory import appearance_trajectory, build_appearance_exemplars
 from tts2face.exemplar.synthesis import blend_trajectory, build_exemplar_model, select_tokens
 from tts2face.gesture.gesture_stream import GestureFields, GestureStream
 from tts2face.gesture.perlin_noise import NoiseStream
 from tts2face.gesture.timeline import Timeline
-from tts2face.models.face_file import list_identities, load_face, read_face
+from tts2face.models.face_file import load_face, read_face
 from tts2face.models.palette import read_palette
 from tts2face.models.talker import load_talker, read_talker, speech_channels
 from tts2face.render.draw import mesh_renderer
@@ -41,7 +42,7 @@ SOUND = Waveform(0.1 * np.sin(np.arange(24_000) ** 1.2), 16_000)
 
 def use_face(path: Path) -> None:
     """Draw a small frame and retarget a few frames; with an identity where there is one."""
-    identity = next(iter(list_identities(path)), None)
+    identity = next((entry.name for entry in identities(str(path))), None)
     face = read_face(path, identity)
     talker = load_talker("grid_s1")
     n_speech = talker.model.n_speech

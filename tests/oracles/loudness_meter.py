@@ -4,6 +4,7 @@ import av
 import numpy as np
 from av.filter import Graph
 
+from tts2face.speech.bs1770 import SILENT_DB, oversampled_peaks
 from tts2face.types import Waveform
 
 
@@ -28,3 +29,8 @@ def measured(sound: Waveform) -> tuple[float, float]:
         except (av.error.EOFError, av.error.BlockingIOError):
             break
     return float(found["lavfi.r128.I"]), 20 * float(np.log10(float(found["lavfi.r128.true_peak"])))
+
+
+def true_peak(sound: Waveform) -> float:
+    """Largest level of the continuous signal in dB of full scale, by fourfold oversampling (annex 2)."""
+    return 20.0 * float(np.log10(max(float(oversampled_peaks(sound.samples).max(initial=0.0)), 10 ** (SILENT_DB / 20))))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tests.oracles.loudness_meter import measured
-from tts2face.speech.bs1770 import ABSOLUTE_GATE_LUFS, integrated_loudness, k_weighting, true_peak
+from tests.oracles.loudness_meter import measured, true_peak
+from tts2face.speech.bs1770 import ABSOLUTE_GATE_LUFS, integrated_loudness, k_weighting
 from tts2face.types import Waveform
 
 

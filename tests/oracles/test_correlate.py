@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from corpus_tools.training.canonical_correlation import canonical_correlation, sampled_correlations
+from corpus_tools.training.canonical_correlation import canonical_correlation
 from lexicon.errors import InputError
+from tests.bench.bench_drive import sampled_correlations
 
 KNOWN = (0.9, 0.5, 0.2)
 
@@ -43,14 +44,6 @@ def test_factors_have_unit_variance_and_the_stated_correlations() -> None:
     np.testing.assert_allclose(left.T @ right / len(a), np.diag(KNOWN), atol=1e-9)
 
 
-def test_loadings_are_correlations_of_measurements_with_factors() -> None:
-    a, b = tied()
-    found = canonical_correlation(a, b)
-    left = (a - found.mean_a) @ found.weights_a
-    expected = [[np.corrcoef(a[:, i], left[:, k])[0, 1] for k in range(3)] for i in range(3)]
-    np.testing.assert_allclose(found.loadings_a, expected, rtol=1e-9)
-
-
 def test_it_equals_scikit_learn() -> None:
     decomposition = pytest.importorskip("sklearn.cross_decomposition")
     a, b = tied(500)
@@ -84,8 +77,3 @@ def test_few_frames_feign_a_strong_tie_that_falls_to_the_true_one() -> None:
 def test_what_has_no_correlation_is_refused(a: np.ndarray, b: np.ndarray, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
         canonical_correlation(a, b)
-
-
-def test_more_frames_than_there_are_are_refused() -> None:
-    with pytest.raises(InputError, match="4000 frames, not 5000"):
-        sampled_correlations(*tied(), (100, 5000), trials=1, rng=np.random.default_rng(0))

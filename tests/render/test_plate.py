@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from corpus_tools.aam.mesh import MOUTH_LANDMARKS
+from corpus_tools.aam.reference_frame import MOUTH_LANDMARKS
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_talker import SIZE, face_points, own_talker
 from tts2face.models.talker import Talker
 from tts2face.render import plate
-from tts2face.render.image_warp import draw_texture, warp_image
+from tts2face.render.image_warp import warp_image
 from tts2face.render.own_face import draw_video_frame, own_face_renderer
 from tts2face.render.picture import Picture
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
@@ -55,7 +55,7 @@ def test_a_texture_is_drawn_at_its_points():
     places = np.array([[0.0, 0], [7, 0], [0, 7]])
     texture = np.mgrid[:8, :8].transpose(1, 2, 0)[:, :, [1, 0, 0]].astype(np.float32)
     drawn = np.zeros((16, 16, 3), np.float32)
-    draw_texture(np.array([[0, 1, 2]], np.int32), 2 * places, texture, places, drawn)
+    warp_image(np.array([[0, 1, 2]], np.int32), 2 * places, places, texture, (texture, places[:0]), drawn)
     assert drawn[4, 6].tolist() == [3.0, 2.0, 2.0]
 
 

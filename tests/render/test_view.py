@@ -56,11 +56,15 @@ def test_the_window_has_the_camera_of_the_picture(name):
     assert np.tan(np.radians(plotter.camera.view_angle) / 2) == pytest.approx(120 / wanted.lens[0])
 
 
-def test_a_clip_plays_to_its_last_frame_and_turning_the_camera_relights_it():
+def skip_without_display(option):
     try:
-        view.require_display("--view")
+        view.require_display(option)
     except BackendError as missing:
         pytest.skip(f"needs a display and pyvista: {missing}")
+
+
+def test_a_clip_plays_to_its_last_frame_and_turning_the_camera_relights_it():
+    skip_without_display("--view")
     face = tiny_face()
     player = view.ClipPlayer(clip_of(face), face, Picture(size="128x128"))
     try:
@@ -81,10 +85,7 @@ def test_a_clip_plays_to_its_last_frame_and_turning_the_camera_relights_it():
 
 
 def test_a_live_window_shows_the_newest_motion():
-    try:
-        view.require_display("--camera")
-    except BackendError as missing:
-        pytest.skip(f"needs a display and pyvista: {missing}")
+    skip_without_display("--camera")
     face = tiny_face()
     motions = [None, (np.array([1.0, 0, 0, 0], np.float32), np.zeros(6, np.float32)), None]
     live_window = view.LiveWindow(face, Picture(size="128x128"), lambda: motions.pop(0))

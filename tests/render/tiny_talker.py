@@ -2,11 +2,16 @@
 
 import numpy as np
 
-from corpus_tools.aam.mesh import MOUTH_LANDMARKS, N_MESH_LANDMARKS, face_ring, face_triangles, mouth_triangles
 from corpus_tools.aam.plate import encode_plate_video
-from corpus_tools.aam.reference_frame import build_reference_frame
+from corpus_tools.aam.reference_frame import (
+    MOUTH_LANDMARKS,
+    build_reference_frame,
+    face_ring,
+    face_triangles,
+    mouth_triangles,
+)
 from tts2face.models.appearance import Appearance, Plate, TextureModel
-from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER, N_MESH_LANDMARKS
 from tts2face.models.talker import ShapeModel, Talker
 
 SIZE = 96

@@ -23,14 +23,14 @@ class FakeVoice:
     def sample_rate(self) -> int:
         return self._rate
 
-    def speak(self, spoken: str | Sequence, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
+    def speak(self, spoken: str | Sequence, *, rate: float = 1.0, seed: int = 0) -> Speech:
         self.said.append((str(spoken), rate))
         words = re.findall(r"\w+" if self._splits else r"[\w'-]+", str(spoken))
         n = sum(map(len, words))
         edges = np.concatenate([[0.0], LEAD + np.arange(n + 1) * LETTER / rate, [0.0]])
         edges[-1] = edges[-2] + TRAIL
         samples = np.zeros(round(edges[-1] * self._rate), np.float32)
-        samples[round(edges[1] * self._rate) : round(edges[-2] * self._rate)] = LEVEL * volume
+        samples[round(edges[1] * self._rate) : round(edges[-2] * self._rate)] = LEVEL
         edges[-1] = len(samples) / self._rate
         firsts = 1 + np.concatenate([[0], np.cumsum([len(word) for word in words])])
         spans = tuple(WordSpan(word, int(firsts[k]), int(firsts[k + 1])) for k, word in enumerate(words))

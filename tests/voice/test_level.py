@@ -4,17 +4,10 @@ import numpy as np
 import pytest
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tests.oracles.loudness_meter import measured
-from tts2face.speech.bs1770 import integrated_loudness, oversampled_peaks, true_peak
+from tests.oracles.loudness_meter import measured, true_peak
+from tts2face.speech.bs1770 import integrated_loudness, oversampled_peaks
 from tts2face.types import Speech, Waveform
-from tts2face.voice.level import (
-    CEILING_DB,
-    LOOK_AHEAD_S,
-    LOUDNESS_LUFS,
-    level_speech,
-    limit_peaks,
-    normalise_loudness,
-)
+from tts2face.voice.level import CEILING_DB, LOOK_AHEAD_S, LOUDNESS_LUFS, level_speech, limit_peaks, normalise_loudness
 
 RATE = 24_000
 

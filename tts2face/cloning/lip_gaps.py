@@ -4,13 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, inner_lip_gaps
 from tts2face.models.talker import ShapeModel
 
 FloatArray = NDArray[np.float64]
 
-# Without the corners, where both lips share one point.
-INNER_UPPER_LIP, INNER_LOWER_LIP = list(INNER_LIP_UPPER[1:-1]), list(INNER_LIP_LOWER[1:-1])
+WITHOUT_CORNERS = slice(1, -1)  # of the inner lip points; at the corners both lips share one point
 MIN_LIP_GAP_MM = 0.01  # margin for the rounding of parameters in a talker file
 CONTACT_SHARE = 0.01  # tracked gap of touching lips, relative to the distance of the outer eye corners
 UNBOUNDED_MM = 1e3  # a gap limit without effect
@@ -19,10 +18,8 @@ MAX_GAP_SLOPE = 10.0  # largest ratio of target to source gap growth beyond cont
 
 def facing_gaps(model: ShapeModel) -> FloatArray:
     """Gaps (P, M + 1) of facing inner lip points, mm: ``gaps[:, :M] @ parameters + gaps[:, M]``."""
-    per_mode = (model.basis[:, INNER_UPPER_LIP, 1] - model.basis[:, INNER_LOWER_LIP, 1]).astype(np.float64).T
-    return np.column_stack(
-        [per_mode, (model.mean[INNER_UPPER_LIP, 1] - model.mean[INNER_LOWER_LIP, 1]).astype(np.float64)]
-    )
+    per_mode, mean = (inner_lip_gaps(part)[..., WITHOUT_CORNERS] for part in (model.basis, model.mean))
+    return np.column_stack([per_mode.T, mean])
 
 
 def rest_with_open_lips(model: ShapeModel, limits: NDArray[np.floating]) -> FloatArray:

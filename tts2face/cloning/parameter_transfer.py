@@ -22,7 +22,7 @@ from tts2face.cloning.lip_gaps import (
 )
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.talker import ShapeModel, Talker
-from tts2face.numeric import ordered_product
+from tts2face.numeric import fix_signs, ordered_product
 from tts2face.retargeting.to_face import inner_product_map
 from tts2face.types import Trajectory
 
@@ -281,6 +281,4 @@ def _missing_components(source: ShapeModel, block: slice, span: FloatArray) -> t
     components, distances = components[real], distances[real]
     components = components - (components @ span.T) @ span
     components[np.abs(components) < ROUNDING_TOLERANCE] = 0.0  # mouth modes are exactly 0 on the rest of the face
-    largest = components[np.arange(len(components)), np.abs(components).argmax(axis=1)]
-    signed: FloatArray = components * np.sign(largest)[:, None]
-    return signed, distances
+    return fix_signs(components), distances

@@ -32,9 +32,9 @@ class PhoneSimilarity:
         return [(self.phones[at], float(row[at])) for at in order[:n]]
 
 
-def token_samples(tokens: Tokens, n_samples: int = N_TOKEN_SAMPLES) -> NDArray[np.float32]:
-    """(N, n_samples, D) speech parameters of every token, evenly over its `SAMPLED_PART` part."""
-    steps = np.linspace(*SAMPLED_PART, n_samples)
+def token_samples(tokens: Tokens) -> NDArray[np.float32]:
+    """(N, `N_TOKEN_SAMPLES`, D) speech parameters of every token, evenly over its `SAMPLED_PART` part."""
+    steps = np.linspace(*SAMPLED_PART, N_TOKEN_SAMPLES)
     starts, ends = tokens.spans[:, 1:2], tokens.spans[:, 2:3]
     positions = (starts + (ends - starts) * steps) * tokens.fps
     bounds = np.stack([tokens.first_frame[tokens.utterance], tokens.first_frame[tokens.utterance + 1]], axis=1)

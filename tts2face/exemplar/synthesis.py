@@ -206,18 +206,12 @@ def rest_weights(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[n
     ahead = np.append(starts, np.inf)[next_start] - times
     behind = times - np.concatenate([[-np.inf], ends])[next_start]
     distance = np.minimum(ahead, np.maximum(behind, 0.0))
-    pull = _smoothstep((distance - RELEASE_FROM_S) / (REST_FROM_S - RELEASE_FROM_S))
+    pull = smoothstep(distance, RELEASE_FROM_S, REST_FROM_S)
     last = times[-1]
     onset = np.clip(starts[0], MIN_EASE_S, REST_FROM_S)
     offset = np.clip(last - ends[-1], MIN_EASE_S, REST_FROM_S)
     if onset < REST_FROM_S:
-        pull = np.maximum(pull, 1.0 - _smoothstep(times / onset))
+        pull = np.maximum(pull, 1.0 - smoothstep(times, 0.0, onset))
     if offset < REST_FROM_S:
-        pull = np.maximum(pull, 1.0 - _smoothstep((last - times) / offset))
+        pull = np.maximum(pull, 1.0 - smoothstep(last - times, 0.0, offset))
     return pull
-
-
-def _smoothstep(part: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cubic smoothstep from 0 to 1."""
-    part = np.clip(part, 0.0, 1.0)
-    return smoothstep(part)

@@ -91,17 +91,6 @@ def _cheapest_path(cost, band):  # type: ignore[no-untyped-def]
     return path, n + m - 1 - at
 
 
-def warp_times(path: IntArray, n_target: int) -> FloatArray:
-    """(n_target,) (fractional) source frame that is mapped to each target frame.
-
-    A target frame with several source frames is mapped to their mean; the map is monotone and includes both ends.
-    """
-    counts = np.bincount(path[:, 1], minlength=n_target)
-    times: FloatArray = np.bincount(path[:, 1], weights=path[:, 0], minlength=n_target) / counts
-    times[0], times[-1] = path[0, 0], path[-1, 0]
-    return times
-
-
 @kernel
 def warp_to_reference(source, reference, scale, band, out):  # type: ignore[no-untyped-def]
     """Write (S, D) source into `out`, resampled so that its events coincide with those of an (S, D) reference.

@@ -7,53 +7,22 @@ Here the basis function of a centre is the product of the splines along the axes
 never negative: the solution is unique and does not oscillate between the centres.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.rbf import check_centres
+from tts2face.face.rbf import Interpolant, check_centres
 
 FloatArray = NDArray[np.float64]
 
-MAX_CONDITION = (
-    1e9  # of the interpolation matrix; beyond it, half of the digits of the coefficients are rounding errors
-)
-CHUNK_SIZE = 4096  # points evaluated at once, which bounds memory
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LocalInterpolant:
-    """``sum_i phi(x - c_i) a_i`` with phi the product of `cubic_bspline` along the axes.
-
-    Parameters
-    ----------
-    centres : (N, D)
-        Points where the displacement is known.
-    coefficients : (N, E)
-        a_i.
-    support
-        Distance from a centre, along any axis, at which its influence ends; in the unit of the centres.
-    """
-
-    centres: FloatArray
-    coefficients: FloatArray
-    support: float
-
-    def __call__(self, points: NDArray[np.floating]) -> FloatArray:
-        """Displacements (P, E) at points (P, D); exactly 0 beyond the support of every centre."""
-        values = np.zeros((len(points), self.coefficients.shape[1]))
-        for first in range(0, len(points), CHUNK_SIZE):
-            span = slice(first, first + CHUNK_SIZE)
-            values[span] = _basis_values(points[span], self.centres, self.support) @ self.coefficients
-        return values
+# Of the interpolation matrix; beyond it, half of the digits of the coefficients are rounding errors.
+MAX_CONDITION = 1e9
 
 
 def fit_local_interpolant(
     centres: NDArray[np.floating], displacements: NDArray[np.floating], support: float
-) -> LocalInterpolant:
-    """Local interpolant that equals the given displacements at the centres.
+) -> Interpolant:
+    """Interpolant that equals the given displacements at the centres; exactly 0 beyond the support of every centre.
 
     Parameters
     ----------
@@ -82,11 +51,11 @@ def fit_local_interpolant(
     points, targets = check_centres(centres, displacements)
     if not support > 0:
         raise InputError(f"the support must be above 0, not {support}")
-    matrix = _basis_values(points, points, support)
+    matrix = bspline_values(points, points, support)
     if np.linalg.cond(matrix) > MAX_CONDITION:
         raise DataError("centres are too close together for their support; remove some centres or reduce the support")
     coefficients: FloatArray = np.linalg.solve(matrix, targets).astype(np.float64)
-    return LocalInterpolant(points, coefficients, float(support))
+    return Interpolant(points, coefficients, float(support), bspline_values)
 
 
 def cubic_bspline(share: NDArray[np.floating]) -> FloatArray:
@@ -96,7 +65,7 @@ def cubic_bspline(share: NDArray[np.floating]) -> FloatArray:
     return values
 
 
-def _basis_values(points: NDArray[np.floating], centres: FloatArray, support: float) -> FloatArray:
+def bspline_values(points: NDArray[np.floating], centres: FloatArray, support: float) -> FloatArray:
     """Values (P, N) of every centre's basis function at points (P, D)."""
     values: FloatArray = np.ones((len(points), len(centres)))
     for axis in range(centres.shape[1]):

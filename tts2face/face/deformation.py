@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import InputError
 from tts2face.compilation import kernel
 from tts2face.models.face import Face
 from tts2face.models.landmarks import CHIN
@@ -80,27 +79,6 @@ def build_rig(face: Face) -> FaceRig:
     )
 
 
-def posed_vertices(face: Face, weights: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Vertices (V, 3) of a face, mm, for shape weights (K,), with the head at rest.
-
-    Raises
-    ------
-    InputError
-        The number of weights is not the number of the face's shapes.
-    """
-    weights = np.asarray(weights, np.float64)
-    if weights.shape != (len(face.shape_names),):
-        raise InputError(f"the face has {len(face.shape_names)} shapes, not weights of shape {weights.shape}")
-    vertices = face.vertices + np.tensordot(weights, face.shapes, axes=1)
-    for eye in face.eyes:
-        turn = np.zeros(3)
-        for name, per_weight in eye.turns.items():
-            turn += weights[face.shape_names.index(name)] * per_weight
-        span = slice(eye.first, eye.first + eye.count)
-        vertices[span] = (vertices[span] - eye.centre) @ rotation_matrix(turn).T + eye.centre
-    return vertices.astype(np.float32)
-
-
 def head_share(face: Face) -> NDArray[np.float32]:
     """Share (V,) of the head motion that each vertex follows: 1 on the head, falling to 0 at the end of the neck."""
     height = face.vertices[:, 1]
@@ -112,8 +90,7 @@ def head_share(face: Face) -> NDArray[np.float32]:
     bottom = float(height.min())
     if top - bottom < MIN_NECK_MM:
         return np.ones(len(height), np.float32)
-    share = np.clip((height - bottom) / (top - bottom), 0.0, 1.0)
-    smooth: NDArray[np.float32] = smoothstep(share).astype(np.float32)
+    smooth: NDArray[np.float32] = smoothstep(height, bottom, top).astype(np.float32)
     return smooth
 
 

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.face.eyelids import BLINK_SHAPES, WIDE_SHAPES, build_eyelid_model
-from tts2face.face.landmark_fit import N_SKIN, landmark_motion, scatter_landmarks
+from tts2face.face.landmark_fit import landmark_motion, scatter_landmarks
 from tts2face.face.lip_constraints import LipConstraints, build_lip_constraints
 from tts2face.face.shape_transfer import add_missing_shapes
 from tts2face.models.face import Face
+from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.models.palette import EXPRESSIONS
 
 EXPRESSION_TABLE = "expressions.tsv"
@@ -85,5 +86,5 @@ def expression_landmarks(face: Face) -> FloatArray:
     weights = expression_weights(complete_face, build_lip_constraints(complete_face))
     motion = scatter_landmarks(complete_face, landmark_motion(complete_face, np.arange(len(complete_face.shape_names))))
     moved: FloatArray = np.nan_to_num(np.einsum("lck,ek->elc", motion, weights))
-    moved[:, N_SKIN:] = 0.0
+    moved[:, N_MESH_LANDMARKS:] = 0.0
     return moved

@@ -14,12 +14,18 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from tts2face.face.expressions import GAZE_SHAPES, add_expression_shapes, expression_weights
 from tts2face.face.eyelids import EyelidModel, build_eyelid_model
-from tts2face.face.landmark_fit import N_SKIN, axis_scales, landmark_positions, procrustes_rotation, scatter_landmarks
+from tts2face.face.landmark_fit import axis_scales, landmark_positions, procrustes_rotation, scatter_landmarks
 from tts2face.face.lip_constraints import LipConstraints, build_lip_constraints
 from tts2face.face.mouth_model import SPEECH_SHAPE_PREFIXES
 from tts2face.face.shape_transfer import SCALE_LIMITS, append_shapes, spread_landmark_motion
 from tts2face.models.face import Face
-from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, OUTER_LIP_LOWER, OUTER_LIP_UPPER
+from tts2face.models.landmarks import (
+    INNER_LIP_LOWER,
+    INNER_LIP_UPPER,
+    N_MESH_LANDMARKS,
+    OUTER_LIP_LOWER,
+    OUTER_LIP_UPPER,
+)
 from tts2face.models.palette import FEATURES, FIXED_CHANNELS, REGION_FEATURES, FaceRegion, Palette
 from tts2face.numeric import ordered_product
 from tts2face.types import HEAD_CHANNELS, Trajectory
@@ -155,7 +161,9 @@ def mouth_response(expression: FloatArray) -> FloatArray:
     """Expression weights (T, 5) for the mouth: attenuated below `MOUTH_RESPONSE_RANGE`, where speech contains them."""
     low, high = MOUTH_RESPONSE_RANGE
     share = np.clip((np.abs(expression) - low) / (high - low), 0.0, 1.0)
-    return np.asarray(expression * share * share * (3.0 - 2.0 * share))
+    return np.asarray(
+        expression * share * share * (3.0 - 2.0 * share)
+    )  # not `smoothstep`: this order rounds differently
 
 
 def check_gestures(
@@ -234,7 +242,7 @@ def region_shapes(face: Face, neutral: FloatArray, region: FaceRegion) -> Float3
 def fit_modes(places: FloatArray, neutral: FloatArray, region: FaceRegion) -> FloatArray:
     """Modes (k, L, 3) of a region, rotated and scaled to the landmarks `places` (478, 3), some of which may be NaN."""
     known: NDArray[np.bool_] = np.isfinite(places[:, 0])
-    skin = np.flatnonzero(known[:N_SKIN])
+    skin = np.flatnonzero(known[:N_MESH_LANDMARKS])
     turn = procrustes_rotation(neutral[skin], places[skin])
     fitted = np.array([number for number in (*region.landmarks, *FIT_LANDMARKS) if known[number]])
     sizes = axis_scales(ordered_product(neutral[fitted], turn.T), places[fitted], SCALE_LIMITS)

@@ -9,7 +9,6 @@ from tts2face.numeric import nearest_rotation
 
 FloatArray = NDArray[np.float64]
 
-N_SKIN = 468  # landmarks from here on lie on the irises
 DIGITS = 9  # decimals kept: the last bits of LAPACK's results depend on its threads
 
 
@@ -42,7 +41,13 @@ def procrustes_rotation(source: FloatArray, target: FloatArray) -> FloatArray:
 
 def axis_scales(source: FloatArray, target: FloatArray, bounds: tuple[float, float]) -> FloatArray:
     """Factors s (3,) of the least-squares fit ``target = s * source + shift`` per axis, clipped to `bounds`."""
-    from_middle, to_middle = source - source.mean(axis=0), target - target.mean(axis=0)
-    scales = (from_middle * to_middle).sum(axis=0) / np.maximum((from_middle**2).sum(axis=0), 1e-12)
-    clipped: FloatArray = np.round(np.clip(scales, *bounds), DIGITS)
+    clipped: FloatArray = np.clip(axis_ratios(source, target), *bounds).round(DIGITS)
     return clipped
+
+
+def axis_ratios(source: NDArray[np.floating], target: NDArray[np.floating]) -> FloatArray:
+    """Factors s (3,) of the least-squares fit ``target = s * source + shift`` per axis."""
+    here, there = (np.asarray(points, np.float64) for points in (source, target))
+    here, there = here - here.mean(axis=0), there - there.mean(axis=0)
+    ratios: FloatArray = (here * there).sum(axis=0) / np.maximum((here**2).sum(axis=0), 1e-12)
+    return ratios

@@ -64,7 +64,7 @@ class LipConstraints:
         of it always remains. Frames without a gesture are unchanged.
         """
         gaps, widened = ordered_product(speech, self.gaps.T), ordered_product(added, self.gaps.T)
-        target_gaps = gaps + _smoothstep(gaps / FULL_EXPRESSION_GAP_MM) * widened
+        target_gaps = gaps + smoothstep(gaps / FULL_EXPRESSION_GAP_MM) * widened
         return self._solve(speech, added, np.maximum(target_gaps, np.where(gaps > 0, MIN_GAP_SHARE * gaps, gaps)))
 
     def _solve(self, speech: FloatArray, added: FloatArray, target_gaps: FloatArray) -> FloatArray:
@@ -98,12 +98,12 @@ class LipConstraints:
         )
         gaps = ordered_product(speech, self.gaps.T)
         return self._solve(
-            speech, added, gaps + grown[:, None] * _smoothstep(gaps / FULL_GROWTH_GAP_MM) * np.maximum(gaps, 0.0)
+            speech, added, gaps + grown[:, None] * smoothstep(gaps / FULL_GROWTH_GAP_MM) * np.maximum(gaps, 0.0)
         )
 
     def rounding(self, speech: FloatArray) -> FloatArray:
         """Rounding (T,) of the mouth: 0 as wide as at rest, 1 when narrower by `FULL_ROUNDING_MM`."""
-        return _smoothstep(-ordered_product(speech, self.width) / FULL_ROUNDING_MM)
+        return smoothstep(-ordered_product(speech, self.width) / FULL_ROUNDING_MM)
 
     def attenuate_on_rounded_lips(self, speech: FloatArray, added: FloatArray) -> FloatArray:
         """Gesture weights (T, K), reduced on rounded lips."""
@@ -134,9 +134,3 @@ def build_lip_constraints(face: Face) -> LipConstraints:
         width=motion[MOUTH_CORNER_LEFT, 0] - motion[MOUTH_CORNER_RIGHT, 0],
         limits=face.limits[moving].astype(np.float64),
     )
-
-
-def _smoothstep(share: FloatArray) -> FloatArray:
-    clipped = np.clip(share, 0.0, 1.0)
-    eased: FloatArray = smoothstep(clipped)
-    return eased

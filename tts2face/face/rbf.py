@@ -4,6 +4,7 @@ Theobald et al. 2007, eqs 3 and 4, after Pighin et al. 1998 and, as in the paper
 vanish far from every centre. The face is aligned beforehand, so that only its shape difference is interpolated.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +22,7 @@ CHUNK_SIZE = 4096  # points evaluated at once, which bounds memory
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Interpolant:
-    """Interpolating function f of eq. 4.
+    """Interpolating function f of eq. 4, or another sum of basis functions about the centres.
 
     Parameters
     ----------
@@ -29,20 +30,23 @@ class Interpolant:
         Points where the displacement is known.
     coefficients : (N, E)
         c of eq. 4.
-    decay_length
-        Distance over which the basis function falls to 1 / e, in the unit of the centres.
+    reach
+        Length scale of the basis functions, in the unit of the centres.
+    basis
+        Returns values (P, N) of the basis functions for points (P, D), the centres and `reach`.
     """
 
     centres: FloatArray
     coefficients: FloatArray
-    decay_length: float
+    reach: float
+    basis: Callable[[NDArray[np.floating], FloatArray, float], FloatArray]
 
     def __call__(self, points: NDArray[np.floating]) -> FloatArray:
         """Displacements (P, E) at points (P, D)."""
         values = np.zeros((len(points), self.coefficients.shape[1]))
         for first in range(0, len(points), CHUNK_SIZE):
             span = slice(first, first + CHUNK_SIZE)
-            values[span] = rbf_values(points[span], self.centres, self.decay_length) @ self.coefficients
+            values[span] = self.basis(points[span], self.centres, self.reach) @ self.coefficients
         return values
 
 
@@ -84,7 +88,7 @@ def fit_interpolant(
     if len(points) > 1 and float(pdist(points).min()) < MIN_CENTRE_DISTANCE * decay_length:
         raise DataError("two centres lie in one place; pass one displacement for each point")
     coefficients = solve(rbf_values(points, points, decay_length), targets, assume_a="pos")
-    return Interpolant(points, coefficients, decay_length)
+    return Interpolant(points, coefficients, decay_length, rbf_values)
 
 
 def check_centres(centres: NDArray[np.floating], displacements: NDArray[np.floating]) -> tuple[FloatArray, FloatArray]:

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.face.compact_spline import fit_local_interpolant
-from tts2face.face.landmark_fit import N_SKIN, axis_scales, landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.landmark_fit import axis_scales, landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.models.face import Eye, Face
 from tts2face.models.face_file import load_face
-from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS
+from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS, N_MESH_LANDMARKS
 
 DEFAULT_FACE = "head"
 SOFT_PARTS = ("lash", "brow")  # substrings of the names of parts that move with the skin
@@ -45,7 +45,7 @@ def eye_distance(face: Face) -> float:
 def soft_vertices(face: Face) -> NDArray[np.int64]:
     """Indices of the vertices that gestures move: parts with landmarks, lashes and brows; not the eyeballs."""
     on_skin = np.zeros(len(face.vertices), bool)
-    on_skin[face.landmark_vertices[face.landmarks < N_SKIN]] = True
+    on_skin[face.landmark_vertices[face.landmarks < N_MESH_LANDMARKS]] = True
     soft = np.zeros(len(face.vertices), bool)
     for part in face.parts:
         used = face.triangles[part.first : part.first + part.count]
@@ -99,7 +99,7 @@ def add_missing_shapes(face: Face, names: Sequence[str]) -> Face:
     if not missing:
         return face
     head = default_head()
-    common = np.intersect1d(face.landmarks[face.landmarks < N_SKIN], head.landmarks)
+    common = np.intersect1d(face.landmarks[face.landmarks < N_MESH_LANDMARKS], head.landmarks)
     places, head_places = (scatter_landmarks(model, landmark_positions(model)) for model in (face, head))
     sizes = axis_scales(head_places[common], places[common], SCALE_LIMITS)
     motion = scatter_landmarks(

@@ -32,5 +32,5 @@ def interpolate_keys(times: ArrayLike, keys: tuple[tuple[float, float], ...]) ->
     curve = np.full(seconds.shape, keys[0][1])
     for (begin, low), (end, high) in pairwise(keys):
         share = np.clip((seconds - begin) / (end - begin), 0.0, 1.0)
-        curve = curve + (high - low) * share**2 * (3 - 2 * share)
+        curve = curve + (high - low) * share**2 * (3 - 2 * share)  # not `smoothstep`: this order rounds differently
     return curve

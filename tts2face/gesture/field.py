@@ -14,6 +14,7 @@ from lexicon.errors import DataError, InputError
 from tts2face.gesture.field_kernels import MIN_MOMENT_GAP, SEARCH_SLACK, generate_frames, nearest_distances
 from tts2face.gesture.kd_tree import KdTree, build_tree
 from tts2face.models.palette import GESTURE_FPS
+from tts2face.numeric import principal_axes
 
 N_SEARCH_AXES = 8  # principal axes of the windows in which the search tree is built
 AXES_STRIDE = 8  # the axes are computed from every eighth window; all windows give the same axes
@@ -182,7 +183,9 @@ def build_field(
     weights = (np.sqrt(np.array(options.alpha[: prosody.shape[1]])) / spread).astype(np.float32)
     scaled = np.ascontiguousarray(values / np.float32(scale), np.float32)
     weighted = np.ascontiguousarray(prosody * weights, np.float32)
-    axes = _principal_axes(_history_windows(scaled, weighted, usable[::AXES_STRIDE], options.history))
+    windows = _history_windows(scaled, weighted, usable[::AXES_STRIDE], options.history)
+    away = (windows - windows.mean(axis=0)).astype(np.float64)
+    axes = np.ascontiguousarray(principal_axes(away.T @ away, N_SEARCH_AXES)[1], np.float32)
     tree = build_tree(_history_windows(scaled, weighted, usable, options.history) @ axes.T)
     tree.order[:] = usable[tree.order]
     made = Field(scaled, weighted, starts, axes, tree, scale, weights, 1.0, options)
@@ -211,12 +214,6 @@ def _history_windows(
     """(N, h (E + D)) sound features and motion of the h frames before each of N frames."""
     rows = frames[:, None] + np.arange(-history, 0)
     return np.concatenate([prosody[rows].reshape(len(rows), -1), values[rows].reshape(len(rows), -1)], axis=1)
-
-
-def _principal_axes(windows: Float32Array) -> Float32Array:
-    away = (windows - windows.mean(axis=0)).astype(np.float64)
-    _, vectors = np.linalg.eigh(np.asarray(away.T @ away))
-    return np.ascontiguousarray(vectors[:, ::-1][:, :N_SEARCH_AXES].T, np.float32)
 
 
 def _no_recent_jumps(made: Field) -> NDArray[np.int64]:

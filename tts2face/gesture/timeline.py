@@ -134,9 +134,8 @@ class Timeline:
             down, up = np.maximum(down, pitch), np.minimum(up, pitch)
         return down + up
 
-    def merge(self, other: "Timeline", shift: float = 0.0) -> "Timeline":
-        """Merge with another timeline, delayed by `shift` seconds, which takes precedence where both overlap."""
-        later = other.shift(shift)
+    def merge(self, later: "Timeline") -> "Timeline":
+        """Merge with another timeline, which takes precedence where both overlap."""
         return Timeline(
             {**self.style, **later.style},
             overlay_spans(self.spans, later.spans),

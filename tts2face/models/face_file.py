@@ -101,13 +101,6 @@ def read_face(path: Path, identity: str | None = None) -> Face:
     return face if identity is None else _apply_identity(face, arrays, header, names.index(identity))
 
 
-def list_identities(path: Path) -> dict[str, str]:
-    """Names and summaries of a face file's identity presets; errors as `read_face`."""
-    arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
-    check_face(path, arrays, header)
-    return {name: summary for name, _, summary in header["identities"]}
-
-
 def load_face(name: str, identity: str | None = None) -> Face:
     """Load a shipped face by name (head, cartoon), or one from a file; errors as `find_file` and `read_face`."""
     return read_face(find_file(name, KIND), identity)

@@ -1,11 +1,15 @@
-"""Landmarks common to talkers and faces: the 478 points of the MediaPipe face mesh.
+"""Landmarks common to talkers and faces, the 478 points of the MediaPipe face mesh, and distances between them.
 
 Indices follow the topology of Kartynnik et al. 2019, "Real-time facial surface geometry from monocular video on
 mobile GPUs" (468 points), followed by ten iris points. "Left" and "right" are the person's own. Landmark
 coordinates: x to the person's left, y up, z out of the face, millimetres, head pose removed.
 """
 
+import numpy as np
+from numpy.typing import NDArray
+
 N_LANDMARKS = 478
+N_MESH_LANDMARKS = 468  # landmarks of the skin; those after them lie on the irises and depend on gaze
 
 UPPER_LIP_INNER_MID = 13
 LOWER_LIP_INNER_MID = 14
@@ -38,3 +42,24 @@ MOUTH_REGION = (
     325, 335, 361, 364, 365, 367, 369, 375, 377, 378, 379, 391, 393, 394, 395, 396, 397, 400, 401, 402, 403, 404, 405,
     406, 407, 408, 409, 410, 411, 415, 416, 418, 421, 422, 424, 426, 427, 428, 430, 431, 432, 433, 434, 435, 436,
 )  # fmt: skip
+
+
+def lip_opening(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(T,) distance of the middle inner lips over that of the outer eye corners, of (T, L, 2 or 3) landmarks."""
+    return _normalised_distance(landmarks, UPPER_LIP_INNER_MID, LOWER_LIP_INNER_MID)
+
+
+def lip_width(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(T,) distance of the mouth's corners over that of the outer eye corners, of (T, L, 2 or 3) landmarks."""
+    return _normalised_distance(landmarks, MOUTH_CORNER_RIGHT, MOUTH_CORNER_LEFT)
+
+
+def _normalised_distance(landmarks: NDArray[np.floating], one: int, other: int) -> NDArray[np.float64]:
+    eyes = np.linalg.norm(landmarks[:, EYE_OUTER_LEFT] - landmarks[:, EYE_OUTER_RIGHT], axis=1)
+    return np.asarray(np.linalg.norm(landmarks[:, one] - landmarks[:, other], axis=1) / eyes, np.float64)
+
+
+def inner_lip_gaps(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(..., P) vertical gaps of facing inner lip points, of (..., 478, 3) landmarks or modes."""
+    gaps = landmarks[..., list(INNER_LIP_UPPER), 1] - landmarks[..., list(INNER_LIP_LOWER), 1]
+    return np.asarray(gaps, np.float64)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lexicon.phones import PHONES
 from lexicon.sequence import SILENCE
 from tts2face.models.audio_map import AUDIO_MAP_PREFIX, FEATURE_SIZES, MAX_CONTEXT
-from tts2face.models.landmarks import FACE_OVAL, N_LANDMARKS
+from tts2face.models.landmarks import FACE_OVAL, N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.models.phone_network import N_PHONES_SEEN, N_PLACE
 from tts2face.storage.schema import (
     MAX_MM,
@@ -32,7 +32,6 @@ from tts2face.types import HEAD_CHANNELS
 MAX_WEIGHT = 1e6  # of a network or an audio map
 MAX_PX = 1e5
 MAX_TEXTURE_SIDE_PX = 4096  # pixels per side
-N_MESH = 468  # mesh points of an appearance model: the landmarks without the irises
 ROUNDING_S, BEYOND_S = 1e-6, 1.0  # largest excess of phones before and after the frames of their utterance
 
 METADATA: Mapping[str, Check] = {
@@ -150,11 +149,11 @@ def _check_appearance(contents: Contents) -> None:
             "appearance.moved_by_speech": Tensor("float16", ("pixels of face",), 0.0, 1.0),
         }
     )
-    contents.sizes["points of face"] = N_MESH
+    contents.sizes["points of face"] = N_MESH_LANDMARKS
     for name in ("face", "mouth"):
         _check_texture(contents, name)
-    n_points = N_MESH + len(FACE_OVAL)
-    contents.indices("appearance.mouth_points", N_MESH, "points of the face")
+    n_points = N_MESH_LANDMARKS + len(FACE_OVAL)
+    contents.indices("appearance.mouth_points", N_MESH_LANDMARKS, "points of the face")
     n_face = contents.sizes["face parameters"]
     contents.tensors(
         {

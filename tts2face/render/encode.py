@@ -1,7 +1,7 @@
 """Encoding of clips while they are drawn: .mp4, .webm, .gif, or a folder of .png pictures."""
 
 import contextlib
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
 
@@ -25,11 +25,9 @@ from tts2face.render.output_path import (
 from tts2face.render.png_folder import PngFolderWriter
 from tts2face.render.renderer import FrameRenderer
 from tts2face.storage.temporary import Temporary
-from tts2face.types import Clip
+from tts2face.types import Clip, Progress
 
 N_SWATCHES = 6  # frames of the first clip from which the palette of a GIF is computed
-
-Progress = Callable[[int, int], None]
 
 
 class ClipWriter:
@@ -47,8 +45,6 @@ class ClipWriter:
         Renderer of the clips' frames.
     on_progress
         Called with the number of frames written and the number of frames added so far.
-    threads
-        Number of frames drawn in parallel; the number of available cores when None.
 
     Raises
     ------
@@ -70,11 +66,10 @@ class ClipWriter:
         renderer: FrameRenderer,
         *,
         on_progress: Progress | None = None,
-        threads: int | None = None,
     ) -> None:
         self.path, self._kind = check_output(path), output_kind(path)
         self._renderer = renderer
-        self._on_progress, self._threads = on_progress, threads
+        self._on_progress = on_progress
         self._n_frames = self._n_added = self._n_samples = 0
         self._clock: tuple[float, int] | None = None
         self._encoder: EncoderThread | None = None
@@ -113,7 +108,7 @@ class ClipWriter:
             encoder.put(samples=np.zeros(begin - self._n_samples, np.float32))  # the previous clip ended within a frame
             self._n_added += len(clip.motion)
             at, samples = 0, clip.speech.waveform.samples
-            for pixels in self._renderer.frames(clip, threads=self._threads, first=self._n_frames):
+            for pixels in self._renderer.frames(clip, first=self._n_frames):
                 self._n_frames += 1
                 until = min(self._first_sample(self._n_frames) - begin, len(samples))
                 encoder.put(pixels, samples[at:until])

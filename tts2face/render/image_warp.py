@@ -1,4 +1,4 @@
-"""Piecewise affine warps: a plate with an added texture change, or a texture alone, drawn triangle by triangle.
+"""Piecewise affine warps: a plate with an added texture change, drawn triangle by triangle.
 
 Pixel coordinates have their origin at the centre of the top left pixel. Every kernel releases the interpreter's lock
 and runs on one thread.
@@ -39,7 +39,7 @@ def warp_image(
         Source picture.
     change
         Texture (h, w, 3) to add, and the positions (M, 2), M <= N, of the first M points in it; triangles with other
-        points are warped without it.
+        points are warped without it. With M = 0 the plate is drawn as it is.
     frame : (H', W', 3) float32
         Out: the picture, written in place.
     """
@@ -72,30 +72,3 @@ def warp_image(
                     v = a * places[triangle[0], 1] + b * places[triangle[1], 1] + c * places[triangle[2], 1]
                     for k in range(3):
                         frame[y, x, k] += interpolate_bilinear(texture, u, v, k)
-
-
-@kernel
-def draw_texture(triangles: Array, target: Array, texture: Array, places: Array, frame: Array) -> None:
-    """Draw the triangles of a texture from `places` in the texture to `target` in the frame; see `warp_image`."""
-    height, width = frame.shape[0], frame.shape[1]
-    for f in range(len(triangles)):
-        triangle = triangles[f]
-        x0, y0 = triangle_corner(target, triangle, 0)
-        x1, y1 = triangle_corner(target, triangle, 1)
-        x2, y2 = triangle_corner(target, triangle, 2)
-        area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
-        if abs(area) < 1e-9:
-            continue
-        left, right = max(int(np.ceil(min(x0, x1, x2))), 0), min(int(max(x0, x1, x2)), width - 1)
-        top, bottom = max(int(np.ceil(min(y0, y1, y2))), 0), min(int(max(y0, y1, y2)), height - 1)
-        for y in range(top, bottom + 1):
-            for x in range(left, right + 1):
-                b = ((x - x0) * (y2 - y0) - (x2 - x0) * (y - y0)) / area
-                c = ((x1 - x0) * (y - y0) - (x - x0) * (y1 - y0)) / area
-                a = 1.0 - b - c
-                if min(a, b, c) < EDGE_TOLERANCE:
-                    continue
-                u = a * places[triangle[0], 0] + b * places[triangle[1], 0] + c * places[triangle[2], 0]
-                v = a * places[triangle[0], 1] + b * places[triangle[1], 1] + c * places[triangle[2], 1]
-                for k in range(3):
-                    frame[y, x, k] = interpolate_bilinear(texture, u, v, k)

@@ -18,7 +18,7 @@ from tts2face.models.landmarks import FACE_OVAL
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.own_face.gestures import OwnFaceGestures
 from tts2face.prefetch import map_in_order
-from tts2face.render.image_warp import draw_texture, warp_image
+from tts2face.render.image_warp import warp_image
 from tts2face.render.picture import AUTO_SIZE, Picture
 from tts2face.render.plate import (
     FrameStore,
@@ -224,7 +224,8 @@ def _draw_mouth_and_face(
     appearance, (change, mouth) = renderer.appearance, textures
     source = renderer.points[number].astype(np.float64)
     places = appearance.face.reference.astype(np.float64)
-    draw_texture(appearance.mouth.triangles, target[appearance.mouth_points], mouth, appearance.mouth.reference, frame)
+    inner, at = appearance.mouth, target[appearance.mouth_points]
+    warp_image(inner.triangles, at, inner.reference, mouth, (change, places[:0]), frame)
     warp_image(renderer.triangles, target, source, renderer.plate[number], (change, places), frame)
 
 

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
-from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, MOUTH_REGION, N_LANDMARKS
+from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS, inner_lip_gaps
 from tts2face.models.talker import ShapeModel, Talker, speech_channels
+from tts2face.numeric import principal_axes
 from tts2face.retargeting.to_face import Retargeter, build_retargeter
 from tts2face.types import Trajectory
 
@@ -93,7 +94,7 @@ def build_performer_retargeter(landmarks: NDArray[np.floating], scores: Trajecto
         There are fewer than 2 frames, or the face lacks landmarks of the lips or shapes that move them.
     """
     model = lip_model(landmarks)
-    gaps = lip_gaps(landmarks)
+    gaps = inner_lip_gaps(landmarks)
     closed = gaps[np.argsort(gaps[:, MIDDLE_PAIR], kind="stable")[: max(1, int(CLOSED_FRAME_SHARE * len(gaps)))]]
     contact = np.clip(np.percentile(closed, 50, axis=0), 0.0, MAX_CONTACT_MM)
     talker = Talker(scores.fps, model, (), {"name": "performer"})
@@ -136,15 +137,14 @@ def lip_model(landmarks: NDArray[np.floating]) -> ShapeModel:
     mean = landmarks.mean(axis=0, dtype=np.float64)
     region = np.isin(np.arange(N_LANDMARKS), MOUTH_REGION)
     offsets = (landmarks[:, region] - mean[region]).reshape(len(landmarks), -1)
-    variances, vectors = np.linalg.eigh(np.asarray(offsets.T @ offsets / len(offsets), np.float64))
-    order = np.argsort(variances)[::-1][:n_modes]
+    variances, axes = principal_axes(np.asarray(offsets.T @ offsets / len(offsets), np.float64), n_modes)
     basis = np.zeros((n_modes, N_LANDMARKS, 3))
-    basis[:, region] = vectors[:, order].T.reshape(n_modes, -1, 3)
-    gap = lip_gaps(landmarks)[:, MIDDLE_PAIR]
+    basis[:, region] = axes.reshape(n_modes, -1, 3)
+    gap = inner_lip_gaps(landmarks)[:, MIDDLE_PAIR]
     closed = gap <= np.quantile(gap, CLOSED_FRAME_SHARE)
     flat = np.median(landmarks[closed], axis=0) - mean
     rest = basis.reshape(n_modes, -1) @ flat.ravel()
-    spread = np.sqrt(np.maximum(variances[order], 1e-12))
+    spread = np.sqrt(np.maximum(variances, 1e-12))
     return ShapeModel(
         mean=mean.astype(np.float32),
         basis=basis.astype(np.float32),
@@ -152,12 +152,6 @@ def lip_model(landmarks: NDArray[np.floating]) -> ShapeModel:
         n_speech=n_modes,
         rest=rest.astype(np.float32),
     )
-
-
-def lip_gaps(landmarks: NDArray[np.floating]) -> FloatArray:
-    """Gaps (T, P) between facing upper and lower inner lip points, mm."""
-    upper, lower = landmarks[:, list(INNER_LIP_UPPER), 1], landmarks[:, list(INNER_LIP_LOWER), 1]
-    return np.asarray(upper - lower, np.float64)
 
 
 def eye_aperture(landmarks: NDArray[np.floating], side: str) -> FloatArray:

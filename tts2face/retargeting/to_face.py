@@ -32,6 +32,7 @@ from tts2face.models.landmarks import (
     MOUTH_CORNER_LEFT,
     MOUTH_CORNER_RIGHT,
     MOUTH_REGION,
+    inner_lip_gaps,
 )
 from tts2face.models.talker import Talker
 from tts2face.numeric import ordered_product
@@ -192,8 +193,7 @@ def contact_gaps(talker: Talker) -> FloatArray:
     A percentile over bilabials, each at the frame where its middle pair is closest; 0 without bilabials in the corpus.
     """
     model, n_speech = talker.model, talker.model.n_speech
-    apart = model.basis[:n_speech, INNER_LIP_UPPER, 1] - model.basis[:n_speech, INNER_LIP_LOWER, 1]
-    mean = (model.mean[list(INNER_LIP_UPPER), 1] - model.mean[list(INNER_LIP_LOWER), 1]).astype(np.float64)
+    apart, mean = inner_lip_gaps(model.basis[:n_speech]), inner_lip_gaps(model.mean)
     minima = [np.zeros((0, len(mean)))]
     for utterance in talker.utterances:
         gaps = ordered_product(utterance.shape[:, :n_speech].astype(np.float64), apart) + mean

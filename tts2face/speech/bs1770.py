@@ -53,11 +53,6 @@ def integrated_loudness(sounds: Sequence[Waveform]) -> float:
     return float(_lufs(audible[_lufs(audible) > gate].mean()))
 
 
-def true_peak(sound: Waveform) -> float:
-    """Largest level of the continuous signal in dB of full scale, by fourfold oversampling (annex 2)."""
-    return 20.0 * float(np.log10(max(float(oversampled_peaks(sound.samples).max(initial=0.0)), 10 ** (SILENT_DB / 20))))
-
-
 def oversampled_peaks(samples: NDArray[np.floating]) -> Floats:
     """(n,) largest magnitude of the continuous signal between each of n samples and the next one."""
     peaks = np.abs(np.asarray(samples, np.float64))

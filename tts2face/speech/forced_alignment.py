@@ -28,7 +28,6 @@ LEVEL_WINDOW_S = 0.01
 NOISE_LEVEL = 1e-4  # relative to full scale; digital silence has no logarithm
 PEAK_LEVEL = 0.7  # peak amplitude of the model's input
 MIN_PHONE_S = 0.005  # one frame; shorter phones and silences cannot be resolved
-SILENT_NAMES = frozenset({"SIL", "+NSN+", "+SPN+"})
 
 Pronunciations = Sequence[tuple[str, ...]]  # alternatives of one word, in phones of the table
 
@@ -214,18 +213,18 @@ def _frame_to_seconds(frame: int) -> float:
     return frame / FRAME_RATE + MODEL_DELAY_S - PADDING_S
 
 
-def enforce_increasing(edges: NDArray[np.float64], least: float = MIN_PHONE_S) -> NDArray[np.float64]:
-    """Move (N + 1,) edges so that successive ones differ by at least `least` seconds; the first and last are fixed.
+def enforce_increasing(edges: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Move (N + 1,) edges so that successive ones differ by at least `MIN_PHONE_S`; the first and last are fixed.
 
     Phones that are too short are lengthened at the cost of their neighbours. If the total duration is less than
-    `least` for each phone, all phones get equal durations.
+    `MIN_PHONE_S` for each phone, all phones get equal durations.
     """
     n = len(edges) - 1
     first, last = float(edges[0]), float(edges[-1])
-    if (last - first) <= n * least:
+    if (last - first) <= n * MIN_PHONE_S:
         return np.linspace(first, last, n + 1)
-    room = np.arange(n + 1) * least
-    slack = np.clip(np.maximum.accumulate(edges - room), first, last - n * least)
+    room = np.arange(n + 1) * MIN_PHONE_S
+    slack = np.clip(np.maximum.accumulate(edges - room), first, last - n * MIN_PHONE_S)
     moved: NDArray[np.float64] = slack + room
     moved[0], moved[-1] = first, last
     return moved

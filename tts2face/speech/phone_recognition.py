@@ -10,7 +10,6 @@ from lexicon.errors import BackendError, InputError
 from lexicon.ipa import parse_ipa
 from tts2face.types import Waveform
 
-RECOGNISER_RATE = 16_000  # Hz, sample rate of the network's training data
 MAX_SOUND_S = 30.0  # longest sound in one call; memory grows with it
 WORD_BOUNDARY = "|"  # separates words in the network's output
 

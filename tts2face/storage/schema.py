@@ -48,9 +48,9 @@ class Tensor:
     may_be_nan: bool = False
 
 
-def millimetres(*shape: int | str, dtype: str = "float32", most: float = MAX_MM) -> Tensor:
+def millimetres(*shape: int | str, most: float = MAX_MM) -> Tensor:
     """Requirements of an array of lengths or coordinates, mm, of magnitude up to `most`."""
-    return Tensor(dtype, shape, -most, most)
+    return Tensor("float32", shape, -most, most)
 
 
 @dataclass(slots=True)

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
+from tts2face.interpolation import interpolate_linear
 
 MAX_FILLED_GAP_S = 0.12  # longest gap that is interpolated; lips make no complete movement in less
 SAME_INSTANT_S = 0.001  # times in a file are rounded to milliseconds
@@ -33,11 +34,7 @@ def resample_to_grid(
     instants = np.arange(first, last + 1) / fps
     if len(instants) == len(times) and np.abs(instants - times).max() <= SAME_INSTANT_S:
         return points, first
-    after = np.clip(np.searchsorted(times, instants), 1, len(times) - 1)
-    share = np.clip((instants - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0)
-    share = share.reshape(-1, *[1] * (points.ndim - 1)).astype(np.float32)
-    between = points[after - 1] * (1 - share) + points[after] * share
-    return between.astype(np.float32), first
+    return interpolate_linear(points, times, instants), first
 
 
 def face_span(points: NDArray[np.float32]) -> tuple[int, int]:

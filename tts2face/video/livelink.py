@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from tts2face.interpolation import interpolate_columns
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
 HEAD_COLUMNS = ("HeadPitch", "HeadYaw", "HeadRoll")
@@ -48,7 +49,7 @@ def read_livelink(path: Path) -> FaceCapture:
     fps = _frame_rate(path, times)
     n_frames = int(np.floor((times[-1] - times[0]) * fps + 0.5)) + 1
     even = times[0] + np.arange(n_frames) / fps
-    read = np.stack([np.interp(even, times, column) for column in values.T], axis=1)
+    read = interpolate_columns(values, times, even)
     shapes = [at for at, name in enumerate(names) if not name.startswith(("Head", "LeftEye", "RightEye"))]
     channels = tuple(names[at][0].lower() + names[at][1:] for at in shapes)
     head = np.zeros((n_frames, len(HEAD_CHANNELS)))

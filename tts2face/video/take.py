@@ -1,6 +1,5 @@
 """A take: tracked landmarks, head pose and blendshape scores of a performer in a video."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.types import HEAD_CHANNELS, Trajectory
+from tts2face.interpolation import interpolate_linear
+from tts2face.types import HEAD_CHANNELS, Progress, Trajectory
 from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.frame_grid import resample_to_grid
 from tts2face.video.media import read_frames, read_media_info
@@ -18,8 +18,6 @@ from tts2face.video.streaming_tracker import StreamingTracker, TrackedFrame
 MAX_COUNTS_WITH_TWO_FACES = 1  # tolerates one false detection
 MIN_TRACKED_SHARE = 0.5  # least share of frames with a face
 PROFILE_RAD = 0.8  # median yaw beyond which the landmarks of the far side are unreliable
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,14 +32,11 @@ class Take:
         `HEAD_CHANNELS` relative to their medians in the take, which compensates an oblique camera.
     scores : (T, 52)
         `BLENDSHAPES` in [0, 1].
-    n_interpolated
-        Number of frames without a face, interpolated from their neighbours.
     """
 
     landmarks: NDArray[np.float32]
     head: Trajectory
     scores: Trajectory
-    n_interpolated: int
 
     @property
     def fps(self) -> float:
@@ -84,8 +79,8 @@ def read_take(
     if seen.mean() < MIN_TRACKED_SHARE:
         raise DataError(f"{video} shows a face in {seen.sum()} of {len(seen)} frames; film it from the front")
     scores = np.array([reader.blendshape_scores(points) for points in pixels[seen]])
-    points, first = resample_to_grid(_interpolate_frames(pixels[seen], times[seen], times), times, fps)
-    read, _ = resample_to_grid(_interpolate_frames(scores, times[seen], times), times, fps)
+    points, first = resample_to_grid(interpolate_linear(pixels[seen], times[seen], times), times, fps)
+    read, _ = resample_to_grid(interpolate_linear(scores, times[seen], times), times, fps)
     points, read = _align_to_start(points, first), _align_to_start(read, first)
     posed = remove_pose(points, fps)
     angles = head_angles(posed.rotations)
@@ -93,20 +88,7 @@ def read_take(
         raise DataError(f"{video} shows the face in profile; film it from the front")
     head = np.column_stack([angles, posed.translations])
     head -= np.median(head, axis=0)
-    n_missing = int((~seen).sum())
-    return Take(posed.landmarks, Trajectory(HEAD_CHANNELS, head, fps), Trajectory(BLENDSHAPES, read, fps), n_missing)
-
-
-def _interpolate_frames(
-    values: NDArray[np.float32], known: NDArray[np.float64], times: NDArray[np.float64]
-) -> NDArray[np.float32]:
-    """Values at `times` from those at `known` times, by linear interpolation; held at the ends."""
-    after = np.clip(np.searchsorted(known, times), 1, max(len(known) - 1, 1))
-    if len(known) == 1:
-        return np.repeat(values, len(times), axis=0)
-    share = np.clip((times - known[after - 1]) / (known[after] - known[after - 1]), 0.0, 1.0)
-    share = share.reshape(-1, *[1] * (values.ndim - 1)).astype(np.float32)
-    return np.asarray(values[after - 1] * (1 - share) + values[after] * share, np.float32)
+    return Take(posed.landmarks, Trajectory(HEAD_CHANNELS, head, fps), Trajectory(BLENDSHAPES, read, fps))
 
 
 def _align_to_start(values: NDArray[np.float32], first: int) -> NDArray[np.float32]:

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError
-from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS
+from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.video.landmark_models import find_bundle, load_network
 
-N_MESH = 468  # landmarks of the face mesh; the iris points follow
 MIN_SCORE = 0.5  # face probability of the mesh network; below it the landmarks are noise
 MIN_CONTRAST = 2.0  # standard deviation of pixel values; a blank frame has 0, a dark face about 20
 DETECTOR_SIZE = 128  # pixels of the detector's square input
@@ -205,7 +204,7 @@ def crop_around(points: NDArray[np.floating]) -> Crop:
     level = points[EYE_OUTER_LEFT, :2] - points[EYE_OUTER_RIGHT, :2]
     angle = float(np.arctan2(level[1], level[0]))
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    turned = points[:N_MESH, :2].astype(np.float64) @ turn.T
+    turned = points[:N_MESH_LANDMARKS, :2].astype(np.float64) @ turn.T
     low, high = turned.min(axis=0), turned.max(axis=0)
     centre = turn.T @ ((low + high) / 2)
     return Crop(float(centre[0]), float(centre[1]), CROP_SCALE * float((high - low).max()), angle)

@@ -41,7 +41,7 @@ class Voice(Protocol):
     def sample_rate(self) -> int:
         """Sample rate in Hz."""
 
-    def speak(self, content: SpeechInput, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
+    def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
         """Synthesise a sentence.
 
         Parameters
@@ -50,8 +50,6 @@ class Voice(Protocol):
             Text, or words with their phones.
         rate
             Factor of the speaking rate.
-        volume
-            Factor of the samples; they are scaled as a whole to stay within full scale.
         seed
             Seed of random numbers, for voices that use any.
 

@@ -72,12 +72,12 @@ class NeuralVoice:
         """Sample rate in Hz."""
         return int(self._model.sample_rate)
 
-    def speak(self, content: SpeechInput, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
+    def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
         """Synthesise a sentence; see `tts2face.voice.engine.Voice`."""
         parts = list(self._parts(content))
         if not any(letters_to_phones(token.letters)[0] for part in parts for token in part):
             raise InputError("there is nothing to say in the text; give at least one word")
-        return concatenate_speech([self._speak_tokens(part, rate, volume, seed) for part in parts])
+        return concatenate_speech([self._speak_tokens(part, rate, seed) for part in parts])
 
     def _parts(self, content: SpeechInput) -> Iterator[list[_Token]]:
         """Yield the tokens of each part that the model synthesises in one call."""
@@ -133,7 +133,7 @@ class NeuralVoice:
         """The letters that belong to the model's vocabulary."""
         return "".join(letter for letter in letters or "" if letter in self._model.vocab)
 
-    def _speak_tokens(self, tokens: Sequence[_Token], rate: float, volume: float, seed: int) -> Speech:
+    def _speak_tokens(self, tokens: Sequence[_Token], rate: float, seed: int) -> Speech:
         letters = "".join(token.letters + " " * token.has_space for token in tokens).strip()
         samples = self._model.from_phonemes(letters, speed=rate, seed=seed)
         sound = Waveform(apply_volume(samples, 1.0), self.sample_rate)
@@ -141,7 +141,7 @@ class NeuralVoice:
             phones, spans = self._align(tokens, sound)
         except DataError:
             phones, spans = self._predict_phones(tokens, letters, rate, sound)
-        return Speech(Waveform(apply_volume(samples, volume), self.sample_rate), phones, spans)
+        return Speech(sound, phones, spans)
 
     def _align(self, tokens: Sequence[_Token], sound: Waveform) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
         words = [(str(owner), [phones]) for owner, phones, _ in _spoken_words(tokens)]

@@ -61,7 +61,7 @@ class PiperVoice:
         """Sample rate in Hz."""
         return int(self._model.config.sample_rate)
 
-    def speak(self, content: SpeechInput, *, rate: float = 1.0, volume: float = 1.0, seed: int = 0) -> Speech:
+    def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
         """Synthesise a sentence; see `tts2face.voice.engine.Voice`. The model runs without noise: `seed` is unused."""
         words = self._words(content)
         if not words:
@@ -73,7 +73,7 @@ class PiperVoice:
         sound = Waveform(apply_volume(self._synthesise(text, rate), 1.0), self.sample_rate)
         pronunciations = [(word.text, [tuple(segment.phone for segment in word.segments)]) for word in words]
         found = self._aligner.align(sound, pronunciations)
-        return Speech(Waveform(apply_volume(sound.samples, volume), self.sample_rate), found.phones, found.words)
+        return Speech(sound, found.phones, found.words)
 
     def _words(self, content: SpeechInput) -> list[SpokenWord]:
         """Words with phones: those given, of the user's dictionary, or of espeak-ng."""
