@@ -5,10 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import tts2face
 from lexicon.errors import InputError
 from tests.golden.requests import starter_with_pictures
+from tts2face.synthesis.performance import Performance
 from tts2face.types import concatenate_clips
 
 TEXTS = ("Bob may move.", "We were away.", "Five big maps.", "Hello there.")
@@ -94,6 +96,24 @@ def test_wrong_calls_are_refused(call: object, reason: str, session: tts2face.Se
     assert callable(call)
     with pytest.raises(InputError, match=reason):
         call(session)
+
+
+@pytest.mark.parametrize(
+    ("replaced", "name"), [("take.csv", "the take"), ("sound.flac", "audio"), ("back.png", "background")]
+)
+def test_a_performance_does_not_replace_its_inputs(
+    replaced: str, name: str, session: tts2face.Session, tmp_path: Path
+) -> None:
+    take, sound, background = (tmp_path / file for file in ("take.csv", "sound.flac", "back.png"))
+    for path in (take, sound):
+        path.write_bytes(b"recorded")
+    Image.new("RGB", (64, 64)).save(background)
+    (tmp_path / "out.mp4").symlink_to(tmp_path / replaced)
+    content = (tmp_path / replaced).read_bytes()
+    picture = tts2face.Picture(size="64x64", background=str(background))
+    with pytest.raises(InputError, match=rf"out .*out\.mp4 would replace {name}; choose another name"):
+        session.write_performance(Performance(take=take, audio=sound), tmp_path / "out.mp4", picture=picture)
+    assert (tmp_path / "out.mp4").read_bytes() == content
 
 
 def test_a_session_without_a_palette_moves_lips_alone() -> None:
