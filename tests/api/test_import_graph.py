@@ -12,8 +12,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("lexicon", "tts2face", "corpus_tools", "cli")
 # Imports each module named on standard input in a fork that has imported no module of the project, and prints those
-# that fail. Modules of other packages are imported before the first fork. The bytecode of the project is written to a folder
-# of its own, so that each file is compiled once even where Python writes none.
+# that fail. Modules of other packages are imported before the first fork. The bytecode of the project is written to a
+# folder of its own, so that each file is compiled once even where Python writes none.
 IMPORT_EACH_ALONE = """
 import gc, importlib, os, sys, traceback
 for name in ("numpy", "scipy.optimize", "scipy.signal", "numba", "av", "PIL.Image", "concurrent.futures.process",

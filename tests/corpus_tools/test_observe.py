@@ -40,8 +40,8 @@ def cache(tmp_path_factory) -> Path:
 def max_missing_frames(takes: Path) -> int:
     """Frames by which an observation may be shorter than its video.
 
-    The sound of real takes lasts as long as the picture. The sound of rendered takes may end within the last frame, as it
-    ends with the speech, and a frame without sound is no part of an observation.
+    The sound of real takes lasts as long as the picture. The sound of rendered takes ends with the speech, which may be
+    within the last frame; a frame without sound is no part of an observation.
     """
     return 0 if SHARED in takes.parents else 1
 
