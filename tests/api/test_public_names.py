@@ -33,7 +33,7 @@ def test_importing_the_package_has_no_side_effect(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", tts2face.__all__)
-def test_every_public_name_has_a_home(name: str) -> None:
+def test_every_public_name_can_be_imported(name: str) -> None:
     value = getattr(tts2face, name)
     assert value.__doc__
     assert name in dir(tts2face)

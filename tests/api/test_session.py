@@ -57,7 +57,7 @@ def test_a_clip_of_another_face_is_refused(session: tts2face.Session, tmp_path: 
         tts2face.write_clip(clip, session.face, tmp_path / "a", picture=SMALL)
 
 
-def test_threads_get_what_one_gets(session: tts2face.Session) -> None:
+def test_threads_get_the_same_clips_as_a_single_thread(session: tts2face.Session) -> None:
     alone = [tts2face.Session(palette=session.palette).clip(text, seed=2) for text in TEXTS]
     with ThreadPoolExecutor(4) as pool:
         together = list(pool.map(lambda text: session.clip(text, seed=2), TEXTS * 2))
@@ -123,7 +123,7 @@ def test_a_session_without_a_palette_moves_lips_alone() -> None:
     assert not clip.head.values.any()
 
 
-def test_voices_in_use_do_not_count_among_those_kept(session: tts2face.Session) -> None:
+def test_voices_in_use_are_not_counted_as_cached(session: tts2face.Session) -> None:
     text = '<speak>One. <voice name="heart">Two.</voice> <lang xml:lang="de">Drei.</lang> Four.</speak>'
     spoken = [word.text for _ in range(2) for word in session.clip(text, voice="espeak").speech.words]
     assert [word.strip(".") for word in spoken] == ["One", "Two", "Drei", "Four"] * 2

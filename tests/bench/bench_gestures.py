@@ -41,7 +41,7 @@ def megabytes() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-def spoken(style: Style) -> np.ndarray:
+def shuffled_intensity(style: Style) -> np.ndarray:
     """(T, 1) intensity of the style's recordings in random order."""
     parts = split_recordings(style.intensity, style.lengths)
     order = np.random.default_rng(5).permutation(len(parts))
@@ -76,7 +76,7 @@ def main() -> None:
     palette = load_palette(parser.parse_args().palette)
     name = max(palette.styles, key=lambda one: palette.styles[one].seconds)
     whole = palette.styles[name]
-    heard = spoken(whole)
+    heard = shuffled_intensity(whole)
     timed(replace_style(palette, name, select_recordings(whole, np.arange(20))), name, heard[:90])  # compile
     before = megabytes()
     order = np.random.default_rng(6).permutation(len(whole.lengths))

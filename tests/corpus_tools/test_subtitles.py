@@ -46,13 +46,13 @@ def test_cues_are_read_and_widened_up_to_their_neighbours(name: str, content: by
         ("{\\an8}Up here.", "Up here."),
     ],
 )
-def test_only_what_is_spoken_counts(shown: str, spoken: str, tmp_path: Path) -> None:
+def test_only_spoken_words_of_a_cue_are_kept(shown: str, spoken: str, tmp_path: Path) -> None:
     path = tmp_path / "a.srt"
     path.write_text(f"1\n00:00:01,000 --> 00:00:03,000\n{shown}\n", encoding="utf-8")
     assert [cue.text for cue in read_cues(path)] == [spoken]
 
 
-def test_subtitles_of_nothing_but_noises(tmp_path: Path) -> None:
+def test_subtitles_with_sound_descriptions_only_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.srt"
     path.write_text("1\n00:00:01,000 --> 00:00:03,000\n[music]\n", encoding="utf-8")
     with pytest.raises(DataError, match="contains no subtitles"):

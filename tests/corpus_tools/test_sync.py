@@ -45,14 +45,14 @@ def test_a_known_lag_is_found(filmed: Callable[..., Observation], lag: float) ->
     assert found.problem is None
 
 
-def test_lags_of_less_than_can_be_told_stay(filmed: Callable[..., Observation]) -> None:
+def test_lags_below_the_resolution_are_not_corrected(filmed: Callable[..., Observation]) -> None:
     assert estimate_sync([filmed("a", 0.02)]).lag_correction_s == 0.0
     assert estimate_sync([filmed("a", 0.06)]).lag_correction_s == pytest.approx(0.06, abs=0.005)
     assert estimate_sync([filmed("a", 0.02, seconds=600.0)]).lag_correction_s == pytest.approx(0.02, abs=0.005)
     assert estimate_sync([filmed("a", 0.2, seconds=10.0)]).lag_correction_s == 0.0
 
 
-def test_another_sound_is_a_fault(filmed: Callable[..., Observation]) -> None:
+def test_unrelated_sound_is_reported(filmed: Callable[..., Observation]) -> None:
     seen, other = filmed("a", 0.0), filmed("b", 0.0, seed=2)
     fault = estimate_sync([replace(seen, intensity=other.intensity)]).problem
     assert fault is not None
@@ -81,12 +81,12 @@ def test_the_rate_of_most_frames_is_everybodys(filmed: Callable[..., Observation
     assert corrected_timings(seen, estimate_sync_by_video(seen)) == {Path("b.mkv"): Timing(30.0, 0.0)}
 
 
-def test_nothing_is_read_again_where_all_is_well(filmed: Callable[..., Observation]) -> None:
+def test_nothing_is_read_twice_without_a_lag(filmed: Callable[..., Observation]) -> None:
     seen = [filmed("a", 0.0), filmed("b", 0.01)]
     assert corrected_timings(seen, estimate_sync_by_video(seen)) == {}
 
 
-def test_lips_that_do_not_move_tell_nothing(filmed: Callable[..., Observation]) -> None:
+def test_lips_that_do_not_move_give_no_lag(filmed: Callable[..., Observation]) -> None:
     seen = filmed("a", 0.1)
     still = replace(seen, landmarks=np.repeat(seen.landmarks[:1], len(seen.landmarks), axis=0))
     found = estimate_sync([still])

@@ -50,13 +50,13 @@ def found(rendered_takes: Path, face_model: Path, tmp_path_factory: pytest.TempP
     return observe(folder, effort=RunOptions(folder / "cache", 2, face_model))
 
 
-def test_what_is_wrong_is_said(found: Observations) -> None:
+def test_every_refusal_names_its_reason(found: Observations) -> None:
     reasons = {refusal.name: refusal.reason for refusal in found.refused}
     assert set(reasons) == set(REASONS)
     assert [name for name, reason in REASONS.items() if reason not in reasons[name]] == []
 
 
-def test_the_rest_goes_on_at_the_rate_of_most(found: Observations) -> None:
+def test_the_other_recordings_use_the_most_frequent_frame_rate(found: Observations) -> None:
     assert [seen.name for seen in found.kept] == ["faster", "good", "second"]
     assert {seen.fps for seen in found.kept} == {25.0}
     faster, good, _ = found.kept

@@ -105,7 +105,7 @@ def test_lips_open_with_the_sound_of_a_rendered_take(audio_map: str, rendered_ta
     assert np.median(found[spoken]) > 2 * np.median(found[~spoken])
 
 
-def test_with_the_words_lips_close_where_they_are_said(
+def test_with_a_transcript_lips_close_at_the_bilabials(
     takes: Path, film: Path, session: Session, talker: Talker
 ) -> None:
     clip = session.clip(Request(audio=film, text=TEXT, fps=25.0))
@@ -149,7 +149,7 @@ def test_sound_and_picture_are_equally_long(fps: float, film: Path, session: Ses
 
 @ONLY_RENDERED
 @pytest.mark.parametrize("text", ["", f"{TEXT} {TEXT} {TEXT} {TEXT} {TEXT}"])
-def test_a_long_recording_comes_in_pieces(text: str, film: Path, session: Session, here: Path) -> None:
+def test_a_long_recording_is_divided_into_pieces(text: str, film: Path, session: Session, here: Path) -> None:
     samples = read_sound(film, 16000).samples
     sound = written(here / "long.wav", np.tile(samples, 5))
     pieces = list(session.stream(Request(audio=sound, text=text, fps=60.0)))
@@ -183,7 +183,7 @@ def test_a_faint_recording_moves_the_lips_as_a_loud_one(film: Path, talker: Talk
     assert np.median(np.abs(loud - faint) / spread) < 0.1  # 16-bit noise is left
 
 
-def test_motion_between_frames_goes_through_them() -> None:
+def test_interpolated_motion_passes_through_the_frames() -> None:
     values = np.random.default_rng(0).normal(size=(20, 3)).astype(np.float32)
     np.testing.assert_allclose(resample_motion(values, 25.0, 50.0, 39)[::2], values, atol=1e-5)
     line = np.arange(20, dtype=np.float32)[:, None]
@@ -213,9 +213,7 @@ def test_the_command_writes_clips(film: Path, talker: Talker, here: Path) -> Non
     ("samples", "reason"), [(np.zeros(16000), "is silent"), (0.1 * np.ones(800), r"lasts 0\.050 s; give a recording")]
 )
 @pytest.mark.parametrize("text", ["", TEXT])
-def test_what_cannot_be_heard_is_refused(
-    samples: np.ndarray, reason: str, text: str, session: Session, here: Path
-) -> None:
+def test_unusable_sound_is_refused(samples: np.ndarray, reason: str, text: str, session: Session, here: Path) -> None:
     path = written(here / "a.wav", samples)
     with pytest.raises(DataError, match=reason):
         session.clip(Request(audio=path, text=text))
@@ -239,13 +237,13 @@ def test_files_without_sound_are_refused(session: Session, here: Path) -> None:
         ({"rate": 1.5}, "--voice and --rate have no effect on a recording"),
     ],
 )
-def test_options_that_do_not_go_together_are_refused(options: dict, reason: str) -> None:
+def test_options_that_exclude_each_other_are_refused(options: dict, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
         Request(**{"audio": Path("a.wav"), **options})
 
 
 @ONLY_RENDERED
-def test_a_recording_that_is_not_there_and_a_talker_without_audio_maps_are_refused(
+def test_a_missing_recording_and_a_talker_without_audio_maps_are_refused(
     film: Path, session: Session, talker: Talker
 ) -> None:
     with pytest.raises(InputError, match=r"there is no recording none\.wav"):

@@ -72,13 +72,13 @@ def test_folders_that_are_split_already(here: Path, capsys: pytest.CaptureFixtur
     assert "wrote split.json: 6 utterances held out, 18 for training" in capsys.readouterr().err
 
 
-def test_another_talker_is_told_apart(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_another_talker_is_reported(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     result = json.loads(measured("across.json", "--train", "all", "--cross-talker", "other"))
     assert (result["is_across"], result["n_train"], result["n_test"]) == (True, 24, 4)
     assert "4 utterances of another talker, 24 for training" in capsys.readouterr().err
 
 
-def test_own_durations_are_told_at_the_terminal_and_in_every_file(
+def test_own_durations_are_reported_in_the_terminal_and_in_every_file(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     own = (*PLAIN, "--own-durations")
@@ -88,7 +88,7 @@ def test_own_durations_are_told_at_the_terminal_and_in_every_file(
     assert len(json.loads(measured("own.json", *own))["own"]) == 4
 
 
-def test_folds_are_told_at_the_terminal_and_in_every_file(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_folds_are_reported_in_the_terminal_and_in_every_file(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folds = ("--recordings", "all", "--folds", "3")
     assert b"<h2>3 folds</h2>" in measured("folds.html", *folds)
     assert "spread over 3 folds" in capsys.readouterr().out

@@ -56,7 +56,7 @@ def channels_of(clip: Clip, begins: tuple[str, ...]) -> np.ndarray:
     return clip.motion.values[:, [name.startswith(begins) for name in clip.motion.channels]]
 
 
-def test_everything_moves(alive: Clip) -> None:
+def test_every_feature_moves(alive: Clip) -> None:
     for feature, begins in SHAPES.items():
         assert np.ptp(channels_of(alive, begins), axis=0).max() > 0.05, feature
     assert np.degrees(np.ptp(alive.head.values[:, :3], axis=0)).max() > 0.5
@@ -70,7 +70,7 @@ def test_a_layer_of_its_own_changes_no_other(alive: Clip, session: Session) -> N
     np.testing.assert_array_equal(still.head.values, alive.head.values)
 
 
-def test_the_starter_palette_holds_the_paper_s_moods_and_says_where_it_is_from() -> None:
+def test_the_starter_palette_has_the_moods_of_the_paper_and_its_provenance() -> None:
     palette = load_palette("starter")
     moods = ("neutral", "depressed", "delighted", "annoyed", "exaggerated", "exasperated")
     assert palette.names == (*moods, "grid_s1")
@@ -123,7 +123,7 @@ def test_marks_and_flags_paint_styles(alive: Clip, session: Session) -> None:
     np.testing.assert_array_equal(channels_of(by_flag, ("brows",)), channels_of(alive, ("brows",)))
 
 
-def test_another_palette_is_another_person(alive: Clip, talker: Talker, face: Face, tmp_path: Path) -> None:
+def test_another_palette_gives_other_motion(alive: Clip, talker: Talker, face: Face, tmp_path: Path) -> None:
     starter = load_palette("starter")
     style = starter.styles["grid_s1"]
     few = {name: values[: int(style.lengths[:40].sum())] for name, values in style.motion.items()}
@@ -162,7 +162,7 @@ def test_an_idle_face_lives(session: Session, face: Face) -> None:
         (["--gain", "head=4"], 2, "the gain of head must lie between 0 and 3, not 4"),
     ],
 )
-def test_what_cannot_be_is_one_sentence_and_nothing_is_written(
+def test_invalid_requests_give_one_sentence_and_nothing_is_written(
     arguments: list[str], code: int, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -174,7 +174,7 @@ def test_what_cannot_be_is_one_sentence_and_nothing_is_written(
     assert set(tmp_path.iterdir()) == before
 
 
-def test_a_style_in_the_text_that_nobody_has(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_an_unknown_style_in_the_text_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert run(["[style:cross]Hi.[/style]", "--out", str(tmp_path / "x.mp4"), *SMALL]) == 2
     assert "no style 'cross'" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

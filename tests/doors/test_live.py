@@ -43,7 +43,9 @@ def live(film: Path, bundle: Path) -> list[LivePose | None]:
     return list(track_poses(read_frames(film), load_face("head"), FaceTracker(bundle), BlendshapeReader(bundle), FPS))
 
 
-def test_a_person_is_learnt_and_then_followed(live: list[LivePose | None], film: Path, bundle: Path) -> None:
+def test_live_capture_calibrates_and_then_follows_the_person(
+    live: list[LivePose | None], film: Path, bundle: Path
+) -> None:
     """Compared with the take read as a whole, which includes later frames."""
     head = load_face("head")
     learnt = round(CALIBRATION_S * FPS)
@@ -92,7 +94,9 @@ def test_orders_that_make_no_sense(words: list[str], reason: str, capsys: pytest
     assert reason in capsys.readouterr().err
 
 
-def test_without_a_display_it_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_display_the_message_names_the_cause(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setattr("tts2face.render.window.sys.platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)

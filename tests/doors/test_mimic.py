@@ -41,7 +41,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def watched(path: Path, bundle: Path) -> tuple[np.ndarray, np.ndarray]:
+def tracked_motion(path: Path, bundle: Path) -> tuple[np.ndarray, np.ndarray]:
     """(T, 478, 3) landmarks in mm and (T, 3) head angles in degrees against their middle."""
     points = FaceTracker(bundle).track(lambda: (picture.pixels for picture in read_frames(path)), FPS).points
     posed = remove_pose(points, FPS)
@@ -59,8 +59,8 @@ def test_lips_lids_and_head_of_the_clip_are_the_performer_s(face: str, film: Pat
     facts = read_media_info(here / "m.mp4")
     assert facts.fps == FPS
     assert facts.rate == 48_000
-    source, source_head = watched(film, bundle)
-    shown, shown_head = watched(here / "m.mp4", bundle)
+    source, source_head = tracked_motion(film, bundle)
+    shown, shown_head = tracked_motion(here / "m.mp4", bundle)
     assert len(shown) == len(source)
     assert np.corrcoef(gap(source), gap(shown))[0, 1] >= 0.95
     assert (np.abs(source_head - shown_head).mean(axis=0) <= 1.0).all()
@@ -80,7 +80,7 @@ def test_a_capture_moves_the_shapes_of_its_names(capture: Path, here: Path) -> N
 
 
 @ONLY_RENDERED
-def test_a_film_without_sound_makes_a_silent_clip_and_says_so(
+def test_a_video_without_sound_gives_a_silent_clip_and_a_message(
     film: Path, bundle: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     written(here / "mute.mp4", [picture.pixels for picture in read_frames(film)][:20])
@@ -166,7 +166,7 @@ def test_captures_that_cannot_be_read_are_refused(
 
 
 @ONLY_RENDERED
-def test_a_copy_under_another_name_gives_the_same_bytes(film: Path, bundle: Path, here: Path) -> None:
+def test_a_copy_with_another_name_gives_the_same_bytes(film: Path, bundle: Path, here: Path) -> None:
     shutil.copy(film, here / "take.mkv")
     for source, out in ((str(film), "a"), ("take.mkv", "b")):
         words = [

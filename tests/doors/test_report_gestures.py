@@ -40,7 +40,7 @@ def written(out: str, *more: str) -> bytes:
     return Path(out).read_bytes()
 
 
-def test_the_page_holds_everything_and_fetches_nothing(here: Path) -> None:
+def test_the_page_is_complete_and_loads_nothing(here: Path) -> None:
     html = written("g.html").decode()
     for heading in ("calm", "quick"):
         assert f"<h2>{heading}</h2>" in html
@@ -65,7 +65,7 @@ def test_the_table_has_a_line_a_trait(here: Path) -> None:
     assert {row["trait"] for row in rows if row["target"]} == {"head speed", "brow height", "blink interval"}
 
 
-def test_the_json_says_the_same_as_the_table(here: Path) -> None:
+def test_the_json_equals_the_table(here: Path) -> None:
     content = json.loads(written("g.json"))
     rows = list(csv.DictReader(written("g.csv").decode().splitlines()))
     weights = [
@@ -116,7 +116,7 @@ def test_the_same_options_write_the_same(plain: bytes, here: Path) -> None:
         ("made.palette", "g.html", ("--seed", "0.5"), '"0.5" is not a whole number'),
     ],
 )
-def test_refusals_are_one_sentence_and_write_nothing(
+def test_errors_are_one_sentence_and_nothing_is_written(
     palette: str, out: str, more: tuple[str, ...], reason: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["report", "gestures", palette, "--out", out, *more]) == 2

@@ -43,7 +43,7 @@ def written(out: str, *more: str) -> bytes:
     return Path(out).read_bytes()
 
 
-def test_the_page_holds_everything_and_fetches_nothing(here: Path) -> None:
+def test_the_page_is_complete_and_loads_nothing(here: Path) -> None:
     html = written("r.html", "--compare", "other.talker").decode()
     for heading in (
         "Phone by phone", "Most similar phones", "Viseme classes", "Reliability", "Similarity and articulation",
@@ -67,7 +67,7 @@ def test_the_matrix_is_a_table_of_numbers(here: Path) -> None:
     assert {row[1] for row in rows[1:]} == {"60"}
 
 
-def test_the_json_says_the_same_as_the_matrix(here: Path) -> None:
+def test_the_json_equals_the_matrix(here: Path) -> None:
     content = json.loads(written("r.json"))
     rows = list(csv.reader(written("r.csv", "--labels", "ipa").decode().splitlines()))
     assert [phone["ipa"] for phone in content["phones"]] == rows[0][2:]
@@ -143,7 +143,7 @@ def test_a_comparison_is_the_difference_of_the_matrices(here: Path) -> None:
         ("made.talker", "r.html", ("--compare", "poor.talker"), "the talker poor.talker has"),
     ],
 )
-def test_refusals_are_one_sentence_and_write_nothing(
+def test_errors_are_one_sentence_and_nothing_is_written(
     talker: str, out: str, more: tuple[str, ...], reason: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["report", "similarity", talker, "--out", out, *more]) == 2

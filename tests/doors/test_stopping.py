@@ -50,7 +50,7 @@ def speaking(here: Path) -> "subprocess.Popen[str]":
 
 
 @pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
-def test_a_signal_leaves_nothing(tmp_path: Path, name: str, code: int) -> None:
+def test_a_signal_leaves_no_files_and_no_processes(tmp_path: Path, name: str, code: int) -> None:
     with speaking(tmp_path) as process:
         process.send_signal(getattr(signal, name))
         _, message = process.communicate(timeout=PATIENCE_S)
@@ -59,7 +59,7 @@ def test_a_signal_leaves_nothing(tmp_path: Path, name: str, code: int) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_a_killed_command_left_is_removed_by_the_next_one(tmp_path: Path) -> None:
+def test_files_of_a_killed_command_are_removed_by_the_next_one(tmp_path: Path) -> None:
     with speaking(tmp_path) as process:
         process.kill()
     assert list(tmp_path.glob(".x*"))

@@ -131,7 +131,7 @@ def test_without_leaps_a_recording_is_repeated():
     np.testing.assert_allclose(shown, values[25:150], atol=1e-5)
 
 
-def test_after_a_leap_motion_goes_on_from_where_it_was():
+def test_motion_is_continuous_across_a_jump():
     values, heard, lengths = _recordings(5)
     made = build_field(values, heard, lengths, FieldOptions(history=5, future=4, alpha=(5.0,), settle_s=0.2))
     generator = np.random.default_rng(6)
@@ -155,7 +155,7 @@ def test_no_dead_end_and_no_loop_in_silence():
     assert set(moments[1000:]) - set(moments[500:1000])
 
 
-def test_another_style_goes_on_where_the_first_stood():
+def test_motion_is_continuous_across_a_change_of_style():
     values, heard, lengths = _recordings(9)
     first = build_field(values, heard, lengths, OPTIONS)
     second = build_field(2.0 * values[::-1].copy(), heard[::-1].copy(), lengths, OPTIONS)
@@ -212,7 +212,7 @@ def test_a_walk_tells_which_moments_it_shows():
     assert not (leaps[~ended] % OPTIONS.stride).any()
 
 
-def test_what_is_left_of_a_leap_is_a_critically_damped_spring():
+def test_the_residual_offset_of_a_jump_decays_as_a_critically_damped_spring():
     values, heard, lengths = _recordings(4)
     made = build_field(values, heard, lengths, OPTIONS)
     generator = np.random.default_rng(5)

@@ -65,7 +65,7 @@ def test_sounds_together_are_weighed_by_their_length() -> None:
     assert integrated_loudness([loud, soft]) == pytest.approx(expected, abs=0.02)
 
 
-def test_a_sound_shorter_than_a_block_counts_with_the_silence_behind_it() -> None:
+def test_a_sound_shorter_than_a_block_is_padded_with_silence() -> None:
     short = sine(997.0, 24_000, seconds=0.1)
     assert integrated_loudness([short]) == pytest.approx(-3.01 - 10 * np.log10(4), abs=0.05)
 

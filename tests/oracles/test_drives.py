@@ -155,6 +155,6 @@ def test_features_of_another_number_are_refused() -> None:
         (lambda: TrainingUtterance(np.zeros((3, 2)), np.zeros((4, 2))), "not 3 and 4"),
     ],
 )
-def test_what_nothing_can_be_learnt_from_is_refused(make: object, reason: str) -> None:
+def test_unusable_training_data_are_refused(make: object, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
         make()

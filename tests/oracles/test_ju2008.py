@@ -48,7 +48,7 @@ def test_the_preset_is_what_the_paper_prints() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_every_frame_is_drawn_as_the_formula_says(seed: int) -> None:
+def test_every_frame_follows_the_formula(seed: int) -> None:
     values, heard, lengths = recordings(seed)
     made = build_field(values, heard, lengths, JU_2008)
     generator = np.random.default_rng(50 + seed)

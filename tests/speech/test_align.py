@@ -63,7 +63,7 @@ def test_sound_without_these_words_is_refused(aligner: Aligner) -> None:
         aligner.align(Waveform(np.zeros(1600), 16000), [WORDS[0]] * 30)
 
 
-def test_phones_the_model_lacks_are_heard_as_their_nearest() -> None:
+def test_phones_that_the_model_lacks_are_aligned_as_the_nearest_ones() -> None:
     assert acoustic_phones(["y", "p", "ə"])[1:] == ["P", "AH"]
 
 

@@ -75,7 +75,7 @@ def test_a_sound_shorter_than_the_look_ahead_has_lips() -> None:
     assert np.isfinite(made).all()
 
 
-def test_memory_does_not_grow_with_what_was_heard() -> None:
+def test_memory_does_not_grow_with_the_length_of_the_sound() -> None:
     ear = StreamingFeatures("level", 25.0)
     for block in blocks(1600) * 20:
         ear.add_samples(block)

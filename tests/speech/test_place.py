@@ -50,7 +50,7 @@ def test_the_path_is_the_cheapest(seed: int) -> None:
     assert min(costs) == pytest.approx(edit_cost(written, sounded), abs=1e-5)
 
 
-def test_words_go_where_their_phones_were_heard() -> None:
+def test_words_are_placed_at_their_recognised_phones() -> None:
     generator = np.random.default_rng(1)
     words = [tuple(generator.choice(list(PHONES), generator.integers(2, 6))) for _ in range(300)]
     truth = np.sort(generator.integers(0, 12, len(words)))

@@ -37,7 +37,7 @@ def test_a_tone_keeps_its_pitch_and_level_at_every_rate(make_video, rate):
     assert sound.samples[rate // 4 : rate // 2].std() == pytest.approx(0.5 / np.sqrt(2), rel=0.01)
 
 
-def test_sound_lies_on_the_clock_of_the_file():
+def test_sound_is_shifted_to_the_clock_of_the_file():
     samples = np.arange(1, 4, dtype=np.float32)
     np.testing.assert_array_equal(_shift_samples(samples, 2), [0, 0, 1, 2, 3])
     np.testing.assert_array_equal(_shift_samples(samples, -1), [2, 3])

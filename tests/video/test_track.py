@@ -112,7 +112,7 @@ def test_the_square_turns_with_the_face(angle):
     np.testing.assert_allclose([crop.x, crop.y], turn @ (upright.x, upright.y), atol=1e-9)
 
 
-def test_without_the_model_one_sentence_says_what_to_run(monkeypatch, tmp_path):
+def test_without_the_model_the_message_names_the_command(monkeypatch, tmp_path):
     monkeypatch.delenv(model.MODEL_VARIABLE, raising=False)
     monkeypatch.setattr(model, "user_cache", lambda: tmp_path)
     monkeypatch.setattr(model, "BUNDLING_PACKAGES", ("no_such_package",))
@@ -126,7 +126,7 @@ def test_another_model_is_refused(tmp_path):
         model.find_bundle(tmp_path / "face_landmarker.task")
 
 
-def test_a_path_that_leads_nowhere(tmp_path):
+def test_a_missing_model_path_is_refused(tmp_path):
     with pytest.raises(InputError, match="there is no face model"):
         model.find_bundle(tmp_path / "none.task")
 

@@ -119,7 +119,7 @@ def test_the_average_is_the_mean_of_its_frames(n: int, n_frames: int) -> None:
     np.testing.assert_allclose(moving_average(motion, n_frames), plain_average(motion, n_frames), atol=1e-12)
 
 
-def test_the_average_keeps_what_stands_still_and_removes_a_period_of_its_length() -> None:
+def test_the_average_keeps_constants_and_removes_its_own_period() -> None:
     wave = np.sin(2 * np.pi * np.arange(200) / N_AVERAGED)[:, None]
     np.testing.assert_allclose(moving_average(wave + 7.0)[40:-40], 7.0, atol=1e-12)
 

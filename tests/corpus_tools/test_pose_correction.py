@@ -53,14 +53,14 @@ def test_lips_that_touch_keep_touching(recorded: list[Observation]) -> None:
         np.testing.assert_allclose(gaps[0], gaps[1], atol=1e-3)
 
 
-def test_too_few_recordings_are_left_alone(recorded: list[Observation]) -> None:
+def test_too_few_recordings_are_not_corrected(recorded: list[Observation]) -> None:
     few = leaking(recorded, np.ones((9, N_LANDMARKS, 3)))[: MIN_CHUNKS - 1]
     assert not fit_pose_correction(few).offsets.any()
     for before, after in zip(few, correct_pose(few), strict=True):
         np.testing.assert_array_equal(before.landmarks, after.landmarks)
 
 
-def test_nobody_leaks_nothing() -> None:
+def test_pose_correction_of_no_recordings_is_empty() -> None:
     assert correct_pose([]) == ()
 
 
