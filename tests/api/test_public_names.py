@@ -13,7 +13,7 @@ HEAVY = ("numpy", "numba", "scipy", "av", "PIL", "onnxruntime", "hibari", "cyclo
 
 
 def run_python(code: str, home: Path) -> str:
-    """What a fresh process with an empty home folder prints."""
+    """Output of a fresh process with an empty home folder."""
     environment = {"PATH": os.environ["PATH"], "HOME": str(home), "PYTHONPATH": str(Path(tts2face.__file__).parents[1])}
     answer = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True, cwd=home

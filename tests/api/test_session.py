@@ -1,4 +1,4 @@
-"""A session: what it returns can be drawn, it serves several threads, and options are checked."""
+"""Sessions: their clips can be drawn, they are thread-safe, and options are checked."""
 
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path

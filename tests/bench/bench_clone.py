@@ -1,4 +1,4 @@
-"""How faithful and how fast motion is cloned between talkers (Theobald et al. 2007, eq. 5).
+"""Accuracy and speed of cloning motion between talkers (Theobald et al. 2007, eq. 5).
 
 Run: ``PYTHONPATH=. python tests/bench/bench_clone.py RECORDINGS [--cache FOLDER]``. The source is the starter talker
 grid_s1. There is one recorded person, so second talkers are learnt from the two halves of RECORDINGS, with other

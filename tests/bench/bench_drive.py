@@ -1,4 +1,4 @@
-"""Speech-driven lips: ties of features to the face, and the drives on utterances held out.
+"""Speech-driven lips: correlation of features with the face, and audio maps on held-out utterances.
 
 Run: ``python tests/bench/bench_drive.py ../shared/recordings/grid_s1`` (``--quick`` for a look; ``--choose`` for the
 inner cross-validation; ``--picture docs/pictures/cca_strength.svg`` draws the ties as Fig. 5 of Theobald et al. 2007).

@@ -1,6 +1,6 @@
-"""Drives on voices that they did not learn from, against the lips that exemplars give for the known phones.
+"""Audio maps on voices outside their training data, compared with exemplar synthesis for the known phones.
 
-Run: ``python tests/bench/bench_drive_voices.py me.talker`` with a talker that carries drives.
+Run: ``python tests/bench/bench_drive_voices.py me.talker`` with a talker that has audio maps.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""How fast gestures are made, and whether a frame's cost grows more slowly than the palette.
+"""Speed of gesture synthesis, and growth of the cost of a frame with the size of the palette.
 
 Run: ``python tests/bench/bench_gestures.py [PALETTE]``. Twelve fields, two of each feature, at 30 frames a second, in
 one thread; processor time, the least of three. They hear the palette's own recordings in random order.

@@ -1,4 +1,4 @@
-"""Films made of real recordings, for tests."""
+"""Videos made of recordings, for tests."""
 
 from collections.abc import Sequence
 from fractions import Fraction
@@ -11,7 +11,7 @@ from tts2face.video.media import read_frames, read_sound
 
 
 def joined(sources: list[Path], out: Path, late_s: float = 0.0) -> list[tuple[float, float]]:
-    """Clips one behind the other in one MP4 with 44.1 kHz stereo sound; returns when each begins and ends.
+    """Join clips to one MP4 with 44.1 kHz stereo sound; returns the begin and end of each in seconds.
 
     ``late_s`` delays the sound.
     """
@@ -51,5 +51,5 @@ def film(pictures: Sequence[np.ndarray], samples: np.ndarray, out: Path, fps: in
 
 
 def doubled(pixels: np.ndarray) -> np.ndarray:
-    """A picture beside its mirror image."""
+    """A picture next to its mirror image."""
     return np.concatenate([pixels, pixels[:, ::-1]], axis=1)

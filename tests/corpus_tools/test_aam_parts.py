@@ -1,4 +1,4 @@
-"""Parts of appearance models against closed forms and against what cannot share their bugs."""
+"""Parts of appearance models against closed forms and independent implementations."""
 
 import numpy as np
 import pytest

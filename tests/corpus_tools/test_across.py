@@ -1,4 +1,4 @@
-"""A talker speaks what somebody else said: faces of another size and lips that go further change nothing."""
+"""Evaluation against another talker: figures do not depend on the size of the face or the amplitude of the lips."""
 
 import csv
 from pathlib import Path

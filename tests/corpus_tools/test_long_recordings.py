@@ -41,7 +41,7 @@ def folder(shared_recordings: Path, rows: list[dict[str, str]], tmp_path_factory
 
 @pytest.fixture(scope="module")
 def read(folder: Path, rows: list[dict[str, str]], cache: Path, face_model: Path) -> Observations:
-    """The take with its text beside it."""
+    """The take with its transcript in the same folder."""
     (folder / "take.txt").write_text(". ".join(row["transcript"].replace(" a ", " ay ") for row in rows))
     found = observe(folder / "take.mp4", effort=RunOptions(cache, 1, face_model))
     (folder / "take.txt").unlink()
@@ -61,7 +61,7 @@ def test_a_long_take_is_cut_at_pauses_and_every_word_is_aligned(read: Observatio
 
 
 def test_the_lag_of_the_sound_is_found_and_kept(read: Observations) -> None:
-    """40 ms: three standard deviations of what 48 s of this talker tell."""
+    """40 ms: three standard deviations of the estimate from 48 s of this talker."""
     (lag,) = {seen.quality.lag for seen in read.kept}
     assert lag == pytest.approx(LATE_S, abs=0.04)
 

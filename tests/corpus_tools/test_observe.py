@@ -1,4 +1,4 @@
-"""The way from a folder of recordings to a talker: refusals with reasons, resuming, any number of processes."""
+"""From a folder of recordings to a talker: refusals with reasons, resuming, any number of processes."""
 
 import os
 import shutil

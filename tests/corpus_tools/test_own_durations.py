@@ -1,4 +1,4 @@
-"""Text alone: words in a voice's own time, laid beside the real ones word by word."""
+"""Evaluation from text alone: words with the durations of a voice, aligned with the real ones."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Displacements by the head's angles: found where they are, and left where they are not."""
+"""Landmark displacements caused by head rotation: corrected if present, no change otherwise."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -32,7 +32,7 @@ def leaking(seen: list[Observation], offsets: np.ndarray) -> list[Observation]:
 
 
 def test_a_known_leak_is_taken_out(recorded: list[Observation]) -> None:
-    """0.25: speech does not average out entirely in a chunk, and the regression takes some of it."""
+    """0.25: the mean of speech over a chunk is not zero, and the regression removes a part of it."""
     offsets = np.random.default_rng(1).normal(0, 1.0, (9, N_LANDMARKS, 3))
     offsets[:, list(INNER_LIP_LOWER)] = offsets[:, list(INNER_LIP_UPPER)]
     leaky = leaking(recorded, offsets)

@@ -1,4 +1,4 @@
-"""The set-up without a network: a stand-in for pip puts made wheels into the folder."""
+"""The set-up without a network: a substitute for pip writes wheels into the folder."""
 
 import subprocess
 import zipfile

@@ -1,4 +1,4 @@
-"""Subtitles beside videos: cues become recordings of parts of a video."""
+"""Subtitles of videos: each cue becomes a recording of a part of a video."""
 
 from pathlib import Path
 

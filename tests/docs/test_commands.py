@@ -1,6 +1,6 @@
 """Every command line of the documentation is parsed by the real command line; those of README and cli.md are executed.
 
-What is not executed here stands in `tests.docs.blocks.NOT_EXECUTED` with its reason; lines that need video of a
+`tests.docs.blocks.NOT_EXECUTED` lists what is not executed, with the reason; lines that need video of a
 person are executed by `tests/doors/test_command_line.py`.
 """
 

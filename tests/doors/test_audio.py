@@ -21,7 +21,7 @@ from tts2face.types import Trajectory, concatenate_clips, frame_count
 from tts2face.video.media import read_media_info, read_sound, sound_blocks
 
 TEXT = "bin blue at F two now"
-REAL_TOLERANCE_S = 0.02  # of the phones that the talker was learnt with
+REAL_TOLERANCE_S = 0.02  # of the phones of the talker's training data
 TOLERANCE_S = 0.08  # of the takes' own word times, which are automatic as well
 LEARNT_FROM = 60  # utterances: enough to be far better than nothing
 SUFFIXES = {".wav": "pcm_s16le", ".flac": "flac", ".mp3": "libmp3lame", ".m4a": "aac", ".ogg": "libopus"}
@@ -44,7 +44,7 @@ def session(talker: Talker) -> Session:
 
 @pytest.fixture(scope="module")
 def held_out(shared_recordings: Path) -> Talker:
-    """The shipped talker with audio maps learnt from some of the recordings, the one that is tested left out."""
+    """The shipped talker with audio maps trained on all recordings but the tested one."""
     clips = shared_recordings / "grid_s1" / "clips"
     shipped = load_talker("grid_s1")
     spoken = [one for one in shipped.utterances if one.name != "bbaf2n"][:: len(shipped.utterances) // LEARNT_FROM]
@@ -180,7 +180,7 @@ def test_a_faint_recording_moves_the_lips_as_a_loud_one(film: Path, talker: Talk
         for gain in (1.0, 0.1)
     )
     spread = talker.model.spread[: talker.model.n_speech]
-    assert np.median(np.abs(loud - faint) / spread) < 0.1  # 16-bit noise is left
+    assert np.median(np.abs(loud - faint) / spread) < 0.1  # 16-bit quantisation noise remains
 
 
 def test_interpolated_motion_passes_through_the_frames() -> None:

@@ -148,7 +148,7 @@ def test_own_durations_need_words(here: Path, monkeypatch: pytest.MonkeyPatch, c
 def test_recordings_are_shown_beside_the_head(
     rendered_takes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Six recordings, one held out, with the real voice: the page holds a film of it, and stays small."""
+    """Six recordings, one held out, with the real voice: the page contains a video of it, and is small."""
     pytest.importorskip("ai_edge_litert", reason="needs the extra [capture]")
     monkeypatch.chdir(tmp_path)
     source, few = rendered_takes, tmp_path / "few"

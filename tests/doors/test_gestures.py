@@ -1,4 +1,4 @@
-"""Faces that live, through the doors: styles, timelines, palettes, and what gestures may never do."""
+"""Gestures from API and command line: styles, timelines, palettes, and constraints that always hold."""
 
 import json
 import re
@@ -191,7 +191,7 @@ def test_a_capture_becomes_a_style_of_the_starter_palette(
     )
     palette = load_palette("live.palette")
     assert palette.names[-2:] == ("grid_s1", "live")
-    assert palette.styles["live"].intensity.max() > 0  # its sound lies beside it
+    assert palette.styles["live"].intensity.max() > 0  # its sound is in the same folder
     assert run(["Hello.", "--palette", "live.palette", "--style", "live", "--out", "x.mp4", *SMALL]) == 0
     alone = ["--alone", "--estimator", "samples"]
     assert run(["corpus", "gestures", str(capture), "--style", "live", "--out", "a.palette", *alone, *cache]) == 0

@@ -51,7 +51,7 @@ def test_clips_are_equally_loud(voice: str, language: str, text: str, ready: Ses
     assert loudness == pytest.approx(-16.0, abs=1.0)  # LUFS
     assert peak < -1.0  # dB of full scale
     levels = [integrated_loudness([piece.clip.speech.waveform]) for piece in pieces]
-    assert max((abs(b - a) for a, b in pairwise(levels)), default=0.0) < 0.7  # LU; 3.8 as the voice says them
+    assert max((abs(b - a) for a, b in pairwise(levels)), default=0.0) < 0.7  # LU; 3.8 in the voice's own output
 
 
 def test_the_first_sentence_sounds_the_same_whatever_follows(ready: Session) -> None:

@@ -1,4 +1,4 @@
-"""A person's video drives a face: found again by the tracker in the clip; what cannot be read is refused."""
+"""A video of a person drives a face: the tracker recovers the motion from the clip; unreadable files are refused."""
 
 import re
 import shutil
@@ -42,7 +42,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def tracked_motion(path: Path, bundle: Path) -> tuple[np.ndarray, np.ndarray]:
-    """(T, 478, 3) landmarks in mm and (T, 3) head angles in degrees against their middle."""
+    """(T, 478, 3) landmarks in mm and (T, 3) head angles in degrees relative to their median."""
     points = FaceTracker(bundle).track(lambda: (picture.pixels for picture in read_frames(path)), FPS).points
     posed = remove_pose(points, FPS)
     angles = np.degrees(head_angles(posed.rotations))

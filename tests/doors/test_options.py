@@ -1,4 +1,4 @@
-"""Options that no command knows, names under which nothing can be written, and how soon help comes."""
+"""Unknown options, invalid output names, and the time that --help takes."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Every command refuses an output that is one of its inputs, before it reads or makes anything."""
+"""Every command refuses an output that is one of its inputs, before it reads or writes anything."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Recordings become a talker who speaks any text with an own face: the whole way, on rendered and real recordings."""
+"""From recordings to a talker with a face of its own that speaks any text, on rendered and real recordings."""
 
 import csv
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Bars: one at a time, under the name of the stage, and none where nobody looks."""
+"""Progress bars: one at a time, with the name of the stage, and none without a terminal."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Commands that are ended from outside leave nothing behind, neither files nor processes."""
+"""Commands ended by a signal leave neither files nor processes."""
 
 import shutil
 import signal
@@ -68,7 +68,7 @@ def test_files_of_a_killed_command_are_removed_by_the_next_one(tmp_path: Path) -
 
 
 def is_running(number: int) -> bool:
-    """Whether a process works; one that has ended and waits for its parent to notice does not."""
+    """Whether a process is running; a zombie is not."""
     status = subprocess.run(["ps", "-o", "stat=", "-p", str(number)], capture_output=True, text=True, check=False)
     return status.stdout.strip() not in {"", "Z"} and not status.stdout.startswith("Z")
 

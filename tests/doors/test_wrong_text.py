@@ -1,4 +1,4 @@
-"""A text that is not what a recording says: the core reports the words, the command line says so in one sentence."""
+"""A text that differs from the recording: the core reports the words, the command line writes one sentence."""
 
 import wave
 from dataclasses import replace

@@ -78,7 +78,7 @@ def test_frame_rates_agree_where_their_frames_meet(voice: ExemplarModel):
 
 
 def test_a_pause_cuts_a_text_into_parts_that_move_alone(voice: ExemplarModel):
-    """Where a sentence is surrounded by silence, it moves as if nothing else were said."""
+    """The motion of a sentence between silences does not depend on other sentences."""
     twice = sequence([*SENTENCE.phones[:-1], SILENCE, *SENTENCE.phones[1:]],
                      [*SENTENCE.durations[:-1], 2.1, *SENTENCE.durations[1:]])  # fmt: skip
     alone, both = moved(voice, SENTENCE, context=1).values, moved(voice, twice, context=1).values
@@ -205,7 +205,7 @@ def test_articulation_is_counted_from_the_mean_speaking_pose(voice: ExemplarMode
     one, other = (
         speech_trajectory(phones, voice, fps=100.0, n_frames=130, options=options).values for options in (plain, more)
     )
-    inner = slice(50, 80)  # no silence is near: nothing is drawn to rest
+    inner = slice(50, 80)  # far from silence, where the rest pose has no influence
     np.testing.assert_allclose(
         other[inner] - voice.mean_speaking_pose,
         1.5 * (one[inner] - voice.mean_speaking_pose),

@@ -134,7 +134,7 @@ def test_a_closed_contact_is_not_changed():
 
 
 def test_poses_are_taken_where_each_token_is_closest(voice: ExemplarModel):
-    """Two p tokens, and one that never closes: the closer ones by weight tell the pose."""
+    """Two p tokens, and one that never closes: the pose is the weighted mean of the closed ones."""
     label = voice.tokens.inventory.index("p")
     p = np.flatnonzero(voice.tokens.phone == label)[:2]
     open_one = np.flatnonzero(voice.tokens.phone == voice.tokens.inventory.index("ɑ"))[0]

@@ -1,4 +1,4 @@
-"""Networks from phones to lips: their answer, their file, and their share in the motion."""
+"""Networks from phones to lips: their output, their file, and their share of the motion."""
 
 from dataclasses import replace
 
@@ -64,7 +64,7 @@ def test_features_say_what_sounds_when() -> None:
     sounding = [KNOWN[at] for at in columns.argmax(axis=1)]
     assert sounding[7] == "i"  # now
     assert sounding[7 - 2] == "b"  # 80 ms before
-    assert sounding[7 + 4] == "p"  # 160 ms behind
+    assert sounding[7 + 4] == "p"  # 160 ms after
     assert sounding[15:] == [SILENCE, SILENCE, "b", "p", SILENCE, SILENCE]  # neighbours; beyond the end the end goes on
     np.testing.assert_allclose(features[-4:], [0.25, 0.05, 0.15, 0.2], atol=1e-6)
 

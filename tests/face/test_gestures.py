@@ -239,7 +239,7 @@ def rename_shapes(face: Face, kept: tuple[str, ...]) -> Face:
 
 @pytest.mark.parametrize("kept", [("jaw", "mouth"), ("jaw", "mouthClose", "mouthF", "mouthPucker", "eyeBlink")])
 def test_a_renamed_rig_moves_like_the_original(kept: tuple[str, ...]) -> None:
-    """The default head with renamed shapes: transferred shapes move it like its own."""
+    """The default head with renamed shapes: transferred shapes give the motion of the original ones."""
     head = load_face("head")
     face, known = gesture_face(rename_shapes(head, kept), palette()), prepared_face("head")
     for name in EXPRESSIONS:

@@ -1,4 +1,4 @@
-"""What a request asks of the gestures."""
+"""Timeline of the gestures of a request."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The phone table, ARPABET, articulatory distance and stand-ins."""
+"""The phone table, ARPABET, articulatory distance and replacements."""
 
 import itertools
 

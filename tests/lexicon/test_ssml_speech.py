@@ -1,4 +1,4 @@
-"""SSML's phoneme, say-as, voice and lang: what they mean, and what is refused by name and line."""
+"""SSML's phoneme, say-as, voice and lang: their meaning, and errors with name and line."""
 
 import time
 from xml.sax.saxutils import escape, quoteattr

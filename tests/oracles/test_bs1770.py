@@ -14,7 +14,7 @@ def sine(hertz: float, rate: int, *, seconds: float = 2.0, level: float = 1.0, p
 
 
 def speechlike(rate: int, seed: int = 0) -> Waveform:
-    """Noise that grows and dies by syllables and rests, so that both gates matter."""
+    """Noise modulated by syllables and pauses, so that both gates have an effect."""
     rng = np.random.default_rng(seed)
     times = np.arange(8 * rate) / rate
     noise = np.convolve(rng.normal(0.0, 0.1, len(times)), np.hanning(5) / 2, "same")

@@ -35,7 +35,7 @@ def lessons(n: int = 12, seed: int = 0, bend: float = 0.0) -> list[TrainingUtter
 
 @pytest.mark.parametrize(("before", "after"), [(0, 0), (1, 2)])
 def test_with_all_factors_equation_8_is_direct_regression(before: int, after: int) -> None:
-    """As many parameters as numbers in a window: the factors span all that was heard."""
+    """As many parameters as numbers in a window: the factors span the whole input."""
     generator = np.random.default_rng(3)
     n_inputs = 3 * (before + 1 + after)
     taught = [
@@ -55,7 +55,7 @@ def test_with_all_factors_equation_8_is_direct_regression(before: int, after: in
 
 
 def test_with_fewer_factors_equation_8_is_still_least_squares_on_what_it_can_reach() -> None:
-    """The factors of two seen parameters reach both: the fit is direct regression again."""
+    """The factors of two visual parameters span both: the fit equals direct regression."""
     taught = [TrainingUtterance(one.features, one.parameters[:, :2]) for one in lessons()]
     drive = learn_linear_map(taught, feature="mfcc")
     assert len(drive.bias) == 2

@@ -98,7 +98,7 @@ def test_random_triangles_are_those_of_the_slow_rasteriser(seed):
                 found.append((float(near) * (float(BACK_BIAS) if back else 1.0), ~number if back else number))
             found.sort(reverse=True)
             if len(found) > 1 and found[0][0] - found[1][0] < 1e-6 * found[0][0]:
-                continue  # nearer to each other than single precision tells
+                continue  # closer than single precision resolves
             assert owner[0, row, column] == (found[0][1] if found else NO_TRIANGLE)
 
 

@@ -1,4 +1,4 @@
-"""Sound heard in blocks gives what the whole sound gives, no later than stated."""
+"""Sound processed in blocks gives the result of the whole sound, within the stated delay."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Phones heard without a transcript, in real speech."""
+"""Recognition of phones in real speech without a transcript."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A text that a recording does not say is noticed, and only where it is wrong."""
+"""Words of a text that a recording does not contain are found, and no others."""
 
 import csv
 from pathlib import Path
@@ -28,7 +28,7 @@ WORD_S = 0.4
 
 
 def alignment(*confidences: float) -> Alignment:
-    """Words of 0.4 s with a silence of 0.1 s behind each, and their log likelihoods per second."""
+    """Words of 0.4 s with a silence of 0.1 s after each, and their log likelihoods per second."""
     phones = [phone for _ in confidences for phone in ("a", SILENCE)]
     edges = np.concatenate([[0.0], np.cumsum([WORD_S, 0.1] * len(confidences))])
     words = tuple(WordSpan(f"w{at}", 2 * at, 2 * at + 1) for at in range(len(confidences)))

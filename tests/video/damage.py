@@ -1,6 +1,6 @@
-"""Reads damaged copies of a film, one after the other; run as a child, whose memory and time the test limits.
+"""Read damaged copies of a video one after the other, in a child process whose memory and time the test limits.
 
-Run: python tests/video/damage.py FILM FOLDER N_COPIES SEED
+Run: python tests/video/damage.py VIDEO FOLDER N_COPIES SEED
 """
 
 import resource
@@ -16,7 +16,7 @@ MEMORY = 3 << 30  # bytes of addresses: libraries take half of it
 
 
 def damaged(content: bytes, generator: np.random.Generator) -> bytes:
-    """A file cut, with bytes flipped, with a part overwritten, left out or doubled, or with several of these."""
+    """A file cut, with bytes flipped, with a part overwritten, removed or repeated, or with several of these."""
     data = np.frombuffer(content, np.uint8).copy()
     for kind in generator.choice(["cut", "flip", "head", "blank", "omit", "double"], generator.integers(1, 4)):
         first, last = sorted(int(at) for at in generator.integers(0, max(len(data), 1), 2))

@@ -1,4 +1,4 @@
-"""Cameras; a film stands in for one, at its own pace."""
+"""Cameras; a video at its own frame rate replaces one."""
 
 import time
 from pathlib import Path

@@ -67,7 +67,9 @@ def test_jaw_open_follows_the_lips(face_model, tracking, takes):
     scores = np.array([reader.blendshape_scores(points) for points in tracking.points])
     gap = np.linalg.norm(tracking.points[:, 13, :2] - tracking.points[:, 14, :2], axis=1)
     assert scores.shape == (len(tracking.points), 52)
-    least = 0.85 if takes.name == "rendered_takes" else 0.9  # the network learnt from people; 0.88 on a rendered head
+    least = (
+        0.85 if takes.name == "rendered_takes" else 0.9
+    )  # the network was trained on people; 0.88 on a rendered head
     assert np.corrcoef(scores[:, BLENDSHAPES.index("jawOpen")], gap)[0, 1] > least
 
 

@@ -1,4 +1,4 @@
-"""Piper voices, by a voice made here whose sound says which letters it was given."""
+"""Piper voices, tested by a generated voice whose sound encodes its letters."""
 
 import json
 from collections.abc import Callable

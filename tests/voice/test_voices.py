@@ -1,4 +1,4 @@
-"""Every voice keeps the same promises."""
+"""Requirements that every voice meets."""
 
 import numpy as np
 import pytest
@@ -63,7 +63,7 @@ def test_the_same_request_gives_the_same_bytes(voice: Voice) -> None:
 
 def test_rate_and_volume_act(voice: Voice) -> None:
     usual, fast = voice.speak(SENTENCE), voice.speak(SENTENCE, rate=1.5)
-    spoken = [speech.phones.end - 0.5 for speech in (usual, fast)]  # half a second of it is silence that may stay
+    spoken = [speech.phones.end - 0.5 for speech in (usual, fast)]  # half a second of it is silence at any rate
     assert spoken[1] < 0.8 * spoken[0]
     quiet = voice.speak(SENTENCE, volume=0.5)
     assert np.allclose(quiet.waveform.samples, usual.waveform.samples * 0.5, atol=1e-6)
@@ -148,13 +148,13 @@ def test_espeak_speaks_other_languages(language: str, text: str, n_words: int) -
 
 
 def test_a_foreign_word_is_spoken_in_its_own_language() -> None:
-    """espeak-ng switches to English for "move" and says so among its phonemes; the marks are no phones."""
+    """espeak-ng switches to English for "move" and marks it among its phonemes; the marks are not phones."""
     speech = load_voice("espeak", "de").speak("Bob may move.")
     assert {"m", "u", "v"} <= set(speech.phones.phones)
 
 
 def test_the_closure_of_a_stop_is_part_of_the_phone() -> None:
-    """espeak-ng's event stands at the burst; the /p/ of "happy" begins where the sound before it ends."""
+    """espeak-ng's event is at the burst; the /p/ of "happy" begins where the sound before it ends."""
     speech = load_voice("espeak", "en-us").speak("A happy apple.")
     rate = speech.waveform.rate
     at = speech.phones.phones.index("p")

@@ -1,4 +1,4 @@
-"""Recordings of every source on one clock: films, Live Link captures, and their resampling."""
+"""Recordings of every source on one clock: videos, Live Link captures, and their resampling."""
 
 from dataclasses import replace
 from pathlib import Path

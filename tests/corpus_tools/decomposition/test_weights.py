@@ -78,7 +78,7 @@ def test_a_face_that_is_a_sample_has_its_weights() -> None:
     basis, _, _ = made()
     ready = build_nearest_samples_estimator(basis, np.random.default_rng(5))
     seen = np.tensordot(ready.samples[:3], basis, axes=1)
-    np.testing.assert_allclose(ready.weights(seen), ready.samples[:3], atol=1e-4)  # rounding stands for distance 0
+    np.testing.assert_allclose(ready.weights(seen), ready.samples[:3], atol=1e-4)  # distance 0 up to rounding
 
 
 def test_the_error_falls_with_the_number_of_samples_and_never_below_least_squares() -> None:

@@ -1,4 +1,4 @@
-"""Measures against what can be worked out by hand."""
+"""Measures against values computed by hand."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What docs/accuracy.md says about the similarity of the starter talker's phones is what the report finds."""
+"""The figures of docs/accuracy.md on the phone similarity of the starter talker equal those of the report."""
 
 from pathlib import Path
 
