@@ -66,7 +66,7 @@ def main() -> None:
         return
     ties = bench.ties(options.trials, options.seed)
     if options.picture:
-        options.picture.write_text(drawn(ties))
+        options.picture.write_text(plot_ties(ties))
     bench.compare()
 
 
@@ -208,7 +208,7 @@ def head() -> None:
     print("\n| drive | " + " | ".join(COLUMNS).replace("_", " ") + " |\n| --- |" + " --- |" * len(COLUMNS))
 
 
-def drawn(ties: dict[str, np.ndarray]) -> str:
+def plot_ties(ties: dict[str, np.ndarray]) -> str:
     """The ties as a picture in SVG: one line a feature, frames across, correlation up."""
     low, width, height, left, top = 0.4, 620, 340, 70, 30
 

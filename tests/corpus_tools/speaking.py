@@ -37,7 +37,7 @@ def observation(number: int, gain: float = 1.0, name: str = "u") -> Observation:
     )
 
 
-def worded(seen: Observation) -> Observation:
+def with_words(seen: Observation) -> Observation:
     """The utterance with a word for every two phones; its first word occurs in no other utterance."""
     first = "".join("abcdefghij"[int(digit)] for digit in seen.name if digit.isdigit())
     texts = (f"{first}um", "alpha", "beta", "gamma")

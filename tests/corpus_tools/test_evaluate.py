@@ -113,14 +113,14 @@ def test_refuses_folds_that_cannot_be(observations: list[Observation], n_folds):
 
 
 def test_words_are_held_out_with_every_utterance_that_holds_them(observations: list[Observation]):
-    worded = [replace(one, words=(WordSpan("ab"[number % 2], 1, 2),)) for number, one in enumerate(observations)]
-    train, test = split_by_words(worded, ["B"])
+    with_words = [replace(one, words=(WordSpan("ab"[number % 2], 1, 2),)) for number, one in enumerate(observations)]
+    train, test = split_by_words(with_words, ["B"])
     assert {word.text for one in train for word in one.words} == {"a"}
     assert {word.text for one in test for word in one.words} == {"b"}
     with pytest.raises(InputError, match="no utterance contains zebra"):
-        split_by_words(worded, ["zebra"])
+        split_by_words(with_words, ["zebra"])
     with pytest.raises(InputError, match="hold out fewer words"):
-        split_by_words(worded, ["a", "b"])
+        split_by_words(with_words, ["a", "b"])
 
 
 def test_refuses_an_utterance_on_both_sides(observations: list[Observation]):

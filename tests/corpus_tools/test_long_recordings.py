@@ -12,7 +12,7 @@ from corpus_tools.recordings.observe import Observations, observe
 from corpus_tools.report.recordings import recordings_page
 from corpus_tools.run_options import RunOptions
 from lexicon.sequence import SILENCE
-from tests.corpus_tools.films import joined
+from tests.corpus_tools.films import join_clips
 from tests.rendered_takes import manifest_rows
 from tts2face.models.talker import read_talker
 
@@ -35,7 +35,7 @@ def folder(shared_recordings: Path, rows: list[dict[str, str]], tmp_path_factory
     """A take of 51 s whose sound is late."""
     made = tmp_path_factory.mktemp("long")
     clips = shared_recordings / "grid_s1" / "clips"
-    joined([clips / f"{row['clip']}.mkv" for row in rows], made / "take.mp4", late_s=LATE_S)
+    join_clips([clips / f"{row['clip']}.mkv" for row in rows], made / "take.mp4", late_s=LATE_S)
     return made
 
 

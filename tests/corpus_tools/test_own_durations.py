@@ -13,13 +13,13 @@ from corpus_tools.recordings.observation import Observation
 from corpus_tools.report.evaluation import evaluation_page
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tests.corpus_tools.speaking import OwnVoice, observation, worded
+from tests.corpus_tools.speaking import OwnVoice, observation, with_words
 from tts2face.types import Speech, Waveform
 
 
 @pytest.fixture(scope="module")
 def observations() -> list[Observation]:
-    return [worded(observation(number)) for number in range(40)]
+    return [with_words(observation(number)) for number in range(40)]
 
 
 def measured(observations: list[Observation], stretch) -> tuple[Evaluation, tuple[SplitResult, ...]]:

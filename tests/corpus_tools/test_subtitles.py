@@ -9,7 +9,7 @@ from corpus_tools.recordings.observe import group_by_video, observe
 from corpus_tools.recordings.subtitles import read_cues
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError
-from tests.corpus_tools.films import joined
+from tests.corpus_tools.films import join_clips
 from tests.rendered_takes import manifest_rows
 
 SRT = "1\n00:00:01,000 --> 00:00:02,000\n<i>Hello</i>\nthere.\n\n2\n00:00:02,100 --> 00:00:03,500\nIt is £5.\n"
@@ -81,7 +81,7 @@ def test_one_long_video_with_subtitles_gives_what_its_parts_gave(takes: Path, fa
     rows = manifest_rows(takes)[:3]
     clips = [takes / "clips" / f"{row['clip']}.mkv" for row in rows]
     (tmp_path / "long").mkdir()
-    spans = joined(clips, tmp_path / "long" / "talk.mp4")
+    spans = join_clips(clips, tmp_path / "long" / "talk.mp4")
     lines = []
     for number, (row, (begin, _)) in enumerate(zip(rows, spans, strict=True), start=1):
         start, end = begin + float(row["speech_start_s"]), begin + float(row["speech_end_s"])

@@ -63,7 +63,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def written(path: Path, samples: np.ndarray, rate: int = 16000) -> Path:
+def write_wave(path: Path, samples: np.ndarray, rate: int = 16000) -> Path:
     with av.open(str(path), "w") as container:
         stream = container.add_stream(SUFFIXES[path.suffix], rate=rate)
         stream.layout = "mono"
@@ -151,7 +151,7 @@ def test_sound_and_picture_are_equally_long(fps: float, film: Path, session: Ses
 @pytest.mark.parametrize("text", ["", f"{TEXT} {TEXT} {TEXT} {TEXT} {TEXT}"])
 def test_a_long_recording_is_divided_into_pieces(text: str, film: Path, session: Session, here: Path) -> None:
     samples = read_sound(film, 16000).samples
-    sound = written(here / "long.wav", np.tile(samples, 5))
+    sound = write_wave(here / "long.wav", np.tile(samples, 5))
     pieces = list(session.stream(Request(audio=sound, text=text, fps=60.0)))
     assert [len(piece.clip.motion) for piece in pieces[:-1]] == [MAX_CLIP_FRAMES] * (len(pieces) - 1)
     assert sum(piece.n_steps for piece in pieces) == 1000
@@ -164,7 +164,7 @@ def test_a_long_recording_is_divided_into_pieces(text: str, film: Path, session:
 @pytest.mark.parametrize("suffix", sorted(SUFFIXES))
 def test_files_of_sound_alone_are_read(suffix: str, here: Path) -> None:
     tone = 0.3 * np.sin(2 * np.pi * 440 * np.arange(16000) / 16000)
-    path = written(here / f"tone{suffix}", tone)
+    path = write_wave(here / f"tone{suffix}", tone)
     blocks = np.concatenate(list(sound_blocks(path, 48000)))
     assert len(blocks) == pytest.approx(48000, abs=4000)  # codecs pad
     spectrum = np.abs(np.fft.rfft(blocks))
@@ -176,7 +176,7 @@ def test_a_faint_recording_moves_the_lips_as_a_loud_one(film: Path, talker: Talk
     sound = read_sound(film, 16000).samples
     audio_map = replace(talker.audio_maps["network"], loudness=-18.0)
     loud, faint = (
-        map_audio_to_motion(written(here / f"{gain}.wav", gain * sound), audio_map, talker, 25.0)[1].values
+        map_audio_to_motion(write_wave(here / f"{gain}.wav", gain * sound), audio_map, talker, 25.0)[1].values
         for gain in (1.0, 0.1)
     )
     spread = talker.model.spread[: talker.model.n_speech]
@@ -214,7 +214,7 @@ def test_the_command_writes_clips(film: Path, talker: Talker, here: Path) -> Non
 )
 @pytest.mark.parametrize("text", ["", TEXT])
 def test_unusable_sound_is_refused(samples: np.ndarray, reason: str, text: str, session: Session, here: Path) -> None:
-    path = written(here / "a.wav", samples)
+    path = write_wave(here / "a.wav", samples)
     with pytest.raises(DataError, match=reason):
         session.clip(Request(audio=path, text=text))
 

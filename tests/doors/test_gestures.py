@@ -42,12 +42,12 @@ def session(talker: Talker, face: Face) -> Session:
 
 
 @pytest.fixture(scope="module")
-def alive(session: Session) -> Clip:
+def with_gestures(session: Session) -> Clip:
     return session.clip(Request(text=TEXT))
 
 
 @pytest.fixture(scope="module")
-def plain(session: Session) -> Clip:
+def without_gestures(session: Session) -> Clip:
     """Speech without gestures."""
     return session.clip(Request(text=TEXT, gestures="none"))
 
@@ -56,18 +56,18 @@ def channels_of(clip: Clip, begins: tuple[str, ...]) -> np.ndarray:
     return clip.motion.values[:, [name.startswith(begins) for name in clip.motion.channels]]
 
 
-def test_every_feature_moves(alive: Clip) -> None:
+def test_every_feature_moves(with_gestures: Clip) -> None:
     for feature, begins in SHAPES.items():
-        assert np.ptp(channels_of(alive, begins), axis=0).max() > 0.05, feature
-    assert np.degrees(np.ptp(alive.head.values[:, :3], axis=0)).max() > 0.5
+        assert np.ptp(channels_of(with_gestures, begins), axis=0).max() > 0.05, feature
+    assert np.degrees(np.ptp(with_gestures.head.values[:, :3], axis=0)).max() > 0.5
 
 
-def test_a_layer_of_its_own_changes_no_other(alive: Clip, session: Session) -> None:
+def test_a_layer_of_its_own_changes_no_other(with_gestures: Clip, session: Session) -> None:
     still = session.clip(Request(text=TEXT, gain="brows=0"))
     assert not channels_of(still, ("brows",)).any()
-    others = [not name.startswith("brows") for name in alive.motion.channels]
-    np.testing.assert_array_equal(still.motion.values[:, others], alive.motion.values[:, others])
-    np.testing.assert_array_equal(still.head.values, alive.head.values)
+    others = [not name.startswith("brows") for name in with_gestures.motion.channels]
+    np.testing.assert_array_equal(still.motion.values[:, others], with_gestures.motion.values[:, others])
+    np.testing.assert_array_equal(still.head.values, with_gestures.head.values)
 
 
 def test_the_starter_palette_has_the_moods_of_the_paper_and_its_provenance() -> None:
@@ -82,20 +82,22 @@ def test_the_starter_palette_has_the_moods_of_the_paper_and_its_provenance() -> 
 
 
 @pytest.mark.parametrize("style", ["depressed", "delighted", "annoyed", "exaggerated", "exasperated"])
-def test_lips_that_meet_still_meet_in_every_mood(style: str, plain: Clip, session: Session, face: Face) -> None:
+def test_lips_that_meet_still_meet_in_every_mood(
+    style: str, without_gestures: Clip, session: Session, face: Face
+) -> None:
     made = session.clip(Request(text=TEXT, style=style))
     shown = gesture_face(face, load_palette("starter")).face
-    before, after = lip_gap(face, plain), lip_gap(shown, made)
+    before, after = lip_gap(face, without_gestures), lip_gap(shown, made)
     touching = before < 0.3
     assert touching.sum() > 5
     assert (after[touching] - before[touching]).max() < 0.1  # mm
     assert after.min() > -0.1
 
 
-def test_neutral_gestures_leave_lips_as_they_are(alive: Clip, plain: Clip, face: Face) -> None:
+def test_neutral_gestures_leave_lips_as_they_are(with_gestures: Clip, without_gestures: Clip, face: Face) -> None:
     shown = gesture_face(face, load_palette("starter")).face
-    assert np.corrcoef(lip_gap(face, plain), lip_gap(shown, alive))[0, 1] > 0.995
-    assert np.corrcoef(lip_width(face, plain), lip_width(shown, alive))[0, 1] > 0.99
+    assert np.corrcoef(lip_gap(face, without_gestures), lip_gap(shown, with_gestures))[0, 1] > 0.995
+    assert np.corrcoef(lip_width(face, without_gestures), lip_width(shown, with_gestures))[0, 1] > 0.99
 
 
 def lip_gap(face: Face, clip: Clip) -> np.ndarray:
@@ -115,15 +117,15 @@ def test_eyes_hold_the_viewer_while_the_head_nods(session: Session) -> None:
     assert np.corrcoef(up, clip.head.values[:, 0])[0, 1] > 0.95
 
 
-def test_marks_and_flags_paint_styles(alive: Clip, session: Session) -> None:
+def test_marks_and_flags_paint_styles(with_gestures: Clip, session: Session) -> None:
     by_flag = session.clip(Request(text=TEXT, style="head=exaggerated"))
     by_mark = session.clip(Request(text=f"[style:head=exaggerated]{TEXT}[/style]"))
     np.testing.assert_allclose(by_mark.head.values[30:-30], by_flag.head.values[30:-30], atol=1e-4)
-    assert not np.array_equal(by_flag.head.values, alive.head.values)
-    np.testing.assert_array_equal(channels_of(by_flag, ("brows",)), channels_of(alive, ("brows",)))
+    assert not np.array_equal(by_flag.head.values, with_gestures.head.values)
+    np.testing.assert_array_equal(channels_of(by_flag, ("brows",)), channels_of(with_gestures, ("brows",)))
 
 
-def test_another_palette_gives_other_motion(alive: Clip, talker: Talker, face: Face, tmp_path: Path) -> None:
+def test_another_palette_gives_other_motion(with_gestures: Clip, talker: Talker, face: Face, tmp_path: Path) -> None:
     starter = load_palette("starter")
     style = starter.styles["grid_s1"]
     few = {name: values[: int(style.lengths[:40].sum())] for name, values in style.motion.items()}
@@ -137,7 +139,7 @@ def test_another_palette_gives_other_motion(alive: Clip, talker: Talker, face: F
     )
     write_palette(tmp_path / "few.palette", replace(starter, styles={"few": part}, derivations={}))
     clip = Session(talker, face, palette=tmp_path / "few.palette").clip(Request(text=TEXT))
-    assert not np.array_equal(clip.head.values, alive.head.values)
+    assert not np.array_equal(clip.head.values, with_gestures.head.values)
     with pytest.raises(InputError, match="no style 'delighted' in the palette; it has few"):
         Session(talker, face, palette=tmp_path / "few.palette").clip(Request(text=TEXT, style="delighted"))
 

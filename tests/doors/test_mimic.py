@@ -83,13 +83,13 @@ def test_a_capture_moves_the_shapes_of_its_names(capture: Path, here: Path) -> N
 def test_a_video_without_sound_gives_a_silent_clip_and_a_message(
     film: Path, bundle: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    written(here / "mute.mp4", [picture.pixels for picture in read_frames(film)][:20])
+    write_video(here / "mute.mp4", [picture.pixels for picture in read_frames(film)][:20])
     assert run(["mimic", "mute.mp4", "--out", "m.mp4", "--size", "64x64", "--model", str(bundle)]) == 0
     assert "contains no sound; the clip is silent" in capsys.readouterr().err
     assert (here / "m.mp4").exists()
 
 
-def written(path: Path, pictures: list[np.ndarray]) -> None:
+def write_video(path: Path, pictures: list[np.ndarray]) -> None:
     height, width = (side - side % 2 for side in pictures[0].shape[:2])
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=Fraction(25))
@@ -107,8 +107,8 @@ def test_films_that_cannot_drive_a_face_are_refused(
     pictures = [picture.pixels for picture in read_frames(film)][:30]
     blue = np.zeros_like(pictures[0])
     blue[:, :, 2] = np.arange(blue.shape[1])
-    written(here / "nobody.mp4", [blue] * 6)
-    written(here / "two.mp4", [np.concatenate([picture, picture], axis=1) for picture in pictures])
+    write_video(here / "nobody.mp4", [blue] * 6)
+    write_video(here / "two.mp4", [np.concatenate([picture, picture], axis=1) for picture in pictures])
     (here / "empty.mp4").touch()
     (here / "cut.mkv").write_bytes(film.read_bytes()[:40_000])
     (here / "words.mp4").write_text("no film\n" * 100)

@@ -39,7 +39,7 @@ def wait_until(holds: Callable[[], object]) -> None:
         time.sleep(0.05)
 
 
-def speaking(here: Path) -> "subprocess.Popen[str]":
+def start_command(here: Path) -> "subprocess.Popen[str]":
     """A command that has begun to write x.mp4."""
     process = subprocess.Popen(
         [*COMMAND, TEXT, "--out", "x.mp4", "--size", "64x64"], stderr=subprocess.PIPE, text=True, cwd=here
@@ -51,7 +51,7 @@ def speaking(here: Path) -> "subprocess.Popen[str]":
 
 @pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
 def test_a_signal_leaves_no_files_and_no_processes(tmp_path: Path, name: str, code: int) -> None:
-    with speaking(tmp_path) as process:
+    with start_command(tmp_path) as process:
         process.send_signal(getattr(signal, name))
         _, message = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == code
@@ -60,7 +60,7 @@ def test_a_signal_leaves_no_files_and_no_processes(tmp_path: Path, name: str, co
 
 
 def test_files_of_a_killed_command_are_removed_by_the_next_one(tmp_path: Path) -> None:
-    with speaking(tmp_path) as process:
+    with start_command(tmp_path) as process:
         process.kill()
     assert list(tmp_path.glob(".x*"))
     subprocess.run([*COMMAND, "Hi.", "--out", "x.mp4", "--size", "64x64", "--fps", "5"], check=True, cwd=tmp_path)

@@ -110,8 +110,8 @@ def test_a_nod_turns_six_degrees_down_and_slightly_overshoots_rest() -> None:
 
 
 def test_a_timeline_can_be_moved() -> None:
-    told = Timeline(spans=(StyleSpan("head", "a", 0.0, math.inf),), nods=(Nod(0.5),)).shifted(2.0)
-    assert (told.spans[0].start, told.spans[0].end, told.nods[0].time) == (2.0, math.inf, 2.5)
+    parsed = Timeline(spans=(StyleSpan("head", "a", 0.0, math.inf),), nods=(Nod(0.5),)).shifted(2.0)
+    assert (parsed.spans[0].start, parsed.spans[0].end, parsed.nods[0].time) == (2.0, math.inf, 2.5)
 
 
 @pytest.mark.parametrize(
@@ -225,7 +225,7 @@ def test_what_is_written_wrongly_is_refused(read, written: str, reason: str) -> 
 
 
 def test_a_file_holds_a_timeline(tmp_path: Path) -> None:
-    told = {
+    parsed = {
         "style": {"all": "calm", "head": "cross"},
         "spans": [
             {"feature": "brows", "style": "annoyed", "start": 1.0, "end": 2.5},
@@ -236,7 +236,7 @@ def test_a_file_holds_a_timeline(tmp_path: Path) -> None:
         "gains": {"head": 1.5, "jaw": 1},
     }
     path = tmp_path / "a.json"
-    path.write_text(json.dumps(told), encoding="utf-8-sig")
+    path.write_text(json.dumps(parsed), encoding="utf-8-sig")
     timeline = read_timeline(path)
     assert timeline.style == {**dict.fromkeys(FEATURES, "calm"), "head": "cross"}
     assert timeline.spans[0] == StyleSpan("brows", "annoyed", 1.0, 2.5)

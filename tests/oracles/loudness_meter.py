@@ -7,7 +7,7 @@ from av.filter import Graph
 from tts2face.types import Waveform
 
 
-def measured(sound: Waveform) -> tuple[float, float]:
+def measure_loudness(sound: Waveform) -> tuple[float, float]:
     """Integrated loudness in LUFS, and true peak in dB of full scale."""
     graph = Graph()
     source = graph.add(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tests.oracles.loudness_meter import measured
+from tests.oracles.loudness_meter import measure_loudness
 from tts2face.speech.bs1770 import ABSOLUTE_GATE_LUFS, integrated_loudness, k_weighting, true_peak
 from tts2face.types import Waveform
 
@@ -43,7 +43,7 @@ def test_a_sine_of_997_hz(rate: int, level_db: float) -> None:
 def test_ffmpeg_s_meter_reads_the_same(rate: int) -> None:
     for seed in range(3):
         sound = speechlike(rate, seed)
-        loudness, peak = measured(sound)
+        loudness, peak = measure_loudness(sound)
         assert integrated_loudness([sound]) == pytest.approx(loudness, abs=0.02)  # LU
         assert true_peak(sound) == pytest.approx(peak, abs=0.1)  # dB; another interpolation filter
 

@@ -54,16 +54,16 @@ def test_words_are_placed_at_their_recognised_phones() -> None:
     generator = np.random.default_rng(1)
     words = [tuple(generator.choice(list(PHONES), generator.integers(2, 6))) for _ in range(300)]
     truth = np.sort(generator.integers(0, 12, len(words)))
-    heard: list[list[str]] = [[] for _ in range(12)]
+    recognised: list[list[str]] = [[] for _ in range(12)]
     for word, at in zip(words, truth, strict=True):
         for phone in word:
             luck = generator.random()
             if luck < 0.1:
                 continue  # not recognised
-            heard[at].append(phone if luck < 0.8 else str(generator.choice(list(PHONES))))
+            recognised[at].append(phone if luck < 0.8 else str(generator.choice(list(PHONES))))
             if luck > 0.95:
-                heard[at].append(str(generator.choice(list(PHONES))))
-    found = assign_words(words, heard)
+                recognised[at].append(str(generator.choice(list(PHONES))))
+    found = assign_words(words, recognised)
     assert (np.diff(found) >= 0).all()
     assert (found == truth).mean() > 0.99
 

@@ -15,7 +15,7 @@ from tts2face.video.media import read_frames, read_media_info, read_sound
 MEMORY = 3 << 30  # bytes of addresses: libraries take half of it
 
 
-def damaged(content: bytes, generator: np.random.Generator) -> bytes:
+def damage(content: bytes, generator: np.random.Generator) -> bytes:
     """A file cut, with bytes flipped, with a part overwritten, removed or repeated, or with several of these."""
     data = np.frombuffer(content, np.uint8).copy()
     for kind in generator.choice(["cut", "flip", "head", "blank", "omit", "double"], generator.integers(1, 4)):
@@ -43,7 +43,7 @@ def main(film: Path, folder: Path, n_copies: int, seed: int) -> None:
     generator = np.random.default_rng(seed)
     for number in range(n_copies):
         path = folder / f"copy{number}{film.suffix}"
-        path.write_bytes(damaged(film.read_bytes(), generator))
+        path.write_bytes(damage(film.read_bytes(), generator))
         outcome = []
         for read in (
             lambda here=path: f"{read_media_info(here).fps:.2f} fps",

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tests.oracles.loudness_meter import measured
+from tests.oracles.loudness_meter import measure_loudness
 from tts2face.speech.bs1770 import integrated_loudness, oversampled_peaks, true_peak
 from tts2face.types import Speech, Waveform
 from tts2face.voice.level import (
@@ -32,7 +32,7 @@ def sound(level: float, seconds: float = 1.5, crest: float = 1.0, seed: int = 0)
 @pytest.mark.parametrize("seconds", [0.2, 3.0])
 def test_loud_and_soft_voices_come_out_alike(level: float, crest: float, seconds: float) -> None:
     (levelled,) = normalise_loudness([sound(level, seconds, crest)])
-    loudness, peak = measured(levelled)
+    loudness, peak = measure_loudness(levelled)
     assert integrated_loudness([levelled]) == pytest.approx(LOUDNESS_LUFS, abs=0.3)
     assert loudness == pytest.approx(LOUDNESS_LUFS, abs=0.3)
     assert peak < -1.0
