@@ -57,6 +57,20 @@ def capture(request: pytest.FixtureRequest) -> Path:
     return request.getfixturevalue("shared_recordings") / "livelink" / "testset_arkit61_60fps.csv"
 
 
+@pytest.fixture(scope="session")
+def face_model() -> Path:
+    """Path of the face landmark models."""
+    from lexicon.errors import BackendError
+    from tts2face.video.landmark_models import find_bundle
+
+    pytest.importorskip("ai_edge_litert", reason="needs `pip install 'tts2face[capture]'`")
+    pytest.importorskip("cv2", reason="needs `pip install 'tts2face[capture]'`")
+    try:
+        return find_bundle()
+    except BackendError as missing:
+        pytest.skip(str(missing))
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Name what was skipped and why, one line for each reason."""
     reasons = Counter(str(report.longrepr[2]) for report in terminalreporter.stats.get("skipped", []))

@@ -8,23 +8,11 @@ import numpy as np
 import pytest
 
 from corpus_tools.recordings.observation import Observation, Quality
-from lexicon.errors import BackendError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS
-from tts2face.video.landmark_models import find_bundle
 
 CLIPS = ("bbaf2n", "bbaf3s", "bbaf5a")
 FPS = 25.0
-
-
-@pytest.fixture(scope="session")
-def face_model() -> Path:
-    pytest.importorskip("ai_edge_litert", reason="needs `pip install 'tts2face[capture]'`")
-    pytest.importorskip("cv2", reason="needs `pip install 'tts2face[capture]'`")
-    try:
-        return find_bundle()
-    except BackendError as missing:
-        pytest.skip(str(missing))
 
 
 @pytest.fixture

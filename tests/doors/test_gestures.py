@@ -13,9 +13,8 @@ from corpus_tools.decomposition.face_motion import moved_landmarks
 from lexicon.errors import InputError
 from tts2face.face.gesture_transfer import gesture_face
 from tts2face.models.face import Face
-from tts2face.models.face_file import load_face
 from tts2face.models.palette import FEATURES, load_palette, write_palette
-from tts2face.models.talker import Talker, load_talker
+from tts2face.models.talker import Talker
 from tts2face.request import Request
 from tts2face.session import Session
 from tts2face.storage.files import SHIPPED_FOLDER
@@ -24,21 +23,6 @@ from tts2face.types import Clip
 TEXT = "Bob may move five big maps, but we keep two."
 SMALL = ["--size", "64x64", "--fps", "5", "--quiet"]
 SHAPES = {"brows": ("brows",), "cheeks": ("cheeks",), "blink": ("eyeBlink",), "gaze": ("eyeLook",)}
-
-
-@pytest.fixture(scope="module")
-def talker() -> Talker:
-    return load_talker("grid_s1")
-
-
-@pytest.fixture(scope="module")
-def face() -> Face:
-    return load_face("head")
-
-
-@pytest.fixture(scope="module")
-def session(talker: Talker, face: Face) -> Session:
-    return Session(talker, face)
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,7 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face
-from tts2face.models.face_file import load_face
-from tts2face.models.talker import Talker, load_talker
+from tts2face.models.talker import Talker
 from tts2face.request import GESTURES, Request
 from tts2face.session import Session
 from tts2face.types import Clip, concatenate_clips
@@ -35,21 +34,6 @@ CHANGES = {
     "gain": "head=2,blink=0",
     "expression": "happy=0.6@0.2-0.9",
 }
-
-
-@pytest.fixture(scope="module")
-def talker() -> Talker:
-    return load_talker("grid_s1")
-
-
-@pytest.fixture(scope="module")
-def face() -> Face:
-    return load_face("head")
-
-
-@pytest.fixture(scope="module")
-def session(talker: Talker, face: Face) -> Session:
-    return Session(talker, face)
 
 
 @pytest.fixture(scope="module")
@@ -80,8 +64,9 @@ def test_every_option_changes_the_clip(name: str, clip: Clip, session: Session, 
 def test_the_same_request_gives_the_same_bytes_in_another_process(clip: Clip) -> None:
     code = (
         "import sys; sys.path.insert(0, 'tests/doors')\n"
-        "from test_requests import *\n"
-        "print(digest(Session(load_talker('grid_s1'), load_face('head')).clip(Request(text=TEXT))))"
+        "from test_requests import TEXT, digest\n"
+        "from tts2face import Request, Session\n"
+        "print(digest(Session('grid_s1', 'head').clip(Request(text=TEXT))))"
     )
     environment = {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PATH": ""}
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)

@@ -4,20 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lexicon.errors import BackendError
-from tts2face.video.landmark_models import find_bundle
-
 MakeVideo = Callable[..., Path]
-
-
-@pytest.fixture(scope="session")
-def face_model() -> Path:
-    pytest.importorskip("ai_edge_litert", reason="needs `pip install 'tts2face[capture]'`")
-    pytest.importorskip("cv2", reason="needs `pip install 'tts2face[capture]'`")
-    try:
-        return find_bundle()
-    except BackendError as missing:
-        pytest.skip(str(missing))
 
 
 @pytest.fixture
