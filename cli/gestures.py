@@ -47,8 +47,6 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
 ) -> None:
     """Build a gesture style for `--palette` from recordings of a person; transcripts are not needed."""
     check_suffix(out, "palette")
-    inputs = {"the recordings": recordings, "--stills": stills, "--markers": markers, "--neutral": neutral}
-    refuse_overwriting({"--out": out}, inputs | {"--palette": palette, "--provenance": provenance, "--model": model})
     from corpus_tools.build_palette import StyleSource, build_style
     from corpus_tools.decomposition.capture_files import MarkerOptions
     from corpus_tools.decomposition.marker_set import DEFAULT_MARKER_TABLE
@@ -56,7 +54,11 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
     from corpus_tools.run_options import RunOptions, ignore_stage
     from tts2face.models.palette import load_palette
 
-    still_files = (find_stills(stills) if stills is not None else {}) | parse_stills(still or [])
+    named_stills = parse_stills(still or [])
+    inputs = {"the recordings": recordings, "--stills": stills, "--markers": markers, "--neutral": neutral}
+    inputs |= {f"--still {name}": one.path for name, one in named_stills.items()}
+    refuse_overwriting({"--out": out}, inputs | {"--palette": palette, "--provenance": provenance, "--model": model})
+    still_files = (find_stills(stills) if stills is not None else {}) | named_stills
     marker_options = MarkerOptions(markers or DEFAULT_MARKER_TABLE, neutral, marker_rate)
     source = StyleSource(
         recordings=recordings, stills=still_files, marker_options=marker_options, provenance=provenance

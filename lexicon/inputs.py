@@ -1,9 +1,11 @@
-"""Bounded reading of files and streams given by a user: UTF-8 text and JSON."""
+"""Bounded reading of files and streams given by a user: UTF-8 text, JSON and CSV."""
 
+import csv
 import json
 import re
 import stat
 from collections.abc import Iterable
+from io import StringIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -11,6 +13,7 @@ from lexicon.errors import DataError, InputError
 
 LARGEST_TEXT_BYTES = 16 << 20  # 16 MiB of text to speak; at 15 characters a second about 300 hours
 LARGEST_JSON_BYTES = 10_000_000  # an hour of timeline spans, one a second in each feature, takes 2 MB
+LARGEST_TABLE_BYTES = 200_000_000  # an hour of Live Link Face at 60 frames/s takes 180 MB
 MAX_DEPTH = 64  # nesting of lists and objects; the supported formats need 5
 MAX_NUMBER_CHARACTERS = 400  # characters; a double has at most 310 digits before the point
 _FILE_KINDS = (
@@ -81,6 +84,23 @@ def read_text(path: Path, largest: int = LARGEST_TEXT_BYTES) -> str:
     """
     with path.open("rb") as file:
         return decode_utf8(read_bounded(file, str(path), largest), str(path))
+
+
+def read_table(path: Path, largest: int = LARGEST_TABLE_BYTES) -> list[list[str]]:
+    """Rows of a CSV file, without empty ones.
+
+    Raises
+    ------
+    DataError
+        It cannot be read, contains more than `largest` bytes, or is not CSV in UTF-8.
+    """
+    try:
+        text = read_text(path, largest)
+        return [row for row in csv.reader(StringIO(text, newline="")) if row]
+    except OSError as refused:
+        raise DataError(f"{path} cannot be read ({refused.strerror}); check the file") from refused
+    except csv.Error as broken:
+        raise DataError(f"{path} is not a CSV file ({broken}); export it again") from broken
 
 
 def read_json(path: Path) -> Any:

@@ -1,4 +1,4 @@
-"""What all tests share: takes rendered by the project, and the way to real recordings, which are not part of it."""
+"""Shared fixtures: takes rendered by the project, and the folder of real recordings, which are not part of it."""
 
 import os
 from collections import Counter
@@ -11,7 +11,7 @@ SHARED = Path(os.environ.get("TTS2FACE_SHARED", Path(__file__).resolve().parents
 
 @pytest.fixture(scope="session")
 def shared_recordings() -> Path:
-    """Folder of real recordings that lies beside the project, or in TTS2FACE_SHARED."""
+    """Folder of real recordings, next to the project or in TTS2FACE_SHARED."""
     folder = SHARED / "recordings"
     if not folder.is_dir():
         pytest.skip("figures about real people: their recordings are not part of the project (TTS2FACE_SHARED)")
@@ -35,7 +35,7 @@ def rendered_takes(run_folder: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def rendered_capture(run_folder: Path) -> Path:
-    """A Live Link Face capture of a speaking face; its sound lies beside it."""
+    """A Live Link Face capture of a speaking face; its sound is in the same folder."""
     from tests.rendered_takes import CAPTURE_NAME, made_once, write_capture
 
     return made_once(run_folder / "rendered_capture", write_capture) / f"{CAPTURE_NAME}.csv"
@@ -43,7 +43,7 @@ def rendered_capture(run_folder: Path) -> Path:
 
 @pytest.fixture(scope="session", params=["rendered", "real"])
 def takes(request: pytest.FixtureRequest) -> Path:
-    """Recordings in the layout of GRID: rendered ones, and real ones where they are."""
+    """Recordings in the layout of GRID: rendered ones, and real ones if available."""
     if request.param == "rendered":
         return request.getfixturevalue("rendered_takes")
     return request.getfixturevalue("shared_recordings") / "grid_s1"
@@ -51,7 +51,7 @@ def takes(request: pytest.FixtureRequest) -> Path:
 
 @pytest.fixture(scope="session", params=["rendered", "real"])
 def capture(request: pytest.FixtureRequest) -> Path:
-    """A Live Link Face capture whose sound lies beside it: a rendered one, and a real one where it is."""
+    """A Live Link Face capture with its sound in the same folder: a rendered one, and a real one if available."""
     if request.param == "rendered":
         return request.getfixturevalue("rendered_capture")
     return request.getfixturevalue("shared_recordings") / "livelink" / "testset_arkit61_60fps.csv"

@@ -1,6 +1,6 @@
 """Takes rendered by the project: videos of a speaking head, with sound, transcripts and word times.
 
-They stand in for recordings of a person where a test needs a face that speaks, and not a figure about real people. The
+They replace recordings of a person in tests that need a speaking face, but no figures about real people. The
 folder has the layout of the GRID corpus: ``clips/NAME.mkv``, ``align/NAME.align`` and ``manifest.csv``; a name spells
 its sentence in GRID's code, ``bbaf2n`` is "bin blue at F two now". Twelve takes cost 24 s of CPU time.
 """
@@ -37,7 +37,7 @@ WORDS = (
 )
 FPS = 25
 SIZE = "208x248"  # pixels, as the real takes; the tracker finds the rendered head from 160 x 160 on
-ROOM_NOISE = 0.001  # standard deviation, -60 dB; the aligner places words badly beside digital silence
+ROOM_NOISE = 0.001  # standard deviation, -60 dB; forced alignment is inaccurate next to digital silence
 LEAD_S, TAIL_S = 0.6, 0.4  # silence before and after a sentence
 ALIGN_RATE = 25_000  # of GRID's word times, per second
 CAPTURE_FPS = 60
@@ -147,7 +147,7 @@ def made_once(folder: Path, make: Callable[[Path], None], timeout_s: float = 900
                 raise TimeoutError(f"{partial} has not been finished within {timeout_s:g} s") from None
             time.sleep(0.2)
             continue
-        if folder.is_dir():  # finished between the two looks
+        if folder.is_dir():  # finished between the two checks
             partial.rmdir()
             break
         try:

@@ -258,10 +258,12 @@ class Session:
         Raises
         ------
         InputError, DataError, BackendError
-            As `tts2face.synthesis.performance.perform`; or the file cannot be written.
+            As `tts2face.synthesis.performance.perform`; or the file cannot be written, or is one of the inputs.
         """
         check_output(out)
         picture = picture or Picture()
+        inputs = {"the take": performance.take, "audio": performance.audio, "model": performance.model}
+        refuse_overwriting({"out": out}, inputs | {"background": picture.background})
         renderer = self.renderer(picture, has_gestures=False)  # rejects invalid options before the video is tracked
         take = perform(performance, self._speech_face, on_progress=stages("tracking") if stages else None)
         n_frames = len(take.motion.face)

@@ -1,6 +1,5 @@
 """Files of facial marker capture: C3D (Vicon, OptiTrack, ...) and tables of comma-separated values."""
 
-import csv
 import struct
 from collections import Counter
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.recordings.corpus_audio import SOUND_RATE
 from lexicon.errors import BackendError, DataError, InputError
+from lexicon.inputs import read_table
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.types import Waveform
 
@@ -131,11 +131,7 @@ def read_marker_table(path: Path, fps: float | None = None) -> MarkerTake:
     The first column is ``time`` in seconds or ``frame``, the others are ``NAME_x``, ``NAME_y``, ``NAME_z`` in mm, in
     any order; empty cells are gaps.
     """
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [[cell.strip() for cell in row] for row in csv.reader(file) if row]
-    except (UnicodeDecodeError, csv.Error) as broken:
-        raise DataError(f"{path} is not a CSV table of markers ({broken})") from broken
+    rows = [[cell.strip() for cell in row] for row in read_table(path)]
     first = rows[0][0].lower() if rows else ""
     if first not in ("time", "frame") or len(rows) < 2:
         raise DataError(f"{path} is not a CSV table of markers: it needs the columns time or frame, then NAME_x, ...")

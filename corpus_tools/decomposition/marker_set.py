@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lexicon.errors import DataError, InputError
+from lexicon.inputs import read_text
 from tts2face.models.landmarks import N_LANDMARKS
 
 # 68 markers of the face and 7 of the head, as many as Ju and Lee 2008, section 3, has. The paper shows its layout in a
@@ -67,9 +68,9 @@ def read_marker_set(path: Path = DEFAULT_MARKER_TABLE) -> MarkerSet:
     if not path.is_file():
         raise InputError(f"there is no marker set {path}; check the path")
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except UnicodeDecodeError as broken:
-        raise DataError(f"{path} is not UTF-8 text ({broken}); save it as such") from broken
+        lines = read_text(path).splitlines()
+    except OSError as refused:
+        raise DataError(f"{path} cannot be read ({refused.strerror}); check the file") from refused
     rows_text = [line for line in lines if line.strip() and not line.startswith("#")]
     rows = list(csv.reader(rows_text, delimiter="\t"))
     if not rows or tuple(rows[0]) != COLUMNS:

@@ -1,6 +1,5 @@
 """External tracks of facial motion, mapped to speech parameters by a linear map fitted on the training utterances."""
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from corpus_tools.evaluation.reference import ReferenceUtterance
 from corpus_tools.training.ridge import fit_ridge
 from lexicon.errors import DataError, InputError
+from lexicon.inputs import read_table
 from tts2face.interpolation import interpolate_columns
 from tts2face.models.talker import Talker
 
@@ -38,23 +38,18 @@ def read_tracks(path: Path) -> Mapping[str, ExternalTrack]:
     InputError
         There is no such file.
     DataError
-        Columns are missing, a value is no number, or times of an utterance do not increase.
+        It is too large, columns are missing, a value is no number, or times of an utterance do not increase.
     """
     if not path.is_file():
         raise InputError(f"there are no tracks {path}; check the path")
     rows: dict[str, list[list[float]]] = {}
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file)
-            head = next(reader, [])
-            if head[:2] != [UTTERANCE_COLUMN, TIME_COLUMN] or len(head) < 3:
-                raise DataError(f"{path} must begin with the columns utterance, time and a channel, not {head[:3]}")
-            for number, row in enumerate(reader, start=2):
-                if len(row) != len(head):
-                    raise DataError(f"{path}, line {number}: {len(row)} columns, not {len(head)}; correct the line")
-                rows.setdefault(row[0], []).append([_parse_number(value, path, number) for value in row[1:]])
-    except (OSError, UnicodeDecodeError, csv.Error) as broken:
-        raise DataError(f"{path} cannot be read as CSV in UTF-8 ({broken}); export it again") from broken
+    head, *lines = read_table(path) or [[]]
+    if head[:2] != [UTTERANCE_COLUMN, TIME_COLUMN] or len(head) < 3:
+        raise DataError(f"{path} must begin with the columns utterance, time and a channel, not {head[:3]}")
+    for number, row in enumerate(lines, start=2):
+        if len(row) != len(head):
+            raise DataError(f"{path}, line {number}: {len(row)} columns, not {len(head)}; correct the line")
+        rows.setdefault(row[0], []).append([_parse_number(value, path, number) for value in row[1:]])
     tracks = {name: np.array(values) for name, values in rows.items()}
     for name, values in tracks.items():
         if (np.diff(values[:, 0]) <= 0).any():

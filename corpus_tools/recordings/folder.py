@@ -1,6 +1,5 @@
 """Folders of recordings: their videos and transcripts."""
 
-import csv
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from corpus_tools.recordings.subtitles import find_subtitles, read_cues
 from corpus_tools.recordings.transcripts import find_transcript, read_transcript
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import DataError, InputError
+from lexicon.inputs import read_table
 from lexicon.normalize import normalize
 
 VIDEO_SUFFIXES = frozenset({".mkv", ".mp4", ".mov", ".webm", ".avi", ".mpg", ".mpeg", ".m4v"})
@@ -128,11 +128,11 @@ def _pronounce_by_rule(word: str) -> tuple[str, ...]:
 
 
 def _recordings_from_manifest(folder: Path, manifest: Path) -> tuple[Recording, ...]:
-    try:
-        with manifest.open(encoding="utf-8-sig", newline="") as file:
-            transcripts = {row["clip"]: row["transcript"] for row in csv.DictReader(file)}
-    except (OSError, UnicodeDecodeError, KeyError, csv.Error) as broken:
-        raise DataError(f"{manifest} needs the columns clip and transcript in UTF-8; correct it") from broken
+    head, *lines = read_table(manifest) or [[]]
+    if not {"clip", "transcript"} <= set(head):
+        raise DataError(f"{manifest} needs the columns clip and transcript in UTF-8; correct it")
+    rows = [dict(zip(head, line, strict=False)) for line in lines]
+    transcripts = {row["clip"]: row.get("transcript") for row in rows if "clip" in row}
     clips = folder / "clips"
     videos = _list_videos(clips if clips.is_dir() else folder)
     return tuple(Recording(video.stem, video, transcripts.get(video.stem), is_spelling=True) for video in videos)

@@ -13,7 +13,7 @@ HEAVY = ("numpy", "numba", "scipy", "av", "PIL", "onnxruntime", "hibari", "cyclo
 
 
 def run_python(code: str, home: Path) -> str:
-    """What a fresh process with an empty home folder prints."""
+    """Output of a fresh process with an empty home folder."""
     environment = {"PATH": os.environ["PATH"], "HOME": str(home), "PYTHONPATH": str(Path(tts2face.__file__).parents[1])}
     answer = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True, cwd=home
@@ -33,7 +33,7 @@ def test_importing_the_package_has_no_side_effect(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", tts2face.__all__)
-def test_every_public_name_has_a_home(name: str) -> None:
+def test_every_public_name_can_be_imported(name: str) -> None:
     value = getattr(tts2face, name)
     assert value.__doc__
     assert name in dir(tts2face)

@@ -1,14 +1,16 @@
-"""A session: what it returns can be drawn, it serves several threads, and options are checked."""
+"""Sessions: their clips can be drawn, they are thread-safe, and options are checked."""
 
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import tts2face
 from lexicon.errors import InputError
 from tests.golden.requests import starter_with_pictures
+from tts2face.synthesis.performance import Performance
 from tts2face.types import concatenate_clips
 
 TEXTS = ("Bob may move.", "We were away.", "Five big maps.", "Hello there.")
@@ -55,7 +57,7 @@ def test_a_clip_of_another_face_is_refused(session: tts2face.Session, tmp_path: 
         tts2face.write_clip(clip, session.face, tmp_path / "a", picture=SMALL)
 
 
-def test_threads_get_what_one_gets(session: tts2face.Session) -> None:
+def test_threads_get_the_same_clips_as_a_single_thread(session: tts2face.Session) -> None:
     alone = [tts2face.Session(palette=session.palette).clip(text, seed=2) for text in TEXTS]
     with ThreadPoolExecutor(4) as pool:
         together = list(pool.map(lambda text: session.clip(text, seed=2), TEXTS * 2))
@@ -96,6 +98,24 @@ def test_wrong_calls_are_refused(call: object, reason: str, session: tts2face.Se
         call(session)
 
 
+@pytest.mark.parametrize(
+    ("replaced", "name"), [("take.csv", "the take"), ("sound.flac", "audio"), ("back.png", "background")]
+)
+def test_a_performance_does_not_replace_its_inputs(
+    replaced: str, name: str, session: tts2face.Session, tmp_path: Path
+) -> None:
+    take, sound, background = (tmp_path / file for file in ("take.csv", "sound.flac", "back.png"))
+    for path in (take, sound):
+        path.write_bytes(b"recorded")
+    Image.new("RGB", (64, 64)).save(background)
+    (tmp_path / "out.mp4").symlink_to(tmp_path / replaced)
+    content = (tmp_path / replaced).read_bytes()
+    picture = tts2face.Picture(size="64x64", background=str(background))
+    with pytest.raises(InputError, match=rf"out .*out\.mp4 would replace {name}; choose another name"):
+        session.write_performance(Performance(take=take, audio=sound), tmp_path / "out.mp4", picture=picture)
+    assert (tmp_path / "out.mp4").read_bytes() == content
+
+
 def test_a_session_without_a_palette_moves_lips_alone() -> None:
     bare = tts2face.Session(palette=None)
     clip = bare.clip("Bob may move.")
@@ -103,7 +123,7 @@ def test_a_session_without_a_palette_moves_lips_alone() -> None:
     assert not clip.head.values.any()
 
 
-def test_voices_in_use_do_not_count_among_those_kept(session: tts2face.Session) -> None:
+def test_voices_in_use_are_not_counted_as_cached(session: tts2face.Session) -> None:
     text = '<speak>One. <voice name="heart">Two.</voice> <lang xml:lang="de">Drei.</lang> Four.</speak>'
     spoken = [word.text for _ in range(2) for word in session.clip(text, voice="espeak").speech.words]
     assert [word.strip(".") for word in spoken] == ["One", "Two", "Drei", "Four"] * 2

@@ -31,7 +31,7 @@ INNER_LIPS = (*INNER_LIP_UPPER, *INNER_LIP_LOWER)
 
 @dataclass(frozen=True, slots=True)
 class AppearanceMeasures:
-    """Figures of shape and texture; pixels are those of the video, ``held_out`` is what no model was learnt from.
+    """Figures of shape and texture; pixels are those of the video, ``held_out`` was not used for training.
 
     ``shape_modes``, ``texture_modes`` and ``mouth_modes`` explain 95 and 99 % of the variance (0: more than were kept).
     ``lag_ms`` is by how much the loudness follows the opening of the lips where both agree best.

@@ -1,7 +1,7 @@
 """From text to a finished clip: speed, cold start, memory.
 
-Run: ``python tests/bench/bench_clip.py`` (``--minutes 10`` for the long text). Beside the figures stands a reference
-loop of plain numpy, run before and after, so that machines and moments can be compared.
+Run: ``python tests/bench/bench_clip.py`` (``--minutes 10`` for the long text). A reference loop of plain numpy runs
+before and after, so that figures of different machines and times can be compared.
 """
 
 import argparse

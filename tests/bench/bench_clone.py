@@ -1,4 +1,4 @@
-"""How faithful and how fast motion is cloned between talkers (Theobald et al. 2007, eq. 5).
+"""Accuracy and speed of cloning motion between talkers (Theobald et al. 2007, eq. 5).
 
 Run: ``PYTHONPATH=. python tests/bench/bench_clone.py RECORDINGS [--cache FOLDER]``. The source is the starter talker
 grid_s1. There is one recorded person, so second talkers are learnt from the two halves of RECORDINGS, with other
@@ -34,7 +34,7 @@ N_FRAMES = 100  # compared with least squares
 EVERY = 8  # utterance of the source is cloned
 
 
-def driven(talker: Talker, name: str) -> list[Observation]:
+def observe_face(talker: Talker, name: str) -> list[Observation]:
     """A shipped face that speaks the talker's utterances, observed without error; brows and eyelids move, too."""
     face = load_face(name)
     ready, rng = build_retargeter(talker, face), np.random.default_rng(0)
@@ -59,7 +59,7 @@ def targets(recordings: Path, cache: Path | None, talker: Talker) -> Iterator[tu
     yield "even half, 12 + 6 modes", learn_shapes(kept[::2], 12, 6)
     yield "odd half, 30 + 15 modes", learn_shapes(kept[1::2], 30, 15)
     for name in ("head", "cartoon"):
-        yield f"{name}, 20 + 10 modes", learn_shapes(driven(talker, name), 20, 10)
+        yield f"{name}, 20 + 10 modes", learn_shapes(observe_face(talker, name), 20, 10)
 
 
 def distance(one: NDArray[np.floating], other: NDArray[np.floating]) -> Floats:
@@ -78,7 +78,7 @@ def least_squares(
     return np.asarray(np.linalg.lstsq(design, wanted.reshape(len(values), -1).T, rcond=None)[0].T, np.float64)
 
 
-def closed(talker: Talker, shapes: list[NDArray[np.float32]], at: list[list[int]]) -> float:
+def closure_share(talker: Talker, shapes: list[NDArray[np.float32]], at: list[list[int]]) -> float:
     """Share of bilabials with closed lips."""
     gaps = [lip_opening(one[frames]) * np.sign(opening(one[frames])) for one, frames in zip(shapes, at, strict=True)]
     return float((np.concatenate(gaps) < CLOSED_GAP).mean())
@@ -137,8 +137,12 @@ def report(talker: Talker, name: str, target: ShapeModel, gain: float = 1.0) -> 
     print(f"  lips set right in {changed.mean():.1%}, by {parted[changed].mean():.3f} mm (most {parted.max():.2f})")
     from_mean = values @ ready.relation.T
     ways = {"eq. 5 from rest": wanted, "eq. 5 from the mean": from_mean, "within limits": held, "all": mapped}
-    shares = [f"{way} {closed(talker, np.split(target.shapes(one), spans), at):.3f}" for way, one in ways.items()]
-    print(f"  {sum(map(len, at))} bilabials closed: source {closed(talker, before, at):.3f}, {', '.join(shares)}")
+    shares = [
+        f"{way} {closure_share(talker, np.split(target.shapes(one), spans), at):.3f}" for way, one in ways.items()
+    ]
+    print(
+        f"  {sum(map(len, at))} bilabials closed: source {closure_share(talker, before, at):.3f}, {', '.join(shares)}"
+    )
     print(f"  opening: r {np.corrcoef(*open_)[0, 1]:.4f}, slope {np.polyfit(*open_, 1)[0]:.3f}; "
           f"{len(values) / spent:.0f} frames/s")  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Speech-driven lips: ties of features to the face, and the drives on utterances held out.
+"""Speech-driven lips: correlation of features with the face, and audio maps on held-out utterances.
 
 Run: ``python tests/bench/bench_drive.py ../shared/recordings/grid_s1`` (``--quick`` for a look; ``--choose`` for the
 inner cross-validation; ``--picture docs/pictures/cca_strength.svg`` draws the ties as Fig. 5 of Theobald et al. 2007).
@@ -68,7 +68,7 @@ def main() -> None:
         return
     ties = bench.ties(options.trials, options.seed)
     if options.picture:
-        options.picture.write_text(drawn(ties))
+        options.picture.write_text(plot_ties(ties))
     bench.compare()
 
 
@@ -222,7 +222,7 @@ def head() -> None:
     print("\n| drive | " + " | ".join(COLUMNS).replace("_", " ") + " |\n| --- |" + " --- |" * len(COLUMNS))
 
 
-def drawn(ties: dict[str, np.ndarray]) -> str:
+def plot_ties(ties: dict[str, np.ndarray]) -> str:
     """The ties as a picture in SVG: one line a feature, frames across, correlation up."""
     low, width, height, left, top = 0.4, 620, 340, 70, 30
 

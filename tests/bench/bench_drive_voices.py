@@ -1,6 +1,6 @@
-"""Drives on voices that they did not learn from, against the lips that exemplars give for the known phones.
+"""Audio maps on voices outside their training data, compared with exemplar synthesis for the known phones.
 
-Run: ``python tests/bench/bench_drive_voices.py me.talker`` with a talker that carries drives.
+Run: ``python tests/bench/bench_drive_voices.py me.talker`` with a talker that has audio maps.
 """
 
 import argparse
@@ -29,21 +29,21 @@ def main() -> None:
     print("| voice | drive | loudness | r opening | r width | range ratio |\n| --- | --- | --- | --- | --- | --- |")
     for name in ("heart", "espeak"):
         voice = load_voice(name, "en-us", {})
-        said = [voice.speak(text, rate=1.0, seed=0) for text in sentences(options.sentences)]
+        speeches = [voice.speak(text, rate=1.0, volume=1.0, seed=0) for text in sentences(options.sentences)]
         for drive in ("linear", "network"):
             for is_matched in (False, True):
                 kept = talker.audio_maps[drive]
                 used = kept if is_matched else replace(kept, loudness=float("nan"))
-                figures = " | ".join(f"{value:.3f}" for value in compared(said, talker, used))
+                figures = " | ".join(f"{value:.3f}" for value in lip_errors(speeches, talker, used))
                 print(f"| {name} | {drive} | {'matched' if is_matched else 'as it is'} | {figures} |", flush=True)
 
 
-def compared(said: list[Speech], talker: Talker, drive: object) -> tuple[float, float, float]:
+def lip_errors(speeches: list[Speech], talker: Talker, drive: object) -> tuple[float, float, float]:
     known = build_exemplar_model(talker)
     exemplars, heard = [], []
     with tempfile.TemporaryDirectory() as folder:
-        for speech in said:
-            path = written(Path(folder) / "said.wav", speech)
+        for speech in speeches:
+            path = write_wave(Path(folder) / "said.wav", speech)
             n_frames = frame_count(speech.waveform.duration, talker.fps)
             exemplars.append(speech_trajectory(speech.phones, known, fps=talker.fps, n_frames=n_frames).values)
             heard.append(map_audio_to_motion(path, drive, talker, talker.fps)[1].values[:n_frames])
@@ -56,7 +56,7 @@ def compared(said: list[Speech], talker: Talker, drive: object) -> tuple[float, 
     return measures.correlation(*openings), measures.correlation(*widths), measures.range_ratio(*openings)
 
 
-def written(path: Path, speech: Speech) -> Path:
+def write_wave(path: Path, speech: Speech) -> Path:
     import wave
 
     with wave.open(str(path), "wb") as file:

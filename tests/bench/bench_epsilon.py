@@ -1,4 +1,4 @@
-"""What epsilon does to the weights of basis expressions (Ju and Lee 2008, section 4.1), on real recordings.
+"""Effect of epsilon on the weights of basis expressions (Ju and Lee 2008, section 4.1), on real recordings.
 
 Run: ``python tests/bench/bench_epsilon.py ../shared/recordings [--cache FOLDER]``. The recordings are 40 videos of
 GRID s1 and 20 s of Live Link Face, taken apart as by ``tts2face corpus gestures --epsilon``. Error: root mean square of

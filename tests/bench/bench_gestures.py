@@ -1,4 +1,4 @@
-"""How fast gestures are made, and whether a frame's cost grows more slowly than the palette.
+"""Speed of gesture synthesis, and growth of the cost of a frame with the size of the palette.
 
 Run: ``python tests/bench/bench_gestures.py [PALETTE]``. Twelve fields, two of each feature, at 30 frames a second, in
 one thread; processor time, the least of three. They hear the palette's own recordings in random order.
@@ -41,31 +41,31 @@ def megabytes() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-def spoken(style: Style) -> np.ndarray:
+def shuffled_intensity(style: Style) -> np.ndarray:
     """(T, 1) intensity of the style's recordings in random order."""
     parts = split_recordings(style.intensity, style.lengths)
     order = np.random.default_rng(5).permutation(len(parts))
     return np.resize(np.concatenate([parts[at] for at in order]), round(SECONDS * GESTURE_FPS))[:, None]
 
 
-def frame_us(made: Field, start: FieldState, heard: np.ndarray) -> float:
-    sample_field(made, start, heard[:3], np.full(3, 0.5))  # compile
+def frame_us(made: Field, start: FieldState, prosody: np.ndarray) -> float:
+    sample_field(made, start, prosody[:3], np.full(3, 0.5))  # compile
     times = []
     for seed in range(TRIES):
-        chances = np.random.default_rng(seed).random(len(heard))
+        chances = np.random.default_rng(seed).random(len(prosody))
         began = time.process_time()
-        sample_field(made, start, heard, chances)
+        sample_field(made, start, prosody, chances)
         times.append(time.process_time() - began)
-    return min(times) / len(heard) * 1e6
+    return min(times) / len(prosody) * 1e6
 
 
-def timed(palette: Palette, name: str, heard: np.ndarray) -> Timed:
+def measure_time(palette: Palette, name: str, prosody: np.ndarray) -> Timed:
     fields, frames, made_s = GestureFields(palette), {}, {}
     for feature in fields.features:
         began = time.process_time()
         made = fields.of(name, feature)
         made_s[feature] = time.process_time() - began
-        frames[feature] = frame_us(made, initial_state(made, 0.5), heard)
+        frames[feature] = frame_us(made, initial_state(made, 0.5), prosody)
     return Timed(frames, made_s)
 
 
@@ -76,15 +76,15 @@ def main() -> None:
     palette = load_palette(parser.parse_args().palette)
     name = max(palette.styles, key=lambda one: palette.styles[one].seconds)
     whole = palette.styles[name]
-    heard = spoken(whole)
-    timed(replace_style(palette, name, select_recordings(whole, np.arange(20))), name, heard[:90])  # compile
+    prosody = shuffled_intensity(whole)
+    measure_time(replace_style(palette, name, select_recordings(whole, np.arange(20))), name, prosody[:90])  # compile
     before = megabytes()
     order = np.random.default_rng(6).permutation(len(whole.lengths))
     found = {}
     for part in PARTS:
         kept = np.sort(order[: max(2, round(part * len(order)))])
         style = whole if part == 1 else select_recordings(whole, kept)
-        found[part] = timed(replace_style(palette, name, style), name, heard)
+        found[part] = measure_time(replace_style(palette, name, style), name, prosody)
     features = list(found[1.0].frame_us)
     print(f"| {whole.seconds / 60:.0f} minutes | {' | '.join(features)} | twelve fields, x real time |")
     print(f"| --- |{' --- |' * (len(features) + 1)}")

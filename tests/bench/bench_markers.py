@@ -1,4 +1,4 @@
-"""A real capture worn as 68 + 7 markers: how much of the face, its expressions and its head comes back.
+"""A real capture as 68 + 7 markers: accuracy of the recovered face, expressions and head pose.
 
 Run: ``python tests/bench/bench_markers.py ../shared/recordings/livelink/testset_arkit61_60fps.csv``. The default head's
 landmarks, moved by a Live Link Face capture, become markers of a person 6 % smaller in a C3D file at 120 frames/s.

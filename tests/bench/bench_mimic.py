@@ -24,7 +24,7 @@ from tts2face.video.take import Take, read_take
 from tts2face.video.track import FaceTracker
 
 
-def seen_again(path: Path, tracker: FaceTracker) -> tuple[np.ndarray, np.ndarray]:
+def track_clip(path: Path, tracker: FaceTracker) -> tuple[np.ndarray, np.ndarray]:
     """Landmarks in mm and head angles in degrees against their middle, of a clip."""
     fps = read_media_info(path).fps
     posed = remove_pose(tracker.track(lambda: (picture.pixels for picture in read_frames(path)), fps).points, fps)
@@ -32,7 +32,7 @@ def seen_again(path: Path, tracker: FaceTracker) -> tuple[np.ndarray, np.ndarray
     return posed.landmarks, angles - np.median(angles, axis=0)
 
 
-def compared(take: Take, shown: tuple[np.ndarray, np.ndarray]) -> list[float]:
+def motion_errors(take: Take, shown: tuple[np.ndarray, np.ndarray]) -> list[float]:
     """Correlations of opening, width and lids, ratio of the openings' ranges, and errors of pitch, yaw, roll."""
 
     def curves(landmarks: np.ndarray) -> list[np.ndarray]:
@@ -69,7 +69,7 @@ def main() -> None:
                 clips = take_clips(retarget_take(take, session.face), read_sound(video, 48_000))
                 write_clips(out, clips, session.renderer(Picture()))
                 drawn_s += time.perf_counter() - began
-                rows.append(compared(take, seen_again(out, tracker)))
+                rows.append(motion_errors(take, track_clip(out, tracker)))
         middle = np.median(rows, axis=0)
         print(
             f"| {name} | {middle[0]:.3f} | {middle[1]:.3f} | {middle[2]:.3f} | {middle[3]:.2f} | "

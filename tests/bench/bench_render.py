@@ -1,6 +1,6 @@
-"""How fast pictures are drawn and files written: python tests/bench/bench_render.py [frames].
+"""Speed of drawing and encoding: python tests/bench/bench_render.py [frames].
 
-Beside the figures stands a reference loop of plain numpy: each line tells how often it ran in the time of one frame.
+Each line also states how many runs of a reference loop of plain numpy take the time of one frame.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""How fast and how faithful speech is carried from a talker to a face.
+"""Speed and accuracy of retargeting speech from a talker to a face.
 
 Run: ``python tests/bench/bench_retarget.py TALKER FACE [--utterances 50]``. The talker's own recordings are retargeted;
 lips are read back from the face's landmarks. Closed: at the frame of a bilabial where the talker's middle lip points

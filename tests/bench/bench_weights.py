@@ -119,7 +119,7 @@ def ends_of(seen: np.ndarray, n_frames: int = 60) -> None:
         print(f"ends {name}: first frame {error[0]:.2f} mm away, all {AFFECTED} {error.mean():.3f} mm")
 
 
-def drawn(panels: list[tuple[Faces, dict[int, list[float]]]]) -> str:
+def plot_errors(panels: list[tuple[Faces, dict[int, list[float]]]]) -> str:
     """An SVG of one panel for each source."""
     parts = ['<rect width="100%" height="100%" fill="white"/>']
     for number, (faces, errors) in enumerate(panels):
@@ -198,7 +198,7 @@ def main() -> None:
     panels = [(faces, faces.report(options.seeds)) for faces in (grid, livelink)]
     ends_of(moved)
     if options.picture:
-        options.picture.write_text(drawn(panels))
+        options.picture.write_text(plot_errors(panels))
 
 
 if __name__ == "__main__":

@@ -95,7 +95,7 @@ def test_equal_bases_have_the_unit_matrix_as_relation(seed: int) -> None:
 
 @some
 @given(seeds, st.floats(0.5, 2.0))
-def test_rest_becomes_rest_whatever_the_gain_and_the_size(seed: int, gain: float) -> None:
+def test_rest_becomes_rest_at_any_gain_and_size(seed: int, gain: float) -> None:
     source, target = model_of(seed), model_of(seed + 1, 3, 4, size=1.7)
     mapped = build_parameter_transfer(source, target, gain=gain).parameters(source.rest[None])
     assert mapped[0] == pytest.approx(target.rest, abs=1e-5)

@@ -1,4 +1,4 @@
-"""Films made of real recordings, for tests."""
+"""Videos made of recordings, for tests."""
 
 from collections.abc import Sequence
 from fractions import Fraction
@@ -10,8 +10,8 @@ import numpy as np
 from tts2face.video.media import read_frames, read_sound
 
 
-def joined(sources: list[Path], out: Path, late_s: float = 0.0) -> list[tuple[float, float]]:
-    """Clips one behind the other in one MP4 with 44.1 kHz stereo sound; returns when each begins and ends.
+def join_clips(sources: list[Path], out: Path, late_s: float = 0.0) -> list[tuple[float, float]]:
+    """Join clips to one MP4 with 44.1 kHz stereo sound; returns the begin and end of each in seconds.
 
     ``late_s`` delays the sound.
     """
@@ -25,11 +25,11 @@ def joined(sources: list[Path], out: Path, late_s: float = 0.0) -> list[tuple[fl
         whole[: len(sound)] = sound[: len(whole)]
         sounds.append(whole)
     together = np.concatenate([np.zeros(round(late_s * 16_000), np.float32), *sounds])[: sum(map(len, sounds))]
-    film(pictures, together, out)
+    write_video(pictures, together, out)
     return spans
 
 
-def film(pictures: Sequence[np.ndarray], samples: np.ndarray, out: Path, fps: int = 25) -> None:
+def write_video(pictures: Sequence[np.ndarray], samples: np.ndarray, out: Path, fps: int = 25) -> None:
     """Pictures (H, W, 3) and samples at 16 kHz as an MP4 with 44.1 kHz stereo sound."""
     import soxr
 
@@ -50,6 +50,6 @@ def film(pictures: Sequence[np.ndarray], samples: np.ndarray, out: Path, fps: in
         container.mux(video.encode(None))
 
 
-def doubled(pixels: np.ndarray) -> np.ndarray:
-    """A picture beside its mirror image."""
+def mirrored_pair(pixels: np.ndarray) -> np.ndarray:
+    """A picture next to its mirror image."""
     return np.concatenate([pixels, pixels[:, ::-1]], axis=1)

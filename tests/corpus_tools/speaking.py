@@ -1,4 +1,4 @@
-"""Made utterances in which every phone has one mouth opening, and a voice that says them in its own time."""
+"""Artificial utterances in which every phone has one mouth opening, and a voice with other durations."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -16,7 +16,7 @@ FPS = 25.0
 
 
 def observation(number: int, gain: float = 1.0, name: str = "u") -> Observation:
-    """An utterance of eight phones; somebody with another `gain` opens the mouth that much wider."""
+    """An utterance of eight phones; `gain` is a factor of the mouth opening."""
     stream = np.random.default_rng(number)
     names = [label for label in OPENINGS if label != SILENCE]
     labels = [SILENCE, *(names[at] for at in stream.integers(0, len(names), 8)), SILENCE]
@@ -37,15 +37,15 @@ def observation(number: int, gain: float = 1.0, name: str = "u") -> Observation:
     )
 
 
-def worded(seen: Observation) -> Observation:
-    """The utterance with a word for every two phones; its first word is nobody else's."""
+def with_words(seen: Observation) -> Observation:
+    """The utterance with a word for every two phones; its first word occurs in no other utterance."""
     first = "".join("abcdefghij"[int(digit)] for digit in seen.name if digit.isdigit())
     texts = (f"{first}um", "alpha", "beta", "gamma")
     return replace(seen, words=tuple(WordSpan(text, 1 + 2 * at, 3 + 2 * at) for at, text in enumerate(texts)))
 
 
 class OwnVoice:
-    """Says what was observed, the time of each phone changed by `stretch` (seconds, by number of the phone)."""
+    """Speech of an observation, the duration of each phone changed by `stretch` (seconds, by number of the phone)."""
 
     sample_rate = 1000
 

@@ -1,4 +1,4 @@
-"""Parts of appearance models against closed forms and against what cannot share their bugs."""
+"""Parts of appearance models against closed forms and independent implementations."""
 
 import numpy as np
 import pytest
@@ -22,14 +22,14 @@ from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPE
 from tts2face.render.own_face import ring_triangles
 
 
-def turned(shape, angle, size, shift):
+def transform(shape, angle, size, shift):
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     return size * shape @ turn.T + shift
 
 
 def test_turned_copies_of_a_shape_are_aligned_onto_one_another():
     shape = np.random.default_rng(0).normal(0, 30, (20, 2))
-    copies = np.array([turned(shape, 0.1 * k, 1 + 0.05 * k, (3 * k, -k)) for k in range(6)])
+    copies = np.array([transform(shape, 0.1 * k, 1 + 0.05 * k, (3 * k, -k)) for k in range(6)])
     placed, mean = align_shapes(copies)
     assert np.abs(placed - placed[0]).max() < 1e-9
     assert np.abs(placed[0] - mean).max() < 1e-9
@@ -37,7 +37,7 @@ def test_turned_copies_of_a_shape_are_aligned_onto_one_another():
 
 def test_a_similarity_is_found_again():
     shape = np.random.default_rng(1).normal(0, 30, (20, 2))
-    target = turned(shape, 0.4, 1.7, (5.0, -9.0))
+    target = transform(shape, 0.4, 1.7, (5.0, -9.0))
     assert np.abs(apply_similarities(shape[None], *fit_similarities(shape[None], target))[0] - target).max() < 1e-9
 
 
@@ -63,8 +63,8 @@ def test_a_texture_does_not_depend_on_where_the_face_is():
     frame = build_reference_frame(shape, triangles, 32)
     y, x = np.mgrid[:200, :200]
     for angle, size, shift in ((0.0, 1.0, (30.0, 30.0)), (0.3, 1.5, (60.0, 40.0))):
-        points = turned(shape, angle, size, shift)
-        back = turned(np.stack([x, y], axis=-1).reshape(-1, 2) - np.array(shift), -angle, 1 / size, 0.0)
+        points = transform(shape, angle, size, shift)
+        back = transform(np.stack([x, y], axis=-1).reshape(-1, 2) - np.array(shift), -angle, 1 / size, 0.0)
         ramp = np.clip(back @ (2.0, 1.0) + 60, 0, 255).reshape(200, 200)
         picture = np.repeat(ramp[:, :, None], 3, axis=2)
         texture = frame.texture(picture, points)
@@ -82,7 +82,7 @@ def test_barycentric_coordinates_give_the_place_back():
     assert np.abs(weights.sum(axis=1) - 1).max() < 1e-9
 
 
-def test_a_point_is_inside_a_polygon_where_its_winding_says_so():
+def test_points_inside_a_polygon_agree_with_the_winding_number():
     polygon = np.array([[0.0, 0], [10, 0], [10, 10], [5, 3], [0, 10]])
     places = np.array([[5.0, 1], [5, 5], [1, 8], [11, 5], [-1, 1]])
     assert points_in_polygon(places, polygon).tolist() == [True, False, True, False, False]
@@ -102,7 +102,7 @@ def test_the_mouth_s_triangles_fill_the_inner_lips_and_no_more():
     assert areas.sum() == pytest.approx(outline)
 
 
-def test_the_ring_lies_around_the_oval():
+def test_the_ring_surrounds_the_face_oval():
     shape = np.random.default_rng(0).normal(0, 5, (468, 2))
     angles = np.linspace(0, 2 * np.pi, len(FACE_OVAL), endpoint=False)
     shape[list(FACE_OVAL)] = 40 * np.stack([np.sin(angles), -np.cos(angles)], axis=1)

@@ -1,4 +1,4 @@
-"""The accuracy page says what was measured, with the options that are the default now."""
+"""The accuracy page states the measured figures, with the present default options."""
 
 import importlib.util
 import json

@@ -1,4 +1,4 @@
-"""A talker speaks what somebody else said: faces of another size and lips that go further change nothing."""
+"""Evaluation against another talker: figures do not depend on the size of the face or the amplitude of the lips."""
 
 import csv
 from pathlib import Path
@@ -35,7 +35,7 @@ def measured(train: list[Observation]) -> tuple[Evaluation, tuple[SplitResult, .
     return evaluate_across_talkers(train, others(2.0))
 
 
-def test_somebody_who_opens_the_mouth_twice_as_far_is_predicted(
+def test_a_talker_with_twice_the_opening_is_predicted(
     measured: tuple[Evaluation, tuple[SplitResult, ...]],
 ) -> None:
     scores = {one.method: one for one in measured[0].scores}
@@ -47,7 +47,7 @@ def test_somebody_who_opens_the_mouth_twice_as_far_is_predicted(
     assert scores["mean face"]["dtw_cost"] > 2 * scores["exemplar"]["dtw_cost"]
 
 
-def test_figures_do_not_depend_on_how_far_the_other_one_moves(
+def test_figures_do_not_depend_on_the_amplitude_of_the_other_talker(
     train: list[Observation], measured: tuple[Evaluation, tuple[SplitResult, ...]]
 ) -> None:
     alike, _ = evaluate_across_talkers(train, others(1.0))
@@ -62,7 +62,7 @@ def test_a_scale_makes_the_mean_0_and_the_spread_1(train: list[Observation]) -> 
     np.testing.assert_allclose((scored.opening[0], scored.width[0]), (2.0, -1.0), rtol=1e-12)
 
 
-def test_the_answer_says_what_it_is(measured: tuple[Evaluation, tuple[SplitResult, ...]]) -> None:
+def test_the_result_states_its_method(measured: tuple[Evaluation, tuple[SplitResult, ...]]) -> None:
     result, runs = measured
     assert result.to_json()["is_across"]
     assert result.rows()[1][:2] == ("another talker", "mean face")
@@ -71,7 +71,7 @@ def test_the_answer_says_what_it_is(measured: tuple[Evaluation, tuple[SplitResul
     assert "lip gap (z)" in html
 
 
-def test_the_talker_herself_is_refused(train: list[Observation]) -> None:
+def test_recordings_of_the_same_talker_are_refused(train: list[Observation]) -> None:
     with pytest.raises(InputError, match="u03 is in both the training and the held-out part"):
         evaluate_across_talkers(train, train[3:5])
 
@@ -86,7 +86,7 @@ def test_landmarks_of_a_face_are_its_own_at_rest_and_follow_its_shapes() -> None
     assert opening[2] > opening[0] + 0.1
 
 
-def test_a_capture_closes_its_lips_where_bilabials_are_heard(shared_recordings: Path, tmp_path: Path) -> None:
+def test_a_capture_closes_its_lips_at_recognised_bilabials(shared_recordings: Path, tmp_path: Path) -> None:
     capture = shared_recordings / "livelink" / "testset_arkit61_60fps.csv"
     pytest.importorskip("hama", reason="needs the extra [capture]")
     found = observe_livelink(capture, RunOptions(tmp_path))

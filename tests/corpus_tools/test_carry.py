@@ -10,7 +10,7 @@ from tests.render.tiny_talker import face_points, own_talker
 from tts2face.models.appearance import Appearance, TextureModel
 
 
-def painted(stretch: float, side: int, across: float) -> TextureModel:
+def wave_texture(stretch: float, side: int, across: float) -> TextureModel:
     """A texture model with one component: a wave over the landmarks' places on one face, whatever shape is shown."""
     shape = face_points()
     frame = build_reference_frame(shape * (1.0, stretch), face_triangles(shape * (1.0, stretch)), side)
@@ -37,7 +37,7 @@ def looking(face: TextureModel) -> Appearance:
 
 def test_the_same_paint_on_a_larger_and_longer_face_keeps_its_size() -> None:
     """5 %: the frames sample the wave at other places. Components have length 1, however many pixels they have."""
-    small, large = painted(1.0, 48, 1.0), painted(1.2, 90, 1.0)
+    small, large = wave_texture(1.0, 48, 1.0), wave_texture(1.2, 90, 1.0)
     found = build_appearance_transfer(looking(small), looking(large)).relation
     grown = np.sqrt(len(large.pixels) / len(small.pixels))
     assert abs(found[0, 0] / grown - 1.0) < 0.05
@@ -46,12 +46,12 @@ def test_the_same_paint_on_a_larger_and_longer_face_keeps_its_size() -> None:
 
 
 def test_paint_that_the_target_does_not_have_is_lost() -> None:
-    found = build_appearance_transfer(looking(painted(1.0, 64, 1.0)), looking(painted(1.0, 64, 0.0))).relation
+    found = build_appearance_transfer(looking(wave_texture(1.0, 64, 1.0)), looking(wave_texture(1.0, 64, 0.0))).relation
     assert abs(found[0, 0]) < 0.2
 
 
 def test_parameters_stay_within_three_spreads_and_follow_the_gain() -> None:
-    face = looking(painted(1.0, 48, 1.0))
+    face = looking(wave_texture(1.0, 48, 1.0))
     made = build_appearance_transfer(face, face)
     parameters = np.array([[4.0, 0.0, 0.0]])
     np.testing.assert_allclose(made.parameters(parameters, gain=2.0), 2 * made.parameters(parameters), rtol=1e-6)

@@ -57,7 +57,7 @@ def test_clipped_speech_is_counted_and_clipped_silence_is_not() -> None:
     assert sound_measures(Waveform(samples, RATE), PHONES)["clipped"] == pytest.approx(0.1)
 
 
-def test_without_a_pause_there_is_no_noise_to_compare_with() -> None:
+def test_without_a_pause_the_signal_to_noise_ratio_is_infinite() -> None:
     assert sound_measures(sound(0.1, 0.1), PhoneSequence(["a"], [0.0, 3.0]))["snr_db"] == np.inf
 
 
@@ -70,7 +70,7 @@ def test_faces_and_still_pictures() -> None:
     assert found == {"crowded": 0.25, "frozen_s": pytest.approx(4 / 25)}
 
 
-def test_a_picture_that_never_stands_still() -> None:
+def test_a_picture_that_always_moves_is_not_frozen() -> None:
     found = picture_measures(np.full(3, NOT_COUNTED, np.int8), np.full(3, np.inf, np.float32), np.arange(3) / 25)
     assert found == {"crowded": 0.0, "frozen_s": 0.0}
 

@@ -112,7 +112,7 @@ def test_the_written_talker_keeps_limits_and_lips(tmp_path: Path) -> None:
     assert made.n_appended == 0
 
 
-def test_pictures_of_the_source_are_left_behind_where_the_target_has_none() -> None:
+def test_pictures_of_the_source_are_dropped_where_the_target_has_none() -> None:
     source, target = talkers()
     assert not transfer_talker(source, target).lacks_appearance
     made = transfer_talker(replace(source, appearance=SimpleNamespace()), target)

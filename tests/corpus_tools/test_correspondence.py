@@ -83,7 +83,7 @@ def test_halves_are_made_alike() -> None:
     )
 
 
-def test_a_table_comes_back_and_a_damaged_one_is_refused(tmp_path: Path) -> None:
+def test_a_table_round_trips_and_a_damaged_one_is_refused(tmp_path: Path) -> None:
     write_places({3: np.array([0.1, -2.0, 3.25])}, tmp_path / "table.csv")
     assert read_places(tmp_path / "table.csv")[3] == pytest.approx([0.1, -2.0, 3.25], abs=1e-6)
     (tmp_path / "table.csv").write_text("landmark,x\n1,2\n")

@@ -107,7 +107,7 @@ def test_no_triangle_of_the_skin_is_torn_or_turned_over(head: Face, long_head: F
     assert np.percentile(along, 0.5) > 0.5
 
 
-def test_the_fitter_finds_a_posed_head_again(long_head: Face) -> None:
+def test_the_fit_recovers_a_posed_head(long_head: Face) -> None:
     opened = long_head.vertices + OPEN_JAW_WEIGHT * long_head.shapes[long_head.shape_names.index("jawOpen")]
     fit = build_picture_fitter(long_head, opened, np.arange(N_MESH_LANDMARKS))
     turn = np.array([[np.cos(0.3), 0, np.sin(0.3)], [0, 1, 0], [-np.sin(0.3), 0, np.cos(0.3)]])

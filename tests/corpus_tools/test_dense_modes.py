@@ -50,7 +50,7 @@ def talker(head: Face) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def seen(head: Face, talker: np.ndarray) -> list[VideoLandmarks]:
+def observed(head: Face, talker: np.ndarray) -> list[VideoLandmarks]:
     """Frames of five known shapes at random weights; one frame shows no face."""
     numbers = [head.shape_names.index(name) for name in SHOWN]
     directions = np.stack([face_landmarks(head, head.shapes[number]) for number in numbers])
@@ -68,8 +68,8 @@ def fit(head: Face) -> PictureFitter:
 
 
 @pytest.fixture(scope="module")
-def model(head: Face, fit: PictureFitter, seen: list[VideoLandmarks], talker: np.ndarray) -> DenseModel:
-    return dense_model(head, fit, seen, talker, N_MODES)
+def model(head: Face, fit: PictureFitter, observed: list[VideoLandmarks], talker: np.ndarray) -> DenseModel:
+    return dense_model(head, fit, observed, talker, N_MODES)
 
 
 def opened_of(head: Face, weight: float = OPEN_JAW) -> np.ndarray:
@@ -81,11 +81,11 @@ def weights_of(face: Face, **shown: float) -> np.ndarray:
 
 
 def test_a_dense_fit_is_the_direct_solution_of_eqs_3_and_4(
-    head: Face, fit: PictureFitter, seen: list[VideoLandmarks], talker
+    head: Face, fit: PictureFitter, observed: list[VideoLandmarks], talker
 ) -> None:
     """u = x - x0 at the constrained places, c = Phi^-1 u, f = sum c phi(|x - x_i|), phi(r) = exp(-r / 64) at 200 px."""
-    moved = displacements(fit, seen[1].landmarks[:3], talker)
-    wanted = 2.0 * (seen[1].landmarks[:3] - talker)[:, USED]
+    moved = displacements(fit, observed[1].landmarks[:3], talker)
+    wanted = 2.0 * (observed[1].landmarks[:3] - talker)[:, USED]
     np.testing.assert_allclose(moved, wanted, atol=1e-4)
     places, centres = opened_of(head)[::97], face_landmarks(head, opened_of(head))[USED]
     pixels = 200.0 / face_width(face_landmarks(head, head.vertices.astype(np.float64))[:N_MESH_LANDMARKS])
@@ -98,9 +98,9 @@ def test_a_dense_fit_is_the_direct_solution_of_eqs_3_and_4(
 
 
 def test_modes_are_the_principal_components_of_the_dense_shapes(
-    head: Face, fit: PictureFitter, seen: list[VideoLandmarks], talker: np.ndarray, model: DenseModel
+    head: Face, fit: PictureFitter, observed: list[VideoLandmarks], talker: np.ndarray, model: DenseModel
 ) -> None:
-    frames = np.concatenate([displacements(fit, one.landmarks, talker) for one in seen])
+    frames = np.concatenate([displacements(fit, one.landmarks, talker) for one in observed])
     assert model.n_frames == len(frames) == N_VIDEOS * N_FRAMES - 1
     skin = part_vertices(head, ("skin",))
     shapes = np.stack([(fit.spread[skin] @ frame).ravel() for frame in frames])
@@ -119,9 +119,9 @@ def test_modes_are_the_principal_components_of_the_dense_shapes(
 
 
 def test_the_sparse_model_is_that_of_the_landmarks(
-    seen: list[VideoLandmarks], fit: PictureFitter, talker, model: DenseModel
+    observed: list[VideoLandmarks], fit: PictureFitter, talker, model: DenseModel
 ) -> None:
-    frames = np.concatenate([displacements(fit, one.landmarks, talker) for one in seen]).reshape(model.n_frames, -1)
+    frames = np.concatenate([displacements(fit, one.landmarks, talker) for one in observed]).reshape(model.n_frames, -1)
     scales = np.linalg.svd(frames - frames.mean(axis=0), compute_uv=False)
     np.testing.assert_allclose(model.sparse.variances[:N_MODES], scales[:N_MODES] ** 2 / len(frames), rtol=1e-6)
 
@@ -148,14 +148,19 @@ def test_errors_of_held_out_frames_are_those_of_dense_shapes() -> None:
 
 
 def test_a_face_file_shows_a_frame_by_its_parameters(
-    head: Face, fit: PictureFitter, seen: list[VideoLandmarks], talker: np.ndarray, model: DenseModel, tmp_path: Path
+    head: Face,
+    fit: PictureFitter,
+    observed: list[VideoLandmarks],
+    talker: np.ndarray,
+    model: DenseModel,
+    tmp_path: Path,
 ) -> None:
     write_face(tmp_path / "me.face", add_modes(head, model))
     face = read_face(tmp_path / "me.face")
     names = [f"dense{number}" for number in range(1, N_MODES + 1)]
     assert face.shape_names == (*head.shape_names, MEAN, *names)
     np.testing.assert_array_equal(face.limits[-N_MODES:], [[-LIMIT, LIMIT]] * N_MODES)
-    frame = displacements(fit, seen[2].landmarks[:1], talker)
+    frame = displacements(fit, observed[2].landmarks[:1], talker)
     parameters = np.tensordot(frame - model.dense.mean, model.dense.duals[:N_MODES], axes=((1, 2), (1, 2)))[0]
     amounts = dict(zip(names, parameters / np.sqrt(model.dense.variances[:N_MODES]), strict=True))
     shown = posed_vertices(face, weights_of(face, denseMean=1.0, **amounts))
@@ -202,10 +207,10 @@ def test_the_edge_of_the_lower_lip_follows_the_jaw_evenly(head: Face) -> None:
 
 @pytest.mark.parametrize("n_modes", [0, N_VIDEOS * N_FRAMES])
 def test_more_modes_than_frames_are_refused(
-    n_modes: int, head: Face, fit: PictureFitter, seen: list[VideoLandmarks], talker
+    n_modes: int, head: Face, fit: PictureFitter, observed: list[VideoLandmarks], talker
 ) -> None:
     with pytest.raises(InputError, match=f"{n_modes} dense modes cannot be computed from 59 frames; choose 1 to 58"):
-        dense_model(head, fit, seen, talker, n_modes)
+        dense_model(head, fit, observed, talker, n_modes)
 
 
 @pytest.mark.parametrize("n_modes", [-1, MOST_MODES + 1])

@@ -1,4 +1,4 @@
-"""Audio maps learnt from recordings: sound features are on the frames of the landmarks."""
+"""Training of audio maps: sound features have the frames of the landmarks."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -76,7 +76,7 @@ def test_tells_itself_as_tables_json_and_rows(measured: tuple[Evaluation, tuple[
     assert all(len(row) == len(head) for row in rows)
 
 
-def test_the_page_shows_all_figures_and_nothing_from_outside(measured: tuple[Evaluation, tuple[SplitResult, ...]]):
+def test_the_page_shows_all_figures_and_loads_nothing(measured: tuple[Evaluation, tuple[SplitResult, ...]]):
     html = evaluation_page(*measured)
     assert html.count("<h3>") == 9
     assert "Worst sentences of exemplar" in html
@@ -113,14 +113,14 @@ def test_refuses_folds_that_cannot_be(observations: list[Observation], n_folds):
 
 
 def test_words_are_held_out_with_every_utterance_that_holds_them(observations: list[Observation]):
-    worded = [replace(one, words=(WordSpan("ab"[number % 2], 1, 2),)) for number, one in enumerate(observations)]
-    train, test = split_by_words(worded, ["B"])
+    with_words = [replace(one, words=(WordSpan("ab"[number % 2], 1, 2),)) for number, one in enumerate(observations)]
+    train, test = split_by_words(with_words, ["B"])
     assert {word.text for one in train for word in one.words} == {"a"}
     assert {word.text for one in test for word in one.words} == {"b"}
     with pytest.raises(InputError, match="no utterance contains zebra"):
-        split_by_words(worded, ["zebra"])
+        split_by_words(with_words, ["zebra"])
     with pytest.raises(InputError, match="hold out fewer words"):
-        split_by_words(worded, ["a", "b"])
+        split_by_words(with_words, ["a", "b"])
 
 
 def test_refuses_an_utterance_on_both_sides(observations: list[Observation]):
@@ -129,7 +129,7 @@ def test_refuses_an_utterance_on_both_sides(observations: list[Observation]):
         evaluate([(tuple(observations), (renamed,))])
 
 
-def test_a_split_is_repeatable_and_parts_nothing_else(observations: list[Observation]):
+def test_a_split_is_repeatable_and_keeps_every_utterance(observations: list[Observation]):
     names = [one.name for one in observations]
     train, test = split_randomly(observations[::-1], hold_out=8, seed=3)
     assert sorted(one.name for one in (*train, *test)) == names

@@ -21,7 +21,7 @@ def stream() -> np.random.Generator:
     return np.random.default_rng(0)
 
 
-def test_phones_are_told_by_what_the_mouth_does_first_and_last() -> None:
+def test_phones_are_encoded_by_the_articulation_of_both_halves() -> None:
     b, diphthong, p, _ = feature_table(KNOWN)
     names = [f"{name} {half}" for half in ("first", "last") for name in ARTICULATORY_WEIGHTS]
     assert [name for name, one, other in zip(names, b, p, strict=True) if one != other] == [
@@ -52,6 +52,6 @@ def test_weights_by_phone_tell_what_weights_by_feature_do(stream: np.random.Gene
     )
 
 
-def test_too_little_is_not_learnt_from(make_observation: Callable[..., Observation]) -> None:
+def test_a_single_utterance_gives_no_phone_network(make_observation: Callable[..., Observation]) -> None:
     talker = learn_talker([make_observation("u0", 0, 75)], n_speech=5, n_other=3, metadata=EVALUATION_METADATA)
     assert add_phone_network(talker) is talker

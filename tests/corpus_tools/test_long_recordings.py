@@ -12,7 +12,7 @@ from corpus_tools.recordings.observe import Observations, observe
 from corpus_tools.report.recordings import recordings_page
 from corpus_tools.run_options import RunOptions
 from lexicon.sequence import SILENCE
-from tests.corpus_tools.films import joined
+from tests.corpus_tools.films import join_clips
 from tests.rendered_takes import manifest_rows
 from tts2face.models.talker import read_talker
 
@@ -35,22 +35,20 @@ def folder(shared_recordings: Path, rows: list[dict[str, str]], tmp_path_factory
     """A take of 51 s whose sound is late."""
     made = tmp_path_factory.mktemp("long")
     clips = shared_recordings / "grid_s1" / "clips"
-    joined([clips / f"{row['clip']}.mkv" for row in rows], made / "take.mp4", late_s=LATE_S)
+    join_clips([clips / f"{row['clip']}.mkv" for row in rows], made / "take.mp4", late_s=LATE_S)
     return made
 
 
 @pytest.fixture(scope="module")
 def read(folder: Path, rows: list[dict[str, str]], cache: Path, face_model: Path) -> Observations:
-    """The take with its text beside it."""
+    """The take with its transcript in the same folder."""
     (folder / "take.txt").write_text(". ".join(row["transcript"].replace(" a ", " ay ") for row in rows))
     found = observe(folder / "take.mp4", run_options=RunOptions(cache, 1, face_model))
     (folder / "take.txt").unlink()
     return found
 
 
-def test_a_long_take_is_cut_at_pauses_and_every_word_lies_where_it_is_said(
-    read: Observations, rows: list[dict[str, str]]
-) -> None:
+def test_a_long_take_is_cut_at_pauses_and_every_word_is_aligned(read: Observations, rows: list[dict[str, str]]) -> None:
     assert not read.refused
     assert [seen.name for seen in read.kept] == [f"take-{number:04d}" for number in range(1, len(read.kept) + 1)]
     assert max(len(seen.landmarks) / seen.fps for seen in read.kept) <= MAX_UTTERANCE_S
@@ -63,7 +61,7 @@ def test_a_long_take_is_cut_at_pauses_and_every_word_lies_where_it_is_said(
 
 
 def test_the_lag_of_the_sound_is_found_and_kept(read: Observations) -> None:
-    """40 ms: three standard deviations of what 48 s of this talker tell."""
+    """40 ms: three standard deviations of the estimate from 48 s of this talker."""
     (lag,) = {seen.quality.lag for seen in read.kept}
     assert lag == pytest.approx(LATE_S, abs=0.04)
 
@@ -84,7 +82,7 @@ def test_without_a_transcript_phones_are_recognised_and_marked(
     assert "their phones were recognised" in report.read_text()
 
 
-def test_the_report_shows_every_recording_and_nothing_from_outside(read: Observations) -> None:
+def test_the_report_shows_every_recording_and_loads_nothing(read: Observations) -> None:
     html = recordings_page("a & b", read)
     assert "<title>Recordings of a &amp; b</title>" in html
     assert html.count('<section class="item">') == len(read.kept)

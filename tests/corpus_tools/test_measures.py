@@ -17,13 +17,13 @@ def landmarks(opening, width=50.0, eyes=80.0):
     return points
 
 
-def test_opening_and_width_are_told_in_eye_distances():
+def test_opening_and_width_are_measured_in_eye_distances():
     points = landmarks([0.0, 8.0, 16.0])
     assert lip_opening(points).tolist() == [0.0, 0.1, 0.2]
     assert lip_width(points).tolist() == [0.625, 0.625, 0.625]
 
 
-def test_judged_from_a_tenth_of_a_second_before_speech_to_a_tenth_behind():
+def test_scored_from_100_ms_before_speech_to_100_ms_after_it():
     assert measures.speech_frames(SPEECH, 60, 50.0) == slice(15, 46)  # 0.30 s to 0.90 s, both frames included
 
 
@@ -69,7 +69,7 @@ def test_warping_cost_forgives_a_small_delay_and_divides_by_the_path():
     assert measures.warping_cost(np.zeros((10, 1)), np.full((10, 1), 2.0), np.full(1, 2.0), 3) == pytest.approx(1.0)
 
 
-def test_least_opening_looks_a_little_beyond_the_phone():
+def test_the_least_opening_includes_a_margin_around_the_phone():
     opening = np.full(60, 1.0)
     opening[19] = 0.3  # 0.38 s: 20 ms before the p
     opening[40] = 0.1  # in the silence
@@ -84,7 +84,7 @@ def test_open_vowels_are_read_in_their_middle():
     np.testing.assert_allclose(measures.midpoint_openings(opening, SPEECH, 50.0), [0.6])
 
 
-def test_knows_the_open_vowels():
+def test_open_vowels_are_classified():
     found = measures.open_vowels()
     assert {"ɑ", "æ", "ɛ", "aɪ", "aʊ", "ʌ"} <= found
     assert not {"i", "u", "eɪ", "oʊ", "ə", "p", SILENCE} & found

@@ -74,7 +74,7 @@ def test_a_cut_moves_phones_and_pictures_together():
     assert words == (WordSpan("b", 1, 3),)
 
 
-def test_a_silence_that_is_cut_away_leaves_no_phone():
+def test_a_removed_silence_has_no_phone():
     phones, words = trim_to_picture(_aligned_speech(), 1.0, 1.5)
     assert phones.phones == ("b", "i")
     np.testing.assert_allclose(phones.edges, [0, 0.1, 0.5])

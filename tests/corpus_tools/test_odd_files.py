@@ -51,7 +51,7 @@ def test_a_transcript_that_is_a_pipe_is_refused(tmp_path: Path) -> None:
         pronounce_recording(recording)
 
 
-def test_where_nothing_is_left_the_reasons_are_said(tmp_path: Path) -> None:
+def test_when_all_recordings_are_refused_the_reasons_are_listed(tmp_path: Path) -> None:
     refused = tuple(Refusal(name, f"reason {name}", tmp_path / name, 0.0) for name in "abcde")
     with pytest.raises(InputError, match=r"^no recording could be used: a: reason a$"):
         check_any_kept(Observations((), refused[:1]))

@@ -1,4 +1,4 @@
-"""Text alone: words in a voice's own time, laid beside the real ones word by word."""
+"""Evaluation from text alone: words with the durations of a voice, aligned with the real ones."""
 
 from dataclasses import replace
 
@@ -13,13 +13,13 @@ from corpus_tools.recordings.observation import Observation
 from corpus_tools.report.evaluation import evaluation_page
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tests.corpus_tools.speaking import OwnVoice, observation, worded
+from tests.corpus_tools.speaking import OwnVoice, observation, with_words
 from tts2face.types import Speech, Waveform
 
 
 @pytest.fixture(scope="module")
 def observations() -> list[Observation]:
-    return [worded(observation(number)) for number in range(40)]
+    return [with_words(observation(number)) for number in range(40)]
 
 
 def measured(observations: list[Observation], stretch) -> tuple[Evaluation, tuple[SplitResult, ...]]:
@@ -54,7 +54,7 @@ def test_a_voice_with_the_real_durations_changes_nothing(observations: list[Obse
     assert [one.method for one in result.own] == [one.method for one in result.scores[:-1]]  # no voice is the camera
 
 
-def test_tempo_counts_for_nothing_and_the_time_within_words_in_full(observations: list[Observation]) -> None:
+def test_tempo_is_removed_and_timing_within_words_is_kept(observations: list[Observation]) -> None:
     slow = measured(observations, lambda durations: 1.3 * durations)[0]
     assert slow.own[2]["r_opening"] > 0.97
     unequal = np.array([1.0, 1.6, 0.4, 1.6, 0.4, 1.6, 0.4, 1.6, 0.4, 1.0])
@@ -100,7 +100,7 @@ def test_the_second_table_is_in_every_answer(observations: list[Observation]) ->
     assert "<h2>With own durations</h2>\n<p>8 utterances." in evaluation_page(result, runs)
 
 
-def test_utterances_that_the_voice_cannot_say_are_left_out_and_none_at_all_is_refused(
+def test_unpronounceable_utterances_are_omitted_and_none_at_all_is_refused(
     observations: list[Observation],
 ) -> None:
     train, test = split_randomly(observations, hold_out=8, seed=0)

@@ -6,7 +6,7 @@ import time
 from corpus_tools.process_pool import map_unordered
 
 
-def test_every_task_comes_with_its_result() -> None:
+def test_every_task_is_returned_with_its_result() -> None:
     done = map_unordered([4.0, 9.0, 16.0], math.sqrt, math.floor, (1.0,), 2)
     assert sorted(done) == [(4.0, 2.0), (9.0, 3.0), (16.0, 4.0)]
 

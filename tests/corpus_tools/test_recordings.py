@@ -79,12 +79,12 @@ def test_words_that_are_known_already_are_not_read_again(tmp_path):
     assert pronounce_recording(Recording("r", tmp_path / "r.mkv", "other words", words=words)) == words
 
 
-def test_a_transcript_of_nothing_but_signs(tmp_path):
+def test_a_transcript_without_words(tmp_path):
     with pytest.raises(DataError, match="contains no word"):
         pronounce_recording(Recording("r", tmp_path / "r.mkv", "... !"))
 
 
-def test_a_word_that_the_dictionary_lacks_is_said_by_rule(tmp_path):
+def test_a_word_missing_in_the_dictionary_is_pronounced_by_rule(tmp_path):
     words = dict(pronounce_recording(Recording("r", tmp_path / "r.mkv", "the zorblatt")))
     assert words["zorblatt"] == (("z", "ɔ", "ɹ", "b", "l", "æ", "t"),)
 
@@ -97,6 +97,6 @@ def test_numbers_of_a_transcript_are_written_out(tmp_path):
     ]
 
 
-def test_a_word_that_nobody_can_say(tmp_path):
+def test_a_word_without_pronunciation_is_refused(tmp_path):
     with pytest.raises(DataError, match="no pronunciation is known for '東京'"):
         pronounce_recording(Recording("r", tmp_path / "r.mkv", "bin 東京"))

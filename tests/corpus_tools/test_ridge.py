@@ -6,7 +6,7 @@ import pytest
 from corpus_tools.training.ridge import fit_ridge
 
 
-def test_errors_left_out_are_those_of_leaving_each_row_out() -> None:
+def test_leave_one_out_errors_equal_those_of_refitting_without_each_row() -> None:
     generator = np.random.default_rng(0)
     terms, wanted = generator.normal(size=(15, 3)), generator.normal(size=(15, 2))
     wanted -= wanted.mean(axis=0)
@@ -21,7 +21,7 @@ def test_errors_left_out_are_those_of_leaving_each_row_out() -> None:
     assert fit_ridge(terms, wanted, [effort]).left_out_error == pytest.approx(total, rel=1e-9)
 
 
-def test_noise_asks_for_effort_and_a_law_for_none() -> None:
+def test_noise_selects_strong_regularisation_and_an_exact_law_none() -> None:
     generator = np.random.default_rng(1)
     terms = generator.normal(size=(40, 10))
     law = terms @ generator.normal(size=(10, 1))

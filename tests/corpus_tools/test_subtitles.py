@@ -1,4 +1,4 @@
-"""Subtitles beside videos: cues become recordings of parts of a video."""
+"""Subtitles of videos: each cue becomes a recording of a part of a video."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from corpus_tools.recordings.observe import group_by_video, observe
 from corpus_tools.recordings.subtitles import read_cues
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError
-from tests.corpus_tools.films import joined
+from tests.corpus_tools.films import join_clips
 from tests.rendered_takes import manifest_rows
 
 SRT = "1\n00:00:01,000 --> 00:00:02,000\n<i>Hello</i>\nthere.\n\n2\n00:00:02,100 --> 00:00:03,500\nIt is £5.\n"
@@ -46,13 +46,13 @@ def test_cues_are_read_and_widened_up_to_their_neighbours(name: str, content: by
         ("{\\an8}Up here.", "Up here."),
     ],
 )
-def test_only_what_is_spoken_counts(shown: str, spoken: str, tmp_path: Path) -> None:
+def test_only_spoken_words_of_a_cue_are_kept(shown: str, spoken: str, tmp_path: Path) -> None:
     path = tmp_path / "a.srt"
     path.write_text(f"1\n00:00:01,000 --> 00:00:03,000\n{shown}\n", encoding="utf-8")
     assert [cue.text for cue in read_cues(path)] == [spoken]
 
 
-def test_subtitles_of_nothing_but_noises(tmp_path: Path) -> None:
+def test_subtitles_with_sound_descriptions_only_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.srt"
     path.write_text("1\n00:00:01,000 --> 00:00:03,000\n[music]\n", encoding="utf-8")
     with pytest.raises(DataError, match="contains no subtitles"):
@@ -81,7 +81,7 @@ def test_one_long_video_with_subtitles_gives_what_its_parts_gave(takes: Path, fa
     rows = manifest_rows(takes)[:3]
     clips = [takes / "clips" / f"{row['clip']}.mkv" for row in rows]
     (tmp_path / "long").mkdir()
-    spans = joined(clips, tmp_path / "long" / "talk.mp4")
+    spans = join_clips(clips, tmp_path / "long" / "talk.mp4")
     lines = []
     for number, (row, (begin, _)) in enumerate(zip(rows, spans, strict=True), start=1):
         start, end = begin + float(row["speech_start_s"]), begin + float(row["speech_end_s"])

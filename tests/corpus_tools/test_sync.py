@@ -20,7 +20,7 @@ FPS = 25.0
 
 
 @pytest.fixture
-def filmed(make_observation: Callable[..., Observation]) -> Callable[..., Observation]:
+def make_take(make_observation: Callable[..., Observation]) -> Callable[..., Observation]:
     def made(name: str, lag: float, seconds: float = 60.0, fps: float = FPS, seed: int = 1) -> Observation:
         generator = np.random.default_rng(seed)
         knots = np.arange(-2.0, seconds + 2.0, 0.12)
@@ -37,37 +37,37 @@ def filmed(make_observation: Callable[..., Observation]) -> Callable[..., Observ
 
 
 @pytest.mark.parametrize("lag", [-0.2, 0.0, 0.093, 0.25])
-def test_a_known_lag_is_found(filmed: Callable[..., Observation], lag: float) -> None:
+def test_a_known_lag_is_found(make_take: Callable[..., Observation], lag: float) -> None:
     """5 ms: half a step, between which the peak is interpolated."""
-    found = estimate_sync([filmed("a", lag)])
+    found = estimate_sync([make_take("a", lag)])
     assert found.lag == pytest.approx(lag, abs=0.005)
     assert found.correlation > 0.9
     assert found.problem is None
 
 
-def test_lags_of_less_than_can_be_told_stay(filmed: Callable[..., Observation]) -> None:
-    assert estimate_sync([filmed("a", 0.02)]).lag_correction_s == 0.0
-    assert estimate_sync([filmed("a", 0.06)]).lag_correction_s == pytest.approx(0.06, abs=0.005)
-    assert estimate_sync([filmed("a", 0.02, seconds=600.0)]).lag_correction_s == pytest.approx(0.02, abs=0.005)
-    assert estimate_sync([filmed("a", 0.2, seconds=10.0)]).lag_correction_s == 0.0
+def test_lags_below_the_resolution_are_not_corrected(make_take: Callable[..., Observation]) -> None:
+    assert estimate_sync([make_take("a", 0.02)]).lag_correction_s == 0.0
+    assert estimate_sync([make_take("a", 0.06)]).lag_correction_s == pytest.approx(0.06, abs=0.005)
+    assert estimate_sync([make_take("a", 0.02, seconds=600.0)]).lag_correction_s == pytest.approx(0.02, abs=0.005)
+    assert estimate_sync([make_take("a", 0.2, seconds=10.0)]).lag_correction_s == 0.0
 
 
-def test_another_sound_is_a_fault(filmed: Callable[..., Observation]) -> None:
-    seen, other = filmed("a", 0.0), filmed("b", 0.0, seed=2)
+def test_unrelated_sound_is_reported(make_take: Callable[..., Observation]) -> None:
+    seen, other = make_take("a", 0.0), make_take("b", 0.0, seed=2)
     fault = estimate_sync([replace(seen, intensity=other.intensity)]).problem
     assert fault is not None
     assert "does not match the sound" in fault
 
 
-def test_a_lag_at_the_border_is_a_fault(filmed: Callable[..., Observation]) -> None:
-    fault = estimate_sync([filmed("a", MAX_LAG_S)]).problem
+def test_a_lag_at_the_border_is_a_fault(make_take: Callable[..., Observation]) -> None:
+    fault = estimate_sync([make_take("a", MAX_LAG_S)]).problem
     assert fault is not None
     assert "out of sync" in fault
 
 
-def test_short_videos_are_taken_together_and_long_ones_alone(filmed: Callable[..., Observation]) -> None:
-    short = [filmed(f"s{number}", 0.1, seconds=12.0, seed=number) for number in range(5)]
-    long = filmed("long", -0.15)
+def test_short_videos_are_taken_together_and_long_ones_alone(make_take: Callable[..., Observation]) -> None:
+    short = [make_take(f"s{number}", 0.1, seconds=12.0, seed=number) for number in range(5)]
+    long = make_take("long", -0.15)
     found = estimate_sync_by_video([*short, long])
     assert found[Path("long.mkv")].lag == pytest.approx(-0.15, abs=0.005)
     assert [found[one.video].seconds for one in short] == pytest.approx([60.0] * 5)
@@ -76,18 +76,22 @@ def test_short_videos_are_taken_together_and_long_ones_alone(filmed: Callable[..
     assert wanted[short[0].video].lag == pytest.approx(0.1, abs=0.005)
 
 
-def test_the_rate_of_most_frames_is_everybodys(filmed: Callable[..., Observation]) -> None:
-    seen = [filmed("a", 0.0, fps=30.0), filmed("b", 0.0, seconds=90.0, fps=25.0), filmed("c", 0.0, 50.0, fps=30.0)]
+def test_the_rate_of_most_frames_is_everybodys(make_take: Callable[..., Observation]) -> None:
+    seen = [
+        make_take("a", 0.0, fps=30.0),
+        make_take("b", 0.0, seconds=90.0, fps=25.0),
+        make_take("c", 0.0, 50.0, fps=30.0),
+    ]
     assert corrected_timings(seen, estimate_sync_by_video(seen)) == {Path("b.mkv"): Timing(30.0, 0.0)}
 
 
-def test_nothing_is_read_again_where_all_is_well(filmed: Callable[..., Observation]) -> None:
-    seen = [filmed("a", 0.0), filmed("b", 0.01)]
+def test_nothing_is_read_twice_without_a_lag(make_take: Callable[..., Observation]) -> None:
+    seen = [make_take("a", 0.0), make_take("b", 0.01)]
     assert corrected_timings(seen, estimate_sync_by_video(seen)) == {}
 
 
-def test_lips_that_do_not_move_tell_nothing(filmed: Callable[..., Observation]) -> None:
-    seen = filmed("a", 0.1)
+def test_lips_that_do_not_move_give_no_lag(make_take: Callable[..., Observation]) -> None:
+    seen = make_take("a", 0.1)
     still = replace(seen, landmarks=np.repeat(seen.landmarks[:1], len(seen.landmarks), axis=0))
     found = estimate_sync([still])
     assert (found.lag, found.lag_correction_s, found.problem) == (0.0, 0.0, None)

@@ -91,7 +91,7 @@ def cues_of(path):
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-32", "cp1252"])
-def test_every_encoding_says_the_same(write, encoding):
+def test_every_encoding_gives_the_same_text(write, encoding):
     assert [cue.text for cue in read_cues(write(".srt", SRT, encoding))][-1] == "now – café"
 
 
@@ -115,14 +115,14 @@ def test_word_times_are_samples_of_25_khz(write):
     assert cues_of(write(".align", ALIGN)) == (Cue(0.95, 1.18, "bin"), Cue(1.18, 1.36, "blue"))
 
 
-def test_all_grid_alignments_say_what_the_manifest_says(takes):
+def test_all_grid_alignments_agree_with_the_manifest(takes):
     listed = {one.name: one.transcript for one in find_recordings(takes)}
     aligned = {path.stem: read_transcript(path) for path in sorted((takes / "align").glob("*.align"))}
     assert aligned
     assert aligned == {name: listed[name] for name in aligned}
 
 
-def test_text_goes_before_the_others(write, tmp_path):
+def test_text_takes_precedence_over_other_transcripts(write, tmp_path):
     write(".align", ALIGN)
     assert find_transcript(tmp_path / "take.mp4") == tmp_path / "take.align"
     write(".TXT", "words")

@@ -7,7 +7,7 @@ import pytest
 
 from corpus_tools.recordings.observe import Observations, observe
 from corpus_tools.run_options import RunOptions
-from tests.corpus_tools.films import doubled, film
+from tests.corpus_tools.films import mirrored_pair, write_video
 from tests.rendered_takes import manifest_rows
 from tts2face.video.media import read_frames, read_sound
 
@@ -32,31 +32,31 @@ def found(rendered_takes: Path, face_model: Path, tmp_path_factory: pytest.TempP
     loud = np.abs(sound).max()
     noise = np.random.default_rng(0).normal(0, sound.std(), len(sound))
     folder = tmp_path_factory.mktemp("unfit")
-    film([doubled(pixels) for pixels in pictures], sound, folder / "crowd.mp4")
-    film([*pictures[:30], *[pictures[30]] * 12, *pictures[42:]], sound, folder / "frozen.mp4")
-    film(pictures, np.clip(8 * sound / loud, -1, 1), folder / "clipped.mp4")
-    film(pictures, sound + noise, folder / "noisy.mp4")
-    film([*pictures[:35], *[grey] * 8, *pictures[43:]], sound, folder / "away.mp4")
-    film([grey] * len(pictures), sound, folder / "dark.mp4")
-    film(pictures, sound, folder / "good.mp4")
-    film(pictures, sound, folder / "wrong.mp4")
+    write_video([mirrored_pair(pixels) for pixels in pictures], sound, folder / "crowd.mp4")
+    write_video([*pictures[:30], *[pictures[30]] * 12, *pictures[42:]], sound, folder / "frozen.mp4")
+    write_video(pictures, np.clip(8 * sound / loud, -1, 1), folder / "clipped.mp4")
+    write_video(pictures, sound + noise, folder / "noisy.mp4")
+    write_video([*pictures[:35], *[grey] * 8, *pictures[43:]], sound, folder / "away.mp4")
+    write_video([grey] * len(pictures), sound, folder / "dark.mp4")
+    write_video(pictures, sound, folder / "good.mp4")
+    write_video(pictures, sound, folder / "wrong.mp4")
     faster = [pictures[min(round(number * 25 / 30), len(pictures) - 1)] for number in range(len(pictures) * 30 // 25)]
-    film(faster, sound, folder / "faster.mp4", fps=30)
+    write_video(faster, sound, folder / "faster.mp4", fps=30)
     for path in folder.glob("*.mp4"):
         path.with_suffix(".txt").write_text(rows[0]["transcript"])
     (folder / "wrong.txt").write_text("yesterday seventeen elephants remembered nothing")
-    film(pictures, sound, folder / "second.mp4")
+    write_video(pictures, sound, folder / "second.mp4")
     (folder / "second.txt").write_text(rows[0]["transcript"])
     return observe(folder, run_options=RunOptions(folder / "cache", 2, face_model))
 
 
-def test_what_is_wrong_is_said(found: Observations) -> None:
+def test_every_refusal_names_its_reason(found: Observations) -> None:
     reasons = {refusal.name: refusal.reason for refusal in found.refused}
     assert set(reasons) == set(REASONS)
     assert [name for name, reason in REASONS.items() if reason not in reasons[name]] == []
 
 
-def test_the_rest_goes_on_at_the_rate_of_most(found: Observations) -> None:
+def test_the_other_recordings_use_the_most_frequent_frame_rate(found: Observations) -> None:
     assert [seen.name for seen in found.kept] == ["faster", "good", "second"]
     assert {seen.fps for seen in found.kept} == {25.0}
     faster, good, _ = found.kept

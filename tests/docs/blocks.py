@@ -1,4 +1,4 @@
-"""Examples as they stand in the documentation: fenced blocks, and command lines in them."""
+"""Examples of the documentation: fenced blocks, and command lines in them."""
 
 import re
 import shlex

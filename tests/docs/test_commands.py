@@ -1,6 +1,6 @@
 """Every command line of the documentation is parsed by the real command line; those of README and cli.md are executed.
 
-What is not executed here stands in `tests.docs.blocks.NOT_EXECUTED` with its reason; lines that need video of a
+`tests.docs.blocks.NOT_EXECUTED` lists what is not executed, with the reason; lines that need video of a
 person are executed by `tests/doors/test_command_line.py`.
 """
 
@@ -132,7 +132,7 @@ def _small(words: list[str]) -> list[str]:
     return [*kept[:end], *(word for option in SMALL.items() for word in option), *kept[end:]]
 
 
-def test_every_command_stands_on_the_cli_page() -> None:
+def test_every_command_is_on_the_cli_page() -> None:
     shown = [tuple(words) for line in shell_lines(CLI_PAGE) for words in own_commands(line)]
     missing = [path for path in commands_of(app) if path and not any(words[: len(path)] == path for words in shown)]
     assert not missing

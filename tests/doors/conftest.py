@@ -1,3 +1,5 @@
+"""The shipped talker and the default head, loaded once for each file of tests."""
+
 import pytest
 
 from tts2face.models.face import Face

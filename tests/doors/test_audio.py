@@ -21,7 +21,7 @@ from tts2face.types import Trajectory, concatenate_clips, frame_count
 from tts2face.video.media import read_media_info, read_sound, sound_blocks
 
 TEXT = "bin blue at F two now"
-REAL_TOLERANCE_S = 0.02  # of the phones that the talker was learnt with
+REAL_TOLERANCE_S = 0.02  # of the phones of the talker's training data
 TOLERANCE_S = 0.08  # of the takes' own word times, which are automatic as well
 LEARNT_FROM = 60  # utterances: enough to be far better than nothing
 SUFFIXES = {".wav": "pcm_s16le", ".flac": "flac", ".mp3": "libmp3lame", ".m4a": "aac", ".ogg": "libopus"}
@@ -44,7 +44,7 @@ def session(talker: Talker) -> Session:
 
 @pytest.fixture(scope="module")
 def held_out(shared_recordings: Path) -> Talker:
-    """The shipped talker with audio maps learnt from some of the recordings, the one that is tested left out."""
+    """The shipped talker with audio maps trained on all recordings but the tested one."""
     clips = shared_recordings / "grid_s1" / "clips"
     shipped = load_talker("grid_s1")
     spoken = [one for one in shipped.utterances if one.name != "bbaf2n"][:: len(shipped.utterances) // LEARNT_FROM]
@@ -63,7 +63,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def written(path: Path, samples: np.ndarray, rate: int = 16000) -> Path:
+def write_wave(path: Path, samples: np.ndarray, rate: int = 16000) -> Path:
     with av.open(str(path), "w") as container:
         stream = container.add_stream(SUFFIXES[path.suffix], rate=rate)
         stream.layout = "mono"
@@ -105,7 +105,7 @@ def test_lips_open_with_the_sound_of_a_rendered_take(audio_map: str, rendered_ta
     assert np.median(found[spoken]) > 2 * np.median(found[~spoken])
 
 
-def test_with_the_words_lips_close_where_they_are_said(
+def test_with_a_transcript_lips_close_at_the_bilabials(
     takes: Path, film: Path, session: Session, talker: Talker
 ) -> None:
     clip = session.clip(Request(audio=film, text=TEXT, fps=25.0))
@@ -149,9 +149,9 @@ def test_sound_and_picture_are_equally_long(fps: float, film: Path, session: Ses
 
 @ONLY_RENDERED
 @pytest.mark.parametrize("text", ["", f"{TEXT} {TEXT} {TEXT} {TEXT} {TEXT}"])
-def test_a_long_recording_comes_in_pieces(text: str, film: Path, session: Session, here: Path) -> None:
+def test_a_long_recording_is_divided_into_pieces(text: str, film: Path, session: Session, here: Path) -> None:
     samples = read_sound(film, 16000).samples
-    sound = written(here / "long.wav", np.tile(samples, 5))
+    sound = write_wave(here / "long.wav", np.tile(samples, 5))
     pieces = list(session.stream(Request(audio=sound, text=text, fps=60.0)))
     assert [len(piece.clip.motion) for piece in pieces[:-1]] == [MAX_CLIP_FRAMES] * (len(pieces) - 1)
     assert sum(piece.n_steps for piece in pieces) == 1000
@@ -164,7 +164,7 @@ def test_a_long_recording_comes_in_pieces(text: str, film: Path, session: Sessio
 @pytest.mark.parametrize("suffix", sorted(SUFFIXES))
 def test_files_of_sound_alone_are_read(suffix: str, here: Path) -> None:
     tone = 0.3 * np.sin(2 * np.pi * 440 * np.arange(16000) / 16000)
-    path = written(here / f"tone{suffix}", tone)
+    path = write_wave(here / f"tone{suffix}", tone)
     blocks = np.concatenate(list(sound_blocks(path, 48000)))
     assert len(blocks) == pytest.approx(48000, abs=4000)  # codecs pad
     spectrum = np.abs(np.fft.rfft(blocks))
@@ -176,14 +176,14 @@ def test_a_faint_recording_moves_the_lips_as_a_loud_one(film: Path, talker: Talk
     sound = read_sound(film, 16000).samples
     audio_map = replace(talker.audio_maps["network"], loudness=-18.0)
     loud, faint = (
-        map_audio_to_motion(written(here / f"{gain}.wav", gain * sound), audio_map, talker, 25.0)[1].values
+        map_audio_to_motion(write_wave(here / f"{gain}.wav", gain * sound), audio_map, talker, 25.0)[1].values
         for gain in (1.0, 0.1)
     )
     spread = talker.model.spread[: talker.model.n_speech]
-    assert np.median(np.abs(loud - faint) / spread) < 0.1  # 16-bit noise is left
+    assert np.median(np.abs(loud - faint) / spread) < 0.1  # 16-bit quantisation noise remains
 
 
-def test_motion_between_frames_goes_through_them() -> None:
+def test_interpolated_motion_passes_through_the_frames() -> None:
     values = np.random.default_rng(0).normal(size=(20, 3)).astype(np.float32)
     np.testing.assert_allclose(resample_motion(values, 25.0, 50.0, 39)[::2], values, atol=1e-5)
     line = np.arange(20, dtype=np.float32)[:, None]
@@ -213,10 +213,8 @@ def test_the_command_writes_clips(film: Path, talker: Talker, here: Path) -> Non
     ("samples", "reason"), [(np.zeros(16000), "is silent"), (0.1 * np.ones(800), r"lasts 0\.050 s; give a recording")]
 )
 @pytest.mark.parametrize("text", ["", TEXT])
-def test_what_cannot_be_heard_is_refused(
-    samples: np.ndarray, reason: str, text: str, session: Session, here: Path
-) -> None:
-    path = written(here / "a.wav", samples)
+def test_unusable_sound_is_refused(samples: np.ndarray, reason: str, text: str, session: Session, here: Path) -> None:
+    path = write_wave(here / "a.wav", samples)
     with pytest.raises(DataError, match=reason):
         session.clip(Request(audio=path, text=text))
 
@@ -239,13 +237,13 @@ def test_files_without_sound_are_refused(session: Session, here: Path) -> None:
         ({"rate": 1.5}, "--voice and --rate have no effect on a recording"),
     ],
 )
-def test_options_that_do_not_go_together_are_refused(options: dict, reason: str) -> None:
+def test_options_that_exclude_each_other_are_refused(options: dict, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
         Request(**{"audio": Path("a.wav"), **options})
 
 
 @ONLY_RENDERED
-def test_a_recording_that_is_not_there_and_a_talker_without_audio_maps_are_refused(
+def test_a_missing_recording_and_a_talker_without_audio_maps_are_refused(
     film: Path, session: Session, talker: Talker
 ) -> None:
     with pytest.raises(InputError, match=r"there is no recording none\.wav"):

@@ -59,7 +59,7 @@ def test_picture_and_sound_end_within_a_frame(made: tuple[Path, Clip], pictures:
     assert abs(ends[0] - clip.speech.waveform.duration) <= 1 / 30
 
 
-def test_the_head_is_there(pictures: np.ndarray) -> None:
+def test_the_head_is_visible(pictures: np.ndarray) -> None:
     """Skin in the middle, redder than blue; the studio's background at the top corners, which never moves."""
     skin = pictures[:, SIDE // 2 - 10 : SIDE // 2 + 10, SIDE // 2 - 10 : SIDE // 2 + 10].mean(axis=(0, 1, 2))
     assert skin[0] > skin[2] + 20

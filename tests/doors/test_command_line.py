@@ -180,7 +180,7 @@ def test_every_kind_of_error_has_an_exit_code() -> None:
         (["--file", "latin.txt", "--out", "x.mp4"], 2, "latin.txt is not UTF-8 text (byte 1)"),
     ],
 )
-def test_bad_input_gets_one_sentence_and_leaves_nothing(
+def test_invalid_input_gives_one_sentence_and_no_output(
     arguments: list[str], code: int, reason: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from tts2face.storage.files import SHIPPED_FOLDER
@@ -226,7 +226,7 @@ def test_text_from_standard_input_and_from_a_file(here: Path) -> None:
         assert out.stat().st_size > 1000
 
 
-def test_an_interruption_leaves_nothing(here: Path) -> None:
+def test_an_interruption_leaves_no_files(here: Path) -> None:
     text = "This is a rather long sentence that takes some time to speak. " * 20
     process = subprocess.Popen([*COMMAND, text, "--out", "x.mp4"], stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 60

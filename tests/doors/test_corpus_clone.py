@@ -77,7 +77,7 @@ def test_a_cloned_talker_can_be_spoken(here: Path) -> None:
         (["a.talker", "b.talker", "--out", "none/c.talker"], 2, "there is no folder none to write c.talker to"),
     ],
 )
-def test_bad_input_gets_one_sentence_and_leaves_nothing(
+def test_invalid_input_gives_one_sentence_and_no_output(
     arguments: list[str], code: int, reason: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (here / "junk.talker").write_bytes(b"no talker at all")

@@ -14,9 +14,9 @@ import pytest
 
 from cli.main import run
 from corpus_tools.recordings.observe import Observations
-from tests.corpus_tools.speaking import OwnVoice, observation, worded
+from tests.corpus_tools.speaking import OwnVoice, observation, with_words
 
-HERS = [worded(observation(number)) for number in range(24)]
+HERS = [with_words(observation(number)) for number in range(24)]
 OTHERS = [observation(100 + number, 2.0, "other") for number in range(4)]
 FOLDERS = {"all": HERS, "some": HERS[:18], "rest": HERS[18:], "other": OTHERS}
 
@@ -41,7 +41,7 @@ def evaluate(*more: str) -> int:
     return run(["corpus", "evaluate", *more])
 
 
-def measured(out: str, *more: str) -> bytes:
+def evaluation_bytes(out: str, *more: str) -> bytes:
     assert evaluate(*more, "--out", out) == 0
     return Path(out).read_bytes()
 
@@ -61,39 +61,42 @@ PLAIN = ("--recordings", "all", "--hold-out", "4")
     ],
 )
 def test_each_option_changes_the_figures(option: tuple[str, ...], here: Path) -> None:
-    plain = measured("plain.csv", *PLAIN)
-    assert measured("plain.csv", *PLAIN) == plain
-    assert measured("more.csv", "--recordings", "all", "--hold-out", "5") != plain
-    assert measured("option.csv", *PLAIN, *option) != plain
+    plain = evaluation_bytes("plain.csv", *PLAIN)
+    assert evaluation_bytes("plain.csv", *PLAIN) == plain
+    assert evaluation_bytes("more.csv", "--recordings", "all", "--hold-out", "5") != plain
+    assert evaluation_bytes("option.csv", *PLAIN, *option) != plain
 
 
 def test_folders_that_are_split_already(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert len(json.loads(measured("split.json", "--train", "some", "--test", "rest"))["scores"][0]["utterances"]) == 6
+    assert (
+        len(json.loads(evaluation_bytes("split.json", "--train", "some", "--test", "rest"))["scores"][0]["utterances"])
+        == 6
+    )
     assert "wrote split.json: 6 utterances held out, 18 for training" in capsys.readouterr().err
 
 
-def test_another_talker_is_told_apart(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    result = json.loads(measured("across.json", "--train", "all", "--cross-talker", "other"))
+def test_another_talker_is_reported(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    result = json.loads(evaluation_bytes("across.json", "--train", "all", "--cross-talker", "other"))
     assert (result["is_across"], result["n_train"], result["n_test"]) == (True, 24, 4)
     assert "4 utterances of another talker, 24 for training" in capsys.readouterr().err
 
 
-def test_own_durations_are_told_at_the_terminal_and_in_every_file(
+def test_own_durations_are_reported_in_the_terminal_and_in_every_file(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     own = (*PLAIN, "--own-durations")
-    assert b"<h2>With own durations</h2>" in measured("own.html", *own)
+    assert b"<h2>With own durations</h2>" in evaluation_bytes("own.html", *own)
     assert len(re.findall(r"\| exemplar \| \d", capsys.readouterr().out)) == 2
-    assert b"\nown durations,exemplar," in measured("own.csv", *own)
-    assert len(json.loads(measured("own.json", *own))["own"]) == 4
+    assert b"\nown durations,exemplar," in evaluation_bytes("own.csv", *own)
+    assert len(json.loads(evaluation_bytes("own.json", *own))["own"]) == 4
 
 
-def test_folds_are_told_at_the_terminal_and_in_every_file(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_folds_are_reported_in_the_terminal_and_in_every_file(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folds = ("--recordings", "all", "--folds", "3")
-    assert b"<h2>3 folds</h2>" in measured("folds.html", *folds)
+    assert b"<h2>3 folds</h2>" in evaluation_bytes("folds.html", *folds)
     assert "spread over 3 folds" in capsys.readouterr().out
-    assert b"\nfold 3,exemplar," in measured("folds.csv", *folds)
-    assert len(json.loads(measured("folds.json", *folds))["folds"]) == 3
+    assert b"\nfold 3,exemplar," in evaluation_bytes("folds.csv", *folds)
+    assert len(json.loads(evaluation_bytes("folds.json", *folds))["folds"]) == 3
 
 
 @pytest.mark.parametrize(
@@ -148,7 +151,7 @@ def test_own_durations_need_words(here: Path, monkeypatch: pytest.MonkeyPatch, c
 def test_recordings_are_shown_beside_the_head(
     rendered_takes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Six recordings, one held out, with the real voice: the page holds a film of it, and stays small."""
+    """Six recordings, one held out, with the real voice: the page contains a video of it, and is small."""
     pytest.importorskip("ai_edge_litert", reason="needs the extra [capture]")
     monkeypatch.chdir(tmp_path)
     source, few = rendered_takes, tmp_path / "few"
@@ -158,7 +161,9 @@ def test_recordings_are_shown_beside_the_head(
     for row in rows[1:]:
         name = f"{row.split(',')[0]}.mkv"
         (few / "clips" / name).symlink_to(source / "clips" / name)
-    page = measured("few.html", "--recordings", "few", "--hold-out", "1", "--own-durations", "--jobs", "1").decode()
+    page = evaluation_bytes(
+        "few.html", "--recordings", "few", "--hold-out", "1", "--own-durations", "--jobs", "1"
+    ).decode()
     assert len(page) < 1_000_000
     (film,) = re.findall(r'src="data:video/mp4;base64,([^"]*)"', page)
     with av.open(BytesIO(b64decode(film))) as container:

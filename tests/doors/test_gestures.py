@@ -1,4 +1,4 @@
-"""Faces that live, through the doors: styles, timelines, palettes, and what gestures may never do."""
+"""Gestures from API and command line: styles, timelines, palettes, and constraints that always hold."""
 
 import json
 import re
@@ -26,12 +26,12 @@ SHAPES = {"brows": ("brows",), "cheeks": ("cheeks",), "blink": ("eyeBlink",), "g
 
 
 @pytest.fixture(scope="module")
-def alive(session: Session) -> Clip:
+def with_gestures(session: Session) -> Clip:
     return session.clip(Request(text=TEXT))
 
 
 @pytest.fixture(scope="module")
-def plain(session: Session) -> Clip:
+def without_gestures(session: Session) -> Clip:
     """Speech without gestures."""
     return session.clip(Request(text=TEXT, gestures="none"))
 
@@ -40,21 +40,21 @@ def channels_of(clip: Clip, begins: tuple[str, ...]) -> np.ndarray:
     return clip.motion.values[:, [name.startswith(begins) for name in clip.motion.channels]]
 
 
-def test_everything_moves(alive: Clip) -> None:
+def test_every_feature_moves(with_gestures: Clip) -> None:
     for feature, begins in SHAPES.items():
-        assert np.ptp(channels_of(alive, begins), axis=0).max() > 0.05, feature
-    assert np.degrees(np.ptp(alive.head.values[:, :3], axis=0)).max() > 0.5
+        assert np.ptp(channels_of(with_gestures, begins), axis=0).max() > 0.05, feature
+    assert np.degrees(np.ptp(with_gestures.head.values[:, :3], axis=0)).max() > 0.5
 
 
-def test_a_layer_of_its_own_changes_no_other(alive: Clip, session: Session) -> None:
+def test_a_layer_of_its_own_changes_no_other(with_gestures: Clip, session: Session) -> None:
     still = session.clip(Request(text=TEXT, gain="brows=0"))
     assert not channels_of(still, ("brows",)).any()
-    others = [not name.startswith("brows") for name in alive.motion.channels]
-    np.testing.assert_array_equal(still.motion.values[:, others], alive.motion.values[:, others])
-    np.testing.assert_array_equal(still.head.values, alive.head.values)
+    others = [not name.startswith("brows") for name in with_gestures.motion.channels]
+    np.testing.assert_array_equal(still.motion.values[:, others], with_gestures.motion.values[:, others])
+    np.testing.assert_array_equal(still.head.values, with_gestures.head.values)
 
 
-def test_the_starter_palette_holds_the_paper_s_moods_and_says_where_it_is_from() -> None:
+def test_the_starter_palette_has_the_moods_of_the_paper_and_its_provenance() -> None:
     palette = load_palette("starter")
     moods = ("neutral", "depressed", "delighted", "annoyed", "exaggerated", "exasperated")
     assert palette.names == (*moods, "grid_s1")
@@ -66,20 +66,22 @@ def test_the_starter_palette_holds_the_paper_s_moods_and_says_where_it_is_from()
 
 
 @pytest.mark.parametrize("style", ["depressed", "delighted", "annoyed", "exaggerated", "exasperated"])
-def test_lips_that_meet_still_meet_in_every_mood(style: str, plain: Clip, session: Session, face: Face) -> None:
+def test_lips_that_meet_still_meet_in_every_mood(
+    style: str, without_gestures: Clip, session: Session, face: Face
+) -> None:
     made = session.clip(Request(text=TEXT, style=style))
     shown = gesture_face(face, load_palette("starter")).face
-    before, after = lip_gap(face, plain), lip_gap(shown, made)
+    before, after = lip_gap(face, without_gestures), lip_gap(shown, made)
     touching = before < 0.3
     assert touching.sum() > 5
     assert (after[touching] - before[touching]).max() < 0.1  # mm
     assert after.min() > -0.1
 
 
-def test_neutral_gestures_leave_lips_as_they_are(alive: Clip, plain: Clip, face: Face) -> None:
+def test_neutral_gestures_leave_lips_as_they_are(with_gestures: Clip, without_gestures: Clip, face: Face) -> None:
     shown = gesture_face(face, load_palette("starter")).face
-    assert np.corrcoef(lip_gap(face, plain), lip_gap(shown, alive))[0, 1] > 0.995
-    assert np.corrcoef(lip_width(face, plain), lip_width(shown, alive))[0, 1] > 0.99
+    assert np.corrcoef(lip_gap(face, without_gestures), lip_gap(shown, with_gestures))[0, 1] > 0.995
+    assert np.corrcoef(lip_width(face, without_gestures), lip_width(shown, with_gestures))[0, 1] > 0.99
 
 
 def lip_gap(face: Face, clip: Clip) -> np.ndarray:
@@ -99,15 +101,15 @@ def test_eyes_hold_the_viewer_while_the_head_nods(session: Session) -> None:
     assert np.corrcoef(up, clip.head.values[:, 0])[0, 1] > 0.95
 
 
-def test_marks_and_flags_paint_styles(alive: Clip, session: Session) -> None:
+def test_marks_and_flags_paint_styles(with_gestures: Clip, session: Session) -> None:
     by_flag = session.clip(Request(text=TEXT, style="head=exaggerated"))
     by_mark = session.clip(Request(text=f"[style:head=exaggerated]{TEXT}[/style]"))
     np.testing.assert_allclose(by_mark.head.values[30:-30], by_flag.head.values[30:-30], atol=1e-4)
-    assert not np.array_equal(by_flag.head.values, alive.head.values)
-    np.testing.assert_array_equal(channels_of(by_flag, ("brows",)), channels_of(alive, ("brows",)))
+    assert not np.array_equal(by_flag.head.values, with_gestures.head.values)
+    np.testing.assert_array_equal(channels_of(by_flag, ("brows",)), channels_of(with_gestures, ("brows",)))
 
 
-def test_another_palette_is_another_person(alive: Clip, talker: Talker, face: Face, tmp_path: Path) -> None:
+def test_another_palette_gives_other_motion(with_gestures: Clip, talker: Talker, face: Face, tmp_path: Path) -> None:
     starter = load_palette("starter")
     style = starter.styles["grid_s1"]
     few = {name: values[: int(style.lengths[:40].sum())] for name, values in style.motion.items()}
@@ -121,7 +123,7 @@ def test_another_palette_is_another_person(alive: Clip, talker: Talker, face: Fa
     )
     write_palette(tmp_path / "few.palette", replace(starter, styles={"few": part}, derivations={}))
     clip = Session(talker, face, palette=tmp_path / "few.palette").clip(Request(text=TEXT))
-    assert not np.array_equal(clip.head.values, alive.head.values)
+    assert not np.array_equal(clip.head.values, with_gestures.head.values)
     with pytest.raises(InputError, match="no style 'delighted' in the palette; it has few"):
         Session(talker, face, palette=tmp_path / "few.palette").clip(Request(text=TEXT, style="delighted"))
 
@@ -146,7 +148,7 @@ def test_an_idle_face_lives(session: Session, face: Face) -> None:
         (["--gain", "head=4"], 2, "the gain of head must lie between 0 and 3, not 4"),
     ],
 )
-def test_what_cannot_be_is_one_sentence_and_nothing_is_written(
+def test_invalid_requests_give_one_sentence_and_nothing_is_written(
     arguments: list[str], code: int, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -158,7 +160,7 @@ def test_what_cannot_be_is_one_sentence_and_nothing_is_written(
     assert set(tmp_path.iterdir()) == before
 
 
-def test_a_style_in_the_text_that_nobody_has(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_an_unknown_style_in_the_text_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert run(["[style:cross]Hi.[/style]", "--out", str(tmp_path / "x.mp4"), *SMALL]) == 2
     assert "no style 'cross'" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
@@ -175,7 +177,7 @@ def test_a_capture_becomes_a_style_of_the_starter_palette(
     )
     palette = load_palette("live.palette")
     assert palette.names[-2:] == ("grid_s1", "live")
-    assert palette.styles["live"].intensity.max() > 0  # its sound lies beside it
+    assert palette.styles["live"].intensity.max() > 0  # its sound is in the same folder
     assert run(["Hello.", "--palette", "live.palette", "--style", "live", "--out", "x.mp4", *SMALL]) == 0
     alone = ["--alone", "--estimator", "samples"]
     assert run(["corpus", "gestures", str(capture), "--style", "live", "--out", "a.palette", *alone, *cache]) == 0

@@ -38,7 +38,7 @@ def test_a_list_is_a_table_or_json(name: str, capsys: pytest.CaptureFixture[str]
     assert [line.split("  ")[0] for line in lines[1:]] == first
 
 
-def test_everything_that_is_listed_exists() -> None:
+def test_all_listed_entries_exist() -> None:
     for face in catalogue.faces():
         if face.name != catalogue.OWN_FACE:
             assert load_face(face.name).shape_names
@@ -54,7 +54,7 @@ def test_everything_that_is_listed_exists() -> None:
     assert all(language_code(language.name) == language.code for language in catalogue.languages())
 
 
-def test_voices_say_what_they_speak_and_whether_they_are_installed() -> None:
+def test_voices_list_their_languages_and_whether_they_are_installed() -> None:
     heart, espeak, female, piper = catalogue.voices()
     assert (heart.name, heart.languages, heart.is_installed) == ("heart", ("en-gb", "en-us"), True)
     assert (espeak.name, len(espeak.languages), espeak.is_installed) == ("espeak", len(catalogue.languages()), True)
@@ -67,7 +67,7 @@ def test_voices_say_what_they_speak_and_whether_they_are_installed() -> None:
         load_voice(heart.name, "de")
 
 
-def test_identities_and_styles_of_what_is_not_there_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_identities_and_styles_of_missing_files_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
     for words, reason in (
         (["identities", "--face", "nobody"], "no face 'nobody'; give cartoon, head"),
         (["styles", "--palette", "nobody"], "no palette 'nobody'; give starter"),
@@ -97,6 +97,6 @@ def test_a_script_completes_commands(shell: str, capsys: pytest.CaptureFixture[s
         subprocess.run(["bash", "-n"], input=script, text=True, check=True)
 
 
-def test_a_shell_that_there_is_not_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_shell_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["completion", "cmd"]) == 2
     assert "bash" in capsys.readouterr().err

@@ -7,7 +7,7 @@ import pytest
 
 from cli.main import run
 from lexicon.errors import BackendError
-from tests.corpus_tools.films import joined
+from tests.corpus_tools.films import join_clips
 from tts2face.models.face_file import load_face
 from tts2face.retargeting.performer import build_performer_retargeter
 from tts2face.synthesis.live_capture import CALIBRATION_S, LiveCapture, LivePose, track_poses
@@ -31,26 +31,30 @@ def bundle() -> Path:
 
 
 @pytest.fixture(scope="module")
-def film(shared_recordings: Path, bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def recording(shared_recordings: Path, bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     clips = sorted((shared_recordings / "grid_s1" / "clips").iterdir())[:4]
     out = tmp_path_factory.mktemp("film") / "person.mp4"
-    joined(clips, out)
+    join_clips(clips, out)
     return out
 
 
 @pytest.fixture(scope="module")
-def live(film: Path, bundle: Path) -> list[LivePose | None]:
-    return list(track_poses(read_frames(film), load_face("head"), FaceTracker(bundle), BlendshapeReader(bundle), FPS))
+def live(recording: Path, bundle: Path) -> list[LivePose | None]:
+    return list(
+        track_poses(read_frames(recording), load_face("head"), FaceTracker(bundle), BlendshapeReader(bundle), FPS)
+    )
 
 
-def test_a_person_is_learnt_and_then_followed(live: list[LivePose | None], film: Path, bundle: Path) -> None:
+def test_live_capture_calibrates_and_then_follows_the_person(
+    live: list[LivePose | None], recording: Path, bundle: Path
+) -> None:
     """Compared with the take read as a whole, which includes later frames."""
     head = load_face("head")
     learnt = round(CALIBRATION_S * FPS)
     assert all(pose is None for pose in live[:learnt])
     followed = live[learnt + 1 :]
     assert all(pose is not None for pose in followed)
-    take = read_take(film, StreamingTracker(bundle), BlendshapeReader(bundle))
+    take = read_take(recording, StreamingTracker(bundle), BlendshapeReader(bundle))
     weights_of_take = build_performer_retargeter(take.landmarks, take.scores, head).weights(take.landmarks, take.scores)
     weights = np.array([pose.weights for pose in followed if pose is not None])
     whole = weights_of_take.values[learnt + 1 : learnt + 1 + len(weights)]
@@ -67,8 +71,8 @@ def test_without_a_face_the_head_waits(bundle: Path) -> None:
     assert found == [None] * 5
 
 
-def test_an_actor_gives_each_pose_once(film: Path, bundle: Path) -> None:
-    with LiveCapture(read_frames(film), load_face("head"), FPS, bundle) as actor:
+def test_an_actor_gives_each_pose_once(recording: Path, bundle: Path) -> None:
+    with LiveCapture(read_frames(recording), load_face("head"), FPS, bundle) as actor:
         actor._thread.join()
         now = actor.latest_pose()
         assert now is not None
@@ -92,7 +96,9 @@ def test_orders_that_make_no_sense(words: list[str], reason: str, capsys: pytest
     assert reason in capsys.readouterr().err
 
 
-def test_without_a_display_it_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_display_the_message_names_the_cause(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setattr("tts2face.render.window.sys.platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)

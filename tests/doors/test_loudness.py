@@ -7,7 +7,7 @@ import av
 import numpy as np
 import pytest
 
-from tests.oracles.loudness_meter import measured, true_peak
+from tests.oracles.loudness_meter import measure_loudness, true_peak
 from tts2face.models.face_file import load_face
 from tts2face.models.talker import load_talker
 from tts2face.render.picture import Picture
@@ -47,11 +47,11 @@ def pieces_of(ready: Session, text: str, **options: object) -> list[Piece]:
 @pytest.mark.parametrize(("voice", "language", "text"), TEXTS)
 def test_clips_are_equally_loud(voice: str, language: str, text: str, ready: Session) -> None:
     pieces = pieces_of(ready, text, voice=voice, language=language)
-    loudness, peak = measured(concatenate_clips([piece.clip for piece in pieces]).speech.waveform)
+    loudness, peak = measure_loudness(concatenate_clips([piece.clip for piece in pieces]).speech.waveform)
     assert loudness == pytest.approx(-16.0, abs=1.0)  # LUFS
     assert peak < -1.0  # dB of full scale
     levels = [integrated_loudness([piece.clip.speech.waveform]) for piece in pieces]
-    assert max((abs(b - a) for a, b in pairwise(levels)), default=0.0) < 0.7  # LU; 3.8 as the voice says them
+    assert max((abs(b - a) for a, b in pairwise(levels)), default=0.0) < 0.7  # LU; 3.8 in the voice's own output
 
 
 def test_the_first_sentence_sounds_the_same_whatever_follows(ready: Session) -> None:
@@ -95,7 +95,7 @@ def test_the_sound_of_a_file_has_the_loudness_too(suffix: str, ready: Session, t
         reader = av.AudioResampler("flt", "mono", 48_000)
         frames = [part for frame in container.decode(audio=0) for part in reader.resample(frame)]
     samples = np.concatenate([frame.to_ndarray()[0] for frame in frames])
-    loudness, peak = measured(Waveform(samples, 48_000))
+    loudness, peak = measure_loudness(Waveform(samples, 48_000))
     assert loudness == pytest.approx(-16.0, abs=1.0)
     assert peak < -1.0
     assert true_peak(Waveform(samples, 48_000)) < -1.0

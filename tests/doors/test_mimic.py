@@ -1,4 +1,4 @@
-"""A person's video drives a face: found again by the tracker in the clip; what cannot be read is refused."""
+"""A video of a person drives a face: the tracker recovers the motion from the clip; unreadable files are refused."""
 
 import re
 import shutil
@@ -41,8 +41,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def watched(path: Path, bundle: Path) -> tuple[np.ndarray, np.ndarray]:
-    """(T, 478, 3) landmarks in mm and (T, 3) head angles in degrees against their middle."""
+def tracked_motion(path: Path, bundle: Path) -> tuple[np.ndarray, np.ndarray]:
+    """(T, 478, 3) landmarks in mm and (T, 3) head angles in degrees relative to their median."""
     points = FaceTracker(bundle).track(lambda: (picture.pixels for picture in read_frames(path)), FPS).points
     posed = remove_pose(points, FPS)
     angles = np.degrees(head_angles(posed.rotations))
@@ -59,8 +59,8 @@ def test_lips_lids_and_head_of_the_clip_are_the_performer_s(face: str, film: Pat
     facts = read_media_info(here / "m.mp4")
     assert facts.fps == FPS
     assert facts.rate == 48_000
-    source, source_head = watched(film, bundle)
-    shown, shown_head = watched(here / "m.mp4", bundle)
+    source, source_head = tracked_motion(film, bundle)
+    shown, shown_head = tracked_motion(here / "m.mp4", bundle)
     assert len(shown) == len(source)
     assert np.corrcoef(gap(source), gap(shown))[0, 1] >= 0.95
     assert (np.abs(source_head - shown_head).mean(axis=0) <= 1.0).all()
@@ -80,16 +80,16 @@ def test_a_capture_moves_the_shapes_of_its_names(capture: Path, here: Path) -> N
 
 
 @ONLY_RENDERED
-def test_a_film_without_sound_makes_a_silent_clip_and_says_so(
+def test_a_video_without_sound_gives_a_silent_clip_and_a_message(
     film: Path, bundle: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    written(here / "mute.mp4", [picture.pixels for picture in read_frames(film)][:20])
+    write_video(here / "mute.mp4", [picture.pixels for picture in read_frames(film)][:20])
     assert run(["mimic", "mute.mp4", "--out", "m.mp4", "--size", "64x64", "--model", str(bundle)]) == 0
     assert "contains no sound; the clip is silent" in capsys.readouterr().err
     assert (here / "m.mp4").exists()
 
 
-def written(path: Path, pictures: list[np.ndarray]) -> None:
+def write_video(path: Path, pictures: list[np.ndarray]) -> None:
     height, width = (side - side % 2 for side in pictures[0].shape[:2])
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=Fraction(25))
@@ -107,8 +107,8 @@ def test_films_that_cannot_drive_a_face_are_refused(
     pictures = [picture.pixels for picture in read_frames(film)][:30]
     blue = np.zeros_like(pictures[0])
     blue[:, :, 2] = np.arange(blue.shape[1])
-    written(here / "nobody.mp4", [blue] * 6)
-    written(here / "two.mp4", [np.concatenate([picture, picture], axis=1) for picture in pictures])
+    write_video(here / "nobody.mp4", [blue] * 6)
+    write_video(here / "two.mp4", [np.concatenate([picture, picture], axis=1) for picture in pictures])
     (here / "empty.mp4").touch()
     (here / "cut.mkv").write_bytes(film.read_bytes()[:40_000])
     (here / "words.mp4").write_text("no film\n" * 100)
@@ -166,7 +166,7 @@ def test_captures_that_cannot_be_read_are_refused(
 
 
 @ONLY_RENDERED
-def test_a_copy_under_another_name_gives_the_same_bytes(film: Path, bundle: Path, here: Path) -> None:
+def test_a_copy_with_another_name_gives_the_same_bytes(film: Path, bundle: Path, here: Path) -> None:
     shutil.copy(film, here / "take.mkv")
     for source, out in ((str(film), "a"), ("take.mkv", "b")):
         words = [

@@ -11,7 +11,7 @@ import pytest
 
 TEXT = "We were away a year ago, but Bob may move five big maps. Zyxwo said so."
 SPEAK = "from cli.main import main; main()"
-# Python's own sockets and files, by audit events; what native code does, strace sees.
+# Python's own sockets and files, by audit events; strace records native code.
 AUDITED = f"""
 import os, sys
 def look(event, arguments):
@@ -33,7 +33,7 @@ def arguments(home: Path, *more: str) -> list[str]:
 
 
 def files_in(home: Path) -> set[str]:
-    """Files in a home folder but kernels that were compiled there."""
+    """Files in a home folder, except compiled kernels."""
     found = {str(path.relative_to(home)) for path in home.rglob("*") if path.is_file()}
     return {path for path in found if not path.startswith(".cache/numba/")}
 

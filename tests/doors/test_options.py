@@ -1,4 +1,4 @@
-"""Options that no command knows, names under which nothing can be written, and how soon help comes."""
+"""Unknown options, invalid output names, and the time that --help takes."""
 
 import json
 import os
@@ -36,7 +36,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (["voices", "--jsn"], "--jsn", "--json"),
     ],
 )
-def test_a_mistyped_option_is_not_spoken(
+def test_a_mistyped_option_is_not_read_as_text(
     words: list[str], option: str, near: str | None, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(words) == 2
@@ -61,7 +61,7 @@ def test_known_options_and_text_with_a_dash_pass(words: list[str]) -> None:
     check_options(app, words)
 
 
-def test_text_behind_two_dashes_is_spoken(here: Path) -> None:
+def test_text_after_two_dashes_is_synthesised(here: Path) -> None:
     assert run(["--explain", "why.json", "--quiet", "--", "--bob"]) == 0
     shown = json.loads((here / "why.json").read_text(encoding="utf-8"))
     assert [phone["phone"] for phone in shown if phone["phone"] != "sil"] == ["b", "ɑ", "b"]
@@ -136,6 +136,6 @@ def test_the_longest_name_can_be_written(here: Path) -> None:
         ("Hallo.", "de_DE.UTF-8"),
     ],
 )
-def test_languages_in_any_spelling_are_spoken(text: str, language: str, here: Path) -> None:
+def test_languages_are_accepted_in_any_spelling(text: str, language: str, here: Path) -> None:
     assert run([text, "--language", language, "--voice", "espeak", "--explain", "why.txt", "--quiet"]) == 0
     assert (here / "why.txt").stat().st_size > 0

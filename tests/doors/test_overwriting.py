@@ -1,4 +1,4 @@
-"""Every command refuses an output that is one of its inputs, before it reads or makes anything."""
+"""Every command refuses an output that is one of its inputs, before it reads or writes anything."""
 
 import os
 from pathlib import Path
@@ -30,6 +30,9 @@ COMMANDS = {
     "a talker that gets audio maps": ["corpus", "audio-maps", ".", "--talker", "in.talker", "--out", "in.talker"],
     "a palette that gets a style": ["corpus", "gestures", ".", "--style", "a", "--palette", "in.palette", "--out",
                                     "in.palette"],
+    "a still": ["corpus", "gestures", "other.wav", "--style", "a", "--still", "sad=in.png", "--out", "link.palette"],
+    "an instant of a video": ["corpus", "gestures", "other.wav", "--style", "a", "--still", "sad=in.mp4@1.5", "--out",
+                              "hard.palette"],
     "a manifest": ["corpus", "evaluate", "--recordings", ".", "--out", "in.csv"],
     "a model": ["corpus", "face", ".", "--model", "in.face", "--out", "in.face", "--consent", "I agree"],
     "a talker to study": ["report", "similarity", "in.json", "--out", "in.json"],
@@ -42,11 +45,13 @@ def test_an_input_is_never_replaced(
     arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    for suffix in ("mp4", "json", "csv", "txt", "talker", "palette", "face"):
+    for suffix in ("mp4", "json", "csv", "txt", "talker", "palette", "face", "png"):
         (tmp_path / f"in.{suffix}").write_bytes(b"precious")
     (tmp_path / "other.wav").write_bytes(b"precious")
     (tmp_path / "link.mp4").symlink_to("in.mp4")
-    os.link(tmp_path / "in.mp4", tmp_path / "hard.mp4")
+    (tmp_path / "link.palette").symlink_to("in.png")
+    for name in ("hard.mp4", "hard.palette"):
+        os.link(tmp_path / "in.mp4", tmp_path / name)
     (tmp_path / "frames").mkdir()
     (tmp_path / "frames" / "000000.png").write_bytes(b"precious")
     before = sorted(tmp_path.rglob("*"))

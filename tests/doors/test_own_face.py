@@ -1,4 +1,4 @@
-"""Recordings become a talker who speaks any text with an own face: the whole way, on rendered and real recordings."""
+"""From recordings to a talker with a face of its own that speaks any text, on rendered and real recordings."""
 
 import csv
 from pathlib import Path
@@ -61,7 +61,7 @@ def pictures(talker: Path) -> np.ndarray:
         return np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)])
 
 
-def test_the_file_says_who_agreed_and_is_small(talker: Path) -> None:
+def test_the_file_contains_the_consent_and_is_small(talker: Path) -> None:
     made = read_talker(talker)
     assert made.metadata["consent"]["statement"] == CONSENT
     assert made.metadata["consent"]["date"]
@@ -135,7 +135,7 @@ def test_speech_of_another_talker_on_an_own_face(source: str, talker: Path, tmp_
 
 
 @ONLY_RENDERED
-def test_her_looks_carried_to_herself_stay(talker: Path) -> None:
+def test_an_appearance_cloned_to_its_own_talker_is_unchanged(talker: Path) -> None:
     """The basis is kept in 16-bit floating point, with three digits."""
     appearance = read_talker(talker).appearance
     carry = build_appearance_transfer(appearance, appearance)

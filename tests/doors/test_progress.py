@@ -1,4 +1,4 @@
-"""Bars: one at a time, under the name of the stage, and none where nobody looks."""
+"""Progress bars: one at a time, with the name of the stage, and none without a terminal."""
 
 import sys
 
@@ -22,7 +22,7 @@ def test_a_bar_starts_again_with_each_stage(
 
 
 @pytest.mark.parametrize("quiet", [True, False])
-def test_nobody_is_told_who_does_not_look(quiet: bool, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_bar_is_shown_without_a_terminal_or_with_quiet(quiet: bool, capsys: pytest.CaptureFixture[str]) -> None:
     with progress_bar("reading", quiet) as tell, stage_bar(quiet) as stages:
         assert tell is None
         assert stages is None

@@ -35,13 +35,13 @@ def here(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def written(out: str, *more: str) -> bytes:
+def report_bytes(out: str, *more: str) -> bytes:
     assert run(["report", "gestures", "made.palette", "--out", out, *more]) == 0
     return Path(out).read_bytes()
 
 
-def test_the_page_holds_everything_and_fetches_nothing(here: Path) -> None:
-    html = written("g.html").decode()
+def test_the_page_is_complete_and_loads_nothing(here: Path) -> None:
+    html = report_bytes("g.html").decode()
     for heading in ("calm", "quick"):
         assert f"<h2>{heading}</h2>" in html
     for heading, n in (("Distributions", 2), ("Spectra, sound, seeds", 2), ("Clips of 10 minutes", 1)):
@@ -57,7 +57,7 @@ def test_the_page_holds_everything_and_fetches_nothing(here: Path) -> None:
 
 
 def test_the_table_has_a_line_a_trait(here: Path) -> None:
-    rows = list(csv.DictReader(written("g.csv").decode().splitlines()))
+    rows = list(csv.DictReader(report_bytes("g.csv").decode().splitlines()))
     assert len(rows) == 20
     assert {row["style"]: row["source"] for row in rows} == {"calm": "", "quick": "calm"}
     assert all(float(row[name]) >= 0 for row in rows for name in ("w_halves", "w_field", "w_noise"))
@@ -65,9 +65,9 @@ def test_the_table_has_a_line_a_trait(here: Path) -> None:
     assert {row["trait"] for row in rows if row["target"]} == {"head speed", "brow height", "blink interval"}
 
 
-def test_the_json_says_the_same_as_the_table(here: Path) -> None:
-    content = json.loads(written("g.json"))
-    rows = list(csv.DictReader(written("g.csv").decode().splitlines()))
+def test_the_json_equals_the_table(here: Path) -> None:
+    content = json.loads(report_bytes("g.json"))
+    rows = list(csv.DictReader(report_bytes("g.csv").decode().splitlines()))
     weights = [
         (style["name"], trait["name"], trait["field"]) for style in content["styles"] for trait in style["traits"]
     ]
@@ -82,7 +82,7 @@ def test_the_json_says_the_same_as_the_table(here: Path) -> None:
 
 
 def test_the_picture_shows_the_main_plots(here: Path) -> None:
-    assert written("g.PNG").startswith(b"\x89PNG")
+    assert report_bytes("g.PNG").startswith(b"\x89PNG")
     with Image.open("g.PNG") as image:
         assert image.size == (2 * 3 * 380, 2 * (2 * 250 + 26))
         colours = {colour for _, colour in image.convert("RGB").getcolors(1 << 20)}
@@ -91,11 +91,11 @@ def test_the_picture_shows_the_main_plots(here: Path) -> None:
 
 @pytest.mark.parametrize("option", [("--held-out", "4"), ("--halves", "9"), ("--clips", "2"), ("--seed", "7")])
 def test_each_option_changes_what_is_written(option: tuple[str, str], plain: bytes, here: Path) -> None:
-    assert written("g.csv", *option) != plain
+    assert report_bytes("g.csv", *option) != plain
 
 
 def test_the_same_options_write_the_same(plain: bytes, here: Path) -> None:
-    assert written("g.csv", "--held-out", "5", "--halves", "50", "--clips", "3", "--seed", "0") == plain
+    assert report_bytes("g.csv", "--held-out", "5", "--halves", "50", "--clips", "3", "--seed", "0") == plain
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_the_same_options_write_the_same(plain: bytes, here: Path) -> None:
         ("made.palette", "g.html", ("--seed", "0.5"), '"0.5" is not a whole number'),
     ],
 )
-def test_refusals_are_one_sentence_and_write_nothing(
+def test_errors_are_one_sentence_and_nothing_is_written(
     palette: str, out: str, more: tuple[str, ...], reason: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["report", "gestures", palette, "--out", out, *more]) == 2

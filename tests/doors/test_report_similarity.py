@@ -38,13 +38,13 @@ def report(out: str, *more: str, talker: str = "made.talker") -> int:
     return run(["report", "similarity", talker, "--out", out, *halves, *more])
 
 
-def written(out: str, *more: str) -> bytes:
+def report_bytes(out: str, *more: str) -> bytes:
     assert report(out, *more) == 0
     return Path(out).read_bytes()
 
 
-def test_the_page_holds_everything_and_fetches_nothing(here: Path) -> None:
-    html = written("r.html", "--compare", "other.talker").decode()
+def test_the_page_is_complete_and_loads_nothing(here: Path) -> None:
+    html = report_bytes("r.html", "--compare", "other.talker").decode()
     for heading in (
         "Phone by phone", "Most similar phones", "Viseme classes", "Reliability", "Similarity and articulation",
         "Movements that phones constrain", "Compared with other.talker",
@@ -58,7 +58,7 @@ def test_the_page_holds_everything_and_fetches_nothing(here: Path) -> None:
 
 
 def test_the_matrix_is_a_table_of_numbers(here: Path) -> None:
-    rows = list(csv.reader(written("r.csv").decode().splitlines()))
+    rows = list(csv.reader(report_bytes("r.csv").decode().splitlines()))
     assert rows[0][:2] == ["phone", "tokens"]
     assert rows[0][2:] == [row[0] for row in rows[1:]]
     matrix = np.array([row[2:] for row in rows[1:]], float)
@@ -67,9 +67,9 @@ def test_the_matrix_is_a_table_of_numbers(here: Path) -> None:
     assert {row[1] for row in rows[1:]} == {"60"}
 
 
-def test_the_json_says_the_same_as_the_matrix(here: Path) -> None:
-    content = json.loads(written("r.json"))
-    rows = list(csv.reader(written("r.csv", "--labels", "ipa").decode().splitlines()))
+def test_the_json_equals_the_matrix(here: Path) -> None:
+    content = json.loads(report_bytes("r.json"))
+    rows = list(csv.reader(report_bytes("r.csv", "--labels", "ipa").decode().splitlines()))
     assert [phone["ipa"] for phone in content["phones"]] == rows[0][2:]
     np.testing.assert_array_equal(content["similarity"], np.array([row[2:] for row in rows[1:]], float))
     assert content["classes"]["best"] == 3
@@ -79,7 +79,7 @@ def test_the_json_says_the_same_as_the_matrix(here: Path) -> None:
 
 
 def test_the_picture_is_a_png(here: Path) -> None:
-    assert written("r.PNG").startswith(b"\x89PNG")
+    assert report_bytes("r.PNG").startswith(b"\x89PNG")
     with Image.open("r.PNG") as image:
         assert min(image.size) > 400
 
@@ -104,9 +104,9 @@ def test_the_picture_is_a_png(here: Path) -> None:
     ],
 )
 def test_each_option_changes_what_is_written(out: str, option: tuple[str, str], here: Path) -> None:
-    plain = written(out)
-    assert written(out) == plain
-    assert written(out, *option) != plain
+    plain = report_bytes(out)
+    assert report_bytes(out) == plain
+    assert report_bytes(out, *option) != plain
 
 
 def test_a_comparison_is_the_difference_of_the_matrices(here: Path) -> None:
@@ -143,7 +143,7 @@ def test_a_comparison_is_the_difference_of_the_matrices(here: Path) -> None:
         ("made.talker", "r.html", ("--compare", "poor.talker"), "the talker poor.talker has"),
     ],
 )
-def test_refusals_are_one_sentence_and_write_nothing(
+def test_errors_are_one_sentence_and_nothing_is_written(
     talker: str, out: str, more: tuple[str, ...], reason: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["report", "similarity", talker, "--out", out, *more]) == 2

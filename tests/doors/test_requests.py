@@ -64,15 +64,16 @@ def test_every_option_changes_the_clip(name: str, clip: Clip, session: Session, 
 def test_the_same_request_gives_the_same_bytes_in_another_process(clip: Clip) -> None:
     code = (
         "import sys; sys.path.insert(0, 'tests/doors')\n"
-        "from test_requests import *\n"
-        "print(digest(Session(load_talker('grid_s1'), load_face('head')).clip(Request(text=TEXT))))"
+        "from test_requests import TEXT, digest\n"
+        "from tts2face import Request, Session\n"
+        "print(digest(Session('grid_s1', 'head').clip(Request(text=TEXT))))"
     )
     environment = {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PATH": ""}
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
     assert answer.stdout.strip() == digest(clip)
 
 
-def test_a_voice_that_has_spoken_before_gives_the_same_bytes(clip: Clip, talker: Talker, face: Face) -> None:
+def test_a_voice_used_before_gives_the_same_bytes(clip: Clip, talker: Talker, face: Face) -> None:
     ready = Session(talker, face)
     for text in ("Something else was said. Bob may have been away.", TEXT):
         joined = concatenate_clips([piece.clip for piece in ready.stream(Request(text=text))])
@@ -95,7 +96,7 @@ def test_every_method_of_gestures_is_another_clip_of_the_same_speech(clip: Clip,
 
 
 @pytest.mark.parametrize(("seconds", "fps"), [(0.1, 30.0), (25.0, 29.97), (12.3, 7.0)])
-def test_an_idle_face_is_silent_for_as_long_as_it_says(seconds: float, fps: float, session: Session) -> None:
+def test_an_idle_clip_is_silent_and_has_the_requested_duration(seconds: float, fps: float, session: Session) -> None:
     pieces = list(session.stream(Request(idle=seconds, fps=fps)))
     clip = concatenate_clips([piece.clip for piece in pieces])
     assert clip.speech.waveform.duration == pytest.approx(seconds, abs=1.01 / fps)
@@ -133,7 +134,7 @@ def test_lips_rest_in_silence_and_at_both_ends(session: Session) -> None:
         ({"dictionary": Path("missing.txt")}, "missing.txt cannot be read"),
     ],
 )
-def test_what_cannot_be_said_is_refused(change: dict, reason: str, session: Session) -> None:
+def test_requests_that_cannot_be_spoken_are_refused(change: dict, reason: str, session: Session) -> None:
     with pytest.raises((InputError, DataError), match=reason):
         session.clip(replace(Request(text=TEXT), **change))
 

@@ -1,4 +1,4 @@
-"""Commands that are ended from outside leave nothing behind, neither files nor processes."""
+"""Commands ended by a signal leave neither files nor processes."""
 
 import shutil
 import signal
@@ -39,7 +39,7 @@ def wait_until(holds: Callable[[], object]) -> None:
         time.sleep(0.05)
 
 
-def speaking(here: Path) -> "subprocess.Popen[str]":
+def start_command(here: Path) -> "subprocess.Popen[str]":
     """A command that has begun to write x.mp4."""
     process = subprocess.Popen(
         [*COMMAND, TEXT, "--out", "x.mp4", "--size", "64x64"], stderr=subprocess.PIPE, text=True, cwd=here
@@ -50,8 +50,8 @@ def speaking(here: Path) -> "subprocess.Popen[str]":
 
 
 @pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
-def test_a_signal_leaves_nothing(tmp_path: Path, name: str, code: int) -> None:
-    with speaking(tmp_path) as process:
+def test_a_signal_leaves_no_files_and_no_processes(tmp_path: Path, name: str, code: int) -> None:
+    with start_command(tmp_path) as process:
         process.send_signal(getattr(signal, name))
         _, message = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == code
@@ -59,8 +59,8 @@ def test_a_signal_leaves_nothing(tmp_path: Path, name: str, code: int) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_a_killed_command_left_is_removed_by_the_next_one(tmp_path: Path) -> None:
-    with speaking(tmp_path) as process:
+def test_files_of_a_killed_command_are_removed_by_the_next_one(tmp_path: Path) -> None:
+    with start_command(tmp_path) as process:
         process.kill()
     assert list(tmp_path.glob(".x*"))
     subprocess.run([*COMMAND, "Hi.", "--out", "x.mp4", "--size", "64x64", "--fps", "5"], check=True, cwd=tmp_path)
@@ -68,7 +68,7 @@ def test_what_a_killed_command_left_is_removed_by_the_next_one(tmp_path: Path) -
 
 
 def is_running(number: int) -> bool:
-    """Whether a process works; one that has ended and waits for its parent to notice does not."""
+    """Whether a process is running; a zombie is not."""
     status = subprocess.run(["ps", "-o", "stat=", "-p", str(number)], capture_output=True, text=True, check=False)
     return status.stdout.strip() not in {"", "Z"} and not status.stdout.startswith("Z")
 

@@ -1,4 +1,4 @@
-"""A text that is not what a recording says: the core reports the words, the command line says so in one sentence."""
+"""A text that differs from the recording: the core reports the words, the command line writes one sentence."""
 
 import wave
 from dataclasses import replace
@@ -42,7 +42,7 @@ def test_the_core_reports_the_words(recording: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("text", "n_lines"), [(SAID, 0), (WRONG, 1)])
-def test_the_command_line_says_so(
+def test_the_command_line_reports_mismatches(
     text: str, n_lines: int, recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "clip.mp4"

@@ -1,4 +1,4 @@
-"""A tiny talker with a known answer: every phone has one mouth opening, reached at its middle."""
+"""A tiny talker with a known answer: every phone has one mouth opening, at its centre."""
 
 import numpy as np
 import pytest

@@ -38,7 +38,7 @@ SENTENCE = sequence([SILENCE, "s", "ɑ", "p", "i", "m", "u", SILENCE], [0.4, 0.1
 
 
 @st.composite
-def spoken(draw):
+def phone_sequences(draw):
     labels = draw(st.lists(st.sampled_from(LABELS), min_size=1, max_size=12))
     durations = [draw(st.floats(0.01, 0.9)) for _ in labels]
     return sequence(labels, durations)
@@ -46,7 +46,9 @@ def spoken(draw):
 
 @settings(max_examples=60, deadline=None)
 @given(
-    phones=spoken(), fps=st.sampled_from([12.5, 24.0, 25.0, 30.0, 60.0]), method=st.sampled_from(sorted(METHOD_OPTIONS))
+    phones=phone_sequences(),
+    fps=st.sampled_from([12.5, 24.0, 25.0, 30.0, 60.0]),
+    method=st.sampled_from(sorted(METHOD_OPTIONS)),
 )
 def test_every_chunk_begins_and_ends_at_rest_and_stays_finite(voice: ExemplarModel, phones, fps, method):
     made = speech_trajectory(
@@ -59,7 +61,7 @@ def test_every_chunk_begins_and_ends_at_rest_and_stays_finite(voice: ExemplarMod
 
 
 @settings(max_examples=40, deadline=None)
-@given(phones=spoken())
+@given(phones=phone_sequences())
 def test_silence_far_from_speech_is_at_rest(voice: ExemplarModel, phones):
     made = moved(voice, phones).values
     times = np.arange(len(made)) / 50.0
@@ -76,7 +78,7 @@ def test_frame_rates_agree_where_their_frames_meet(voice: ExemplarModel):
 
 
 def test_a_pause_cuts_a_text_into_parts_that_move_alone(voice: ExemplarModel):
-    """Where a sentence is surrounded by silence, it moves as if nothing else were said."""
+    """The motion of a sentence between silences does not depend on other sentences."""
     twice = sequence([*SENTENCE.phones[:-1], SILENCE, *SENTENCE.phones[1:]],
                      [*SENTENCE.durations[:-1], 2.1, *SENTENCE.durations[1:]])  # fmt: skip
     alone, both = moved(voice, SENTENCE, context=1).values, moved(voice, twice, context=1).values
@@ -127,18 +129,20 @@ def test_a_throat_sound_takes_the_next_phone_s_shape(voice: ExemplarModel):
 
 
 def test_a_recorded_sentence_finds_itself_first(voice: ExemplarModel, talker: Talker):
-    spoken = talker.utterances[7]
-    found = select_tokens(spoken.phones, voice, SynthesisOptions(context=4, k=1)).found
+    phone_sequences = talker.utterances[7]
+    found = select_tokens(phone_sequences.phones, voice, SynthesisOptions(context=4, k=1)).found
     assert (voice.tokens.utterance[found.tokens[:, 0]] == 7).all()
 
 
 def test_one_exemplar_of_a_recorded_sentence_gives_the_recording_back(voice: ExemplarModel, talker: Talker):
-    spoken = talker.utterances[7]
+    phone_sequences = talker.utterances[7]
     options = SynthesisOptions(context=4, k=1, smoothing_s=0.0, contacts=False, articulation=1.0)
-    made = speech_trajectory(spoken.phones, voice, fps=25.0, n_frames=len(spoken.shape), options=options).values
-    inner = slice(int(spoken.phones.edges[1] * 25) + 1, int(spoken.phones.edges[-2] * 25))
+    made = speech_trajectory(
+        phone_sequences.phones, voice, fps=25.0, n_frames=len(phone_sequences.shape), options=options
+    ).values
+    inner = slice(int(phone_sequences.phones.edges[1] * 25) + 1, int(phone_sequences.phones.edges[-2] * 25))
     # mm; straight lines between knots cut the corners of a curve with 25 frames a second
-    assert np.abs(made[inner, 0] - spoken.shape[inner, 0]).max() < 0.6
+    assert np.abs(made[inner, 0] - phone_sequences.shape[inner, 0]).max() < 0.6
 
 
 @pytest.mark.parametrize("name", [field.name for field in fields(SynthesisOptions) if field.name != "network"])
@@ -201,7 +205,7 @@ def test_articulation_is_counted_from_the_mean_speaking_pose(voice: ExemplarMode
     one, other = (
         speech_trajectory(phones, voice, fps=100.0, n_frames=130, options=options).values for options in (plain, more)
     )
-    inner = slice(50, 80)  # no silence is near: nothing is drawn to rest
+    inner = slice(50, 80)  # far from silence, where the rest pose has no influence
     np.testing.assert_allclose(
         other[inner] - voice.mean_speaking_pose,
         1.5 * (one[inner] - voice.mean_speaking_pose),

@@ -67,17 +67,19 @@ def pieces_of(*values, knots=25):
     return AveragedTokens(mean, np.zeros_like(mean))
 
 
-def test_pieces_edge_to_edge_stand_where_they_belong():
-    joined, told = join_averages(pieces_of(1.0, 3.0, knots=9), targets(0.1, 0.2, 0.4), 60, THEOBALD_2007)
-    assert told.nonzero()[0].tolist() == list(range(10, 41))
+def test_adjacent_pieces_keep_their_positions():
+    joined, contacts_with = join_averages(pieces_of(1.0, 3.0, knots=9), targets(0.1, 0.2, 0.4), 60, THEOBALD_2007)
+    assert contacts_with.nonzero()[0].tolist() == list(range(10, 41))
     np.testing.assert_allclose(joined[11:20, 0], 1.0)
     np.testing.assert_allclose(joined[21:41, 0], 3.0)
-    assert (joined[~told] == 0).all()
+    assert (joined[~contacts_with] == 0).all()
 
 
 def test_overlapping_pieces_hand_over_without_a_jump():
-    joined, told = join_averages(pieces_of(0.0, 1.0), targets(0.0, 0.2, 0.4), 41, SynthesisOptions(precision=0.0))
-    assert told.all()
+    joined, contacts_with = join_averages(
+        pieces_of(0.0, 1.0), targets(0.0, 0.2, 0.4), 41, SynthesisOptions(precision=0.0)
+    )
+    assert contacts_with.all()
     steps = np.diff(joined[:, 0])
     assert (steps >= -1e-6).all()
     assert steps.max() < 0.06
@@ -102,13 +104,13 @@ def test_smoothing_is_a_gaussian_in_seconds():
     assert gaussian_smooth(pulse, 0.0, 100.0)[100, 0] == 1.0
 
 
-def test_knows_the_phones_that_bring_the_lips_together():
+def test_phones_with_lip_contact_are_found():
     assert [contact_rule(label) for label in ("p", "b", "m")] == [CONTACT_RULES["bilabial"]] * 3
     assert [contact_rule(label) for label in ("f", "v")] == [CONTACT_RULES["labiodental"]] * 2
     assert not any(contact_rule(label) for label in ("w", "t", "u", "ɹ", "sil"))
 
 
-def test_a_contact_closes_what_averaging_left_open():
+def test_a_contact_closes_lips_that_averaging_opened():
     values = np.full((100, 1), 4.0, np.float32)
     values[45:56, 0] = 2.0
     contact = Contacts(np.array([[0.46, 0.54]]), np.array([[0.1]], np.float32), np.array([0.1], np.float32))
@@ -121,7 +123,7 @@ def test_a_contact_closes_what_averaging_left_open():
     assert (kept <= values + 1e-6).all()
 
 
-def test_a_closed_contact_is_left_alone():
+def test_a_closed_contact_is_not_changed():
     values = np.full((100, 1), 0.05, np.float32)
     contact = Contacts(np.array([[0.46, 0.54]]), np.array([[0.1]], np.float32), np.array([0.1], np.float32))
     assert (enforce_contacts(values, contact, GAP, 100.0) == values).all()
@@ -132,14 +134,14 @@ def test_a_closed_contact_is_left_alone():
 
 
 def test_poses_are_taken_where_each_token_is_closest(voice: ExemplarModel):
-    """Two p tokens, and one that never closes: the closer ones by weight tell the pose."""
+    """Two p tokens, and one that never closes: the pose is the weighted mean of the closed ones."""
     label = voice.tokens.inventory.index("p")
     p = np.flatnonzero(voice.tokens.phone == label)[:2]
     open_one = np.flatnonzero(voice.tokens.phone == voice.tokens.inventory.index("ɑ"))[0]
     chosen = np.array([[open_one, *p]], np.int32)
     exemplars = ChosenExemplars(voice.tokens, chosen, np.array([[0.2, 0.4, 0.4]]))
 
-    def told(enough: float) -> Contacts:
+    def contacts_with(enough: float) -> Contacts:
         return find_contacts(exemplars, voice.lip_gap, np.array([[0.0, 0.1]]), [ContactRule(0.7, enough)])
 
     least, frames = [], voice.tokens.frames
@@ -148,6 +150,6 @@ def test_poses_are_taken_where_each_token_is_closest(voice: ExemplarModel):
         times = np.arange(last - first) / voice.tokens.fps
         near = (times >= voice.tokens.spans[token, 1] - 0.03) & (times <= voice.tokens.spans[token, 2] + 0.03)
         least.append(np.abs(frames[first:last][near, 0]).min())
-    assert told(0.0).poses[0, 0] == pytest.approx(np.mean(least[:2]), abs=1e-5)
-    assert told(0.7).enough[0] == pytest.approx(max(least[:2]), abs=1e-5)
-    assert told(0.9).enough[0] == pytest.approx(least[2], abs=1e-5)
+    assert contacts_with(0.0).poses[0, 0] == pytest.approx(np.mean(least[:2]), abs=1e-5)
+    assert contacts_with(0.7).enough[0] == pytest.approx(max(least[:2]), abs=1e-5)
+    assert contacts_with(0.9).enough[0] == pytest.approx(least[2], abs=1e-5)

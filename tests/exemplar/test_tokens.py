@@ -29,7 +29,7 @@ def test_contexts_are_nearest_first_and_end_with_the_utterance():
     assert phone_contexts(phone[:1], utterance[:1], 7).tolist() == [[7] * 12]
 
 
-def test_silence_keeps_only_what_lies_beside_speech():
+def test_only_silence_next_to_speech_is_kept():
     spans = spoken_spans((SILENCE, "i", SILENCE), np.array([0.0, 1.0, 1.2, 3.0]))
     reach = PAUSE_REACH_S
     np.testing.assert_allclose(spans[0, 1:], [1 - reach, 1.0, 1.2])
@@ -61,7 +61,7 @@ def test_token_samples_lie_within_the_token(talker: Talker, voice: ExemplarModel
     assert abs(samples[at, 2, 0] - near) < 0.7  # mm; a cubic against straight lines
 
 
-def test_a_said_phone_stands_for_itself_and_an_unsaid_one_for_its_nearest():
+def test_recorded_phones_map_to_themselves_and_others_to_the_nearest():
     assert substitute_phones("p", INVENTORY) == ("p",)
     assert substitute_phones("m", INVENTORY) == ("b",)
     assert substitute_phones("h", INVENTORY) == ()

@@ -1,4 +1,4 @@
-"""Networks from phones to lips: their answer, their file, and their share in the motion."""
+"""Networks from phones to lips: their output, their file, and their share of the motion."""
 
 from dataclasses import replace
 
@@ -18,14 +18,14 @@ KNOWN = ("b", "i", "p", SILENCE)
 TIMES = np.arange(25) / 25
 
 
-def seen_as_ones(phones: PhoneSequence, times: np.ndarray) -> np.ndarray:
+def one_hot_features(phones: PhoneSequence, times: np.ndarray) -> np.ndarray:
     shown, place = window_features(phones, times, KNOWN)
     return np.array([[*np.eye(len(KNOWN))[row].ravel(), *where] for row, where in zip(shown, place, strict=True)])
 
 
 def random_network(n_outputs: int, n_networks: int = 2) -> PhoneNetwork:
     generator = np.random.default_rng(0)
-    n_features = seen_as_ones(PHONES, TIMES).shape[1]
+    n_features = one_hot_features(PHONES, TIMES).shape[1]
     shapes = [(n_features, 7), (7, 5), (5, n_outputs)]
     weights = tuple(generator.normal(0, 1, (n_networks, *shape)).astype(np.float32) for shape in shapes)
     biases = tuple(generator.normal(0, 1, (n_networks, shape[1])).astype(np.float32) for shape in shapes)
@@ -34,7 +34,7 @@ def random_network(n_outputs: int, n_networks: int = 2) -> PhoneNetwork:
 
 def test_the_answer_is_the_mean_of_the_networks_neuron_by_neuron() -> None:
     network = random_network(2)
-    features = seen_as_ones(PHONES, TIMES)
+    features = one_hot_features(PHONES, TIMES)
     wanted = np.zeros((len(TIMES), 2))
     for member in range(2):
         for frame, row in enumerate(features):
@@ -51,27 +51,27 @@ def test_the_answer_is_the_mean_of_the_networks_neuron_by_neuron() -> None:
     np.testing.assert_allclose(network.parameters(PHONES, TIMES), wanted, rtol=1e-4, atol=1e-4)
 
 
-def test_one_member_can_answer_alone() -> None:
+def test_a_single_network_can_be_evaluated() -> None:
     network = random_network(2)
     alone = [network.parameters(PHONES, TIMES, slice(at, at + 1)) for at in (0, 1)]
     np.testing.assert_allclose(np.mean(alone, axis=0), network.parameters(PHONES, TIMES), atol=1e-4)
 
 
 def test_features_say_what_sounds_when() -> None:
-    features = seen_as_ones(PHONES, np.array([0.45]))[0]
+    features = one_hot_features(PHONES, np.array([0.45]))[0]
     columns = features[: 21 * 4].reshape(21, 4)
     assert (columns.sum(axis=1) == 1).all()
     sounding = [KNOWN[at] for at in columns.argmax(axis=1)]
     assert sounding[7] == "i"  # now
     assert sounding[7 - 2] == "b"  # 80 ms before
-    assert sounding[7 + 4] == "p"  # 160 ms behind
+    assert sounding[7 + 4] == "p"  # 160 ms after
     assert sounding[15:] == [SILENCE, SILENCE, "b", "p", SILENCE, SILENCE]  # neighbours; beyond the end the end goes on
     np.testing.assert_allclose(features[-4:], [0.25, 0.05, 0.15, 0.2], atol=1e-6)
 
 
-def test_an_unknown_phone_is_seen_as_its_nearest() -> None:
+def test_an_unknown_phone_is_encoded_as_the_nearest_one() -> None:
     other = PhoneSequence([SILENCE, "m", "i", "p", SILENCE], PHONES.edges)
-    features = seen_as_ones(other, np.array([0.35]))[0][:84].reshape(21, 4)
+    features = one_hot_features(other, np.array([0.35]))[0][:84].reshape(21, 4)
     assert KNOWN[int(features[7].argmax())] in {"b", "p"}
     with pytest.raises(InputError, match="§"):
         window_features(PhoneSequence(["§"], [0.0, 1.0]), TIMES, KNOWN)
@@ -90,7 +90,7 @@ def test_a_talker_keeps_its_networks(talker: Talker, tmp_path) -> None:
     assert read_talker(tmp_path / "b.talker").network is None
 
 
-def test_the_share_of_the_networks_is_what_it_says(voice: ExemplarModel) -> None:
+def test_the_share_of_the_networks_equals_its_parameter(voice: ExemplarModel) -> None:
     knowing = replace(voice, network=random_network(len(voice.spread)))
     plain = SynthesisOptions(network=0.0, articulation=1.0, smoothing_s=0.0, contacts=False)
 

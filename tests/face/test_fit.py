@@ -29,7 +29,7 @@ def test_known_scales_are_recovered_and_clipped() -> None:
     assert axis_scales(places, places * [1.2, 0.8, 1.0] + 7, (0.9, 1.1)) == pytest.approx([1.1, 0.9, 1.0])
 
 
-def test_landmarks_move_as_those_of_the_posed_face() -> None:
+def test_landmarks_move_like_those_of_the_posed_face() -> None:
     face = load_face("head")
     number = face.shape_names.index("mouthSmileLeft")
     weights = np.zeros(len(face.shape_names))

@@ -37,7 +37,7 @@ def prepared_face(name: str) -> GestureFace:
 
 
 @cache
-def spoken(name: str) -> Trajectory:
+def speech_motion(name: str) -> Trajectory:
     return Session(load_talker("grid_s1"), load_face(name)).clip(Request(text=BILABIALS, gestures="none")).motion
 
 
@@ -88,7 +88,7 @@ def lid_openings(face: Face, weights: np.ndarray) -> np.ndarray:
 )
 def test_an_expression_never_opens_closed_lips(name: str, weights: dict[str, float], gains: dict[str, float]) -> None:
     """The case that the paper warns about (section 7), on speech with many /p b m/."""
-    face, speech = prepared_face(name), spoken(name)
+    face, speech = prepared_face(name), speech_motion(name)
     plain = gaps(face.face, face.perform(speech, {}).motion.values)
     moved = gaps(face.face, face.perform(speech, expression_gestures(len(speech), **weights), gains).motion.values)
     closed = plain <= CONTACT_MM
@@ -99,7 +99,7 @@ def test_an_expression_never_opens_closed_lips(name: str, weights: dict[str, flo
 
 @pytest.mark.parametrize("name", FACES)
 def test_neutral_gestures_do_not_change_speech(name: str) -> None:
-    face, speech = prepared_face(name), spoken(name)
+    face, speech = prepared_face(name), speech_motion(name)
     calm = expression_gestures(len(speech), sad=0.05, happy=0.15, afraid=0.02, angry=0.05, surprised=0.1)
     calm |= {"blink": np.zeros((len(speech), 2), np.float32), "cheeks": np.full((len(speech), 2), 0.5, np.float32)}
     plain, moved = (face.perform(speech, gestures).motion.values for gestures in ({}, calm))
@@ -108,7 +108,7 @@ def test_neutral_gestures_do_not_change_speech(name: str) -> None:
 
 
 def test_a_smile_keeps_rounded_lips_round() -> None:
-    face, speech = prepared_face("head"), spoken("head")
+    face, speech = prepared_face("head"), speech_motion("head")
     plain, smiling = (
         width(face.face, face.perform(speech, gestures).motion.values)
         for gestures in ({}, expression_gestures(len(speech), happy=1))
@@ -122,7 +122,7 @@ def test_a_smile_keeps_rounded_lips_round() -> None:
 
 @pytest.mark.parametrize("name", FACES)
 def test_without_gestures_speech_passes_unchanged(name: str) -> None:
-    face, speech = prepared_face(name), spoken(name)
+    face, speech = prepared_face(name), speech_motion(name)
     performed = face.perform(speech, {})
     assert np.array_equal(performed.motion.values[:, : face.n_speech_shapes], speech.values)
     assert not performed.motion.values[:, face.n_speech_shapes :].any()
@@ -131,7 +131,7 @@ def test_without_gestures_speech_passes_unchanged(name: str) -> None:
 
 
 def test_a_louder_jaw_opens_wider() -> None:
-    face, speech = prepared_face("head"), spoken("head")
+    face, speech = prepared_face("head"), speech_motion("head")
     plain, loud, low = (gaps(face.face, face.perform(speech, {}, {"jaw": g}).motion.values)[:, 5] for g in (1, 1.5, 0))
     assert loud.max() > 1.2 * plain.max()
     assert low.max() < 0.7 * plain.max()
@@ -221,7 +221,7 @@ def test_the_head_moves_and_gains_multiply() -> None:
 
 
 def test_frames_are_independent() -> None:
-    face, speech = prepared_face("head"), spoken("head")
+    face, speech = prepared_face("head"), speech_motion("head")
     values = np.random.default_rng(1).uniform(-0.1, 1.1, (len(speech), 5)).astype(np.float32)
     whole = face.perform(speech, {"expression": values}).motion.values
     part = face.perform(Trajectory(speech.channels, speech.values[40:50], speech.fps), {"expression": values[40:50]})
@@ -231,7 +231,7 @@ def test_frames_are_independent() -> None:
     assert (whole <= high + 1e-6).all()
 
 
-def renamed(face: Face, kept: tuple[str, ...]) -> Face:
+def rename_shapes(face: Face, kept: tuple[str, ...]) -> Face:
     """A face with renamed shapes, except those with the prefixes `kept`, and without eye rotations."""
     names = tuple(name if name.startswith(kept) else f"rig_{i}" for i, name in enumerate(face.shape_names))
     return replace(face, shape_names=names, eyes=tuple(replace(eye, turns={}) for eye in face.eyes))
@@ -239,21 +239,23 @@ def renamed(face: Face, kept: tuple[str, ...]) -> Face:
 
 @pytest.mark.parametrize("kept", [("jaw", "mouth"), ("jaw", "mouthClose", "mouthF", "mouthPucker", "eyeBlink")])
 def test_a_renamed_rig_moves_like_the_original(kept: tuple[str, ...]) -> None:
-    """The default head with renamed shapes: transferred shapes move it like its own."""
+    """The default head with renamed shapes: transferred shapes give the motion of the original ones."""
     head = load_face("head")
-    face, known = gesture_face(renamed(head, kept), palette()), prepared_face("head")
+    face, known = gesture_face(rename_shapes(head, kept), palette()), prepared_face("head")
     for name in EXPRESSIONS:
         original, transferred = (
             posed_landmarks(model.face, model.perform(silence(own), expression_gestures(1, **{name: 1})).motion.values)[
                 0, :468
             ]
-            for model, own in ((known, head), (face, renamed(head, kept)))
+            for model, own in ((known, head), (face, rename_shapes(head, kept)))
         )
         rest = landmark_positions(head)[:468]
         assert np.corrcoef((original - rest).ravel(), (transferred - rest).ravel())[0, 1] > 0.9
-    shut = face.perform(silence(renamed(head, kept)), {"blink": np.ones((1, 2), np.float32)}).motion.values
+    shut = face.perform(silence(rename_shapes(head, kept)), {"blink": np.ones((1, 2), np.float32)}).motion.values
     assert np.abs(lid_openings(face.face, shut)).max() < 0.8
-    looking = face.perform(silence(renamed(head, kept)), {"gaze": np.array([[0.1, 0.1]], np.float32)}).motion.values[0]
+    looking = face.perform(
+        silence(rename_shapes(head, kept)), {"gaze": np.array([[0.1, 0.1]], np.float32)}
+    ).motion.values[0]
     for turn in np.einsum("ekc,k->ec", build_rig(face.face).eye_turns, looking):
         assert turn == pytest.approx([0.1, 0.1, 0], abs=1e-5)
 

@@ -20,7 +20,7 @@ def test_takes_the_given_displacements_at_the_centres() -> None:
     np.testing.assert_allclose(fit_interpolant(centres, moved, WIDTH)(centres), moved, atol=1e-9)
 
 
-def test_one_centre_falls_off_as_the_paper_says() -> None:
+def test_one_centre_decreases_as_in_the_paper() -> None:
     field = fit_interpolant(np.zeros((1, 3)), np.array([[2.0, 0.0, -1.0]]), 200.0)
     far = field(np.array([[64.0, 0.0, 0.0], [0.0, 0.0, 128.0]]))
     np.testing.assert_allclose(far, np.exp([[-1.0], [-2.0]]) * [2.0, 0.0, -1.0], rtol=1e-12)

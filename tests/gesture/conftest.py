@@ -28,8 +28,8 @@ def made_style(seed: int, size: float = 1.0) -> Style:
     channels = {name: len(names) for name, names in FIXED_CHANNELS.items()} | dict.fromkeys(REGION_FEATURES, N_MODES)
     motion = {name: size * _smooth(generator, n) for name, n in channels.items()}
     motion["head"] *= np.float32([0.01, 0.01, 0.01, 1, 1, 1])
-    heard = _smooth(generator, 2)
-    return Style(LENGTHS, 3 * heard[:, 0] - 15, heard[:, 1], motion, {"sources": "made", "licence": "none"})
+    prosody = _smooth(generator, 2)
+    return Style(LENGTHS, 3 * prosody[:, 0] - 15, prosody[:, 1], motion, {"sources": "made", "licence": "none"})
 
 
 @pytest.fixture(scope="session")

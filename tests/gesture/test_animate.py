@@ -129,7 +129,7 @@ def test_loud_speech_and_silence_differ(fields):
     assert not np.array_equal(silent["head"], _made(fields)["head"])
 
 
-def test_pitch_matters_where_it_is_asked_for(palette):
+def test_pitch_has_an_effect_where_it_is_enabled(palette):
     tone = np.sin(2 * np.pi * (150 + 50 * np.sin(np.arange(4 * RATE) / RATE * 5)) * np.arange(4 * RATE) / RATE)
     made = {
         with_pitch: GestureStream(GestureFields(palette, {}, with_pitch), style="calm", seed=0, fps=FPS).next(

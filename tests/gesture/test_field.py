@@ -33,10 +33,10 @@ def resting(made: Field, rest: np.ndarray, silence: np.ndarray) -> FieldState:
     """The state of a face that has been at rest (D,) in silence (E,)."""
     history = made.options.history
     shown = np.repeat((rest / np.float32(made.scale))[None], history, axis=0).astype(np.float32)
-    heard = np.repeat((silence * made.weights)[None], history, axis=0).astype(np.float32)
+    loudness = np.repeat((silence * made.weights)[None], history, axis=0).astype(np.float32)
     n_leaps = min(made.options.memory, len(made.tree.order) // (8 * MIN_MOMENT_GAP))
     recent = np.full(n_leaps, -MIN_MOMENT_GAP, np.int64)
-    return FieldState(shown, heard, -1, np.zeros((2, len(rest)), np.float32), recent, 0)
+    return FieldState(shown, loudness, -1, np.zeros((2, len(rest)), np.float32), recent, 0)
 
 
 def _brute_force(made, state, n_best: int) -> list[int]:
@@ -72,8 +72,8 @@ def test_a_tree_holds_every_place_once_and_on_its_side():
 
 @pytest.mark.parametrize("seed", range(8))
 def test_the_search_finds_what_brute_force_finds(seed, monkeypatch):
-    values, heard, lengths = _recordings(seed)
-    made = build_field(values, heard, lengths, FieldOptions(history=5, candidates=1, future=4, alpha=(1.0,)))
+    values, loudness, lengths = _recordings(seed)
+    made = build_field(values, loudness, lengths, FieldOptions(history=5, candidates=1, future=4, alpha=(1.0,)))
     generator = np.random.default_rng(100 + seed)
     state = resting(made, generator.normal(size=2).astype(np.float32), np.float32([0.3]))
     (expected,) = _brute_force(made, state, 1)
@@ -86,8 +86,10 @@ def test_the_search_finds_what_brute_force_finds(seed, monkeypatch):
 
 
 def test_candidates_are_drawn_by_their_distance():
-    values, heard, lengths = _recordings(1)
-    made = build_field(values, heard, lengths, FieldOptions(history=5, candidates=3, future=4, alpha=(1.0,), sigma=0.5))
+    values, loudness, lengths = _recordings(1)
+    made = build_field(
+        values, loudness, lengths, FieldOptions(history=5, candidates=3, future=4, alpha=(1.0,), sigma=0.5)
+    )
     state = resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32))
     best = _brute_force(made, state, 3)
     chances = (np.arange(3000) + 0.5) / 3000
@@ -108,8 +110,8 @@ def test_candidates_are_drawn_by_their_distance():
 
 
 def _field_and_sound(seed, n_frames):
-    values, heard, lengths = _recordings(seed)
-    made = build_field(values, heard, lengths, OPTIONS)
+    values, loudness, lengths = _recordings(seed)
+    made = build_field(values, loudness, lengths, OPTIONS)
     generator = np.random.default_rng(seed + 1)
     sound, chances = generator.normal(size=(n_frames, 1)).astype(np.float32), generator.random(n_frames)
     return made, resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32)), sound, chances, lengths
@@ -126,20 +128,20 @@ def test_in_parts_as_at_once():
 
 
 def test_without_leaps_a_recording_is_repeated():
-    values, heard, lengths = _recordings(4, n=1, length=300)
+    values, loudness, lengths = _recordings(4, n=1, length=300)
     options = FieldOptions(history=5, future=20, alpha=(1.0,), continuity=0.0, sigma=1e-6)
-    made = build_field(values, heard, lengths, options)
+    made = build_field(values, loudness, lengths, options)
     state = FieldState(
         made.values[20:25], made.prosody[20:25], 24, np.zeros((2, 2), np.float32), np.zeros(0, np.int64), 0
     )
-    shown, behind = sample_field(made, state, heard[25:150], np.full(125, 0.5))
+    shown, behind = sample_field(made, state, loudness[25:150], np.full(125, 0.5))
     assert behind.moment == 149
     np.testing.assert_allclose(shown, values[25:150], atol=1e-5)
 
 
-def test_after_a_leap_motion_goes_on_from_where_it_was():
-    values, heard, lengths = _recordings(5)
-    made = build_field(values, heard, lengths, FieldOptions(history=5, future=4, alpha=(5.0,), settle_s=0.2))
+def test_motion_is_continuous_across_a_jump():
+    values, loudness, lengths = _recordings(5)
+    made = build_field(values, loudness, lengths, FieldOptions(history=5, future=4, alpha=(5.0,), settle_s=0.2))
     generator = np.random.default_rng(6)
     sound = generator.normal(size=(600, 1)).astype(np.float32)
     start = resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32))
@@ -149,8 +151,8 @@ def test_after_a_leap_motion_goes_on_from_where_it_was():
 
 
 def test_no_dead_end_and_no_loop_in_silence():
-    values, heard, lengths = _recordings(7)
-    made = build_field(values, heard, lengths, OPTIONS)
+    values, loudness, lengths = _recordings(7)
+    made = build_field(values, loudness, lengths, OPTIONS)
     start = resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32))
     moments, state = [], start
     generator = np.random.default_rng(8)
@@ -161,10 +163,10 @@ def test_no_dead_end_and_no_loop_in_silence():
     assert set(moments[1000:]) - set(moments[500:1000])
 
 
-def test_another_style_goes_on_where_the_first_stood():
-    values, heard, lengths = _recordings(9)
-    first = build_field(values, heard, lengths, OPTIONS)
-    second = build_field(2.0 * values[::-1].copy(), heard[::-1].copy(), lengths, OPTIONS)
+def test_motion_is_continuous_across_a_change_of_style():
+    values, loudness, lengths = _recordings(9)
+    first = build_field(values, loudness, lengths, OPTIONS)
+    second = build_field(2.0 * values[::-1].copy(), loudness[::-1].copy(), lengths, OPTIONS)
     state = resting(first, np.float32([1.0, 2.0]), np.float32([0.5]))
     there = transfer_state(state, first, second)
     np.testing.assert_allclose(there.motion * second.scale, state.motion * first.scale, rtol=1e-6)
@@ -172,15 +174,15 @@ def test_another_style_goes_on_where_the_first_stood():
 
 
 def test_too_short_recordings():
-    values, heard, _ = _recordings(10, n=1, length=9)
+    values, loudness, _ = _recordings(10, n=1, length=9)
     with pytest.raises(DataError, match="no recording of the style has 10 frames"):
-        build_field(values, heard, np.array([9], np.int32), OPTIONS)
+        build_field(values, loudness, np.array([9], np.int32), OPTIONS)
 
 
 def test_sound_without_weight():
-    values, heard, lengths = _recordings(11)
+    values, loudness, lengths = _recordings(11)
     with pytest.raises(InputError, match="2 sound features need as many weights, not 1"):
-        build_field(values, np.repeat(heard, 2, axis=1), lengths, OPTIONS)
+        build_field(values, np.repeat(loudness, 2, axis=1), lengths, OPTIONS)
 
 
 @pytest.mark.parametrize(
@@ -214,9 +216,9 @@ def test_a_walk_tells_which_moments_it_shows():
     assert not (leaps[~ended] % OPTIONS.stride).any()
 
 
-def test_what_is_left_of_a_leap_is_a_critically_damped_spring():
-    values, heard, lengths = _recordings(4)
-    made = build_field(values, heard, lengths, OPTIONS)
+def test_the_residual_offset_of_a_jump_decays_as_a_critically_damped_spring():
+    values, loudness, lengths = _recordings(4)
+    made = build_field(values, loudness, lengths, OPTIONS)
     generator = np.random.default_rng(5)
     sound, chances = generator.normal(size=(300, 1)).astype(np.float32), generator.random(300)
     walk = sample_field_moments(made, resting(made, np.zeros(2, np.float32), np.zeros(1, np.float32)), sound, chances)
@@ -232,8 +234,8 @@ def test_what_is_left_of_a_leap_is_a_critically_damped_spring():
 
 @pytest.mark.parametrize("chance", [0.0, 0.5, 0.999])
 def test_a_clip_begins_as_a_recording_did(chance: float):
-    values, heard, lengths = _recordings(12)
-    made = build_field(values, heard, lengths, OPTIONS)
+    values, loudness, lengths = _recordings(12)
+    made = build_field(values, loudness, lengths, OPTIONS)
     state = initial_state(made, chance)
     start = 60 * int(chance * 12)
     np.testing.assert_array_equal(state.motion, made.values[start : start + OPTIONS.history])

@@ -47,7 +47,7 @@ def test_styles_share_a_feature_wholly(spans: tuple[StyleSpan, ...]) -> None:
 
 
 @given(disjoint())
-def test_away_from_edges_there_is_one_style(spans: tuple[StyleSpan, ...]) -> None:
+def test_far_from_edges_a_single_style_is_active(spans: tuple[StyleSpan, ...]) -> None:
     timeline = Timeline(spans=spans)
     edges = np.array([edge for span in spans for edge in (span.start, span.end)] or [-9.0])
     at = TIMES[np.abs(TIMES[:, None] - edges).min(axis=1) > BLEND_S / 2]
@@ -57,7 +57,9 @@ def test_away_from_edges_there_is_one_style(spans: tuple[StyleSpan, ...]) -> Non
 
 
 @given(disjoint(), disjoint())
-def test_of_two_timelines_the_second_is_seen(under: tuple[StyleSpan, ...], over: tuple[StyleSpan, ...]) -> None:
+def test_of_two_timelines_the_second_takes_precedence(
+    under: tuple[StyleSpan, ...], over: tuple[StyleSpan, ...]
+) -> None:
     both = Timeline(spans=under).merge(Timeline(spans=over))
     first, second, seen = (
         one.style_at("brows", TIMES, default="-") for one in (Timeline(spans=under), Timeline(spans=over), both)
@@ -91,12 +93,12 @@ def test_expressions_rise_and_fall_smoothly() -> None:
     assert np.abs(np.diff(happy)).max() < 2 * 0.6 * 0.01 / ONSET_S + 1e-9
 
 
-def test_what_begins_with_the_clip_or_lasts_to_its_end_is_on_there() -> None:
+def test_spans_at_the_ends_of_a_clip_are_fully_active_there() -> None:
     weights = Timeline(expressions=(ExpressionSpan("sad", 1.0, 0.0, math.inf),)).expression_weights([0.0, 1.0, 1e6])
     np.testing.assert_array_equal(weights[:, EXPRESSIONS.index("sad")], 1.0)
 
 
-def test_a_nod_goes_six_degrees_down_and_a_little_beyond_rest() -> None:
+def test_a_nod_turns_six_degrees_down_and_slightly_overshoots_rest() -> None:
     pitch = np.degrees(Timeline(nods=(Nod(1.0),)).nod_pitch(TIMES))
     assert pitch.max() == pytest.approx(6.0, abs=0.01)
     assert TIMES[np.argmax(pitch)] == pytest.approx(1.18, abs=0.01)
@@ -108,8 +110,8 @@ def test_a_nod_goes_six_degrees_down_and_a_little_beyond_rest() -> None:
 
 
 def test_a_timeline_can_be_moved() -> None:
-    told = Timeline(spans=(StyleSpan("head", "a", 0.0, math.inf),), nods=(Nod(0.5),)).shift(2.0)
-    assert (told.spans[0].start, told.spans[0].end, told.nods[0].time) == (2.0, math.inf, 2.5)
+    parsed = Timeline(spans=(StyleSpan("head", "a", 0.0, math.inf),), nods=(Nod(0.5),)).shift(2.0)
+    assert (parsed.spans[0].start, parsed.spans[0].end, parsed.nods[0].time) == (2.0, math.inf, 2.5)
 
 
 @pytest.mark.parametrize(
@@ -178,7 +180,7 @@ def test_written_gains_are_read_back(factors: dict) -> None:
     assert parse_gains(",".join(f"{name}={factor:g}" for name, factor in factors.items())).factors == factors
 
 
-def test_gains_of_everything() -> None:
+def test_gains_apply_to_every_feature() -> None:
     gains = parse_gains("all=0.5,head=2")
     assert [gains.of(name) for name in ("brows", "head", "jaw")] == [0.5, 2.0, 1.0]
 
@@ -223,7 +225,7 @@ def test_what_is_written_wrongly_is_refused(read, written: str, reason: str) -> 
 
 
 def test_a_file_holds_a_timeline(tmp_path: Path) -> None:
-    told = {
+    parsed = {
         "style": {"all": "calm", "head": "cross"},
         "spans": [
             {"feature": "brows", "style": "annoyed", "start": 1.0, "end": 2.5},
@@ -234,7 +236,7 @@ def test_a_file_holds_a_timeline(tmp_path: Path) -> None:
         "gains": {"head": 1.5, "jaw": 1},
     }
     path = tmp_path / "a.json"
-    path.write_text(json.dumps(told), encoding="utf-8-sig")
+    path.write_text(json.dumps(parsed), encoding="utf-8-sig")
     timeline = read_timeline(path)
     assert timeline.style == {**dict.fromkeys(FEATURES, "calm"), "head": "cross"}
     assert timeline.spans[0] == StyleSpan("brows", "annoyed", 1.0, 2.5)
@@ -286,6 +288,6 @@ def test_files_that_are_wrong_are_refused(content: str | bytes, reason: str, tmp
         read_timeline(path)
 
 
-def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot read the timeline"):
         read_timeline(tmp_path / "none.json")

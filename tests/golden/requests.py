@@ -1,4 +1,4 @@
-"""Twelve requests whose motion, sound and pictures must not change, and the fingerprint of what each gives.
+"""Twelve requests whose motion, sound and pictures must not change, and the fingerprint of each result.
 
 Run as a script it measures all of them and writes `requests.json` beside this file.
 """
@@ -139,7 +139,7 @@ def hashed(*parts: bytes) -> str:
 
 
 def environment() -> dict[str, str]:
-    """What bytes depend on beside the code: machine and versions of the libraries that compute."""
+    """What the bytes depend on besides the code: machine and versions of the libraries that compute."""
     return {"machine": f"{platform.machine()} {_processor()}"} | {name: version(name) for name in DECIDES}
 
 

@@ -91,7 +91,7 @@ def test_normalising_twice_is_normalising_once(text: str) -> None:
 
 
 @given(TEXTS)
-def test_no_digit_and_no_symbol_is_left(text: str) -> None:
+def test_all_digits_and_symbols_are_replaced(text: str) -> None:
     spoken = normalize(text)
     assert not any(character.isdigit() and character.isascii() for character in spoken)
     assert not set(spoken) & set('$£€%&@#*_()[]{}<>"/\\+=~^|\n\t')

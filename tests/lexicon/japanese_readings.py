@@ -1,4 +1,4 @@
-"""Forty sentences, and what a person says for them: katakana, long vowels with a dash, particles as spoken."""
+"""Forty sentences with their pronunciation: katakana, long vowels with a dash, particles as pronounced."""
 
 READINGS = (
     ("私は学生です。", "ワタシワガクセーデス"),

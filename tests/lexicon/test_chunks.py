@@ -44,7 +44,7 @@ def test_nothing_but_space_is_lost(text: str, limit: int) -> None:
     assert "".join("".join(split_chunks(text, limit)).split()) == "".join(text.split())
 
 
-def test_a_megabyte_comes_in_bounded_pieces() -> None:
+def test_a_megabyte_is_divided_into_bounded_pieces() -> None:
     pieces = list(split_chunks("The quick brown fox jumps over the lazy dog, and again. " * 18_000, 300))
     assert len(pieces) == 18_000
     assert max(map(len, pieces)) < 60

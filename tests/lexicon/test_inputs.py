@@ -6,7 +6,15 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import DataError
-from lexicon.inputs import MAX_DEPTH, check_regular_file, parse_json, read_bounded, read_json, read_text
+from lexicon.inputs import (
+    MAX_DEPTH,
+    check_regular_file,
+    parse_json,
+    read_bounded,
+    read_json,
+    read_table,
+    read_text,
+)
 
 
 @pytest.mark.parametrize(
@@ -51,6 +59,27 @@ def test_files_are_read_to_a_size_and_no_further(tmp_path: Path) -> None:
     file.write_bytes(b"h\xe9")
     with pytest.raises(DataError, match=r"a\.txt is not UTF-8 text \(byte 1\)"):
         read_json(file)
+
+
+def test_a_table_is_its_rows_without_empty_ones(tmp_path: Path) -> None:
+    table = tmp_path / "a.csv"
+    table.write_bytes(b'\xef\xbb\xbfname,value\r\n\r\n"a,\r\nb",1\r\n')
+    assert read_table(table) == [["name", "value"], ["a,\r\nb", "1"]]
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"a,b\n" * 100_000, r"a\.csv contains more than 0 MB; split it"),
+        (b"a,\xff\n", r"a\.csv is not UTF-8 text \(byte 2\)"),
+        (b"a" * 200_000, r"a\.csv is not a CSV file \(field larger than field limit"),
+    ],
+)
+def test_tables_that_are_refused(content: bytes, reason: str, tmp_path: Path) -> None:
+    table = tmp_path / "a.csv"
+    table.write_bytes(content)
+    with pytest.raises(DataError, match=reason):
+        read_table(table, 300_000)
 
 
 def test_only_ordinary_files_pass(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,7 +35,7 @@ def test_symbols(written: str, phones: str) -> None:
     assert _phones(written) == phones
 
 
-def test_stress_goes_to_the_next_vowel() -> None:
+def test_stress_is_assigned_to_the_next_vowel() -> None:
     assert [(s.phone, s.stress) for s in parse_ipa("ˌstɹɔˈb_ɛɹi")] == [
         ("s", 0), ("t", 0), ("ɹ", 0), ("ɔ", 2), ("b", 0), ("ɛ", 1), ("ɹ", 0), ("i", 0),
     ]  # fmt: skip

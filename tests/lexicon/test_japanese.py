@@ -13,38 +13,38 @@ from tests.lexicon.japanese_readings import READINGS
 from tts2face.voice.loading import load_voice
 
 
-def spoken(text: str) -> str:
+def reading(text: str) -> str:
     return re.sub(r"[\s、。？！]", "", japanese.to_kana(text))
 
 
 def test_most_sentences_are_read_as_a_person_reads_them() -> None:
     """35 of 40 when the library was chosen (docs/decisions/058-japanese.md)."""
     assert len(READINGS) == 40
-    right = [written for written, kana in READINGS if spoken(written) == kana]
+    right = [written for written, kana in READINGS if reading(written) == kana]
     assert len(right) >= 35
 
 
-def test_phrases_are_apart_and_punctuation_stays() -> None:
+def test_phrases_are_separated_and_punctuation_is_kept() -> None:
     assert japanese.to_kana("今日は、東京へ行きます。") == "キョーワ、 トーキョーエ イキマス。"
 
 
 def test_long_texts_are_read_piece_by_piece() -> None:
-    assert spoken("今日" * 5000).count("キョー") > 4000
+    assert reading("今日" * 5000).count("キョー") > 4000
 
 
-def test_texts_in_kana_are_left_to_espeak() -> None:
+def test_texts_in_kana_are_passed_to_espeak_unchanged() -> None:
     assert not japanese.has_kanji("こんにちは、カタカナ。 abc 3")
     assert pronounce("きょうは", "ja").words[0].text == "きょうは"
 
 
-def test_the_voice_says_what_is_read() -> None:
+def test_the_voice_pronounces_the_reading() -> None:
     phones = pronounce("東京へ行きます。", "ja").phones
     assert phones == ("t", "o", "o", "k", "o", "o", "e", "i", "k", "i", "m", "a", "s", "ɯ")
     heard = load_voice(None, "ja").speak("東京へ行きます。").phones.phones
     assert "".join(phone for phone in heard if phone in {"t", "k", "m", "s"}) == "tkkms"
 
 
-def test_without_the_library_the_message_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_library_the_message_names_the_installation_command(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyopenjtalk", None)
     japanese.load_reader.cache_clear()
     check_script("こんにちは", "ja")

@@ -38,7 +38,7 @@ def test_other_brackets_are_text(text: str) -> None:
 
 
 @given(st.lists(st.tuples(PLAIN, st.sampled_from([0.1, 0.4, 2.0])), max_size=6), PLAIN)
-def test_marks_stand_where_they_were_written(parts: list, last: str) -> None:
+def test_marks_keep_their_positions(parts: list, last: str) -> None:
     found = parse_marks("".join(f"{text}[nod {size:g}]" for text, size in parts) + last)
     assert found.text == "".join(text for text, _ in parts) + last
     places = [sum(len(text) for text, _ in parts[: k + 1]) for k in range(len(parts))]
@@ -93,7 +93,7 @@ def ssml(inside: str, more: str = "") -> MarkedText:
     return parse_marks(f"<speak{more}>{inside}</speak>")
 
 
-def test_ssml_says_the_same_as_marks() -> None:
+def test_ssml_is_equivalent_to_marks() -> None:
     assert ssml('Hi <break time="400ms"/>there <express-as style="cross">you</express-as>') == parse_marks(
         "Hi [pause 0.4]there [style:cross]you[/style]"
     )

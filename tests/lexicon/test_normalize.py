@@ -11,7 +11,7 @@ CASES = [line.split("\t") for line in TABLE.read_text(encoding="utf-8").splitlin
 
 
 @pytest.mark.parametrize(("written", "spoken"), CASES, ids=[written for written, _ in CASES])
-def test_written_forms_are_said(written: str, spoken: str) -> None:
+def test_written_forms_are_normalised(written: str, spoken: str) -> None:
     assert normalize(written.replace("\\n", "\n")) == spoken
 
 
@@ -19,7 +19,7 @@ def test_the_table_is_large() -> None:
     assert len(CASES) >= 120
 
 
-def test_a_token_knows_what_was_written() -> None:
+def test_a_token_keeps_its_written_form() -> None:
     assert [(t.source, t.spoken) for t in split_tokens("It cost $5.")] == [
         ("It", "It"), ("cost", "cost"), ("$5", "five dollars"), (".", "."),
     ]  # fmt: skip
@@ -38,7 +38,7 @@ def test_other_languages_keep_their_numbers_and_marks(written: str, kept: str, l
     assert normalize(written, language) == kept
 
 
-def test_a_megabyte_is_said() -> None:
+def test_a_megabyte_is_normalised() -> None:
     sentence = "We met Dr. Smith on March 3, 2024; it cost $5.20. "
     spoken = normalize(sentence * (1_000_000 // len(sentence)))
     assert spoken.startswith(

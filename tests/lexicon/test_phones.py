@@ -1,4 +1,4 @@
-"""The phone table, ARPABET, articulatory distance and stand-ins."""
+"""The phone table, ARPABET, articulatory distance and replacements."""
 
 import itertools
 
@@ -28,7 +28,7 @@ HEADER = (
 
 
 @pytest.mark.parametrize("name", CMU)
-def test_arpabet_goes_to_ipa_and_back(name: str) -> None:
+def test_arpabet_is_converted_to_ipa_and_back(name: str) -> None:
     assert ipa_to_arpabet(arpabet_to_ipa(name)) == name
     if look_up_phone(arpabet_to_ipa(name)).is_vowel:
         for stress in (1, 2):
@@ -107,7 +107,7 @@ def _order(label: str, others: str) -> list[str]:
         ("ɲ", "n m"),
     ],
 )
-def test_what_looks_alike_is_near(label: str, nearest_first: str) -> None:
+def test_visually_similar_phones_are_near(label: str, nearest_first: str) -> None:
     assert _order(label, " ".join(reversed(nearest_first.split()))) == nearest_first.split()
 
 

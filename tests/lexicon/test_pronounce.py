@@ -136,5 +136,5 @@ def test_nominal_times_cover_words_and_pauses() -> None:
         ("We chose plan B. Then we left.", ["B.", "left."]),
     ],
 )
-def test_abbreviations_pause_nowhere_and_sentence_ends_do(text: str, marked: list[str]) -> None:
+def test_abbreviations_do_not_pause_and_sentence_ends_do(text: str, marked: list[str]) -> None:
     assert [word.text + word.mark for word in pronounce(text).words if word.mark] == marked

@@ -1,4 +1,4 @@
-"""SSML's phoneme, say-as, voice and lang: what they mean, and what is refused by name and line."""
+"""SSML's phoneme, say-as, voice and lang: their meaning, and errors with name and line."""
 
 import time
 from xml.sax.saxutils import escape, quoteattr
@@ -130,7 +130,7 @@ def test_every_given_word_is_found_again(pieces: list) -> None:
         ("expletive", "damn", "", "bleep"),
     ],
 )
-def test_a_text_is_read_as_what_it_is_said_to_be(kind: str, written: str, more: str, said: str) -> None:
+def test_say_as_determines_the_reading(kind: str, written: str, more: str, said: str) -> None:
     assert say_as(kind, written, more, "en-us") == said
     attributes = f'interpret-as="{kind}"' + (f' format="{more}"' if more else "")
     assert ssml(f"<say-as {attributes}>{escape(written)}</say-as>").text == said

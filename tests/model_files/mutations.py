@@ -9,7 +9,7 @@ from safetensors.numpy import save
 
 from tts2face.storage.tensors import read_tensors
 
-DEEP = "@DEEP@"  # stands in metadata for 5,000 nested lists, which the json module cannot write
+DEEP = "@DEEP@"  # placeholder in metadata for 5,000 nested lists, which the json module cannot write
 FLOATS = (math.nan, math.inf, -math.inf, 1e30, -1e30, 65504.0, 1e-30, 0.0, -1.0, 1.0, 12345.0)
 WHOLE = (-1, 0, 1, 467, 468, 478, 65535, 10**6, 2**31 - 1, -(2**31), 2**15 - 1, -(2**15))
 WRONG = (

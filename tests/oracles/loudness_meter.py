@@ -8,7 +8,7 @@ from tts2face.speech.bs1770 import SILENT_DB, oversampled_peaks
 from tts2face.types import Waveform
 
 
-def measured(sound: Waveform) -> tuple[float, float]:
+def measure_loudness(sound: Waveform) -> tuple[float, float]:
     """Integrated loudness in LUFS, and true peak in dB of full scale."""
     graph = Graph()
     source = graph.add(

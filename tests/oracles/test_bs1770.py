@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tests.oracles.loudness_meter import measured, true_peak
+from tests.oracles.loudness_meter import measure_loudness, true_peak
 from tts2face.speech.bs1770 import ABSOLUTE_GATE_LUFS, integrated_loudness, k_weighting
 from tts2face.types import Waveform
 
@@ -14,7 +14,7 @@ def sine(hertz: float, rate: int, *, seconds: float = 2.0, level: float = 1.0, p
 
 
 def speechlike(rate: int, seed: int = 0) -> Waveform:
-    """Noise that grows and dies by syllables and rests, so that both gates matter."""
+    """Noise modulated by syllables and pauses, so that both gates have an effect."""
     rng = np.random.default_rng(seed)
     times = np.arange(8 * rate) / rate
     noise = np.convolve(rng.normal(0.0, 0.1, len(times)), np.hanning(5) / 2, "same")
@@ -43,7 +43,7 @@ def test_a_sine_of_997_hz(rate: int, level_db: float) -> None:
 def test_ffmpeg_s_meter_reads_the_same(rate: int) -> None:
     for seed in range(3):
         sound = speechlike(rate, seed)
-        loudness, peak = measured(sound)
+        loudness, peak = measure_loudness(sound)
         assert integrated_loudness([sound]) == pytest.approx(loudness, abs=0.02)  # LU
         assert true_peak(sound) == pytest.approx(peak, abs=0.1)  # dB; another interpolation filter
 
@@ -65,7 +65,7 @@ def test_sounds_together_are_weighed_by_their_length() -> None:
     assert integrated_loudness([loud, soft]) == pytest.approx(expected, abs=0.02)
 
 
-def test_a_sound_shorter_than_a_block_counts_with_the_silence_behind_it() -> None:
+def test_a_sound_shorter_than_a_block_is_padded_with_silence() -> None:
     short = sine(997.0, 24_000, seconds=0.1)
     assert integrated_loudness([short]) == pytest.approx(-3.01 - 10 * np.log10(4), abs=0.05)
 

@@ -35,7 +35,7 @@ def lessons(n: int = 12, seed: int = 0, bend: float = 0.0) -> list[TrainingUtter
 
 @pytest.mark.parametrize(("before", "after"), [(0, 0), (1, 2)])
 def test_with_all_factors_equation_8_is_direct_regression(before: int, after: int) -> None:
-    """As many parameters as numbers in a window: the factors span all that was heard."""
+    """As many parameters as numbers in a window: the factors span the whole input."""
     generator = np.random.default_rng(3)
     n_inputs = 3 * (before + 1 + after)
     taught = [
@@ -44,26 +44,26 @@ def test_with_all_factors_equation_8_is_direct_regression(before: int, after: in
     ]
     drive = learn_linear_map(taught, feature="mfcc", before=before, after=after)
     rows = [np.pad(one.features, ((before, after), (0, 0)), mode="edge") for one in taught]
-    heard = np.concatenate(
+    inputs = np.concatenate(
         [np.concatenate([row[k : k + 60] for k in range(before + 1 + after)], axis=1) for row in rows]
     )
     seen = np.concatenate([one.parameters for one in taught])
-    table = np.concatenate([heard, np.ones((len(heard), 1))], axis=1).astype(np.float64)
+    table = np.concatenate([inputs, np.ones((len(inputs), 1))], axis=1).astype(np.float64)
     expected = table @ np.linalg.lstsq(table, seen, rcond=None)[0]
     made = np.concatenate([drive.parameters(one.features) for one in taught])
     np.testing.assert_allclose(made, expected, atol=1e-4)  # float32 of numbers about 5
 
 
 def test_with_fewer_factors_equation_8_is_still_least_squares_on_what_it_can_reach() -> None:
-    """The factors of two seen parameters reach both: the fit is direct regression again."""
+    """The factors of two visual parameters span both: the fit equals direct regression."""
     taught = [TrainingUtterance(one.features, one.parameters[:, :2]) for one in lessons()]
     drive = learn_linear_map(taught, feature="mfcc")
     assert len(drive.bias) == 2
-    heard = np.concatenate([one.features for one in taught])
-    table = np.concatenate([heard, np.ones((len(heard), 1))], axis=1).astype(np.float64)
+    inputs = np.concatenate([one.features for one in taught])
+    table = np.concatenate([inputs, np.ones((len(inputs), 1))], axis=1).astype(np.float64)
     seen = np.concatenate([one.parameters for one in taught])
     expected = table @ np.linalg.lstsq(table, seen, rcond=None)[0]
-    np.testing.assert_allclose(drive.parameters(heard)[5:-5], expected[5:-5], atol=1e-4)
+    np.testing.assert_allclose(drive.parameters(inputs)[5:-5], expected[5:-5], atol=1e-4)
 
 
 @pytest.mark.parametrize("decay", [0.0, 0.01])
@@ -71,8 +71,8 @@ def test_the_gradient_is_that_of_finite_differences(decay: float) -> None:
     generator = np.random.default_rng(0)
     shapes = ((4, 6), (4,), (3, 4), (3,))
     layers = tuple(generator.normal(0, 0.5, shape) for shape in shapes)
-    heard, seen = generator.normal(size=(20, 6)), generator.normal(size=(20, 3))
-    _, slope = loss_and_gradient(layers, heard, seen, decay)
+    inputs, seen = generator.normal(size=(20, 6)), generator.normal(size=(20, 3))
+    _, slope = loss_and_gradient(layers, inputs, seen, decay)
     differences = []
     for which, layer in enumerate(layers):
         for place in np.ndindex(layer.shape):
@@ -80,7 +80,7 @@ def test_the_gradient_is_that_of_finite_differences(decay: float) -> None:
             for step in (1e-6, -1e-6):
                 moved = [one.copy() for one in layers]
                 moved[which][place] += step
-                errors.append(loss_and_gradient(tuple(moved), heard, seen, decay)[0])
+                errors.append(loss_and_gradient(tuple(moved), inputs, seen, decay)[0])
             differences.append((errors[0] - errors[1]) / 2e-6)
     np.testing.assert_allclose(slope, differences, atol=1e-8)
 
@@ -128,9 +128,9 @@ def test_a_talker_file_keeps_its_drives_and_old_files_have_none(tmp_path: Path) 
         write_talker(path, Talker(25.0, model, (spoken,), {"name": "Ada"}, audio_maps=drives))
         kept = read_talker(path).audio_maps
         assert set(kept) == set(drives)
-    heard = lessons(1)[0].features
+    inputs = lessons(1)[0].features
     assert (kept["network"].feature, kept["network"].before, kept["network"].after) == (THREE, 1, 2)
-    np.testing.assert_array_equal(kept["network"].parameters(heard), drive.parameters(heard))
+    np.testing.assert_array_equal(kept["network"].parameters(inputs), drive.parameters(inputs))
 
 
 def test_a_drive_that_lost_a_part_is_refused() -> None:
@@ -155,6 +155,6 @@ def test_features_of_another_number_are_refused() -> None:
         (lambda: TrainingUtterance(np.zeros((3, 2)), np.zeros((4, 2))), "not 3 and 4"),
     ],
 )
-def test_what_nothing_can_be_learnt_from_is_refused(make: object, reason: str) -> None:
+def test_unusable_training_data_are_refused(make: object, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
         make()

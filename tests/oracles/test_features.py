@@ -19,7 +19,7 @@ def vowel(seconds: float = 1.0) -> Waveform:
     for hertz in VOWEL_HZ:
         radius = np.exp(-np.pi * 80.0 / FEATURE_RATE)
         pulses = lfilter([1.0], [1.0, -2 * radius * np.cos(2 * np.pi * hertz / FEATURE_RATE), radius**2], pulses)
-    pulses = lfilter([1.0], [1.0, -0.97], pulses)  # what pre-emphasis takes away again
+    pulses = lfilter([1.0], [1.0, -0.97], pulses)  # removed by pre-emphasis
     return Waveform(0.5 * pulses / np.abs(pulses).max(), FEATURE_RATE)
 
 

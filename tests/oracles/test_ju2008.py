@@ -20,18 +20,18 @@ def recordings(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return smooth[:, :2], smooth[:, 2:], np.full(N, LENGTH, np.int32)
 
 
-def distances(made: Field, shown: np.ndarray, heard: np.ndarray) -> dict[int, float]:
+def distances(made: Field, shown: np.ndarray, loudness: np.ndarray) -> dict[int, float]:
     """dist(t, t') of every recorded frame with h frames before it in its recording; alpha is in `heard` already."""
     found = {}
     for moment in range(N * LENGTH):
         if moment % LENGTH >= H:
             before = slice(moment - H, moment)
-            of_sound = np.square(heard.astype(float) - made.prosody[before]).sum()
+            of_sound = np.square(loudness.astype(float) - made.prosody[before]).sum()
             found[moment] = float(of_sound + np.square(shown.astype(float) - made.values[before]).sum())
     return found
 
 
-def drawn(away: dict[int, float], sigma: float, chance: float) -> int:
+def draw_frame(away: dict[int, float], sigma: float, chance: float) -> int:
     """One of the best candidates, with a probability proportional to exp(-dist / sigma)."""
     best = sorted(away, key=lambda moment: away[moment])[:N_BEST]
     weights = np.exp(-(np.array([away[moment] for moment in best]) - away[best[0]]) / sigma)
@@ -48,9 +48,9 @@ def test_the_preset_is_what_the_paper_prints() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_every_frame_is_drawn_as_the_formula_says(seed: int) -> None:
-    values, heard, lengths = recordings(seed)
-    made = build_field(values, heard, lengths, JU_2008)
+def test_every_frame_follows_the_formula(seed: int) -> None:
+    values, loudness, lengths = recordings(seed)
+    made = build_field(values, loudness, lengths, JU_2008)
     generator = np.random.default_rng(50 + seed)
     sound = np.convolve(generator.normal(size=N_SHOWN), np.hanning(9), "same").astype(np.float32)[:, None]
     chances = generator.random(N_SHOWN)
@@ -60,7 +60,7 @@ def test_every_frame_is_drawn_as_the_formula_says(seed: int) -> None:
     expected = []
     for frame in range(N_SHOWN):
         away = distances(made, np.array(shown[-H:]), np.array(driving[frame : frame + H]))
-        moment = drawn(away, H * JU_2008.sigma * made.median_distance, chances[frame])
+        moment = draw_frame(away, H * JU_2008.sigma * made.median_distance, chances[frame])
         expected.append(moment)
         shown.append(made.values[moment])
     assert walk.moments.tolist() == expected
@@ -70,15 +70,15 @@ def test_every_frame_is_drawn_as_the_formula_says(seed: int) -> None:
 
 def test_sound_and_motion_weigh_alike() -> None:
     """alpha is 1 in units of variance: the windows' two terms have the same mean."""
-    values, heard, lengths = recordings(4)
-    made = build_field(values, heard, lengths, JU_2008)
+    values, loudness, lengths = recordings(4)
+    made = build_field(values, loudness, lengths, JU_2008)
     assert np.square(made.prosody - made.prosody.mean(axis=0)).sum(axis=1).mean() == pytest.approx(1.0, rel=1e-3)
     assert np.square(made.values - made.values.mean(axis=0)).sum(axis=1).mean() == pytest.approx(1.0, rel=1e-3)
 
 
 def test_candidates_come_with_the_frequencies_of_the_formula() -> None:
-    values, heard, lengths = recordings(5)
-    made = build_field(values, heard, lengths, JU_2008)
+    values, loudness, lengths = recordings(5)
+    made = build_field(values, loudness, lengths, JU_2008)
     start = initial_state(made, 0.0)
     state = FieldState(
         np.zeros_like(start.motion), np.zeros_like(start.prosody), -1, start.offset, start.recent_jumps, 0

@@ -17,7 +17,7 @@ angles = st.floats(-0.6, 0.6)
 
 
 def _face(n_frames: int, seed: int = 0) -> np.ndarray:
-    """(T, 478, 3) faces in mm whose rigid points stand still while all others move."""
+    """(T, 478, 3) faces in mm whose rigid points are fixed while all others move."""
     indices, canonical, _ = rigid_points()
     generator = np.random.default_rng(seed)
     faces = np.repeat(generator.normal(0, 40, (1, N_LANDMARKS, 3)), n_frames, axis=0)
@@ -58,7 +58,7 @@ def test_coming_nearer_is_a_shift_and_not_a_shape():
     faces = np.repeat(_face(1), 100, axis=0)
     size = np.exp(np.linspace(-0.1, 0.1, 100))[:, None, None]  # 10 % in 2 s, either side
     posed = remove_pose(_filmed(faces, np.repeat(np.eye(3)[None], 100, 0), np.zeros((100, 3))) * size, FPS)
-    middle = slice(40, 60)  # away from the ends, where smoothing holds the last value
+    middle = slice(40, 60)  # far from the ends, where smoothing holds the last value
     np.testing.assert_allclose(posed.landmarks[middle], faces[middle], atol=0.5)
     assert (np.diff(posed.translations[:, 2]) > 0).all()
 

@@ -98,12 +98,12 @@ def test_random_triangles_are_those_of_the_slow_rasteriser(seed):
                 found.append((float(near) * (float(BACK_BIAS) if back else 1.0), ~number if back else number))
             found.sort(reverse=True)
             if len(found) > 1 and found[0][0] - found[1][0] < 1e-6 * found[0][0]:
-                continue  # nearer to each other than single precision tells
+                continue  # closer than single precision resolves
             assert owner[0, row, column] == (found[0][1] if found else NO_TRIANGLE)
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_no_sample_of_a_mesh_is_drawn_twice_or_left_out(seed):
+def test_every_sample_of_a_mesh_is_drawn_exactly_once(seed):
     rng = np.random.default_rng(seed)
     places = rng.integers(-2, 2 * SIZE[0], (60, 2)) / 2.0  # many corners and edges run through the middle of samples
     places = np.unique(np.vstack([places, [[-5, -5], [60, -5], [60, 50], [-5, 50]]]), axis=0)
@@ -113,7 +113,7 @@ def test_no_sample_of_a_mesh_is_drawn_twice_or_left_out(seed):
     np.testing.assert_array_equal(drawn, 1)
 
 
-def test_the_near_plane_cuts_triangles_where_it_lies():
+def test_triangles_are_clipped_at_the_near_plane():
     rng = np.random.default_rng(3)
     for _ in range(20):
         points = np.column_stack([rng.uniform(-15, 15, (3, 2)), rng.uniform(-30, 60, 3)])

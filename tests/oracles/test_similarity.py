@@ -86,7 +86,7 @@ def test_ranks_the_nearest_phones():
     assert [phone for phone, _ in found.nearest("m")] == ["p", "i"]
 
 
-def test_an_unsaid_phone_is_similar_to_itself_only():
+def test_an_unrecorded_phone_is_similar_to_itself_only():
     matrix = phone_similarity(np.zeros((2, 1, 1)), np.array([0, 0]), ("a", "b"), np.ones(1)).matrix
     assert matrix.tolist() == [[1.0, 0.0], [0.0, 1.0]]
 

@@ -46,12 +46,12 @@ def blinker() -> Talker:
     looks[:, 1] += 50 * share**2
     phones = PhoneSequence([SILENCE], [0.0, N_FRAMES / 25])
     still = np.zeros((N_FRAMES, 6), np.float32)
-    spoken = Utterance("a", phones, (), shape.astype(np.float32), still, still[:, 0], looks.astype(np.float32))
+    speech_motion = Utterance("a", phones, (), shape.astype(np.float32), still, still[:, 0], looks.astype(np.float32))
     assert talker.appearance is not None
     on_plate = np.zeros((4, 3), np.float32)
     on_plate[3, 2] = SHUT_BY * sizes[2]
     plate = replace(talker.appearance.plate, shape=on_plate)
-    return replace(talker, model=model, utterances=(spoken,), appearance=replace(talker.appearance, plate=plate))
+    return replace(talker, model=model, utterances=(speech_motion,), appearance=replace(talker.appearance, plate=plate))
 
 
 @cache
@@ -59,7 +59,7 @@ def gesture_model() -> OwnFaceGestures:
     return build_own_face_gestures(blinker(), palette())
 
 
-def spoken(n_frames: int = 1) -> Trajectory:
+def speech_motion(n_frames: int = 1) -> Trajectory:
     values = np.random.default_rng(2).normal(size=(n_frames, 6))
     return Trajectory(("shape0", "shape1", "face0", "face1", "mouth0", "mouth1"), values, 25.0)
 
@@ -67,7 +67,7 @@ def spoken(n_frames: int = 1) -> Trajectory:
 def gesture_channels(**gestures: list[float]) -> np.ndarray:
     """Gesture channels of one frame."""
     values = {name: np.array([value], np.float32) for name, value in gestures.items()}
-    return gesture_model().motion(spoken(), values).values[0, 6:]
+    return gesture_model().motion(speech_motion(), values).values[0, 6:]
 
 
 @pytest.mark.parametrize("share", [0.25, 0.5, 1.0])
@@ -102,7 +102,7 @@ def test_expressions_do_not_change_the_lip_gap(mood: int) -> None:
 def test_only_gestures_change_the_picture() -> None:
     talker, picture = blinker(), Picture(size="96x96")
     plain, renderer = own_face_renderer(talker, picture), own_face_renderer(talker, picture, gesture_model())
-    own = spoken()
+    own = speech_motion()
     assert renderer.channels == plain.channels + gesture_model().channels
     still, blink = (gesture_model().motion(own, g).values[0] for g in ({}, {"blink": np.ones((1, 2), np.float32)}))
     assert np.array_equal(draw_video_frame(renderer, still, 1), draw_video_frame(plain, own.values[0], 1))
@@ -112,7 +112,7 @@ def test_only_gestures_change_the_picture() -> None:
 def test_gains_multiply_and_gaze_and_head_have_no_effect() -> None:
     values = {"brows": np.ones((1, 2), np.float32), "head": np.ones((1, 6), np.float32)}
     values |= {"gaze": np.ones((1, 2), np.float32), "blink": np.full((1, 2), 0.4, np.float32)}
-    doubled = gesture_model().motion(spoken(), values, {"brows": 2.0, "blink": 0.5}).values[0, 6:]
+    doubled = gesture_model().motion(speech_motion(), values, {"brows": 2.0, "blink": 0.5}).values[0, 6:]
     assert doubled.tolist() == pytest.approx([0, 0, 0, 0, 0, 2, 2, 0, 0, 0.2])
 
 
@@ -127,6 +127,6 @@ def test_a_talker_without_blinks_gets_no_lid_motion() -> None:
 
 def test_invalid_gestures_are_refused() -> None:
     with pytest.raises(InputError, match=r"brows must be finite values \(1, 2\), not \(1, 3\)"):
-        gesture_model().motion(spoken(), {"brows": np.zeros((1, 3), np.float32)})
+        gesture_model().motion(speech_motion(), {"brows": np.zeros((1, 3), np.float32)})
     with pytest.raises(InputError, match="motion only"):
         build_own_face_gestures(own_talker(has_face=False), palette())

@@ -139,11 +139,11 @@ def test_a_camera_inside_the_head_draws_the_surface_in_front():
     assert np.ptp(drawn.reshape(-1, 3).astype(int), axis=0).max() > 0
 
 
-def test_translucent_lashes_are_blended_with_the_surface_behind():
+def test_translucent_lashes_are_blended_with_the_surface_below():
     face = tiny_face()
     solid = replace(face, parts=(*face.parts[:-1], replace(face.parts[-1], opacity=1.0)))
-    gone = replace(face, triangles=np.concatenate([face.triangles[:-2], np.zeros((2, 3), np.int32)]))
-    through, full, none = (draw(f, REST, picture=SMALL).astype(float) for f in (face, solid, gone))
+    removed = replace(face, triangles=np.concatenate([face.triangles[:-2], np.zeros((2, 3), np.int32)]))
+    through, full, none = (draw(f, REST, picture=SMALL).astype(float) for f in (face, solid, removed))
     changed = np.abs(full - none).max(axis=2) > 40
     assert changed.any()
     assert (np.abs(through - none)[changed].mean(axis=-1) > 5).all()

@@ -222,7 +222,7 @@ def test_a_missing_folder_is_refused(tmp_path):
         check_output(tmp_path / "none" / "a.mp4")
 
 
-def test_a_folder_with_other_things_is_not_touched(tmp_path):
+def test_a_folder_with_other_files_is_not_changed(tmp_path):
     (tmp_path / "notes").mkdir()
     (tmp_path / "notes" / "letter.txt").write_text("text")
     with pytest.raises(InputError, match="files other than the pictures"):

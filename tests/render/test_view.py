@@ -22,7 +22,7 @@ def clip_of(face):
     return Clip(Trajectory(face.shape_names, motion, 30), Trajectory(HEAD_CHANNELS, np.zeros((3, 6)), 30), speech)
 
 
-def test_without_a_display_it_is_refused_before_anything_is_opened(monkeypatch):
+def test_without_a_display_the_window_is_refused_before_it_opens(monkeypatch):
     monkeypatch.setattr(view, "require_pyvista", lambda purpose: None)
     monkeypatch.setattr(view, "sys", SimpleNamespace(platform="linux"))
     monkeypatch.delenv("DISPLAY", raising=False)

@@ -66,7 +66,7 @@ def test_a_transparent_picture_has_the_same_coverage(supersampling):
 
 
 @pytest.mark.usefixtures("gl")
-def test_a_texture_lies_the_same_way_up():
+def test_textures_have_the_same_orientation():
     # Light changes hard between vertices where the chequers do, so that colours agree less than on a face.
     ours, theirs = both(tiny_face(textured=True, n_rings=40), [0, 0, 0, 0], TURNED, size="128x128")
     alike = np.corrcoef(ours.ravel(), theirs.ravel())[0, 1]

@@ -63,7 +63,7 @@ def test_sound_without_these_words_is_refused(aligner: Aligner) -> None:
         aligner.align(Waveform(np.zeros(1600), 16000), [WORDS[0]] * 30)
 
 
-def test_phones_the_model_lacks_are_heard_as_their_nearest() -> None:
+def test_phones_that_the_model_lacks_are_aligned_as_the_nearest_ones() -> None:
     assert acoustic_phones(["y", "p", "ə"])[1:] == ["P", "AH"]
 
 
@@ -93,14 +93,14 @@ def test_recordings_agree_with_their_word_times(aligner: Aligner, takes: Path) -
     wrong: list[float] = []
     for row, other in zip(rows, rows[1:] + rows[:1], strict=True):
         sound = read_sound(takes / "clips" / f"{row['clip']}.mkv", 16000)
-        told = []
+        transcripts = []
         for transcript in (row["transcript"], other["transcript"]):
             words = [word for word in transcript.split() if len(word) > 1]
-            told.append([(word, [tuple(s.phone for s in cmudict_lookup(word) or ())]) for word in words])
-        found = aligner.align(sound, told[0])
+            transcripts.append([(word, [tuple(s.phone for s in cmudict_lookup(word) or ())]) for word in words])
+        found = aligner.align(sound, transcripts[0])
         right.append(found.confidence)
         try:
-            wrong.append(aligner.align(sound, told[1]).confidence)
+            wrong.append(aligner.align(sound, transcripts[1]).confidence)
         except DataError:  # the words are not found at all
             wrong.append(-np.inf)
         known = [line.split() for line in (takes / "align" / f"{row['clip']}.align").read_text().splitlines()]

@@ -1,4 +1,4 @@
-"""Sound heard in blocks gives what the whole sound gives, no later than stated."""
+"""Sound processed in blocks gives the result of the whole sound, within the stated delay."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from tts2face.types import frame_count
 SOUND = babble(2.3)
 
 
-def taught(feature: str, before: int, after: int, *, bends: bool) -> AudioMap:
+def linear_map(feature: str, before: int, after: int, *, bends: bool) -> AudioMap:
     features = speech_features(SOUND, feature, fps=25.0, n_frames=57).values
     moved = np.random.default_rng(1).normal(size=(57, 3)).astype(np.float32)
     lessons = [TrainingUtterance(features, moved)] * 3
@@ -48,7 +48,7 @@ def test_features_of_blocks_are_those_of_the_whole(kind: str, fps: float, sizes:
 @pytest.mark.parametrize("sizes", [(800,), (7, 4001, 0, 350), (100_000,)])
 @pytest.mark.parametrize(("before", "after", "bends"), [(0, 0, False), (2, 3, False), (3, 1, True)])
 def test_lips_of_blocks_are_those_of_the_whole(before: int, after: int, bends: bool, sizes: tuple[int, ...]) -> None:
-    audio_map = taught("mfcc", before, after, bends=bends)
+    audio_map = linear_map("mfcc", before, after, bends=bends)
     listener = StreamingAudioMap(audio_map, 25.0)
     made = np.concatenate([*(listener.add_samples(block) for block in blocks(*sizes)), listener.finish()])
     features = speech_features(SOUND, "mfcc", fps=25.0, n_frames=frame_count(SOUND.duration, 25.0))
@@ -56,26 +56,26 @@ def test_lips_of_blocks_are_those_of_the_whole(before: int, after: int, bends: b
 
 
 def test_lips_come_no_later_than_stated() -> None:
-    audio_map = taught("lsf", 2, 3, bends=True)
+    audio_map = linear_map("lsf", 2, 3, bends=True)
     listener = StreamingAudioMap(audio_map, 25.0)
     assert listener.look_ahead_s == pytest.approx(3 / 25 + 0.0427, abs=1e-3)
-    known, heard = 0, 0
+    known, n_received = 0, 0
     for block in blocks(160):
         known += len(listener.add_samples(block))
-        heard += len(block)
-        frames_due = int(np.floor((heard / FEATURE_RATE - listener.look_ahead_s) * 25.0 + 1e-9)) + 1
+        n_received += len(block)
+        frames_due = int(np.floor((n_received / FEATURE_RATE - listener.look_ahead_s) * 25.0 + 1e-9)) + 1
         assert known >= max(frames_due, 0)
 
 
 def test_a_sound_shorter_than_the_look_ahead_has_lips() -> None:
-    listener = StreamingAudioMap(taught("mfcc", 2, 5, bends=False), 25.0)
+    listener = StreamingAudioMap(linear_map("mfcc", 2, 5, bends=False), 25.0)
     assert len(listener.add_samples(SOUND.samples[:1000])) == 0
     made = listener.finish()
     assert made.shape == (2, 3)
     assert np.isfinite(made).all()
 
 
-def test_memory_does_not_grow_with_what_was_heard() -> None:
+def test_memory_does_not_grow_with_the_length_of_the_sound() -> None:
     ear = StreamingFeatures("level", 25.0)
     for block in blocks(1600) * 20:
         ear.add_samples(block)

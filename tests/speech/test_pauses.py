@@ -12,7 +12,7 @@ from tts2face.types import Waveform
 RATE = 16_000
 
 
-def spoken(*lengths: float, level: float = 0.3, noise: float = 0.001) -> Waveform:
+def speech_with_pauses(*lengths: float, level: float = 0.3, noise: float = 0.001) -> Waveform:
     """Noise bursts as loud as speech and pauses in turn, of these lengths in seconds."""
     generator = np.random.default_rng(0)
     parts = [
@@ -23,26 +23,28 @@ def spoken(*lengths: float, level: float = 0.3, noise: float = 0.001) -> Wavefor
 
 
 def test_pauses_are_found_and_closures_are_not() -> None:
-    found = find_pauses(spoken(1.0, 0.5, 1.0, 0.1, 1.0, 0.3, 1.0))
+    found = find_pauses(speech_with_pauses(1.0, 0.5, 1.0, 0.1, 1.0, 0.3, 1.0))
     assert np.array(found) == pytest.approx(np.array([[1.0, 1.5], [3.6, 3.9]]), abs=0.03)
 
 
 @pytest.mark.parametrize("noise", [0.0001, 0.03])
 def test_the_level_of_the_noise_does_not_matter(noise: float) -> None:
-    assert np.array(find_pauses(spoken(1.0, 0.5, 1.0, noise=noise))) == pytest.approx(np.array([[1.0, 1.5]]), abs=0.03)
+    assert np.array(find_pauses(speech_with_pauses(1.0, 0.5, 1.0, noise=noise))) == pytest.approx(
+        np.array([[1.0, 1.5]]), abs=0.03
+    )
 
 
 def test_even_noise_has_no_pause() -> None:
-    assert find_pauses(spoken(3.0)) == ()
+    assert find_pauses(speech_with_pauses(3.0)) == ()
 
 
 def test_stretches_are_cut_in_the_middle_of_the_longest_pause() -> None:
-    found = cut_at_pauses(spoken(3.0, 0.3, 2.0, 0.6, 3.0, 0.4, 4.0), longest=8.0)
+    found = cut_at_pauses(speech_with_pauses(3.0, 0.3, 2.0, 0.6, 3.0, 0.4, 4.0), longest=8.0)
     assert np.array(found) == pytest.approx(np.array([[0, 5.6], [5.6, 13.3]]), abs=0.03)
 
 
 def test_stretches_cover_the_sound_and_none_is_too_long() -> None:
-    sound = spoken(*[0.9, 0.25] * 40)
+    sound = speech_with_pauses(*[0.9, 0.25] * 40)
     found = cut_at_pauses(sound, longest=5.0)
     assert found[0][0] == 0.0
     assert found[-1][1] == sound.duration
@@ -51,16 +53,16 @@ def test_stretches_cover_the_sound_and_none_is_too_long() -> None:
 
 
 def test_speech_without_a_pause_is_cut_where_it_is_quietest() -> None:
-    sound = spoken(4.0, 0.06, 4.0)
+    sound = speech_with_pauses(4.0, 0.06, 4.0)
     (_, cut), _ = cut_at_pauses(sound, longest=5.0)
     assert cut == pytest.approx(4.03, abs=0.04)
 
 
 def test_a_short_sound_is_one_stretch() -> None:
-    assert cut_at_pauses(spoken(1.0), longest=5.0) == ((0.0, 1.0),)
+    assert cut_at_pauses(speech_with_pauses(1.0), longest=5.0) == ((0.0, 1.0),)
     assert cut_at_pauses(Waveform(np.zeros(0), RATE), longest=5.0) == ((0.0, 0.0),)
 
 
 def test_no_length() -> None:
     with pytest.raises(InputError, match="must be above 0 s"):
-        cut_at_pauses(spoken(1.0), longest=0)
+        cut_at_pauses(speech_with_pauses(1.0), longest=0)

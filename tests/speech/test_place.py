@@ -22,7 +22,7 @@ def edit_cost(written: str, sounded: str) -> float:
 
 
 def cost_of(partners: np.ndarray, written: str, sounded: str, steps: list[int]) -> float:
-    """Cost of the edits that a row of partners stands for."""
+    """Cost of the edits of an assignment."""
     missed = len(sounded) - sum(step == place.MATCHED for step in steps)
     said = sum(
         place.SUBSTITUTION_COST * (written[number] != sounded[partner])
@@ -42,7 +42,7 @@ def test_the_path_is_the_cheapest(seed: int) -> None:
     )
     assert (np.diff(partners) >= 0).all()
     costs = []
-    for flags in np.ndindex(*[2] * len(written)):  # which phones count as said: some choice gives the cheapest cost
+    for flags in np.ndindex(*[2] * len(written)):  # any choice of recognised phones; one of them has the least cost
         steps = [place.MATCHED if flag else place.DELETED for flag in flags]
         used = [int(partner) for partner, flag in zip(partners, flags, strict=True) if flag]
         if len(set(used)) == len(used):
@@ -50,20 +50,20 @@ def test_the_path_is_the_cheapest(seed: int) -> None:
     assert min(costs) == pytest.approx(edit_cost(written, sounded), abs=1e-5)
 
 
-def test_words_go_where_their_phones_were_heard() -> None:
+def test_words_are_placed_at_their_recognised_phones() -> None:
     generator = np.random.default_rng(1)
     words = [tuple(generator.choice(list(PHONES), generator.integers(2, 6))) for _ in range(300)]
     truth = np.sort(generator.integers(0, 12, len(words)))
-    heard: list[list[str]] = [[] for _ in range(12)]
+    recognised: list[list[str]] = [[] for _ in range(12)]
     for word, at in zip(words, truth, strict=True):
         for phone in word:
             luck = generator.random()
             if luck < 0.1:
-                continue  # not heard
-            heard[at].append(phone if luck < 0.8 else str(generator.choice(list(PHONES))))
+                continue  # not recognised
+            recognised[at].append(phone if luck < 0.8 else str(generator.choice(list(PHONES))))
             if luck > 0.95:
-                heard[at].append(str(generator.choice(list(PHONES))))
-    found = assign_words(words, heard)
+                recognised[at].append(str(generator.choice(list(PHONES))))
+    found = assign_words(words, recognised)
     assert (np.diff(found) >= 0).all()
     assert (found == truth).mean() > 0.99
 

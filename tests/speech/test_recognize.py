@@ -1,4 +1,4 @@
-"""Phones heard without a transcript, in real speech."""
+"""Recognition of phones in real speech without a transcript."""
 
 from pathlib import Path
 
@@ -22,12 +22,12 @@ def recogniser() -> PhoneRecogniser:
     return PhoneRecogniser()
 
 
-def edits(written: list[str], heard: list[str]) -> int:
+def edits(written: list[str], recognised: list[str]) -> int:
     """Levenshtein distance."""
-    row = list(range(len(heard) + 1))
+    row = list(range(len(recognised) + 1))
     for phone in written:
         before, row = row, [row[0] + 1]
-        for number, other in enumerate(heard):
+        for number, other in enumerate(recognised):
             row.append(min(before[number] + (phone != other), before[number + 1] + 1, row[-1] + 1))
     return row[-1]
 
@@ -41,8 +41,8 @@ def test_most_phones_of_sentences_are_recognised(recogniser: PhoneRecogniser, ta
         words = pronounce_recording(Recording(row["clip"], video, row["transcript"], is_spelling=True))
         assert words is not None
         written = acoustic_phones([phone for _, ways in words for phone in ways[0]])
-        heard = acoustic_phones([phone for word in recogniser.words(read_sound(video, 16_000)) for phone in word])
-        wrong, total = wrong + edits(written, heard), total + len(written)
+        recognised = acoustic_phones([phone for word in recogniser.words(read_sound(video, 16_000)) for phone in word])
+        wrong, total = wrong + edits(written, recognised), total + len(written)
     assert wrong / total < EDITED
 
 

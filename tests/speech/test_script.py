@@ -1,4 +1,4 @@
-"""The words of a transcript, how they are said, and where in a recording."""
+"""Words of a transcript, their pronunciations, and their places in a recording."""
 
 from pathlib import Path
 

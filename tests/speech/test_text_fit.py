@@ -1,4 +1,4 @@
-"""A text that a recording does not say is noticed, and only where it is wrong."""
+"""Words of a text that a recording does not contain are found, and no others."""
 
 import csv
 from pathlib import Path
@@ -28,7 +28,7 @@ WORD_S = 0.4
 
 
 def alignment(*confidences: float) -> Alignment:
-    """Words of 0.4 s with a silence of 0.1 s behind each, and their log likelihoods per second."""
+    """Words of 0.4 s with a silence of 0.1 s after each, and their log likelihoods per second."""
     phones = [phone for _ in confidences for phone in ("a", SILENCE)]
     edges = np.concatenate([[0.0], np.cumsum([WORD_S, 0.1] * len(confidences))])
     words = tuple(WordSpan(f"w{at}", 2 * at, 2 * at + 1) for at in range(len(confidences)))
@@ -36,7 +36,7 @@ def alignment(*confidences: float) -> Alignment:
     return Alignment(PhoneSequence(phones, edges), words, float(np.mean(confidences)), scores)
 
 
-def test_words_that_fit_badly_together_are_found() -> None:
+def test_consecutive_words_with_low_likelihood_are_found() -> None:
     found = alignment(*[-4000.0] * 6, *[-11000.0] * 4, *[-4000.0] * 6)
     (misfit,) = find_misfits(found, is_english=True)
     assert misfit == (6, 10)
@@ -49,7 +49,7 @@ def test_a_single_word_is_not_enough() -> None:
     assert find_misfits(alignment(*[-3000.0] * 4, -9000.0, *[-3000.0] * 4), is_english=True) == []
 
 
-def test_other_languages_have_a_limit_of_their_own() -> None:
+def test_other_languages_have_another_limit() -> None:
     found = alignment(*[(LEAST_LOCAL_CONFIDENCE + LEAST_FOREIGN_CONFIDENCE) / 2] * 5)
     assert find_misfits(found, is_english=True) == [(0, 5)]
     assert find_misfits(found, is_english=False) == []
@@ -61,7 +61,7 @@ def test_what_surrounds_a_span_is_cut_between_words() -> None:
     assert (begin, end) == pytest.approx((2.45, 6.45))
 
 
-def test_a_mismatch_says_where_and_what() -> None:
+def test_a_mismatch_has_its_time_and_words() -> None:
     mismatch = TextMismatch(1.0, 2.5, ("one", "two"), -9000.0).shift(2.0)
     assert mismatch.sentence == ("the text does not fit the recording from 3.0 to 4.5 s (one two); check the words")
     long = TextMismatch(0.0, 9.0, tuple("abcdefghij"), -9000.0)

@@ -1,4 +1,4 @@
-"""A voice with a known answer: every letter lasts 0.1 s, a loud one; silences of 0.2 s before and 0.3 s behind."""
+"""A voice with a known answer: 0.1 s for every letter, a silence of 0.2 s before and of 0.3 s after the words."""
 
 import re
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ LEAD, TRAIL, LETTER, LEVEL = 0.2, 0.3, 0.1, 0.25
 
 
 class FakeVoice:
-    """Splits words at hyphens where ``splits`` says so, as voices may."""
+    """Splits words at hyphens if ``splits`` is set, as some voices do."""
 
     def __init__(self, splits: bool = False, rate: int = RATE) -> None:
         self.said: list[tuple[str, float]] = []

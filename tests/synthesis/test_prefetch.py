@@ -14,7 +14,7 @@ def test_same_items_in_the_same_order() -> None:
         assert list(items) == list(range(50))
 
 
-def test_no_more_than_the_room_is_made_ahead() -> None:
+def test_no_more_items_than_the_limit_are_prefetched() -> None:
     made: list[int] = []
 
     def source() -> Iterator[int]:
@@ -28,7 +28,7 @@ def test_no_more_than_the_room_is_made_ahead() -> None:
         assert 3 <= len(made) <= 5
 
 
-def test_an_error_comes_where_its_item_would() -> None:
+def test_an_error_is_raised_in_place_of_its_item() -> None:
     def source() -> Iterator[int]:
         yield 1
         raise ValueError("broken")
@@ -40,7 +40,7 @@ def test_an_error_comes_where_its_item_would() -> None:
             next(items)
 
 
-def test_the_maker_ends_when_nobody_asks_any_more() -> None:
+def test_the_producer_ends_when_the_consumer_stops() -> None:
     before = threading.active_count()
     with Prefetch(iter(int, 1), 1) as items:  # endless
         next(iter(items))

@@ -9,7 +9,7 @@ MakeVideo = Callable[..., Path]
 
 @pytest.fixture
 def make_video(tmp_path: Path) -> MakeVideo:
-    """Writes a film of grey frames, frame i of level 20 + 4 i, with a tone of 440 Hz or without sound."""
+    """Writes a video of grey frames, frame i of level 20 + 4 i, with a tone of 440 Hz or without sound."""
 
     def made(name: str, n_frames: int = 10, fps: int = 25, tone_s: float = 0.0) -> Path:
         import av

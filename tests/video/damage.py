@@ -1,6 +1,6 @@
-"""Reads damaged copies of a film, one after the other; run as a child, whose memory and time the test limits.
+"""Read damaged copies of a video one after the other, in a child process whose memory and time the test limits.
 
-Run: python tests/video/damage.py FILM FOLDER N_COPIES SEED
+Run: python tests/video/damage.py VIDEO FOLDER N_COPIES SEED
 """
 
 import resource
@@ -15,8 +15,8 @@ from tts2face.video.media import read_frames, read_media_info, read_sound
 MEMORY = 3 << 30  # bytes of addresses: libraries take half of it
 
 
-def damaged(content: bytes, generator: np.random.Generator) -> bytes:
-    """A file cut, with bytes flipped, with a part overwritten, left out or doubled, or with several of these."""
+def damage(content: bytes, generator: np.random.Generator) -> bytes:
+    """A file cut, with bytes flipped, with a part overwritten, removed or repeated, or with several of these."""
     data = np.frombuffer(content, np.uint8).copy()
     for kind in generator.choice(["cut", "flip", "head", "blank", "omit", "double"], generator.integers(1, 4)):
         first, last = sorted(int(at) for at in generator.integers(0, max(len(data), 1), 2))
@@ -43,7 +43,7 @@ def main(film: Path, folder: Path, n_copies: int, seed: int) -> None:
     generator = np.random.default_rng(seed)
     for number in range(n_copies):
         path = folder / f"copy{number}{film.suffix}"
-        path.write_bytes(damaged(film.read_bytes(), generator))
+        path.write_bytes(damage(film.read_bytes(), generator))
         outcome = []
         for read in (
             lambda here=path: f"{read_media_info(here).fps:.2f} fps",

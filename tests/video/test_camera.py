@@ -1,4 +1,4 @@
-"""Cameras; a film stands in for one, at its own pace."""
+"""Cameras; a video at its own frame rate replaces one."""
 
 import time
 from pathlib import Path
@@ -37,7 +37,7 @@ def test_leaving_early_lets_the_camera_go(make_video) -> None:
     assert not camera._thread.is_alive()
 
 
-def test_where_nothing_films(tmp_path: Path) -> None:
+def test_a_missing_camera_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="there is no camera '97'"):
         CaptureDevice("97")
     with pytest.raises(InputError, match="give a camera's number"):

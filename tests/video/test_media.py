@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tests.corpus_tools.films import joined
+from tests.corpus_tools.films import join_clips
 from tts2face.video.media import _shift_samples, _upright_pixels, read_frames, read_media_info, read_sound
 
 
@@ -37,7 +37,7 @@ def test_a_tone_keeps_its_pitch_and_level_at_every_rate(make_video, rate):
     assert sound.samples[rate // 4 : rate // 2].std() == pytest.approx(0.5 / np.sqrt(2), rel=0.01)
 
 
-def test_sound_lies_on_the_clock_of_the_file():
+def test_sound_is_shifted_to_the_clock_of_the_file():
     samples = np.arange(1, 4, dtype=np.float32)
     np.testing.assert_array_equal(_shift_samples(samples, 2), [0, 0, 1, 2, 3])
     np.testing.assert_array_equal(_shift_samples(samples, -1), [2, 3])
@@ -103,11 +103,11 @@ def test_a_rate_that_counts_ticks_is_read_from_the_frames(tmp_path):
 @pytest.mark.parametrize("name", ["bbaf2n.mkv", "copy.mp4"])
 def test_damaged_films_are_read_or_refused_in_bounded_memory_and_time(name, rendered_takes, tmp_path):
     """A crash, another exception than a refusal, or more memory than the child may have ends the child."""
-    film = rendered_takes / "clips" / "bbaf2n.mkv"
-    if name != film.name:
-        joined([film], tmp_path / name)
-        film = tmp_path / name
-    command = [sys.executable, "tests/video/damage.py", str(film), str(tmp_path), "40", "7"]
+    recording = rendered_takes / "clips" / "bbaf2n.mkv"
+    if name != recording.name:
+        join_clips([recording], tmp_path / name)
+        recording = tmp_path / name
+    command = [sys.executable, "tests/video/damage.py", str(recording), str(tmp_path), "40", "7"]
     root = Path(__file__).parents[2]
     done = subprocess.run(  # noqa: PLW1510 - its answer is looked at
         command, cwd=root, env={**os.environ, "PYTHONPATH": str(root)}, capture_output=True, text=True, timeout=120

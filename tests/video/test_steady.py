@@ -37,7 +37,7 @@ def test_faces_are_counted_and_changes_measured(takes: Path, face_model: Path) -
     assert min(sight.change for sight in alone[6:]) > 0.1
 
 
-def test_landmarks_of_a_large_picture_lie_where_they_lie_in_a_small_one(takes: Path, face_model: Path) -> None:
+def test_landmarks_do_not_depend_on_the_size_of_the_picture(takes: Path, face_model: Path) -> None:
     plain = [picture.pixels for picture in read_frames(takes / CLIP)][:3]
     large = [pixels.repeat(8, axis=0).repeat(8, axis=1) for pixels in plain]
     small, grown = (list(StreamingTracker(face_model).track(_film(pictures), 25.0)) for pictures in (plain, large))

@@ -67,7 +67,9 @@ def test_jaw_open_follows_the_lips(face_model, tracking, takes):
     scores = np.array([reader.blendshape_scores(points) for points in tracking.points])
     gap = np.linalg.norm(tracking.points[:, 13, :2] - tracking.points[:, 14, :2], axis=1)
     assert scores.shape == (len(tracking.points), 52)
-    least = 0.85 if takes.name == "rendered_takes" else 0.9  # the network learnt from people; 0.88 on a rendered head
+    least = (
+        0.85 if takes.name == "rendered_takes" else 0.9
+    )  # the network was trained on people; 0.88 on a rendered head
     assert np.corrcoef(scores[:, BLENDSHAPES.index("jawOpen")], gap)[0, 1] > least
 
 
@@ -112,7 +114,7 @@ def test_the_square_turns_with_the_face(angle):
     np.testing.assert_allclose([crop.x, crop.y], turn @ (upright.x, upright.y), atol=1e-9)
 
 
-def test_without_the_model_one_sentence_says_what_to_run(monkeypatch, tmp_path):
+def test_without_the_model_the_message_names_the_command(monkeypatch, tmp_path):
     monkeypatch.delenv(model.MODEL_VARIABLE, raising=False)
     monkeypatch.setattr(model, "user_cache", lambda: tmp_path)
     monkeypatch.setattr(model, "BUNDLING_PACKAGES", ("no_such_package",))
@@ -126,7 +128,7 @@ def test_another_model_is_refused(tmp_path):
         model.find_bundle(tmp_path / "face_landmarker.task")
 
 
-def test_a_path_that_leads_nowhere(tmp_path):
+def test_a_missing_model_path_is_refused(tmp_path):
     with pytest.raises(InputError, match="there is no face model"):
         model.find_bundle(tmp_path / "none.task")
 

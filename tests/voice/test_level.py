@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tests.oracles.loudness_meter import measured, true_peak
+from tests.oracles.loudness_meter import measure_loudness, true_peak
 from tts2face.speech.bs1770 import integrated_loudness, oversampled_peaks
 from tts2face.types import Speech, Waveform
 from tts2face.voice.level import CEILING_DB, LOOK_AHEAD_S, LOUDNESS_LUFS, level_speech, limit_peaks, normalise_loudness
@@ -25,7 +25,7 @@ def sound(level: float, seconds: float = 1.5, crest: float = 1.0, seed: int = 0)
 @pytest.mark.parametrize("seconds", [0.2, 3.0])
 def test_loud_and_soft_voices_come_out_alike(level: float, crest: float, seconds: float) -> None:
     (levelled,) = normalise_loudness([sound(level, seconds, crest)])
-    loudness, peak = measured(levelled)
+    loudness, peak = measure_loudness(levelled)
     assert integrated_loudness([levelled]) == pytest.approx(LOUDNESS_LUFS, abs=0.3)
     assert loudness == pytest.approx(LOUDNESS_LUFS, abs=0.3)
     assert peak < -1.0

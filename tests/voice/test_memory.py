@@ -1,4 +1,4 @@
-"""A long sentence takes memory only while it is spoken."""
+"""Memory of a long sentence is released after its synthesis."""
 
 import subprocess
 import sys

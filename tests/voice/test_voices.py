@@ -1,4 +1,4 @@
-"""Every voice keeps the same promises."""
+"""Requirements that every voice meets."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def voice(request: pytest.FixtureRequest) -> Voice:
     return load_voice(request.param, "en-us")
 
 
-def spoken_words(speech: Speech) -> dict[str, str]:
+def phones_by_word(speech: Speech) -> dict[str, str]:
     return {word.text.strip(".,"): "".join(speech.phones.phones[word.first : word.last]) for word in speech.words}
 
 
@@ -44,7 +44,7 @@ def test_speech_is_sound_with_phones_of_the_table_and_words(voice: Voice) -> Non
     assert speech.phones.end == speech.waveform.duration
     assert set(speech.phones.phones) <= PHONES.keys()
     assert speech.phones.phones[0] == speech.phones.phones[-1] == SILENCE
-    assert spoken_words(speech) == {
+    assert phones_by_word(speech) == {
         "Bob": "bɑb",
         "may": "meɪ",
         "move": "muv",
@@ -63,7 +63,7 @@ def test_the_same_request_gives_the_same_bytes(voice: Voice) -> None:
 
 def test_the_rate_acts(voice: Voice) -> None:
     usual, fast = voice.speak(SENTENCE), voice.speak(SENTENCE, rate=1.5)
-    spoken = [speech.phones.end - 0.5 for speech in (usual, fast)]  # half a second of it is silence that may stay
+    spoken = [speech.phones.end - 0.5 for speech in (usual, fast)]  # half a second of it is silence at any rate
     assert spoken[1] < 0.8 * spoken[0]
 
 
@@ -79,20 +79,20 @@ def test_silences_are_silent_and_phones_are_not(voice: Voice) -> None:
 
 def test_phones_in_instead_of_text(voice: Voice) -> None:
     words = [SpokenWord("map", parse_ipa("mˈæp")), SpokenWord("you", parse_ipa("jˈuː"), ".")]
-    assert spoken_words(voice.speak(words)) == {"map": "mæp", "you": "ju"}
+    assert phones_by_word(voice.speak(words)) == {"map": "mæp", "you": "ju"}
 
 
 def test_words_with_and_without_phones(voice: Voice) -> None:
     words = [SpokenWord(text, ()) for text in ("Of", "the", "twenty-five")]
     mixed = [*words, SpokenWord("Bob", parse_ipa("ʃˈiː"), ","), SpokenWord("may", ()), SpokenWord("move.", ())]
-    found = spoken_words(voice.speak(mixed))
+    found = phones_by_word(voice.speak(mixed))
     assert (found["Bob"], found["may"], found["move"], found["twenty-five"]) == ("ʃi", "meɪ", "muv", "twɛntifaɪv")
 
 
 @pytest.mark.parametrize("name", ["heart", "espeak"])
-def test_a_users_words_win_beside_given_phones(name: str) -> None:
+def test_words_of_a_user_dictionary_are_combined_with_given_phones(name: str) -> None:
     voice = load_voice(name, "en-us", {"bob": parse_ipa("ʃˈiː")})
-    found = spoken_words(
+    found = phones_by_word(
         voice.speak([SpokenWord("May", parse_ipa("kˈæt")), SpokenWord("Bob", ()), SpokenWord("move.", ())])
     )
     assert (found["May"], found["Bob"]) == ("kæt", "ʃi")
@@ -132,9 +132,9 @@ def test_speech_at_another_rate_keeps_its_phones_and_pitch(rate: int) -> None:
 
 
 @pytest.mark.parametrize("name", ["heart", "espeak"])
-def test_a_users_words_win(name: str) -> None:
+def test_words_of_a_user_dictionary_take_precedence(name: str) -> None:
     voice = load_voice(name, "en-us", {"bob": parse_ipa("ʃˈiː")})
-    assert spoken_words(voice.speak("May Bob move?"))["Bob"] == "ʃi"
+    assert phones_by_word(voice.speak("May Bob move?"))["Bob"] == "ʃi"
 
 
 @pytest.mark.parametrize(("language", "text", "n_words"), [(code, *case) for code, case in IN_OTHER_LANGUAGES.items()])
@@ -146,13 +146,13 @@ def test_espeak_speaks_other_languages(language: str, text: str, n_words: int) -
 
 
 def test_a_foreign_word_is_spoken_in_its_own_language() -> None:
-    """espeak-ng switches to English for "move" and says so among its phonemes; the marks are no phones."""
+    """espeak-ng switches to English for "move" and marks it among its phonemes; the marks are not phones."""
     speech = load_voice("espeak", "de").speak("Bob may move.")
     assert {"m", "u", "v"} <= set(speech.phones.phones)
 
 
-def test_a_stops_closure_belongs_to_it() -> None:
-    """espeak-ng's event stands at the burst; the /p/ of "happy" begins where the sound before it ends."""
+def test_the_closure_of_a_stop_is_part_of_the_phone() -> None:
+    """espeak-ng's event is at the burst; the /p/ of "happy" begins where the sound before it ends."""
     speech = load_voice("espeak", "en-us").speak("A happy apple.")
     rate = speech.waveform.rate
     at = speech.phones.phones.index("p")
@@ -168,7 +168,7 @@ def test_nothing_to_say_is_refused(voice: Voice, text: str) -> None:
         voice.speak(text)
 
 
-def test_what_the_neural_voice_cannot_say_is_refused() -> None:
+def test_text_that_the_neural_voice_cannot_speak_is_refused() -> None:
     with pytest.raises(InputError, match="cannot say '你好'"):
         load_voice("heart", "en-us").speak("Hello 你好 there.")
 
@@ -188,7 +188,7 @@ def test_the_longest_words_of_a_dictionary_are_spoken(language: str) -> None:
     assert len(spoken.words) == 2
 
 
-def test_a_crash_of_espeak_is_said_to_be_one() -> None:
+def test_a_crash_of_espeak_is_reported() -> None:
     words = [SpokenWord("bob", (Segment("b"),) * 300)]
     with pytest.raises(BackendError, match=r"espeak-ng crashed \(signal 11\) on '\[\[bbb.*change the spelling"):
         load_voice("espeak", "en-us").speak(words)

@@ -43,7 +43,7 @@ def intensity(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32
     centres = first + np.arange(n_frames) * STEP_S
     nearest = np.floor((centres - 0.5 * period) / period + 1.5) - 1.0  # rounds ties as Praat does
     samples = sound.samples.astype(np.float64)
-    powers = np.empty(n_frames)
+    powers = np.zeros(n_frames)
     for frame, centre in enumerate(nearest.astype(int)):
         begin, end = max(centre - half, 0), min(centre + half + 1, len(samples))
         part, weights = samples[begin:end], window[begin - centre + half : end - centre + half]

@@ -1,6 +1,5 @@
 """Reader of Live Link Face captures: CSV files with 61 ARKit channels for each frame."""
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from lexicon.inputs import read_table
 from tts2face.interpolation import interpolate_columns
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
@@ -34,15 +34,11 @@ def read_livelink(path: Path) -> FaceCapture:
     InputError
         The file does not exist.
     DataError
-        The file has another format, or a row is damaged.
+        The file has another format or is too large, or a row is damaged.
     """
     if not path.is_file():
         raise InputError(f"there is no capture {path}; check the path")
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [row for row in csv.reader(file) if row]
-    except (UnicodeDecodeError, csv.Error) as broken:
-        raise DataError(f"{path} is not a CSV file of Live Link Face ({broken})") from broken
+    rows = read_table(path)
     if not rows or rows[0][:1] != ["Timecode"] or "JawOpen" not in rows[0] or len(rows) < 3:
         raise DataError(f"{path} is not a CSV file of Live Link Face: it needs the columns Timecode, JawOpen, ...")
     names, times, values = _parse_rows(path, rows)

@@ -1,6 +1,7 @@
 """Piper voices from files (extra ``[piper]``), with phone edges by forced alignment of their sound."""
 
 import re
+import unicodedata
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 from lexicon.errors import BackendError, DataError, InputError
 from lexicon.g2p import parse_espeak_word, phonemize
 from lexicon.inputs import read_json
+from lexicon.languages import language_code
+from lexicon.phones import PHONES, nearest_phones
 from lexicon.writing_systems import check_script
 from tts2face.speech.forced_alignment import Aligner
 from tts2face.telemetry import disable_telemetry
@@ -18,7 +21,11 @@ from tts2face.types import Speech, Waveform
 from tts2face.voice.engine import PronunciationMap, SpeechInput, SpokenWord, apply_volume
 
 WORD = re.compile(r"[^\W_]+(?:['’-][^\W_]+)*")
+WORD_AND_MARKS = re.compile(rf"({WORD.pattern})([.,;:!?]*)")
 STRESS_MARKS = MappingProxyType({1: "ˈ", 2: "ˌ"})
+ESPEAK_PHONES = "espeak"  # type of the supported voices; others need letters, or models that piper downloads
+MODEL_INPUTS = frozenset({"input", "input_lengths", "scales"})
+SAMPLE_RATES_HZ = (8_000, 48_000)
 
 
 class PiperVoice:
@@ -27,7 +34,7 @@ class PiperVoice:
     Raises
     ------
     InputError
-        The voice does not exist.
+        The voice does not exist, speaks another language, or does not use the phones of espeak-ng.
     DataError
         The settings are missing, or a file is damaged.
     BackendError
@@ -42,18 +49,15 @@ class PiperVoice:
             raise DataError(f"the Piper voice {path} lacks its settings; put {settings.name} into the same folder")
         disable_telemetry()
         try:
-            read_json(settings)  # checks size and nesting, which piper does not limit
+            content = read_json(settings)  # checks size and nesting, which piper does not limit
         except OSError as refused:
             raise DataError(f"{settings} cannot be read ({refused.strerror}); check the file") from refused
-        try:
-            from piper import PiperVoice as Loaded
-        except ImportError as missing:
-            raise BackendError("a Piper voice needs piper-tts; run: pip install 'tts2face[piper]'") from missing
-        try:
-            self._model: Any = Loaded.load(str(path), config_path=str(settings))
-        except (ValueError, KeyError, RuntimeError) as broken:
-            raise DataError(f"{path} is not a Piper voice ({broken}); download it again") from broken
-        self._language = str(self._model.config.espeak_voice or language)
+        _check_settings(settings, content)
+        self._language = content["espeak"]["voice"]
+        _check_language(path, self._language, language)
+        self._path, self._model = path, _load_model(path, settings)
+        self._letters = frozenset(content["phoneme_id_map"])
+        self._phones = tuple(phone for phone in PHONES if self._letters.issuperset(_letters(phone)))
         self._own_words, self._aligner = own_words, Aligner()
 
     @property
@@ -69,7 +73,7 @@ class PiperVoice:
         if isinstance(content, str):
             text = self._insert_own_words(content)
         else:
-            text = " ".join(_bracketed_ipa(word) for word in words)
+            text = " ".join(self._bracketed_ipa(word) for word in words)
         sound = Waveform(apply_volume(self._synthesise(text, rate), 1.0), self.sample_rate)
         pronunciations = [(word.text, [tuple(segment.phone for segment in word.segments)]) for word in words]
         found = self._aligner.align(sound, pronunciations)
@@ -98,19 +102,95 @@ class PiperVoice:
         """Replace a user's words by ``[[IPA]]``, Piper's notation for given pronunciations."""
 
         def replace_with_ipa(match: "re.Match[str]") -> str:
-            segments = self._own_words.get(match[0].lower())
-            return match[0] if segments is None else _bracketed_ipa(SpokenWord(match[0], segments))
+            segments = self._own_words.get(match[1].lower())
+            return match[0] if segments is None else self._bracketed_ipa(SpokenWord(match[1], segments, match[2]))
 
-        return WORD.sub(replace_with_ipa, text)
+        return WORD_AND_MARKS.sub(replace_with_ipa, text.replace("[[", " "))  # its own brackets are not read
+
+    def _bracketed_ipa(self, word: SpokenWord) -> str:
+        """A word in Piper's notation; phones that the voice does not have are replaced by the nearest ones."""
+        written = "".join(
+            STRESS_MARKS.get(segment.stress, "") + "".join(map(_letters, nearest_phones(segment.phone, self._phones)))
+            for segment in word.segments
+        )
+        marks = "".join(mark for mark in word.after if mark in self._letters)
+        return f"[[{written}{marks}]]"  # Piper omits punctuation that follows the brackets
 
     def _synthesise(self, text: str, rate: float) -> NDArray[np.float32]:
         from piper import SynthesisConfig
 
         config = SynthesisConfig(length_scale=1.0 / rate, noise_scale=0.0, noise_w_scale=0.0)
-        chunks = [chunk.audio_float_array for chunk in self._model.synthesize(text, syn_config=config)]
-        return np.concatenate([np.zeros(0), *chunks]).astype(np.float32)
+        try:
+            chunks = [chunk.audio_float_array for chunk in self._model.synthesize(text, syn_config=config)]
+            samples = np.concatenate([np.zeros(0), *chunks]).astype(np.float32)
+        except _piper_errors() as broken:
+            raise DataError(f"{self._path} cannot speak {text!r} ({broken}); download the voice again") from broken
+        if not np.isfinite(samples).all() or not samples.any():
+            raise DataError(f"{self._path} returned no sound for {text!r}; download the voice again")
+        return samples
 
 
-def _bracketed_ipa(word: SpokenWord) -> str:
-    phones = "".join(STRESS_MARKS.get(segment.stress, "") + segment.phone for segment in word.segments)
-    return f"[[{phones}]]{word.after}"
+def _check_settings(path: Path, content: Any) -> None:
+    """Check the entries of a settings file from which a voice is loaded."""
+    content = content if isinstance(content, dict) else {}
+    low, high = SAMPLE_RATES_HZ
+    audio, espeak, ids = (content.get(name) for name in ("audio", "espeak", "phoneme_id_map"))
+    rate = audio.get("sample_rate") if isinstance(audio, dict) else None
+    language = espeak.get("voice") if isinstance(espeak, dict) else None
+    faults = {
+        f"audio.sample_rate, {low} to {high}": not isinstance(rate, int) or not low <= rate <= high,
+        "espeak.voice, a language of espeak-ng": not isinstance(language, str) or not language,
+        "phoneme_id_map, lists of indices by letter": not _is_id_map(ids),
+        "num_speakers, a number": not isinstance(content.get("num_speakers"), int),
+        "num_symbols, a number": not isinstance(content.get("num_symbols"), int),
+    }
+    for entry, is_wrong in faults.items():
+        if is_wrong:
+            raise DataError(f"{path} lacks {entry}; download the voice again")
+    if (kind := content.get("phoneme_type", ESPEAK_PHONES)) != ESPEAK_PHONES:
+        raise InputError(f"{path} is a voice of the type {kind!r}; choose a voice of the type {ESPEAK_PHONES!r}")
+
+
+def _is_id_map(ids: Any) -> bool:
+    return (
+        isinstance(ids, dict)
+        and {"^", "_", "$"} <= ids.keys()  # begin, padding and end of a sentence
+        and all(isinstance(value, list) and all(isinstance(index, int) for index in value) for value in ids.values())
+    )
+
+
+def _check_language(path: Path, spoken: str, wanted: str) -> None:
+    try:
+        code = language_code(spoken)
+    except InputError as unknown:
+        raise DataError(f"the Piper voice {path} names no language of espeak-ng ({unknown})") from unknown
+    if code.partition("-")[0] != wanted.partition("-")[0]:
+        raise InputError(f"the Piper voice {path} speaks {code}, not {wanted}; use --language {code} or another voice")
+
+
+def _load_model(path: Path, settings: Path) -> Any:
+    try:
+        from piper import PiperVoice as Loaded
+    except ImportError as missing:
+        raise BackendError("a Piper voice needs piper-tts; run: pip install 'tts2face[piper]'") from missing
+    try:
+        model = Loaded.load(str(path), config_path=str(settings))
+        inputs = {tensor.name for tensor in model.session.get_inputs()}
+    except _piper_errors() as broken:
+        raise DataError(f"{path} is not a Piper voice ({broken}); download it again") from broken
+    if not inputs >= MODEL_INPUTS:
+        raise DataError(f"{path} is not a Piper voice: its inputs are {', '.join(sorted(inputs))}; download it again")
+    return model
+
+
+def _piper_errors() -> tuple[type[Exception], ...]:
+    """Exceptions of Piper for damaged files, and those of ONNX Runtime, which have no common base but Exception."""
+    from onnxruntime.capi import onnxruntime_pybind11_state as state
+
+    runtime = [error for error in vars(state).values() if isinstance(error, type) and issubclass(error, Exception)]
+    return TypeError, ValueError, KeyError, AttributeError, *runtime
+
+
+def _letters(phone: str) -> str:
+    """Characters of a phone in the alphabet of Piper, which separates diacritics."""
+    return unicodedata.normalize("NFD", phone) if phone != "ç" else phone

@@ -59,7 +59,7 @@ def test_captured_expressions_are_what_differs_from_neutral(tmp_path: Path) -> N
     assert not found.expressions[:, 468:].any()
 
 
-def test_a_recording_s_rest_stands_for_a_neutral_still(tmp_path: Path) -> None:
+def test_the_rest_pose_of_a_recording_replaces_a_neutral_still(tmp_path: Path) -> None:
     expressions, rest = random_faces()
     stills = stills_at(tmp_path)
     del stills["neutral"]

@@ -1,4 +1,4 @@
-"""Recordings of every source on one clock: films, Live Link captures, and their resampling."""
+"""Recordings of every source on one clock: videos, Live Link captures, and their resampling."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -42,7 +42,7 @@ def test_a_movement_keeps_its_time_and_size_at_thirty_frames(fps: float) -> None
     assert abs(len(read.landmarks) / 30.0 - 4.0) <= 1 / 30.0
 
 
-def test_what_is_too_fast_does_not_come_back_as_something_slow() -> None:
+def test_resampling_does_not_alias() -> None:
     fps = 120.0
     fast = np.cos(2 * np.pi * 29.0 * np.arange(480) / fps)[:, None]  # every fourth frame of it: a movement at 1 Hz
     assert np.abs(fast[::4]).max() == 1.0
@@ -140,7 +140,7 @@ def test_a_film_brings_its_sound_on_the_clock_of_its_frames(begin: float, monkey
     np.testing.assert_array_equal(sound.samples, np.where(at < 0, 0.0, ramp[np.maximum(at, 0)]))
 
 
-def test_one_sound_of_another_name_is_the_capture_s(tmp_path: Path) -> None:
+def test_a_single_sound_file_with_another_name_belongs_to_the_capture(tmp_path: Path) -> None:
     capture = tmp_path / "take.csv"
     (tmp_path / "room.wav").write_bytes(b"")
     assert find_capture_sound(capture) == tmp_path / "room.wav"

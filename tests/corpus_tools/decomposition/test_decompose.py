@@ -64,7 +64,7 @@ def test_no_landmark_lies_in_two_regions_or_in_the_lips() -> None:
     assert not set(every) & set(MOUTH_REGION)
 
 
-def test_a_slow_expression_is_told_by_its_weight(basis: ExpressionBasis) -> None:
+def test_a_slow_expression_is_recovered_by_its_weight(basis: ExpressionBasis) -> None:
     slow = 0.5 - 0.5 * np.cos(2 * np.pi * TIMES / SECONDS)
     happy = EXPRESSIONS.index("happy")
     moved = basis.rest + slow[:, None, None] * basis.expressions[happy]
@@ -89,7 +89,7 @@ def test_quick_brows_are_independent_motion_and_no_expression(basis: ExpressionB
     assert np.abs(made.motion["cheeks"]).max() < 0.3
 
 
-def test_speech_is_left_in_the_lips(basis: ExpressionBasis) -> None:
+def test_speech_remains_in_the_lips(basis: ExpressionBasis) -> None:
     opened = 4.0 * np.maximum(np.sin(2 * np.pi * 4 * TIMES), 0)
     moved = np.tile(basis.rest, (len(TIMES), 1, 1))
     moved[:, 14, 1] -= opened
@@ -133,7 +133,7 @@ def test_a_capture_tells_its_eyes_itself(face: Face, basis: ExpressionBasis) -> 
     np.testing.assert_allclose(made.motion["blink"][:, 0], 0.3 * looking, atol=1e-6)
 
 
-def test_irises_behind_lids_are_not_believed(basis: ExpressionBasis) -> None:
+def test_irises_covered_by_lids_are_ignored(basis: ExpressionBasis) -> None:
     shut = np.zeros((len(TIMES), 2), np.float32)
     shut[100:110] = 1.0
     turned = np.zeros((len(TIMES), 2))
@@ -181,7 +181,7 @@ def test_modes_are_orthonormal(basis: ExpressionBasis) -> None:
         np.testing.assert_allclose(flat @ flat.T, np.eye(len(flat)), atol=1e-5)
 
 
-def test_a_style_that_is_there_already(basis: ExpressionBasis) -> None:
+def test_an_existing_style_is_refused(basis: ExpressionBasis) -> None:
     palette = add_style(None, "one", _style(basis, 2), basis.rest, {}).palette
     with pytest.raises(InputError, match="the palette has a style one already"):
         add_style(palette, "one", _style(basis, 2), basis.rest, {})

@@ -99,14 +99,16 @@ def test_a_long_gap_is_refused_with_its_time(made: Made, face: Face, marker_set:
         read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
 
 
-def test_a_marker_never_seen_is_refused(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
+def test_a_marker_missing_in_all_frames_is_refused(
+    made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path
+) -> None:
     points = made.points.copy()
     points[:, made.names.index("LBRO2")] = np.nan
     with pytest.raises(DataError, match="LBRO2 is never visible"):
         read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
 
 
-def test_a_missing_marker_is_told_and_a_missing_region_refused(
+def test_a_missing_marker_is_reported_and_a_missing_region_refused(
     made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path
 ) -> None:
     one = [number for number, name in enumerate(made.names) if name != "LIP3"]

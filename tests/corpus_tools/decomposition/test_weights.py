@@ -78,7 +78,7 @@ def test_a_face_that_is_a_sample_has_its_weights() -> None:
     basis, _, _ = made()
     ready = build_nearest_samples_estimator(basis, np.random.default_rng(5))
     seen = np.tensordot(ready.samples[:3], basis, axes=1)
-    np.testing.assert_allclose(ready.weights(seen), ready.samples[:3], atol=1e-4)  # rounding stands for distance 0
+    np.testing.assert_allclose(ready.weights(seen), ready.samples[:3], atol=1e-4)  # distance 0 up to rounding
 
 
 def test_the_error_falls_with_the_number_of_samples_and_never_below_least_squares() -> None:
@@ -114,7 +114,7 @@ def test_the_average_is_the_mean_of_its_frames(n: int) -> None:
     np.testing.assert_allclose(moving_average(motion), plain_average(motion), atol=1e-12)
 
 
-def test_the_average_keeps_what_stands_still_and_removes_a_period_of_its_length() -> None:
+def test_the_average_keeps_constants_and_removes_its_own_period() -> None:
     wave = np.sin(2 * np.pi * np.arange(200) / N_AVERAGED)[:, None]
     np.testing.assert_allclose(moving_average(wave + 7.0)[40:-40], 7.0, atol=1e-12)
 

@@ -26,7 +26,7 @@ def compared(style: StyleStudy, name: str) -> TraitComparison:
     return next(one for one in style.trait_comparisons if one.trait.name == name)
 
 
-def test_recordings_are_dealt_whole_and_once():
+def test_every_recording_is_assigned_whole_and_once():
     style = made_style()
     learnt, held = hold_out(style, 4, 0)
     assert (len(learnt.lengths), len(held.lengths)) == (45, 15)
@@ -69,7 +69,7 @@ def test_a_derived_style_is_the_changed_clip_of_its_source():
     np.testing.assert_allclose(larger - middle, 2 * (plain - middle), atol=1e-5)
 
 
-def test_noise_hears_nothing_and_differs_by_seed():
+def test_noise_is_independent_of_the_sound_and_depends_on_the_seed():
     fields = GestureFields(made_palette())
     one, same, other = (noise_clip(fields, "calm", 100, seed)["head"] for seed in (1, 1, 2))
     np.testing.assert_array_equal(one, same)

@@ -1,4 +1,4 @@
-"""Measures against what can be worked out by hand."""
+"""Measures against values computed by hand."""
 
 import numpy as np
 import pytest
@@ -81,7 +81,7 @@ def test_distance_is_how_far_numbers_must_be_moved():
     assert np.isnan(wasserstein(np.zeros(0), np.ones(3)))
 
 
-def test_halves_hold_everything_once():
+def test_halves_contain_every_recording_once():
     made = list(random_halves(7, 20, np.random.default_rng(0)))
     assert len(made) == 20
     assert all(sorted([*one, *other]) == list(range(7)) for one, other in made)

@@ -35,7 +35,7 @@ def test_hundreds_of_recordings_are_studied(style: StyleStudy) -> None:
 
 
 @pytest.mark.parametrize("name", ["head speed", "brow height", "blink interval"])
-def test_fields_are_as_near_as_other_recordings_of_the_same_person(name: str, style: StyleStudy) -> None:
+def test_fields_differ_no_more_than_other_recordings_of_the_same_person(name: str, style: StyleStudy) -> None:
     found = compared(style, name)
     assert found.to_field <= 1.5 * found.halves
     assert found.to_field < 0.5 * found.to_noise
@@ -49,7 +49,7 @@ def test_heads_move_with_the_sound_as_real_ones_do(style: StyleStudy) -> None:
 
 
 @pytest.mark.parametrize("feature", ["head", "brows"])
-def test_nothing_trembles(feature: str, style: StyleStudy) -> None:
+def test_no_feature_has_excess_high_frequency_motion(feature: str, style: StyleStudy) -> None:
     assert 0.7 < moving(style, feature).fast_power[0] < NO_JITTER
 
 

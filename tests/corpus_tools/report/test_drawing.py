@@ -24,7 +24,7 @@ def diagonal(figure):
     return [Tip(axes, 0, 0, "from < here"), Tip(axes, 10, 1, "to"), Tip(axes, 0, 0, "all", 10, 1)]
 
 
-def test_lines_and_tips_are_where_their_numbers_say():
+def test_lines_and_tooltips_are_at_their_values():
     svg = draw_svg(diagonal, 300, 200, "a & b")
     (path,) = re.findall(r'<path d="M ([^"]*)" clip-path="[^"]*" style="fill: none; stroke: var\(--first\)', svg)
     line = np.array(path.replace("L", "").split(), float).reshape(2, 2)

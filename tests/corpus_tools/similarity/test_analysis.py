@@ -18,7 +18,7 @@ from tts2face.exemplar.synthesis import build_exemplar_model
 
 
 @pytest.fixture(scope="module")
-def spoken(talker):
+def spoken_tokens(talker):
     return collect_spoken_tokens(talker, "made")
 
 
@@ -27,8 +27,8 @@ def found(talker):
     return analyse(NamedTalker("made", talker), Options(halves=4))
 
 
-def test_the_table_is_the_one_that_synthesis_uses_without_silence(talker, spoken):
-    table, used = similarity_table(spoken), build_exemplar_model(talker).similarity
+def test_the_table_is_the_one_that_synthesis_uses_without_silence(talker, spoken_tokens):
+    table, used = similarity_table(spoken_tokens), build_exemplar_model(talker).similarity
     assert "sil" not in table.phones
     for i, a in enumerate(table.phones):
         assert table.silence[i] == used.matrix[used.phones.index(a), used.phones.index("sil")]
@@ -37,7 +37,7 @@ def test_the_table_is_the_one_that_synthesis_uses_without_silence(talker, spoken
     assert (table.counts == 60).all()
 
 
-def test_the_classes_are_the_looks_that_were_made(found):
+def test_the_classes_equal_the_generated_visemes(found):
     assert found.best.n_classes == 3
     groups = {frozenset(np.array(found.table.phones)[found.best.labels == k]) for k in range(3)}
     assert groups == {frozenset(block) for block in BLOCKS}
@@ -52,7 +52,7 @@ def test_neighbours_are_of_the_same_look(found):
         assert {near for near, _ in ranked[:2]} == block - {phone}
 
 
-def test_articulation_agrees_within_what_was_said(found):
+def test_articulatory_features_are_compared_for_recorded_phones(found):
     assert [name for name, _ in found.articulatory] == ["all phones", "consonants", "vowels"]
     assert found.articulatory[0][1].n_pairs == 36
     assert found.articulatory[1][1].n_pairs == 6
@@ -72,23 +72,25 @@ def test_halves_of_a_steady_talker_agree_and_each_holds_half(found):
     assert split.left_out == ()
 
 
-def test_halves_by_words_share_no_word(spoken):
-    units = np.where(spoken.word >= 0, spoken.word, NO_WORD)
-    split = split_half(spoken, units, 3, np.random.default_rng(0))
+def test_halves_by_words_share_no_word(spoken_tokens):
+    units = np.where(spoken_tokens.word >= 0, spoken_tokens.word, NO_WORD)
+    split = split_half(spoken_tokens, units, 3, np.random.default_rng(0))
     assert split is not None
     assert split.mean > 0.9
 
 
-def test_halves_compare_only_the_phones_among_those_given(spoken):
+def test_halves_compare_only_the_phones_among_those_given(spoken_tokens):
     among = {"p", "b", "u", "w", "a"}
-    split = split_half(spoken, spoken.utterance, 3, np.random.default_rng(0), among=among)
+    split = split_half(spoken_tokens, spoken_tokens.utterance, 3, np.random.default_rng(0), among=among)
     assert split is not None
     assert set(split.phones) - set(split.left_out) == among
     assert (split.n_phones == 5).all()
 
 
 def test_a_talker_without_words_has_no_halves_of_words(talker):
-    wordless = replace(talker, utterances=tuple(replace(spoken, words=()) for spoken in talker.utterances))
+    wordless = replace(
+        talker, utterances=tuple(replace(spoken_tokens, words=()) for spoken_tokens in talker.utterances)
+    )
     found = analyse(NamedTalker("made", wordless), Options(halves=2))
     assert found.by_words is None
     assert found.by_utterances_same_phones is None
@@ -102,23 +104,23 @@ def test_progress_runs_to_its_end(talker):
     assert steps == [(done, 6) for done in range(1, 7)]
 
 
-def test_random_looks_do_not_agree(spoken):
-    shuffled = replace(spoken, phone=np.random.default_rng(0).permutation(spoken.phone))
-    split = split_half(shuffled, spoken.utterance, 10, np.random.default_rng(0))
+def test_random_visemes_do_not_correlate(spoken_tokens):
+    shuffled = replace(spoken_tokens, phone=np.random.default_rng(0).permutation(spoken_tokens.phone))
+    split = split_half(shuffled, spoken_tokens.utterance, 10, np.random.default_rng(0))
     assert split is not None
     assert abs(split.mean) < 0.35
 
 
-def test_a_phone_with_few_tokens_is_left_out_of_the_halves(spoken):
-    rare = spoken.inventory.index("w")
-    few = np.flatnonzero(spoken.phone == rare)[12:]
-    kept = ~np.isin(np.arange(len(spoken.phone)), few)
+def test_a_phone_with_few_tokens_is_omitted_from_the_halves(spoken_tokens):
+    rare = spoken_tokens.inventory.index("w")
+    few = np.flatnonzero(spoken_tokens.phone == rare)[12:]
+    kept = ~np.isin(np.arange(len(spoken_tokens.phone)), few)
     thin = replace(
-        spoken,
-        samples=spoken.samples[kept],
-        phone=spoken.phone[kept],
-        utterance=spoken.utterance[kept],
-        word=spoken.word[kept],
+        spoken_tokens,
+        samples=spoken_tokens.samples[kept],
+        phone=spoken_tokens.phone[kept],
+        utterance=spoken_tokens.utterance[kept],
+        word=spoken_tokens.word[kept],
     )
     split = split_half(thin, thin.utterance, 3, np.random.default_rng(0))
     assert split is not None
@@ -127,8 +129,8 @@ def test_a_phone_with_few_tokens_is_left_out_of_the_halves(spoken):
     assert np.isnan(split.per_phone[split.phones.index("w")])
 
 
-def test_no_halves_where_all_is_one_word(spoken):
-    assert split_half(spoken, np.zeros(len(spoken.phone), int), 3, np.random.default_rng(0)) is None
+def test_no_halves_where_all_is_one_word(spoken_tokens):
+    assert split_half(spoken_tokens, np.zeros(len(spoken_tokens.phone), int), 3, np.random.default_rng(0)) is None
 
 
 def test_the_seed_chooses_the_halves(talker, found):
@@ -146,15 +148,15 @@ def test_movements_are_measured_in_millimetres():
     assert mode_names(made_model()) == ("opening +6.0", "width +4.0", "fine detail")
 
 
-def test_what_the_phone_says_is_held_and_noise_is_free(talker, spoken, found):
-    held = movement_consistency(spoken, found.table.phones, talker.model)
+def test_controlled_movements_are_held_and_noise_is_free(talker, spoken_tokens, found):
+    held = movement_consistency(spoken_tokens, found.table.phones, talker.model)
     opening = held.names.index("opening")
     assert held.free_share[opening] < 0.05
     assert (held.free[:, opening] < 0.3).all()
     assert found.modes.free_share[2] > 0.95
     assert found.modes.free[:, 2] == pytest.approx(1.0, abs=0.2)
-    values = spoken.samples[spoken.phone == spoken.inventory.index("a"), :, 2]
-    total = spoken.samples[spoken.phone != spoken.inventory.index("sil"), :, 2]
+    values = spoken_tokens.samples[spoken_tokens.phone == spoken_tokens.inventory.index("a"), :, 2]
+    total = spoken_tokens.samples[spoken_tokens.phone != spoken_tokens.inventory.index("sil"), :, 2]
     expected = np.sqrt(np.mean(values.std(axis=0) ** 2) / np.mean(total.std(axis=0) ** 2))
     assert found.modes.free[found.table.phones.index("a"), 2] == pytest.approx(expected, rel=1e-6)
 

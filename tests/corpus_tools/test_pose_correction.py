@@ -1,4 +1,4 @@
-"""Displacements by the head's angles: found where they are, and left where they are not."""
+"""Landmark displacements caused by head rotation: corrected if present, no change otherwise."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -32,7 +32,7 @@ def leaking(seen: list[Observation], offsets: np.ndarray) -> list[Observation]:
 
 
 def test_a_known_leak_is_taken_out(recorded: list[Observation]) -> None:
-    """0.25: speech does not average out entirely in a chunk, and the regression takes some of it."""
+    """0.25: the mean of speech over a chunk is not zero, and the regression removes a part of it."""
     offsets = np.random.default_rng(1).normal(0, 1.0, (9, N_LANDMARKS, 3))
     offsets[:, list(INNER_LIP_LOWER)] = offsets[:, list(INNER_LIP_UPPER)]
     leaky = leaking(recorded, offsets)
@@ -53,14 +53,14 @@ def test_lips_that_touch_keep_touching(recorded: list[Observation]) -> None:
         np.testing.assert_allclose(gaps[0], gaps[1], atol=1e-3)
 
 
-def test_too_few_recordings_are_left_alone(recorded: list[Observation]) -> None:
+def test_too_few_recordings_are_not_corrected(recorded: list[Observation]) -> None:
     few = leaking(recorded, np.ones((9, N_LANDMARKS, 3)))[: MIN_CHUNKS - 1]
     assert not fit_pose_correction(few).offsets.any()
     for before, after in zip(few, correct_pose(few), strict=True):
         np.testing.assert_array_equal(before.landmarks, after.landmarks)
 
 
-def test_nobody_leaks_nothing() -> None:
+def test_pose_correction_of_no_recordings_is_empty() -> None:
     assert correct_pose([]) == ()
 
 

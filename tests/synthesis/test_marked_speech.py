@@ -30,7 +30,7 @@ from tts2face.synthesis.speech_joining import join_utterances, silent_speech, tr
 from tts2face.voice.loading import load_voice
 
 
-def said(text: str, voice: object | None = None, **options: object) -> list[SpokenSentence]:
+def synthesise_sentences(text: str, voice: object | None = None, **options: object) -> list[SpokenSentence]:
     request = Request(text=text, **options)
     return [
         speak_sentence(voice or FakeVoice(), part, request)
@@ -39,7 +39,7 @@ def said(text: str, voice: object | None = None, **options: object) -> list[Spok
 
 
 def one(text: str, voice: object | None = None, **options: object) -> SpokenSentence:
-    (only,) = said(text, voice, **options)
+    (only,) = synthesise_sentences(text, voice, **options)
     return only
 
 
@@ -48,7 +48,7 @@ def words(answer: SpokenSentence) -> dict[str, tuple[float, float]]:
     return {word.text: (float(edges[word.first]), float(edges[word.last])) for word in answer.speech.words}
 
 
-def test_without_marks_the_voice_s_answer_goes_through() -> None:
+def test_without_marks_the_speech_of_the_voice_is_unchanged() -> None:
     voice = FakeVoice()
     answer = one("hello there.", voice)
     plain = FakeVoice().speak("hello there.")
@@ -59,7 +59,7 @@ def test_without_marks_the_voice_s_answer_goes_through() -> None:
 
 
 @pytest.mark.parametrize("pause", [0.02, 0.1, 0.4, 1.0, 3.0])
-def test_a_pause_within_a_sentence_lasts_as_long_as_it_says(pause: float) -> None:
+def test_a_pause_within_a_sentence_has_the_requested_duration(pause: float) -> None:
     voice = FakeVoice()
     answer = one(f"hello [pause {pause}] there.", voice)
     assert [text for text, _ in voice.said] == ["hello", "there."]
@@ -73,21 +73,21 @@ def test_a_pause_within_a_sentence_lasts_as_long_as_it_says(pause: float) -> Non
 
 
 def test_pauses_between_sentences_come_on_top() -> None:
-    plain = said("One. Two.")
-    paused = said("[pause 2]One. [pause 0.5]Two.[pause 1]")
+    plain = synthesise_sentences("One. Two.")
+    paused = synthesise_sentences("[pause 2]One. [pause 0.5]Two.[pause 1]")
     gained = [b.speech.phones.end - a.speech.phones.end for a, b in zip(plain, paused, strict=True)]
     assert gained == pytest.approx([2.5, 1.0])
     assert words(paused[0])["One"][0] == pytest.approx(2 + LEAD)
 
 
-def test_punctuation_behind_a_pause_belongs_to_the_words_before() -> None:
+def test_punctuation_after_a_pause_belongs_to_the_preceding_words() -> None:
     voice = FakeVoice()
     answer = one("hello [pause 1].", voice)
     assert voice.said == [("hello.", 1.0)]
     assert answer.speech.phones.end == pytest.approx(LEAD + 5 * LETTER + TRAIL + 1)
 
 
-def test_pauses_where_nothing_is_said_are_kept() -> None:
+def test_pauses_without_words_are_kept() -> None:
     assert [
         part.utterances[-1].pause for part in split_sentences(parse_marks("One. … [pause 1] Two. [pause 2] …"), "en-us")
     ] == [
@@ -113,7 +113,7 @@ def test_a_mark_within_a_word_counts_for_it() -> None:
     assert answer.timeline.nods == (Nod(words(answer)["two"][0]),)
 
 
-def test_numbers_are_counted_as_they_are_said() -> None:
+def test_words_of_numbers_are_counted_as_pronounced() -> None:
     answer = one("it is 25 [nod]times.")
     assert answer.timeline.nods == (Nod(words(answer)["times"][0]),)
 
@@ -136,7 +136,7 @@ def test_styles_hold_over_their_words_and_the_inner_one_counts() -> None:
 
 
 def test_a_style_around_all_sentences_holds_throughout() -> None:
-    for answer in said("[style:brows=calm]One. Two. Three.[/style]"):
+    for answer in synthesise_sentences("[style:brows=calm]One. Two. Three.[/style]"):
         assert answer.timeline.spans == (StyleSpan("brows", "calm", 0.0, float("inf")),)
 
 
@@ -175,7 +175,7 @@ def test_emphasis_is_louder_with_a_nod() -> None:
     assert answer.timeline.nods == (Nod(start),)
 
 
-def test_spans_are_spoken_by_their_voice_at_the_rate_of_the_first() -> None:
+def test_spans_use_their_own_voice_at_the_sample_rate_of_the_first() -> None:
     asked: list[tuple[str | None, str]] = []
     other = FakeVoice(rate=2 * RATE)
 
@@ -239,7 +239,7 @@ WORDS = st.lists(
 def test_times_of_marks_increase_and_lie_in_the_sound(texts: list, data: st.DataObject, splits: bool) -> None:
     kinds = [data.draw(st.sampled_from(["", "[nod]", "[pause 0.3]", "[pause 1][nod 0.5]"])) for _ in texts]
     text = " ".join(kind + word for kind, word in zip(kinds, texts, strict=True))
-    for answer in said(f"[style:head=a]{text}[/style]", FakeVoice(splits)):
+    for answer in synthesise_sentences(f"[style:head=a]{text}[/style]", FakeVoice(splits)):
         nods = [nod.time for nod in answer.timeline.nods]
         assert nods == sorted(nods)
         assert all(0 <= time < answer.speech.phones.end for time in nods)
@@ -272,7 +272,7 @@ def test_any_text_is_cut_without_loss(bits: list) -> None:
         assert all(before[1] <= after[0] for before, after in pairwise(bounds))
 
 
-def test_silences_are_taken_away_and_put_in_exactly() -> None:
+def test_silences_are_removed_and_inserted_exactly() -> None:
     first, second = FakeVoice().speak("ab"), FakeVoice().speak("cd")
     short, cut = trim_silence(second, before=0.05, behind=0.1)
     assert cut == pytest.approx(0.15)
@@ -284,7 +284,7 @@ def test_silences_are_taken_away_and_put_in_exactly() -> None:
 
 
 @pytest.mark.parametrize("name", ["heart", "espeak"])
-def test_real_voices_pause_and_nod_where_they_are_told(name: str) -> None:
+def test_real_voices_pause_and_nod_at_the_marks(name: str) -> None:
     answer = one("We were away [pause 0.4] a year ago, [nod]but Bob may move.", load_voice(name, "en-us"))
     at = words(answer)
     assert at["a"][0] - at["away"][1] == pytest.approx(0.4, abs=0.002)

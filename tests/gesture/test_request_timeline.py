@@ -1,4 +1,4 @@
-"""What a request asks of the gestures."""
+"""Timeline of the gestures of a request."""
 
 from pathlib import Path
 
@@ -35,7 +35,7 @@ def test_flags_win_over_the_file(tmp_path: Path) -> None:
     )
 
 
-def test_nothing_asked_is_an_empty_timeline() -> None:
+def test_a_request_without_gestures_has_an_empty_timeline() -> None:
     timeline = build_request_timeline(Request(text="Hi."))
     assert (timeline.style, timeline.spans, timeline.expressions, timeline.nods) == ({}, (), (), ())
 
