@@ -94,11 +94,10 @@ def test_a_text_is_spoken_with_the_phones_of_espeak(voice_file: Path) -> None:
     assert speech.phones.end == speech.waveform.duration
 
 
-def test_rate_and_volume_act(voice_file: Path) -> None:
+def test_rate_acts_and_seed_does_not(voice_file: Path) -> None:
     voice = load_voice(str(voice_file), "en-us")
-    usual, fast, quiet = voice.speak("Bob."), voice.speak("Bob.", rate=2.0), voice.speak("Bob.", volume=0.5)
+    usual, fast = voice.speak("Bob."), voice.speak("Bob.", rate=2.0)
     assert len(fast.waveform.samples) * 2 == len(usual.waveform.samples)
-    np.testing.assert_allclose(quiet.waveform.samples, usual.waveform.samples * 0.5, atol=1e-6)
     again = voice.speak("Bob.", seed=7)
     assert np.array_equal(again.waveform.samples, usual.waveform.samples)
 

@@ -65,7 +65,7 @@ class Voice(Protocol):
         """
 
 
-def apply_volume(samples: NDArray[np.floating], volume: float) -> NDArray[np.float32]:
+def apply_volume(samples: NDArray[np.floating], volume: float = 1.0) -> NDArray[np.float32]:
     """Samples (n,) times a factor, scaled as a whole to [-1, 1] if they exceed full scale."""
     amplified = np.asarray(samples, np.float32) * np.float32(volume)
     peak = float(np.abs(amplified).max(initial=0.0))

@@ -85,7 +85,7 @@ class EspeakVoice:
         if not any(phone != SILENCE for event in events for phone in event.phones):
             raise InputError(f"there is nothing to say in {text[:40]!r}; give at least one word")
         phones, spans = _phone_sequence(events, words or names, len(sound) / self._rate)
-        return Speech(Waveform(apply_volume(sound, 1.0), self._rate), phones, spans)
+        return Speech(Waveform(apply_volume(sound), self._rate), phones, spans)
 
     def _espeak_text(self, content: SpeechInput) -> tuple[str, list[str]]:
         """Input text for espeak-ng, and the written words if any is given as phones."""

@@ -136,7 +136,7 @@ class NeuralVoice:
     def _speak_tokens(self, tokens: Sequence[_Token], rate: float, seed: int) -> Speech:
         letters = "".join(token.letters + " " * token.has_space for token in tokens).strip()
         samples = self._model.from_phonemes(letters, speed=rate, seed=seed)
-        sound = Waveform(apply_volume(samples, 1.0), self.sample_rate)
+        sound = Waveform(apply_volume(samples), self.sample_rate)
         try:
             phones, spans = self._align(tokens, sound)
         except DataError:

@@ -74,7 +74,7 @@ class PiperVoice:
             text = self._insert_own_words(content)
         else:
             text = " ".join(self._bracketed_ipa(word) for word in words)
-        sound = Waveform(apply_volume(self._synthesise(text, rate), 1.0), self.sample_rate)
+        sound = Waveform(apply_volume(self._synthesise(text, rate)), self.sample_rate)
         pronunciations = [(word.text, [tuple(segment.phone for segment in word.segments)]) for word in words]
         found = self._aligner.align(sound, pronunciations)
         return Speech(sound, found.phones, found.words)
