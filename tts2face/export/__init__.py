@@ -1,1 +1,1 @@
-"""Export of words and phones in text formats."""
+"""Export of clips and phones to files of other programs: one module for each format."""
