@@ -64,7 +64,7 @@ def phones(
     from lexicon.dictionary import read_dictionary
     from lexicon.given_pronunciations import pronounce_marked
     from lexicon.mark_parser import parse_marks
-    from tts2face.export.text import FORMATS
+    from tts2face.exports.text import FORMATS
 
     pronunciation = pronounce_marked(
         parse_marks(text, language), language, read_dictionary(dictionary) if dictionary else None

@@ -17,8 +17,11 @@ if TYPE_CHECKING:
     from lexicon.errors import Tts2faceError as Tts2faceError
     from lexicon.sequence import PhoneSequence as PhoneSequence
     from lexicon.sequence import WordSpan as WordSpan
+    from tts2face.api import export as export
+    from tts2face.api import load_clip as load_clip
     from tts2face.api import write_clip as write_clip
     from tts2face.catalogue import faces as faces
+    from tts2face.catalogue import formats as formats
     from tts2face.catalogue import identities as identities
     from tts2face.catalogue import languages as languages
     from tts2face.catalogue import styles as styles
@@ -65,9 +68,12 @@ __all__ = [
     "Waveform",
     "WordSpan",
     "WrittenClip",
+    "export",
     "faces",
+    "formats",
     "identities",
     "languages",
+    "load_clip",
     "load_face",
     "load_palette",
     "load_talker",
@@ -80,8 +86,8 @@ __all__ = [
 _MODULES = {
     "lexicon.errors": ("BackendError", "DataError", "InputError", "Tts2faceError"),
     "lexicon.sequence": ("PhoneSequence", "WordSpan"),
-    "tts2face.api": ("write_clip",),
-    "tts2face.catalogue": ("faces", "identities", "languages", "styles", "talkers", "voices"),
+    "tts2face.api": ("export", "load_clip", "write_clip"),
+    "tts2face.catalogue": ("faces", "formats", "identities", "languages", "styles", "talkers", "voices"),
     "tts2face.models.face": ("Face",),
     "tts2face.models.face_file": ("load_face",),
     "tts2face.models.palette": ("Palette", "load_palette"),

@@ -9,7 +9,7 @@ from importlib import resources
 from types import MappingProxyType
 
 from lexicon.phones import look_up_phone
-from tts2face.export.labels import Label
+from tts2face.exports.labels import Label
 
 OCULUS = ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U")  # index = id
 AZURE = tuple(str(number) for number in range(22))
@@ -20,7 +20,7 @@ INVENTORIES: Mapping[str, tuple[str, ...]] = MappingProxyType({"oculus": OCULUS,
 @functools.cache
 def viseme_table(inventory: str) -> Mapping[str, tuple[str, ...]]:
     """Visemes of each phone in one of `INVENTORIES`."""
-    lines = resources.files("tts2face.export").joinpath("visemes.tsv").read_text(encoding="utf-8").splitlines()
+    lines = resources.files("tts2face.exports").joinpath("visemes.tsv").read_text(encoding="utf-8").splitlines()
     heading, *rows = [line.split("\t") for line in lines]
     column = heading.index(inventory)
     return MappingProxyType({row[0]: tuple(row[column].split()) for row in rows})

@@ -4,8 +4,8 @@ import re
 import textwrap
 from collections.abc import Iterator, Sequence
 
-from tts2face.export.labels import Label, part_words
-from tts2face.export.parts import Part, Target
+from tts2face.exports.labels import Label, part_words
+from tts2face.exports.parts import Part, Target
 
 MAX_LINE_CHARACTERS = 42  # of a line of captions, a common limit of subtitling guides
 MAX_CUE_CHARACTERS = 2 * MAX_LINE_CHARACTERS

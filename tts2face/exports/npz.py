@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from tts2face.export.labels import AllLabels
-from tts2face.export.parts import Part, Target
-from tts2face.export.spool import Spool
+from tts2face.exports.labels import AllLabels
+from tts2face.exports.parts import Part, Target
+from tts2face.exports.spool import Spool
 from tts2face.types import HEAD_CHANNELS
 
 

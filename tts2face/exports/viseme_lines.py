@@ -3,9 +3,9 @@
 import json
 from typing import Any
 
-from tts2face.export.labels import Label, PhoneLabels
-from tts2face.export.parts import Part, Target
-from tts2face.export.visemes import OCULUS, viseme_labels
+from tts2face.exports.labels import Label, PhoneLabels
+from tts2face.exports.parts import Part, Target
+from tts2face.exports.visemes import OCULUS, viseme_labels
 
 TICKS_PER_SECOND = 10_000_000  # Azure states offsets in units of 100 ns
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from xml.sax.saxutils import escape
 
 from lexicon.sequence import SILENCE
-from tts2face.export.labels import AllLabels
-from tts2face.export.parts import Part, Target
-from tts2face.export.visemes import viseme_labels
+from tts2face.exports.labels import AllLabels
+from tts2face.exports.parts import Part, Target
+from tts2face.exports.visemes import viseme_labels
 
 Cue = tuple[str, str, str]  # start and end in seconds with two decimals, as Rhubarb writes them, and shape
 REST = "X"

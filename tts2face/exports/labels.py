@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from lexicon.sequence import SILENCE
-from tts2face.export.parts import Part
+from tts2face.exports.parts import Part
 
 
 @dataclass(frozen=True, slots=True)

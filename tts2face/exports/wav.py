@@ -4,7 +4,7 @@ import wave
 
 import numpy as np
 
-from tts2face.export.parts import Part, Target
+from tts2face.exports.parts import Part, Target
 
 FULL_SCALE = 32767
 MAX_SAMPLES = (2**32 - 64) // 2  # a .wav file states its size in 32 bits

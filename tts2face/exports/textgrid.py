@@ -1,9 +1,9 @@
 """Words and phones of a clip as a Praat TextGrid."""
 
 from lexicon.sequence import PhoneSequence, WordSpan
-from tts2face.export.labels import AllLabels
-from tts2face.export.parts import Part, Target
-from tts2face.export.text import textgrid
+from tts2face.exports.labels import AllLabels
+from tts2face.exports.parts import Part, Target
+from tts2face.exports.text import textgrid
 
 
 class TextGridWriter:
@@ -24,7 +24,7 @@ class TextGridWriter:
         sequence = PhoneSequence([phone.text for phone in phones], edges)
         words = []
         for word in self._labels.words:
-            first = sequence.index_at((word.start + sequence.durations.min() / 4))
+            first = sequence.index_at(word.start + sequence.durations.min() / 4)
             last = sequence.index_at(word.end - sequence.durations.min() / 4) + 1
             words.append(WordSpan(word.text, first, last))
         self._path.write_text(textgrid(sequence, words), encoding="utf-8", newline="\n")

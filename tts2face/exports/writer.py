@@ -4,11 +4,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
+from typing import Protocol
 
 from lexicon.errors import InputError
 from tts2face.clock import exact_rate
-from tts2face.export.formats import FormatInfo, find_format, split_format
-from tts2face.export.parts import FormatWriter, FrameGrid, Target
+from tts2face.exports.formats import FormatInfo, find_format, split_format
+from tts2face.exports.parts import FormatWriter, FrameGrid, Target
 from tts2face.models.face import Face
 from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.output_names import check_name
@@ -56,18 +57,43 @@ def plan_exports(
     if fps is not None:
         exact_rate(fps)
     for file in files:
-        check_name(file.path)
-        if file.path.is_dir():
-            raise InputError(f"{file.path} is a folder; choose another name")
+        _check_path(file.path)
     names = [file.path.resolve() for file in files]
     if len(set(names)) != len(names):
         raise InputError("two exports have the same path; choose two names")
-    for file in [one for one in files if one.format.has_sound_beside]:
-        sound = sound_path(file.path)
+    sounds = dict.fromkeys(sound_path(file.path) for file in files if file.format.has_sound_beside)
+    for sound in sounds:
         if sound.resolve() not in names:
-            names.append(sound.resolve())
+            _check_path(sound)
             files.append(ExportFile(sound, find_format(sound, SOUND_FORMAT)))
     return tuple(files)
+
+
+class HasMesh(Protocol):
+    """A face with a mesh, such as `tts2face.AnimatedFace`."""
+
+    @property
+    def mesh(self) -> Face:
+        """Mesh with the shapes of all channels."""
+
+
+def mesh_of(face: Face | HasMesh | None, files: Iterable[ExportFile]) -> Face | None:
+    """Mesh of a face if one of the files uses it, else None.
+
+    Raises
+    ------
+    InputError
+        The face is a talker's own face, which has no mesh.
+    """
+    if face is None or isinstance(face, Face) or not any(file.format.uses_face for file in files):
+        return face if isinstance(face, Face) else None
+    return face.mesh
+
+
+def _check_path(path: Path) -> None:
+    check_name(path)
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; choose another name")
 
 
 def sound_path(path: Path) -> Path:

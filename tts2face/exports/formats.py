@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -27,12 +28,12 @@ class FormatInfo:
         Whether it holds values for each frame, so that a frame rate can be chosen.
     default_fps
         Frame rate unless one is given; None for that of the clip.
-    needs_mesh
-        Whether it holds the mesh of the face.
+    uses_shapes, needs_mesh
+        Whether it expresses the channels by ARKit shapes, and whether it holds the mesh of the face.
     has_sound_beside
         Whether the sound is written to a .wav file beside it.
-    extra
-        Extra of the package that it needs.
+    package
+        Package that it needs besides those of tts2face.
     """
 
     name: str
@@ -41,14 +42,25 @@ class FormatInfo:
     writer: tuple[str, str]
     has_frames: bool = False
     default_fps: float | None = None
+    uses_shapes: bool = False
     needs_mesh: bool = False
     has_sound_beside: bool = False
-    extra: str | None = None
+    package: str | None = None
+
+    @property
+    def uses_face(self) -> bool:
+        """Whether its writer takes the mesh of the face."""
+        return self.uses_shapes or self.needs_mesh
+
+    @property
+    def is_installed(self) -> bool:
+        """Whether the package that it needs is installed."""
+        return self.package is None or find_spec(self.package) is not None
 
     def make_writer(self) -> Callable[[Any], Any]:
         """Import the class of its writer."""
         module, name = self.writer
-        factory: Callable[[Any], Any] = getattr(import_module(f"tts2face.export.{module}"), name)
+        factory: Callable[[Any], Any] = getattr(import_module(f"tts2face.exports.{module}"), name)
         return factory
 
 
@@ -58,13 +70,13 @@ FORMATS = (
     FormatInfo("track", (".track.json", ".json"), "lossless clip: motion, head, phones, words, sound",
                ("track_json", "TrackWriter")),
     FormatInfo("livelink", (".csv",), "ARKit-52 weights and head angles, as Live Link Face records them",
-               ("livelink_csv", "LiveLinkWriter"), has_frames=True, default_fps=LIVELINK_FPS),
+               ("livelink_csv", "LiveLinkWriter"), has_frames=True, default_fps=LIVELINK_FPS, uses_shapes=True),
     FormatInfo("a2f", (".a2f.json",), "ARKit-52 weights as Audio2Face exports them",
-               ("audio2face_json", "Audio2FaceWriter"), has_frames=True),
+               ("audio2face_json", "Audio2FaceWriter"), has_frames=True, uses_shapes=True),
     FormatInfo("glb", (".glb",), "mesh, morph targets, skeleton and animation (glTF 2.0)",
                ("glb", "GlbWriter"), has_frames=True, needs_mesh=True, has_sound_beside=True),
     FormatInfo("usd", (".usda", ".usdc", ".usd"), "mesh, blend shapes, skeleton and animation (UsdSkel)",
-               ("usd", "UsdWriter"), has_frames=True, needs_mesh=True, has_sound_beside=True, extra="usd"),
+               ("usd", "UsdWriter"), has_frames=True, needs_mesh=True, has_sound_beside=True, package="pxr"),
     FormatInfo("bvh", (".bvh",), "head motion", ("bvh", "BvhWriter"), has_frames=True),
     FormatInfo("npz", (".npz",), "all arrays for NumPy", ("npz", "NpzWriter"), has_frames=True),
     FormatInfo("oculus", (".oculus.jsonl",), "15 visemes of Oculus Lipsync, JSON lines",

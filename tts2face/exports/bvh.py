@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tts2face.export.parts import Part, Target
+from tts2face.exports.parts import Part, Target
 from tts2face.types import HEAD_CHANNELS
 
 MM_PER_CM = 10.0
