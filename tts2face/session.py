@@ -2,7 +2,7 @@
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -222,7 +222,7 @@ class Session:
         picture = picture or Picture(**picture_options)
         check_output(out)
         files = plan_exports(exports)
-        refuse_overwriting({"out": out} | _output_names(files), input_paths(prepared.request, picture))
+        refuse_overwriting(_output_names(files) | {"out": out}, input_paths(prepared.request, picture))
         renderer = self.renderer(picture, has_gestures=prepared.request.has_gestures)
         progress = _Steps(prepared.n_steps, on_progress)
         with (
@@ -335,7 +335,7 @@ class Session:
             check_output(out)
         picture = picture or Picture()
         inputs = {"the take": performance.take, "audio": performance.audio, "model": performance.model}
-        refuse_overwriting({"out": out} | _output_names(files), inputs | {"background": picture.background})
+        refuse_overwriting(_output_names(files) | {"out": out}, inputs | {"background": picture.background})
         if out is not None:
             self.renderer(picture, has_gestures=False)  # rejects invalid options before the video is tracked
         take = perform(performance, self._speech_face, on_progress=stages("tracking") if stages else None)
@@ -446,7 +446,7 @@ def _names(options: type) -> tuple[str, ...]:
     return tuple(option.name for option in fields(options) if option.name != "text")
 
 
-def _output_names(files: Sequence[ExportFile]) -> Mapping[str, Path]:
+def _output_names(files: Sequence[ExportFile]) -> dict[str, Path | str | None]:
     """Paths of exports by names for messages."""
     return {f"export {number}": file.path for number, file in enumerate(files, start=1)}
 

@@ -3,6 +3,7 @@
 import re
 import textwrap
 from collections.abc import Iterator, Sequence
+from difflib import SequenceMatcher
 
 from tts2face.exports.labels import Label, part_words
 from tts2face.exports.parts import Part, Target
@@ -44,14 +45,43 @@ def _ends_cue(cue: Sequence[Label], token: Label, *, has_text: bool) -> bool:
 
 
 def _timed_tokens(words: Sequence[Label], tokens: Sequence[str]) -> list[Label]:
-    if len(tokens) == len(words):
-        return [Label(token, word.start, word.end) for token, word in zip(tokens, words, strict=True)]
+    """Written tokens with the times of the spoken words: equal words first, then by shares of letters between them."""
+    matcher = SequenceMatcher(None, [_plain(token) for token in tokens], [_plain(word.text) for word in words], False)
+    timed: list[Label] = []
+    at_token = at_word = 0
+    for token, word, size in matcher.get_matching_blocks():
+        timed += _shared_times(words[at_word:word], tokens[at_token:token], timed, words[word : word + 1])
+        matched = zip(tokens[token : token + size], words[word : word + size], strict=True)
+        timed += [Label(written, spoken.start, spoken.end) for written, spoken in matched]
+        at_token, at_word = token + size, word + size
+    return timed
+
+
+def _plain(text: str) -> str:
+    """Letters and digits of a text in lower case."""
+    return "".join(character for character in text.casefold() if character.isalnum())
+
+
+def _shared_times(
+    words: Sequence[Label], tokens: Sequence[str], before: Sequence[Label], after: Sequence[Label]
+) -> list[Label]:
+    """Tokens that are none of the words, over the time of the words between the same neighbours.
+
+    Without words between them, the tokens (a dash, a symbol that is not spoken) have the time of the pause there.
+    """
+    if not tokens:
+        return []
+    if not words:
+        start = before[-1].end if before else after[0].start
+        end = after[0].start if after else start
+        return [Label(token, start, max(start, end)) for token in tokens]
     shares = _shares([word.text for word in words])
     timed = []
     for token, (first, last) in zip(tokens, _shares(tokens), strict=True):
         covered = [number for number, (begin, end) in enumerate(shares) if begin < last and end > first]
-        start, end = words[covered[0]], words[covered[-1]]
-        timed.append(Label(token, _within(start, shares[covered[0]], first), _within(end, shares[covered[-1]], last)))
+        at, until = covered[0], covered[-1]
+        begin, finish = _within(words[at], shares[at], first), _within(words[until], shares[until], last)
+        timed.append(Label(token, begin, finish))
     return timed
 
 

@@ -78,7 +78,8 @@ class GlbWriter:
         n_frames = self._weights.n_rows
         times = (np.arange(n_frames) / float(self._target.fps)).astype("<f4")
         clock = buffer.add_accessor(times, min=[float(times[0])], max=[float(times[-1])])
-        channels, samplers = [], []
+        channels: list[dict[str, Any]] = []
+        samplers: list[dict[str, Any]] = []
 
         def animate(node: int, path: str, values: Spool, width: int) -> None:
             channels.append({"sampler": len(samplers), "target": {"node": node, "path": path}})

@@ -42,7 +42,7 @@ class NpzWriter:
             }.items():
                 with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
                     header = {"descr": spool.dtype.str, "fortran_order": False, "shape": shape}
-                    np.lib.format.write_array_header_1_0(file, header)  # type: ignore[arg-type]
+                    np.lib.format.write_array_header_1_0(file, header)
                     spool.copy_to(file)
             for name, values in self._small_arrays().items():
                 content = io.BytesIO()

@@ -50,7 +50,8 @@ def weight_scales(face: Face, n_channels: int) -> NDArray[np.float32]:
 
     Modes of gestures have weights up to 35, in mm; programs that show sliders expect -1 to 1.
     """
-    return np.maximum(np.abs(face.limits[:n_channels]).max(axis=1, initial=1.0), 1.0).astype(np.float32)
+    scales: NDArray[np.float32] = np.abs(face.limits[:n_channels]).max(axis=1, initial=1.0)
+    return scales
 
 
 def vertex_normals(face: Face) -> NDArray[np.float32]:

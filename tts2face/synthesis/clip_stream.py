@@ -129,9 +129,8 @@ def _sentences(prepared: PreparedRequest, models: SynthesisModels) -> Iterator[t
             return stack.enter_context(models.voice(name, language))
 
         voice = voice_of(request.voice, request.language)
-        at = 0
         for sentence in prepared.sentences():
-            text, at = prepared.text.text[at : at + sentence.n_characters].strip(), at + sentence.n_characters
+            text = " ".join(phrase.source for phrase in sentence.utterances)
             yield speak_sentence(voice, sentence, request, voice_of), sentence.n_characters, text
 
 
