@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from lexicon.errors import Tts2faceError as Tts2faceError
     from lexicon.sequence import PhoneSequence as PhoneSequence
     from lexicon.sequence import WordSpan as WordSpan
+    from tts2face.api import convert as convert
     from tts2face.api import export as export
     from tts2face.api import load_clip as load_clip
     from tts2face.api import write_clip as write_clip
@@ -68,6 +69,7 @@ __all__ = [
     "Waveform",
     "WordSpan",
     "WrittenClip",
+    "convert",
     "export",
     "faces",
     "formats",
@@ -86,7 +88,7 @@ __all__ = [
 _MODULES = {
     "lexicon.errors": ("BackendError", "DataError", "InputError", "Tts2faceError"),
     "lexicon.sequence": ("PhoneSequence", "WordSpan"),
-    "tts2face.api": ("export", "load_clip", "write_clip"),
+    "tts2face.api": ("convert", "export", "load_clip", "write_clip"),
     "tts2face.catalogue": ("faces", "formats", "identities", "languages", "styles", "talkers", "voices"),
     "tts2face.models.face": ("Face",),
     "tts2face.models.face_file": ("load_face",),

@@ -73,6 +73,11 @@ class WrittenClip:
     mismatches: tuple[TextMismatch, ...] = ()
     exports: tuple[Path, ...] = ()
 
+    @property
+    def names(self) -> str:
+        """All files written, separated by commas."""
+        return ", ".join(dict.fromkeys(str(path) for path in (self.path, *self.exports)))
+
 
 class Session:
     """A talker, a face and a palette for any number of requests.

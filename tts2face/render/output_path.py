@@ -27,7 +27,7 @@ def output_kind(path: Path | str) -> str:
     if suffix not in FILE_SUFFIXES:
         raise InputError(
             f"{path} has the unknown suffix {suffix}; give one of {', '.join(FILE_SUFFIXES)}, "
-            "or a folder without a suffix for .png pictures"
+            "a folder without a suffix for .png pictures, or a suffix that `tts2face formats` lists"
         )
     return suffix
 
