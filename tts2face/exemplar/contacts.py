@@ -36,9 +36,8 @@ CONTACT_RULES = {
 }
 MANNERS_WITHOUT_CONTACT = frozenset({"approximant"})  # narrowed, not closed
 CONTACT_MARGIN_S = 0.03  # a closure may lie this far outside its phone's edges (video frames are 40 ms, edges +- 10 ms)
-CONTACT_HOLD_S = (
-    0.03  # lips stay together at least this long: shorter, and the touch falls between two frames at 30 fps
-)
+# Lips stay together at least this long: shorter, and the touch falls between two frames at 30 fps.
+CONTACT_HOLD_S = 0.03
 CONTACT_EASE_S = 0.05  # way into and out of it; longer eats into the vowels (0.06: r of opening falls by .001)
 
 

@@ -18,9 +18,8 @@ from tts2face.types import Waveform
 
 MODEL_RATE = 16000  # Hz, sample rate of the acoustic model's training data
 FRAME_RATE = 200  # Hz; 100 halves the run time and doubles the edge error
-MODEL_DELAY_S = (
-    0.009  # the model's frames are early by this time; measured on the TIMIT sample, confirmed on an Australian voice
-)
+# The model's frames are early by this time; measured on the TIMIT sample, confirmed on an Australian voice.
+MODEL_DELAY_S = 0.009
 PADDING_S = 0.1  # low noise at both ends, as silence before the first and after the last phone
 MARGIN_S = 0.15  # silence retained at both ends; more of it would shift the mean by which the model normalises
 AUDIBLE_SHARE = 0.01  # relative to the level of the loudest window
