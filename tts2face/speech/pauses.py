@@ -69,3 +69,9 @@ def _window_levels(sound: Waveform) -> NDArray[np.float64]:
     smooth = uniform_filter1d(power, SMOOTHING_WINDOWS, mode="nearest") if n_windows else power
     levels: NDArray[np.float64] = 10.0 * np.log10(np.maximum(smooth, 1e-10))
     return levels
+
+
+def cut_sound(sound: Waveform, span: tuple[float, float]) -> Waveform:
+    """The sound in a span of seconds."""
+    first, last = (round(second * sound.rate) for second in span)
+    return Waveform(sound.samples[first:last], sound.rate)
