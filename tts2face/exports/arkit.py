@@ -22,8 +22,8 @@ ARKIT_SHAPES = (
     "browOuterUpLeft", "browOuterUpRight", "cheekPuff", "cheekSquintLeft", "cheekSquintRight", "noseSneerLeft",
     "noseSneerRight", "tongueOut",
 )  # fmt: skip
-# Shapes that replace others: gaze and lid closure are exact in their own channels and stay so.
-FIXED_PREFIXES = ("eyeLook", "eyeBlink", "tongueOut")
+# Shapes that express other channels, which are gestures of brows and cheeks; lips, jaw, lids and gaze keep their own.
+HELPER_PREFIXES = ("brow", "cheek", "noseSneer", "eyeSquint", "eyeWide")
 RIDGE = 1e-3  # of the mean curvature: prefers small changes where several shapes do the same
 
 
@@ -59,7 +59,7 @@ class ArkitProjection:
         problem for each frame.
         """
         known = np.where(self.columns >= 0, motion[:, self.columns], 0.0).astype(np.float64).clip(0.0, 1.0)
-        if len(self.others) and len(motion):
+        if len(self.helpers) and len(motion):
             extra = motion[:, self.others].astype(np.float64)
             moved = np.flatnonzero(extra.any(axis=1))
             start = known[np.ix_(moved, self.helpers)]
@@ -94,8 +94,10 @@ def build_arkit_projection(target: Target) -> ArkitProjection:
             f"shapes; to express them in {target.name}, give the clip's face, as in face=session.face"
         )
     helpers = np.array([
-        at for at, name in enumerate(ARKIT_SHAPES) if columns[at] >= 0 and not name.startswith(FIXED_PREFIXES)
+        at for at, name in enumerate(ARKIT_SHAPES) if columns[at] >= 0 and name.startswith(HELPER_PREFIXES)
     ])  # fmt: skip
+    if not len(helpers):
+        return ArkitProjection(columns, others, helpers, none, none)
     curvature, cross = _inner_products(target.face, columns[helpers], others)
     return ArkitProjection(columns, others, helpers, curvature, cross)
 
@@ -103,10 +105,7 @@ def build_arkit_projection(target: Target) -> ArkitProjection:
 def _inner_products(
     face: Face, helpers: NDArray[np.int64], others: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    moved = np.flatnonzero(face.shapes[others].any(axis=(0, 2)))  # other vertices add only to the curvature
-    shapes = face.shapes[helpers].reshape(len(helpers), -1).astype(np.float64)
-    curvature = shapes @ shapes.T
+    own = face.shapes[helpers].reshape(len(helpers), -1)
+    curvature = (own @ own.T).astype(np.float64)
     curvature += RIDGE * float(np.trace(curvature)) / len(curvature) * np.eye(len(curvature))
-    near = face.shapes[helpers][:, moved].reshape(len(helpers), -1).astype(np.float64)
-    cross = near @ face.shapes[others][:, moved].reshape(len(others), -1).astype(np.float64).T
-    return curvature, cross
+    return curvature, (own @ face.shapes[others].reshape(len(others), -1).T).astype(np.float64)
