@@ -131,14 +131,14 @@ def _read_pieces(file: TextIO, path: Path) -> Iterator[TrackPiece]:
             yield _parse_piece(piece, header, f"{path}, piece {number}")
         return
     header = _check_header(_parse_object(first + CLOSING, str(path), path), path)
-    number = 1
+    number = 0
     while (line := _read_line(file, path)) != CLOSING:
         number += 1
         if not line:
             raise _not_a_track(path, "it ends before its last piece is complete")
-        name = f"{path}, line {number}"
+        name = f"{path}, piece {number}"
         yield _parse_piece(_parse_object(line.removesuffix(","), name, path), header, name)
-    if number == 1:
+    if number == 0:
         raise _not_a_track(path, "it has no piece")
 
 
