@@ -33,7 +33,7 @@ from tts2face.models.palette import Palette, load_palette, write_palette
 from tts2face.storage.files import SHIPPED_FOLDER
 
 SMALL = {"--size": "64x64", "--fps": "5"}
-LISTS = {"voices", "languages", "faces", "identities", "styles", "talkers", "phones", "completion", "corpus", "report"}
+LISTS = {"voices", "languages", "faces", "identities", "styles", "talkers", "formats", "phones", "completion", "corpus", "report"}
 OWN_LINES = [(page.name, line) for page in PAGES for line in shell_lines(page) if own_commands(line)]
 EXECUTED = [
     line
