@@ -94,7 +94,8 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
         write_message(f"{take} contains no sound; the clip is silent")
     took = time.perf_counter() - began
     write_message(
-        f"wrote {written.names}: {written.seconds:.1f} s, made in {took:.1f} s ({written.seconds / took:.1f} x real time)"
+        f"wrote {written.names}: {written.seconds:.1f} s, made in {took:.1f} s "
+        f"({written.seconds / took:.1f} x real time)"
     )
 
 

@@ -128,7 +128,11 @@ def test_a_capture_is_exported_as_it_was_recorded(here: Path) -> None:
         (["--file", "text.srt", "--export", "text.srt"], 2, "--export text.srt text.srt would replace --file"),
         (["Hi.", "--out", "a.xyz"], 2, "a.xyz has the unknown suffix .xyz"),
         (["mimic", "take.csv", "--export", "take.csv"], 2, "would replace the take"),
-        (["mimic", "--camera", "0", "--export", "a.csv"], 2, "--camera cannot be combined with a take, --out, --export"),
+        (
+            ["mimic", "--camera", "0", "--export", "a.csv"],
+            2,
+            "--camera cannot be combined with",
+        ),
         (["mimic", "take.csv"], 2, "there is no input or no output"),
         (["convert", "no.json", "a.csv"], 2, "there is no track no.json"),
         (["convert", "text.srt", "text.srt"], 2, "would replace the track"),
@@ -154,6 +158,8 @@ def test_a_track_of_another_face_is_refused(session: Session, here: Path) -> Non
     names = ("a", *clip.motion.channels[1:])
     other = tts2face.Clip(tts2face.Trajectory(names, clip.motion.values, 5.0), clip.head, clip.speech)
     tts2face.export(other, "a.json")
-    with pytest.raises(DataError, match="65 channels .* which are not those of the face head with the palette starter"):
+    with pytest.raises(
+        DataError, match=r"65 channels .* which are not those of the face head with the palette starter"
+    ):
         tts2face.convert("a.json", "a.glb")
     tts2face.convert("a.json", "a.bvh")

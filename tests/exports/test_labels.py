@@ -2,6 +2,7 @@
 
 import csv
 import json
+from itertools import pairwise
 from xml.etree import ElementTree
 
 import numpy as np
@@ -62,7 +63,7 @@ def test_oculus_lines(tmp_path):
     assert [one["viseme"] for one in read] == ["sil", "PP", "aa", "I", "RR", "DD", "SS", "sil"]
     assert [OCULUS[one["id"]] for one in read] == [one["viseme"] for one in read]
     assert [one["phone"] for one in read] == ["sil", "p", "aɪ", "aɪ", "ʁ", "ts", "ts", "sil"]
-    assert all(one["end"] == other["start"] for one, other in zip(read, read[1:], strict=False))
+    assert all(one["end"] == other["start"] for one, other in pairwise(read))
     assert (read[0]["start"], read[-1]["end"]) == (0, clip.speech.waveform.duration)
     assert read[1]["start"] == pytest.approx(clip.speech.phones.edges[1], abs=1e-9)
 
@@ -97,7 +98,7 @@ def test_rhubarb_files_hold_the_same_cues(tmp_path):
     cues = content["mouthCues"]
     assert [cue["value"] for cue in cues] == ["X", "A", "D", "B", "X"]  # aɪ ends, ʁ and ts are B
     assert [cue["start"] for cue in cues] == [0, 0.1, 0.25, 0.38, 0.8]
-    assert all(cue["end"] == after["start"] for cue, after in zip(cues, cues[1:], strict=False))
+    assert all(cue["end"] == after["start"] for cue, after in pairwise(cues))
     table = list(csv.reader(paths[1].read_text(encoding="utf-8").splitlines(), delimiter="\t"))
     assert [(float(start), shape) for start, shape in table[:-1]] == [(cue["start"], cue["value"]) for cue in cues]
     assert table[-1] == ["1.00", "X"]

@@ -1,6 +1,7 @@
 """USD files: pxr itself skins the mesh; vertices are those of the renderer."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -38,7 +39,8 @@ def test_vertices_skinned_by_usd_are_those_of_the_renderer(suffix, tmp_path):
 def test_units_times_and_names(tmp_path):
     from pxr import UsdGeom, UsdSkel
 
-    tts2face.export(turned_clip(5, 24.0, yaw=np.radians(10.0)), tmp_path / "a.usda", face=FACE)
+    person = replace(FACE, metadata={"name": "Ada", "consent": "I agree"})
+    tts2face.export(turned_clip(5, 24.0, yaw=np.radians(10.0)), tmp_path / "a.usda", face=person)
     stage = Usd.Stage.Open(str(tmp_path / "a.usda"))
     assert UsdGeom.GetStageMetersPerUnit(stage) == 0.001
     assert UsdGeom.GetStageUpAxis(stage) == "Y"
@@ -48,6 +50,7 @@ def test_units_times_and_names(tmp_path):
     turn = animation.GetRotationsAttr().Get(2)[0]
     assert turn.GetReal() == pytest.approx(np.cos(np.radians(5)), abs=1e-6)
     assert tuple(turn.GetImaginary()) == pytest.approx((0, np.sin(np.radians(5)), 0), abs=1e-6)
+    assert "motion of Ada" in stage.GetRootLayer().customLayerData["notice"]
     assert (tmp_path / "a.wav").is_file()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.usda", "a.wav"]
 

@@ -76,7 +76,7 @@ def _at_rate(clip, rate):
 
 
 def test_a_mesh_of_other_shapes_is_refused(tmp_path):
-    with pytest.raises(InputError, match="4 channels .* are not the first of the face's 4 shapes"):
+    with pytest.raises(InputError, match=r"4 channels .* are not the first of the face's 4 shapes"):
         tts2face.export(made_clip(channels=("a", "b", "c", "d")), tmp_path / "a.glb", face=FACE)
     with pytest.raises(InputError, match=r"a.glb holds the mesh of the face; give the face"):
         tts2face.export(made_clip(), tmp_path / "a.glb")

@@ -96,6 +96,8 @@ class GlbWriter:
 
 def _asset(target: Target, face: Face) -> dict[str, Any]:
     extras = {"fps": float(target.fps), "sound": target.sound_name}
+    if face.synthetic_notice:
+        extras["notice"] = face.synthetic_notice
     asset: dict[str, Any] = {"version": "2.0", "generator": GENERATOR, "extras": extras}
     notes = [str(face.metadata[key]) for key in ("attribution", "licence") if face.metadata.get(key)]
     if notes:

@@ -56,7 +56,8 @@ class UsdWriter:
         stage.SetFramesPerSecond(float(target.fps))
         stage.SetStartTimeCode(0)
         stage.SetEndTimeCode(self._weights.n_rows - 1)
-        stage.GetRootLayer().customLayerData = {"sound": target.sound_name, "generator": "tts2face"}
+        about = {"sound": target.sound_name, "generator": "tts2face", "notice": self._face.synthetic_notice}
+        stage.GetRootLayer().customLayerData = {name: value for name, value in about.items() if value}
         root = usd.UsdSkel.Root.Define(stage, ROOT_PATH)
         stage.SetDefaultPrim(root.GetPrim())
         names = _identifiers(target.channels)
