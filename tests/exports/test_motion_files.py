@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tts2face
+from lexicon.errors import InputError
 from tests.exports.made import FACE, RATE, WORDS, made_clip, made_stream, silent_clip, turned_clip
 from tts2face.face.deformation import head_rotation
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Waveform, concatenate_clips
@@ -94,6 +95,13 @@ def test_wave_reads_the_sound(tmp_path):
     whole = concatenate_clips(pieces).speech.waveform.samples
     assert len(samples) == len(whole)
     assert np.abs(samples / 32767 - whole).max() <= 0.51 / 32767
+
+
+def test_sound_beyond_four_gigabytes_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("tts2face.exports.wav.MAX_SAMPLES", RATE)
+    with pytest.raises(InputError, match=r"a.wav would have more than 4 GB, 0 hours; export shorter clips"):
+        tts2face.export(made_stream(2), tmp_path / "a.wav")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_clip_that_ends_within_a_frame_is_followed_by_silence(tmp_path):

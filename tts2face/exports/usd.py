@@ -3,6 +3,7 @@
 Millimetres (``metersPerUnit`` 0.001), y up, the face looks along +z. Time code i is frame i.
 """
 
+import errno
 import importlib
 import re
 from typing import Any
@@ -66,9 +67,12 @@ class UsdWriter:
         for number, surface in enumerate(divide_surface(self._face)):
             _define_surface(usd, stage, (self._face, surface, self._skeleton), (f"{surface.part.name}_{number}", names))
         written = target.path.with_name(f"{target.path.name}{'.usda' if is_text else '.usdc'}")  # USD goes by suffix
-        if not stage.GetRootLayer().Export(str(written)):
-            raise OSError(f"USD could not write {written}")
-        written.replace(target.path)
+        try:
+            if not stage.GetRootLayer().Export(str(written)):
+                raise OSError(errno.EIO, "USD could not write the file", str(target.path))
+            written.replace(target.path)
+        finally:
+            written.unlink(missing_ok=True)
 
     def close(self) -> None:
         """Remove the temporary files."""
