@@ -341,8 +341,9 @@ class Session:
         picture = picture or Picture()
         inputs = {"the take": performance.take, "audio": performance.audio, "model": performance.model}
         refuse_overwriting(_output_names(files) | {"out": out}, inputs | {"background": picture.background})
+        mesh_of(self._speech_face, files)  # rejects files that the face cannot fill before the video is tracked
         if out is not None:
-            self.renderer(picture, has_gestures=False)  # rejects invalid options before the video is tracked
+            self.renderer(picture, has_gestures=False)  # rejects invalid options, too
         take = perform(performance, self._speech_face, on_progress=stages("tracking") if stages else None)
         n_frames = len(take.motion.face)
         draw = stages("drawing" if out is not None else "writing") if stages else None
