@@ -11,7 +11,7 @@ import tts2face
 from tests.exports.made import arkit_clip, made_clip, made_stream, turned_clip
 from tests.render.tiny_face import tiny_face
 from tts2face.exports.arkit import ARKIT_SHAPES, build_arkit_projection
-from tts2face.exports.livelink_csv import timecode
+from tts2face.exports.livelink_csv import eye_angles, timecode
 from tts2face.exports.parts import Target
 from tts2face.face.shape_transfer import append_shapes
 from tts2face.models.face_file import load_face
@@ -83,7 +83,22 @@ def test_openfacefx_has_the_same_columns(tmp_path):
     writer = pytest.importorskip("openfacefx.export_livelink", reason="needs openfacefx")
     tts2face.export(arkit_clip(2), tmp_path / "a.csv")
     heading = table(tmp_path / "a.csv")[0]
-    assert heading == ["Timecode", "BlendshapeCount", *writer.LIVELINK_COLUMNS]
+    assert heading[:2] == ["Timecode", "BlendshapeCount"]
+    assert sorted(heading[2:]) == sorted(writer.LIVELINK_COLUMNS)
+
+
+def test_a_recorded_capture_has_the_same_columns_and_relation_of_eyes(shared_recordings, tmp_path):
+    recorded = table(shared_recordings / "livelink" / "testset_arkit61_60fps.csv")
+    tts2face.export(arkit_clip(2), tmp_path / "a.csv")
+    heading = table(tmp_path / "a.csv")[0]
+    assert heading == recorded[0]
+    values = np.array([row[2:] for row in recorded[1:]], np.float32)
+    for side in ("Left", "Right"):
+        angles = eye_angles(values[:, :52], side)
+        shown = values[:, [heading.index(f"{side}Eye{angle}") - 2 for angle in ("Yaw", "Pitch")]]
+        for column in range(2):
+            slope = np.polyfit(angles[:, column], shown[:, column], 1)[0]
+            assert slope == pytest.approx(1.0, abs=0.1)
 
 
 def test_head_and_eyes_are_in_radians(tmp_path):
@@ -98,11 +113,11 @@ def test_head_and_eyes_are_in_radians(tmp_path):
     row = dict(zip(heading, first, strict=True))
     assert row["BlendshapeCount"] == "61"
     expected = {
-        "HeadPitch": 10, "HeadYaw": -20, "HeadRoll": 30, "LeftEyePitch": 10, "LeftEyeYaw": 25, "LeftEyeRoll": 0,
-        "RightEyePitch": 0, "RightEyeYaw": 25, "RightEyeRoll": 0,
+        "HeadPitch": ten, "HeadYaw": -2 * ten, "HeadRoll": 3 * ten, "LeftEyePitch": 0.25, "LeftEyeYaw": 0.64,
+        "LeftEyeRoll": 0, "RightEyePitch": 0, "RightEyeYaw": 0.64, "RightEyeRoll": 0,
     }  # fmt: skip
-    for name, degrees in expected.items():
-        assert np.degrees(float(row[name])) == pytest.approx(degrees, abs=1e-3), name
+    for name, radians in expected.items():
+        assert float(row[name]) == pytest.approx(radians, abs=STEP), name
 
 
 def test_timecodes():

@@ -14,9 +14,9 @@ TIMECODE_RATES = (24, 25, 30, 50, 60, 120)  # frames in a second of timecode
 DEFAULT_TIMECODE_RATE = 60  # for other frame rates, with fractions of frames
 # Signs of the angles in the file relative to `HEAD_CHANNELS`: pitch down, yaw to the right, roll alike.
 HEAD_SIGNS = {"yaw": -1.0, "pitch": 1.0, "roll": 1.0}
-# Radians at weight 1 of the gaze shapes, in the columns of the eyes: pitch follows eyeLookDown, yaw eyeLookIn of the
-# left and eyeLookOut of the right eye. The values are those of the default head.
-EYE_PITCH_RAD, EYE_YAW_RAD = np.radians(20.0), np.radians(25.0)
+# Angles of the eyes at weight 1 of the gaze shapes: pitch follows eyeLookDown, yaw eyeLookIn of the left and
+# eyeLookOut of the right eye; slopes of a recorded capture of 20 s (correlations 0.98 and 0.99).
+EYE_PITCH_RAD, EYE_YAW_RAD = 0.50, 0.64
 
 
 class LiveLinkWriter:

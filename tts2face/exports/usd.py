@@ -25,7 +25,7 @@ ROOT_PATH = "/Face"
 class UsdWriter:
     """Keeps frames in temporary files, and builds the stage when their number is known.
 
-    USD itself keeps the animation in memory: about 30 MB for ten minutes at 30 frames/s.
+    USD itself keeps the animation in memory: about 15 MB for ten minutes at 30 frames/s.
     """
 
     def __init__(self, target: Target) -> None:
