@@ -37,10 +37,10 @@ if TYPE_CHECKING:
     from tts2face.render.picture import Picture as Picture
     from tts2face.request import Request as Request
     from tts2face.session import Session as Session
-    from tts2face.session import WrittenClip as WrittenClip
     from tts2face.synthesis.animated_face import AnimatedFace as AnimatedFace
     from tts2face.synthesis.clip_stream import Piece as Piece
     from tts2face.synthesis.performance import Performance as Performance
+    from tts2face.synthesis.written_clip import WrittenClip as WrittenClip
     from tts2face.types import Clip as Clip
     from tts2face.types import Speech as Speech
     from tts2face.types import Trajectory as Trajectory
@@ -96,10 +96,11 @@ _MODULES = {
     "tts2face.models.talker": ("Talker", "load_talker"),
     "tts2face.render.picture": ("Picture",),
     "tts2face.request": ("Request",),
-    "tts2face.session": ("Session", "WrittenClip"),
+    "tts2face.session": ("Session",),
     "tts2face.synthesis.animated_face": ("AnimatedFace",),
     "tts2face.synthesis.clip_stream": ("Piece",),
     "tts2face.synthesis.performance": ("Performance",),
+    "tts2face.synthesis.written_clip": ("WrittenClip",),
     "tts2face.types": ("Clip", "Speech", "Trajectory", "Waveform"),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}

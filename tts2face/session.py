@@ -4,7 +4,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -32,6 +32,7 @@ from tts2face.synthesis.gesture_layer import GestureLayer
 from tts2face.synthesis.marked_speech import MarkTime
 from tts2face.synthesis.performance import Performance, perform, take_clips
 from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, prepare
+from tts2face.synthesis.written_clip import RequestSteps, WrittenClip
 from tts2face.types import Clip, Progress, concatenate_clips
 from tts2face.voice.engine import PronunciationMap, Voice
 from tts2face.voice.loading import load_voice
@@ -43,40 +44,6 @@ MAX_RENDERERS = 2  # renderers in memory, one for each picture; about 30 MB each
 N_PIECES_AHEAD = 2  # pieces synthesised before they are drawn
 
 Value = TypeVar("Value")
-
-
-@dataclass(frozen=True, slots=True)
-class WrittenClip:
-    """Summary of a written file.
-
-    Parameters
-    ----------
-    seconds
-        Duration of the sound.
-    n_frames
-        Number of video frames.
-    marks
-        Named marks of the text with their times.
-    is_silent
-        Whether the file has no sound.
-    mismatches
-        Words of the text that the recording probably does not contain.
-    exports
-        Files of other formats, those beside them included.
-    """
-
-    path: Path
-    seconds: float
-    n_frames: int
-    marks: tuple[MarkTime, ...] = ()
-    is_silent: bool = False
-    mismatches: tuple[TextMismatch, ...] = ()
-    exports: tuple[Path, ...] = ()
-
-    @property
-    def names(self) -> str:
-        """All files written, separated by commas."""
-        return ", ".join(dict.fromkeys(str(path) for path in (self.path, *self.exports)))
 
 
 class Session:
@@ -229,7 +196,7 @@ class Session:
         files = plan_exports(exports)
         refuse_overwriting(_output_names(files) | {"out": out}, input_paths(prepared.request, picture))
         renderer = self.renderer(picture, has_gestures=prepared.request.has_gestures)
-        progress = _Steps(prepared.n_steps, on_progress)
+        progress = RequestSteps(prepared.n_steps, on_progress)
         with (
             ClipWriter(out, renderer, on_progress=progress.report_frames) as writer,
             ExportWriter(files, face=mesh_of(self._face(prepared.request.has_gestures), files)) as copies,
@@ -274,7 +241,7 @@ class Session:
         if not files:
             raise InputError("there is no file to export to; give at least one path")
         refuse_overwriting(_output_names(files), input_paths(prepared.request, Picture()))
-        progress = _Steps(prepared.n_steps, on_progress)
+        progress = RequestSteps(prepared.n_steps, on_progress)
         with ExportWriter(files, face=mesh_of(self._face(prepared.request.has_gestures), files)) as writer:
 
             def add(piece: Piece) -> None:
@@ -455,32 +422,3 @@ def _names(options: type) -> tuple[str, ...]:
 def _output_names(files: Sequence[ExportFile]) -> dict[str, Path | str | None]:
     """Paths of exports by names for messages."""
     return {f"export {number}": file.path for number, file in enumerate(files, start=1)}
-
-
-class _Steps:
-    """Converts the number of drawn frames into steps of a request."""
-
-    def __init__(self, n_steps: int, on_progress: Progress | None) -> None:
-        self._n_steps, self._on_progress = n_steps, on_progress
-        self._steps_before = self._piece_steps = self._frames_before = self._n_frames = 0
-
-    def begin(self, piece: Piece) -> None:
-        """Start the next piece."""
-        self._steps_before += self._piece_steps
-        self._piece_steps, self._frames_before = piece.n_steps, self._n_frames
-        self._n_frames += len(piece.clip.motion)
-
-    def report_piece(self) -> None:
-        """Report that the piece is done."""
-        self.report_frames(self._n_frames, self._n_frames)
-
-    def report_frames(self, n_drawn: int, n_submitted: int) -> None:
-        """Report the frames drawn, out of those passed to the writer so far."""
-        if self._on_progress:
-            share = (n_drawn - self._frames_before) / max(n_submitted - self._frames_before, 1)
-            self._on_progress(min(self._n_steps, int(self._steps_before + self._piece_steps * share)), self._n_steps)
-
-    def finish(self) -> None:
-        """Report that all steps are done."""
-        if self._on_progress:
-            self._on_progress(self._n_steps, self._n_steps)
