@@ -40,6 +40,7 @@ class SpeakOptions:
     quiet: bool
     file: Path | None = None
     exports: tuple[str, ...] = ()
+    out_is_export: bool = False  # then it is the first of the exports
 
     def with_export_of_out(self) -> "SpeakOptions":
         """The same options, with an output in an export format as an export."""
@@ -47,7 +48,7 @@ class SpeakOptions:
 
         if self.out is None or not is_export(self.out):
             return self
-        return replace(self, out=None, exports=(str(self.out), *self.exports))
+        return replace(self, out=None, exports=(str(self.out), *self.exports), out_is_export=True)
 
 
 def run_request(request: Request, picture: Picture, options: SpeakOptions) -> None:
@@ -105,7 +106,9 @@ def _check_overwriting(request: Request, picture: Picture, options: SpeakOptions
     from tts2face.exports.formats import split_format
 
     outputs = {"--out": options.out, "--explain": options.explain}
-    outputs |= {f"--export {given}": split_format(given)[0] for given in options.exports}
+    for number, given in enumerate(options.exports):
+        name = "--out" if number == 0 and options.out_is_export else f"--export {given}"
+        outputs[name] = split_format(given)[0]
     refuse_overwriting(outputs, {"--file": options.file} | models | inputs)
 
 

@@ -67,12 +67,14 @@ def test_an_export_without_a_video_holds_the_same_clip(session: Session, here: P
         (["a.fbx"], {}, "no suffix of an export format"),
         (["a.vtt", "a.vtt"], {}, "the same path"),
         (["words.srt"], {"dictionary": "words.srt"}, "would replace dictionary"),
+        (["speech.glb"], {"audio": "speech.wav"}, "speech.wav would replace audio"),
     ],
 )
 def test_wrong_paths_are_refused(
     paths: list[str], options: dict[str, str], reason: str, session: Session, here: Path
 ) -> None:
     (here / "words.srt").write_text("gif  JH IH1 F\n")
+    (here / "speech.wav").write_bytes(b"RIFF")
     with pytest.raises(InputError, match=reason):
         session.export("Hello.", paths, **options)
     assert (here / "words.srt").read_text() == "gif  JH IH1 F\n"
@@ -124,7 +126,7 @@ def test_a_capture_is_exported_as_it_was_recorded(here: Path) -> None:
         (["Hi.", "--export", "a.jsonl"], 2, "a.jsonl may have several formats"),
         (["Hi.", "--export", "a.fbx", "--out", "a.mp4"], 2, "a.fbx has no suffix of an export format"),
         (["Hi.", "--export", "no/a.glb"], 2, "there is no folder no"),
-        (["Hi.", "--out", "a.glb", "--export", "a.glb"], 2, "two exports have the same path"),
+        (["Hi.", "--out", "a.glb", "--export", "a.glb"], 2, "--out and --export a.glb are the same file a.glb"),
         (["--file", "text.srt", "--export", "text.srt"], 2, "--export text.srt text.srt would replace --file"),
         (["Hi.", "--out", "a.xyz"], 2, "a.xyz has the unknown suffix .xyz"),
         (["mimic", "take.csv", "--export", "take.csv"], 2, "would replace the take"),

@@ -231,7 +231,7 @@ def test_the_khronos_validator_finds_nothing(face, n_frames, tmp_path):
 PAGE = """<html><body><script type="importmap">{"imports": {"three": "/three/build/three.module.js",
 "three/addons/": "/three/examples/jsm/"}}</script><script type="module">
 import * as THREE from 'three'; import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
-const answer = document.createElement('pre'); document.body.append(answer);
+const answer = document.createElement('pre');
 try {
   const file = await new GLTFLoader().loadAsync('a.glb'), mixer = new THREE.AnimationMixer(file.scene);
   mixer.clipAction(file.animations[0]).play(); mixer.setTime(FRAME / 30); file.scene.updateMatrixWorld(true);
@@ -243,6 +243,7 @@ try {
     meshes.push({material: mesh.material.name, names: Object.keys(mesh.morphTargetDictionary), places}); } });
   answer.textContent = JSON.stringify({duration: file.animations[0].duration, meshes});
 } catch (error) { answer.textContent = JSON.stringify({error: String(error.stack)}); }
+document.body.append(answer);
 </script></body></html>"""
 
 
@@ -255,7 +256,7 @@ def test_three_js_shows_the_vertices_of_the_renderer(tmp_path):
     (tmp_path / "three").symlink_to(packages / "three")
     (tmp_path / "index.html").write_text(PAGE.replace("FRAME", str(frame)))
     with programs.served(tmp_path) as address:
-        document = programs.page_content(f"{address}/index.html")
+        document = programs.page_content(f"{address}/index.html", "</pre>")
     answer = json.loads(html.unescape(re.search("<pre>(.*)</pre>", document, re.DOTALL)[1]))
     assert "error" not in answer, answer
     assert answer["duration"] == pytest.approx(29 / 30, abs=1e-6)
