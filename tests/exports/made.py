@@ -6,6 +6,7 @@ from lexicon.sequence import PhoneSequence, WordSpan
 from tests.render.tiny_face import tiny_face
 from tts2face.clock import exact_rate, first_sample
 from tts2face.exports.arkit import ARKIT_SHAPES
+from tts2face.face.shape_transfer import append_shapes
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 RATE = 16_000
@@ -59,3 +60,17 @@ def made_stream(n_pieces=3, n_frames=30, fps=30.0, channels=FACE.shape_names):
 def arkit_clip(n_frames=120, fps=60.0):
     """Clip with the 52 ARKit channels."""
     return made_clip(n_frames, fps, ARKIT_SHAPES)
+
+
+def with_gesture(face=FACE):
+    """The face with a shape in millimetres whose limits are -9 and 9."""
+    mode = np.zeros((1, *face.vertices.shape), np.float32)
+    mode[0, :40, 2] = 0.5
+    return append_shapes(face, ("brows0",), mode, np.array([[-9.0, 9.0]], np.float32))
+
+
+def signed_clip(n_frames, face):
+    """Clip in the channels of a face whose gestures have both signs."""
+    clip = made_clip(n_frames, 30.0, face.shape_names)
+    low, high = face.limits.T
+    return Clip(Trajectory(face.shape_names, low + (high - low) * clip.motion.values, 30.0), clip.head, clip.speech)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tts2face
-from tests.exports.made import FACE, made_clip
+from tests.exports.made import signed_clip, with_gesture
 from tts2face.exports.surfaces import divide_surface
 from tts2face.face.deformation import build_rig
 
@@ -36,17 +36,20 @@ print("ANSWER" + json.dumps({"keys": keys, "places": places.tolist(), "materials
 def test_blender_shows_the_vertices_of_the_renderer(tmp_path):
     if importlib.util.find_spec("bpy") is None:
         pytest.skip("Blender's package bpy is not installed")
-    clip = made_clip(30, 30.0)
-    tts2face.export(clip, tmp_path / "a.glb", face=FACE)
+    face = with_gesture()
+    clip = signed_clip(30, face)
+    tts2face.export(clip, tmp_path / "a.glb", face=face)
     command = [sys.executable, "-c", SCRIPT, str(tmp_path / "a.glb"), str(FRAME)]
     printed = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
     answer = json.loads(next(line for line in printed.splitlines() if line.startswith("ANSWER")).removeprefix("ANSWER"))
-    assert list(answer["keys"]) == ["Basis", *FACE.shape_names]
-    surfaces = divide_surface(FACE)
+    assert list(answer["keys"]) == ["Basis", *face.shape_names, "brows0Minus"]
+    surfaces = divide_surface(face)
     assert answer["materials"] == [surface.part.name for surface in surfaces]
     weights = clip.motion.values[FRAME]
-    assert np.allclose(list(answer["keys"].values())[1:], weights, rtol=0, atol=1e-4)
-    posed = build_rig(FACE).pose(weights, clip.head.values[FRAME]) / 1000
+    values = list(answer["keys"].values())[1:]
+    assert np.allclose(values[:4], weights[:4], rtol=0, atol=1e-4)
+    assert np.allclose(9 * (values[4] - values[5]), weights[4], rtol=0, atol=1e-3)
+    posed = build_rig(face).pose(weights, clip.head.values[FRAME]) / 1000
     expected = np.concatenate([posed[surface.vertices] for surface in surfaces])
     x, y, z = expected.T
     assert np.allclose(answer["places"], np.column_stack([x, -z, y]), rtol=0, atol=2e-5)  # z is up in Blender

@@ -12,15 +12,13 @@ import pytest
 import tts2face
 from lexicon.errors import InputError
 from tests.exports import programs
-from tests.exports.made import FACE, RATE, made_clip, made_stream, turned_clip
+from tests.exports.made import FACE, RATE, made_clip, made_stream, signed_clip, turned_clip, with_gesture
 from tests.render.tiny_face import tiny_face
 from tts2face.exports.gltf import GltfBuffer
 from tts2face.exports.skeleton import continuous_quaternions
 from tts2face.exports.spool import Spool
-from tts2face.exports.surfaces import divide_surface, weight_scales
+from tts2face.exports.surfaces import divide_surface
 from tts2face.face.deformation import build_rig, rotation_matrix
-from tts2face.face.shape_transfer import append_shapes
-from tts2face.models.face import Face
 from tts2face.types import HEAD_CHANNELS, Clip, Trajectory
 
 DTYPES = {5121: "u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -108,16 +106,9 @@ def quaternion_matrix(value):
     ])  # fmt: skip
 
 
-def with_gesture(face: Face = FACE) -> Face:
-    """The face with a shape in millimetres whose limit is 9."""
-    mode = np.zeros((1, *face.vertices.shape), np.float32)
-    mode[0, :40, 2] = 0.5
-    return append_shapes(face, ("brows0",), mode, np.array([[-9.0, 9.0]], np.float32))
-
-
 @pytest.mark.parametrize("face", [FACE, tiny_face(), with_gesture()], ids=["textured", "coloured", "gestures"])
 def test_vertices_are_those_of_the_renderer(face, tmp_path):
-    clip = made_clip(5, 30.0, face.shape_names)
+    clip = signed_clip(5, face)
     tts2face.export(clip, tmp_path / "a.glb", face=face)
     file, rig = GltfFile(tmp_path / "a.glb"), build_rig(face)
     surfaces = divide_surface(face)
@@ -169,16 +160,18 @@ def test_metres_seconds_and_gaze(tmp_path):
     assert file.content.asset.extras == {"fps": pytest.approx(30000 / 1001), "sound": "a.wav"}
 
 
-def test_names_weights_and_scales_of_morph_targets(tmp_path):
+def test_a_gesture_of_both_directions_has_two_targets_with_weights_from_0_to_1(tmp_path):
     face = with_gesture()
-    clip = made_clip(6, 30.0, face.shape_names)
+    motion = np.zeros((3, 5), np.float32)
+    motion[:, 4], motion[:, 0] = [4.5, 0.0, -9.0], [0.0, 0.5, 1.0]
+    clip = made_clip(3, 30.0, face.shape_names)
+    clip = Clip(Trajectory(face.shape_names, motion, 30.0), clip.head, clip.speech)
     tts2face.export(clip, tmp_path / "a.glb", face=face)
     file = GltfFile(tmp_path / "a.glb")
-    assert file.content.meshes[0].extras["targetNames"] == [*FACE.shape_names, "brows0"]
+    assert file.content.meshes[0].extras["targetNames"] == [*FACE.shape_names, "brows0", "brows0Minus"]
     weights = file.animated("face", "weights")[1]
-    scales = weight_scales(face, len(face.shape_names))
-    assert scales.tolist() == [1, 1, 1, 1, 9]
-    assert np.allclose(weights * scales, clip.motion.values, rtol=1e-6, atol=0)
+    assert np.allclose(weights[:, 4:], [[0.5, 0], [0, 0], [0, 1]], rtol=0, atol=1e-7)
+    assert np.array_equal(weights[:, 0], motion[:, 0])
 
 
 def test_openfacefx_reads_names_and_weights(tmp_path):
@@ -251,7 +244,7 @@ def test_three_js_shows_the_vertices_of_the_renderer(tmp_path):
     packages = programs.node_package("three")
     programs.browser()
     face, frame = with_gesture(), 12
-    clip = made_clip(30, 30.0, face.shape_names)
+    clip = signed_clip(30, face)
     tts2face.export(clip, tmp_path / "a.glb", face=face)
     (tmp_path / "three").symlink_to(packages / "three")
     (tmp_path / "index.html").write_text(PAGE.replace("FRAME", str(frame)))
@@ -264,7 +257,7 @@ def test_three_js_shows_the_vertices_of_the_renderer(tmp_path):
     surfaces = {surface.part.name: surface for surface in divide_surface(face)}
     assert {mesh["material"] for mesh in answer["meshes"]} == set(surfaces)
     for mesh in answer["meshes"]:
-        assert mesh["names"] == list(face.shape_names)
+        assert mesh["names"] == [*face.shape_names, "brows0Minus"]
         own = surfaces[mesh["material"]].vertices[::7]
         assert np.allclose(mesh["places"], expected[own], rtol=0, atol=2e-6)  # the animation has 32-bit times
 

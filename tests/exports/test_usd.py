@@ -8,7 +8,7 @@ import pytest
 
 import tts2face
 from lexicon.errors import BackendError
-from tests.exports.made import FACE, made_clip, turned_clip
+from tests.exports.made import FACE, made_clip, signed_clip, turned_clip, with_gesture
 from tts2face.exports.surfaces import divide_surface
 from tts2face.exports.usd import _identifiers
 from tts2face.face.deformation import build_rig
@@ -22,15 +22,16 @@ Usd = pytest.importorskip("pxr.Usd", reason="needs `pip install 'tts2face[usd]'`
 def test_vertices_skinned_by_usd_are_those_of_the_renderer(suffix, tmp_path):
     from pxr import UsdSkel
 
-    clip = made_clip(4, 25.0)
-    tts2face.export(clip, tmp_path / f"a{suffix}", face=FACE)
+    face = with_gesture()
+    clip = signed_clip(4, face)
+    tts2face.export(clip, tmp_path / f"a{suffix}", face=face)
     assert ((tmp_path / f"a{suffix}").read_bytes()[:5] == b"#usda") == (suffix == ".usda")
     stage = Usd.Stage.Open(str(tmp_path / f"a{suffix}"))
     assert UsdSkel.BakeSkinning(UsdSkel.Root.Get(stage, "/Face"))
-    rig = build_rig(FACE)
+    rig = build_rig(face)
     for frame in (0, 3):
         expected = rig.pose(clip.motion.values[frame], clip.head.values[frame])
-        for number, surface in enumerate(divide_surface(FACE)):
+        for number, surface in enumerate(divide_surface(face)):
             mesh = stage.GetPrimAtPath(f"/Face/{surface.part.name}_{number}")
             found = np.array(mesh.GetAttribute("points").Get(frame))
             assert np.allclose(found, expected[surface.vertices], rtol=0, atol=TOLERANCE_MM)

@@ -17,12 +17,13 @@ from tts2face.exports.spool import Spool
 from tts2face.exports.surfaces import (
     MM_PER_M,
     ExportSurface,
+    MorphTargets,
     divide_surface,
     linear_colours,
+    morph_targets,
     roughness,
     texture_jpeg,
     vertex_normals,
-    weight_scales,
 )
 from tts2face.models.face import Face
 
@@ -37,10 +38,9 @@ class GlbWriter:
         if target.face is None:
             raise InputError(f"{target.name} holds the mesh of the face; give the face, as in face=session.face")
         self._target, self._face = target, target.face
-        n_channels = len(target.channels)
-        self._skeleton = build_skeleton(target.face, n_channels)
-        self._scales = weight_scales(target.face, n_channels)
-        self._weights, self._shift = Spool(n_channels), Spool(3)
+        self._skeleton = build_skeleton(target.face, len(target.channels))
+        self._targets = morph_targets(target.face, target.channels)
+        self._weights, self._shift = Spool(len(self._targets.names)), Spool(3)
         n_eyes = len(self._skeleton.names) - HEAD - 1
         self._turns = [Spool(4) for _ in range(1 + n_eyes)]  # of the head and the eyes
         self._last: list[NDArray[np.float64] | None] = [None] * len(self._turns)
@@ -49,7 +49,7 @@ class GlbWriter:
         """Append frames."""
         if not len(part.motion):
             return
-        self._weights.add(part.motion / self._scales)
+        self._weights.add(self._targets.weights(part.motion))
         self._shift.add(self._skeleton.head_places(part.head) / MM_PER_M)
         turns = [self._skeleton.head_rotations(part.head)]
         turns += [self._skeleton.eye_rotations(part.motion, eye) for eye in range(len(self._turns) - 1)]
@@ -64,7 +64,7 @@ class GlbWriter:
         content = _asset(self._target, self._face)
         content |= _materials(self._face, buffer)
         surfaces = divide_surface(self._face)
-        content["meshes"] = [_mesh(self._face, surfaces, self._target, self._skeleton, buffer)]
+        content["meshes"] = [_mesh(self._face, surfaces, self._targets, self._skeleton, buffer)]
         content |= _nodes(self._skeleton, buffer)
         content["animations"] = [self._animation(buffer)]
         buffer.write(self._target.path, content)
@@ -131,10 +131,9 @@ def _materials(face: Face, buffer: GltfBuffer) -> dict[str, Any]:
 
 
 def _mesh(
-    face: Face, surfaces: list[ExportSurface], target: Target, skeleton: Skeleton, buffer: GltfBuffer
+    face: Face, surfaces: list[ExportSurface], targets: MorphTargets, skeleton: Skeleton, buffer: GltfBuffer
 ) -> dict[str, Any]:
-    normals, colours, n_channels = vertex_normals(face), linear_colours(face), len(target.channels)
-    scales = weight_scales(face, n_channels)[:, None, None] / MM_PER_M
+    normals, colours = vertex_normals(face), linear_colours(face)
     has_texture = face.texture is not None
     primitives = []
     for number, surface in enumerate(surfaces):
@@ -154,7 +153,7 @@ def _mesh(
             steps = np.rint(opaque * 0xFFFF).astype("<u2")
             attributes["COLOR_0"] = buffer.add_accessor(steps, VERTICES, normalized=True)
         kind = "<u2" if len(own) < 0xFFFF else "<u4"
-        shapes = (face.shapes[:n_channels, own] * scales).astype("<f4")
+        shapes = [(shape / MM_PER_M).astype("<f4") for shape in targets.displacements(face, own)]
         primitives.append({
             "attributes": attributes,
             "indices": buffer.add_accessor(surface.triangles.ravel().astype(kind), INDICES),
@@ -164,8 +163,8 @@ def _mesh(
     return {
         "name": "face",
         "primitives": primitives,
-        "weights": [0] * n_channels,
-        "extras": {"targetNames": list(target.channels)},
+        "weights": [0] * len(targets.names),
+        "extras": {"targetNames": list(targets.names)},
     }
 
 

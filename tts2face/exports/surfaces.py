@@ -1,5 +1,6 @@
 """Surfaces of an exported head: one for each part with its own material, with its own vertices."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from tts2face.models.face import Face, Part
 
 MM_PER_M = 1000.0
+OPPOSITE = "Minus"  # ending of the name of a target for negative weights
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,13 +47,52 @@ def divide_surface(face: Face) -> list[ExportSurface]:
     return surfaces
 
 
-def weight_scales(face: Face, n_channels: int) -> NDArray[np.float32]:
-    """Weight (K,) at which an exported shape has weight 1: the limit of shapes whose limit is above 1, else 1.
+@dataclass(frozen=True, slots=True, eq=False)
+class MorphTargets:
+    """Exported shapes, whose weights are 0 to 1 within the limits of the face.
 
-    Modes of gestures have weights up to 35, in mm; programs that show sliders expect -1 to 1.
+    Modes of gestures have weights of both signs up to 35, in mm, while many programs clamp weights at 0: such a channel
+    has a second target for its negative weights.
+
+    Parameters
+    ----------
+    names, channels : (M,)
+        Name and channel of each target.
+    scales : (M,)
+        Weight of the channel at which the target has weight 1; negative for a second target.
+    is_half : (M,)
+        Whether the target moves in one of two directions of its channel.
     """
-    scales: NDArray[np.float32] = np.abs(face.limits[:n_channels]).max(axis=1, initial=1.0)
-    return scales
+
+    names: tuple[str, ...]
+    channels: NDArray[np.int64]
+    scales: NDArray[np.float32]
+    is_half: NDArray[np.bool_]
+
+    def weights(self, motion: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Weights (T, M) of the targets from motion (T, K)."""
+        scaled = motion[:, self.channels] / self.scales
+        return np.where(self.is_half, np.maximum(scaled, 0.0), scaled).astype(np.float32)
+
+    def displacements(self, face: Face, vertices: NDArray[np.int64]) -> Iterator[NDArray[np.float32]]:
+        """Yield the displacement (n, 3) in mm of some vertices by each target at weight 1."""
+        for channel, scale in zip(self.channels, self.scales, strict=True):
+            yield face.shapes[channel, vertices] * scale
+
+
+def morph_targets(face: Face, channels: tuple[str, ...]) -> MorphTargets:
+    """Targets of the first shapes of a face, which are the channels of a clip."""
+    rows = []
+    for at, (name, (low, high)) in enumerate(zip(channels, face.limits[: len(channels)].tolist(), strict=True)):
+        rows.append((name, at, max(high, 1.0), low < 0))
+        if low < 0:
+            rows.append((f"{name}{OPPOSITE}", at, -max(-low, 1.0), True))
+    return MorphTargets(
+        names=tuple(row[0] for row in rows),
+        channels=np.array([row[1] for row in rows], np.int64),
+        scales=np.array([row[2] for row in rows], np.float32),
+        is_half=np.array([row[3] for row in rows], bool),
+    )
 
 
 def vertex_normals(face: Face) -> NDArray[np.float32]:

@@ -15,7 +15,7 @@ from lexicon.errors import BackendError, InputError
 from tts2face.exports.parts import Part, Target
 from tts2face.exports.skeleton import HEAD, Skeleton, build_skeleton
 from tts2face.exports.spool import Spool
-from tts2face.exports.surfaces import ExportSurface, divide_surface, linear_colours, vertex_normals, weight_scales
+from tts2face.exports.surfaces import ExportSurface, divide_surface, linear_colours, morph_targets, vertex_normals
 from tts2face.models.face import Face
 
 METRES_PER_UNIT = 0.001
@@ -34,13 +34,13 @@ class UsdWriter:
         self._usd = _UsdModules()
         self._target, self._face = target, target.face
         self._skeleton = build_skeleton(target.face, len(target.channels))
-        self._scales = weight_scales(target.face, len(target.channels))
-        self._weights, self._places = Spool(len(target.channels)), Spool(3)
+        self._targets = morph_targets(target.face, target.channels)
+        self._weights, self._places = Spool(len(self._targets.names)), Spool(3)
         self._turns = [Spool(4) for _ in self._skeleton.names[HEAD:]]
 
     def add(self, part: Part) -> None:
         """Append frames."""
-        self._weights.add(part.motion / self._scales)
+        self._weights.add(self._targets.weights(part.motion))
         self._places.add(self._skeleton.head_places(part.head))
         self._turns[0].add(self._skeleton.head_rotations(part.head))
         for eye, spool in enumerate(self._turns[1:]):
@@ -61,11 +61,11 @@ class UsdWriter:
         stage.GetRootLayer().customLayerData = {name: value for name, value in about.items() if value}
         root = usd.UsdSkel.Root.Define(stage, ROOT_PATH)
         stage.SetDefaultPrim(root.GetPrim())
-        names = _identifiers(target.channels)
+        names = _identifiers(self._targets.names)
         _define_skeleton(usd, stage, self._skeleton)
         self._define_animation(stage, names)
         for number, surface in enumerate(divide_surface(self._face)):
-            _define_surface(usd, stage, (self._face, surface, self._skeleton), (f"{surface.part.name}_{number}", names))
+            self._define_surface(stage, surface, f"{surface.part.name}_{number}", names)
         written = target.path.with_name(f"{target.path.name}{'.usda' if is_text else '.usdc'}")  # USD goes by suffix
         try:
             if not stage.GetRootLayer().Export(str(written)):
@@ -97,6 +97,36 @@ class UsdWriter:
             rotations.Set(usd.Vt.QuatfArray.FromNumpy(turns[frame].copy()), frame)
             moved = np.vstack([places[frame : frame + 1], still]).astype(np.float32)
             translations.Set(usd.Vt.Vec3fArray.FromNumpy(moved), frame)
+
+    def _define_surface(self, stage: Any, surface: ExportSurface, name: str, shape_names: list[str]) -> None:
+        usd, face, skeleton, own = self._usd, self._face, self._skeleton, surface.vertices
+        path = f"{ROOT_PATH}/{re.sub(r'[^A-Za-z0-9_]', '_', name)}"
+        mesh = usd.UsdGeom.Mesh.Define(stage, path)
+        mesh.CreatePointsAttr(_vectors(usd, face.vertices[own]))
+        mesh.CreateFaceVertexCountsAttr(usd.Vt.IntArray.FromNumpy(np.full(len(surface.triangles), 3, np.int32)))
+        mesh.CreateFaceVertexIndicesAttr(usd.Vt.IntArray.FromNumpy(surface.triangles.ravel().astype(np.int32)))
+        mesh.CreateNormalsAttr(_vectors(usd, vertex_normals(face)[own]))
+        mesh.SetNormalsInterpolation(usd.UsdGeom.Tokens.vertex)
+        mesh.CreateSubdivisionSchemeAttr(usd.UsdGeom.Tokens.none)
+        mesh.CreateDoubleSidedAttr(True)
+        mesh.CreateDisplayColorPrimvar(usd.UsdGeom.Tokens.vertex).Set(_vectors(usd, _display_colours(face, surface)))
+        binding = usd.UsdSkel.BindingAPI.Apply(mesh.GetPrim())
+        binding.CreateSkeletonRel().SetTargets([usd.Sdf.Path(f"{ROOT_PATH}/Skeleton")])
+        joints = skeleton.joints[own].astype(np.int32).ravel()
+        binding.CreateJointIndicesPrimvar(False, 2).Set(usd.Vt.IntArray.FromNumpy(joints))
+        weights = skeleton.weights[own].astype(np.float32).ravel()
+        binding.CreateJointWeightsPrimvar(False, 2).Set(usd.Vt.FloatArray.FromNumpy(weights))
+        used, targets = [], []
+        for shape_name, shape in zip(shape_names, self._targets.displacements(face, own), strict=True):
+            moved = np.flatnonzero(shape.any(axis=1))
+            if len(moved):
+                target = usd.UsdSkel.BlendShape.Define(stage, f"{path}/{shape_name}")
+                target.CreateOffsetsAttr(_vectors(usd, shape[moved]))
+                target.CreatePointIndicesAttr(usd.Vt.IntArray.FromNumpy(moved.astype(np.int32)))
+                used.append(shape_name)
+                targets.append(target.GetPath())
+        binding.CreateBlendShapesAttr(used)
+        binding.CreateBlendShapeTargetsRel().SetTargets(targets)
 
 
 class _UsdModules:
@@ -136,41 +166,6 @@ def _define_skeleton(usd: Any, stage: Any, skeleton: Skeleton) -> None:
     prim.CreateRestTransformsAttr(usd.Vt.Matrix4dArray(local))
     binding = usd.UsdSkel.BindingAPI.Apply(prim.GetPrim())
     binding.CreateAnimationSourceRel().SetTargets([usd.Sdf.Path(f"{ROOT_PATH}/Skeleton/Animation")])
-
-
-def _define_surface(
-    usd: Any, stage: Any, of: tuple[Face, ExportSurface, Skeleton], names: tuple[str, list[str]]
-) -> None:
-    (face, surface, skeleton), (name, shape_names) = of, names
-    own, n_channels = surface.vertices, len(shape_names)
-    path = f"{ROOT_PATH}/{re.sub(r'[^A-Za-z0-9_]', '_', name)}"
-    mesh = usd.UsdGeom.Mesh.Define(stage, path)
-    mesh.CreatePointsAttr(_vectors(usd, face.vertices[own]))
-    mesh.CreateFaceVertexCountsAttr(usd.Vt.IntArray.FromNumpy(np.full(len(surface.triangles), 3, np.int32)))
-    mesh.CreateFaceVertexIndicesAttr(usd.Vt.IntArray.FromNumpy(surface.triangles.ravel().astype(np.int32)))
-    mesh.CreateNormalsAttr(_vectors(usd, vertex_normals(face)[own]))
-    mesh.SetNormalsInterpolation(usd.UsdGeom.Tokens.vertex)
-    mesh.CreateSubdivisionSchemeAttr(usd.UsdGeom.Tokens.none)
-    mesh.CreateDoubleSidedAttr(True)
-    mesh.CreateDisplayColorPrimvar(usd.UsdGeom.Tokens.vertex).Set(_vectors(usd, _display_colours(face, surface)))
-    binding = usd.UsdSkel.BindingAPI.Apply(mesh.GetPrim())
-    binding.CreateSkeletonRel().SetTargets([usd.Sdf.Path(f"{ROOT_PATH}/Skeleton")])
-    joints = skeleton.joints[own].astype(np.int32).ravel()
-    binding.CreateJointIndicesPrimvar(False, 2).Set(usd.Vt.IntArray.FromNumpy(joints))
-    weights = skeleton.weights[own].astype(np.float32).ravel()
-    binding.CreateJointWeightsPrimvar(False, 2).Set(usd.Vt.FloatArray.FromNumpy(weights))
-    used, targets = [], []
-    scales = weight_scales(face, n_channels)[:, None, None]
-    for shape_name, shape in zip(shape_names, face.shapes[:n_channels, own] * scales, strict=True):
-        moved = np.flatnonzero(shape.any(axis=1))
-        if len(moved):
-            target = usd.UsdSkel.BlendShape.Define(stage, f"{path}/{shape_name}")
-            target.CreateOffsetsAttr(_vectors(usd, shape[moved]))
-            target.CreatePointIndicesAttr(usd.Vt.IntArray.FromNumpy(moved.astype(np.int32)))
-            used.append(shape_name)
-            targets.append(target.GetPath())
-    binding.CreateBlendShapesAttr(used)
-    binding.CreateBlendShapeTargetsRel().SetTargets(targets)
 
 
 def _vectors(usd: Any, values: NDArray[Any]) -> Any:
