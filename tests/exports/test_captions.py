@@ -64,13 +64,13 @@ def test_a_clip_without_words_has_no_cue(suffix, tmp_path):
 def test_numbers_have_the_time_of_the_words_that_say_them():
     words = evenly(["it", "costs", "three", "dollars", "fifty", "now"])
     (cue,) = sentence_cues(words, 'It costs "$3.50" now!')
-    assert [token.text for token in cue] == ["It", "costs", '"$3.50"', "now!"]
+    assert [token.text for token in cue] == ["It ", "costs ", '"$3.50" ', "now!"]
     assert [(token.start, token.end) for token in cue] == [(0, 0.4), (0.4, 0.8), (0.8, 2.0), (2.0, 2.4)]
 
 
 def test_signs_that_are_not_spoken_lie_between_their_neighbours():
     (cue,) = sentence_cues(evenly(["a", "b"], pause=0.2), "– a – b –")
-    assert [(token.text, round(token.start, 3), round(token.end, 3)) for token in cue] == [
+    assert [(token.text.strip(), round(token.start, 3), round(token.end, 3)) for token in cue] == [
         ("–", 0, 0), ("a", 0, 0.4), ("–", 0.4, 0.6), ("b", 0.6, 1.0), ("–", 1.0, 1.0),
     ]  # fmt: skip
 
@@ -79,8 +79,8 @@ def test_long_sentences_become_cues_of_two_lines_and_seven_seconds(tmp_path):
     words = [f"word{number}" for number in range(60)]
     for text in ("", " ".join(words)):
         cues = sentence_cues(evenly(words), text)
-        assert [token.text for cue in cues for token in cue] == words
-        assert all(sum(len(token.text) + 1 for token in cue) - 1 <= MAX_CUE_CHARACTERS for cue in cues)
+        assert [token.text.strip() for cue in cues for token in cue] == words
+        assert all(len("".join(token.text for token in cue).strip()) <= MAX_CUE_CHARACTERS for cue in cues)
         assert all(cue[-1].end - cue[0].start <= MAX_CUE_S for cue in cues)
     duration = 30.0
     samples = Waveform([0.0] * int(duration * RATE), RATE)
@@ -92,9 +92,20 @@ def test_long_sentences_become_cues_of_two_lines_and_seven_seconds(tmp_path):
     assert max(len(row) for row in rows) <= MAX_LINE_CHARACTERS
 
 
+def test_text_without_spaces_is_divided_too():
+    text = "我们一年前不在这里，可是鲍勃也许会搬动五张大地图。" * 8
+    cues = sentence_cues(evenly(["a"] * 100, 0.25), text)
+    assert "".join(token.text for cue in cues for token in cue) == text
+    assert len(cues) >= 4
+    assert all(len("".join(token.text for token in cue)) <= MAX_CUE_CHARACTERS for cue in cues)
+    assert all(cue[-1].end - cue[0].start <= MAX_CUE_S for cue in cues)
+    times = [token.start for cue in cues for token in cue]
+    assert times == sorted(times)
+
+
 def test_without_written_text_a_pause_ends_a_cue():
     words = [*evenly(["one", "two"]), *evenly(["three"], start=1.3)]
-    assert [[token.text for token in cue] for cue in sentence_cues(words, "")] == [["one", "two"], ["three"]]
+    assert [[token.text.strip() for token in cue] for cue in sentence_cues(words, "")] == [["one", "two"], ["three"]]
     assert len(sentence_cues(words, "one two three")) == 1
 
 

@@ -12,11 +12,15 @@ MAX_LINE_CHARACTERS = 42  # of a line of captions, a common limit of subtitling 
 MAX_CUE_CHARACTERS = 2 * MAX_LINE_CHARACTERS
 MAX_CUE_S = 7.0  # longest cue of the same guides
 MIN_PAUSE_S = 0.3  # silence that ends a cue where the written text is unknown
+_TOKEN = re.compile(r"\S+\s*")
+_PIECE = re.compile(
+    r"[^、。，！？；：]{1,10}[、。，！？；：」』]*\s*|[、。，！？；：」』]+\s*"
+)  # a break after punctuation
 _VTT_ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
 
 
 def sentence_cues(words: Sequence[Label], text: str) -> list[list[Label]]:
-    """Cues of a part, each as a list of timed tokens; of at most two lines and `MAX_CUE_S`.
+    """Cues of a part, each as a list of timed tokens with the space after them; at most two lines and `MAX_CUE_S`.
 
     Parameters
     ----------
@@ -28,7 +32,10 @@ def sentence_cues(words: Sequence[Label], text: str) -> list[list[Label]]:
     """
     if not words:
         return []
-    tokens = _timed_tokens(words, text.split()) if text.strip() else list(words)
+    if text.strip():
+        tokens = _timed_tokens(words, written_tokens(text))
+    else:
+        tokens = [Label(f"{word.text} ", word.start, word.end) for word in words]
     cues: list[list[Label]] = [[]]
     for token in tokens:
         cue = cues[-1]
@@ -38,8 +45,16 @@ def sentence_cues(words: Sequence[Label], text: str) -> list[list[Label]]:
     return cues
 
 
+def written_tokens(text: str) -> list[str]:
+    """Tokens of a text with the space after them; text without spaces (Chinese, Japanese, Thai) is divided further."""
+    tokens: list[str] = []
+    for token in _TOKEN.findall(text):
+        tokens += [token] if len(token) <= MAX_LINE_CHARACTERS else _PIECE.findall(token)
+    return tokens
+
+
 def _ends_cue(cue: Sequence[Label], token: Label, *, has_text: bool) -> bool:
-    n_characters = sum(len(one.text) + 1 for one in cue) + len(token.text)
+    n_characters = sum(len(one.text) for one in cue) + len(token.text.rstrip())
     is_pause = not has_text and token.start - cue[-1].end >= MIN_PAUSE_S
     return is_pause or n_characters > MAX_CUE_CHARACTERS or token.end - cue[0].start > MAX_CUE_S
 
@@ -108,7 +123,7 @@ def _clock(seconds: float, decimal: str) -> str:
 
 
 def _lines(tokens: Sequence[Label]) -> str:
-    text = re.sub(r"\s+", " ", " ".join(token.text for token in tokens))
+    text = re.sub(r"\s+", " ", "".join(token.text for token in tokens)).strip()
     return "\n".join(textwrap.wrap(text, MAX_LINE_CHARACTERS, break_on_hyphens=False) or [text])
 
 
@@ -156,7 +171,7 @@ class KaraokeVttWriter(_CaptionWriter):
 
     def content(self, tokens: Sequence[Label]) -> str:
         """Text of a cue on one line, with timestamps that increase within the cue."""
-        return " ".join(self._marked(tokens))
+        return re.sub(r"\s+", " ", "".join(self._marked(tokens))).strip()
 
     def _marked(self, tokens: Sequence[Label]) -> Iterator[str]:
         before = _clock(tokens[0].start, self.decimal)
