@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from cyclopts import App, CycloptsError, Parameter
 
 import cli.gestures  # noqa: F401 - adds its command to `corpus`
+from cli.batch import batch
 from cli.corpus import corpus
 from cli.flags import add_option_flags, check_options, options_from_flags, switch
 from cli.lists import LISTS
@@ -41,6 +42,7 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 app.command(mimic)
+app.command(batch)
 app.command(corpus)
 app.command(report)
 for list_command in LISTS:
@@ -88,7 +90,7 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     /,
     *,
     out: Annotated[
-        Path | None, Parameter(help="Output clip: .mp4, .webm, .gif, or a folder for .png files.", alias="-o")
+        Path | None, Parameter(help="Output clip: .mp4, .webm, .mov, .gif, or a folder for .png files.", alias="-o")
     ] = None,
     file: Annotated[
         Path | None, Parameter(help="Read the text from a UTF-8 file.", name=["--file", "--transcript"])

@@ -23,7 +23,7 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     /,
     *,
     out: Annotated[
-        Path | None, Parameter(help="Output clip: .mp4, .webm, .gif, or a folder for .png files.", alias="-o")
+        Path | None, Parameter(help="Output clip: .mp4, .webm, .mov, .gif, or a folder for .png files.", alias="-o")
     ] = None,
     camera: Annotated[
         str | None,

@@ -10,8 +10,8 @@ from tts2face.render.png_folder import is_png_folder
 from tts2face.storage.output_names import check_name
 from tts2face.storage.temporary import Temporary
 
-MP4, WEBM, GIF, FOLDER = ".mp4", ".webm", ".gif", ""
-FILE_SUFFIXES = (MP4, WEBM, GIF)
+MP4, WEBM, MOV, GIF, FOLDER = ".mp4", ".webm", ".mov", ".gif", ""
+FILE_SUFFIXES = (MP4, WEBM, MOV, GIF)
 
 
 def output_kind(path: Path | str) -> str:

@@ -6,8 +6,19 @@ from collections.abc import Mapping, Sequence
 from tts2face.subtitles.cue import SubtitleWarning, WrittenCue
 from tts2face.subtitles.timestamps import parse_clock
 
-ASS_FIELDS = ("layer", "start", "end", "style", "name", "marginl", "marginr", "marginv", "effect", "text")
-SSA_FIELDS = ("marked", *ASS_FIELDS[1:])
+ASS_FIELDS: tuple[str, ...] = (
+    "layer",
+    "start",
+    "end",
+    "style",
+    "name",
+    "marginl",
+    "marginr",
+    "marginv",
+    "effect",
+    "text",
+)
+SSA_FIELDS: tuple[str, ...] = ("marked", *ASS_FIELDS[1:])
 _SECTION = re.compile(r"\s*\[([^\]]+)\]\s*$")
 _DRAWING = re.compile(r"\\p[1-9]")  # a text in drawing mode holds coordinates, no words
 _LINE_BREAK = re.compile(r"\\[Nn]")
