@@ -47,6 +47,14 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     store: Annotated[
         str | None, Parameter(help="Store of rendered segments: a folder, or a URL (s3://, gs://, az://, file://).")
     ] = None,
+    database: Annotated[
+        str | None,
+        Parameter(
+            help="Queue of segments for `tts2face worker`: a SQLite file, or postgresql://... for many machines. "
+            "Without it the processes of --jobs render."
+        ),
+    ] = None,
+    priority: Annotated[int, whole_number("With --database: jobs with smaller numbers are taken first; from 1.")] = 10,
     dry_run: Annotated[bool, switch("Print the plan with expected hours and disk space; render nothing.")] = False,
     progress: Annotated[
         Literal["bar", "json"], Parameter(help="Progress bar, or one line of JSON for each step on standard output.")
@@ -55,8 +63,10 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     **options: Any,
 ) -> None:
     """Make clips of subtitle files, fitted to their cues. Running it again makes only what is missing or changed."""
-    if jobs < 1:
-        raise InputError(f"--jobs must be 1 or more, not {jobs}")
+    if jobs < (0 if database is not None else 1):
+        raise InputError(f"--jobs must be 1 or more (0 with --database: other workers only), not {jobs}")
+    if priority < 1:
+        raise InputError(f"--priority must be 1 or more, not {priority}")
     from tts2face.batch.cast import Cast, Models, read_cast
     from tts2face.batch.plan import plan_batch
 
@@ -72,17 +82,28 @@ def batch(  # noqa: PLR0913 - one parameter a flag
         _print_warnings(plan)
     if dry_run:
         return _print_plan(plan, out, store)
+    from tts2face.batch.run import SEGMENT_FOLDER
     from tts2face.batch.store import open_store
 
-    opened = open_store(store) if store is not None else None
-    from tts2face.batch.engine import LocalEngine
-
-    engine = LocalEngine(jobs, write_message)
+    place = store if store is not None else str((out / SEGMENT_FOLDER).resolve())
+    opened = open_store(place)
+    engine = _open_engine(database, place, jobs, priority)
     _finish(_run(plan, out, (opened, engine), is_json=progress == "json", quiet=quiet), out, quiet=quiet)
     return None
 
 
-def _run(plan: "Plan", out: Path, parts: "tuple[Store | None, Engine]", *, is_json: bool, quiet: bool) -> "BatchResult":
+def _open_engine(database: str | None, place: str, jobs: int, priority: int) -> "Engine":
+    """Processes of this machine, or the workers of a database."""
+    if database is None:
+        from tts2face.batch.engine import LocalEngine
+
+        return LocalEngine(jobs, write_message)
+    from tts2face.jobs.engine import DatabaseEngine
+
+    return DatabaseEngine(database, place, jobs, priority, write_message)
+
+
+def _run(plan: "Plan", out: Path, parts: "tuple[Store, Engine]", *, is_json: bool, quiet: bool) -> "BatchResult":
     from tts2face.batch.run import run_batch
 
     store, engine = parts

@@ -11,6 +11,7 @@ import cli.gestures  # noqa: F401 - adds its command to `corpus`
 from cli.batch import batch
 from cli.corpus import corpus
 from cli.flags import add_option_flags, check_options, options_from_flags, switch
+from cli.jobs import jobs, worker
 from cli.lists import LISTS
 from cli.mimic import mimic
 from cli.process import (
@@ -43,6 +44,8 @@ app = App(
 )
 app.command(mimic)
 app.command(batch)
+app.command(worker)
+app.command(jobs)
 app.command(corpus)
 app.command(report)
 for list_command in LISTS:
