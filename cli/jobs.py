@@ -95,7 +95,7 @@ def cancel(*names: Names, database: Database = DEFAULT_DATABASE) -> None:
     """Cancel waiting and running jobs."""
     from tts2face.jobs.control import cancel_jobs
 
-    write_message(f"cancelled {cancel_jobs(_existing(database), names)} jobs")
+    print(f"cancelled {cancel_jobs(_existing(database), names)} jobs")  # noqa: T201 - the result
 
 
 @jobs.command
@@ -107,7 +107,7 @@ def retry(
     """Queue failed and cancelled jobs again."""
     from tts2face.jobs.control import retry_jobs
 
-    write_message(f"queued {retry_jobs(_existing(database), names, priority)} jobs again")
+    print(f"queued {retry_jobs(_existing(database), names, priority)} jobs again")  # noqa: T201 - the result
 
 
 @jobs.command
@@ -119,7 +119,7 @@ def prune(
     """Remove jobs that have ended; stored segments stay."""
     from tts2face.jobs.control import prune_jobs
 
-    write_message(f"removed {prune_jobs(_existing(database), days * 86_400.0)} jobs")
+    print(f"removed {prune_jobs(_existing(database), days * 86_400.0)} jobs")  # noqa: T201 - the result
 
 
 def _existing(database: str) -> str:

@@ -1,27 +1,20 @@
 """Fit of speech to cues, with a voice whose durations are known."""
 
 import re
-from dataclasses import dataclass
 
 import pytest
 
 from tts2face.batch.fit import Limits, fit_speech
+from tts2face.synthesis.clip_stream import SpeechSpan
 
 TEN = "abcdefghij"  # 1 s at rate 1 with 0.1 s a letter
 
 
-@dataclass(frozen=True)
-class Span:
-    begin: float
-    end: float
-    total: float
-
-
-def measure(text: str, rate: float) -> Span:
+def measure(text: str, rate: float) -> SpeechSpan:
     """0.1 s a letter, and 0.5 s a comma unless a pause mark follows it."""
     words = re.sub(r"\[[^\]]*\]", "", text)
     end = 0.1 * sum(letter.isalpha() for letter in words) / rate + 0.5 * len(re.findall(r",(?! \[)", text)) / rate
-    return Span(0.0, end, end + 0.2)
+    return SpeechSpan(0.0, end, end + 0.2)
 
 
 def limits(window: float, slot: float | None = None, policy: str = "extend", max_rate: float = 1.4) -> Limits:

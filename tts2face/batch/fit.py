@@ -3,24 +3,16 @@
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 from lexicon.errors import InputError
 from tts2face.batch.options import CUT_PAUSES, REPORT
 from tts2face.request import RATE_LIMITS
+from tts2face.synthesis.clip_stream import SpeechSpan
 
 MAX_STEPS = 4  # of the search for a rate; two are usual
 AIM = 0.985  # of the cue's time, so that rounding of durations by the voice does not need another step
 PAUSE_PLACES = re.compile(r"(?<=\w)([,;:.!?…]+)\s+(?=\S)")
 SHORT_PAUSE = "[pause 0]"  # the shortest pause between two utterances, 20 ms
-
-
-class SpeechSpan(Protocol):
-    """Seconds at which the speech of a clip begins, ends, and at which its sound ends."""
-
-    begin: float
-    end: float
-    total: float
 
 
 Measure = Callable[[str, float], SpeechSpan]  # span of a text at a rate

@@ -7,8 +7,9 @@ from typing import Any
 
 from lexicon.errors import InputError
 from tts2face.batch.segment import segment_from_json
-from tts2face.jobs.database import QUEUE, Workers, database_url, prepare_database
+from tts2face.jobs.database import Workers, database_url, prepare_database
 from tts2face.jobs.engine import ACTIVE, enqueue, failure_reason, open_client
+from tts2face.jobs.worker import WORKFLOW
 
 STATES = {
     "ENQUEUED": "waiting",
@@ -66,7 +67,7 @@ def list_jobs(database: str, states: Sequence[str] = (), limit: int | None = Non
     statuses = [status for status, state in STATES.items() if not states or state in states]
     with open_client(url) as client, Workers(url) as workers:
         places = workers.alive(within_s=1e9)
-        found = client.list_workflows(queue_name=QUEUE, status=statuses, limit=limit)
+        found = client.list_workflows(name=WORKFLOW, status=statuses, limit=limit)
         return tuple(_job(one, places) for one in found)
 
 
@@ -122,7 +123,7 @@ def _prepared(database: str) -> str:
 
 def _of_states(client: Any, statuses: frozenset[str], *, load_input: bool = True) -> list[Any]:
     found: list[Any] = client.list_workflows(
-        queue_name=QUEUE, status=sorted(statuses), load_input=load_input, load_output=False
+        name=WORKFLOW, status=sorted(statuses), load_input=load_input, load_output=False
     )
     return found
 
@@ -130,7 +131,7 @@ def _of_states(client: Any, statuses: frozenset[str], *, load_input: bool = True
 def _find(client: Any, name: str) -> Any:
     if len(name) < MIN_NAME_CHARACTERS:
         raise InputError(f"the name {name!r} is too short; give at least {MIN_NAME_CHARACTERS} characters of it")
-    found = client.list_workflows(workflow_id_prefix=name, queue_name=QUEUE)
+    found = client.list_workflows(workflow_id_prefix=name, name=WORKFLOW)
     addresses = {one.workflow_id.partition(".")[0] for one in found}
     if len(addresses) != 1:
         raise InputError(f"{len(addresses)} jobs begin with {name!r}; give more of the name that `jobs list` prints")

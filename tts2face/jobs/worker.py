@@ -166,7 +166,7 @@ class Worker:
         from dbos import error as dbos_error
 
         try:
-            running = DBOS.list_workflows(status="PENDING", queue_name=QUEUE, load_input=False, load_output=False)
+            running = DBOS.list_workflows(status="PENDING", name=WORKFLOW, load_input=False, load_output=False)
             owners = {str(one.executor_id) for one in running if one.executor_id} - {self.executor_id}
             dead = owners - set(workers.alive()) if owners else set()
             if dead:
