@@ -38,6 +38,7 @@ APPLICATION_VERSION = f"segments-{SEGMENT_FORMAT}"  # pinned: workers of equal s
 WORKFLOW = "render_segment"
 MAX_DEATHS = 8  # of workers that had the same segment; then it counts as failed
 POLL_S = 0.2
+N_TAKEN = 2  # jobs that a worker holds: one is rendered, one waits, so that no time is lost between them
 
 
 class SegmentFailedError(RuntimeError):
@@ -81,6 +82,7 @@ class Worker:
         self.executor_id = f"{uuid.uuid4().hex[:20]}"
         self._place = f"{socket.gethostname()}, process {os.getpid()}"
         self._stopped = threading.Event()
+        self._rendering = threading.Lock()  # one segment at a time
         self.n_rendered = 0
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
@@ -109,7 +111,7 @@ class Worker:
         with Workers(self._url) as workers:
             workers.beat(self.executor_id, self._place)
             DBOS.launch()
-            DBOS.register_queue(QUEUE, worker_concurrency=1, polling_interval_sec=POLL_S)
+            DBOS.register_queue(QUEUE, worker_concurrency=N_TAKEN, polling_interval_sec=POLL_S)
             beats = threading.Thread(target=self._beat, args=(workers,), name="beat", daemon=True)
             beats.start()
             try:
@@ -143,7 +145,8 @@ class Worker:
                 )
         except Tts2faceError as wrong:
             raise SegmentFailedError(str(wrong)) from None
-        rendered = render_into(self._store, segment, self._renderer, self._on_message)
+        with self._rendering:
+            rendered = render_into(self._store, segment, self._renderer, self._on_message)
         if rendered.result is None:
             raise SegmentFailedError(rendered.reason)
         self.n_rendered += 1
