@@ -8,9 +8,11 @@ from typing import Annotated, Any, Literal
 from cyclopts import App, CycloptsError, Parameter
 
 import cli.gestures  # noqa: F401 - adds its command to `corpus`
+from cli.batch import batch
 from cli.convert import convert
 from cli.corpus import corpus
 from cli.flags import add_option_flags, check_options, options_from_flags, switch
+from cli.jobs import jobs, worker
 from cli.lists import LISTS
 from cli.mimic import mimic
 from cli.process import (
@@ -43,6 +45,9 @@ app = App(
 )
 app.command(mimic)
 app.command(convert)
+app.command(batch)
+app.command(worker)
+app.command(jobs)
 app.command(corpus)
 app.command(report)
 for list_command in LISTS:
@@ -92,7 +97,7 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     out: Annotated[
         Path | None,
         Parameter(
-            help="Output clip: .mp4, .webm, .gif, a folder for .png files, or an export format without a video.",
+            help="Output clip: .mp4, .webm, .mov, .gif, a folder for .png files, or an export format without a video.",
             alias="-o",
         ),
     ] = None,

@@ -26,7 +26,7 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     out: Annotated[
         Path | None,
         Parameter(
-            help="Output clip: .mp4, .webm, .gif, a folder for .png files, or an export format without a video.",
+            help="Output clip: .mp4, .webm, .mov, .gif, a folder for .png files, or an export format without a video.",
             alias="-o",
         ),
     ] = None,

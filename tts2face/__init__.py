@@ -21,6 +21,13 @@ if TYPE_CHECKING:
     from tts2face.api import export as export
     from tts2face.api import load_clip as load_clip
     from tts2face.api import write_clip as write_clip
+    from tts2face.batch.cast import Cast as Cast
+    from tts2face.batch.cast import read_cast as read_cast
+    from tts2face.batch.options import BatchOptions as BatchOptions
+    from tts2face.batch.plan import Plan as Plan
+    from tts2face.batch.plan import plan_batch as plan_batch
+    from tts2face.batch.run import BatchResult as BatchResult
+    from tts2face.batch.run import run_batch as run_batch
     from tts2face.catalogue import faces as faces
     from tts2face.catalogue import formats as formats
     from tts2face.catalogue import identities as identities
@@ -37,6 +44,9 @@ if TYPE_CHECKING:
     from tts2face.render.picture import Picture as Picture
     from tts2face.request import Request as Request
     from tts2face.session import Session as Session
+    from tts2face.subtitles.cue import Cue as Cue
+    from tts2face.subtitles.cue import Subtitles as Subtitles
+    from tts2face.subtitles.reader import read_subtitles as read_subtitles
     from tts2face.synthesis.animated_face import AnimatedFace as AnimatedFace
     from tts2face.synthesis.clip_stream import Piece as Piece
     from tts2face.synthesis.performance import Performance as Performance
@@ -51,7 +61,11 @@ __version__ = "0.1.0"
 __all__ = [
     "AnimatedFace",
     "BackendError",
+    "BatchOptions",
+    "BatchResult",
+    "Cast",
     "Clip",
+    "Cue",
     "DataError",
     "Face",
     "InputError",
@@ -60,9 +74,11 @@ __all__ = [
     "PhoneSequence",
     "Picture",
     "Piece",
+    "Plan",
     "Request",
     "Session",
     "Speech",
+    "Subtitles",
     "Talker",
     "Trajectory",
     "Tts2faceError",
@@ -79,6 +95,10 @@ __all__ = [
     "load_face",
     "load_palette",
     "load_talker",
+    "plan_batch",
+    "read_cast",
+    "read_subtitles",
+    "run_batch",
     "styles",
     "talkers",
     "voices",
@@ -89,6 +109,10 @@ _MODULES = {
     "lexicon.errors": ("BackendError", "DataError", "InputError", "Tts2faceError"),
     "lexicon.sequence": ("PhoneSequence", "WordSpan"),
     "tts2face.api": ("convert", "export", "load_clip", "write_clip"),
+    "tts2face.batch.cast": ("Cast", "read_cast"),
+    "tts2face.batch.options": ("BatchOptions",),
+    "tts2face.batch.plan": ("Plan", "plan_batch"),
+    "tts2face.batch.run": ("BatchResult", "run_batch"),
     "tts2face.catalogue": ("faces", "formats", "identities", "languages", "styles", "talkers", "voices"),
     "tts2face.models.face": ("Face",),
     "tts2face.models.face_file": ("load_face",),
@@ -98,6 +122,8 @@ _MODULES = {
     "tts2face.request": ("Request",),
     "tts2face.session": ("Session",),
     "tts2face.synthesis.animated_face": ("AnimatedFace",),
+    "tts2face.subtitles.cue": ("Cue", "Subtitles"),
+    "tts2face.subtitles.reader": ("read_subtitles",),
     "tts2face.synthesis.clip_stream": ("Piece",),
     "tts2face.synthesis.performance": ("Performance",),
     "tts2face.synthesis.written_clip": ("WrittenClip",),

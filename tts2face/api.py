@@ -34,8 +34,8 @@ def write_clip(
     face
         `Session.face` of the session that made the clip, or of another one with the same face.
     out
-        .mp4, .webm, .gif, or a folder of .png files. The file appears when it is complete; after an error no partial
-        file remains.
+        .mp4, .webm, .mov, .gif, or a folder of .png files. The file appears when it is complete; after an error no
+        partial file remains.
     picture
         Drawing options; None for the defaults.
     on_progress

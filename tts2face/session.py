@@ -27,7 +27,8 @@ from tts2face.request import Request
 from tts2face.speech.text_fit import TextMismatch
 from tts2face.storage.overwrite import refuse_overwriting
 from tts2face.synthesis.animated_face import AnimatedFace, mesh_face, own_appearance_face
-from tts2face.synthesis.clip_stream import Piece, SynthesisModels, pieces
+from tts2face.synthesis.clip_stream import Piece, SpeechSpan, SynthesisModels, measure_speech, pieces
+from tts2face.synthesis.fixed_length import Length, clips_of_length
 from tts2face.synthesis.gesture_layer import GestureLayer
 from tts2face.synthesis.marked_speech import MarkTime
 from tts2face.synthesis.performance import Performance, perform, take_clips
@@ -36,6 +37,7 @@ from tts2face.synthesis.written_clip import RequestSteps, WrittenClip
 from tts2face.types import Clip, Progress, concatenate_clips
 from tts2face.voice.engine import PronunciationMap, Voice
 from tts2face.voice.loading import load_voice
+from tts2face.voice.recent import RecentUtterances
 
 DEFAULT_FIELDS = "fields"
 OWN_FACE = "self"  # name of the talker's own face
@@ -151,6 +153,26 @@ class Session:
         """
         return self._pieces(prepare_request(text, options))
 
+    def measure_speech(self, text: str | Request | PreparedRequest, **options: Any) -> SpeechSpan:
+        """Seconds at which the speech of a text begins and ends in its clip, without synthesis of motion.
+
+        The last utterances are kept, so that a following `stream` of the same text does not speak it again.
+        """
+        prepared = prepare_request(text, options)
+        return measure_speech(prepared, self._models(prepared.request, self._face(prepared.request.has_gestures)))
+
+    def stream_to_length(self, text: str | Request | PreparedRequest, n_frames: int, **options: Any) -> Iterator[Clip]:
+        """Synthesise the clip of a text or request in pieces with `n_frames` frames in total.
+
+        Idle animation follows the speech; speech beyond the last frame is cut. Head and face are at rest in the first
+        and last frame, so that such clips can be joined. Arguments and errors as `clip`.
+        """
+        prepared = prepare_request(text, options)
+        is_text = prepared.request.audio is None and prepared.request.idle is None
+        sound_end = self.measure_speech(prepared).total if is_text else None
+        first = len(self._speech_face.channels) if self._mesh is None else 0  # a talker's own video fixes the rest
+        yield from clips_of_length(prepared, sound_end, Length(n_frames, first), self._pieces)
+
     def write(
         self,
         text: str | Request | PreparedRequest,
@@ -171,7 +193,7 @@ class Session:
         text
             As for `clip`.
         out
-            .mp4, .webm, .gif, or a folder of .png files. The file appears when it is complete; after an error no
+            .mp4, .webm, .mov, .gif, or a folder of .png files. The file appears when it is complete; after an error no
             partial file remains.
         picture
             Drawing options; if None, fields of `Picture` may be given among the options.
@@ -345,13 +367,15 @@ class Session:
         face = self._face(request.has_gestures)
         palette = self.palette if request.has_gestures else None
         layer = None if palette is None else GestureLayer(prepared, self._fields(palette, request), face)
+        return pieces(prepared, self._models(request, face), layer)
+
+    def _models(self, request: Request, face: AnimatedFace) -> SynthesisModels:
         dictionary = read_dictionary(request.dictionary).entries if request.dictionary else {}
 
         def borrow_voice(name: str | None, language: str) -> AbstractContextManager[Voice]:
             return self._borrow_voice(name, language, dictionary)
 
-        models = SynthesisModels(self.talker, self._exemplars, face, borrow_voice)
-        return pieces(prepared, models, layer)
+        return SynthesisModels(self.talker, self._exemplars, face, borrow_voice)
 
     def _face(self, has_gestures: bool) -> AnimatedFace:
         return self.face if has_gestures else self._speech_face
@@ -385,7 +409,7 @@ class Session:
         with self._lock:
             found = next((at for at, (kept, _) in enumerate(self._unused_voices) if kept == key), None)
             voice = None if found is None else self._unused_voices.pop(found)[1]
-        voice = voice or load_voice(name, language, dictionary)
+        voice = voice or RecentUtterances(load_voice(name, language, dictionary))
         try:
             yield voice
         finally:

@@ -4,8 +4,9 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from corpus_tools.recordings.subtitles import SUBTITLE_FORMATS, Cue, read_cues, read_text
+from corpus_tools.recordings.subtitles import SUBTITLE_SUFFIXES, Cue, read_cues
 from lexicon.errors import DataError
+from tts2face.subtitles.decode import read_text
 
 SILENT_LABELS = frozenset({"", "sil", "sp", "spn", "<p:>", "<sil>", "pau", "#"})
 # Outside quotes only numbers have a meaning (Praat manual, "TextGrid file format").
@@ -88,7 +89,7 @@ def read_word_times(path: Path) -> tuple[Cue, ...]:
 
 
 TEXT_SUFFIX = ".txt"
-READERS = {".textgrid": read_textgrid, ".align": read_word_times, **dict.fromkeys(SUBTITLE_FORMATS, read_cues)}
+READERS = {".textgrid": read_textgrid, ".align": read_word_times, **dict.fromkeys(SUBTITLE_SUFFIXES, read_cues)}
 
 
 def find_transcript(video: Path) -> Path | None:

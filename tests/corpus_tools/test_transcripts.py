@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from corpus_tools.recordings.folder import find_recordings, pronounce_recording
-from corpus_tools.recordings.subtitles import MAX_BYTES, Cue, read_cues, read_text
+from corpus_tools.recordings.subtitles import Cue, read_cues
 from corpus_tools.recordings.transcripts import READERS, find_transcript, read_transcript
 from lexicon.errors import DataError
+from tts2face.subtitles.decode import MAX_BYTES, read_text
 
 SRT = """1
 00:00:01,000 --> 00:00:02,500

@@ -16,6 +16,8 @@ NOT_EXECUTED = {  # beginning of a command line: why it is parsed only
     '"Hello." --talker me.talker --face self': PERSON,
     "mimic take.mp4": PERSON,
     "mimic --camera": WINDOW,
+    "worker": "runs until it is interrupted",
+    "jobs show": "needs the name of a job",
     "corpus setup": "uses the network",
     "corpus build": PERSON,
     "corpus face": PERSON,

@@ -4,15 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.docs.blocks import DOCS, PAGES, code_blocks
+from tests.docs.blocks import PAGES, code_blocks
 
 WITH_EXAMPLES = [page for page in PAGES if code_blocks(page, "python")]
 
 
 @pytest.mark.parametrize("page", WITH_EXAMPLES, ids=lambda page: page.name)
 def test_python_examples_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    if page == DOCS / "subtitles.md":
-        pytest.importorskip("pysubs2", reason="needs the extra [capture]")
     monkeypatch.chdir(tmp_path)
     namespace: dict[str, object] = {}
     for block in code_blocks(page, "python"):
@@ -20,6 +18,6 @@ def test_python_examples_run(page: Path, tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_pages_with_examples_are_found() -> None:
-    assert {"python.md", "animator.md", "subtitles.md", "speech-science.md", "developer.md"} <= {
+    assert {"python.md", "animator.md", "batch.md", "subtitles.md", "speech-science.md", "developer.md"} <= {
         page.name for page in WITH_EXAMPLES
     }

@@ -1,4 +1,4 @@
-"""Encoding of clips while they are drawn: .mp4, .webm, .gif, or a folder of .png pictures."""
+"""Encoding of clips while they are drawn: .mp4, .webm, .mov, .gif, or a folder of .png pictures."""
 
 import contextlib
 from collections.abc import Iterable
@@ -11,10 +11,12 @@ from lexicon.errors import InputError
 from tts2face.clock import exact_rate, first_sample
 from tts2face.render.encoder_thread import EncoderThread, Sink
 from tts2face.render.gif import GifWriter
-from tts2face.render.movie import MP4_MOVIE, WEBM_MOVIE, MovieWriter
+from tts2face.render.movie import MOV_MOVIE, MP4_MOVIE, WEBM_MOVIE, MovieWriter
 from tts2face.render.output_path import (
     FOLDER,
     GIF,
+    MOV,
+    MP4,
     WEBM,
     check_output,
     make_temporary,
@@ -27,6 +29,7 @@ from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.temporary import Temporary
 from tts2face.types import Clip, Progress
 
+_MOVIES = {MP4: MP4_MOVIE, WEBM: WEBM_MOVIE, MOV: MOV_MOVIE}
 N_SWATCHES = 6  # frames of the first clip from which the palette of a GIF is computed
 
 
@@ -40,7 +43,7 @@ class ClipWriter:
     Parameters
     ----------
     path
-        Output, by suffix: .mp4, .webm, .gif; a folder of .png pictures with a trailing slash or without a suffix.
+        Output, by suffix: .mp4, .webm, .mov, .gif; a folder of .png pictures with a trailing slash or without a suffix.
     renderer
         Renderer of the clips' frames.
     on_progress
@@ -139,7 +142,7 @@ class ClipWriter:
         shape = (picture.height, picture.width, picture.channels)
         return MovieWriter(
             self._temporary.path,
-            WEBM_MOVIE if self._kind == WEBM else MP4_MOVIE,
+            _MOVIES[self._kind],
             shape,
             (fps, rate),
             self._renderer.notice,

@@ -1,4 +1,4 @@
-"""Movie files, written frame by frame: MP4 (H.264 and AAC) or WebM (VP9 and Opus)."""
+"""Movie files, written frame by frame: MP4 (H.264 and AAC), WebM (VP9 and Opus), or MOV (H.264 and PCM)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -38,6 +38,11 @@ WEBM_MOVIE = MovieKind(
     MappingProxyType({"crf": "24", "deadline": "realtime", "cpu-used": "6", "row-mt": "1", "tile-columns": "1",
                       "auto-alt-ref": "0", "lag-in-frames": "0"}),
 )  # fmt: skip
+
+
+MOV_MOVIE = MovieKind(
+    "mov", "libx264", "pcm_s16le", 768_000, MP4_MOVIE.video_options
+)  # uncompressed sound, for editing
 
 
 class MovieWriter:

@@ -9,8 +9,8 @@ from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.output_names import check_name
 from tts2face.storage.temporary import Temporary
 
-MP4, WEBM, GIF, FOLDER = ".mp4", ".webm", ".gif", ""
-FILE_SUFFIXES = (MP4, WEBM, GIF)
+MP4, WEBM, MOV, GIF, FOLDER = ".mp4", ".webm", ".mov", ".gif", ""
+FILE_SUFFIXES = (MP4, WEBM, MOV, GIF)
 
 
 def output_kind(path: Path | str) -> str:

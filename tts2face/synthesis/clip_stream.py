@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lexicon.sequence import SILENCE
 from tts2face.clock import pad_to_frame
 from tts2face.exemplar.explanation import PhoneExplanation, explain_selection
 from tts2face.exemplar.synthesis import ExemplarModel, TokenSelection, select_tokens
@@ -99,6 +100,29 @@ def pieces(prepared: PreparedRequest, models: SynthesisModels, layer: GestureLay
         yield from _spoken_pieces(prepared, models, layer)
     if layer is not None:
         layer.finish()
+
+
+@dataclass(frozen=True, slots=True)
+class SpeechSpan:
+    """Seconds of a clip at which its first word begins, its last word ends, and its sound ends."""
+
+    begin: float
+    end: float
+    total: float
+
+
+def measure_speech(prepared: PreparedRequest, models: SynthesisModels) -> SpeechSpan:
+    """Span of the speech of a text in its clip, without synthesis of motion."""
+    fps, first_frame, begin, end, total = float(prepared.fps), 0, 0.0, 0.0, 0.0
+    for spoken, _, _ in _sentences(prepared, models):
+        at, phones = first_frame / fps, spoken.speech.phones
+        voiced = [number for number, phone in enumerate(phones.phones) if phone != SILENCE]
+        if voiced:
+            begin = begin if end else at + float(phones.edges[voiced[0]])
+            end = at + float(phones.edges[voiced[-1] + 1])
+        total = at + spoken.speech.waveform.duration
+        first_frame += frame_count(spoken.speech.waveform.duration, fps)
+    return SpeechSpan(begin, end, total)
 
 
 def _spoken_pieces(prepared: PreparedRequest, models: SynthesisModels, layer: GestureLayer | None) -> Iterator[Piece]:

@@ -1,0 +1,175 @@
+"""``tts2face batch``: subtitles to clips."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from cli.flags import add_option_flags, options_from_flags, switch, whole_number
+from cli.process import write_message
+from cli.progress import progress_bar
+from lexicon.errors import DataError, InputError
+from tts2face.batch.options import BatchOptions
+from tts2face.render.picture import Picture
+from tts2face.request import Request
+
+if TYPE_CHECKING:
+    from tts2face.batch.engine import Engine
+    from tts2face.batch.plan import Plan
+    from tts2face.batch.run import BatchResult
+    from tts2face.batch.store import Store
+
+NOT_IN_BATCH = frozenset({"text", "audio", "audio_map", "idle", "timeline", "expression"})
+MAX_WARNINGS = 40  # on the terminal; all are in the manifest
+
+
+@add_option_flags(("Batch", BatchOptions), ("Speech and motion", Request), ("Picture", Picture), without=NOT_IN_BATCH)
+def batch(  # noqa: PLR0913 - one parameter a flag
+    *subtitles: Annotated[Path, Parameter(help="Subtitle files: .srt, .vtt, .ass, .ssa, .ttml.")],
+    out: Annotated[Path, Parameter(help="Folder of the clips and of manifest.json and manifest.csv.", alias="-o")],
+    cast: Annotated[
+        Path | None, Parameter(help="TOML file that gives speakers their talker, voice, face, style, ...")
+    ] = None,
+    talker: Annotated[str, Parameter(help="Talker whose articulation is used.")] = "grid_s1",
+    face: Annotated[str, Parameter(help="Face to show: head, cartoon, a .face file, or self.")] = "head",
+    identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
+    palette: Annotated[str, Parameter(help="Palette of gesture styles.")] = "starter",
+    audio: Annotated[
+        Path | None,
+        Parameter(
+            help="Folder of recordings in place of a voice: STEM-0001.wav or STEM/0001.wav for cue 1 of STEM.srt "
+            "(any sound or video file)."
+        ),
+    ] = None,
+    jobs: Annotated[int, whole_number("Number of processes on this machine.")] = 1,
+    store: Annotated[
+        str | None, Parameter(help="Store of rendered segments: a folder, or a URL (s3://, gs://, az://, file://).")
+    ] = None,
+    database: Annotated[
+        str | None,
+        Parameter(
+            help="Queue of segments for `tts2face worker`: a SQLite file, or postgresql://... for many machines. "
+            "Without it the processes of --jobs render."
+        ),
+    ] = None,
+    priority: Annotated[int, whole_number("With --database: jobs with smaller numbers are taken first; from 1.")] = 10,
+    dry_run: Annotated[bool, switch("Print the plan with expected hours and disk space; render nothing.")] = False,
+    progress: Annotated[
+        Literal["bar", "json"], Parameter(help="Progress bar, or one line of JSON for each step on standard output.")
+    ] = "bar",
+    quiet: Annotated[bool, switch("Print no progress, no warnings and no summary.")] = False,
+    **options: Any,
+) -> None:
+    """Make clips of subtitle files, fitted to their cues. Running it again makes only what is missing or changed."""
+    if jobs < (0 if database is not None else 1):
+        raise InputError(f"--jobs must be 1 or more (0 with --database: other workers only), not {jobs}")
+    if priority < 1:
+        raise InputError(f"--priority must be 1 or more, not {priority}")
+    from tts2face.batch.cast import Cast, Models, read_cast
+    from tts2face.batch.plan import plan_batch
+
+    plan = plan_batch(
+        subtitles,
+        options_from_flags(BatchOptions, options, audio=audio),
+        request=options_from_flags(Request, options),
+        picture=options_from_flags(Picture, options),
+        models=Models(talker, face, identity, palette),
+        cast=read_cast(cast) if cast is not None else Cast(),
+    )
+    if not quiet:
+        _print_warnings(plan)
+    if dry_run:
+        return _print_plan(plan, out, store)
+    from tts2face.batch.run import SEGMENT_FOLDER
+    from tts2face.batch.store import open_store
+
+    place = store if store is not None else str((out / SEGMENT_FOLDER).resolve())
+    opened = open_store(place)
+    engine = _open_engine(database, place, jobs, priority)
+    _finish(_run(plan, out, (opened, engine), is_json=progress == "json", quiet=quiet), out, quiet=quiet)
+    return None
+
+
+def _open_engine(database: str | None, place: str, jobs: int, priority: int) -> "Engine":
+    """Processes of this machine, or the workers of a database."""
+    if database is None:
+        from tts2face.batch.engine import LocalEngine
+
+        return LocalEngine(jobs, write_message)
+    from tts2face.jobs.engine import DatabaseEngine
+
+    return DatabaseEngine(database, place, jobs, priority, write_message)
+
+
+def _run(plan: "Plan", out: Path, parts: "tuple[Store, Engine]", *, is_json: bool, quiet: bool) -> "BatchResult":
+    from tts2face.batch.run import run_batch
+
+    store, engine = parts
+    if is_json:
+        return run_batch(plan, out, store=store, engine=engine, on_progress=_write_progress, on_output=_write_output)
+    with progress_bar("segments", quiet) as on_progress:
+        return run_batch(plan, out, store=store, engine=engine, on_progress=on_progress)
+
+
+def _write_progress(done: int, of: int) -> None:
+    _write_line({"event": "progress", "done": done, "of": of})
+
+
+def _write_output(entry: dict[str, Any]) -> None:
+    _write_line({"event": "output", **{name: value for name, value in entry.items() if name != "cues"}})
+
+
+def _write_line(content: dict[str, Any]) -> None:
+    sys.stdout.write(json.dumps(content, ensure_ascii=False) + "\n")
+    sys.stdout.flush()
+
+
+def _finish(result: "BatchResult", out: Path, *, quiet: bool) -> None:
+    """Print the summary.
+
+    Raises
+    ------
+    DataError
+        An output has failed.
+    """
+    if not quiet:
+        for warning in result.warnings[:MAX_WARNINGS]:
+            write_message(f"tts2face: warning: {warning}")
+        if len(result.warnings) > MAX_WARNINGS:
+            write_message(f"{len(result.warnings) - MAX_WARNINGS} more warnings are in {out / 'manifest.json'}")
+        write_message(
+            f"made {result.n_made} clips ({result.seconds:.1f} s) from {result.n_rendered} new segments in "
+            f"{result.took_s:.1f} s; {result.n_current} clips were up to date"
+        )
+    if result.failed:
+        name, reason = result.failed[0]
+        raise DataError(
+            f"{len(result.failed)} clips failed, the first is {name}: {reason}; all are in {out / 'manifest.json'}"
+        )
+
+
+def _print_warnings(plan: "Plan") -> None:
+    for warning in plan.warnings[:MAX_WARNINGS]:
+        write_message(f"tts2face: warning: {warning.file}, line {warning.line}: {warning.message}")
+    if len(plan.warnings) > MAX_WARNINGS:
+        write_message(f"{len(plan.warnings) - MAX_WARNINGS} more warnings will be in the manifest")
+
+
+def _print_plan(plan: "Plan", out: Path, store: str | None) -> None:
+    from tts2face.batch.estimate import estimate_batch
+    from tts2face.batch.run import SEGMENT_FOLDER
+    from tts2face.batch.store import open_store
+
+    place = store if store is not None else str(out / SEGMENT_FOLDER)
+    is_there = "://" in place or Path(place).is_dir()
+    estimate = estimate_batch(plan, out, open_store(place) if is_there else None)
+    for output in plan.outputs:
+        length = max((cue.end_s for cue in output.cues), default=output.begin_s) - output.begin_s
+        print(f"{output.name}  {output.begin_s:.2f} s  {length:.2f} s  {len(output.cues)} cues")  # noqa: T201 - the result
+    print(  # noqa: T201 - the result
+        f"{plan.n_cues} cues, {plan.n_silent} of them silent; {estimate.n_outputs} clips, {estimate.n_stale} to make "
+        f"({estimate.seconds:.0f} s); {estimate.n_segments} segments, {estimate.n_missing} to render; about "
+        f"{estimate.core_hours:.2f} hours of one core and {estimate.n_bytes / 1e6:.0f} MB on disk"
+    )

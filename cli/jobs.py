@@ -1,0 +1,142 @@
+"""``tts2face worker`` and ``tts2face jobs``: workers of a database, and control of their jobs."""
+
+import json
+import os
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from cli.flags import whole_number
+from cli.lists import AsJson
+from cli.process import write_message
+from lexicon.errors import InputError
+
+if TYPE_CHECKING:
+    from tts2face.jobs.control import Job
+
+DEFAULT_DATABASE = "tts2face-jobs.sqlite"
+Database = Annotated[
+    str, Parameter(help="SQLite file on a local disk, or postgresql://user@host/name for many machines.")
+]
+Names = Annotated[str, Parameter(help="Names of jobs, or at least six characters of each; without any, all of them.")]
+WAIT_S = 0.5
+SHOWN_CHARACTERS = 50  # of a text in the list
+
+jobs = App(name="jobs", help="List, show, cancel, retry and prune the jobs of a database.")
+
+
+def worker(
+    *,
+    database: Database = DEFAULT_DATABASE,
+    store: Annotated[str, Parameter(help="Store of rendered segments that the batch uses: a folder or a URL.")],
+    jobs: Annotated[int, whole_number("Number of workers on this machine.")] = 1,
+) -> None:
+    """Render segments of a database until interrupted; start one on each machine."""
+    if jobs < 1:
+        raise InputError(f"--jobs must be 1 or more, not {jobs}")
+    from tts2face.batch.store import open_store
+    from tts2face.jobs.database import database_url, prepare_database
+    from tts2face.jobs.engine import DatabaseEngine, local_workers
+
+    open_store(store)
+    prepare_database(database_url(database))
+    engine = DatabaseEngine(database, store, jobs, on_message=write_message)
+    write_message(
+        f"{jobs} workers of {os.uname().nodename if hasattr(os, 'uname') else 'this machine'}; Ctrl-C ends them"
+    )
+    with local_workers(engine) as supervise:
+        while True:
+            supervise()
+            time.sleep(WAIT_S)
+
+
+@jobs.command(name="list")
+def list_jobs(
+    *,
+    database: Database = DEFAULT_DATABASE,
+    state: Annotated[str | None, Parameter(help="waiting, running, done, failed or cancelled.")] = None,
+    limit: Annotated[int | None, whole_number("Largest number of jobs.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """List jobs with their states, workers and reasons."""
+    from tts2face.jobs.control import list_jobs
+
+    found = list_jobs(_existing(database), (state,) if state else (), limit)
+    if as_json:
+        print(json.dumps([asdict(one) for one in found], ensure_ascii=False, indent=2))  # noqa: T201 - the result
+        return
+    for one in found:
+        print("  ".join(_row(one)).rstrip())  # noqa: T201 - the result
+    counts = ", ".join(
+        f"{sum(one.state == name for one in found)} {name}" for name in dict.fromkeys(one.state for one in found)
+    )
+    print(f"{len(found)} jobs{': ' + counts if counts else ''}")  # noqa: T201 - the result
+
+
+@jobs.command
+def show(
+    name: Annotated[str, Parameter(help="Name of a job, or at least six characters of it.")],
+    /,
+    *,
+    database: Database = DEFAULT_DATABASE,
+) -> None:
+    """Print a job and its segment as JSON."""
+    from tts2face.jobs.control import show_job
+
+    job, segment = show_job(_existing(database), name)
+    print(json.dumps({**asdict(job), "segment": segment}, ensure_ascii=False, indent=2))  # noqa: T201 - the result
+
+
+@jobs.command
+def cancel(*names: Names, database: Database = DEFAULT_DATABASE) -> None:
+    """Cancel waiting and running jobs."""
+    from tts2face.jobs.control import cancel_jobs
+
+    print(f"cancelled {cancel_jobs(_existing(database), names)} jobs")  # noqa: T201 - the result
+
+
+@jobs.command
+def retry(
+    *names: Names,
+    database: Database = DEFAULT_DATABASE,
+    priority: Annotated[int | None, whole_number("New priority; smaller numbers are taken first.")] = None,
+) -> None:
+    """Queue failed and cancelled jobs again."""
+    from tts2face.jobs.control import retry_jobs
+
+    print(f"queued {retry_jobs(_existing(database), names, priority)} jobs again")  # noqa: T201 - the result
+
+
+@jobs.command
+def prune(
+    *,
+    database: Database = DEFAULT_DATABASE,
+    days: Annotated[float, Parameter(help="Remove jobs that ended this many days ago or earlier.")] = 0.0,
+) -> None:
+    """Remove jobs that have ended; stored segments stay."""
+    from tts2face.jobs.control import prune_jobs
+
+    print(f"removed {prune_jobs(_existing(database), days * 86_400.0)} jobs")  # noqa: T201 - the result
+
+
+def _existing(database: str) -> str:
+    """A database that exists: control never creates one.
+
+    Raises
+    ------
+    InputError
+        There is no such SQLite file.
+    """
+    path = Path(database.removeprefix("sqlite:///"))
+    if "://" not in str(database).removeprefix("sqlite:///") and not path.is_file():
+        raise InputError(f"there is no database {path}; give --database as for `tts2face batch`")
+    return database
+
+
+def _row(one: "Job") -> tuple[str, ...]:
+    took = "" if one.took_s is None else f"{one.took_s:.1f} s"
+    text = one.text if len(one.text) <= SHOWN_CHARACTERS else f"{one.text[:SHOWN_CHARACTERS]}..."
+    return one.name[:12], one.state.ljust(9), str(one.priority).rjust(4), took.rjust(8), text, one.reason

@@ -1,0 +1,38 @@
+"""Stores of segments: a folder, and a bucket (here a folder by URL)."""
+
+from pathlib import Path
+
+import pytest
+
+from lexicon.errors import InputError
+from tts2face.batch.render_segment import SegmentResult
+from tts2face.batch.store import open_store
+
+ADDRESS = "ab" * 32
+RESULT = SegmentResult(15, 10.0, 1.1, 1.4, 0.0, 0.0, ("a warning",), 2.5)
+
+
+@pytest.mark.parametrize("kind", ["folder", "url"])
+def test_a_segment_is_stored_whole_fetched_listed_and_removed(kind: str, tmp_path: Path) -> None:
+    if kind == "url":
+        pytest.importorskip("obstore", reason="needs the extra [batch]")
+    place = tmp_path / "store"
+    store = open_store(place if kind == "folder" else f"file://{place}")
+    assert store.result(ADDRESS) is None
+    assert list(store.addresses()) == []
+    for content in (b"first", b"second"):  # storing twice costs time and nothing else
+        movie = tmp_path / "new.mov"
+        movie.write_bytes(content)
+        store.put(ADDRESS, movie, RESULT)
+        assert not movie.exists()
+    assert store.result(ADDRESS) == RESULT
+    assert store.fetch(ADDRESS, tmp_path).read_bytes() == b"second"
+    assert list(store.addresses()) == [ADDRESS]
+    store.remove(ADDRESS)
+    store.remove(ADDRESS)
+    assert store.result(ADDRESS) is None
+
+
+def test_an_unknown_scheme_is_refused() -> None:
+    with pytest.raises(InputError, match="there is no store ftp://x"):
+        open_store("ftp://x")

@@ -1,0 +1,145 @@
+"""Databases of jobs: a SQLite file, and PostgreSQL if it is installed; workers that can be killed."""
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from tempfile import mkdtemp
+
+import pytest
+
+pytest.importorskip("dbos", reason="needs the extra [batch]")
+
+from tts2face.batch.cast import Models
+from tts2face.batch.segment import Segment, input_hashes
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True)
+StartWorker = Callable[..., "subprocess.Popen[bytes]"]
+
+
+class Postgres:
+    """A server in a temporary folder; a superuser starts it as the user postgres."""
+
+    def __init__(self) -> None:
+        found = shutil.which("initdb")
+        folder = Path(found).parent if found else next(iter(FOLDERS), None)
+        if folder is None:
+            pytest.skip("PostgreSQL is not installed (apt install postgresql)")
+        self._as_user = ["runuser", "-u", "postgres", "--"] if os.getuid() == 0 else []
+        if self._as_user and shutil.which("runuser") is None:
+            pytest.skip("PostgreSQL does not run as a superuser, and runuser is missing")
+        self._bin, self.folder = folder, Path(mkdtemp(prefix="tts2face-pg-", dir="/tmp"))
+        if self._as_user:
+            shutil.chown(self.folder, "postgres")
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.port = free.getsockname()[1]
+        self._run("initdb", "-D", str(self.folder / "data"), "-A", "trust", "-U", "tts2face", "--no-sync")
+        self.start()
+        self.n_databases = 0
+
+    def _run(self, command: str, *arguments: str) -> None:
+        answer = subprocess.run(
+            [*self._as_user, str(self._bin / command), *arguments], capture_output=True, text=True, check=False, cwd="/"
+        )
+        if answer.returncode:
+            pytest.skip(f"PostgreSQL does not start here: {(answer.stderr or answer.stdout).strip()[-200:]}")
+
+    def start(self) -> None:
+        options = f"-p {self.port} -k {self.folder} -h 127.0.0.1 -F"
+        self._run(
+            "pg_ctl", "-D", str(self.folder / "data"), "-w", "-o", options, "-l", str(self.folder / "log"), "start"
+        )
+
+    def stop(self, mode: str = "immediate") -> None:
+        self._run("pg_ctl", "-D", str(self.folder / "data"), "-m", mode, "-w", "stop")
+
+    def database(self) -> str:
+        """URL of a new database."""
+        self.n_databases += 1
+        name = f"jobs{self.n_databases}"
+        server = f"postgresql://tts2face@127.0.0.1:{self.port}"
+        import psycopg
+
+        with psycopg.connect(f"{server}/postgres", autocommit=True) as connection:
+            connection.execute(f"CREATE DATABASE {name}")
+        return f"{server}/{name}"
+
+
+@pytest.fixture(scope="session")
+def postgres() -> Iterator[Postgres]:
+    pytest.importorskip("psycopg", reason="needs the extra [postgres]")
+    server = Postgres()
+    yield server
+    server.stop()
+    shutil.rmtree(server.folder, ignore_errors=True)
+
+
+@pytest.fixture(params=["sqlite", "postgres"])
+def database(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """An empty database of either kind."""
+    if request.param == "sqlite":
+        return str(tmp_path / "jobs.sqlite")
+    url: str = request.getfixturevalue("postgres").database()
+    return url
+
+
+@pytest.fixture
+def start_worker(tmp_path: Path) -> Iterator[StartWorker]:
+    """Starts workers of `tests.jobs.stub_worker`; they end with the test."""
+    children: list[subprocess.Popen[bytes]] = []
+
+    def start(database: str, seconds: float = 0.15) -> "subprocess.Popen[bytes]":
+        with (tmp_path / "workers.log").open("ab") as messages:
+            children.append(
+                subprocess.Popen(
+                    [sys.executable, "-m", "tests.jobs.stub_worker", database, str(tmp_path / "store"),
+                     str(tmp_path / "rendered"), str(seconds)],
+                    stdin=subprocess.PIPE, stdout=messages, stderr=messages, cwd=ROOT,
+                )
+            )  # fmt: skip
+        return children[-1]
+
+    yield start
+    for child in children:
+        child.kill()
+        child.wait()
+        if child.stdin is not None:
+            child.stdin.close()
+
+
+@pytest.fixture
+def segments() -> Callable[..., dict[str, Segment]]:
+    """Segments with given words."""
+    models = Models()
+    hashes = input_hashes(models, {}, {})
+
+    def make(*texts: str) -> dict[str, Segment]:
+        made = [Segment({"text": text, "fps": 10.0}, {}, models, 15, file_hashes=hashes) for text in texts]
+        return {one.address: one for one in made}
+
+    return make
+
+
+def wait_until(condition: Callable[[], bool], seconds: float = 30.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited too long"
+        time.sleep(0.1)
+
+
+@pytest.fixture
+def rendered(tmp_path: Path) -> Callable[[], list[tuple[str, int]]]:
+    """Addresses and processes of all renderings so far."""
+
+    def read() -> list[tuple[str, int]]:
+        path = tmp_path / "rendered"
+        lines = path.read_text().splitlines() if path.exists() else []
+        return [(line.split()[0], int(line.split()[1])) for line in lines]
+
+    return read

@@ -1,0 +1,1 @@
+"""Subtitles to clips: cast, plan, fit to the cues, segments, assembly and manifest."""

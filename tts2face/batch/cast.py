@@ -1,0 +1,133 @@
+"""The cast file: which speaker of the subtitles has which talker, voice, face, identity, palette and gestures.
+
+::
+
+    [default]
+    face = "head"
+
+    [[role]]
+    speaker = "ANN*"         # a pattern of shells; also `subtitle_style` and `file`
+    identity = "kofi"
+    voice = "espeak-female"
+    style = "delighted"
+"""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+from lexicon.errors import DataError, InputError
+from lexicon.inputs import read_text
+from tts2face.request import Request
+from tts2face.subtitles.cue import Cue
+
+MODEL_NAMES = ("talker", "face", "identity", "palette")
+PATTERN_NAMES = ("speaker", "subtitle_style", "file")
+NOT_IN_CAST = frozenset({"text", "audio", "audio_map", "idle", "fps", "timeline", "expression"})
+REQUEST_NAMES = tuple(option.name for option in fields(Request) if option.name not in NOT_IN_CAST)
+PATH_NAMES = ("talker", "face", "palette", "voice", "dictionary")
+MAX_CAST_BYTES = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Models:
+    """Models that show and move a speaker, by name or path."""
+
+    talker: str = "grid_s1"
+    face: str = "head"
+    identity: str | None = None
+    palette: str = "starter"
+
+
+@dataclass(frozen=True, slots=True)
+class Role:
+    """Patterns of the cues to which a role applies, and its settings."""
+
+    patterns: Mapping[str, str]
+    settings: Mapping[str, Any]
+
+    def applies(self, cue: Cue, file: str) -> bool:
+        """Whether all patterns match a cue, in capitals and small letters alike."""
+        values = {"speaker": cue.speaker, "subtitle_style": cue.style, "file": file}
+        return all(fnmatchcase(values[name].lower(), pattern.lower()) for name, pattern in self.patterns.items())
+
+
+@dataclass(frozen=True, slots=True)
+class Cast:
+    """Settings of all cues, and roles; the first role that applies to a cue counts."""
+
+    default: Mapping[str, Any] = field(default_factory=dict)
+    roles: tuple[Role, ...] = ()
+
+    def settings(self, cue: Cue, file: str) -> dict[str, Any]:
+        """Settings of a cue by name: those of its role over the defaults."""
+        role = next((role for role in self.roles if role.applies(cue, file)), None)
+        return {**self.default, **(role.settings if role else {})}
+
+
+def read_cast(path: Path) -> Cast:
+    """Cast of a TOML file; paths in it are relative to its folder.
+
+    Raises
+    ------
+    InputError
+        There is no such file.
+    DataError
+        It is not TOML, or has an unknown table, key or value; the message names it.
+    """
+    try:
+        content = read_text(path, MAX_CAST_BYTES)
+    except OSError as refused:
+        raise InputError(f"cannot read the cast {path}: {refused.strerror}; check the path") from refused
+    try:
+        tables = tomllib.loads(content)
+    except (tomllib.TOMLDecodeError, RecursionError) as broken:
+        raise DataError(f"{path} is not TOML ({broken}); correct it there") from broken
+    for name in tables:
+        if name not in ("default", "role"):
+            raise DataError(f"{path}: there is no table {name!r}; use [default] and [[role]]")
+    roles, default = tables.get("role", []), tables.get("default", {})
+    if not isinstance(roles, list) or not isinstance(default, dict) or not all(isinstance(one, dict) for one in roles):
+        raise DataError(f"{path}: write the defaults as [default], and each role as [[role]]")
+    return Cast(
+        _settings(default, f"{path}, [default]", path.parent),
+        tuple(_role(one, f"{path}, role {number}", path.parent) for number, one in enumerate(roles, start=1)),
+    )
+
+
+def _role(table: Mapping[str, Any], place: str, folder: Path) -> Role:
+    patterns = {name: table[name] for name in PATTERN_NAMES if name in table}
+    if not patterns:
+        raise DataError(f"{place} has no pattern; give {', '.join(PATTERN_NAMES)}")
+    for name, pattern in patterns.items():
+        if not isinstance(pattern, str):
+            raise DataError(f"{place}: {name} must be a text in quotes, not {pattern!r}")
+    rest = {name: value for name, value in table.items() if name not in PATTERN_NAMES}
+    return Role(patterns, _settings(rest, place, folder))
+
+
+def _settings(table: Mapping[str, Any], place: str, folder: Path) -> dict[str, Any]:
+    for name, value in table.items():
+        if name not in (*MODEL_NAMES, *REQUEST_NAMES):
+            known = ", ".join((*PATTERN_NAMES, *MODEL_NAMES, *REQUEST_NAMES))
+            raise DataError(f"{place}: there is no setting {name!r}; use {known}")
+        if not isinstance(value, str | int | float | bool):
+            raise DataError(f"{place}: {name} must be a text, a number or true or false, not {value!r}")
+        if name in MODEL_NAMES and not isinstance(value, str):
+            raise DataError(f"{place}: {name} must be a text in quotes, not {value!r}")
+    settings = {name: _resolve(name, value, folder) for name, value in table.items()}
+    try:
+        Request(**{name: value for name, value in settings.items() if name in REQUEST_NAMES})
+    except (InputError, TypeError, AttributeError) as wrong:
+        raise DataError(f"{place}: {wrong}") from wrong
+    return settings
+
+
+def _resolve(name: str, value: Any, folder: Path) -> Any:
+    """A path relative to the folder of the cast, where there is such a file; else the value."""
+    if name in PATH_NAMES and isinstance(value, str) and Path(value).suffix and (folder / value).exists():
+        return str(folder / value)
+    return value

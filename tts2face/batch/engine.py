@@ -1,0 +1,160 @@
+"""Engines that render segments: processes of this machine, or workers of a database (`tts2face.jobs`)."""
+
+import os
+import queue
+import shutil
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Protocol
+
+from lexicon.errors import BackendError, Tts2faceError
+from tts2face.batch.render_process import ChildDiedError, RenderProcess
+from tts2face.batch.render_segment import SEGMENT_SUFFIX, SegmentRenderer, SegmentResult
+from tts2face.batch.segment import Segment
+from tts2face.batch.store import Store
+
+MAX_TRIES = 3  # of a segment whose process ended; then it counts as failed
+MIN_FREE_BYTES = 200 << 20  # below which work pauses
+PAUSE_S = 2.0  # between two looks at a full disk
+
+Message = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Rendered:
+    """A segment that is stored, or the reason why it is not."""
+
+    address: str
+    result: SegmentResult | None
+    reason: str = ""
+
+
+class Engine(Protocol):
+    """Renders segments into a store, in any order."""
+
+    def render(self, segments: Mapping[str, Segment], store: Store) -> Iterator[Rendered]:
+        """Yield each segment as soon as it is stored or has failed."""
+
+
+class Renders(Protocol):
+    """A renderer of this process, or a child process."""
+
+    def render(self, segment: Segment, out: Path) -> SegmentResult:
+        """Render a segment into a file."""
+
+
+@dataclass(frozen=True, slots=True)
+class LocalEngine:
+    """Processes of this machine; one job renders in this process."""
+
+    n_jobs: int = 1
+    on_message: Message = lambda _: None
+
+    def render(self, segments: Mapping[str, Segment], store: Store) -> Iterator[Rendered]:
+        """Yield each segment as soon as it is stored or has failed."""
+        if self.n_jobs == 1:
+            renderer = SegmentRenderer()
+            for segment in segments.values():
+                yield render_into(store, segment, renderer, self.on_message)
+            return
+        with _processes(self.n_jobs) as free, ThreadPoolExecutor(self.n_jobs) as pool:
+
+            def work(segment: Segment) -> Rendered:
+                process = free.get()
+                try:
+                    return render_into(store, segment, process, self.on_message)
+                finally:
+                    free.put(process)
+
+            waiting = [pool.submit(work, segment) for segment in segments.values()]
+            try:
+                for finished in as_completed(waiting):
+                    yield finished.result()
+            finally:
+                for one in waiting:
+                    one.cancel()
+
+
+@contextmanager
+def _processes(n_jobs: int) -> Iterator["queue.Queue[RenderProcess]"]:
+    """Child processes, each bound to a core."""
+    cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+    processes = [RenderProcess(cores[number % len(cores)] if cores else None) for number in range(n_jobs)]
+    free: queue.Queue[RenderProcess] = queue.Queue()
+    for process in processes:
+        free.put(process)
+    try:
+        yield free
+    finally:
+        for process in processes:
+            process.close()
+
+
+def render_into(store: Store, segment: Segment, renderer: Renders, on_message: Message) -> Rendered:
+    """Render a segment unless the store has it; errors become the reason.
+
+    A process that ends is tried again up to `MAX_TRIES` times. A full disk is waited for.
+    """
+    address = segment.address
+    reason = ""
+    tries = 0
+    while tries < MAX_TRIES:
+        found = store.result(address)
+        if found is not None:
+            return Rendered(address, found)
+        try:
+            with _scratch(store) as folder:
+                wait_for_space(folder, on_message)
+                movie = folder / f"{address}-{os.getpid()}-{threading.get_ident()}{SEGMENT_SUFFIX}"
+                try:
+                    result = renderer.render(segment, movie)
+                    store.put(address, movie, result)
+                finally:
+                    movie.unlink(missing_ok=True)
+            return Rendered(address, result)
+        except ChildDiedError as died:
+            reason = str(died)
+            tries += 1
+        except Tts2faceError as wrong:
+            if isinstance(wrong, BackendError) and _is_full(store):
+                continue
+            return Rendered(address, None, str(wrong))
+    return Rendered(address, None, f"{reason} ({MAX_TRIES} tries)")
+
+
+@contextmanager
+def _scratch(store: Store) -> Iterator[Path]:
+    folder = store.scratch()
+    if folder is not None:
+        yield folder
+        return
+    with TemporaryDirectory(prefix="tts2face-") as temporary:
+        yield Path(temporary)
+
+
+def _is_full(store: Store) -> bool:
+    with _scratch(store) as folder:
+        return free_bytes(folder) < MIN_FREE_BYTES
+
+
+def free_bytes(folder: Path) -> int:
+    """Free bytes of the disk of a folder."""
+    return shutil.disk_usage(folder).free
+
+
+def wait_for_space(folder: Path, on_message: Message) -> None:
+    """Wait until the disk of a folder has `MIN_FREE_BYTES`, and say so."""
+    is_waiting = False
+    while free_bytes(folder) < MIN_FREE_BYTES:
+        if not is_waiting:
+            on_message(f"paused: the disk of {folder} is full; free {MIN_FREE_BYTES >> 20} MB to continue")
+            is_waiting = True
+        time.sleep(PAUSE_S)
+    if is_waiting:
+        on_message(f"continued: the disk of {folder} has space again")

@@ -1,0 +1,51 @@
+"""Options of a batch besides those of speech and picture; a module without heavy imports."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from lexicon.errors import InputError
+from tts2face.request import RATE_LIMITS, option
+
+CLIP_UNITS = ("cue", "scene", "file", "film")
+EXTEND, CUT_PAUSES, REPORT = OVERFLOW_POLICIES = ("extend", "cut-pauses", "report")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BatchOptions:
+    """How subtitles become clips.
+
+    Raises
+    ------
+    InputError
+        An option is unknown or out of range.
+    """
+
+    per: str = option("cue", "One clip for each cue, scene or file, or one film of all files.")
+    overflow: str = option(
+        "extend",
+        "For speech that is longer than its cue at the largest rate: extend (into the silence after the cue), "
+        "cut-pauses (within the speech, then extend), or report (only say so).",
+    )
+    max_rate: float = option(1.4, "Largest speaking rate by which speech is fitted to its cue, 1 to 2.")
+    scene_gap: float = option(4.0, "Seconds without a cue that divide two scenes.")
+    audio: Path | None = option(
+        None,
+        "Folder of recordings in place of a voice: STEM-0001.wav or STEM/0001.wav for cue 1 of STEM.srt (any sound or "
+        "video file).",
+    )
+    encoding: str | None = option(None, "Encoding of subtitles that are not UTF-8, such as cp1250.")
+
+    def __post_init__(self) -> None:
+        """Reject unknown names and numbers out of range."""
+        if self.per not in CLIP_UNITS:
+            raise InputError(f"--per must be {', '.join(CLIP_UNITS[:-1])} or {CLIP_UNITS[-1]}, not {self.per!r}")
+        if self.overflow not in OVERFLOW_POLICIES:
+            raise InputError(f"--overflow must be extend, cut-pauses or report, not {self.overflow!r}")
+        if not 1.0 <= self.max_rate <= RATE_LIMITS[1]:
+            raise InputError(f"--max-rate must lie between 1 and {RATE_LIMITS[1]:g}, not {self.max_rate:g}")
+        if not 0.0 < self.scene_gap <= 3600.0:
+            raise InputError(f"--scene-gap must lie between 0 and 3600 s, not {self.scene_gap:g}")
+        if isinstance(self.audio, str):
+            object.__setattr__(self, "audio", Path(self.audio))
+        if self.audio is not None and not self.audio.is_dir():
+            raise InputError(f"there is no folder of recordings {self.audio}; check the path")

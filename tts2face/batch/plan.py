@@ -1,0 +1,363 @@
+"""The plan of a batch: which outputs are made of which segments."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from lexicon.errors import DataError, InputError
+from tts2face.batch.address import content_address
+from tts2face.batch.cast import MODEL_NAMES, REQUEST_NAMES, Cast, Models
+from tts2face.batch.options import BatchOptions
+from tts2face.batch.recordings import find_recording, index_recordings
+from tts2face.batch.segment import Segment, input_hashes
+from tts2face.batch.windows import Window, cue_windows, scenes
+from tts2face.clock import exact_rate
+from tts2face.render.picture import Picture
+from tts2face.request import IDLE_LIMITS_S, Request
+from tts2face.subtitles.cue import Subtitles, SubtitleWarning
+from tts2face.subtitles.reader import read_subtitles
+from tts2face.synthesis.prepared_request import prepare
+
+MAX_IDLE_S = 20.0  # of one segment of silence
+OUTPUT_SUFFIX = ".mp4"
+NOT_WHEN_SILENT = ("text", "audio", "audio_map", "voice", "rate", "volume", "dictionary", "language")
+NOT_WITH_AUDIO = ("voice", "rate")
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedCue:
+    """A cue of an output; `segment` is the index of its segment, None for a silent one."""
+
+    number: int
+    line: int
+    speaker: str
+    text: str
+    begin_s: float
+    end_s: float
+    segment: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """A clip: segments in order of time.
+
+    Parameters
+    ----------
+    name
+        Name of the file in the folder of outputs.
+    source
+        Subtitle files.
+    begin_s
+        Instant of its first frame in the film.
+    """
+
+    name: str
+    source: tuple[str, ...]
+    begin_s: float
+    fps: float
+    cues: tuple[PlannedCue, ...]
+    segments: tuple[Segment, ...]
+
+    @property
+    def address(self) -> str:
+        """Content address: equal for equal files."""
+        return content_address({"segments": [segment.address for segment in self.segments], "suffix": OUTPUT_SUFFIX})
+
+
+@dataclass(frozen=True, slots=True)
+class PlanWarning:
+    """A defect of a subtitle file or its text, and what is done about it."""
+
+    file: str
+    line: int
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Outputs of a batch, and warnings; equal segments occur once in `segments`."""
+
+    outputs: tuple[Output, ...]
+    warnings: tuple[PlanWarning, ...]
+    n_cues: int
+    n_silent: int
+
+    @property
+    def segments(self) -> dict[str, Segment]:
+        """Different segments by their content address, in order of first use."""
+        return {segment.address: segment for output in self.outputs for segment in output.segments}
+
+
+def plan_batch(
+    files: Sequence[Path],
+    options: BatchOptions,
+    *,
+    request: Request | None = None,
+    picture: Picture | None = None,
+    models: Models | None = None,
+    cast: Cast | None = None,
+) -> Plan:
+    """Plan the clips of subtitle files; nothing is loaded or rendered.
+
+    Parameters
+    ----------
+    request, picture, models
+        Settings of all cues; those of the cast take precedence.
+
+    Raises
+    ------
+    InputError
+        There is no file, an option is invalid, or a model does not exist.
+    DataError
+        A subtitle file has no cue or cannot be read.
+    """
+    if not files:
+        raise InputError("there are no subtitles; give .srt, .vtt, .ass, .ssa or .ttml files")
+    if picture is not None and picture.is_transparent:
+        raise InputError("clips of a batch are .mp4, which has no transparency; choose another background")
+    base = _Base(
+        options,
+        request or Request(),
+        non_defaults(picture or Picture()),
+        models or Models(),
+        cast or Cast(),
+        len(files),
+    )
+    planned = [_FilePlan(base, path, name) for path, name in zip(files, _names(files), strict=True)]
+    outputs = [output for one in planned for output in one.outputs()]
+    if options.per == "film" and outputs:
+        outputs = [_joined("film", outputs)]
+    warnings = tuple(warning for one in planned for warning in one.warnings)
+    return Plan(tuple(outputs), warnings, sum(one.n_cues for one in planned), sum(one.n_silent for one in planned))
+
+
+def non_defaults(options: Any) -> dict[str, Any]:
+    """Fields of an option dataclass that differ from their defaults, as JSON values."""
+    found = {one.name: getattr(options, one.name) for one in fields(options) if one.name != "text"}
+    defaults = {one.name: one.default for one in fields(options)}
+    return {
+        name: str(value) if isinstance(value, Path) else value
+        for name, value in found.items()
+        if value != defaults[name]
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class _Base:
+    """Settings of all files."""
+
+    options: BatchOptions
+    request: Request
+    picture: Mapping[str, Any]
+    models: Models
+    cast: Cast
+    n_files: int
+
+
+@dataclass(slots=True)
+class _FilePlan:
+    """Plan of one subtitle file."""
+
+    base: _Base
+    path: Path
+    name: str
+    warnings: list[PlanWarning] = field(default_factory=list)
+    n_cues: int = 0
+    n_silent: int = 0
+    _hashes: dict[str, Mapping[str, str]] = field(default_factory=dict)
+
+    def outputs(self) -> Iterator[Output]:
+        """Outputs of the file."""
+        read = read_subtitles(self.path, self.base.options.encoding)
+        self._add_warnings(read)
+        spoken = [cue for cue in read.cues if cue.text]
+        self.n_cues, self.n_silent = len(read.cues), len(read.cues) - len(spoken)
+        if not spoken:
+            self._warn(1, "no cue has words; there is no clip of this file")
+            return
+        fps = exact_rate(self.base.request.fps)
+        windows = cue_windows(spoken, fps)
+        recordings = index_recordings(self.base.options.audio) if self.base.options.audio else {}
+        per = self.base.options.per
+        if per == "cue":
+            for window in windows:
+                segment = self._speech(window, recordings, fills=False)
+                if segment is not None:
+                    yield self._output(f"{self.name}-{window.cue.number:04d}", window.begin, [(window, segment)])
+        elif per == "scene":
+            gap = round(self.base.options.scene_gap * float(fps))
+            for number, group in enumerate(scenes(windows, gap), start=1):
+                yield self._joined_output(f"{self.name}-scene-{number:03d}", group, group[0].begin, recordings)
+        else:
+            yield self._joined_output(self.name, windows, 0, recordings)
+
+    def _joined_output(
+        self, name: str, windows: Sequence[Window], begin: int, recordings: Mapping[str, Path]
+    ) -> Output:
+        """Clip of consecutive windows with the silences between them."""
+        parts: list[tuple[Window | None, Segment]] = []
+        at = begin
+        for window in windows:
+            parts += [(None, silence) for silence in self._silences(window, window.begin - at)]
+            speech = self._speech(window, recordings, fills=True)
+            if speech is None:
+                parts += [(None, silence) for silence in self._silences(window, window.slot_end - window.begin)]
+            else:
+                parts.append((window, speech))
+            at = window.slot_end
+        return self._output(name, begin, parts)
+
+    def _output(self, name: str, begin: int, parts: Sequence[tuple[Window | None, Segment]]) -> Output:
+        fps = exact_rate(self.base.request.fps)
+        cues = tuple(
+            PlannedCue(
+                window.cue.number,
+                window.cue.line,
+                window.cue.speaker,
+                window.cue.text,
+                float(window.begin / fps),
+                float(window.end / fps),
+                index,
+            )
+            for index, (window, _) in enumerate(parts)
+            if window is not None
+        )
+        segments = tuple(segment for _, segment in parts)
+        return Output(f"{name}{OUTPUT_SUFFIX}", (str(self.path),), float(begin / fps), float(fps), cues, segments)
+
+    def _speech(self, window: Window, recordings: Mapping[str, Path], *, fills: bool) -> Segment | None:
+        """Segment of a cue; None with a warning if it cannot be spoken."""
+        settings = self._settings(window)
+        request: dict[str, Any] = {**settings, "text": window.cue.text}
+        if self.base.options.audio is not None:
+            names = (self.name, self.path.stem) if self.base.n_files > 1 else (self.name, self.path.stem, "")
+            found = find_recording(recordings, names, window.cue.number)
+            if found is None:
+                self._warn(window.cue.line, f"cue {window.cue.number} has no recording; it is silent")
+                return None
+            request = {name: value for name, value in request.items() if name not in NOT_WITH_AUDIO}
+            request["audio"] = str(found)
+        slot_end = window.slot_end if fills else window.next_begin
+        try:
+            prepare(Request(**request))
+            return self._segment(window, request, None if slot_end is None else slot_end - window.begin, fills=fills)
+        except (InputError, DataError) as wrong:
+            self._warn(window.cue.line, f"cue {window.cue.number} is silent: {wrong}")
+            return None
+
+    def _silences(self, window: Window, n_frames: int) -> Iterator[Segment]:
+        """Segments of idle animation of the speaker of a window."""
+        fps = float(exact_rate(self.base.request.fps))
+        longest = max(1, int(MAX_IDLE_S * fps))
+        settings = {name: value for name, value in self._settings(window).items() if name not in NOT_WHEN_SILENT}
+        while n_frames > 0:
+            part = min(n_frames, longest)
+            seed = int(settings.get("seed", 0)) + part  # silences of different lengths move differently
+            request = {**settings, "idle": max(part / fps, IDLE_LIMITS_S[0]), "seed": seed}
+            yield self._segment(window, request, part, fills=True, window_frames=part)
+            n_frames -= part
+
+    def _segment(
+        self,
+        window: Window,
+        request: Mapping[str, Any],
+        slot: int | None,
+        *,
+        fills: bool,
+        window_frames: int | None = None,
+    ) -> Segment:
+        models = self._models(window)
+        return Segment(
+            request,
+            self.base.picture,
+            models,
+            window.end - window.begin if window_frames is None else window_frames,
+            slot,
+            fills,
+            self.base.options.overflow,
+            self.base.options.max_rate,
+            self._file_hashes(models, request),
+        )
+
+    def _settings(self, window: Window) -> dict[str, Any]:
+        """Request fields of a cue: of the command, its language, and its role in the cast."""
+        settings = non_defaults(self.base.request)
+        if window.cue.language and "language" not in settings:
+            settings["language"] = self._language(window)
+        cast = self.base.cast.settings(window.cue, self.path.name)
+        settings |= {name: value for name, value in cast.items() if name in REQUEST_NAMES}
+        return {name: value for name, value in settings.items() if value is not None}
+
+    def _language(self, window: Window) -> str | None:
+        from lexicon.languages import language_code
+
+        try:
+            return language_code(str(window.cue.language))
+        except InputError:
+            self._warn(window.cue.line, f"the language {window.cue.language} is not known; it is not used")
+            return None
+
+    def _models(self, window: Window) -> Models:
+        cast = self.base.cast.settings(window.cue, self.path.name)
+        chosen = {name: cast.get(name, getattr(self.base.models, name)) for name in MODEL_NAMES}
+        if chosen["face"] != self.base.models.face and "identity" not in cast:
+            chosen["identity"] = None  # presets belong to a face
+        return Models(**chosen)
+
+    def _file_hashes(self, models: Models, request: Mapping[str, Any]) -> Mapping[str, str]:
+        key = repr((models, [request.get(name) for name in ("audio", "dictionary", "voice")]))
+        if key not in self._hashes:
+            self._hashes[key] = input_hashes(models, request, self.base.picture)
+        return self._hashes[key]
+
+    def _add_warnings(self, read: Subtitles) -> None:
+        for warning in read.warnings:
+            self._warn(warning.line, warning.message)
+
+    def _warn(self, line: int, message: str) -> None:
+        warning = SubtitleWarning(line, message)
+        planned = PlanWarning(str(self.path), warning.line, warning.message)
+        if planned not in self.warnings[-8:]:
+            self.warnings.append(planned)
+
+
+def _joined(name: str, outputs: Sequence[Output]) -> Output:
+    """One output of several in order; the times of its cues are those of the whole film."""
+    cues: list[PlannedCue] = []
+    segments: list[Segment] = []
+    offset_frames = 0
+    for output in outputs:
+        offset_s = offset_frames / output.fps
+        for cue in output.cues:
+            index = None if cue.segment is None else cue.segment + len(segments)
+            cues.append(
+                PlannedCue(
+                    cue.number, cue.line, cue.speaker, cue.text, cue.begin_s + offset_s, cue.end_s + offset_s, index
+                )
+            )
+        segments += output.segments
+        offset_frames += sum(segment.slot_frames or segment.window_frames for segment in output.segments)
+    source = tuple(path for output in outputs for path in output.source)
+    return Output(f"{name}{OUTPUT_SUFFIX}", source, 0.0, outputs[0].fps, tuple(cues), tuple(segments))
+
+
+def _names(files: Sequence[Path]) -> list[str]:
+    """Names of outputs: the stems of the files, with their folders or suffixes where stems are equal.
+
+    Raises
+    ------
+    InputError
+        A file is given twice.
+    """
+    if len({path.resolve() for path in files}) < len(files):
+        raise InputError("a subtitle file is given twice; remove one of them")
+    for name_of in (
+        lambda path: path.stem,
+        lambda path: f"{path.resolve().parent.name}-{path.stem}",
+        lambda path: f"{path.resolve().parent.name}-{path.name.replace('.', '-')}",
+    ):
+        names = [name_of(path) for path in files]
+        if len(set(names)) == len(names):
+            return names
+    return [f"{number:03d}-{path.stem}" for number, path in enumerate(files, start=1)]

@@ -1,0 +1,149 @@
+"""Rendering of one segment with the sessions of this process."""
+
+import time
+from collections import OrderedDict
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from tts2face.batch.cast import Models
+from tts2face.batch.fit import Fit, Limits, fit_speech
+from tts2face.batch.segment import Segment
+from tts2face.clock import exact_rate
+from tts2face.render.encode import ClipWriter
+from tts2face.render.picture import Picture
+from tts2face.request import Request
+from tts2face.session import Session
+from tts2face.synthesis.prepared_request import prepare
+from tts2face.types import frame_count
+
+MAX_SESSIONS = 2  # in the memory of a worker; each takes 60 to 150 MB
+SEGMENT_SUFFIX = ".mov"
+
+
+@dataclass(frozen=True, slots=True)
+class SegmentResult:
+    """A rendered segment.
+
+    Parameters
+    ----------
+    n_frames, fps
+        Its length.
+    rate
+        Speaking rate of the fit; 1 for silence and recordings.
+    speech_s
+        Seconds from its begin to the end of its last word; 0 without words.
+    overflow_s
+        Seconds by which the speech ends after its cue.
+    cut_s
+        Seconds of speech that the next cue cuts off.
+    warnings
+        What does not match the subtitles.
+    took_s
+        Seconds of work.
+    """
+
+    n_frames: int
+    fps: float
+    rate: float = 1.0
+    speech_s: float = 0.0
+    overflow_s: float = 0.0
+    cut_s: float = 0.0
+    warnings: tuple[str, ...] = ()
+    took_s: float = 0.0
+
+    def as_json(self) -> dict[str, Any]:
+        """JSON object from which `result_from_json` makes the result again."""
+        return asdict(self) | {"warnings": list(self.warnings)}
+
+
+def result_from_json(content: dict[str, Any]) -> SegmentResult:
+    """The result of `SegmentResult.as_json`; unknown names are ignored."""
+    known = {field.name for field in fields(SegmentResult)}
+    found = {name: value for name, value in content.items() if name in known}
+    return SegmentResult(**{**found, "warnings": tuple(found.get("warnings", ()))})
+
+
+class SegmentRenderer:
+    """Renders segments; the last `MAX_SESSIONS` sessions are kept."""
+
+    def __init__(self) -> None:
+        self._sessions: OrderedDict[Models, Session] = OrderedDict()
+
+    def render(self, segment: Segment, out: Path) -> SegmentResult:
+        """Render a segment into a file (`SEGMENT_SUFFIX`), which appears when it is complete.
+
+        Raises
+        ------
+        InputError, DataError, BackendError
+            As `Session.write`.
+        """
+        began = time.perf_counter()
+        session = self._session(segment.models)
+        request, picture = Request(**segment.request), Picture(**segment.picture)
+        fitted, result = _fit(session, request, segment)
+        renderer = session.renderer(picture, has_gestures=fitted.has_gestures)
+        with ClipWriter(out, renderer) as writer:
+            for clip in session.stream_to_length(fitted, result.n_frames):
+                writer.add(clip)
+        return replace(result, took_s=round(time.perf_counter() - began, 3))
+
+    def _session(self, models: Models) -> Session:
+        if models in self._sessions:
+            self._sessions.move_to_end(models)
+        else:
+            while len(self._sessions) >= MAX_SESSIONS:
+                self._sessions.popitem(last=False)
+            self._sessions[models] = Session(
+                models.talker, models.face, identity=models.identity, palette=models.palette
+            )
+        return self._sessions[models]
+
+
+def _fit(session: Session, request: Request, segment: Segment) -> tuple[Request, SegmentResult]:
+    """The request with its fitted text and rate, and the length of the segment."""
+    fps = exact_rate(request.fps)
+    window_s = float(segment.window_frames / fps)
+    if request.idle is not None:
+        return request, SegmentResult(segment.slot_frames or segment.window_frames, float(fps))
+    if request.audio is not None:
+        spoken = sum(piece.clip.speech.waveform.duration for piece in session.stream(request))
+        fit = Fit(request.text, 1.0, spoken, max(0.0, spoken - window_s), 1)
+    else:
+        slot_s = None if segment.slot_frames is None else float(segment.slot_frames / fps)
+        limits = Limits(window_s, slot_s, request.rate, segment.max_rate, segment.overflow)
+        fit = fit_speech(
+            request.text, limits, lambda text, rate: session.measure_speech(replace(request, text=text, rate=rate))
+        )
+        request = replace(request, text=fit.text, rate=fit.rate)
+    n_frames, warnings = _length(segment, fit, float(fps))
+    cut = max(0.0, fit.speech_s - n_frames / float(fps))
+    if cut > 0:
+        warnings.append(f"the last {cut:.2f} s of the speech are cut off by the next cue")
+    result = SegmentResult(
+        n_frames, float(fps), fit.rate, round(fit.speech_s, 4), round(fit.overflow_s, 4), round(cut, 4), tuple(warnings)
+    )
+    return request, result
+
+
+def _length(segment: Segment, fit: Fit, fps: float) -> tuple[int, list[str]]:
+    """Frames of a segment, and warnings of its fit."""
+    warnings = []
+    if fit.overflow_s > 1.0 / fps:
+        warnings.append(f"the speech is {fit.overflow_s:.2f} s longer than its cue at rate {fit.rate:.2f}")
+    if fit.rate > segment.max_rate + 1e-6:
+        warnings.append(f"the rate {fit.rate:.2f} exceeds {segment.max_rate:g}, as the next cue begins")
+    if segment.fills_slot and segment.slot_frames is not None:
+        return segment.slot_frames, warnings
+    return max(segment.window_frames, frame_count(max(fit.speech_s, 1e-3), fps)), warnings
+
+
+def check_segment_text(segment: Segment) -> None:
+    """Refuse words that the voice cannot speak, before anything is rendered.
+
+    Raises
+    ------
+    InputError
+        As `prepare`.
+    """
+    prepare(Request(**segment.request))

@@ -1,0 +1,193 @@
+"""Running a plan: segments are rendered once, outputs are joined as soon as their segments are there."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from lexicon.errors import Tts2faceError
+from tts2face.batch.assemble import join_segments
+from tts2face.batch.engine import Engine, LocalEngine
+from tts2face.batch.manifest import (
+    CSV_NAME,
+    JSON_NAME,
+    done_entry,
+    failed_entry,
+    is_current,
+    read_manifest,
+    write_manifest,
+)
+from tts2face.batch.plan import Output, Plan
+from tts2face.batch.render_segment import SegmentResult
+from tts2face.batch.store import Store, open_store
+from tts2face.storage.overwrite import refuse_overwriting
+from tts2face.types import Progress
+
+SEGMENT_FOLDER = ".segments"  # in the folder of outputs
+MANIFEST_INTERVAL_S = 10.0  # between two writes while the batch runs
+
+
+@dataclass(frozen=True, slots=True)
+class BatchResult:
+    """Summary of a batch: outputs made now, left as they were, and failed with their reasons."""
+
+    n_made: int
+    n_current: int
+    failed: tuple[tuple[str, str], ...]
+    n_rendered: int
+    seconds: float
+    took_s: float
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(slots=True)
+class _Run:
+    """State of a running batch."""
+
+    plan: Plan
+    folder: Path
+    store: Store
+    entries: dict[str, dict[str, Any]]
+    results: dict[str, SegmentResult] = field(default_factory=dict)
+    reasons: dict[str, str] = field(default_factory=dict)
+    waiting: dict[str, set[str]] = field(default_factory=dict)  # addresses that an output still needs
+    users: dict[str, list[Output]] = field(default_factory=dict)
+    n_made: int = 0
+    seconds: float = 0.0
+    warnings: list[str] = field(default_factory=list)
+
+
+def run_batch(
+    plan: Plan,
+    out: Path | str,
+    *,
+    store: Store | None = None,
+    engine: Engine | None = None,
+    on_progress: Progress | None = None,
+    on_output: Callable[[dict[str, Any]], None] | None = None,
+) -> BatchResult:
+    """Make the outputs of a plan in a folder; outputs that are current are left as they are.
+
+    Parameters
+    ----------
+    store
+        Store of the segments; None: a hidden folder in `out`.
+    engine
+        What renders the segments; None: this process.
+    on_progress
+        Called with the number of segments done and of all segments that this run needs.
+    on_output
+        Called with the entry of the manifest of each output that was made or has failed.
+
+    Raises
+    ------
+    InputError
+        An output would replace an input.
+    BackendError
+        The folder cannot be written.
+    """
+    began = time.perf_counter()
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    check_outputs(plan, folder)
+    run = _Run(plan, folder, store or open_store(folder / SEGMENT_FOLDER), read_manifest(folder))
+    stale = [one for one in plan.outputs if not is_current(run.entries.get(one.name), one, folder)]
+    needed = {segment.address: segment for output in stale for segment in output.segments}
+    for output in stale:
+        run.waiting[output.name] = {segment.address for segment in output.segments}
+        for address in run.waiting[output.name]:
+            run.users.setdefault(address, []).append(output)
+    missing, written_at = {}, time.monotonic()
+    for address, segment in needed.items():
+        found = run.store.result(address)
+        if found is None:
+            missing[address] = segment
+        else:
+            _finish_segment(run, address, found, "", on_output)
+    done = len(needed) - len(missing)
+    for rendered in (engine or LocalEngine()).render(missing, run.store):
+        _finish_segment(run, rendered.address, rendered.result, rendered.reason, on_output)
+        done += 1
+        if on_progress:
+            on_progress(done, len(needed))
+        if time.monotonic() - written_at > MANIFEST_INTERVAL_S:
+            write_manifest(folder, plan, run.entries)
+            written_at = time.monotonic()
+    write_manifest(folder, plan, run.entries)
+    failed = tuple(
+        (one.name, str(run.entries[one.name].get("reason", "")))
+        for one in stale
+        if run.entries.get(one.name, {}).get("status") == "failed"
+    )
+    return BatchResult(
+        run.n_made,
+        len(plan.outputs) - len(stale),
+        failed,
+        len(missing) - len(run.reasons),
+        run.seconds,
+        time.perf_counter() - began,
+        tuple(run.warnings),
+    )
+
+
+def check_outputs(plan: Plan, folder: Path) -> None:
+    """Refuse outputs that would replace subtitles or recordings.
+
+    Raises
+    ------
+    InputError
+        An output is an input.
+    """
+    sources = {path for output in plan.outputs for path in output.source}
+    sources |= {
+        str(one.request["audio"]) for output in plan.outputs for one in output.segments if "audio" in one.request
+    }
+    inputs = {Path(path).resolve() for path in sources}
+    for name in [output.name for output in plan.outputs] + [JSON_NAME, CSV_NAME]:
+        path = folder / name
+        if path.exists() and path.resolve() in inputs:
+            refuse_overwriting({name: path}, {"an input of the batch": path})
+
+
+def _finish_segment(
+    run: _Run,
+    address: str,
+    result: SegmentResult | None,
+    reason: str,
+    on_output: Callable[[dict[str, Any]], None] | None,
+) -> None:
+    """Note a segment, and make the outputs that need no other one."""
+    if result is None:
+        run.reasons[address] = reason
+    else:
+        run.results[address] = result
+    for output in run.users.get(address, ()):
+        run.waiting[output.name].discard(address)
+        if not run.waiting[output.name]:
+            _finish_output(run, output)
+            if on_output:
+                on_output(run.entries[output.name])
+
+
+def _finish_output(run: _Run, output: Output) -> None:
+    """Join the segments of an output, or note why it failed."""
+    reasons = [run.reasons[one.address] for one in output.segments if one.address in run.reasons]
+    if reasons:
+        run.entries[output.name] = failed_entry(output, reasons[0])
+        return
+    path = run.folder / output.name
+    results = [run.results[one.address] for one in output.segments]
+    try:
+        with TemporaryDirectory(prefix="tts2face-") as copies:
+            parts = [run.store.fetch(one.address, Path(copies)) for one in output.segments]
+            n_frames = join_segments(parts, path, output.fps)
+        entry = done_entry(output, path, n_frames, results)
+    except Tts2faceError as wrong:
+        run.entries[output.name] = failed_entry(output, str(wrong))
+        return
+    run.entries[output.name] = entry
+    run.n_made += 1
+    run.seconds += entry["duration_s"]
+    run.warnings += [f"{output.name}, {warning}" for warning in entry["warnings"]]

@@ -1,0 +1,92 @@
+"""Segments: the units that are rendered once and kept by their content address."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from tts2face.batch.address import content_address, file_hash, model_hash, program_version
+from tts2face.batch.cast import Models
+
+OWN_FACE = "self"
+REQUEST_FILES = ("audio", "dictionary", "voice")
+
+
+@dataclass(frozen=True)
+class Segment:
+    """What is rendered: the words of a cue, a recording, or silence between cues.
+
+    Parameters
+    ----------
+    request
+        Fields of `Request` that differ from their defaults; JSON values.
+    picture
+        Fields of `Picture` that differ from their defaults.
+    window_frames
+        Frames of the cue, into which its speech should fit.
+    slot_frames
+        Frames up to the next cue: longest length of the segment; None: as long as its speech.
+    fills_slot
+        Whether the segment is `slot_frames` long (a part of a longer clip), or as short as its speech and cue allow.
+    overflow, max_rate
+        As `BatchOptions`.
+    """
+
+    request: Mapping[str, Any]
+    picture: Mapping[str, Any]
+    models: Models
+    window_frames: int
+    slot_frames: int | None = None
+    fills_slot: bool = True
+    overflow: str = "extend"
+    max_rate: float = 1.4
+    file_hashes: Mapping[str, str] = field(default_factory=dict)
+
+    @cached_property
+    def address(self) -> str:
+        """Content address: equal for segments with equal pictures and sound."""
+        content = {name: value for name, value in self.as_json().items() if name != "models"}
+        content["request"] = {name: self.file_hashes.get(name, value) for name, value in self.request.items()}
+        content["picture"] = {name: self.file_hashes.get(name, value) for name, value in self.picture.items()}
+        content["identity"] = self.models.identity
+        return content_address(content | {"versions": program_version()})
+
+    def as_json(self) -> dict[str, Any]:
+        """JSON object from which `segment_from_json` makes the segment again."""
+        return {
+            "request": dict(self.request),
+            "picture": dict(self.picture),
+            "models": asdict(self.models),
+            "window_frames": self.window_frames,
+            "slot_frames": self.slot_frames,
+            "fills_slot": self.fills_slot,
+            "overflow": self.overflow,
+            "max_rate": self.max_rate,
+            "file_hashes": dict(self.file_hashes),
+        }
+
+
+def segment_from_json(content: Mapping[str, Any]) -> Segment:
+    """The segment of `Segment.as_json`."""
+    return Segment(**{**content, "models": Models(**content["models"])})
+
+
+def input_hashes(models: Models, request: Mapping[str, Any], picture: Mapping[str, Any]) -> dict[str, str]:
+    """Hashes of all files that a segment reads, by their names.
+
+    Raises
+    ------
+    InputError
+        A model or file does not exist.
+    """
+    hashes = {"talker": model_hash(models.talker, "talker"), "palette": model_hash(models.palette, "palette")}
+    hashes["face"] = OWN_FACE if models.face == OWN_FACE else model_hash(models.face, "face")
+    for name in REQUEST_FILES:
+        value = request.get(name)
+        if value is not None and (name != "voice" or Path(str(value)).suffix):
+            hashes[name] = file_hash(Path(str(value)))
+    background = picture.get("background")
+    if background is not None and Path(str(background)).suffix:
+        hashes["background"] = file_hash(Path(str(background)))
+    return hashes

@@ -1,0 +1,1 @@
+"""Durable segments on one machine or many: a database of jobs, workers, and their control."""

@@ -1,0 +1,155 @@
+"""Control of jobs: list, show, cancel, retry, prune."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from lexicon.errors import InputError
+from tts2face.batch.segment import segment_from_json
+from tts2face.jobs.database import Workers, database_url, prepare_database
+from tts2face.jobs.engine import ACTIVE, enqueue, failure_reason, open_client
+from tts2face.jobs.worker import WORKFLOW
+
+STATES = {
+    "ENQUEUED": "waiting",
+    "DELAYED": "waiting",
+    "PENDING": "running",
+    "SUCCESS": "done",
+    "ERROR": "failed",
+    "MAX_RECOVERY_ATTEMPTS_EXCEEDED": "failed",
+    "CANCELLED": "cancelled",
+}
+MIN_NAME_CHARACTERS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A segment in the queue.
+
+    Parameters
+    ----------
+    name
+        Content address of the segment, a point, and the number of the try.
+    state
+        waiting, running, done, failed or cancelled.
+    text
+        Words of the segment; empty for silence.
+    worker
+        Place of the worker that runs it or ran it last.
+    """
+
+    name: str
+    state: str
+    priority: int
+    text: str
+    worker: str
+    n_tries: int
+    reason: str
+    created_s: float
+    took_s: float | None
+
+
+def list_jobs(database: str, states: Sequence[str] = (), limit: int | None = None) -> tuple[Job, ...]:
+    """Jobs of a database, the oldest first.
+
+    Raises
+    ------
+    InputError
+        There is no such state.
+    BackendError
+        The database cannot be used.
+    """
+    for state in states:
+        if state not in STATES.values():
+            raise InputError(f"there is no state {state!r}; choose {', '.join(dict.fromkeys(STATES.values()))}")
+    url = _prepared(database)
+    statuses = [status for status, state in STATES.items() if not states or state in states]
+    with open_client(url) as client, Workers(url) as workers:
+        places = workers.alive(within_s=1e9)
+        found = client.list_workflows(name=WORKFLOW, status=statuses, limit=limit)
+        return tuple(_job(one, places) for one in found)
+
+
+def show_job(database: str, name: str) -> tuple[Job, dict[str, Any]]:
+    """A job by the begin of its name, and its segment as JSON; errors as `list_jobs` and `InputError` without one."""
+    url = _prepared(database)
+    with open_client(url) as client, Workers(url) as workers:
+        one = _find(client, name)
+        content = one.input["args"][1] if one.input else {}
+        return _job(one, workers.alive(within_s=1e9)), dict(content)
+
+
+def cancel_jobs(database: str, names: Sequence[str] = ()) -> int:
+    """Cancel waiting and running jobs by name, or all of them; their number."""
+    with open_client(_prepared(database)) as client:
+        chosen = [_find(client, name) for name in names] if names else _of_states(client, ACTIVE)
+        active = [one.workflow_id for one in chosen if one.status in ACTIVE]
+        if active:
+            client.cancel_workflows(active, cancel_children=True)
+        return len(active)
+
+
+def retry_jobs(database: str, names: Sequence[str] = (), priority: int | None = None) -> int:
+    """Queue failed and cancelled jobs again by name, or all of them; their number."""
+    ended = frozenset(status for status, state in STATES.items() if state in ("failed", "cancelled"))
+    with open_client(_prepared(database)) as client:
+        chosen = [_find(client, name) for name in names] if names else _of_states(client, ended)
+        latest = {one.workflow_id.partition(".")[0]: one for one in chosen if one.status in ended}
+        for address, one in latest.items():
+            segment = segment_from_json(one.input["args"][1])
+            enqueue(client, {address: segment}, one.priority if priority is None else priority)
+        return len(latest)
+
+
+def prune_jobs(database: str, older_than_s: float = 0.0) -> int:
+    """Remove jobs that have ended some seconds ago or earlier; their number. Stored segments stay."""
+    url = _prepared(database)
+    with open_client(url) as client, Workers(url) as workers:
+        ended = [one for one in _of_states(client, frozenset(STATES) - ACTIVE, load_input=False)]
+        before_ms = (time.time() - older_than_s) * 1000.0
+        names = [one.workflow_id for one in ended if (one.completed_at or one.updated_at or 0) <= before_ms]
+        if names:
+            client.delete_workflows(names)
+        workers.forget_dead()
+        return len(names)
+
+
+def _prepared(database: str) -> str:
+    url = database_url(database)
+    prepare_database(url)
+    return url
+
+
+def _of_states(client: Any, statuses: frozenset[str], *, load_input: bool = True) -> list[Any]:
+    found: list[Any] = client.list_workflows(
+        name=WORKFLOW, status=sorted(statuses), load_input=load_input, load_output=False
+    )
+    return found
+
+
+def _find(client: Any, name: str) -> Any:
+    if len(name) < MIN_NAME_CHARACTERS:
+        raise InputError(f"the name {name!r} is too short; give at least {MIN_NAME_CHARACTERS} characters of it")
+    found = client.list_workflows(workflow_id_prefix=name, name=WORKFLOW)
+    addresses = {one.workflow_id.partition(".")[0] for one in found}
+    if len(addresses) != 1:
+        raise InputError(f"{len(addresses)} jobs begin with {name!r}; give more of the name that `jobs list` prints")
+    return max(found, key=lambda one: int(one.workflow_id.partition(".")[2] or 0))
+
+
+def _job(one: Any, places: dict[str, str]) -> Job:
+    content = one.input["args"][1] if one.input and len(one.input.get("args", ())) > 1 else {}
+    state = STATES.get(one.status, one.status)
+    took = None if not one.completed_at or not one.dequeued_at else (one.completed_at - one.dequeued_at) / 1000.0
+    return Job(
+        one.workflow_id,
+        state,
+        one.priority or 0,
+        str(content.get("request", {}).get("text", "")),
+        places.get(str(one.executor_id), str(one.executor_id or "")),
+        one.recovery_attempts or 0,
+        failure_reason(one) if state in ("failed", "cancelled") else "",
+        (one.created_at or 0) / 1000.0,
+        took,
+    )

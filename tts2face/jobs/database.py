@@ -1,0 +1,148 @@
+"""The database of jobs: a SQLite file, or PostgreSQL by URL; and the table of the workers that are alive in it."""
+
+import sqlite3
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from lexicon.errors import BackendError, InputError
+
+DEFAULT_DATABASE = "tts2face-jobs.sqlite"
+QUEUE = "tts2face-segments"
+APPLICATION = "tts2face"
+BEAT_S = 1.5  # between two signs of life of a worker
+DEAD_AFTER_S = 6.0  # without a sign of life; with the interval of looking this is below 10 s
+POSTGRES_SCHEMES = ("postgresql://", "postgres://", "postgresql+psycopg://")
+_TABLE = """
+CREATE TABLE IF NOT EXISTS tts2face_workers (
+    executor_id VARCHAR(64) PRIMARY KEY, beat DOUBLE PRECISION NOT NULL, place VARCHAR(200) NOT NULL
+)"""
+_BEAT = """
+INSERT INTO tts2face_workers (executor_id, beat, place) VALUES (:id, {now}, :place)
+ON CONFLICT (executor_id) DO UPDATE SET beat = {now}"""
+_NOW = {"sqlite": "(julianday('now') - 2440587.5) * 86400.0", "postgresql": "EXTRACT(EPOCH FROM clock_timestamp())"}
+
+
+def database_url(where: str | Path) -> str:
+    """URL of a database: PostgreSQL as given, everything else is the path of a SQLite file.
+
+    Raises
+    ------
+    InputError
+        The URL names another kind of database, or the folder of the file does not exist.
+    """
+    text = str(where)
+    if text.startswith(POSTGRES_SCHEMES):
+        return text.replace("postgres://", "postgresql://", 1).replace("postgresql+psycopg://", "postgresql://", 1)
+    path = text.removeprefix("sqlite:///")
+    if "://" in path:
+        raise InputError(f"there is no database {path.split('://')[0]}; give a SQLite file or postgresql://...")
+    if not Path(path).resolve().parent.is_dir():
+        raise InputError(f"there is no folder {Path(path).resolve().parent} for the database; create it first")
+    return f"sqlite:///{Path(path).resolve()}"
+
+
+def prepare_database(url: str) -> None:
+    """Create the tables of jobs and workers where they are missing; SQLite gets a write-ahead log.
+
+    Raises
+    ------
+    BackendError
+        The package dbos is missing, or the database cannot be reached or written.
+    """
+    try:
+        from dbos import DBOS
+    except ImportError as missing:
+        raise BackendError("jobs need the package dbos; pip install 'tts2face[batch]'") from missing
+    import sqlalchemy
+
+    quiet_dbos()
+    try:
+        if url.startswith("sqlite"):
+            with sqlite3.connect(url.removeprefix("sqlite:///"), timeout=30.0) as connection:
+                connection.execute("PRAGMA journal_mode=WAL")
+        DBOS.migrate(url)
+        with Workers(url) as workers:
+            workers.create()
+    except (sqlite3.Error, sqlalchemy.exc.SQLAlchemyError, ModuleNotFoundError) as error:
+        reason = " ".join(str(getattr(error, "orig", None) or error).split())
+        raise BackendError(f"cannot use the database {shown_url(url)} ({reason[:200]}); check it") from error
+
+
+def quiet_dbos() -> None:
+    """Messages of the engine below errors are not written; it never sends any."""
+    import logging
+
+    logging.getLogger("dbos").setLevel(logging.ERROR)
+
+
+def shown_url(url: str) -> str:
+    """A URL without its password."""
+    before, at, after = url.rpartition("@")
+    if not at or "://" not in before:
+        return url
+    scheme, _, user = before.partition("://")
+    return f"{scheme}://{user.partition(':')[0]}@{after}"
+
+
+class Workers:
+    """Table of workers with the time of their last sign of life, by the clock of the database."""
+
+    def __init__(self, url: str) -> None:
+        import sqlalchemy
+
+        self._sql = sqlalchemy.text
+        kind = "sqlite" if url.startswith("sqlite") else "postgresql"
+        self._now = _NOW[kind]
+        arguments: dict[str, Any] = {"timeout": 30.0} if kind == "sqlite" else {"connect_timeout": 5}
+        engine_url = url if kind == "sqlite" else url.replace("postgresql://", "postgresql+psycopg://", 1)
+        self._engine = sqlalchemy.create_engine(
+            engine_url, pool_pre_ping=True, pool_size=2, max_overflow=1, connect_args=arguments
+        )
+
+    def __enter__(self) -> "Workers":
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the connections."""
+        self._engine.dispose()
+
+    def create(self) -> None:
+        """Create the table where it is missing; several processes may do so at once."""
+        for attempt in range(5):
+            try:
+                with self._engine.begin() as connection:
+                    connection.execute(self._sql(_TABLE))
+                return
+            except Exception as raced:
+                import sqlalchemy
+
+                if not isinstance(raced, sqlalchemy.exc.DBAPIError) or attempt == 4:
+                    raise
+                time.sleep(0.2)
+
+    def beat(self, executor_id: str, place: str) -> None:
+        """Note that a worker is alive."""
+        with self._engine.begin() as connection:
+            connection.execute(self._sql(_BEAT.format(now=self._now)), {"id": executor_id, "place": place[:200]})
+
+    def alive(self, within_s: float = DEAD_AFTER_S) -> dict[str, str]:
+        """Places of the workers that gave a sign of life within some seconds, by their ids."""
+        query = f"SELECT executor_id, place FROM tts2face_workers WHERE beat > {self._now} - :age"
+        with self._engine.begin() as connection:
+            rows = connection.execute(self._sql(query), {"age": within_s})
+            return {str(row[0]): str(row[1]) for row in rows}
+
+    def forget(self, executor_ids: Iterable[str]) -> None:
+        """Remove workers."""
+        with self._engine.begin() as connection:
+            for one in executor_ids:
+                connection.execute(self._sql("DELETE FROM tts2face_workers WHERE executor_id = :id"), {"id": one})
+
+    def forget_dead(self, older_than_s: float = 3600.0) -> None:
+        """Remove workers without a sign of life for a long time."""
+        query = f"DELETE FROM tts2face_workers WHERE beat < {self._now} - :age"
+        with self._engine.begin() as connection:
+            connection.execute(self._sql(query), {"age": older_than_s})

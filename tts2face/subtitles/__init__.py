@@ -1,0 +1,1 @@
+"""Subtitle files as cues: SubRip, WebVTT, SubStation Alpha and TTML, by one tolerant reader."""

@@ -1,0 +1,91 @@
+"""Cues of a subtitle file, as they are written and as they are spoken."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenCue:
+    """A cue as its file has it.
+
+    Parameters
+    ----------
+    begin_s, end_s
+        Instants in seconds; `end_s` is None if it is missing or unreadable.
+    text
+        Lines of the cue with their tags.
+    line
+        Line of the file at which the cue begins, from 1.
+    speaker, style
+        Name of the speaker and of the style, where the format has them; else empty.
+    language
+        Language tag of the cue or of the whole file; else None.
+    """
+
+    begin_s: float
+    end_s: float | None
+    text: str
+    line: int
+    speaker: str = ""
+    style: str = ""
+    language: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Cue:
+    """Words spoken between two instants.
+
+    Parameters
+    ----------
+    number
+        Position in order of time, from 1.
+    begin_s, end_s
+        Instants in seconds; the end lies after the begin.
+    text
+        Spoken words on one line, without tags, noises, lyrics and speaker labels; empty for a silent cue.
+    line
+        Line of the file at which the cue begins, from 1.
+    shown
+        Text as it is shown, on one line, without tags.
+    speaker
+        Speaker by label (``JOHN:``), WebVTT voice tag, actor of SubStation Alpha, or TTML agent; else empty.
+    style
+        Style of SubStation Alpha or TTML, or class of the WebVTT voice tag; else empty.
+    language
+        Language tag, where the file has one.
+    has_estimated_end
+        Whether the end is estimated from the length of the text, as the file has none after the begin.
+    """
+
+    number: int
+    begin_s: float
+    end_s: float
+    text: str
+    line: int
+    shown: str = ""
+    speaker: str = ""
+    style: str = ""
+    language: str | None = None
+    has_estimated_end: bool = False
+
+    @property
+    def duration_s(self) -> float:
+        """Duration in seconds."""
+        return self.end_s - self.begin_s
+
+
+@dataclass(frozen=True, slots=True)
+class SubtitleWarning:
+    """A defect of a subtitle file and how it was read."""
+
+    line: int
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Subtitles:
+    """Cues of a file in order of time, and its defects in order of their lines."""
+
+    path: Path
+    cues: tuple[Cue, ...]
+    warnings: tuple[SubtitleWarning, ...]
