@@ -3,7 +3,7 @@
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -35,13 +35,11 @@ from tts2face.synthesis.performance import Performance, perform, take_clips
 from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, prepare
 from tts2face.synthesis.written_clip import RequestSteps, WrittenClip
 from tts2face.types import Clip, Progress, concatenate_clips
-from tts2face.voice.engine import PronunciationMap, Voice
-from tts2face.voice.loading import load_voice
-from tts2face.voice.recent import RecentUtterances
+from tts2face.voice.engine import Voice
+from tts2face.voice.pool import VoicePool
 
 DEFAULT_FIELDS = "fields"
 OWN_FACE = "self"  # name of the talker's own face
-MAX_VOICES = 2  # unused voices in memory; about 100 MB each
 MAX_RENDERERS = 2  # renderers in memory, one for each picture; about 30 MB each
 N_PIECES_AHEAD = 2  # pieces synthesised before they are drawn
 
@@ -97,7 +95,7 @@ class Session:
         self._lock = threading.RLock()
         self._cache: dict[Hashable, Any] = {}
         self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
-        self._unused_voices: list[tuple[Hashable, Voice]] = []  # the last ones returned, the newest at the end
+        self._voices = VoicePool()
         self._speech_face: AnimatedFace = self._prepare_face(None)
 
     @property
@@ -159,7 +157,8 @@ class Session:
         The last utterances are kept, so that a following `stream` of the same text does not speak it again.
         """
         prepared = prepare_request(text, options)
-        return measure_speech(prepared, self._models(prepared.request, self._face(prepared.request.has_gestures)))
+        face = self._face(prepared.request.has_gestures)
+        return measure_speech(prepared, self._models(prepared.request, face, keeps_utterances=True))
 
     def stream_to_length(self, text: str | Request | PreparedRequest, n_frames: int, **options: Any) -> Iterator[Clip]:
         """Synthesise the clip of a text or request in pieces with `n_frames` frames in total.
@@ -369,11 +368,11 @@ class Session:
         layer = None if palette is None else GestureLayer(prepared, self._fields(palette, request), face)
         return pieces(prepared, self._models(request, face), layer)
 
-    def _models(self, request: Request, face: AnimatedFace) -> SynthesisModels:
+    def _models(self, request: Request, face: AnimatedFace, *, keeps_utterances: bool = False) -> SynthesisModels:
         dictionary = read_dictionary(request.dictionary).entries if request.dictionary else {}
 
         def borrow_voice(name: str | None, language: str) -> AbstractContextManager[Voice]:
-            return self._borrow_voice(name, language, dictionary)
+            return self._voices.borrow(name, language, dictionary, keeps_utterances=keeps_utterances)
 
         return SynthesisModels(self.talker, self._exemplars, face, borrow_voice)
 
@@ -401,21 +400,6 @@ class Session:
                 self._cache[key] = make()
             value: Value = self._cache[key]
             return value
-
-    @contextmanager
-    def _borrow_voice(self, name: str | None, language: str, dictionary: PronunciationMap) -> Iterator[Voice]:
-        """A voice for exclusive use within a ``with`` block; loading one takes half a second."""
-        key = (name, language, frozenset(dictionary.items()))
-        with self._lock:
-            found = next((at for at, (kept, _) in enumerate(self._unused_voices) if kept == key), None)
-            voice = None if found is None else self._unused_voices.pop(found)[1]
-        voice = voice or RecentUtterances(load_voice(name, language, dictionary))
-        try:
-            yield voice
-        finally:
-            with self._lock:
-                self._unused_voices.append((key, voice))
-                del self._unused_voices[:-MAX_VOICES]
 
 
 def prepare_request(text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:

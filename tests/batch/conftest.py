@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from tests.synthesis.fake_voice import FakeVoice
-from tts2face import session
 from tts2face.batch.options import BatchOptions
 from tts2face.batch.plan import Plan, plan_batch
 from tts2face.render.picture import Picture
 from tts2face.request import Request
+from tts2face.voice import pool
 
 FPS = 10
 SRT = (
@@ -31,7 +31,7 @@ def voices(monkeypatch: pytest.MonkeyPatch) -> list[FakeVoice]:
         loaded.append(FakeVoice())
         return loaded[-1]
 
-    monkeypatch.setattr(session, "load_voice", load)
+    monkeypatch.setattr(pool, "load_voice", load)
     return loaded
 
 

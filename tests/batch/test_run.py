@@ -18,9 +18,10 @@ from tests.synthesis.fake_voice import LEAD, LETTER, FakeVoice
 from tts2face.batch import engine as engines
 from tts2face.batch.engine import LocalEngine, Rendered
 from tts2face.batch.render_process import ChildDiedError, RenderProcess
-from tts2face.batch.render_segment import SegmentRenderer, SegmentResult
+from tts2face.batch.render_segment import SegmentRenderer
 from tts2face.batch.run import SEGMENT_FOLDER, run_batch
 from tts2face.batch.segment import Segment
+from tts2face.batch.segment_result import SegmentResult
 from tts2face.batch.store import FolderStore, Store
 
 HALF_FRAME_S = 0.5 / FPS

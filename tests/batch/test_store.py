@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.batch.render_segment import SegmentResult
+from tts2face.batch.segment_result import SegmentResult
 from tts2face.batch.store import open_store
 
 ADDRESS = "ab" * 32

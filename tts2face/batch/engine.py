@@ -15,8 +15,8 @@ from typing import Protocol
 
 from lexicon.errors import BackendError, Tts2faceError
 from tts2face.batch.render_process import ChildDiedError, RenderProcess
-from tts2face.batch.render_segment import SEGMENT_SUFFIX, SegmentRenderer, SegmentResult
 from tts2face.batch.segment import Segment
+from tts2face.batch.segment_result import SEGMENT_SUFFIX, SegmentResult
 from tts2face.batch.store import Store
 
 MAX_TRIES = 3  # of a segment whose process ended; then it counts as failed
@@ -59,6 +59,8 @@ class LocalEngine:
     def render(self, segments: Mapping[str, Segment], store: Store) -> Iterator[Rendered]:
         """Yield each segment as soon as it is stored or has failed."""
         if self.n_jobs == 1:
+            from tts2face.batch.render_segment import SegmentRenderer
+
             renderer = SegmentRenderer()
             for segment in segments.values():
                 yield render_into(store, segment, renderer, self.on_message)

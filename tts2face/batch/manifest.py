@@ -12,7 +12,7 @@ from lexicon.errors import DataError
 from lexicon.inputs import parse_json
 from tts2face import __version__
 from tts2face.batch.plan import Output, Plan
-from tts2face.batch.render_segment import SegmentResult
+from tts2face.batch.segment_result import SegmentResult
 from tts2face.storage.files import write_atomically
 
 JSON_NAME, CSV_NAME = "manifest.json", "manifest.csv"

@@ -12,14 +12,19 @@ import sys
 import tempfile
 import threading
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
-from tts2face.batch.render_segment import SegmentRenderer, SegmentResult, result_from_json
 from tts2face.batch.segment import Segment, segment_from_json
+from tts2face.batch.segment_result import SegmentResult, result_from_json
 from tts2face.child_process import exit_after
 
+if TYPE_CHECKING:
+    from tts2face.batch.render_segment import SegmentRenderer
+
 KINDS: dict[str, type[Tts2faceError]] = {"InputError": InputError, "DataError": DataError, "BackendError": BackendError}
+# glibc returns blocks of 1 MiB and more to the system, instead of keeping those of each thread (decision 064).
+RETURNED_BLOCKS = {"MALLOC_MMAP_THRESHOLD_": "1048576", "MALLOC_TRIM_THRESHOLD_": "1048576"}
 MAX_SHOWN_CHARACTERS = 300  # of the standard error of a child that ended
 
 
@@ -80,7 +85,7 @@ class RenderProcess:
             self._end()
 
     def _start(self) -> subprocess.Popen[bytes]:
-        environment = dict(os.environ)
+        environment = dict(os.environ) | RETURNED_BLOCKS
         if self._core is not None:
             environment |= {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the child
@@ -123,6 +128,8 @@ def main() -> None:
             requests.put(line)
 
     exit_after(read_requests)
+    from tts2face.batch.render_segment import SegmentRenderer  # a second of imports, only in the child
+
     renderer = SegmentRenderer()
     while True:
         request = json.loads(requests.get())
@@ -130,7 +137,7 @@ def main() -> None:
         answers.flush()
 
 
-def _answer(renderer: SegmentRenderer, request: dict[str, Any]) -> dict[str, Any]:
+def _answer(renderer: "SegmentRenderer", request: dict[str, Any]) -> dict[str, Any]:
     try:
         result = renderer.render(segment_from_json(request["segment"]), Path(request["out"]))
         return {"result": result.as_json()}

@@ -1,14 +1,15 @@
 """Rendering of one segment with the sessions of this process."""
 
+import gc
 import time
 from collections import OrderedDict
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from tts2face.batch.cast import Models
 from tts2face.batch.fit import Fit, Limits, fit_speech
 from tts2face.batch.segment import Segment
+from tts2face.batch.segment_result import SegmentResult
 from tts2face.clock import exact_rate
 from tts2face.render.encode import ClipWriter
 from tts2face.render.picture import Picture
@@ -17,51 +18,7 @@ from tts2face.session import Session
 from tts2face.synthesis.prepared_request import prepare
 from tts2face.types import frame_count
 
-MAX_SESSIONS = 2  # in the memory of a worker; each takes 60 to 150 MB
-SEGMENT_SUFFIX = ".mov"
-
-
-@dataclass(frozen=True, slots=True)
-class SegmentResult:
-    """A rendered segment.
-
-    Parameters
-    ----------
-    n_frames, fps
-        Its length.
-    rate
-        Speaking rate of the fit; 1 for silence and recordings.
-    speech_s
-        Seconds from its begin to the end of its last word; 0 without words.
-    overflow_s
-        Seconds by which the speech ends after its cue.
-    cut_s
-        Seconds of speech that the next cue cuts off.
-    warnings
-        What does not match the subtitles.
-    took_s
-        Seconds of work.
-    """
-
-    n_frames: int
-    fps: float
-    rate: float = 1.0
-    speech_s: float = 0.0
-    overflow_s: float = 0.0
-    cut_s: float = 0.0
-    warnings: tuple[str, ...] = ()
-    took_s: float = 0.0
-
-    def as_json(self) -> dict[str, Any]:
-        """JSON object from which `result_from_json` makes the result again."""
-        return asdict(self) | {"warnings": list(self.warnings)}
-
-
-def result_from_json(content: dict[str, Any]) -> SegmentResult:
-    """The result of `SegmentResult.as_json`; unknown names are ignored."""
-    known = {field.name for field in fields(SegmentResult)}
-    found = {name: value for name, value in content.items() if name in known}
-    return SegmentResult(**{**found, "warnings": tuple(found.get("warnings", ()))})
+MAX_SESSIONS = 1  # in the memory of a worker; a second one takes 250 MB, and work comes sorted by its models
 
 
 class SegmentRenderer:
@@ -71,7 +28,7 @@ class SegmentRenderer:
         self._sessions: OrderedDict[Models, Session] = OrderedDict()
 
     def render(self, segment: Segment, out: Path) -> SegmentResult:
-        """Render a segment into a file (`SEGMENT_SUFFIX`), which appears when it is complete.
+        """Render a segment into a file (.mov), which appears when it is complete.
 
         Raises
         ------
@@ -94,6 +51,7 @@ class SegmentRenderer:
         else:
             while len(self._sessions) >= MAX_SESSIONS:
                 self._sessions.popitem(last=False)
+            gc.collect()  # sessions hold themselves in circles
             self._sessions[models] = Session(
                 models.talker, models.face, identity=models.identity, palette=models.palette
             )

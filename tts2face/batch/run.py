@@ -20,7 +20,7 @@ from tts2face.batch.manifest import (
     write_manifest,
 )
 from tts2face.batch.plan import Output, Plan
-from tts2face.batch.render_segment import SegmentResult
+from tts2face.batch.segment_result import SegmentResult
 from tts2face.batch.store import Store, open_store
 from tts2face.storage.overwrite import refuse_overwriting
 from tts2face.types import Progress
@@ -107,7 +107,8 @@ def run_batch(
         else:
             _finish_segment(run, address, found, "", on_output)
     done = len(needed) - len(missing)
-    for rendered in (engine or LocalEngine()).render(missing, run.store):
+    by_models = dict(sorted(missing.items(), key=lambda item: repr(item[1].models)))  # a worker holds one session
+    for rendered in (engine or LocalEngine()).render(by_models, run.store):
         _finish_segment(run, rendered.address, rendered.result, rendered.reason, on_output)
         done += 1
         if on_progress:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from lexicon.errors import BackendError, DataError, InputError
-from tts2face.batch.render_segment import SEGMENT_SUFFIX, SegmentResult, result_from_json
+from tts2face.batch.segment_result import SEGMENT_SUFFIX, SegmentResult, result_from_json
 from tts2face.storage.files import write_atomically
 from tts2face.storage.temporary import NAME_INFIX, Temporary
 

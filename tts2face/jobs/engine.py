@@ -13,7 +13,7 @@ from lexicon.errors import BackendError
 from tts2face.batch.engine import Message, Rendered
 from tts2face.batch.segment import Segment
 from tts2face.batch.store import Store
-from tts2face.jobs.database import APPLICATION, QUEUE, database_url, prepare_database
+from tts2face.jobs.database import APPLICATION, QUEUE, Workers, database_url, prepare_database
 from tts2face.jobs.worker import APPLICATION_VERSION, WORKFLOW
 
 POLL_S = 0.5  # between two looks at the jobs; longer for long lists
@@ -53,6 +53,8 @@ class DatabaseEngine:
         prepare_database(url)
         with open_client(url) as client, local_workers(self) as supervise:
             waiting = enqueue(client, segments, self.priority)
+            if self.n_workers == 0 and not _has_workers(url):
+                self.on_message("no worker is alive in this database; start `tts2face worker` with it")
             while waiting:
                 supervise()
                 for name, status in _finished(client, waiting):
@@ -114,6 +116,11 @@ def enqueue(client: Any, segments: Mapping[str, Segment], priority: int) -> dict
         client.enqueue(options, address, segment.as_json())
         waiting[name] = address
     return waiting
+
+
+def _has_workers(url: str) -> bool:
+    with Workers(url) as workers:
+        return bool(workers.alive())
 
 
 def _finished(client: Any, waiting: Mapping[str, str]) -> list[tuple[str, Any]]:
