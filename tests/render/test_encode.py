@@ -62,7 +62,9 @@ def read(path):
                 pictures.append(frame.to_ndarray(format="rgb24"))
                 times.append(Fraction(frame.pts) * frame.time_base)
             else:
-                sound.append(frame.to_ndarray().mean(axis=0))
+                samples = frame.to_ndarray()
+                full_scale = 32_768.0 if samples.dtype == np.int16 else 1.0
+                sound.append(samples.mean(axis=0) / full_scale)
                 starts.append(float(frame.pts * frame.time_base))
                 rate = frame.sample_rate
     return np.array(pictures), times, np.concatenate(sound) if sound else np.zeros(0), (rate, starts[:1])
@@ -93,7 +95,7 @@ def test_an_mp4_has_every_frame_at_its_exact_time(tmp_path, renderer, fps):
     assert abs(ends[0] - ends[1]) <= 1 / fps
 
 
-@pytest.mark.parametrize("suffix", [".mp4", ".webm"])
+@pytest.mark.parametrize("suffix", [".mp4", ".webm", ".mov"])
 @pytest.mark.parametrize("rate", [16_000, 22_050, 24_000])
 def test_a_click_keeps_its_time(tmp_path, renderer, suffix, rate):
     path = tmp_path / f"a{suffix}"
@@ -138,6 +140,13 @@ def test_an_mp4_can_be_played_while_it_loads(tmp_path, renderer):
     write_clips(tmp_path / "a.mp4", [clip_of(0.3)], renderer)
     content = (tmp_path / "a.mp4").read_bytes()
     assert 0 < content.find(b"moov") < content.find(b"mdat")
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".mov"])
+def test_a_file_without_transparency_is_refused(tmp_path, transparent, suffix):
+    with pytest.raises(InputError, match=r"cannot be transparent; give \.webm, \.gif or a folder"):
+        write_clips(tmp_path / f"a{suffix}", [clip_of(0.3)], transparent)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_webm_keeps_the_coverage(tmp_path, transparent):
@@ -211,9 +220,9 @@ def test_progress_counts_every_frame(tmp_path, renderer):
     assert calls == [(i + 1, 15) for i in range(15)]
 
 
-@pytest.mark.parametrize("name", ["a.avi", "a.mov", "a.MP3", "a.mp4.bak"])
+@pytest.mark.parametrize("name", ["a.avi", "a.mkv", "a.MP3", "a.mp4.bak"])
 def test_unknown_suffixes_are_refused_with_the_known_ones(tmp_path, name):
-    with pytest.raises(InputError, match=r"unknown suffix.*\.mp4, \.webm, \.gif"):
+    with pytest.raises(InputError, match=r"unknown suffix.*\.mp4, \.webm, \.mov, \.gif"):
         check_output(tmp_path / name)
 
 
@@ -260,7 +269,7 @@ def test_clips_of_another_clock_are_refused(tmp_path, renderer):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["a.mp4", "a.webm", "a.gif", "pictures"])
+@pytest.mark.parametrize("name", ["a.mp4", "a.webm", "a.mov", "a.gif", "pictures"])
 @pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
 def test_an_interrupted_file_is_removed(tmp_path, renderer, name, error):
     def stop(done, _of):
@@ -280,7 +289,7 @@ def test_an_older_file_stays_when_the_new_one_fails(tmp_path, renderer):
     assert (tmp_path / "a.mp4").read_bytes() == b"older"
 
 
-@pytest.mark.parametrize("name", ["a.mp4", "a.webm", "a.gif", "pictures"])
+@pytest.mark.parametrize("name", ["a.mp4", "a.webm", "a.mov", "a.gif", "pictures"])
 def test_a_full_disk_is_reported_and_leaves_no_file(tmp_path, renderer, name):
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

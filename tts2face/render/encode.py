@@ -29,6 +29,7 @@ from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.temporary import Temporary
 from tts2face.types import Clip, Progress
 
+OPAQUE = frozenset({MP4, MOV})  # H.264 as players know it has no coverage
 _MOVIES = {MP4: MP4_MOVIE, WEBM: WEBM_MOVIE, MOV: MOV_MOVIE}
 N_SWATCHES = 6  # frames of the first clip from which the palette of a GIF is computed
 
@@ -52,7 +53,8 @@ class ClipWriter:
     Raises
     ------
     InputError
-        The suffix is unknown, the folder does not exist, clips differ in fps or sound rate, or no clip was added.
+        The suffix is unknown or has no transparency, the folder does not exist, clips differ in fps or sound rate, or
+        no clip was added.
     BackendError
         The disk is full or cannot be written.
 
@@ -71,6 +73,8 @@ class ClipWriter:
         on_progress: Progress | None = None,
     ) -> None:
         self.path, self._kind = check_output(path), output_kind(path)
+        if self._kind in OPAQUE and renderer.picture.is_transparent:
+            raise InputError(f"{self.path} cannot be transparent; give .webm, .gif or a folder, or another background")
         self._renderer = renderer
         self._on_progress = on_progress
         self._n_frames = self._n_added = self._n_samples = 0
