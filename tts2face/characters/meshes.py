@@ -80,6 +80,8 @@ class _Primitive:
         ]
         places = places + self._default_shape(targets, mesh, len(places))
         matrices, bones = self._skinning(tree, len(places))
+        if np.median(np.linalg.det(matrices[..., :3, :3])) < 0:  # a mirrored mesh
+            triangles = triangles[:, ::-1]
         morphs = {
             Target(mesh, number): linear(moved, matrices).astype(np.float32)
             for number, moved in enumerate(targets)
