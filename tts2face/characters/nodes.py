@@ -104,7 +104,8 @@ def find_bones(root: Fields, tree: NodeTree) -> dict[str, int]:
     joints = {joint for skin in root.children("skins") for joint in skin.indices("joints", len(tree.names), "nodes")}
     for number in sorted(tree.world, key=lambda number: (number not in joints, number)):
         for bone, pattern in _BONE_NAMES.items():
-            if bone not in found and pattern.search(tree.names[number]):
+            is_possible = number in joints or bone not in BONES[:2]  # a group named head is not its pivot
+            if is_possible and bone not in found and pattern.search(tree.names[number]):
                 found[bone] = number
     return {bone: number for bone, number in found.items() if number in tree.world}
 

@@ -1,0 +1,356 @@
+"""Import of a character of another program as a face: ``tts2face face import``."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError, InputError
+from tts2face.characters.character import Character
+from tts2face.characters.eyeballs import mark_eyeballs
+from tts2face.characters.face_surface import Placement, add_gaze_shapes, build_face, is_plain, unwrap
+from tts2face.characters.gltf import SUFFIXES
+from tts2face.characters.gltf_character import read_gltf_character
+from tts2face.characters.head_mesh import HeadMesh, build_head_mesh, moved_box, source_weights
+from tts2face.characters.landmark_table import read_landmark_table
+from tts2face.characters.landmark_tracking import SKIN, LocatedLandmarks, frontal_score, locate_landmarks, part_triangles
+from tts2face.characters.obj_folder import read_obj_folder
+from tts2face.characters.shape_mapping import ShapeMapping, read_mapping
+from tts2face.characters.shape_names import ARKIT_SHAPES, VISEME_PREFIX, guess_mapping
+from tts2face.characters.surface_points import nearest_points
+from tts2face.face.expressions import add_expression_shapes
+from tts2face.face.eyelids import BLINK_SHAPES, WIDE_SHAPES, build_eyelid_model
+from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.lip_constraints import build_lip_constraints
+from tts2face.face.shape_transfer import default_head, eye_distance
+from tts2face.models.face import Face
+from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_MESH_LANDMARKS
+from tts2face.video.track import MIN_SCORE
+
+FRONTS = {"+z": 0.0, "-z": 180.0, "+x": -90.0, "-x": 90.0}  # axis that a character looks along -> turn, degrees
+PROVISIONAL_HEIGHT_MM = 150.0  # of the moved part of a face, until the distance of its eyes is known
+TRUE_EYE_DISTANCES_MM = (60.0, 140.0)  # outer corners; other sizes are scaled to the default head's
+MIN_GAP_MM = 3.0  # by which the lips must part at weight 1 of some shape
+METADATA_KEY = "character"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImportReport:
+    """What an import found and did.
+
+    Parameters
+    ----------
+    mapping
+        Morph targets or expressions that each shape of the face uses.
+    unused
+        Names of the character that no shape uses.
+    missing
+        ARKit shapes that the character lacks -> what replaces them.
+    landmarks
+        Position (3,) of each landmark in the units and axes of the file.
+    score
+        Mean score of the face tracker, 0 to 1; None for landmarks of a table.
+    n_eyeballs
+        Eyeballs that gaze turns.
+    notes
+        What was changed or left out, in sentences.
+    licence
+        What the file says about its licence and author.
+    """
+
+    mapping: ShapeMapping
+    unused: tuple[str, ...]
+    missing: Mapping[str, str]
+    landmarks: Mapping[int, NDArray[np.float64]]
+    score: float | None
+    n_eyeballs: int
+    notes: tuple[str, ...]
+    licence: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImportedFace:
+    """A face made from a character, and the report of its import."""
+
+    face: Face
+    report: ImportReport
+
+
+def read_character(path: Path) -> Character:
+    """Character of a .glb, .gltf or .vrm file, or of a folder of .obj files.
+
+    Raises
+    ------
+    InputError
+        The path does not exist or has another suffix.
+    DataError
+        A file is damaged, too large or not supported.
+    """
+    if path.is_dir():
+        return read_obj_folder(path)
+    if not path.exists():
+        raise InputError(f"there is no character {path}; check the path")
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"a character is a {', '.join(SUFFIXES)} file or a folder of .obj files, not {path.name}")
+    return read_gltf_character(path)
+
+
+def propose_mapping(character: Character) -> ShapeMapping:
+    """Mapping guessed from the names of a character's morph targets and expressions."""
+    return guess_mapping([*character.target_names.values(), *character.expressions])
+
+
+def import_face(
+    path: str | Path,
+    *,
+    mapping: str | Path | ShapeMapping | None = None,
+    landmarks: str | Path | None = None,
+    front: str | None = None,
+    model: Path | None = None,
+) -> ImportedFace:
+    """Make a face of a character's file.
+
+    Parameters
+    ----------
+    path
+        .glb, .gltf or .vrm file, or a folder with ``neutral.obj`` and one .obj file for each shape.
+    mapping
+        Mapping or its file (.tsv or .toml), which replaces the guess for the shapes that it names.
+    landmarks
+        Table of landmark positions (.tsv); without it the face is tracked in rendered views (extra ``[capture]``).
+    front
+        Axis that the character looks along: ``+z``, ``-z``, ``+x`` or ``-x``; by default the one where a face is
+        recognised.
+    model
+        Path of ``face_landmarker.task``.
+
+    Raises
+    ------
+    InputError
+        A path does not exist, or an option is unknown.
+    DataError
+        A file is damaged, or the character has no shape that moves its mouth, or no face is recognised.
+    BackendError
+        The face tracker is not installed.
+
+    Examples
+    --------
+    >>> imported = import_face("character.glb")  # doctest: +SKIP
+    >>> sorted(imported.report.missing)  # doctest: +SKIP
+    ['tongueOut']
+    """
+    path = Path(path)
+    if front is not None and front not in FRONTS:
+        raise InputError(f"there is no front {front!r}; choose {', '.join(FRONTS)}")
+    character = read_character(path)
+    chosen = _complete_mapping(character, mapping)
+    table = None if landmarks is None else read_landmark_table(Path(landmarks))
+    head = _front_head(character, chosen, front, (table is None, model))
+    low, high = moved_box(head)
+    provisional = Placement((low + high) / 2, PROVISIONAL_HEIGHT_MM / float(high[1] - low[1]))
+    drawn = build_face(head, character, provisional)
+    if table is None:
+        located = locate_landmarks(drawn, model)
+    else:
+        located = _project_table(table, head, drawn)
+    face = _place(_with_landmarks(drawn, located), character, head, provisional)
+    face, notes = _drop_unsuited_shapes(face)
+    face = replace(face, metadata=_metadata(path, character, chosen, head))
+    build_eyelid_model(add_expression_shapes(face))
+    positions = located.points.places(drawn.vertices) / provisional.scale + provisional.origin
+    places = dict(zip(located.numbers.tolist(), positions @ head.turn, strict=True))
+    report = ImportReport(
+        mapping={name: sources for name, sources in chosen.items() if name in face.shape_names},
+        unused=_unused_names(character, chosen),
+        missing=_missing_shapes(face),
+        landmarks=places,
+        score=None if table is not None else located.score,
+        n_eyeballs=len(face.eyes),
+        notes=(*character.notes, *_colour_notes(character, head), *notes),
+        licence=character.licence,
+    )
+    return ImportedFace(face, report)
+
+
+def _complete_mapping(character: Character, given: str | Path | ShapeMapping | None) -> ShapeMapping:
+    """The guessed mapping with the given rows in its place, without shapes that have no source."""
+    mapping = dict(propose_mapping(character))
+    if given is not None:
+        rows = given if isinstance(given, Mapping) else read_mapping(Path(given))
+        known = {*character.target_names.values(), *character.expressions}
+        unknown = [source.name for sources in rows.values() for source in sources if source.name not in known]
+        if unknown:
+            raise InputError(f"the character has no shape {unknown[0]!r}; it has: {_some(sorted(known))}")
+        mapping |= rows
+    mapping = {
+        name: sources
+        for name, sources in mapping.items()
+        if any(source_weights(character, source) for source in sources)
+    }
+    if not any(name.startswith(("jaw", "mouth")) for name in mapping):
+        names = sorted({*character.target_names.values(), *character.expressions})
+        raise DataError(
+            "the character has no shape of a known name that moves its mouth, so speech cannot move it; name its shapes "
+            f"in a file and give it as --mapping; it has: {_some(names)}"
+        )
+    return mapping
+
+
+def _some(names: Sequence[str]) -> str:
+    shown = [name[:40] for name in names[:12]]
+    return ", ".join(shown) + (f" and {len(names) - 12} more" if len(names) > 12 else "") if names else "no shapes"
+
+
+def _front_head(
+    character: Character, mapping: ShapeMapping, front: str | None, tracking: tuple[bool, Path | None]
+) -> HeadMesh:
+    """Head turned to the front: by the given axis, otherwise by the first one where the tracker sees a face."""
+    is_tracked, model = tracking
+    likely = ["-z", "+z"] if character.faces_back else ["+z", "-z"]
+    axes = [front] if front is not None else [*likely, "+x", "-x"]
+    heads: list[tuple[float, HeadMesh]] = []
+    for axis in axes if is_tracked else axes[:1]:
+        head = build_head_mesh(character, mapping, FRONTS[axis])
+        head = add_gaze_shapes(mark_eyeballs(unwrap(head, character), character))
+        if len(axes) == 1 or not is_tracked:
+            return head
+        low, high = moved_box(head)
+        placement = Placement((low + high) / 2, PROVISIONAL_HEIGHT_MM / float(high[1] - low[1]))
+        heads.append((frontal_score(build_face(head, character, placement), model), head))
+        if heads[-1][0] >= MIN_SCORE:
+            break
+    return max(heads, key=lambda scored: scored[0])[1]
+
+
+def _project_table(table: Mapping[int, NDArray[np.float64]], head: HeadMesh, drawn: Face) -> LocatedLandmarks:
+    numbers = np.array(sorted(table), np.int64)
+    places = np.stack([table[int(number)] for number in numbers]) @ head.turn.T
+    is_skin = numbers < N_MESH_LANDMARKS
+    skin = part_triangles(drawn, SKIN)
+    triangles = np.asarray(head.triangles if not len(skin) else skin, np.int64)
+    points = nearest_points(places, head.vertices, triangles)
+    if not is_skin.all():
+        irises = nearest_points(places[~is_skin], head.vertices, drawn.triangles.astype(np.int64))
+        points.vertices[~is_skin], points.weights[~is_skin] = irises.vertices, irises.weights
+    return LocatedLandmarks(numbers, points, 1.0)
+
+
+def _with_landmarks(face: Face, located: LocatedLandmarks) -> Face:
+    return replace(
+        face,
+        landmarks=located.numbers.astype(np.int32),
+        landmark_vertices=located.points.vertices.astype(np.int32),
+        landmark_weights=located.points.weights.astype(np.float32),
+    )
+
+
+def _place(face: Face, character: Character, head: HeadMesh, provisional: Placement) -> Face:
+    """Face in mm with its origin between the eyes and the pivot of its head.
+
+    Raises
+    ------
+    DataError
+        The landmarks of the eye corners are missing.
+    """
+    model = default_head()
+    distance = eye_distance(face)
+    metres = distance / provisional.scale * 1000.0
+    low, high = TRUE_EYE_DISTANCES_MM
+    scale = (metres if low <= metres <= high else eye_distance(model)) / distance
+    if len(face.eyes) == 2:
+        origin = np.mean([eye.centre for eye in face.eyes], axis=0)
+    else:
+        places = scatter_landmarks(face, landmark_positions(face))
+        corners = scatter_landmarks(model, landmark_positions(model))[[EYE_OUTER_LEFT, EYE_OUTER_RIGHT]]
+        origin = places[[EYE_OUTER_LEFT, EYE_OUTER_RIGHT]].mean(axis=0) - corners.mean(axis=0) / scale
+    pivot = model.pivot * (scale * distance / eye_distance(model))
+    if "head" in character.bone_places:
+        bone = provisional.millimetres((head.turn @ character.bone_places["head"])[None])[0]
+        inside = (bone > face.vertices.min(axis=0)) & (bone < face.vertices.max(axis=0))
+        pivot = (bone - origin) * scale if inside.all() else pivot
+    factor = np.float32(scale)
+    return replace(
+        face,
+        vertices=((face.vertices - origin) * scale).astype(np.float32),
+        shapes=face.shapes * factor,
+        eyes=tuple(replace(eye, centre=((eye.centre - origin) * scale).astype(np.float32)) for eye in face.eyes),
+        pivot=np.asarray(pivot, np.float32),
+    )
+
+
+def _drop_unsuited_shapes(face: Face) -> tuple[Face, list[str]]:
+    """Face without blinks that do not close the eyes and wide eyes that do not open them, and notes about them.
+
+    Raises
+    ------
+    DataError
+        The lips have no landmarks, or no shape parts them.
+    """
+    mouth = build_lip_constraints(face)
+    widest = float(mouth.gaps[:, mouth.moving].max(initial=0.0)) if len(mouth.moving) else 0.0
+    if widest < MIN_GAP_MM:
+        raise DataError(
+            f"no shape parts the character's lips by more than {widest:.1f} mm; check the landmarks with --preview, and "
+            "the names of the shapes"
+        )
+    complete = add_expression_shapes(face)
+    motion = scatter_landmarks(complete, landmark_motion(complete, np.arange(len(complete.shape_names))))[:, 1]
+    pairs = {"Left": ((386, 385), (374, 380)), "Right": ((159, 158), (145, 153))}
+    dropped = []
+    for name in (*BLINK_SHAPES, *WIDE_SHAPES):
+        upper, lower = pairs["Left" if name.endswith("Left") else "Right"]
+        change = float((motion[list(upper)] - motion[list(lower)]).mean(axis=0)[complete.shape_names.index(name)])
+        if name in face.shape_names and not (change < 0 if name in BLINK_SHAPES else change > 0):
+            dropped.append(name)
+    kept = np.array([name not in dropped for name in face.shape_names])
+    notes = [f"{name} does not move the lids at their landmarks and is replaced" for name in dropped]
+    names = tuple(name for name in face.shape_names if name not in dropped)
+    return replace(face, shape_names=names, shapes=face.shapes[kept], limits=face.limits[kept]), notes
+
+
+def _missing_shapes(face: Face) -> dict[str, str]:
+    """ARKit shapes that a face lacks, and what replaces each of them."""
+    speaks_by_visemes = any(name.startswith(VISEME_PREFIX) for name in face.shape_names)
+    moved_by_gestures = {*add_expression_shapes(face).shape_names} - {*face.shape_names}
+    missing = {}
+    for name in ARKIT_SHAPES:
+        if name in face.shape_names:
+            continue
+        if name in moved_by_gestures:
+            missing[name] = "landmarks moved as on the default head, in expressions and gestures"
+        elif name.startswith(("jaw", "mouth")):
+            missing[name] = "the character's own visemes" if speaks_by_visemes else "the other shapes of its mouth"
+        else:
+            missing[name] = "nothing"
+    return missing
+
+
+def _unused_names(character: Character, mapping: ShapeMapping) -> tuple[str, ...]:
+    used = {source.name for sources in mapping.values() for source in sources}
+    names = dict.fromkeys([*character.target_names.values(), *character.expressions])
+    return tuple(name for name in names if name not in used)
+
+
+def _colour_notes(character: Character, head: HeadMesh) -> list[str]:
+    used = {character.pieces[number].material for number in np.unique(head.piece_of).tolist()}
+    names = sorted({character.materials[number].name for number in used if is_plain(character.materials[number])})
+    return [f"the material {name[:60]!r} is white without an image; plain colours replace it" for name in names]
+
+
+def _metadata(path: Path, character: Character, mapping: ShapeMapping, head: HeadMesh) -> dict[str, Any]:
+    """Provenance of the face, and what is needed to write its animation onto the character's file."""
+    binds = {
+        name: [[source.name, source.gain, source.side] for source in sources] for name, sources in mapping.items()
+    }
+    digest = "" if path.is_dir() else sha256(path.read_bytes()).hexdigest()
+    front = float(np.degrees(np.arctan2(head.turn[0, 2], head.turn[0, 0])))
+    return {
+        "name": path.stem,
+        "licence": character.licence or "not stated by the character's file",
+        "attribution": "",
+        METADATA_KEY: {"file": str(path.resolve()), "sha256": digest, "yaw_deg": round(front, 3), "mapping": binds},
+    }
