@@ -9,6 +9,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 import cli.gestures  # noqa: F401 - adds its command to `corpus`
 from cli.corpus import corpus
+from cli.face import face as face_commands
 from cli.flags import add_option_flags, check_options, options_from_flags, switch
 from cli.lists import LISTS
 from cli.mimic import mimic
@@ -43,6 +44,7 @@ app = App(
 app.command(mimic)
 app.command(corpus)
 app.command(report)
+app.command(face_commands)
 for list_command in LISTS:
     app.command(list_command)
 

@@ -197,6 +197,3 @@ def add_gaze_shapes(head: HeadMesh) -> HeadMesh:
 def is_plain(material: Material) -> bool:
     """Whether a material is white without an image, so that `PLAIN` colours replace it."""
     return material.image is None and min(material.colour[:3]) > UNPAINTED and material.alpha_mode == OPAQUE
-
-
-

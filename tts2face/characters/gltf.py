@@ -157,9 +157,7 @@ class GltfFile:
         if int(rows.max()) >= len(values):
             raise DataError(f"{fields.place}: index {rows.max()} is beyond {len(values)} elements; export it again")
         shape = (count, values.shape[1])
-        values[rows[:, 0]] = self._elements(
-            views[1], elements.integer("byteOffset", 0), shape, values.dtype.type
-        )
+        values[rows[:, 0]] = self._elements(views[1], elements.integer("byteOffset", 0), shape, values.dtype.type)
 
     def _slice(self, fields: Fields) -> NDArray[np.uint8]:
         """Bytes of the part of a buffer that a buffer view or a compression extension names."""
@@ -167,7 +165,7 @@ class GltfFile:
         if number is None:
             raise fields.wrong("buffer", "the index of a buffer", None)
         offset, length = fields.integer("byteOffset", 0), fields.integer("byteLength", low=1)
-        content = self._buffer(number)
+        content = self.buffer(number)
         if offset + length > len(content):
             raise DataError(f"{fields.place}: reaches to byte {offset + length} of {len(content)}; export it again")
         return content[offset : offset + length]
@@ -179,7 +177,8 @@ class GltfFile:
         content = decode_buffer(self._slice(fields), fields.text("mode"), count, stride)
         return apply_exponential_filter(content) if kept == EXPONENTIAL else content
 
-    def _buffer(self, number: int) -> NDArray[np.uint8]:
+    def buffer(self, number: int) -> NDArray[np.uint8]:
+        """Bytes of a buffer, from the binary chunk, a data URI or a file beside this one."""
         if number not in self._buffers:
             fields = self.root.children("buffers")[number]
             length = fields.integer("byteLength", low=1)

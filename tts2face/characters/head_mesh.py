@@ -136,9 +136,7 @@ def divide_sides(head: HeadMesh, mapping: ShapeMapping, blend: float) -> HeadMes
 def _join(character: Character, mapping: ShapeMapping, turn: FloatArray) -> HeadMesh:
     pieces = character.pieces
     starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
-    weights = {
-        shape: [source_weights(character, source) for source in sources] for shape, sources in mapping.items()
-    }
+    weights = {shape: [source_weights(character, source) for source in sources] for shape, sources in mapping.items()}
     shapes: dict[str, NDArray[np.float32]] = {}
     for shape, sources in weights.items():
         moved = [_displacement(piece, sources) for piece in pieces]

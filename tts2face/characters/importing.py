@@ -17,7 +17,13 @@ from tts2face.characters.gltf import SUFFIXES
 from tts2face.characters.gltf_character import read_gltf_character
 from tts2face.characters.head_mesh import HeadMesh, build_head_mesh, moved_box, source_weights
 from tts2face.characters.landmark_table import read_landmark_table
-from tts2face.characters.landmark_tracking import SKIN, LocatedLandmarks, frontal_score, locate_landmarks, part_triangles
+from tts2face.characters.landmark_tracking import (
+    SKIN,
+    LocatedLandmarks,
+    frontal_score,
+    locate_landmarks,
+    part_triangles,
+)
 from tts2face.characters.obj_folder import read_obj_folder
 from tts2face.characters.shape_mapping import ShapeMapping, read_mapping
 from tts2face.characters.shape_names import ARKIT_SHAPES, VISEME_PREFIX, guess_mapping
@@ -159,7 +165,7 @@ def import_face(
         located = _project_table(table, head, drawn)
     face = _place(_with_landmarks(drawn, located), character, head, provisional)
     face, notes = _drop_unsuited_shapes(face)
-    face = replace(face, metadata=_metadata(path, character, chosen, head))
+    face = replace(face, metadata=_metadata(path, character, chosen, head, face))
     build_eyelid_model(add_expression_shapes(face))
     positions = located.points.places(drawn.vertices) / provisional.scale + provisional.origin
     places = dict(zip(located.numbers.tolist(), positions @ head.turn, strict=True))
@@ -341,16 +347,24 @@ def _colour_notes(character: Character, head: HeadMesh) -> list[str]:
     return [f"the material {name[:60]!r} is white without an image; plain colours replace it" for name in names]
 
 
-def _metadata(path: Path, character: Character, mapping: ShapeMapping, head: HeadMesh) -> dict[str, Any]:
+def _metadata(path: Path, character: Character, mapping: ShapeMapping, head: HeadMesh, face: Face) -> dict[str, Any]:
     """Provenance of the face, and what is needed to write its animation onto the character's file."""
-    binds = {
-        name: [[source.name, source.gain, source.side] for source in sources] for name, sources in mapping.items()
-    }
+    scale = float(np.ptp(face.vertices[:, 1]) / np.ptp(head.vertices[:, 1]))
+    origin = head.vertices[0] - face.vertices[0].astype(np.float64) / scale
+    binds = {name: [[source.name, source.gain, source.side] for source in sources] for name, sources in mapping.items()}
     digest = "" if path.is_dir() else sha256(path.read_bytes()).hexdigest()
     front = float(np.degrees(np.arctan2(head.turn[0, 2], head.turn[0, 0])))
+    source = {
+        "file": str(path.resolve()),
+        "sha256": digest,
+        "yaw_deg": round(front, 3),
+        "scale": scale,
+        "origin": origin.tolist(),
+        "mapping": binds,
+    }
     return {
         "name": path.stem,
         "licence": character.licence or "not stated by the character's file",
         "attribution": "",
-        METADATA_KEY: {"file": str(path.resolve()), "sha256": digest, "yaw_deg": round(front, 3), "mapping": binds},
+        METADATA_KEY: source,
     }

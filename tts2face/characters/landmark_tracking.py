@@ -153,9 +153,7 @@ def _medoids(readings: Sequence[tuple[SurfacePoints, FloatArray]], vertices: NDA
 
 
 def _joined(one: SurfacePoints, other: SurfacePoints) -> SurfacePoints:
-    return SurfacePoints(
-        np.concatenate([one.vertices, other.vertices]), np.concatenate([one.weights, other.weights])
-    )
+    return SurfacePoints(np.concatenate([one.vertices, other.vertices]), np.concatenate([one.weights, other.weights]))
 
 
 def _opened_weights(face: Face) -> list[NDArray[np.float32]]:

@@ -75,9 +75,7 @@ class _Primitive:
         if mode < TRIANGLES or places is None:
             return None
         triangles = self._triangles(mode, len(places))
-        targets = [
-            self._accessor(target, "POSITION", (3,), len(places)) for target in self._fields.children("targets")
-        ]
+        targets = [self._accessor(target, "POSITION", (3,), len(places)) for target in self._fields.children("targets")]
         places = places + self._default_shape(targets, mesh, len(places))
         matrices, bones = self._skinning(tree, len(places))
         if np.median(np.linalg.det(matrices[..., :3, :3])) < 0:  # a mirrored mesh
@@ -168,7 +166,9 @@ class _Primitive:
         if number is not None:
             values = self._file.accessor(number).astype(np.float64)
             if values.shape[1] != 16 or len(values) < len(bones):
-                raise DataError(f"{skin.place}: has {len(values)} bind matrices for {len(bones)} bones; export it again")
+                raise DataError(
+                    f"{skin.place}: has {len(values)} bind matrices for {len(bones)} bones; export it again"
+                )
             inverse = values[: len(bones)].reshape(-1, 4, 4).transpose(0, 2, 1)
         missing = [bone for bone in bones if int(bone) not in tree.world]
         if missing:

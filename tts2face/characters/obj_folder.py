@@ -40,7 +40,9 @@ def read_obj_folder(folder: Path) -> Character:
     for target, path in zip(names, shapes, strict=True):
         places = read_vertices(path)
         if len(places) != len(mesh.vertices):
-            raise DataError(f"{path} has {len(places)} vertices, but {NEUTRAL} has {len(mesh.vertices)}; export it again")
+            raise DataError(
+                f"{path} has {len(places)} vertices, but {NEUTRAL} has {len(mesh.vertices)}; export it again"
+            )
         moved[target] = (places - mesh.vertices).astype(np.float32)
     materials = [_material(name, mesh.image_of(name)) for name in mesh.materials]
     pieces = tuple(mesh.piece(number, moved) for number in range(len(materials)))
@@ -142,7 +144,9 @@ class _ObjFile:
             vertex = int(parts[0])
             coordinate = int(parts[1]) if len(parts) > 1 and parts[1] else 0
         except ValueError as error:
-            raise DataError(f"{self._path}: the corner {cell[:40]!r} of a face is not a number; export it again") from error
+            raise DataError(
+                f"{self._path}: the corner {cell[:40]!r} of a face is not a number; export it again"
+            ) from error
         vertex = vertex - 1 if vertex > 0 else len(self.vertices) + vertex
         coordinate = coordinate - 1 if coordinate > 0 else n_coordinates + coordinate if coordinate else -1
         if not 0 <= vertex < len(self.vertices) or not -1 <= coordinate:
