@@ -241,8 +241,8 @@ def _quaternions(rotations: FloatArray) -> FloatArray:
 
 
 def _orthonormal(matrix: FloatArray) -> FloatArray:
-    scaled: FloatArray = matrix[:3, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
-    return scaled
+    scaled = matrix[:3, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
+    return np.asarray(scaled, np.float64)
 
 
 def _character_metadata(face: Face) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import binascii
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
@@ -25,7 +26,14 @@ MAX_COUNT = 30_000_000  # elements of an accessor: 52 shapes of 50,000 vertices 
 MAX_STRIDE = 256
 GLB_MAGIC, JSON_CHUNK, BINARY_CHUNK = b"glTF", b"JSON", b"BIN\0"
 SUFFIXES = (".glb", ".gltf", ".vrm")
-COMPONENTS = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
+COMPONENTS: dict[int, type[np.integer[Any] | np.floating[Any]]] = {
+    5120: np.int8,
+    5121: np.uint8,
+    5122: np.int16,
+    5123: np.uint16,
+    5125: np.uint32,
+    5126: np.float32,
+}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 DRACO = "KHR_draco_mesh_compression"
@@ -124,14 +132,14 @@ class GltfFile:
         if self._decoded_bytes > 4 * MAX_DECODED_BYTES:
             raise DataError(f"{fields.place}: the file unpacks to more than 4 GB; reduce its meshes and shapes")
 
-    def _component(self, fields: Fields) -> type[np.generic]:
+    def _component(self, fields: Fields) -> type[np.integer[Any] | np.floating[Any]]:
         number = fields.integer("componentType")
         if number not in COMPONENTS:
             raise fields.wrong("componentType", "one of " + ", ".join(map(str, COMPONENTS)), number)
         return COMPONENTS[number]
 
     def _elements(
-        self, view: int, offset: int, shape: tuple[int, int], component: type[np.generic]
+        self, view: int, offset: int, shape: tuple[int, int], component: type[np.integer[Any] | np.floating[Any]]
     ) -> NDArray[np.generic]:
         """Elements `shape` of a buffer view from a byte offset on; not copied."""
         fields = self.root.children("bufferViews")[view]
@@ -261,5 +269,5 @@ def _as_numbers(values: NDArray[np.generic], fields: Fields) -> NDArray[np.float
         return values.astype(np.float64)
     if not fields.flag("normalized"):
         return values.astype(np.int64)
-    scaled: FloatArray = values.astype(np.float64) / np.iinfo(values.dtype).max
+    scaled: FloatArray = values.astype(np.float64) / float(np.iinfo(values.dtype.str).max)
     return np.maximum(scaled, -1.0)

@@ -133,5 +133,5 @@ def _texture_transform(texture: Fields) -> NDArray[np.float64]:
     scale = np.array(fields.numbers("scale", 2, (1.0, 1.0)))
     cos, sin = np.cos(turn), np.sin(turn)
     placed[:, :2] = np.array([[cos, sin], [-sin, cos]]) * scale
-    placed[:, 2] = fields.numbers("offset", 2, (0.0, 0.0))  # type: ignore[assignment]
+    placed[:, 2] = fields.numbers("offset", 2, (0.0, 0.0))
     return placed

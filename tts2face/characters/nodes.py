@@ -81,7 +81,7 @@ def local_matrix(node: Fields) -> FloatArray:
     turn = node.numbers("rotation", 4, (0.0, 0.0, 0.0, 1.0))
     placed = np.eye(4)
     placed[:3, :3] = quaternion_matrix(np.array(turn)) * np.array(scale)
-    placed[:3, 3] = shift  # type: ignore[assignment]
+    placed[:3, 3] = shift
     return placed
 
 

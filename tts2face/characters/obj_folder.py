@@ -1,5 +1,6 @@
 """Reading of a character from a folder of .obj files: ``neutral.obj`` and one file for each shape."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -134,7 +135,7 @@ class _ObjFile:
         corners = [self._corner(cell, n_coordinates) for cell in cells]
         if len(corners) < 3:
             raise DataError(f"{self._path}: a face has {len(corners)} corners; export the mesh again")
-        for second, third in zip(corners[1:-1], corners[2:], strict=True):
+        for second, third in pairwise(corners[1:]):
             self._corners += [corners[0], second, third]
             self._of.append(self._current)
 
@@ -149,7 +150,7 @@ class _ObjFile:
             ) from error
         vertex = vertex - 1 if vertex > 0 else len(self.vertices) + vertex
         coordinate = coordinate - 1 if coordinate > 0 else n_coordinates + coordinate if coordinate else -1
-        if not 0 <= vertex < len(self.vertices) or not -1 <= coordinate:
+        if not 0 <= vertex < len(self.vertices) or coordinate < -1:
             raise DataError(f"{self._path}: a face uses vertex {vertex + 1} of {len(self.vertices)}; export it again")
         return vertex, coordinate
 

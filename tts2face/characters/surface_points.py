@@ -14,6 +14,8 @@ IntArray = NDArray[np.int64]
 # A ray that passes a vertex at up to 3 mm, at least 12 mm before its hit, hits the vertex: it passed an outline; at up
 # to 10 mm where the hit is 30 mm behind, as the neck is behind the chin.
 GRAZES = ((3.0, 12.0), (10.0, 30.0))
+MAX_VERTEX_MM = 2.5  # distance from the ray up to which the vertex of an outline is taken as it is
+INWARD_STEPS = np.linspace(0.01, 0.3, 30)  # shares of the way to the middle of all pixels at which a surface is sought
 N_NEAREST = 12  # vertices whose triangles are searched for the nearest point
 
 
@@ -35,41 +37,85 @@ def points_under_pixels(
 ) -> tuple[SurfacePoints, FloatArray]:
     """Points of a mesh that a camera sees at pixels (N, 2), and cosines (N,) between the rays and the surface normals.
 
-    Triangles that face away are ignored. A ray that misses the mesh, or that passes close to an outline and hits a
-    surface far behind it, gives the nearest vertex in the picture and 1; a ray that misses everything 0.
+    Triangles that face away are ignored. Where a ray misses the mesh, or passes close to an outline and hits a surface
+    far behind it, the point is the nearest vertex in the picture if it is near, otherwise the outline in the direction
+    of the middle of all pixels; its cosine is 1 for a grazed outline, 0 for a miss.
     """
-    there = positions @ camera.view[:, :3].T + camera.view[:, 3]
-    focal, middle_x, middle_y, _ = camera.lens
-    flat = there[:, :2] / np.maximum(there[:, 2:], 1e-6) * focal + [middle_x, middle_y]
-    a, b, c = (flat[triangles[:, corner]] for corner in range(3))
-    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    facing = np.flatnonzero(area < -1e-9)  # y points down, so counter-clockwise triangles have negative area
-    corners = np.stack([a[facing], b[facing], c[facing]], axis=1)
-    low, high, depth = corners.min(axis=1), corners.max(axis=1), there[triangles[facing], 2]
-    seen = np.unique(triangles[facing])
+    projection = _Projection(positions, triangles, camera)
     points = SurfacePoints(np.zeros((len(pixels), 3), np.int64), np.zeros((len(pixels), 3)))
     cosines = np.zeros(len(pixels))
+    middle = pixels.mean(axis=0)
     for number, pixel in enumerate(pixels):
-        under = np.flatnonzero(((low <= pixel) & (pixel <= high)).all(axis=1))
-        mixed = _barycentric(pixel, corners[under])
+        hit = projection.hit(pixel)
+        vertex = projection.outline_vertex(pixel, np.inf if hit is None else hit.depth)
+        cosines[number] = 0.0 if hit is None else 1.0 if vertex is not None else hit.facing
+        if vertex is not None and projection.distance(vertex, pixel) > MAX_VERTEX_MM:
+            steps = (projection.hit(pixel + share * (middle - pixel)) for share in INWARD_STEPS)
+            depth = projection.depth(vertex) + GRAZES[0][1]
+            hit = next((inner for inner in steps if inner is not None and inner.depth < depth), None)
+            vertex = vertex if hit is None else None
+        if vertex is not None:
+            points.vertices[number], points.weights[number] = vertex, (1.0, 0.0, 0.0)
+        elif hit is not None:
+            points.vertices[number], points.weights[number] = hit.corners, hit.weights
+    return points, cosines
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Hit:
+    """Point of a triangle under a pixel: vertices (3,), barycentric weights (3,), depth in mm, cosine to the ray."""
+
+    corners: IntArray
+    weights: FloatArray
+    depth: float
+    facing: float
+
+
+class _Projection:
+    """Mesh projected into a picture."""
+
+    def __init__(self, positions: FloatArray, triangles: IntArray, camera: CameraMatrices) -> None:
+        self._there = positions @ camera.view[:, :3].T + camera.view[:, 3]
+        focal, middle_x, middle_y, _ = camera.lens
+        self._focal = float(focal)
+        self._flat = self._there[:, :2] / np.maximum(self._there[:, 2:], 1e-6) * focal + [middle_x, middle_y]
+        a, b, c = (self._flat[triangles[:, corner]] for corner in range(3))
+        area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+        is_facing = area < -1e-9  # y points down, so counter-clockwise triangles have negative area
+        self._triangles = triangles[is_facing] if is_facing.any() else triangles
+        self._corners = self._flat[self._triangles]
+        self._low, self._high = self._corners.min(axis=1), self._corners.max(axis=1)
+        self._seen = np.unique(self._triangles)
+
+    def hit(self, pixel: FloatArray) -> _Hit | None:
+        """Nearest triangle under a pixel."""
+        under = np.flatnonzero(((self._low <= pixel) & (pixel <= self._high)).all(axis=1))
+        mixed = _barycentric(pixel, self._corners[under])
         inside = (mixed >= -1e-6).all(axis=1)
         hits, mixed = under[inside], mixed[inside]
-        near = int((mixed * depth[hits]).sum(axis=1).argmin()) if len(hits) else -1
-        hit_depth = float((mixed[near] * depth[hits[near]]).sum()) if len(hits) else np.inf
-        off = np.linalg.norm(flat[seen] - pixel, axis=1)
-        ahead = hit_depth - there[seen, 2]
+        if not len(hits):
+            return None
+        depths = (mixed * self._there[self._triangles[hits], 2]).sum(axis=1)
+        near = int(depths.argmin())
+        corners = self._triangles[hits[near]]
+        return _Hit(corners, mixed[near], float(depths[near]), _facing(self._there[corners]))
+
+    def outline_vertex(self, pixel: FloatArray, depth: float) -> int | None:
+        """Vertex of an outline that a ray with a hit at a depth (infinite without one) passes; None if it does not."""
+        off = np.linalg.norm(self._flat[self._seen] - pixel, axis=1)
+        ahead = depth - self._there[self._seen, 2]
         grazed = np.isinf(ahead)
         for reach, depth_mm in GRAZES:
-            grazed |= (ahead >= depth_mm) & (off * there[seen, 2] < reach * focal)
-        if grazed.any():
-            vertex = int(np.where(grazed, off, np.inf).argmin())
-            points.vertices[number], points.weights[number] = seen[vertex], (1.0, 0.0, 0.0)
-            cosines[number] = float(len(hits) > 0)
-        elif len(hits):
-            corner = triangles[facing[hits[near]]]
-            points.vertices[number], points.weights[number] = corner, mixed[near]
-            cosines[number] = _facing(there[corner])
-    return points, cosines
+            grazed |= (ahead >= depth_mm) & (off * self._there[self._seen, 2] < reach * self._focal)
+        return int(self._seen[np.where(grazed, off, np.inf).argmin()]) if grazed.any() else None
+
+    def distance(self, vertex: int, pixel: FloatArray) -> float:
+        """Distance in mm, across the line of sight, of a vertex from a pixel."""
+        return float(np.linalg.norm(self._flat[vertex] - pixel) * self.depth(vertex) / self._focal)
+
+    def depth(self, vertex: int) -> float:
+        """Depth of a vertex, mm."""
+        return float(self._there[vertex, 2])
 
 
 def nearest_points(places: FloatArray, positions: FloatArray, triangles: IntArray) -> SurfacePoints:
