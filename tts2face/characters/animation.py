@@ -148,8 +148,7 @@ def _replacement(face: Face, shapes: NDArray[np.int64], missing: NDArray[np.int6
     there = landmark_motion(face, missing).reshape(-1, len(missing))
     curvature = here.T @ here
     ridge = RIDGE * float(np.trace(curvature)) / len(shapes) + 1e-9
-    solved: FloatArray = np.linalg.solve(curvature + ridge * np.eye(len(shapes)), here.T @ there)
-    return solved
+    return np.asarray(np.linalg.solve(curvature + ridge * np.eye(len(shapes)), here.T @ there), np.float64)
 
 
 def _weight_tracks(file: GltfFile, tree: NodeTree, weights: Mapping[Target, FloatArray], n_frames: int) -> list[Track]:

@@ -47,7 +47,7 @@ def eyeball_centres(head: HeadMesh, character: Character) -> dict[int, FloatArra
         if len(rows):
             centre, radius, error = fit_sphere(rows)
             is_round = error < MAX_ROUNDNESS_ERROR * radius
-            nearest = min(places, key=lambda place: abs(place[0] - rows[:, 0].mean()), default=centre)  # noqa: B023
+            nearest = min(places, key=lambda place: abs(place[0] - rows[:, 0].mean()), default=centre)
             centres[eye] = centre if is_round else nearest
     return centres
 

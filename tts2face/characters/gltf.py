@@ -95,7 +95,7 @@ class GltfFile:
         else:
             values = self._elements(view, fields.integer("byteOffset", 0), shape, component).copy()
         if fields.has("sparse"):
-            self._apply_sparse(fields.child("sparse"), values)
+            self._apply_sparse(fields.child("sparse"), values, component)
         return _as_numbers(values, fields)
 
     def view(self, number: int) -> NDArray[np.uint8]:
@@ -151,7 +151,9 @@ class GltfFile:
             raise DataError(f"{fields.place}: has {len(content)} bytes, but {end} are used; export the character again")
         return np.ndarray(shape, np.dtype(component).newbyteorder("<"), content, offset, (stride, size))
 
-    def _apply_sparse(self, fields: Fields, values: NDArray[np.generic]) -> None:
+    def _apply_sparse(
+        self, fields: Fields, values: NDArray[np.generic], component_of: type[np.integer[Any] | np.floating[Any]]
+    ) -> None:
         count = fields.integer("count", low=1, high=len(values))
         indices, elements = fields.child("indices"), fields.child("values")
         n_views = self.count("bufferViews")
@@ -165,7 +167,8 @@ class GltfFile:
         if int(rows.max()) >= len(values):
             raise DataError(f"{fields.place}: index {rows.max()} is beyond {len(values)} elements; export it again")
         shape = (count, values.shape[1])
-        values[rows[:, 0]] = self._elements(views[1], elements.integer("byteOffset", 0), shape, values.dtype.type)
+        read = self._elements(views[1], elements.integer("byteOffset", 0), shape, component_of)
+        values[rows[:, 0]] = read
 
     def _slice(self, fields: Fields) -> NDArray[np.uint8]:
         """Bytes of the part of a buffer that a buffer view or a compression extension names."""

@@ -13,7 +13,7 @@ from tts2face.numeric import smoothstep
 
 MOVED_SHARE = 0.1  # of a shape's largest displacement: vertices that it clearly moves
 NECK_SHARE = 0.55  # of the height of the moved face: length of neck kept below it
-WIDTH_SHARE = 1.6  # of the same height: width kept on each side of its middle
+WIDTH_SHARE = 1.8  # of the same height: width kept on each side of its middle
 BLEND_SHARE = 0.03  # of the same height: half width of the blend between the two halves of a divided shape
 LEFT_EYE, RIGHT_EYE = 1, 2  # values of `HeadMesh.eye_of`
 
@@ -64,6 +64,7 @@ class HeadMesh:
         return replace(self, triangles=rank[self.triangles]).take(order)
 
     def take(self, rows: IntArray) -> "HeadMesh":
+        """Mesh with these vertices; its triangles are not changed."""
         return replace(
             self,
             vertices=self.vertices[rows],

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError, InputError
 from tts2face.characters.character import Character
 from tts2face.characters.eyeballs import mark_eyeballs
+from tts2face.characters.face_placement import drop_unsuited_shapes, missing_shapes, place_face
 from tts2face.characters.face_surface import Placement, add_gaze_shapes, build_face, is_plain, unwrap
 from tts2face.characters.gltf import SUFFIXES
 from tts2face.characters.gltf_character import read_gltf_character
@@ -26,21 +27,16 @@ from tts2face.characters.landmark_tracking import (
 )
 from tts2face.characters.obj_folder import read_obj_folder
 from tts2face.characters.shape_mapping import ShapeMapping, read_mapping
-from tts2face.characters.shape_names import ARKIT_SHAPES, VISEME_PREFIX, guess_mapping
+from tts2face.characters.shape_names import guess_mapping
 from tts2face.characters.surface_points import nearest_points
 from tts2face.face.expressions import add_expression_shapes
-from tts2face.face.eyelids import BLINK_SHAPES, WIDE_SHAPES, build_eyelid_model
-from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
-from tts2face.face.lip_constraints import build_lip_constraints
-from tts2face.face.shape_transfer import default_head, eye_distance
+from tts2face.face.eyelids import build_eyelid_model
 from tts2face.models.face import Face
-from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_MESH_LANDMARKS
+from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.video.track import MIN_SCORE
 
 FRONTS = {"+z": 0.0, "-z": 180.0, "+x": -90.0, "-x": 90.0}  # axis that a character looks along -> turn, degrees
 PROVISIONAL_HEIGHT_MM = 150.0  # of the moved part of a face, until the distance of its eyes is known
-TRUE_EYE_DISTANCES_MM = (60.0, 140.0)  # outer corners; other sizes are scaled to the default head's
-MIN_GAP_MM = 3.0  # by which the lips must part at weight 1 of some shape
 METADATA_KEY = "character"
 
 
@@ -159,12 +155,9 @@ def import_face(
     low, high = moved_box(head)
     provisional = Placement((low + high) / 2, PROVISIONAL_HEIGHT_MM / float(high[1] - low[1]))
     drawn = build_face(head, character, provisional)
-    if table is None:
-        located = locate_landmarks(drawn, model)
-    else:
-        located = _project_table(table, head, drawn)
-    face = _place(_with_landmarks(drawn, located), character, head, provisional)
-    face, notes = _drop_unsuited_shapes(face)
+    located = locate_landmarks(drawn, model) if table is None else _project_table(table, head, drawn)
+    face = place_face(_with_landmarks(drawn, located), character, head, provisional)
+    face, notes = drop_unsuited_shapes(face)
     face = replace(face, metadata=_metadata(path, character, chosen, head, face))
     build_eyelid_model(add_expression_shapes(face))
     positions = located.points.places(drawn.vertices) / provisional.scale + provisional.origin
@@ -172,7 +165,7 @@ def import_face(
     report = ImportReport(
         mapping={name: sources for name, sources in chosen.items() if name in face.shape_names},
         unused=_unused_names(character, chosen),
-        missing=_missing_shapes(face),
+        missing=missing_shapes(face),
         landmarks=places,
         score=None if table is not None else located.score,
         n_eyeballs=len(face.eyes),
@@ -200,8 +193,8 @@ def _complete_mapping(character: Character, given: str | Path | ShapeMapping | N
     if not any(name.startswith(("jaw", "mouth")) for name in mapping):
         names = sorted({*character.target_names.values(), *character.expressions})
         raise DataError(
-            "the character has no shape of a known name that moves its mouth, so speech cannot move it; name its shapes "
-            f"in a file and give it as --mapping; it has: {_some(names)}"
+            "the character has no shape of a known name that moves its mouth, so speech cannot move it; "
+            f"name its shapes in a file and give it as --mapping; it has: {_some(names)}"
         )
     return mapping
 
@@ -254,87 +247,6 @@ def _with_landmarks(face: Face, located: LocatedLandmarks) -> Face:
     )
 
 
-def _place(face: Face, character: Character, head: HeadMesh, provisional: Placement) -> Face:
-    """Face in mm with its origin between the eyes and the pivot of its head.
-
-    Raises
-    ------
-    DataError
-        The landmarks of the eye corners are missing.
-    """
-    model = default_head()
-    distance = eye_distance(face)
-    metres = distance / provisional.scale * 1000.0
-    low, high = TRUE_EYE_DISTANCES_MM
-    scale = (metres if low <= metres <= high else eye_distance(model)) / distance
-    if len(face.eyes) == 2:
-        origin = np.mean([eye.centre for eye in face.eyes], axis=0)
-    else:
-        places = scatter_landmarks(face, landmark_positions(face))
-        corners = scatter_landmarks(model, landmark_positions(model))[[EYE_OUTER_LEFT, EYE_OUTER_RIGHT]]
-        origin = places[[EYE_OUTER_LEFT, EYE_OUTER_RIGHT]].mean(axis=0) - corners.mean(axis=0) / scale
-    pivot = model.pivot * (scale * distance / eye_distance(model))
-    if "head" in character.bone_places:
-        bone = provisional.millimetres((head.turn @ character.bone_places["head"])[None])[0]
-        inside = (bone > face.vertices.min(axis=0)) & (bone < face.vertices.max(axis=0))
-        pivot = (bone - origin) * scale if inside.all() else pivot
-    factor = np.float32(scale)
-    return replace(
-        face,
-        vertices=((face.vertices - origin) * scale).astype(np.float32),
-        shapes=face.shapes * factor,
-        eyes=tuple(replace(eye, centre=((eye.centre - origin) * scale).astype(np.float32)) for eye in face.eyes),
-        pivot=np.asarray(pivot, np.float32),
-    )
-
-
-def _drop_unsuited_shapes(face: Face) -> tuple[Face, list[str]]:
-    """Face without blinks that do not close the eyes and wide eyes that do not open them, and notes about them.
-
-    Raises
-    ------
-    DataError
-        The lips have no landmarks, or no shape parts them.
-    """
-    mouth = build_lip_constraints(face)
-    widest = float(mouth.gaps[:, mouth.moving].max(initial=0.0)) if len(mouth.moving) else 0.0
-    if widest < MIN_GAP_MM:
-        raise DataError(
-            f"no shape parts the character's lips by more than {widest:.1f} mm; check the landmarks with --preview, and "
-            "the names of the shapes"
-        )
-    complete = add_expression_shapes(face)
-    motion = scatter_landmarks(complete, landmark_motion(complete, np.arange(len(complete.shape_names))))[:, 1]
-    pairs = {"Left": ((386, 385), (374, 380)), "Right": ((159, 158), (145, 153))}
-    dropped = []
-    for name in (*BLINK_SHAPES, *WIDE_SHAPES):
-        upper, lower = pairs["Left" if name.endswith("Left") else "Right"]
-        change = float((motion[list(upper)] - motion[list(lower)]).mean(axis=0)[complete.shape_names.index(name)])
-        if name in face.shape_names and not (change < 0 if name in BLINK_SHAPES else change > 0):
-            dropped.append(name)
-    kept = np.array([name not in dropped for name in face.shape_names])
-    notes = [f"{name} does not move the lids at their landmarks and is replaced" for name in dropped]
-    names = tuple(name for name in face.shape_names if name not in dropped)
-    return replace(face, shape_names=names, shapes=face.shapes[kept], limits=face.limits[kept]), notes
-
-
-def _missing_shapes(face: Face) -> dict[str, str]:
-    """ARKit shapes that a face lacks, and what replaces each of them."""
-    speaks_by_visemes = any(name.startswith(VISEME_PREFIX) for name in face.shape_names)
-    moved_by_gestures = {*add_expression_shapes(face).shape_names} - {*face.shape_names}
-    missing = {}
-    for name in ARKIT_SHAPES:
-        if name in face.shape_names:
-            continue
-        if name in moved_by_gestures:
-            missing[name] = "landmarks moved as on the default head, in expressions and gestures"
-        elif name.startswith(("jaw", "mouth")):
-            missing[name] = "the character's own visemes" if speaks_by_visemes else "the other shapes of its mouth"
-        else:
-            missing[name] = "nothing"
-    return missing
-
-
 def _unused_names(character: Character, mapping: ShapeMapping) -> tuple[str, ...]:
     used = {source.name for sources in mapping.values() for source in sources}
     names = dict.fromkeys([*character.target_names.values(), *character.expressions])
@@ -342,8 +254,12 @@ def _unused_names(character: Character, mapping: ShapeMapping) -> tuple[str, ...
 
 
 def _colour_notes(character: Character, head: HeadMesh) -> list[str]:
-    used = {character.pieces[number].material for number in np.unique(head.piece_of).tolist()}
-    names = sorted({character.materials[number].name for number in used if is_plain(character.materials[number])})
+    """Notes about white materials, whose colour is replaced."""
+    used = [character.pieces[number] for number in np.unique(head.piece_of).tolist()]
+    plain = {
+        piece.material for piece in used if piece.colours is None and is_plain(character.materials[piece.material])
+    }
+    names = sorted(character.materials[number].name for number in plain)
     return [f"the material {name[:60]!r} is white without an image; plain colours replace it" for name in names]
 
 

@@ -84,10 +84,7 @@ class MaterialReader:
     def _image(self, fields: Fields) -> NDArray[np.uint8] | None:
         """Pixels (H, W, 4) of an image, at most `MAX_IMAGE_SIDE` on a side; None with a note if it cannot be read."""
         view = fields.index("bufferView", self._file.count("bufferViews"), "buffer views")
-        if view is not None:
-            content = self._file.view(view).tobytes()
-        else:
-            content = self._file.uri(fields.text("uri"), fields)
+        content = self._file.uri(fields.text("uri"), fields) if view is None else self._file.view(view).tobytes()
         if content[:8] == KTX2[:8]:
             self._notes.append(
                 f"{fields.place} is a KTX2 image, which is not read: its material has one colour; "

@@ -64,7 +64,7 @@ def _decode_attributes(content: Bytes, count: int, stride: int) -> Bytes:
 
 
 @kernel
-def _decode_blocks(data: Any, block: int, last: Any, out: Any) -> bool:
+def _decode_blocks(data: Any, block: int, last: Any, out: Any) -> bool:  # noqa: C901 - one pass over bits
     """Decode blocks of deltas into `out` (count, stride), which begins after the element `last`; False if too short."""
     count, stride, at = out.shape[0], out.shape[1], 0
     for first in range(0, count, block):

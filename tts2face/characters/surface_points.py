@@ -122,12 +122,12 @@ def nearest_points(places: FloatArray, positions: FloatArray, triangles: IntArra
     """Points of a mesh nearest to places (N, 3), among the triangles around the nearest vertices."""
     used = np.unique(triangles)
     count = min(N_NEAREST, len(used))
-    _, near = cKDTree(positions[used]).query(places, k=count)
+    near = np.asarray(cKDTree(positions[used]).query(places, k=count)[1]).reshape(len(places), count)
     found = SurfacePoints(np.zeros((len(places), 3), np.int64), np.zeros((len(places), 3)))
     order = np.argsort(triangles.reshape(-1), kind="stable")
     starts = np.searchsorted(triangles.reshape(-1)[order], np.arange(len(positions) + 1))
     for number, place in enumerate(places):
-        vertices = used[np.atleast_1d(near[number])]
+        vertices = used[near[number]]
         around = np.unique(np.concatenate([order[starts[v] : starts[v + 1]] // 3 for v in vertices]))
         corners = positions[triangles[around]]
         weights = _nearest_weights(place, corners)
@@ -165,7 +165,7 @@ def _nearest_weights(place: FloatArray, corners: FloatArray) -> FloatArray:
     area = np.maximum(d11 * d22 - d12 * d12, 1e-30)
     second, third = (d22 * d1 - d12 * d2) / area, (d11 * d2 - d12 * d1) / area
     inner = np.stack([1.0 - second - third, second, third], axis=1)
-    candidates = [np.where((inner >= 0).all(axis=1)[:, None], inner, np.nan)]
+    candidates = [np.where((inner >= 0).all(axis=1).reshape(-1, 1), inner, np.nan)]
     for first, last in ((0, 1), (1, 2), (2, 0)):
         along = corners[:, last] - corners[:, first]
         length = np.maximum((along**2).sum(axis=1), 1e-30)
