@@ -20,6 +20,7 @@ from tts2face.characters.head_mesh import source_weights
 from tts2face.characters.importing import METADATA_KEY
 from tts2face.characters.nodes import NodeTree, read_nodes
 from tts2face.characters.shape_mapping import ShapeSource
+from tts2face.face.bounded_least_squares import bounded_least_squares
 from tts2face.face.deformation import head_rotation, rotation_matrix
 from tts2face.face.landmark_fit import landmark_motion
 from tts2face.face.mouth_model import SPEECH_SHAPE_PREFIXES
@@ -131,24 +132,32 @@ def _own_values(clip: Clip, face: Face, own: list[str]) -> FloatArray:
     for is_mouth in (True, False):
         group = [k for k in others if channels[k].startswith(SPEECH_SHAPE_PREFIXES) == is_mouth]
         columns = [
-            n for n, name in enumerate(own)
+            n
+            for n, name in enumerate(own)
             if name.startswith(SPEECH_SHAPE_PREFIXES) == is_mouth and "eyeLook" not in name
-        ]  # fmt: skip
+        ]
         if group and columns:
             shapes = np.array([channels.index(own[n]) for n in columns])
-            kept[:, columns] += values[:, group] @ _replacement(face, shapes, np.array(group)).T
-    limits = np.array([face.limits[channels.index(name)] for name in own], np.float64).reshape(-1, 2)
-    clipped: FloatArray = np.clip(kept, limits[:, 0], limits[:, 1])
-    return clipped
+            missing = (np.array(group), values[:, group])
+            kept[:, columns] = _with_replacement(face, shapes, kept[:, columns], missing)
+    return kept
 
 
-def _replacement(face: Face, shapes: NDArray[np.int64], missing: NDArray[np.int64]) -> FloatArray:
-    """Weights (k, m) of `shapes` (k,) that move the landmarks most like each shape of `missing` (m,)."""
+def _with_replacement(
+    face: Face, shapes: NDArray[np.int64], weights: FloatArray, missing: tuple[NDArray[np.int64], FloatArray]
+) -> FloatArray:
+    """Weights (T, k) of `shapes` (k,) that move the landmarks most like their `weights` and missing shapes do.
+
+    `missing` holds the indices (m,) of the missing shapes and their weights (T, m). The result is within the limits.
+    """
     here = landmark_motion(face, shapes).reshape(-1, len(shapes))
-    there = landmark_motion(face, missing).reshape(-1, len(missing))
+    there = landmark_motion(face, missing[0]).reshape(-1, len(missing[0]))
     curvature = here.T @ here
-    ridge = RIDGE * float(np.trace(curvature)) / len(shapes) + 1e-9
-    return np.asarray(np.linalg.solve(curvature + ridge * np.eye(len(shapes)), here.T @ there), np.float64)
+    curvature += (RIDGE * float(np.trace(curvature)) / len(shapes) + 1e-9) * np.eye(len(shapes))
+    limits = face.limits[shapes].astype(np.float64)
+    solved = bounded_least_squares(curvature, weights @ curvature + missing[1] @ (there.T @ here), limits)
+    is_moved = np.asarray(missing[1].any(axis=1))
+    return np.where(is_moved.reshape(-1, 1), solved, weights)
 
 
 def _weight_tracks(file: GltfFile, tree: NodeTree, weights: Mapping[Target, FloatArray], n_frames: int) -> list[Track]:

@@ -70,10 +70,10 @@ def name_key(name: str) -> Key:
 
 
 def _tails(name: str) -> list[Key]:
-    """Keys of a name with fewer and fewer of its first words, which may be a prefix; at least two words."""
+    """Keys of a name with fewer and fewer of its first words, which may be a prefix; at least two words or a side."""
     words, side = name_key(name)
     parts = words.split(" ")
-    return [(" ".join(parts[first:]), side) for first in range(max(len(parts) - 1, 1))]
+    return [(" ".join(parts[first:]), side) for first in range(max(len(parts) - (not side), 1))]
 
 
 def _arkit_shapes(name: str) -> tuple[str, ...]:
