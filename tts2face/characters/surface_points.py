@@ -84,12 +84,17 @@ class _Projection:
         is_facing = area < -1e-9  # y points down, so counter-clockwise triangles have negative area
         self._triangles = triangles[is_facing] if is_facing.any() else triangles
         self._corners = self._flat[self._triangles]
-        self._low, self._high = self._corners.min(axis=1), self._corners.max(axis=1)
+        self._left, self._top = np.ascontiguousarray(self._corners.min(axis=1).T)
+        self._right, self._bottom = np.ascontiguousarray(self._corners.max(axis=1).T)
         self._seen = np.unique(self._triangles)
+        self._tree = cKDTree(self._flat[self._seen])
+        nearest = float(np.maximum(self._there[self._seen, 2].min(), 1.0))
+        self._reach_px = GRAZES[-1][0] * self._focal / nearest
 
     def hit(self, pixel: FloatArray) -> _Hit | None:
         """Nearest triangle under a pixel."""
-        under = np.flatnonzero(((self._low <= pixel) & (pixel <= self._high)).all(axis=1))
+        x, y = pixel
+        under = np.flatnonzero((self._left <= x) & (x <= self._right) & (self._top <= y) & (y <= self._bottom))
         mixed = _barycentric(pixel, self._corners[under])
         inside = (mixed >= -1e-6).all(axis=1)
         hits, mixed = under[inside], mixed[inside]
@@ -102,12 +107,14 @@ class _Projection:
 
     def outline_vertex(self, pixel: FloatArray, depth: float) -> int | None:
         """Vertex of an outline that a ray with a hit at a depth (infinite without one) passes; None if it does not."""
-        off = np.linalg.norm(self._flat[self._seen] - pixel, axis=1)
-        ahead = depth - self._there[self._seen, 2]
-        grazed = np.isinf(ahead)
+        if np.isinf(depth):
+            return int(self._seen[int(np.asarray(self._tree.query(pixel)[1]))])
+        near = self._seen[np.array(self._tree.query_ball_point(pixel, self._reach_px), np.int64)]
+        off = np.linalg.norm(self._flat[near] - pixel, axis=1)
+        ahead, grazed = depth - self._there[near, 2], np.zeros(len(near), bool)
         for reach, depth_mm in GRAZES:
-            grazed |= (ahead >= depth_mm) & (off * self._there[self._seen, 2] < reach * self._focal)
-        return int(self._seen[np.where(grazed, off, np.inf).argmin()]) if grazed.any() else None
+            grazed |= (ahead >= depth_mm) & (off * self._there[near, 2] < reach * self._focal)
+        return int(near[np.where(grazed, off, np.inf).argmin()]) if grazed.any() else None
 
     def distance(self, vertex: int, pixel: FloatArray) -> float:
         """Distance in mm, across the line of sight, of a vertex from a pixel."""
