@@ -14,7 +14,7 @@ from tts2face.characters.gltf_character import read_gltf_character
 from tts2face.characters.importing import import_face
 from tts2face.models.face import Face
 
-N_MUTATIONS = 200
+N_MUTATIONS = 70  # of each of three files
 WRONG_VALUES: tuple[Any, ...] = (
     None, -1, 0, 1, 2**31, 2**60, 1e300, 0.5, True, "", "x", [], {}, [0], [[]], {"a": 1}, "data:,", "../x", [-1, 2**40],
 )  # fmt: skip
@@ -26,7 +26,7 @@ def small_head() -> Face:
 
     head = shipped_head()
     spans, first = [], 0
-    triangles = []
+    triangles: list[np.ndarray] = []
     for part in head.parts:
         corners = head.triangles[part.first : part.first + part.count : 16]
         triangles.append(corners)
@@ -35,12 +35,22 @@ def small_head() -> Face:
     names = ("eyeBlinkLeft", "eyeBlinkRight", "jawOpen", "mouthPucker", "mouthSmileLeft")
     rows = [head.shape_names.index(name) for name in names]
     texture = head.texture[::16, ::16].copy() if head.texture is not None else None
+    used, corners = np.unique(np.concatenate(triangles), return_inverse=True)
+    bounds = [np.searchsorted(used, [eye.first, eye.first + eye.count]).tolist() for eye in head.eyes]
+    eyes = tuple(replace(eye, first=low, count=high - low) for eye, (low, high) in zip(head.eyes, bounds, strict=True))
     return replace(
         head,
-        triangles=np.concatenate(triangles),
+        vertices=head.vertices[used],
+        colours=head.colours[used],
+        uv=None if head.uv is None else head.uv[used],
+        eyes=eyes,
+        triangles=corners.reshape(-1, 3).astype(np.int32),
+        landmarks=head.landmarks[:0],
+        landmark_vertices=head.landmark_vertices[:0],
+        landmark_weights=head.landmark_weights[:0],
         parts=tuple(spans),
         shape_names=names,
-        shapes=head.shapes[rows],
+        shapes=head.shapes[rows][:, used],
         limits=head.limits[rows],
         texture=texture,
     )
@@ -90,6 +100,14 @@ def mutate(root: dict[str, Any], random_: random.Random) -> dict[str, Any]:
     return changed
 
 
+def outcome(path: Path, table: Path) -> tuple[Face | None, str]:
+    """The imported face, or the message of the one error."""
+    try:
+        return import_face(path, landmarks=table).face, ""
+    except (DataError, InputError) as error:
+        return None, str(error)
+
+
 @pytest.mark.parametrize("name", ["skinned", "quantised", "vrm"])
 def test_a_mutated_file_loads_or_is_refused(
     name: str, sources: dict[str, tuple[dict[str, Any], bytes]], tmp_path: Path
@@ -99,15 +117,11 @@ def test_a_mutated_file_loads_or_is_refused(
     for seed in range(N_MUTATIONS):
         path = tmp_path / "mutated.glb"
         path.write_bytes(glb(mutate(root, random.Random(f"{name} {seed}")), binary))
-        try:
-            face = import_face(path, landmarks=table).face
-        except (DataError, InputError) as error:
-            refused += 1
-            assert len(str(error)) < 700
-            assert "\n" not in str(error)
-        else:
-            assert np.isfinite(face.vertices).all()
-            assert np.isfinite(face.shapes).all()
+        face, message = outcome(path, table)
+        refused += face is None
+        assert len(message) < 700
+        assert "\n" not in message
+        assert face is None or (np.isfinite(face.vertices).all() and np.isfinite(face.shapes).all())
     assert 0.2 * N_MUTATIONS < refused < N_MUTATIONS
 
 
@@ -127,7 +141,7 @@ def test_a_truncated_file_is_refused(cut: int, tmp_path: Path) -> None:
         (lambda root: root.update(extensionsRequired=["EXT_other"]), "requires the glTF extension EXT_other"),
         (lambda root: root["asset"].update(version="1.0"), "not glTF of version 2"),
         (lambda root: root["nodes"][-1]["children"].append(len(root["nodes"]) - 1), "has two parents"),
-        (lambda root: root["accessors"][0].update(count=10**7), "bytes are used|are used"),
+        (lambda root: root["accessors"][0].update(count=10**7), "are used"),
         (lambda root: root["bufferViews"][0].update(byteLength=10**9), "reaches to byte"),
         (lambda root: root["buffers"].__setitem__(0, {"byteLength": 4, "uri": "../secret.bin"}), "not a file beside"),
         (
@@ -165,5 +179,5 @@ def test_a_picture_of_many_pixels_is_refused(tmp_path: Path) -> None:
 
     head = b"IHDR" + width + width + bytes([8, 2, 0, 0, 0])
     png = b"\x89PNG\r\n\x1a\n" + (13).to_bytes(4, "big") + head + zlib.crc32(head).to_bytes(4, "big")
-    with pytest.raises(DataError, match="100000 x 100000 pixels|cannot be decoded"):
+    with pytest.raises(DataError, match=r"100000 x 100000 pixels|cannot be decoded"):
         decode_image(png, "test.png")

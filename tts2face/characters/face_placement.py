@@ -9,8 +9,8 @@ from tts2face.characters.character import Character
 from tts2face.characters.face_surface import Placement
 from tts2face.characters.head_mesh import HeadMesh
 from tts2face.characters.shape_names import ARKIT_SHAPES, VISEME_PREFIX
-from tts2face.face.expressions import add_expression_shapes
-from tts2face.face.eyelids import BLINK_SHAPES, LID_LANDMARK_PAIRS, WIDE_SHAPES
+from tts2face.face.expressions import GAZE_SHAPES, add_expression_shapes, expression_table
+from tts2face.face.eyelids import BLINK_SHAPES, LID_LANDMARK_PAIRS, WIDE_SHAPES, build_eyelid_model
 from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.face.lip_constraints import build_lip_constraints
 from tts2face.face.shape_transfer import default_head, eye_distance
@@ -61,7 +61,7 @@ def drop_unsuited_shapes(face: Face) -> tuple[Face, list[str]]:
     Raises
     ------
     DataError
-        The lips have no landmarks, or no shape parts them.
+        The lips or lids have no landmarks, or no shape parts the lips.
     """
     mouth = build_lip_constraints(face)
     widest = float(mouth.gaps[:, mouth.moving].max(initial=0.0)) if len(mouth.moving) else 0.0
@@ -81,13 +81,15 @@ def drop_unsuited_shapes(face: Face) -> tuple[Face, list[str]]:
     kept = np.array([name not in dropped for name in face.shape_names])
     notes = [f"{name} does not move the lids at their landmarks and is replaced" for name in dropped]
     names = tuple(name for name in face.shape_names if name not in dropped)
-    return replace(face, shape_names=names, shapes=face.shapes[kept], limits=face.limits[kept]), notes
+    face = replace(face, shape_names=names, shapes=face.shapes[kept], limits=face.limits[kept])
+    build_eyelid_model(add_expression_shapes(face) if dropped else complete)
+    return face, notes
 
 
 def missing_shapes(face: Face) -> dict[str, str]:
     """ARKit shapes that a face lacks, and what replaces each of them."""
     speaks_by_visemes = any(name.startswith(VISEME_PREFIX) for name in face.shape_names)
-    moved_by_gestures = {*add_expression_shapes(face).shape_names} - {*face.shape_names}
+    moved_by_gestures = {*expression_table(), *BLINK_SHAPES, *WIDE_SHAPES, *GAZE_SHAPES}
     missing = {}
     for name in ARKIT_SHAPES:
         if name in face.shape_names:

@@ -24,6 +24,7 @@ MAX_FILE_BYTES = 512_000_000  # a film character with 4k textures has about 100 
 MAX_DECODED_BYTES = 1_000_000_000  # of all compressed or sparse arrays of a file
 MAX_COUNT = 30_000_000  # elements of an accessor: 52 shapes of 50,000 vertices are 2.6 million
 MAX_STRIDE = 256
+MAX_VALUE = 1e9  # of positions and other numbers: beyond it no single-precision geometry works
 GLB_MAGIC, JSON_CHUNK, BINARY_CHUNK = b"glTF", b"JSON", b"BIN\0"
 SUFFIXES = (".glb", ".gltf", ".vrm")
 COMPONENTS: dict[int, type[np.integer[Any] | np.floating[Any]]] = {
@@ -265,10 +266,12 @@ def _check_extensions(root: Fields) -> None:
             raise DataError(f"{root.place} requires the glTF extension {name[:60]}; export it again without it")
 
 
-def _as_numbers(values: NDArray[np.generic], fields: Fields) -> NDArray[np.float64] | NDArray[np.int64]:
+def _as_numbers(values: NDArray[Any], fields: Fields) -> NDArray[np.float64] | NDArray[np.int64]:
     if values.dtype.kind == "f":
-        if not np.isfinite(values.astype(np.float64)).all():
-            raise DataError(f"{fields.place}: contains numbers that are not finite; export the character again")
+        if not (np.abs(values) <= MAX_VALUE).all():
+            raise DataError(
+                f"{fields.place}: contains numbers that are not finite or beyond {MAX_VALUE:g}; export it again"
+            )
         return values.astype(np.float64)
     if not fields.flag("normalized"):
         return values.astype(np.int64)

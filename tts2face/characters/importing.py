@@ -29,8 +29,6 @@ from tts2face.characters.obj_folder import read_obj_folder
 from tts2face.characters.shape_mapping import ShapeMapping, read_mapping
 from tts2face.characters.shape_names import guess_mapping
 from tts2face.characters.surface_points import nearest_points
-from tts2face.face.expressions import add_expression_shapes
-from tts2face.face.eyelids import build_eyelid_model
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.video.track import MIN_SCORE
@@ -159,7 +157,6 @@ def import_face(
     face = place_face(_with_landmarks(drawn, located), character, head, provisional)
     face, notes = drop_unsuited_shapes(face)
     face = replace(face, metadata=_metadata(path, character, chosen, head, face))
-    build_eyelid_model(add_expression_shapes(face))
     positions = located.points.places(drawn.vertices) / provisional.scale + provisional.origin
     places = dict(zip(located.numbers.tolist(), positions @ head.turn, strict=True))
     report = ImportReport(
