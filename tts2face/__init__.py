@@ -24,6 +24,12 @@ if TYPE_CHECKING:
     from tts2face.catalogue import styles as styles
     from tts2face.catalogue import talkers as talkers
     from tts2face.catalogue import voices as voices
+    from tts2face.characters.animation import WrittenCharacter as WrittenCharacter
+    from tts2face.characters.animation import write_character as write_character
+    from tts2face.characters.importing import ImportedFace as ImportedFace
+    from tts2face.characters.importing import ImportReport as ImportReport
+    from tts2face.characters.importing import import_face as import_face
+    from tts2face.characters.saving import save_face as save_face
     from tts2face.models.face import Face as Face
     from tts2face.models.face_file import load_face as load_face
     from tts2face.models.palette import Palette as Palette
@@ -50,6 +56,8 @@ __all__ = [
     "Clip",
     "DataError",
     "Face",
+    "ImportReport",
+    "ImportedFace",
     "InputError",
     "Palette",
     "Performance",
@@ -64,16 +72,20 @@ __all__ = [
     "Tts2faceError",
     "Waveform",
     "WordSpan",
+    "WrittenCharacter",
     "WrittenClip",
     "faces",
     "identities",
+    "import_face",
     "languages",
     "load_face",
     "load_palette",
     "load_talker",
+    "save_face",
     "styles",
     "talkers",
     "voices",
+    "write_character",
     "write_clip",
 ]
 
@@ -82,6 +94,9 @@ _MODULES = {
     "lexicon.sequence": ("PhoneSequence", "WordSpan"),
     "tts2face.api": ("write_clip",),
     "tts2face.catalogue": ("faces", "identities", "languages", "styles", "talkers", "voices"),
+    "tts2face.characters.animation": ("WrittenCharacter", "write_character"),
+    "tts2face.characters.importing": ("ImportReport", "ImportedFace", "import_face"),
+    "tts2face.characters.saving": ("save_face",),
     "tts2face.models.face": ("Face",),
     "tts2face.models.face_file": ("load_face",),
     "tts2face.models.palette": ("Palette", "load_palette"),
