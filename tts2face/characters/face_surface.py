@@ -1,7 +1,6 @@
 """Surface of a character's head as a face: parts with materials, one texture, opacity, and colours."""
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,8 +9,9 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from tts2face.characters.atlas import Atlas, build_atlas, opacity_levels, srgb, triangle_alpha
 from tts2face.characters.character import OPAQUE, Character, Material
-from tts2face.characters.eyeballs import eyeball_centres, gaze_turns
+from tts2face.characters.eyeballs import eyeball_centres, fit_sphere, gaze_turns
 from tts2face.characters.head_mesh import LEFT_EYE, RIGHT_EYE, HeadMesh
+from tts2face.face.mouth_model import SPEECH_SHAPE_PREFIXES
 from tts2face.models.face import Eye, Face, Part
 
 # Highlights and softness of materials by kind, as on the default head: specular, shininess, wrap.
@@ -31,11 +31,22 @@ _KINDS = {
     "teeth": re.compile(r"teeth|tooth|gum|dent(?:al|ure)", re.I),
     "tongue": re.compile(r"tongue", re.I),
     "hair": re.compile(r"hair|beard|mustache|moustache", re.I),
+    "eyes": re.compile(r"eye(?!.?(?:lid|shadow|socket))|cornea|sclera|iris|pupil", re.I),  # unless speech moves it
 }
 # sRGB of white materials without an image: they would hide the features of the face.
-PLAIN = {"skin": (214, 164, 140), "eyes": (236, 234, 230), "other": (228, 222, 212), "tongue": (190, 98, 96)}
+PLAIN = {
+    "skin": (214, 164, 140),
+    "eyes": (236, 234, 230),
+    "other": (228, 222, 212),
+    "tongue": (190, 98, 96),
+    "lashes": (44, 34, 30),
+    "brows": (78, 58, 46),
+    "hair": (84, 64, 50),
+    "teeth": (236, 230, 216),
+}
 IRIS_RAD, PUPIL_RAD = 0.50, 0.20  # angles of plain irises and pupils from the line of sight
 IRIS, PUPIL = (86, 104, 96), (18, 16, 16)  # sRGB
+MIN_BALL_VERTICES = 12  # of an eyeball that is painted
 UNPAINTED = 0.9  # least linear value of each channel of a white material
 
 FloatArray = NDArray[np.float64]
@@ -131,14 +142,18 @@ def _parts(keys: list[tuple[str, int, float]], character: Character, atlas: Atla
 
 def _kinds(head: HeadMesh, character: Character) -> dict[int, str]:
     """Kind of each piece of the character: by its name and material, otherwise skin where shapes move it."""
-    moved = np.zeros(len(head.vertices), bool)
-    for shape in head.shapes.values():
+    moved, spoken = np.zeros(len(head.vertices), bool), np.zeros(len(head.vertices), bool)
+    for name, shape in head.shapes.items():
         moved |= shape.any(axis=1)
+        if name.startswith(SPEECH_SHAPE_PREFIXES):
+            spoken |= shape.any(axis=1)
     kinds = {}
     for number, piece in enumerate(character.pieces):
         name = f"{piece.name} {character.materials[piece.material].name}"
         by_name = next((kind for kind, pattern in _KINDS.items() if pattern.search(name)), None)
         corners = head.triangles[head.piece_of == number]
+        if by_name == "eyes" and spoken[corners].any():
+            by_name = None
         kinds[number] = by_name or ("skin" if moved[corners].any() else "other")
     return kinds
 
@@ -148,7 +163,6 @@ def _paint(
 ) -> tuple[FloatArray, NDArray[np.uint8]]:
     """Texture coordinates (V, 2) in the atlas, and colours (V, 3), sRGB."""
     uv, colours = np.zeros((len(head.vertices), 2)), np.zeros((len(head.vertices), 3), np.uint8)
-    centres = eyeball_centres(head, character)
     for number in np.unique(material_of).tolist():
         material = character.materials[number]
         for kind in np.unique(kind_of[material_of == number]).tolist():
@@ -159,16 +173,18 @@ def _paint(
             colours[rows] = srgb(light)
             if material.image is None and (light > UNPAINTED).all() and kind in PLAIN:
                 colours[rows] = PLAIN[kind]
-                _paint_irises(head, centres, rows, colours)
+                if kind == "eyes":
+                    _paint_irises(head, rows, colours)
     return uv, colours
 
 
-def _paint_irises(
-    head: HeadMesh, centres: Mapping[int, FloatArray], rows: NDArray[np.int64], colours: NDArray[np.uint8]
-) -> None:
-    for eye, centre in centres.items():
-        on = rows[head.eye_of[rows] == eye]
-        towards = head.vertices[on] - centre
+def _paint_irises(head: HeadMesh, rows: NDArray[np.int64], colours: NDArray[np.uint8]) -> None:
+    """Paint plain irises on the vertices `rows` of eyeballs, about the middle of the ball on each side."""
+    is_left = head.vertices[rows, 0] > head.vertices[rows, 0].mean()
+    for on in (rows[is_left], rows[~is_left]):
+        if len(on) < MIN_BALL_VERTICES:
+            continue
+        towards = head.vertices[on] - fit_sphere(head.vertices[on])[0]
         angle = np.arccos(np.clip(towards[:, 2] / np.maximum(np.linalg.norm(towards, axis=1), 1e-12), -1, 1))
         colours[on[angle < IRIS_RAD]] = IRIS
         colours[on[angle < PUPIL_RAD]] = PUPIL
