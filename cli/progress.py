@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from tts2face.types import Progress
+Progress = Callable[[int, int], None]  # as in `tts2face.types`, which would load numpy for --help
 
 
 @contextmanager

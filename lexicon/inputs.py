@@ -183,3 +183,16 @@ def _parse_number(written: str) -> float:
 def _check_length(written: str) -> None:
     if len(written) > MAX_NUMBER_CHARACTERS:
         raise InputError(f"a number of {len(written)} characters is too long ({written[:20]}...); shorten it")
+
+
+def check_limits(what: str, value: float, limits: tuple[float, float], unit: str = "") -> None:
+    """Refuse a number outside its limits.
+
+    Raises
+    ------
+    InputError
+        The value is below the lower limit, above the upper one, or not a number.
+    """
+    low, high = limits
+    if not low <= value <= high:
+        raise InputError(f"{what} must lie between {low:g} and {high:g}{unit}, not {value:g}{unit}")

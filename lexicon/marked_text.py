@@ -6,6 +6,7 @@ Positions are character indices of the spoken text, which does not contain the m
 from dataclasses import dataclass, replace
 
 from lexicon.errors import InputError
+from lexicon.inputs import check_limits
 from lexicon.ipa import Segment
 
 RATE_LIMITS = (0.5, 2.0)  # speaking rate of marked words, as of a whole request
@@ -39,7 +40,7 @@ class PauseMark:
 
     def __post_init__(self) -> None:
         """Refuse lengths out of range."""
-        _check_range("a pause", self.seconds, (0.0, MAX_PAUSE_S), " s")
+        check_limits("a pause", self.seconds, (0.0, MAX_PAUSE_S), " s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +52,7 @@ class NodMark:
 
     def __post_init__(self) -> None:
         """Refuse sizes out of range."""
-        _check_range("the size of a nod", self.size, NOD_SIZE_LIMITS)
+        check_limits("the size of a nod", self.size, NOD_SIZE_LIMITS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,8 +163,8 @@ class MarkedTextBuilder:
             Spans are nested too deep, or their combined rate or volume is out of range.
         """
         before = self._begin(kind, shown)
-        _check_range(f"the speaking rate within {shown}", before.rate * rate, RATE_LIMITS)
-        _check_range(f"the volume within {shown}", before.volume * volume, VOLUME_LIMITS)
+        check_limits(f"the speaking rate within {shown}", before.rate * rate, RATE_LIMITS)
+        check_limits(f"the volume within {shown}", before.volume * volume, VOLUME_LIMITS)
         styles = (*before.styles, style) if style is not None else before.styles
         self._start_run(
             replace(before, start=self._length, styles=styles, rate=before.rate * rate, volume=before.volume * volume)
@@ -235,9 +236,3 @@ class MarkedTextBuilder:
         last = self._runs[-1] if self._runs else None
         if last is None or replace(last, start=run.start) != run:
             self._runs.append(run)
-
-
-def _check_range(what: str, value: float, limits: tuple[float, float], unit: str = "") -> None:
-    low, high = limits
-    if not low <= value <= high:
-        raise InputError(f"{what} must lie between {low:g} and {high:g}{unit}, not {value:g}{unit}")

@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from lexicon.errors import InputError
+from lexicon.inputs import check_limits
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.request import FPS_LIMITS
 from tts2face.types import Speech, Waveform, frame_count
@@ -20,9 +20,7 @@ def exact_rate(fps: float) -> Fraction:
     InputError
         The rate lies outside `FPS_LIMITS`.
     """
-    low, high = FPS_LIMITS
-    if not low <= fps <= high:
-        raise InputError(f"fps must lie between {low:g} and {high:g}, not {fps:g}")
+    check_limits("fps", fps, FPS_LIMITS)
     for nominal in NTSC_NOMINAL_RATES:
         if abs(fps - nominal * 1000 / 1001) < 0.006:
             return Fraction(nominal * 1000, 1001)

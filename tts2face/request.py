@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import InputError
+from lexicon.inputs import check_limits
 
 RATE_LIMITS = (0.5, 2.0)
 VOLUME_LIMITS = (0.0, 2.0)
@@ -98,9 +99,9 @@ class Request:
         for name in ("audio", "dictionary", "timeline"):
             if isinstance(getattr(self, name), str):
                 object.__setattr__(self, name, Path(getattr(self, name)))
-        _check_limits("rate", self.rate, RATE_LIMITS)
-        _check_limits("volume", self.volume, VOLUME_LIMITS)
-        _check_limits("fps", self.fps, FPS_LIMITS)
+        check_limits("rate", self.rate, RATE_LIMITS)
+        check_limits("volume", self.volume, VOLUME_LIMITS)
+        check_limits("fps", self.fps, FPS_LIMITS)
         if self.synthesis not in SYNTHESIS_METHODS:
             raise InputError(f"there is no synthesis {self.synthesis!r}; choose {' or '.join(SYNTHESIS_METHODS)}")
         if self.seed < 0:
@@ -110,7 +111,7 @@ class Request:
         if self.audio is not None and (self.voice is not None or self.rate != 1.0):
             raise InputError("--voice and --rate have no effect on a recording; remove them or --audio")
         if self.idle is not None:
-            _check_limits("idle", self.idle, IDLE_LIMITS_S)
+            check_limits("idle", self.idle, IDLE_LIMITS_S)
             _check_idle(self)
         _check_gestures(self)
 
@@ -142,9 +143,3 @@ def _check_idle(request: Request) -> None:
         raise InputError("--idle cannot be combined with text or --audio; remove one of them")
     if (request.voice, request.rate, request.volume) != (None, 1.0, 1.0):
         raise InputError("--voice, --rate and --volume have no effect with --idle; remove them")
-
-
-def _check_limits(name: str, value: float, limits: tuple[float, float]) -> None:
-    low, high = limits
-    if not low <= value <= high:
-        raise InputError(f"{name} must lie between {low:g} and {high:g}, not {value:g}")

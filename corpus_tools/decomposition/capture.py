@@ -116,15 +116,15 @@ def _interpolate_frames(values: Floats, fps: float, target_fps: float, n_frames:
     return np.asarray((area(stop) - area(begin)) / (stop - begin)[:, None])
 
 
-def read_capture_sound(capture: Path, given: Path | None = None) -> Waveform | None:
-    """The sound of a capture: of the given file, or of the file that `find_capture_sound` finds.
+def read_capture_sound(capture: Path) -> Waveform | None:
+    """The sound of the file that `find_capture_sound` finds for a capture.
 
     Raises
     ------
     InputError, DataError
         As `find_capture_sound` and `tts2face.video.media.read_sound`.
     """
-    found = given or find_capture_sound(capture)
+    found = find_capture_sound(capture)
     return None if found is None else read_sound(found, SOUND_RATE)
 
 

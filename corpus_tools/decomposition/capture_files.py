@@ -65,7 +65,7 @@ def read_capture_file(path: Path, face: Face, *, options: MarkerOptions | None =
 FEATURE_CHANNELS = {"gaze": ("eyeLook",), "blink": ("eyeBlink",), "brows": ("brow",), "cheeks": ("cheek", "nose")}
 
 
-def read_livelink_recording(path: Path, face: Face, *, sound: Path | None = None) -> FaceRecording:
+def read_livelink_recording(path: Path, face: Face) -> FaceRecording:
     """A Live Link capture in the size of `face`; sound as in `read_capture_sound`.
 
     Raises
@@ -82,7 +82,7 @@ def read_livelink_recording(path: Path, face: Face, *, sound: Path | None = None
         fps=capture.weights.fps,
         landmarks=moved_landmarks(face, motion),
         head=np.asarray(capture.head.values, np.float32),
-        sound=read_capture_sound(path, sound),
+        sound=read_capture_sound(path),
         rest=rest_landmarks(face).astype(np.float32),
         eyes=eye_motion(face, motion),
         missing_features=_missing_features(capture),

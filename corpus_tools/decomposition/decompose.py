@@ -21,9 +21,8 @@ from tts2face.models.palette import FEATURES, GESTURE_FPS, REGION_FEATURES
 from tts2face.retargeting.performer import EYELID_LANDMARKS, eye_aperture
 
 TREMOR_SMOOTHING_S = 0.03  # standard deviation of the Gaussian that removes tracking noise from head, brows and cheeks
-CLOSED_LID_APERTURE = (
-    0.055  # of tracked lids that touch; first percentile of 40 minutes of one person (docs/gestures.md)
-)
+# Of tracked lids that touch; first percentile of 40 minutes of one person (docs/gestures.md).
+CLOSED_LID_APERTURE = 0.055
 IRIS_LANDMARKS = {"Left": 473, "Right": 468}
 # Motion of a tracked iris in eye widths per radian of gaze, down and to the left; measured on one person who turns the
 # head with the gaze on the camera (docs/gestures.md).

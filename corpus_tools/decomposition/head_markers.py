@@ -13,9 +13,8 @@ from tts2face.video.pose import similarity_transforms
 
 MIN_VISIBLE_MARKERS = 3  # markers that show a pose
 MAX_MISFIT_MM = 5.0  # root mean square deviation of the head's markers from a rigid head; caps slip by less
-N_ROUNDS = (
-    3  # alternating estimates of reference and poses; the reference moves by less than 0.01 mm from the second on
-)
+# Alternating estimates of reference and poses; the reference moves by less than 0.01 mm from the second on.
+N_ROUNDS = 3
 MAX_COLLINEAR_RATIO = 0.05  # second over first spread of markers that lie nearly on a line
 
 Floats = NDArray[np.float64]

@@ -46,10 +46,11 @@ class MarkerFace:
 
 
 def read_marker_recording(
-    path: Path, face: Face, marker_set: MarkerSet, *, neutral: Path | None = None, sound: Path | None = None,
-    fps: float | None = None,
-) -> FaceRecording:  # fmt: skip
+    path: Path, face: Face, marker_set: MarkerSet, *, neutral: Path | None = None, fps: float | None = None
+) -> FaceRecording:
     """A marker recording as landmarks in the person's own size; filled gaps are reported in its notes.
+
+    Its sound is that of the file, or else as `read_capture_sound` finds it.
 
     Parameters
     ----------
@@ -57,8 +58,6 @@ def read_marker_recording(
         Provides the common landmarks at rest.
     neutral
         A recording of the person at rest; by default the median of the recording.
-    sound
-        As in `read_capture_sound`, if the file itself has none.
     fps
         Frame rate of a table with frame numbers.
 
@@ -82,7 +81,7 @@ def read_marker_recording(
         fps=take.fps,
         landmarks=landmarks.astype(np.float32),
         head=_head_motion(poses, rest.spread, face).astype(np.float32),
-        sound=take.sound or read_capture_sound(path, sound),
+        sound=take.sound or read_capture_sound(path),
         rest=rest.spread.rest.astype(np.float32),
         missing_features=marker_set.missing_features,
         notes=(*_absent_markers(take, marker_set), *notes),

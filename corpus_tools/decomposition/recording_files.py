@@ -19,7 +19,7 @@ from lexicon.errors import DataError, InputError
 from lexicon.inputs import check_regular_file
 from tts2face.models.face import Face
 from tts2face.types import Progress, Waveform
-from tts2face.video.frame_grid import face_span, fill_gaps, resample_to_grid
+from tts2face.video.frame_grid import resample_to_grid, trim_and_fill
 from tts2face.video.landmark_models import find_bundle
 from tts2face.video.media import read_sound
 from tts2face.video.pose import head_angles, remove_pose
@@ -35,10 +35,7 @@ def read_video_recording(video: Path, tracker: CachedTracker) -> FaceRecording:
     """
     tracked = tracker.track(video)
     points, first = resample_to_grid(tracked.tracking.points, tracked.times, tracked.fps)
-    if np.isnan(points).all():
-        raise DataError("no frame shows a face")
-    start, end = face_span(points)
-    filled, n_filled = fill_gaps(points[start:end], tracked.fps)
+    filled, start, n_filled = trim_and_fill(points, tracked.fps)
     posed = remove_pose(filled, tracked.fps)
     angles = head_angles(posed.rotations)
     check_limits(

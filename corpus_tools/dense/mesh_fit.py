@@ -26,9 +26,8 @@ FULL_EYE_DISTANCE_MM, FREE_SKIN_DISTANCE_MM = (
     11.0,
 )  # from an eyeball: skin up to the first keeps its distance from it, beyond the second it is free
 N_NEIGHBOURS = 10  # neighbouring landmarks with whose motion a landmark's is compared
-MAX_STRAY_MM = (
-    4.0  # maximum deviation from the neighbours' motion; larger ones are errors of correspondence at the face's rim
-)
+# Maximum deviation from the neighbours' motion; larger ones are errors of correspondence at the face's rim.
+MAX_STRAY_MM = 4.0
 N_ROUNDS = 3  # landmarks lie inside triangles, so that residuals are fitted again
 
 

@@ -45,32 +45,26 @@ class Evaluation:
         if self.own:
             yield OWN_DURATIONS, self.own
 
-    def table(self, *, intervals: bool = False) -> str:
+    def table(self) -> str:
         """Markdown tables, one method a line."""
-        every = [(name, figures_table(scores, intervals=intervals)) for name, scores in self.tables()]
+        every = [(name, _markdown_table(figure_rows(scores))) for name, scores in self.tables()]
         if self.folds:
             every.append((f"spread over {len(self.folds)} folds", self.fold_table()))
         return every[0][1] if len(every) == 1 else "\n\n".join(f"{name}\n\n{lines}" for name, lines in every)
 
     def class_table(self) -> str:
         """Markdown table of the classes of phones, one method and class a line."""
-        lines = ["| method | phones | frames | RMSE z | error of opening | bias |", "| --- |" + " --- |" * 5]
-        lines += [
-            f"| {one.method} | {some.phones} | {some.n_frames} | {some.rmse_z:.3f} | {some.opening_error:.4f} | "
-            f"{some.opening_bias:+.4f} |"
-            for one in self.scores
-            for some in one.classes
-        ]
-        return "\n".join(lines)
+        return _markdown_table(class_rows(self.scores))
 
     def fold_table(self) -> str:
         """Markdown table of the standard deviation of each figure over the folds, one method a line."""
         heads = available_figures(self.scores)
-        lines = [f"| method | {' | '.join(head for _, head, _ in heads)} |", "| --- |" + " --- |" * len(heads)]
+        rows = [("method", *(head for _, head, _ in heads))]
         for one in self.scores:
-            cells = [f"{self.fold_mean_and_deviation(one.method, name)[1]:.{digits}f}" for name, _, digits in heads]
-            lines.append(f"| {one.method} | {' | '.join(cells)} |")
-        return "\n".join(lines)
+            spreads = (self.fold_mean_and_deviation(one.method, name)[1] for name, _, _ in heads)
+            cells = (f"{spread:.{digits}f}" for spread, (_, _, digits) in zip(spreads, heads, strict=True))
+            rows.append((one.method, *cells))
+        return _markdown_table(rows)
 
     def fold_mean_and_deviation(self, method: str, figure: str) -> tuple[float, float]:
         """Mean and standard deviation (of a sample) of a figure over the folds."""
@@ -89,14 +83,28 @@ class Evaluation:
         return (head, *rows)
 
 
-def figures_table(scores: Sequence[Scores], *, intervals: bool = False) -> str:
-    """Markdown table of figures, one method a line."""
+def figure_rows(scores: Sequence[Scores], *, intervals: bool = False) -> list[tuple[str, ...]]:
+    """Heads of a table of figures, and a row for each method."""
     heads = available_figures(scores)
-    lines = [f"| method | {' | '.join(head for _, head, _ in heads)} |", "| --- |" + " --- |" * len(heads)]
+    rows = [("method", *(head for _, head, _ in heads))]
     for one in scores:
-        cells = [figure_text(one, name, digits, intervals=intervals) for name, _, digits in heads]
-        lines.append(f"| {one.method} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        rows.append((one.method, *(figure_text(one, name, digits, intervals=intervals) for name, _, digits in heads)))
+    return rows
+
+
+def class_rows(scores: Sequence[Scores]) -> list[tuple[str, ...]]:
+    """Heads of a table of the classes of phones, and a row for each method and class."""
+    rows: list[tuple[str, ...]] = [("method", "phones", "frames", "RMSE z", "opening error", "opening bias")]
+    for one in scores:
+        for some in one.classes:
+            error, bias = f"{some.opening_error:.4f}", f"{some.opening_bias:+.4f}"
+            rows.append((one.method, some.phones, str(some.n_frames), f"{some.rmse_z:.3f}", error, bias))
+    return rows
+
+
+def _markdown_table(rows: Sequence[Sequence[str]]) -> str:
+    lines = [f"| {' | '.join(row)} |" for row in rows]
+    return "\n".join([lines[0], "| --- |" + " --- |" * (len(rows[0]) - 1), *lines[1:]])
 
 
 def figure_text(scores: Scores, name: str, digits: int, *, intervals: bool) -> str:

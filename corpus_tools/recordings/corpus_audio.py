@@ -13,7 +13,7 @@ from corpus_tools.recordings.corpus_video import content_key
 from corpus_tools.recordings.folder import PronouncedTranscript
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence, WordSpan
-from tts2face.speech.pauses import Span, cut_at_pauses
+from tts2face.speech.pauses import Span, cut_at_pauses, cut_sound
 from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
@@ -158,12 +158,6 @@ class CachedAligner:
         self._recogniser = self._recogniser or PhoneRecogniser()
         parts = [cut_sound(sound, span) for span in cut_at_pauses(sound, MAX_SOUND_S)]
         return tuple(word for part in parts for word in self._recogniser.words(part))
-
-
-def cut_sound(sound: Waveform, span: Span) -> Waveform:
-    """The sound in a span of seconds."""
-    first, last = (round(second * sound.rate) for second in span)
-    return Waveform(sound.samples[first:last], sound.rate)
 
 
 def _read_cached_alignment(cached: Path, sound: Waveform, *, is_recognised: bool) -> AlignedSpeech | None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from corpus_tools.recordings.corpus_video import NOT_COUNTED
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.speech.pauses import sound_windows
 from tts2face.speech.text_fit import LEAST_CONFIDENCE
 from tts2face.types import Waveform
 
@@ -76,9 +77,8 @@ def sound_measures(sound: Waveform, phones: PhoneSequence) -> dict[str, float]:
 
     Without pauses the noise cannot be estimated and the ratio is infinite.
     """
-    window = max(1, round(LEVEL_WINDOW_S * sound.rate))
-    n_windows = len(sound.samples) // window
-    blocks = sound.samples[: n_windows * window].reshape(n_windows, window)
+    blocks = sound_windows(sound, LEVEL_WINDOW_S)
+    n_windows = len(blocks)
     middles = (np.arange(n_windows) + 0.5) * LEVEL_WINDOW_S
     at = np.clip(np.searchsorted(phones.edges, middles, side="right") - 1, 0, len(phones) - 1)
     is_speech = np.array([phone != SILENCE for phone in phones.phones])[at] if n_windows else np.zeros(0, bool)

@@ -13,7 +13,7 @@ from corpus_tools.recordings.limits import check_limits, head_turn_deg, picture_
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.speech.loudness import intensity
-from tts2face.video.frame_grid import face_span, fill_gaps, resample_to_grid
+from tts2face.video.frame_grid import resample_to_grid, trim_and_fill
 from tts2face.video.pose import PoseFreeLandmarks, head_angles, remove_pose
 
 TIME_TOLERANCE_S = 1e-6  # seconds
@@ -145,10 +145,7 @@ def _span_landmarks(
     instants = (first + np.arange(len(points))) / fps
     inside = (instants > begin - TIME_TOLERANCE_S) & (instants < end + TIME_TOLERANCE_S)
     points, first = points[inside], first + int(inside.argmax())
-    if np.isnan(points).all():
-        raise DataError("no frame shows a face")
-    start, end = face_span(points)
-    filled, n_filled = fill_gaps(points[start:end], fps)
+    filled, start, n_filled = trim_and_fill(points, fps)
     return filled, first + start, n_filled
 
 

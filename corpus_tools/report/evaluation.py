@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.evaluation.evaluate import CEILING_METHOD, SplitResult
 from corpus_tools.evaluation.scores import CONFIDENCE, Scores, available_figures
-from corpus_tools.evaluation.tables import Evaluation, figure_text
+from corpus_tools.evaluation.tables import Evaluation, class_rows, figure_rows
 from corpus_tools.report.drawing import RULE, SERIES, draw_svg
 from corpus_tools.report.page import page, paragraphs, scroll_box, table
 from corpus_tools.report.videos import MethodVideos
@@ -40,6 +40,7 @@ def evaluation_page(result: Evaluation, runs: Sequence[SplitResult]) -> str:
     """The page (HTML)."""
     compared = [one.method for one in result.scores if one.method != CEILING_METHOD]
     method = SHOWN if SHOWN in compared else compared[-1]
+    head, *classes = class_rows([one for one in result.scores if one.method != CEILING_METHOD])
     about = ABOUT[result.is_across].format(n_test=result.n_test, n_train=result.n_train)
     return page(
         "Accuracy of synthesised lips",
@@ -49,7 +50,7 @@ def evaluation_page(result: Evaluation, runs: Sequence[SplitResult]) -> str:
             *_own_durations(result.own),
             *_folds(result),
             "<h2>By class of phone</h2>",
-            _classes(result.scores),
+            table(head, classes, numbers=range(2, 6)),
             "<h2>DTW cost of the sentences</h2>",
             cost_histogram(
                 {
@@ -64,11 +65,8 @@ def evaluation_page(result: Evaluation, runs: Sequence[SplitResult]) -> str:
 
 
 def _figures(scores: Sequence[Scores]) -> str:
-    heads = available_figures(scores)
-    rows = [
-        (one.method, *(figure_text(one, name, digits, intervals=True) for name, _, digits in heads)) for one in scores
-    ]
-    return table(("method", *(head for _, head, _ in heads)), rows, numbers=range(1, len(heads) + 1))
+    head, *rows = figure_rows(scores, intervals=True)
+    return table(head, rows, numbers=range(1, len(head)))
 
 
 def _own_durations(scores: Sequence[Scores]) -> Iterator[str]:
@@ -94,18 +92,6 @@ def _folds(result: Evaluation) -> Iterator[str]:
         "Each fold is tested with methods learnt from the others. Spread: standard deviation over the folds."
     )
     yield table(("method", "fold", *(head for _, head, _ in heads)), rows, numbers=range(2, len(heads) + 2))
-
-
-def _classes(scores: Sequence[Scores]) -> str:
-    rows = [
-        (one.method, some.phones, str(some.n_frames), f"{some.rmse_z:.3f}", f"{some.opening_error:.4f}",
-         f"{some.opening_bias:+.4f}")
-        for one in scores
-        if one.method != CEILING_METHOD
-        for some in one.classes
-    ]  # fmt: skip
-    heads = ("method", "phones", "frames", "RMSE z", "opening error", "opening bias")
-    return table(heads, rows, numbers=range(2, 6))
 
 
 def _sentences(result: Evaluation, runs: Sequence[SplitResult], method: str, plain: str | None) -> Iterator[str]:

@@ -15,9 +15,8 @@ from tts2face.numeric import fix_signs, nearest_rotation, principal_axes
 from tts2face.video.pose import head_angles
 
 REST_MARGIN_S = 0.2  # lips start to move this long before the first sound
-CLOSED_GAP = (
-    0.01  # of the distance of the outer eye corners: the inner lips' gap below which the mouth counts as closed
-)
+# Of the distance of the outer eye corners: the inner lips' gap below which the mouth counts as closed.
+CLOSED_GAP = 0.01
 
 
 def learn_talker(

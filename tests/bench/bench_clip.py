@@ -71,20 +71,19 @@ def cold_start(folder: Path) -> None:
         print(f"{what}: {np.median(spent):.2f} s ({min(spent):.2f}-{max(spent):.2f})")
     code = (
         "import sys, time; began = time.perf_counter()\n"
-        "import tts2face.render.encode as e\n"
-        "from tts2face.render import draw as d; frames = d.frames\n"
+        "from tts2face.render.draw import MeshRenderer as M; frames = M.frames\n"
         "def first(*a, **k):\n"
         "    for n, x in enumerate(frames(*a, **k)):\n"
         "        if n == 0: print(time.perf_counter() - began)\n"
         "        yield x\n"
-        "e.frames = first\n"
+        "M.frames = first\n"
         "from cli.main import run; run(sys.argv[1:])"
     )
     spent = []
     for _ in range(5):
         arguments = [SHORT, "--out", str(folder / "first.mp4"), "--quiet"]
-        told = subprocess.run([sys.executable, "-c", code, *arguments], check=True, capture_output=True, text=True)
-        spent.append(float(told.stdout.split()[0]))
+        done = subprocess.run([sys.executable, "-c", code, *arguments], check=True, capture_output=True, text=True)
+        spent.append(float(done.stdout.split()[0]))
     print(f"cold start to the first frame: {np.median(spent):.2f} s ({min(spent):.2f}-{max(spent):.2f})")
 
 

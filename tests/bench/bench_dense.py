@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw
 
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
-from tts2face.render.draw import draw, staged
+from tts2face.render.draw import mesh_renderer
 from tts2face.render.picture import Picture
 
 N_DRAWN = 6
@@ -35,8 +35,10 @@ def table(face: Face) -> None:
 def sheet(face: Face, size: str) -> Image.Image:
     rows = []
     for camera in CAMERAS:
-        stage = staged(face, Picture(size=size, camera=camera))
-        pictures = [[draw(stage, weights(face, mode, amount)) for mode in range(1, N_DRAWN + 1)] for amount in AMOUNTS]
+        renderer = mesh_renderer(face, Picture(size=size, camera=camera))
+        pictures = [
+            [renderer.draw(weights(face, mode, amount)) for mode in range(1, N_DRAWN + 1)] for amount in AMOUNTS
+        ]
         rows += [np.concatenate(row, axis=1)[..., :3] for row in pictures]
     image = Image.fromarray(np.concatenate(rows))
     pen, side = ImageDraw.Draw(image), image.width // N_DRAWN

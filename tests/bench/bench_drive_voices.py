@@ -29,7 +29,7 @@ def main() -> None:
     print("| voice | drive | loudness | r opening | r width | range ratio |\n| --- | --- | --- | --- | --- | --- |")
     for name in ("heart", "espeak"):
         voice = load_voice(name, "en-us", {})
-        speeches = [voice.speak(text, rate=1.0, volume=1.0, seed=0) for text in sentences(options.sentences)]
+        speeches = [voice.speak(text, rate=1.0, seed=0) for text in sentences(options.sentences)]
         for drive in ("linear", "network"):
             for is_matched in (False, True):
                 kept = talker.audio_maps[drive]

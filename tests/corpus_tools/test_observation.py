@@ -8,7 +8,7 @@ from corpus_tools.recordings.observation import trim_to_picture
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.types import Waveform
-from tts2face.video.frame_grid import face_span, fill_gaps, resample_to_grid
+from tts2face.video.frame_grid import fill_gaps, resample_to_grid, trim_and_fill
 
 FPS = 25.0
 
@@ -48,10 +48,8 @@ def test_blank_frames_at_the_ends_and_short_gaps():
     points = _line(np.arange(20) / FPS)
     whole = points.copy()
     points[[0, 1, 2, 9, 10, 19]] = np.nan
-    start, end = face_span(points)
-    assert (start, end) == (3, 19)
-    filled, n_filled = fill_gaps(points[start:end], FPS)
-    assert n_filled == 2
+    filled, start, n_filled = trim_and_fill(points, FPS)
+    assert (start, len(filled), n_filled) == (3, 16, 2)
     np.testing.assert_allclose(filled, whole[3:19], atol=1e-6)
 
 

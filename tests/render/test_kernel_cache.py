@@ -8,6 +8,7 @@ import pytest
 from tts2face import compilation
 from tts2face.compilation import CACHE_VARIABLE, cache_folder
 from tts2face.render import raster
+from tts2face.synthesis import warm_up
 from tts2face.synthesis.warm_up import kernels_are_compiled
 
 
@@ -61,3 +62,14 @@ def test_kernels_count_as_compiled_once_they_lie_on_disk(monkeypatch, tmp_path):
     assert kernels_are_compiled()
     os.utime(tmp_path / "raster.draw_band-1.py311.nbi", (0, 0))  # older than the source
     assert not kernels_are_compiled()
+
+
+def test_a_cache_that_is_older_than_its_source_is_compiled_once_only(monkeypatch, tmp_path):
+    index = tmp_path / "raster.draw_band-1.py311.nbi"
+    index.write_bytes(b"")
+    os.utime(index, (0, 0))  # numba still uses it if the source has the same content as before
+    monkeypatch.setattr(raster, "draw_band", SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path))))
+    monkeypatch.setattr(warm_up, "draw", lambda *arguments, **options: None)
+    monkeypatch.setattr(warm_up, "COMPILE_MOTION_CODE", "")
+    warm_up.compile_kernels()
+    assert kernels_are_compiled()

@@ -5,6 +5,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tts2face.numeric import smoothstep
+
 FloatArray = NDArray[np.float64]
 
 
@@ -31,6 +33,5 @@ def interpolate_keys(times: ArrayLike, keys: tuple[tuple[float, float], ...]) ->
     seconds = np.asarray(times, np.float64)
     curve = np.full(seconds.shape, keys[0][1])
     for (begin, low), (end, high) in pairwise(keys):
-        share = np.clip((seconds - begin) / (end - begin), 0.0, 1.0)
-        curve = curve + (high - low) * share**2 * (3 - 2 * share)  # not `smoothstep`: this order rounds differently
+        curve = curve + (high - low) * smoothstep(seconds, begin, end)
     return curve

@@ -4,9 +4,8 @@ import numpy as np
 
 from tts2face.compilation import kernel
 
-SEARCH_SLACK = (
-    1.1  # default factor by which distances of moments found may exceed the best ones (Ju and Lee 2008 use ANN)
-)
+# Default factor by which distances of moments found may exceed the best ones (Ju and Lee 2008 use ANN).
+SEARCH_SLACK = 1.1
 MIN_MOMENT_GAP = 10  # default least number of frames between two candidates of one recording
 
 

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import TypeVar
 
 from lexicon.errors import InputError
+from lexicon.inputs import check_limits
 from tts2face.models.palette import EXPRESSIONS, FEATURES
 
 EXPRESSION_WEIGHT_LIMITS = (-0.5, 1.5)  # -e to 1 + e with e = 0.5, the middle of what Ju and Lee 2008 (section 4) allow
@@ -68,7 +69,7 @@ class ExpressionSpan:
             raise InputError("the expression neutral has no effect because it is the face at rest; remove it")
         if self.expression not in EXPRESSIONS:
             raise InputError(f"there is no expression {self.expression!r}; choose {', '.join(EXPRESSIONS)}")
-        _check_range(f"the weight of {self.expression}", self.weight, EXPRESSION_WEIGHT_LIMITS)
+        check_limits(f"the weight of {self.expression}", self.weight, EXPRESSION_WEIGHT_LIMITS)
         _check_span(f"the span of {self.expression}", self.start, self.end)
 
     @property
@@ -88,7 +89,7 @@ class Nod:
         """Refuse times before the clip and sizes out of range."""
         if not 0.0 <= self.time < math.inf:
             raise InputError(f"a nod needs a time of 0 s or more, not {self.time:g}")
-        _check_range("the size of a nod", self.size, NOD_SIZE_LIMITS)
+        check_limits("the size of a nod", self.size, NOD_SIZE_LIMITS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +102,7 @@ class Gains:
         """Refuse unknown features and factors out of range."""
         for feature, factor in self.factors.items():
             check_feature(feature, GAIN_NAMES)
-            _check_range(f"the gain of {feature}", factor, GAIN_LIMITS)
+            check_limits(f"the gain of {feature}", factor, GAIN_LIMITS)
         object.__setattr__(self, "factors", MappingProxyType(dict(self.factors)))
 
     def of(self, feature: str) -> float:
@@ -116,12 +117,6 @@ def check_style(style: str) -> None:
     """Refuse a style without a name."""
     if not style.strip():
         raise InputError("a style needs a name; give one of the palette's")
-
-
-def _check_range(what: str, value: float, limits: tuple[float, float]) -> None:
-    low, high = limits
-    if not low <= value <= high:
-        raise InputError(f"{what} must lie between {low:g} and {high:g}, not {value:g}")
 
 
 def _check_span(what: str, start: float, end: float) -> None:

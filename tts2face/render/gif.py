@@ -12,9 +12,8 @@ TICKS_PER_SECOND = 100  # ticks of a GIF's clock per second
 MIN_TICKS = 2  # browsers play shorter delays as 0.1 s
 COLOUR_BITS = 6  # bits of each channel in the colour lookup table
 BAYER = np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]], np.int16)
-DITHER_AMPLITUDE = (
-    10  # 8-bit steps between the extremes of the ordered dither, which does not flicker on still pictures
-)
+# 8-bit steps between the extremes of the ordered dither, which does not flicker on still pictures.
+DITHER_AMPLITUDE = 10
 OPAQUE_COVERAGE = 128  # least coverage of an opaque pixel
 
 

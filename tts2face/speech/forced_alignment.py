@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from lexicon.phones import ARPABET, PHONES, nearest_phones
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from tts2face.speech.pauses import sound_windows
 from tts2face.types import Waveform
 
 MODEL_RATE = 16000  # Hz, sample rate of the acoustic model's training data
 FRAME_RATE = 200  # Hz; 100 halves the run time and doubles the edge error
-MODEL_DELAY_S = (
-    0.009  # the model's frames are early by this time; measured on the TIMIT sample, confirmed on an Australian voice
-)
+# The model's frames are early by this time; measured on the TIMIT sample, confirmed on an Australian voice.
+MODEL_DELAY_S = 0.009
 PADDING_S = 0.1  # low noise at both ends, as silence before the first and after the last phone
 MARGIN_S = 0.15  # silence retained at both ends; more of it would shift the mean by which the model normalises
 AUDIBLE_SHARE = 0.01  # relative to the level of the loudest window
@@ -150,9 +150,8 @@ _MODEL_PHONES = frozenset(ARPABET.values())
 
 def _trim_to_audible(sound: Waveform) -> tuple[Waveform, float]:
     """Audible part of a sound with a margin of `MARGIN_S` at both ends, and its start in seconds."""
-    window = max(1, round(LEVEL_WINDOW_S * sound.rate))
-    n_windows = len(sound.samples) // window
-    levels = np.abs(sound.samples[: n_windows * window].reshape(n_windows, window)).max(axis=1, initial=0.0)
+    windows = sound_windows(sound, LEVEL_WINDOW_S)
+    levels, window = np.abs(windows).max(axis=1, initial=0.0), windows.shape[1]
     loud = np.flatnonzero(levels > AUDIBLE_SHARE * levels.max(initial=0.0))
     if not len(loud):
         return sound, 0.0

@@ -63,9 +63,20 @@ def _window_levels(sound: Waveform) -> NDArray[np.float64]:
     """(T,) levels in dB relative to full scale, in windows of `LEVEL_WINDOW_S`."""
     from scipy.ndimage import uniform_filter1d
 
-    window = max(1, round(LEVEL_WINDOW_S * sound.rate))
-    n_windows = len(sound.samples) // window
-    power = np.square(sound.samples[: n_windows * window].reshape(n_windows, window), dtype=np.float64).mean(axis=1)
-    smooth = uniform_filter1d(power, SMOOTHING_WINDOWS, mode="nearest") if n_windows else power
+    power = np.square(sound_windows(sound, LEVEL_WINDOW_S), dtype=np.float64).mean(axis=1)
+    smooth = uniform_filter1d(power, SMOOTHING_WINDOWS, mode="nearest") if len(power) else power
     levels: NDArray[np.float64] = 10.0 * np.log10(np.maximum(smooth, 1e-10))
     return levels
+
+
+def cut_sound(sound: Waveform, span: tuple[float, float]) -> Waveform:
+    """The sound in a span of seconds."""
+    first, last = (round(second * sound.rate) for second in span)
+    return Waveform(sound.samples[first:last], sound.rate)
+
+
+def sound_windows(sound: Waveform, window_s: float) -> NDArray[np.float32]:
+    """(T, W) samples of the whole windows of `window_s` seconds, one after another."""
+    window = max(1, round(window_s * sound.rate))
+    n_windows = len(sound.samples) // window
+    return sound.samples[: n_windows * window].reshape(n_windows, window)

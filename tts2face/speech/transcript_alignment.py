@@ -8,7 +8,7 @@ from lexicon.errors import DataError
 from lexicon.pronounce import Word, pronounce
 from lexicon.sequence import PhoneSequence, WordSpan, concatenate_phones
 from tts2face.speech.forced_alignment import Aligner, Alignment
-from tts2face.speech.pauses import cut_at_pauses
+from tts2face.speech.pauses import cut_at_pauses, cut_sound
 from tts2face.speech.text_fit import TextMismatch, extend_range, find_misfits, mismatch_of
 from tts2face.types import Waveform
 
@@ -76,7 +76,7 @@ def align_recording(
     if sound.duration <= MAX_ALIGNED_S:
         found = aligner.align(sound, words)
         return found.phones, found.words, _mismatches(aligner, sound, words, found, is_english=is_english)
-    parts = [_cut_sound(sound, span) for span in cut_at_pauses(sound, MAX_STRETCH_S)]
+    parts = [cut_sound(sound, span) for span in cut_at_pauses(sound, MAX_STRETCH_S)]
     phones: list[PhoneSequence] = []
     spans: list[tuple[WordSpan, ...]] = []
     mismatches: list[TextMismatch] = []
@@ -110,7 +110,7 @@ def _mismatches(
         if last - first == len(words):  # the excerpt would be the whole recording
             return (mismatch_of(alignment, *misfit),)
         try:
-            excerpt = aligner.align(_cut_sound(sound, (begin, end)), words[first:last])
+            excerpt = aligner.align(cut_sound(sound, (begin, end)), words[first:last])
         except DataError:  # the excerpt does not contain the words
             mismatches = [mismatch_of(alignment, *misfit)]
         else:
@@ -132,8 +132,3 @@ def _words_by_part(parts: Sequence[Waveform], words: PronouncedTranscript) -> li
         raise DataError("the recording contains no speech; give another recording")
     places = assign_words([alternatives[0] for _, alternatives in words], recognised)
     return [tuple(word for word, place in zip(words, places, strict=True) if place == at) for at in range(len(parts))]
-
-
-def _cut_sound(sound: Waveform, span: tuple[float, float]) -> Waveform:
-    first, last = (round(second * sound.rate) for second in span)
-    return Waveform(sound.samples[first:last], sound.rate)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from lexicon.errors import InputError
+from lexicon.inputs import check_limits
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.clock import exact_rate, first_sample
 from tts2face.synthesis.animated_face import AnimatedFace, FaceMotion
@@ -58,9 +59,7 @@ class Performance:
 
     def __post_init__(self) -> None:
         """Reject options that exclude each other."""
-        low, high = GAINS
-        if not low <= self.gain <= high:
-            raise InputError(f"the gain must lie between {low:g} and {high:g}, not {self.gain:g}")
+        check_limits("the gain", self.gain, GAINS)
         if self.audio is not None and not is_capture(self.take):
             raise InputError(f"{self.take} has its own sound; --audio belongs to a Live Link Face .csv file")
 

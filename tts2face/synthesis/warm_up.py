@@ -6,6 +6,7 @@ one kernel at a time in each process.
 
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -29,15 +30,15 @@ COMPILE_TIMEOUT_S = 120.0
 
 def kernels_are_compiled() -> bool:
     """Whether the drawing kernels are in the disk cache; compiling them delays the first picture by some seconds."""
-    folder = Path(str(raster.draw_band.stats.cache_path))  # type: ignore[attr-defined]
     source = Path(raster.__file__).stat().st_mtime
-    return any(index.stat().st_mtime >= source for index in folder.glob("raster.draw_band-*.nbi"))
+    return any(index.stat().st_mtime >= source for index in _cache_indexes())
 
 
 def compile_kernels() -> None:
-    """Compile all kernels that a clip needs.
+    """Compile all kernels that a clip needs, and mark the disk cache as new.
 
-    If the child process fails, the motion kernels are compiled at their first use.
+    If the child process fails, the motion kernels are compiled at their first use. numba keeps cached code whose source
+    file was replaced by one of the same content, so that the age of the cache does not show by itself that it is valid.
     """
     face = load_face("head")
     child = subprocess.Popen(
@@ -57,6 +58,14 @@ def compile_kernels() -> None:
         child.wait()
         if child.stdin is not None:
             child.stdin.close()
+    for index in _cache_indexes():
+        with suppress(OSError):  # a cache that this user may only read
+            index.touch()
+
+
+def _cache_indexes() -> list[Path]:
+    folder = Path(str(raster.draw_band.stats.cache_path))  # type: ignore[attr-defined]
+    return list(folder.glob("raster.draw_band-*.nbi"))
 
 
 def compile_motion() -> None:

@@ -37,10 +37,20 @@ def resample_to_grid(
     return interpolate_linear(points, times, instants), first
 
 
-def face_span(points: NDArray[np.float32]) -> tuple[int, int]:
-    """Half-open range from the first frame with a face to the last, of (T, L, 3) points that are NaN without one."""
+def trim_and_fill(points: NDArray[np.float32], fps: float) -> tuple[NDArray[np.float32], int, int]:
+    """Points (T, L, 3) from the first frame with a face to the last, gaps filled; that first frame; frames filled.
+
+    Raises
+    ------
+    DataError
+        No frame shows a face; or as `fill_gaps`.
+    """
     present = np.flatnonzero(~np.isnan(points[:, 0, 0]))
-    return int(present[0]), int(present[-1]) + 1
+    if not len(present):
+        raise DataError("no frame shows a face")
+    start = int(present[0])
+    filled, n_filled = fill_gaps(points[start : int(present[-1]) + 1], fps)
+    return filled, start, n_filled
 
 
 def fill_gaps(points: NDArray[np.float32], fps: float) -> tuple[NDArray[np.float32], int]:

@@ -107,9 +107,7 @@ def read_sound(path: Path, rate: int) -> Waveform:
 
     blocks: list[NDArray[np.float32]] = []
     with _open_container(path) as container:
-        stream = _first_decodable(container.streams.audio)
-        if stream is None:
-            raise DataError(f"{path} holds no sound; give a recording with its sound track")
+        stream = _sound_stream(container, path)
         start = 0.0
         for frame in _decode_frames(container, stream, path):
             if not blocks:
@@ -131,9 +129,7 @@ def sound_blocks(path: Path, rate: int) -> Iterator[NDArray[np.float32]]:
     import soxr
 
     with _open_container(path) as container:
-        stream = _first_decodable(container.streams.audio)
-        if stream is None:
-            raise DataError(f"{path} holds no sound; give a recording with its sound track")
+        stream = _sound_stream(container, path)
         resampler = soxr.ResampleStream(stream.rate, rate, 1, dtype="float32")
         n_early: int | None = None  # number of samples before time 0 that remain to be skipped
         for frame in _decode_frames(container, stream, path):
@@ -175,6 +171,13 @@ def _video_stream(container: "InputContainer", path: Path) -> "VideoStream":
     stream = _first_decodable(container.streams.video)
     if stream is None:
         raise DataError(f"{path} holds no video; give a recording with pictures")
+    return stream
+
+
+def _sound_stream(container: "InputContainer", path: Path) -> "AudioStream":
+    stream = _first_decodable(container.streams.audio)
+    if stream is None:
+        raise DataError(f"{path} holds no sound; give a recording with its sound track")
     return stream
 
 
