@@ -1,5 +1,7 @@
 """A character made from the shipped head is imported back: same vertices, shapes, landmarks, eyes and speech."""
 
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ from cli.main import run
 from lexicon.errors import BackendError, DataError, InputError
 from tests.characters.made import Variant, shipped_head, write_character_file, write_landmarks
 from tts2face.characters.importing import ImportedFace, import_face
+from tts2face.characters.landmark_table import landmark_table, read_landmark_table
 from tts2face.characters.saving import save_face
 from tts2face.characters.shape_mapping import mapping_table, read_mapping
 from tts2face.face.gesture_transfer import gesture_face
@@ -20,6 +23,7 @@ from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, OUTER_LI
 from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
 from tts2face.retargeting.to_face import build_retargeter
+from tts2face.types import Trajectory
 from tts2face.video.landmark_models import find_bundle
 
 PLACE_MM = 0.02  # of a landmark after its table with 7 digits; quantised files have steps of 0.015 mm
@@ -73,8 +77,6 @@ def test_shapes_and_landmarks_come_back(name: str, tmp_path: Path) -> None:
 def test_speech_moves_an_imported_face_as_the_face_it_was_made_of(plain: ImportedFace) -> None:
     talker, head = load_talker("grid_s1"), shipped_head()
     parameters = talker.utterances[0].shape[:, : talker.model.n_speech]
-    from tts2face.types import Trajectory
-
     speech = Trajectory(tuple(f"shape{n}" for n in range(talker.model.n_speech)), parameters, talker.fps)
     weights = [build_retargeter(talker, face).retarget(speech) for face in (plain.face, head)]
     assert weights[0].channels == weights[1].channels
@@ -136,8 +138,6 @@ def test_a_mapping_survives_its_table(plain: ImportedFace, tmp_path: Path) -> No
 
 
 def test_landmarks_survive_their_table_in_the_axes_of_the_file(tmp_path: Path) -> None:
-    from tts2face.characters.landmark_table import landmark_table, read_landmark_table
-
     imported = made_face(tmp_path, "turned", Variant(turn_deg=180.0))
     given = read_landmark_table(tmp_path / "turned.tsv")
     (tmp_path / "again.tsv").write_text(landmark_table(imported.report.landmarks))
@@ -213,8 +213,6 @@ def test_tracked_landmarks_lie_near_the_true_ones(tmp_path: Path) -> None:
 def test_a_saved_face_is_read_and_a_bad_one_does_not_appear(plain: ImportedFace, tmp_path: Path) -> None:
     save_face(tmp_path / "me.face", plain.face)
     assert read_face(tmp_path / "me.face").shape_names == plain.face.shape_names
-    from dataclasses import replace
-
     with pytest.raises(DataError, match=r"broken\.face.*vertices"):
         save_face(tmp_path / "broken.face", replace(plain.face, vertices=plain.face.vertices * 1e6))
     assert [path.name for path in tmp_path.iterdir()] == ["me.face"]
@@ -266,3 +264,46 @@ def test_a_source_that_does_not_exist_is_named(tmp_path: Path) -> None:
         import_face(character, mapping=tmp_path / "map.tsv", landmarks=write_landmarks(tmp_path / "l.tsv"))
     with pytest.raises(InputError, match=r"a character is a .glb, .gltf, .vrm file or a folder"):
         import_face(tmp_path / "map.tsv")
+
+
+def dense_head() -> Face:
+    """The skin of the shipped head with every triangle divided into four: more than 50,000 vertices."""
+    head = shipped_head()
+    part = head.parts[0]
+    used, corners = np.unique(head.triangles[: part.count], return_inverse=True)
+    triangles = corners.reshape(-1, 3)
+    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    unique, places = np.unique(edges, axis=0, return_inverse=True)
+    ab, bc, ca = places.reshape(3, -1) + len(used)
+    a, b, c = triangles.T
+    divided = np.stack([a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca], axis=1).reshape(-1, 3)
+
+    def between(values: np.ndarray) -> np.ndarray:
+        kept = values[used].astype(np.float32)
+        return np.concatenate([kept, (kept[unique[:, 0]] + kept[unique[:, 1]]) / 2])
+
+    return replace(
+        head,
+        vertices=between(head.vertices),
+        triangles=divided.astype(np.int32),
+        parts=(replace(part, count=len(divided)),),
+        shapes=np.stack([between(shape) for shape in head.shapes]),
+        colours=between(head.colours).astype(np.uint8),
+        uv=None if head.uv is None else between(head.uv),
+        eyes=(),
+        landmarks=head.landmarks[:0],
+        landmark_vertices=head.landmark_vertices[:0],
+        landmark_weights=head.landmark_weights[:0],
+    )
+
+
+def test_a_face_of_fifty_thousand_vertices(tmp_path: Path) -> None:
+    character = write_character_file(tmp_path / "dense.glb", Variant(is_dense=True), face=dense_head())
+    began = time.perf_counter()
+    face = import_face(character, landmarks=write_landmarks(tmp_path / "landmarks.tsv")).face
+    save_face(tmp_path / "dense.face", face)
+    assert time.perf_counter() - began < 60.0  # seconds; 7 on two cores
+    assert len(face.vertices) > 50_000
+    opened = [motion_of(one, "jawOpen")[[13, 14], 1] for one in (face, shipped_head())]
+    np.testing.assert_allclose(opened[0], opened[1], atol=0.05)
+    assert read_face(tmp_path / "dense.face").triangles.shape == face.triangles.shape
