@@ -1,4 +1,4 @@
-"""``tts2face voices | languages | faces | identities | styles | talkers``: lists of the available choices."""
+"""``tts2face voices | languages | faces | identities | styles | talkers | formats``: lists of the available choices."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -85,7 +85,16 @@ def talkers(*, as_json: AsJson = False) -> None:
     _print(entries, ("talker", "language", "utterances", "minutes", "own face", "licence"), rows, as_json)
 
 
-LISTS = (voices, languages, faces, identities, styles, talkers)
+def formats(*, as_json: AsJson = False) -> None:
+    """List the export formats (`--export`) and the suffixes that select them."""
+    from tts2face.catalogue import formats
+
+    entries = formats()
+    rows = ((one.name, " ".join(one.suffixes), "yes" if one.is_installed else "no", one.summary) for one in entries)
+    _print(entries, ("format", "suffixes", "installed", "summary"), rows, as_json)
+
+
+LISTS = (voices, languages, faces, identities, styles, talkers, formats)
 
 
 def _languages_text(codes: Sequence[str]) -> str:

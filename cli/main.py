@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from cyclopts import App, CycloptsError, Parameter
 
 import cli.gestures  # noqa: F401 - adds its command to `corpus`
+from cli.convert import convert
 from cli.corpus import corpus
 from cli.face import face as face_commands
 from cli.flags import add_option_flags, check_options, options_from_flags, switch
@@ -42,6 +43,7 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 app.command(mimic)
+app.command(convert)
 app.command(corpus)
 app.command(report)
 app.command(face_commands)
@@ -66,7 +68,7 @@ def phones(
     from lexicon.dictionary import read_dictionary
     from lexicon.given_pronunciations import pronounce_marked
     from lexicon.mark_parser import parse_marks
-    from tts2face.export.text import FORMATS
+    from tts2face.exports.text import FORMATS
 
     pronunciation = pronounce_marked(
         parse_marks(text, language), language, read_dictionary(dictionary) if dictionary else None
@@ -90,7 +92,19 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     /,
     *,
     out: Annotated[
-        Path | None, Parameter(help="Output clip: .mp4, .webm, .gif, or a folder for .png files.", alias="-o")
+        Path | None,
+        Parameter(
+            help="Output clip: .mp4, .webm, .gif, a folder for .png files, or an export format without a video.",
+            alias="-o",
+        ),
+    ] = None,
+    export: Annotated[
+        list[str] | None,
+        Parameter(
+            help="File for another program, by suffix (`tts2face formats`) or as FORMAT:PATH; beside --out or alone, "
+            "several times if wanted.",
+            negative="",
+        ),
     ] = None,
     file: Annotated[
         Path | None, Parameter(help="Read the text from a UTF-8 file.", name=["--file", "--transcript"])
@@ -127,7 +141,9 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     request = options_from_flags(
         Request, options, text=_read_text(text if text_option is None else text_option, file, is_needed=needs_text)
     )
-    speak_options = SpeakOptions(out, talker, face, identity, palette, explain, view, quiet, file)
+    speak_options = SpeakOptions(
+        out, talker, face, identity, palette, explain, view, quiet, file, tuple(export or ())
+    ).with_export_of_out()
     run_request(request, options_from_flags(Picture, options), speak_options)
 
 

@@ -10,6 +10,7 @@ from cli.flags import switch
 from cli.process import write_message
 from cli.progress import stage_bar
 from lexicon.errors import InputError
+from tts2face.exports.formats import is_export, split_format
 from tts2face.storage.overwrite import refuse_overwriting
 
 if TYPE_CHECKING:
@@ -23,7 +24,19 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     /,
     *,
     out: Annotated[
-        Path | None, Parameter(help="Output clip: .mp4, .webm, .gif, or a folder for .png files.", alias="-o")
+        Path | None,
+        Parameter(
+            help="Output clip: .mp4, .webm, .gif, a folder for .png files, or an export format without a video.",
+            alias="-o",
+        ),
+    ] = None,
+    export: Annotated[
+        list[str] | None,
+        Parameter(
+            help="File for another program, by suffix (`tts2face formats`) or as FORMAT:PATH; beside --out or alone, "
+            "several times if wanted.",
+            negative="",
+        ),
     ] = None,
     camera: Annotated[
         str | None,
@@ -54,13 +67,15 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     from tts2face.render.picture import Picture
 
     if camera is not None:
-        if take is not None or out is not None or face == OWN_FACE:
-            raise InputError("--camera cannot be combined with a take, --out or --face self; remove them")
+        if take is not None or out is not None or export or face == OWN_FACE:
+            raise InputError("--camera cannot be combined with a take, --out, --export or --face self; remove them")
         return _run_live_window(camera, face, identity, Picture(size=size, background=background), model)
-    if take is None or out is None:
+    out, exports = _divide_outputs(out, export)
+    if take is None or (out is None and not exports):
         raise InputError("there is no input or no output; add a take and --out, or use --camera")
     inputs = {"the take": take, "--audio": audio, "--talker": talker, "--face": face, "--background": background}
-    refuse_overwriting({"--out": out}, inputs | {"--model": model})
+    outputs = {"--out": out} | {f"--export {given}": split_format(given)[0] for given in exports}
+    refuse_overwriting(outputs, inputs | {"--model": model})
     if (face == OWN_FACE) != (talker is not None):
         raise InputError("--face self and --talker need each other; add the missing one, or remove both")
     if append_missing and talker is None:
@@ -72,15 +87,22 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     session = Session(talker or "grid_s1", face, identity=identity, palette=None)
     picture = Picture(size=size, background=background)
     with stage_bar(quiet) as stages:
-        written = session.write_performance(performance, out, picture=picture, stages=stages)
+        written = session.write_performance(performance, out, picture=picture, exports=exports, stages=stages)
     if quiet:
         return
     if written.is_silent:
         write_message(f"{take} contains no sound; the clip is silent")
     took = time.perf_counter() - began
     write_message(
-        f"wrote {out}: {written.seconds:.1f} s, made in {took:.1f} s ({written.seconds / took:.1f} x real time)"
+        f"wrote {written.names}: {written.seconds:.1f} s, made in {took:.1f} s "
+        f"({written.seconds / took:.1f} x real time)"
     )
+
+
+def _divide_outputs(out: Path | None, export: list[str] | None) -> tuple[Path | None, list[str]]:
+    """Output of a video, and the exports, to which an output in an export format belongs."""
+    exports = list(export or ())
+    return (None, [str(out), *exports]) if out is not None and is_export(out) else (out, exports)
 
 
 def _run_live_window(source: str, face: str, identity: str | None, picture: "Picture", model: Path | None) -> None:

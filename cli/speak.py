@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -39,6 +39,15 @@ class SpeakOptions:
     view: bool
     quiet: bool
     file: Path | None = None
+    exports: tuple[str, ...] = ()
+
+    def with_export_of_out(self) -> "SpeakOptions":
+        """The same options, with an output in an export format as an export."""
+        from tts2face.exports.formats import is_export
+
+        if self.out is None or not is_export(self.out):
+            return self
+        return replace(self, out=None, exports=(str(self.out), *self.exports))
 
 
 def run_request(request: Request, picture: Picture, options: SpeakOptions) -> None:
@@ -54,8 +63,8 @@ def run_request(request: Request, picture: Picture, options: SpeakOptions) -> No
         if options.explain is not None:
             explanations.extend(piece.explain())
 
-    if options.out is not None:
-        _write_clip(session, (prepared, picture), options.out, (collect, options.quiet))
+    if options.out is not None or options.exports:
+        _write_files(session, (prepared, picture), options, collect)
     elif options.explain is not None:
         for piece in session.stream(prepared):
             collect(piece)
@@ -70,11 +79,12 @@ def run_request(request: Request, picture: Picture, options: SpeakOptions) -> No
 
 def _check_options(request: Request, picture: Picture, options: SpeakOptions) -> None:
     """Refuse conflicting flags before anything is loaded."""
-    if options.out is None and options.explain is None and not options.view:
+    if options.out is None and not options.exports and options.explain is None and not options.view:
         raise InputError("there is no output; add --out clip.mp4 (or .webm, .gif, or a folder for .png files)")
     if options.explain is not None:
         check_file_name(options.explain, "an explanation", EXPLANATION_SUFFIXES)
     _check_overwriting(request, picture, options)
+    _check_exports(options)
     is_silent = request.audio is not None or request.idle is not None
     if not request.text.strip() and (not is_silent or options.explain is not None):
         raise InputError("the text is empty; add words to speak, or the words of --audio")
@@ -92,26 +102,47 @@ def _check_overwriting(request: Request, picture: Picture, options: SpeakOptions
 
     inputs = {f"--{name}": path for name, path in input_paths(request, picture).items()}
     models = {"--talker": options.talker, "--face": options.face, "--palette": options.palette}
+    from tts2face.exports.formats import split_format
+
     outputs = {"--out": options.out, "--explain": options.explain}
+    outputs |= {f"--export {given}": split_format(given)[0] for given in options.exports}
     refuse_overwriting(outputs, {"--file": options.file} | models | inputs)
 
 
-def _write_clip(
+def _check_exports(options: SpeakOptions) -> None:
+    if options.exports:
+        from tts2face.exports.writer import plan_exports
+
+        plan_exports(options.exports)
+
+
+def _write_files(
     session: "Session",
     request_and_picture: "tuple[PreparedRequest, Picture]",
-    out: Path,
-    how: tuple[Callable[["Piece"], None], bool],
+    options: SpeakOptions,
+    on_piece: Callable[["Piece"], None],
 ) -> None:
+    """Write the clip and the exports, or only the exports."""
     began = time.perf_counter()
-    (request, picture), (on_piece, is_quiet) = request_and_picture, how
-    with progress_bar("rendering", is_quiet) as on_progress:
-        written = session.write(request, out, picture=picture, on_progress=on_progress, on_piece=on_piece)
+    request, picture = request_and_picture
+    with progress_bar("writing" if options.out is None else "rendering", options.quiet) as on_progress:
+        if options.out is None:
+            written = session.export(request, options.exports, on_progress=on_progress, on_piece=on_piece)
+        else:
+            written = session.write(
+                request,
+                options.out,
+                picture=picture,
+                exports=options.exports,
+                on_progress=on_progress,
+                on_piece=on_piece,
+            )
     _warn_mismatches(written.mismatches)
-    if is_quiet:
+    if options.quiet:
         return
     took = time.perf_counter() - began
     write_message(
-        f"wrote {written.path}: {written.seconds:.1f} s, {written.n_frames} frames, "
+        f"wrote {written.names}: {written.seconds:.1f} s, {written.n_frames} frames, "
         f"made in {took:.1f} s ({written.seconds / took:.1f} x real time)"
     )
     for mark in written.marks:

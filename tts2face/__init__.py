@@ -17,8 +17,12 @@ if TYPE_CHECKING:
     from lexicon.errors import Tts2faceError as Tts2faceError
     from lexicon.sequence import PhoneSequence as PhoneSequence
     from lexicon.sequence import WordSpan as WordSpan
+    from tts2face.api import convert as convert
+    from tts2face.api import export as export
+    from tts2face.api import load_clip as load_clip
     from tts2face.api import write_clip as write_clip
     from tts2face.catalogue import faces as faces
+    from tts2face.catalogue import formats as formats
     from tts2face.catalogue import identities as identities
     from tts2face.catalogue import languages as languages
     from tts2face.catalogue import styles as styles
@@ -39,10 +43,10 @@ if TYPE_CHECKING:
     from tts2face.render.picture import Picture as Picture
     from tts2face.request import Request as Request
     from tts2face.session import Session as Session
-    from tts2face.session import WrittenClip as WrittenClip
     from tts2face.synthesis.animated_face import AnimatedFace as AnimatedFace
     from tts2face.synthesis.clip_stream import Piece as Piece
     from tts2face.synthesis.performance import Performance as Performance
+    from tts2face.synthesis.written_clip import WrittenClip as WrittenClip
     from tts2face.types import Clip as Clip
     from tts2face.types import Speech as Speech
     from tts2face.types import Trajectory as Trajectory
@@ -74,10 +78,14 @@ __all__ = [
     "WordSpan",
     "WrittenCharacter",
     "WrittenClip",
+    "convert",
+    "export",
     "faces",
+    "formats",
     "identities",
     "import_face",
     "languages",
+    "load_clip",
     "load_face",
     "load_palette",
     "load_talker",
@@ -92,8 +100,8 @@ __all__ = [
 _MODULES = {
     "lexicon.errors": ("BackendError", "DataError", "InputError", "Tts2faceError"),
     "lexicon.sequence": ("PhoneSequence", "WordSpan"),
-    "tts2face.api": ("write_clip",),
-    "tts2face.catalogue": ("faces", "identities", "languages", "styles", "talkers", "voices"),
+    "tts2face.api": ("convert", "export", "load_clip", "write_clip"),
+    "tts2face.catalogue": ("faces", "formats", "identities", "languages", "styles", "talkers", "voices"),
     "tts2face.characters.animation": ("WrittenCharacter", "write_character"),
     "tts2face.characters.importing": ("ImportReport", "ImportedFace", "import_face"),
     "tts2face.characters.saving": ("save_face",),
@@ -103,10 +111,11 @@ _MODULES = {
     "tts2face.models.talker": ("Talker", "load_talker"),
     "tts2face.render.picture": ("Picture",),
     "tts2face.request": ("Request",),
-    "tts2face.session": ("Session", "WrittenClip"),
+    "tts2face.session": ("Session",),
     "tts2face.synthesis.animated_face": ("AnimatedFace",),
     "tts2face.synthesis.clip_stream": ("Piece",),
     "tts2face.synthesis.performance": ("Performance",),
+    "tts2face.synthesis.written_clip": ("WrittenClip",),
     "tts2face.types": ("Clip", "Speech", "Trajectory", "Waveform"),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}

@@ -1,12 +1,22 @@
-"""Public functions besides `tts2face.session.Session`: drawing an existing clip into a file."""
+"""Public functions besides `tts2face.session.Session`: drawing an existing clip, exporting it, and reading it back."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from itertools import chain
 from pathlib import Path
 
+from lexicon.errors import DataError
+from tts2face.exports.track_json import read_track
+from tts2face.exports.writer import ExportWriter, mesh_of, plan_exports
+from tts2face.face.gesture_transfer import gesture_face
+from tts2face.models.face import Face
+from tts2face.models.face_file import load_face
+from tts2face.models.palette import load_palette
 from tts2face.render.encode import write_clips
 from tts2face.render.picture import Picture
+from tts2face.storage.overwrite import refuse_overwriting
 from tts2face.synthesis.animated_face import AnimatedFace
-from tts2face.types import Clip
+from tts2face.synthesis.clip_stream import Piece
+from tts2face.types import Clip, concatenate_clips
 
 
 def write_clip(
@@ -39,3 +49,125 @@ def write_clip(
         The file cannot be written.
     """
     write_clips(Path(out), [clip], face.renderer(picture or Picture()), on_progress=on_progress)
+
+
+def export(
+    clip: Clip | Iterable[Clip | Piece],
+    path: str | Path | Iterable[str | Path],
+    *,
+    face: AnimatedFace | Face | None = None,
+    format: str | None = None,
+    fps: float | None = None,
+) -> tuple[Path, ...]:
+    """Write a clip, or the pieces of a stream, to one or several files of other programs.
+
+    Parameters
+    ----------
+    clip
+        A clip, or consecutive ones such as `Session.stream` gives; a stream is written in bounded memory.
+    path
+        Output, or several; the suffix selects the format (docs/exports.md). The files appear when all are complete.
+    face
+        `Session.face` of the session that made the clip, or its mesh; needed by formats with a mesh, and by those of
+        ARKit if the clip has gestures.
+    format
+        Name of the format in place of that of the suffix; `tts2face.formats` lists all.
+    fps
+        Frames per second of formats with frames; None for those of the clip, or of the format.
+
+    Returns
+    -------
+    tuple of Path
+        The files written, those beside them included.
+
+    Raises
+    ------
+    InputError
+        The suffix or format is unknown, the format needs a face, or the clip's channels are not those of the face.
+    BackendError
+        A file cannot be written, or a package is missing.
+    """
+    paths = [path] if isinstance(path, str | Path) else list(path)
+    files = plan_exports(paths, format=format, fps=fps)
+    with ExportWriter(files, face=mesh_of(face, files), fps=fps) as writer:
+        for piece in [clip] if isinstance(clip, Clip) else clip:
+            if isinstance(piece, Clip):
+                writer.add(piece)
+            else:
+                writer.add(piece.clip, piece.text)
+    return tuple(file.path for file in files)
+
+
+def load_clip(path: str | Path) -> Clip:
+    """Read the clip of a lossless track that `export` wrote.
+
+    Raises
+    ------
+    InputError
+        The file does not exist.
+    DataError
+        It is not a track, or is damaged.
+    """
+    return concatenate_clips([piece.clip for piece in read_track(Path(path))])
+
+
+def convert(
+    track: str | Path,
+    path: str | Path | Iterable[str | Path],
+    *,
+    face: str = "head",
+    identity: str | None = None,
+    palette: str = "starter",
+    fps: float | None = None,
+) -> tuple[Path, ...]:
+    """Write the clip of a lossless track to files of other formats, in bounded memory.
+
+    Parameters
+    ----------
+    track
+        Track that `export` wrote, ``clip.track.json``.
+    path, fps
+        As for `export`.
+    face, identity, palette
+        Names or paths of the face, its identity preset, and the palette that made the clip; loaded if a format uses
+        the face's shapes.
+
+    Returns
+    -------
+    tuple of Path
+        The files written.
+
+    Raises
+    ------
+    InputError
+        As `export`; or a model does not exist, or a file would replace the track.
+    DataError
+        The track is damaged, or its channels are not those of the face and palette.
+    """
+    paths = [path] if isinstance(path, str | Path) else list(path)
+    files = plan_exports(paths, fps=fps)
+    names: dict[str, str | Path | None] = {f"output {number}": file.path for number, file in enumerate(files, start=1)}
+    refuse_overwriting(names, {"the track": track, "the face": face, "the palette": palette})
+    pieces = read_track(Path(track))
+    first = next(pieces)
+    channels = first.clip.motion.channels
+    mesh = None
+    if any(file.format.uses_face for file in files):
+        mesh = _mesh_with_channels(channels, face, identity, palette)
+    with ExportWriter(files, face=mesh, fps=fps) as writer:
+        for piece in chain([first], pieces):
+            writer.add(piece.clip, piece.text)
+    return tuple(file.path for file in files)
+
+
+def _mesh_with_channels(channels: tuple[str, ...], face: str, identity: str | None, palette: str) -> Face:
+    """Mesh of a face whose first shapes are the channels of a track, with the gestures of a palette if it has them."""
+    mesh = load_face(face, identity)
+    if len(channels) > len(mesh.shape_names):
+        mesh = gesture_face(mesh, load_palette(palette)).face
+    if mesh.shape_names[: len(channels)] != channels:
+        raise DataError(
+            f"the track has {len(channels)} channels ({', '.join(channels[:3])}, ...), which are not those of the face "
+            f"{face} with the palette {palette}; name the face and palette that made it"
+        )
+    return mesh

@@ -1,4 +1,4 @@
-"""Lists of the available voices, languages, faces, identity presets, styles and talkers."""
+"""Lists of the available voices, languages, faces, identity presets, styles, talkers and export formats."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -73,6 +73,23 @@ class TalkerEntry:
     n_utterances: int
     minutes: float
     has_own_face: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FormatEntry:
+    """An export format: name, suffixes of its files, whether its package is installed, and what it holds."""
+
+    name: str
+    suffixes: tuple[str, ...]
+    is_installed: bool
+    summary: str
+
+
+def formats() -> tuple[FormatEntry, ...]:
+    """The formats of `tts2face.export`."""
+    from tts2face.exports.formats import FORMATS
+
+    return tuple(FormatEntry(one.name, one.suffixes, one.is_installed, one.summary) for one in FORMATS)
 
 
 def voices() -> tuple[VoiceEntry, ...]:

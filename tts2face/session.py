@@ -2,15 +2,16 @@
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterator
-from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 from lexicon.dictionary import read_dictionary
 from lexicon.errors import InputError
 from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model
+from tts2face.exports.writer import ExportFile, ExportWriter, mesh_of, plan_exports
 from tts2face.gesture.gesture_stream import GestureFields
 from tts2face.gesture.ju2008 import FIELD_OPTIONS
 from tts2face.models.face import Face
@@ -18,7 +19,7 @@ from tts2face.models.face_file import load_face
 from tts2face.models.palette import Palette, load_palette
 from tts2face.models.talker import Talker, load_talker
 from tts2face.prefetch import Prefetch
-from tts2face.render.encode import ClipWriter, write_clips
+from tts2face.render.encode import ClipWriter
 from tts2face.render.output_path import check_output
 from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
@@ -31,6 +32,7 @@ from tts2face.synthesis.gesture_layer import GestureLayer
 from tts2face.synthesis.marked_speech import MarkTime
 from tts2face.synthesis.performance import Performance, perform, take_clips
 from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, prepare
+from tts2face.synthesis.written_clip import RequestSteps, WrittenClip
 from tts2face.types import Clip, Progress, concatenate_clips
 from tts2face.voice.engine import PronunciationMap, Voice
 from tts2face.voice.loading import load_voice
@@ -42,32 +44,6 @@ MAX_RENDERERS = 2  # renderers in memory, one for each picture; about 30 MB each
 N_PIECES_AHEAD = 2  # pieces synthesised before they are drawn
 
 Value = TypeVar("Value")
-
-
-@dataclass(frozen=True, slots=True)
-class WrittenClip:
-    """Summary of a written file.
-
-    Parameters
-    ----------
-    seconds
-        Duration of the sound.
-    n_frames
-        Number of video frames.
-    marks
-        Named marks of the text with their times.
-    is_silent
-        Whether the file has no sound.
-    mismatches
-        Words of the text that the recording probably does not contain.
-    """
-
-    path: Path
-    seconds: float
-    n_frames: int
-    marks: tuple[MarkTime, ...] = ()
-    is_silent: bool = False
-    mismatches: tuple[TextMismatch, ...] = ()
 
 
 class Session:
@@ -181,6 +157,7 @@ class Session:
         out: str | Path,
         *,
         picture: Picture | None = None,
+        exports: Sequence[str | Path] = (),
         on_progress: Progress | None = None,
         on_piece: Callable[[Piece], None] | None = None,
         **options: Any,
@@ -198,6 +175,8 @@ class Session:
             partial file remains.
         picture
             Drawing options; if None, fields of `Picture` may be given among the options.
+        exports
+            Files of other formats written beside it, by suffix, as by `tts2face.export`.
         on_progress
             Called with the number of steps done and the total: characters of a text, or parts of a recording.
         on_piece
@@ -214,34 +193,95 @@ class Session:
         prepared = prepare_request(text, options)
         picture = picture or Picture(**picture_options)
         check_output(out)
-        refuse_overwriting({"out": out}, input_paths(prepared.request, picture))
+        files = plan_exports(exports)
+        refuse_overwriting(_output_names(files) | {"out": out}, input_paths(prepared.request, picture))
         renderer = self.renderer(picture, has_gestures=prepared.request.has_gestures)
-        progress = _Steps(prepared.n_steps, on_progress)
+        progress = RequestSteps(prepared.n_steps, on_progress)
+        with (
+            ClipWriter(out, renderer, on_progress=progress.report_frames) as writer,
+            ExportWriter(files, face=mesh_of(self._face(prepared.request.has_gestures), files)) as copies,
+        ):
+
+            def add(piece: Piece) -> None:
+                progress.begin(piece)
+                copies.add(piece.clip, piece.text)
+                writer.add(piece.clip)
+
+            written = self._write_pieces(prepared, Path(out), add, on_piece)
+        progress.finish()
+        return replace(written, exports=tuple(file.path for file in files))
+
+    def export(
+        self,
+        text: str | Request | PreparedRequest,
+        paths: str | Path | Sequence[str | Path],
+        *,
+        on_progress: Progress | None = None,
+        on_piece: Callable[[Piece], None] | None = None,
+        **options: Any,
+    ) -> WrittenClip:
+        """Synthesise the clip of a text or request into files of other programs, without drawing it.
+
+        Parameters
+        ----------
+        text, on_progress, on_piece
+            As for `write`.
+        paths
+            Output, or several; the suffix selects the format (docs/exports.md). The files appear when all are complete.
+        options
+            Fields of `Request`, such as ``style="delighted"``.
+
+        Raises
+        ------
+        InputError, DataError, BackendError
+            As `clip` and `tts2face.export`.
+        """
+        prepared = prepare_request(text, options)
+        files = plan_exports([paths] if isinstance(paths, str | Path) else paths)
+        if not files:
+            raise InputError("there is no file to export to; give at least one path")
+        refuse_overwriting(_output_names(files), input_paths(prepared.request, Picture()))
+        progress = RequestSteps(prepared.n_steps, on_progress)
+        with ExportWriter(files, face=mesh_of(self._face(prepared.request.has_gestures), files)) as writer:
+
+            def add(piece: Piece) -> None:
+                progress.begin(piece)
+                writer.add(piece.clip, piece.text)
+                progress.report_piece()
+
+            written = self._write_pieces(prepared, files[0].path, add, on_piece)
+        progress.finish()
+        return replace(written, exports=tuple(file.path for file in files))
+
+    def _write_pieces(
+        self,
+        prepared: PreparedRequest,
+        path: Path,
+        add: Callable[[Piece], None],
+        on_piece: Callable[[Piece], None] | None,
+    ) -> WrittenClip:
+        """Pass all pieces to `add` while the next ones are synthesised."""
         marks: list[MarkTime] = []
         mismatches: list[TextMismatch] = []
         seconds, n_frames = 0.0, 0
-        with (
-            Prefetch(self._pieces(prepared), N_PIECES_AHEAD) as synthesised,
-            ClipWriter(out, renderer, on_progress=progress.report_frames) as writer,
-        ):
+        with Prefetch(self._pieces(prepared), N_PIECES_AHEAD) as synthesised:
             for piece in synthesised:
                 if on_piece:
                     on_piece(piece)
-                progress.begin(piece.n_steps, n_frames)
-                writer.add(piece.clip)
+                add(piece)
                 marks += piece.marks
                 mismatches += piece.mismatches
                 seconds += piece.clip.speech.waveform.duration
                 n_frames += len(piece.clip.motion)
-        progress.finish()
-        return WrittenClip(Path(out), seconds, n_frames, tuple(marks), mismatches=tuple(mismatches))
+        return WrittenClip(path, seconds, n_frames, tuple(marks), mismatches=tuple(mismatches))
 
     def write_performance(
         self,
         performance: Performance,
-        out: str | Path,
+        out: str | Path | None,
         *,
         picture: Picture | None = None,
+        exports: Sequence[str | Path] = (),
         stages: Callable[[str], Progress] | None = None,
     ) -> WrittenClip:
         """Transfer a recorded performance to the session's face and write the clip to a file.
@@ -250,8 +290,8 @@ class Session:
         ----------
         performance
             The video or capture and its options.
-        out, picture
-            As for `write`.
+        out, picture, exports
+            As for `write`; without `out`, only the exports are written.
         stages
             Called with the name of each stage of the work; returns the progress callback of that stage.
 
@@ -260,20 +300,35 @@ class Session:
         InputError, DataError, BackendError
             As `tts2face.synthesis.performance.perform`; or the file cannot be written, or is one of the inputs.
         """
-        check_output(out)
+        files = plan_exports(exports)
+        if out is None and not files:
+            raise InputError("there is no output; give out, or exports")
+        if out is not None:
+            check_output(out)
         picture = picture or Picture()
         inputs = {"the take": performance.take, "audio": performance.audio, "model": performance.model}
-        refuse_overwriting({"out": out}, inputs | {"background": picture.background})
-        renderer = self.renderer(picture, has_gestures=False)  # rejects invalid options before the video is tracked
+        refuse_overwriting(_output_names(files) | {"out": out}, inputs | {"background": picture.background})
+        mesh_of(self._speech_face, files)  # rejects files that the face cannot fill before the video is tracked
+        if out is not None:
+            self.renderer(picture, has_gestures=False)  # rejects invalid options, too
         take = perform(performance, self._speech_face, on_progress=stages("tracking") if stages else None)
         n_frames = len(take.motion.face)
-        draw = stages("drawing") if stages else None
-        clips = take_clips(take.motion, take.sound)
+        draw = stages("drawing" if out is not None else "writing") if stages else None
         progress = (lambda done, _: draw(done, n_frames)) if draw else None
-        if take.face is not self._speech_face:  # missing motion was appended to it
-            renderer = take.face.renderer(picture)
-        write_clips(out, clips, renderer, on_progress=progress)
-        return WrittenClip(Path(out), take.seconds, n_frames, is_silent=not len(take.sound.samples))
+        with ExitStack() as stack:
+            writers: list[ClipWriter | ExportWriter] = [
+                stack.enter_context(ExportWriter(files, face=mesh_of(take.face, files)))
+            ]
+            if out is not None:  # motion may have been appended to the face
+                own = take.face is self._speech_face
+                renderer = self.renderer(picture, has_gestures=False) if own else take.face.renderer(picture)
+                writers.append(stack.enter_context(ClipWriter(out, renderer, on_progress=progress)))
+            for clip in take_clips(take.motion, take.sound):
+                for writer in writers:
+                    writer.add(clip)
+        paths = tuple(file.path for file in files)
+        path = paths[0] if out is None else Path(out)
+        return WrittenClip(path, take.seconds, n_frames, is_silent=not len(take.sound.samples), exports=paths)
 
     def renderer(self, picture: Picture, *, has_gestures: bool = True) -> FrameRenderer:
         """Renderer of the session's face for drawing options; the last `MAX_RENDERERS` renderers are cached."""
@@ -364,25 +419,6 @@ def _names(options: type) -> tuple[str, ...]:
     return tuple(option.name for option in fields(options) if option.name != "text")
 
 
-class _Steps:
-    """Converts the number of drawn frames into steps of a request."""
-
-    def __init__(self, n_steps: int, on_progress: Progress | None) -> None:
-        self._n_steps, self._on_progress = n_steps, on_progress
-        self._steps_before = self._piece_steps = self._frames_before = 0
-
-    def begin(self, n_steps: int, n_frames_before: int) -> None:
-        """Start a piece of `n_steps` steps that follows `n_frames_before` frames."""
-        self._steps_before += self._piece_steps
-        self._piece_steps, self._frames_before = n_steps, n_frames_before
-
-    def report_frames(self, n_drawn: int, n_submitted: int) -> None:
-        """Report the frames drawn, out of those passed to the writer so far."""
-        if self._on_progress:
-            share = (n_drawn - self._frames_before) / max(n_submitted - self._frames_before, 1)
-            self._on_progress(min(self._n_steps, int(self._steps_before + self._piece_steps * share)), self._n_steps)
-
-    def finish(self) -> None:
-        """Report that all steps are done."""
-        if self._on_progress:
-            self._on_progress(self._n_steps, self._n_steps)
+def _output_names(files: Sequence[ExportFile]) -> dict[str, Path | str | None]:
+    """Paths of exports by names for messages."""
+    return {f"export {number}": file.path for number, file in enumerate(files, start=1)}

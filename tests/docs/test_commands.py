@@ -11,6 +11,7 @@ import shutil
 import sys
 import wave
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -29,24 +30,13 @@ from tests.docs.blocks import (
     reason_not_executed,
     shell_lines,
 )
-from tts2face import import_face, save_face, session
+from tts2face import export, import_face, save_face, session
 from tts2face.models.palette import Palette, load_palette, write_palette
 from tts2face.storage.files import SHIPPED_FOLDER
 
 SMALL = {"--size": "64x64", "--fps": "5"}
-LISTS = {
-    "voices",
-    "languages",
-    "faces",
-    "identities",
-    "styles",
-    "talkers",
-    "phones",
-    "completion",
-    "corpus",
-    "report",
-    "face",
-}
+LISTS = {"voices", "languages", "faces", "identities", "styles", "talkers", "formats", "phones", "completion"}
+TOOLS = {"corpus", "report", "convert", "face"}
 OWN_LINES = [(page.name, line) for page in PAGES for line in shell_lines(page) if own_commands(line)]
 EXECUTED = [
     line
@@ -82,7 +72,9 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "words.txt").write_text("gif  JH IH1 F\n", encoding="utf-8")
     (folder / "timeline.json").write_text('{"style": "delighted", "nods": [{"time": 0.2}]}', encoding="utf-8")
     spoken = session.Session("grid_s1", "head", identity=None, palette="starter")
-    sound = spoken.clip("Hello there.").speech.waveform
+    clip = spoken.clip("Hello there.", fps=5)
+    export(clip, folder / "hello.track.json")
+    sound = clip.speech.waveform
     with wave.open(str(folder / "speech.wav"), "wb") as file:
         file.setparams((1, 2, sound.rate, 0, "NONE", ""))
         file.writeframes((sound.samples * 32767).astype("<i2").tobytes())
@@ -125,16 +117,16 @@ def test_command_lines_of_readme_and_cli_page_work(
     if line.startswith("echo"):
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"Good morning.\n")))
     (words,) = own_commands(line)
-    is_clip = words[0] not in LISTS and not words[0].startswith(("--help", "--version"))
+    is_clip = words[0] not in LISTS | TOOLS and not words[0].startswith(("--help", "--version"))
     if is_clip:
         words = _small(words)
     if words[:2] == ["report", "similarity"]:
         words += ["--halves", "2"]
     assert run(words) == 0, capsys.readouterr().err
-    for flag in ("--out", "--explain"):
-        if flag in words:
-            assert (here / words[words.index(flag) + 1]).exists()
-    if not is_clip and "--out" not in words:
+    named = [after for word, after in pairwise(words) if word in {"--out", "--explain", "--export"}]
+    named += [word for word in words[2:] if "." in word] if words[0] == "convert" else []
+    assert all((here / name).exists() for name in named)
+    if not is_clip and not named:
         printed = capsys.readouterr().out
         assert printed
         if "--json" in words:

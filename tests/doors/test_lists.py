@@ -18,7 +18,7 @@ from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
 from tts2face.voice.loading import load_voice
 
-LISTED = ["voices", "languages", "faces", "identities", "styles", "talkers"]
+LISTED = ["voices", "languages", "faces", "identities", "styles", "talkers", "formats"]
 
 
 def test_there_is_a_command_for_each_list() -> None:

@@ -14,7 +14,6 @@ from tts2face.prefetch import map_in_order
 from tts2face.render import vtk_renderer
 from tts2face.render.picture import PYVISTA, Picture
 from tts2face.render.picture_kernels import DrawingBuffers, allocate_buffers, draw_surface
-from tts2face.render.renderer import SYNTHETIC_NOTICE
 from tts2face.render.scene import Scene, available_cores, build_scene
 from tts2face.types import Clip
 
@@ -33,8 +32,7 @@ class MeshRenderer:
     @property
     def notice(self) -> str:
         """Comment for every written file; empty unless the face is the likeness of a real person."""
-        metadata = self.scene.face.metadata
-        return SYNTHETIC_NOTICE.format(name=metadata.get("name", "a person")) if "consent" in metadata else ""
+        return self.scene.face.synthetic_notice
 
     def frames(self, clip: Clip, *, threads: int | None = None, first: int = 0) -> Iterator[NDArray[np.uint8]]:
         """Pictures (H, W, 3 or 4) of a clip's frames in order.

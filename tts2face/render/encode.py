@@ -20,10 +20,10 @@ from tts2face.render.output_path import (
     make_temporary,
     move_into_place,
     output_kind,
-    translate_disk_errors,
 )
 from tts2face.render.png_folder import PngFolderWriter
 from tts2face.render.renderer import FrameRenderer
+from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.temporary import Temporary
 from tts2face.types import Clip, Progress
 

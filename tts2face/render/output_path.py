@@ -1,12 +1,11 @@
 """Output paths: their kind, their checks, and the temporary file or folder that replaces them when complete."""
 
-import contextlib
 import os
-from collections.abc import Iterator
 from pathlib import Path
 
-from lexicon.errors import BackendError, InputError
+from lexicon.errors import InputError
 from tts2face.render.png_folder import is_png_folder
+from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.output_names import check_name
 from tts2face.storage.temporary import Temporary
 
@@ -28,7 +27,7 @@ def output_kind(path: Path | str) -> str:
     if suffix not in FILE_SUFFIXES:
         raise InputError(
             f"{path} has the unknown suffix {suffix}; give one of {', '.join(FILE_SUFFIXES)}, "
-            "or a folder without a suffix for .png pictures"
+            "a folder without a suffix for .png pictures, or a suffix that `tts2face formats` lists"
         )
     return suffix
 
@@ -76,19 +75,3 @@ def move_into_place(temporary: Temporary, path: Path) -> None:
     """
     with translate_disk_errors(path):
         temporary.replace(path)
-
-
-@contextlib.contextmanager
-def translate_disk_errors(path: Path) -> Iterator[None]:
-    """Translate errors of the operating system into a `BackendError` with the reason.
-
-    Raises
-    ------
-    BackendError
-        An OSError occurred within the block.
-    """
-    try:
-        yield
-    except OSError as error:
-        reason = os.strerror(error.errno) if error.errno else str(error)
-        raise BackendError(f"cannot write {path}: {reason}; free some space or choose another folder") from error

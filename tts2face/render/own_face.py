@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.models.appearance import Appearance, nearest_pixels
+from tts2face.models.face import SYNTHETIC_NOTICE
 from tts2face.models.landmarks import FACE_OVAL
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.own_face.gestures import OwnFaceGestures
@@ -27,7 +28,6 @@ from tts2face.render.plate import (
     fit_background_video,
     texture_samples,
 )
-from tts2face.render.renderer import SYNTHETIC_NOTICE
 from tts2face.render.scene import available_cores
 from tts2face.types import Clip
 

@@ -1,5 +1,8 @@
 """Atomic writing of files, and lookup of shipped files."""
 
+import contextlib
+import os
+from collections.abc import Iterator
 from pathlib import Path
 
 from lexicon.errors import BackendError, InputError
@@ -41,3 +44,19 @@ def find_file(name: str, kind: str) -> Path:
         return Path(name)
     known = ", ".join(sorted(file.stem for file in SHIPPED_FOLDER.glob(f"*.{kind}")))
     raise InputError(f"there is no {kind} {name!r}; give {known}, or the path of a .{kind} file")
+
+
+@contextlib.contextmanager
+def translate_disk_errors(path: Path) -> Iterator[None]:
+    """Translate errors of the operating system into a `BackendError` with the reason.
+
+    Raises
+    ------
+    BackendError
+        An OSError occurred within the block.
+    """
+    try:
+        yield
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise BackendError(f"cannot write {path}: {reason}; free some space or choose another folder") from error

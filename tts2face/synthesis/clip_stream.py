@@ -54,6 +54,8 @@ class Piece:
         animation and for a recording without words; the first piece of a recording returns those of all pieces.
     mismatches
         Words that the recording probably does not contain and that start in this piece; in seconds of the whole clip.
+    text
+        Written sentence without its marks; empty for a recording and for idle animation.
     """
 
     clip: Clip
@@ -63,6 +65,7 @@ class Piece:
     marks: tuple[MarkTime, ...] = ()
     explain: Callable[[], tuple[PhoneExplanation, ...]] = tuple
     mismatches: tuple[TextMismatch, ...] = ()
+    text: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +103,7 @@ def pieces(prepared: PreparedRequest, models: SynthesisModels, layer: GestureLay
 
 def _spoken_pieces(prepared: PreparedRequest, models: SynthesisModels, layer: GestureLayer | None) -> Iterator[Piece]:
     fps, first_frame = prepared.fps, 0
-    for spoken, n_steps in _sentences(prepared, models):
+    for spoken, n_steps, text in _sentences(prepared, models):
         speech, begin = pad_to_frame(spoken.speech, first_frame, fps), float(first_frame / fps)
         timeline = spoken.timeline.restrict(0.0, speech.waveform.duration).shift(begin)
         n_frames = frame_count(speech.waveform.duration, float(fps))
@@ -109,14 +112,15 @@ def _spoken_pieces(prepared: PreparedRequest, models: SynthesisModels, layer: Ge
         clip = _with_sound(_with_gestures(speech, lips, timeline, layer), spoken.sound)
         first_frame += n_frames
         marks = tuple(replace(mark, seconds=mark.seconds + begin) for mark in spoken.marks)
-        yield Piece(clip, begin, n_steps, timeline, marks, _explanation(selection, models.exemplars, begin))
+        explain = _explanation(selection, models.exemplars, begin)
+        yield Piece(clip, begin, n_steps, timeline, marks, explain, text=text)
 
 
-def _sentences(prepared: PreparedRequest, models: SynthesisModels) -> Iterator[tuple[SpokenSentence, int]]:
-    """Spoken sentences of a text with their numbers of characters, or parts of idle animation with their steps."""
+def _sentences(prepared: PreparedRequest, models: SynthesisModels) -> Iterator[tuple[SpokenSentence, int, str]]:
+    """Spoken sentences with numbers of characters and texts, or parts of idle animation with steps and no text."""
     request = prepared.request
     if request.idle is not None:
-        yield from silent_sentences(request.idle, prepared.fps, IDLE_STEPS)
+        yield from ((silent, steps, "") for silent, steps in silent_sentences(request.idle, prepared.fps, IDLE_STEPS))
         return
     with ExitStack() as stack:
 
@@ -126,7 +130,8 @@ def _sentences(prepared: PreparedRequest, models: SynthesisModels) -> Iterator[t
 
         voice = voice_of(request.voice, request.language)
         for sentence in prepared.sentences():
-            yield speak_sentence(voice, sentence, request, voice_of), sentence.n_characters
+            text = " ".join(phrase.source for phrase in sentence.utterances)
+            yield speak_sentence(voice, sentence, request, voice_of), sentence.n_characters, text
 
 
 def _recording_pieces(

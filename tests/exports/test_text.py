@@ -13,7 +13,7 @@ from lexicon.errors import InputError
 from lexicon.nominal_durations import nominal_phones
 from lexicon.pronounce import pronounce
 from lexicon.sequence import PhoneSequence, WordSpan
-from tts2face.export.text import FORMATS, NOMINAL_NOTE, textgrid
+from tts2face.exports.text import FORMATS, NOMINAL_NOTE, textgrid
 
 
 def _tier(grid: Any, number: int) -> list[tuple[float, float, str]]:

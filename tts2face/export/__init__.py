@@ -1,1 +1,0 @@
-"""Export of words and phones in text formats."""

@@ -1,0 +1,145 @@
+"""Table of the export formats; the suffix of a path selects one of them. The module imports no numeric library."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from lexicon.errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class FormatInfo:
+    """An export format.
+
+    Parameters
+    ----------
+    name
+        Name of the format, for ``FORMAT:PATH``.
+    suffixes
+        Endings of file names that select it, in lower case; the longest that fits a name wins.
+    summary
+        What the file holds.
+    writer
+        Module and class of its writer.
+    has_frames
+        Whether it holds values for each frame, so that a frame rate can be chosen.
+    default_fps
+        Frame rate unless one is given; None for that of the clip.
+    uses_shapes, needs_mesh
+        Whether it expresses the channels by ARKit shapes, and whether it holds the mesh of the face.
+    has_sound_beside
+        Whether the sound is written to a .wav file beside it.
+    package
+        Package that it needs besides those of tts2face.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    summary: str
+    writer: tuple[str, str]
+    has_frames: bool = False
+    default_fps: float | None = None
+    uses_shapes: bool = False
+    needs_mesh: bool = False
+    has_sound_beside: bool = False
+    package: str | None = None
+
+    @property
+    def uses_face(self) -> bool:
+        """Whether its writer takes the mesh of the face."""
+        return self.uses_shapes or self.needs_mesh
+
+    @property
+    def is_installed(self) -> bool:
+        """Whether the package that it needs is installed."""
+        return self.package is None or find_spec(self.package) is not None
+
+    def make_writer(self) -> Callable[[Any], Any]:
+        """Import the class of its writer."""
+        module, name = self.writer
+        factory: Callable[[Any], Any] = getattr(import_module(f"tts2face.exports.{module}"), name)
+        return factory
+
+
+LIVELINK_FPS = 60.0  # of the Live Link Face app
+
+FORMATS = (
+    FormatInfo("track", (".track.json", ".json"), "lossless clip: motion, head, phones, words, sound",
+               ("track_json", "TrackWriter")),
+    FormatInfo("livelink", (".csv",), "ARKit-52 weights and head angles, as Live Link Face records them",
+               ("livelink_csv", "LiveLinkWriter"), has_frames=True, default_fps=LIVELINK_FPS, uses_shapes=True),
+    FormatInfo("a2f", (".a2f.json",), "ARKit-52 weights as Audio2Face exports them",
+               ("audio2face_json", "Audio2FaceWriter"), has_frames=True, uses_shapes=True),
+    FormatInfo("glb", (".glb",), "mesh, morph targets, skeleton and animation (glTF 2.0)",
+               ("glb", "GlbWriter"), has_frames=True, needs_mesh=True, has_sound_beside=True),
+    FormatInfo("usd", (".usda", ".usdc", ".usd"), "mesh, blend shapes, skeleton and animation (UsdSkel)",
+               ("usd", "UsdWriter"), has_frames=True, needs_mesh=True, has_sound_beside=True, package="pxr"),
+    FormatInfo("bvh", (".bvh",), "head motion", ("bvh", "BvhWriter"), has_frames=True),
+    FormatInfo("npz", (".npz",), "all arrays for NumPy", ("npz", "NpzWriter"), has_frames=True),
+    FormatInfo("oculus", (".oculus.jsonl",), "15 visemes of Oculus Lipsync, JSON lines",
+               ("viseme_lines", "OculusWriter")),
+    FormatInfo("azure", (".azure.jsonl",), "22 viseme ids of Azure Speech, JSON lines",
+               ("viseme_lines", "AzureWriter")),
+    FormatInfo("rhubarb-json", (".rhubarb.json",), "mouth cues A-H and X of Rhubarb Lip Sync",
+               ("rhubarb", "RhubarbJsonWriter")),
+    FormatInfo("rhubarb-tsv", (".rhubarb.tsv",), "the same as a table", ("rhubarb", "RhubarbTsvWriter")),
+    FormatInfo("rhubarb-xml", (".rhubarb.xml",), "the same as XML", ("rhubarb", "RhubarbXmlWriter")),
+    FormatInfo("textgrid", (".textgrid",), "words and phones for Praat", ("textgrid", "TextGridWriter")),
+    FormatInfo("vtt", (".vtt",), "WebVTT captions, one cue for each sentence", ("captions", "SentenceVttWriter")),
+    FormatInfo("srt", (".srt",), "SubRip captions, one cue for each sentence", ("captions", "SentenceSrtWriter")),
+    FormatInfo("words-vtt", (".words.vtt",), "WebVTT, one cue for each word", ("captions", "WordVttWriter")),
+    FormatInfo("words-srt", (".words.srt",), "SubRip, one cue for each word", ("captions", "WordSrtWriter")),
+    FormatInfo("karaoke-vtt", (".karaoke.vtt",), "WebVTT sentences with a time before each word",
+               ("captions", "KaraokeVttWriter")),
+    FormatInfo("wav", (".wav",), "the sound, 16-bit PCM", ("wav", "WavWriter")),
+)  # fmt: skip
+_BY_NAME = {one.name: one for one in FORMATS}
+_BY_SUFFIX = {suffix: one for one in FORMATS for suffix in one.suffixes}
+
+
+def split_format(given: str | Path) -> tuple[Path, str | None]:
+    """Path and format of ``FORMAT:PATH``; None without one of the names of `FORMATS` before the colon."""
+    if isinstance(given, str):
+        name, colon, rest = given.partition(":")
+        if colon and name in _BY_NAME:
+            return Path(rest), name
+    return Path(given), None
+
+
+def is_export(path: str | Path) -> bool:
+    """Whether the ending of a file name selects an export format."""
+    return _longest_suffix(Path(path).name) is not None
+
+
+def find_format(path: Path, name: str | None = None) -> FormatInfo:
+    """Format of a name, or of the ending of a path.
+
+    Raises
+    ------
+    InputError
+        There is no such format, or several share the last suffix.
+    """
+    if name is not None:
+        if name not in _BY_NAME:
+            raise InputError(f"there is no export format {name!r}; choose one of {', '.join(_BY_NAME)}")
+        return _BY_NAME[name]
+    suffix = _longest_suffix(path.name)
+    if suffix is not None:
+        return _BY_SUFFIX[suffix]
+    last = path.suffix.lower()
+    several = [ending for ending in _BY_SUFFIX if last and ending.endswith(last)]
+    if several:
+        raise InputError(f"{path.name} may have several formats; end its name in {_choices(several)}")
+    raise InputError(f"{path.name} has no suffix of an export format; end its name in {_choices(list(_BY_SUFFIX))}")
+
+
+def _choices(suffixes: Sequence[str]) -> str:
+    return " or ".join(filter(None, [", ".join(suffixes[:-1]), suffixes[-1]]))
+
+
+def _longest_suffix(name: str) -> str | None:
+    fitting = [suffix for suffix in _BY_SUFFIX if name.lower().endswith(suffix)]
+    return max(fitting, key=len, default=None)

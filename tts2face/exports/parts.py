@@ -1,0 +1,155 @@
+"""Consecutive parts of a clip on the frames of an export, and what a writer of a format is."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from tts2face.clock import exact_rate, first_sample
+from tts2face.models.face import Face
+from tts2face.types import HEAD_CHANNELS, Clip, frame_count
+
+Float32Array = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """Frames of an export, and the clip that begins with them.
+
+    Parameters
+    ----------
+    motion, head : (T, K), (T, 6)
+        Values at the frames of the export; T may be 0.
+    clip
+        The source clip; None for frames after the last clip.
+    begin_sample
+        Index of the clip's first sample in the whole sound.
+    text
+        Written text of the clip; empty if unknown.
+    """
+
+    motion: Float32Array
+    head: Float32Array
+    clip: Clip | None = None
+    begin_sample: int = 0
+    text: str = ""
+
+    @property
+    def begin(self) -> float:
+        """Start of the clip in seconds of the whole."""
+        return 0.0 if self.clip is None else self.begin_sample / self.clip.speech.waveform.rate
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Target:
+    """File that a writer of a format fills.
+
+    Parameters
+    ----------
+    path
+        Temporary file to write to.
+    name
+        Name that the file receives when it is complete.
+    fps, source_fps
+        Frames per second of the export and of the clips.
+    rate
+        Sample rate in Hz.
+    channels
+        Names of the motion's channels.
+    face
+        Mesh whose first shapes are these channels; None if not given.
+    """
+
+    path: Path
+    name: str
+    fps: Fraction
+    source_fps: Fraction
+    rate: int
+    channels: tuple[str, ...]
+    face: Face | None
+
+    @property
+    def sound_name(self) -> str:
+        """Name of the sound file beside it."""
+        return f"{self.name.partition('.')[0]}.wav" if "." in self.name else f"{self.name}.wav"
+
+
+class FormatWriter(Protocol):
+    """Writer of one format, made with a `Target`; memory does not grow with the number of frames."""
+
+    def add(self, part: Part) -> None:
+        """Append a part."""
+
+    def finish(self) -> None:
+        """Complete the file."""
+
+    def close(self) -> None:
+        """Release files that are still open, complete or not."""
+
+
+class FrameGrid:
+    """Places consecutive clips on the frames of an export, by linear interpolation where rates differ."""
+
+    def __init__(self, clip: Clip, fps: float | None) -> None:
+        self.source_fps = exact_rate(clip.fps)
+        self.fps = self.source_fps if fps is None else exact_rate(fps)
+        self._rate, self._channels = clip.speech.waveform.rate, clip.motion.channels
+        self._n_source = self._n_frames = self._end_sample = 0
+        self._last = np.zeros((0, len(self._channels) + len(HEAD_CHANNELS)), np.float32)
+
+    def place(self, clip: Clip, text: str) -> Part:
+        """Part of the next clip.
+
+        Raises
+        ------
+        InputError
+            Its frame rate, sample rate or channels differ from those of the first clip.
+        """
+        given = (exact_rate(clip.fps), clip.speech.waveform.rate, clip.motion.channels)
+        if given != (self.source_fps, self._rate, self._channels):
+            raise InputError(
+                f"clips of one file must share fps, sound rate and channels; this one has {clip.fps:g} frames/s, "
+                f"{clip.speech.waveform.rate} Hz and {len(clip.motion.channels)} channels"
+            )
+        begin = first_sample(self._n_source, self._rate, self.source_fps)
+        values = np.concatenate([clip.motion.values, clip.head.values], axis=1)
+        rows = values if self.fps == self.source_fps else self._resample(values)
+        self._n_source += len(values)
+        self._n_frames += len(rows)
+        self._end_sample = begin + len(clip.speech.waveform.samples)
+        self._last = values[-1:]
+        return self._part(rows, clip, begin, text)
+
+    def remainder(self) -> Part:
+        """Frames after the last source frame, which repeat it up to the end of the sound."""
+        if self.fps == self.source_fps:
+            return self._part(self._last[:0])
+        expected = frame_count(self._end_sample / self._rate, float(self.fps))
+        return self._part(np.repeat(self._last, max(expected - self._n_frames, 0), axis=0))
+
+    def _resample(self, values: Float32Array) -> Float32Array:
+        """Rows at the export's frames up to the last of `values`, which follow the rows before."""
+        rows = np.concatenate([self._last, values])
+        first = self._n_source - len(self._last)
+        ratio = self.source_fps / self.fps
+        until = int((self._n_source + len(values) - 1) / ratio) + 1
+        at = np.arange(self._n_frames, until, dtype=np.float64) * float(ratio) - first
+        low = np.clip(at.astype(np.int64), 0, len(rows) - 1)
+        share = (at - low)[:, None].astype(np.float32)
+        return np.asarray((1 - share) * rows[low] + share * rows[np.minimum(low + 1, len(rows) - 1)], np.float32)
+
+    def _part(self, rows: Float32Array, clip: Clip | None = None, begin: int = 0, text: str = "") -> Part:
+        k = len(self._channels)
+        return Part(rows[:, :k], rows[:, k:], clip, begin, text)
+
+
+def frame_rows(values: Float32Array, decimals: str) -> Iterator[str]:
+    """Yield the rows (T, D) as text, numbers separated by commas in the given format such as ``%.6f``."""
+    pattern = ",".join([decimals] * values.shape[1])
+    for row in values.tolist():
+        yield pattern % tuple(row)

@@ -1,0 +1,97 @@
+"""Surfaces of an exported head: one for each part with its own material, with its own vertices."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.models.face import Face, Part
+
+MM_PER_M = 1000.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExportSurface:
+    """Surface of the parts of one name.
+
+    Parameters
+    ----------
+    part
+        Material.
+    vertices : (n,)
+        Indices of its vertices in the face.
+    triangles : (F, 3)
+        Indices into `vertices`.
+    """
+
+    part: Part
+    vertices: NDArray[np.int64]
+    triangles: NDArray[np.int64]
+
+
+def divide_surface(face: Face) -> list[ExportSurface]:
+    """Surfaces of a face, those of equal names and materials merged."""
+    spans: dict[tuple[object, ...], list[Part]] = {}
+    for part in face.parts:
+        material = (part.name, part.specular, part.shininess, part.wrap, part.opacity, part.textured)
+        spans.setdefault(material, []).append(part)
+    surfaces = []
+    for parts in spans.values():
+        triangles = np.concatenate([face.triangles[part.first : part.first + part.count] for part in parts])
+        if not len(triangles):
+            continue
+        vertices, corners = np.unique(triangles, return_inverse=True)
+        surfaces.append(ExportSurface(parts[0], vertices.astype(np.int64), corners.reshape(-1, 3).astype(np.int64)))
+    return surfaces
+
+
+def weight_scales(face: Face, n_channels: int) -> NDArray[np.float32]:
+    """Weight (K,) at which an exported shape has weight 1: the limit of shapes whose limit is above 1, else 1.
+
+    Modes of gestures have weights up to 35, in mm; programs that show sliders expect -1 to 1.
+    """
+    scales: NDArray[np.float32] = np.abs(face.limits[:n_channels]).max(axis=1, initial=1.0)
+    return scales
+
+
+def vertex_normals(face: Face) -> NDArray[np.float32]:
+    """Unit normals (V, 3) at rest, weighted by area; equal on both sides of a seam of the texture."""
+    a, b, c = (face.vertices[corner].astype(np.float64) for corner in face.triangles.T)
+    flat = np.cross(b - a, c - a)
+    part_of = np.repeat(np.arange(len(face.parts)), [part.count for part in face.parts])
+    vertex_part = np.zeros(len(face.vertices), np.int64)
+    vertex_part[face.triangles.ravel()] = np.repeat(part_of, 3)
+    key = np.column_stack([np.rint(face.vertices * 1000).astype(np.int64), vertex_part])
+    _, weld = np.unique(key, axis=0, return_inverse=True)
+    weld = weld.ravel()
+    corners = weld[face.triangles.ravel()]
+    summed = np.column_stack(
+        [np.bincount(corners, np.repeat(flat[:, axis], 3), int(weld.max()) + 1) for axis in range(3)]
+    )
+    length = np.linalg.norm(summed, axis=1, keepdims=True)
+    unit = np.where(length > 0, summed / np.where(length > 0, length, 1), [0.0, 0.0, 1.0])
+    return unit[weld].astype(np.float32)
+
+
+def linear_colours(face: Face) -> NDArray[np.float64]:
+    """Linear light (V, 3) in [0, 1] of the vertex colours (IEC 61966-2-1)."""
+    value = np.arange(256) / 255.0
+    table = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+    colours: NDArray[np.float64] = table[face.colours]
+    return colours
+
+
+def roughness(part: Part) -> float:
+    """Roughness in [0, 1] of a Blinn-Phong exponent: the fourth root of 2 / (n + 2) (Karis 2013)."""
+    return float((2.0 / (part.shininess + 2.0)) ** 0.25)
+
+
+def texture_jpeg(texture: NDArray[np.uint8]) -> bytes:
+    """A texture (H, W, 3) as JPEG."""
+    import io
+
+    from PIL import Image
+
+    content = io.BytesIO()
+    Image.fromarray(texture).save(content, "JPEG", quality=95, subsampling=0)
+    return content.getvalue()
