@@ -1,4 +1,4 @@
-"""``tts2face face``: import characters of other programs as faces, show faces, and animate the characters."""
+"""``tts2face face``: import characters of other programs as faces, and show faces."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,7 +14,7 @@ from tts2face.storage.overwrite import refuse_overwriting
 if TYPE_CHECKING:
     from tts2face.characters.importing import ImportReport
 
-face = App(name="face", help="Import characters as faces, show faces, and animate characters.")
+face = App(name="face", help="Import characters as faces, show faces.")
 
 
 @face.command(name="import")
@@ -96,36 +96,6 @@ def show(
     write_atomically(out, png_bytes(drawn))
     if not quiet:
         write_message(f"wrote {out}: {len(loaded.shape_names)} shapes")
-
-
-@face.command
-def animate(
-    name: Annotated[str, Parameter(help="Imported face (.face).")],
-    text: Annotated[str, Parameter(help="Text to speak.")],
-    /,
-    *,
-    out: Annotated[Path, Parameter(help="Output character with animation (.glb).", alias="-o")],
-    character: Annotated[
-        Path | None, Parameter(help="File of the character; by default the one that the face was imported from.")
-    ] = None,
-    fps: Annotated[float, Parameter(help="Frames per second.")] = 30.0,
-    quiet: Annotated[bool, switch("Print no summary.")] = False,
-) -> None:
-    """Write the character's own .glb file with the speech as animation, and the sound beside it (.wav)."""
-    check_file_name(out, "a character", (".glb",))
-    refuse_overwriting(
-        {"--out": out, "the sound": out.with_suffix(".wav")}, {"the face": name, "--character": character}
-    )
-    from tts2face.characters.animation import write_character
-    from tts2face.session import Session
-
-    session = Session(face=name)
-    written = write_character(session.clip(text, fps=fps), session.mesh, out, character=character)
-    if not quiet:
-        write_message(
-            f"wrote {out} and {out.with_suffix('.wav').name}: {written.n_frames} frames, "
-            f"{written.n_targets} morph targets, bones: {', '.join(written.bones) or 'none'}"
-        )
 
 
 def _report_text(report: "ImportReport") -> str:

@@ -4,37 +4,33 @@ import io
 import wave
 from collections.abc import Mapping
 from dataclasses import dataclass
-from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import DataError, InputError
+from lexicon.errors import InputError
+from tts2face.characters.binding import character_file, read_binding
+from tts2face.characters.bone_tracks import BoneTracks, Track
 from tts2face.characters.character import Character, Target
-from tts2face.characters.glb_writer import GlbWriter, matrix_quaternion
+from tts2face.characters.glb_writer import GlbWriter
 from tts2face.characters.gltf import GltfFile, read_gltf
 from tts2face.characters.gltf_character import read_gltf_character
 from tts2face.characters.head_mesh import source_weights
-from tts2face.characters.importing import METADATA_KEY
 from tts2face.characters.nodes import NodeTree, read_nodes
-from tts2face.characters.shape_mapping import ShapeSource
+from tts2face.characters.shape_mapping import ShapeMapping
 from tts2face.face.bounded_least_squares import bounded_least_squares
-from tts2face.face.deformation import head_rotation, rotation_matrix
 from tts2face.face.landmark_fit import landmark_motion
 from tts2face.face.mouth_model import SPEECH_SHAPE_PREFIXES
 from tts2face.models.face import Face
 from tts2face.storage.files import write_atomically
-from tts2face.types import Clip, Waveform
+from tts2face.types import Clip, Trajectory, Waveform
 
 ANIMATION = "tts2face"
-HEAD_NODE = "tts2face_head"
 BOTH_SIDES_SHARE = 0.5  # of each of two shapes that one morph target for both sides gets
 RIDGE = 0.02  # of the mean curvature: keeps replaced shapes from adding large opposite weights
 
 FloatArray = NDArray[np.float64]
-Track = tuple[int, str, FloatArray]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +39,15 @@ class WrittenCharacter:
 
     path: Path
     n_frames: int
+    n_targets: int
+    bones: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class AnimatedCharacter:
+    """Content of a .glb file with an animation, the number of its animated morph targets, and its animated bones."""
+
+    content: bytes
     n_targets: int
     bones: tuple[str, ...]
 
@@ -77,38 +82,45 @@ def write_character(
     Motion of shapes that the character lacks is carried to its own shapes by least squares on the landmarks. A head
     without a bone is moved by a node above the scene.
     """
-    binds = _character_metadata(face)
     if clip.motion.channels != face.shape_names[: len(clip.motion.channels)]:
         raise InputError("the clip's motion is not in the shapes of this face; make the clip with a session of it")
-    path = _source(binds, character)
-    file, source = read_gltf(path), read_gltf_character(path)
-    tree = read_nodes(file.root)
-    weights = target_weights(clip, face, source, binds["mapping"])
-    writer = GlbWriter(file)
-    seconds = np.arange(len(clip.motion)) / clip.fps
-    tracks = [*_weight_tracks(file, tree, weights, len(clip.motion))]
-    bones = _Bones(face, source, tree, writer, float(binds["yaw_deg"]))
-    turned = [*bones.eye_tracks(clip), *bones.head_tracks(clip, file)]
-    writer.add_animation(ANIMATION, seconds, [*tracks, *turned])
+    animated = animate_character(clip.motion, clip.head, face, character=character)
     out = Path(out)
     write_atomically(out.with_suffix(".wav"), wave_bytes(clip.speech.waveform))
-    write_atomically(out, writer.content())
+    write_atomically(out, animated.content)
+    return WrittenCharacter(out, len(clip.motion), animated.n_targets, animated.bones)
+
+
+def animate_character(
+    motion: Trajectory, head: Trajectory, face: Face, *, character: str | Path | None = None
+) -> AnimatedCharacter:
+    """Content of the character's file with an animation by motion (T, K) and head pose (T, 6); as `write_character`."""
+    binding = read_binding(face)
+    path = character_file(binding, character)
+    file, source = read_gltf(path), read_gltf_character(path)
+    tree = read_nodes(file.root)
+    weights = target_weights(motion, face, source, binding.mapping)
+    writer = GlbWriter(file)
+    bones = BoneTracks(face, binding, source, tree, writer)
+    turned = [*bones.eye_tracks(motion), *bones.head_tracks(head, file)]
+    tracks = [*_weight_tracks(file, tree, weights, len(motion)), *turned]
+    writer.add_animation(ANIMATION, np.arange(len(motion)) / motion.fps, tracks)
     names = dict.fromkeys(bones.name_of(node) for node, _, _ in turned)
-    return WrittenCharacter(out, len(clip.motion), len(weights), tuple(names))
+    return AnimatedCharacter(writer.content(), len(weights), tuple(names))
 
 
 def target_weights(
-    clip: Clip, face: Face, character: Character, mapping: Mapping[str, list[list[Any]]]
+    motion: Trajectory, face: Face, character: Character, mapping: ShapeMapping
 ) -> dict[Target, FloatArray]:
-    """Weights (T,) of each morph target that a clip moves, in addition to the file's default weights."""
-    channels = clip.motion.channels
+    """Weights (T,) of each morph target that a motion moves, in addition to the file's default weights."""
+    channels = motion.channels
     own = [name for name in channels if name in mapping]
-    values = dict(zip(own, _own_values(clip, face, own).T, strict=True))
+    values = dict(zip(own, _own_values(motion, face, own).T, strict=True))
     found: dict[Target, FloatArray] = {}
     for name, track in values.items():
-        for source, gain, side in mapping[name]:
-            share = BOTH_SIDES_SHARE if side else 1.0
-            for target, weight in source_weights(character, ShapeSource(source, gain)).items():
+        for source in mapping[name]:
+            share = BOTH_SIDES_SHARE if source.side else 1.0
+            for target, weight in source_weights(character, source).items():
                 found[target] = found.get(target, np.zeros(len(track))) + share * weight * track
     return found
 
@@ -122,10 +134,10 @@ def wave_bytes(waveform: Waveform) -> bytes:
     return content.getvalue()
 
 
-def _own_values(clip: Clip, face: Face, own: list[str]) -> FloatArray:
+def _own_values(motion: Trajectory, face: Face, own: list[str]) -> FloatArray:
     """Weights (T, k) of the shapes `own`, which also carry the motion of the shapes that the character lacks."""
-    channels = clip.motion.channels
-    values = clip.motion.values.astype(np.float64)
+    channels = motion.channels
+    values = motion.values.astype(np.float64)
     kept = values[:, [channels.index(name) for name in own]]
     turned = {name for eye in face.eyes for name in eye.turns}
     others = [k for k, name in enumerate(channels) if name not in own and name not in turned and values[:, k].any()]
@@ -178,94 +190,3 @@ def _weight_tracks(file: GltfFile, tree: NodeTree, weights: Mapping[Target, Floa
                 rows[:, target] += track
         tracks.append((number, "weights", rows.reshape(-1, 1)))
     return tracks
-
-
-class _Bones:
-    """Tracks of the rotations of eye and head bones."""
-
-    def __init__(self, face: Face, character: Character, tree: NodeTree, writer: GlbWriter, yaw_deg: float) -> None:
-        self._face, self._character, self._tree, self._writer = face, character, tree, writer
-        self._turn = head_rotation(0.0, float(np.radians(yaw_deg)), 0.0)  # from the file's axes to the face's
-        self._names: dict[int, str] = {}
-
-    def name_of(self, node: int) -> str:
-        """Name of an animated bone."""
-        return self._names.get(node, HEAD_NODE)
-
-    def eye_tracks(self, clip: Clip) -> list[Track]:
-        """Rotations of the bones of the eyeballs, which gaze shapes turn."""
-        places = {
-            bone: self._turn @ place for bone, place in self._character.bone_places.items() if bone.endswith("Eye")
-        }
-        if len(places) < 2:
-            return []
-        tracks = []
-        for eye in self._face.eyes:
-            is_left = eye.centre[0] > 0
-            bone = (max if is_left else min)(places, key=lambda name: float(places[name][0]))
-            vectors = np.zeros((len(clip.motion), 3))
-            for name, turn in eye.turns.items():
-                if name in clip.motion.channels:
-                    vectors += clip.motion.values[:, clip.motion.channels.index(name), None] * turn
-            rotations = np.stack([rotation_matrix(vector) for vector in vectors])
-            tracks.append(self._rotation_track(bone, rotations))
-        return tracks
-
-    def head_tracks(self, clip: Clip, file: GltfFile) -> list[Track]:
-        """Rotation of the head's bone; without one, rotation and translation of a node above the scene."""
-        rotations = np.stack([head_rotation(*(float(x) for x in pose[:3])) for pose in clip.head.values])
-        if "head" in self._character.bones:
-            return [self._rotation_track("head", rotations)]
-        scenes = file.root.children("scenes")
-        if not scenes:
-            return []
-        node = self._writer.add_node_above(HEAD_NODE, file.root.index("scene", len(scenes), "scenes") or 0)
-        binds = self._face.metadata[METADATA_KEY]
-        origin, scale = np.array(binds["origin"], np.float64), float(binds["scale"])
-        pivot = origin + self._face.pivot.astype(np.float64) / scale
-        shift = clip.head.values[:, 3:].astype(np.float64) / scale
-        moved = (pivot - np.einsum("tij,j->ti", rotations, pivot) + shift) @ self._turn
-        turned = np.einsum("ji,tjk,kl->til", self._turn, rotations, self._turn)
-        return [(node, "rotation", _quaternions(turned)), (node, "translation", moved)]
-
-    def _rotation_track(self, bone: str, rotations: FloatArray) -> Track:
-        """Local rotations (T, 4) of a bone turned by rotations (T, 3, 3) in the face's axes."""
-        node = self._character.bones[bone]
-        self._writer.divide_matrix(node)
-        self._names[node] = bone
-        world = _orthonormal(self._tree.world[node])
-        parent = self._character.parents.get(node)
-        above = np.eye(3) if parent is None else _orthonormal(self._tree.world[parent])
-        turned = np.einsum("ji,tjk,kl->til", self._turn, rotations, self._turn)
-        return node, "rotation", _quaternions(np.einsum("ji,tjk,kl->til", above, turned, world))
-
-
-def _quaternions(rotations: FloatArray) -> FloatArray:
-    """Quaternions (T, 4) of rotation matrices (T, 3, 3), each with the sign nearest to the one before."""
-    rows = np.stack([matrix_quaternion(rotation) for rotation in rotations])
-    signs = np.where((rows[1:] * rows[:-1]).sum(axis=1) < 0, -1.0, 1.0)
-    rows[1:] *= np.cumprod(signs)[:, None]
-    return rows
-
-
-def _orthonormal(matrix: FloatArray) -> FloatArray:
-    scaled = matrix[:3, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
-    return np.asarray(scaled, np.float64)
-
-
-def _character_metadata(face: Face) -> dict[str, Any]:
-    binds = face.metadata.get(METADATA_KEY)
-    if not isinstance(binds, dict) or not isinstance(binds.get("mapping"), dict):
-        raise InputError("the face was not imported from a character's file; import one with `tts2face face import`")
-    if not binds.get("sha256"):
-        raise InputError("the face was imported from .obj files, which hold no animation; import a .glb file instead")
-    return binds
-
-
-def _source(binds: Mapping[str, Any], character: str | Path | None) -> Path:
-    path = Path(str(binds["file"]) if character is None else character)
-    if not path.is_file():
-        raise DataError(f"there is no character {path}, from which the face was imported; give its path as --character")
-    if sha256(path.read_bytes()).hexdigest() != binds["sha256"]:
-        raise DataError(f"{path} is not the file from which the face was imported; import it again, or give that file")
-    return path

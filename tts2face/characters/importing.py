@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from tts2face.characters.binding import KEY, CharacterBinding
 from tts2face.characters.character import Character
 from tts2face.characters.eyeballs import mark_eyeballs
 from tts2face.characters.face_placement import drop_unsuited_shapes, missing_shapes, place_face
@@ -35,7 +36,6 @@ from tts2face.video.track import MIN_SCORE
 
 FRONTS = {"+z": 0.0, "-z": 180.0, "+x": -90.0, "-x": 90.0}  # axis that a character looks along -> turn, degrees
 PROVISIONAL_HEIGHT_MM = 150.0  # of the moved part of a face, until the distance of its eyes is known
-METADATA_KEY = "character"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -264,20 +264,13 @@ def _metadata(path: Path, character: Character, mapping: ShapeMapping, head: Hea
     """Provenance of the face, and what is needed to write its animation onto the character's file."""
     scale = float(np.ptp(face.vertices[:, 1]) / np.ptp(head.vertices[:, 1]))
     origin = head.vertices[0] - face.vertices[0].astype(np.float64) / scale
-    binds = {name: [[source.name, source.gain, source.side] for source in sources] for name, sources in mapping.items()}
     digest = "" if path.is_dir() else sha256(path.read_bytes()).hexdigest()
-    front = float(np.degrees(np.arctan2(head.turn[0, 2], head.turn[0, 0])))
-    source = {
-        "file": str(path.resolve()),
-        "sha256": digest,
-        "yaw_deg": round(front, 3),
-        "scale": scale,
-        "origin": origin.tolist(),
-        "mapping": binds,
-    }
+    yaw_deg = float(np.degrees(np.arctan2(head.turn[0, 2], head.turn[0, 0])))
+    x, y, z = (float(value) for value in origin)
+    binding = CharacterBinding(str(path.resolve()), digest, round(yaw_deg, 3), scale, (x, y, z), mapping)
     return {
         "name": path.stem,
         "licence": character.licence or "not stated by the character's file",
         "attribution": "",
-        METADATA_KEY: source,
+        KEY: binding.as_metadata(),
     }
