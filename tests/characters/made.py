@@ -48,6 +48,11 @@ class Variant:
     extensions: Mapping[str, Any] = field(default_factory=dict)
 
 
+def bounds(rows: NDArray[Any]) -> dict[str, list[float]]:
+    """Fields ``min`` and ``max`` that an accessor of positions must have."""
+    return {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
+
+
 class GltfMaker:
     """JSON and binary chunk of a glTF file while they grow."""
 
@@ -86,7 +91,7 @@ class GltfMaker:
                 "values": {"bufferView": self.view(rows[moved].astype("<f4").tobytes())},
             },
         }  # fmt: skip
-        self.json["accessors"].append(entry)
+        self.json["accessors"].append(entry | bounds(rows.astype("<f4")))
         return len(self.json["accessors"]) - 1
 
     def add(self, kind: str, entry: dict[str, Any]) -> int:
@@ -224,8 +229,8 @@ def _positions(maker: GltfMaker, metres: NDArray[np.floating], variant: Variant)
         view = maker.view(padded.tobytes())
         maker.json["bufferViews"][view]["byteStride"] = 8
         entry = {"componentType": 5122, "count": len(steps), "type": "VEC3", "bufferView": view}
-        return maker.add("accessors", entry)
-    return maker.accessor(metres.astype("<f4"))
+        return maker.add("accessors", entry | bounds(steps))
+    return maker.accessor(metres.astype("<f4"), **bounds(metres.astype("<f4")))
 
 
 def _add_bones(maker: GltfMaker, face: Face) -> dict[str, int]:

@@ -1,5 +1,6 @@
 """Animation on a character's own file, read back by another reader and compared with the face."""
 
+import json
 import struct
 import wave
 from pathlib import Path
@@ -11,6 +12,7 @@ from cli.main import run
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence
 from tests.characters.made import METRES, Variant, shipped_head, split_glb, write_character_file, write_landmarks
+from tests.exports import programs
 from tts2face.characters.animation import write_character
 from tts2face.characters.importing import import_face
 from tts2face.face.deformation import build_rig
@@ -144,6 +146,21 @@ def test_a_head_without_bones_turns_about_the_pivot_of_the_face(folder: Path) ->
         assert np.abs(turn @ place + shift - shown).max() < TOLERANCE_MM
 
 
+def test_eyeballs_that_are_nodes_without_bones_turn_about_their_centres(folder: Path) -> None:
+    face = imported(folder, "nodes", Variant(turn_deg=0.0))
+    write_character(made_clip(face, {"eyeLookUpRight": 1.0}), face, folder / "nodes_out.glb")
+    played = Played(folder / "nodes_out.glb")
+    x, y, z, w = played.track("rotation", "RightEye")[-1].astype(float)
+    shift = played.track("translation", "RightEye")[-1].astype(float)
+    assert (y, z) == (0.0, 0.0)
+    cos, sin = w * w - x * x, 2 * x * w
+    turn = np.array([[1, 0, 0], [0, cos, -sin], [0, sin, cos]])
+    centre = shipped_head().eyes[1].centre.astype(float) * METRES
+    assert np.abs(turn @ centre + shift - centre).max() < 0.5 * METRES  # the fitted centre is 0.55 mm off
+    assert np.arctan2(sin, cos) == pytest.approx(face.eyes[1].turns["eyeLookUpRight"][0], abs=1e-5)
+    assert np.abs(played.track("rotation", "LeftEye")[-1][:3]).max() == 0.0
+
+
 def test_motion_of_missing_shapes_is_carried_by_own_ones(folder: Path) -> None:
     face = imported(folder, "carried", Variant(dropped=frozenset({"browInnerUp"})))
     from tts2face.face.expressions import add_expression_shapes
@@ -194,3 +211,19 @@ def test_an_export_is_the_animated_character(tmp_path: Path) -> None:
     assert written.path.read_bytes() == out.read_bytes()
     character.unlink()
     assert run(["Hello.", "--face", str(face), "--out", str(out), "--fps", "10", "--quiet"]) == 3
+
+
+@pytest.mark.parametrize("variant", [Variant(), Variant(is_skinned=True)], ids=["plain", "skinned"])
+def test_the_khronos_validator_finds_no_error(variant: Variant, folder: Path) -> None:
+    packages = programs.node_package("gltf-validator")
+    face = imported(folder, f"valid{variant.is_skinned}", variant)
+    out = folder / f"valid{variant.is_skinned}_out.glb"
+    head = (0.1, 0.2, 0.0, 1.0, 0.0, 0.0)
+    write_character(made_clip(face, {"jawOpen": 0.5, "eyeLookOutLeft": 0.5}, head=head), face, out)
+    reports = [
+        json.loads(programs.run_node(programs.VALIDATE, packages, str(path)))
+        for path in (folder / f"valid{variant.is_skinned}.glb", out)
+    ]
+    errors = [[m["code"] for m in report["issues"]["messages"] if m["severity"] == 0] for report in reports]
+    assert errors == [[], []]
+    assert reports[1]["info"]["animationCount"] == 1

@@ -13,6 +13,7 @@ from tts2face.models.face import Face
 from tts2face.types import Trajectory
 
 HEAD_NODE = "tts2face_head"
+MAX_OFFSET_MM = 2.0  # between the origin of an eye bone and the centre of its eyeball, up to which it only rotates
 
 FloatArray = NDArray[np.float64]
 Track = tuple[int, str, FloatArray]
@@ -41,16 +42,17 @@ class BoneTracks:
         }
         if len(places) < 2:
             return []
+        left, right = sorted(places, key=lambda name: (-float(places[name][0].round(9)), name))
         tracks = []
         for eye in self._face.eyes:
-            is_left = eye.centre[0] > 0
-            bone = (max if is_left else min)(places, key=lambda name: float(places[name][0]))
             vectors = np.zeros((len(motion), 3))
             for name, turn in eye.turns.items():
                 if name in motion.channels:
                     vectors += motion.values[:, motion.channels.index(name), None] * turn
             rotations = np.stack([rotation_matrix(vector) for vector in vectors])
-            tracks.append(self._rotation_track(bone, rotations))
+            bone = left if eye.centre[0] > 0 else right
+            centre = self._turn.T @ (eye.centre.astype(np.float64) / self._binding.scale + self._binding.origin)
+            tracks += [self._rotation_track(bone, rotations), *self._shift_tracks(bone, rotations, centre)]
         return tracks
 
     def head_tracks(self, head: Trajectory, file: GltfFile) -> list[Track]:
@@ -68,6 +70,19 @@ class BoneTracks:
         moved = (pivot - np.einsum("tij,j->ti", rotations, pivot) + shift) @ self._turn
         turned = np.einsum("ji,tjk,kl->til", self._turn, rotations, self._turn)
         return [(node, "rotation", _quaternions(turned)), (node, "translation", moved)]
+
+    def _shift_tracks(self, bone: str, rotations: FloatArray, centre: FloatArray) -> list[Track]:
+        """Local translation (T, 3) of a node whose origin is not the centre (3,) that it turns about, in file units."""
+        node = self._character.bones[bone]
+        place = self._tree.world[node][:3, 3]
+        if np.linalg.norm(place - centre) * self._binding.scale < MAX_OFFSET_MM:
+            return []
+        turned = np.einsum("ji,tjk,kl->til", self._turn, rotations, self._turn)
+        moved = centre + turned @ (place - centre)
+        parent = self._character.parents.get(node)
+        above = np.eye(4) if parent is None else self._tree.world[parent]
+        inverse = np.linalg.pinv(above)
+        return [(node, "translation", moved @ inverse[:3, :3].T + inverse[:3, 3])]
 
     def _rotation_track(self, bone: str, rotations: FloatArray) -> Track:
         """Local rotations (T, 4) of a bone turned by rotations (T, 3, 3) in the face's axes."""
