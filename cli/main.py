@@ -11,6 +11,7 @@ import cli.gestures  # noqa: F401 - adds its command to `corpus`
 from cli.batch import batch
 from cli.convert import convert
 from cli.corpus import corpus
+from cli.face import face as face_commands
 from cli.flags import add_option_flags, check_options, options_from_flags, switch
 from cli.jobs import jobs, worker
 from cli.lists import LISTS
@@ -50,6 +51,7 @@ app.command(worker)
 app.command(jobs)
 app.command(corpus)
 app.command(report)
+app.command(face_commands)
 for list_command in LISTS:
     app.command(list_command)
 

@@ -35,6 +35,12 @@ if TYPE_CHECKING:
     from tts2face.catalogue import styles as styles
     from tts2face.catalogue import talkers as talkers
     from tts2face.catalogue import voices as voices
+    from tts2face.characters.animation import WrittenCharacter as WrittenCharacter
+    from tts2face.characters.animation import write_character as write_character
+    from tts2face.characters.importing import ImportedFace as ImportedFace
+    from tts2face.characters.importing import ImportReport as ImportReport
+    from tts2face.characters.importing import import_face as import_face
+    from tts2face.characters.saving import save_face as save_face
     from tts2face.models.face import Face as Face
     from tts2face.models.face_file import load_face as load_face
     from tts2face.models.palette import Palette as Palette
@@ -68,6 +74,8 @@ __all__ = [
     "Cue",
     "DataError",
     "Face",
+    "ImportReport",
+    "ImportedFace",
     "InputError",
     "Palette",
     "Performance",
@@ -84,12 +92,14 @@ __all__ = [
     "Tts2faceError",
     "Waveform",
     "WordSpan",
+    "WrittenCharacter",
     "WrittenClip",
     "convert",
     "export",
     "faces",
     "formats",
     "identities",
+    "import_face",
     "languages",
     "load_clip",
     "load_face",
@@ -99,9 +109,11 @@ __all__ = [
     "read_cast",
     "read_subtitles",
     "run_batch",
+    "save_face",
     "styles",
     "talkers",
     "voices",
+    "write_character",
     "write_clip",
 ]
 
@@ -114,6 +126,9 @@ _MODULES = {
     "tts2face.batch.plan": ("Plan", "plan_batch"),
     "tts2face.batch.run": ("BatchResult", "run_batch"),
     "tts2face.catalogue": ("faces", "formats", "identities", "languages", "styles", "talkers", "voices"),
+    "tts2face.characters.animation": ("WrittenCharacter", "write_character"),
+    "tts2face.characters.importing": ("ImportReport", "ImportedFace", "import_face"),
+    "tts2face.characters.saving": ("save_face",),
     "tts2face.models.face": ("Face",),
     "tts2face.models.face_file": ("load_face",),
     "tts2face.models.palette": ("Palette", "load_palette"),

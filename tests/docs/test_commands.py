@@ -20,6 +20,7 @@ from cyclopts import App
 
 from cli.flags import check_options, option_names
 from cli.main import app, run
+from tests.characters.made import write_character_file, write_landmarks
 from tests.docs.blocks import (
     CLI_PAGE,
     EXECUTED_PAGES,
@@ -30,14 +31,14 @@ from tests.docs.blocks import (
     reason_not_executed,
     shell_lines,
 )
-from tts2face import export, session
+from tts2face import export, import_face, save_face, session
 from tts2face.jobs.database import prepare_database
 from tts2face.models.palette import Palette, load_palette, write_palette
 from tts2face.storage.files import SHIPPED_FOLDER
 
 SMALL = {"--size": "64x64", "--fps": "5"}
 LISTS = {"voices", "languages", "faces", "identities", "styles", "talkers", "formats", "phones", "completion", "jobs"}
-TOOLS = {"corpus", "report", "convert"}
+TOOLS = {"corpus", "report", "convert", "face"}
 OWN_LINES = [(page.name, line) for page in PAGES for line in shell_lines(page) if own_commands(line)]
 EXECUTED = [
     line
@@ -90,6 +91,9 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rows = ["Timecode,BlendshapeCount," + ",".join(shape[0].upper() + shape[1:] for shape in shapes)]
     rows += [f"00:00:00:{i:02d}.000,61," + ",".join(["0.1"] * len(shapes)) for i in range(20)]
     (folder / "take.csv").write_text("\n".join(rows), encoding="utf-8")
+    character = write_character_file(folder / "character.glb")
+    landmarks = write_landmarks(folder / "landmarks.tsv")
+    save_face(folder / "mine.face", import_face(character, landmarks=landmarks).face)
     return folder
 
 

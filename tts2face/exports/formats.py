@@ -74,7 +74,7 @@ FORMATS = (
     FormatInfo("a2f", (".a2f.json",), "ARKit-52 weights as Audio2Face exports them",
                ("audio2face_json", "Audio2FaceWriter"), has_frames=True, uses_shapes=True),
     FormatInfo("glb", (".glb",), "mesh, morph targets, skeleton and animation (glTF 2.0)",
-               ("glb", "GlbWriter"), has_frames=True, needs_mesh=True, has_sound_beside=True),
+               ("character_glb", "make_glb_writer"), has_frames=True, needs_mesh=True, has_sound_beside=True),
     FormatInfo("usd", (".usda", ".usdc", ".usd"), "mesh, blend shapes, skeleton and animation (UsdSkel)",
                ("usd", "UsdWriter"), has_frames=True, needs_mesh=True, has_sound_beside=True, package="pxr"),
     FormatInfo("bvh", (".bvh",), "head motion", ("bvh", "BvhWriter"), has_frames=True),

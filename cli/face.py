@@ -1,0 +1,112 @@
+"""``tts2face face``: import characters of other programs as faces, and show faces."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from cli.flags import switch
+from cli.process import write_message
+from cli.progress import progress_bar
+from tts2face.storage.output_names import check_file_name
+from tts2face.storage.overwrite import refuse_overwriting
+
+if TYPE_CHECKING:
+    from tts2face.characters.importing import ImportReport
+
+face = App(name="face", help="Import characters as faces, show faces.")
+
+
+@face.command(name="import")
+def import_character(  # noqa: PLR0913 - one parameter a flag
+    character: Annotated[
+        Path, Parameter(help="Character: .glb, .gltf or .vrm, or a folder of neutral.obj and one .obj for each shape.")
+    ],
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="Output face (.face).", alias="-o")],
+    mapping: Annotated[
+        Path | None, Parameter(help="Names of the character's shapes (.tsv or .toml), in place of the guessed ones.")
+    ] = None,
+    landmarks: Annotated[
+        Path | None, Parameter(help="Table of landmark positions (.tsv), in place of tracking (extra [capture]).")
+    ] = None,
+    front: Annotated[
+        str | None, Parameter(help="Axis that the character looks along: +z, -z, +x or -x; by default found.")
+    ] = None,
+    preview: Annotated[Path | None, Parameter(help="Write a picture with the landmarks drawn (.png).")] = None,
+    write_landmarks: Annotated[Path | None, Parameter(help="Write the landmarks as a table to edit (.tsv).")] = None,
+    write_mapping: Annotated[Path | None, Parameter(help="Write the used mapping as a table to edit (.tsv).")] = None,
+    model: Annotated[Path | None, Parameter(help="Path of face_landmarker.task; by default found or set up.")] = None,
+    quiet: Annotated[bool, switch("Print no report.")] = False,
+) -> None:
+    """Make a .face file of a character; print the mapping of its shapes, and what replaces missing ones."""
+    check_file_name(out, "a face", (".face",))
+    for path, what, suffix in (
+        (preview, "a picture", ".png"),
+        (write_landmarks, "a table of landmarks", ".tsv"),
+        (write_mapping, "a mapping", ".tsv"),
+    ):
+        if path is not None:
+            check_file_name(path, what, (suffix,))
+    outputs = {"--out": out, "--preview": preview, "--write-landmarks": write_landmarks}
+    refuse_overwriting(
+        outputs | {"--write-mapping": write_mapping},
+        {"the character": character, "--mapping": mapping, "--landmarks": landmarks, "--model": model},
+    )
+    from tts2face.characters.importing import import_face
+    from tts2face.characters.landmark_table import landmark_table
+    from tts2face.characters.pictures import draw_preview, png_bytes
+    from tts2face.characters.saving import save_face
+    from tts2face.characters.shape_mapping import mapping_table
+    from tts2face.storage.files import write_atomically
+
+    imported = import_face(character, mapping=mapping, landmarks=landmarks, front=front, model=model)
+    if preview is not None:
+        write_atomically(preview, png_bytes(draw_preview(imported.face)))
+    if write_landmarks is not None:
+        write_atomically(write_landmarks, landmark_table(imported.report.landmarks).encode())
+    if write_mapping is not None:
+        write_atomically(write_mapping, mapping_table(imported.report.mapping).encode())
+    save_face(out, imported.face)
+    if not quiet:
+        print(_report_text(imported.report), end="")  # noqa: T201 - the result
+        write_message(f"wrote {out}")
+
+
+@face.command
+def show(
+    name: Annotated[str, Parameter(help="Face: head, cartoon, or a .face file.")],
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="Output picture (.png).", alias="-o")],
+    landmarks: Annotated[bool, switch("Draw the landmarks instead of the shapes.")] = False,
+    quiet: Annotated[bool, switch("Print no progress bar and no summary.")] = False,
+) -> None:
+    """Draw a contact sheet of all shapes of a face."""
+    check_file_name(out, "a picture", (".png",))
+    refuse_overwriting({"--out": out}, {"the face": name})
+    from tts2face.characters.pictures import draw_contact_sheet, draw_preview, png_bytes
+    from tts2face.models.face_file import load_face
+    from tts2face.storage.files import write_atomically
+
+    loaded = load_face(name)
+    with progress_bar("drawing", quiet) as on_progress:
+        drawn = draw_preview(loaded) if landmarks else draw_contact_sheet(loaded, on_progress)
+    write_atomically(out, png_bytes(drawn))
+    if not quiet:
+        write_message(f"wrote {out}: {len(loaded.shape_names)} shapes")
+
+
+def _report_text(report: "ImportReport") -> str:
+    """Report of an import: mapping, missing shapes, landmarks, notes."""
+    from tts2face.characters.shape_mapping import mapping_table
+
+    score = "read from the table" if report.score is None else f"tracked, score {report.score:.2f}"
+    lines = [mapping_table(report.mapping).rstrip()]
+    lines += [f"missing {name}: {replacement}" for name, replacement in report.missing.items()]
+    lines += [f"unused: {', '.join(report.unused)}"] if report.unused else []
+    lines += [f"landmarks: {len(report.landmarks)}, {score}; eyeballs: {report.n_eyeballs}"]
+    lines += [f"note: {note}" for note in report.notes]
+    lines += [f"licence: {report.licence or 'not stated; check it before publishing clips'}"]
+    return "\n".join(lines) + "\n"

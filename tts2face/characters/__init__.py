@@ -1,0 +1,1 @@
+"""Characters of other programs: import as faces, and export of animation onto them."""

@@ -1,0 +1,109 @@
+"""Rotations of the head and eye bones of a character's file, as tracks of an animation."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.characters.binding import CharacterBinding
+from tts2face.characters.character import Character
+from tts2face.characters.glb_writer import GlbWriter, matrix_quaternion
+from tts2face.characters.gltf import GltfFile
+from tts2face.characters.nodes import NodeTree
+from tts2face.face.deformation import head_rotation, rotation_matrix
+from tts2face.models.face import Face
+from tts2face.types import Trajectory
+
+HEAD_NODE = "tts2face_head"
+MAX_OFFSET_MM = 2.0  # between the origin of an eye bone and the centre of its eyeball, up to which it only rotates
+
+FloatArray = NDArray[np.float64]
+Track = tuple[int, str, FloatArray]
+
+
+class BoneTracks:
+    """Tracks of the rotations of eye and head bones."""
+
+    def __init__(
+        self, face: Face, binding: CharacterBinding, character: Character, tree: NodeTree, writer: GlbWriter
+    ) -> None:
+        self._face, self._character, self._tree, self._writer = face, character, tree, writer
+        self._binding = binding
+        turn = float(np.radians(binding.yaw_deg))
+        self._turn = head_rotation(0.0, turn, 0.0)  # from the file's axes to the face's
+        self._names: dict[int, str] = {}
+
+    def name_of(self, node: int) -> str:
+        """Name of an animated bone."""
+        return self._names.get(node, HEAD_NODE)
+
+    def eye_tracks(self, motion: Trajectory) -> list[Track]:
+        """Rotations of the bones of the eyeballs, which gaze shapes turn."""
+        places = {
+            bone: self._turn @ place for bone, place in self._character.bone_places.items() if bone.endswith("Eye")
+        }
+        if len(places) < 2:
+            return []
+        left, right = sorted(places, key=lambda name: (-float(places[name][0].round(9)), name))
+        tracks = []
+        for eye in self._face.eyes:
+            vectors = np.zeros((len(motion), 3))
+            for name, turn in eye.turns.items():
+                if name in motion.channels:
+                    vectors += motion.values[:, motion.channels.index(name), None] * turn
+            rotations = np.stack([rotation_matrix(vector) for vector in vectors])
+            bone = left if eye.centre[0] > 0 else right
+            centre = self._turn.T @ (eye.centre.astype(np.float64) / self._binding.scale + self._binding.origin)
+            tracks += [self._rotation_track(bone, rotations), *self._shift_tracks(bone, rotations, centre)]
+        return tracks
+
+    def head_tracks(self, head: Trajectory, file: GltfFile) -> list[Track]:
+        """Rotation of the head's bone; without one, rotation and translation of a node above the scene."""
+        rotations = np.stack([head_rotation(*(float(x) for x in pose[:3])) for pose in head.values])
+        if "head" in self._character.bones:
+            return [self._rotation_track("head", rotations)]
+        scenes = file.root.children("scenes")
+        if not scenes:
+            return []
+        node = self._writer.add_node_above(HEAD_NODE, file.root.index("scene", len(scenes), "scenes") or 0)
+        scale = self._binding.scale
+        pivot = np.array(self._binding.origin) + self._face.pivot.astype(np.float64) / scale
+        shift = head.values[:, 3:].astype(np.float64) / scale
+        moved = (pivot - np.einsum("tij,j->ti", rotations, pivot) + shift) @ self._turn
+        turned = np.einsum("ji,tjk,kl->til", self._turn, rotations, self._turn)
+        return [(node, "rotation", _quaternions(turned)), (node, "translation", moved)]
+
+    def _shift_tracks(self, bone: str, rotations: FloatArray, centre: FloatArray) -> list[Track]:
+        """Local translation (T, 3) of a node whose origin is not the centre (3,) that it turns about, in file units."""
+        node = self._character.bones[bone]
+        place = self._tree.world[node][:3, 3]
+        if np.linalg.norm(place - centre) * self._binding.scale < MAX_OFFSET_MM:
+            return []
+        turned = np.einsum("ji,tjk,kl->til", self._turn, rotations, self._turn)
+        moved = centre + turned @ (place - centre)
+        parent = self._character.parents.get(node)
+        above = np.eye(4) if parent is None else self._tree.world[parent]
+        inverse = np.linalg.pinv(above)
+        return [(node, "translation", moved @ inverse[:3, :3].T + inverse[:3, 3])]
+
+    def _rotation_track(self, bone: str, rotations: FloatArray) -> Track:
+        """Local rotations (T, 4) of a bone turned by rotations (T, 3, 3) in the face's axes."""
+        node = self._character.bones[bone]
+        self._writer.divide_matrix(node)
+        self._names[node] = bone
+        world = _orthonormal(self._tree.world[node])
+        parent = self._character.parents.get(node)
+        above = np.eye(3) if parent is None else _orthonormal(self._tree.world[parent])
+        turned = np.einsum("ji,tjk,kl->til", self._turn, rotations, self._turn)
+        return node, "rotation", _quaternions(np.einsum("ji,tjk,kl->til", above, turned, world))
+
+
+def _quaternions(rotations: FloatArray) -> FloatArray:
+    """Quaternions (T, 4) of rotation matrices (T, 3, 3), each with the sign nearest to the one before."""
+    rows = np.stack([matrix_quaternion(rotation) for rotation in rotations])
+    signs = np.where((rows[1:] * rows[:-1]).sum(axis=1) < 0, -1.0, 1.0)
+    rows[1:] *= np.cumprod(signs)[:, None]
+    return rows
+
+
+def _orthonormal(matrix: FloatArray) -> FloatArray:
+    scaled = matrix[:3, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
+    return np.asarray(scaled, np.float64)

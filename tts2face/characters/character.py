@@ -1,0 +1,126 @@
+"""Character: meshes, materials, named shapes and bones of an imported file, in the file's own units."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+OPAQUE, MASK, BLEND = "OPAQUE", "MASK", "BLEND"
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Morph target `number` of mesh `mesh` of the file."""
+
+    mesh: int
+    number: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Material:
+    """Material of a piece.
+
+    Parameters
+    ----------
+    colour
+        Red, green, blue (linear light) and alpha; factors of the image where there is one.
+    image : (H, W, 4)
+        sRGB and alpha, or None.
+    transform : (2, 3)
+        Affine transform of texture coordinates.
+    """
+
+    name: str
+    colour: tuple[float, float, float, float] = (0.8, 0.8, 0.8, 1.0)
+    image: NDArray[np.uint8] | None = None
+    transform: FloatArray = field(default_factory=lambda: np.eye(2, 3))
+    alpha_mode: str = OPAQUE
+    cutoff: float = 0.5
+    roughness: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Piece:
+    """Triangles of one material at rest, in world coordinates: y up.
+
+    Parameters
+    ----------
+    name
+        Names of its mesh, node and material.
+    vertices, triangles : (N, 3), (F, 3)
+    uv, colours : (N, 2), (N, 3)
+        Texture coordinates from the top left corner; linear light; or None.
+    material
+        Index of its material.
+    morphs
+        Displacement (N, 3) of each morph target that it has.
+    bones : (N,)
+        Node that each vertex follows most.
+    """
+
+    name: str
+    vertices: FloatArray
+    triangles: IntArray
+    uv: FloatArray | None
+    colours: FloatArray | None
+    material: int
+    morphs: Mapping[Target, NDArray[np.float32]]
+    bones: IntArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Character:
+    """Everything that is read from a character's file.
+
+    Parameters
+    ----------
+    target_names
+        Name of each morph target; several meshes may use one name.
+    expressions
+        Expressions of a VRM file: name -> weights of morph targets.
+    bones
+        Nodes of ``head``, ``neck``, ``leftEye`` and ``rightEye`` as far as they are known.
+    bone_places
+        Position (3,) of each of them in world coordinates.
+    parents
+        Parent of each node that has one.
+    faces_back
+        Whether the character looks along -z (VRM 0), not +z.
+    licence
+        What the file says about its licence and author.
+    notes
+        What was not read, in sentences.
+    """
+
+    pieces: tuple[Piece, ...]
+    materials: tuple[Material, ...]
+    target_names: Mapping[Target, str]
+    expressions: Mapping[str, Mapping[Target, float]]
+    bones: Mapping[str, int]
+    bone_places: Mapping[str, FloatArray]
+    parents: Mapping[int, int]
+    faces_back: bool
+    licence: str
+    notes: tuple[str, ...] = ()
+
+
+def affine(points: FloatArray, matrix: FloatArray) -> FloatArray:
+    """Points (N, 3) transformed by a matrix (4, 4) or by one matrix for each point (N, 4, 4)."""
+    if matrix.ndim == 3:
+        moved: FloatArray = np.einsum("nij,nj->ni", matrix[:, :3, :3], points) + matrix[:, :3, 3]
+        return moved
+    moved = points @ matrix[:3, :3].T + matrix[:3, 3]
+    return moved
+
+
+def linear(points: FloatArray, matrix: FloatArray) -> FloatArray:
+    """Displacements (N, 3) transformed by the linear part of a matrix (4, 4) or of matrices (N, 4, 4)."""
+    if matrix.ndim == 3:
+        moved: FloatArray = np.einsum("nij,nj->ni", matrix[:, :3, :3], points)
+        return moved
+    moved = points @ matrix[:3, :3].T
+    return moved

@@ -1,0 +1,276 @@
+"""Import of a character of another program as a face: ``tts2face face import``."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError, InputError
+from tts2face.characters.binding import KEY, CharacterBinding
+from tts2face.characters.character import Character
+from tts2face.characters.eyeballs import mark_eyeballs
+from tts2face.characters.face_placement import drop_unsuited_shapes, missing_shapes, place_face
+from tts2face.characters.face_surface import Placement, add_gaze_shapes, build_face, is_plain, unwrap
+from tts2face.characters.gltf import SUFFIXES
+from tts2face.characters.gltf_character import read_gltf_character
+from tts2face.characters.head_mesh import HeadMesh, build_head_mesh, moved_box, source_weights
+from tts2face.characters.landmark_table import read_landmark_table
+from tts2face.characters.landmark_tracking import (
+    SKIN,
+    LocatedLandmarks,
+    frontal_score,
+    locate_landmarks,
+    part_triangles,
+)
+from tts2face.characters.obj_folder import read_obj_folder
+from tts2face.characters.shape_mapping import ShapeMapping, read_mapping
+from tts2face.characters.shape_names import guess_mapping
+from tts2face.characters.surface_points import nearest_points
+from tts2face.models.face import Face
+from tts2face.models.landmarks import N_MESH_LANDMARKS
+from tts2face.video.track import MIN_SCORE
+
+FRONTS = {"+z": 0.0, "-z": 180.0, "+x": -90.0, "-x": 90.0}  # axis that a character looks along -> turn, degrees
+PROVISIONAL_HEIGHT_MM = 150.0  # of the moved part of a face, until the distance of its eyes is known
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImportReport:
+    """What an import found and did.
+
+    Parameters
+    ----------
+    mapping
+        Morph targets or expressions that each shape of the face uses.
+    unused
+        Names of the character that no shape uses.
+    missing
+        ARKit shapes that the character lacks -> what replaces them.
+    landmarks
+        Position (3,) of each landmark in the units and axes of the file.
+    score
+        Mean score of the face tracker, 0 to 1; None for landmarks of a table.
+    n_eyeballs
+        Eyeballs that gaze turns.
+    notes
+        What was changed or left out, in sentences.
+    licence
+        What the file says about its licence and author.
+    """
+
+    mapping: ShapeMapping
+    unused: tuple[str, ...]
+    missing: Mapping[str, str]
+    landmarks: Mapping[int, NDArray[np.float64]]
+    score: float | None
+    n_eyeballs: int
+    notes: tuple[str, ...]
+    licence: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImportedFace:
+    """A face made from a character, and the report of its import."""
+
+    face: Face
+    report: ImportReport
+
+
+def read_character(path: Path) -> Character:
+    """Character of a .glb, .gltf or .vrm file, or of a folder of .obj files.
+
+    Raises
+    ------
+    InputError
+        The path does not exist or has another suffix.
+    DataError
+        A file is damaged, too large or not supported.
+    """
+    if path.is_dir():
+        return read_obj_folder(path)
+    if not path.exists():
+        raise InputError(f"there is no character {path}; check the path")
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"a character is a {', '.join(SUFFIXES)} file or a folder of .obj files, not {path.name}")
+    return read_gltf_character(path)
+
+
+def propose_mapping(character: Character) -> ShapeMapping:
+    """Mapping guessed from the names of a character's morph targets and expressions."""
+    return guess_mapping([*character.target_names.values(), *character.expressions])
+
+
+def import_face(
+    path: str | Path,
+    *,
+    mapping: str | Path | ShapeMapping | None = None,
+    landmarks: str | Path | None = None,
+    front: str | None = None,
+    model: Path | None = None,
+) -> ImportedFace:
+    """Make a face of a character's file.
+
+    Parameters
+    ----------
+    path
+        .glb, .gltf or .vrm file, or a folder with ``neutral.obj`` and one .obj file for each shape.
+    mapping
+        Mapping or its file (.tsv or .toml), which replaces the guess for the shapes that it names.
+    landmarks
+        Table of landmark positions (.tsv); without it the face is tracked in rendered views (extra ``[capture]``).
+    front
+        Axis that the character looks along: ``+z``, ``-z``, ``+x`` or ``-x``; by default the one where a face is
+        recognised.
+    model
+        Path of ``face_landmarker.task``.
+
+    Raises
+    ------
+    InputError
+        A path does not exist, or an option is unknown.
+    DataError
+        A file is damaged, or the character has no shape that moves its mouth, or no face is recognised.
+    BackendError
+        The face tracker is not installed.
+
+    Examples
+    --------
+    >>> imported = import_face("character.glb")  # doctest: +SKIP
+    >>> sorted(imported.report.missing)  # doctest: +SKIP
+    ['tongueOut']
+    """
+    path = Path(path)
+    if front is not None and front not in FRONTS:
+        raise InputError(f"there is no front {front!r}; choose {', '.join(FRONTS)}")
+    character = read_character(path)
+    chosen = _complete_mapping(character, mapping)
+    table = None if landmarks is None else read_landmark_table(Path(landmarks))
+    head = _front_head(character, chosen, front, (table is None, model))
+    low, high = moved_box(head)
+    provisional = Placement((low + high) / 2, PROVISIONAL_HEIGHT_MM / float(high[1] - low[1]))
+    drawn = build_face(head, character, provisional)
+    located = locate_landmarks(drawn, model) if table is None else _project_table(table, head, drawn)
+    face = place_face(_with_landmarks(drawn, located), character, head, provisional)
+    face, notes = drop_unsuited_shapes(face)
+    face = replace(face, metadata=_metadata(path, character, chosen, head, face))
+    positions = located.points.places(drawn.vertices) / provisional.scale + provisional.origin
+    places = dict(zip(located.numbers.tolist(), positions @ head.turn, strict=True))
+    report = ImportReport(
+        mapping={name: sources for name, sources in chosen.items() if name in face.shape_names},
+        unused=_unused_names(character, chosen),
+        missing=missing_shapes(face),
+        landmarks=places,
+        score=None if table is not None else located.score,
+        n_eyeballs=len(face.eyes),
+        notes=(*character.notes, *_colour_notes(character, head), *notes),
+        licence=character.licence,
+    )
+    return ImportedFace(face, report)
+
+
+def _complete_mapping(character: Character, given: str | Path | ShapeMapping | None) -> ShapeMapping:
+    """The guessed mapping with the given rows in its place, without shapes that have no source."""
+    mapping = dict(propose_mapping(character))
+    if given is not None:
+        rows = given if isinstance(given, Mapping) else read_mapping(Path(given))
+        known = {*character.target_names.values(), *character.expressions}
+        unknown = [source.name for sources in rows.values() for source in sources if source.name not in known]
+        if unknown:
+            raise InputError(f"the character has no shape {unknown[0]!r}; it has: {_some(sorted(known))}")
+        mapping |= rows
+    mapping = {
+        name: sources
+        for name, sources in mapping.items()
+        if any(source_weights(character, source) for source in sources)
+    }
+    if not any(name.startswith(("jaw", "mouth")) for name in mapping):
+        names = sorted({*character.target_names.values(), *character.expressions})
+        raise DataError(
+            "the character has no shape of a known name that moves its mouth, so speech cannot move it; "
+            f"name its shapes in a file and give it as --mapping; it has: {_some(names)}"
+        )
+    return mapping
+
+
+def _some(names: Sequence[str]) -> str:
+    shown = [name[:40] for name in names[:12]]
+    return ", ".join(shown) + (f" and {len(names) - 12} more" if len(names) > 12 else "") if names else "no shapes"
+
+
+def _front_head(
+    character: Character, mapping: ShapeMapping, front: str | None, tracking: tuple[bool, Path | None]
+) -> HeadMesh:
+    """Head turned to the front: by the given axis, otherwise by the first one where the tracker sees a face."""
+    is_tracked, model = tracking
+    likely = ["-z", "+z"] if character.faces_back else ["+z", "-z"]
+    axes = [front] if front is not None else [*likely, "+x", "-x"]
+    heads: list[tuple[float, HeadMesh]] = []
+    for axis in axes if is_tracked else axes[:1]:
+        head = build_head_mesh(character, mapping, FRONTS[axis])
+        head = add_gaze_shapes(mark_eyeballs(unwrap(head, character), character))
+        if len(axes) == 1 or not is_tracked:
+            return head
+        low, high = moved_box(head)
+        placement = Placement((low + high) / 2, PROVISIONAL_HEIGHT_MM / float(high[1] - low[1]))
+        heads.append((frontal_score(build_face(head, character, placement), model), head))
+        if heads[-1][0] >= MIN_SCORE:
+            break
+    return max(heads, key=lambda scored: scored[0])[1]
+
+
+def _project_table(table: Mapping[int, NDArray[np.float64]], head: HeadMesh, drawn: Face) -> LocatedLandmarks:
+    numbers = np.array(sorted(table), np.int64)
+    places = np.stack([table[int(number)] for number in numbers]) @ head.turn.T
+    is_skin = numbers < N_MESH_LANDMARKS
+    skin = part_triangles(drawn, SKIN)
+    triangles = np.asarray(head.triangles if not len(skin) else skin, np.int64)
+    points = nearest_points(places, head.vertices, triangles)
+    if not is_skin.all():
+        irises = nearest_points(places[~is_skin], head.vertices, drawn.triangles.astype(np.int64))
+        points.vertices[~is_skin], points.weights[~is_skin] = irises.vertices, irises.weights
+    return LocatedLandmarks(numbers, points, 1.0)
+
+
+def _with_landmarks(face: Face, located: LocatedLandmarks) -> Face:
+    return replace(
+        face,
+        landmarks=located.numbers.astype(np.int32),
+        landmark_vertices=located.points.vertices.astype(np.int32),
+        landmark_weights=located.points.weights.astype(np.float32),
+    )
+
+
+def _unused_names(character: Character, mapping: ShapeMapping) -> tuple[str, ...]:
+    used = {source.name for sources in mapping.values() for source in sources}
+    names = dict.fromkeys([*character.target_names.values(), *character.expressions])
+    return tuple(name for name in names if name not in used)
+
+
+def _colour_notes(character: Character, head: HeadMesh) -> list[str]:
+    """Notes about white materials, whose colour is replaced."""
+    used = [character.pieces[number] for number in np.unique(head.piece_of).tolist()]
+    plain = {
+        piece.material for piece in used if piece.colours is None and is_plain(character.materials[piece.material])
+    }
+    names = sorted(character.materials[number].name for number in plain)
+    return [f"the material {name[:60]!r} is white without an image; plain colours replace it" for name in names]
+
+
+def _metadata(path: Path, character: Character, mapping: ShapeMapping, head: HeadMesh, face: Face) -> dict[str, Any]:
+    """Provenance of the face, and what is needed to write its animation onto the character's file."""
+    scale = float(np.ptp(face.vertices[:, 1]) / np.ptp(head.vertices[:, 1]))
+    origin = head.vertices[0] - face.vertices[0].astype(np.float64) / scale
+    digest = "" if path.is_dir() else sha256(path.read_bytes()).hexdigest()
+    yaw_deg = float(np.degrees(np.arctan2(head.turn[0, 2], head.turn[0, 0])))
+    x, y, z = (float(value) for value in origin)
+    binding = CharacterBinding(str(path.resolve()), digest, round(yaw_deg, 3), scale, (x, y, z), mapping)
+    return {
+        "name": path.stem,
+        "licence": character.licence or "not stated by the character's file",
+        "attribution": "",
+        KEY: binding.as_metadata(),
+    }

@@ -1,0 +1,118 @@
+"""Mapping from the shapes of a face to morph targets and expressions of a character, and its files (TSV, TOML)."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from lexicon.errors import DataError, InputError
+from lexicon.inputs import read_text
+
+MAX_GAIN = 10.0
+MAX_MAPPING_BYTES = 1_000_000
+NOTHING = "-"  # source of a shape that is left out
+SIDES = ("Left", "Right")
+HEADER = ("shape", "source", "gain")
+
+
+@dataclass(frozen=True, slots=True)
+class ShapeSource:
+    """Morph target or expression of a character, times a gain; on one side of the face only if `side` names it."""
+
+    name: str
+    gain: float = 1.0
+    side: str = ""
+
+
+ShapeMapping = Mapping[str, tuple[ShapeSource, ...]]
+
+
+def with_sides(mapping: ShapeMapping) -> ShapeMapping:
+    """Mapping in which a source of both the left and the right shape moves only that side for each of them."""
+    users: dict[str, set[str]] = {}
+    for shape, sources in mapping.items():
+        for source in sources:
+            users.setdefault(source.name, set()).add(shape)
+
+    def sided(shape: str, source: ShapeSource) -> ShapeSource:
+        for side, other in (SIDES, SIDES[::-1]):
+            if shape.endswith(side) and shape.removesuffix(side) + other in users[source.name]:
+                return replace(source, side=side)
+        return replace(source, side="")
+
+    return {shape: tuple(sided(shape, source) for source in sources) for shape, sources in mapping.items()}
+
+
+def read_mapping(path: Path) -> ShapeMapping:
+    """Mapping of a TSV file (shape, source, gain) or of a TOML file with a table ``[shapes]``.
+
+    Raises
+    ------
+    InputError
+        The file does not exist or has another suffix.
+    DataError
+        A row or value is wrong.
+    """
+    if path.suffix not in (".tsv", ".toml"):
+        raise InputError(f"a mapping is a .tsv or .toml file, not {path.name}")
+    try:
+        text = read_text(path, MAX_MAPPING_BYTES)
+    except OSError as refused:
+        raise InputError(f"cannot read the mapping {path}: {refused.strerror}; check the path") from refused
+    rows = _toml_rows(text, path) if path.suffix == ".toml" else _table_rows(text, path)
+    mapping: dict[str, tuple[ShapeSource, ...]] = {}
+    for place, shape, source, gain in rows:
+        if not shape or not source:
+            raise DataError(f"{place}: shape or source is empty; give both, or the source {NOTHING}")
+        if not -MAX_GAIN <= gain <= MAX_GAIN:
+            raise DataError(f"{place}: the gain {gain:g} is not within {MAX_GAIN:g}; correct it")
+        mapping[shape] = (*mapping.get(shape, ()), *(() if source == NOTHING else (ShapeSource(source, gain),)))
+    if not mapping:
+        raise DataError(f"{path} names no shape; add rows of shape, source and gain")
+    return with_sides(mapping)
+
+
+def mapping_table(mapping: ShapeMapping) -> str:
+    """Mapping as the text of a TSV file."""
+    rows = [
+        "\t".join((shape, source.name, f"{source.gain:g}")) for shape, sources in mapping.items() for source in sources
+    ]
+    return "\n".join(["\t".join(HEADER), *rows]) + "\n"
+
+
+def _table_rows(text: str, path: Path) -> list[tuple[str, str, str, float]]:
+    rows = []
+    for number, line in enumerate(text.splitlines(), 1):
+        cells = [cell.strip() for cell in line.split("\t")]
+        if not line.strip() or line.startswith("#") or tuple(cells) == HEADER[: len(cells)]:
+            continue
+        place = f"{path}, line {number}"
+        if len(cells) not in (2, 3):
+            raise DataError(f"{place}: has {len(cells)} columns; give shape, source and gain, separated by tabs")
+        rows.append((place, cells[0], cells[1], _gain(cells[2] if len(cells) == 3 else "1", place)))
+    return rows
+
+
+def _toml_rows(text: str, path: Path) -> list[tuple[str, str, str, float]]:
+    try:
+        content = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise DataError(f"{path} is not TOML ({error}); correct it there") from error
+    shapes = content.get("shapes")
+    if not isinstance(shapes, dict):
+        raise DataError(f'{path} has no table [shapes]; add one with lines such as jawOpen = "MouthOpen"')
+    rows = []
+    for shape, value in shapes.items():
+        place = f"{path}, {shape}"
+        sources = {value: 1.0} if isinstance(value, str) else value
+        if not isinstance(sources, dict):
+            raise DataError(f"{place}: give a name or a table of names with gains, not {value!r:.40}")
+        rows += [(place, shape, name, _gain(gain, place)) for name, gain in sources.items()]
+    return rows
+
+
+def _gain(value: object, place: str) -> float:
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError) as error:
+        raise DataError(f"{place}: the gain {value!r:.40} is not a number; correct it") from error
