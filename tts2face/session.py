@@ -3,7 +3,7 @@
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -35,7 +35,7 @@ from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, pr
 from tts2face.types import Clip, Progress, concatenate_clips
 from tts2face.voice.engine import PronunciationMap, Voice
 from tts2face.voice.loading import load_voice
-from tts2face.voice.recent import RecentUtterances
+from tts2face.voice.recent import MeasuredVoice
 
 DEFAULT_FIELDS = "fields"
 OWN_FACE = "self"  # name of the talker's own face
@@ -121,7 +121,7 @@ class Session:
         self._lock = threading.RLock()
         self._cache: dict[Hashable, Any] = {}
         self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
-        self._unused_voices: list[tuple[Hashable, Voice]] = []  # the last ones returned, the newest at the end
+        self._unused_voices: list[tuple[Hashable, MeasuredVoice]] = []  # the last ones returned, the newest at the end
         self._speech_face: AnimatedFace = self._prepare_face(None)
 
     @property
@@ -180,10 +180,11 @@ class Session:
     def measure_speech(self, text: str | Request | PreparedRequest, **options: Any) -> SpeechSpan:
         """Seconds at which the speech of a text begins and ends in its clip, without synthesis of motion.
 
-        The last utterances are kept, so that a following `stream` of the same text does not speak it again.
+        Its last utterances are kept for a following `stream` of the same text, which does not speak them again.
         """
         prepared = prepare_request(text, options)
-        return measure_speech(prepared, self._models(prepared.request, self._face(prepared.request.has_gestures)))
+        face = self._face(prepared.request.has_gestures)
+        return measure_speech(prepared, self._models(prepared.request, face, measures=True))
 
     def stream_to_length(self, text: str | Request | PreparedRequest, n_frames: int, **options: Any) -> Iterator[Clip]:
         """Synthesise the clip of a text or request in pieces with `n_frames` frames in total.
@@ -314,11 +315,13 @@ class Session:
         layer = None if palette is None else GestureLayer(prepared, self._fields(palette, request), face)
         return pieces(prepared, self._models(request, face), layer)
 
-    def _models(self, request: Request, face: AnimatedFace) -> SynthesisModels:
+    def _models(self, request: Request, face: AnimatedFace, *, measures: bool = False) -> SynthesisModels:
         dictionary = read_dictionary(request.dictionary).entries if request.dictionary else {}
 
-        def borrow_voice(name: str | None, language: str) -> AbstractContextManager[Voice]:
-            return self._borrow_voice(name, language, dictionary)
+        @contextmanager
+        def borrow_voice(name: str | None, language: str) -> Iterator[Voice]:
+            with self._borrow_voice(name, language, dictionary) as voice:
+                yield voice.measuring() if measures else voice
 
         return SynthesisModels(self.talker, self._exemplars, face, borrow_voice)
 
@@ -348,13 +351,13 @@ class Session:
             return value
 
     @contextmanager
-    def _borrow_voice(self, name: str | None, language: str, dictionary: PronunciationMap) -> Iterator[Voice]:
+    def _borrow_voice(self, name: str | None, language: str, dictionary: PronunciationMap) -> Iterator[MeasuredVoice]:
         """A voice for exclusive use within a ``with`` block; loading one takes half a second."""
         key = (name, language, frozenset(dictionary.items()))
         with self._lock:
             found = next((at for at, (kept, _) in enumerate(self._unused_voices) if kept == key), None)
             voice = None if found is None else self._unused_voices.pop(found)[1]
-        voice = voice or RecentUtterances(load_voice(name, language, dictionary))
+        voice = voice or MeasuredVoice(load_voice(name, language, dictionary))
         try:
             yield voice
         finally:
