@@ -209,6 +209,11 @@ def test_an_export_is_the_animated_character(tmp_path: Path) -> None:
     session = Session(face=str(face))
     written = write_character(session.clip("Hello.", fps=10), session.mesh, tmp_path / "same.glb")
     assert written.path.read_bytes() == out.read_bytes()
+    before = character.read_bytes()
+    assert run(["Hello.", "--face", str(face), "--out", str(character), "--fps", "10", "--quiet"]) == 2
+    with pytest.raises(InputError, match="would replace the character"):
+        write_character(session.clip("Hello.", fps=10), session.mesh, character)
+    assert character.read_bytes() == before
     character.unlink()
     assert run(["Hello.", "--face", str(face), "--out", str(out), "--fps", "10", "--quiet"]) == 3
 

@@ -24,6 +24,7 @@ from tts2face.face.landmark_fit import landmark_motion
 from tts2face.face.mouth_model import SPEECH_SHAPE_PREFIXES
 from tts2face.models.face import Face
 from tts2face.storage.files import write_atomically
+from tts2face.storage.overwrite import refuse_overwriting
 from tts2face.types import Clip, Trajectory, Waveform
 
 ANIMATION = "tts2face"
@@ -71,7 +72,8 @@ def write_character(
     Raises
     ------
     InputError
-        The face was not imported from a .glb, .gltf or .vrm file, or the clip is not in its shapes.
+        The face was not imported from a .glb, .gltf or .vrm file, the clip is not in its shapes, or the output is the
+        character's file.
     DataError
         The character's file is missing, or has changed since its import.
     BackendError
@@ -84,8 +86,9 @@ def write_character(
     """
     if clip.motion.channels != face.shape_names[: len(clip.motion.channels)]:
         raise InputError("the clip's motion is not in the shapes of this face; make the clip with a session of it")
-    animated = animate_character(clip.motion, clip.head, face, character=character)
     out = Path(out)
+    refuse_overwriting({"the output": out}, {"the character": character_file(read_binding(face), character)})
+    animated = animate_character(clip.motion, clip.head, face, character=character)
     write_atomically(out.with_suffix(".wav"), wave_bytes(clip.speech.waveform))
     write_atomically(out, animated.content)
     return WrittenCharacter(out, len(clip.motion), animated.n_targets, animated.bones)

@@ -8,6 +8,7 @@ from tts2face.characters.binding import character_file, has_binding, read_bindin
 from tts2face.exports.glb import GlbWriter
 from tts2face.exports.parts import FormatWriter, Part, Target
 from tts2face.exports.spool import Spool
+from tts2face.storage.overwrite import refuse_overwriting
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
 
@@ -17,7 +18,8 @@ class CharacterGlbWriter:
     def __init__(self, target: Target) -> None:
         if target.face is None:
             raise InputError(f"{target.name} holds the character of the face; give the face, as in face=session.face")
-        character_file(read_binding(target.face))  # a missing file is reported with the first clip
+        source = character_file(read_binding(target.face))  # a missing file is reported with the first clip
+        refuse_overwriting({"the export": target.path.with_name(target.name)}, {"the character": source})
         self._target, self._face = target, target.face
         self._motion, self._head = Spool(len(target.channels)), Spool(len(HEAD_CHANNELS))
 
