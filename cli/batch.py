@@ -17,7 +17,7 @@ from tts2face.request import Request
 
 if TYPE_CHECKING:
     from tts2face.batch.engine import Engine
-    from tts2face.batch.plan import Plan
+    from tts2face.batch.output import Plan
     from tts2face.batch.run import BatchResult
     from tts2face.batch.store import Store
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tts2face.batch.cast import Cast as Cast
     from tts2face.batch.cast import read_cast as read_cast
     from tts2face.batch.options import BatchOptions as BatchOptions
-    from tts2face.batch.plan import Plan as Plan
+    from tts2face.batch.output import Plan as Plan
     from tts2face.batch.plan import plan_batch as plan_batch
     from tts2face.batch.run import BatchResult as BatchResult
     from tts2face.batch.run import run_batch as run_batch
@@ -123,7 +123,8 @@ _MODULES = {
     "tts2face.api": ("convert", "export", "load_clip", "write_clip"),
     "tts2face.batch.cast": ("Cast", "read_cast"),
     "tts2face.batch.options": ("BatchOptions",),
-    "tts2face.batch.plan": ("Plan", "plan_batch"),
+    "tts2face.batch.output": ("Plan",),
+    "tts2face.batch.plan": ("plan_batch",),
     "tts2face.batch.run": ("BatchResult", "run_batch"),
     "tts2face.catalogue": ("faces", "formats", "identities", "languages", "styles", "talkers", "voices"),
     "tts2face.characters.animation": ("WrittenCharacter", "write_character"),

@@ -7,7 +7,8 @@ import pytest
 
 from tests.synthesis.fake_voice import FakeVoice
 from tts2face.batch.options import BatchOptions
-from tts2face.batch.plan import Plan, plan_batch
+from tts2face.batch.output import Plan
+from tts2face.batch.plan import plan_batch
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.voice import pool

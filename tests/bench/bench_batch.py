@@ -12,7 +12,8 @@ from pathlib import Path
 
 from tts2face.batch.engine import LocalEngine
 from tts2face.batch.options import BatchOptions
-from tts2face.batch.plan import Plan, plan_batch
+from tts2face.batch.output import Plan
+from tts2face.batch.plan import plan_batch
 from tts2face.batch.run import run_batch
 from tts2face.render.picture import Picture
 from tts2face.request import Request

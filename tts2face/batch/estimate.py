@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tts2face.batch.manifest import is_current, read_manifest
-from tts2face.batch.plan import Plan
+from tts2face.batch.output import Plan
 from tts2face.batch.segment import Segment
 from tts2face.batch.store import Store
 from tts2face.render.picture import Picture

@@ -11,7 +11,7 @@ from typing import Any
 from lexicon.errors import DataError
 from lexicon.inputs import parse_json
 from tts2face import __version__
-from tts2face.batch.plan import Output, Plan
+from tts2face.batch.output import Output, Plan
 from tts2face.batch.segment_result import SegmentResult
 from tts2face.storage.files import write_atomically
 

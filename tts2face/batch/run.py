@@ -19,7 +19,7 @@ from tts2face.batch.manifest import (
     read_manifest,
     write_manifest,
 )
-from tts2face.batch.plan import Output, Plan
+from tts2face.batch.output import Output, Plan
 from tts2face.batch.segment_result import SegmentResult
 from tts2face.batch.store import Store, open_store
 from tts2face.storage.overwrite import refuse_overwriting
