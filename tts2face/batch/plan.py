@@ -188,9 +188,7 @@ class _FilePlan:
         settings = {name: value for name, value in self._settings(window).items() if name not in NOT_WHEN_SILENT}
         while n_frames > 0:
             part = min(n_frames, longest)
-            seed = (
-                int(settings.get("seed", 0)) + n_frames
-            )  # differs within a long silence, and by the length of silences
+            seed = int(settings.get("seed", 0)) + n_frames  # other motion in each part, and for other lengths
             request = {**settings, "idle": max(part / fps, IDLE_LIMITS_S[0]), "seed": seed}
             yield self._segment(window, request, part, fills=True, window_frames=part)
             n_frames -= part
