@@ -86,7 +86,7 @@ def test_an_actor_gives_each_pose_once(recording: Path, bundle: Path) -> None:
     [
         (["take.mp4", "--camera", "0"], "--camera cannot be combined with a take, --out"),
         (["--camera", "0", "--out", "m.mp4"], "--camera cannot be combined with a take, --out"),
-        (["--camera", "0", "--face", "self"], "--out or --face self; remove them"),
+        (["--camera", "0", "--face", "self"], "--out, --export or --face self; remove them"),
         ([], "add a take and --out, or use --camera"),
         (["take.mp4"], "add a take and --out, or use --camera"),
     ],

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from lexicon.errors import BackendError, DataError, InputError
+from lexicon.inputs import parse_json
 from tts2face.batch.segment_result import SEGMENT_SUFFIX, SegmentResult, result_from_json
 from tts2face.storage.files import write_atomically
 from tts2face.storage.temporary import NAME_INFIX, Temporary
@@ -202,7 +203,6 @@ class ObjectStore:
 def _parse_result(content: bytes) -> SegmentResult | None:
     """Result of its JSON; None if it is damaged, so that the segment is rendered again."""
     try:
-        found = json.loads(content)
-        return result_from_json(found)
+        return result_from_json(parse_json(content.decode("utf-8"), "the result of a segment"))
     except (ValueError, TypeError, AttributeError, DataError):
         return None
