@@ -235,7 +235,7 @@ def test_an_interruption_leaves_no_files(here: Path) -> None:
     assert list(here.glob(".x*"))
     process.send_signal(signal.SIGINT)
     _, captured = process.communicate(timeout=60)
-    assert process.returncode == 130
+    assert process.returncode == 130, captured
     assert "interrupted; no output was written" in captured
     assert list(here.iterdir()) == []
 
