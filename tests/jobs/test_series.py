@@ -111,7 +111,9 @@ def test_a_series_survives_kills(database: str, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     check_outputs(out, episodes)
     n_clips = sum(len(episode.spoken) for episode in episodes)
-    assert len(list(open_store(store).addresses())) == n_clips  # none twice
+    stored = sorted(open_store(store).addresses())  # equal cues share a segment
+    assert stored == sorted({job.name.partition(".")[0] for job in list_jobs(database)})
+    assert 0.9 * n_clips < len(stored) <= n_clips
     assert {job.state for job in list_jobs(database)} == {"done"}
     LOG.info("%d clips, %d kills, %.0f s", n_clips, killer.n_kills, time.perf_counter() - began)
     again = subprocess.run([*batch, "--jobs", "0"], capture_output=True, text=True, check=True)
