@@ -26,8 +26,8 @@ from tts2face.jobs.control import list_jobs
 
 N_CUES = int(os.environ.get("TTS2FACE_SERIES_CUES", "12"))
 FPS = 10
-TIMEOUT_S = 60 + 3 * N_CUES
-KILL_INTERVAL_S = (6.0, 12.0)
+TIMEOUT_S = 240 + 3 * N_CUES
+FIRST_KILL_S, KILL_INTERVAL_S = 3.0, (6.0, 12.0)
 LOG = logging.getLogger(__name__)
 COMMAND = [sys.executable, "-m", "tts2face"]
 DRAFT = ["--voice", "espeak", "--size", "64x64", "--supersampling", "1", "--fps", str(FPS)]
@@ -52,7 +52,9 @@ class Killer:
 
     def _run(self) -> None:
         generator = random.Random(1)
-        while not self._ended.wait(generator.uniform(*KILL_INTERVAL_S)):
+        wait_s = FIRST_KILL_S
+        while not self._ended.wait(wait_s):
+            wait_s = generator.uniform(*KILL_INTERVAL_S)
             for number in [generator.randrange(2)] if generator.random() < 0.8 else [0, 1]:
                 self._workers[number].kill()
                 self._workers[number].wait()
