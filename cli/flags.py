@@ -5,6 +5,7 @@ import inspect
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, Field, fields
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 from cyclopts import App, Group, Parameter
@@ -15,6 +16,21 @@ if TYPE_CHECKING:
     from cyclopts import Token
 
 END_OF_OPTIONS = "--"  # everything after it is text or a path
+Out = Annotated[
+    Path | None,
+    Parameter(
+        help="Output clip: .mp4, .webm, .mov, .gif, a folder for .png files, or an export format without a video.",
+        alias="-o",
+    ),
+]
+Exports = Annotated[
+    list[str] | None,
+    Parameter(
+        help="File for another program, by suffix (`tts2face formats`) or as FORMAT:PATH; beside --out or alone, "
+        "several times if wanted.",
+        negative="",
+    ),
+]
 _SHORT_OPTION = re.compile(r"-[A-Za-z]")
 
 

@@ -12,7 +12,7 @@ from cli.batch import batch
 from cli.convert import convert
 from cli.corpus import corpus
 from cli.face import face as face_commands
-from cli.flags import add_option_flags, check_options, options_from_flags, switch
+from cli.flags import Exports, Out, add_option_flags, check_options, options_from_flags, switch
 from cli.jobs import jobs, worker
 from cli.lists import LISTS
 from cli.mimic import mimic
@@ -96,21 +96,8 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     ] = None,
     /,
     *,
-    out: Annotated[
-        Path | None,
-        Parameter(
-            help="Output clip: .mp4, .webm, .mov, .gif, a folder for .png files, or an export format without a video.",
-            alias="-o",
-        ),
-    ] = None,
-    export: Annotated[
-        list[str] | None,
-        Parameter(
-            help="File for another program, by suffix (`tts2face formats`) or as FORMAT:PATH; beside --out or alone, "
-            "several times if wanted.",
-            negative="",
-        ),
-    ] = None,
+    out: Out = None,
+    export: Exports = None,
     file: Annotated[
         Path | None, Parameter(help="Read the text from a UTF-8 file.", name=["--file", "--transcript"])
     ] = None,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from cli.flags import switch
+from cli.flags import Exports, Out, switch
 from cli.process import write_message
 from cli.progress import stage_bar
 from lexicon.errors import InputError
@@ -23,21 +23,8 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     take: Annotated[Path | None, Parameter(help="Video of one person, or a .csv file of Live Link Face.")] = None,
     /,
     *,
-    out: Annotated[
-        Path | None,
-        Parameter(
-            help="Output clip: .mp4, .webm, .mov, .gif, a folder for .png files, or an export format without a video.",
-            alias="-o",
-        ),
-    ] = None,
-    export: Annotated[
-        list[str] | None,
-        Parameter(
-            help="File for another program, by suffix (`tts2face formats`) or as FORMAT:PATH; beside --out or alone, "
-            "several times if wanted.",
-            negative="",
-        ),
-    ] = None,
+    out: Out = None,
+    export: Exports = None,
     camera: Annotated[
         str | None,
         Parameter(help="Camera number (0 is the first) or address, shown live in a window, instead of a take."),

@@ -14,7 +14,6 @@ from tts2face.storage.files import find_file
 
 SEGMENT_FORMAT = 1  # raised when equal requests give other segments
 VOICE_PACKAGES = ("hibari-tts", "onnxruntime", "espeakng-loader", "piper-tts", "pocketsphinx", "pyopenjtalk-plus", "av")
-_BLOCK_BYTES = 1 << 20
 
 
 def content_address(content: Mapping[str, Any]) -> str:
@@ -40,11 +39,8 @@ def file_hash(path: Path) -> str:
 
 @lru_cache(maxsize=4096)
 def _file_hash(path: Path, _size: int, _time: int) -> str:
-    digest = hashlib.sha256()
     with path.open("rb") as file:
-        while block := file.read(_BLOCK_BYTES):
-            digest.update(block)
-    return digest.hexdigest()
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def model_hash(name: str, kind: str) -> str:

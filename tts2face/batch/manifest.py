@@ -1,7 +1,6 @@
 """The manifest of a batch: every output with its cues, duration, fit, warnings, hash and time of work."""
 
 import csv
-import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from io import StringIO
@@ -11,6 +10,7 @@ from typing import Any
 from lexicon.errors import DataError
 from lexicon.inputs import parse_json
 from tts2face import __version__
+from tts2face.batch.address import file_hash
 from tts2face.batch.output import Output, Plan
 from tts2face.batch.segment_result import SegmentResult
 from tts2face.storage.files import write_atomically
@@ -21,7 +21,6 @@ COLUMNS = (
     "file", "status", "source", "cues", "begin_s", "duration_s", "n_frames", "fps", "rate", "overflow_s", "cut_s",
     "warnings", "sha256", "bytes", "took_s",
 )  # fmt: skip
-_BLOCK_BYTES = 1 << 20
 
 
 def read_manifest(folder: Path) -> dict[str, dict[str, Any]]:
@@ -56,7 +55,7 @@ def done_entry(output: Output, path: Path, n_frames: int, results: Sequence[Segm
         "overflow_s": max((result.overflow_s for _, result in spoken), default=0.0),
         "cut_s": max((result.cut_s for _, result in spoken), default=0.0),
         "warnings": warnings,
-        "sha256": _sha256(path),
+        "sha256": file_hash(path),
         "bytes": path.stat().st_size,
         "took_s": round(sum(result.took_s for result in results), 3),
         "cues": [
@@ -116,11 +115,3 @@ def _cue_entry(cue: Any) -> dict[str, Any]:
         "begin_s": round(cue.begin_s, 4),
         "end_s": round(cue.end_s, 4),
     }
-
-
-def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(_BLOCK_BYTES):
-            digest.update(block)
-    return digest.hexdigest()

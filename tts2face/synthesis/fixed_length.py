@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from lexicon.marked_text import MAX_PAUSE_S, PauseMark
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.clock import first_sample
+from tts2face.numeric import smoothstep
 from tts2face.request import IDLE_LIMITS_S, Request
 from tts2face.synthesis.clip_stream import Piece
 from tts2face.synthesis.prepared_request import PreparedRequest, prepare
@@ -86,8 +87,7 @@ def ease_weights(n_frames: int, fps: float) -> NDArray[np.float32]:
     """(n_frames,) weights that rise from 0 at the first frame and fall to 0 at the last one within `EASE_S`."""
     n_ease = max(1, min(round(EASE_S * fps), (n_frames - 1) // 2)) if n_frames > 1 else 1
     to_edge = np.minimum(np.arange(n_frames), np.arange(n_frames)[::-1])
-    share = np.clip(to_edge / n_ease, 0.0, 1.0)
-    return np.asarray(share * share * (3.0 - 2.0 * share), np.float32)
+    return smoothstep(to_edge / n_ease).astype(np.float32)
 
 
 def _eased(clips: Iterator[Clip], n_frames: int, first_channel: int) -> Iterator[Clip]:
