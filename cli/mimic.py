@@ -11,12 +11,11 @@ from cli.process import write_message
 from cli.progress import stage_bar
 from lexicon.errors import InputError
 from tts2face.exports.formats import is_export, split_format
+from tts2face.request import OWN_FACE
 from tts2face.storage.overwrite import refuse_overwriting
 
 if TYPE_CHECKING:
     from tts2face.render.picture import Picture
-
-OWN_FACE = "self"
 
 
 def mimic(  # noqa: PLR0913 - one parameter a flag

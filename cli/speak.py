@@ -11,7 +11,7 @@ from cli.process import write_message
 from cli.progress import progress_bar
 from lexicon.errors import InputError
 from tts2face.render.picture import Picture
-from tts2face.request import Request
+from tts2face.request import OWN_FACE, Request
 from tts2face.storage.files import write_atomically
 from tts2face.storage.output_names import check_file_name
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from tts2face.synthesis.clip_stream import Piece
     from tts2face.synthesis.prepared_request import PreparedRequest
 
-OWN_FACE = "self"
 EXPLANATION_SUFFIXES = (".json", ".txt")
 
 

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError
+from tts2face.request import OWN_FACE
 from tts2face.storage.files import SHIPPED_FOLDER, find_file
-
-OWN_FACE = "self"
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ AUDIO_MAP_NAMES = ("linear", "network")
 SYNTHESIS_METHODS = ("exemplar", "theobald2007")
 GESTURES = ("fields", "ju2008", "noise", "none")
 IDLE_LIMITS_S = (0.1, 3600.0)
+OWN_FACE = "self"  # name of the talker's own face
 
 
 def option(default: Any, help_text: str) -> Any:
@@ -90,6 +91,11 @@ class Request:
     def has_gestures(self) -> bool:
         """Whether gestures are added to the lip motion."""
         return self.gestures != "none"
+
+    @property
+    def is_text(self) -> bool:
+        """Whether a text is spoken by a voice, in place of a recording or idle animation."""
+        return self.audio is None and self.idle is None
 
     def __post_init__(self) -> None:
         """Reject numbers outside their range and options that exclude each other."""

@@ -63,7 +63,7 @@ def test_an_export_without_a_video_holds_the_same_clip(session: Session, here: P
 @pytest.mark.parametrize(
     ("paths", "options", "reason"),
     [
-        ([], {}, "there is no file to export to"),
+        ([], {}, "there is no output"),
         (["a.fbx"], {}, "no suffix of an export format"),
         (["a.vtt", "a.vtt"], {}, "the same path"),
         (["words.srt"], {"dictionary": "words.srt"}, "would replace dictionary"),

@@ -16,6 +16,7 @@ from tts2face import __version__, catalogue
 from tts2face.models.face_file import load_face
 from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
+from tts2face.request import OWN_FACE
 from tts2face.voice.loading import load_voice
 
 LISTED = ["voices", "languages", "faces", "identities", "styles", "talkers", "formats"]
@@ -40,7 +41,7 @@ def test_a_list_is_a_table_or_json(name: str, capsys: pytest.CaptureFixture[str]
 
 def test_all_listed_entries_exist() -> None:
     for face in catalogue.faces():
-        if face.name != catalogue.OWN_FACE:
+        if face.name != OWN_FACE:
             assert load_face(face.name).shape_names
             assert tuple(one.name for one in catalogue.identities(face.name)) == face.identities
     for identity in catalogue.identities():

@@ -8,8 +8,8 @@ from typing import Any
 
 from tts2face.batch.address import content_address, file_hash, model_hash, program_version
 from tts2face.batch.cast import Models
+from tts2face.request import OWN_FACE
 
-OWN_FACE = "self"
 REQUEST_FILES = ("audio", "dictionary", "voice")
 
 

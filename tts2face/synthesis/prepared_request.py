@@ -1,8 +1,9 @@
 """Parsing and checking of a request's text, marks and timeline file."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
+from typing import Any
 
 from lexicon.errors import InputError
 from lexicon.mark_parser import parse_marks
@@ -86,6 +87,40 @@ def prepare(request: Request) -> PreparedRequest:
     if next(prepared.sentences(), None) is None:
         raise InputError(f"there is nothing to say in {request.text[:40]!r}; give at least one word")
     return prepared
+
+
+def prepare_request(text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:
+    """Prepare a text with options by name, or a complete request, once.
+
+    Raises
+    ------
+    InputError
+        An option does not exist, or options are given together with a complete request; errors as `prepare`.
+    """
+    known = _option_names(Request)
+    for name in options:
+        if name not in known:
+            raise InputError(f"there is no option {name!r}; the options are {', '.join(known)}")
+    if isinstance(text, str):
+        return prepare(Request(text=text, **options))
+    if options:
+        raise InputError(
+            f"the option {next(iter(options))!r} cannot be given with a complete request; set it in the request"
+        )
+    return prepare(text) if isinstance(text, Request) else text
+
+
+def divide_options(options: dict[str, Any], kind: type) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Options that are fields of a class, and all others."""
+    names = _option_names(kind)
+    return (
+        {name: value for name, value in options.items() if name in names},
+        {name: value for name, value in options.items() if name not in names},
+    )
+
+
+def _option_names(kind: type) -> tuple[str, ...]:
+    return tuple(option.name for option in fields(kind) if option.name != "text")
 
 
 def build_request_timeline(request: Request) -> Timeline:

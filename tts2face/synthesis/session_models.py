@@ -1,0 +1,144 @@
+"""Models that the requests of a session share, each loaded or computed at its first use."""
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any, TypeVar
+
+from lexicon.dictionary import read_dictionary
+from lexicon.errors import InputError
+from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model
+from tts2face.gesture.gesture_stream import GestureFields
+from tts2face.gesture.ju2008 import FIELD_OPTIONS
+from tts2face.models.face import Face
+from tts2face.models.face_file import load_face
+from tts2face.models.palette import Palette, load_palette
+from tts2face.models.talker import Talker, load_talker
+from tts2face.render.picture import Picture
+from tts2face.render.renderer import FrameRenderer
+from tts2face.request import OWN_FACE, Request
+from tts2face.synthesis.animated_face import AnimatedFace, mesh_face, own_appearance_face
+from tts2face.synthesis.clip_stream import SynthesisModels
+from tts2face.synthesis.gesture_layer import GestureLayer
+from tts2face.synthesis.prepared_request import PreparedRequest
+from tts2face.voice.engine import Voice
+from tts2face.voice.pool import VoicePool
+
+DEFAULT_FIELDS = "fields"
+MAX_RENDERERS = 2  # renderers in memory, one for each picture; about 30 MB each
+
+Value = TypeVar("Value")
+
+
+class SessionModels:
+    """Talker, faces, palette, exemplars, gesture fields, renderers and voices of a session.
+
+    All methods are thread-safe: each model is made by one thread, once, and is read-only; a voice is lent to one
+    request at a time.
+
+    Parameters
+    ----------
+    talker, face, identity, palette
+        As for `tts2face.Session`.
+
+    Raises
+    ------
+    InputError, DataError
+        As for `tts2face.Session`.
+    """
+
+    def __init__(
+        self,
+        talker: str | Path | Talker,
+        face: str | Path | Face,
+        identity: str | None,
+        palette: str | Path | Palette | None,
+    ) -> None:
+        self.talker: Talker = talker if isinstance(talker, Talker) else load_talker(str(talker))
+        if face == OWN_FACE and identity is not None:
+            raise InputError("a talker's own face has no identity presets; remove the identity, or choose another face")
+        self._mesh: Face | None = None
+        if face != OWN_FACE:
+            self._mesh = face if isinstance(face, Face) else load_face(str(face), identity)
+        self._palette = palette
+        self._lock = threading.RLock()
+        self._cache: dict[Hashable, Any] = {}
+        self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
+        self._voices = VoicePool()
+        self.speech_face: AnimatedFace = self._prepare_face(None)
+
+    @property
+    def palette(self) -> Palette | None:
+        """Palette with the styles of the gestures; None without gestures."""
+        given = self._palette
+        if given is None or isinstance(given, Palette):
+            return given
+        return self._once("palette", lambda: load_palette(str(given)))
+
+    @property
+    def n_fixed_channels(self) -> int:
+        """Number of first channels that have no rest: those of a talker's own video, 0 for a mesh."""
+        return len(self.speech_face.channels) if self._mesh is None else 0
+
+    def face(self, *, has_gestures: bool = True) -> AnimatedFace:
+        """Face with the channels of speech, and with those of the palette's gestures if there is a palette."""
+        palette = self.palette if has_gestures else None
+        return self.speech_face if palette is None else self._once("face", lambda: self._prepare_face(palette))
+
+    def renderer(self, picture: Picture, *, has_gestures: bool) -> FrameRenderer:
+        """Renderer of the face for drawing options; the last `MAX_RENDERERS` renderers are cached."""
+        face, key = self.face(has_gestures=has_gestures), (picture, has_gestures)
+        with self._lock:
+            if key not in self._renderers:
+                while len(self._renderers) >= MAX_RENDERERS:
+                    self._renderers.popitem(last=False)
+                self._renderers[key] = face.renderer(picture)
+            return self._renderers[key]
+
+    def gesture_layer(self, prepared: PreparedRequest) -> GestureLayer | None:
+        """Gestures of one clip from its beginning; None for a request without gestures."""
+        request = prepared.request
+        palette = self.palette if request.has_gestures else None
+        if palette is None:
+            return None
+        return GestureLayer(prepared, self._fields(palette, request), self.face())
+
+    def for_request(self, request: Request, *, keeps_utterances: bool = False) -> SynthesisModels:
+        """Models of a request with its own dictionary.
+
+        Parameters
+        ----------
+        keeps_utterances
+            As for `VoicePool.borrow`.
+        """
+        dictionary = read_dictionary(request.dictionary).entries if request.dictionary else {}
+
+        def borrow_voice(name: str | None, language: str) -> AbstractContextManager[Voice]:
+            return self._voices.borrow(name, language, dictionary, keeps_utterances=keeps_utterances)
+
+        face = self.face(has_gestures=request.has_gestures)
+        return SynthesisModels(self.talker, self._exemplars, face, borrow_voice)
+
+    @property
+    def _exemplars(self) -> ExemplarModel:
+        return self._once("exemplars", lambda: build_exemplar_model(self.talker))
+
+    def _fields(self, palette: Palette, request: Request) -> GestureFields:
+        method = request.gestures if request.gestures in FIELD_OPTIONS else DEFAULT_FIELDS  # noise has no options
+        key = ("fields", method, request.pitch)
+        return self._once(key, lambda: GestureFields(palette, FIELD_OPTIONS[method], with_pitch=request.pitch))
+
+    def _prepare_face(self, palette: Palette | None) -> AnimatedFace:
+        if self._mesh is None:
+            return own_appearance_face(self.talker, self._exemplars, palette)
+        return mesh_face(self.talker, self._exemplars, self._mesh, palette)
+
+    def _once(self, key: Hashable, make: Callable[[], Value]) -> Value:
+        """Cached value of a key, computed at the first call by one thread only."""
+        with self._lock:
+            if key not in self._cache:
+                self._cache[key] = make()
+            value: Value = self._cache[key]
+            return value
