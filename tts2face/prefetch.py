@@ -18,8 +18,8 @@ POLL_INTERVAL_S = 0.1  # longest time until the producer thread notices that it 
 class Prefetch(Generic[Item]):
     """Iterator over a source whose items are produced in a background thread.
 
-    Production starts at once and stops at the end of the ``with`` block. An exception of the source is raised in place
-    of the item that failed.
+    Production starts and stops with the ``with`` block. An exception of the source is raised in place of the item that
+    failed. The thread is no daemon: a process that exits while native code is running in one aborts.
 
     Parameters
     ----------
@@ -33,17 +33,21 @@ class Prefetch(Generic[Item]):
         self._source = source
         self._queue: queue.Queue[ItemOrError] = queue.Queue(n_ahead)
         self._stopped = threading.Event()
-        self._thread = threading.Thread(target=self._fill, name="prefetch", daemon=True)
-        self._thread.start()
+        self._thread = threading.Thread(target=self._fill, name="prefetch")
 
     def __enter__(self) -> "Prefetch[Item]":
-        """Return the iterator itself."""
+        """Start production; return the iterator itself."""
+        try:
+            self._thread.start()
+        except BaseException:  # an interruption, after which the thread runs or not
+            self._stopped.set()
+            raise
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Wait until the current item is finished: a process that exits while native code is running aborts."""
+        """Wait until the current item is finished."""
         self._stopped.set()
         self._thread.join()
 

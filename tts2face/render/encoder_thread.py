@@ -38,7 +38,11 @@ class EncoderThread:
         self._sink, self._stopped = sink, False
         self._queue: queue.Queue[tuple[Pixels, SoundBlock] | None] = queue.Queue(QUEUE_LENGTH)
         self._pool = ThreadPoolExecutor(1, "encode")
-        self._work: Future[None] = self._pool.submit(self._run)
+        try:
+            self._work: Future[None] = self._pool.submit(self._run)
+        except BaseException:  # an interruption, after which the thread runs or not
+            self._queue.put_nowait(None)
+            raise
 
     def _run(self) -> None:
         while (item := self._queue.get()) is not None and not self._stopped:
