@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from tts2face.synthesis.clip_stream import Piece as Piece
     from tts2face.synthesis.performance import Performance as Performance
     from tts2face.synthesis.written_clip import WrittenClip as WrittenClip
+    from tts2face.types import Chunk as Chunk
     from tts2face.types import Clip as Clip
     from tts2face.types import Speech as Speech
     from tts2face.types import Trajectory as Trajectory
@@ -70,6 +71,7 @@ __all__ = [
     "BatchOptions",
     "BatchResult",
     "Cast",
+    "Chunk",
     "Clip",
     "Cue",
     "DataError",
@@ -143,7 +145,7 @@ _MODULES = {
     "tts2face.synthesis.clip_stream": ("Piece",),
     "tts2face.synthesis.performance": ("Performance",),
     "tts2face.synthesis.written_clip": ("WrittenClip",),
-    "tts2face.types": ("Clip", "Speech", "Trajectory", "Waveform"),
+    "tts2face.types": ("Chunk", "Clip", "Speech", "Trajectory", "Waveform"),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -7,23 +7,19 @@ from typing import Any
 from tts2face.models.face import Face
 from tts2face.models.palette import Palette
 from tts2face.models.talker import Talker
-from tts2face.prefetch import Prefetch
 from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
 from tts2face.request import Request
-from tts2face.speech.text_fit import TextMismatch
 from tts2face.synthesis.animated_face import AnimatedFace
-from tts2face.synthesis.clip_stream import Piece, SpeechSpan, measure_speech, pieces
+from tts2face.synthesis.byte_stream import StreamFormat, encode_stream
+from tts2face.synthesis.clip_stream import Piece, SpeechSpan, measure_speech
 from tts2face.synthesis.fixed_length import Length, clips_of_length
-from tts2face.synthesis.marked_speech import MarkTime
 from tts2face.synthesis.output_files import OutputFiles, plan_outputs
 from tts2face.synthesis.performance import Performance, perform, take_clips
-from tts2face.synthesis.prepared_request import PreparedRequest, divide_options, input_paths, prepare_request
+from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, prepare_request, split_picture
 from tts2face.synthesis.session_models import SessionModels
-from tts2face.synthesis.written_clip import RequestSteps, WrittenClip
-from tts2face.types import Clip, Progress, concatenate_clips
-
-N_PIECES_AHEAD = 2  # pieces synthesised before they are drawn
+from tts2face.synthesis.written_clip import RequestSteps, WrittenClip, write_pieces
+from tts2face.types import Chunk, Clip, Progress, concatenate_clips
 
 
 class Session:
@@ -119,7 +115,7 @@ class Session:
 
         The concatenated clips of the pieces equal the result of `clip`.
         """
-        return self._pieces(prepare_request(text, options))
+        return self._models.pieces(prepare_request(text, options))
 
     def measure_speech(self, text: str | Request | PreparedRequest, **options: Any) -> SpeechSpan:
         """Seconds at which the speech of a text begins and ends in its clip, without synthesis of motion.
@@ -138,7 +134,37 @@ class Session:
         prepared = prepare_request(text, options)
         sound_end = self.measure_speech(prepared).total if prepared.request.is_text else None
         length = Length(n_frames, self._models.n_fixed_channels)
-        yield from clips_of_length(prepared, sound_end, length, self._pieces)
+        yield from clips_of_length(prepared, sound_end, length, self._models.pieces)
+
+    def stream_file(
+        self,
+        text: str | Request | PreparedRequest,
+        format: str = "mp4",
+        *,
+        picture: Picture | None = None,
+        threads: int | None = None,
+        **options: Any,
+    ) -> Iterator[Chunk]:
+        """Synthesise and encode the clip of a text or request; yields the file in chunks while it is made.
+
+        Parameters
+        ----------
+        text, picture, options
+            As for `write`.
+        format
+            A movie (mp4 in fragments, webm), sound (wav, mp3, opus, aac, flac, pcm), or lines (curves, oculus, azure,
+            livelink). Sound alone needs neither lips nor phones, and starts sooner.
+        threads
+            Number of frames drawn in advance; None for one on each core.
+
+        Raises
+        ------
+        InputError, DataError, BackendError
+            As `write`; or the format is unknown or cannot be transparent.
+        """
+        picture, options = split_picture(picture, options)
+        prepared = prepare_request(text, options)
+        return encode_stream(prepared, self._models, StreamFormat(format, picture, threads))
 
     def write(
         self,
@@ -178,9 +204,8 @@ class Session:
         InputError, DataError, BackendError
             As `clip`; or the file cannot be written.
         """
-        picture_options, options = divide_options(options, Picture) if picture is None else ({}, options)
+        picture, options = split_picture(picture, options)
         prepared = prepare_request(text, options)
-        picture = picture or Picture(**picture_options)
         outputs = plan_outputs(out, exports, input_paths(prepared.request, picture))
         return self._write(prepared, outputs, picture, on_progress, on_piece)
 
@@ -261,9 +286,6 @@ class Session:
         """Renderer of the session's face for drawing options; the last few renderers are cached."""
         return self._models.renderer(picture, has_gestures=has_gestures)
 
-    def _pieces(self, prepared: PreparedRequest) -> Iterator[Piece]:
-        return pieces(prepared, self._models.for_request(prepared.request), self._models.gesture_layer(prepared))
-
     def _write(
         self,
         prepared: PreparedRequest,
@@ -272,29 +294,8 @@ class Session:
         on_progress: Progress | None,
         on_piece: Callable[[Piece], None] | None,
     ) -> WrittenClip:
-        """Write all pieces to the outputs while the next ones are synthesised."""
         has_gestures = prepared.request.has_gestures
         renderer = None if outputs.out is None else self.renderer(picture, has_gestures=has_gestures)
         progress = RequestSteps(prepared.n_steps, on_progress)
-        marks: list[MarkTime] = []
-        mismatches: list[TextMismatch] = []
-        seconds, n_frames = 0.0, 0
-        with (
-            outputs.open(self._models.face(has_gestures=has_gestures), renderer, progress.report_frames) as files,
-            Prefetch(self._pieces(prepared), N_PIECES_AHEAD) as synthesised,
-        ):
-            for piece in synthesised:
-                if on_piece:
-                    on_piece(piece)
-                progress.begin(piece)
-                files.add(piece.clip, piece.text)
-                if renderer is None:
-                    progress.report_piece()
-                marks += piece.marks
-                mismatches += piece.mismatches
-                seconds += piece.clip.speech.waveform.duration
-                n_frames += len(piece.clip.motion)
-        progress.finish()
-        return WrittenClip(
-            outputs.path, seconds, n_frames, tuple(marks), mismatches=tuple(mismatches), exports=outputs.export_paths
-        )
+        with outputs.open(self._models.face(has_gestures=has_gestures), renderer, progress.report_frames) as files:
+            return write_pieces(self._models.pieces(prepared), files, outputs, progress, on_piece)

@@ -38,6 +38,14 @@ def _checked_read_only(values: ArrayLike, what: str, ndim: int) -> NDArray[np.fl
 Progress = Callable[[int, int], None]  # number of finished steps, number of all steps
 
 
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """A part of a file that is sent while it is made: its bytes, often none, and the seconds of the clip it adds."""
+
+    content: bytes
+    seconds: float = 0.0
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Waveform:
     """Mono sound.

@@ -23,6 +23,9 @@ class FakeVoice:
     def sample_rate(self) -> int:
         return self._rate
 
+    def sound(self, spoken: str | Sequence, *, rate: float = 1.0, seed: int = 0) -> Waveform:
+        return self.speak(spoken, rate=rate, seed=seed).waveform
+
     def speak(self, spoken: str | Sequence, *, rate: float = 1.0, seed: int = 0) -> Speech:
         self.said.append((str(spoken), rate))
         words = re.findall(r"\w+" if self._splits else r"[\w'-]+", str(spoken))

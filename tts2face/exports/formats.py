@@ -32,6 +32,8 @@ class FormatInfo:
         Whether it expresses the channels by ARKit shapes, and whether it holds the mesh of the face.
     has_sound_beside
         Whether the sound is written to a .wav file beside it.
+    has_lines
+        Whether it consists of lines of text that can be sent while they are made.
     package
         Package that it needs besides those of tts2face.
     """
@@ -45,6 +47,7 @@ class FormatInfo:
     uses_shapes: bool = False
     needs_mesh: bool = False
     has_sound_beside: bool = False
+    has_lines: bool = False
     package: str | None = None
 
     @property
@@ -70,7 +73,8 @@ FORMATS = (
     FormatInfo("track", (".track.json", ".json"), "lossless clip: motion, head, phones, words, sound",
                ("track_json", "TrackWriter")),
     FormatInfo("livelink", (".csv",), "ARKit-52 weights and head angles, as Live Link Face records them",
-               ("livelink_csv", "LiveLinkWriter"), has_frames=True, default_fps=LIVELINK_FPS, uses_shapes=True),
+               ("livelink_csv", "LiveLinkWriter"), has_frames=True, default_fps=LIVELINK_FPS, uses_shapes=True,
+               has_lines=True),
     FormatInfo("a2f", (".a2f.json",), "ARKit-52 weights as Audio2Face exports them",
                ("audio2face_json", "Audio2FaceWriter"), has_frames=True, uses_shapes=True),
     FormatInfo("glb", (".glb",), "mesh, morph targets, skeleton and animation (glTF 2.0)",
@@ -80,9 +84,11 @@ FORMATS = (
     FormatInfo("bvh", (".bvh",), "head motion", ("bvh", "BvhWriter"), has_frames=True),
     FormatInfo("npz", (".npz",), "all arrays for NumPy", ("npz", "NpzWriter"), has_frames=True),
     FormatInfo("oculus", (".oculus.jsonl",), "15 visemes of Oculus Lipsync, JSON lines",
-               ("viseme_lines", "OculusWriter")),
+               ("viseme_lines", "OculusWriter"), has_lines=True),
     FormatInfo("azure", (".azure.jsonl",), "22 viseme ids of Azure Speech, JSON lines",
-               ("viseme_lines", "AzureWriter")),
+               ("viseme_lines", "AzureWriter"), has_lines=True),
+    FormatInfo("curves", (".curves.jsonl",), "ARKit-52 weights and head pose of each frame, JSON lines",
+               ("curve_lines", "CurveLinesWriter"), has_frames=True, uses_shapes=True, has_lines=True),
     FormatInfo("rhubarb-json", (".rhubarb.json",), "mouth cues A-H and X of Rhubarb Lip Sync",
                ("rhubarb", "RhubarbJsonWriter")),
     FormatInfo("rhubarb-tsv", (".rhubarb.tsv",), "the same as a table", ("rhubarb", "RhubarbTsvWriter")),

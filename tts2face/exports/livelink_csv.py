@@ -25,7 +25,7 @@ class LiveLinkWriter:
     def __init__(self, target: Target) -> None:
         self._projection = build_arkit_projection(target)
         self._fps, self._n_frames = target.fps, 0
-        self._file = target.path.open("w", encoding="utf-8", newline="\n")
+        self._file = target.open_lines()
         columns = [name[0].upper() + name[1:] for name in ARKIT_SHAPES]
         columns += [*HEAD_COLUMNS, *(f"{side}Eye{angle}" for side in EYES for angle in ("Yaw", "Pitch", "Roll"))]
         self._file.write(f"Timecode,BlendshapeCount,{','.join(columns)}\n")

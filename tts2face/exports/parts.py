@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +63,8 @@ class Target:
         Names of the motion's channels.
     face
         Mesh whose first shapes are these channels; None if not given.
+    lines
+        Receives the text of formats that consist of lines, in place of `path`.
     """
 
     path: Path
@@ -72,6 +74,11 @@ class Target:
     rate: int
     channels: tuple[str, ...]
     face: Face | None
+    lines: TextIO | None = None
+
+    def open_lines(self) -> TextIO:
+        """Text file to write lines to: `path`, or `lines` of an export that is sent while it is made."""
+        return self.lines or self.path.open("w", encoding="utf-8", newline="\n")
 
     @property
     def sound_name(self) -> str:

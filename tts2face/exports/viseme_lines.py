@@ -16,7 +16,7 @@ class _VisemeLines:
     inventory: str
 
     def __init__(self, target: Target) -> None:
-        self._file = target.path.open("w", encoding="utf-8", newline="\n")
+        self._file = target.open_lines()
         self._phones = PhoneLabels()
 
     def add(self, part: Part) -> None:

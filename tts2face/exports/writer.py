@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol
+from typing import Protocol, TextIO
 
 from lexicon.errors import InputError
 from tts2face.clock import exact_rate
@@ -217,15 +217,26 @@ class _OpenFile:
             self._temporary = None
 
     def _target(self, grid: FrameGrid, clip: Clip, temporary: Temporary) -> Target:
-        channels = clip.motion.channels
-        face = self._face
-        if face is not None and face.shape_names[: len(channels)] != channels:
-            if self._format.needs_mesh:
-                raise InputError(
-                    f"the clip has {len(channels)} channels ({', '.join(channels[:3])}, ...), which are not the first "
-                    f"of the face's {len(face.shape_names)} shapes; give the face and palette that made the clip"
-                )
-            face = None
-        return Target(
-            temporary.path, self.path.name, grid.fps, grid.source_fps, clip.speech.waveform.rate, channels, face
-        )
+        return make_target(ExportFile(self.path, self._format), grid, clip, self._face, temporary.path)
+
+
+def make_target(
+    file: ExportFile, grid: FrameGrid, clip: Clip, face: Face | None, path: Path, lines: TextIO | None = None
+) -> Target:
+    """Target of a writer for clips such as the given one; `path` and `lines` as for `Target`.
+
+    Raises
+    ------
+    InputError
+        The format needs a mesh, and its shapes are not the channels of the clip.
+    """
+    channels = clip.motion.channels
+    if face is not None and face.shape_names[: len(channels)] != channels:
+        if file.format.needs_mesh:
+            raise InputError(
+                f"the clip has {len(channels)} channels ({', '.join(channels[:3])}, ...), which are not the first "
+                f"of the face's {len(face.shape_names)} shapes; give the face and palette that made the clip"
+            )
+        face = None
+    rate = clip.speech.waveform.rate
+    return Target(path, file.path.name, grid.fps, grid.source_fps, rate, channels, face, lines)

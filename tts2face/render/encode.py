@@ -8,7 +8,8 @@ from types import TracebackType
 import numpy as np
 
 from lexicon.errors import InputError
-from tts2face.clock import exact_rate, first_sample
+from tts2face.clock import exact_rate
+from tts2face.render.clip_frames import ClipFrames
 from tts2face.render.encoder_thread import EncoderThread, Sink
 from tts2face.render.gif import GifWriter
 from tts2face.render.movie import MOV_MOVIE, MP4_MOVIE, WEBM_MOVIE, MovieWriter
@@ -37,9 +38,8 @@ N_SWATCHES = 6  # frames of the first clip from which the palette of a GIF is co
 class ClipWriter:
     """Writer of consecutive clips to one file; drawing and encoding run in parallel.
 
-    The file appears under its name when it is complete; after an error or an interruption no file remains. Each clip
-    begins on the frame after the previous clip, and its sound on the sample of that frame, so that picture and sound
-    do not drift apart.
+    The file appears under its name when it is complete; after an error or an interruption no file remains. Clips follow
+    each other as in `ClipFrames`.
 
     Parameters
     ----------
@@ -77,8 +77,7 @@ class ClipWriter:
             raise InputError(f"{self.path} cannot be transparent; give .webm, .gif or a folder, or another background")
         self._renderer = renderer
         self._on_progress = on_progress
-        self._n_frames = self._n_added = self._n_samples = 0
-        self._clock: tuple[float, int] | None = None
+        self._frames = ClipFrames(renderer)
         self._encoder: EncoderThread | None = None
         self._temporary: Temporary | None = None
 
@@ -108,28 +107,13 @@ class ClipWriter:
             The disk is full or cannot be written.
         """
         with translate_disk_errors(self.path):
-            encoder = self._encoder or self._open_encoder(clip)
-            if self._clock != (clip.fps, clip.speech.waveform.rate):
-                raise InputError(f"clips of one file must share fps and sound rate; this one has {clip.fps:g} fps")
-            begin = self._first_sample(self._n_frames)
-            encoder.put(samples=np.zeros(begin - self._n_samples, np.float32))  # the previous clip ended within a frame
-            self._n_added += len(clip.motion)
-            at, samples = 0, clip.speech.waveform.samples
-            for pixels in self._renderer.frames(clip, first=self._n_frames):
-                self._n_frames += 1
-                until = min(self._first_sample(self._n_frames) - begin, len(samples))
-                encoder.put(pixels, samples[at:until])
-                at = until
-                if self._on_progress:
-                    self._on_progress(self._n_frames, self._n_added)
-            self._n_samples = begin + at
-
-    def _first_sample(self, frame: int) -> int:
-        fps, rate = self._clock or (1.0, 1)
-        return first_sample(frame, rate, exact_rate(fps))
+            for pixels, samples in self._frames.add(clip):
+                encoder = self._encoder or self._open_encoder(clip)
+                encoder.put(pixels, samples)
+                if self._on_progress and pixels is not None:
+                    self._on_progress(self._frames.n_frames, self._frames.n_added)
 
     def _open_encoder(self, clip: Clip) -> EncoderThread:
-        self._clock = (clip.fps, clip.speech.waveform.rate)
         self._encoder = EncoderThread(self._open_sink(clip))
         return self._encoder
 

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.render.write_buffer import WriteBuffer
+
 SOUND_RATE = 48_000  # Hz; the usual rate of players and editors, required by Opus
 BT709, LIMITED_RANGE = 1, 1  # H.273 code points: primaries, transfer and matrix of BT.709; studio range
 
@@ -44,14 +46,31 @@ MOV_MOVIE = MovieKind(
     "mov", "libx264", "pcm_s16le", 768_000, MP4_MOVIE.video_options
 )  # uncompressed sound, for editing
 
+# Movies that are sent while they are made: fragments of a fifth of a second that refer to no later picture.
+STREAMED_MP4 = MovieKind(
+    "mp4", "libx264", "aac", 128_000,
+    MappingProxyType({**MP4_MOVIE.video_options, "bf": "0", "rc-lookahead": "0"}),
+    MappingProxyType({"movflags": "+frag_keyframe+empty_moov+default_base_moof", "frag_duration": "200000",
+                      "flush_packets": "1"}),
+)  # fmt: skip
+STREAMED_WEBM = MovieKind(
+    "webm", "libvpx-vp9", "libopus", 96_000, WEBM_MOVIE.video_options,
+    MappingProxyType({"live": "1", "cluster_time_limit": "200", "flush_packets": "1"}),
+)  # fmt: skip
+
 
 class MovieWriter:
     """Sink that encodes pictures and sound; `finish` completes the file."""
 
     def __init__(
-        self, path: Path, kind: MovieKind, shape: tuple[int, ...], clock: tuple[Fraction, int], notice: str = ""
+        self,
+        path: Path | WriteBuffer,
+        kind: MovieKind,
+        shape: tuple[int, ...],
+        clock: tuple[Fraction, int],
+        notice: str = "",
     ) -> None:
-        """Open a file for pictures of `shape` (H, W, 3 or 4) and mono sound at `clock` (fps, Hz).
+        """Open a file, or a stream, for pictures of `shape` (H, W, 3 or 4) and mono sound at `clock` (fps, Hz).
 
         `notice` becomes the comment in its metadata.
         """
@@ -62,7 +81,8 @@ class MovieWriter:
         fps = self._fps
         self._n_frames = self._n_samples = 0
         self._fill_colour: NDArray[np.uint8] | None = None
-        self._container: Any = av.open(str(path), "w", format=kind.container, options=dict(kind.container_options))
+        target = str(path) if isinstance(path, Path) else path
+        self._container: Any = av.open(target, "w", format=kind.container, options=dict(kind.container_options))
         if notice:
             self._container.metadata["comment"] = notice
         video: Any = self._container.add_stream(kind.video, rate=fps, options=dict(kind.video_options))

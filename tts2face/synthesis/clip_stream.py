@@ -5,15 +5,18 @@ from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
+from lexicon.sentences import Sentence
 from lexicon.sequence import SILENCE
-from tts2face.clock import pad_to_frame
+from tts2face.clock import first_sample, pad_to_frame
 from tts2face.exemplar.explanation import PhoneExplanation, explain_selection
 from tts2face.exemplar.synthesis import ExemplarModel, TokenSelection, select_tokens
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.talker import Talker
+from tts2face.request import Request
 from tts2face.speech.text_fit import TextMismatch
 from tts2face.synthesis.animated_face import AnimatedFace, resting_head
 from tts2face.synthesis.audio_input import (
@@ -27,13 +30,17 @@ from tts2face.synthesis.gesture_layer import GestureLayer
 from tts2face.synthesis.marked_speech import (
     MarkTime,
     SpokenSentence,
+    Voices,
     resolve_recording_marks,
+    sentence_sound,
     silent_sentences,
     speak_sentence,
 )
 from tts2face.synthesis.prepared_request import IDLE_STEPS, RECORDING_STEPS, PreparedRequest
 from tts2face.types import Clip, Speech, Trajectory, Waveform, frame_count
 from tts2face.voice.engine import Voice
+
+Spoken = TypeVar("Spoken")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,12 +147,27 @@ def _spoken_pieces(prepared: PreparedRequest, models: SynthesisModels, layer: Ge
         yield Piece(clip, begin, n_steps, timeline, marks, explain, text=text)
 
 
-def _sentences(prepared: PreparedRequest, models: SynthesisModels) -> Iterator[tuple[SpokenSentence, int, str]]:
-    """Spoken sentences with numbers of characters and texts, or parts of idle animation with steps and no text."""
+def sounds(prepared: PreparedRequest, models: SynthesisModels) -> Iterator[Waveform]:
+    """Sound of each piece of a text or of idle animation, without motion; the same samples as those of `pieces`."""
+    fps, first_frame = prepared.fps, 0
+    if prepared.request.idle is not None:
+        found: Iterator[Waveform] = (spoken.sound for spoken, _, _ in _sentences(prepared, models))
+    else:
+        found = _spoken(prepared, models, sentence_sound)
+    for sound in found:
+        last_frame = first_frame + frame_count(sound.duration, float(fps))
+        n_samples = first_sample(last_frame, sound.rate, fps) - first_sample(first_frame, sound.rate, fps)
+        first_frame = last_frame
+        samples = np.zeros(max(n_samples, len(sound.samples)), np.float32)
+        samples[: len(sound.samples)] = sound.samples
+        yield Waveform(samples, sound.rate)
+
+
+def _spoken(
+    prepared: PreparedRequest, models: SynthesisModels, speak: Callable[[Voice, Sentence, Request, Voices], Spoken]
+) -> Iterator[Spoken]:
+    """Result of `speak` for each sentence of a text, with voices that are borrowed meanwhile."""
     request = prepared.request
-    if request.idle is not None:
-        yield from ((silent, steps, "") for silent, steps in silent_sentences(request.idle, prepared.fps, IDLE_STEPS))
-        return
     with ExitStack() as stack:
 
         @cache
@@ -154,8 +176,21 @@ def _sentences(prepared: PreparedRequest, models: SynthesisModels) -> Iterator[t
 
         voice = voice_of(request.voice, request.language)
         for sentence in prepared.sentences():
-            text = " ".join(phrase.source for phrase in sentence.utterances)
-            yield speak_sentence(voice, sentence, request, voice_of), sentence.n_characters, text
+            yield speak(voice, sentence, request, voice_of)
+
+
+def _sentences(prepared: PreparedRequest, models: SynthesisModels) -> Iterator[tuple[SpokenSentence, int, str]]:
+    """Spoken sentences with numbers of characters and texts, or parts of idle animation with steps and no text."""
+    request = prepared.request
+    if request.idle is not None:
+        yield from ((silent, steps, "") for silent, steps in silent_sentences(request.idle, prepared.fps, IDLE_STEPS))
+        return
+
+    def speak(voice: Voice, sentence: Sentence, request: Request, voices: Voices) -> tuple[SpokenSentence, int, str]:
+        text = " ".join(phrase.source for phrase in sentence.utterances)
+        return speak_sentence(voice, sentence, request, voices), sentence.n_characters, text
+
+    yield from _spoken(prepared, models, speak)
 
 
 def _recording_pieces(

@@ -15,7 +15,7 @@ from lexicon.languages import language_code
 from lexicon.marked_text import Mark, MarkedText, NameMark, NodMark, StyleRun
 from lexicon.pronounce import PAUSES_S
 from lexicon.sentences import Phrase, Sentence, index_by_letters, n_letters
-from lexicon.sequence import PhoneSequence, WordSpan
+from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.clock import first_sample
 from tts2face.gesture.easing import span_weights
 from tts2face.gesture.notation import parse_style
@@ -25,7 +25,7 @@ from tts2face.request import RATE_LIMITS, VOLUME_LIMITS, Request
 from tts2face.synthesis.speech_joining import join_utterances, resampled_speech, silent_speech
 from tts2face.synthesis.word_times import LetterTimes, SentenceTimes, WordTimes
 from tts2face.types import Speech, Waveform, concatenate_speech, frame_count
-from tts2face.voice.engine import ENGLISH_CODES, VOICE_NAMES, SpokenWord, Voice, apply_volume
+from tts2face.voice.engine import ENGLISH_CODES, VOICE_NAMES, SpeechInput, SpokenWord, Voice, apply_volume
 from tts2face.voice.level import level_speech
 
 MIN_UTTERANCE_GAP_S = 0.02  # between utterances of a sentence; less would cut into speech (edges are exact to 16 ms)
@@ -92,8 +92,7 @@ def speak_sentence(voice: Voice, sentence: Sentence, request: Request, voices: V
     gains: list[Floats] = []
     for part in sentence.utterances:
         speaker = speaker_of(part, voice, request, voices)
-        content = [SpokenWord(word.text, word.segments, word.after) for word in part.words] or part.text
-        speech = speaker.speak(content, rate=request.rate * part.rate, seed=request.seed)
+        speech = speaker.speak(_content(part), rate=request.rate * part.rate, seed=request.seed)
         speech = resampled_speech(speech, voice.sample_rate)
         language = part.language or request.language
         times_of_part = WordTimes(part.source, speech.phones, speech.words, language=language, first=part.first)
@@ -108,6 +107,23 @@ def speak_sentence(voice: Voice, sentence: Sentence, request: Request, voices: V
     return SpokenSentence(
         speech, *resolve_marks(sentence.runs, sentence.marks, times, (sentence.first, sentence.last)), sound
     )
+
+
+def sentence_sound(voice: Voice, sentence: Sentence, request: Request, voices: Voices | None = None) -> Waveform:
+    """Sound of `speak_sentence`, byte for byte, without aligning the phones of a sentence that needs no edges."""
+    part = sentence.utterances[0]
+    if len(sentence.utterances) > 1 or any(run.volume != 1.0 for run in sentence.runs):
+        return speak_sentence(voice, sentence, request, voices).sound
+    speaker = speaker_of(part, voice, request, voices)
+    sound = speaker.sound(_content(part), rate=request.rate * part.rate, seed=request.seed)
+    whole = Speech(sound, PhoneSequence([SILENCE], [0.0, sound.duration]), ())
+    levelled = level_speech([resampled_speech(whole, voice.sample_rate)], [request.volume * np.ones(1)])
+    return _join_sentence(levelled, sentence, voice.sample_rate)[0].waveform
+
+
+def _content(part: Phrase) -> SpeechInput:
+    """Words of a phrase with their phones, or its text."""
+    return [SpokenWord(word.text, word.segments, word.after) for word in part.words] or part.text
 
 
 def speaker_of(part: Phrase, voice: Voice, request: Request, voices: Voices | None) -> Voice:

@@ -110,13 +110,19 @@ def prepare_request(text: str | Request | PreparedRequest, options: dict[str, An
     return prepare(text) if isinstance(text, Request) else text
 
 
-def divide_options(options: dict[str, Any], kind: type) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Options that are fields of a class, and all others."""
-    names = _option_names(kind)
-    return (
-        {name: value for name, value in options.items() if name in names},
-        {name: value for name, value in options.items() if name not in names},
-    )
+def split_picture(picture: Picture | None, options: dict[str, Any]) -> tuple[Picture, dict[str, Any]]:
+    """A picture, from its fields among the options if it is None, and the options of the request.
+
+    Raises
+    ------
+    InputError
+        A field of the picture is invalid.
+    """
+    if picture is not None:
+        return picture, options
+    names = _option_names(Picture)
+    chosen = {name: value for name, value in options.items() if name in names}
+    return Picture(**chosen), {name: value for name, value in options.items() if name not in names}
 
 
 def _option_names(kind: type) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,7 +20,7 @@ from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
 from tts2face.request import OWN_FACE, Request
 from tts2face.synthesis.animated_face import AnimatedFace, mesh_face, own_appearance_face
-from tts2face.synthesis.clip_stream import SynthesisModels
+from tts2face.synthesis.clip_stream import Piece, SynthesisModels, pieces
 from tts2face.synthesis.gesture_layer import GestureLayer
 from tts2face.synthesis.prepared_request import PreparedRequest
 from tts2face.voice.engine import Voice
@@ -120,6 +120,10 @@ class SessionModels:
 
         face = self.face(has_gestures=request.has_gestures)
         return SynthesisModels(self.talker, self._exemplars, face, borrow_voice)
+
+    def pieces(self, prepared: PreparedRequest) -> Iterator[Piece]:
+        """Synthesise the clip of a request piece by piece."""
+        return pieces(prepared, self.for_request(prepared.request), self.gesture_layer(prepared))
 
     @property
     def _exemplars(self) -> ExemplarModel:

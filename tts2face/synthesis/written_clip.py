@@ -1,12 +1,17 @@
-"""Summary of a written clip, and progress in the steps of its request."""
+"""Writing of the pieces of a clip to its outputs, with progress in the steps of the request."""
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from tts2face.prefetch import Prefetch
 from tts2face.speech.text_fit import TextMismatch
 from tts2face.synthesis.clip_stream import Piece
 from tts2face.synthesis.marked_speech import MarkTime
+from tts2face.synthesis.output_files import OpenOutputs, OutputFiles
 from tts2face.types import Progress
+
+N_PIECES_AHEAD = 2  # pieces synthesised before they are drawn
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,3 +75,38 @@ class RequestSteps:
         """Report that all steps are done."""
         if self._on_progress:
             self._on_progress(self._n_steps, self._n_steps)
+
+
+def write_pieces(
+    pieces: Iterator[Piece],
+    files: OpenOutputs,
+    outputs: OutputFiles,
+    progress: RequestSteps,
+    on_piece: Callable[[Piece], None] | None,
+) -> WrittenClip:
+    """Write all pieces to the open files of `outputs` while the next ones are synthesised.
+
+    Parameters
+    ----------
+    on_piece
+        Called with each piece before it is drawn.
+    """
+    marks: list[MarkTime] = []
+    mismatches: list[TextMismatch] = []
+    seconds, n_frames = 0.0, 0
+    with Prefetch(pieces, N_PIECES_AHEAD) as synthesised:
+        for piece in synthesised:
+            if on_piece:
+                on_piece(piece)
+            progress.begin(piece)
+            files.add(piece.clip, piece.text)
+            if files.film is None:
+                progress.report_piece()
+            marks += piece.marks
+            mismatches += piece.mismatches
+            seconds += piece.clip.speech.waveform.duration
+            n_frames += len(piece.clip.motion)
+    progress.finish()
+    return WrittenClip(
+        outputs.path, seconds, n_frames, tuple(marks), mismatches=tuple(mismatches), exports=outputs.export_paths
+    )

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.ipa import Segment
-from tts2face.types import Speech
+from tts2face.types import Speech, Waveform
 
 ENGLISH_CODES = ("en", "en-us", "en-gb")
 VOICE_NAMES: Mapping[str, str] = {
@@ -63,6 +63,9 @@ class Voice(Protocol):
         InputError
             The content has no word, or characters that this voice cannot speak.
         """
+
+    def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
+        """Sound of `speak` alone, which some voices compute sooner; arguments and errors as `speak`."""
 
 
 def apply_volume(samples: NDArray[np.floating], volume: float = 1.0) -> NDArray[np.float32]:

@@ -87,6 +87,10 @@ class EspeakVoice:
         phones, spans = _phone_sequence(events, words or names, len(sound) / self._rate)
         return Speech(Waveform(apply_volume(sound), self._rate), phones, spans)
 
+    def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
+        """Sound of `speak`; see `tts2face.voice.engine.Voice`."""
+        return self.speak(content, rate=rate, seed=seed).waveform
+
     def _espeak_text(self, content: SpeechInput) -> tuple[str, list[str]]:
         """Input text for espeak-ng, and the written words if any is given as phones."""
         if isinstance(content, str):

@@ -74,10 +74,25 @@ class NeuralVoice:
 
     def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
         """Synthesise a sentence; see `tts2face.voice.engine.Voice`."""
+        return concatenate_speech([self._speak_tokens(part, rate, seed) for part in self._spoken_parts(content)])
+
+    def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
+        """Sound without the alignment of its phones, which takes most of the time."""
+        sounds = [self._sound_of(part, rate, seed).samples for part in self._spoken_parts(content)]
+        return Waveform(np.concatenate(sounds), self.sample_rate)
+
+    def _spoken_parts(self, content: SpeechInput) -> "list[list[_Token]]":
+        """Tokens of each part.
+
+        Raises
+        ------
+        InputError
+            No part has a word.
+        """
         parts = list(self._parts(content))
         if not any(letters_to_phones(token.letters)[0] for part in parts for token in part):
             raise InputError("there is nothing to say in the text; give at least one word")
-        return concatenate_speech([self._speak_tokens(part, rate, seed) for part in parts])
+        return parts
 
     def _parts(self, content: SpeechInput) -> Iterator[list[_Token]]:
         """Yield the tokens of each part that the model synthesises in one call."""
@@ -134,14 +149,16 @@ class NeuralVoice:
         return "".join(letter for letter in letters or "" if letter in self._model.vocab)
 
     def _speak_tokens(self, tokens: Sequence[_Token], rate: float, seed: int) -> Speech:
-        letters = "".join(token.letters + " " * token.has_space for token in tokens).strip()
-        samples = self._model.from_phonemes(letters, speed=rate, seed=seed)
-        sound = Waveform(apply_volume(samples), self.sample_rate)
+        sound = self._sound_of(tokens, rate, seed)
         try:
             phones, spans = self._align(tokens, sound)
         except DataError:
-            phones, spans = self._predict_phones(tokens, letters, rate, sound)
+            phones, spans = self._predict_phones(tokens, _joined_letters(tokens), rate, sound)
         return Speech(sound, phones, spans)
+
+    def _sound_of(self, tokens: Sequence[_Token], rate: float, seed: int) -> Waveform:
+        samples = self._model.from_phonemes(_joined_letters(tokens), speed=rate, seed=seed)
+        return Waveform(apply_volume(samples), self.sample_rate)
 
     def _align(self, tokens: Sequence[_Token], sound: Waveform) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
         words = [(str(owner), [phones]) for owner, phones, _ in _spoken_words(tokens)]
@@ -187,6 +204,10 @@ def _session_without_arena(path: str) -> Any:
     options.log_severity_level = 3  # errors
     options.enable_cpu_mem_arena = options.enable_mem_pattern = False
     return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+
+
+def _joined_letters(tokens: Sequence[_Token]) -> str:
+    return "".join(token.letters + " " * token.has_space for token in tokens).strip()
 
 
 def _token_from_word(word: SpokenWord) -> _Token:

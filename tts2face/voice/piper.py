@@ -2,6 +2,7 @@
 
 import re
 import unicodedata
+from collections.abc import Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -67,17 +68,28 @@ class PiperVoice:
 
     def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
         """Synthesise a sentence; see `tts2face.voice.engine.Voice`. The model runs without noise: `seed` is unused."""
+        words = self._spoken_words(content)
+        sound = self._speak_words(content, words, rate)
+        pronunciations = [(word.text, [tuple(segment.phone for segment in word.segments)]) for word in words]
+        found = self._aligner.align(sound, pronunciations)
+        return Speech(sound, found.phones, found.words)
+
+    def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
+        """Sound without the alignment of its phones."""
+        return self._speak_words(content, self._spoken_words(content), rate)
+
+    def _spoken_words(self, content: SpeechInput) -> list[SpokenWord]:
         words = self._words(content)
         if not words:
             raise InputError("there is nothing to say in the text; give at least one word")
+        return words
+
+    def _speak_words(self, content: SpeechInput, words: Sequence[SpokenWord], rate: float) -> Waveform:
         if isinstance(content, str):
             text = self._insert_own_words(content)
         else:
             text = " ".join(self._bracketed_ipa(word) for word in words)
-        sound = Waveform(apply_volume(self._synthesise(text, rate)), self.sample_rate)
-        pronunciations = [(word.text, [tuple(segment.phone for segment in word.segments)]) for word in words]
-        found = self._aligner.align(sound, pronunciations)
-        return Speech(sound, found.phones, found.words)
+        return Waveform(apply_volume(self._synthesise(text, rate)), self.sample_rate)
 
     def _words(self, content: SpeechInput) -> list[SpokenWord]:
         """Words with phones: those given, of the user's dictionary, or of espeak-ng."""

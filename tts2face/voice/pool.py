@@ -5,7 +5,7 @@ from collections import OrderedDict
 from collections.abc import Hashable, Iterator
 from contextlib import contextmanager
 
-from tts2face.types import Speech
+from tts2face.types import Speech, Waveform
 from tts2face.voice.engine import PronunciationMap, SpeechInput, Voice
 from tts2face.voice.loading import load_voice
 
@@ -39,6 +39,10 @@ class RecentUtterances:
             while len(self._kept) > MAX_UTTERANCES:
                 self._kept.popitem(last=False)
         return speech
+
+    def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
+        """Sound of a sentence; arguments as for `Voice.sound`."""
+        return self._voice.sound(content, rate=rate, seed=seed)
 
 
 class VoicePool:

@@ -1,0 +1,114 @@
+"""Clips as the bytes of a file that is sent while it is made: a movie, sound, or lines of text."""
+
+import io
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from lexicon.errors import InputError
+from tts2face.exports.formats import FORMATS
+from tts2face.exports.parts import FormatWriter, FrameGrid
+from tts2face.exports.writer import ExportFile, make_target
+from tts2face.models.face import Face
+from tts2face.render.movie_stream import MOVIE_KINDS, encode_movie, find_movie_kind
+from tts2face.render.picture import Picture
+from tts2face.render.sound_stream import SOUND_KINDS, encode_sound
+from tts2face.synthesis.clip_stream import Piece, sounds
+from tts2face.synthesis.prepared_request import PreparedRequest
+from tts2face.synthesis.session_models import SessionModels
+from tts2face.types import Chunk
+
+LINE_FORMATS = {one.name: one for one in FORMATS if one.has_lines}
+MEDIA_TYPES = {
+    **{name: kind.media_type for name, kind in MOVIE_KINDS.items()},
+    **{name: kind.media_type for name, kind in SOUND_KINDS.items()},
+    **dict.fromkeys(LINE_FORMATS, "application/jsonl"),
+    "livelink": "text/csv",
+}  # of the formats of `Session.stream_file`
+
+
+@dataclass(frozen=True, slots=True)
+class StreamFormat:
+    """Format of streamed bytes, one of `MEDIA_TYPES`, and the drawing options of movies.
+
+    Parameters
+    ----------
+    threads
+        Number of frames drawn in advance; None for one on each core.
+
+    Raises
+    ------
+    InputError
+        There is no such format, or it cannot be transparent.
+    """
+
+    name: str
+    picture: Picture
+    threads: int | None = None
+
+    def __post_init__(self) -> None:
+        """Check the format."""
+        if self.name not in MEDIA_TYPES:
+            raise InputError(f"there is no streamed format {self.name!r}; the formats are {', '.join(MEDIA_TYPES)}")
+        if self.name in MOVIE_KINDS:
+            find_movie_kind(self.name, self.picture)
+
+
+def encode_stream(prepared: PreparedRequest, models: SessionModels, format: StreamFormat) -> Iterator[Chunk]:
+    """Synthesise and encode a request; yields consecutive chunks of a file."""
+    request, name = prepared.request, format.name
+    if name in MOVIE_KINDS:
+        renderer = models.renderer(format.picture, has_gestures=request.has_gestures)
+        clips = (piece.clip for piece in models.pieces(prepared))
+        return encode_movie(clips, renderer, name, threads=format.threads)
+    if name in SOUND_KINDS:
+        if request.audio is None:
+            return encode_sound(sounds(prepared, models.for_request(request)), name)
+        return encode_sound((piece.clip.speech.waveform for piece in models.pieces(prepared)), name)
+    face = models.face(has_gestures=request.has_gestures) if LINE_FORMATS[name].uses_face else None
+    return encode_lines(models.pieces(prepared), name, None if face is None else face.mesh)
+
+
+class LineBuffer(io.StringIO):
+    """Text that is taken in parts; closing it keeps what was not yet taken."""
+
+    def take(self) -> bytes:
+        """Return the text written since the last call as UTF-8."""
+        taken = self.getvalue().encode()
+        self.seek(0)
+        self.truncate()
+        return taken
+
+    def close(self) -> None:
+        """Do nothing: memory is all that a buffer holds."""
+
+
+def encode_lines(pieces: Iterable[Piece], format: str, face: Face | None) -> Iterator[Chunk]:
+    """Write consecutive pieces in a format of lines; yields a chunk for each piece.
+
+    Parameters
+    ----------
+    format
+        One of `LINE_FORMATS`.
+    face
+        Mesh whose shapes the clips' channels are, for formats of ARKit shapes.
+
+    Raises
+    ------
+    InputError
+        As `ExportWriter`.
+    """
+    info = LINE_FORMATS[format]
+    file, buffer = ExportFile(Path(f"clip{info.suffixes[0]}"), info), LineBuffer()
+    grid: FrameGrid | None = None
+    writer: FormatWriter | None = None
+    for piece in pieces:
+        if grid is None or writer is None:
+            grid = FrameGrid(piece.clip, info.default_fps)
+            writer = info.make_writer()(make_target(file, grid, piece.clip, face, file.path, buffer))
+        writer.add(grid.place(piece.clip, piece.text))
+        yield Chunk(buffer.take(), piece.clip.speech.waveform.duration)
+    if grid is not None and writer is not None:
+        writer.add(grid.remainder())
+        writer.finish()
+        yield Chunk(buffer.take())
