@@ -67,8 +67,9 @@ def batch(  # noqa: PLR0913 - one parameter a flag
         raise InputError(f"--jobs must be 1 or more (0 with --database: other workers only), not {jobs}")
     if priority < 1:
         raise InputError(f"--priority must be 1 or more, not {priority}")
-    from tts2face.batch.cast import Cast, Models, read_cast
+    from tts2face.batch.cast import Cast, read_cast
     from tts2face.batch.plan import plan_batch
+    from tts2face.session_cache import Models
 
     plan = plan_batch(
         subtitles,

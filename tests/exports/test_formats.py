@@ -29,7 +29,10 @@ def test_names_and_suffixes_are_unique():
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("clip.jsonl", r"clip.jsonl may have several formats; end its name in .oculus.jsonl, .azure.jsonl or .curves.jsonl"),
+        (
+            "clip.jsonl",
+            r"clip.jsonl may have several formats; end its name in .oculus.jsonl, .azure.jsonl or .curves.jsonl",
+        ),
         ("clip.tsv", r"end its name in .rhubarb.tsv"),
         ("clip.fbx", "clip.fbx has no suffix of an export format"),
         ("clip", "clip has no suffix of an export format"),

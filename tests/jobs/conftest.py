@@ -14,8 +14,8 @@ import pytest
 
 pytest.importorskip("dbos", reason="needs the extra [batch]")
 
-from tts2face.batch.cast import Models
 from tts2face.batch.segment import Segment, input_hashes
+from tts2face.session_cache import Models
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True)

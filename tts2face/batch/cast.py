@@ -33,16 +33,6 @@ MAX_CAST_BYTES = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Models:
-    """Models that show and move a speaker, by name or path."""
-
-    talker: str = "grid_s1"
-    face: str = "head"
-    identity: str | None = None
-    palette: str = "starter"
-
-
-@dataclass(frozen=True, slots=True)
 class Role:
     """Patterns of the cues to which a role applies, and its settings."""
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError, InputError
-from tts2face.batch.cast import MODEL_NAMES, REQUEST_NAMES, Cast, Models
+from tts2face.batch.cast import MODEL_NAMES, REQUEST_NAMES, Cast
 from tts2face.batch.options import BatchOptions
 from tts2face.batch.output import OUTPUT_SUFFIX, Output, Plan, PlannedCue, PlanWarning, join_outputs
 from tts2face.batch.recordings import find_recording, index_recordings
@@ -15,6 +15,7 @@ from tts2face.batch.windows import Window, cue_windows, scenes
 from tts2face.clock import exact_rate
 from tts2face.render.picture import Picture
 from tts2face.request import IDLE_LIMITS_S, Request
+from tts2face.session_cache import Models
 from tts2face.subtitles.cue import Subtitles, SubtitleWarning
 from tts2face.subtitles.reader import read_subtitles
 from tts2face.synthesis.prepared_request import prepare

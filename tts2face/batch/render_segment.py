@@ -1,12 +1,9 @@
 """Rendering of one segment with the sessions of this process."""
 
-import gc
 import time
-from collections import OrderedDict
 from dataclasses import replace
 from pathlib import Path
 
-from tts2face.batch.cast import Models
 from tts2face.batch.fit import Fit, Limits, fit_speech
 from tts2face.batch.segment import Segment
 from tts2face.batch.segment_result import SegmentResult
@@ -15,17 +12,16 @@ from tts2face.render.encode import ClipWriter
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.session import Session
+from tts2face.session_cache import SessionCache
 from tts2face.synthesis.prepared_request import prepare
 from tts2face.types import frame_count
 
-MAX_SESSIONS = 1  # in the memory of a worker; a second one takes 250 MB, and work comes sorted by its models
-
 
 class SegmentRenderer:
-    """Renders segments; the last `MAX_SESSIONS` sessions are kept."""
+    """Renders segments with one session at a time: work comes sorted by its models."""
 
     def __init__(self) -> None:
-        self._sessions: OrderedDict[Models, Session] = OrderedDict()
+        self._sessions = SessionCache()
 
     def render(self, segment: Segment, out: Path) -> SegmentResult:
         """Render a segment into a file (.mov), which appears when it is complete.
@@ -36,7 +32,7 @@ class SegmentRenderer:
             As `Session.write`.
         """
         began = time.perf_counter()
-        session = self._session(segment.models)
+        session = self._sessions.get(segment.models)
         request, picture = Request(**segment.request), Picture(**segment.picture)
         fitted, result = _fit(session, request, segment)
         renderer = session.renderer(picture, has_gestures=fitted.has_gestures)
@@ -44,18 +40,6 @@ class SegmentRenderer:
             for clip in session.stream_to_length(fitted, result.n_frames):
                 writer.add(clip)
         return replace(result, took_s=round(time.perf_counter() - began, 3))
-
-    def _session(self, models: Models) -> Session:
-        if models in self._sessions:
-            self._sessions.move_to_end(models)
-        else:
-            while len(self._sessions) >= MAX_SESSIONS:
-                self._sessions.popitem(last=False)
-            gc.collect()  # sessions hold themselves in circles
-            self._sessions[models] = Session(
-                models.talker, models.face, identity=models.identity, palette=models.palette
-            )
-        return self._sessions[models]
 
 
 def _fit(session: Session, request: Request, segment: Segment) -> tuple[Request, SegmentResult]:

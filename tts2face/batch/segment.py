@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from tts2face.batch.address import content_address, file_hash, model_hash, program_version
-from tts2face.batch.cast import Models
 from tts2face.request import OWN_FACE
+from tts2face.session_cache import Models
 
 REQUEST_FILES = ("audio", "dictionary", "voice")
 
