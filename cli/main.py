@@ -28,6 +28,7 @@ from cli.process import (
     write_message,
 )
 from cli.report import report
+from cli.serve import keys, serve
 from lexicon.errors import DataError, InputError, Tts2faceError
 from lexicon.inputs import LARGEST_TEXT_BYTES, decode_utf8, read_bounded, read_text
 from tts2face import __version__
@@ -49,6 +50,8 @@ app.command(convert)
 app.command(batch)
 app.command(worker)
 app.command(jobs)
+app.command(serve)
+app.command(keys)
 app.command(corpus)
 app.command(report)
 app.command(face_commands)

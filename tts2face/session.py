@@ -12,10 +12,11 @@ from tts2face.render.renderer import FrameRenderer
 from tts2face.request import Request
 from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.synthesis.byte_stream import StreamFormat, encode_stream
-from tts2face.synthesis.clip_stream import Piece, SpeechSpan, measure_speech
+from tts2face.synthesis.clip_stream import Piece, SpeechSpan, TimedSpeech, measure_speech, timed_speech
 from tts2face.synthesis.fixed_length import Length, clips_of_length
 from tts2face.synthesis.output_files import OutputFiles, plan_outputs
-from tts2face.synthesis.performance import Performance, perform, take_clips
+from tts2face.synthesis.performance import Performance
+from tts2face.synthesis.performance_output import write_take
 from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, prepare_request, split_picture
 from tts2face.synthesis.session_models import SessionModels
 from tts2face.synthesis.written_clip import RequestSteps, WrittenClip, write_pieces
@@ -26,7 +27,7 @@ class Session:
     """A talker, a face and a palette for any number of requests.
 
     Talker and face are loaded by the constructor; palette, voices and renderers at their first use. All methods are
-    thread-safe: a voice is used by one request at a time, and all other models are read-only. The same request, talker,
+    thread-safe: a voice speaks for one caller at a time, and all other models are read-only. The same request, talker,
     face, palette and version give the same clip, independent of earlier and concurrent requests.
 
     Parameters
@@ -135,6 +136,14 @@ class Session:
         sound_end = self.measure_speech(prepared).total if prepared.request.is_text else None
         length = Length(n_frames, self._models.n_fixed_channels)
         yield from clips_of_length(prepared, sound_end, length, self._models.pieces)
+
+    def stream_speech(self, text: str | Request | PreparedRequest, **options: Any) -> Iterator[TimedSpeech]:
+        """Synthesise the speech of a text sentence by sentence: sound, phones and words as in its clip, no motion.
+
+        Arguments and errors as `clip`; a recording is refused.
+        """
+        prepared = prepare_request(text, options)
+        return timed_speech(prepared, self._models.for_request(prepared.request))
 
     def stream_file(
         self,
@@ -267,20 +276,7 @@ class Session:
         picture = picture or Picture()
         inputs = {"the take": performance.take, "audio": performance.audio, "model": performance.model}
         outputs = plan_outputs(out, exports, inputs | {"background": picture.background})
-        face = self._models.speech_face
-        outputs.check_face(face)  # before the video is tracked, as are the drawing options
-        renderer = None if out is None else self.renderer(picture, has_gestures=False)
-        take = perform(performance, face, on_progress=stages("tracking") if stages else None)
-        if renderer is not None and take.face is not face:  # motion was appended to the face
-            renderer = take.face.renderer(picture)
-        n_frames = len(take.motion.face)
-        draw = stages("writing" if renderer is None else "drawing") if stages else None
-        on_frames = (lambda done, _: draw(done, n_frames)) if draw else None
-        with outputs.open(take.face, renderer, on_frames) as files:
-            for clip in take_clips(take.motion, take.sound):
-                files.add(clip)
-        is_silent = not len(take.sound.samples)
-        return WrittenClip(outputs.path, take.seconds, n_frames, is_silent=is_silent, exports=outputs.export_paths)
+        return write_take(performance, self._models, (outputs, picture), stages)
 
     def renderer(self, picture: Picture, *, has_gestures: bool = True) -> FrameRenderer:
         """Renderer of the session's face for drawing options; the last few renderers are cached."""

@@ -1,7 +1,6 @@
 """Synthesis of a prepared request piece by piece: text, a recording, or idle animation."""
 
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from lexicon.errors import InputError
 from lexicon.sentences import Sentence
 from lexicon.sequence import SILENCE
 from tts2face.clock import first_sample, pad_to_frame
@@ -80,14 +80,13 @@ class Piece:
 class SynthesisModels:
     """Models from which clips are synthesised: talker, the talker's exemplars, face, and voices.
 
-    ``voice`` takes a name and a language and returns a context manager whose ``with`` block has exclusive use of the
-    voice.
+    ``voice`` returns the voice of a name and a language.
     """
 
     talker: Talker
     exemplars: ExemplarModel
     face: AnimatedFace
-    voice: Callable[[str | None, str], AbstractContextManager[Voice]]
+    voice: Voices
 
 
 def pieces(prepared: PreparedRequest, models: SynthesisModels, layer: GestureLayer | None) -> Iterator[Piece]:
@@ -142,9 +141,39 @@ def _spoken_pieces(prepared: PreparedRequest, models: SynthesisModels, layer: Ge
         lips = models.face.motion_of_tokens(selection, fps=float(fps), n_frames=n_frames)
         clip = _with_sound(_with_gestures(speech, lips, timeline, layer), spoken.sound)
         first_frame += n_frames
-        marks = tuple(replace(mark, seconds=mark.seconds + begin) for mark in spoken.marks)
         explain = _explanation(selection, models.exemplars, begin)
-        yield Piece(clip, begin, n_steps, timeline, marks, explain, text=text)
+        yield Piece(clip, begin, n_steps, timeline, _shifted(spoken.marks, begin), explain, text=text)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TimedSpeech:
+    """Speech of a sentence with its final sound; its start and its named marks in seconds of the whole."""
+
+    speech: Speech
+    begin: float
+    marks: tuple[MarkTime, ...] = ()
+
+
+def timed_speech(prepared: PreparedRequest, models: SynthesisModels) -> Iterator[TimedSpeech]:
+    """Speech of each piece of a text or of idle animation, without motion.
+
+    Raises
+    ------
+    InputError
+        The request has a recording.
+    """
+    if prepared.request.audio is not None:
+        raise InputError("a recording is not spoken; remove it, or stream its clip")
+    return _timed_sentences(prepared, models)
+
+
+def _timed_sentences(prepared: PreparedRequest, models: SynthesisModels) -> Iterator[TimedSpeech]:
+    fps, first_frame = prepared.fps, 0
+    for spoken, _, _ in _sentences(prepared, models):
+        speech, begin = pad_to_frame(spoken.speech, first_frame, fps), float(first_frame / fps)
+        sound = _padded(spoken.sound, len(speech.waveform.samples))
+        yield TimedSpeech(replace(speech, waveform=sound), begin, _shifted(spoken.marks, begin))
+        first_frame += frame_count(speech.waveform.duration, float(fps))
 
 
 def sounds(prepared: PreparedRequest, models: SynthesisModels) -> Iterator[Waveform]:
@@ -158,25 +187,17 @@ def sounds(prepared: PreparedRequest, models: SynthesisModels) -> Iterator[Wavef
         last_frame = first_frame + frame_count(sound.duration, float(fps))
         n_samples = first_sample(last_frame, sound.rate, fps) - first_sample(first_frame, sound.rate, fps)
         first_frame = last_frame
-        samples = np.zeros(max(n_samples, len(sound.samples)), np.float32)
-        samples[: len(sound.samples)] = sound.samples
-        yield Waveform(samples, sound.rate)
+        yield _padded(sound, max(n_samples, len(sound.samples)))
 
 
 def _spoken(
     prepared: PreparedRequest, models: SynthesisModels, speak: Callable[[Voice, Sentence, Request, Voices], Spoken]
 ) -> Iterator[Spoken]:
-    """Result of `speak` for each sentence of a text, with voices that are borrowed meanwhile."""
-    request = prepared.request
-    with ExitStack() as stack:
-
-        @cache
-        def voice_of(name: str | None, language: str) -> Voice:
-            return stack.enter_context(models.voice(name, language))
-
-        voice = voice_of(request.voice, request.language)
-        for sentence in prepared.sentences():
-            yield speak(voice, sentence, request, voice_of)
+    """Result of `speak` for each sentence of a text."""
+    request, voice_of = prepared.request, cache(models.voice)
+    voice = voice_of(request.voice, request.language)
+    for sentence in prepared.sentences():
+        yield speak(voice, sentence, request, voice_of)
 
 
 def _sentences(prepared: PreparedRequest, models: SynthesisModels) -> Iterator[tuple[SpokenSentence, int, str]]:
@@ -242,9 +263,18 @@ def _with_gestures(speech: Speech, lips: Trajectory, timeline: Timeline, layer: 
 def _with_sound(clip: Clip, sound: Waveform) -> Clip:
     """Replace the sound of a clip by its final sound, padded with silence to the same length."""
     speech = clip.speech
-    samples = np.zeros_like(speech.waveform.samples)
+    return replace(clip, speech=replace(speech, waveform=_padded(sound, len(speech.waveform.samples))))
+
+
+def _shifted(marks: tuple[MarkTime, ...], seconds: float) -> tuple[MarkTime, ...]:
+    return tuple(replace(mark, seconds=mark.seconds + seconds) for mark in marks)
+
+
+def _padded(sound: Waveform, n_samples: int) -> Waveform:
+    """Sound followed by silence up to a number of samples."""
+    samples = np.zeros(n_samples, np.float32)
     samples[: len(sound.samples)] = sound.samples
-    return replace(clip, speech=replace(speech, waveform=Waveform(samples, sound.rate)))
+    return Waveform(samples, sound.rate)
 
 
 def _explanation(

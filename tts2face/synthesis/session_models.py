@@ -3,7 +3,6 @@
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -35,8 +34,7 @@ Value = TypeVar("Value")
 class SessionModels:
     """Talker, faces, palette, exemplars, gesture fields, renderers and voices of a session.
 
-    All methods are thread-safe: each model is made by one thread, once, and is read-only; a voice is lent to one
-    request at a time.
+    All methods are thread-safe: each model is made by one thread, once, and is read-only.
 
     Parameters
     ----------
@@ -111,15 +109,15 @@ class SessionModels:
         Parameters
         ----------
         keeps_utterances
-            As for `VoicePool.borrow`.
+            As for `VoicePool.voice`.
         """
         dictionary = read_dictionary(request.dictionary).entries if request.dictionary else {}
 
-        def borrow_voice(name: str | None, language: str) -> AbstractContextManager[Voice]:
-            return self._voices.borrow(name, language, dictionary, keeps_utterances=keeps_utterances)
+        def load_voice(name: str | None, language: str) -> Voice:
+            return self._voices.voice(name, language, dictionary, keeps_utterances=keeps_utterances)
 
         face = self.face(has_gestures=request.has_gestures)
-        return SynthesisModels(self.talker, self._exemplars, face, borrow_voice)
+        return SynthesisModels(self.talker, self._exemplars, face, load_voice)
 
     def pieces(self, prepared: PreparedRequest) -> Iterator[Piece]:
         """Synthesise the clip of a request piece by piece."""

@@ -1,0 +1,50 @@
+"""``tts2face serve`` and ``tts2face keys``: the HTTP service."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, Parameter
+
+from cli.flags import switch, whole_number
+from cli.process import write_message
+from tts2face.service.settings import read_settings
+
+keys = App(name="keys", help="API keys of the service.")
+
+
+def serve(
+    *,
+    settings: Annotated[Path | None, Parameter(help="TOML file of settings.")] = None,
+    host: Annotated[str | None, Parameter(help="Address to listen on (127.0.0.1).")] = None,
+    port: Annotated[int | None, whole_number("Port (8880); 0: a free one.")] = None,
+    keys: Annotated[Path | None, Parameter(help="File of API keys.")] = None,
+    processes: Annotated[int | None, whole_number("Synthesis processes; by default one for each core.")] = None,
+    show_config: Annotated[bool, switch("Print the settings and exit.")] = False,
+) -> None:
+    """Serve speech, clips and curves over HTTP (docs/http.md)."""
+    chosen = read_settings(settings, {"host": host, "port": port, "keys": keys, "processes": processes})
+    if show_config:
+        sys.stdout.write(chosen.as_toml())
+        return
+    from tts2face.service.server import serve as run_server
+
+    write_message(f"tts2face: http://{chosen.host}:{chosen.port}/docs (ready when /readyz answers 200)")
+    run_server(chosen)
+
+
+@keys.command
+def add(
+    name: Annotated[str, Parameter(help="Name of the key, in the log and the metrics.")],
+    /,
+    *,
+    file: Annotated[Path, Parameter(help="File of keys (TOML); created if needed.")],
+    scope: Annotated[list[str] | None, Parameter(help="speak, build, admin; several possible.")] = None,
+    requests_per_minute: Annotated[int | None, whole_number("Requests a minute.")] = None,
+    concurrent: Annotated[int | None, whole_number("Requests at the same time.")] = None,
+) -> None:
+    """Create a key and print it; the file holds only its hash."""
+    from tts2face.service.keys import add_key
+
+    limits = {"requests_per_minute": requests_per_minute, "concurrent": concurrent}
+    print(add_key(file, name, scope or ["speak"], **limits))  # noqa: T201 - the result

@@ -1,0 +1,65 @@
+"""The ASGI application of the service."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from fastapi import FastAPI
+from fastapi import Request as HttpRequest
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from starlette.exceptions import HTTPException
+
+from tts2face import __version__
+from tts2face.service import clips, headtts, health, openai_speech
+from tts2face.service.errors import RefusedError, error_body
+from tts2face.service.guard import Guard
+from tts2face.service.settings import ServiceSettings
+from tts2face.service.state import ServiceState
+
+
+def create_app(settings: ServiceSettings) -> FastAPI:
+    """Application with the given settings; its synthesis processes run from startup to shutdown."""
+    state = ServiceState(settings)
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        state.pool.start()
+        try:
+            yield
+        finally:
+            await state.pool.close()
+
+    app = FastAPI(
+        title="tts2face", version=__version__, lifespan=lifespan, redoc_url=None, description="Text to talking face."
+    )
+    app.state.service = state
+    for part in (openai_speech, clips, headtts, health):
+        app.include_router(part.router)
+    app.add_exception_handler(RefusedError, _answer_refused)
+    app.add_exception_handler(RequestValidationError, _answer_invalid)
+    app.add_exception_handler(HTTPException, _answer_http)
+    app.add_exception_handler(Exception, _answer_internal)
+    app.add_middleware(Guard, state=state)
+    return app
+
+
+async def _answer_refused(_: HttpRequest, error: Exception) -> JSONResponse:
+    assert isinstance(error, RefusedError)
+    return JSONResponse(error_body(error.code, error.message), error.status, error.headers)
+
+
+async def _answer_invalid(_: HttpRequest, error: Exception) -> JSONResponse:
+    assert isinstance(error, RequestValidationError)
+    first = error.errors()[0]
+    name = ".".join(str(part) for part in first["loc"] if part != "body") or "body"
+    message = f"{name}: {first['msg'][:200]}"
+    return JSONResponse(error_body("invalid_request", message, name), 422)
+
+
+async def _answer_http(_: HttpRequest, error: Exception) -> JSONResponse:
+    assert isinstance(error, HTTPException)
+    return JSONResponse(error_body("http", str(error.detail)), error.status_code, dict(error.headers or {}))
+
+
+async def _answer_internal(_: HttpRequest, error: Exception) -> JSONResponse:
+    return JSONResponse(error_body("internal", f"internal error: {type(error).__name__}; see the log"), 500)

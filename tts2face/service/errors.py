@@ -1,0 +1,46 @@
+"""Errors of the service as answers."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
+from tts2face.service.pool import BusyError
+
+
+class RefusedError(Exception):
+    """A request that is refused before any work.
+
+    Parameters
+    ----------
+    status
+        HTTP status.
+    code
+        Word for programs.
+    message
+        One sentence: what, which value, what to do.
+    """
+
+    def __init__(self, status: int, code: str, message: str, headers: Mapping[str, str] | None = None) -> None:
+        super().__init__(message)
+        self.status, self.code, self.message, self.headers = status, code, message, dict(headers or {})
+
+
+STATUS: Mapping[type[Tts2faceError], tuple[int, str]] = {
+    BusyError: (429, "busy"),
+    InputError: (400, "invalid_request"),
+    DataError: (422, "invalid_data"),
+    BackendError: (503, "unavailable"),
+}
+
+
+def as_refused(error: Tts2faceError) -> RefusedError:
+    """Answer to an error of the synthesis."""
+    status, code = next(found for kind, found in STATUS.items() if isinstance(error, kind))
+    headers = {"Retry-After": str(BusyError.retry_after_s)} if status in {429, 503} else {}
+    return RefusedError(status, code, " ".join(str(error).split()), headers)
+
+
+def error_body(code: str, message: str, param: str | None = None) -> dict[str, Any]:
+    """JSON of an error, in the form of OpenAI's API."""
+    kind = "server_error" if code in {"internal", "unavailable"} else "invalid_request_error"
+    return {"error": {"message": message, "type": kind, "param": param, "code": code}}

@@ -1,0 +1,119 @@
+"""API keys: random, stored as hashes, with scopes and limits."""
+
+import hashlib
+import hmac
+import secrets
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from lexicon.errors import DataError, InputError
+from lexicon.inputs import read_text
+from tts2face.storage.files import write_atomically
+
+SCOPES = ("speak", "build", "admin")  # synthesis; uploads and talkers; everybody's jobs and metrics
+KEY_PREFIX = "t2f_"
+N_KEY_BYTES = 32
+MAX_FILE_BYTES = 1_000_000
+NAMES = {"name", "hash", "scopes", "requests_per_minute", "concurrent"}
+
+
+@dataclass(frozen=True, slots=True)
+class ApiKey:
+    """A key without its secret.
+
+    Parameters
+    ----------
+    hash
+        SHA-256 of the key, hexadecimal; a key has 256 random bits, so that no slow hash is needed.
+    requests_per_minute, concurrent
+        Limits; None: none.
+    """
+
+    name: str
+    hash: str
+    scopes: tuple[str, ...] = ("speak",)
+    requests_per_minute: int | None = None
+    concurrent: int | None = None
+
+
+LOCAL_KEY = ApiKey("local", "", SCOPES)  # of requests to a service without keys
+
+
+def find_key(keys: Sequence[ApiKey], given: str) -> ApiKey | None:
+    """Key of a secret; compares all hashes in constant time."""
+    digest, found = hashlib.sha256(given.encode()).hexdigest(), None
+    for key in keys:
+        if hmac.compare_digest(key.hash, digest):
+            found = key
+    return found
+
+
+def read_keys(path: Path) -> tuple[ApiKey, ...]:
+    """Keys of a file.
+
+    Raises
+    ------
+    InputError
+        The file does not exist.
+    DataError
+        It is no file of keys.
+    """
+    try:
+        content = tomllib.loads(read_text(path, MAX_FILE_BYTES))
+    except FileNotFoundError as missing:
+        raise InputError(
+            f"there is no file of keys {path}; create it with `tts2face keys add NAME --file {path}`"
+        ) from missing
+    except tomllib.TOMLDecodeError as wrong:
+        raise DataError(f"{path} is no file of keys: {wrong}") from wrong
+    return tuple(_key(path, one) for one in content.get("key", []))
+
+
+def add_key(path: Path, name: str, scopes: Sequence[str], **limits: int | None) -> str:
+    """Add a key to a file, which is created if needed; returns the secret, which is stored nowhere.
+
+    Raises
+    ------
+    InputError
+        The name exists already, or a scope is unknown.
+    """
+    keys = read_keys(path) if path.exists() else ()
+    if any(key.name == name for key in keys):
+        raise InputError(f"{path} has a key named {name} already; choose another name, or remove it first")
+    secret = KEY_PREFIX + secrets.token_urlsafe(N_KEY_BYTES)
+    digest = hashlib.sha256(secret.encode()).hexdigest()
+    write_keys(path, (*keys, ApiKey(name, digest, tuple(scopes), **limits)))
+    return secret
+
+
+def write_keys(path: Path, keys: Sequence[ApiKey]) -> None:
+    """Write a file of keys that only its owner can read."""
+    parts = []
+    for key in keys:
+        _check_scopes(key.scopes)
+        lines = [f'name = "{key.name}"', f'hash = "{key.hash}"', f"scopes = {list(key.scopes)!r}".replace("'", '"')]
+        lines += [
+            f"{limit} = {getattr(key, limit)}"
+            for limit in ("requests_per_minute", "concurrent")
+            if getattr(key, limit) is not None
+        ]
+        parts.append("[[key]]\n" + "\n".join(lines) + "\n")
+    write_atomically(path, "\n".join(parts).encode())
+    path.chmod(0o600)
+
+
+def _key(path: Path, content: Any) -> ApiKey:
+    if not isinstance(content, dict) or not set(content) <= NAMES or not {"name", "hash"} <= set(content):
+        raise DataError(f"{path} has a key without name or hash, or with other names than {', '.join(sorted(NAMES))}")
+    key = ApiKey(**{**content, "scopes": tuple(content.get("scopes", ("speak",)))})
+    _check_scopes(key.scopes)
+    return key
+
+
+def _check_scopes(scopes: Sequence[str]) -> None:
+    for scope in scopes:
+        if scope not in SCOPES:
+            raise InputError(f"there is no scope {scope!r}; the scopes are {', '.join(SCOPES)}")

@@ -1,0 +1,43 @@
+"""Messages between the server and its synthesis processes.
+
+Commands to a process are lines of JSON. Messages from it are a header (number of the task, kind, length) and a payload.
+"""
+
+import struct
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+HEADER = struct.Struct("<IBI")
+MAX_PAYLOAD_BYTES = 1 << 28
+
+
+class MessageKind(IntEnum):
+    """What the payload of a message is."""
+
+    READY = 0  # of the process: models are loaded; JSON
+    DATA = 1  # bytes of the result
+    EVENT = 2  # JSON object of the result
+    END = 3  # the task is done; JSON with its measures
+    ERROR = 4  # the task has failed; JSON with kind and message
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A message of a task."""
+
+    task: int
+    kind: MessageKind
+    payload: bytes
+
+    def encode(self) -> bytes:
+        """Header and payload."""
+        return HEADER.pack(self.task, self.kind, len(self.payload)) + self.payload
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A JSON object as a part of a result, and the seconds of speech that it adds."""
+
+    content: dict[str, Any]
+    seconds: float = 0.0

@@ -1,0 +1,130 @@
+"""Cooperative scheduling of tasks in one process: whoever is nearest to running dry goes next."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from lexicon.errors import Tts2faceError
+from tts2face.service.messages import Event, Message, MessageKind
+from tts2face.types import Chunk
+
+Step = Chunk | Event | None  # a part of the result; None: the task waits for input
+Send = Callable[[Message], None]
+
+
+@dataclass(slots=True)
+class Task:
+    """A result that is made step by step."""
+
+    number: int
+    steps: Iterator[Step]
+    priority: int
+    begin: float
+    seconds: float = 0.0  # of the clip made so far
+    cpu_s: float = 0.0
+    is_paused: bool = False
+    is_waiting: bool = False
+    inputs: list[Any] = field(default_factory=list)
+
+    def lead(self, now: float) -> float:
+        """Seconds by which the result is ahead of a listener who began at the request."""
+        return self.seconds - (now - self.begin)
+
+
+class Scheduler:
+    """Runs tasks in steps of some hundredths of a second; a task of lower priority runs when no other can.
+
+    Parameters
+    ----------
+    send
+        Receives all messages of the tasks.
+    clock
+        Monotonic seconds.
+    """
+
+    def __init__(self, send: Send, clock: Callable[[], float] = time.monotonic) -> None:
+        self._send, self._clock = send, clock
+        self._tasks: dict[int, Task] = {}
+
+    @property
+    def n_tasks(self) -> int:
+        """Number of unfinished tasks."""
+        return len(self._tasks)
+
+    def start(self, number: int, steps: Callable[[], Iterator[Step]], priority: int = 0) -> None:
+        """Add a task; an error of `steps` becomes its message."""
+        began = self._clock()
+        try:
+            made = steps()
+        except Exception as error:  # noqa: BLE001 - reported to the client; other tasks go on
+            self._send_error(number, error)
+            return
+        self._tasks[number] = Task(number, made, priority, began, cpu_s=self._clock() - began)
+
+    def cancel(self, number: int) -> None:
+        """Forget a task and release what it holds."""
+        task = self._tasks.pop(number, None)
+        if task is not None:
+            _close(task)
+
+    def pause(self, number: int, *, is_paused: bool) -> None:
+        """Stop or continue a task whose reader is slower than its steps."""
+        if number in self._tasks:
+            self._tasks[number].is_paused = is_paused
+
+    def wake(self, number: int) -> None:
+        """Continue a task that waited for input."""
+        if number in self._tasks:
+            self._tasks[number].is_waiting = False
+
+    def run_step(self) -> bool:
+        """Run one step of the task that needs it most; False if no task can run."""
+        now = self._clock()
+        ready = [task for task in self._tasks.values() if not (task.is_paused or task.is_waiting)]
+        if not ready:
+            return False
+        self._advance(min(ready, key=lambda task: (task.priority, task.lead(now))))
+        return True
+
+    def _advance(self, task: Task) -> None:
+        began = self._clock()
+        try:
+            step = next(task.steps)
+        except StopIteration:
+            task.cpu_s += self._clock() - began
+            del self._tasks[task.number]
+            self._send(_json_message(task.number, MessageKind.END, {
+                "seconds": round(task.seconds, 4), "cpu_s": round(task.cpu_s, 4)
+            }))  # fmt: skip
+            return
+        except Exception as error:  # noqa: BLE001 - reported to the client; other tasks go on
+            del self._tasks[task.number]
+            self._send_error(task.number, error)
+            return
+        task.cpu_s += self._clock() - began
+        if step is None:
+            task.is_waiting = True
+            return
+        task.seconds += step.seconds
+        if isinstance(step, Event):
+            self._send(_json_message(task.number, MessageKind.EVENT, step.content))
+        elif step.content:
+            self._send(Message(task.number, MessageKind.DATA, step.content))
+
+    def _send_error(self, number: int, error: Exception) -> None:
+        kind = type(error).__name__ if isinstance(error, Tts2faceError) else "InternalError"
+        message = str(error) if isinstance(error, Tts2faceError) else f"{type(error).__name__}: {error}"
+        self._send(_json_message(number, MessageKind.ERROR, {"kind": kind, "message": " ".join(message.split())}))
+
+
+def _json_message(number: int, kind: MessageKind, content: dict[str, Any]) -> Message:
+    import json
+
+    return Message(number, kind, json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode())
+
+
+def _close(task: Task) -> None:
+    close = getattr(task.steps, "close", None)
+    if close is not None:
+        close()

@@ -1,0 +1,174 @@
+"""Settings of the service: defaults, a TOML file, environment variables, flags; the later ones win."""
+
+import ipaddress
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from lexicon.errors import InputError
+from lexicon.inputs import check_limits, read_text
+
+PREFIX = "TTS2FACE_SERVE_"  # of environment variables: TTS2FACE_SERVE_PORT
+LOCAL_HOSTS = ("localhost", "127.0.0.1", "::1")
+MAX_SETTINGS_BYTES = 100_000
+Limits = tuple[float, float]
+
+
+def setting(default: Any, help_text: str, limits: Limits | None = None) -> Any:
+    """Dataclass field with its help text and limits."""
+    return field(default=default, metadata={"help": help_text, "limits": limits})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServiceSettings:
+    """Settings of `tts2face serve`.
+
+    Raises
+    ------
+    InputError
+        A value is out of range, or the host is not this machine and there are no keys.
+    """
+
+    host: str = setting("127.0.0.1", "Address to listen on; others than this machine need keys.")
+    port: int = setting(8880, "Port; 0: a free one.", (0, 65535))
+    keys: Path | None = setting(None, "File of API keys, written by `tts2face keys`.")
+    hosts: tuple[str, ...] = setting((), "Further host names under which clients may reach the service.")
+    origins: tuple[str, ...] = setting((), "Web pages of other origins that may use the service: https://example.org.")
+    talker: str = setting("grid_s1", "Talker of requests that name none.")
+    face: str = setting("head", "Face of requests that name none.")
+    palette: str = setting("starter", "Palette of requests that name none.")
+    processes: int = setting(0, "Synthesis processes; 0: one for each core.", (0, 256))
+    sessions: int = setting(2, "Sets of talker, face and palette that each process keeps in memory.", (1, 16))
+    waiting: int = setting(64, "Requests that may wait for a process; further ones are refused with 429.", (0, 10_000))
+    text_characters: int = setting(100_000, "Longest text of a request.", (1, 10_000_000))
+    body_mb: float = setting(20.0, "Largest body of a request in MB.", (0.01, 4096))
+    body_s: float = setting(20.0, "Seconds within which the body of a request must arrive.", (0.1, 3600))
+    drain_s: float = setting(30.0, "Seconds that running requests have to finish after SIGTERM.", (0, 3600))
+    log_text: bool = setting(False, "Write the texts of requests to the log.")
+
+    def __post_init__(self) -> None:
+        """Check limits, and that a service that others can reach has keys."""
+        for one in fields(self):
+            if one.metadata["limits"] is not None:
+                check_limits(one.name, getattr(self, one.name), one.metadata["limits"])
+        if self.keys is None and not is_loopback(self.host):
+            raise InputError(
+                f"the service would be open to everybody who reaches {self.host}; create a key with `tts2face keys add "
+                f"NAME --file keys.toml` and give --keys keys.toml"
+            )
+
+    @property
+    def allowed_hosts(self) -> frozenset[str]:
+        """Host names that requests may name."""
+        return frozenset({*LOCAL_HOSTS, self.host, *self.hosts})
+
+    def as_toml(self) -> str:
+        """The settings as a settings file."""
+        return "".join(f"{name} = {_toml(value)}\n" for name, value in asdict(self).items() if value is not None)
+
+
+def is_loopback(host: str) -> bool:
+    """Whether an address reaches this machine only."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def read_settings(
+    path: Path | None = None, flags: Mapping[str, Any] | None = None, environment: Mapping[str, str] | None = None
+) -> ServiceSettings:
+    """Settings from a file, the environment and flags.
+
+    Parameters
+    ----------
+    flags
+        Values by name; None is ignored.
+    environment
+        Variables; None: those of this process.
+
+    Raises
+    ------
+    InputError
+        A name is unknown, a value has the wrong type or is out of range, or the file cannot be read.
+    """
+    values: dict[str, Any] = {}
+    if path is not None:
+        values |= _read_file(path)
+    for variable, text in (os.environ if environment is None else environment).items():
+        if variable.startswith(PREFIX):
+            name = variable.removeprefix(PREFIX).lower()
+            values[name] = _parse(_field(name, f"variable {variable}"), text, variable)
+    values |= {name: value for name, value in (flags or {}).items() if value is not None}
+    return ServiceSettings(**values)
+
+
+def _read_file(path: Path) -> dict[str, Any]:
+    try:
+        content = tomllib.loads(read_text(path, MAX_SETTINGS_BYTES))
+    except (OSError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"the settings {path} cannot be read: {error}") from error
+    return {name: _convert(_field(name, f"file {path}"), value, str(path)) for name, value in content.items()}
+
+
+def _field(name: str, source: str) -> Any:
+    known = {one.name: one for one in fields(ServiceSettings)}
+    if name not in known:
+        raise InputError(f"the {source} has an unknown setting {name!r}; the settings are {', '.join(known)}")
+    return known[name]
+
+
+def _convert(one: Any, value: Any, source: str) -> Any:
+    """A value of a TOML file in the type of its setting."""
+    kind = _kind(one)
+    if kind is tuple and isinstance(value, list) and all(isinstance(item, str) for item in value):
+        return tuple(value)
+    if kind is Path and isinstance(value, str):
+        return Path(value)
+    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if type(value) is kind:
+        return value
+    raise InputError(f"{one.name} in {source} must be {_describe(kind)}, not {value!r}")
+
+
+def _parse(one: Any, text: str, source: str) -> Any:
+    """The text of an environment variable in the type of its setting."""
+    kind = _kind(one)
+    if kind is tuple:
+        return tuple(item.strip() for item in text.split(",") if item.strip())
+    if kind is bool and text.lower() in {"true", "false", "1", "0"}:
+        return text.lower() in {"true", "1"}
+    try:
+        if kind in {int, float, str, Path}:
+            return kind(text)
+    except ValueError:
+        pass
+    raise InputError(f"{source} must be {_describe(kind)}, not {text!r}")
+
+
+def _kind(one: Any) -> Any:
+    if one.name == "keys":
+        return Path
+    return tuple if isinstance(one.default, tuple) else type(one.default)
+
+
+def _describe(kind: Any) -> str:
+    names = {int: "a whole number", float: "a number", bool: "true or false", tuple: "a list of texts", Path: "a path"}
+    return names.get(kind, "a text")
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    text = str(value).replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{text}"'
