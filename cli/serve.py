@@ -7,7 +7,6 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from cli.flags import switch, whole_number
-from cli.process import write_message
 from tts2face.service.settings import read_settings
 
 keys = App(name="keys", help="API keys of the service.")
@@ -29,7 +28,6 @@ def serve(
         return
     from tts2face.service.server import serve as run_server
 
-    write_message(f"tts2face: http://{chosen.host}:{chosen.port}/docs (ready when /readyz answers 200)")
     run_server(chosen)
 
 

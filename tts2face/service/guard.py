@@ -64,13 +64,13 @@ class Guard:
     def _check_host(self, request: "_Request") -> None:
         """Refuse names of other hosts (DNS rebinding) and pages of other origins."""
         host = request.headers.get(b"host", b"").decode("latin-1")
-        name = urlsplit(f"//{host}").hostname or ""
+        name = _host_name(host)
         if name not in self._state.settings.allowed_hosts:
             raise RefusedError(
                 421, "unknown_host", f"the host {name!r} is none of this service; add it to the setting hosts"
             )
         origin = request.headers.get(b"origin", b"").decode("latin-1")
-        if origin and origin not in self._state.settings.origins and urlsplit(origin).netloc != host:
+        if origin and origin not in self._state.settings.origins and origin.partition("://")[2] != host:
             raise RefusedError(
                 403,
                 "unknown_origin",
@@ -92,6 +92,14 @@ class Guard:
                 {"WWW-Authenticate": "Bearer"},
             )  # fmt: skip
         return found
+
+
+def _host_name(host: str) -> str:
+    """Name of a Host header without its port; empty if it is none."""
+    try:
+        return urlsplit(f"//{host}").hostname or ""
+    except ValueError:
+        return ""
 
 
 class _Request:

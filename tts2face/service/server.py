@@ -1,11 +1,14 @@
 """Running the service with uvicorn."""
 
+import json
 import logging
+import socket
 
 import uvicorn
 
 from tts2face.service.app import create_app
 from tts2face.service.settings import ServiceSettings
+from tts2face.service.state import LOG
 from tts2face.telemetry import disable_telemetry
 
 
@@ -29,7 +32,15 @@ def serve(settings: ServiceSettings) -> None:
 
 
 class DrainingServer(uvicorn.Server):
-    """Server that reports that it is shutting down."""
+    """Server that says where it listens and that it is shutting down."""
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Listen; then write the address, whose port may have been chosen by the system."""
+        await super().startup(sockets)
+        for server in self.servers:
+            for one in server.sockets:
+                host, port = one.getsockname()[:2]
+                LOG.info(json.dumps({"event": "listening", "url": f"http://{host}:{port}"}))
 
     def handle_exit(self, sig: int, frame: object) -> None:
         """Refuse new work while running requests finish."""

@@ -1,0 +1,156 @@
+"""What is refused before any work; a tiny application stands behind the guard."""
+
+import asyncio
+import json
+import logging
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from tts2face.service.guard import Guard, Receive, Scope, Send
+from tts2face.service.keys import add_key
+from tts2face.service.settings import ServiceSettings
+from tts2face.service.state import ServiceState
+
+
+async def echo(scope: Scope, receive: Receive, send: Send) -> None:
+    """Application that answers with the size of the body and the name of the key."""
+    size = 0
+    while True:
+        message = await receive()
+        size += len(message.get("body", b""))
+        if not message.get("more_body"):
+            break
+    body = json.dumps({"size": size, "key": scope["state"]["key"].name}).encode()
+    await send({"type": "http.response.start", "status": 200, "headers": []})
+    await send({"type": "http.response.body", "body": body})
+
+
+Make = Callable[..., httpx.AsyncClient]
+
+
+@pytest.fixture
+def make_client() -> Make:
+    def make(**settings: Any) -> httpx.AsyncClient:
+        state = ServiceState(ServiceSettings(processes=1, **settings))
+        return httpx.AsyncClient(transport=httpx.ASGITransport(Guard(echo, state)), base_url="http://localhost:8880")
+
+    return make
+
+
+def answer(client: httpx.AsyncClient, method: str = "POST", path: str = "/v1/x", **options: Any) -> httpx.Response:
+    async def ask() -> httpx.Response:
+        async with client:
+            return await client.request(method, path, **options)
+
+    return asyncio.run(ask())
+
+
+def code(response: httpx.Response) -> tuple[int, str]:
+    return response.status_code, response.json()["error"]["code"]
+
+
+def test_a_request_passes_with_headers(make_client: Make) -> None:
+    response = answer(make_client(), content=b"abc", headers={"x-request-id": "id-7"})
+    assert response.json() == {"size": 3, "key": "local"}
+    assert response.headers["x-request-id"] == "id-7"
+    assert response.headers["server-timing"].startswith("total;dur=")
+    assert response.headers["x-content-type-options"] == "nosniff"
+
+
+@pytest.mark.parametrize("given", ["a b", "x" * 65, "é"])
+def test_a_request_id_that_could_confuse_a_log_is_replaced(make_client: Make, given: str) -> None:
+    response = answer(make_client(), headers={"x-request-id": given.encode()})
+    assert len(response.headers["x-request-id"]) == 32
+
+
+@pytest.mark.parametrize("host", ["evil.example", "localhost.evil.example", "", "[bad"])
+def test_hosts_of_others_are_refused(make_client: Make, host: str) -> None:
+    assert code(answer(make_client(), headers={"host": host})) == (421, "unknown_host")
+
+
+def test_a_configured_host_is_served(make_client: Make) -> None:
+    assert answer(make_client(hosts=("face.example",)), headers={"host": "face.example:80"}).status_code == 200
+
+
+def test_pages_of_other_origins_are_refused(make_client: Make) -> None:
+    assert code(answer(make_client(), headers={"origin": "https://evil.example"})) == (403, "unknown_origin")
+    assert code(answer(make_client(), headers={"origin": "null"})) == (403, "unknown_origin")
+    assert answer(make_client(), headers={"origin": "http://localhost:8880"}).status_code == 200
+    allowed = make_client(origins=("https://a.example",))
+    assert answer(allowed, headers={"origin": "https://a.example"}).status_code == 200
+
+
+def test_a_service_with_keys_needs_one(make_client: Make, tmp_path: Path) -> None:
+    path = tmp_path / "keys.toml"
+    secret = add_key(path, "studio", ["speak"])
+    missing = answer(make_client(keys=path))
+    assert code(missing) == (401, "unauthorized")
+    assert missing.headers["www-authenticate"] == "Bearer"
+    assert "missing" in missing.text
+    wrong = answer(make_client(keys=path), headers={"authorization": "Bearer t2f_wrong"})
+    assert code(wrong) == (401, "unauthorized")
+    assert "t2f_wrong" not in wrong.text
+    for headers in ({"authorization": f"Bearer {secret}"}, {"x-api-key": secret}):
+        assert answer(make_client(keys=path), headers=headers).json()["key"] == "studio"
+    assert code(answer(make_client(keys=path), params={"key": secret})) == (401, "unauthorized")  # logs keep addresses
+    assert answer(make_client(keys=path), "GET", "/healthz").status_code == 200
+
+
+def test_a_large_body_is_refused_before_it_is_read(make_client: Make) -> None:
+    read: list[int] = []
+
+    async def body(n_parts: int) -> AsyncIterator[bytes]:
+        for number in range(n_parts):
+            read.append(number)
+            yield bytes(1000)
+
+    stated = answer(make_client(body_mb=0.01), content=body(100), headers={"content-length": "100000"})
+    assert code(stated) == (413, "too_large")
+    assert read == []
+    unstated = answer(make_client(body_mb=0.01), content=body(100))
+    assert code(unstated) == (413, "too_large")
+    assert len(read) <= 12
+    negative = answer(make_client(), headers={"content-length": "-1"})
+    assert code(negative) == (413, "too_large")
+
+
+def test_a_slow_body_is_refused(make_client: Make) -> None:
+    async def body() -> AsyncIterator[bytes]:
+        for _ in range(100):
+            yield b"x"
+            await asyncio.sleep(0.05)
+
+    assert code(answer(make_client(body_s=0.2), content=body())) == (408, "too_slow")
+
+
+def test_limits_of_a_key(make_client: Make, tmp_path: Path) -> None:
+    path = tmp_path / "keys.toml"
+    headers = {"authorization": f"Bearer {add_key(path, 'a', ['speak'], requests_per_minute=2)}"}
+    other = {"authorization": f"Bearer {add_key(path, 'b', ['speak'])}"}
+
+    async def ask() -> list[httpx.Response]:
+        async with make_client(keys=path) as client:
+            return [await client.post("/v1/x", headers=one) for one in (headers, headers, headers, other)]
+
+    first, second, third, of_other = asyncio.run(ask())
+    assert [one.status_code for one in (first, second, third, of_other)] == [200, 200, 429, 200]
+    assert 1 <= int(third.headers["retry-after"]) <= 30
+    assert "the key a has used its 2 requests a minute; wait" in third.text
+
+
+def test_the_log_has_one_line_and_no_secret(
+    make_client: Make, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "keys.toml"
+    secret = add_key(path, "studio", ["speak"])
+    with caplog.at_level(logging.INFO, "tts2face.service"):
+        answer(make_client(keys=path), content=b"my words", headers={"authorization": f"Bearer {secret}"})
+    (record,) = caplog.records
+    line = json.loads(record.message)
+    assert (line["key"], line["status"], line["method"]) == ("studio", 200, "POST")
+    assert secret not in record.message
+    assert "my words" not in record.message
