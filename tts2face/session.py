@@ -14,6 +14,7 @@ from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.synthesis.byte_stream import StreamFormat, encode_stream
 from tts2face.synthesis.clip_stream import Piece, SpeechSpan, TimedSpeech, measure_speech, timed_speech
 from tts2face.synthesis.fixed_length import Length, clips_of_length
+from tts2face.synthesis.live_speech import LiveSpeech
 from tts2face.synthesis.output_files import OutputFiles, plan_outputs
 from tts2face.synthesis.performance import Performance
 from tts2face.synthesis.performance_output import write_take
@@ -144,6 +145,10 @@ class Session:
         """
         prepared = prepare_request(text, options)
         return timed_speech(prepared, self._models.for_request(prepared.request))
+
+    def live(self, **options: Any) -> LiveSpeech:
+        """A clip without an end, extended by `LiveSpeech.say` and `LiveSpeech.idle`; options and errors as `clip`."""
+        return LiveSpeech(Request(**options), self._models)
 
     def stream_file(
         self,

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.service.messages import Event, Message, MessageKind
+from tts2face.service.messages import Event, Message, MessageKind, Wait
 from tts2face.service.scheduler import Scheduler, Step
 from tts2face.types import Chunk
 
@@ -91,7 +91,7 @@ def test_a_paused_task_waits(scheduler: Scheduler, sent: list[Message], clock: C
 
 def test_a_task_without_input_waits_until_it_is_woken(scheduler: Scheduler, sent: list[Message], clock: Clock) -> None:
     def listens() -> Iterator[Step]:
-        yield None
+        yield Wait()
         yield Event({"heard": True}, 0.5)
 
     scheduler.start(1, listens)

@@ -70,35 +70,44 @@ class ArkitProjection:
 
 
 def build_arkit_projection(target: Target) -> ArkitProjection:
-    """Projection for the channels of an export.
+    """Projection for the channels of an export; errors as `arkit_projection`."""
+    return arkit_projection(target.channels, target.face, target.name)
+
+
+def arkit_projection(channels: tuple[str, ...], face: Face | None, name: str) -> ArkitProjection:
+    """Projection for channels of a face.
+
+    Parameters
+    ----------
+    name
+        Name of the output in messages.
 
     Raises
     ------
     InputError
         No channel is an ARKit shape, or there are other channels and no face whose shapes they are.
     """
-    channels = target.channels
     columns = np.array([channels.index(name) if name in channels else -1 for name in ARKIT_SHAPES])
     others = np.array([at for at, name in enumerate(channels) if name not in ARKIT_SHAPES], np.int64)
     if (columns < 0).all():
         raise InputError(
-            f"{target.name} holds ARKit shapes, and the clip has none of them (its channels are "
+            f"{name} holds ARKit shapes, and the clip has none of them (its channels are "
             f"{', '.join(channels[:3])}, ...); choose a face with ARKit shapes, such as head or cartoon"
         )
     none = np.zeros((0, 0))
     if not len(others):
         return ArkitProjection(columns, others, np.zeros(0, np.int64), none, none)
-    if target.face is None:
+    if face is None:
         raise InputError(
             f"{len(others)} channels of the clip ({', '.join(channels[at] for at in others[:3])}, ...) are not ARKit "
-            f"shapes; to express them in {target.name}, give the clip's face, as in face=session.face"
+            f"shapes; to express them in {name}, give the clip's face, as in face=session.face"
         )
     helpers = np.array([
         at for at, name in enumerate(ARKIT_SHAPES) if columns[at] >= 0 and name.startswith(HELPER_PREFIXES)
     ])  # fmt: skip
     if not len(helpers):
         return ArkitProjection(columns, others, helpers, none, none)
-    curvature, cross = _inner_products(target.face, columns[helpers], others)
+    curvature, cross = _inner_products(face, columns[helpers], others)
     return ArkitProjection(columns, others, helpers, curvature, cross)
 
 

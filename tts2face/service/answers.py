@@ -11,7 +11,7 @@ from fastapi.responses import StreamingResponse
 
 from tts2face.service.messages import Message, MessageKind
 from tts2face.service.state import ServiceState
-from tts2face.service.tasks import Work
+from tts2face.service.work import Work
 
 
 def service_state(request: HttpRequest | WebSocket) -> ServiceState:

@@ -36,6 +36,13 @@ class Message:
 
 
 @dataclass(frozen=True, slots=True)
+class Wait:
+    """A task has nothing to do until it gets input, or until the given seconds have passed."""
+
+    seconds: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Event:
     """A JSON object as a part of a result, and the seconds of speech that it adds."""
 

@@ -13,8 +13,8 @@ from lexicon.errors import BackendError
 from tts2face.render.movie_stream import MOVIE_KINDS
 from tts2face.render.sound_stream import SOUND_KINDS
 from tts2face.service.messages import Message, MessageKind
-from tts2face.service.tasks import Work
 from tts2face.service.warm_process import ProcessEndedError, WarmProcess
+from tts2face.service.work import Work
 
 MOVIE_COST, LINES_COST, SOUND_COST = 1.0, 0.2, 0.1  # shares of a core of a stream in real time, rounded up
 CAPACITY = 2.0  # cost of the tasks that one process takes at a time
@@ -55,8 +55,10 @@ class PoolSettings:
 
 def work_cost(work: Work) -> float:
     """Share of a core that a work takes."""
-    if work.kind == "speech" or work.format in SOUND_KINDS:
-        return SOUND_COST if work.kind == "file" else LINES_COST
+    if work.kind != "file":
+        return LINES_COST
+    if work.format in SOUND_KINDS:
+        return SOUND_COST
     return MOVIE_COST if work.format in MOVIE_KINDS else LINES_COST
 
 
@@ -112,8 +114,14 @@ class Pool:
             await process.close()
         await asyncio.gather(*self._runs, return_exceptions=True)
 
-    async def stream(self, work: Work, key: str = "", priority: int = STREAM_PRIORITY) -> AsyncIterator[Message]:
-        """Messages of a work up to END; leaving the iteration cancels it.
+    async def stream(
+        self,
+        work: Work,
+        key: str = "",
+        priority: int = STREAM_PRIORITY,
+        inputs: "asyncio.Queue[Any] | None" = None,
+    ) -> AsyncIterator[Message]:
+        """Messages of a work up to END; leaving the iteration cancels it. `inputs` as for `WarmProcess.stream`.
 
         Raises
         ------
@@ -126,7 +134,7 @@ class Pool:
         while True:
             process = await self._take(cost, key)
             is_begun = False
-            messages = process.stream(work, priority)
+            messages = process.stream(work, priority, inputs)
             try:
                 async for message in messages:
                     is_begun = True

@@ -1,15 +1,17 @@
 """Cooperative scheduling of tasks in one process: whoever is nearest to running dry goes next."""
 
+import json
+import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from lexicon.errors import Tts2faceError
-from tts2face.service.messages import Event, Message, MessageKind
+from tts2face.service.messages import Event, Message, MessageKind, Wait
 from tts2face.types import Chunk
 
-Step = Chunk | Event | None  # a part of the result; None: the task waits for input
+Step = Chunk | Event | Wait  # a part of the result, or a wait
 Send = Callable[[Message], None]
 
 
@@ -24,8 +26,7 @@ class Task:
     seconds: float = 0.0  # of the clip made so far
     cpu_s: float = 0.0
     is_paused: bool = False
-    is_waiting: bool = False
-    inputs: list[Any] = field(default_factory=list)
+    wakes_at: float = 0.0  # seconds of the clock; infinite: only by input
 
     def lead(self, now: float) -> float:
         """Seconds by which the result is ahead of a listener who began at the request."""
@@ -76,12 +77,17 @@ class Scheduler:
     def wake(self, number: int) -> None:
         """Continue a task that waited for input."""
         if number in self._tasks:
-            self._tasks[number].is_waiting = False
+            self._tasks[number].wakes_at = 0.0
+
+    def seconds_to_wait(self) -> float | None:
+        """Seconds until a task can run without input; None if none will."""
+        wakes_at = min((task.wakes_at for task in self._tasks.values() if not task.is_paused), default=math.inf)
+        return None if wakes_at == math.inf else max(0.0, wakes_at - self._clock())
 
     def run_step(self) -> bool:
         """Run one step of the task that needs it most; False if no task can run."""
         now = self._clock()
-        ready = [task for task in self._tasks.values() if not (task.is_paused or task.is_waiting)]
+        ready = [task for task in self._tasks.values() if not task.is_paused and task.wakes_at <= now]
         if not ready:
             return False
         self._advance(min(ready, key=lambda task: (task.priority, task.lead(now))))
@@ -103,8 +109,8 @@ class Scheduler:
             self._send_error(task.number, error)
             return
         task.cpu_s += self._clock() - began
-        if step is None:
-            task.is_waiting = True
+        if isinstance(step, Wait):
+            task.wakes_at = math.inf if step.seconds is None else self._clock() + step.seconds
             return
         task.seconds += step.seconds
         if isinstance(step, Event):
@@ -119,8 +125,6 @@ class Scheduler:
 
 
 def _json_message(number: int, kind: MessageKind, content: dict[str, Any]) -> Message:
-    import json
-
     return Message(number, kind, json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode())
 
 

@@ -1,5 +1,6 @@
 """What all parts of a running service share."""
 
+import asyncio
 import json
 import logging
 from collections.abc import AsyncIterator
@@ -14,7 +15,7 @@ from tts2face.service.metrics import Metrics
 from tts2face.service.pool import Pool, PoolSettings
 from tts2face.service.rate_limits import RateLimits
 from tts2face.service.settings import ServiceSettings
-from tts2face.service.tasks import Work
+from tts2face.service.work import Work
 
 if TYPE_CHECKING:
     from tts2face.service.guard import _Request
@@ -42,7 +43,9 @@ class ServiceState:
         defaults = {"talker": self.settings.talker, "face": self.settings.face, "palette": self.settings.palette}
         return Work(models=defaults | (models or {}), **fields)
 
-    async def messages(self, work: Work, key: ApiKey) -> AsyncIterator[Message]:
+    async def messages(
+        self, work: Work, key: ApiKey, inputs: "asyncio.Queue[Any] | None" = None
+    ) -> AsyncIterator[Message]:
         """Messages of a work, without the last one; counted in the metrics.
 
         Raises
@@ -55,7 +58,7 @@ class ServiceState:
                 413, "too_long", f"the text has more than {self.settings.text_characters} characters; divide it"
             )
         try:
-            async with aclosing(self.pool.stream(work, key.name)) as stream:  # type: ignore[type-var]
+            async with aclosing(self.pool.stream(work, key.name, inputs=inputs)) as stream:  # type: ignore[type-var]
                 async for message in stream:
                     if message.kind == MessageKind.END:
                         measures = json.loads(message.payload)

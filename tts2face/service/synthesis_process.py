@@ -9,12 +9,14 @@ import os
 import queue
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any, BinaryIO
 
 from tts2face.child_process import exit_after
 from tts2face.service.messages import Message, MessageKind
 from tts2face.service.scheduler import Scheduler, Step
-from tts2face.service.tasks import TASKS, Work, work_from_json
+from tts2face.service.tasks import TASKS
+from tts2face.service.work import Work, work_from_json
 from tts2face.session_cache import Models, SessionCache
 
 WARM_TEXT = "Hello there."
@@ -87,7 +89,8 @@ def main() -> None:
         while not commands.empty():
             process.execute(json.loads(commands.get()))
         if not process.scheduler.run_step():
-            process.execute(json.loads(commands.get()))
+            with suppress(queue.Empty):
+                process.execute(json.loads(commands.get(timeout=process.scheduler.seconds_to_wait())))
 
 
 if __name__ == "__main__":

@@ -1,51 +1,17 @@
 """Tasks of a synthesis process: each makes a result step by step with a session."""
 
-import queue
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.service.messages import Event
+from tts2face.service.live_task import live
+from tts2face.service.messages import Event, Wait
+from tts2face.service.work import Inputs, Work
 from tts2face.types import Chunk
 
 if TYPE_CHECKING:
     from tts2face.session import Session
-
-Inputs = queue.SimpleQueue[Any]
-
-
-@dataclass(frozen=True, slots=True)
-class Work:
-    """What a task makes; all values are JSON.
-
-    Parameters
-    ----------
-    kind
-        Name of one of `TASKS`.
-    models
-        Fields of `tts2face.session_cache.Models` that differ from their defaults.
-    request, picture
-        Fields of `Request` and `Picture` that differ from their defaults.
-    format
-        Format of `Session.stream_file`.
-    """
-
-    kind: str = "file"
-    models: Mapping[str, Any] = field(default_factory=dict)
-    request: Mapping[str, Any] = field(default_factory=dict)
-    picture: Mapping[str, Any] = field(default_factory=dict)
-    format: str = "mp4"
-
-    def as_json(self) -> dict[str, Any]:
-        """JSON object from which `work_from_json` makes the work again."""
-        return asdict(self)
-
-
-def work_from_json(content: Mapping[str, Any]) -> Work:
-    """The work of `Work.as_json`."""
-    return Work(**content)
 
 
 def stream_file(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
@@ -74,7 +40,8 @@ def timed_speech(session: "Session", work: Work, _: Inputs) -> Iterator[Event | 
         yield Chunk(pcm_bytes(spoken.waveform), spoken.waveform.duration)
 
 
-TASKS: Mapping[str, Callable[["Session", Work, Inputs], Iterator[Any]]] = {
+TASKS: Mapping[str, Callable[["Session", Work, Inputs], Iterator[Chunk | Event | Wait]]] = {
     "file": stream_file,
     "speech": timed_speech,
+    "live": live,
 }

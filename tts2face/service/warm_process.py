@@ -12,7 +12,7 @@ from typing import Any
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
 from tts2face.batch.render_process import RETURNED_BLOCKS
 from tts2face.service.messages import HEADER, MAX_PAYLOAD_BYTES, Message, MessageKind
-from tts2face.service.tasks import Work
+from tts2face.service.work import Work
 
 KINDS: Mapping[str, type[Tts2faceError]] = {
     "InputError": InputError,
@@ -77,8 +77,15 @@ class WarmProcess:
                 await self._end()
                 self._on_change()
 
-    async def stream(self, work: Work, priority: int) -> AsyncIterator[Message]:
+    async def stream(
+        self, work: Work, priority: int, inputs: "asyncio.Queue[Any] | None" = None
+    ) -> AsyncIterator[Message]:
         """Messages of a task up to END, which is included; leaving the iteration cancels the task.
+
+        Parameters
+        ----------
+        inputs
+            JSON values that are passed on to the task.
 
         Raises
         ------
@@ -90,9 +97,11 @@ class WarmProcess:
         self._number += 1
         number, result = self._number, Result()
         self._results[number] = result
-        is_done = False
+        is_done, forwarding = False, None
         try:
             await self._command({"do": "start", "task": number, "work": work.as_json(), "priority": priority})
+            if inputs is not None:
+                forwarding = asyncio.create_task(self._forward(number, inputs))
             while not is_done:
                 message = await result.messages.get()
                 if message is None:
@@ -105,10 +114,17 @@ class WarmProcess:
                 await self._taken(number, result, message)
                 yield message
         finally:
+            if forwarding is not None:
+                forwarding.cancel()
             del self._results[number]
             if not is_done:
                 with suppress(ProcessEndedError):
                     await self._command({"do": "cancel", "task": number})
+
+    async def _forward(self, number: int, inputs: "asyncio.Queue[Any]") -> None:
+        with suppress(ProcessEndedError):
+            while True:
+                await self._command({"do": "input", "task": number, "content": await inputs.get()})
 
     async def close(self) -> None:
         """End the process at once."""

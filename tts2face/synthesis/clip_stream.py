@@ -103,7 +103,7 @@ def pieces(prepared: PreparedRequest, models: SynthesisModels, layer: GestureLay
     if prepared.request.audio is not None:
         yield from _recording_pieces(prepared, prepared.request.audio, models, layer)
     else:
-        yield from _spoken_pieces(prepared, models, layer)
+        yield from pieces_from(prepared, models, layer)
     if layer is not None:
         layer.finish()
 
@@ -131,8 +131,11 @@ def measure_speech(prepared: PreparedRequest, models: SynthesisModels) -> Speech
     return SpeechSpan(begin, end, total)
 
 
-def _spoken_pieces(prepared: PreparedRequest, models: SynthesisModels, layer: GestureLayer | None) -> Iterator[Piece]:
-    fps, first_frame = prepared.fps, 0
+def pieces_from(
+    prepared: PreparedRequest, models: SynthesisModels, layer: GestureLayer | None, first_frame: int = 0
+) -> Iterator[Piece]:
+    """Pieces of a text or of idle animation that begins at a frame of a longer clip."""
+    fps = prepared.fps
     for spoken, n_steps, text in _sentences(prepared, models):
         speech, begin = pad_to_frame(spoken.speech, first_frame, fps), float(first_frame / fps)
         timeline = spoken.timeline.restrict(0.0, speech.waveform.duration).shift(begin)
