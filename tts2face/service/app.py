@@ -11,7 +11,7 @@ from starlette.exceptions import HTTPException
 
 from tts2face import __version__
 from tts2face.service import clips, headtts, health, live, openai_speech
-from tts2face.service.errors import RefusedError, error_body
+from tts2face.service.errors import DOCUMENTED, RefusedError, error_body
 from tts2face.service.guard import Guard
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.state import ServiceState
@@ -30,7 +30,12 @@ def create_app(settings: ServiceSettings) -> FastAPI:
             await state.pool.close()
 
     app = FastAPI(
-        title="tts2face", version=__version__, lifespan=lifespan, redoc_url=None, description="Text to talking face."
+        title="tts2face",
+        version=__version__,
+        lifespan=lifespan,
+        redoc_url=None,
+        description="Text to talking face.",
+        responses=DOCUMENTED,
     )
     app.state.service = state
     for part in (openai_speech, clips, headtts, live, health):

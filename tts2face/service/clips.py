@@ -21,7 +21,7 @@ Format = Literal["mp4", "webm", "mp3", "opus", "aac", "flac", "wav", "pcm", "cur
 class ClipRequest(BaseModel):
     """What is said, how the face moves and how it is drawn; meanings as of the flags of the command line."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", strict=True)
 
     text: Annotated[str, Field(description="Text, with marks or SSML.", examples=["Hello there."])] = ""
     format: Annotated[Format, Field(description="Movie, sound, or lines.")] = "mp4"

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from pydantic import BaseModel
+
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
 from tts2face.service.pool import BusyError
 
@@ -38,6 +40,38 @@ def as_refused(error: Tts2faceError) -> RefusedError:
     status, code = next(found for kind, found in STATUS.items() if isinstance(error, kind))
     headers = {"Retry-After": str(BusyError.retry_after_s)} if status in {429, 503} else {}
     return RefusedError(status, code, " ".join(str(error).split()), headers)
+
+
+class ErrorDetail(BaseModel):
+    """What is wrong."""
+
+    message: str
+    type: str
+    param: str | None
+    code: str
+
+
+class ErrorBody(BaseModel):
+    """An error, in the form of OpenAI's API."""
+
+    error: ErrorDetail
+
+
+DOCUMENTED: dict[int | str, dict[str, Any]] = {
+    status: {"model": ErrorBody, "description": text}
+    for status, text in {
+        400: "A value is wrong.",
+        401: "The API key is missing or unknown.",
+        403: "The key lacks the scope, or the page is of another origin.",
+        408: "The body did not arrive in time.",
+        413: "The body or text is too long.",
+        421: "The host is none of this service.",
+        422: "The body does not have the form of the schema.",
+        429: "Too many requests; Retry-After says when to repeat.",
+        500: "A defect of the service; the log says more.",
+        503: "Something is missing on the server, or it is not ready.",
+    }.items()
+}
 
 
 def error_body(code: str, message: str, param: str | None = None) -> dict[str, Any]:

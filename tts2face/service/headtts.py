@@ -31,7 +31,7 @@ SILENT_VISEME = "sil"
 class HeadTtsRequest(BaseModel):
     """A text, or items, and how they are spoken."""
 
-    model_config = ConfigDict(extra="ignore")
+    model_config = ConfigDict(extra="ignore", strict=True)
 
     input: Annotated[
         str | list[str | dict[str, Any]],
@@ -51,7 +51,32 @@ def hello() -> str:
     return "HeadTTS v1.3 (tts2face)"
 
 
-@router.post("/v1/synthesize", summary="Speak a text with words and visemes")
+class HeadTtsError(BaseModel):
+    """An error as HeadTTS reports it."""
+
+    error: str
+
+
+class HeadTtsAudio(BaseModel):
+    """Sound with its words and visemes; times in milliseconds."""
+
+    audio: Annotated[str, Field(description="Base64 of a .wav file or of 16-bit samples.")]
+    audioEncoding: str  # noqa: N815
+    words: list[str]
+    wtimes: list[int]
+    wdurations: list[int]
+    visemes: list[str]
+    vtimes: list[int]
+    vdurations: list[int]
+    phonemes: list[str]
+
+
+OWN_ERRORS: dict[int | str, dict[str, Any]] = {status: {"model": HeadTtsError} for status in (400, 413, 429, 503)}
+
+
+@router.post(
+    "/v1/synthesize", summary="Speak a text with words and visemes", response_model=HeadTtsAudio, responses=OWN_ERRORS
+)
 async def synthesize(request: HttpRequest, body: HeadTtsRequest) -> JSONResponse:
     """Sound as base64, words and Oculus visemes with times in milliseconds."""
     try:

@@ -23,7 +23,7 @@ INVALID = 1007  # WebSocket close code: a message is not what it should be
 class LiveOptions(BaseModel):
     """First message of a live stream."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", strict=True)
 
     type: Literal["start"]
     language: Annotated[str, Field(description="Language of the text.")] = "en-us"

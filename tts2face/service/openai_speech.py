@@ -30,7 +30,7 @@ Format = Literal["mp3", "opus", "aac", "flac", "wav", "pcm", "mp4", "webm", "jso
 class Speech(BaseModel):
     """A text to speak."""
 
-    model_config = ConfigDict(extra="ignore")
+    model_config = ConfigDict(extra="ignore", strict=True)
 
     input: Annotated[str, Field(min_length=1, description="Text, with marks or SSML.", examples=["Hello there."])]
     model: Annotated[str, Field(description="A talker, or a model name of OpenAI for the default talker.")] = "tts-1"
