@@ -1,8 +1,8 @@
 """Streams of results as HTTP answers."""
 
 import json
-from collections.abc import AsyncIterator, Callable, Mapping
-from contextlib import aclosing
+from collections.abc import AsyncIterator, Callable
+from contextlib import AsyncExitStack, aclosing
 from typing import Any
 
 from fastapi import Request as HttpRequest
@@ -26,7 +26,7 @@ async def stream_work(
     media_type: str,
     *,
     convert: "Callable[[AsyncIterator[Message]], AsyncIterator[bytes]] | None" = None,
-    headers: Mapping[str, str] | None = None,
+    resources: AsyncExitStack | None = None,
 ) -> StreamingResponse:
     """Answer that sends a result while it is made.
 
@@ -36,8 +36,10 @@ async def stream_work(
     ----------
     convert
         Converts messages to bytes; None: the bytes of all data.
+    resources
+        Closed when the answer is complete or has failed.
     """
-    state = service_state(request)
+    state, stack = service_state(request), resources or AsyncExitStack()
     messages = state.messages(work, request.state.key)
     chunks = (convert or data_bytes)(messages)
     try:
@@ -46,15 +48,16 @@ async def stream_work(
         first = b""
     except BaseException:
         await messages.aclose()  # type: ignore[attr-defined]
+        await stack.aclose()
         raise
 
     async def body() -> AsyncIterator[bytes]:
-        async with aclosing(messages):  # type: ignore[type-var]
+        async with stack, aclosing(messages):  # type: ignore[type-var]
             yield first
             async for chunk in chunks:
                 yield chunk
 
-    return StreamingResponse(body(), media_type=media_type, headers=dict(headers or {}))
+    return StreamingResponse(body(), media_type=media_type)
 
 
 async def data_bytes(messages: AsyncIterator[Message]) -> AsyncIterator[bytes]:

@@ -44,6 +44,7 @@ class ServiceSettings:
     sessions: int = setting(2, "Sets of talker, face and palette that each process keeps in memory.", (1, 16))
     waiting: int = setting(64, "Requests that may wait for a process; further ones are refused with 429.", (0, 10_000))
     text_characters: int = setting(100_000, "Longest text of a request.", (1, 10_000_000))
+    sound_s: float = setting(600.0, "Longest recording that a request may send.", (1, 86_400))
     body_mb: float = setting(20.0, "Largest body of a request in MB.", (0.01, 4096))
     body_s: float = setting(20.0, "Seconds within which the body of a request must arrive.", (0.1, 3600))
     drain_s: float = setting(30.0, "Seconds that running requests have to finish after SIGTERM.", (0, 3600))
