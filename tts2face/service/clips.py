@@ -44,7 +44,7 @@ class ClipRequest(BaseModel):
     style: Annotated[str | None, Field(description="Style of the palette.", examples=["delighted"])] = None
     gain: Annotated[str | None, Field(description="Gains of features.", examples=["head=1.5"])] = None
     expression: Annotated[str | None, Field(description="Expressions with times.", examples=["happy=0.6"])] = None
-    idle: Annotated[float | None, Field(ge=0.1, le=3600, description="Seconds of idle animation, no speech.")] = None
+    idle: Annotated[float | None, Field(ge=0.1, le=30, description="Seconds of idle animation, no speech.")] = None
     talker: Annotated[str | None, Field(description="A talker of GET /v1/talkers.")] = None
     face: Annotated[str | None, Field(description="A face of GET /v1/faces, or self.")] = None
     identity: Annotated[str | None, Field(description="Identity preset of the face.")] = None
