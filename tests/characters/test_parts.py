@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError
-from tts2face.characters.atlas import build_atlas, opacity_levels, triangle_alpha
+from tts2face.characters.atlas import CUTOUT, build_atlas, coverage, fill_uncovered, triangle_opacity
 from tts2face.characters.character import BLEND, MASK, Material
 from tts2face.characters.glb_writer import matrix_quaternion
 from tts2face.characters.gltf_character import read_gltf_character
@@ -145,16 +145,42 @@ def test_images_of_materials_lie_in_one_texture() -> None:
         assert (atlas.texture[row, column] == 40 * n + 20).all()
 
 
-def test_alpha_leaves_triangles_out_or_makes_them_translucent() -> None:
-    image = np.full((8, 8, 4), 255, np.uint8)
-    image[:, :4, 3] = 0
-    corners = np.array([[[0.05, 0.1], [0.4, 0.1], [0.2, 0.9]], [[0.6, 0.1], [0.95, 0.1], [0.8, 0.9]]])
+def test_triangles_are_opaque_empty_translucent_or_have_holes() -> None:
+    image = np.full((64, 64, 4), 255, np.uint8)
+    image[:, :32, 3] = 0
+    image[10:12, 4:6, 3] = 255  # a strand between the corners of the first triangle
+    corners = np.array(
+        [
+            [[0.02, 0.1], [0.4, 0.1], [0.2, 0.9]],
+            [[0.6, 0.1], [0.95, 0.1], [0.8, 0.9]],
+            [[0.02, 0.5], [0.4, 0.5], [0.2, 0.9]],
+            [[0.3, 0.5], [0.9, 0.5], [0.6, 0.9]],
+        ]
+    )
     masked = Material("lashes", image=image, alpha_mode=MASK)
-    assert opacity_levels(masked, triangle_alpha(masked, corners)).tolist() == [0.0, 1.0]
-    blended = Material("glass", (1.0, 1.0, 1.0, 0.5), image, alpha_mode=BLEND)
-    assert opacity_levels(blended, triangle_alpha(blended, corners)).tolist() == [0.0, 0.55]
-    opaque = Material("skin", image=image)
-    assert opacity_levels(opaque, triangle_alpha(opaque, corners)).tolist() == [1.0, 1.0]
+    assert triangle_opacity(masked, corners).tolist() == [CUTOUT, 1.0, 0.0, CUTOUT]
+    glass = Material("glass", (1.0, 1.0, 1.0, 0.5), image, alpha_mode=BLEND)
+    assert triangle_opacity(glass, corners).tolist() == [CUTOUT, 0.55, 0.0, CUTOUT]
+    assert triangle_opacity(Material("skin", image=image), corners).tolist() == [1.0] * 4
+    assert triangle_opacity(Material("tint", (1.0, 1.0, 1.0, 0.3), alpha_mode=BLEND), corners).tolist() == [0.3] * 4
+
+
+def test_the_cutoff_of_a_mask_decides_its_coverage() -> None:
+    image = np.full((1, 4, 4), 255, np.uint8)
+    image[0, :, 3] = [0, 60, 100, 255]
+    assert coverage(Material("hair", image=image, alpha_mode=MASK, cutoff=0.3)).tolist() == [[0, 0, 255, 255]]
+    half = Material("hair", (1.0, 1.0, 1.0, 0.5), image, alpha_mode=MASK, cutoff=0.3)
+    assert coverage(half).tolist() == [[0, 0, 0, 255]]
+    assert coverage(Material("hair", (1.0, 1.0, 1.0, 0.5), image, alpha_mode=BLEND)).tolist() == [[0, 30, 50, 128]]
+
+
+def test_hidden_colours_beyond_an_edge_are_those_of_the_visible_pixels_near_them() -> None:
+    colours, covered = np.zeros((37, 50, 3), np.uint8), np.zeros((37, 50), np.uint8)
+    colours[:, :10], covered[:, :10] = (10, 200, 30), 255
+    colours[:, 40:], covered[:, 40:] = (200, 20, 90), 255
+    filled = fill_uncovered(colours, covered)
+    np.testing.assert_array_equal(filled[:, :14], np.broadcast_to([10, 200, 30], (37, 14, 3)))
+    np.testing.assert_array_equal(filled[:, 36:], np.broadcast_to([200, 20, 90], (37, 14, 3)))
 
 
 def test_points_under_pixels_are_where_the_rays_meet_the_plane() -> None:
