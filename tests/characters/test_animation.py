@@ -14,6 +14,7 @@ from lexicon.sequence import PhoneSequence
 from tests.characters.made import METRES, Variant, shipped_head, split_glb, write_character_file, write_landmarks
 from tests.exports import programs
 from tts2face.characters.animation import write_character
+from tts2face.characters.bone_tracks import NECK_SHARE
 from tts2face.characters.importing import import_face
 from tts2face.face.deformation import build_rig
 from tts2face.models.face import Face
@@ -121,8 +122,10 @@ def test_head_and_eye_bones_turn(folder: Path) -> None:
     clip = made_clip(face, {"eyeLookOutLeft": 1.0}, head=(0.0, 0.3, 0.0, 0.0, 0.0, 0.0))
     written = write_character(clip, face, folder / "bones_out.glb")
     played = Played(folder / "bones_out.glb")
-    assert set(written.bones) == {"head", "leftEye", "rightEye"}
-    np.testing.assert_allclose(played.track("rotation", "Head")[-1], [0, np.sin(0.15), 0, np.cos(0.15)], atol=1e-6)
+    assert set(written.bones) == {"neck", "head", "leftEye", "rightEye"}
+    for bone, share in (("Neck", NECK_SHARE), ("Head", 1 - NECK_SHARE)):
+        half = 0.15 * share  # of the angle about the vertical axis, rad
+        np.testing.assert_allclose(played.track("rotation", bone)[-1], [0, np.sin(half), 0, np.cos(half)], atol=1e-6)
     angle = face.eyes[0].turns["eyeLookOutLeft"][1] / 2
     np.testing.assert_allclose(played.track("rotation", "LeftEye")[-1], [0, np.sin(angle), 0, np.cos(angle)], atol=1e-6)
 
