@@ -18,6 +18,7 @@ from tts2face.characters.bone_tracks import NECK_SHARE
 from tts2face.characters.importing import import_face
 from tts2face.face.deformation import build_rig
 from tts2face.models.face import Face
+from tts2face.models.face_file import read_face
 from tts2face.session import Session
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
@@ -194,7 +195,7 @@ def test_another_file_or_face_is_refused(folder: Path) -> None:
     with pytest.raises(InputError, match="not imported from a character's file"):
         write_character(clip, shipped_head(), folder / "x.glb")
     (folder / "other.glb").write_bytes((folder / "own.glb").read_bytes() + b"\0")
-    with pytest.raises(DataError, match="is not the file from which the face was imported"):
+    with pytest.raises(DataError, match=r"content of .* differs from the file from which the face was imported"):
         write_character(clip, face, folder / "x.glb", character=folder / "other.glb")
     with pytest.raises(DataError, match="there is no character"):
         write_character(clip, face, folder / "x.glb", character=folder / "none.glb")
@@ -217,8 +218,32 @@ def test_an_export_is_the_animated_character(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="would replace the character"):
         write_character(session.clip("Hello.", fps=10), session.mesh, character)
     assert character.read_bytes() == before
-    character.unlink()
-    assert run(["Hello.", "--face", str(face), "--out", str(out), "--fps", "10", "--quiet"]) == 3
+
+
+def test_a_moved_character_is_found_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    character = write_character_file(tmp_path / "character.glb")
+    table = write_landmarks(tmp_path / "landmarks.tsv")
+    face, out, moved = tmp_path / "me.face", tmp_path / "spoken.glb", tmp_path / "elsewhere.glb"
+    assert run(["face", "import", str(character), "--out", str(face), "--landmarks", str(table), "--quiet"]) == 0
+    character.rename(moved)
+    speak = ["Hello.", "--face", str(face), "--out", str(out), "--fps", "10", "--quiet"]
+    assert run(speak) == 3
+    assert "if it was moved, run `tts2face face relink FACE.face CHARACTER`" in capsys.readouterr().err
+    before = read_face(face)
+    assert run(["face", "relink", str(face), str(moved), "--quiet"]) == 0
+    after = read_face(face)
+    np.testing.assert_array_equal(before.texture, after.texture)
+    np.testing.assert_array_equal(before.shapes, after.shapes)
+    assert run(speak) == 0
+    assert max(Played(out).weights().values()) > 0.1
+    linked = face.read_bytes()
+    moved.write_bytes(moved.read_bytes() + b"\0")
+    assert run(["face", "relink", str(face), str(moved), "--quiet"]) == 3
+    assert "differs from the file from which the face was imported" in capsys.readouterr().err
+    assert run(["face", "relink", str(face), str(tmp_path / "none.glb"), "--quiet"]) == 3
+    assert "none.glb; check the path" in capsys.readouterr().err
+    assert run(["face", "relink", str(tmp_path / "no.face"), str(moved), "--quiet"]) == 2
+    assert face.read_bytes() == linked
 
 
 @pytest.mark.parametrize("variant", [Variant(), Variant(is_skinned=True)], ids=["plain", "skinned"])
