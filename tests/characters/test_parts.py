@@ -15,7 +15,7 @@ from tts2face.characters.meshopt import apply_exponential_filter, decode_buffer
 from tts2face.characters.nodes import quaternion_matrix
 from tts2face.characters.shape_mapping import ShapeSource
 from tts2face.characters.shape_names import ARKIT_SHAPES, guess_mapping
-from tts2face.characters.surface_points import nearest_points, points_under_pixels
+from tts2face.characters.surface_points import _barycentric, _Projection, nearest_points, points_under_pixels
 from tts2face.models.face_file import load_face
 from tts2face.render.camera import CameraMatrices
 
@@ -193,6 +193,31 @@ def test_points_under_pixels_are_where_the_rays_meet_the_plane() -> None:
     points, facing = points_under_pixels(pixels, vertices, triangles, camera)
     np.testing.assert_allclose(points.places(vertices), wanted, atol=1e-9)
     assert (facing > 0.99).all()
+
+
+def test_the_nearest_triangle_under_a_pixel_is_that_of_a_brute_force_search() -> None:
+    head = load_face("head")
+    vertices, triangles = head.vertices.astype(np.float64), head.triangles.astype(np.int64)
+    view = np.array([[1.0, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 500]])
+    camera = CameraMatrices(view, np.array([1000.0, 320.0, 320.0, 1.0]))
+    projection = _Projection(vertices, triangles, camera)
+    there = vertices @ view[:, :3].T + view[:, 3]
+    flat = there[:, :2] / there[:, 2:] * 1000.0 + 320.0
+    a, b, c = (flat[triangles[:, corner]] for corner in range(3))
+    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    facing = triangles[area < 0]
+    random = np.random.default_rng(5)
+    n_hits = 0
+    for pixel in random.uniform(-150, 1050, (300, 2)):
+        weights = _barycentric(pixel, flat[facing])
+        inside = np.flatnonzero((weights >= 0).all(axis=1))
+        depths = (weights[inside] * there[facing[inside], 2]).sum(axis=1)
+        hit = projection.hit(pixel)
+        assert (hit is None) == (not len(inside))
+        if hit is not None:
+            n_hits += 1
+            assert hit.depth == pytest.approx(depths.min(), abs=1e-6)
+    assert n_hits > 40
 
 
 def test_nearest_points_are_those_of_a_brute_force_search() -> None:
