@@ -1,7 +1,5 @@
 """Animation of a clip on the file of an imported character: its own morph targets, head and eye bones."""
 
-import io
-import wave
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +23,8 @@ from tts2face.face.mouth_model import SPEECH_SHAPE_PREFIXES
 from tts2face.models.face import Face
 from tts2face.storage.files import write_atomically
 from tts2face.storage.overwrite import refuse_overwriting
-from tts2face.types import Clip, Trajectory, Waveform
+from tts2face.storage.wave_files import wave_bytes
+from tts2face.types import Clip, Trajectory
 
 ANIMATION = "tts2face"
 BOTH_SIDES_SHARE = 0.5  # of each of two shapes that one morph target for both sides gets
@@ -89,7 +88,7 @@ def write_character(
     out = Path(out)
     refuse_overwriting({"the output": out}, {"the character": character_file(read_binding(face), character)})
     animated = animate_character(clip.motion, clip.head, face, character=character)
-    write_atomically(out.with_suffix(".wav"), wave_bytes(clip.speech.waveform))
+    write_atomically(out.with_suffix(".wav"), wave_bytes(clip.speech.waveform.samples, clip.speech.waveform.rate))
     write_atomically(out, animated.content)
     return WrittenCharacter(out, len(clip.motion), animated.n_targets, animated.bones)
 
@@ -126,15 +125,6 @@ def target_weights(
             for target, weight in source_weights(character, source).items():
                 found[target] = found.get(target, np.zeros(len(track))) + share * weight * track
     return found
-
-
-def wave_bytes(waveform: Waveform) -> bytes:
-    """Content of a 16-bit .wav file."""
-    content = io.BytesIO()
-    with wave.open(content, "wb") as file:
-        file.setparams((1, 2, waveform.rate, 0, "NONE", ""))
-        file.writeframes(np.rint(np.clip(waveform.samples, -1, 1) * 32767).astype("<i2").tobytes())
-    return content.getvalue()
 
 
 def _own_values(motion: Trajectory, face: Face, own: list[str]) -> FloatArray:
