@@ -1,7 +1,6 @@
 """Parts of the import: names of shapes, compressed buffers, atlas, alpha, points under pixels."""
 
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ from lexicon.errors import DataError
 from tts2face.characters.atlas import CUTOUT, build_atlas, coverage, fill_uncovered, triangle_opacity
 from tts2face.characters.character import BLEND, MASK, Material
 from tts2face.characters.glb_writer import matrix_quaternion
-from tts2face.characters.gltf_character import read_gltf_character
 from tts2face.characters.meshopt import apply_exponential_filter, decode_buffer
 from tts2face.characters.nodes import quaternion_matrix
 from tts2face.characters.shape_mapping import ShapeSource
@@ -106,21 +104,6 @@ def test_triangles_and_attributes_of_the_reference_encoder() -> None:
     stream = np.frombuffer(bytes(meshoptimizer.encode_vertex_buffer(words, 700, 12)), np.uint8)
     if stream[0] == 0xA0:
         np.testing.assert_array_equal(decode_buffer(stream, "ATTRIBUTES", 700, 12), rows.reshape(-1))
-
-
-def test_the_head_that_openfacefx_carries() -> None:
-    spec = find_spec("openfacefx")
-    path = Path(spec.origin).parent / "studio_web/assets/facecap.glb" if spec and spec.origin else None
-    if path is None or not path.is_file():
-        pytest.skip("the package openfacefx, which carries a head, is not installed")
-    character = read_gltf_character(path)
-    assert [len(piece.vertices) for piece in character.pieces] == [530, 530, 2694, 614]
-    assert len(guess_mapping(character.target_names.values())) == 52
-    assert "KTX2" in character.notes[0]
-    head = character.pieces[2]
-    size = np.ptp(head.vertices, axis=0)
-    edges = head.vertices[head.triangles[:, 0]] - head.vertices[head.triangles[:, 1]]
-    assert np.linalg.norm(edges, axis=1).max() < 0.3 * size.max()  # wrongly decoded triangles cross the whole head
 
 
 def test_quaternions_of_rotation_matrices() -> None:
