@@ -11,7 +11,7 @@ import pytest
 from cli.main import run
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence
-from tests.characters.made import METRES, Variant, shipped_head, split_glb, write_character_file, write_landmarks
+from tests.characters.made import METRES, Variant, glb, shipped_head, split_glb, write_character_file, write_landmarks
 from tests.exports import programs
 from tts2face.characters.animation import write_character
 from tts2face.characters.bone_tracks import NECK_SHARE
@@ -163,6 +163,26 @@ def test_eyeballs_that_are_nodes_without_bones_turn_about_their_centres(folder: 
     assert np.abs(turn @ centre + shift - centre).max() < 0.5 * METRES  # the fitted centre is 0.55 mm off
     assert np.arctan2(sin, cos) == pytest.approx(face.eyes[1].turns["eyeLookUpRight"][0], abs=1e-5)
     assert np.abs(played.track("rotation", "LeftEye")[-1][:3]).max() == 0.0
+
+
+def test_a_pose_that_the_file_was_saved_in_is_not_the_face_at_rest(folder: Path) -> None:
+    plain = imported(folder, "unposed", Variant())
+    names = shipped_head().shape_names
+    character = write_character_file(
+        folder / "saved.glb", Variant(rename=lambda name: "Fatness" if name == "cheekPuff" else name)
+    )
+    root, binary = split_glb(character.read_bytes())
+    saved = {"jawOpen": 0.4, "cheekPuff": 0.5}
+    root["meshes"][0]["weights"] = [saved.get(name, 0.0) for name in names]
+    character.write_bytes(glb(root, binary))
+    result = import_face(character, landmarks=folder / "landmarks.tsv")
+    fat = shipped_head().shapes[names.index("cheekPuff")] * 0.5
+    gaps = np.abs(result.face.vertices - result.face.vertices[0] - (plain.vertices - plain.vertices[0]))
+    assert gaps.max() == pytest.approx(np.abs(fat - fat[0]).max(), abs=0.02)  # mm; the jaw alone would give 20
+    assert any("poses 1 of the mapped shapes (jawOpen 0.40)" in note for note in result.report.notes)
+    write_character(made_clip(result.face, {"mouthPucker": 0.3}), result.face, folder / "saved_out.glb")
+    weights = {name: weight for name, weight in Played(folder / "saved_out.glb").weights().items() if weight}
+    assert weights == {"mouthPucker": pytest.approx(0.3, abs=1e-6), "Fatness": pytest.approx(0.5, abs=1e-6)}
 
 
 def test_motion_of_missing_shapes_is_carried_by_own_ones(folder: Path) -> None:

@@ -14,7 +14,7 @@ from tts2face.characters.character import Character, Target
 from tts2face.characters.glb_writer import GlbWriter
 from tts2face.characters.gltf import GltfFile, read_gltf
 from tts2face.characters.gltf_character import read_gltf_character
-from tts2face.characters.head_mesh import source_weights
+from tts2face.characters.head_mesh import mapped_targets, source_weights
 from tts2face.characters.nodes import NodeTree, read_nodes
 from tts2face.characters.shape_mapping import ShapeMapping
 from tts2face.face.bounded_least_squares import bounded_least_squares
@@ -105,7 +105,8 @@ def animate_character(
     writer = GlbWriter(file)
     bones = BoneTracks(face, binding, source, tree, writer)
     turned = [*bones.eye_tracks(motion), *bones.head_tracks(head, file)]
-    tracks = [*_weight_tracks(file, tree, weights, len(motion)), *turned]
+    driven = mapped_targets(source, binding.mapping)
+    tracks = [*_weight_tracks(file, tree, (weights, driven), len(motion)), *turned]
     writer.add_animation(ANIMATION, np.arange(len(motion)) / motion.fps, tracks)
     names = dict.fromkeys(bones.name_of(node) for node, _, _ in turned)
     return AnimatedCharacter(writer.content(), len(weights), tuple(names))
@@ -114,7 +115,7 @@ def animate_character(
 def target_weights(
     motion: Trajectory, face: Face, character: Character, mapping: ShapeMapping
 ) -> dict[Target, FloatArray]:
-    """Weights (T,) of each morph target that a motion moves, in addition to the file's default weights."""
+    """Weights (T,) of each morph target that a motion moves."""
     channels = motion.channels
     own = [name for name in channels if name in mapping]
     values = dict(zip(own, _own_values(motion, face, own).T, strict=True))
@@ -165,8 +166,15 @@ def _with_replacement(
     return np.where(is_moved.reshape(-1, 1), solved, weights)
 
 
-def _weight_tracks(file: GltfFile, tree: NodeTree, weights: Mapping[Target, FloatArray], n_frames: int) -> list[Track]:
-    """Tracks of the morph weights (T * targets, 1) of every shown node whose mesh has animated targets."""
+def _weight_tracks(
+    file: GltfFile, tree: NodeTree, animated_targets: tuple[Mapping[Target, FloatArray], set[Target]], n_frames: int
+) -> list[Track]:
+    """Tracks of the morph weights (T * targets, 1) of every shown node whose mesh has animated targets.
+
+    `animated_targets` holds the weights (T,), and all targets that the face drives: those without motion are 0, and
+    other targets keep the file's default weights.
+    """
+    weights, driven = animated_targets
     nodes, meshes = file.root.children("nodes"), file.root.children("meshes")
     tracks: list[Track] = []
     for number in sorted(tree.world):
@@ -177,7 +185,8 @@ def _weight_tracks(file: GltfFile, tree: NodeTree, weights: Mapping[Target, Floa
         n_targets = max(len(p.children("targets")) for p in meshes[mesh].children("primitives"))
         holder = nodes[number] if nodes[number].has("weights") else meshes[mesh]
         rest = holder.numbers("weights", n_targets, (0.0,) * n_targets)
-        rows = np.tile(np.array(rest), (n_frames, 1))
+        kept = [0.0 if Target(mesh, number) in driven else weight for number, weight in enumerate(rest or ())]
+        rows = np.tile(np.array(kept), (n_frames, 1))
         for target, track in animated.items():
             if target < n_targets:
                 rows[:, target] += track

@@ -138,6 +138,12 @@ def moved_box(head: HeadMesh) -> tuple[FloatArray, FloatArray]:
     return places.min(axis=0), places.max(axis=0)
 
 
+def mapped_targets(character: Character, mapping: ShapeMapping) -> set[Target]:
+    """Morph targets that the shapes of a mapping use; their weights are 0 at rest, whatever the file's defaults are."""
+    sources = (source for sources in mapping.values() for source in sources)
+    return {target for source in sources for target in source_weights(character, source)}
+
+
 def source_weights(character: Character, source: ShapeSource) -> Mapping[Target, float]:
     """Weights of the morph targets that a source names: targets of this name, otherwise a VRM expression."""
     named = {target: source.gain for target, name in character.target_names.items() if name == source.name}
@@ -170,8 +176,9 @@ def _join(character: Character, mapping: ShapeMapping, turn: FloatArray) -> Head
             zeros = [np.zeros(piece.vertices.shape, np.float32) for piece in pieces]
             parts = [zero if part is None else part for part, zero in zip(moved, zeros, strict=True)]
             shapes[shape] = (np.concatenate(parts) @ turn.T).astype(np.float32)
+    driven = mapped_targets(character, mapping)
     return HeadMesh(
-        vertices=np.concatenate([piece.vertices for piece in pieces]) @ turn.T,
+        vertices=np.concatenate([_at_rest(piece, driven) for piece in pieces]) @ turn.T,
         triangles=np.concatenate([piece.triangles + start for piece, start in zip(pieces, starts, strict=False)]),
         piece_of=np.repeat(np.arange(len(pieces)), [len(piece.triangles) for piece in pieces]),
         uv=np.concatenate([_or_nan(piece.uv, len(piece.vertices)) for piece in pieces]),
@@ -183,6 +190,14 @@ def _join(character: Character, mapping: ShapeMapping, turn: FloatArray) -> Head
         eye_of=np.zeros(int(starts[-1]), np.int8),
         turn=turn,
     )
+
+
+def _at_rest(piece: Piece, driven: set[Target]) -> FloatArray:
+    """Vertices (N, 3) of a piece with weights of 0 of the driven targets."""
+    vertices = piece.vertices
+    for target in driven & piece.defaults.keys() & piece.morphs.keys():
+        vertices = vertices - piece.defaults[target] * piece.morphs[target]
+    return vertices
 
 
 def _displacement(piece: Piece, sources: list[Mapping[Target, float]]) -> NDArray[np.float32] | None:

@@ -17,7 +17,7 @@ from tts2face.characters.face_placement import drop_unsuited_shapes, missing_sha
 from tts2face.characters.face_surface import Placement, add_gaze_shapes, build_face, is_plain, unwrap
 from tts2face.characters.gltf import SUFFIXES
 from tts2face.characters.gltf_character import read_gltf_character
-from tts2face.characters.head_mesh import HeadMesh, build_head_mesh, moved_box, source_weights
+from tts2face.characters.head_mesh import HeadMesh, build_head_mesh, mapped_targets, moved_box, source_weights
 from tts2face.characters.landmark_table import read_landmark_table
 from tts2face.characters.landmark_tracking import (
     SKIN,
@@ -170,7 +170,7 @@ def import_face(
         landmarks=places,
         score=None if table is not None else located.score,
         n_eyeballs=len(face.eyes),
-        notes=(*character.notes, *_colour_notes(character, head), *notes),
+        notes=(*character.notes, *_pose_notes(character, chosen), *_colour_notes(character, head), *notes),
         licence=character.licence,
     )
     return ImportedFace(face, report)
@@ -258,6 +258,15 @@ def _unused_names(character: Character, mapping: ShapeMapping) -> tuple[str, ...
     used = {source.name for sources in mapping.values() for source in sources}
     names = dict.fromkeys([*character.target_names.values(), *character.expressions])
     return tuple(name for name in names if name not in used)
+
+
+def _pose_notes(character: Character, mapping: ShapeMapping) -> list[str]:
+    """A note about default weights of the file, which the face at rest does not have."""
+    driven = mapped_targets(character, mapping)
+    posed = {t: weight for piece in character.pieces for t, weight in piece.defaults.items() if t in driven}
+    largest = sorted(posed, key=lambda target: -abs(posed[target]))[:3]
+    named = ", ".join(f"{character.target_names[target][:40]} {posed[target]:.2f}" for target in largest)
+    return [f"the file poses {len(posed)} of the mapped shapes ({named}); the face at rest has none of them"] if posed else []
 
 
 def _colour_notes(character: Character, head: HeadMesh) -> list[str]:
