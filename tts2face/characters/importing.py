@@ -266,7 +266,11 @@ def _pose_notes(character: Character, mapping: ShapeMapping) -> list[str]:
     posed = {t: weight for piece in character.pieces for t, weight in piece.defaults.items() if t in driven}
     largest = sorted(posed, key=lambda target: -abs(posed[target]))[:3]
     named = ", ".join(f"{character.target_names[target][:40]} {posed[target]:.2f}" for target in largest)
-    return [f"the file poses {len(posed)} of the mapped shapes ({named}); the face at rest has none of them"] if posed else []
+    return (
+        [f"the file poses {len(posed)} of the mapped shapes ({named}); the face at rest has none of them"]
+        if posed
+        else []
+    )
 
 
 def _colour_notes(character: Character, head: HeadMesh) -> list[str]:
