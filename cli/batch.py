@@ -65,6 +65,8 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     """Make clips of subtitle files, fitted to their cues. Running it again makes only what is missing or changed."""
     if jobs < (0 if database is not None else 1):
         raise InputError(f"--jobs must be 1 or more (0 with --database: other workers only), not {jobs}")
+    if "://" in str(out) or str(out).startswith(("s3:", "gs:", "az:")):
+        raise InputError(f"--out must be a folder of this machine, not {out}; give a bucket by --store")
     if priority < 1:
         raise InputError(f"--priority must be 1 or more, not {priority}")
     from tts2face.batch.cast import Cast, Models, read_cast

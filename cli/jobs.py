@@ -41,7 +41,7 @@ def worker(
     from tts2face.jobs.database import database_url, prepare_database
     from tts2face.jobs.engine import DatabaseEngine, local_workers
 
-    open_store(store)
+    open_store(store).check()
     prepare_database(database_url(database))
     engine = DatabaseEngine(database, store, jobs, on_message=write_message)
     write_message(

@@ -267,3 +267,6 @@ def test_the_command_plans_makes_and_reports(
     assert run([*words, "--jobs", "0"]) == 2
     assert run(["batch", "--out", "clips"]) == 2
     assert "there are no subtitles" in capsys.readouterr().err
+    assert run(["batch", "one.srt", "--out", "s3://bucket/clips"]) == 2
+    assert "--out must be a folder of this machine" in capsys.readouterr().err
+    assert not Path("s3:").exists()

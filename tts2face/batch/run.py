@@ -1,7 +1,8 @@
 """Running a plan: segments are rendered once, outputs are joined as soon as their segments are there."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,6 +21,7 @@ from tts2face.batch.manifest import (
     write_manifest,
 )
 from tts2face.batch.output import Output, Plan
+from tts2face.batch.segment import Segment
 from tts2face.batch.segment_result import SegmentResult
 from tts2face.batch.store import Store, open_store
 from tts2face.storage.overwrite import refuse_overwriting
@@ -27,6 +29,7 @@ from tts2face.types import Progress
 
 SEGMENT_FOLDER = ".segments"  # in the folder of outputs
 MANIFEST_INTERVAL_S = 10.0  # between two writes while the batch runs
+N_LOOKS = 8  # results read at a time, as each takes some 50 ms in a bucket
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,14 +102,8 @@ def run_batch(
         run.waiting[output.name] = {segment.address for segment in output.segments}
         for address in run.waiting[output.name]:
             run.users.setdefault(address, []).append(output)
-    missing, written_at = {}, time.monotonic()
-    for address, segment in needed.items():
-        found = run.store.result(address)
-        if found is None:
-            missing[address] = segment
-        else:
-            _finish_segment(run, address, found, "", on_output)
-    done = len(needed) - len(missing)
+    missing = _find_missing(run, needed, on_output)
+    done, written_at = len(needed) - len(missing), time.monotonic()
     by_models = dict(sorted(missing.items(), key=lambda item: repr(item[1].models)))  # a worker holds one session
     for rendered in (engine or LocalEngine()).render(by_models, run.store):
         _finish_segment(run, rendered.address, rendered.result, rendered.reason, on_output)
@@ -131,6 +128,28 @@ def run_batch(
         time.perf_counter() - began,
         tuple(run.warnings),
     )
+
+
+def _find_missing(
+    run: _Run, needed: Mapping[str, Segment], on_output: Callable[[dict[str, Any]], None] | None
+) -> dict[str, Segment]:
+    """Segments that are to be rendered; those that are stored are noted.
+
+    Raises
+    ------
+    BackendError
+        The store cannot be used.
+    """
+    missing = {}
+    with ThreadPoolExecutor(N_LOOKS) as pool:
+        for (address, segment), found in zip(needed.items(), pool.map(run.store.result, needed), strict=True):
+            if found is None:
+                missing[address] = segment
+            else:
+                _finish_segment(run, address, found, "", on_output)
+    if missing:
+        run.store.check()
+    return missing
 
 
 def check_outputs(plan: Plan, folder: Path) -> None:
