@@ -39,8 +39,8 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     audio: Annotated[
         Path | None,
         Parameter(
-            help="Folder of recordings in place of a voice: STEM-0001.wav or STEM/0001.wav for cue 1 of STEM.srt "
-            "(any sound or video file)."
+            help="Folder of recordings in place of a voice: STEM-0001.wav or STEM/0001.wav for cue 1 of STEM.srt, or "
+            "STEM.wav for all of it (any sound or video file)."
         ),
     ] = None,
     jobs: Annotated[int, whole_number("Number of processes on this machine.")] = 1,

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
+from tts2face.batch.output import Sound
+from tts2face.batch.track import open_track
 from tts2face.clock import exact_rate, first_sample
 from tts2face.render.movie import MP4_MOVIE, SOUND_RATE
 from tts2face.render.output_path import MP4, make_temporary, move_into_place
@@ -21,8 +23,13 @@ from tts2face.storage.files import translate_disk_errors
 SAMPLE_BLOCK = 48_000  # samples that are encoded at a time
 
 
-def join_segments(segments: Sequence[Path], out: Path, fps: float) -> int:
+def join_segments(segments: Sequence[Path], out: Path, fps: float, sounds: Sequence[Sound | None] = ()) -> int:
     """Join segments into a .mp4 file, which appears when it is complete; its number of frames.
+
+    Parameters
+    ----------
+    sounds
+        For each segment, what replaces its sound; empty: nothing.
 
     Raises
     ------
@@ -36,7 +43,7 @@ def join_segments(segments: Sequence[Path], out: Path, fps: float) -> int:
     temporary = make_temporary(out, MP4)
     try:
         with translate_disk_errors(out):
-            n_frames = _join(segments, temporary.path, exact_rate(fps))
+            n_frames = _join(segments, temporary.path, exact_rate(fps), sounds or [None] * len(segments))
         move_into_place(temporary, out)
     except av.FFmpegError as broken:
         raise DataError(
@@ -47,16 +54,16 @@ def join_segments(segments: Sequence[Path], out: Path, fps: float) -> int:
     return n_frames
 
 
-def _join(segments: Sequence[Path], out: Path, fps: Fraction) -> int:
+def _join(segments: Sequence[Path], out: Path, fps: Fraction, sounds: Sequence[Sound | None]) -> int:
     import av
 
     with av.open(str(out), "w", format="mp4", options=dict(MP4_MOVIE.container_options)) as target:
         joined: _Joined | None = None
-        for path in segments:
+        for path, sound in zip(segments, sounds, strict=True):
             with av.open(str(path)) as source:
                 if joined is None:
                     joined = _Joined(target, source, fps)
-                joined.append(source, path)
+                joined.append(source, path, sound)
         if joined is None:
             raise DataError(f"there are no segments to join into {out.name}")
         joined.finish()
@@ -77,8 +84,8 @@ class _Joined:
         self._extradata = bytes(source.streams.video[0].codec_context.extradata)
         self.n_frames = self._n_samples = 0
 
-    def append(self, source: Any, path: Path) -> None:
-        """Copy the pictures of a segment and encode its sound."""
+    def append(self, source: Any, path: Path, sound: Sound | None) -> None:
+        """Copy the pictures of a segment and encode its sound, or what replaces it."""
         video = source.streams.video[0]
         if bytes(video.codec_context.extradata) != self._extradata:
             raise DataError(f"{path.name} was encoded with other settings than the others; remove it and run again")
@@ -95,7 +102,12 @@ class _Joined:
         source.seek(0)
         begin = first_sample(self.n_frames, SOUND_RATE, self._fps)
         self.n_frames += n_frames
-        n_samples = first_sample(self.n_frames, SOUND_RATE, self._fps) - begin
+        end = first_sample(self.n_frames, SOUND_RATE, self._fps)
+        if sound is not None:
+            origin = first_sample(sound.offset, SOUND_RATE, self._fps)
+            self._encode(open_track(Path(sound.path)).read(origin + begin, origin + end))
+            return
+        n_samples = end - begin
         for block in _exactly(_sound(source), n_samples):
             self._encode(block)
 

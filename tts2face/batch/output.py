@@ -1,7 +1,8 @@
 """Outputs of a batch: clips made of segments, and the plan of all of them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from tts2face.batch.address import content_address
 from tts2face.batch.segment import Segment
@@ -23,6 +24,15 @@ class PlannedCue:
 
 
 @dataclass(frozen=True, slots=True)
+class Sound:
+    """Sound in place of that of a segment: a recording, and its frame at frame 0 of the output."""
+
+    path: str
+    hash: str
+    offset: int
+
+
+@dataclass(frozen=True, slots=True)
 class Output:
     """A clip: segments in order of time.
 
@@ -34,6 +44,8 @@ class Output:
         Subtitle files.
     begin_s
         Instant of its first frame in the film.
+    sounds
+        For each segment, what replaces its sound; empty: nothing.
     """
 
     name: str
@@ -42,11 +54,18 @@ class Output:
     fps: float
     cues: tuple[PlannedCue, ...]
     segments: tuple[Segment, ...]
+    sounds: tuple[Sound | None, ...] = ()
 
     @property
     def address(self) -> str:
         """Content address: equal for equal files."""
-        return content_address({"segments": [segment.address for segment in self.segments], "suffix": OUTPUT_SUFFIX})
+        content: dict[str, Any] = {
+            "segments": [segment.address for segment in self.segments],
+            "suffix": OUTPUT_SUFFIX,
+        }
+        if any(self.sounds):
+            content["sounds"] = [(one.hash, one.offset) if one else None for one in self.sounds]
+        return content_address(content)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +96,7 @@ def join_outputs(name: str, outputs: Sequence[Output]) -> Output:
     """One output of several in order; the times of its cues are those of the whole film."""
     cues: list[PlannedCue] = []
     segments: list[Segment] = []
+    sounds: list[Sound | None] = []
     offset_frames = 0
     for output in outputs:
         offset_s = offset_frames / output.fps
@@ -88,6 +108,10 @@ def join_outputs(name: str, outputs: Sequence[Output]) -> Output:
                 )
             )
         segments += output.segments
+        sounds += [
+            replace(one, offset=one.offset - offset_frames) if one else None
+            for one in output.sounds or [None] * len(output.segments)
+        ]
         offset_frames += sum(segment.slot_frames or segment.window_frames for segment in output.segments)
     source = tuple(path for output in outputs for path in output.source)
-    return Output(f"{name}{OUTPUT_SUFFIX}", source, 0.0, outputs[0].fps, tuple(cues), tuple(segments))
+    return Output(f"{name}{OUTPUT_SUFFIX}", source, 0.0, outputs[0].fps, tuple(cues), tuple(segments), tuple(sounds))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from tts2face.batch.cast import Models
 from tts2face.batch.fit import Fit, Limits, fit_speech
+from tts2face.batch.render_recording import excerpt_of, fit_recording
 from tts2face.batch.segment import Segment
 from tts2face.batch.segment_result import SegmentResult
 from tts2face.clock import exact_rate
@@ -37,12 +38,13 @@ class SegmentRenderer:
         """
         began = time.perf_counter()
         session = self._session(segment.models)
-        request, picture = Request(**segment.request), Picture(**segment.picture)
-        fitted, result = _fit(session, request, segment)
-        renderer = session.renderer(picture, has_gestures=fitted.has_gestures)
-        with ClipWriter(out, renderer) as writer:
-            for clip in session.stream_to_length(fitted, result.n_frames):
-                writer.add(clip)
+        picture = Picture(**segment.picture)
+        with excerpt_of(segment, Request(**segment.request)) as request:
+            fitted, result = _fit(session, request, segment)
+            renderer = session.renderer(picture, has_gestures=fitted.has_gestures)
+            with ClipWriter(out, renderer) as writer:
+                for clip in session.stream_to_length(fitted, result.n_frames):
+                    writer.add(clip)
         return replace(result, took_s=round(time.perf_counter() - began, 3))
 
     def _session(self, models: Models) -> Session:
@@ -64,8 +66,10 @@ def _fit(session: Session, request: Request, segment: Segment) -> tuple[Request,
     window_s = float(segment.window_frames / fps)
     if request.idle is not None:
         return request, SegmentResult(segment.slot_frames or segment.window_frames, float(fps))
+    heard: list[str] = []
     if request.audio is not None:
-        spoken = sum(piece.clip.speech.waveform.duration for piece in session.stream(request))
+        request, spoken, heard = fit_recording(session, request, segment)
+        spoken = min(spoken, window_s) if segment.audio_begin is not None else spoken
         fit = Fit(request.text, 1.0, spoken, max(0.0, spoken - window_s), 1)
     else:
         slot_s = None if segment.slot_frames is None else float(segment.slot_frames / fps)
@@ -79,7 +83,13 @@ def _fit(session: Session, request: Request, segment: Segment) -> tuple[Request,
     if cut > 0:
         warnings.append(f"the last {cut:.2f} s of the speech are cut off by the next cue")
     result = SegmentResult(
-        n_frames, float(fps), fit.rate, round(fit.speech_s, 4), round(fit.overflow_s, 4), round(cut, 4), tuple(warnings)
+        n_frames,
+        float(fps),
+        fit.rate,
+        round(fit.speech_s, 4),
+        round(fit.overflow_s, 4),
+        round(cut, 4),
+        (*heard, *warnings),
     )
     return request, result
 

@@ -202,7 +202,7 @@ def _finish_output(run: _Run, output: Output) -> None:
     try:
         with TemporaryDirectory(prefix="tts2face-") as copies:
             parts = [run.store.fetch(one.address, Path(copies)) for one in output.segments]
-            n_frames = join_segments(parts, path, output.fps)
+            n_frames = join_segments(parts, path, output.fps, output.sounds)
         entry = done_entry(output, path, n_frames, results)
     except Tts2faceError as wrong:
         run.entries[output.name] = failed_entry(output, str(wrong))

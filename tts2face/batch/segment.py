@@ -8,6 +8,9 @@ from typing import Any
 
 from tts2face.batch.address import content_address, file_hash, model_hash, program_version
 from tts2face.batch.cast import Models
+from tts2face.clock import exact_rate, first_sample
+from tts2face.render.movie import SOUND_RATE
+from tts2face.request import Request
 
 OWN_FACE = "self"
 REQUEST_FILES = ("audio", "dictionary", "voice")
@@ -31,6 +34,9 @@ class Segment:
         Whether the segment is `slot_frames` long (a part of a longer clip), or as short as its speech and cue allow.
     overflow, max_rate
         As `BatchOptions`.
+    audio_begin
+        Sample, at `SOUND_RATE`, at which the segment begins in the recording of a whole file; None: the recording is
+        one of this segment.
     """
 
     request: Mapping[str, Any]
@@ -42,11 +48,12 @@ class Segment:
     overflow: str = "extend"
     max_rate: float = 1.4
     file_hashes: Mapping[str, str] = field(default_factory=dict)
+    audio_begin: int | None = None
 
     @cached_property
     def address(self) -> str:
         """Content address: equal for segments with equal pictures and sound."""
-        content = {name: value for name, value in self.as_json().items() if name != "models"}
+        content = {name: value for name, value in self.as_json().items() if name not in ("models", "audio_begin")}
         content["request"] = {name: self.file_hashes.get(name, value) for name, value in self.request.items()}
         content["picture"] = {name: self.file_hashes.get(name, value) for name, value in self.picture.items()}
         content["identity"] = self.models.identity
@@ -64,7 +71,30 @@ class Segment:
             "overflow": self.overflow,
             "max_rate": self.max_rate,
             "file_hashes": dict(self.file_hashes),
+            "audio_begin": self.audio_begin,
         }
+
+    @property
+    def audio_end(self) -> int:
+        """Sample at which an excerpt ends."""
+        fps = exact_rate(float(self.request.get("fps", Request().fps)))
+        return (self.audio_begin or 0) + first_sample(self.window_frames, SOUND_RATE, fps)
+
+    def input_hashes(self) -> dict[str, str]:
+        """Hashes of all files that the segment reads, by their names; of an excerpt, the hash of its samples.
+
+        Raises
+        ------
+        InputError, DataError
+            A model or file does not exist, or a recording cannot be read.
+        """
+        if self.audio_begin is None:
+            return input_hashes(self.models, self.request, self.picture)
+        from tts2face.batch.track import open_track
+
+        others = {name: value for name, value in self.request.items() if name != "audio"}
+        excerpt = open_track(Path(str(self.request["audio"]))).excerpt_hash(self.audio_begin, self.audio_end)
+        return input_hashes(self.models, others, self.picture) | {"audio": excerpt}
 
 
 def segment_from_json(content: Mapping[str, Any]) -> Segment:

@@ -13,19 +13,32 @@ MAX_TAIL_S = 2.0  # longer silences are segments of their own, shared by equal s
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Frames [begin, end) of a cue, and the end of its slot: the time that its segment fills."""
+    """Frames [begin, end) of a cue with its margins, and the end of its slot: the time that its segment fills."""
 
     cue: Cue
     begin: int
     end: int
     slot_end: int
     next_begin: int | None = None
+    margin_begin: int = 0
+    margin_end: int = 0
+
+    @property
+    def cue_begin(self) -> int:
+        """Frame at which the cue itself begins."""
+        return self.begin + self.margin_begin
+
+    @property
+    def cue_end(self) -> int:
+        """Frame at which the cue itself ends."""
+        return self.end - self.margin_end
 
 
-def cue_windows(cues: Sequence[Cue], fps: Fraction) -> tuple[Window, ...]:
+def cue_windows(cues: Sequence[Cue], fps: Fraction, margin: int = 0) -> tuple[Window, ...]:
     """Windows of spoken cues in order of time; overlapping ones end where the next one begins.
 
-    Cues that begin at the same frame divide their time by the number of their letters.
+    Cues that begin at the same frame divide their time by the number of their letters. Windows are longer than their
+    cues by `margin` frames at both ends, or by half of a gap that is shorter than two margins.
     """
     windows: list[Window] = []
     for begin, group in groupby(cues, key=lambda cue: round(Fraction(cue.begin_s) * fps)):
@@ -40,7 +53,23 @@ def cue_windows(cues: Sequence[Cue], fps: Fraction) -> tuple[Window, ...]:
             until = max(until, at + 1)
             windows.append(Window(cue, at, until, until))
             at = until
-    return tuple(_with_slots(windows, fps))
+    return tuple(_with_slots(_with_margins(windows, margin), fps))
+
+
+def _with_margins(windows: Sequence[Window], margin: int) -> list[Window]:
+    """Windows with margins in the gaps between them."""
+    if margin == 0:
+        return list(windows)
+    longer: list[Window] = []
+    for number, window in enumerate(windows):
+        before = window.begin if number == 0 else max(window.begin - windows[number - 1].end, 0)
+        after = windows[number + 1].begin - window.end if number + 1 < len(windows) else 2 * margin
+        first = min(margin, before if number == 0 else before - before // 2)
+        last = min(margin, max(after, 0) // 2)
+        longer.append(
+            replace(window, begin=window.begin - first, end=window.end + last, margin_begin=first, margin_end=last)
+        )
+    return longer
 
 
 def _with_slots(windows: Sequence[Window], fps: Fraction) -> list[Window]:

@@ -23,7 +23,7 @@ from lexicon.errors import DataError, Tts2faceError
 from tts2face.batch.address import SEGMENT_FORMAT
 from tts2face.batch.engine import Message, Renders, render_into
 from tts2face.batch.render_process import RenderProcess
-from tts2face.batch.segment import input_hashes, segment_from_json
+from tts2face.batch.segment import segment_from_json
 from tts2face.batch.store import Store, open_store, wait_for_store
 from tts2face.jobs.database import (
     APPLICATION,
@@ -139,8 +139,7 @@ class Worker:
             found = wait_for_store(partial(self._store.result, address), self._on_message)
             if found is not None:
                 return found.as_json()
-            hashes = input_hashes(segment.models, segment.request, segment.picture)
-            if replace(segment, file_hashes=hashes).address != address:
+            if replace(segment, file_hashes=segment.input_hashes()).address != address:
                 raise DataError(
                     "a model, voice, file or program version of this machine differs from that of the batch; "
                     "install and copy the same ones"
