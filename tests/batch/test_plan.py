@@ -37,6 +37,30 @@ def test_a_clip_for_each_spoken_cue(plan_of: Planner) -> None:
     assert [cue.speaker for output in plan.outputs for cue in output.cues] == ["ANN", "", ""]
 
 
+def test_speakers_of_one_cue_have_their_own_clips_and_divide_its_time(plan_of: Planner, tmp_path: Path) -> None:
+    (tmp_path / "cast.toml").write_text(CAST)
+    text = "1\n00:00:01,000 --> 00:00:04,000\n- JOHN: Good.\n- ANN: Hello there.\n"
+    plan = plan_of(text, cast=read_cast(tmp_path / "cast.toml"))
+    assert [(one.name, one.begin_s) for one in plan.outputs] == [("one-0001.mp4", 1.0), ("one-0001-2.mp4", 1.9)]
+    assert [one.segments[0].models.face for one in plan.outputs] == ["head", "cartoon"]
+    assert [cue.speaker for one in plan.outputs for cue in one.cues] == ["JOHN", "ANN"]
+    assert [(one.line, one.message) for one in plan.warnings] == [
+        (2, "JOHN and ANN speak in cue 1; its time is divided by their letters")
+    ]
+    (file,) = plan_of(text, per="file").outputs
+    assert [(cue.begin_s, cue.end_s) for cue in file.cues] == [(1.0, 1.9), (1.9, 4.0)]
+
+
+def test_a_recording_of_two_speakers_shows_one_face(plan_of: Planner, tmp_path: Path) -> None:
+    (tmp_path / "dub").mkdir()
+    (tmp_path / "dub" / "one-0001.wav").write_bytes(b"RIFF")
+    plan = plan_of("1\n00:00:01,000 --> 00:00:04,000\n- JOHN: Good.\n- Hello.\n", audio=tmp_path / "dub")
+    assert len(plan.outputs) == 1
+    assert [one.message for one in plan.warnings] == [
+        "JOHN and somebody speak in cue 1, which has one recording; one face is shown"
+    ]
+
+
 def test_scenes_files_and_films_fill_all_frames(plan_of: Planner) -> None:
     scenes = plan_of(per="scene").outputs
     assert [(one.name, one.begin_s) for one in scenes] == [("one-scene-001.mp4", 0.5), ("one-scene-002.mp4", 10.0)]

@@ -30,8 +30,8 @@ class BatchOptions:
     scene_gap: float = option(4.0, "Seconds without a cue that divide two scenes.")
     audio: Path | None = option(
         None,
-        "Folder of recordings in place of a voice: STEM-0001.wav or STEM/0001.wav for cue 1 of STEM.srt, or STEM.wav for "
-        "all of it (any sound or video file).",
+        "Folder of recordings in place of a voice: STEM-0001.wav or STEM/0001.wav for cue 1 of STEM.srt, or STEM.wav "
+        "for all of it (any sound or video file).",
     )
     encoding: str | None = option(None, "Encoding of subtitles that are not UTF-8, such as cp1250.")
 

@@ -18,7 +18,7 @@ from tts2face.clock import exact_rate, first_sample
 from tts2face.render.movie import SOUND_RATE
 from tts2face.render.picture import Picture
 from tts2face.request import IDLE_LIMITS_S, Request
-from tts2face.subtitles.cue import Subtitles, SubtitleWarning
+from tts2face.subtitles.cue import Cue, Subtitles, SubtitleWarning
 from tts2face.subtitles.reader import read_subtitles
 from tts2face.synthesis.prepared_request import prepare
 
@@ -120,6 +120,7 @@ class _FilePlan:
         if self.base.options.audio is not None:
             names = (self.name, self.path.stem, *([""] if self.base.n_files == 1 else []))
             self.recordings = find_recordings(self.base.options.audio, self.path, names)
+        spoken = [self._divide(cue) for cue in spoken]
         margin = MARGIN_S if self.recordings.track else 0.0
         windows = cue_windows(spoken, fps, round(margin * fps))
         per = self.base.options.per
@@ -127,13 +128,26 @@ class _FilePlan:
             for window in windows:
                 segment = self._speech(window, fills=False)
                 if segment is not None:
-                    yield self._output(f"{self.name}-{window.cue.number:04d}", window.begin, [(window, segment)])
+                    part = f"-{window.part}" if window.part > 1 else ""
+                    name = f"{self.name}-{window.cue.number:04d}{part}"
+                    yield self._output(name, window.begin, [(window, segment)])
         elif per == "scene":
             gap = round(self.base.options.scene_gap * float(fps))
             for number, group in enumerate(scenes(windows, gap), start=1):
                 yield self._joined_output(f"{self.name}-scene-{number:03d}", group, group[0].begin)
         else:
             yield self._joined_output(self.name, windows, 0)
+
+    def _divide(self, cue: Cue) -> Cue:
+        """A cue with its parts by speaker, or without them if it has one recording of all; both with a warning."""
+        if not cue.parts:
+            return cue
+        named = " and ".join(part.speaker or "somebody" for part in cue.parts)
+        if cue.number in self.recordings.cues:
+            self._warn(cue.line, f"{named} speak in cue {cue.number}, which has one recording; one face is shown")
+            return replace(cue, parts=())
+        self._warn(cue.line, f"{named} speak in cue {cue.number}; its time is divided by their letters")
+        return cue
 
     def _joined_output(self, name: str, windows: Sequence[Window], begin: int) -> Output:
         """Clip of consecutive windows with the silences between them."""
