@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tts2face.batch.run import BatchResult
     from tts2face.batch.store import Store
 
-NOT_IN_BATCH = frozenset({"text", "audio", "audio_map", "idle", "timeline", "expression"})
+NOT_IN_BATCH = frozenset({"text", "exports", "audio", "audio_map", "idle", "timeline", "expression"})
 MAX_WARNINGS = 40  # on the terminal; all are in the manifest
 
 
@@ -41,6 +41,14 @@ def batch(  # noqa: PLR0913 - one parameter a flag
         Parameter(
             help="Folder of recordings in place of a voice: STEM-0001.wav or STEM/0001.wav for cue 1 of STEM.srt, or "
             "STEM.wav for all of it (any sound or video file)."
+        ),
+    ] = None,
+    export: Annotated[
+        list[str] | None,
+        Parameter(
+            help="Files for other programs beside every clip, by ending (glb, track.json, csv, ...; see `tts2face "
+            "formats`); several times if wanted.",
+            negative="",
         ),
     ] = None,
     jobs: Annotated[int, whole_number("Number of processes on this machine.")] = 1,
@@ -74,7 +82,7 @@ def batch(  # noqa: PLR0913 - one parameter a flag
 
     plan = plan_batch(
         subtitles,
-        options_from_flags(BatchOptions, options, audio=audio),
+        options_from_flags(BatchOptions, options, audio=audio, exports=tuple(export or ())),
         request=options_from_flags(Request, options),
         picture=options_from_flags(Picture, options),
         models=Models(talker, face, identity, palette),

@@ -361,6 +361,10 @@ class Session:
                 self._renderers[key] = face.renderer(picture)
             return self._renderers[key]
 
+    def animated_face(self, *, has_gestures: bool = True) -> AnimatedFace:
+        """Face whose channels the clips of requests with or without gestures use."""
+        return self._face(has_gestures)
+
     def _pieces(self, prepared: PreparedRequest) -> Iterator[Piece]:
         request = prepared.request
         face = self._face(request.has_gestures)

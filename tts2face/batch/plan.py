@@ -8,13 +8,15 @@ from typing import Any
 from lexicon.errors import DataError, InputError
 from tts2face.batch.address import file_hash
 from tts2face.batch.cast import MODEL_NAMES, REQUEST_NAMES, Cast, Models
+from tts2face.batch.export import check_faces
 from tts2face.batch.file_names import output_names
 from tts2face.batch.options import BatchOptions
-from tts2face.batch.output import OUTPUT_SUFFIX, Output, Plan, PlannedCue, PlanWarning, Sound, join_outputs
+from tts2face.batch.output import Output, Plan, PlannedCue, PlanWarning, Sound, join_outputs
 from tts2face.batch.recordings import Recordings, find_recordings
-from tts2face.batch.segment import Segment
+from tts2face.batch.segment import ALPHA_MOVIE, MOVIE, Segment
 from tts2face.batch.windows import Window, cue_windows, scenes
 from tts2face.clock import exact_rate, first_sample
+from tts2face.exports.formats import batch_format
 from tts2face.render.movie import SOUND_RATE
 from tts2face.render.picture import Picture
 from tts2face.request import IDLE_LIMITS_S, Request
@@ -53,8 +55,8 @@ def plan_batch(
     """
     if not files:
         raise InputError("there are no subtitles; give .srt, .vtt, .ass, .ssa or .ttml files")
-    if picture is not None and picture.is_transparent:
-        raise InputError("clips of a batch are .mp4, which has no transparency; choose another background")
+    if picture is not None and picture.is_transparent and options.format in ("mp4", "mov"):
+        raise InputError(f".{options.format} has no transparency; choose --format webm, or another background")
     base = _Base(
         options,
         request or Request(),
@@ -67,6 +69,7 @@ def plan_batch(
     outputs = [output for one in planned for output in one.outputs()]
     if options.per == "film" and outputs:
         outputs = [join_outputs("film", outputs)]
+        check_faces(outputs[0])
     warnings = tuple(warning for one in planned for warning in one.warnings)
     return Plan(tuple(outputs), warnings, sum(one.n_cues for one in planned), sum(one.n_silent for one in planned))
 
@@ -183,7 +186,13 @@ class _FilePlan:
             if window is not None
         )
         segments = tuple(segment for _, segment in parts)
-        return Output(f"{name}{OUTPUT_SUFFIX}", (str(self.path),), float(begin / fps), float(fps), cues, segments)
+        options = self.base.options
+        suffix = "" if options.format == "none" else f".{options.format}"
+        exports = tuple(batch_format(one)[0] for one in options.exports)
+        source = (str(self.path),)
+        output = Output(name, source, float(begin / fps), float(fps), cues, segments, suffix=suffix, exports=exports)
+        check_faces(output)
+        return output
 
     def _speech(self, window: Window, *, fills: bool) -> Segment | None:
         """Segment of a cue; None with a warning if it cannot be spoken."""
@@ -239,6 +248,7 @@ class _FilePlan:
             self.base.options.overflow,
             self.base.options.max_rate,
             audio_begin=first_sample(window.begin, SOUND_RATE, fps) if is_excerpt else None,
+            medium=ALPHA_MOVIE if self.base.options.format == "webm" else MOVIE,
         )
         return replace(segment, file_hashes=self._file_hashes(segment))
 

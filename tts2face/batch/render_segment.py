@@ -9,10 +9,11 @@ from pathlib import Path
 from tts2face.batch.cast import Models
 from tts2face.batch.fit import Fit, Limits, fit_speech
 from tts2face.batch.render_recording import excerpt_of, fit_recording
-from tts2face.batch.segment import Segment
+from tts2face.batch.segment import ALPHA_MOVIE, TRACK, Segment
 from tts2face.batch.segment_result import SegmentResult
 from tts2face.clock import exact_rate
-from tts2face.render.encode import ClipWriter
+from tts2face.exports.writer import ExportWriter, plan_exports
+from tts2face.render.encode import MKV, ClipWriter
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.session import Session
@@ -29,7 +30,7 @@ class SegmentRenderer:
         self._sessions: OrderedDict[Models, Session] = OrderedDict()
 
     def render(self, segment: Segment, out: Path) -> SegmentResult:
-        """Render a segment into a file (.mov), which appears when it is complete.
+        """Render a segment into a file, which appears when it is complete.
 
         Raises
         ------
@@ -38,11 +39,9 @@ class SegmentRenderer:
         """
         began = time.perf_counter()
         session = self._session(segment.models)
-        picture = Picture(**segment.picture)
         with excerpt_of(segment, Request(**segment.request)) as request:
             fitted, result = _fit(session, request, segment)
-            renderer = session.renderer(picture, has_gestures=fitted.has_gestures)
-            with ClipWriter(out, renderer) as writer:
+            with _writer(session, segment, fitted, out) as writer:
                 for clip in session.stream_to_length(fitted, result.n_frames):
                     writer.add(clip)
         return replace(result, took_s=round(time.perf_counter() - began, 3))
@@ -58,6 +57,14 @@ class SegmentRenderer:
                 models.talker, models.face, identity=models.identity, palette=models.palette
             )
         return self._sessions[models]
+
+
+def _writer(session: Session, segment: Segment, request: Request, out: Path) -> ClipWriter | ExportWriter:
+    """Writer of the medium of a segment."""
+    if segment.medium == TRACK:
+        return ExportWriter(plan_exports([out], format=TRACK))
+    renderer = session.renderer(Picture(**segment.picture), has_gestures=request.has_gestures)
+    return ClipWriter(out, renderer, kind=MKV if segment.medium == ALPHA_MOVIE else None)
 
 
 def _fit(session: Session, request: Request, segment: Segment) -> tuple[Request, SegmentResult]:

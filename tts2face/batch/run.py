@@ -11,6 +11,7 @@ from typing import Any
 from lexicon.errors import Tts2faceError
 from tts2face.batch.assemble import join_segments
 from tts2face.batch.engine import Engine, LocalEngine
+from tts2face.batch.export import Exporter
 from tts2face.batch.manifest import (
     CSV_NAME,
     JSON_NAME,
@@ -60,6 +61,7 @@ class _Run:
     n_made: int = 0
     seconds: float = 0.0
     warnings: list[str] = field(default_factory=list)
+    exporter: Exporter = field(default_factory=Exporter)
 
 
 def run_batch(
@@ -97,9 +99,9 @@ def run_batch(
     check_outputs(plan, folder)
     run = _Run(plan, folder, store or open_store(folder / SEGMENT_FOLDER), read_manifest(folder))
     stale = [one for one in plan.outputs if not is_current(run.entries.get(one.name), one, folder)]
-    needed = {segment.address: segment for output in stale for segment in output.segments}
+    needed = {segment.address: segment for output in stale for segment in output.needed}
     for output in stale:
-        run.waiting[output.name] = {segment.address for segment in output.segments}
+        run.waiting[output.name] = {segment.address for segment in output.needed}
         for address in run.waiting[output.name]:
             run.users.setdefault(address, []).append(output)
     missing = _find_missing(run, needed, on_output)
@@ -165,7 +167,7 @@ def check_outputs(plan: Plan, folder: Path) -> None:
         str(one.request["audio"]) for output in plan.outputs for one in output.segments if "audio" in one.request
     }
     inputs = {Path(path).resolve() for path in sources}
-    for name in [output.name for output in plan.outputs] + [JSON_NAME, CSV_NAME]:
+    for name in [name for output in plan.outputs for name in output.names] + [JSON_NAME, CSV_NAME]:
         path = folder / name
         if path.exists() and path.resolve() in inputs:
             refuse_overwriting({name: path}, {"an input of the batch": path})
@@ -193,17 +195,21 @@ def _finish_segment(
 
 def _finish_output(run: _Run, output: Output) -> None:
     """Join the segments of an output, or note why it failed."""
-    reasons = [run.reasons[one.address] for one in output.segments if one.address in run.reasons]
+    reasons = [run.reasons[one.address] for one in output.needed if one.address in run.reasons]
     if reasons:
         run.entries[output.name] = failed_entry(output, reasons[0])
         return
-    path = run.folder / output.name
-    results = [run.results[one.address] for one in output.segments]
+    results = [run.results[one.address] for one in (output.segments if output.suffix else output.tracks)]
     try:
         with TemporaryDirectory(prefix="tts2face-") as copies:
-            parts = [run.store.fetch(one.address, Path(copies)) for one in output.segments]
-            n_frames = join_segments(parts, path, output.fps, output.sounds)
-        entry = done_entry(output, path, n_frames, results)
+            parts = {one.address: run.store.fetch(one.address, Path(copies)) for one in output.needed}
+            written = []
+            if output.exports:
+                written = run.exporter.write(output, [parts[one.address] for one in output.tracks], run.folder)
+            if output.suffix:
+                path = run.folder / output.name
+                join_segments([parts[one.address] for one in output.segments], path, output.fps, output.sounds)
+        entry = done_entry(output, run.folder, results, written)
     except Tts2faceError as wrong:
         run.entries[output.name] = failed_entry(output, str(wrong))
         return

@@ -1,7 +1,7 @@
 """Segments: the units that are rendered once and kept by their content address."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from tts2face.render.movie import SOUND_RATE
 from tts2face.request import Request
 
 OWN_FACE = "self"
+MOVIE, ALPHA_MOVIE, TRACK = "movie", "vp9", "track"  # what a segment is stored as: H.264, VP9, or motion for exports
 REQUEST_FILES = ("audio", "dictionary", "voice")
 
 
@@ -37,6 +38,8 @@ class Segment:
     audio_begin
         Sample, at `SOUND_RATE`, at which the segment begins in the recording of a whole file; None: the recording is
         one of this segment.
+    medium
+        What is stored: `MOVIE` (H.264), `ALPHA_MOVIE` (VP9), or `TRACK`, a lossless track for exports.
     """
 
     request: Mapping[str, Any]
@@ -49,11 +52,14 @@ class Segment:
     max_rate: float = 1.4
     file_hashes: Mapping[str, str] = field(default_factory=dict)
     audio_begin: int | None = None
+    medium: str = MOVIE
 
     @cached_property
     def address(self) -> str:
         """Content address: equal for segments with equal pictures and sound."""
         content = {name: value for name, value in self.as_json().items() if name not in ("models", "audio_begin")}
+        if self.medium == MOVIE:
+            del content["medium"]
         content["request"] = {name: self.file_hashes.get(name, value) for name, value in self.request.items()}
         content["picture"] = {name: self.file_hashes.get(name, value) for name, value in self.picture.items()}
         content["identity"] = self.models.identity
@@ -72,7 +78,13 @@ class Segment:
             "max_rate": self.max_rate,
             "file_hashes": dict(self.file_hashes),
             "audio_begin": self.audio_begin,
+            "medium": self.medium,
         }
+
+    def as_track(self) -> "Segment":
+        """The same segment as a track, which does not depend on the picture."""
+        hashes = {name: value for name, value in self.file_hashes.items() if name != "background"}
+        return replace(self, medium=TRACK, picture={}, file_hashes=hashes)
 
     @property
     def audio_end(self) -> int:
