@@ -63,7 +63,7 @@ def batch(  # noqa: PLR0913 - one parameter a flag
         ),
     ] = None,
     priority: Annotated[int, whole_number("With --database: jobs with smaller numbers are taken first; from 1.")] = 10,
-    dry_run: Annotated[bool, switch("Print the plan with expected hours and disk space; render nothing.")] = False,
+    dry_run: Annotated[bool, switch("Print the plan with expected time and disk space; render nothing.")] = False,
     progress: Annotated[
         Literal["bar", "json"], Parameter(help="Progress bar, or one line of JSON for each step on standard output.")
     ] = "bar",
@@ -180,6 +180,13 @@ def _print_plan(plan: "Plan", out: Path, store: str | None) -> None:
         print(f"{output.name}  {output.begin_s:.2f} s  {length:.2f} s  {len(output.cues)} cues")  # noqa: T201 - the result
     print(  # noqa: T201 - the result
         f"{plan.n_cues} cues, {plan.n_silent} of them silent; {estimate.n_outputs} clips, {estimate.n_stale} to make "
-        f"({estimate.seconds:.0f} s); {estimate.n_segments} segments, {estimate.n_missing} to render; about "
-        f"{estimate.core_hours:.2f} hours of one core and {estimate.n_bytes / 1e6:.0f} MB on disk"
+        f"({_duration(estimate.seconds)}); {estimate.n_segments} segments, {estimate.n_missing} to render; about "
+        f"{_duration(estimate.core_s)} of one core and {estimate.n_bytes / 1e6:.0f} MB on disk"
     )
+
+
+def _duration(seconds: float) -> str:
+    """Seconds in the unit that fits them."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} minutes" if seconds < 6000.0 else f"{seconds / 3600:.1f} hours"
