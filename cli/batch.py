@@ -90,6 +90,8 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     )
     if not quiet:
         _print_warnings(plan)
+    if not plan.outputs:
+        raise InputError("no cue can be spoken, so there is nothing to make; the warnings say why")
     if dry_run:
         return _print_plan(plan, out, store)
     from tts2face.batch.run import SEGMENT_FOLDER
@@ -162,7 +164,8 @@ def _finish(result: "BatchResult", out: Path, *, quiet: bool) -> None:
 
 def _print_warnings(plan: "Plan") -> None:
     for warning in plan.warnings[:MAX_WARNINGS]:
-        write_message(f"tts2face: warning: {warning.file}, line {warning.line}: {warning.message}")
+        place = f"{warning.file}, line {warning.line}" if warning.line else warning.file
+        write_message(f"tts2face: warning: {place}: {warning.message}")
     if len(plan.warnings) > MAX_WARNINGS:
         write_message(f"{len(plan.warnings) - MAX_WARNINGS} more warnings will be in the manifest")
 

@@ -1,7 +1,8 @@
 """Options of a batch besides those of speech and picture; a module without heavy imports."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from lexicon.errors import BackendError, InputError
 from tts2face.exports.formats import batch_format
@@ -70,3 +71,14 @@ class BatchOptions:
         for suffix, info in map(batch_format, self.exports):
             if not info.is_installed:
                 raise BackendError(f"{suffix} needs the package {info.package}; pip install 'tts2face[usd]'")
+
+
+def non_defaults(options: Any) -> dict[str, Any]:
+    """Fields of an option dataclass that differ from their defaults, as JSON values."""
+    found = {one.name: getattr(options, one.name) for one in fields(options) if one.name != "text"}
+    defaults = {one.name: one.default for one in fields(options)}
+    return {
+        name: str(value) if isinstance(value, Path) else value
+        for name, value in found.items()
+        if value != defaults[name]
+    }

@@ -95,7 +95,7 @@ class Output:
 
 @dataclass(frozen=True, slots=True)
 class PlanWarning:
-    """A defect of a subtitle file or its text, and what is done about it."""
+    """A defect of a subtitle file or its text, and what is done about it; `line` is 0 for other files."""
 
     file: str
     line: int

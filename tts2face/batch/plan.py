@@ -1,16 +1,17 @@
 """The plan of a batch: which outputs are made of which segments."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError, InputError
 from tts2face.batch.address import file_hash
 from tts2face.batch.cast import MODEL_NAMES, REQUEST_NAMES, Cast, Models
+from tts2face.batch.check import check_names
 from tts2face.batch.export import check_faces
 from tts2face.batch.file_names import output_names
-from tts2face.batch.options import BatchOptions
+from tts2face.batch.options import BatchOptions, non_defaults
 from tts2face.batch.output import Output, Plan, PlannedCue, PlanWarning, Sound, join_outputs
 from tts2face.batch.recordings import Recordings, find_recordings
 from tts2face.batch.segment import ALPHA_MOVIE, MOVIE, Segment
@@ -70,19 +71,10 @@ def plan_batch(
     if options.per == "film" and outputs:
         outputs = [join_outputs("film", outputs)]
         check_faces(outputs[0])
-    warnings = tuple(warning for one in planned for warning in one.warnings)
-    return Plan(tuple(outputs), warnings, sum(one.n_cues for one in planned), sum(one.n_silent for one in planned))
-
-
-def non_defaults(options: Any) -> dict[str, Any]:
-    """Fields of an option dataclass that differ from their defaults, as JSON values."""
-    found = {one.name: getattr(options, one.name) for one in fields(options) if one.name != "text"}
-    defaults = {one.name: one.default for one in fields(options)}
-    return {
-        name: str(value) if isinstance(value, Path) else value
-        for name, value in found.items()
-        if value != defaults[name]
-    }
+    warnings = [warning for one in planned for warning in one.warnings]
+    warnings += [PlanWarning("the cast", 0, text) for text in base.cast.unused(base.used)]
+    n_cues, n_silent = sum(one.n_cues for one in planned), sum(one.n_silent for one in planned)
+    return Plan(tuple(outputs), tuple(warnings), n_cues, n_silent)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +87,7 @@ class _Base:
     models: Models
     cast: Cast
     n_files: int
+    used: set[int] = field(default_factory=set)  # roles of the cast
 
 
 @dataclass(slots=True)
@@ -206,12 +199,14 @@ class _FilePlan:
             request = {name: value for name, value in request.items() if name not in NOT_WITH_AUDIO}
             request["audio"] = str(found)
         slot_end = window.slot_end if fills else window.next_begin
+        segment = self._segment(window, request, None if slot_end is None else slot_end - window.begin, fills=fills)
         try:
             prepare(Request(**request))
-            return self._segment(window, request, None if slot_end is None else slot_end - window.begin, fills=fills)
         except (InputError, DataError) as wrong:
+            self.n_silent += 1
             self._warn(window.cue.line, f"cue {window.cue.number} is silent: {wrong}")
             return None
+        return segment
 
     def _silences(self, window: Window, n_frames: int) -> Iterator[Segment]:
         """Segments of idle animation of the speaker of a window."""
@@ -257,6 +252,7 @@ class _FilePlan:
         settings = non_defaults(self.base.request)
         if window.cue.language and "language" not in settings:
             settings["language"] = self._language(window)
+        self.base.used.add(id(self.base.cast.role_of(window.cue, self.path.name)))
         cast = self.base.cast.settings(window.cue, self.path.name)
         settings |= {name: value for name, value in cast.items() if name in REQUEST_NAMES}
         return {name: value for name, value in settings.items() if value is not None}
@@ -271,17 +267,21 @@ class _FilePlan:
             return None
 
     def _models(self, window: Window) -> Models:
-        cast = self.base.cast.settings(window.cue, self.path.name)
-        chosen = {name: cast.get(name, getattr(self.base.models, name)) for name in MODEL_NAMES}
-        if chosen["face"] != self.base.models.face and "identity" not in cast:
-            chosen["identity"] = None  # presets belong to a face
+        chosen = {name: getattr(self.base.models, name) for name in MODEL_NAMES}
+        role = self.base.cast.role_of(window.cue, self.path.name)
+        for settings in (self.base.cast.default, role.settings if role else {}):
+            if settings.get("face", chosen["face"]) != chosen["face"]:
+                chosen["identity"] = None  # presets belong to a face
+            chosen |= {name: settings[name] for name in MODEL_NAMES if name in settings}
         return Models(**chosen)
 
     def _file_hashes(self, segment: Segment) -> Mapping[str, str]:
         if segment.audio_begin is not None:
             return segment.input_hashes()
-        key = repr((segment.models, [segment.request.get(name) for name in ("audio", "dictionary", "voice")]))
+        names = ("audio", "dictionary", "voice", "style")
+        key = repr((segment.models, [segment.request.get(name) for name in names]))
         if key not in self._hashes:
+            check_names(segment.models, segment.request)
             self._hashes[key] = segment.input_hashes()
         return self._hashes[key]
 
