@@ -100,7 +100,12 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     place = store if store is not None else str((out / SEGMENT_FOLDER).resolve())
     opened = open_store(place)
     engine = _open_engine(database, place, jobs, priority)
-    _finish(_run(plan, out, (opened, engine), is_json=progress == "json", quiet=quiet), out, quiet=quiet)
+    try:
+        result = _run(plan, out, (opened, engine), is_json=progress == "json", quiet=quiet)
+    except KeyboardInterrupt as interrupt:
+        interrupt.add_note(f"what is finished is in {out}; the same command continues")
+        raise
+    _finish(result, out, quiet=quiet)
     return None
 
 

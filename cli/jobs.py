@@ -47,10 +47,14 @@ def worker(
     write_message(
         f"{jobs} workers of {os.uname().nodename if hasattr(os, 'uname') else 'this machine'}; Ctrl-C ends them"
     )
-    with local_workers(engine) as supervise:
-        while True:
-            supervise()
-            time.sleep(WAIT_S)
+    try:
+        with local_workers(engine) as supervise:
+            while True:
+                supervise()
+                time.sleep(WAIT_S)
+    except KeyboardInterrupt as interrupt:
+        interrupt.add_note("the workers have ended; others take over their segments")
+        raise
 
 
 @jobs.command(name="list")

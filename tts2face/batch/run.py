@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from lexicon.errors import Tts2faceError
+from lexicon.errors import BackendError, Tts2faceError
 from tts2face.batch.assemble import join_segments
 from tts2face.batch.engine import Engine, LocalEngine
 from tts2face.batch.export import Exporter
@@ -26,6 +26,7 @@ from tts2face.batch.segment import Segment
 from tts2face.batch.segment_result import SegmentResult
 from tts2face.batch.store import Store, open_store
 from tts2face.storage.overwrite import refuse_overwriting
+from tts2face.storage.temporary import Temporary
 from tts2face.types import Progress
 
 SEGMENT_FOLDER = ".segments"  # in the folder of outputs
@@ -95,7 +96,7 @@ def run_batch(
     """
     began = time.perf_counter()
     folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
+    _prepare_folder(folder)
     check_outputs(plan, folder)
     run = _Run(plan, folder, store or open_store(folder / SEGMENT_FOLDER), read_manifest(folder))
     stale = [one for one in plan.outputs if not is_current(run.entries.get(one.name), one, folder)]
@@ -107,15 +108,17 @@ def run_batch(
     missing = _find_missing(run, needed, on_output)
     done, written_at = len(needed) - len(missing), time.monotonic()
     by_models = dict(sorted(missing.items(), key=lambda item: repr(item[1].models)))  # a worker holds one session
-    for rendered in (engine or LocalEngine()).render(by_models, run.store):
-        _finish_segment(run, rendered.address, rendered.result, rendered.reason, on_output)
-        done += 1
-        if on_progress:
-            on_progress(done, len(needed))
-        if time.monotonic() - written_at > MANIFEST_INTERVAL_S:
-            write_manifest(folder, plan, run.entries)
-            written_at = time.monotonic()
-    write_manifest(folder, plan, run.entries)
+    try:
+        for rendered in (engine or LocalEngine()).render(by_models, run.store):
+            _finish_segment(run, rendered.address, rendered.result, rendered.reason, on_output)
+            done += 1
+            if on_progress:
+                on_progress(done, len(needed))
+            if time.monotonic() - written_at > MANIFEST_INTERVAL_S:
+                write_manifest(folder, plan, run.entries)
+                written_at = time.monotonic()
+    finally:  # also of an interrupted batch
+        write_manifest(folder, plan, run.entries)
     failed = tuple(
         (one.name, str(run.entries[one.name].get("reason", "")))
         for one in stale
@@ -130,6 +133,16 @@ def run_batch(
         time.perf_counter() - began,
         tuple(run.warnings),
     )
+
+
+def _prepare_folder(folder: Path) -> None:
+    """Create the folder of the outputs, and refuse one that cannot be written, before anything is rendered."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with Temporary(folder / JSON_NAME):
+            pass
+    except OSError as error:
+        raise BackendError(f"cannot write the folder {folder}: {error.strerror}; choose another --out") from error
 
 
 def _find_missing(
