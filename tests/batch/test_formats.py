@@ -12,14 +12,18 @@ import pytest
 from lexicon.errors import BackendError, InputError
 from tests.batch.conftest import FPS, SMALL, SRT, Planner
 from tests.batch.test_run import AAC_SMEAR_S, decoded, manifest, spans
+from tests.render.tiny_talker import own_talker
 from tests.synthesis.fake_voice import LEAD, LETTER, FakeVoice
 from tts2face import load_clip
-from tts2face.batch.cast import Cast, Role
+from tts2face.batch.cast import Cast, Models, Role
 from tts2face.batch.options import BatchOptions
 from tts2face.batch.plan import plan_batch
+from tts2face.batch.render_segment import _writer
 from tts2face.batch.run import run_batch
+from tts2face.batch.segment import Segment
 from tts2face.exports import formats
 from tts2face.exports.formats import batch_format, sound_name
+from tts2face.render.own_face import OwnFaceRenderer, own_face_renderer
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 
@@ -185,3 +189,15 @@ def test_speech_that_is_cut_keeps_its_phones(plan_of: Planner, voices: list[Fake
     assert [time for time in voiced if 0.5 < time < 1.0]
     assert Fraction(len(speech.waveform.samples), 48_000) == Fraction(3)
     assert SMALL.width == 64
+
+
+def test_a_talkers_video_returns_to_its_first_frame_at_joins(tmp_path: Path) -> None:
+    renderer = own_face_renderer(own_talker(), Picture(size="96x96"))
+
+    class OwnSession:
+        def renderer(self, *_: object, **__: object) -> OwnFaceRenderer:
+            return renderer
+
+    segment = Segment({"text": "Hello."}, {}, Models(face="self"), 15)
+    writer = _writer(OwnSession(), segment, Request(), (tmp_path / "x.mov", 15))
+    assert writer._renderer.n_returning == 15

@@ -14,7 +14,9 @@ from tts2face.batch.segment_result import SegmentResult
 from tts2face.clock import exact_rate
 from tts2face.exports.writer import ExportWriter, plan_exports
 from tts2face.render.encode import MKV, ClipWriter
+from tts2face.render.own_face import OwnFaceRenderer
 from tts2face.render.picture import Picture
+from tts2face.render.renderer import FrameRenderer
 from tts2face.request import Request
 from tts2face.session import Session
 from tts2face.synthesis.prepared_request import prepare
@@ -41,7 +43,7 @@ class SegmentRenderer:
         session = self._session(segment.models)
         with excerpt_of(segment, Request(**segment.request)) as request:
             fitted, result = _fit(session, request, segment)
-            with _writer(session, segment, fitted, out) as writer:
+            with _writer(session, segment, fitted, (out, result.n_frames)) as writer:
                 for clip in session.stream_to_length(fitted, result.n_frames):
                     writer.add(clip)
         return replace(result, took_s=round(time.perf_counter() - began, 3))
@@ -59,11 +61,16 @@ class SegmentRenderer:
         return self._sessions[models]
 
 
-def _writer(session: Session, segment: Segment, request: Request, out: Path) -> ClipWriter | ExportWriter:
-    """Writer of the medium of a segment."""
+def _writer(
+    session: Session, segment: Segment, request: Request, target: tuple[Path, int]
+) -> ClipWriter | ExportWriter:
+    """Writer of the medium of a segment into a path, for a number of frames."""
+    out, n_frames = target
     if segment.medium == TRACK:
         return ExportWriter(plan_exports([out], format=TRACK))
-    renderer = session.renderer(Picture(**segment.picture), has_gestures=request.has_gestures)
+    renderer: FrameRenderer = session.renderer(Picture(**segment.picture), has_gestures=request.has_gestures)
+    if isinstance(renderer, OwnFaceRenderer):
+        renderer = replace(renderer, n_returning=n_frames)
     return ClipWriter(out, renderer, kind=MKV if segment.medium == ALPHA_MOVIE else None)
 
 
