@@ -41,16 +41,20 @@ def worker(
     from tts2face.jobs.database import database_url, prepare_database
     from tts2face.jobs.engine import DatabaseEngine, local_workers
 
-    open_store(store)
+    open_store(store).check()
     prepare_database(database_url(database))
     engine = DatabaseEngine(database, store, jobs, on_message=write_message)
     write_message(
         f"{jobs} workers of {os.uname().nodename if hasattr(os, 'uname') else 'this machine'}; Ctrl-C ends them"
     )
-    with local_workers(engine) as supervise:
-        while True:
-            supervise()
-            time.sleep(WAIT_S)
+    try:
+        with local_workers(engine) as supervise:
+            while True:
+                supervise()
+                time.sleep(WAIT_S)
+    except KeyboardInterrupt as interrupt:
+        interrupt.add_note("the workers have ended; others take over their segments")
+        raise
 
 
 @jobs.command(name="list")

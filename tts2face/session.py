@@ -261,6 +261,10 @@ class Session:
         """Renderer of the session's face for drawing options; the last few renderers are cached."""
         return self._models.renderer(picture, has_gestures=has_gestures)
 
+    def animated_face(self, *, has_gestures: bool = True) -> AnimatedFace:
+        """Face whose channels the clips of requests with or without gestures use."""
+        return self._models.face(has_gestures=has_gestures)
+
     def _pieces(self, prepared: PreparedRequest) -> Iterator[Piece]:
         return pieces(prepared, self._models.for_request(prepared.request), self._models.gesture_layer(prepared))
 

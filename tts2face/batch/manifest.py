@@ -39,12 +39,19 @@ def is_current(entry: Mapping[str, Any] | None, output: Output, folder: Path) ->
     """Whether a file is what the plan would make: its entry has the same address, and the file the same size."""
     if entry is None or entry.get("address") != output.address or entry.get("status") != "done":
         return False
+    files = {output.name: entry.get("bytes")} if output.suffix else {}
+    files |= {str(one.get("file")): one.get("bytes") for one in entry.get("exports", ()) if isinstance(one, dict)}
+    if not set(output.names) <= set(files):
+        return False
+    return all((folder / name).is_file() and (folder / name).stat().st_size == size for name, size in files.items())
+
+
+def done_entry(
+    output: Output, folder: Path, results: Sequence[SegmentResult], exports: Sequence[Path] = ()
+) -> dict[str, Any]:
+    """Entry of a finished output, whose files are in a folder."""
+    n_frames = sum(result.n_frames for result in results)
     path = folder / output.name
-    return path.is_file() and path.stat().st_size == entry.get("bytes")
-
-
-def done_entry(output: Output, path: Path, n_frames: int, results: Sequence[SegmentResult]) -> dict[str, Any]:
-    """Entry of a finished output."""
     spoken = [(cue, results[cue.segment]) for cue in output.cues if cue.segment is not None]
     warnings = [f"cue {cue.number}: {text}" for cue, result in spoken for text in result.warnings]
     return _entry(output) | {
@@ -58,12 +65,17 @@ def done_entry(output: Output, path: Path, n_frames: int, results: Sequence[Segm
         "sha256": file_hash(path),
         "bytes": path.stat().st_size,
         "took_s": round(sum(result.took_s for result in results), 3),
+        **({"exports": [_file_entry(path) for path in exports]} if exports else {}),
         "cues": [
             _cue_entry(cue)
             | {"rate": result.rate, "speech_s": result.speech_s, "overflow_s": result.overflow_s, "cut_s": result.cut_s}
             for cue, result in spoken
         ],
     }
+
+
+def _file_entry(path: Path) -> dict[str, Any]:
+    return {"file": path.name, "sha256": file_hash(path), "bytes": path.stat().st_size}
 
 
 def failed_entry(output: Output, reason: str) -> dict[str, Any]:

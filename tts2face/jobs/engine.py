@@ -7,12 +7,13 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from lexicon.errors import BackendError
 from tts2face.batch.engine import Message, Rendered
 from tts2face.batch.segment import Segment
-from tts2face.batch.store import Store
+from tts2face.batch.store import Store, wait_for_store
 from tts2face.jobs.database import APPLICATION, QUEUE, Workers, database_url, prepare_database
 from tts2face.jobs.worker import APPLICATION_VERSION, WORKFLOW
 
@@ -59,7 +60,7 @@ class DatabaseEngine:
                 supervise()
                 for name, status in _finished(client, waiting):
                     address = waiting.pop(name)
-                    result = store.result(address)
+                    result = wait_for_store(partial(store.result, address), self.on_message)
                     reason = "" if result is not None else failure_reason(status)
                     yield Rendered(address, result, reason)
                 if waiting:

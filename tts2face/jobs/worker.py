@@ -16,14 +16,15 @@ import time
 import uuid
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from lexicon.errors import DataError, Tts2faceError
 from tts2face.batch.address import SEGMENT_FORMAT
 from tts2face.batch.engine import Message, Renders, render_into
 from tts2face.batch.render_process import RenderProcess
-from tts2face.batch.segment import input_hashes, segment_from_json
-from tts2face.batch.store import Store, open_store
+from tts2face.batch.segment import segment_from_json
+from tts2face.batch.store import Store, open_store, wait_for_store
 from tts2face.jobs.database import (
     APPLICATION,
     BEAT_S,
@@ -87,6 +88,7 @@ class Worker:
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
         """Work until `until` returns true, or `stop` is called."""
+        self._store.check()
         prepare_database(self._url)
         from dbos import DBOS
 
@@ -133,12 +135,11 @@ class Worker:
     def _render(self, address: str, content: dict[str, Any]) -> dict[str, Any]:
         """Render a segment unless it is stored; after a death it runs again and has no other effect."""
         segment = segment_from_json(content)
-        found = self._store.result(address)
-        if found is not None:
-            return found.as_json()
         try:
-            hashes = input_hashes(segment.models, segment.request, segment.picture)
-            if replace(segment, file_hashes=hashes).address != address:
+            found = wait_for_store(partial(self._store.result, address), self._on_message)
+            if found is not None:
+                return found.as_json()
+            if replace(segment, file_hashes=segment.input_hashes()).address != address:
                 raise DataError(
                     "a model, voice, file or program version of this machine differs from that of the batch; "
                     "install and copy the same ones"
