@@ -115,10 +115,7 @@ class Session:
         return concatenate_clips([piece.clip for piece in self.stream(text, **options)])
 
     def stream(self, text: str | Request | PreparedRequest, **options: Any) -> Iterator[Piece]:
-        """Synthesise the clip of a text or request piece by piece, in bounded memory; arguments as for `clip`.
-
-        The concatenated clips of the pieces equal the result of `clip`.
-        """
+        """Synthesise the clip of a text or request piece by piece, in bounded memory; arguments as for `clip`."""
         return self._pieces(prepare_request(text, options))
 
     def measure_speech(self, text: str | Request | PreparedRequest, **options: Any) -> SpeechSpan:
@@ -197,12 +194,10 @@ class Session:
 
         Parameters
         ----------
-        text, on_progress, on_piece
-            As for `write`.
+        text, on_progress, on_piece, options
+            As for `write`, without fields of `Picture`.
         paths
             Output, or several; the suffix selects the format (docs/exports.md). The files appear when all are complete.
-        options
-            Fields of `Request`, such as ``style="delighted"``.
 
         Raises
         ------

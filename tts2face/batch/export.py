@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from lexicon.sequence import PhoneSequence
 from tts2face.batch.output import Output, Sound
-from tts2face.batch.segment import OWN_FACE, Segment
+from tts2face.batch.segment import Segment
 from tts2face.clock import exact_rate, first_sample
 from tts2face.exports.formats import batch_format
 from tts2face.exports.track_json import read_track
 from tts2face.exports.writer import ExportWriter, mesh_of, plan_exports
 from tts2face.render.movie import SOUND_RATE
-from tts2face.request import Request
+from tts2face.request import OWN_FACE, Request
 from tts2face.types import Clip, Speech, Waveform
 
 if TYPE_CHECKING:
