@@ -1,7 +1,9 @@
 """Databases of jobs: a SQLite file, and PostgreSQL if it is installed; workers that can be killed."""
 
+import contextlib
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -23,9 +25,15 @@ StartWorker = Callable[..., "subprocess.Popen[bytes]"]
 
 
 class Postgres:
-    """A server in a temporary folder; a superuser starts it as the user postgres."""
+    """A server in a temporary folder; a superuser starts it as the user postgres.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    settings
+        Options of the server.
+    """
+
+    def __init__(self, settings: str = "-F") -> None:
         found = shutil.which("initdb")
         folder = Path(found).parent if found else next(iter(FOLDERS), None)
         if folder is None:
@@ -33,7 +41,8 @@ class Postgres:
         self._as_user = ["runuser", "-u", "postgres", "--"] if os.getuid() == 0 else []
         if self._as_user and shutil.which("runuser") is None:
             pytest.skip("PostgreSQL does not run as a superuser, and runuser is missing")
-        self._bin, self.folder = folder, Path(mkdtemp(prefix="tts2face-pg-", dir="/tmp"))
+        self._bin, self._settings = folder, settings
+        self.folder = Path(mkdtemp(prefix="tts2face-pg-", dir="/tmp"))
         if self._as_user:
             shutil.chown(self.folder, "postgres")
         with socket.socket() as free:
@@ -51,13 +60,31 @@ class Postgres:
             pytest.skip(f"PostgreSQL does not start here: {(answer.stderr or answer.stdout).strip()[-200:]}")
 
     def start(self) -> None:
-        options = f"-p {self.port} -k {self.folder} -h 127.0.0.1 -F"
+        options = f"-p {self.port} -k {self.folder} -h 127.0.0.1 {self._settings}"
         self._run(
             "pg_ctl", "-D", str(self.folder / "data"), "-w", "-o", options, "-l", str(self.folder / "log"), "start"
         )
 
     def stop(self, mode: str = "immediate") -> None:
         self._run("pg_ctl", "-D", str(self.folder / "data"), "-m", mode, "-w", "stop")
+
+    def kill(self) -> None:
+        """Kill the server and its processes, as `kill -9` does."""
+        family = self.processes()
+        for number in family:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(number, signal.SIGKILL)
+        wait_until(lambda: all(_processes().get(number, ("Z", 0))[0] == "Z" for number in family))
+
+    def processes(self) -> list[int]:
+        """Numbers of the processes of the server."""
+        main = int((self.folder / "data" / "postmaster.pid").read_text().split()[0])
+        return [main, *(number for number, (_, parent) in _processes().items() if parent == main)]
+
+    def remove(self) -> None:
+        """End the server and remove its files."""
+        self.stop()
+        shutil.rmtree(self.folder, ignore_errors=True)
 
     def database(self) -> str:
         """URL of a new database."""
@@ -71,13 +98,22 @@ class Postgres:
         return f"{server}/{name}"
 
 
+def _processes() -> dict[int, tuple[str, int]]:
+    """State and parent of all processes."""
+    found = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            state, parent = path.read_text().rpartition(")")[2].split()[:2]
+            found[int(path.parent.name)] = (state, int(parent))
+    return found
+
+
 @pytest.fixture(scope="session")
 def postgres() -> Iterator[Postgres]:
     pytest.importorskip("psycopg", reason="needs the extra [postgres]")
     server = Postgres()
     yield server
-    server.stop()
-    shutil.rmtree(server.folder, ignore_errors=True)
+    server.remove()
 
 
 @pytest.fixture(params=["sqlite", "postgres"])

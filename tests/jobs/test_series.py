@@ -21,6 +21,7 @@ import pytest
 pytest.importorskip("dbos", reason="needs the extra [batch]")
 
 from tests.jobs.series import Episode, make_series
+from tests.jobs.watch import StoreWatch
 from tts2face.batch.store import open_store
 from tts2face.jobs.control import list_jobs
 
@@ -104,7 +105,7 @@ def test_a_series_survives_kills(database: str, tmp_path: Path) -> None:
     files = [str(episode.path) for episode in episodes]
     batch = [*COMMAND, "batch", *files, "--out", str(out), "--database", database, "--store", str(store), *DRAFT]
     began = time.perf_counter()
-    with Killer(database, store, tmp_path / "workers.log") as killer:
+    with StoreWatch(store) as watch, Killer(database, store, tmp_path / "workers.log") as killer:
         done = subprocess.run(
             [*batch, "--jobs", "0", "--quiet"], capture_output=True, text=True, check=False, timeout=TIMEOUT_S
         )
@@ -117,6 +118,12 @@ def test_a_series_survives_kills(database: str, tmp_path: Path) -> None:
     assert stored == sorted({job.name.partition(".")[0] for job in list_jobs(database)})
     assert 0.9 * n_clips < len(stored) <= n_clips
     assert {job.state for job in list_jobs(database)} == {"done"}
-    LOG.info("%d clips, %d kills, %.0f s", n_clips, killer.n_kills, time.perf_counter() - began)
+    assert watch.n_twice == 0
+    assert watch.cut_off() <= killer.n_kills + 2  # the last two workers are killed, too
+    LOG.info(
+        "%d clips, %d segments, %d kills; %d renderings were cut off and repeated, %d stored segments rendered again; "
+        "%.0f s",
+        n_clips, len(stored), killer.n_kills, watch.cut_off(), watch.n_twice, time.perf_counter() - began,
+    )  # fmt: skip
     again = subprocess.run([*batch, "--jobs", "0"], capture_output=True, text=True, check=True)
     assert f"{n_clips} clips were up to date" in again.stdout + again.stderr
