@@ -1,16 +1,14 @@
 """Figures of jobs in a database for docs/performance.md: speed-up, overhead, many workers, idle workers, memory.
 
 ``PYTHONPATH=. python tests/bench/bench_jobs.py speed|workers|idle|memory [--database sqlite|postgres] [...]``.
-PostgreSQL is started in a temporary folder (apt install postgresql). `workers` are real workers, forked from one process
-after its imports, whose rendering is a sleep; `--seconds` is its length.
+PostgreSQL is started in a temporary folder (apt install postgresql). The workers of `workers`, `idle` and `memory` are
+real ones, forked from one process after its imports, whose rendering is a sleep of `--seconds`.
 """
 
 import argparse
 import os
 import signal
 import statistics
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -59,11 +57,15 @@ def fork_worker(database: str, store: str, seconds: float) -> int:
 @contextmanager
 def workers(database: str, store: Path, n_workers: int, seconds: float) -> Iterator[list[int]]:
     """Workers that are alive in the database."""
-    children = [fork_worker(database, str(store), seconds) for _ in range(n_workers)]
+    children: list[int] = []
     try:
         with Workers(database_url(database)) as table:
-            while len(table.alive()) < n_workers:
-                time.sleep(0.5)
+            while len(children) < n_workers:  # some at a time, so that the start does not last long
+                children += [
+                    fork_worker(database, str(store), seconds) for _ in range(min(8, n_workers - len(children)))
+                ]
+                while len(table.alive()) < len(children):
+                    time.sleep(0.2)
         yield children
     finally:
         for child in children:
@@ -141,11 +143,11 @@ def bench_workers(place: Path, database: str, server: Postgres | None, chosen: a
     """Jobs per second of many workers whose rendering is a sleep."""
     plan = plan_of(place, chosen.jobs)
     store = place / "store"
+    url = database_url(database)
     with workers(database, store, chosen.workers, chosen.seconds) as children:
         began = time.perf_counter()
-        url = database_url(database)
-        with open_client(url) as client:
-            enqueue(client, plan.segments, 10)
+        with open_client(url) as client, Workers(url) as table:
+            enqueue(client, table, plan.segments, 10)
         print(f"queued {len(plan.segments)} in {time.perf_counter() - began:.1f} s", flush=True)
         load = Load(server, database, children)
         engine = DatabaseEngine(database, str(store), n_workers=0)
@@ -157,12 +159,11 @@ def bench_workers(place: Path, database: str, server: Postgres | None, chosen: a
     jobs = list_jobs(database)
     spans = sorted(one.took_s for one in jobs if one.took_s is not None)
     ideal = chosen.workers / chosen.seconds if chosen.seconds else float("inf")
-    done = sorted(one.created_s for one in jobs)
-    del done
     print(
         f"{chosen.workers} workers, {chosen.seconds:g} s each: {len(ends)} jobs in {ends[-1]:.1f} s = "
-        f"{len(ends) / ends[-1]:.1f}/s (without a database at most {ideal:.0f}/s), held for {statistics.median(spans):.2f} "
-        f"s each, {sum(one.n_tries for one in jobs) - len(jobs)} tries more than jobs; {report}"
+        f"{len(ends) / ends[-1]:.1f}/s (without a database at most {ideal:.0f}/s), held for "
+        f"{statistics.median(spans):.2f} s each, {sum(one.n_tries for one in jobs) - len(jobs)} tries more than jobs; "
+        f"{report}"
     )
 
 
@@ -181,8 +182,9 @@ def bench_memory(place: Path, database: str, server: Postgres | None, chosen: ar
     """Memory of one worker over many tiny jobs."""
     plan = plan_of(place, chosen.jobs)
     store = place / "store"
-    with workers(database, store, 1, 0.0) as (child,), open_client(database_url(database)) as client:
-        enqueue(client, plan.segments, 10)
+    url = database_url(database)
+    with workers(database, store, 1, 0.0) as (child,), open_client(url) as client, Workers(url) as table:
+        enqueue(client, table, plan.segments, 10)
         done = 0
         while done < chosen.jobs:
             time.sleep(5.0)
@@ -201,7 +203,6 @@ def bench_speed(place: Path, database: str, server: Postgres | None, chosen: arg
         plan = plan_of(folder, chosen.jobs)
         where = str(folder / "jobs.sqlite") if server is None else server.database()
         prepare_database(database_url(where))
-        store = open_store(folder / "store")
         children = [start_worker(where, str(folder / "store"), cores[number]) for number in range(n_workers)]
         try:
             run_timed(folder, plan, where, n_workers)
@@ -209,7 +210,6 @@ def bench_speed(place: Path, database: str, server: Postgres | None, chosen: arg
             for child in children:
                 child.kill()
                 child.wait()
-        del store
 
 
 def run_timed(folder: Path, plan: Any, database: str, n_workers: int) -> None:
@@ -234,12 +234,12 @@ def run_timed(folder: Path, plan: Any, database: str, n_workers: int) -> None:
         spans += of_worker[-1][0] - of_worker[0][0]
         rendering += sum(took for _, took in of_worker[1:])
         n_jobs += len(of_worker) - 1
-    first = min(one[0] for one in sum(ends.values(), []))
-    last = max(one[0] for one in sum(ends.values(), []))
+    first = min(of_worker[0][0] for of_worker in ends.values())
+    last = max(of_worker[-1][0] for of_worker in ends.values())
     rate = (len(plan.segments) - n_workers) / (last - first)
     print(
-        f"{n_workers} workers: {len(plan.segments)} segments, batch {result.took_s:.1f} s with the start of the workers; "
-        f"{rate:.3f} segments/s from the first end on; rendering {rendering / n_jobs:.3f} s each, "
+        f"{n_workers} workers: {len(plan.segments)} segments, batch {result.took_s:.1f} s with the start of the "
+        f"workers; {rate:.3f} segments/s from the first end on; rendering {rendering / n_jobs:.3f} s each, "
         f"beside it {1000 * (spans - rendering) / n_jobs:.0f} ms = {100 * (spans / rendering - 1):.1f} %",
         flush=True,
     )

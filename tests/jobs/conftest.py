@@ -48,16 +48,20 @@ class Postgres:
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             self.port = free.getsockname()[1]
+        self.has_started = False
         self._run("initdb", "-D", str(self.folder / "data"), "-A", "trust", "-U", "tts2face", "--no-sync")
         self.start()
-        self.n_databases = 0
+        self.n_databases, self.has_started = 0, True
 
     def _run(self, command: str, *arguments: str) -> None:
         answer = subprocess.run(
             [*self._as_user, str(self._bin / command), *arguments], capture_output=True, text=True, check=False, cwd="/"
         )
         if answer.returncode:
-            pytest.skip(f"PostgreSQL does not start here: {(answer.stderr or answer.stdout).strip()[-200:]}")
+            reason = f"PostgreSQL does not start here: {(answer.stderr or answer.stdout).strip()[-200:]}"
+            if self.has_started:
+                pytest.fail(reason)
+            pytest.skip(reason)
 
     def start(self) -> None:
         options = f"-p {self.port} -k {self.folder} -h 127.0.0.1 {self._settings}"
@@ -74,12 +78,12 @@ class Postgres:
         for number in family:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(number, signal.SIGKILL)
-        wait_until(lambda: all(_processes().get(number, ("Z", 0))[0] == "Z" for number in family))
+        wait_until(lambda: not _parents().keys() & set(family))  # a zombie still holds the folder
 
     def processes(self) -> list[int]:
         """Numbers of the processes of the server."""
         main = int((self.folder / "data" / "postmaster.pid").read_text().split()[0])
-        return [main, *(number for number, (_, parent) in _processes().items() if parent == main)]
+        return [main, *(number for number, parent in _parents().items() if parent == main)]
 
     def remove(self) -> None:
         """End the server and remove its files."""
@@ -98,13 +102,12 @@ class Postgres:
         return f"{server}/{name}"
 
 
-def _processes() -> dict[int, tuple[str, int]]:
-    """State and parent of all processes."""
+def _parents() -> dict[int, int]:
+    """Parent of each process."""
     found = {}
     for path in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):
-            state, parent = path.read_text().rpartition(")")[2].split()[:2]
-            found[int(path.parent.name)] = (state, int(parent))
+            found[int(path.parent.name)] = int(path.read_text().rpartition(")")[2].split()[1])
     return found
 
 
