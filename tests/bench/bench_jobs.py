@@ -1,6 +1,6 @@
 """Figures of jobs in a database for docs/performance.md: speed-up, overhead, many workers, idle workers, memory.
 
-``PYTHONPATH=. python tests/bench/bench_jobs.py speed|workers|idle|memory [--database sqlite|postgres] [...]``.
+``PYTHONPATH=. python tests/bench/bench_jobs.py speed|workers|load|idle|memory [--database sqlite|postgres] [...]``.
 PostgreSQL is started in a temporary folder (apt install postgresql). The workers of `workers`, `idle` and `memory` are
 real ones, forked from one process after its imports, whose rendering is a sleep of `--seconds`.
 """
@@ -22,9 +22,9 @@ from tts2face.batch.segment import Segment
 from tts2face.batch.segment_result import SegmentResult
 from tts2face.batch.store import open_store
 from tts2face.jobs.control import list_jobs
-from tts2face.jobs.database import Workers, database_url, prepare_database
+from tts2face.jobs.database import BEAT_S, Workers, database_url, prepare_database
 from tts2face.jobs.engine import DatabaseEngine, enqueue, open_client, start_worker
-from tts2face.jobs.worker import Worker
+from tts2face.jobs.worker import Worker, poll_interval
 
 CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
 SETTINGS = "-c max_connections=1200 -c shared_preload_libraries=pg_stat_statements -c shared_buffers=512MB"
@@ -75,14 +75,14 @@ def workers(database: str, store: Path, n_workers: int, seconds: float) -> Itera
 
 
 def cpu_seconds(processes: list[int]) -> float:
-    """Processor time of processes so far."""
+    """Processor time of processes and their ended children so far."""
     total = 0
     for number in processes:
         try:
             fields = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()
         except FileNotFoundError:
             continue
-        total += int(fields[11]) + int(fields[12])
+        total += sum(map(int, fields[11:15]))
     return total / CLOCK_TICKS
 
 
@@ -104,15 +104,16 @@ class Load:
         found = {"worker_cpu": cpu_seconds(self._children)}
         if self._server is not None:
             found["server_cpu"] = cpu_seconds(self._server.processes())
-            found["commits"] = self._one("SELECT xact_commit FROM pg_stat_database WHERE datname = current_database()")
-            found["queries"] = self._one(
+            found["commits"] = self.one("SELECT xact_commit FROM pg_stat_database WHERE datname = current_database()")
+            found["queries"] = self.one(
                 "SELECT coalesce(sum(calls), 0) FROM pg_stat_statements s JOIN pg_database d ON d.oid = s.dbid "
                 "WHERE d.datname = current_database()"
             )
-            found["wal"] = self._one("SELECT wal_bytes FROM pg_stat_wal")
+            found["wal"] = self.one("SELECT wal_bytes FROM pg_stat_wal")
         return found
 
-    def _one(self, query: str) -> float:
+    def one(self, query: str) -> float:
+        """Number that a query gives."""
         return float(self._connection.execute(query).fetchone()[0])
 
     def report(self, n_jobs: int, n_statements: int = 0) -> str:
@@ -125,13 +126,13 @@ class Load:
                 if n_jobs:
                     parts.append(f"{1000 * (ended[name] - self._began[name]) / n_jobs:.1f} ms each job")
         if self._server is not None:
-            used = self._one("SELECT count(*) FROM pg_stat_activity WHERE datname = current_database()")
+            used = self.one("SELECT count(*) FROM pg_stat_activity WHERE datname = current_database()")
             for name in ("commits", "queries", "wal"):
                 parts.append(f"{(ended[name] - self._began[name]) / took:.0f} {name}/s")
             parts.append(f"{used - 1:.0f} connections")
-            parts.append(f"{self._one('SELECT pg_database_size(current_database())') / 1e6:.1f} MB")
+            parts.append(f"{self.one('SELECT pg_database_size(current_database())') / 1e6:.1f} MB")
             for row in self._connection.execute(
-                "SELECT calls, total_exec_time / calls, left(regexp_replace(query, '\\s+', ' ', 'g'), 110) "
+                "SELECT calls, total_exec_time / calls, left(regexp_replace(query, '\\s+', ' ', 'g'), 1500) "
                 "FROM pg_stat_statements ORDER BY total_exec_time DESC LIMIT %s",
                 (n_statements,),
             ):
@@ -165,6 +166,62 @@ def bench_workers(place: Path, database: str, server: Postgres | None, chosen: a
         f"{statistics.median(spans):.2f} s each, {sum(one.n_tries for one in jobs) - len(jobs)} tries more than jobs; "
         f"{report}"
     )
+
+
+def bench_load(place: Path, database: str, server: Postgres | None, chosen: argparse.Namespace) -> None:
+    """The statements of many workers, sent by pgbench: one connection stands for a worker."""
+    assert server is not None, "--database postgres"
+    plan = plan_of(place, 1)
+    url = database_url(database)
+    with open_client(url) as client, Workers(url) as table:
+        enqueue(client, table, plan.segments, 10)
+    fill_queue(database, chosen.jobs)
+    interval = poll_interval(chosen.workers)
+    share = 1.0 if not chosen.seconds else min(1.0, interval / chosen.seconds)
+    values = {
+        "share": round(1e6 * share),
+        "beats": round(1e6 * min(1.0, (interval if chosen.seconds else 0.1) / BEAT_S)),
+        "pause_us": round(1e6 * interval) if chosen.seconds else 0,
+    }
+    load = Load(server, database, [])
+    server.run(
+        "pgbench", "-n", "-M", "extended", "-h", "127.0.0.1", "-p", str(server.port), "-U", "tts2face", "-T", "30",
+        "-c", str(chosen.workers), "-j", "1", *(f"-D{name}={value}" for name, value in values.items()), "-f",
+        str(server.put(Path(__file__).with_name("worker_load.sql"))), database.rpartition("/")[2],
+    )  # fmt: skip
+    n_done = int(load.one("SELECT count(*) FROM dbos.workflow_status WHERE status = 'SUCCESS'"))
+    longest = load.one("SELECT max(max_exec_time) FROM pg_stat_statements WHERE query LIKE '%SKIP LOCKED%'")
+    print(
+        f"pgbench as {chosen.workers} workers, a job in {chosen.seconds:g} s, looks every {interval:g} s: "
+        f"{n_done / 30:.0f} jobs/s of {chosen.jobs} queued, longest claim {longest:.0f} ms; {load.report(n_done, chosen.statements)}"
+    )
+
+
+def fill_queue(database: str, n_jobs: int) -> None:
+    """Copies of the one queued job."""
+    import psycopg
+
+    with psycopg.connect(database, autocommit=True) as connection:
+        columns = [
+            row[0]
+            for row in connection.execute(
+                "SELECT column_name FROM information_schema.columns WHERE table_schema = 'dbos' AND table_name = %s",
+                ("workflow_status",),
+            )
+        ]
+        new = {"workflow_uuid": "md5(n::text) || md5((n + 1)::text) || '.0'", "created_at": "created_at + n"}
+        chosen = ", ".join(new.get(name, name) for name in columns)
+        connection.execute(
+            f"INSERT INTO dbos.workflow_status ({', '.join(columns)}) SELECT {chosen} FROM dbos.workflow_status, "
+            f"generate_series(1, {n_jobs}) AS n"
+        )
+        connection.execute(
+            "INSERT INTO dbos.workflow_input (workflow_uuid, inputs) SELECT s.workflow_uuid, i.inputs "
+            "FROM dbos.workflow_status s, dbos.workflow_input i ON CONFLICT DO NOTHING"
+        )
+        connection.execute("VACUUM ANALYZE")
+        size = connection.execute("SELECT pg_database_size(current_database())").fetchone()
+        print(f"{n_jobs} jobs queued: {size[0] / n_jobs if size else 0:.0f} bytes each")
 
 
 def bench_idle(place: Path, database: str, server: Postgres | None, chosen: argparse.Namespace) -> None:
@@ -247,7 +304,7 @@ def run_timed(folder: Path, plan: Any, database: str, n_workers: int) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("bench", choices=("speed", "workers", "idle", "memory"))
+    parser.add_argument("bench", choices=("speed", "workers", "load", "idle", "memory"))
     parser.add_argument("--database", choices=("sqlite", "postgres"), default="sqlite")
     parser.add_argument("--workers", type=int, default=4)
     parser.add_argument("--seconds", type=float, default=0.0, help="of a rendering")
@@ -261,7 +318,13 @@ def main() -> None:
             place = Path(folder)
             database = str(place / "jobs.sqlite") if server is None else server.database()
             prepare_database(database_url(database))
-            benches = {"speed": bench_speed, "workers": bench_workers, "idle": bench_idle, "memory": bench_memory}
+            benches = {
+                "speed": bench_speed,
+                "workers": bench_workers,
+                "load": bench_load,
+                "idle": bench_idle,
+                "memory": bench_memory,
+            }
             benches[chosen.bench](place, database, server, chosen)
     finally:
         if server is not None:

@@ -35,7 +35,7 @@ class Postgres:
 
     def __init__(self, settings: str = "-F") -> None:
         found = shutil.which("initdb")
-        folder = Path(found).parent if found else next(iter(FOLDERS), None)
+        folder = Path(found).resolve().parent if found else next(iter(FOLDERS), None)
         if folder is None:
             pytest.skip("PostgreSQL is not installed (apt install postgresql)")
         self._as_user = ["runuser", "-u", "postgres", "--"] if os.getuid() == 0 else []
@@ -49,11 +49,12 @@ class Postgres:
             free.bind(("127.0.0.1", 0))
             self.port = free.getsockname()[1]
         self.has_started = False
-        self._run("initdb", "-D", str(self.folder / "data"), "-A", "trust", "-U", "tts2face", "--no-sync")
+        self.run("initdb", "-D", str(self.folder / "data"), "-A", "trust", "-U", "tts2face", "--no-sync")
         self.start()
         self.n_databases, self.has_started = 0, True
 
-    def _run(self, command: str, *arguments: str) -> None:
+    def run(self, command: str, *arguments: str) -> None:
+        """Run a program of PostgreSQL."""
         answer = subprocess.run(
             [*self._as_user, str(self._bin / command), *arguments], capture_output=True, text=True, check=False, cwd="/"
         )
@@ -65,12 +66,12 @@ class Postgres:
 
     def start(self) -> None:
         options = f"-p {self.port} -k {self.folder} -h 127.0.0.1 {self._settings}"
-        self._run(
+        self.run(
             "pg_ctl", "-D", str(self.folder / "data"), "-w", "-o", options, "-l", str(self.folder / "log"), "start"
         )
 
     def stop(self, mode: str = "immediate") -> None:
-        self._run("pg_ctl", "-D", str(self.folder / "data"), "-m", mode, "-w", "stop")
+        self.run("pg_ctl", "-D", str(self.folder / "data"), "-m", mode, "-w", "stop")
 
     def kill(self) -> None:
         """Kill the server and its processes, as `kill -9` does."""
@@ -84,6 +85,12 @@ class Postgres:
         """Numbers of the processes of the server."""
         main = int((self.folder / "data" / "postmaster.pid").read_text().split()[0])
         return [main, *(number for number, parent in _parents().items() if parent == main)]
+
+    def put(self, path: Path) -> Path:
+        """A copy of a file that the server's user can read."""
+        copy = shutil.copyfile(path, self.folder / path.name)
+        copy.chmod(0o644)
+        return copy
 
     def remove(self) -> None:
         """End the server and remove its files."""
