@@ -3,7 +3,8 @@
 import contextlib
 import json
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -16,6 +17,15 @@ from tts2face.storage.temporary import NAME_INFIX, Temporary
 RESULT_SUFFIX = ".json"
 MAX_RESULT_BYTES = 1_000_000
 REMOTE_SCHEMES = ("s3://", "gs://", "az://", "abfs://", "file://", "memory://")
+
+
+@dataclass(frozen=True, slots=True)
+class StoredSegment:
+    """A stored segment: its files together, and when it was stored, in seconds since 1970."""
+
+    address: str
+    n_bytes: int
+    stored_s: float
 
 
 class Store(Protocol):
@@ -32,6 +42,9 @@ class Store(Protocol):
 
     def addresses(self) -> Iterator[str]:
         """Addresses of all stored segments."""
+
+    def entries(self) -> Iterator[StoredSegment]:
+        """All stored segments with their sizes and times."""
 
     def remove(self, address: str) -> None:
         """Remove a segment, if it is stored."""
@@ -107,6 +120,12 @@ class FolderStore:
             if NAME_INFIX not in path.name:
                 yield path.stem
 
+    def entries(self) -> Iterator[StoredSegment]:
+        """All stored segments with their sizes and times."""
+        for folder in sorted(self.folder.glob("??")):
+            paths = [path for path in folder.iterdir() if path.suffix in (SEGMENT_SUFFIX, RESULT_SUFFIX)]
+            yield from sum_files((path.stem, path.stat().st_size, path.stat().st_mtime) for path in paths)
+
     def remove(self, address: str) -> None:
         """Remove a segment, its result first."""
         movie = self._path(address)
@@ -175,6 +194,15 @@ class ObjectStore:
                 if path.endswith(RESULT_SUFFIX):
                     yield Path(path).stem
 
+    def entries(self) -> Iterator[StoredSegment]:
+        """All stored segments with their sizes and times."""
+        files = (entry for page in self._obstore.list(self._store) for entry in page)
+        yield from sum_files(
+            (Path(entry["path"]).stem, entry["size"], entry["last_modified"].timestamp())
+            for entry in files
+            if entry["path"].endswith((SEGMENT_SUFFIX, RESULT_SUFFIX))
+        )
+
     def remove(self, address: str) -> None:
         """Remove a segment, its result first."""
         for suffix in (RESULT_SUFFIX, SEGMENT_SUFFIX):
@@ -198,6 +226,15 @@ class ObjectStore:
     @staticmethod
     def _name(address: str, suffix: str) -> str:
         return f"{address[:2]}/{address}{suffix}"
+
+
+def sum_files(files: Iterable[tuple[str, int, float]]) -> Iterator[StoredSegment]:
+    """Segments of files given by address, bytes and time; a segment has the time of its latest file."""
+    found: dict[str, StoredSegment] = {}
+    for address, n_bytes, stored_s in files:
+        other = found.get(address, StoredSegment(address, 0, 0.0))
+        found[address] = StoredSegment(address, other.n_bytes + n_bytes, max(other.stored_s, stored_s))
+    yield from found.values()
 
 
 def _parse_result(content: bytes) -> SegmentResult | None:

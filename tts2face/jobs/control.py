@@ -103,7 +103,14 @@ def retry_jobs(database: str, names: Sequence[str] = (), priority: int | None = 
         return len(latest)
 
 
-def prune_jobs(database: str, older_than_s: float = 0.0) -> int:
+def unfinished_segments(database: str) -> frozenset[str]:
+    """Addresses of the segments of waiting and running jobs."""
+    with open_client(_prepared(database)) as client:
+        found = _of_states(client, ACTIVE, load_input=False)
+    return frozenset(one.workflow_id.partition(".")[0] for one in found)
+
+
+def prune_jobs(database: str, older_than_s: float = 0.0, *, dry_run: bool = False) -> int:
     """Remove jobs that have ended some seconds ago or earlier; their number. Stored segments stay."""
     url = _prepared(database)
     removed = 0
@@ -115,14 +122,17 @@ def prune_jobs(database: str, older_than_s: float = 0.0) -> int:
                 status=sorted(frozenset(STATES) - ACTIVE),
                 completed_before=before,
                 limit=JOBS_PER_QUERY,
+                offset=removed if dry_run else 0,
                 load_input=False,
                 load_output=False,
             )
+            removed += len(ended)
             if not ended:
                 break
-            client.delete_workflows([one.workflow_id for one in ended])
-            removed += len(ended)
-        workers.forget_dead()
+            if not dry_run:
+                client.delete_workflows([one.workflow_id for one in ended])
+        if not dry_run:
+            workers.forget_dead()
     return removed
 
 
