@@ -9,13 +9,15 @@ import pytest
 
 pytest.importorskip("dbos", reason="needs the extra [batch]")
 
+from cli.main import run
 from lexicon.errors import BackendError
+from tests.batch.test_prune import age, fill, manifest
 from tests.jobs.conftest import Postgres, StartWorker, wait_until
 from tests.jobs.stub_worker import Stub
 from tests.jobs.test_jobs import collect, queue
 from tts2face.batch.segment import Segment
-from tts2face.batch.store import open_store
-from tts2face.jobs.control import list_jobs, prune_jobs
+from tts2face.batch.store import FolderStore, open_store
+from tts2face.jobs.control import cancel_jobs, list_jobs, prune_jobs
 from tts2face.jobs.database import Workers, database_url, prepare_database
 from tts2face.jobs.engine import JOBS_PER_QUERY, DatabaseEngine, enqueue, open_client
 from tts2face.jobs.worker import MAX_LOOKS_PER_S, POLL_S, Worker, poll_interval
@@ -127,11 +129,26 @@ def test_a_job_that_is_removed_while_a_batch_waits_ends_the_wait(
 def test_more_jobs_than_one_statement_takes_are_pruned(
     segments: Segments, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from tts2face.jobs.control import cancel_jobs
-
     database = str(tmp_path / "jobs.sqlite")
     monkeypatch.setattr("tts2face.jobs.control.JOBS_PER_QUERY", 3)
     queue(database, segments(*(f"Words {number}." for number in range(8))))
     assert cancel_jobs(database) == 8
     assert prune_jobs(database, older_than_s=60.0) == 0
     assert prune_jobs(database) == 8
+
+
+def test_segments_of_unfinished_jobs_are_never_pruned(
+    segments: Segments, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    database, store = str(tmp_path / "jobs.sqlite"), FolderStore(tmp_path / "store")
+    work = segments("Words.", "Others.")
+    queue(database, work)
+    waiting, ended = sorted(work)
+    assert cancel_jobs(database, [ended]) == 1
+    fill(store, tmp_path, waiting, ended)
+    age(store.folder, 8 * 86_400.0)
+    out = manifest(tmp_path / "out")
+    words = ["jobs", "prune", "--database", database, "--store", str(store.folder), "--outputs", str(out)]
+    assert run([*words, "--days", "7", "--dry-run"]) == run([*words, "--days", "7"]) == 0
+    assert capsys.readouterr().out.splitlines()[1::2] == ["would remove 0 jobs", "removed 0 jobs"]
+    assert list(store.addresses()) == [waiting]
