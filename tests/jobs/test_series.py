@@ -27,8 +27,8 @@ from tts2face.jobs.control import list_jobs
 
 N_CUES = int(os.environ.get("TTS2FACE_SERIES_CUES", "12"))
 FPS = 10
-TIMEOUT_S = 240 + 3 * N_CUES
-FIRST_KILL_S, KILL_INTERVAL_S = 3.0, (6.0, 12.0)
+TIMEOUT_S = 240 + 6 * N_CUES
+FIRST_KILL_S, KILL_INTERVAL_S = 3.0, (8.0, 16.0)
 LOG = logging.getLogger(__name__)
 COMMAND = [sys.executable, "-m", "tts2face"]
 DRAFT = ["--voice", "espeak", "--size", "64x64", "--supersampling", "1", "--fps", str(FPS)]
