@@ -1,5 +1,6 @@
 """Signs of life, the return of work, the looks at the queue, and the engine's function on which it all rests."""
 
+import sqlite3
 import threading
 import time
 from collections.abc import Callable
@@ -135,6 +136,44 @@ def test_more_jobs_than_one_statement_takes_are_pruned(
     assert cancel_jobs(database) == 8
     assert prune_jobs(database, older_than_s=60.0) == 0
     assert prune_jobs(database) == 8
+
+
+def test_an_outage_of_the_database_is_two_lines(
+    postgres: Postgres, segments: Segments, start_worker: StartWorker, tmp_path: Path
+) -> None:
+    database = postgres.database()
+    work = segments("One.", "Two.")
+    first = start_worker(database, 0.1)
+    assert set(collect(database, segments("One."), tmp_path).values()) == {""}
+    postgres.stop()
+    time.sleep(6.0)
+    postgres.start()
+    assert set(collect(database, work, tmp_path).values()) == {""}
+    log = tmp_path / "workers.log"
+    wait_until(lambda: "reached again" in log.read_text())
+    first.kill()
+    lines = log.read_text().splitlines()
+    assert len(lines) == 2, lines
+    assert lines[0].startswith("the database cannot be reached (")
+    assert lines[1] == "the database can be reached again"
+
+
+def test_nothing_of_a_pruned_job_remains_in_the_database(
+    segments: Segments, start_worker: StartWorker, tmp_path: Path
+) -> None:
+    path = tmp_path / "jobs.sqlite"
+    prepare_database(database_url(path))
+    start_worker(str(path), 0.0)
+    rows = []
+    for number in range(3):
+        work = segments(f"Words {number}.", f"These are wrong, {number}.")
+        collect(str(path), work, tmp_path)
+        assert prune_jobs(str(path)) == 2
+        with sqlite3.connect(path) as connection:
+            tables = [row[0] for row in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
+            rows.append({one: connection.execute(f"SELECT count(*) FROM {one}").fetchone()[0] for one in tables})
+    assert rows[0] == rows[1] == rows[2]
+    assert rows[0]["workflow_status"] == 0
 
 
 def test_segments_of_unfinished_jobs_are_never_pruned(

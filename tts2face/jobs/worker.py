@@ -93,6 +93,8 @@ class Worker:
         self._rendering = threading.Lock()  # one segment at a time
         self._vanished: set[str] = set()
         self._next_all_work_s = 0.0
+        self._noting = threading.Lock()
+        self._is_reached = True
         self.n_rendered = 0
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
@@ -186,7 +188,9 @@ class Worker:
             try:
                 self._vanished = workers.beat(self.executor_id, self._place)
             except sqlalchemy.exc.SQLAlchemyError as away:
-                self._on_message(f"the database cannot be reached ({type(away).__name__}); trying again")
+                self._note_database(away)
+            else:
+                self._note_database(None)
 
     def _take_over(self, workers: Workers) -> None:
         """Return the work of workers without a sign of life to the queue; called again and again."""
@@ -205,7 +209,18 @@ class Worker:
                 self._vanished -= ended
                 self._on_message(f"took over from {len(ended)} workers without a sign of life")
         except (sqlalchemy.exc.SQLAlchemyError, dbos_error.DBOSException) as away:
-            self._on_message(f"the database cannot be reached ({type(away).__name__}); trying again")
+            self._note_database(away)
+
+    def _note_database(self, away: Exception | None) -> None:
+        """Say once that the database cannot be reached, and once that it can be reached again."""
+        with self._noting:
+            if (away is None) != self._is_reached:
+                self._is_reached = away is None
+                self._on_message(
+                    "the database can be reached again"
+                    if away is None
+                    else f"the database cannot be reached ({type(away).__name__}); trying again"
+                )
 
     @staticmethod
     def _look_at_all_work(workers: Workers) -> set[str]:
