@@ -28,7 +28,7 @@ from tts2face.jobs.control import list_jobs
 N_CUES = int(os.environ.get("TTS2FACE_SERIES_CUES", "12"))
 FPS = 10
 TIMEOUT_S = 240 + 6 * N_CUES
-FIRST_KILL_S, KILL_INTERVAL_S = 3.0, (8.0, 16.0)
+FIRST_KILL_S, KILL_INTERVAL_S = 3.0, (4.0, 12.0)
 LOG = logging.getLogger(__name__)
 COMMAND = [sys.executable, "-m", "tts2face"]
 DRAFT = ["--voice", "espeak", "--size", "64x64", "--supersampling", "1", "--fps", str(FPS)]
@@ -42,10 +42,14 @@ def start_worker(database: str, store: Path, log: Path) -> "subprocess.Popen[byt
 
 
 class Killer:
-    """Kills one of two workers, or both, every few seconds, and starts others."""
+    """Kills one of two workers, or both, every few seconds, and starts others.
 
-    def __init__(self, database: str, store: Path, log: Path) -> None:
+    The seconds are counted from the first segment after the last kill, so that a slow machine ends the test, too.
+    """
+
+    def __init__(self, database: str, store: Path, log: Path, watch: StoreWatch) -> None:
         self._start = lambda: start_worker(database, store, log)
+        self._watch = watch
         self._workers = [self._start(), self._start()]
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run)
@@ -56,11 +60,14 @@ class Killer:
         wait_s = FIRST_KILL_S
         while not self._ended.wait(wait_s):
             wait_s = generator.uniform(*KILL_INTERVAL_S)
+            n_stored = len(self._watch.stored)
             for number in [generator.randrange(2)] if generator.random() < 0.8 else [0, 1]:
                 self._workers[number].kill()
                 self._workers[number].wait()
                 self._workers[number] = self._start()
                 self.n_kills += 1
+            while len(self._watch.stored) == n_stored and not self._ended.wait(0.2):
+                continue
 
     def __enter__(self) -> "Killer":
         self._thread.start()
@@ -105,7 +112,7 @@ def test_a_series_survives_kills(database: str, tmp_path: Path) -> None:
     files = [str(episode.path) for episode in episodes]
     batch = [*COMMAND, "batch", *files, "--out", str(out), "--database", database, "--store", str(store), *DRAFT]
     began = time.perf_counter()
-    with StoreWatch(store) as watch, Killer(database, store, tmp_path / "workers.log") as killer:
+    with StoreWatch(store) as watch, Killer(database, store, tmp_path / "workers.log", watch) as killer:
         done = subprocess.run(
             [*batch, "--jobs", "0", "--quiet"], capture_output=True, text=True, check=False, timeout=TIMEOUT_S
         )
