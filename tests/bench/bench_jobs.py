@@ -24,7 +24,8 @@ from tts2face.batch.store import open_store
 from tts2face.jobs.control import list_jobs
 from tts2face.jobs.database import BEAT_S, Workers, database_url, prepare_database
 from tts2face.jobs.engine import DatabaseEngine, enqueue, open_client, start_worker
-from tts2face.jobs.worker import Worker, poll_interval
+from tts2face.jobs.takeover import poll_interval
+from tts2face.jobs.worker import Worker
 
 CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
 SETTINGS = "-c max_connections=1200 -c shared_preload_libraries=pg_stat_statements -c shared_buffers=512MB"
@@ -193,7 +194,8 @@ def bench_load(place: Path, database: str, server: Postgres | None, chosen: argp
     longest = load.one("SELECT max(max_exec_time) FROM pg_stat_statements WHERE query LIKE '%SKIP LOCKED%'")
     print(
         f"pgbench as {chosen.workers} workers, a job in {chosen.seconds:g} s, looks every {interval:g} s: "
-        f"{n_done / 30:.0f} jobs/s of {chosen.jobs} queued, longest claim {longest:.0f} ms; {load.report(n_done, chosen.statements)}"
+        f"{n_done / 30:.0f} jobs/s of {chosen.jobs} queued, longest claim {longest:.0f} ms; "
+        f"{load.report(n_done, chosen.statements)}"
     )
 
 

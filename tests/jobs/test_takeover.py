@@ -19,9 +19,10 @@ from tests.jobs.test_jobs import collect, queue
 from tts2face.batch.segment import Segment
 from tts2face.batch.store import FolderStore, open_store
 from tts2face.jobs.control import cancel_jobs, list_jobs, prune_jobs
-from tts2face.jobs.database import Workers, database_url, prepare_database
+from tts2face.jobs.database import BEAT_S, Workers, database_url, prepare_database
 from tts2face.jobs.engine import JOBS_PER_QUERY, DatabaseEngine, enqueue, open_client
-from tts2face.jobs.worker import MAX_LOOKS_PER_S, POLL_S, Worker, poll_interval
+from tts2face.jobs.takeover import MAX_LOOKS_PER_S, POLL_S, poll_interval
+from tts2face.jobs.worker import Worker
 
 Segments = Callable[..., dict[str, Segment]]
 
@@ -30,7 +31,7 @@ def test_the_engine_still_returns_the_work_of_dead_executors() -> None:
     from dbos import DBOS
 
     assert callable(getattr(DBOS, "_recover_pending_workflows", None)), (
-        "this release of dbos has no DBOS._recover_pending_workflows(executor_ids); tts2face.jobs.worker.return_work "
+        "this release of dbos has no DBOS._recover_pending_workflows(executor_ids); tts2face.jobs.takeover.return_work "
         "needs another way to return the work of dead workers to the queue (decision 083)"
     )
 
@@ -64,6 +65,25 @@ def test_work_of_an_owner_that_is_not_in_the_table_is_returned(
         assert workers.alive(within_s=1e9) == {}
     start_worker(database, 0.1)
     assert collect(database, work, tmp_path) == dict.fromkeys(work, "")
+
+
+def test_a_dead_worker_of_another_version_is_reported_once(
+    segments: Segments, start_worker: StartWorker, tmp_path: Path
+) -> None:
+    """Its work waits for a worker of its version."""
+    path = tmp_path / "jobs.sqlite"
+    queue(str(path), segments("Words."))
+    with sqlite3.connect(path) as connection:
+        connection.execute(
+            "UPDATE workflow_status SET status = 'PENDING', executor_id = 'old', application_version = 'segments-0'"
+        )
+        connection.execute("INSERT INTO tts2face_workers VALUES ('old', 0, 'there')")
+    start_worker(str(path), 0.0)
+    log = tmp_path / "workers.log"
+    wait_until(lambda: "took over from 1 workers" in log.read_text())
+    time.sleep(2 * BEAT_S + 0.5)
+    assert log.read_text().count("took over") == 1
+    assert [one.state for one in list_jobs(str(path))] == ["running"]
 
 
 def test_looks_at_the_queue_are_bounded() -> None:

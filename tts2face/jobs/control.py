@@ -7,9 +7,8 @@ from typing import Any
 
 from lexicon.errors import InputError
 from tts2face.batch.segment import segment_from_json
-from tts2face.jobs.database import Workers, database_url, prepare_database
+from tts2face.jobs.database import WORKFLOW, Workers, database_url, prepare_database
 from tts2face.jobs.engine import ACTIVE, JOBS_PER_QUERY, enqueue, failure_reason, open_client
-from tts2face.jobs.worker import WORKFLOW
 
 STATES = {
     "ENQUEUED": "waiting",

@@ -8,10 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import BackendError, InputError
+from tts2face.batch.address import SEGMENT_FORMAT
 
 DEFAULT_DATABASE = "tts2face-jobs.sqlite"
 QUEUE = "tts2face-segments"
 APPLICATION = "tts2face"
+APPLICATION_VERSION = f"segments-{SEGMENT_FORMAT}"  # pinned: workers of equal segments share their work
+WORKFLOW = "render_segment"
 BEAT_S = 1.5  # between two signs of life of a worker
 DEAD_AFTER_S = 6.0  # without a sign of life; with the interval of looking this is below 10 s
 CONNECTIONS = {"pool_size": 1, "max_overflow": 2}  # of a process to the table of workers; one of them stays open

@@ -14,8 +14,15 @@ from lexicon.errors import BackendError
 from tts2face.batch.engine import Message, Rendered
 from tts2face.batch.segment import Segment
 from tts2face.batch.store import Store
-from tts2face.jobs.database import APPLICATION, QUEUE, Workers, database_url, prepare_database
-from tts2face.jobs.worker import APPLICATION_VERSION, WORKFLOW
+from tts2face.jobs.database import (
+    APPLICATION,
+    APPLICATION_VERSION,
+    QUEUE,
+    WORKFLOW,
+    Workers,
+    database_url,
+    prepare_database,
+)
 
 POLL_S = 0.5  # between two looks at the jobs that have ended
 OVERLAP_S = 5.0  # of the times of two looks: a transaction ends some time after the time that it notes
@@ -97,12 +104,12 @@ class _Look:
                 reasons[name] = "its job was removed from the database; run again"
             elif job.status not in ACTIVE:
                 reasons[name] = failure_reason(job)
-                self.since_s = max(self.since_s, (job.completed_at or 0) / 1000.0)
         return [(self.waiting.pop(name), reason) for name, reason in reasons.items()]
 
     def _recent(self) -> dict[str, Any]:
         after = datetime.fromtimestamp(self.since_s - OVERLAP_S, UTC).isoformat()
         found = self.client.list_workflows(name=WORKFLOW, completed_after=after, load_input=False)
+        self.since_s = max([self.since_s, *((one.completed_at or 0) / 1000.0 for one in found)])
         return {one.workflow_id: one for one in found}
 
     def _all(self) -> dict[str, Any]:

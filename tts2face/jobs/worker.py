@@ -22,26 +22,24 @@ from dataclasses import replace
 from typing import Any
 
 from lexicon.errors import BackendError, DataError, Tts2faceError
-from tts2face.batch.address import SEGMENT_FORMAT
 from tts2face.batch.engine import Message, Renders, render_into
 from tts2face.batch.render_process import RenderProcess
 from tts2face.batch.segment import input_hashes, segment_from_json
 from tts2face.batch.store import Store, open_store
 from tts2face.jobs.database import (
     APPLICATION,
+    APPLICATION_VERSION,
     BEAT_S,
     QUEUE,
+    WORKFLOW,
     Workers,
     database_url,
     prepare_database,
     quiet_dbos,
 )
+from tts2face.jobs.takeover import list_running, poll_interval, return_work
 
-APPLICATION_VERSION = f"segments-{SEGMENT_FORMAT}"  # pinned: workers of equal segments share their work
-WORKFLOW = "render_segment"
 MAX_DEATHS = 8  # of workers that had the same segment; then it counts as failed
-POLL_S = 0.2  # between two looks at the queue
-MAX_LOOKS_PER_S = 200.0  # of all workers together: with more than 40, each looks less often
 ALL_WORK_S = 60.0  # between two looks at all running work
 N_TAKEN = 2  # jobs that a worker holds: one is rendered, one waits, so that no time is lost between them
 START_FAILED = 4  # exit code, as of the command for BackendError
@@ -207,7 +205,8 @@ class Worker:
                 ended = return_work(dead)
                 workers.forget(ended)
                 self._vanished -= ended
-                self._on_message(f"took over from {len(ended)} workers without a sign of life")
+                if ended:
+                    self._on_message(f"took over from {len(ended)} workers without a sign of life")
         except (sqlalchemy.exc.SQLAlchemyError, dbos_error.DBOSException) as away:
             self._note_database(away)
 
@@ -232,28 +231,7 @@ class Worker:
         wanted = poll_interval(len(alive))
         if queue is not None and not 0.8 < wanted / queue.polling_interval_sec < 1.25:
             queue.set_polling_interval_sec(wanted)
-        running = DBOS.list_workflows(status="PENDING", name=WORKFLOW, load_input=False, load_output=False)
-        return {str(one.executor_id) for one in running if one.executor_id} - alive
-
-
-def poll_interval(n_workers: int) -> float:
-    """Seconds between two looks of a worker at the queue, for a number of workers."""
-    return max(POLL_S, n_workers / MAX_LOOKS_PER_S)
-
-
-def return_work(executor_ids: set[str]) -> set[str]:
-    """Return the running work of executors to the queue; the executors that have none left.
-
-    The engine has no public function that does so safely: `resume_workflows` has no condition on the owner, so that it
-    would take work from a worker that has just taken it over, and it sets the number of tries to zero, so that a
-    segment that ends every worker would never fail (decision 083).
-    """
-    from dbos import DBOS
-
-    names = sorted(executor_ids)
-    DBOS._recover_pending_workflows(names)
-    running = DBOS.list_workflows(status="PENDING", executor_id=names, load_input=False, load_output=False)
-    return executor_ids - {str(one.executor_id) for one in running}
+        return {str(one.executor_id) for one in list_running() if one.executor_id} - alive
 
 
 def main() -> None:
