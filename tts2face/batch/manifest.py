@@ -35,6 +35,25 @@ def read_manifest(folder: Path) -> dict[str, dict[str, Any]]:
     return {str(one["file"]): one for one in entries if isinstance(one, dict) and "file" in one}
 
 
+def read_segments(folder: Path) -> set[str]:
+    """Addresses of all segments that the batch of a manifest uses.
+
+    Raises
+    ------
+    DataError
+        The manifest is damaged, or of a version that does not list them.
+    """
+    path = folder / JSON_NAME
+    try:
+        content = parse_json(path.read_text(encoding="utf-8"), str(path))
+    except (OSError, UnicodeDecodeError) as broken:
+        raise DataError(f"cannot read {path} ({broken}); run the batch again, which writes it anew") from broken
+    segments = content.get("segments") if isinstance(content, dict) else None
+    if not isinstance(segments, list):
+        raise DataError(f"{path} does not list its segments; run the batch again, which writes it anew")
+    return set(map(str, segments))
+
+
 def is_current(entry: Mapping[str, Any] | None, output: Output, folder: Path) -> bool:
     """Whether a file is what the plan would make: its entry has the same address, and the file the same size."""
     if entry is None or entry.get("address") != output.address or entry.get("status") != "done":
@@ -93,6 +112,7 @@ def write_manifest(folder: Path, plan: Plan, entries: Mapping[str, Mapping[str, 
         "n_cues": plan.n_cues,
         "n_silent_cues": plan.n_silent,
         "warnings": [{"file": one.file, "line": one.line, "message": one.message} for one in plan.warnings],
+        "segments": sorted(plan.segments),
     }
     write_atomically(folder / JSON_NAME, json.dumps(content, ensure_ascii=False, indent=1).encode())
     table = StringIO(newline="")

@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 
 from lexicon.errors import BackendError, InputError
 from tts2face.batch.segment_result import SEGMENT_SUFFIX, SegmentResult
-from tts2face.batch.store import RESULT_SUFFIX, StoreAwayError, parse_result
+from tts2face.batch.store import RESULT_SUFFIX, StoreAwayError, StoredSegment, parse_result, sum_files
 from tts2face.storage.temporary import Temporary
 
 PROBE = "tts2face-store"  # object that shows that the store can be written
@@ -133,6 +133,16 @@ class ObjectStore:
                     path = str(entry["path"])
                     if path.endswith(RESULT_SUFFIX):
                         yield Path(path).stem
+
+    def entries(self) -> Iterator[StoredSegment]:
+        """All stored segments with their sizes and times."""
+        with self._errors():
+            files = (entry for page in self._obstore.list(self._store) for entry in page)
+            yield from sum_files(
+                (Path(entry["path"]).stem, entry["size"], entry["last_modified"].timestamp())
+                for entry in files
+                if entry["path"].endswith((SEGMENT_SUFFIX, RESULT_SUFFIX))
+            )
 
     def remove(self, address: str) -> None:
         """Remove a segment, its result first."""

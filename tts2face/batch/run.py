@@ -99,6 +99,7 @@ def run_batch(
     _prepare_folder(folder)
     check_outputs(plan, folder)
     run = _Run(plan, folder, store or open_store(folder / SEGMENT_FOLDER), read_manifest(folder))
+    write_manifest(folder, plan, run.entries)  # its list of segments keeps them from being pruned
     stale = [one for one in plan.outputs if not is_current(run.entries.get(one.name), one, folder)]
     needed = {segment.address: segment for output in stale for segment in output.needed}
     for output in stale:

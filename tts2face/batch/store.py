@@ -3,7 +3,8 @@
 import json
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -26,6 +27,15 @@ class StoreAwayError(BackendError):
     """The store cannot be reached now; another try may succeed."""
 
 
+@dataclass(frozen=True, slots=True)
+class StoredSegment:
+    """A stored segment: its files together, and when it was stored, in seconds since 1970."""
+
+    address: str
+    n_bytes: int
+    stored_s: float
+
+
 class Store(Protocol):
     """Segments by content address, for any number of processes."""
 
@@ -43,6 +53,9 @@ class Store(Protocol):
 
     def addresses(self) -> Iterator[str]:
         """Addresses of all stored segments."""
+
+    def entries(self) -> Iterator[StoredSegment]:
+        """All stored segments with their sizes and times."""
 
     def remove(self, address: str) -> None:
         """Remove a segment, if it is stored."""
@@ -137,6 +150,12 @@ class FolderStore:
             if NAME_INFIX not in path.name:
                 yield path.stem
 
+    def entries(self) -> Iterator[StoredSegment]:
+        """All stored segments with their sizes and times."""
+        for folder in sorted(self.folder.glob("??")):
+            paths = [path for path in folder.iterdir() if path.suffix in (SEGMENT_SUFFIX, RESULT_SUFFIX)]
+            yield from sum_files((path.stem, path.stat().st_size, path.stat().st_mtime) for path in paths)
+
     def remove(self, address: str) -> None:
         """Remove a segment, its result first."""
         movie = self._path(address)
@@ -151,6 +170,15 @@ class FolderStore:
 
     def _path(self, address: str) -> Path:
         return self.folder / address[:2] / f"{address}{SEGMENT_SUFFIX}"
+
+
+def sum_files(files: Iterable[tuple[str, int, float]]) -> Iterator[StoredSegment]:
+    """Segments of files given by address, bytes and time; a segment has the time of its latest file."""
+    found: dict[str, StoredSegment] = {}
+    for address, n_bytes, stored_s in files:
+        other = found.get(address, StoredSegment(address, 0, 0.0))
+        found[address] = StoredSegment(address, other.n_bytes + n_bytes, max(other.stored_s, stored_s))
+    yield from found.values()
 
 
 def parse_result(content: bytes) -> SegmentResult | None:
