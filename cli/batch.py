@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tts2face.batch.run import BatchResult
     from tts2face.batch.store import Store
 
-NOT_IN_BATCH = frozenset({"text", "audio", "audio_map", "idle", "timeline", "expression"})
+NOT_IN_BATCH = frozenset({"text", "exports", "audio", "audio_map", "idle", "timeline", "expression"})
 MAX_WARNINGS = 40  # on the terminal; all are in the manifest
 
 
@@ -39,8 +39,16 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     audio: Annotated[
         Path | None,
         Parameter(
-            help="Folder of recordings in place of a voice: STEM-0001.wav or STEM/0001.wav for cue 1 of STEM.srt "
-            "(any sound or video file)."
+            help="Folder of recordings in place of a voice: STEM-0001.wav or STEM/0001.wav for cue 1 of STEM.srt, or "
+            "STEM.wav for all of it (any sound or video file)."
+        ),
+    ] = None,
+    export: Annotated[
+        list[str] | None,
+        Parameter(
+            help="Files for other programs beside every clip, by ending (glb, track.json, csv, ...; see `tts2face "
+            "formats`); several times if wanted.",
+            negative="",
         ),
     ] = None,
     jobs: Annotated[int, whole_number("Number of processes on this machine.")] = 1,
@@ -55,7 +63,7 @@ def batch(  # noqa: PLR0913 - one parameter a flag
         ),
     ] = None,
     priority: Annotated[int, whole_number("With --database: jobs with smaller numbers are taken first; from 1.")] = 10,
-    dry_run: Annotated[bool, switch("Print the plan with expected hours and disk space; render nothing.")] = False,
+    dry_run: Annotated[bool, switch("Print the plan with expected time and disk space; render nothing.")] = False,
     progress: Annotated[
         Literal["bar", "json"], Parameter(help="Progress bar, or one line of JSON for each step on standard output.")
     ] = "bar",
@@ -65,6 +73,8 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     """Make clips of subtitle files, fitted to their cues. Running it again makes only what is missing or changed."""
     if jobs < (0 if database is not None else 1):
         raise InputError(f"--jobs must be 1 or more (0 with --database: other workers only), not {jobs}")
+    if "://" in str(out) or str(out).startswith(("s3:", "gs:", "az:")):
+        raise InputError(f"--out must be a folder of this machine, not {out}; give a bucket by --store")
     if priority < 1:
         raise InputError(f"--priority must be 1 or more, not {priority}")
     from tts2face.batch.cast import Cast, read_cast
@@ -73,7 +83,7 @@ def batch(  # noqa: PLR0913 - one parameter a flag
 
     plan = plan_batch(
         subtitles,
-        options_from_flags(BatchOptions, options, audio=audio),
+        options_from_flags(BatchOptions, options, audio=audio, exports=tuple(export or ())),
         request=options_from_flags(Request, options),
         picture=options_from_flags(Picture, options),
         models=Models(talker, face, identity, palette),
@@ -81,6 +91,8 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     )
     if not quiet:
         _print_warnings(plan)
+    if not plan.outputs:
+        raise InputError("no cue can be spoken, so there is nothing to make; the warnings say why")
     if dry_run:
         return _print_plan(plan, out, store)
     from tts2face.batch.run import SEGMENT_FOLDER
@@ -89,7 +101,12 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     place = store if store is not None else str((out / SEGMENT_FOLDER).resolve())
     opened = open_store(place)
     engine = _open_engine(database, place, jobs, priority)
-    _finish(_run(plan, out, (opened, engine), is_json=progress == "json", quiet=quiet), out, quiet=quiet)
+    try:
+        result = _run(plan, out, (opened, engine), is_json=progress == "json", quiet=quiet)
+    except KeyboardInterrupt as interrupt:
+        interrupt.add_note(f"what is finished is in {out}; the same command continues")
+        raise
+    _finish(result, out, quiet=quiet)
     return None
 
 
@@ -153,7 +170,8 @@ def _finish(result: "BatchResult", out: Path, *, quiet: bool) -> None:
 
 def _print_warnings(plan: "Plan") -> None:
     for warning in plan.warnings[:MAX_WARNINGS]:
-        write_message(f"tts2face: warning: {warning.file}, line {warning.line}: {warning.message}")
+        place = f"{warning.file}, line {warning.line}" if warning.line else warning.file
+        write_message(f"tts2face: warning: {place}: {warning.message}")
     if len(plan.warnings) > MAX_WARNINGS:
         write_message(f"{len(plan.warnings) - MAX_WARNINGS} more warnings will be in the manifest")
 
@@ -171,6 +189,13 @@ def _print_plan(plan: "Plan", out: Path, store: str | None) -> None:
         print(f"{output.name}  {output.begin_s:.2f} s  {length:.2f} s  {len(output.cues)} cues")  # noqa: T201 - the result
     print(  # noqa: T201 - the result
         f"{plan.n_cues} cues, {plan.n_silent} of them silent; {estimate.n_outputs} clips, {estimate.n_stale} to make "
-        f"({estimate.seconds:.0f} s); {estimate.n_segments} segments, {estimate.n_missing} to render; about "
-        f"{estimate.core_hours:.2f} hours of one core and {estimate.n_bytes / 1e6:.0f} MB on disk"
+        f"({_duration(estimate.seconds)}); {estimate.n_segments} segments, {estimate.n_missing} to render; about "
+        f"{_duration(estimate.core_s)} of one core and {estimate.n_bytes / 1e6:.0f} MB on disk"
     )
+
+
+def _duration(seconds: float) -> str:
+    """Seconds in the unit that fits them."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} minutes" if seconds < 6000.0 else f"{seconds / 3600:.1f} hours"

@@ -75,6 +75,23 @@ def import_character(  # noqa: PLR0913 - one parameter a flag
 
 
 @face.command
+def relink(
+    name: Annotated[Path, Parameter(name="face", help="Imported face (.face), which is changed in place.")],
+    character: Annotated[Path, Parameter(help="Where its character's file (.glb, .gltf or .vrm) is now.")],
+    /,
+    *,
+    quiet: Annotated[bool, switch("Print nothing.")] = False,
+) -> None:
+    """Write the new place of a moved character into the face that was imported from it, for exports to its file."""
+    check_file_name(name, "a face", (".face",))
+    from tts2face.characters.saving import relink_face
+
+    place = relink_face(name, character)
+    if not quiet:
+        print(f"{name} belongs to {place}")  # noqa: T201 - the result
+
+
+@face.command
 def show(
     name: Annotated[str, Parameter(help="Face: head, cartoon, or a .face file.")],
     /,

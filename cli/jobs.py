@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from cli.flags import whole_number
+from cli.flags import switch, whole_number
 from cli.lists import AsJson
 from cli.process import write_message
 from lexicon.errors import InputError
@@ -41,16 +41,20 @@ def worker(
     from tts2face.jobs.database import database_url, prepare_database
     from tts2face.jobs.engine import DatabaseEngine, local_workers
 
-    open_store(store)
+    open_store(store).check()
     prepare_database(database_url(database))
     engine = DatabaseEngine(database, store, jobs, on_message=write_message)
     write_message(
         f"{jobs} workers of {os.uname().nodename if hasattr(os, 'uname') else 'this machine'}; Ctrl-C ends them"
     )
-    with local_workers(engine) as supervise:
-        while True:
-            supervise()
-            time.sleep(WAIT_S)
+    try:
+        with local_workers(engine) as supervise:
+            while True:
+                supervise()
+                time.sleep(WAIT_S)
+    except KeyboardInterrupt as interrupt:
+        interrupt.add_note("the workers have ended; others take over their segments")
+        raise
 
 
 @jobs.command(name="list")
@@ -113,13 +117,47 @@ def retry(
 @jobs.command
 def prune(
     *,
-    database: Database = DEFAULT_DATABASE,
-    days: Annotated[float, Parameter(help="Remove jobs that ended this many days ago or earlier.")] = 0.0,
+    database: Annotated[
+        str | None, Parameter(help=f"SQLite file or postgresql://...; {DEFAULT_DATABASE} if there is one.")
+    ] = None,
+    days: Annotated[float, Parameter(help="Remove what ended or was stored this many days ago or earlier.")] = 0.0,
+    store: Annotated[
+        str | None, Parameter(help="Store whose unused segments are removed, too: a folder or a URL; needs --days 1.")
+    ] = None,
+    outputs: Annotated[
+        tuple[Path, ...],
+        Parameter(help="With --store: the folders of clips of all batches that use it; their segments stay."),
+    ] = (),
+    dry_run: Annotated[bool, switch("Print what would be removed; remove nothing.")] = False,
 ) -> None:
-    """Remove jobs that have ended; stored segments stay."""
-    from tts2face.jobs.control import prune_jobs
+    """Remove jobs that have ended and, with --store, segments that no manifest and no unfinished job refers to."""
+    if outputs and store is None:
+        raise InputError("--outputs has no effect without --store; give both or neither")
+    would = "would remove" if dry_run else "removed"
+    has_database = database is not None or store is None or Path(DEFAULT_DATABASE).is_file()
+    place = _existing(database or DEFAULT_DATABASE) if has_database else None
+    if store is not None:
+        print(f"{would} {_prune_store(store, place, outputs, days, dry_run=dry_run)}")  # noqa: T201 - the result
+    if place is not None:
+        from tts2face.jobs.control import prune_jobs
 
-    print(f"removed {prune_jobs(_existing(database), days * 86_400.0)} jobs")  # noqa: T201 - the result
+        print(f"{would} {prune_jobs(place, days * 86_400.0, dry_run=dry_run)} jobs")  # noqa: T201 - the result
+
+
+def _prune_store(store: str, database: str | None, outputs: tuple[Path, ...], days: float, *, dry_run: bool) -> str:
+    """What was removed from a store."""
+    from tts2face.batch.prune import prune_segments
+    from tts2face.batch.store import open_store
+
+    if "://" not in store and not Path(store).is_dir():
+        raise InputError(f"there is no store {store}; give --store as for `tts2face batch`, or its folder .segments")
+    unfinished: frozenset[str] = frozenset()
+    if database is not None:
+        from tts2face.jobs.control import unfinished_segments
+
+        unfinished = unfinished_segments(database)
+    pruned = prune_segments(open_store(store), outputs, unfinished, days * 86_400.0, dry_run=dry_run)
+    return f"{pruned.n_removed} segments ({pruned.n_bytes / 1e6:.1f} MB); {pruned.n_kept} stay"
 
 
 def _existing(database: str) -> str:

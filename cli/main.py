@@ -188,7 +188,8 @@ def run(arguments: Sequence[str]) -> int:
         write_message(f"tts2face: {error_message(refused)}")
         return exit_code(refused)
     except KeyboardInterrupt as interrupt:
-        write_message("\ntts2face: interrupted; no output was written")
+        what_remains = "; ".join(getattr(interrupt, "__notes__", ())) or "no output was written"
+        write_message(f"\ntts2face: interrupted; {what_remains}")
         return signal_exit_code(interrupt)
     return 0
 

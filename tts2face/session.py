@@ -113,10 +113,7 @@ class Session:
         return concatenate_clips([piece.clip for piece in self.stream(text, **options)])
 
     def stream(self, text: str | Request | PreparedRequest, **options: Any) -> Iterator[Piece]:
-        """Synthesise the clip of a text or request piece by piece, in bounded memory; arguments as for `clip`.
-
-        The concatenated clips of the pieces equal the result of `clip`.
-        """
+        """Synthesise the clip of a text or request piece by piece, in bounded memory; arguments as for `clip`."""
         return self._models.pieces(prepare_request(text, options))
 
     def measure_speech(self, text: str | Request | PreparedRequest, **options: Any) -> SpeechSpan:
@@ -147,7 +144,7 @@ class Session:
         return timed_speech(prepared, self._models.for_request(prepared.request))
 
     def live(self, **options: Any) -> LiveSpeech:
-        """A clip without an end, extended by `LiveSpeech.say` and `LiveSpeech.idle`; options and errors as `clip`."""
+        """A clip without an end, extended by `say` and `idle` of the result; options and errors as `clip`."""
         return LiveSpeech(Request(**options), self._models)
 
     def stream_file(
@@ -236,12 +233,10 @@ class Session:
 
         Parameters
         ----------
-        text, on_progress, on_piece
-            As for `write`.
+        text, on_progress, on_piece, options
+            As for `write`, without fields of `Picture`.
         paths
             Output, or several; the suffix selects the format (docs/exports.md). The files appear when all are complete.
-        options
-            Fields of `Request`, such as ``style="delighted"``.
 
         Raises
         ------
@@ -286,6 +281,10 @@ class Session:
     def renderer(self, picture: Picture, *, has_gestures: bool = True) -> FrameRenderer:
         """Renderer of the session's face for drawing options; the last few renderers are cached."""
         return self._models.renderer(picture, has_gestures=has_gestures)
+
+    def animated_face(self, *, has_gestures: bool = True) -> AnimatedFace:
+        """Face whose channels the clips of requests with or without gestures use."""
+        return self._models.face(has_gestures=has_gestures)
 
     def _write(
         self,

@@ -37,6 +37,30 @@ def test_a_clip_for_each_spoken_cue(plan_of: Planner) -> None:
     assert [cue.speaker for output in plan.outputs for cue in output.cues] == ["ANN", "", ""]
 
 
+def test_speakers_of_one_cue_have_their_own_clips_and_divide_its_time(plan_of: Planner, tmp_path: Path) -> None:
+    (tmp_path / "cast.toml").write_text(CAST)
+    text = "1\n00:00:01,000 --> 00:00:04,000\n- JOHN: Good.\n- ANN: Hello there.\n"
+    plan = plan_of(text, cast=read_cast(tmp_path / "cast.toml"))
+    assert [(one.name, one.begin_s) for one in plan.outputs] == [("one-0001.mp4", 1.0), ("one-0001-2.mp4", 1.9)]
+    assert [one.segments[0].models.face for one in plan.outputs] == ["head", "cartoon"]
+    assert [cue.speaker for one in plan.outputs for cue in one.cues] == ["JOHN", "ANN"]
+    assert [(one.line, one.message) for one in plan.warnings] == [
+        (2, "JOHN and ANN speak in cue 1; its time is divided by their letters")
+    ]
+    (file,) = plan_of(text, per="file").outputs
+    assert [(cue.begin_s, cue.end_s) for cue in file.cues] == [(1.0, 1.9), (1.9, 4.0)]
+
+
+def test_a_recording_of_two_speakers_shows_one_face(plan_of: Planner, tmp_path: Path) -> None:
+    (tmp_path / "dub").mkdir()
+    (tmp_path / "dub" / "one-0001.wav").write_bytes(b"RIFF")
+    plan = plan_of("1\n00:00:01,000 --> 00:00:04,000\n- JOHN: Good.\n- Hello.\n", audio=tmp_path / "dub")
+    assert len(plan.outputs) == 1
+    assert [one.message for one in plan.warnings] == [
+        "JOHN and somebody speak in cue 1, which has one recording; one face is shown"
+    ]
+
+
 def test_scenes_files_and_films_fill_all_frames(plan_of: Planner) -> None:
     scenes = plan_of(per="scene").outputs
     assert [(one.name, one.begin_s) for one in scenes] == [("one-scene-001.mp4", 0.5), ("one-scene-002.mp4", 10.0)]
@@ -99,7 +123,7 @@ def test_segments_survive_json(plan_of: Planner) -> None:
 def test_roles_choose_models_and_options(plan_of: Planner, tmp_path: Path) -> None:
     (tmp_path / "cast.toml").write_text(CAST)
     first, second, _ = (one.segments[0] for one in plan_of(cast=read_cast(tmp_path / "cast.toml")).outputs)
-    assert (first.models.face, first.models.identity) == ("cartoon", "kofi")
+    assert (first.models.face, first.models.identity) == ("cartoon", None)  # presets belong to a face
     assert {name: first.request[name] for name in ("voice", "style", "rate")} == {
         "voice": "espeak-female",
         "style": "delighted",
@@ -133,6 +157,37 @@ def test_words_that_no_voice_speaks_are_a_warning_with_their_line(plan_of: Plann
     plan = plan_of(SRT.replace("Bob may move.", "☃ … 你好"))
     assert [(one.line, one.message[:15]) for one in plan.warnings] == [(10, "cue 3 is silent")]
     assert len(plan.outputs) == 2
+
+
+@pytest.mark.parametrize(
+    ("setting", "reason"),
+    [
+        ('face = "haed"', "there is no face 'haed'"),
+        ('talker = "grid"', "there is no talker 'grid'"),
+        ('identity = "adda"', "the face head has no identity 'adda'; it has erik"),
+        ('style = "gleeful"', "there is no style 'gleeful' in the palette"),
+        ('voice = "nosuch"', "there is no voice 'nosuch'; give heart"),
+        ('voice = "/no/such.onnx"', "cannot read /no/such.onnx: No such file"),
+    ],
+)
+def test_names_of_a_cast_are_checked_before_anything_is_rendered(
+    setting: str, reason: str, plan_of: Planner, tmp_path: Path
+) -> None:
+    (tmp_path / "cast.toml").write_text(f'[[role]]\nspeaker = "ANN"\n{setting}\n')
+    with pytest.raises(InputError, match=reason):
+        plan_of(cast=read_cast(tmp_path / "cast.toml"))
+
+
+def test_a_role_that_applies_to_no_cue_is_a_warning(plan_of: Planner, tmp_path: Path) -> None:
+    (tmp_path / "cast.toml").write_text('[[role]]\nspeaker = "ANN"\n[[role]]\nspeaker = "JOHNN"\nface = "cartoon"\n')
+    plan = plan_of(cast=read_cast(tmp_path / "cast.toml"))
+    assert [(one.file, one.line, one.message) for one in plan.warnings] == [
+        ("the cast", 0, "role 2 (speaker 'JOHNN') applies to no cue; check its patterns")
+    ]
+
+
+def test_cues_that_cannot_be_spoken_count_as_silent(plan_of: Planner) -> None:
+    assert plan_of(SRT.replace("Bob may move.", "你好")).n_silent == 1
 
 
 def test_a_language_of_the_file_is_used_and_an_unknown_one_is_not(plan_of: Planner) -> None:

@@ -134,6 +134,44 @@ def test_a_failed_segment_is_named_and_the_rest_goes_on(
     assert run_batch(plan_of(), out).n_made == 1
 
 
+@pytest.mark.parametrize("name", ["taken", "taken/clips"])
+def test_a_folder_that_cannot_be_written_is_named_before_anything_is_rendered(
+    name: str, plan_of: Planner, voices: list[FakeVoice], tmp_path: Path
+) -> None:
+    (tmp_path / "taken").write_text("a file")
+    with pytest.raises(BackendError, match=rf"cannot write the folder .*{name}: .*; choose another --out"):
+        run_batch(plan_of(), tmp_path / name, store=FolderStore(tmp_path / "store"))
+    assert voices == []
+
+
+class InterruptedEngine:
+    """Renders one segment, then Ctrl-C is pressed."""
+
+    def __init__(self, *_: object) -> None:
+        pass
+
+    def render(self, segments: Mapping[str, Segment], store: Store) -> Iterator[Rendered]:
+        for rendered in LocalEngine().render(segments, store):
+            yield rendered
+            raise KeyboardInterrupt
+
+
+def test_an_interrupted_batch_keeps_what_is_finished_and_says_how_to_continue(
+    voices: list[FakeVoice], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "one.srt").write_text(SRT, encoding="utf-8")
+    out = tmp_path / "clips"
+    words = ["batch", str(tmp_path / "one.srt"), "--out", str(out), "--size", "64x64", "--fps", "10"]
+    with monkeypatch.context() as patch:
+        patch.setattr(engines, "LocalEngine", InterruptedEngine)
+        assert run(words) == 130
+    message = capsys.readouterr().err
+    assert f"interrupted; what is finished is in {out}; the same command continues" in message
+    assert [one["status"] for one in manifest(out)["outputs"]] == ["done"]
+    assert run(words) == 0
+    assert "made 2 clips" in capsys.readouterr().err
+
+
 def test_a_recording_is_used_in_place_of_a_voice(plan_of: Planner, voices: list[FakeVoice], tmp_path: Path) -> None:
     recordings = tmp_path / "dub"
     recordings.mkdir()
@@ -267,3 +305,11 @@ def test_the_command_plans_makes_and_reports(
     assert run([*words, "--jobs", "0"]) == 2
     assert run(["batch", "--out", "clips"]) == 2
     assert "there are no subtitles" in capsys.readouterr().err
+    Path("two.srt").write_text("1\n00:00:00,500 --> 00:00:02,000\n你好\n", encoding="utf-8")
+    assert run(["batch", "two.srt", "--out", "two"]) == 2
+    printed = capsys.readouterr().err
+    assert "two.srt, line 2: cue 1 is silent" in printed
+    assert "no cue can be spoken, so there is nothing to make" in printed
+    assert run(["batch", "one.srt", "--out", "s3://bucket/clips"]) == 2
+    assert "--out must be a folder of this machine" in capsys.readouterr().err
+    assert not Path("s3:").exists()

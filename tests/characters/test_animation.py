@@ -11,12 +11,14 @@ import pytest
 from cli.main import run
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence
-from tests.characters.made import METRES, Variant, shipped_head, split_glb, write_character_file, write_landmarks
+from tests.characters.made import METRES, Variant, glb, shipped_head, split_glb, write_character_file, write_landmarks
 from tests.exports import programs
 from tts2face.characters.animation import write_character
+from tts2face.characters.bone_tracks import NECK_SHARE
 from tts2face.characters.importing import import_face
 from tts2face.face.deformation import build_rig
 from tts2face.models.face import Face
+from tts2face.models.face_file import read_face
 from tts2face.session import Session
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
@@ -121,8 +123,10 @@ def test_head_and_eye_bones_turn(folder: Path) -> None:
     clip = made_clip(face, {"eyeLookOutLeft": 1.0}, head=(0.0, 0.3, 0.0, 0.0, 0.0, 0.0))
     written = write_character(clip, face, folder / "bones_out.glb")
     played = Played(folder / "bones_out.glb")
-    assert set(written.bones) == {"head", "leftEye", "rightEye"}
-    np.testing.assert_allclose(played.track("rotation", "Head")[-1], [0, np.sin(0.15), 0, np.cos(0.15)], atol=1e-6)
+    assert set(written.bones) == {"neck", "head", "leftEye", "rightEye"}
+    for bone, share in (("Neck", NECK_SHARE), ("Head", 1 - NECK_SHARE)):
+        half = 0.15 * share  # of the angle about the vertical axis, rad
+        np.testing.assert_allclose(played.track("rotation", bone)[-1], [0, np.sin(half), 0, np.cos(half)], atol=1e-6)
     angle = face.eyes[0].turns["eyeLookOutLeft"][1] / 2
     np.testing.assert_allclose(played.track("rotation", "LeftEye")[-1], [0, np.sin(angle), 0, np.cos(angle)], atol=1e-6)
 
@@ -161,6 +165,26 @@ def test_eyeballs_that_are_nodes_without_bones_turn_about_their_centres(folder: 
     assert np.abs(played.track("rotation", "LeftEye")[-1][:3]).max() == 0.0
 
 
+def test_a_pose_that_the_file_was_saved_in_is_not_the_face_at_rest(folder: Path) -> None:
+    plain = imported(folder, "unposed", Variant())
+    names = shipped_head().shape_names
+    character = write_character_file(
+        folder / "saved.glb", Variant(rename=lambda name: "Fatness" if name == "cheekPuff" else name)
+    )
+    root, binary = split_glb(character.read_bytes())
+    saved = {"jawOpen": 0.4, "cheekPuff": 0.5}
+    root["meshes"][0]["weights"] = [saved.get(name, 0.0) for name in names]
+    character.write_bytes(glb(root, binary))
+    result = import_face(character, landmarks=folder / "landmarks.tsv")
+    fat = shipped_head().shapes[names.index("cheekPuff")] * 0.5
+    gaps = np.abs(result.face.vertices - result.face.vertices[0] - (plain.vertices - plain.vertices[0]))
+    assert gaps.max() == pytest.approx(np.abs(fat - fat[0]).max(), abs=0.02)  # mm; the jaw alone would give 20
+    assert any("poses 1 of the mapped shapes (jawOpen 0.40)" in note for note in result.report.notes)
+    write_character(made_clip(result.face, {"mouthPucker": 0.3}), result.face, folder / "saved_out.glb")
+    weights = {name: weight for name, weight in Played(folder / "saved_out.glb").weights().items() if weight}
+    assert weights == {"mouthPucker": pytest.approx(0.3, abs=1e-6), "Fatness": pytest.approx(0.5, abs=1e-6)}
+
+
 def test_motion_of_missing_shapes_is_carried_by_own_ones(folder: Path) -> None:
     face = imported(folder, "carried", Variant(dropped=frozenset({"browInnerUp"})))
     from tts2face.face.expressions import add_expression_shapes
@@ -191,7 +215,7 @@ def test_another_file_or_face_is_refused(folder: Path) -> None:
     with pytest.raises(InputError, match="not imported from a character's file"):
         write_character(clip, shipped_head(), folder / "x.glb")
     (folder / "other.glb").write_bytes((folder / "own.glb").read_bytes() + b"\0")
-    with pytest.raises(DataError, match="is not the file from which the face was imported"):
+    with pytest.raises(DataError, match=r"content of .* differs from the file from which the face was imported"):
         write_character(clip, face, folder / "x.glb", character=folder / "other.glb")
     with pytest.raises(DataError, match="there is no character"):
         write_character(clip, face, folder / "x.glb", character=folder / "none.glb")
@@ -214,8 +238,32 @@ def test_an_export_is_the_animated_character(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="would replace the character"):
         write_character(session.clip("Hello.", fps=10), session.mesh, character)
     assert character.read_bytes() == before
-    character.unlink()
-    assert run(["Hello.", "--face", str(face), "--out", str(out), "--fps", "10", "--quiet"]) == 3
+
+
+def test_a_moved_character_is_found_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    character = write_character_file(tmp_path / "character.glb")
+    table = write_landmarks(tmp_path / "landmarks.tsv")
+    face, out, moved = tmp_path / "me.face", tmp_path / "spoken.glb", tmp_path / "elsewhere.glb"
+    assert run(["face", "import", str(character), "--out", str(face), "--landmarks", str(table), "--quiet"]) == 0
+    character.rename(moved)
+    speak = ["Hello.", "--face", str(face), "--out", str(out), "--fps", "10", "--quiet"]
+    assert run(speak) == 3
+    assert "if it was moved, run `tts2face face relink FACE.face CHARACTER`" in capsys.readouterr().err
+    before = read_face(face)
+    assert run(["face", "relink", str(face), str(moved), "--quiet"]) == 0
+    after = read_face(face)
+    np.testing.assert_array_equal(before.texture, after.texture)
+    np.testing.assert_array_equal(before.shapes, after.shapes)
+    assert run(speak) == 0
+    assert max(Played(out).weights().values()) > 0.1
+    linked = face.read_bytes()
+    moved.write_bytes(moved.read_bytes() + b"\0")
+    assert run(["face", "relink", str(face), str(moved), "--quiet"]) == 3
+    assert "differs from the file from which the face was imported" in capsys.readouterr().err
+    assert run(["face", "relink", str(face), str(tmp_path / "none.glb"), "--quiet"]) == 3
+    assert "none.glb; check the path" in capsys.readouterr().err
+    assert run(["face", "relink", str(tmp_path / "no.face"), str(moved), "--quiet"]) == 2
+    assert face.read_bytes() == linked
 
 
 @pytest.mark.parametrize("variant", [Variant(), Variant(is_skinned=True)], ids=["plain", "skinned"])

@@ -1,21 +1,19 @@
 """Parts of the import: names of shapes, compressed buffers, atlas, alpha, points under pixels."""
 
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lexicon.errors import DataError
-from tts2face.characters.atlas import build_atlas, opacity_levels, triangle_alpha
+from tts2face.characters.atlas import CUTOUT, build_atlas, coverage, fill_uncovered, triangle_opacity
 from tts2face.characters.character import BLEND, MASK, Material
 from tts2face.characters.glb_writer import matrix_quaternion
-from tts2face.characters.gltf_character import read_gltf_character
 from tts2face.characters.meshopt import apply_exponential_filter, decode_buffer
 from tts2face.characters.nodes import quaternion_matrix
 from tts2face.characters.shape_mapping import ShapeSource
 from tts2face.characters.shape_names import ARKIT_SHAPES, guess_mapping
-from tts2face.characters.surface_points import nearest_points, points_under_pixels
+from tts2face.characters.surface_points import _barycentric, _Projection, nearest_points, points_under_pixels
 from tts2face.models.face_file import load_face
 from tts2face.render.camera import CameraMatrices
 
@@ -108,21 +106,6 @@ def test_triangles_and_attributes_of_the_reference_encoder() -> None:
         np.testing.assert_array_equal(decode_buffer(stream, "ATTRIBUTES", 700, 12), rows.reshape(-1))
 
 
-def test_the_head_that_openfacefx_carries() -> None:
-    spec = find_spec("openfacefx")
-    path = Path(spec.origin).parent / "studio_web/assets/facecap.glb" if spec and spec.origin else None
-    if path is None or not path.is_file():
-        pytest.skip("the package openfacefx, which carries a head, is not installed")
-    character = read_gltf_character(path)
-    assert [len(piece.vertices) for piece in character.pieces] == [530, 530, 2694, 614]
-    assert len(guess_mapping(character.target_names.values())) == 52
-    assert "KTX2" in character.notes[0]
-    head = character.pieces[2]
-    size = np.ptp(head.vertices, axis=0)
-    edges = head.vertices[head.triangles[:, 0]] - head.vertices[head.triangles[:, 1]]
-    assert np.linalg.norm(edges, axis=1).max() < 0.3 * size.max()  # wrongly decoded triangles cross the whole head
-
-
 def test_quaternions_of_rotation_matrices() -> None:
     random = np.random.default_rng(3)
     for _ in range(50):
@@ -145,16 +128,42 @@ def test_images_of_materials_lie_in_one_texture() -> None:
         assert (atlas.texture[row, column] == 40 * n + 20).all()
 
 
-def test_alpha_leaves_triangles_out_or_makes_them_translucent() -> None:
-    image = np.full((8, 8, 4), 255, np.uint8)
-    image[:, :4, 3] = 0
-    corners = np.array([[[0.05, 0.1], [0.4, 0.1], [0.2, 0.9]], [[0.6, 0.1], [0.95, 0.1], [0.8, 0.9]]])
+def test_triangles_are_opaque_empty_translucent_or_have_holes() -> None:
+    image = np.full((64, 64, 4), 255, np.uint8)
+    image[:, :32, 3] = 0
+    image[10:12, 4:6, 3] = 255  # a strand between the corners of the first triangle
+    corners = np.array(
+        [
+            [[0.02, 0.1], [0.4, 0.1], [0.2, 0.9]],
+            [[0.6, 0.1], [0.95, 0.1], [0.8, 0.9]],
+            [[0.02, 0.5], [0.4, 0.5], [0.2, 0.9]],
+            [[0.3, 0.5], [0.9, 0.5], [0.6, 0.9]],
+        ]
+    )
     masked = Material("lashes", image=image, alpha_mode=MASK)
-    assert opacity_levels(masked, triangle_alpha(masked, corners)).tolist() == [0.0, 1.0]
-    blended = Material("glass", (1.0, 1.0, 1.0, 0.5), image, alpha_mode=BLEND)
-    assert opacity_levels(blended, triangle_alpha(blended, corners)).tolist() == [0.0, 0.55]
-    opaque = Material("skin", image=image)
-    assert opacity_levels(opaque, triangle_alpha(opaque, corners)).tolist() == [1.0, 1.0]
+    assert triangle_opacity(masked, corners).tolist() == [CUTOUT, 1.0, 0.0, CUTOUT]
+    glass = Material("glass", (1.0, 1.0, 1.0, 0.5), image, alpha_mode=BLEND)
+    assert triangle_opacity(glass, corners).tolist() == [CUTOUT, 0.55, 0.0, CUTOUT]
+    assert triangle_opacity(Material("skin", image=image), corners).tolist() == [1.0] * 4
+    assert triangle_opacity(Material("tint", (1.0, 1.0, 1.0, 0.3), alpha_mode=BLEND), corners).tolist() == [0.3] * 4
+
+
+def test_the_cutoff_of_a_mask_decides_its_coverage() -> None:
+    image = np.full((1, 4, 4), 255, np.uint8)
+    image[0, :, 3] = [0, 60, 100, 255]
+    assert coverage(Material("hair", image=image, alpha_mode=MASK, cutoff=0.3)).tolist() == [[0, 0, 255, 255]]
+    half = Material("hair", (1.0, 1.0, 1.0, 0.5), image, alpha_mode=MASK, cutoff=0.3)
+    assert coverage(half).tolist() == [[0, 0, 0, 255]]
+    assert coverage(Material("hair", (1.0, 1.0, 1.0, 0.5), image, alpha_mode=BLEND)).tolist() == [[0, 30, 50, 128]]
+
+
+def test_hidden_colours_beyond_an_edge_are_those_of_the_visible_pixels_near_them() -> None:
+    colours, covered = np.zeros((37, 50, 3), np.uint8), np.zeros((37, 50), np.uint8)
+    colours[:, :10], covered[:, :10] = (10, 200, 30), 255
+    colours[:, 40:], covered[:, 40:] = (200, 20, 90), 255
+    filled = fill_uncovered(colours, covered)
+    np.testing.assert_array_equal(filled[:, :14], np.broadcast_to([10, 200, 30], (37, 14, 3)))
+    np.testing.assert_array_equal(filled[:, 36:], np.broadcast_to([200, 20, 90], (37, 14, 3)))
 
 
 def test_points_under_pixels_are_where_the_rays_meet_the_plane() -> None:
@@ -167,6 +176,31 @@ def test_points_under_pixels_are_where_the_rays_meet_the_plane() -> None:
     points, facing = points_under_pixels(pixels, vertices, triangles, camera)
     np.testing.assert_allclose(points.places(vertices), wanted, atol=1e-9)
     assert (facing > 0.99).all()
+
+
+def test_the_nearest_triangle_under_a_pixel_is_that_of_a_brute_force_search() -> None:
+    head = load_face("head")
+    vertices, triangles = head.vertices.astype(np.float64), head.triangles.astype(np.int64)
+    view = np.array([[1.0, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 500]])
+    camera = CameraMatrices(view, np.array([1000.0, 320.0, 320.0, 1.0]))
+    projection = _Projection(vertices, triangles, camera)
+    there = vertices @ view[:, :3].T + view[:, 3]
+    flat = there[:, :2] / there[:, 2:] * 1000.0 + 320.0
+    a, b, c = (flat[triangles[:, corner]] for corner in range(3))
+    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    facing = triangles[area < 0]
+    random = np.random.default_rng(5)
+    n_hits = 0
+    for pixel in random.uniform(-150, 1050, (300, 2)):
+        weights = _barycentric(pixel, flat[facing])
+        inside = np.flatnonzero((weights >= 0).all(axis=1))
+        depths = (weights[inside] * there[facing[inside], 2]).sum(axis=1)
+        hit = projection.hit(pixel)
+        assert (hit is None) == (not len(inside))
+        if hit is not None:
+            n_hits += 1
+            assert hit.depth == pytest.approx(depths.min(), abs=1e-6)
+    assert n_hits > 40
 
 
 def test_nearest_points_are_those_of_a_brute_force_search() -> None:

@@ -18,6 +18,7 @@ NOT_EXECUTED = {  # beginning of a command line: why it is parsed only
     "mimic --camera": WINDOW,
     "worker": "runs until it is interrupted",
     "jobs show": "needs the name of a job",
+    "jobs prune --store": "needs a finished batch",
     "corpus setup": "uses the network",
     "corpus build": PERSON,
     "corpus face": PERSON,

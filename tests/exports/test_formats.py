@@ -60,7 +60,7 @@ def test_the_sound_beside_a_mesh_is_planned_once(tmp_path):
     assert [file.path.name for file in planned] == ["clip.glb", "clip.usda", "clip.csv", "clip.wav"]
     planned = plan_exports([tmp_path / "clip.wav", tmp_path / "clip.glb"])
     assert [file.path.name for file in planned] == ["clip.wav", "clip.glb"]
-    assert sound_path(Path("a/b.scene.glb")) == Path("a/b.wav")
+    assert sound_path(Path("a/b.scene.glb")) == Path("a/b.scene.wav")  # another scene has its own sound
 
 
 @pytest.mark.parametrize(

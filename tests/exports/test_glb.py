@@ -1,6 +1,7 @@
 """GLB files: Khronos validator, pygltflib, OpenFaceFX and three.js read them; vertices are those of the renderer."""
 
 import html
+import io
 import json
 import re
 import wave
@@ -8,11 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import tts2face
 from lexicon.errors import InputError
 from tests.exports import programs
 from tests.exports.made import FACE, RATE, made_clip, made_stream, signed_clip, turned_clip, with_gesture
+from tests.render.test_cutouts import face_with_sheet
 from tests.render.tiny_face import tiny_face
 from tts2face.exports.gltf import GltfBuffer
 from tts2face.exports.skeleton import continuous_quaternions
@@ -219,6 +222,19 @@ def test_the_khronos_validator_finds_nothing(face, n_frames, tmp_path):
     issues = report["issues"]
     assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), issues["messages"]
     assert report["info"]["animationCount"] == 1
+
+
+def test_parts_with_holes_are_masked_by_the_alpha_of_the_texture(tmp_path):
+    pygltflib = pytest.importorskip("pygltflib", reason="needs pygltflib")
+    alpha = np.arange(4096, dtype=np.uint16).reshape(64, 64).astype(np.uint8)
+    face = face_with_sheet(alpha)
+    tts2face.export(made_clip(2, channels=face.shape_names), tmp_path / "a.glb", face=face)
+    file = pygltflib.GLTF2().load(str(tmp_path / "a.glb"))
+    assert {material.name: material.alphaMode for material in file.materials}["lashes"] == "MASK"
+    view = file.bufferViews[file.images[0].bufferView]
+    content = file.binary_blob()[view.byteOffset : view.byteOffset + view.byteLength]
+    pixels = np.array(Image.open(io.BytesIO(content)))
+    assert np.array_equal(pixels, np.dstack([face.texture, alpha]))
 
 
 PAGE = """<html><body><script type="importmap">{"imports": {"three": "/three/build/three.module.js",

@@ -82,6 +82,24 @@ def test_a_face_without_texture_round_trips(tmp_path: Path) -> None:
     assert read.texture is None
 
 
+def test_a_face_with_holes_round_trips(tmp_path: Path) -> None:
+    face, holes = small_face(), np.arange(256, dtype=np.uint8).reshape(16, 16)
+    face = replace(face, alpha=holes, parts=(replace(face.parts[0], cutout=True), face.parts[1]))
+    write_face(tmp_path / "holes.face", face)
+    read = read_face(tmp_path / "holes.face")
+    assert np.array_equal(read.alpha, holes)
+    assert read.parts == face.parts
+    with pytest.raises(DataError, match="do not fit each other"):
+        replace(face, alpha=holes[:8])
+
+
+def test_holes_without_alpha_are_refused(tmp_path: Path) -> None:
+    face = small_face()
+    write_face(tmp_path / "holes.face", replace(face, parts=(replace(face.parts[0], cutout=True), face.parts[1])))
+    with pytest.raises(DataError, match="has a part with cutout, but no alpha"):
+        read_face(tmp_path / "holes.face")
+
+
 def test_an_identity_moves_vertices_and_eyes_and_tints_its_part(written: tuple[Face, Path]) -> None:
     face, path = written
     read = read_face(path, "older")

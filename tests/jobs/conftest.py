@@ -1,7 +1,9 @@
 """Databases of jobs: a SQLite file, and PostgreSQL if it is installed; workers that can be killed."""
 
+import contextlib
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -23,41 +25,77 @@ StartWorker = Callable[..., "subprocess.Popen[bytes]"]
 
 
 class Postgres:
-    """A server in a temporary folder; a superuser starts it as the user postgres."""
+    """A server in a temporary folder; a superuser starts it as the user postgres.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    settings
+        Options of the server.
+    """
+
+    def __init__(self, settings: str = "-F") -> None:
         found = shutil.which("initdb")
-        folder = Path(found).parent if found else next(iter(FOLDERS), None)
+        folder = Path(found).resolve().parent if found else next(iter(FOLDERS), None)
         if folder is None:
             pytest.skip("PostgreSQL is not installed (apt install postgresql)")
         self._as_user = ["runuser", "-u", "postgres", "--"] if os.getuid() == 0 else []
         if self._as_user and shutil.which("runuser") is None:
             pytest.skip("PostgreSQL does not run as a superuser, and runuser is missing")
-        self._bin, self.folder = folder, Path(mkdtemp(prefix="tts2face-pg-", dir="/tmp"))
+        self._bin, self._settings = folder, settings
+        self.folder = Path(mkdtemp(prefix="tts2face-pg-", dir="/tmp"))
         if self._as_user:
             shutil.chown(self.folder, "postgres")
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             self.port = free.getsockname()[1]
-        self._run("initdb", "-D", str(self.folder / "data"), "-A", "trust", "-U", "tts2face", "--no-sync")
+        self.has_started = False
+        self.run("initdb", "-D", str(self.folder / "data"), "-A", "trust", "-U", "tts2face", "--no-sync")
         self.start()
-        self.n_databases = 0
+        self.n_databases, self.has_started = 0, True
 
-    def _run(self, command: str, *arguments: str) -> None:
+    def run(self, command: str, *arguments: str) -> None:
+        """Run a program of PostgreSQL."""
         answer = subprocess.run(
             [*self._as_user, str(self._bin / command), *arguments], capture_output=True, text=True, check=False, cwd="/"
         )
         if answer.returncode:
-            pytest.skip(f"PostgreSQL does not start here: {(answer.stderr or answer.stdout).strip()[-200:]}")
+            reason = f"PostgreSQL does not start here: {(answer.stderr or answer.stdout).strip()[-200:]}"
+            if self.has_started:
+                pytest.fail(reason)
+            pytest.skip(reason)
 
     def start(self) -> None:
-        options = f"-p {self.port} -k {self.folder} -h 127.0.0.1 -F"
-        self._run(
+        options = f"-p {self.port} -k {self.folder} -h 127.0.0.1 {self._settings}"
+        self.run(
             "pg_ctl", "-D", str(self.folder / "data"), "-w", "-o", options, "-l", str(self.folder / "log"), "start"
         )
 
     def stop(self, mode: str = "immediate") -> None:
-        self._run("pg_ctl", "-D", str(self.folder / "data"), "-m", mode, "-w", "stop")
+        self.run("pg_ctl", "-D", str(self.folder / "data"), "-m", mode, "-w", "stop")
+
+    def kill(self) -> None:
+        """Kill the server and its processes, as `kill -9` does."""
+        family = self.processes()
+        for number in family:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(number, signal.SIGKILL)
+        wait_until(lambda: not _parents().keys() & set(family))  # a zombie still holds the folder
+
+    def processes(self) -> list[int]:
+        """Numbers of the processes of the server."""
+        main = int((self.folder / "data" / "postmaster.pid").read_text().split()[0])
+        return [main, *(number for number, parent in _parents().items() if parent == main)]
+
+    def put(self, path: Path) -> Path:
+        """A copy of a file that the server's user can read."""
+        copy = shutil.copyfile(path, self.folder / path.name)
+        copy.chmod(0o644)
+        return copy
+
+    def remove(self) -> None:
+        """End the server and remove its files."""
+        self.stop()
+        shutil.rmtree(self.folder, ignore_errors=True)
 
     def database(self) -> str:
         """URL of a new database."""
@@ -71,13 +109,21 @@ class Postgres:
         return f"{server}/{name}"
 
 
+def _parents() -> dict[int, int]:
+    """Parent of each process."""
+    found = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            found[int(path.parent.name)] = int(path.read_text().rpartition(")")[2].split()[1])
+    return found
+
+
 @pytest.fixture(scope="session")
 def postgres() -> Iterator[Postgres]:
     pytest.importorskip("psycopg", reason="needs the extra [postgres]")
     server = Postgres()
     yield server
-    server.stop()
-    shutil.rmtree(server.folder, ignore_errors=True)
+    server.remove()
 
 
 @pytest.fixture(params=["sqlite", "postgres"])

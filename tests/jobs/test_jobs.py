@@ -30,8 +30,8 @@ Rendered = Callable[[], list[tuple[str, int]]]
 def queue(database: str, segments: dict[str, Segment], priority: int = 10) -> None:
     url = database_url(database)
     prepare_database(url)
-    with open_client(url) as client:
-        enqueue(client, segments, priority)
+    with open_client(url) as client, Workers(url) as workers:
+        enqueue(client, workers, segments, priority)
 
 
 def collect(database: str, segments: dict[str, Segment], tmp_path: Path) -> dict[str, str]:

@@ -21,13 +21,14 @@ import pytest
 pytest.importorskip("dbos", reason="needs the extra [batch]")
 
 from tests.jobs.series import Episode, make_series
+from tests.jobs.watch import StoreWatch
 from tts2face.batch.store import open_store
 from tts2face.jobs.control import list_jobs
 
 N_CUES = int(os.environ.get("TTS2FACE_SERIES_CUES", "12"))
 FPS = 10
-TIMEOUT_S = 240 + 3 * N_CUES
-FIRST_KILL_S, KILL_INTERVAL_S = 3.0, (6.0, 12.0)
+TIMEOUT_S = 240 + 6 * N_CUES
+FIRST_KILL_S, KILL_INTERVAL_S = 3.0, (4.0, 12.0)
 LOG = logging.getLogger(__name__)
 COMMAND = [sys.executable, "-m", "tts2face"]
 DRAFT = ["--voice", "espeak", "--size", "64x64", "--supersampling", "1", "--fps", str(FPS)]
@@ -41,10 +42,14 @@ def start_worker(database: str, store: Path, log: Path) -> "subprocess.Popen[byt
 
 
 class Killer:
-    """Kills one of two workers, or both, every few seconds, and starts others."""
+    """Kills one of two workers, or both, every few seconds, and starts others.
 
-    def __init__(self, database: str, store: Path, log: Path) -> None:
+    The seconds are counted from the first segment after the last kill, so that a slow machine ends the test, too.
+    """
+
+    def __init__(self, database: str, store: Path, log: Path, watch: StoreWatch) -> None:
         self._start = lambda: start_worker(database, store, log)
+        self._watch = watch
         self._workers = [self._start(), self._start()]
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run)
@@ -55,11 +60,14 @@ class Killer:
         wait_s = FIRST_KILL_S
         while not self._ended.wait(wait_s):
             wait_s = generator.uniform(*KILL_INTERVAL_S)
+            n_stored = len(self._watch.stored)
             for number in [generator.randrange(2)] if generator.random() < 0.8 else [0, 1]:
                 self._workers[number].kill()
                 self._workers[number].wait()
                 self._workers[number] = self._start()
                 self.n_kills += 1
+            while len(self._watch.stored) == n_stored and not self._ended.wait(0.2):
+                continue
 
     def __enter__(self) -> "Killer":
         self._thread.start()
@@ -104,7 +112,7 @@ def test_a_series_survives_kills(database: str, tmp_path: Path) -> None:
     files = [str(episode.path) for episode in episodes]
     batch = [*COMMAND, "batch", *files, "--out", str(out), "--database", database, "--store", str(store), *DRAFT]
     began = time.perf_counter()
-    with Killer(database, store, tmp_path / "workers.log") as killer:
+    with StoreWatch(store) as watch, Killer(database, store, tmp_path / "workers.log", watch) as killer:
         done = subprocess.run(
             [*batch, "--jobs", "0", "--quiet"], capture_output=True, text=True, check=False, timeout=TIMEOUT_S
         )
@@ -117,6 +125,12 @@ def test_a_series_survives_kills(database: str, tmp_path: Path) -> None:
     assert stored == sorted({job.name.partition(".")[0] for job in list_jobs(database)})
     assert 0.9 * n_clips < len(stored) <= n_clips
     assert {job.state for job in list_jobs(database)} == {"done"}
-    LOG.info("%d clips, %d kills, %.0f s", n_clips, killer.n_kills, time.perf_counter() - began)
+    assert watch.n_twice == 0
+    assert watch.cut_off() <= killer.n_kills + 2  # the last two workers are killed, too
+    LOG.info(
+        "%d clips, %d segments, %d kills; %d renderings were cut off and repeated, %d stored segments rendered again; "
+        "%.0f s",
+        n_clips, len(stored), killer.n_kills, watch.cut_off(), watch.n_twice, time.perf_counter() - began,
+    )  # fmt: skip
     again = subprocess.run([*batch, "--jobs", "0"], capture_output=True, text=True, check=True)
     assert f"{n_clips} clips were up to date" in again.stdout + again.stderr

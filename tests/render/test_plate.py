@@ -1,5 +1,7 @@
 """A talker's own face: warps against a slow exact computation, and pixels of the plate that speech does not move."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -95,6 +97,17 @@ def test_appearance_parameters_change_the_texture_by_their_basis():
 @pytest.mark.parametrize(("instant", "number"), [(0.0, 0), (0.08, 2), (0.12, 3), (0.16, 2), (0.24, 0), (0.28, 1)])
 def test_the_plate_plays_forwards_and_backwards(instant, number):
     assert own_face_renderer(own_talker(), Picture(size="96x96")).plate_frame(instant) == number
+
+
+@pytest.mark.parametrize("n_frames", [1, 2, 3, 5, 12, 13, 14, 40])
+def test_a_video_that_returns_begins_and_ends_at_its_first_frame_without_a_jump(n_frames):
+    renderer = replace(own_face_renderer(own_talker(), Picture(size="96x96")), n_returning=n_frames)
+    positions = renderer._positions(np.arange(n_frames), renderer.fps) / renderer.fps
+    shown = [renderer.plate_frame(float(instant)) for instant in positions]
+    assert (shown[0], shown[-1]) == (0, 0)
+    assert np.abs(np.diff(shown)).max(initial=0) <= 1
+    plays_on = [renderer.plate_frame(number / renderer.fps) for number in range(n_frames)]
+    assert shown[: n_frames // 2] == plays_on[: n_frames // 2]
 
 
 def test_without_a_size_the_picture_is_as_large_as_the_video():

@@ -8,6 +8,7 @@ import pytest
 
 from lexicon.errors import BackendError
 from lexicon.sequence import SILENCE, PhoneSequence
+from tests.render.test_cutouts import face_with_sheet, without_sheet
 from tests.render.tiny_face import tiny_face
 from tts2face.models.face_file import load_face
 from tts2face.render import vtk_renderer as vtk
@@ -73,6 +74,21 @@ def test_textures_have_the_same_orientation():
     upside_down = np.corrcoef(ours.ravel(), theirs[::-1].ravel())[0, 1]
     assert alike > 0.9
     assert upside_down < 0.5
+
+
+@pytest.mark.usefixtures("gl")
+def test_holes_have_the_same_place():
+    alpha = np.where(np.indices((64, 64)).sum(axis=0) % 32 < 16, 255, 0).astype(np.uint8)
+    ours, theirs = both(face_with_sheet(alpha), [0, 0, 0, 0], size="256x256", background="transparent")
+    solid, _ = both(face_with_sheet(None), [0, 0, 0, 0], size="256x256", background="transparent")
+    bare = mesh_renderer(without_sheet(face_with_sheet(None)), Picture(size="256x256", background="transparent"))
+    on_sheet = np.abs(solid - bare.draw([0, 0, 0, 0]).astype(int)).max(axis=2) > 60
+    assert on_sheet.sum() > 200
+    both_drawn = on_sheet & (np.abs(ours - solid).max(axis=2) < 30) & (np.abs(theirs - solid).max(axis=2) < 60)
+    both_left = on_sheet & (np.abs(ours - solid).max(axis=2) > 60) & (np.abs(theirs - solid).max(axis=2) > 60)
+    assert both_drawn.sum() > 0.25 * on_sheet.sum()
+    assert both_left.sum() > 0.25 * on_sheet.sum()
+    assert (both_drawn | both_left).sum() > 0.75 * on_sheet.sum()
 
 
 @pytest.mark.usefixtures("gl")

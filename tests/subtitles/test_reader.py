@@ -232,12 +232,53 @@ def test_noises_lyrics_and_labels_are_not_spoken(shown: str, spoken: str, speake
     assert cue.shown
 
 
-def test_two_labels_in_a_cue_are_a_warning(tmp_path: Path) -> None:
-    path = tmp_path / "a.srt"
-    path.write_text(f"1\n{A}\nJOHN: Hi.\nANN: Bye.\n", encoding="utf-8")
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("- JOHN: Hi.\n- ANN: Hello there,\nJohn.", [("JOHN", "Hi."), ("ANN", "Hello there, John.")]),
+        ("JOHN: Hi.\nANN: Bye.\nJOHN: Oh.", [("JOHN", "Hi."), ("ANN", "Bye."), ("JOHN", "Oh.")]),
+        ("- Hi.\n- Hello.", [("", "Hi."), ("", "Hello.")]),
+        ("– JOHN: Hi.\n– Hello.", [("JOHN", "Hi."), ("", "Hello.")]),
+        ("JOHN: Hi.\nJOHN: It is me.", []),
+        ("- JOHN: [sighs]\n- ANN: Hello.", []),
+        ("He came\n- late - and left.", []),
+        ("JOHN: Hi.\nIt is me.", []),
+    ],
+)
+@pytest.mark.parametrize("suffix", ["srt", "vtt", "ass"])
+def test_speakers_of_one_cue_are_divided(suffix: str, text: str, parts: list[tuple[str, str]], tmp_path: Path) -> None:
+    path = tmp_path / f"a.{suffix}"
+    content = {
+        "srt": f"1\n{A}\n{text}\n",
+        "vtt": f"WEBVTT\n\n00:01.000 --> 00:02.000\n{text}\n",
+        "ass": "[Events]\nFormat: Start, End, Text\nDialogue: 0:00:01.00,0:00:02.00," + text.replace("\n", "\\N"),
+    }[suffix]
+    path.write_text(content, encoding="utf-8")
     read = read_subtitles(path)
-    assert (read.cues[0].text, read.cues[0].speaker) == ("Hi. Bye.", "JOHN")
-    assert [(one.line, "JOHN, ANN" in one.message) for one in read.warnings] == [(2, True)]
+    (cue,) = read.cues
+    assert [(part.speaker, part.text) for part in cue.parts] == parts
+    assert read.warnings == ()
+    assert not parts or cue.text == " ".join(words for _, words in parts)
+
+
+def test_voices_of_one_webvtt_cue_are_divided(tmp_path: Path) -> None:
+    path = tmp_path / "a.vtt"
+    path.write_text(
+        "WEBVTT\n\n00:01.000 --> 00:02.000\n<v.loud Ann>Hi.</v> <v Bob Lee>- Hello.</v>\n", encoding="utf-8"
+    )
+    (cue,) = read_subtitles(path).cues
+    assert [(part.speaker, part.text) for part in cue.parts] == [("Ann", "Hi."), ("Bob Lee", "Hello.")]
+    assert (cue.text, cue.shown, cue.speaker, cue.style) == ("Hi. Hello.", "Hi. - Hello.", "Ann", "loud")
+
+
+def test_the_actor_of_a_line_speaks_up_to_the_first_label(tmp_path: Path) -> None:
+    path = tmp_path / "a.ass"
+    path.write_text(
+        "[Events]\nFormat: Start, End, Name, Text\nDialogue: 0:00:01.00,0:00:02.00,Kim,- Hi.\\N- ANN: Bye.",
+        encoding="utf-8",
+    )
+    (cue,) = read_subtitles(path).cues
+    assert [part.speaker for part in cue.parts] == ["Kim", "ANN"]
 
 
 def test_speakers_and_styles_of_each_format(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Joining of segments into one .mp4 file: pictures are copied, only the sound is encoded again.
+"""Joining of segments into one video: pictures are copied, only the sound is encoded again.
 
 All segments have the same picture size, frame rate and encoder settings; each begins on a key frame and has exact
 uncompressed sound.
@@ -13,16 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
+from tts2face.batch.output import Sound
+from tts2face.batch.track import open_track
 from tts2face.clock import exact_rate, first_sample
-from tts2face.render.movie import MP4_MOVIE, SOUND_RATE
-from tts2face.render.output_path import MP4, make_temporary, move_into_place
+from tts2face.render.movie import MOV_MOVIE, MP4_MOVIE, SOUND_RATE, WEBM_MOVIE, MovieKind
+from tts2face.render.output_path import MOV, MP4, WEBM, make_temporary, move_into_place
 from tts2face.storage.files import translate_disk_errors
 
+KINDS = {MP4: MP4_MOVIE, MOV: MOV_MOVIE, WEBM: WEBM_MOVIE}
 SAMPLE_BLOCK = 48_000  # samples that are encoded at a time
 
 
-def join_segments(segments: Sequence[Path], out: Path, fps: float) -> int:
-    """Join segments into a .mp4 file, which appears when it is complete; its number of frames.
+def join_segments(segments: Sequence[Path], out: Path, fps: float, sounds: Sequence[Sound | None] = ()) -> int:
+    """Join segments into a video, which appears when it is complete; its number of frames.
+
+    The suffix of `out` is .mp4 or .mov for segments of H.264, and .webm for those of VP9.
+
+    Parameters
+    ----------
+    sounds
+        For each segment, what replaces its sound; empty: nothing.
 
     Raises
     ------
@@ -33,10 +43,17 @@ def join_segments(segments: Sequence[Path], out: Path, fps: float) -> int:
     """
     import av
 
-    temporary = make_temporary(out, MP4)
+    temporary, kind = make_temporary(out, MP4), KINDS[out.suffix]
     try:
-        with translate_disk_errors(out):
-            n_frames = _join(segments, temporary.path, exact_rate(fps))
+        with (
+            translate_disk_errors(out),
+            av.open(str(temporary.path), "w", format=kind.container, options=dict(kind.container_options)) as target,
+        ):
+            joined = _Joined(target, kind, exact_rate(fps))
+            for path, sound in zip(segments, sounds or [None] * len(segments), strict=True):
+                with av.open(str(path)) as source:
+                    joined.append(source, path, sound)
+            joined.finish()
         move_into_place(temporary, out)
     except av.FFmpegError as broken:
         raise DataError(
@@ -44,43 +61,38 @@ def join_segments(segments: Sequence[Path], out: Path, fps: float) -> int:
         ) from broken
     finally:
         temporary.remove()
-    return n_frames
-
-
-def _join(segments: Sequence[Path], out: Path, fps: Fraction) -> int:
-    import av
-
-    with av.open(str(out), "w", format="mp4", options=dict(MP4_MOVIE.container_options)) as target:
-        joined: _Joined | None = None
-        for path in segments:
-            with av.open(str(path)) as source:
-                if joined is None:
-                    joined = _Joined(target, source, fps)
-                joined.append(source, path)
-        if joined is None:
-            raise DataError(f"there are no segments to join into {out.name}")
-        joined.finish()
-        return joined.n_frames
+    return joined.n_frames
 
 
 class _Joined:
     """Streams of the joined file."""
 
-    def __init__(self, target: Any, source: Any, fps: Fraction) -> None:
-        self._target, self._fps = target, fps
-        for name, value in source.metadata.items():
-            if name == "comment":
-                target.metadata[name] = value
-        self._video = target.add_stream_from_template(source.streams.video[0])
-        self._audio = target.add_stream(MP4_MOVIE.audio, rate=SOUND_RATE, layout="mono")
-        self._audio.codec_context.bit_rate = MP4_MOVIE.audio_bits
-        self._extradata = bytes(source.streams.video[0].codec_context.extradata)
+    def __init__(self, target: Any, kind: MovieKind, fps: Fraction) -> None:
+        self._target, self._kind, self._fps = target, kind, fps
+        self._video: Any = None
+        self._audio: Any = None
+        self._settings: tuple[Any, ...] = ()
         self.n_frames = self._n_samples = 0
 
-    def append(self, source: Any, path: Path) -> None:
-        """Copy the pictures of a segment and encode its sound."""
+    def _open(self, source: Any) -> None:
+        """Streams like those of the first segment."""
+        for name, value in source.metadata.items():
+            if name.lower() == "comment":
+                self._target.metadata["comment"] = value
+        first = source.streams.video[0]
+        self._video = self._target.add_stream_from_template(first)
+        if "alpha_mode" in (name.lower() for name in first.metadata):
+            self._video.metadata["alpha_mode"] = "1"
+        self._audio = self._target.add_stream(self._kind.audio, rate=SOUND_RATE, layout="mono")
+        self._audio.codec_context.bit_rate = self._kind.audio_bits
+        self._settings = _settings(first)
+
+    def append(self, source: Any, path: Path, sound: Sound | None) -> None:
+        """Copy the pictures of a segment and encode its sound, or what replaces it."""
         video = source.streams.video[0]
-        if bytes(video.codec_context.extradata) != self._extradata:
+        if self._video is None:
+            self._open(source)
+        if _settings(video) != self._settings:
             raise DataError(f"{path.name} was encoded with other settings than the others; remove it and run again")
         offset = Fraction(self.n_frames) / self._fps / video.time_base
         n_frames = 0
@@ -95,12 +107,19 @@ class _Joined:
         source.seek(0)
         begin = first_sample(self.n_frames, SOUND_RATE, self._fps)
         self.n_frames += n_frames
-        n_samples = first_sample(self.n_frames, SOUND_RATE, self._fps) - begin
+        end = first_sample(self.n_frames, SOUND_RATE, self._fps)
+        if sound is not None:
+            origin = first_sample(sound.offset, SOUND_RATE, self._fps)
+            self._encode(open_track(Path(sound.path)).read(origin + begin, origin + end))
+            return
+        n_samples = end - begin
         for block in _exactly(_sound(source), n_samples):
             self._encode(block)
 
     def finish(self) -> None:
         """Flush the encoder of the sound."""
+        if self._audio is None:
+            raise DataError("there are no segments to join; run again")
         self._target.mux(self._audio.encode(None))
 
     def _encode(self, samples: NDArray[np.int16]) -> None:
@@ -110,6 +129,11 @@ class _Joined:
         frame.sample_rate, frame.pts, frame.time_base = SOUND_RATE, self._n_samples, Fraction(1, SOUND_RATE)
         self._n_samples += len(samples)
         self._target.mux(self._audio.encode(frame))
+
+
+def _settings(video: Any) -> tuple[Any, ...]:
+    context = video.codec_context
+    return context.name, context.width, context.height, bytes(context.extradata or b"")
 
 
 def _sound(source: Any) -> Iterator[NDArray[np.int16]]:

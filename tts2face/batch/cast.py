@@ -13,7 +13,7 @@
 """
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -52,9 +52,22 @@ class Cast:
     default: Mapping[str, Any] = field(default_factory=dict)
     roles: tuple[Role, ...] = ()
 
+    def role_of(self, cue: Cue, file: str) -> Role | None:
+        """The first role that applies to a cue."""
+        return next((role for role in self.roles if role.applies(cue, file)), None)
+
+    def unused(self, used: Collection[int]) -> list[str]:
+        """Warnings of roles that apply to no cue; `used` holds the identities of the others."""
+        return [
+            f"role {number} ({', '.join(f'{name} {pattern!r}' for name, pattern in role.patterns.items())}) applies to "
+            "no cue; check its patterns"
+            for number, role in enumerate(self.roles, start=1)
+            if id(role) not in used
+        ]
+
     def settings(self, cue: Cue, file: str) -> dict[str, Any]:
         """Settings of a cue by name: those of its role over the defaults."""
-        role = next((role for role in self.roles if role.applies(cue, file)), None)
+        role = self.role_of(cue, file)
         return {**self.default, **(role.settings if role else {})}
 
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Protocol
@@ -17,7 +18,7 @@ from lexicon.errors import BackendError, Tts2faceError
 from tts2face.batch.render_process import ChildDiedError, RenderProcess
 from tts2face.batch.segment import Segment
 from tts2face.batch.segment_result import SEGMENT_SUFFIX, SegmentResult
-from tts2face.batch.store import Store
+from tts2face.batch.store import Store, wait_for_store
 
 MAX_TRIES = 3  # of a segment whose process ended; then it counts as failed
 MIN_FREE_BYTES = 200 << 20  # below which work pauses
@@ -101,22 +102,23 @@ def _processes(n_jobs: int) -> Iterator["queue.Queue[RenderProcess]"]:
 def render_into(store: Store, segment: Segment, renderer: Renders, on_message: Message) -> Rendered:
     """Render a segment unless the store has it; errors become the reason.
 
-    A process that ends is tried again up to `MAX_TRIES` times. A full disk is waited for.
+    A process that ends is tried again up to `MAX_TRIES` times. A full disk and a store that cannot be reached are
+    waited for.
     """
     address = segment.address
     reason = ""
     tries = 0
     while tries < MAX_TRIES:
-        found = store.result(address)
-        if found is not None:
-            return Rendered(address, found)
         try:
+            found = wait_for_store(partial(store.result, address), on_message)
+            if found is not None:
+                return Rendered(address, found)
             with _scratch(store) as folder:
                 wait_for_space(folder, on_message)
                 movie = folder / f"{address}-{os.getpid()}-{threading.get_ident()}{SEGMENT_SUFFIX}"
                 try:
                     result = renderer.render(segment, movie)
-                    store.put(address, movie, result)
+                    wait_for_store(partial(store.put, address, movie, result), on_message)
                 finally:
                     movie.unlink(missing_ok=True)
             return Rendered(address, result)

@@ -35,16 +35,42 @@ def read_manifest(folder: Path) -> dict[str, dict[str, Any]]:
     return {str(one["file"]): one for one in entries if isinstance(one, dict) and "file" in one}
 
 
+def read_segments(folder: Path) -> set[str]:
+    """Addresses of all segments that the batch of a manifest uses.
+
+    Raises
+    ------
+    DataError
+        The manifest is damaged, or of a version that does not list them.
+    """
+    path = folder / JSON_NAME
+    try:
+        content = parse_json(path.read_text(encoding="utf-8"), str(path))
+    except (OSError, UnicodeDecodeError) as broken:
+        raise DataError(f"cannot read {path} ({broken}); run the batch again, which writes it anew") from broken
+    segments = content.get("segments") if isinstance(content, dict) else None
+    if not isinstance(segments, list):
+        raise DataError(f"{path} does not list its segments; run the batch again, which writes it anew")
+    return set(map(str, segments))
+
+
 def is_current(entry: Mapping[str, Any] | None, output: Output, folder: Path) -> bool:
     """Whether a file is what the plan would make: its entry has the same address, and the file the same size."""
     if entry is None or entry.get("address") != output.address or entry.get("status") != "done":
         return False
+    files = {output.name: entry.get("bytes")} if output.suffix else {}
+    files |= {str(one.get("file")): one.get("bytes") for one in entry.get("exports", ()) if isinstance(one, dict)}
+    if not set(output.names) <= set(files):
+        return False
+    return all((folder / name).is_file() and (folder / name).stat().st_size == size for name, size in files.items())
+
+
+def done_entry(
+    output: Output, folder: Path, results: Sequence[SegmentResult], exports: Sequence[Path] = ()
+) -> dict[str, Any]:
+    """Entry of a finished output, whose files are in a folder."""
+    n_frames = sum(result.n_frames for result in results)
     path = folder / output.name
-    return path.is_file() and path.stat().st_size == entry.get("bytes")
-
-
-def done_entry(output: Output, path: Path, n_frames: int, results: Sequence[SegmentResult]) -> dict[str, Any]:
-    """Entry of a finished output."""
     spoken = [(cue, results[cue.segment]) for cue in output.cues if cue.segment is not None]
     warnings = [f"cue {cue.number}: {text}" for cue, result in spoken for text in result.warnings]
     return _entry(output) | {
@@ -58,12 +84,17 @@ def done_entry(output: Output, path: Path, n_frames: int, results: Sequence[Segm
         "sha256": file_hash(path),
         "bytes": path.stat().st_size,
         "took_s": round(sum(result.took_s for result in results), 3),
+        **({"exports": [_file_entry(path) for path in exports]} if exports else {}),
         "cues": [
             _cue_entry(cue)
             | {"rate": result.rate, "speech_s": result.speech_s, "overflow_s": result.overflow_s, "cut_s": result.cut_s}
             for cue, result in spoken
         ],
     }
+
+
+def _file_entry(path: Path) -> dict[str, Any]:
+    return {"file": path.name, "sha256": file_hash(path), "bytes": path.stat().st_size}
 
 
 def failed_entry(output: Output, reason: str) -> dict[str, Any]:
@@ -81,6 +112,7 @@ def write_manifest(folder: Path, plan: Plan, entries: Mapping[str, Mapping[str, 
         "n_cues": plan.n_cues,
         "n_silent_cues": plan.n_silent,
         "warnings": [{"file": one.file, "line": one.line, "message": one.message} for one in plan.warnings],
+        "segments": sorted(plan.segments),
     }
     write_atomically(folder / JSON_NAME, json.dumps(content, ensure_ascii=False, indent=1).encode())
     table = StringIO(newline="")

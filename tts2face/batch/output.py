@@ -1,12 +1,12 @@
 """Outputs of a batch: clips made of segments, and the plan of all of them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 from tts2face.batch.address import content_address
 from tts2face.batch.segment import Segment
-
-OUTPUT_SUFFIX = ".mp4"
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,35 +23,79 @@ class PlannedCue:
 
 
 @dataclass(frozen=True, slots=True)
+class Sound:
+    """Sound in place of that of a segment: a recording, and its frame at frame 0 of the output."""
+
+    path: str
+    hash: str
+    offset: int
+
+
+@dataclass(frozen=True)
 class Output:
     """A clip: segments in order of time.
 
     Parameters
     ----------
-    name
-        Name of the file in the folder of outputs.
+    stem
+        Name of its files in the folder of outputs, without their endings.
     source
         Subtitle files.
     begin_s
         Instant of its first frame in the film.
+    sounds
+        For each segment, what replaces its sound; empty: nothing.
+    suffix, exports
+        Endings of the video, empty without one, and of the exports.
     """
 
-    name: str
+    stem: str
     source: tuple[str, ...]
     begin_s: float
     fps: float
     cues: tuple[PlannedCue, ...]
     segments: tuple[Segment, ...]
+    sounds: tuple[Sound | None, ...] = ()
+    suffix: str = ".mp4"
+    exports: tuple[str, ...] = ()
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its files: the video, if there is one, and the exports."""
+        return tuple(f"{self.stem}{suffix}" for suffix in (self.suffix, *self.exports) if suffix)
+
+    @property
+    def name(self) -> str:
+        """Name of its first file."""
+        return self.names[0]
+
+    @cached_property
+    def tracks(self) -> tuple[Segment, ...]:
+        """Tracks of its segments; empty without exports."""
+        return tuple(segment.as_track() for segment in self.segments) if self.exports else ()
+
+    @property
+    def needed(self) -> tuple[Segment, ...]:
+        """What must be stored to make it."""
+        return (*(self.segments if self.suffix else ()), *self.tracks)
+
+    @cached_property
     def address(self) -> str:
         """Content address: equal for equal files."""
-        return content_address({"segments": [segment.address for segment in self.segments], "suffix": OUTPUT_SUFFIX})
+        content: dict[str, Any] = {
+            "segments": [segment.address for segment in self.segments],
+            "suffix": self.suffix,
+        }
+        if self.exports:
+            content["exports"] = list(self.exports)
+        if any(self.sounds):
+            content["sounds"] = [(one.hash, one.offset) if one else None for one in self.sounds]
+        return content_address(content)
 
 
 @dataclass(frozen=True, slots=True)
 class PlanWarning:
-    """A defect of a subtitle file or its text, and what is done about it."""
+    """A defect of a subtitle file or its text, and what is done about it; `line` is 0 for other files."""
 
     file: str
     line: int
@@ -70,13 +114,14 @@ class Plan:
     @property
     def segments(self) -> dict[str, Segment]:
         """Different segments by their content address, in order of first use."""
-        return {segment.address: segment for output in self.outputs for segment in output.segments}
+        return {segment.address: segment for output in self.outputs for segment in output.needed}
 
 
 def join_outputs(name: str, outputs: Sequence[Output]) -> Output:
     """One output of several in order; the times of its cues are those of the whole film."""
     cues: list[PlannedCue] = []
     segments: list[Segment] = []
+    sounds: list[Sound | None] = []
     offset_frames = 0
     for output in outputs:
         offset_s = offset_frames / output.fps
@@ -88,6 +133,18 @@ def join_outputs(name: str, outputs: Sequence[Output]) -> Output:
                 )
             )
         segments += output.segments
+        sounds += [
+            replace(one, offset=one.offset - offset_frames) if one else None
+            for one in output.sounds or [None] * len(output.segments)
+        ]
         offset_frames += sum(segment.slot_frames or segment.window_frames for segment in output.segments)
     source = tuple(path for output in outputs for path in output.source)
-    return Output(f"{name}{OUTPUT_SUFFIX}", source, 0.0, outputs[0].fps, tuple(cues), tuple(segments))
+    return replace(
+        outputs[0],
+        stem=name,
+        source=source,
+        begin_s=0.0,
+        cues=tuple(cues),
+        segments=tuple(segments),
+        sounds=tuple(sounds),
+    )

@@ -1,26 +1,33 @@
 """The plan of a batch: which outputs are made of which segments."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError, InputError
+from tts2face.batch.address import file_hash
 from tts2face.batch.cast import MODEL_NAMES, REQUEST_NAMES, Cast
-from tts2face.batch.options import BatchOptions
-from tts2face.batch.output import OUTPUT_SUFFIX, Output, Plan, PlannedCue, PlanWarning, join_outputs
-from tts2face.batch.recordings import find_recording, index_recordings
-from tts2face.batch.segment import Segment, input_hashes
+from tts2face.batch.check import check_names
+from tts2face.batch.export import check_faces
+from tts2face.batch.file_names import output_names
+from tts2face.batch.options import BatchOptions, non_defaults
+from tts2face.batch.output import Output, Plan, PlannedCue, PlanWarning, Sound, join_outputs
+from tts2face.batch.recordings import Recordings, find_recordings
+from tts2face.batch.segment import ALPHA_MOVIE, MOVIE, Segment
 from tts2face.batch.windows import Window, cue_windows, scenes
-from tts2face.clock import exact_rate
+from tts2face.clock import exact_rate, first_sample
+from tts2face.exports.formats import batch_format
+from tts2face.render.movie import SOUND_RATE
 from tts2face.render.picture import Picture
 from tts2face.request import IDLE_LIMITS_S, Request
 from tts2face.session_cache import Models
-from tts2face.subtitles.cue import Subtitles, SubtitleWarning
+from tts2face.subtitles.cue import Cue, Subtitles, SubtitleWarning
 from tts2face.subtitles.reader import read_subtitles
 from tts2face.synthesis.prepared_request import prepare
 
 MAX_IDLE_S = 20.0  # of one segment of silence
+MARGIN_S = 0.5  # around a cue, for speech of a dubbing track that begins early or ends late; half of shorter gaps
 NOT_WHEN_SILENT = ("text", "audio", "audio_map", "voice", "rate", "volume", "dictionary", "language")
 NOT_WITH_AUDIO = ("voice", "rate")
 
@@ -50,8 +57,8 @@ def plan_batch(
     """
     if not files:
         raise InputError("there are no subtitles; give .srt, .vtt, .ass, .ssa or .ttml files")
-    if picture is not None and picture.is_transparent:
-        raise InputError("clips of a batch are .mp4, which has no transparency; choose another background")
+    if picture is not None and picture.is_transparent and options.format in ("mp4", "mov"):
+        raise InputError(f".{options.format} has no transparency; choose --format webm, or another background")
     base = _Base(
         options,
         request or Request(),
@@ -60,23 +67,15 @@ def plan_batch(
         cast or Cast(),
         len(files),
     )
-    planned = [_FilePlan(base, path, name) for path, name in zip(files, _names(files), strict=True)]
+    planned = [_FilePlan(base, path, name) for path, name in zip(files, output_names(files), strict=True)]
     outputs = [output for one in planned for output in one.outputs()]
     if options.per == "film" and outputs:
         outputs = [join_outputs("film", outputs)]
-    warnings = tuple(warning for one in planned for warning in one.warnings)
-    return Plan(tuple(outputs), warnings, sum(one.n_cues for one in planned), sum(one.n_silent for one in planned))
-
-
-def non_defaults(options: Any) -> dict[str, Any]:
-    """Fields of an option dataclass that differ from their defaults, as JSON values."""
-    found = {one.name: getattr(options, one.name) for one in fields(options) if one.name != "text"}
-    defaults = {one.name: one.default for one in fields(options)}
-    return {
-        name: str(value) if isinstance(value, Path) else value
-        for name, value in found.items()
-        if value != defaults[name]
-    }
+        check_faces(outputs[0])
+    warnings = [warning for one in planned for warning in one.warnings]
+    warnings += [PlanWarning("the cast", 0, text) for text in base.cast.unused(base.used)]
+    n_cues, n_silent = sum(one.n_cues for one in planned), sum(one.n_silent for one in planned)
+    return Plan(tuple(outputs), tuple(warnings), n_cues, n_silent)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +88,7 @@ class _Base:
     models: Models
     cast: Cast
     n_files: int
+    used: set[int] = field(default_factory=set)  # roles of the cast
 
 
 @dataclass(slots=True)
@@ -99,6 +99,7 @@ class _FilePlan:
     path: Path
     name: str
     warnings: list[PlanWarning] = field(default_factory=list)
+    recordings: Recordings = field(default_factory=Recordings)
     n_cues: int = 0
     n_silent: int = 0
     _hashes: dict[str, Mapping[str, str]] = field(default_factory=dict)
@@ -113,36 +114,55 @@ class _FilePlan:
             self._warn(1, "no cue has words; there is no clip of this file")
             return
         fps = exact_rate(self.base.request.fps)
-        windows = cue_windows(spoken, fps)
-        recordings = index_recordings(self.base.options.audio) if self.base.options.audio else {}
+        if self.base.options.audio is not None:
+            names = (self.name, self.path.stem, *([""] if self.base.n_files == 1 else []))
+            self.recordings = find_recordings(self.base.options.audio, self.path, names)
+        spoken = [self._divide(cue) for cue in spoken]
+        margin = MARGIN_S if self.recordings.track else 0.0
+        windows = cue_windows(spoken, fps, round(margin * fps))
         per = self.base.options.per
         if per == "cue":
             for window in windows:
-                segment = self._speech(window, recordings, fills=False)
+                segment = self._speech(window, fills=False)
                 if segment is not None:
-                    yield self._output(f"{self.name}-{window.cue.number:04d}", window.begin, [(window, segment)])
+                    part = f"-{window.part}" if window.part > 1 else ""
+                    name = f"{self.name}-{window.cue.number:04d}{part}"
+                    yield self._output(name, window.begin, [(window, segment)])
         elif per == "scene":
             gap = round(self.base.options.scene_gap * float(fps))
             for number, group in enumerate(scenes(windows, gap), start=1):
-                yield self._joined_output(f"{self.name}-scene-{number:03d}", group, group[0].begin, recordings)
+                yield self._joined_output(f"{self.name}-scene-{number:03d}", group, group[0].begin)
         else:
-            yield self._joined_output(self.name, windows, 0, recordings)
+            yield self._joined_output(self.name, windows, 0)
 
-    def _joined_output(
-        self, name: str, windows: Sequence[Window], begin: int, recordings: Mapping[str, Path]
-    ) -> Output:
+    def _divide(self, cue: Cue) -> Cue:
+        """A cue with its parts by speaker, or without them if it has one recording of all; both with a warning."""
+        if not cue.parts:
+            return cue
+        named = " and ".join(part.speaker or "somebody" for part in cue.parts)
+        if cue.number in self.recordings.cues:
+            self._warn(cue.line, f"{named} speak in cue {cue.number}, which has one recording; one face is shown")
+            return replace(cue, parts=())
+        self._warn(cue.line, f"{named} speak in cue {cue.number}; its time is divided by their letters")
+        return cue
+
+    def _joined_output(self, name: str, windows: Sequence[Window], begin: int) -> Output:
         """Clip of consecutive windows with the silences between them."""
         parts: list[tuple[Window | None, Segment]] = []
         at = begin
         for window in windows:
             parts += [(None, silence) for silence in self._silences(window, window.begin - at)]
-            speech = self._speech(window, recordings, fills=True)
+            speech = self._speech(window, fills=True)
             if speech is None:
                 parts += [(None, silence) for silence in self._silences(window, window.slot_end - window.begin)]
             else:
                 parts.append((window, speech))
             at = window.slot_end
-        return self._output(name, begin, parts)
+        output = self._output(name, begin, parts)
+        if self.recordings.track is None:
+            return output
+        sound = Sound(str(self.recordings.track), file_hash(self.recordings.track), begin)
+        return replace(output, sounds=(sound,) * len(parts))
 
     def _output(self, name: str, begin: int, parts: Sequence[tuple[Window | None, Segment]]) -> Output:
         fps = exact_rate(self.base.request.fps)
@@ -152,35 +172,42 @@ class _FilePlan:
                 window.cue.line,
                 window.cue.speaker,
                 window.cue.text,
-                float(window.begin / fps),
-                float(window.end / fps),
+                float(window.cue_begin / fps),
+                float(window.cue_end / fps),
                 index,
             )
             for index, (window, _) in enumerate(parts)
             if window is not None
         )
         segments = tuple(segment for _, segment in parts)
-        return Output(f"{name}{OUTPUT_SUFFIX}", (str(self.path),), float(begin / fps), float(fps), cues, segments)
+        options = self.base.options
+        suffix = "" if options.format == "none" else f".{options.format}"
+        exports = tuple(batch_format(one)[0] for one in options.exports)
+        source = (str(self.path),)
+        output = Output(name, source, float(begin / fps), float(fps), cues, segments, suffix=suffix, exports=exports)
+        check_faces(output)
+        return output
 
-    def _speech(self, window: Window, recordings: Mapping[str, Path], *, fills: bool) -> Segment | None:
+    def _speech(self, window: Window, *, fills: bool) -> Segment | None:
         """Segment of a cue; None with a warning if it cannot be spoken."""
         settings = self._settings(window)
         request: dict[str, Any] = {**settings, "text": window.cue.text}
         if self.base.options.audio is not None:
-            names = (self.name, self.path.stem) if self.base.n_files > 1 else (self.name, self.path.stem, "")
-            found = find_recording(recordings, names, window.cue.number)
+            found = self.recordings.track or self.recordings.cues.get(window.cue.number)
             if found is None:
                 self._warn(window.cue.line, f"cue {window.cue.number} has no recording; it is silent")
                 return None
             request = {name: value for name, value in request.items() if name not in NOT_WITH_AUDIO}
             request["audio"] = str(found)
         slot_end = window.slot_end if fills else window.next_begin
+        segment = self._segment(window, request, None if slot_end is None else slot_end - window.begin, fills=fills)
         try:
             prepare(Request(**request))
-            return self._segment(window, request, None if slot_end is None else slot_end - window.begin, fills=fills)
         except (InputError, DataError) as wrong:
+            self.n_silent += 1
             self._warn(window.cue.line, f"cue {window.cue.number} is silent: {wrong}")
             return None
+        return segment
 
     def _silences(self, window: Window, n_frames: int) -> Iterator[Segment]:
         """Segments of idle animation of the speaker of a window."""
@@ -204,23 +231,29 @@ class _FilePlan:
         window_frames: int | None = None,
     ) -> Segment:
         models = self._models(window)
-        return Segment(
+        n_frames = window.end - window.begin if window_frames is None else window_frames
+        is_excerpt = self.recordings.track is not None and "audio" in request
+        fps = exact_rate(self.base.request.fps)
+        segment = Segment(
             request,
             self.base.picture,
             models,
-            window.end - window.begin if window_frames is None else window_frames,
+            n_frames,
             slot,
             fills,
             self.base.options.overflow,
             self.base.options.max_rate,
-            self._file_hashes(models, request),
+            audio_begin=first_sample(window.begin, SOUND_RATE, fps) if is_excerpt else None,
+            medium=ALPHA_MOVIE if self.base.options.format == "webm" else MOVIE,
         )
+        return replace(segment, file_hashes=self._file_hashes(segment))
 
     def _settings(self, window: Window) -> dict[str, Any]:
         """Request fields of a cue: of the command, its language, and its role in the cast."""
         settings = non_defaults(self.base.request)
         if window.cue.language and "language" not in settings:
             settings["language"] = self._language(window)
+        self.base.used.add(id(self.base.cast.role_of(window.cue, self.path.name)))
         cast = self.base.cast.settings(window.cue, self.path.name)
         settings |= {name: value for name, value in cast.items() if name in REQUEST_NAMES}
         return {name: value for name, value in settings.items() if value is not None}
@@ -235,16 +268,22 @@ class _FilePlan:
             return None
 
     def _models(self, window: Window) -> Models:
-        cast = self.base.cast.settings(window.cue, self.path.name)
-        chosen = {name: cast.get(name, getattr(self.base.models, name)) for name in MODEL_NAMES}
-        if chosen["face"] != self.base.models.face and "identity" not in cast:
-            chosen["identity"] = None  # presets belong to a face
+        chosen = {name: getattr(self.base.models, name) for name in MODEL_NAMES}
+        role = self.base.cast.role_of(window.cue, self.path.name)
+        for settings in (self.base.cast.default, role.settings if role else {}):
+            if settings.get("face", chosen["face"]) != chosen["face"]:
+                chosen["identity"] = None  # presets belong to a face
+            chosen |= {name: settings[name] for name in MODEL_NAMES if name in settings}
         return Models(**chosen)
 
-    def _file_hashes(self, models: Models, request: Mapping[str, Any]) -> Mapping[str, str]:
-        key = repr((models, [request.get(name) for name in ("audio", "dictionary", "voice")]))
+    def _file_hashes(self, segment: Segment) -> Mapping[str, str]:
+        if segment.audio_begin is not None:
+            return segment.input_hashes()
+        names = ("audio", "dictionary", "voice", "style")
+        key = repr((segment.models, [segment.request.get(name) for name in names]))
         if key not in self._hashes:
-            self._hashes[key] = input_hashes(models, request, self.base.picture)
+            check_names(segment.models, segment.request)
+            self._hashes[key] = segment.input_hashes()
         return self._hashes[key]
 
     def _add_warnings(self, read: Subtitles) -> None:
@@ -256,24 +295,3 @@ class _FilePlan:
         planned = PlanWarning(str(self.path), warning.line, warning.message)
         if planned not in self.warnings[-8:]:
             self.warnings.append(planned)
-
-
-def _names(files: Sequence[Path]) -> list[str]:
-    """Names of outputs: the stems of the files, with their folders or suffixes where stems are equal.
-
-    Raises
-    ------
-    InputError
-        A file is given twice.
-    """
-    if len({path.resolve() for path in files}) < len(files):
-        raise InputError("a subtitle file is given twice; remove one of them")
-    for name_of in (
-        lambda path: path.stem,
-        lambda path: f"{path.resolve().parent.name}-{path.stem}",
-        lambda path: f"{path.resolve().parent.name}-{path.name.replace('.', '-')}",
-    ):
-        names = [name_of(path) for path in files]
-        if len(set(names)) == len(names):
-            return names
-    return [f"{number:03d}-{path.stem}" for number, path in enumerate(files, start=1)]

@@ -5,11 +5,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from tts2face.batch.fit import Fit, Limits, fit_speech
-from tts2face.batch.segment import Segment
+from tts2face.batch.render_recording import excerpt_of, fit_recording
+from tts2face.batch.segment import ALPHA_MOVIE, TRACK, Segment
 from tts2face.batch.segment_result import SegmentResult
 from tts2face.clock import exact_rate
-from tts2face.render.encode import ClipWriter
+from tts2face.exports.writer import ExportWriter, plan_exports
+from tts2face.render.encode import MKV, ClipWriter
+from tts2face.render.own_face import OwnFaceRenderer
 from tts2face.render.picture import Picture
+from tts2face.render.renderer import FrameRenderer
 from tts2face.request import Request
 from tts2face.session import Session
 from tts2face.session_cache import SessionCache
@@ -24,7 +28,7 @@ class SegmentRenderer:
         self._sessions = SessionCache()
 
     def render(self, segment: Segment, out: Path) -> SegmentResult:
-        """Render a segment into a file (.mov), which appears when it is complete.
+        """Render a segment into a file, which appears when it is complete.
 
         Raises
         ------
@@ -33,13 +37,25 @@ class SegmentRenderer:
         """
         began = time.perf_counter()
         session = self._sessions.get(segment.models)
-        request, picture = Request(**segment.request), Picture(**segment.picture)
-        fitted, result = _fit(session, request, segment)
-        renderer = session.renderer(picture, has_gestures=fitted.has_gestures)
-        with ClipWriter(out, renderer) as writer:
-            for clip in session.stream_to_length(fitted, result.n_frames):
-                writer.add(clip)
+        with excerpt_of(segment, Request(**segment.request)) as request:
+            fitted, result = _fit(session, request, segment)
+            with _writer(session, segment, fitted, (out, result.n_frames)) as writer:
+                for clip in session.stream_to_length(fitted, result.n_frames):
+                    writer.add(clip)
         return replace(result, took_s=round(time.perf_counter() - began, 3))
+
+
+def _writer(
+    session: Session, segment: Segment, request: Request, target: tuple[Path, int]
+) -> ClipWriter | ExportWriter:
+    """Writer of the medium of a segment into a path, for a number of frames."""
+    out, n_frames = target
+    if segment.medium == TRACK:
+        return ExportWriter(plan_exports([out], format=TRACK))
+    renderer: FrameRenderer = session.renderer(Picture(**segment.picture), has_gestures=request.has_gestures)
+    if isinstance(renderer, OwnFaceRenderer):
+        renderer = replace(renderer, n_returning=n_frames)
+    return ClipWriter(out, renderer, kind=MKV if segment.medium == ALPHA_MOVIE else None)
 
 
 def _fit(session: Session, request: Request, segment: Segment) -> tuple[Request, SegmentResult]:
@@ -48,8 +64,10 @@ def _fit(session: Session, request: Request, segment: Segment) -> tuple[Request,
     window_s = float(segment.window_frames / fps)
     if request.idle is not None:
         return request, SegmentResult(segment.slot_frames or segment.window_frames, float(fps))
+    heard: list[str] = []
     if request.audio is not None:
-        spoken = sum(piece.clip.speech.waveform.duration for piece in session.stream(request))
+        request, spoken, heard = fit_recording(session, request, segment)
+        spoken = min(spoken, window_s) if segment.audio_begin is not None else spoken
         fit = Fit(request.text, 1.0, spoken, max(0.0, spoken - window_s), 1)
     else:
         slot_s = None if segment.slot_frames is None else float(segment.slot_frames / fps)
@@ -63,7 +81,13 @@ def _fit(session: Session, request: Request, segment: Segment) -> tuple[Request,
     if cut > 0:
         warnings.append(f"the last {cut:.2f} s of the speech are cut off by the next cue")
     result = SegmentResult(
-        n_frames, float(fps), fit.rate, round(fit.speech_s, 4), round(fit.overflow_s, 4), round(cut, 4), tuple(warnings)
+        n_frames,
+        float(fps),
+        fit.rate,
+        round(fit.speech_s, 4),
+        round(fit.overflow_s, 4),
+        round(cut, 4),
+        (*heard, *warnings),
     )
     return request, result
 

@@ -1,15 +1,17 @@
 """Running a plan: segments are rendered once, outputs are joined as soon as their segments are there."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from lexicon.errors import Tts2faceError
+from lexicon.errors import BackendError, Tts2faceError
 from tts2face.batch.assemble import join_segments
 from tts2face.batch.engine import Engine, LocalEngine
+from tts2face.batch.export import Exporter
 from tts2face.batch.manifest import (
     CSV_NAME,
     JSON_NAME,
@@ -20,13 +22,16 @@ from tts2face.batch.manifest import (
     write_manifest,
 )
 from tts2face.batch.output import Output, Plan
+from tts2face.batch.segment import Segment
 from tts2face.batch.segment_result import SegmentResult
 from tts2face.batch.store import Store, open_store
 from tts2face.storage.overwrite import refuse_overwriting
+from tts2face.storage.temporary import Temporary
 from tts2face.types import Progress
 
 SEGMENT_FOLDER = ".segments"  # in the folder of outputs
 MANIFEST_INTERVAL_S = 10.0  # between two writes while the batch runs
+N_LOOKS = 8  # results read at a time, as each takes some 50 ms in a bucket
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +62,7 @@ class _Run:
     n_made: int = 0
     seconds: float = 0.0
     warnings: list[str] = field(default_factory=list)
+    exporter: Exporter = field(default_factory=Exporter)
 
 
 def run_batch(
@@ -90,33 +96,30 @@ def run_batch(
     """
     began = time.perf_counter()
     folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
+    _prepare_folder(folder)
     check_outputs(plan, folder)
     run = _Run(plan, folder, store or open_store(folder / SEGMENT_FOLDER), read_manifest(folder))
+    write_manifest(folder, plan, run.entries)  # its list of segments keeps them from being pruned
     stale = [one for one in plan.outputs if not is_current(run.entries.get(one.name), one, folder)]
-    needed = {segment.address: segment for output in stale for segment in output.segments}
+    needed = {segment.address: segment for output in stale for segment in output.needed}
     for output in stale:
-        run.waiting[output.name] = {segment.address for segment in output.segments}
+        run.waiting[output.name] = {segment.address for segment in output.needed}
         for address in run.waiting[output.name]:
             run.users.setdefault(address, []).append(output)
-    missing, written_at = {}, time.monotonic()
-    for address, segment in needed.items():
-        found = run.store.result(address)
-        if found is None:
-            missing[address] = segment
-        else:
-            _finish_segment(run, address, found, "", on_output)
-    done = len(needed) - len(missing)
+    missing = _find_missing(run, needed, on_output)
+    done, written_at = len(needed) - len(missing), time.monotonic()
     by_models = dict(sorted(missing.items(), key=lambda item: repr(item[1].models)))  # a worker holds one session
-    for rendered in (engine or LocalEngine()).render(by_models, run.store):
-        _finish_segment(run, rendered.address, rendered.result, rendered.reason, on_output)
-        done += 1
-        if on_progress:
-            on_progress(done, len(needed))
-        if time.monotonic() - written_at > MANIFEST_INTERVAL_S:
-            write_manifest(folder, plan, run.entries)
-            written_at = time.monotonic()
-    write_manifest(folder, plan, run.entries)
+    try:
+        for rendered in (engine or LocalEngine()).render(by_models, run.store):
+            _finish_segment(run, rendered.address, rendered.result, rendered.reason, on_output)
+            done += 1
+            if on_progress:
+                on_progress(done, len(needed))
+            if time.monotonic() - written_at > MANIFEST_INTERVAL_S:
+                write_manifest(folder, plan, run.entries)
+                written_at = time.monotonic()
+    finally:  # also of an interrupted batch
+        write_manifest(folder, plan, run.entries)
     failed = tuple(
         (one.name, str(run.entries[one.name].get("reason", "")))
         for one in stale
@@ -133,6 +136,38 @@ def run_batch(
     )
 
 
+def _prepare_folder(folder: Path) -> None:
+    """Create the folder of the outputs, and refuse one that cannot be written, before anything is rendered."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with Temporary(folder / JSON_NAME):
+            pass
+    except OSError as error:
+        raise BackendError(f"cannot write the folder {folder}: {error.strerror}; choose another --out") from error
+
+
+def _find_missing(
+    run: _Run, needed: Mapping[str, Segment], on_output: Callable[[dict[str, Any]], None] | None
+) -> dict[str, Segment]:
+    """Segments that are to be rendered; those that are stored are noted.
+
+    Raises
+    ------
+    BackendError
+        The store cannot be used.
+    """
+    missing = {}
+    with ThreadPoolExecutor(N_LOOKS) as pool:
+        for (address, segment), found in zip(needed.items(), pool.map(run.store.result, needed), strict=True):
+            if found is None:
+                missing[address] = segment
+            else:
+                _finish_segment(run, address, found, "", on_output)
+    if missing:
+        run.store.check()
+    return missing
+
+
 def check_outputs(plan: Plan, folder: Path) -> None:
     """Refuse outputs that would replace subtitles or recordings.
 
@@ -146,7 +181,7 @@ def check_outputs(plan: Plan, folder: Path) -> None:
         str(one.request["audio"]) for output in plan.outputs for one in output.segments if "audio" in one.request
     }
     inputs = {Path(path).resolve() for path in sources}
-    for name in [output.name for output in plan.outputs] + [JSON_NAME, CSV_NAME]:
+    for name in [name for output in plan.outputs for name in output.names] + [JSON_NAME, CSV_NAME]:
         path = folder / name
         if path.exists() and path.resolve() in inputs:
             refuse_overwriting({name: path}, {"an input of the batch": path})
@@ -174,17 +209,21 @@ def _finish_segment(
 
 def _finish_output(run: _Run, output: Output) -> None:
     """Join the segments of an output, or note why it failed."""
-    reasons = [run.reasons[one.address] for one in output.segments if one.address in run.reasons]
+    reasons = [run.reasons[one.address] for one in output.needed if one.address in run.reasons]
     if reasons:
         run.entries[output.name] = failed_entry(output, reasons[0])
         return
-    path = run.folder / output.name
-    results = [run.results[one.address] for one in output.segments]
+    results = [run.results[one.address] for one in (output.segments if output.suffix else output.tracks)]
     try:
         with TemporaryDirectory(prefix="tts2face-") as copies:
-            parts = [run.store.fetch(one.address, Path(copies)) for one in output.segments]
-            n_frames = join_segments(parts, path, output.fps)
-        entry = done_entry(output, path, n_frames, results)
+            parts = {one.address: run.store.fetch(one.address, Path(copies)) for one in output.needed}
+            written = []
+            if output.exports:
+                written = run.exporter.write(output, [parts[one.address] for one in output.tracks], run.folder)
+            if output.suffix:
+                path = run.folder / output.name
+                join_segments([parts[one.address] for one in output.segments], path, output.fps, output.sounds)
+        entry = done_entry(output, run.folder, results, written)
     except Tts2faceError as wrong:
         run.entries[output.name] = failed_entry(output, str(wrong))
         return

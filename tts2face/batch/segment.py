@@ -1,15 +1,18 @@
 """Segments: the units that are rendered once and kept by their content address."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from tts2face.batch.address import content_address, file_hash, model_hash, program_version
-from tts2face.request import OWN_FACE
+from tts2face.clock import exact_rate, first_sample
+from tts2face.render.movie import SOUND_RATE
+from tts2face.request import OWN_FACE, Request
 from tts2face.session_cache import Models
 
+MOVIE, ALPHA_MOVIE, TRACK = "movie", "vp9", "track"  # what a segment is stored as: H.264, VP9, or motion for exports
 REQUEST_FILES = ("audio", "dictionary", "voice")
 
 
@@ -31,6 +34,11 @@ class Segment:
         Whether the segment is `slot_frames` long (a part of a longer clip), or as short as its speech and cue allow.
     overflow, max_rate
         As `BatchOptions`.
+    audio_begin
+        Sample, at `SOUND_RATE`, at which the segment begins in the recording of a whole file; None: the recording is
+        one of this segment.
+    medium
+        What is stored: `MOVIE` (H.264), `ALPHA_MOVIE` (VP9), or `TRACK`, a lossless track for exports.
     """
 
     request: Mapping[str, Any]
@@ -42,11 +50,15 @@ class Segment:
     overflow: str = "extend"
     max_rate: float = 1.4
     file_hashes: Mapping[str, str] = field(default_factory=dict)
+    audio_begin: int | None = None
+    medium: str = MOVIE
 
     @cached_property
     def address(self) -> str:
         """Content address: equal for segments with equal pictures and sound."""
-        content = {name: value for name, value in self.as_json().items() if name != "models"}
+        content = {name: value for name, value in self.as_json().items() if name not in ("models", "audio_begin")}
+        if self.medium == MOVIE:
+            del content["medium"]
         content["request"] = {name: self.file_hashes.get(name, value) for name, value in self.request.items()}
         content["picture"] = {name: self.file_hashes.get(name, value) for name, value in self.picture.items()}
         content["identity"] = self.models.identity
@@ -64,7 +76,36 @@ class Segment:
             "overflow": self.overflow,
             "max_rate": self.max_rate,
             "file_hashes": dict(self.file_hashes),
+            "audio_begin": self.audio_begin,
+            "medium": self.medium,
         }
+
+    def as_track(self) -> "Segment":
+        """The same segment as a track, which does not depend on the picture."""
+        hashes = {name: value for name, value in self.file_hashes.items() if name != "background"}
+        return replace(self, medium=TRACK, picture={}, file_hashes=hashes)
+
+    @property
+    def audio_end(self) -> int:
+        """Sample at which an excerpt ends."""
+        fps = exact_rate(float(self.request.get("fps", Request().fps)))
+        return (self.audio_begin or 0) + first_sample(self.window_frames, SOUND_RATE, fps)
+
+    def input_hashes(self) -> dict[str, str]:
+        """Hashes of all files that the segment reads, by their names; of an excerpt, the hash of its samples.
+
+        Raises
+        ------
+        InputError, DataError
+            A model or file does not exist, or a recording cannot be read.
+        """
+        if self.audio_begin is None:
+            return input_hashes(self.models, self.request, self.picture)
+        from tts2face.batch.track import open_track
+
+        others = {name: value for name, value in self.request.items() if name != "audio"}
+        excerpt = open_track(Path(str(self.request["audio"]))).excerpt_hash(self.audio_begin, self.audio_end)
+        return input_hashes(self.models, others, self.picture) | {"audio": excerpt}
 
 
 def segment_from_json(content: Mapping[str, Any]) -> Segment:

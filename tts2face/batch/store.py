@@ -1,11 +1,12 @@
 """Stores of rendered segments: a local folder, or a bucket by URL. A segment appears complete or not at all."""
 
-import contextlib
 import json
 import shutil
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol, TypeVar
 
 from lexicon.errors import BackendError, DataError, InputError
 from lexicon.inputs import parse_json
@@ -15,11 +16,31 @@ from tts2face.storage.temporary import NAME_INFIX, Temporary
 
 RESULT_SUFFIX = ".json"
 MAX_RESULT_BYTES = 1_000_000
+PAUSE_S = 5.0  # between two tries of a store that cannot be reached
 REMOTE_SCHEMES = ("s3://", "gs://", "az://", "abfs://", "file://", "memory://")
+
+
+Value = TypeVar("Value")
+
+
+class StoreAwayError(BackendError):
+    """The store cannot be reached now; another try may succeed."""
+
+
+@dataclass(frozen=True, slots=True)
+class StoredSegment:
+    """A stored segment: its files together, and when it was stored, in seconds since 1970."""
+
+    address: str
+    n_bytes: int
+    stored_s: float
 
 
 class Store(Protocol):
     """Segments by content address, for any number of processes."""
+
+    def check(self) -> None:
+        """Refuse a store that cannot be written, before anything is rendered."""
 
     def result(self, address: str) -> SegmentResult | None:
         """Result of a stored segment; None if it is not stored."""
@@ -32,6 +53,9 @@ class Store(Protocol):
 
     def addresses(self) -> Iterator[str]:
         """Addresses of all stored segments."""
+
+    def entries(self) -> Iterator[StoredSegment]:
+        """All stored segments with their sizes and times."""
 
     def remove(self, address: str) -> None:
         """Remove a segment, if it is stored."""
@@ -52,6 +76,8 @@ def open_store(where: str | Path) -> Store:
     """
     text = str(where)
     if text.startswith(REMOTE_SCHEMES):
+        from tts2face.batch.object_store import ObjectStore
+
         return ObjectStore(text)
     if "://" in text:
         raise InputError(
@@ -70,6 +96,23 @@ class FolderStore:
         except OSError as error:
             raise BackendError(f"cannot create the folder {folder}: {error.strerror}; choose another one") from error
 
+    def check(self) -> None:
+        """Refuse a folder that cannot be written.
+
+        Raises
+        ------
+        BackendError
+            It cannot be written.
+        """
+        try:
+            folder = self.scratch() or self.folder
+            with Temporary(folder / "check"):
+                pass
+        except OSError as error:
+            raise BackendError(
+                f"cannot write the folder {self.folder}: {error.strerror}; change its permissions or choose another one"
+            ) from error
+
     def result(self, address: str) -> SegmentResult | None:
         """Result of a stored segment; None if it is not stored or damaged."""
         movie = self._path(address)
@@ -79,7 +122,7 @@ class FolderStore:
             content = movie.with_suffix(RESULT_SUFFIX).read_bytes()[:MAX_RESULT_BYTES]
         except OSError:
             return None
-        return _parse_result(content)
+        return parse_result(content)
 
     def put(self, address: str, movie: Path, result: SegmentResult) -> None:
         """Move a movie into the store, then write its result."""
@@ -107,6 +150,12 @@ class FolderStore:
             if NAME_INFIX not in path.name:
                 yield path.stem
 
+    def entries(self) -> Iterator[StoredSegment]:
+        """All stored segments with their sizes and times."""
+        for folder in sorted(self.folder.glob("??")):
+            paths = [path for path in folder.iterdir() if path.suffix in (SEGMENT_SUFFIX, RESULT_SUFFIX)]
+            yield from sum_files((path.stem, path.stat().st_size, path.stat().st_mtime) for path in paths)
+
     def remove(self, address: str) -> None:
         """Remove a segment, its result first."""
         movie = self._path(address)
@@ -123,86 +172,35 @@ class FolderStore:
         return self.folder / address[:2] / f"{address}{SEGMENT_SUFFIX}"
 
 
-class ObjectStore:
-    """A bucket, or a folder by ``file://``, through obstore; puts are atomic."""
-
-    def __init__(self, url: str) -> None:
-        try:
-            import obstore
-            import obstore.store
-        except ImportError as missing:
-            raise BackendError("stores by URL need the package obstore; pip install 'tts2face[batch]'") from missing
-        self._obstore = obstore
-        if url.startswith("file://"):
-            Path(url.removeprefix("file://")).mkdir(parents=True, exist_ok=True)
-        try:
-            self._store: Any = obstore.store.from_url(url)
-        except (ValueError, obstore.exceptions.BaseError) as wrong:
-            raise InputError(f"cannot open the store {url} ({wrong}); check the URL and its credentials") from wrong
-
-    def result(self, address: str) -> SegmentResult | None:
-        """Result of a stored segment; None if it is not stored."""
-        try:
-            with self._errors(address):
-                return _parse_result(bytes(self._obstore.get(self._store, self._name(address, RESULT_SUFFIX)).bytes()))
-        except FileNotFoundError:
-            return None
-
-    def put(self, address: str, movie: Path, result: SegmentResult) -> None:
-        """Upload a movie, then its result."""
-        with self._errors(address):
-            self._obstore.put(self._store, self._name(address, SEGMENT_SUFFIX), movie)
-            self._obstore.put(self._store, self._name(address, RESULT_SUFFIX), json.dumps(result.as_json()).encode())
-        movie.unlink(missing_ok=True)
-
-    def fetch(self, address: str, folder: Path) -> Path:
-        """Path of a copy of a stored segment."""
-        path = folder / f"{address}{SEGMENT_SUFFIX}"
-        if not path.exists():
-            with self._errors(address), Temporary(path) as temporary:
-                found = self._obstore.get(self._store, self._name(address, SEGMENT_SUFFIX))
-                with temporary.path.open("wb") as file:
-                    for block in found.stream():
-                        file.write(block)
-                temporary.replace(path)
-        return path
-
-    def addresses(self) -> Iterator[str]:
-        """Addresses of all stored segments."""
-        for page in self._obstore.list(self._store):
-            for entry in page:
-                path = str(entry["path"])
-                if path.endswith(RESULT_SUFFIX):
-                    yield Path(path).stem
-
-    def remove(self, address: str) -> None:
-        """Remove a segment, its result first."""
-        for suffix in (RESULT_SUFFIX, SEGMENT_SUFFIX):
-            with contextlib.suppress(FileNotFoundError), self._errors(address):
-                self._obstore.delete(self._store, self._name(address, suffix))
-
-    def scratch(self) -> Path | None:
-        """Nothing local."""
-        return None
-
-    @contextlib.contextmanager
-    def _errors(self, address: str) -> Iterator[None]:
-        """Errors of the store as BackendError; FileNotFoundError stays."""
-        try:
-            yield
-        except FileNotFoundError:
-            raise
-        except (self._obstore.exceptions.BaseError, OSError) as error:
-            raise BackendError(f"the store failed for {address[:12]} ({error}); run again") from error
-
-    @staticmethod
-    def _name(address: str, suffix: str) -> str:
-        return f"{address[:2]}/{address}{suffix}"
+def sum_files(files: Iterable[tuple[str, int, float]]) -> Iterator[StoredSegment]:
+    """Segments of files given by address, bytes and time; a segment has the time of its latest file."""
+    found: dict[str, StoredSegment] = {}
+    for address, n_bytes, stored_s in files:
+        other = found.get(address, StoredSegment(address, 0, 0.0))
+        found[address] = StoredSegment(address, other.n_bytes + n_bytes, max(other.stored_s, stored_s))
+    yield from found.values()
 
 
-def _parse_result(content: bytes) -> SegmentResult | None:
+def parse_result(content: bytes) -> SegmentResult | None:
     """Result of its JSON; None if it is damaged, so that the segment is rendered again."""
     try:
         return result_from_json(parse_json(content.decode("utf-8"), "the result of a segment"))
     except (ValueError, TypeError, AttributeError, DataError):
         return None
+
+
+def wait_for_store(action: Callable[[], Value], on_message: Callable[[str], None]) -> Value:
+    """Value of an action on a store; while the store cannot be reached, wait, say so, and try again."""
+    is_waiting = False
+    while True:
+        try:
+            value = action()
+        except StoreAwayError as away:
+            if not is_waiting:
+                on_message(f"paused: {away}")
+                is_waiting = True
+            time.sleep(PAUSE_S)
+            continue
+        if is_waiting:
+            on_message("continued: the store can be reached again")
+        return value

@@ -1,7 +1,5 @@
 """Animation of a clip on the file of an imported character: its own morph targets, head and eye bones."""
 
-import io
-import wave
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +14,7 @@ from tts2face.characters.character import Character, Target
 from tts2face.characters.glb_writer import GlbWriter
 from tts2face.characters.gltf import GltfFile, read_gltf
 from tts2face.characters.gltf_character import read_gltf_character
-from tts2face.characters.head_mesh import source_weights
+from tts2face.characters.head_mesh import mapped_targets, source_weights
 from tts2face.characters.nodes import NodeTree, read_nodes
 from tts2face.characters.shape_mapping import ShapeMapping
 from tts2face.face.bounded_least_squares import bounded_least_squares
@@ -25,7 +23,8 @@ from tts2face.face.mouth_model import SPEECH_SHAPE_PREFIXES
 from tts2face.models.face import Face
 from tts2face.storage.files import write_atomically
 from tts2face.storage.overwrite import refuse_overwriting
-from tts2face.types import Clip, Trajectory, Waveform
+from tts2face.storage.wave_files import wave_bytes
+from tts2face.types import Clip, Trajectory
 
 ANIMATION = "tts2face"
 BOTH_SIDES_SHARE = 0.5  # of each of two shapes that one morph target for both sides gets
@@ -89,7 +88,7 @@ def write_character(
     out = Path(out)
     refuse_overwriting({"the output": out}, {"the character": character_file(read_binding(face), character)})
     animated = animate_character(clip.motion, clip.head, face, character=character)
-    write_atomically(out.with_suffix(".wav"), wave_bytes(clip.speech.waveform))
+    write_atomically(out.with_suffix(".wav"), wave_bytes(clip.speech.waveform.samples, clip.speech.waveform.rate))
     write_atomically(out, animated.content)
     return WrittenCharacter(out, len(clip.motion), animated.n_targets, animated.bones)
 
@@ -106,7 +105,8 @@ def animate_character(
     writer = GlbWriter(file)
     bones = BoneTracks(face, binding, source, tree, writer)
     turned = [*bones.eye_tracks(motion), *bones.head_tracks(head, file)]
-    tracks = [*_weight_tracks(file, tree, weights, len(motion)), *turned]
+    driven = mapped_targets(source, binding.mapping)
+    tracks = [*_weight_tracks(file, tree, (weights, driven), len(motion)), *turned]
     writer.add_animation(ANIMATION, np.arange(len(motion)) / motion.fps, tracks)
     names = dict.fromkeys(bones.name_of(node) for node, _, _ in turned)
     return AnimatedCharacter(writer.content(), len(weights), tuple(names))
@@ -115,7 +115,7 @@ def animate_character(
 def target_weights(
     motion: Trajectory, face: Face, character: Character, mapping: ShapeMapping
 ) -> dict[Target, FloatArray]:
-    """Weights (T,) of each morph target that a motion moves, in addition to the file's default weights."""
+    """Weights (T,) of each morph target that a motion moves."""
     channels = motion.channels
     own = [name for name in channels if name in mapping]
     values = dict(zip(own, _own_values(motion, face, own).T, strict=True))
@@ -126,15 +126,6 @@ def target_weights(
             for target, weight in source_weights(character, source).items():
                 found[target] = found.get(target, np.zeros(len(track))) + share * weight * track
     return found
-
-
-def wave_bytes(waveform: Waveform) -> bytes:
-    """Content of a 16-bit .wav file."""
-    content = io.BytesIO()
-    with wave.open(content, "wb") as file:
-        file.setparams((1, 2, waveform.rate, 0, "NONE", ""))
-        file.writeframes(np.rint(np.clip(waveform.samples, -1, 1) * 32767).astype("<i2").tobytes())
-    return content.getvalue()
 
 
 def _own_values(motion: Trajectory, face: Face, own: list[str]) -> FloatArray:
@@ -175,8 +166,15 @@ def _with_replacement(
     return np.where(is_moved.reshape(-1, 1), solved, weights)
 
 
-def _weight_tracks(file: GltfFile, tree: NodeTree, weights: Mapping[Target, FloatArray], n_frames: int) -> list[Track]:
-    """Tracks of the morph weights (T * targets, 1) of every shown node whose mesh has animated targets."""
+def _weight_tracks(
+    file: GltfFile, tree: NodeTree, animated_targets: tuple[Mapping[Target, FloatArray], set[Target]], n_frames: int
+) -> list[Track]:
+    """Tracks of the morph weights (T * targets, 1) of every shown node whose mesh has animated targets.
+
+    `animated_targets` holds the weights (T,), and all targets that the face drives: those without motion are 0, and
+    other targets keep the file's default weights.
+    """
+    weights, driven = animated_targets
     nodes, meshes = file.root.children("nodes"), file.root.children("meshes")
     tracks: list[Track] = []
     for number in sorted(tree.world):
@@ -187,7 +185,8 @@ def _weight_tracks(file: GltfFile, tree: NodeTree, weights: Mapping[Target, Floa
         n_targets = max(len(p.children("targets")) for p in meshes[mesh].children("primitives"))
         holder = nodes[number] if nodes[number].has("weights") else meshes[mesh]
         rest = holder.numbers("weights", n_targets, (0.0,) * n_targets)
-        rows = np.tile(np.array(rest), (n_frames, 1))
+        kept = [0.0 if Target(mesh, number) in driven else weight for number, weight in enumerate(rest or ())]
+        rows = np.tile(np.array(kept), (n_frames, 1))
         for target, track in animated.items():
             if target < n_targets:
                 rows[:, target] += track

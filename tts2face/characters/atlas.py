@@ -1,21 +1,19 @@
-"""One texture for a face from the images of several materials, and the opacity of triangles from their alpha."""
+"""One texture for a face from the images of several materials, and the opacity of their triangles."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.characters.character import BLEND, MASK, OPAQUE, Material
+from tts2face.characters.character import MASK, OPAQUE, Material
 from tts2face.render.surface import encoding_table, linear_light
 
 MAX_ATLAS_SIDE = 4096  # pixels
 BORDER = 4  # pixels around each image that repeat its edge, so that neighbours do not bleed into it
-SAMPLES = np.array(
-    [[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 1], [2, 1, 2], [1, 2, 2]], np.float64
-)  # barycentric places at which a triangle's alpha is read
-SAMPLES = SAMPLES / SAMPLES.sum(axis=1, keepdims=True)
-CLEAR = 0.12  # mean alpha below which a triangle is left out
+CLEAR, FULL = 32, 224  # of 255: pixels with less coverage count as holes, with more as covered
 LEVELS = (0.3, 0.55, 0.8, 1.0)  # opacities in which translucent triangles are drawn
+CUTOUT = 2.0  # opacity of triangles that are drawn where the coverage of the texture is
 TABLE_STEPS = 4096
 
 FloatArray = NDArray[np.float64]
@@ -23,9 +21,10 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Atlas:
-    """Texture (H, W, 3) with the place of each material's image: corner (x, y) and size (w, h) in pixels."""
+    """Texture (H, W, 3), its coverage (H, W), and the place of each material's image: corner (x, y) and size (w, h)."""
 
     texture: NDArray[np.uint8] | None
+    alpha: NDArray[np.uint8] | None
     places: dict[int, tuple[int, int, int, int]]
 
     def coordinates(self, material: int, uv: FloatArray) -> FloatArray:
@@ -44,7 +43,7 @@ def build_atlas(materials: dict[int, Material]) -> Atlas:
 
     images = {number: _coloured(material) for number, material in materials.items() if material.image is not None}
     if not images:
-        return Atlas(None, {})
+        return Atlas(None, None, {})
     order = sorted(images, key=lambda number: (-images[number].shape[0], number))
     reduction = 1
     while True:
@@ -53,41 +52,67 @@ def build_atlas(materials: dict[int, Material]) -> Atlas:
         if max(shape) <= MAX_ATLAS_SIDE:
             break
         reduction *= 2
-    texture = np.zeros((shape[1], shape[0], 3), np.uint8)
+    texture = np.zeros((shape[1], shape[0], 4), np.uint8)
     for number, (x, y, width, height) in places.items():
         image = images[number]
         if reduction > 1:
             image = np.array(Image.fromarray(image).resize((width, height), Image.Resampling.BOX))
         bordered = np.pad(image, ((BORDER, BORDER), (BORDER, BORDER), (0, 0)), mode="edge")
         texture[y - BORDER : y + height + BORDER, x - BORDER : x + width + BORDER] = bordered
-    return Atlas(texture, places)
+    return Atlas(np.ascontiguousarray(texture[:, :, :3]), np.ascontiguousarray(texture[:, :, 3]), places)
 
 
-def triangle_alpha(material: Material, corners: FloatArray) -> FloatArray:
-    """Mean alpha (F,) of triangles with texture coordinates (F, 3, 2) of a material."""
-    alpha = np.full(len(corners), material.colour[3])
+def triangle_opacity(material: Material, corners: FloatArray) -> FloatArray:
+    """Opacity (F,) of triangles with texture coordinates (F, 3, 2) of a material.
+
+    1 where they are opaque, 0 where nothing of them is visible, one of `LEVELS` where they are evenly translucent, and
+    `CUTOUT` where the image has holes or edges within them. An image counts by its pixels in the box around each
+    triangle, so that no visible pixel is missed.
+    """
     if material.alpha_mode == OPAQUE:
         return np.ones(len(corners))
-    if material.image is not None and np.isfinite(corners).all():
-        height, width = material.image.shape[:2]
-        at = np.einsum("sk,fkd->fsd", SAMPLES, corners) % 1.0
-        column = np.minimum((at[..., 0] * width).astype(np.int64), width - 1)
-        row = np.minimum((at[..., 1] * height).astype(np.int64), height - 1)
-        read = material.image[row, column, 3] / 255.0
-        alpha = alpha * ((read >= material.cutoff) if material.alpha_mode == MASK else read).mean(axis=1)
-    return alpha
+    covered = coverage(material)
+    if material.image is None or not np.isfinite(corners).all():
+        return np.full(len(corners), _level(float(covered.mean()) / 255.0))
+    height, width = covered.shape
+    low = np.floor(corners.min(axis=1) * [width, height] - 0.5).astype(np.int64).clip(0, [width - 1, height - 1])
+    high = np.ceil(corners.max(axis=1) * [width, height] - 0.5).astype(np.int64).clip(low, [width - 1, height - 1])
+    n_pixels = (high - low + 1).prod(axis=1)
+    n_clear, n_full = (_count(covered < CLEAR, low, high), _count(covered >= FULL, low, high))
+    n_middle = n_pixels - n_clear - n_full
+    opacity = np.full(len(corners), CUTOUT)
+    opacity[n_clear == n_pixels] = 0.0
+    opacity[n_full == n_pixels] = 1.0
+    even = np.flatnonzero(n_middle == n_pixels)
+    total = _count(covered, low[even], high[even])
+    opacity[even] = [_level(float(mean)) for mean in total / n_pixels[even] / 255.0]
+    return opacity
 
 
-def opacity_levels(material: Material, alpha: FloatArray) -> FloatArray:
-    """Opacity (F,) in which triangles of a mean alpha are drawn; 0 for those that are left out."""
+def coverage(material: Material) -> NDArray[np.uint8]:
+    """Coverage (H, W) of a material, 0 to 255; masked pixels are 0 or 255."""
+    alpha = np.full((1, 1), 255, np.uint8) if material.image is None else material.image[:, :, 3]
     if material.alpha_mode == OPAQUE:
-        return np.ones(len(alpha))
+        return np.full_like(alpha, 255)
+    scaled = alpha * material.colour[3]
     if material.alpha_mode == MASK:
-        return np.where(alpha >= 0.5, 1.0, 0.0)
-    levels = np.array(LEVELS)
-    nearest = levels[np.abs(alpha[:, None] - levels).argmin(axis=1)]
-    kept: FloatArray = np.where(alpha < CLEAR, 0.0, nearest)
-    return kept if material.alpha_mode == BLEND else np.ones(len(alpha))
+        return np.where(scaled >= material.cutoff * 255.0, np.uint8(255), np.uint8(0))
+    covered: NDArray[np.uint8] = np.rint(scaled).astype(np.uint8)
+    return covered
+
+
+def _count(values: NDArray[Any], low: NDArray[np.int64], high: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Sums (F,) of an image in boxes from pixel `low` to pixel `high`, (F, 2) each, both included."""
+    sums = np.zeros((values.shape[0] + 1, values.shape[1] + 1), np.int64)
+    sums[1:, 1:] = values.astype(np.int64).cumsum(axis=0).cumsum(axis=1)
+    (left, top), (right, bottom) = low.T, high.T + 1
+    within: NDArray[np.int64] = sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left]
+    return within
+
+
+def _level(opacity: float) -> float:
+    """The nearest of `LEVELS`; 0 for an opacity that is not seen."""
+    return 0.0 if opacity < CLEAR / 255.0 else min(LEVELS, key=lambda level: abs(level - opacity))
 
 
 def srgb(linear: FloatArray) -> NDArray[np.uint8]:
@@ -97,13 +122,36 @@ def srgb(linear: FloatArray) -> NDArray[np.uint8]:
 
 
 def _coloured(material: Material) -> NDArray[np.uint8]:
-    """Image (H, W, 3) of a material times its colour."""
+    """Image (H, W, 4) of a material: its colours times the material's colour, and its coverage."""
     image = np.zeros((1, 1, 4), np.uint8) if material.image is None else material.image
     factor = np.array(material.colour[:3])
-    if (factor > 0.999).all():
-        return np.ascontiguousarray(image[:, :, :3])
-    tables = [srgb(linear_light(np.arange(256, dtype=np.uint8)).astype(np.float64) * share) for share in factor]
-    return np.stack([table[image[:, :, channel]] for channel, table in enumerate(tables)], axis=2)
+    colours = image[:, :, :3]
+    if not (factor > 0.999).all():
+        tables = [srgb(linear_light(np.arange(256, dtype=np.uint8)).astype(np.float64) * share) for share in factor]
+        colours = np.stack([table[image[:, :, channel]] for channel, table in enumerate(tables)], axis=2)
+    covered = coverage(material)
+    return np.dstack([fill_uncovered(colours, covered), covered])
+
+
+def fill_uncovered(colours: NDArray[np.uint8], covered: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Colours (H, W, 3) whose pixels with little coverage (H, W) have the mean colour of covered pixels near them.
+
+    Edges of cut-outs are interpolated between pixels, and the hidden colours beyond them are often black or white.
+    """
+    if (covered >= FULL).all() or not (covered >= FULL).any():
+        return colours
+    sums = np.dstack([colours, np.ones(covered.shape, np.uint8)]) * (covered >= FULL)[:, :, None].astype(np.float32)
+    levels = [sums]
+    while min(levels[-1].shape[:2]) > 1:
+        height, width = levels[-1].shape[:2]
+        even = np.pad(levels[-1], ((0, height % 2), (0, width % 2), (0, 0)))
+        levels.append(even[::2, ::2] + even[1::2, ::2] + even[::2, 1::2] + even[1::2, 1::2])
+    filled = levels[-1][:, :, :3] / np.maximum(levels[-1][:, :, 3:], 1)
+    for level in reversed(levels[:-1]):
+        below = filled.repeat(2, axis=0).repeat(2, axis=1)[: level.shape[0], : level.shape[1]]
+        filled = np.where(level[:, :, 3:] > 0, level[:, :, :3] / np.maximum(level[:, :, 3:], 1), below)
+    near: NDArray[np.uint8] = np.where((covered < FULL)[:, :, None], np.rint(filled).astype(np.uint8), colours)
+    return near
 
 
 def _rows(

@@ -94,12 +94,18 @@ def character_file(binding: CharacterBinding, given: str | Path | None = None) -
         The file is missing or has changed.
     """
     path = Path(binding.file if given is None else given)
+    if not path.is_file() and given is not None:
+        raise DataError(f"there is no character {path}; check the path")
     if not path.is_file():
         raise DataError(
-            f"there is no character {path}, from which the face was imported; put it back or import it again"
+            f"there is no character {path}, from which the face was imported; "
+            "if it was moved, run `tts2face face relink FACE.face CHARACTER`"
         )
     if sha256(path.read_bytes()).hexdigest() != binding.sha256:
-        raise DataError(f"{path} is not the file from which the face was imported; import it again, or give that file")
+        raise DataError(
+            f"the content of {path} differs from the file from which the face was imported; "
+            "import it again, or give that file"
+        )
     return path
 
 

@@ -60,6 +60,8 @@ class Piece:
         Displacement (N, 3) of each morph target that it has.
     bones : (N,)
         Node that each vertex follows most.
+    defaults
+        Weights other than 0 of morph targets in the file, which `vertices` include.
     """
 
     name: str
@@ -70,6 +72,7 @@ class Piece:
     material: int
     morphs: Mapping[Target, NDArray[np.float32]]
     bones: IntArray
+    defaults: Mapping[Target, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

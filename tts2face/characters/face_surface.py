@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.characters.atlas import Atlas, build_atlas, opacity_levels, srgb, triangle_alpha
+from tts2face.characters.atlas import CUTOUT, Atlas, build_atlas, srgb, triangle_opacity
 from tts2face.characters.character import OPAQUE, Character, Material
 from tts2face.characters.eyeballs import eyeball_centres, fit_sphere, gaze_turns
 from tts2face.characters.head_mesh import LEFT_EYE, RIGHT_EYE, HeadMesh
@@ -97,16 +97,17 @@ def build_face(head: HeadMesh, character: Character, placement: Placement) -> Fa
     opacity = np.ones(len(head.triangles))
     for number in np.unique(material_of).tolist():
         rows, material = material_of == number, character.materials[number]
-        opacity[rows] = opacity_levels(material, triangle_alpha(material, head.uv[head.triangles[rows]]))
+        opacity[rows] = triangle_opacity(material, head.uv[head.triangles[rows]])
     if not (opacity > 0).any():
         raise DataError("no triangle of the character is visible; check the alpha of its materials")
     kind_of = np.array([kinds[n] for n in range(len(character.pieces))])[head.piece_of]
     kind_of[head.eye_of[head.triangles].min(axis=1) > 0] = "eyes"
-    order = np.lexsort((material_of, kind_of != "skin", -opacity))
+    order = np.lexsort((material_of, kind_of != "skin", -np.where(opacity == CUTOUT, 0.999, opacity)))
     order = order[opacity[order] > 0]
     keys = [(str(kind_of[t]), int(material_of[t]), float(opacity[t])) for t in order]
     names = tuple(sorted(head.shapes))
     uv, colours = _paint(head, character, atlas, material_of, kind_of)
+    has_holes = bool((opacity == CUTOUT).any())
     return Face(
         vertices=placement.millimetres(head.vertices).astype(np.float32),
         triangles=head.triangles[order].astype(np.int32),
@@ -119,6 +120,7 @@ def build_face(head: HeadMesh, character: Character, placement: Placement) -> Fa
         colours=colours,
         uv=None if atlas.texture is None else uv.astype(np.float32),
         texture=atlas.texture,
+        alpha=atlas.alpha if has_holes else None,
         landmarks=np.zeros(0, np.int32),
         landmark_vertices=np.zeros((0, 3), np.int32),
         landmark_weights=np.zeros((0, 3), np.float32),
@@ -135,7 +137,9 @@ def _parts(keys: list[tuple[str, int, float]], character: Character, atlas: Atla
         specular, shininess, wrap = SHADING[kind]
         name = f"{kind}:{character.materials[material].name}"[:80]
         is_textured = material in atlas.places
-        parts.append(Part(name, first, end - first, specular, shininess, wrap, opacity, is_textured))
+        is_cut = opacity == CUTOUT
+        opacity = 1.0 if is_cut else opacity
+        parts.append(Part(name, first, end - first, specular, shininess, wrap, opacity, is_textured, is_cut))
         first = end
     return tuple(parts)
 

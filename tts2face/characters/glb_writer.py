@@ -1,17 +1,16 @@
 """Writing of a glTF file as one .glb file with further data: buffers joined, images embedded, animations added."""
 
 import copy
-import json
-import struct
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.characters.gltf import BINARY_CHUNK, GLB_MAGIC, JSON_CHUNK, MESHOPT, GltfFile
+from tts2face.characters.gltf import MESHOPT, GltfFile
 from tts2face.characters.nodes import local_matrix
+from tts2face.storage.glb_container import ALIGNMENT, glb_header
 
-FLOAT, ALIGNMENT = 5126, 4
+FLOAT = 5126
 TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 
 FloatArray = NDArray[np.float64]
@@ -81,12 +80,8 @@ class GlbWriter:
     def content(self) -> bytes:
         """Bytes of the .glb file."""
         self.root["buffers"][0] = {"byteLength": len(self._binary)}
-        text = json.dumps(self.root, ensure_ascii=False, separators=(",", ":")).encode()
-        text += b" " * (-len(text) % ALIGNMENT)
         binary = bytes(self._binary) + b"\0" * (-len(self._binary) % ALIGNMENT)
-        chunks = struct.pack("<I", len(text)) + JSON_CHUNK + text
-        chunks += struct.pack("<I", len(binary)) + BINARY_CHUNK + binary
-        return GLB_MAGIC + struct.pack("<II", 2, 12 + len(chunks)) + chunks
+        return glb_header(self.root, len(binary), self._file.path.name) + binary
 
     def _append(self, kind: str, entry: dict[str, Any]) -> int:
         entries = self.root.setdefault(kind, [])

@@ -19,13 +19,13 @@ from lexicon.errors import DataError
 from lexicon.inputs import check_regular_file, decode_utf8, parse_json
 from tts2face.characters.json_fields import Fields
 from tts2face.characters.meshopt import EXPONENTIAL, NO_FILTER, apply_exponential_filter, decode_buffer
+from tts2face.storage.glb_container import ALIGNMENT, BINARY_CHUNK, JSON_CHUNK, MAGIC
 
 MAX_FILE_BYTES = 512_000_000  # a film character with 4k textures has about 100 MB
 MAX_DECODED_BYTES = 1_000_000_000  # of all compressed or sparse arrays of a file
 MAX_COUNT = 30_000_000  # elements of an accessor: 52 shapes of 50,000 vertices are 2.6 million
 MAX_STRIDE = 256
 MAX_VALUE = 1e9  # of positions and other numbers: beyond it no single-precision geometry works
-GLB_MAGIC, JSON_CHUNK, BINARY_CHUNK = b"glTF", b"JSON", b"BIN\0"
 SUFFIXES = (".glb", ".gltf", ".vrm")
 COMPONENTS: dict[int, type[np.integer[Any] | np.floating[Any]]] = {
     5120: np.int8,
@@ -215,7 +215,7 @@ def read_gltf(path: Path) -> GltfFile:
         The file is missing, damaged or too large, of another version, or requires an extension that is not supported.
     """
     content = read_bytes(path)
-    text, binary = _split_glb(content, path) if content[:4] == GLB_MAGIC else (content, None)
+    text, binary = _split_glb(content, path) if content[:4] == MAGIC else (content, None)
     parsed = parse_json(decode_utf8(text, str(path)), str(path))
     if not isinstance(parsed, dict):
         raise DataError(f"{path} is not a glTF file; give a .glb, .gltf or .vrm file")
@@ -252,7 +252,7 @@ def _split_glb(content: bytes, path: Path) -> tuple[bytes, bytes | None]:
         if at + 8 + length > len(content):
             raise DataError(f"{path} ends within a chunk; copy the file again")
         chunks.setdefault(kind, content[at + 8 : at + 8 + length])
-        at += 8 + length + (-length % 4)
+        at += 8 + length + (-length % ALIGNMENT)
     if JSON_CHUNK not in chunks:
         raise DataError(f"{path} has no JSON chunk; export the character again")
     return chunks[JSON_CHUNK].rstrip(b"\0"), chunks.get(BINARY_CHUNK)

@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.characters.character import Character, Piece, Target
+from tts2face.characters.cropping import cut_triangles
 from tts2face.characters.shape_mapping import ShapeMapping, ShapeSource
 from tts2face.numeric import smoothstep
 
@@ -56,6 +58,27 @@ class HeadMesh:
         used, corners = np.unique(triangles, return_inverse=True)
         return replace(self, triangles=corners.reshape(-1, 3), piece_of=self.piece_of[is_kept]).take(used)
 
+    def cut(self, heights: FloatArray) -> "HeadMesh":
+        """Mesh cut along a plane: the part where the heights (V,) of its vertices above the plane are not negative."""
+        cut = cut_triangles(self.triangles, heights)
+
+        def extended(values: NDArray[Any]) -> NDArray[Any]:
+            there = values[cut.upper] + cut.share[:, None] * (values[cut.lower] - values[cut.upper])
+            return np.concatenate([values, there.astype(values.dtype)])
+
+        whole = replace(
+            self,
+            vertices=extended(self.vertices),
+            triangles=cut.triangles,
+            piece_of=self.piece_of[cut.source],
+            uv=extended(self.uv),
+            colours=extended(self.colours),
+            shapes={name: extended(shape) for name, shape in self.shapes.items()},
+            bones=np.concatenate([self.bones, self.bones[cut.upper]]),
+            eye_of=np.concatenate([self.eye_of, self.eye_of[cut.upper]]),
+        )
+        return whole.keep(np.ones(len(cut.triangles), bool))
+
     def order_eyes_last(self) -> "HeadMesh":
         """Mesh whose vertices of the left and then of the right eyeball are the last."""
         order = np.argsort(self.eye_of, kind="stable")
@@ -89,10 +112,12 @@ def build_head_mesh(character: Character, mapping: ShapeMapping, yaw_deg: float)
     whole = _join(character, mapping, turn)
     low, high = moved_box(whole)
     height, middle = high[1] - low[1], (low[0] + high[0]) / 2
-    near = (whole.vertices[:, 1] > low[1] - NECK_SHARE * height) & (
-        np.abs(whole.vertices[:, 0] - middle) < WIDTH_SHARE * height
-    )
-    return divide_sides(whole.keep(near[whole.triangles].all(axis=1)), mapping, BLEND_SHARE * height)
+    lowest = low[1] - NECK_SHARE * height
+    head = whole.keep((whole.vertices[:, 1] >= lowest)[whole.triangles].any(axis=1))
+    head = head.cut(head.vertices[:, 1] - lowest)
+    for side in (1, -1):
+        head = head.cut(WIDTH_SHARE * height - side * (head.vertices[:, 0] - middle))
+    return divide_sides(head, mapping, BLEND_SHARE * height)
 
 
 def moved_box(head: HeadMesh) -> tuple[FloatArray, FloatArray]:
@@ -111,6 +136,12 @@ def moved_box(head: HeadMesh) -> tuple[FloatArray, FloatArray]:
         raise DataError("no shape moves the character's mesh; give the names of its shapes with --mapping")
     places = head.vertices[moved]
     return places.min(axis=0), places.max(axis=0)
+
+
+def mapped_targets(character: Character, mapping: ShapeMapping) -> set[Target]:
+    """Morph targets that the shapes of a mapping use; their weights are 0 at rest, whatever the file's defaults are."""
+    sources = (source for sources in mapping.values() for source in sources)
+    return {target for source in sources for target in source_weights(character, source)}
 
 
 def source_weights(character: Character, source: ShapeSource) -> Mapping[Target, float]:
@@ -145,8 +176,9 @@ def _join(character: Character, mapping: ShapeMapping, turn: FloatArray) -> Head
             zeros = [np.zeros(piece.vertices.shape, np.float32) for piece in pieces]
             parts = [zero if part is None else part for part, zero in zip(moved, zeros, strict=True)]
             shapes[shape] = (np.concatenate(parts) @ turn.T).astype(np.float32)
+    driven = mapped_targets(character, mapping)
     return HeadMesh(
-        vertices=np.concatenate([piece.vertices for piece in pieces]) @ turn.T,
+        vertices=np.concatenate([_at_rest(piece, driven) for piece in pieces]) @ turn.T,
         triangles=np.concatenate([piece.triangles + start for piece, start in zip(pieces, starts, strict=False)]),
         piece_of=np.repeat(np.arange(len(pieces)), [len(piece.triangles) for piece in pieces]),
         uv=np.concatenate([_or_nan(piece.uv, len(piece.vertices)) for piece in pieces]),
@@ -158,6 +190,14 @@ def _join(character: Character, mapping: ShapeMapping, turn: FloatArray) -> Head
         eye_of=np.zeros(int(starts[-1]), np.int8),
         turn=turn,
     )
+
+
+def _at_rest(piece: Piece, driven: set[Target]) -> FloatArray:
+    """Vertices (N, 3) of a piece with weights of 0 of the driven targets."""
+    vertices = piece.vertices
+    for target in driven & piece.defaults.keys() & piece.morphs.keys():
+        vertices = vertices - piece.defaults[target] * piece.morphs[target]
+    return vertices
 
 
 def _displacement(piece: Piece, sources: list[Mapping[Target, float]]) -> NDArray[np.float32] | None:

@@ -1,6 +1,6 @@
 """Import of a character of another program as a face: ``tts2face face import``."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
@@ -17,12 +17,12 @@ from tts2face.characters.face_placement import drop_unsuited_shapes, missing_sha
 from tts2face.characters.face_surface import Placement, add_gaze_shapes, build_face, is_plain, unwrap
 from tts2face.characters.gltf import SUFFIXES
 from tts2face.characters.gltf_character import read_gltf_character
-from tts2face.characters.head_mesh import HeadMesh, build_head_mesh, moved_box, source_weights
+from tts2face.characters.head_mesh import HeadMesh, build_head_mesh, mapped_targets, moved_box, source_weights
 from tts2face.characters.landmark_table import read_landmark_table
 from tts2face.characters.landmark_tracking import (
     SKIN,
+    CharacterViews,
     LocatedLandmarks,
-    frontal_score,
     locate_landmarks,
     part_triangles,
 )
@@ -149,11 +149,15 @@ def import_face(
     character = read_character(path)
     chosen = _complete_mapping(character, mapping)
     table = None if landmarks is None else read_landmark_table(Path(landmarks))
-    head = _front_head(character, chosen, front, (table is None, model))
-    low, high = moved_box(head)
-    provisional = Placement((low + high) / 2, PROVISIONAL_HEIGHT_MM / float(high[1] - low[1]))
-    drawn = build_face(head, character, provisional)
-    located = locate_landmarks(drawn, model) if table is None else _project_table(table, head, drawn)
+    candidates = _turned_heads(character, chosen, front)
+    if table is None:
+        head, provisional, views = _find_front(candidates, character, model)
+        drawn, located = views.face, locate_landmarks(views)
+    else:
+        head = next(candidates)
+        provisional = _provisional_placement(head)
+        drawn = build_face(head, character, provisional)
+        located = _project_table(table, head, drawn)
     face = place_face(_with_landmarks(drawn, located), character, head, provisional)
     face, notes = drop_unsuited_shapes(face)
     face = replace(face, metadata=_metadata(path, character, chosen, head, face))
@@ -166,7 +170,7 @@ def import_face(
         landmarks=places,
         score=None if table is not None else located.score,
         n_eyeballs=len(face.eyes),
-        notes=(*character.notes, *_colour_notes(character, head), *notes),
+        notes=(*character.notes, *_pose_notes(character, chosen), *_colour_notes(character, head), *notes),
         licence=character.licence,
     )
     return ImportedFace(face, report)
@@ -201,25 +205,31 @@ def _some(names: Sequence[str]) -> str:
     return ", ".join(shown) + (f" and {len(names) - 12} more" if len(names) > 12 else "") if names else "no shapes"
 
 
-def _front_head(
-    character: Character, mapping: ShapeMapping, front: str | None, tracking: tuple[bool, Path | None]
-) -> HeadMesh:
-    """Head turned to the front: by the given axis, otherwise by the first one where the tracker sees a face."""
-    is_tracked, model = tracking
+def _turned_heads(character: Character, mapping: ShapeMapping, front: str | None) -> Iterator[HeadMesh]:
+    """Heads turned to look along z from the given axis, or from each axis, the likely one first."""
     likely = ["-z", "+z"] if character.faces_back else ["+z", "-z"]
-    axes = [front] if front is not None else [*likely, "+x", "-x"]
-    heads: list[tuple[float, HeadMesh]] = []
-    for axis in axes if is_tracked else axes[:1]:
+    for axis in [front] if front is not None else [*likely, "+x", "-x"]:
         head = build_head_mesh(character, mapping, FRONTS[axis])
-        head = add_gaze_shapes(mark_eyeballs(unwrap(head, character), character))
-        if len(axes) == 1 or not is_tracked:
-            return head
-        low, high = moved_box(head)
-        placement = Placement((low + high) / 2, PROVISIONAL_HEIGHT_MM / float(high[1] - low[1]))
-        heads.append((frontal_score(build_face(head, character, placement), model), head))
-        if heads[-1][0] >= MIN_SCORE:
+        yield add_gaze_shapes(mark_eyeballs(unwrap(head, character), character))
+
+
+def _provisional_placement(head: HeadMesh) -> Placement:
+    low, high = moved_box(head)
+    return Placement((low + high) / 2, PROVISIONAL_HEIGHT_MM / float(high[1] - low[1]))
+
+
+def _find_front(
+    candidates: Iterator[HeadMesh], character: Character, model: Path | None
+) -> tuple[HeadMesh, Placement, CharacterViews]:
+    """The first head in whose frontal view the tracker sees a face, otherwise the one with the highest score."""
+    scored: list[tuple[float, tuple[HeadMesh, Placement, CharacterViews]]] = []
+    for head in candidates:
+        placement = _provisional_placement(head)
+        views = CharacterViews(build_face(head, character, placement), model)
+        scored.append((views.frontal_score(), (head, placement, views)))
+        if scored[-1][0] >= MIN_SCORE:
             break
-    return max(heads, key=lambda scored: scored[0])[1]
+    return max(scored, key=lambda found: found[0])[1]
 
 
 def _project_table(table: Mapping[int, NDArray[np.float64]], head: HeadMesh, drawn: Face) -> LocatedLandmarks:
@@ -248,6 +258,19 @@ def _unused_names(character: Character, mapping: ShapeMapping) -> tuple[str, ...
     used = {source.name for sources in mapping.values() for source in sources}
     names = dict.fromkeys([*character.target_names.values(), *character.expressions])
     return tuple(name for name in names if name not in used)
+
+
+def _pose_notes(character: Character, mapping: ShapeMapping) -> list[str]:
+    """A note about default weights of the file, which the face at rest does not have."""
+    driven = mapped_targets(character, mapping)
+    posed = {t: weight for piece in character.pieces for t, weight in piece.defaults.items() if t in driven}
+    largest = sorted(posed, key=lambda target: -abs(posed[target]))[:3]
+    named = ", ".join(f"{character.target_names[target][:40]} {posed[target]:.2f}" for target in largest)
+    return (
+        [f"the file poses {len(posed)} of the mapped shapes ({named}); the face at rest has none of them"]
+        if posed
+        else []
+    )
 
 
 def _colour_notes(character: Character, head: HeadMesh) -> list[str]:

@@ -41,10 +41,16 @@ class LocatedLandmarks:
 
 
 class CharacterViews:
-    """Rendered views of a face, with landmarks read in each; soft shadows are computed once."""
+    """Rendered views of a face, with landmarks read in each; soft shadows are computed once.
 
-    def __init__(self, face: Face, model: Path | None) -> None:
-        self._face = face
+    Raises
+    ------
+    BackendError
+        The tracker is not installed.
+    """
+
+    def __init__(self, face: Face, model: Path | None = None) -> None:
+        self.face = face
         self._tracker = FaceTracker(model)
         self._renderer: MeshRenderer = mesh_renderer(face, _picture(0, 0))
 
@@ -55,28 +61,27 @@ class CharacterViews:
         tracking = self._tracker.track(lambda: [drawn], 25.0)
         return tracking.points[0, :, :2].astype(np.float64) + 0.5, float(tracking.scores[0])
 
+    def frontal_score(self) -> float:
+        """Score of the tracker in the frontal view; 0 where no face is found."""
+        return self.read((0, 0), np.zeros(len(self.face.shape_names), np.float32))[1]
+
     def points(
         self, view: tuple[float, float], weights: NDArray[np.float32], pixels: FloatArray, triangles: NDArray[np.int64]
     ) -> tuple[SurfacePoints, FloatArray]:
         """Points of the mesh at pixels of a view, and how much the surface faces it."""
-        camera = camera_matrices(_picture(*view).view, self._face, (SIDE_PX, SIDE_PX))
+        camera = camera_matrices(_picture(*view).view, self.face, (SIDE_PX, SIDE_PX))
         positions = self._renderer.scene.surface.rig.pose(weights).astype(np.float64)
         return points_under_pixels(pixels, positions, triangles, camera)
 
     def _scene(self, view: tuple[float, float]) -> Scene:
         picture = _picture(*view)
         side = SIDE_PX * picture.supersampling
-        optics = camera_matrices(picture.view, self._face, (side, side))
+        optics = camera_matrices(picture.view, self.face, (side, side))
         lights = light_table(lamp_directions(picture.view), optics)
         return replace(self._renderer.scene, picture=picture, optics=optics, lights=lights)
 
 
-def frontal_score(face: Face, model: Path | None = None) -> float:
-    """Score of the tracker in the frontal view; 0 where no face is found."""
-    return CharacterViews(face, model).read((0, 0), np.zeros(len(face.shape_names), np.float32))[1]
-
-
-def locate_landmarks(face: Face, model: Path | None = None) -> LocatedLandmarks:
+def locate_landmarks(views: CharacterViews) -> LocatedLandmarks:
     """Landmarks of a face without landmarks.
 
     The skin is read at rest in all `VIEWS`, the inner lips with an open mouth. Each landmark is the reading nearest to
@@ -86,10 +91,8 @@ def locate_landmarks(face: Face, model: Path | None = None) -> LocatedLandmarks:
     ------
     DataError
         The tracker recognises no face.
-    BackendError
-        The tracker is not installed.
     """
-    views = CharacterViews(face, model)
+    face = views.face
     skin, eyes = part_triangles(face, SKIN), part_triangles(face, EYES)
     rest = np.zeros(len(face.shape_names), np.float32)
     readings, scores = _readings(views, [rest], skin, np.arange(N_MESH_LANDMARKS))

@@ -76,7 +76,10 @@ class _Primitive:
             return None
         triangles = self._triangles(mode, len(places))
         targets = [self._accessor(target, "POSITION", (3,), len(places)) for target in self._fields.children("targets")]
-        places = places + self._default_shape(targets, mesh, len(places))
+        defaults = self._default_weights(mesh, len(targets))
+        for number, weight in defaults.items():
+            if (moved := targets[number]) is not None:
+                places = places + weight * moved
         matrices, bones = self._skinning(tree, len(places))
         if np.median(np.linalg.det(matrices[..., :3, :3])) < 0:  # a mirrored mesh
             triangles = triangles[:, ::-1]
@@ -95,6 +98,7 @@ class _Primitive:
             material=-1 if material is None else material,
             morphs=morphs,
             bones=bones,
+            defaults={Target(mesh, number): weight for number, weight in defaults.items()},
         )
 
     def _accessor(self, fields: Fields, key: str, widths: tuple[int, ...], count: int | None) -> FloatArray | None:
@@ -127,16 +131,12 @@ class _Primitive:
         rows[1::2] = rows[1::2, [1, 0, 2]]
         return rows
 
-    def _default_shape(self, targets: list[FloatArray | None], mesh: int, count: int) -> FloatArray:
-        """Displacement (N, 3) by the morph weights that node or mesh give."""
+    def _default_weights(self, mesh: int, n_targets: int) -> dict[int, float]:
+        """Morph weights other than 0 that node or mesh give, by the number of the target."""
         node = self._file.root.children("nodes")[self._node]
         holder = node if node.has("weights") else self._file.root.children("meshes")[mesh]
-        weights = holder.numbers("weights", len(targets), None) if holder.has("weights") else None
-        moved = np.zeros((count, 3))
-        for weight, target in zip(weights or (), targets, strict=False):
-            if weight and target is not None:
-                moved += weight * target
-        return moved
+        weights = holder.numbers("weights", n_targets, None) if holder.has("weights") else None
+        return {number: weight for number, weight in enumerate(weights or ()) if weight}
 
     def _skinning(self, tree: NodeTree, count: int) -> tuple[FloatArray, IntArray]:
         """Matrix (4, 4) or matrices (N, 4, 4) from mesh to world, and the node that each vertex follows most (N,)."""

@@ -7,13 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from lexicon.inputs import read_text
 from tts2face.characters.character import Character, Material, Piece, Target
-from tts2face.characters.gltf import read_bytes
-from tts2face.characters.materials import decode_image
+from tts2face.characters.obj_materials import read_libraries, read_lines
 
 NEUTRAL = "neutral.obj"
-MAX_OBJ_BYTES = 200_000_000
 MAX_OBJ_VERTICES = 500_000
 MAX_SHAPES = 500
 MAX_COORDINATE = 1e6
@@ -45,7 +42,8 @@ def read_obj_folder(folder: Path) -> Character:
                 f"{path} has {len(places)} vertices, but {NEUTRAL} has {len(mesh.vertices)}; export it again"
             )
         moved[target] = (places - mesh.vertices).astype(np.float32)
-    materials = [_material(name, mesh.image_of(name)) for name in mesh.materials]
+    known = read_libraries(folder, mesh.libraries)
+    materials = [known.get(name, Material(name, (1.0, 1.0, 1.0, 1.0))) for name in mesh.materials]
     pieces = tuple(mesh.piece(number, moved) for number in range(len(materials)))
     pieces = tuple(piece for piece in pieces if len(piece.triangles))
     if not pieces:
@@ -55,7 +53,7 @@ def read_obj_folder(folder: Path) -> Character:
 
 def read_vertices(path: Path) -> FloatArray:
     """Vertices (V, 3) of an .obj file."""
-    lines = (line.split() for line in _lines(path) if line.startswith(("v ", "v\t")))
+    lines = (line.split() for line in read_lines(path) if line.startswith(("v ", "v\t")))
     return _numbers([line[1:4] for line in lines], 3, path)
 
 
@@ -67,18 +65,18 @@ class _ObjFile:
         self.vertices = read_vertices(path)
         coordinates: list[list[str]] = []
         self.materials: list[str] = []
-        self._libraries: list[str] = []
+        self.libraries: list[str] = []
         self._corners: list[tuple[int, int]] = []
         self._of: list[int] = []
         self._current = 0
-        for line in _lines(path):
+        for line in read_lines(path):
             key, _, rest = line.partition(" ")
             if key == "vt":
                 coordinates.append(rest.split()[:2])
             elif key == "usemtl":
                 self._use(rest.strip())
             elif key == "mtllib":
-                self._libraries.append(rest.strip())
+                self.libraries.append(rest.strip())
             elif key == "f":
                 self._face(rest.split(), len(coordinates))
         self._uv = _numbers(coordinates, 2, path)
@@ -103,26 +101,6 @@ class _ObjFile:
             morphs={target: moved[unique[:, 0]] for target, moved in shapes.items()},
             bones=np.zeros(len(unique), np.int64),
         )
-
-    def image_of(self, material: str) -> NDArray[np.uint8] | None:
-        """Image (H, W, 4) that a material library beside the file gives a material, or None."""
-        for library in self._libraries:
-            path = self._beside(library)
-            current = ""
-            for line in _lines(path) if path is not None else ():
-                key, _, rest = line.strip().partition(" ")
-                current = rest.strip() if key == "newmtl" else current
-                if key == "map_Kd" and current == material:
-                    image = self._beside(rest.split()[-1] if rest.split() else "")
-                    return None if image is None else decode_image(read_bytes(image), str(image))
-        return None
-
-    def _beside(self, name: str) -> Path | None:
-        relative = Path(name)
-        if not name or "\0" in name or relative.is_absolute() or ".." in relative.parts:
-            return None
-        path = self._path.parent / relative
-        return path if path.is_file() else None
 
     def _use(self, name: str) -> None:
         if name not in self.materials:
@@ -155,13 +133,6 @@ class _ObjFile:
         return vertex, coordinate
 
 
-def _lines(path: Path) -> list[str]:
-    try:
-        return read_text(path, MAX_OBJ_BYTES).splitlines()
-    except OSError as refused:
-        raise DataError(f"{path} cannot be read ({refused.strerror}); check the file") from refused
-
-
 def _numbers(rows: list[list[str]], width: int, path: Path) -> FloatArray:
     if len(rows) > MAX_OBJ_VERTICES:
         raise DataError(f"{path} has {len(rows)} vertices; reduce them to at most {MAX_OBJ_VERTICES}")
@@ -172,7 +143,3 @@ def _numbers(rows: list[list[str]], width: int, path: Path) -> FloatArray:
     if not (np.abs(table) <= MAX_COORDINATE).all():
         raise DataError(f"{path}: a coordinate is not finite or beyond {MAX_COORDINATE:g}; export it again")
     return table
-
-
-def _material(name: str, image: NDArray[np.uint8] | None) -> Material:
-    return Material(name, (1.0, 1.0, 1.0, 1.0), image)

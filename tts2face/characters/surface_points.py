@@ -16,6 +16,8 @@ IntArray = NDArray[np.int64]
 GRAZES = ((3.0, 12.0), (10.0, 30.0))
 MAX_VERTEX_MM = 2.5  # distance from the ray up to which the vertex of an outline is taken as it is
 INWARD_STEPS = np.linspace(0.01, 0.3, 30)  # shares of the way to the middle of all pixels at which a surface is sought
+CELL_PX = 16.0  # side of the cells of a picture in which the triangles under a pixel are looked up
+N_CELLS = 64  # cells along each side of the grid; what lies beyond it counts to the cells at its border
 N_NEAREST = 12  # vertices whose triangles are searched for the nearest point
 
 
@@ -86,7 +88,12 @@ class _Projection:
         self._corners = self._flat[self._triangles]
         self._left, self._top = np.ascontiguousarray(self._corners.min(axis=1).T)
         self._right, self._bottom = np.ascontiguousarray(self._corners.max(axis=1).T)
-        self._seen = np.unique(self._triangles)
+        self._starts, self._members = _sort_into_cells(
+            np.column_stack([self._left, self._top]), np.column_stack([self._right, self._bottom])
+        )
+        is_seen = np.zeros(len(positions), bool)
+        is_seen[self._triangles] = True
+        self._seen = np.flatnonzero(is_seen)
         self._tree = cKDTree(self._flat[self._seen])
         nearest = float(np.maximum(self._there[self._seen, 2].min(), 1.0))
         self._reach_px = GRAZES[-1][0] * self._focal / nearest
@@ -94,16 +101,19 @@ class _Projection:
     def hit(self, pixel: FloatArray) -> _Hit | None:
         """Nearest triangle under a pixel."""
         x, y = pixel
-        under = np.flatnonzero((self._left <= x) & (x <= self._right) & (self._top <= y) & (y <= self._bottom))
+        column, row = _cells(pixel)
+        near = self._members[slice(*self._starts[row * N_CELLS + column : row * N_CELLS + column + 2])]
+        is_around = (self._left[near] <= x) & (x <= self._right[near])
+        under = near[is_around & (self._top[near] <= y) & (y <= self._bottom[near])]
         mixed = _barycentric(pixel, self._corners[under])
         inside = (mixed >= -1e-6).all(axis=1)
         hits, mixed = under[inside], mixed[inside]
         if not len(hits):
             return None
         depths = (mixed * self._there[self._triangles[hits], 2]).sum(axis=1)
-        near = int(depths.argmin())
-        corners = self._triangles[hits[near]]
-        return _Hit(corners, mixed[near], float(depths[near]), _facing(self._there[corners]))
+        first = int(depths.argmin())
+        corners = self._triangles[hits[first]]
+        return _Hit(corners, mixed[first], float(depths[first]), _facing(self._there[corners]))
 
     def outline_vertex(self, pixel: FloatArray, depth: float) -> int | None:
         """Vertex of an outline that a ray with a hit at a depth (infinite without one) passes; None if it does not."""
@@ -123,6 +133,27 @@ class _Projection:
     def depth(self, vertex: int) -> float:
         """Depth of a vertex, mm."""
         return float(self._there[vertex, 2])
+
+
+def _cells(pixels: FloatArray) -> IntArray:
+    """Column and row of the cells of pixels (N, 2) or (2,)."""
+    cells: IntArray = np.clip(pixels / CELL_PX, 0, N_CELLS - 1).astype(np.int64)
+    return cells
+
+
+def _sort_into_cells(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray]:
+    """Boxes from `low` to `high`, (F, 2) each, by the cells that they touch.
+
+    Cell c has the boxes ``members[starts[c]:starts[c + 1]]`` in their order.
+    """
+    first, last = _cells(low), _cells(high)
+    across, down = (last - first + 1).T
+    counts = across * down
+    box = np.repeat(np.arange(len(low)), counts)
+    step = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    cell = (first[box, 1] + step // across[box]) * N_CELLS + first[box, 0] + step % across[box]
+    order = np.argsort(cell, kind="stable")
+    return np.searchsorted(cell[order], np.arange(N_CELLS**2 + 1)), box[order]
 
 
 def nearest_points(places: FloatArray, positions: FloatArray, triangles: IntArray) -> SurfacePoints:

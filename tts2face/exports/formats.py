@@ -142,6 +142,31 @@ def find_format(path: Path, name: str | None = None) -> FormatInfo:
     raise InputError(f"{path.name} has no suffix of an export format; end its name in {_choices(list(_BY_SUFFIX))}")
 
 
+def batch_format(name: str) -> tuple[str, FormatInfo]:
+    """Ending and format of the files of a batch, by a suffix with or without its point, or by the name of a format.
+
+    Raises
+    ------
+    InputError
+        There is no such format.
+    """
+    suffix = f".{name.lower().removeprefix('.')}"
+    if suffix in _BY_SUFFIX:
+        return suffix, _BY_SUFFIX[suffix]
+    if name in _BY_NAME:
+        return _BY_NAME[name].suffixes[0], _BY_NAME[name]
+    raise InputError(
+        f"there is no export format {name!r}; give an ending ({_choices([one[1:] for one in _BY_SUFFIX])}) or a name "
+        "that `tts2face formats` lists"
+    )
+
+
+def sound_name(name: str) -> str:
+    """Name of the sound file beside an export: its own name with another ending."""
+    suffix = _longest_suffix(name)
+    return f"{name[: -len(suffix)] if suffix else name.partition('.')[0]}.wav"
+
+
 def _choices(suffixes: Sequence[str]) -> str:
     return " or ".join(filter(None, [", ".join(suffixes[:-1]), suffixes[-1]]))
 

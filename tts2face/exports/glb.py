@@ -23,6 +23,7 @@ from tts2face.exports.surfaces import (
     morph_targets,
     roughness,
     texture_jpeg,
+    texture_png,
     vertex_normals,
 )
 from tts2face.models.face import Face
@@ -110,8 +111,11 @@ def _materials(face: Face, buffer: GltfBuffer) -> dict[str, Any]:
     content: dict[str, Any] = {"materials": []}
     has_texture = face.texture is not None and face.uv is not None
     if has_texture and face.texture is not None:
-        view = buffer.add_view(texture_jpeg(face.texture))
-        content["images"] = [{"bufferView": view, "mimeType": "image/jpeg", "name": "skin"}]
+        if face.alpha is None:
+            image = {"bufferView": buffer.add_view(texture_jpeg(face.texture)), "mimeType": "image/jpeg"}
+        else:
+            image = {"bufferView": buffer.add_view(texture_png(face.texture, face.alpha)), "mimeType": "image/png"}
+        content["images"] = [image | {"name": "skin"}]
         content["samplers"] = [{}]
         content["textures"] = [{"source": 0, "sampler": 0}]
     for surface in divide_surface(face):
@@ -126,6 +130,8 @@ def _materials(face: Face, buffer: GltfBuffer) -> dict[str, Any]:
         material: dict[str, Any] = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": shading}
         if part.opacity < 1:
             material["alphaMode"] = "BLEND"
+        elif part.cutout:
+            material["alphaMode"] = "MASK"
         content["materials"].append(material)
     return content
 

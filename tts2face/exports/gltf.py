@@ -1,7 +1,5 @@
-"""Binary glTF 2.0: buffer views, accessors, and the container (Khronos glTF 2.0 specification)."""
+"""Binary glTF 2.0: buffer views and accessors of a file that is written (Khronos glTF 2.0 specification)."""
 
-import json
-import struct
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,16 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import InputError
 from tts2face.exports.spool import Spool
+from tts2face.storage.glb_container import ALIGNMENT, glb_header
 
-MAGIC, VERSION = 0x46546C67, 2
-JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 VERTICES, INDICES = 34962, 34963  # targets of buffer views
 _COMPONENTS: Mapping[str, int] = {"|u1": 5121, "<u2": 5123, "<u4": 5125, "<f4": 5126}
 _TYPES: Mapping[int, str] = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
-MAX_FILE_BYTES = 2**32 - 1  # the container states its size in 32 bits
-ALIGNMENT = 4
 
 
 class GltfBuffer:
@@ -87,17 +81,9 @@ class GltfBuffer:
             "bufferViews": self.views,
             "accessors": self.accessors,
         }
-        text = json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode()
-        text += b" " * (-len(text) % ALIGNMENT)
-        size = 12 + 8 + len(text) + 8 + self.n_bytes
-        if size > MAX_FILE_BYTES:
-            raise InputError(
-                f"{path.name} would have {size / 1e9:.1f} GB; a .glb file holds 4 GB, export shorter clips"
-            )
+        header = glb_header(content, self.n_bytes, path.name)
         with path.open("wb") as file:
-            file.write(struct.pack("<III", MAGIC, VERSION, size))
-            file.write(struct.pack("<II", len(text), JSON_CHUNK) + text)
-            file.write(struct.pack("<II", self.n_bytes, BINARY_CHUNK))
+            file.write(header)
             for chunk in self._chunks:
                 if isinstance(chunk, Spool):
                     chunk.copy_to(file)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.clock import exact_rate, first_sample
+from tts2face.exports.formats import sound_name
 from tts2face.models.face import Face
 from tts2face.types import HEAD_CHANNELS, Clip, frame_count
 
@@ -83,7 +84,7 @@ class Target:
     @property
     def sound_name(self) -> str:
         """Name of the sound file beside it."""
-        return f"{self.name.partition('.')[0]}.wav" if "." in self.name else f"{self.name}.wav"
+        return sound_name(self.name)
 
 
 class FormatWriter(Protocol):

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,10 +130,19 @@ def roughness(part: Part) -> float:
 
 def texture_jpeg(texture: NDArray[np.uint8]) -> bytes:
     """A texture (H, W, 3) as JPEG."""
+    return _encoded(texture, "JPEG", quality=95, subsampling=0)
+
+
+def texture_png(texture: NDArray[np.uint8], alpha: NDArray[np.uint8]) -> bytes:
+    """A texture (H, W, 3) with its coverage (H, W) as PNG."""
+    return _encoded(np.dstack([texture, alpha]), "PNG", compress_level=3)
+
+
+def _encoded(pixels: NDArray[np.uint8], kind: str, **options: Any) -> bytes:
     import io
 
     from PIL import Image
 
     content = io.BytesIO()
-    Image.fromarray(texture).save(content, "JPEG", quality=95, subsampling=0)
+    Image.fromarray(pixels).save(content, kind, **options)
     return content.getvalue()

@@ -1,13 +1,9 @@
 """The sound of a clip as a 16-bit .wav file."""
 
-import wave
-
-import numpy as np
-
 from lexicon.errors import InputError
 from tts2face.exports.parts import Part, Target
+from tts2face.storage.wave_files import open_wave, pcm_bytes
 
-FULL_SCALE = 32767
 MAX_SAMPLES = (2**32 - 64) // 2  # a .wav file states its size in bytes in 32 bits
 
 
@@ -15,8 +11,7 @@ class WavWriter:
     """Appends sound; a clip that ended within a frame is padded with silence."""
 
     def __init__(self, target: Target) -> None:
-        self._file = wave.open(str(target.path), "wb")  # noqa: SIM115 - closed by finish or close
-        self._file.setparams((1, 2, target.rate, 0, "NONE", "not compressed"))
+        self._file = open_wave(str(target.path), target.rate)
         self._n_samples, self._name = 0, target.name
 
     def add(self, part: Part) -> None:
@@ -29,7 +24,7 @@ class WavWriter:
             raise InputError(f"{self._name} would have more than 4 GB, {hours:.0f} hours; export shorter clips")
         padding = part.begin_sample - self._n_samples
         self._file.writeframesraw(bytes(2 * max(padding, 0)))
-        self._file.writeframesraw(np.rint(samples * FULL_SCALE).astype("<i2").tobytes())
+        self._file.writeframesraw(pcm_bytes(samples))
         self._n_samples = part.begin_sample + len(samples)
 
     def finish(self) -> None:

@@ -8,7 +8,7 @@ from typing import Protocol, TextIO
 
 from lexicon.errors import InputError
 from tts2face.clock import exact_rate
-from tts2face.exports.formats import FormatInfo, find_format, split_format
+from tts2face.exports.formats import FormatInfo, find_format, sound_name, split_format
 from tts2face.exports.parts import FormatWriter, FrameGrid, Target
 from tts2face.models.face import Face
 from tts2face.storage.files import translate_disk_errors
@@ -98,7 +98,7 @@ def _check_path(path: Path) -> None:
 
 def sound_path(path: Path) -> Path:
     """Path of the .wav file beside an export."""
-    return path.with_name(f"{path.name.partition('.')[0]}.wav")
+    return path.with_name(sound_name(path.name))
 
 
 class ExportWriter:

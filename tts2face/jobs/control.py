@@ -1,15 +1,14 @@
 """Control of jobs: list, show, cancel, retry, prune."""
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Any
 
 from lexicon.errors import InputError
 from tts2face.batch.segment import segment_from_json
-from tts2face.jobs.database import Workers, database_url, prepare_database
-from tts2face.jobs.engine import ACTIVE, enqueue, failure_reason, open_client
-from tts2face.jobs.worker import WORKFLOW
+from tts2face.jobs.database import WORKFLOW, Workers, database_url, prepare_database
+from tts2face.jobs.engine import ACTIVE, JOBS_PER_QUERY, enqueue, failure_reason, open_client
 
 STATES = {
     "ENQUEUED": "waiting",
@@ -83,36 +82,57 @@ def show_job(database: str, name: str) -> tuple[Job, dict[str, Any]]:
 def cancel_jobs(database: str, names: Sequence[str] = ()) -> int:
     """Cancel waiting and running jobs by name, or all of them; their number."""
     with open_client(_prepared(database)) as client:
-        chosen = [_find(client, name) for name in names] if names else _of_states(client, ACTIVE)
+        chosen = [_find(client, name) for name in names] if names else _of_states(client, ACTIVE, load_input=False)
         active = [one.workflow_id for one in chosen if one.status in ACTIVE]
-        if active:
-            client.cancel_workflows(active, cancel_children=True)
+        for at in range(0, len(active), JOBS_PER_QUERY):
+            client.cancel_workflows(active[at : at + JOBS_PER_QUERY], cancel_children=True)
         return len(active)
 
 
 def retry_jobs(database: str, names: Sequence[str] = (), priority: int | None = None) -> int:
     """Queue failed and cancelled jobs again by name, or all of them; their number."""
     ended = frozenset(status for status, state in STATES.items() if state in ("failed", "cancelled"))
-    with open_client(_prepared(database)) as client:
+    url = _prepared(database)
+    with open_client(url) as client, Workers(url) as workers:
         chosen = [_find(client, name) for name in names] if names else _of_states(client, ended)
         latest = {one.workflow_id.partition(".")[0]: one for one in chosen if one.status in ended}
         for address, one in latest.items():
             segment = segment_from_json(one.input["args"][1])
-            enqueue(client, {address: segment}, one.priority if priority is None else priority)
+            enqueue(client, workers, {address: segment}, one.priority if priority is None else priority)
         return len(latest)
 
 
-def prune_jobs(database: str, older_than_s: float = 0.0) -> int:
+def unfinished_segments(database: str) -> frozenset[str]:
+    """Addresses of the segments of waiting and running jobs."""
+    with open_client(_prepared(database)) as client:
+        found = _of_states(client, ACTIVE, load_input=False)
+    return frozenset(one.workflow_id.partition(".")[0] for one in found)
+
+
+def prune_jobs(database: str, older_than_s: float = 0.0, *, dry_run: bool = False) -> int:
     """Remove jobs that have ended some seconds ago or earlier; their number. Stored segments stay."""
     url = _prepared(database)
+    removed = 0
     with open_client(url) as client, Workers(url) as workers:
-        ended = [one for one in _of_states(client, frozenset(STATES) - ACTIVE, load_input=False)]
-        before_ms = (time.time() - older_than_s) * 1000.0
-        names = [one.workflow_id for one in ended if (one.completed_at or one.updated_at or 0) <= before_ms]
-        if names:
-            client.delete_workflows(names)
-        workers.forget_dead()
-        return len(names)
+        before = datetime.fromtimestamp(workers.now() - older_than_s, UTC).isoformat()
+        while True:
+            ended = client.list_workflows(
+                name=WORKFLOW,
+                status=sorted(frozenset(STATES) - ACTIVE),
+                completed_before=before,
+                limit=JOBS_PER_QUERY,
+                offset=removed if dry_run else 0,
+                load_input=False,
+                load_output=False,
+            )
+            removed += len(ended)
+            if not ended:
+                break
+            if not dry_run:
+                client.delete_workflows([one.workflow_id for one in ended])
+        if not dry_run:
+            workers.forget_dead()
+    return removed
 
 
 def _prepared(database: str) -> str:

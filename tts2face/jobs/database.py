@@ -1,5 +1,6 @@
 """The database of jobs: a SQLite file, or PostgreSQL by URL; and the table of the workers that are alive in it."""
 
+import logging
 import sqlite3
 import time
 from collections.abc import Iterable
@@ -7,12 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import BackendError, InputError
+from tts2face.batch.address import SEGMENT_FORMAT
 
 DEFAULT_DATABASE = "tts2face-jobs.sqlite"
 QUEUE = "tts2face-segments"
 APPLICATION = "tts2face"
+APPLICATION_VERSION = f"segments-{SEGMENT_FORMAT}"  # pinned: workers of equal segments share their work
+WORKFLOW = "render_segment"
 BEAT_S = 1.5  # between two signs of life of a worker
 DEAD_AFTER_S = 6.0  # without a sign of life; with the interval of looking this is below 10 s
+CONNECTIONS = {"pool_size": 1, "max_overflow": 2}  # of a process to the table of workers; one of them stays open
 POSTGRES_SCHEMES = ("postgresql://", "postgres://", "postgresql+psycopg://")
 _TABLE = """
 CREATE TABLE IF NOT EXISTS tts2face_workers (
@@ -70,11 +75,9 @@ def prepare_database(url: str) -> None:
         raise BackendError(f"cannot use the database {shown_url(url)} ({reason[:200]}); check it") from error
 
 
-def quiet_dbos() -> None:
-    """Messages of the engine below errors are not written; it never sends any."""
-    import logging
-
-    logging.getLogger("dbos").setLevel(logging.ERROR)
+def quiet_dbos(level: int = logging.ERROR) -> None:
+    """Messages of the engine below a level are not written; it never sends any."""
+    logging.getLogger("dbos").setLevel(level)
 
 
 def shown_url(url: str) -> str:
@@ -97,9 +100,7 @@ class Workers:
         self._now = _NOW[kind]
         arguments: dict[str, Any] = {"timeout": 30.0} if kind == "sqlite" else {"connect_timeout": 5}
         engine_url = url if kind == "sqlite" else url.replace("postgresql://", "postgresql+psycopg://", 1)
-        self._engine = sqlalchemy.create_engine(
-            engine_url, pool_pre_ping=True, pool_size=2, max_overflow=1, connect_args=arguments
-        )
+        self._engine = sqlalchemy.create_engine(engine_url, pool_pre_ping=True, connect_args=arguments, **CONNECTIONS)
 
     def __enter__(self) -> "Workers":
         """Return itself."""
@@ -123,10 +124,27 @@ class Workers:
                     raise
                 time.sleep(0.2)
 
-    def beat(self, executor_id: str, place: str) -> None:
-        """Note that a worker is alive."""
+    def transaction(self) -> Any:
+        """Context of a transaction in the database; the value is its connection."""
+        return self._engine.begin()
+
+    def now(self) -> float:
+        """Seconds since 1970 by the clock of the database."""
+        with self._engine.begin() as connection:
+            return float(connection.execute(self._sql(f"SELECT {self._now}")).scalar() or 0.0)
+
+    def beat(self, executor_id: str, place: str) -> set[str]:
+        """Note that a worker is alive; the ids of workers without a sign of life."""
+        query = f"SELECT executor_id FROM tts2face_workers WHERE beat <= {self._now} - :age"
         with self._engine.begin() as connection:
             connection.execute(self._sql(_BEAT.format(now=self._now)), {"id": executor_id, "place": place[:200]})
+            return {str(row[0]) for row in connection.execute(self._sql(query), {"age": DEAD_AFTER_S})}
+
+    def leave(self, executor_id: str) -> None:
+        """Note that a worker ends; the others take its jobs over without waiting."""
+        with self._engine.begin() as connection:
+            query = "UPDATE tts2face_workers SET beat = 0 WHERE executor_id = :id"
+            connection.execute(self._sql(query), {"id": executor_id})
 
     def alive(self, within_s: float = DEAD_AFTER_S) -> dict[str, str]:
         """Places of the workers that gave a sign of life within some seconds, by their ids."""

@@ -6,19 +6,29 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from functools import partial
 from typing import Any
 
 from lexicon.errors import BackendError
 from tts2face.batch.engine import Message, Rendered
 from tts2face.batch.segment import Segment
-from tts2face.batch.store import Store
-from tts2face.jobs.database import APPLICATION, QUEUE, Workers, database_url, prepare_database
-from tts2face.jobs.worker import APPLICATION_VERSION, WORKFLOW
+from tts2face.batch.store import Store, wait_for_store
+from tts2face.jobs.database import (
+    APPLICATION,
+    APPLICATION_VERSION,
+    QUEUE,
+    WORKFLOW,
+    Workers,
+    database_url,
+    prepare_database,
+)
 
-POLL_S = 0.5  # between two looks at the jobs; longer for long lists
+POLL_S = 0.5  # between two looks at the jobs that have ended
+OVERLAP_S = 5.0  # of the times of two looks: a transaction ends some time after the time that it notes
+ALL_JOBS_S = 60.0  # between two looks at all jobs that are awaited
 JOBS_PER_QUERY = 500
-POLL_S_PER_JOB = 0.0005
 ACTIVE = frozenset({"PENDING", "ENQUEUED", "DELAYED"})
 RESTART_S = 1.0  # after the death of a local worker
 QUICK_END_S = 3.0  # after which a worker has begun its work; one that ends earlier cannot start
@@ -51,19 +61,65 @@ class DatabaseEngine:
             return
         url = database_url(self.database)
         prepare_database(url)
-        with open_client(url) as client, local_workers(self) as supervise:
-            waiting = enqueue(client, segments, self.priority)
-            if self.n_workers == 0 and not _has_workers(url):
+        with open_client(url) as client, Workers(url) as workers, local_workers(self) as supervise:
+            look = _Look(client, workers.now())
+            look.waiting = enqueue(client, workers, segments, self.priority)
+            if self.n_workers == 0 and not workers.alive():
                 self.on_message("no worker is alive in this database; start `tts2face worker` with it")
-            while waiting:
+            while look.waiting:
                 supervise()
-                for name, status in _finished(client, waiting):
-                    address = waiting.pop(name)
-                    result = store.result(address)
-                    reason = "" if result is not None else failure_reason(status)
-                    yield Rendered(address, result, reason)
-                if waiting:
-                    time.sleep(POLL_S + POLL_S_PER_JOB * len(waiting))
+                for address, reason in look.ended():
+                    result = wait_for_store(partial(store.result, address), self.on_message)
+                    yield Rendered(address, result, "" if result is not None else reason)
+                if look.waiting:
+                    time.sleep(POLL_S)
+
+
+@dataclass(slots=True)
+class _Look:
+    """Looks at jobs: often at those that have ended since the last look, and now and then at all that are awaited.
+
+    Parameters
+    ----------
+    since_s
+        Time of the database before the jobs were queued.
+    waiting
+        Addresses by the names of their jobs.
+    """
+
+    client: Any
+    since_s: float
+    waiting: dict[str, str] = field(default_factory=dict)
+    _next_all_s: float = 0.0
+
+    def ended(self) -> list[tuple[str, str]]:
+        """Addresses of the jobs that have ended, with the reason if there is no segment; each once."""
+        if time.monotonic() < self._next_all_s:
+            found = {name: job for name, job in self._recent().items() if name in self.waiting}
+        else:
+            found = self._all()
+            self._next_all_s = time.monotonic() + ALL_JOBS_S
+        reasons = {}
+        for name, job in found.items():
+            if job is None:
+                reasons[name] = "its job was removed from the database; run again"
+            elif job.status not in ACTIVE:
+                reasons[name] = failure_reason(job)
+        return [(self.waiting.pop(name), reason) for name, reason in reasons.items()]
+
+    def _recent(self) -> dict[str, Any]:
+        after = datetime.fromtimestamp(self.since_s - OVERLAP_S, UTC).isoformat()
+        found = self.client.list_workflows(name=WORKFLOW, completed_after=after, load_input=False)
+        self.since_s = max([self.since_s, *((one.completed_at or 0) / 1000.0 for one in found)])
+        return {one.workflow_id: one for one in found}
+
+    def _all(self) -> dict[str, Any]:
+        names = list(self.waiting)
+        found: dict[str, Any] = dict.fromkeys(names)
+        for at in range(0, len(names), JOBS_PER_QUERY):
+            part = names[at : at + JOBS_PER_QUERY]
+            found |= {one.workflow_id: one for one in self.client.list_workflows(workflow_ids=part, load_input=False)}
+        return found
 
 
 @contextmanager
@@ -88,50 +144,58 @@ def open_client(url: str) -> Iterator[Any]:
         client.destroy()
 
 
-def enqueue(client: Any, segments: Mapping[str, Segment], priority: int) -> dict[str, str]:
+def enqueue(client: Any, workers: Workers, segments: Mapping[str, Segment], priority: int) -> dict[str, str]:
     """Queue segments; their addresses by the names of their jobs.
 
     The name of a job is the content address of its segment, so that two batches share it. A job that has ended without
     a stored segment is followed by a new one with the next number.
     """
-    attempts: dict[str, int] = {}
-    for at in range(0, len(segments), JOBS_PER_QUERY):
-        names = list(segments)[at : at + JOBS_PER_QUERY]
-        for one in client.list_workflows(
-            workflow_id_prefix=[f"{name}." for name in names], load_input=False, load_output=False
-        ):
-            address, _, number = one.workflow_id.partition(".")
-            following = int(number) if one.status in ACTIVE else int(number) + 1
-            attempts[address] = max(attempts.get(address, 0), following)
+    import sqlalchemy
+
     waiting: dict[str, str] = {}
-    for address, segment in segments.items():
-        name = f"{address}.{attempts.get(address, 0)}"
-        options = {
-            "queue_name": QUEUE,
-            "workflow_name": WORKFLOW,
-            "workflow_id": name,
-            "app_version": APPLICATION_VERSION,
-            "priority": priority,
-        }
-        client.enqueue(options, address, segment.as_json())
-        waiting[name] = address
+    addresses = list(segments)
+    for at in range(0, len(addresses), JOBS_PER_QUERY):
+        numbers = dict.fromkeys(addresses[at : at + JOBS_PER_QUERY], 0)
+        active = _skip_ended(client, numbers)
+        names = {f"{address}.{number}": address for address, number in numbers.items()}
+        waiting |= names
+        missing = [(name, address) for name, address in names.items() if address not in active]
+        jobs = [(_enqueue_options(name, priority), address, segments[address].as_json()) for name, address in missing]
+        try:
+            with workers.transaction() as connection:
+                for job in jobs:
+                    client.enqueue_in_transaction(connection, *job)
+        except sqlalchemy.exc.DBAPIError:  # such as a deadlock with a batch of the same segments in another order
+            for job in jobs:
+                client.enqueue(*job)
     return waiting
 
 
-def _has_workers(url: str) -> bool:
-    with Workers(url) as workers:
-        return bool(workers.alive())
+def _enqueue_options(name: str, priority: int) -> dict[str, Any]:
+    return {
+        "queue_name": QUEUE,
+        "workflow_name": WORKFLOW,
+        "workflow_id": name,
+        "app_version": APPLICATION_VERSION,
+        "priority": priority,
+    }
 
 
-def _finished(client: Any, waiting: Mapping[str, str]) -> list[tuple[str, Any]]:
-    """Jobs that are not active any more."""
-    names = list(waiting)
-    found: list[tuple[str, Any]] = []
-    for at in range(0, len(names), JOBS_PER_QUERY):
-        part = names[at : at + JOBS_PER_QUERY]
-        jobs = client.list_workflows(workflow_ids=part, load_input=False)
-        found += [(one.workflow_id, one) for one in jobs if one.status not in ACTIVE]
-    return found
+def _skip_ended(client: Any, numbers: dict[str, int]) -> set[str]:
+    """Raise the numbers of jobs until none of them has ended; the addresses of those that are active."""
+    active: set[str] = set()
+    unknown = set(numbers)
+    while unknown:
+        names = [f"{address}.{numbers[address]}" for address in unknown]
+        unknown = set()
+        for one in client.list_workflows(workflow_ids=names, load_input=False, load_output=False):
+            address = one.workflow_id.partition(".")[0]
+            if one.status in ACTIVE:
+                active.add(address)
+            else:
+                numbers[address] += 1
+                unknown.add(address)
+    return active
 
 
 def failure_reason(job: Any) -> str:

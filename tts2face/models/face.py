@@ -18,7 +18,8 @@ class Part:
 
     ``specular`` is the strength of the highlight (0 = matt), ``shininess`` its Blinn-Phong exponent, ``wrap`` the wrap
     of diffuse light around the shape (0 = hard, 1 = very soft, an approximation of subsurface scattering), ``opacity``
-    is in (0, 1]. ``textured`` parts take their colour from the texture, the others from the vertex colours.
+    is in (0, 1]. ``textured`` parts take their colour from the texture, the others from the vertex colours; ``cutout``
+    parts are drawn where the texture's alpha is.
     """
 
     name: str
@@ -29,6 +30,7 @@ class Part:
     wrap: float = 0.0
     opacity: float = 1.0
     textured: bool = False
+    cutout: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,6 +70,8 @@ class Face:
         sRGB, 0-255.
     uv, texture : (V, 2), (H, W, 3)
         Texture coordinates in [0, 1] from the top left corner of the texture, and its sRGB pixels; or None.
+    alpha : (H, W)
+        Coverage of the texture's pixels, 0-255, for `cutout` parts; or None.
     landmarks, landmark_vertices, landmark_weights : (L,), (L, 3), (L, 3)
         Landmark `landmarks[i]` of `tts2face.models.landmarks` lies at the barycentric weights of three vertices.
     pivot : (3,)
@@ -91,6 +95,7 @@ class Face:
     landmark_weights: NDArray[np.float32]
     pivot: NDArray[np.float32]
     metadata: Mapping[str, Any] = field(default_factory=dict)
+    alpha: NDArray[np.uint8] | None = None
 
     @property
     def synthetic_notice(self) -> str:
@@ -109,6 +114,7 @@ class Face:
             and self.colours.shape == (n_vertices, 3)
             and (self.uv is None or self.uv.shape == (n_vertices, 2))
             and self.landmark_vertices.shape == self.landmark_weights.shape == (len(self.landmarks), 3)
+            and (self.alpha is None or (self.texture is not None and self.alpha.shape == self.texture.shape[:2]))
             and sum(part.count for part in self.parts) == len(self.triangles)
         )
         if not fits:
@@ -117,7 +123,7 @@ class Face:
             raise DataError(
                 f"a triangle of the face has a vertex index beyond its {n_vertices} vertices; build it again"
             )
-        for name in ("vertices", "triangles", "shapes", "limits", "colours", "uv", "texture", "pivot",
+        for name in ("vertices", "triangles", "shapes", "limits", "colours", "uv", "texture", "alpha", "pivot",
                      "landmarks", "landmark_vertices", "landmark_weights"):  # fmt: skip
             array = getattr(self, name)
             if array is not None:

@@ -57,14 +57,16 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
     arrays |= _pack_shapes(face.shapes)
     if face.uv is not None and face.texture is not None:
         arrays["uv"] = np.rint(np.clip(face.uv, 0, 1) * 65535).astype(np.uint16)
-        arrays["texture"] = _encode_jpeg(face.texture)
+        arrays["texture"] = _encode_picture(face.texture, "JPEG", quality=JPEG_QUALITY, subsampling=0)
+        if face.alpha is not None:
+            arrays["alpha"] = _encode_picture(face.alpha, "PNG")
     presets = dict(identities or {})
     for number, preset in enumerate(presets.values()):
         steps, step = _quantise(preset.displacement)
         arrays[f"identity{number}"] = steps
         arrays[f"identity{number}_step"] = np.array([step], np.float32)
     header = {
-        "parts": [asdict(part) for part in face.parts],
+        "parts": [_part_fields(part) for part in face.parts],
         "shape_names": list(face.shape_names),
         "eyes": [
             {
@@ -137,24 +139,31 @@ def _unpack_shapes(arrays: Mapping[str, NDArray[Any]], n_vertices: int) -> NDArr
     return shapes
 
 
-def _encode_jpeg(texture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _part_fields(part: Part) -> dict[str, Any]:
+    """Fields of a part; ``cutout`` only where it is set, as older files have it."""
+    fields = asdict(part)
+    return fields if part.cutout else {key: value for key, value in fields.items() if key != "cutout"}
+
+
+def _encode_picture(pixels: NDArray[np.uint8], kind: str, **options: Any) -> NDArray[np.uint8]:
     from PIL import Image
 
     content = io.BytesIO()
-    Image.fromarray(texture).save(content, "JPEG", quality=JPEG_QUALITY, subsampling=0)
+    Image.fromarray(pixels).save(content, kind, **options)
     return np.frombuffer(content.getvalue(), np.uint8)
 
 
-def _decode_jpeg(content: NDArray[np.uint8], path: Path) -> NDArray[np.uint8]:
+def _decode_picture(content: NDArray[np.uint8], kind: str, mode: str, path: Path) -> NDArray[np.uint8]:
+    """Pixels of an image of one kind of file, in a mode of Pillow (RGB or L)."""
     from PIL import Image
 
     try:
-        with Image.open(io.BytesIO(content.tobytes()), formats=["JPEG"]) as image:
+        with Image.open(io.BytesIO(content.tobytes()), formats=[kind]) as image:
             if max(image.size) > MAX_TEXTURE_SIDE_PX:
                 raise DataError(
                     f"{path}: the texture has {image.size} pixels; reduce it to at most {MAX_TEXTURE_SIDE_PX} per side"
                 )
-            return np.array(image.convert("RGB"))
+            return np.array(image.convert(mode))
     except (OSError, SyntaxError) as error:
         raise DataError(f"{path}: the texture cannot be decoded ({error}); build or copy the face again") from error
 
@@ -169,6 +178,10 @@ def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, A
         )
         for eye in header["eyes"]
     ]
+    texture = _decode_picture(arrays["texture"], "JPEG", "RGB", path) if "texture" in arrays else None
+    alpha = _decode_picture(arrays["alpha"], "PNG", "L", path) if "alpha" in arrays else None
+    if alpha is not None and (texture is None or alpha.shape != texture.shape[:2]):
+        raise DataError(f"{path}: texture and alpha differ in size; build or copy the face again")
     return Face(
         vertices=arrays["vertices"],
         triangles=arrays["triangles"],
@@ -179,7 +192,8 @@ def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, A
         eyes=tuple(eyes),
         colours=arrays["colours"],
         uv=(arrays["uv"] / 65535).astype(np.float32) if "uv" in arrays else None,
-        texture=_decode_jpeg(arrays["texture"], path) if "texture" in arrays else None,
+        texture=texture,
+        alpha=alpha,
         landmarks=arrays["landmarks"],
         landmark_vertices=arrays["landmark_vertices"],
         landmark_weights=arrays["landmark_weights"],

@@ -46,6 +46,7 @@ _PART = record(
         "wrap": number(0.0, 10.0),
         "opacity": number(1e-3, 1.0),
         "textured": flag,
+        "cutout": flag,
     },
 )
 _EYE = record(
@@ -70,6 +71,7 @@ TENSORS: Mapping[str, Tensor] = {
     "colours": Tensor("uint8", ("vertices", 3)),
     "uv": Tensor("uint16", ("vertices", 2), is_optional=True),
     "texture": Tensor("uint8", ("bytes",), is_optional=True),
+    "alpha": Tensor("uint8", ("alpha bytes",), is_optional=True),
     "landmarks": Tensor("int32", ("landmarks",), may_be_empty=True),
     "landmark_vertices": Tensor("int32", ("landmarks", N_CORNERS), may_be_empty=True),
     "landmark_weights": Tensor("float32", ("landmarks", N_CORNERS), -SUM_WITHIN, 1 + SUM_WITHIN, may_be_empty=True),
@@ -98,6 +100,9 @@ def check_face(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[s
     contents.indices("landmarks", N_LANDMARKS, "landmarks of the face mesh")
     contents.distinct("landmarks")
     contents.require(("uv" in arrays) == ("texture" in arrays), "has only one of uv and texture")
+    has_cutouts = any(part.get("cutout", False) for part in header["parts"])
+    contents.require("alpha" in arrays or not has_cutouts, "has a part with cutout, but no alpha")
+    contents.require("texture" in arrays or "alpha" not in arrays, "has alpha, but no texture")
     _check_places(contents)
     _check_shapes(contents, n_vertices)
     _check_parts(contents, n_vertices)

@@ -12,7 +12,7 @@ from tts2face.clock import exact_rate
 from tts2face.render.clip_frames import ClipFrames
 from tts2face.render.encoder_thread import EncoderThread, Sink
 from tts2face.render.gif import GifWriter
-from tts2face.render.movie import MOV_MOVIE, MP4_MOVIE, WEBM_MOVIE, MovieWriter
+from tts2face.render.movie import MKV_MOVIE, MOV_MOVIE, MP4_MOVIE, WEBM_MOVIE, MovieWriter
 from tts2face.render.output_path import (
     FOLDER,
     GIF,
@@ -31,7 +31,8 @@ from tts2face.storage.temporary import Temporary
 from tts2face.types import Clip, Progress
 
 OPAQUE = frozenset({MP4, MOV})  # H.264 as players know it has no coverage
-_MOVIES = {MP4: MP4_MOVIE, WEBM: WEBM_MOVIE, MOV: MOV_MOVIE}
+MKV = ".mkv"  # parts of a .webm file
+_MOVIES = {MP4: MP4_MOVIE, WEBM: WEBM_MOVIE, MOV: MOV_MOVIE, MKV: MKV_MOVIE}
 N_SWATCHES = 6  # frames of the first clip from which the palette of a GIF is computed
 
 
@@ -47,6 +48,8 @@ class ClipWriter:
         Output, by suffix: .mp4, .webm, .mov, .gif; a folder of .png pictures with a trailing slash or without a suffix.
     renderer
         Renderer of the clips' frames.
+    kind
+        Kind of the file, for a path with another suffix; None: that of its suffix.
     on_progress
         Called with the number of frames written and the number of frames added so far.
 
@@ -70,9 +73,10 @@ class ClipWriter:
         path: Path | str,
         renderer: FrameRenderer,
         *,
+        kind: str | None = None,
         on_progress: Progress | None = None,
     ) -> None:
-        self.path, self._kind = check_output(path), output_kind(path)
+        self.path, self._kind = check_output(path), kind or output_kind(path)
         if self._kind in OPAQUE and renderer.picture.is_transparent:
             raise InputError(f"{self.path} cannot be transparent; give .webm, .gif or a folder, or another background")
         self._renderer = renderer

@@ -45,6 +45,9 @@ WEBM_MOVIE = MovieKind(
 MOV_MOVIE = MovieKind(
     "mov", "libx264", "pcm_s16le", 768_000, MP4_MOVIE.video_options
 )  # uncompressed sound, for editing
+MKV_MOVIE = MovieKind(
+    "matroska", "libvpx-vp9", "pcm_s16le", 768_000, WEBM_MOVIE.video_options
+)  # parts that are joined into .webm
 
 # Movies that are sent while they are made: fragments of a fifth of a second that refer to no later picture.
 STREAMED_MP4 = MovieKind(

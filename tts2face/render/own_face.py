@@ -54,6 +54,8 @@ class OwnFaceRenderer:
         For each texture pixel the nearest pixel of its mesh, as `tts2face.models.appearance.nearest_pixels`.
     gestures, eyes
         Gesture model and the texture pixels around the eyes; None without gestures.
+    n_returning
+        Frames after which the video is back at its first frame, so that such clips can be joined; None: it plays on.
     """
 
     appearance: Appearance
@@ -69,6 +71,7 @@ class OwnFaceRenderer:
     mouth_fill: NDArray[np.int64]
     gestures: OwnFaceGestures | None = None
     eyes: TextureSamples | None = None
+    n_returning: int | None = None
 
     @property
     def notice(self) -> str:
@@ -95,7 +98,7 @@ class OwnFaceRenderer:
             The clip's motion is not in the channels of this face.
         """
         values = self._motion(clip)
-        instants = (first + np.arange(len(values))) / clip.fps
+        instants = self._positions(first + np.arange(len(values)), clip.fps) / clip.fps
 
         def draw_one(number: int) -> NDArray[np.uint8]:
             return draw_video_frame(self, values[number], self.plate_frame(float(instants[number])))
@@ -104,7 +107,19 @@ class OwnFaceRenderer:
 
     def frame(self, clip: Clip, number: int) -> NDArray[np.uint8]:
         """Picture (H, W, 3) of one frame of a clip."""
-        return draw_video_frame(self, self._motion(clip)[number], self.plate_frame(number / clip.fps))
+        position = float(self._positions(np.array([number]), clip.fps)[0])
+        return draw_video_frame(self, self._motion(clip)[number], self.plate_frame(position / clip.fps))
+
+    def _positions(self, frames: NDArray[np.int64], fps: float) -> NDArray[np.float64]:
+        """Positions in the video, in frames of the clip, at frames of the clip.
+
+        A clip that returns turns round within its last part that is shorter than the video's way there and back.
+        """
+        if self.n_returning is None:
+            return frames.astype(np.float64)
+        last, period = self.n_returning - 1, max(2 * (len(self.plate) - 1) / self.fps * fps, 1.0)
+        turn = last + last // period * period  # twice the frame at which it turns round
+        return np.where(2 * frames <= turn, frames, turn - frames).astype(np.float64)
 
     def plate_frame(self, instant: float) -> int:
         """Index of the plate's frame at an instant in seconds; the video plays forwards and backwards in turn."""

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.render.camera import CameraMatrices
+from tts2face.render.cutouts import draw_cutouts
 from tts2face.render.fragments import (
     COLOUR,
     EXPOSURE,
@@ -105,7 +106,6 @@ def draw_surface(
     batch = project_surface(points, surface, (optics.view, optics.lens), buffers, (width, height))
     face_normals(buffers.vertex, surface.triangles, buffers.flat)
     vertex_normals(buffers.flat, surface.starts, surface.members, buffers.vertex)
-    geometry = (buffers.vertex, surface.triangles, surface.translucent, lens)
     scene = (surface.triangles, surface.part_of, surface.materials, surface.texture, TONE_TABLES[0])
     facets = (buffers.flat, surface.part_of)
     n_rows = buffers.depth.shape[1]
@@ -114,10 +114,7 @@ def draw_surface(
             continue
         place = (band * n_rows, min(n_rows, height - band * n_rows), side)
         members = batch[begin:end]
-        n_translucent = draw_band(
-            geometry, (buffers.corners, buffers.source, members), place[0], buffers.depth, buffers.owner
-        )
-        layers = N_LAYERS if n_translucent else 1
+        layers = draw_samples(surface, lens, members, place[0], buffers)
         n_pixels = find_fragments(buffers.owner, layers, place, facets, buffers.found, buffers.pixels)
         if n_pixels == 0:
             continue
@@ -133,6 +130,30 @@ def draw_surface(
             shading,
             (picture, TONE_TABLES),
         )
+
+
+def draw_samples(
+    surface: Surface, lens: NDArray[np.float64], members: NDArray[np.int32], first_row: int, buffers: DrawingBuffers
+) -> int:
+    """Draw the projected triangles `members` of a band into ``depth`` and ``owner``; the number of valid layers."""
+    holes = members[:0]
+    if surface.cut_out.any():
+        source = buffers.source[members]
+        has_holes = surface.cut_out[np.where(source >= 0, source, ~source)]
+        members, holes = members[~has_holes], members[has_holes]
+    geometry = (buffers.vertex, surface.triangles, surface.translucent, lens)
+    batch = (buffers.corners, buffers.source, members)
+    layers = N_LAYERS if draw_band(geometry, batch, first_row, buffers.depth, buffers.owner) else 1
+    if len(holes):
+        draw_cutouts(
+            (buffers.vertex, surface.triangles, lens),
+            surface.alpha,
+            (buffers.corners, buffers.source, holes),
+            (first_row, buffers.side, layers),
+            buffers.depth,
+            buffers.owner,
+        )
+    return layers
 
 
 def project_surface(

@@ -1,10 +1,11 @@
 """Folder of .png pictures, numbered from 0, with the sound in sound.wav."""
 
-import wave
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from tts2face.storage.wave_files import open_wave, pcm_bytes
 
 SOUND_NAME = "sound.wav"
 NUMBER_DIGITS = 6
@@ -17,8 +18,7 @@ class PngFolderWriter:
     def __init__(self, folder: Path, sound_rate: int, notice: str = "") -> None:
         """Open an existing folder; `notice` becomes the comment of every picture."""
         self._folder, self._n_frames, self._notice = folder, 0, notice
-        self._sound = wave.open(str(folder / SOUND_NAME), "wb")  # noqa: SIM115 - closed by finish or abandon
-        self._sound.setparams((1, 2, sound_rate, 0, "NONE", "not compressed"))
+        self._sound = open_wave(str(folder / SOUND_NAME), sound_rate)
 
     def picture(self, pixels: NDArray[np.uint8]) -> None:
         """Write one picture (H, W, 3 or 4)."""
@@ -33,7 +33,7 @@ class PngFolderWriter:
 
     def sound(self, samples: NDArray[np.float32]) -> None:
         """Append mono samples (n,) in [-1, 1] as 16-bit integers."""
-        self._sound.writeframes(np.rint(samples * 32767).astype("<i2").tobytes())
+        self._sound.writeframes(pcm_bytes(samples))
 
     def finish(self) -> None:
         """Complete the sound file."""

@@ -17,8 +17,8 @@ from tts2face.compilation import kernel
 from tts2face.models.face import Face
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.render.fragments import NORMAL, face_normals, vertex_normals
-from tts2face.render.picture_kernels import allocate_buffers, project_surface
-from tts2face.render.raster import GRID_SHIFT, draw_band, transform_to_camera
+from tts2face.render.picture_kernels import allocate_buffers, draw_samples, project_surface
+from tts2face.render.raster import GRID_SHIFT, transform_to_camera
 from tts2face.render.studio_light import LAMP_RADIUS_RAD
 from tts2face.render.surface import Surface
 
@@ -149,8 +149,7 @@ def _visibility(
         for d in numbers:
             view, lens = _shadow_view(directions[d], middle, radius)
             members = project_surface(points, surface, (view, lens), buffers, (VIEW_SAMPLES, VIEW_SAMPLES))
-            geometry = (buffers.vertex, surface.triangles, surface.translucent, lens)
-            draw_band(geometry, (buffers.corners, buffers.source, members), 0, buffers.depth, buffers.owner)
+            draw_samples(surface, lens, members, 0, buffers)
             transform_to_camera(lifted, view, lens, camera, grid)
             mark_visible(camera, grid, buffers.depth, np.float32(SLACK_MM), visible[d])
 

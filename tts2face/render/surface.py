@@ -17,7 +17,8 @@ class Surface:
     """Constant arrays for drawing a face.
 
     ``triangles`` (F, 3); ``colours`` (V, 3) linear light; ``uv`` (V, 2), ``texture`` (H, W, 3) sRGB; ``part_of`` and
-    ``translucent`` (F,); ``materials`` (P, 6) as `tts2face.render.fragments` names its columns; the triangles
+    ``translucent`` (F,); ``cut_out`` (F,) marks triangles that are drawn where ``alpha`` (H, W), the coverage of the
+    texture, is; ``materials`` (P, 6) as `tts2face.render.fragments` names its columns; the triangles
     around vertex v are ``members[starts[v]:starts[v + 1]]``, those of vertices at the same place and of the same
     part included, so that a seam of the texture does not show.
     """
@@ -29,6 +30,8 @@ class Surface:
     texture: NDArray[np.uint8]
     part_of: NDArray[np.int32]
     translucent: NDArray[np.int8]
+    cut_out: NDArray[np.bool_]
+    alpha: NDArray[np.uint8]
     materials: NDArray[np.float32]
     starts: NDArray[np.int64]
     members: NDArray[np.int32]
@@ -50,6 +53,8 @@ def build_surface(face: Face) -> Surface:
         texture=np.array(face.texture) if face.texture is not None else np.zeros((1, 1, 3), np.uint8),
         part_of=part_of,
         translucent=translucent.astype(np.int8),
+        cut_out=np.repeat([part.cutout and face.alpha is not None for part in parts], counts),
+        alpha=np.zeros((1, 1), np.uint8) if face.alpha is None else np.array(face.alpha),
         materials=_materials(face, triangles, part_of),
         starts=starts,
         members=members,

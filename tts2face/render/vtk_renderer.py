@@ -36,6 +36,7 @@ seen = numpy.asarray(plotter.screenshot(return_img=True))
 opened = plotter.render_window.GetClassName()
 raise SystemExit(0 if int(seen[16, 16, 0]) > 200 and opened not in {refused} else 3)
 """
+HALF_COVERED = 128  # of 255: parts with holes are drawn from this coverage on
 VTK_TONE_TABLES = (linear_table(), encoding_table(8192))
 
 
@@ -167,7 +168,9 @@ class PlottedFace:
         opacity = surface.materials[surface.part_of, OPACITY]
         for share in np.unique(opacity)[::-1]:
             for number in np.unique(shade):
-                self._add((shade == number) & (opacity == share), float(share), number >= 0)
+                chosen = (shade == number) & (opacity == share)
+                self._add(chosen & ~surface.cut_out, float(share), number >= 0)
+                self._add(chosen & surface.cut_out, float(share), number >= 0)
 
     def show(
         self, points: NDArray[np.float32], view: NDArray[np.floating], lights: tuple[NDArray[Any], NDArray[Any]]
@@ -186,7 +189,10 @@ class PlottedFace:
         scale, options = np.ones(3, np.float32), {"opacity": opacity}
         if is_textured:
             scale = self._light.albedo[used].max(axis=0)
-            options["texture"] = pyvista.Texture(brighten(self._surface.texture, scale))
+            pixels = brighten(self._surface.texture, scale)
+            if self._surface.cut_out[chosen].any():
+                pixels = np.dstack([pixels, np.where(self._surface.alpha >= HALF_COVERED, np.uint8(255), np.uint8(0))])
+            options["texture"] = pyvista.Texture(pixels)
         for culling, light_of in (("front", self._light.back), ("back", self._light.front)):
             mesh = pyvista.PolyData.from_regular_faces(self._surface.rig.rest[used].copy(), places.reshape(-1, 3))
             mesh.point_data["light"] = np.zeros((len(used), 3), np.uint8)

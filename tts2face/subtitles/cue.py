@@ -32,6 +32,14 @@ class WrittenCue:
 
 
 @dataclass(frozen=True, slots=True)
+class CuePart:
+    """Words of one speaker in a cue; the speaker is empty if the cue has no name for them."""
+
+    speaker: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class Cue:
     """Words spoken between two instants.
 
@@ -55,6 +63,8 @@ class Cue:
         Language tag, where the file has one.
     has_estimated_end
         Whether the end is estimated from the length of the text, as the file has none after the begin.
+    parts
+        Words of each speaker in a cue of several; else empty.
     """
 
     number: int
@@ -67,6 +77,7 @@ class Cue:
     style: str = ""
     language: str | None = None
     has_estimated_end: bool = False
+    parts: tuple[CuePart, ...] = ()
 
     @property
     def duration_s(self) -> float:

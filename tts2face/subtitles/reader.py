@@ -123,15 +123,12 @@ def _timed(written: Sequence[WrittenCue], warnings: list[SubtitleWarning]) -> tu
         elif following is not None and end is not None and end > following + 1e-6:
             message = f"this cue overlaps the next one by {end - following:.2f} s"
             warnings.append(SubtitleWarning(cue.line, message))
-        if len(text.speakers) > 1:
-            named = ", ".join(text.speakers)
-            warnings.append(
-                SubtitleWarning(cue.line, f"this cue has the speakers {named}; {text.speakers[0]} speaks all of it")
-            )
-        speaker = text.speakers[0] if text.speakers else cue.speaker
+        parts = text.parts if len(text.parts) > 1 else ()
+        if parts and not parts[0].speaker:
+            parts = (replace(parts[0], speaker=cue.speaker), *parts[1:])
         cues.append(
-            Cue(number, cue.begin_s, end or 0.0, text.spoken, cue.line, text.shown, speaker, cue.style, cue.language,
-                is_estimated)
+            Cue(number, cue.begin_s, end or 0.0, text.spoken, cue.line, text.shown, text.speaker or cue.speaker,
+                cue.style, cue.language, is_estimated, parts)
         )  # fmt: skip
     return tuple(cues)
 

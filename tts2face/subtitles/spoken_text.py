@@ -4,6 +4,8 @@ import html
 import re
 from dataclasses import dataclass
 
+from tts2face.subtitles.cue import CuePart
+
 _BREAK_TAG = re.compile(r"<br\s*/?\s*>", re.IGNORECASE)
 _RUBY_TEXT = re.compile(r"<rt\b[^<>]*>.*?(?:</rt\s*>|(?=</ruby)|$)", re.IGNORECASE | re.DOTALL)
 # Tags of SubRip and WebVTT, inner timestamps, and tags of known names that are not closed.
@@ -25,36 +27,63 @@ _LABEL = re.compile(
 _DASH = re.compile(r"^\s*(?:[-–—‐]\s*(?=\S)|>>\s*|•\s*)", re.MULTILINE)
 
 
+_VOICE = re.compile(r"<v(?:\.[^\s.>]+)*\s+([^>]+)>")
+_VOICE_MARK = re.compile(r"^\s*\x02([^\x03]*)\x03")
+
+
 @dataclass(frozen=True, slots=True)
 class SpokenText:
-    """What of a cue is spoken, on one line, the text as shown, and the labels of its speakers in order."""
+    """What of a cue is spoken, on one line, the text as shown, and its parts by speaker.
+
+    The speaker of a part is a label or WebVTT voice, or empty for a dash without a name.
+    """
 
     spoken: str
     shown: str
-    speakers: tuple[str, ...]
+    parts: tuple[CuePart, ...]
+
+    @property
+    def speaker(self) -> str:
+        """The first speaker that has a name; else empty."""
+        return next((part.speaker for part in self.parts if part.speaker), "")
 
 
 def spoken_text(written: str) -> SpokenText:
-    """Divide the text of a cue into words, tags, noises, lyrics and speaker labels.
+    """Divide the text of a cue into words, tags, noises, lyrics and speakers.
 
-    A label is a name in capitals before a colon and a space (``JOHN:``), at the begin of a line.
+    A label is a name in capitals before a colon and a space (``JOHN:``), at the begin of a line. A part begins at a
+    label, at a tag of one of several WebVTT voices, and at each of two or more lines that begin with a dash.
     """
-    plain = _plain(written)
-    speakers: list[str] = []
+    is_dialogue = len({name.strip() for name in _VOICE.findall(written)}) > 1
+    plain = _plain(_VOICE.sub("\n\x02\\1\x03", written) if is_dialogue else written)
+    lines = _NOISE.sub(" ", plain).split("\n")
+    has_dashes = sum(_DASH.match(line) is not None for line in lines) > 1
+    parts: list[tuple[str, list[str]]] = [("", [])]
+    for line in lines:
+        speaker, rest = _speaker_of(line, has_dashes=has_dashes)
+        if speaker is not None and not (speaker and speaker == parts[-1][0]):
+            parts.append((speaker, []))
+        parts[-1][1].append(rest)
+    spoken = [CuePart(speaker, " ".join(" ".join(words).split())) for speaker, words in parts]
+    spoken = [part for part in spoken if any(character.isalnum() for character in part.text)]
+    shown = " ".join(re.sub(r"\x02[^\x03]*\x03", "", plain).split())
+    return SpokenText(" ".join(part.text for part in spoken), shown, tuple(spoken))
 
-    def take_label(match: "re.Match[str]") -> str:
+
+def _speaker_of(line: str, *, has_dashes: bool) -> tuple[str | None, str]:
+    """Speaker who begins at a line, empty if unnamed and None if the line continues, and the words of the line."""
+    voice = _VOICE_MARK.match(line)
+    if voice:
+        return " ".join(voice[1].split()), _DASH.sub("", line[voice.end() :])
+    match = _LABEL.match(line)
+    if match:
         label = " ".join(match["label"].split())
-        if label != label.upper() or label == label.lower():
-            return match[0]
-        speakers.append(label)
-        return " "
-
-    without_noise = _NOISE.sub(" ", plain)
-    spoken = _DASH.sub(" ", _LABEL.sub(take_label, without_noise))
-    words = " ".join(spoken.split())
-    if not any(character.isalnum() for character in words):
-        words = ""
-    return SpokenText(words, " ".join(plain.split()), tuple(dict.fromkeys(speakers)))
+        if label == label.upper() and label != label.lower():
+            return label, line[match.end() :]
+    dash = _DASH.match(line)
+    if dash:
+        return ("" if has_dashes else None), line[dash.end() :]
+    return None, line
 
 
 def _plain(written: str) -> str:

@@ -18,6 +18,7 @@ from tts2face.types import Clip, Speech, Trajectory, Waveform
 
 EASE_S = 0.25  # from and to rest; a head turns back within a quarter of a second
 MARGIN_FRAMES = 0.25  # by which a padded sound ends before its last frame does, so that rounding adds no frame
+MIN_PHONE_S = 0.005  # shorter rests of a phone that is cut are dropped
 Stream = Callable[[PreparedRequest], Iterator[Piece]]
 
 
@@ -68,13 +69,18 @@ def clips_of_length(
 
 
 def first_frames(clip: Clip, n_frames: int) -> Clip:
-    """The first frames of a clip; its words are dropped where it is cut."""
+    """The first frames of a clip, with the phones and whole words that they contain."""
     if n_frames >= len(clip.motion):
         return clip
     fps, sound = clip.fps, clip.speech.waveform
     n_samples = min(round(n_frames / fps * sound.rate), len(sound.samples))
+    seconds, phones = n_samples / sound.rate, clip.speech.phones
+    n_phones = max(int(np.searchsorted(phones.edges[:-1], seconds - MIN_PHONE_S)), 1)
+    labels = [*phones.phones[:n_phones]]
     speech = Speech(
-        Waveform(sound.samples[:n_samples], sound.rate), PhoneSequence([SILENCE], [0.0, n_samples / sound.rate]), ()
+        Waveform(sound.samples[:n_samples], sound.rate),
+        PhoneSequence(labels, [*phones.edges[:n_phones], seconds]),
+        tuple(word for word in clip.speech.words if word.last <= n_phones),
     )
     return Clip(
         Trajectory(clip.motion.channels, clip.motion.values[:n_frames], fps),

@@ -1,0 +1,43 @@
+"""Checks of names that a renderer would refuse segment by segment: voices, identities and styles."""
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+from lexicon.errors import InputError
+from tts2face.catalogue import identities
+from tts2face.models.palette import Palette, load_palette
+from tts2face.session_cache import Models
+from tts2face.voice.engine import VOICE_NAMES
+
+
+def check_names(models: Models, request: Mapping[str, Any]) -> None:
+    """Refuse a voice, an identity or a style that does not exist.
+
+    Raises
+    ------
+    InputError
+        There is no such voice, identity or style, or no such model.
+    DataError
+        A model is damaged.
+    """
+    voice = request.get("voice")
+    if voice is not None and voice not in VOICE_NAMES and not str(voice).endswith(".onnx"):
+        raise InputError(f"there is no voice {voice!r}; give {', '.join(VOICE_NAMES)}, or a Piper voice (.onnx)")
+    if models.identity is not None:
+        known = _identities(models.face)
+        if models.identity not in known:
+            offered = ", ".join(known) or "none"
+            raise InputError(f"the face {models.face} has no identity {models.identity!r}; it has {offered}")
+    if request.get("style") is not None:
+        _palette(models.palette).require(str(request["style"]))
+
+
+@lru_cache(maxsize=64)
+def _identities(face: str) -> tuple[str, ...]:
+    return () if face == "self" else tuple(one.name for one in identities(face))
+
+
+@lru_cache(maxsize=8)
+def _palette(name: str) -> Palette:
+    return load_palette(name)

@@ -1,0 +1,142 @@
+"""Exports of outputs: the tracks of their segments, one after another, in files of other programs."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from lexicon.sequence import PhoneSequence
+from tts2face.batch.output import Output, Sound
+from tts2face.batch.segment import Segment
+from tts2face.clock import exact_rate, first_sample
+from tts2face.exports.formats import batch_format
+from tts2face.exports.track_json import read_track
+from tts2face.exports.writer import ExportWriter, mesh_of, plan_exports
+from tts2face.render.movie import SOUND_RATE
+from tts2face.request import OWN_FACE, Request
+from tts2face.types import Clip, Speech, Waveform
+
+if TYPE_CHECKING:
+    from tts2face.session import Session
+
+MAX_SHOWN = 3
+
+
+def check_faces(output: Output) -> None:
+    """Refuse exports of an output with several faces, whose channels differ, or of a mesh where there is none.
+
+    Raises
+    ------
+    InputError
+        It has several faces, or a talker's own face.
+    """
+    if not output.exports:
+        return
+    faces = dict.fromkeys(map(_face_of, output.segments))
+    meshes = [info.name for _, info in map(batch_format, output.exports) if info.uses_face]
+    if meshes and any(face[0] == OWN_FACE for face in faces):
+        raise InputError(f"{output.stem} shows a talker's own face, which {meshes[0]} cannot show; choose another face")
+    if len(faces) > 1:
+        shown = ", ".join(" ".join(str(part) for part in face if part) for face in list(faces)[:MAX_SHOWN])
+        raise InputError(
+            f"{output.stem} shows {len(faces)} faces ({shown}), which one export cannot hold; choose --per cue, or one "
+            "face, identity and palette for all speakers"
+        )
+
+
+class Exporter:
+    """Writes the exports of outputs; the session whose face they show is kept."""
+
+    def __init__(self) -> None:
+        self._key: tuple[str, ...] | None = None
+        self._session: Session | None = None
+
+    def write(self, output: Output, tracks: Sequence[Path], folder: Path) -> list[Path]:
+        """Write the exports of an output from the tracks of its segments; their paths, those of sounds beside included.
+
+        Raises
+        ------
+        DataError
+            A track is damaged.
+        InputError, BackendError
+            The face has no mesh, a package is missing, or the files cannot be written.
+        """
+        files = plan_exports([folder / name for name in output.names if name != output.stem + output.suffix])
+        face = None
+        if any(file.format.uses_face for file in files):
+            session = self._session_of(output)
+            gestures = Request(gestures=output.segments[0].request.get("gestures", Request().gestures))
+            face = mesh_of(session.animated_face(has_gestures=gestures.has_gestures), files)
+        with ExportWriter(files, face=face) as writer:
+            for clip in joined_clips(tracks, output.fps, output.sounds):
+                writer.add(clip)
+        return [file.path for file in files]
+
+    def _session_of(self, output: Output) -> "Session":
+        from tts2face.session import Session
+
+        models = output.segments[0].models
+        key = (models.talker, models.face, str(models.identity), models.palette)
+        if self._session is None or key != self._key:
+            self._key, self._session = (
+                key,
+                Session(models.talker, models.face, identity=models.identity, palette=models.palette),
+            )
+        return self._session
+
+
+def joined_clips(tracks: Sequence[Path], fps: float, sounds: Sequence[Sound | None] = ()) -> Iterator[Clip]:
+    """Clips of tracks in order, with their sound at `SOUND_RATE` on the samples of their frames.
+
+    Raises
+    ------
+    DataError
+        A track is damaged.
+    """
+    from tts2face.batch.track import open_track
+
+    rate, at = exact_rate(fps), 0
+    for path, sound in zip(tracks, sounds or [None] * len(tracks), strict=True):
+        for piece in read_track(path):
+            begin = first_sample(at, SOUND_RATE, rate)
+            at += len(piece.clip.motion)
+            end = first_sample(at, SOUND_RATE, rate)
+            if sound is None:
+                samples = _resampled(piece.clip.speech.waveform, end - begin)
+            else:
+                origin = first_sample(sound.offset, SOUND_RATE, rate)
+                found = open_track(Path(sound.path)).read(origin + begin, origin + end)
+                samples = (found / 32767.0).astype(np.float32)
+            yield _with_samples(piece.clip, samples)
+
+
+def _resampled(sound: Waveform, n_samples: int) -> NDArray[np.float32]:
+    """(n_samples,) samples at `SOUND_RATE`."""
+    import soxr
+
+    samples = sound.samples if sound.rate == SOUND_RATE else soxr.resample(sound.samples, sound.rate, SOUND_RATE)
+    exact = np.zeros(n_samples, np.float32)
+    n_kept = min(n_samples, len(samples))
+    exact[:n_kept] = np.clip(samples[:n_kept], -1.0, 1.0)
+    return exact
+
+
+def _with_samples(clip: Clip, samples: NDArray[np.float32]) -> Clip:
+    """A clip with other samples, whose phones end with them; they last as long to half a sample of the former rate."""
+    phones = clip.speech.phones
+    seconds = len(samples) / SOUND_RATE
+    edges = np.minimum(phones.edges, seconds)
+    edges[-1] = seconds
+    if (np.diff(edges) <= 0).any():
+        edges = phones.edges * (seconds / phones.end)
+    speech = Speech(Waveform(samples, SOUND_RATE), PhoneSequence(phones.phones, edges), clip.speech.words)
+    return replace(clip, speech=speech)
+
+
+def _face_of(segment: Segment) -> tuple[str, ...]:
+    models, gestures = segment.models, str(segment.request.get("gestures", ""))
+    return models.face, str(models.identity or ""), models.palette, "without gestures" if gestures == "none" else ""
