@@ -17,6 +17,7 @@ NOT_EXECUTED = {  # beginning of a command line: why it is parsed only
     "mimic take.mp4": PERSON,
     "mimic --camera": WINDOW,
     "worker": "runs until it is interrupted",
+    "serve --port": "runs until it is interrupted",
     "jobs show": "needs the name of a job",
     "jobs prune --store": "needs a finished batch",
     "corpus setup": "uses the network",

@@ -1,0 +1,31 @@
+"""The examples of docs/http.md, against a running service."""
+
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+import tts2face
+from tests.docs.blocks import DOCS, code_blocks
+from tests.service.conftest import RunningService
+
+EXAMPLES = code_blocks(DOCS / "http.md", "python")
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the files that the examples read."""
+    monkeypatch.chdir(tmp_path)
+    tts2face.export(tts2face.Session().clip("We were away a year ago."), tmp_path / "speech.wav")
+    Image.new("RGB", (64, 64), (20, 40, 60)).save(tmp_path / "wall.png")
+    return tmp_path
+
+
+def test_the_examples_run(service: RunningService, here: Path) -> None:
+    assert len(EXAMPLES) == 3
+    namespace: dict[str, object] = {}
+    for example in EXAMPLES:
+        assert "http://localhost:8880" in example
+        exec(compile(example.replace("http://localhost:8880", service.url), "docs/http.md", "exec"), namespace)
+    assert (here / "hello.mp4").stat().st_size > 100_000
+    assert (here / "hello.mp3").stat().st_size > 2_000
