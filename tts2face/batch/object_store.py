@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 
 from lexicon.errors import BackendError, InputError
 from tts2face.batch.segment_result import SEGMENT_SUFFIX, SegmentResult
-from tts2face.batch.store import RESULT_SUFFIX, StoreAwayError, StoredSegment, parse_result, sum_files
+from tts2face.batch.stored_segment import RESULT_SUFFIX, StoreAwayError, StoredSegment, parse_result, sum_files
 from tts2face.storage.temporary import Temporary
 
 PROBE = "tts2face-store"  # object that shows that the store can be written

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from lexicon.errors import InputError
 from tts2face.batch.manifest import JSON_NAME, read_segments
-from tts2face.batch.store import FolderStore, Store, StoredSegment
+from tts2face.batch.store import FolderStore, Store
+from tts2face.batch.stored_segment import StoredSegment
 
 MIN_AGE_S = 86_400.0  # a younger segment may belong to a batch that is being planned or has just begun
 

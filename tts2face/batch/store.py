@@ -3,37 +3,22 @@
 import json
 import shutil
 import time
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-from lexicon.errors import BackendError, DataError, InputError
-from lexicon.inputs import parse_json
-from tts2face.batch.segment_result import SEGMENT_SUFFIX, SegmentResult, result_from_json
+from lexicon.errors import BackendError, InputError
+from tts2face.batch.segment_result import SEGMENT_SUFFIX, SegmentResult
+from tts2face.batch.stored_segment import RESULT_SUFFIX, StoreAwayError, StoredSegment, parse_result, sum_files
 from tts2face.storage.files import write_atomically
 from tts2face.storage.temporary import NAME_INFIX, Temporary
 
-RESULT_SUFFIX = ".json"
 MAX_RESULT_BYTES = 1_000_000
 PAUSE_S = 5.0  # between two tries of a store that cannot be reached
 REMOTE_SCHEMES = ("s3://", "gs://", "az://", "abfs://", "file://", "memory://")
 
 
 Value = TypeVar("Value")
-
-
-class StoreAwayError(BackendError):
-    """The store cannot be reached now; another try may succeed."""
-
-
-@dataclass(frozen=True, slots=True)
-class StoredSegment:
-    """A stored segment: its files together, and when it was stored, in seconds since 1970."""
-
-    address: str
-    n_bytes: int
-    stored_s: float
 
 
 class Store(Protocol):
@@ -170,23 +155,6 @@ class FolderStore:
 
     def _path(self, address: str) -> Path:
         return self.folder / address[:2] / f"{address}{SEGMENT_SUFFIX}"
-
-
-def sum_files(files: Iterable[tuple[str, int, float]]) -> Iterator[StoredSegment]:
-    """Segments of files given by address, bytes and time; a segment has the time of its latest file."""
-    found: dict[str, StoredSegment] = {}
-    for address, n_bytes, stored_s in files:
-        other = found.get(address, StoredSegment(address, 0, 0.0))
-        found[address] = StoredSegment(address, other.n_bytes + n_bytes, max(other.stored_s, stored_s))
-    yield from found.values()
-
-
-def parse_result(content: bytes) -> SegmentResult | None:
-    """Result of its JSON; None if it is damaged, so that the segment is rendered again."""
-    try:
-        return result_from_json(parse_json(content.decode("utf-8"), "the result of a segment"))
-    except (ValueError, TypeError, AttributeError, DataError):
-        return None
 
 
 def wait_for_store(action: Callable[[], Value], on_message: Callable[[str], None]) -> Value:
