@@ -37,7 +37,20 @@ from tts2face.models.palette import Palette, load_palette, write_palette
 from tts2face.storage.files import SHIPPED_FOLDER
 
 SMALL = {"--size": "64x64", "--fps": "5"}
-LISTS = {"voices", "languages", "faces", "identities", "styles", "talkers", "formats", "phones", "completion", "jobs", "serve", "keys"}
+LISTS = {
+    "voices",
+    "languages",
+    "faces",
+    "identities",
+    "styles",
+    "talkers",
+    "formats",
+    "phones",
+    "completion",
+    "jobs",
+    "serve",
+    "keys",
+}
 TOOLS = {"corpus", "report", "convert", "face"}
 OWN_LINES = [(page.name, line) for page in PAGES for line in shell_lines(page) if own_commands(line)]
 EXECUTED = [
