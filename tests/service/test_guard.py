@@ -10,7 +10,8 @@ from typing import Any
 import httpx
 import pytest
 
-from tts2face.service.guard import Guard, Receive, Scope, Send
+from tts2face.service.exchange import Receive, Scope, Send
+from tts2face.service.guard import Guard
 from tts2face.service.keys import add_key
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.state import ServiceState

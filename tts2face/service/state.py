@@ -18,7 +18,7 @@ from tts2face.service.settings import ServiceSettings
 from tts2face.service.work import Work
 
 if TYPE_CHECKING:
-    from tts2face.service.guard import _Request
+    from tts2face.service.exchange import Exchange
 
 LOG = logging.getLogger("tts2face.service")
 WARM_TEXT = "Hello there."
@@ -71,7 +71,7 @@ class ServiceState:
             self.metrics.failures.labels(refused.code).inc()
             raise refused from error
 
-    def record(self, request: "_Request", key: ApiKey | None) -> None:
+    def record(self, request: "Exchange", key: ApiKey | None) -> None:
         """Log and count a finished request."""
         route = request.scope.get("route")
         path = getattr(route, "path", "other")
