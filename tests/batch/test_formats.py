@@ -15,7 +15,7 @@ from tests.batch.test_run import AAC_SMEAR_S, decoded, manifest, spans
 from tests.render.tiny_talker import own_talker
 from tests.synthesis.fake_voice import LEAD, LETTER, FakeVoice
 from tts2face import load_clip
-from tts2face.batch.cast import Cast, Models, Role
+from tts2face.batch.cast import Cast, Role
 from tts2face.batch.options import BatchOptions
 from tts2face.batch.plan import plan_batch
 from tts2face.batch.render_segment import _writer
@@ -26,6 +26,7 @@ from tts2face.exports.formats import batch_format, sound_name
 from tts2face.render.own_face import OwnFaceRenderer, own_face_renderer
 from tts2face.render.picture import Picture
 from tts2face.request import Request
+from tts2face.session_cache import Models
 
 CUES = ((0.5, "Hello there"), (2.5, "Good morning to you all"), (10.0, "Bob may move"))
 

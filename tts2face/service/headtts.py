@@ -3,7 +3,6 @@
 import asyncio
 import base64
 import datetime
-import json
 import re
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any, Literal
@@ -14,10 +13,12 @@ from fastapi import Request as HttpRequest
 from fastapi.responses import JSONResponse, PlainTextResponse
 from pydantic import BaseModel, ConfigDict, Field
 
+from lexicon.errors import DataError
+from lexicon.inputs import parse_json
 from tts2face.exports.labels import Label
 from tts2face.render.sound_stream import wav_header
 from tts2face.service.answers import service_state, timed_speech
-from tts2face.service.errors import RefusedError
+from tts2face.service.errors import ErrorBody, RefusedError
 from tts2face.service.names import check_voice
 
 router = APIRouter(tags=["headtts"])
@@ -71,7 +72,9 @@ class HeadTtsAudio(BaseModel):
     phonemes: list[str]
 
 
-OWN_ERRORS: dict[int | str, dict[str, Any]] = {status: {"model": HeadTtsError} for status in (400, 413, 429, 503)}
+OWN_ERRORS: dict[int | str, dict[str, Any]] = {
+    status: {"model": HeadTtsError | ErrorBody} for status in (400, 413, 429, 503)
+}
 
 
 @router.post(
@@ -112,8 +115,8 @@ async def socket(connection: WebSocket) -> None:
 
 def _read_message(text: str) -> dict[str, Any]:
     try:
-        message = json.loads(text)
-    except (ValueError, RecursionError):
+        message = parse_json(text, "the message")
+    except DataError:
         return {}
     return message if isinstance(message, dict) else {}
 

@@ -1,13 +1,14 @@
 """Live streams for avatars: text comes in word by word, speech, phones and curves go out with their times."""
 
 import asyncio
-import json
 from contextlib import aclosing, suppress
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from lexicon.errors import DataError
+from lexicon.inputs import parse_json
 from tts2face.service.errors import RefusedError
 from tts2face.service.messages import MessageKind
 from tts2face.service.names import check_models, check_voice
@@ -78,10 +79,10 @@ async def _receive(connection: WebSocket, inputs: "asyncio.Queue[Any]") -> bool:
     """Pass the client's messages on; True after ``end``, False when the client has left."""
     while True:
         try:
-            content = json.loads(await connection.receive_text())
+            content = parse_json(await connection.receive_text(), "the message")
         except (WebSocketDisconnect, KeyError):
             return False
-        except (ValueError, RecursionError):
+        except DataError:
             content = None
         if not isinstance(content, dict) or content.get("type") not in INPUT_TYPES:
             await connection.send_json(
