@@ -10,6 +10,7 @@ import numpy as np
 
 from lexicon.errors import InputError
 from tts2face.render.write_buffer import WriteBuffer
+from tts2face.storage.wave_files import pcm_bytes
 from tts2face.types import Chunk, Waveform
 
 UNKNOWN_BYTES = 0xFFFFFFFF  # size of a WAV file that is not yet known; players read to the end of the stream
@@ -82,11 +83,6 @@ def wav_header(rate: int, n_bytes: int | None) -> bytes:
     ))  # fmt: skip
 
 
-def pcm_bytes(sound: Waveform) -> bytes:
-    """Samples as 16-bit integers, low byte first."""
-    return np.round(np.clip(sound.samples, -1.0, 1.0) * 32767).astype("<i2").tobytes()
-
-
 class _PcmEncoder:
     """Encoder without compression."""
 
@@ -95,7 +91,7 @@ class _PcmEncoder:
 
     def add(self, sound: Waveform) -> bytes:
         header, self._header = self._header, b""
-        return header + pcm_bytes(sound)
+        return header + pcm_bytes(sound.samples)
 
     def finish(self) -> bytes:
         return b""

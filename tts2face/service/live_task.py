@@ -129,6 +129,6 @@ def _speech_event(piece: "Piece") -> Event:
 
 
 def _sound(clip: Clip) -> Chunk:
-    from tts2face.render.sound_stream import pcm_bytes
+    from tts2face.storage.wave_files import pcm_bytes
 
-    return Chunk(pcm_bytes(clip.speech.waveform), clip.speech.waveform.duration)
+    return Chunk(pcm_bytes(clip.speech.waveform.samples), clip.speech.waveform.duration)

@@ -12,7 +12,7 @@ from typing import Any
 from lexicon.errors import BackendError
 from tts2face.render.movie_stream import MOVIE_KINDS
 from tts2face.render.sound_stream import SOUND_KINDS
-from tts2face.service.messages import Message, MessageKind
+from tts2face.service.messages import Message
 from tts2face.service.warm_process import ProcessEndedError, WarmProcess
 from tts2face.service.work import Work
 
@@ -199,8 +199,3 @@ class Pool:
                 queue.remove(next(one for one in queue if one[2] is future))
             if not queue:
                 del self._waiting[key]
-
-
-def is_end(message: Message) -> bool:
-    """Whether a message is the last one of its work."""
-    return message.kind == MessageKind.END

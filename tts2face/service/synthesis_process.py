@@ -19,8 +19,6 @@ from tts2face.service.tasks import TASKS
 from tts2face.service.work import Work, work_from_json
 from tts2face.session_cache import Models, SessionCache
 
-WARM_TEXT = "Hello there."
-
 
 class SynthesisProcess:
     """Executes commands: start, cancel, pause, resume, input."""

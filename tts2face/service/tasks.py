@@ -24,7 +24,7 @@ def timed_speech(session: "Session", work: Work, _: Inputs) -> Iterator[Event | 
     """For each sentence an event with its words, phones and visemes in seconds of the whole, then its sound (PCM)."""
     from tts2face.exports.labels import Label
     from tts2face.exports.visemes import viseme_labels
-    from tts2face.render.sound_stream import pcm_bytes
+    from tts2face.storage.wave_files import pcm_bytes
 
     for timed in session.stream_speech(Request(**work.request)):
         spoken, phones, begin = timed.speech, timed.speech.phones, timed.begin
@@ -37,7 +37,7 @@ def timed_speech(session: "Session", work: Work, _: Inputs) -> Iterator[Event | 
             "visemes": [[viseme.text, viseme.start, viseme.end, label.text]
                         for label in labels for viseme in viseme_labels(label, "oculus")],
         })  # fmt: skip
-        yield Chunk(pcm_bytes(spoken.waveform), spoken.waveform.duration)
+        yield Chunk(pcm_bytes(spoken.waveform.samples), spoken.waveform.duration)
 
 
 TASKS: Mapping[str, Callable[["Session", Work, Inputs], Iterator[Chunk | Event | Wait]]] = {
