@@ -12,13 +12,12 @@ from starlette.datastructures import FormData
 
 from tts2face.service.answers import service_state, stream_work
 from tts2face.service.errors import RefusedError
-from tts2face.service.names import check_background, check_models, check_voice
+from tts2face.service.names import MODEL_FIELDS, check_background, check_models, check_voice
 from tts2face.service.uploads import MAX_TEXT_BYTES, UploadFolder, upload_folder
 from tts2face.synthesis.byte_stream import MEDIA_TYPES
 
 router = APIRouter(prefix="/v1", tags=["clips"])
 
-MODEL_FIELDS = ("talker", "face", "identity", "palette")
 FILES = ("audio", "background", "timeline")
 PICTURE_FIELDS = ("size", "camera", "background", "supersampling")
 Format = Literal["mp4", "webm", "mp3", "opus", "aac", "flac", "wav", "pcm", "curves", "oculus", "azure", "livelink"]

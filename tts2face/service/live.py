@@ -11,12 +11,11 @@ from lexicon.errors import DataError
 from lexicon.inputs import parse_json
 from tts2face.service.errors import RefusedError
 from tts2face.service.messages import MessageKind
-from tts2face.service.names import check_models, check_voice
+from tts2face.service.names import MODEL_FIELDS, check_models, check_voice
 from tts2face.service.state import ServiceState
 
 router = APIRouter(tags=["live"])
 
-MODEL_FIELDS = ("talker", "face", "identity", "palette")
 INPUT_TYPES = frozenset({"text", "flush", "cancel", "end"})
 INVALID = 1007  # WebSocket close code: a message is not what it should be
 

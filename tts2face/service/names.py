@@ -11,6 +11,7 @@ from tts2face.service.errors import RefusedError
 
 COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
 MODEL_KINDS = ("talker", "face", "palette")
+MODEL_FIELDS = (*MODEL_KINDS, "identity")  # of a request; those of `tts2face.session_cache.Models`
 
 
 def known_names(kind: str) -> tuple[str, ...]:

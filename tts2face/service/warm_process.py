@@ -9,19 +9,13 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
-from tts2face.batch.render_process import RETURNED_BLOCKS
+from lexicon.errors import BackendError
+from tts2face.batch.render_process import KINDS, RETURNED_BLOCKS
 from tts2face.service.messages import HEADER, MAX_PAYLOAD_BYTES, Message, MessageKind
 from tts2face.service.work import Work
 
-KINDS: Mapping[str, type[Tts2faceError]] = {
-    "InputError": InputError,
-    "DataError": DataError,
-    "BackendError": BackendError,
-}
 PAUSE_BYTES = 8 << 20  # of a result that nobody has read yet, beyond which its task is paused
 RESUME_BYTES = 2 << 20
-START_TIMEOUT_S = 180.0  # the first start on a machine compiles kernels
 
 
 class ProcessEndedError(BackendError):
