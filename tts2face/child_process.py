@@ -1,8 +1,45 @@
-"""Termination of child processes together with their parent process, however the parent ends."""
+"""Child processes that answer requests: their cores, environment and pipes, and their end with their parent."""
 
 import os
+import queue
+import sys
 import threading
 from collections.abc import Callable
+from typing import BinaryIO
+
+# glibc returns blocks of 1 MiB and more to the system, instead of keeping those of each thread (decision 064).
+RETURNED_BLOCKS = {"MALLOC_MMAP_THRESHOLD_": "1048576", "MALLOC_TRIM_THRESHOLD_": "1048576"}
+
+
+def child_environment(core: int | None) -> dict[str, str]:
+    """Environment of a child process that is bound to a core, or to none."""
+    threads = {} if core is None else {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    return dict(os.environ) | RETURNED_BLOCKS | threads
+
+
+def bind_to_core(core: int | None) -> None:
+    """Bind this process to a core, where the system can; None: to none."""
+    if core is not None and hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {core})
+
+
+def claim_standard_output() -> BinaryIO:
+    """Standard output for answers alone; whatever a library prints goes to standard error from now on."""
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    return answers
+
+
+def request_lines() -> "queue.Queue[bytes]":
+    """Lines of standard input as they arrive; this process exits when the input ends."""
+    lines: queue.Queue[bytes] = queue.Queue()
+
+    def read_lines() -> None:
+        while line := sys.stdin.buffer.readline():
+            lines.put(line)
+
+    exit_after(read_lines)
+    return lines
 
 
 def exit_after(wait: Callable[[], object]) -> None:

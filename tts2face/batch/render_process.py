@@ -5,8 +5,6 @@ of the requests closes then.
 """
 
 import json
-import os
-import queue
 import subprocess
 import sys
 import tempfile
@@ -17,14 +15,12 @@ from typing import TYPE_CHECKING, Any
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
 from tts2face.batch.segment import Segment, segment_from_json
 from tts2face.batch.segment_result import SegmentResult, result_from_json
-from tts2face.child_process import exit_after
+from tts2face.child_process import bind_to_core, child_environment, claim_standard_output, request_lines
 
 if TYPE_CHECKING:
     from tts2face.batch.render_segment import SegmentRenderer
 
 KINDS: dict[str, type[Tts2faceError]] = {"InputError": InputError, "DataError": DataError, "BackendError": BackendError}
-# glibc returns blocks of 1 MiB and more to the system, instead of keeping those of each thread (decision 064).
-RETURNED_BLOCKS = {"MALLOC_MMAP_THRESHOLD_": "1048576", "MALLOC_TRIM_THRESHOLD_": "1048576"}
 MAX_SHOWN_CHARACTERS = 300  # of the standard error of a child that ended
 
 
@@ -85,16 +81,14 @@ class RenderProcess:
             self._end()
 
     def _start(self) -> subprocess.Popen[bytes]:
-        environment = dict(os.environ) | RETURNED_BLOCKS
-        if self._core is not None:
-            environment |= {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the child
         arguments = [sys.executable, "-m", "tts2face.batch.render_process"]
         if self._core is not None:
             arguments.append(str(self._core))
         self._child = subprocess.Popen(
-            arguments, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, env=environment
-        )
+            arguments, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors,
+            env=child_environment(self._core),
+        )  # fmt: skip
         return self._child
 
     def _end(self) -> str:
@@ -117,17 +111,8 @@ class RenderProcess:
 
 def main() -> None:
     """Answer requests until standard input ends."""
-    if len(sys.argv) > 1 and hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, {int(sys.argv[1])})
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever a library prints must not mix with the answers
-    requests: queue.Queue[bytes] = queue.Queue()
-
-    def read_requests() -> None:
-        while line := sys.stdin.buffer.readline():
-            requests.put(line)
-
-    exit_after(read_requests)
+    bind_to_core(int(sys.argv[1]) if len(sys.argv) > 1 else None)
+    answers, requests = claim_standard_output(), request_lines()
     from tts2face.batch.render_segment import SegmentRenderer  # a second of imports, only in the child
 
     renderer = SegmentRenderer()

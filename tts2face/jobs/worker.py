@@ -237,11 +237,11 @@ class Worker:
 
 def main() -> None:
     """Run one worker that ends with its parent: ``python -m tts2face.jobs.worker DATABASE STORE CORE``."""
-    from tts2face.child_process import exit_after
+    from tts2face.child_process import bind_to_core, exit_after
 
     database, store, core = sys.argv[1:4]
-    if hasattr(os, "sched_setaffinity") and core.isdecimal():
-        os.sched_setaffinity(0, {int(core)})
+    bound = int(core) if core.isdecimal() else None
+    bind_to_core(bound)
 
     def wait_for_parent() -> None:
         while os.read(0, 1):
@@ -249,7 +249,6 @@ def main() -> None:
 
     exit_after(wait_for_parent)
     write = sys.stderr.write
-    bound = int(core) if core.isdecimal() else None
     try:
         Worker(database, store, core=bound, on_message=lambda text: _say(write, text)).run()
     except Tts2faceError as wrong:

@@ -5,14 +5,13 @@ messages go to standard output. It ends with the server, as its standard input c
 """
 
 import json
-import os
 import queue
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any, BinaryIO
 
-from tts2face.child_process import exit_after
+from tts2face.child_process import bind_to_core, claim_standard_output, request_lines
 from tts2face.service.messages import Message, MessageKind
 from tts2face.service.scheduler import Scheduler, Step
 from tts2face.service.tasks import TASKS
@@ -70,17 +69,8 @@ class SynthesisProcess:
 def main() -> None:
     """Execute commands until standard input ends."""
     settings = json.loads(sys.argv[1])
-    if settings.get("core") is not None and hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, {settings["core"]})
-    messages = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever a library prints must not mix with the messages
-    commands: queue.Queue[bytes] = queue.Queue()
-
-    def read_commands() -> None:
-        while line := sys.stdin.buffer.readline():
-            commands.put(line)
-
-    exit_after(read_commands)
+    bind_to_core(settings.get("core"))
+    messages, commands = claim_standard_output(), request_lines()
     process = SynthesisProcess(messages, settings["n_sessions"])
     process.warm_up(settings["warm"])
     while True:

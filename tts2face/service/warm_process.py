@@ -2,7 +2,6 @@
 
 import asyncio
 import json
-import os
 import sys
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import suppress
@@ -10,7 +9,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lexicon.errors import BackendError
-from tts2face.batch.render_process import KINDS, RETURNED_BLOCKS
+from tts2face.batch.render_process import KINDS
+from tts2face.child_process import child_environment
 from tts2face.service.messages import HEADER, MAX_PAYLOAD_BYTES, Message, MessageKind
 from tts2face.service.work import Work
 
@@ -61,8 +61,8 @@ class WarmProcess:
         while not self.is_closed:
             self._child = await asyncio.create_subprocess_exec(
                 sys.executable, "-m", "tts2face.service.synthesis_process", json.dumps(dict(self._settings)),
-                stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, env=_environment(self._settings),
-                limit=1 << 20,
+                stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
+                env=child_environment(self._settings.get("core")), limit=1 << 20,
             )  # fmt: skip
             try:
                 await self._distribute(self._child)
@@ -175,10 +175,3 @@ class WarmProcess:
             await child.wait()
         for result in self._results.values():
             result.messages.put_nowait(None)
-
-
-def _environment(settings: Mapping[str, Any]) -> dict[str, str]:
-    environment = dict(os.environ) | RETURNED_BLOCKS
-    if settings.get("core") is not None:
-        environment |= {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    return environment
