@@ -26,6 +26,12 @@ class Metrics:
         self.failures = Counter("tts2face_failures", "Failed works by kind.", ["kind"], registry=self.registry)
         self.speech = Counter("tts2face_speech_seconds", "Seconds of speech made.", registry=self.registry)
         self.cpu = Counter("tts2face_synthesis_seconds", "Seconds that processes spent on it.", registry=self.registry)
+        self.cancel = Histogram(
+            "tts2face_cancel_seconds", "Seconds until a cancelled work had released what it held.",
+            buckets=LATENCY_BUCKETS_S, registry=self.registry,
+        )  # fmt: skip
+        for process in pool.processes:
+            process.on_cancelled = self.cancel.observe
         gauges = {
             "tts2face_processes_ready": ("Synthesis processes that are ready.", lambda: pool.n_ready),
             "tts2face_waiting": ("Requests that wait for a process.", lambda: pool.n_waiting),

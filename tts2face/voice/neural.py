@@ -14,7 +14,7 @@ from lexicon.errors import BackendError, DataError, InputError
 from lexicon.ipa import Segment
 from lexicon.phones import nearest_phones
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tts2face.speech.forced_alignment import Aligner, enforce_increasing
+from tts2face.speech.forced_alignment import Aligner, SpeechAligner, enforce_increasing
 from tts2face.telemetry import disable_telemetry
 from tts2face.types import Speech, Waveform, concatenate_speech
 from tts2face.voice.engine import PronunciationMap, SpeechInput, SpokenWord, apply_volume
@@ -54,9 +54,15 @@ class _Token:
 
 
 class NeuralVoice:
-    """The voice ``heart``: American English, 24 kHz. Not thread-safe."""
+    """The voice ``heart``: American English, 24 kHz. Not thread-safe.
 
-    def __init__(self, own_words: PronunciationMap) -> None:
+    Parameters
+    ----------
+    aligner
+        Aligns its sound with its phones; None for an aligner of its own.
+    """
+
+    def __init__(self, own_words: PronunciationMap, aligner: SpeechAligner | None = None) -> None:
         self._own_words = {word: segments_to_letters(segments) for word, segments in own_words.items()}
         disable_telemetry()
         try:
@@ -65,7 +71,7 @@ class NeuralVoice:
             raise BackendError("the voice heart needs hibari-tts; run: pip install hibari-tts") from missing
         self._model: Any = Hibari(voice="heart", threads=1)
         self._model.sess = _session_without_arena(self._model.model_path)
-        self._aligner = Aligner()
+        self._aligner: SpeechAligner = aligner or Aligner()
 
     @property
     def sample_rate(self) -> int:
