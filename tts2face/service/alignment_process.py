@@ -2,7 +2,7 @@
 
 Started as ``python -m tts2face.service.alignment_process``. A job is a line of JSON (number, rate, number of samples,
 words with pronunciations) and the samples as float32; its answer is a line of JSON with its number. The process loads
-the acoustic model and forks a worker; on `CANCEL` it ends the worker and forks another one, which takes some milliseconds,
+the acoustic model and forks a worker; on `CANCEL` it ends the worker, forks another one within some milliseconds,
 and answers ``null``.
 """
 
