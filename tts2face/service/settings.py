@@ -10,6 +10,7 @@ from typing import Any
 
 from lexicon.errors import InputError
 from lexicon.inputs import check_limits, read_text
+from tts2face.storage.user_folders import user_data
 
 PREFIX = "TTS2FACE_SERVE_"  # of environment variables: TTS2FACE_SERVE_PORT
 LOCAL_HOSTS = ("localhost", "127.0.0.1", "::1")
@@ -40,6 +41,10 @@ class ServiceSettings:
     talker: str = setting("grid_s1", "Talker of requests that name none.")
     face: str = setting("head", "Face of requests that name none.")
     palette: str = setting("starter", "Palette of requests that name none.")
+    data: Path | None = setting(None, "Folder of jobs, results and uploads; by default one of the user's.")
+    database: str = setting("", "SQLite file or postgresql://...; empty: service.sqlite in the data folder.")
+    store: str = setting("", "Folder or s3://, gs://, az:// of segments and results; empty: in the data folder.")
+    workers: int = setting(1, "Job workers of this server; 0: only those of `tts2face worker`.", (0, 256))
     processes: int = setting(0, "Synthesis processes; 0: one for each core.", (0, 256))
     sessions: int = setting(2, "Sets of talker, face and palette that each process keeps in memory.", (1, 16))
     waiting: int = setting(64, "Requests that may wait for a process; further ones are refused with 429.", (0, 10_000))
@@ -65,6 +70,21 @@ class ServiceSettings:
     def allowed_hosts(self) -> frozenset[str]:
         """Host names that requests may name."""
         return frozenset({*LOCAL_HOSTS, self.host, *self.hosts})
+
+    @property
+    def data_folder(self) -> Path:
+        """Folder of the service's data."""
+        return self.data if self.data is not None else user_data() / "service"
+
+    @property
+    def database_place(self) -> str:
+        """SQLite file or PostgreSQL URL of the jobs."""
+        return self.database or str(self.data_folder / "service.sqlite")
+
+    @property
+    def store_place(self) -> str:
+        """Folder or URL of segments and results."""
+        return self.store or str(self.data_folder / "store")
 
     def as_toml(self) -> str:
         """The settings as a settings file."""
@@ -154,7 +174,7 @@ def _parse(one: Any, text: str, source: str) -> Any:
 
 
 def _kind(one: Any) -> Any:
-    if one.name == "keys":
+    if one.name in {"keys", "data"}:
         return Path
     return tuple if isinstance(one.default, tuple) else type(one.default)
 
