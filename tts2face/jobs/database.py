@@ -89,6 +89,16 @@ def shown_url(url: str) -> str:
     return f"{scheme}://{user.partition(':')[0]}@{after}"
 
 
+def open_engine(url: str) -> Any:
+    """SQLAlchemy engine of a database of `database_url`, with few connections and limits of waiting."""
+    import sqlalchemy
+
+    is_file = url.startswith("sqlite")
+    arguments: dict[str, Any] = {"timeout": 30.0} if is_file else {"connect_timeout": 5}
+    engine_url = url if is_file else url.replace("postgresql://", "postgresql+psycopg://", 1)
+    return sqlalchemy.create_engine(engine_url, pool_pre_ping=True, connect_args=arguments, **CONNECTIONS)
+
+
 class Workers:
     """Table of workers with the time of their last sign of life, by the clock of the database."""
 
@@ -96,11 +106,8 @@ class Workers:
         import sqlalchemy
 
         self._sql = sqlalchemy.text
-        kind = "sqlite" if url.startswith("sqlite") else "postgresql"
-        self._now = _NOW[kind]
-        arguments: dict[str, Any] = {"timeout": 30.0} if kind == "sqlite" else {"connect_timeout": 5}
-        engine_url = url if kind == "sqlite" else url.replace("postgresql://", "postgresql+psycopg://", 1)
-        self._engine = sqlalchemy.create_engine(engine_url, pool_pre_ping=True, connect_args=arguments, **CONNECTIONS)
+        self._now = _NOW["sqlite" if url.startswith("sqlite") else "postgresql"]
+        self._engine = open_engine(url)
 
     def __enter__(self) -> "Workers":
         """Return itself."""

@@ -55,6 +55,8 @@ def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> N
         if kind not in {DICTIONARY, CHARACTER}:
             _check_type(kind, source)
         _describe(_CHECKS[kind](source, folder / CONTENT), folder)
+        if kind != DICTIONARY:
+            draw_resource(FACE if kind == CHARACTER else kind, folder / CONTENT, folder / PICTURE)
     except (DataError, InputError, BackendError) as error:
         raise RefusedFileError(_sentence(error, source, folder)) from error
     except MemoryError as error:
