@@ -32,7 +32,7 @@ def serve(
 
 
 @keys.command
-def add(
+def add(  # noqa: PLR0913 - one parameter a flag
     name: Annotated[str, Parameter(help="Name of the key, in the log and the metrics.")],
     /,
     *,
@@ -40,9 +40,11 @@ def add(
     scope: Annotated[list[str] | None, Parameter(help="speak, build, admin; several possible.")] = None,
     requests_per_minute: Annotated[int | None, whole_number("Requests a minute.")] = None,
     concurrent: Annotated[int | None, whole_number("Requests at the same time.")] = None,
+    resources: Annotated[int | None, whole_number("Uploads that it may have.")] = None,
+    resources_mb: Annotated[float | None, Parameter(help="MB of its uploads.")] = None,
 ) -> None:
     """Create a key and print it; the file holds only its hash."""
     from tts2face.service.keys import add_key
 
-    limits = {"requests_per_minute": requests_per_minute, "concurrent": concurrent}
-    print(add_key(file, name, scope or ["speak"], **limits))  # noqa: T201 - the result
+    limits = {"requests_per_minute": requests_per_minute, "concurrent": concurrent, "resources": resources}
+    print(add_key(file, name, scope or ["speak"], resources_mb=resources_mb, **limits))  # noqa: T201 - the result

@@ -7,6 +7,7 @@ from typing import Any
 from lexicon.errors import BackendError
 
 NOW = {"sqlite": "(julianday('now') - 2440587.5) * 86400.0", "postgresql": "EXTRACT(EPOCH FROM clock_timestamp())"}
+CONNECTIONS = {"pool_size": 1, "max_overflow": 2}  # of a process to a table; one of them stays open
 LOCK_KEY = 5_742_301  # of PostgreSQL's advisory lock for changes of jobs
 # SQLite begins a transaction, and takes its lock for writing, with the first statement that changes something.
 _LOCK = {"sqlite": "DELETE FROM tts2face_jobs WHERE id = ''", "postgresql": f"SELECT pg_advisory_xact_lock({LOCK_KEY})"}
@@ -21,7 +22,9 @@ def database_kind(url: str) -> str:
     return "sqlite" if url.startswith("sqlite") else "postgresql"
 
 
-def open_engine(url: str, connections: Mapping[str, Any], *, connect_s: int = 5, options: str = "") -> Any:
+def open_engine(
+    url: str, connections: Mapping[str, Any] = CONNECTIONS, *, connect_s: int = 5, options: str = ""
+) -> Any:
     """Engine of SQLAlchemy for a URL of `tts2face.jobs.database.database_url`.
 
     Parameters

@@ -20,7 +20,6 @@ WORKFLOW = "render_segment"
 JOB_QUEUE, JOB_WORKFLOW = "tts2face-jobs", "run_job"  # of the service; a job waits for its segments
 BEAT_S = 1.5  # between two signs of life of a worker
 DEAD_AFTER_S = 6.0  # without a sign of life; with the interval of looking this is below 10 s
-CONNECTIONS = {"pool_size": 1, "max_overflow": 2}  # of a process to the table of workers; one of them stays open
 POSTGRES_SCHEMES = ("postgresql://", "postgres://", "postgresql+psycopg://")
 _TABLE = """
 CREATE TABLE IF NOT EXISTS tts2face_workers (
@@ -104,7 +103,7 @@ class Workers:
 
         self._sql = sqlalchemy.text
         self._now = NOW[database_kind(url)]
-        self._engine = open_engine(url, CONNECTIONS)
+        self._engine = open_engine(url)
 
     def __enter__(self) -> "Workers":
         """Return itself."""

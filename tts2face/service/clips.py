@@ -12,7 +12,7 @@ from starlette.datastructures import FormData
 
 from tts2face.service.answers import service_state, stream_work
 from tts2face.service.errors import RefusedError
-from tts2face.service.names import MODEL_FIELDS, check_background, check_models, check_voice
+from tts2face.service.names import MODEL_FIELDS, check_background, check_voice, resolve_dictionary, resolve_models
 from tts2face.service.uploads import MAX_TEXT_BYTES, UploadFolder, upload_folder
 from tts2face.synthesis.byte_stream import MEDIA_TYPES
 
@@ -48,6 +48,7 @@ class ClipRequest(BaseModel):
     face: Annotated[str | None, Field(description="A face of GET /v1/faces, or self.")] = None
     identity: Annotated[str | None, Field(description="Identity preset of the face.")] = None
     palette: Annotated[str | None, Field(description="A palette of GET /v1/palettes.")] = None
+    dictionary: Annotated[str | None, Field(description="A dictionary of GET /v1/dictionaries.")] = None
     size: Annotated[str, Field(description="Width x height in pixels.", examples=["512x512"])] = "auto"
     camera: Annotated[str, Field(description="front, three-quarter, profile, close, or yaw,pitch.")] = "front"
     background: Annotated[str, Field(description="studio, transparent, or a colour.", examples=["#204060"])] = "studio"
@@ -124,7 +125,9 @@ async def _answer(
     format = given.pop("format", "mp4")
     models = {name: given.pop(name) for name in MODEL_FIELDS if name in given}
     picture = {name: given.pop(name) for name in PICTURE_FIELDS if name in given}
-    check_models(models)
+    library, key = service_state(request).library, request.state.key
+    models = await resolve_models(library, key, models)
+    given = await resolve_dictionary(library, key, given)
     check_voice(given.get("voice"))
     check_background(picture.get("background", "studio"))
     if "background" in files:

@@ -1,33 +1,37 @@
 """Decoding of an uploaded file in a process of its own, with limits of memory, time and files, and without a network.
 
 ``python -m tts2face.service.decode_process KIND SOURCE TARGET LIMIT``: a file becomes a plain one (sound: mono .wav at
-48 kHz; picture: .png). LIMIT is the largest duration in seconds, or the largest number of pixels. The exit code is
-0, or 2 with one sentence on standard error.
+48 kHz; picture: .png); a resource (talker, face, palette, dictionary) is checked and written, with its description and
+picture, into the folder TARGET; ``draw-`` and its kind draw the picture TARGET only. LIMIT is
+the largest duration in seconds, number of pixels, or size in bytes. The exit code is 0, or 2 with one sentence on
+standard error.
 """
 
 import ctypes
+import os
 import sys
 from pathlib import Path
 
-SOUND, PICTURE = "sound", "picture"
+from tts2face.service.refused_file import RefusedFileError
+from tts2face.service.resource_check import RESOURCE_KINDS, check_resource, draw_resource
+
+SOUND, PICTURE, DRAW = "sound", "picture", "draw-"
 MEMORY_BYTES, CPU_S, FILE_BYTES, N_FILES = 2 << 30, 60, 1 << 30, 64
+RESOURCE_MEMORY_BYTES, RESOURCE_CPU_S = 3 << 30, 180  # with its picture, and the compilation of kernels at first use
 NEW_USERS, NEW_NETWORK = 0x10000000, 0x40000000  # flags of unshare in Linux's sched.h
 SOUND_RATE = 48_000  # Hz
 SOUND_FORMATS = "wav,mp3,ogg,flac,aac,mov,mp4,m4a,matroska,webm,aiff,caf"
 PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TIFF")
 REFUSED = 2
+LOW_PRIORITY = 10
 
 
-class RefusedFileError(Exception):
-    """The file is not what it should be."""
-
-
-def limit_process() -> None:
+def limit_process(memory_bytes: int = MEMORY_BYTES, cpu_s: int = CPU_S) -> None:
     """Limit memory, processor time and files of this process, and leave the network where the system allows it."""
     import resource
 
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-    resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
+    resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))
+    resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s))
     resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
     resource.setrlimit(resource.RLIMIT_NOFILE, (N_FILES, N_FILES))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -89,13 +93,32 @@ def decode_picture(source: Path, target: Path, max_pixels: float) -> None:
         raise RefusedFileError("it is no picture that can be decoded") from error
 
 
+def decode(kind: str, source: Path, target: Path, limit: float) -> None:
+    """Decode or check one file of a kind.
+
+    Raises
+    ------
+    RefusedFileError
+        It is not what it should be.
+    """
+    if kind in RESOURCE_KINDS:
+        check_resource(kind, source, target, limit)
+    elif kind.startswith(DRAW):
+        draw_resource(kind.removeprefix(DRAW), source, target)
+    else:
+        {SOUND: decode_sound, PICTURE: decode_picture}[kind](source, target, limit)
+
+
 def main() -> int:
     """Decode one file."""
     kind, source, target, limit = sys.argv[1:]
-    limit_process()
-    decode = {SOUND: decode_sound, PICTURE: decode_picture}[kind]
+    if kind in {SOUND, PICTURE}:
+        limit_process()
+    else:
+        limit_process(RESOURCE_MEMORY_BYTES, RESOURCE_CPU_S)
+        os.nice(LOW_PRIORITY)  # streams go first
     try:
-        decode(Path(source), Path(target), float(limit))
+        decode(kind, Path(source), Path(target), float(limit))
     except RefusedFileError as refused:
         sys.stderr.write(str(refused))
         return REFUSED

@@ -17,7 +17,9 @@ SCOPES = ("speak", "build", "admin")  # synthesis; uploads and talkers; everybod
 KEY_PREFIX = "t2f_"
 N_KEY_BYTES = 32
 MAX_FILE_BYTES = 1_000_000
-NAMES = {"name", "hash", "scopes", "requests_per_minute", "concurrent"}
+LIMITS = ("requests_per_minute", "concurrent", "resources", "resources_mb")
+MAX_LIMIT = 1e9
+NAMES = {"name", "hash", "scopes", *LIMITS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +32,8 @@ class ApiKey:
         SHA-256 of the key, hexadecimal; a key has 256 random bits, so that no slow hash is needed.
     requests_per_minute, concurrent
         Limits; None: none.
+    resources, resources_mb
+        Uploads and their MB; None: those of the settings.
     """
 
     name: str
@@ -37,6 +41,8 @@ class ApiKey:
     scopes: tuple[str, ...] = ("speak",)
     requests_per_minute: int | None = None
     concurrent: int | None = None
+    resources: int | None = None
+    resources_mb: float | None = None
 
 
 LOCAL_KEY = ApiKey("local", "", SCOPES)  # of requests to a service without keys
@@ -72,7 +78,7 @@ def read_keys(path: Path) -> tuple[ApiKey, ...]:
     return tuple(_key(path, one) for one in content.get("key", []))
 
 
-def add_key(path: Path, name: str, scopes: Sequence[str], **limits: int | None) -> str:
+def add_key(path: Path, name: str, scopes: Sequence[str], **limits: Any) -> str:
     """Add a key to a file, which is created if needed; returns the secret, which is stored nowhere.
 
     Raises
@@ -95,11 +101,7 @@ def write_keys(path: Path, keys: Sequence[ApiKey]) -> None:
     for key in keys:
         _check_scopes(key.scopes)
         lines = [f'name = "{key.name}"', f'hash = "{key.hash}"', f"scopes = {list(key.scopes)!r}".replace("'", '"')]
-        lines += [
-            f"{limit} = {getattr(key, limit)}"
-            for limit in ("requests_per_minute", "concurrent")
-            if getattr(key, limit) is not None
-        ]
+        lines += [f"{limit} = {getattr(key, limit)}" for limit in LIMITS if getattr(key, limit) is not None]
         parts.append("[[key]]\n" + "\n".join(lines) + "\n")
     write_atomically(path, "\n".join(parts).encode())
     path.chmod(0o600)
@@ -108,6 +110,10 @@ def write_keys(path: Path, keys: Sequence[ApiKey]) -> None:
 def _key(path: Path, content: Any) -> ApiKey:
     if not isinstance(content, dict) or not set(content) <= NAMES or not {"name", "hash"} <= set(content):
         raise DataError(f"{path} has a key without name or hash, or with other names than {', '.join(sorted(NAMES))}")
+    for limit in LIMITS:
+        given = content.get(limit, 0)
+        if isinstance(given, bool) or not isinstance(given, int | float) or not 0 <= given <= MAX_LIMIT:
+            raise DataError(f"{path}: {limit} of a key must be a number from 0 to {MAX_LIMIT:g}, not {given!r}")
     key = ApiKey(**{**content, "scopes": tuple(content.get("scopes", ("speak",)))})
     _check_scopes(key.scopes)
     return key

@@ -64,6 +64,8 @@ class ServiceSettings:
     sound_s: float = setting(600.0, "Longest recording that a request may send.", (1, 86_400))
     body_mb: float = setting(20.0, "Largest body of a request in MB.", (0.01, 4096))
     body_s: float = setting(20.0, "Seconds within which the body of a request must arrive.", (0.1, 3600))
+    resources: int = setting(100, "Talkers, faces, palettes and dictionaries that a key may upload.", (0, 100_000))
+    resources_mb: float = setting(500.0, "MB of uploads of a key, with their pictures.", (0, 1e9))
     drain_s: float = setting(30.0, "Seconds that running requests have to finish after SIGTERM.", (0, 3600))
     log_text: bool = setting(False, "Write the texts of requests to the log.")
 

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any
 from lexicon.errors import Tts2faceError
 from tts2face.service.errors import RefusedError, as_refused
 from tts2face.service.keys import ApiKey, read_keys
+from tts2face.service.library import Library
 from tts2face.service.messages import Message, MessageKind
 from tts2face.service.metrics import Metrics
 from tts2face.service.pool import Pool, PoolSettings
 from tts2face.service.rate_limits import RateLimits
 from tts2face.service.settings import ServiceSettings
+from tts2face.service.upload_checks import Checks
 from tts2face.service.work import Work
 
 if TYPE_CHECKING:
@@ -36,6 +38,7 @@ class ServiceState:
              self.work(kind="speech", request={"text": WARM_TEXT}).as_json()),
         ))  # fmt: skip
         self.limits, self.metrics = RateLimits(), Metrics(self.pool)
+        self.library, self.checks = Library(settings), Checks()
         self.is_draining = False
 
     def work(self, *, models: dict[str, Any] | None = None, **fields: Any) -> Work:
