@@ -1,5 +1,6 @@
 """Jobs of the service as its server sees them: submit, cancel, delete, webhooks."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,10 +54,19 @@ class JobClient:
         self._client.destroy()
         self._database.close()
 
-    def submit(self, new: NewJob, max_waiting: int | None = None) -> tuple[JobRecord, bool]:
-        """Queue a job; arguments, result and errors as `JobTable.submit`."""
+    def submit(
+        self, new: NewJob, max_waiting: int | None = None, put_missing: Callable[[], None] = lambda: None
+    ) -> tuple[JobRecord, bool]:
+        """Queue a job; arguments, result and errors as `JobTable.submit`.
+
+        Parameters
+        ----------
+        put_missing
+            Called within the transaction: stores files that another job's deletion has removed meanwhile.
+        """
 
         def enqueue(change: Transaction) -> None:
+            put_missing()
             options = {
                 "queue_name": JOB_QUEUE,
                 "workflow_name": JOB_WORKFLOW,

@@ -17,13 +17,14 @@ from tts2face.batch.stored_segment import StoreAwayError
 from tts2face.jobs.blobs import BlobStore, open_blobs
 from tts2face.jobs.connection import DatabaseAwayError, JobDatabase, connection_errors
 from tts2face.jobs.engine import ACTIVE, JOBS_PER_QUERY, DatabaseEngine, failure_reason, open_client
-from tts2face.jobs.input_files import place_file
+from tts2face.jobs.input_files import place_file, place_models
 from tts2face.jobs.job_changes import Ending, JobChanges
 from tts2face.jobs.job_kinds import JobCancelledError, JobTask, Product, find_runner
 from tts2face.jobs.job_records import DONE, FAILED, JobFile, JobRecord
 from tts2face.storage.temporary import Temporary
 
 BLOBS, RESOURCES = "results", "resources"  # kinds of files in a store: of jobs, and uploaded models
+MODEL_SECTIONS = ("models", "request")  # parts of a job's JSON that may name uploads
 PAUSE_S = 2.0  # before another try while the database or the store cannot be reached
 CHECK_S = 1.0  # between two looks whether a job is still wanted
 REPORT_S = 0.5  # between two notes of its progress
@@ -96,7 +97,9 @@ class JobRunner:
                 inputs = self._inputs(job, folder.path)
                 work = folder.path / "work"
                 work.mkdir()
-                task = JobTask(job.request, inputs, work, self._engine(watch), self._store, watch.report, watch.check)
+                task = JobTask(
+                    self._request(job), inputs, work, self._engine(watch), self._store, watch.report, watch.check
+                )
                 products = find_runner(job.kind)(task)
                 ending = Ending(DONE, self._put(products.files), products.error)
                 paths = {one.name: one.path for one in products.files}
@@ -109,6 +112,21 @@ class JobRunner:
 
     def _engine(self, watch: "_Watch") -> "_JobEngine":
         return _JobEngine(watch, partial(DatabaseEngine, self._url, self._place, 0))
+
+    def _request(self, job: JobRecord) -> dict[str, Any]:
+        """JSON of a job with the paths of uploaded models on this machine."""
+        found = dict(job.request)
+        for name in MODEL_SECTIONS:
+            if name in found:
+                found[name] = place_models(found[name], self._blobs)
+        if "cast" in found:
+            cast = dict(found["cast"])
+            default, roles = cast.get("default", {}), cast.get("role", [])
+            found["cast"] = {
+                "default": place_models(default, self._blobs),
+                "role": [place_models(one, self._blobs) for one in roles],
+            }
+        return found
 
     def _inputs(self, job: JobRecord, folder: Path) -> dict[str, Path]:
         return {one.name: place_file(self._blobs(), one.sha256, one.name, folder / "inputs") for one in job.inputs}

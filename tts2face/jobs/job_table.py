@@ -45,7 +45,6 @@ _SELECT = f"SELECT {', '.join(COLUMNS)} FROM tts2face_jobs"
 _OPEN = "('waiting', 'running')"
 N_CREATE_TRIES = 5
 CHILD_TABLES = ("tts2face_job_files", "tts2face_job_events", "tts2face_job_segments")
-RowFilter = tuple[str, dict[str, Any]]
 
 
 class QueueFullError(BackendError):

@@ -2,20 +2,22 @@
 
 ``python -m tts2face.service.decode_process KIND SOURCE TARGET LIMIT``: a file becomes a plain one (sound: mono .wav at
 48 kHz; picture: .png); a resource (talker, face, palette, dictionary) is checked and written, with its description and
-picture, into the folder TARGET; ``draw-`` and its kind draw the picture TARGET only. LIMIT is
-the largest duration in seconds, number of pixels, or size in bytes. The exit code is 0, or 2 with one sentence on
-standard error.
+picture, into the folder TARGET; ``draw-`` and its kind draw the picture TARGET only; ``subtitles-`` and an encoding
+check subtitles. LIMIT is the largest duration in seconds, number of pixels or cues, or size in bytes. The exit code is
+0, or 2 with one sentence on standard error.
 """
 
 import ctypes
+import json
 import os
+import shutil
 import sys
 from pathlib import Path
 
 from tts2face.service.refused_file import RefusedFileError
 from tts2face.service.resource_check import RESOURCE_KINDS, check_resource, draw_resource
 
-SOUND, PICTURE, DRAW = "sound", "picture", "draw-"
+SOUND, PICTURE, DRAW, SUBTITLES = "sound", "picture", "draw-", "subtitles-"
 MEMORY_BYTES, CPU_S, FILE_BYTES, N_FILES = 2 << 30, 60, 1 << 30, 64
 RESOURCE_MEMORY_BYTES, RESOURCE_CPU_S = 3 << 30, 180  # with its picture, and the compilation of kernels at first use
 NEW_USERS, NEW_NETWORK = 0x10000000, 0x40000000  # flags of unshare in Linux's sched.h
@@ -93,6 +95,28 @@ def decode_picture(source: Path, target: Path, max_pixels: float) -> None:
         raise RefusedFileError("it is no picture that can be decoded") from error
 
 
+def check_subtitles(source: Path, target: Path, max_cues: float, encoding: str | None) -> None:
+    """Copy a subtitle file, and write its numbers beside it: cues and seconds, as JSON.
+
+    Raises
+    ------
+    RefusedFileError
+        It contains no cues or more than `max_cues`.
+    """
+    from lexicon.errors import Tts2faceError
+    from tts2face.subtitles.reader import read_subtitles
+
+    shutil.copyfile(source, target)
+    try:
+        cues = read_subtitles(target, encoding).cues
+    except Tts2faceError as wrong:
+        raise RefusedFileError(str(wrong).replace(f"{target.parent}/", "")) from wrong
+    if len(cues) > max_cues:
+        raise RefusedFileError(f"it has {len(cues)} cues, more than {max_cues:g}")
+    numbers = {"cues": len(cues), "seconds": max(cue.end_s for cue in cues)}
+    Path(f"{target}.json").write_text(json.dumps(numbers))
+
+
 def decode(kind: str, source: Path, target: Path, limit: float) -> None:
     """Decode or check one file of a kind.
 
@@ -103,6 +127,8 @@ def decode(kind: str, source: Path, target: Path, limit: float) -> None:
     """
     if kind in RESOURCE_KINDS:
         check_resource(kind, source, target, limit)
+    elif kind.startswith(SUBTITLES):
+        check_subtitles(source, target, limit, kind.removeprefix(SUBTITLES) or None)
     elif kind.startswith(DRAW):
         draw_resource(kind.removeprefix(DRAW), source, target)
     else:
@@ -112,7 +138,7 @@ def decode(kind: str, source: Path, target: Path, limit: float) -> None:
 def main() -> int:
     """Decode one file."""
     kind, source, target, limit = sys.argv[1:]
-    if kind in {SOUND, PICTURE}:
+    if kind in {SOUND, PICTURE} or kind.startswith(SUBTITLES):
         limit_process()
     else:
         limit_process(RESOURCE_MEMORY_BYTES, RESOURCE_CPU_S)

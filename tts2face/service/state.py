@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import Tts2faceError
 from tts2face.service.errors import RefusedError, as_refused
+from tts2face.service.job_service import JobService
 from tts2face.service.keys import ApiKey, read_keys
 from tts2face.service.library import Library
 from tts2face.service.messages import Message, MessageKind
@@ -37,7 +38,8 @@ class ServiceState:
             (self.work(format="mp4", request={"text": WARM_TEXT}).as_json(),
              self.work(kind="speech", request={"text": WARM_TEXT}).as_json()),
         ))  # fmt: skip
-        self.limits, self.metrics = RateLimits(), Metrics(self.pool)
+        self.jobs = JobService(settings)
+        self.limits, self.metrics = RateLimits(), Metrics(self.pool, self.jobs)
         self.library, self.checks = Library(settings), Checks()
         self.is_draining = False
 

@@ -1,6 +1,7 @@
 """Uploaded files: never opened by the server itself, never stored under a client's name."""
 
 import asyncio
+import json
 import os
 import sys
 import tempfile
@@ -11,7 +12,7 @@ from pathlib import Path
 
 from starlette.datastructures import UploadFile
 
-from tts2face.service.decode_process import PICTURE, REFUSED, SOUND
+from tts2face.service.decode_process import PICTURE, REFUSED, SOUND, SUBTITLES
 from tts2face.service.errors import RefusedError
 
 DECODE_TIMEOUT_S = 60.0
@@ -55,6 +56,20 @@ class UploadFolder:
             raise RefusedError(413, "too_large", f"{name} has more than {MAX_TEXT_BYTES} bytes; send less")
         path.write_bytes(content)
         return path
+
+    async def subtitles(
+        self, name: str, upload: UploadFile, suffix: str, encoding: str | None, max_cues: int
+    ) -> tuple[Path, dict[str, float]]:
+        """Checked subtitles of an upload, and their numbers: cues and seconds.
+
+        Raises
+        ------
+        RefusedError
+            They have no cues, or too many.
+        """
+        path = await self._decode(f"{SUBTITLES}{encoding or ''}", name, upload, suffix, max_cues)
+        numbers: dict[str, float] = json.loads(Path(f"{path}.json").read_text())
+        return path, numbers
 
     async def resource(self, kind: str, upload: UploadFile, max_bytes: float) -> Path:
         """Folder with a checked talker, face, palette or dictionary (`tts2face.service.resource_check`).
