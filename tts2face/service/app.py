@@ -28,6 +28,7 @@ def create_app(settings: ServiceSettings) -> FastAPI:
             yield
         finally:
             await state.pool.close()
+            state.library.close()
 
     app = FastAPI(
         title="tts2face",

@@ -77,6 +77,11 @@ class Library:
     def _blobs(self) -> BlobStore:
         return open_blobs(self._settings.store_place, "resources", cache=self._settings.data_folder / "resources-cache")
 
+    def close(self) -> None:
+        """Close the connections to the database."""
+        if "_table" in self.__dict__:
+            self._table.close()
+
     def resolve(self, key: ApiKey, kind: str, name: str) -> tuple[str, dict[str, Any]]:
         """Value of a field of a request for a name: the name if shipped, the path of an upload; its description.
 

@@ -77,6 +77,10 @@ class ResourceTable:
         self._url, self._engine = url, open_engine(url)
         self._is_created = False
 
+    def close(self) -> None:
+        """Close the connections."""
+        self._engine.dispose()
+
     def find(self, owner: str, kind: str, name: str) -> StoredResource | None:
         """The resource of a name, if the owner has one."""
         with self._transaction() as run:
