@@ -15,6 +15,7 @@ from lexicon.errors import BackendError
 from tts2face.batch.engine import Message, Rendered
 from tts2face.batch.segment import Segment
 from tts2face.batch.store import Store, wait_for_store
+from tts2face.jobs.connection import DatabaseAwayError
 from tts2face.jobs.database import (
     APPLICATION,
     APPLICATION_VERSION,
@@ -47,6 +48,10 @@ class DatabaseEngine:
         Store as the local workers open it.
     priority
         Jobs with smaller numbers are taken first; from 1.
+    on_wait
+        Called at each look at the jobs; what it raises ends the waiting.
+    niceness
+        What is added to the niceness of the local workers: 10 gives way to other processes.
     """
 
     database: str
@@ -54,6 +59,8 @@ class DatabaseEngine:
     n_workers: int = 1
     priority: int = 10
     on_message: Message = lambda _: None
+    on_wait: Callable[[], None] = lambda: None
+    niceness: int = 0
 
     def render(self, segments: Mapping[str, Segment], store: Store) -> Iterator[Rendered]:
         """Yield each segment as soon as it is stored or has failed."""
@@ -68,6 +75,7 @@ class DatabaseEngine:
                 self.on_message("no worker is alive in this database; start `tts2face worker` with it")
             while look.waiting:
                 supervise()
+                self.on_wait()
                 for address, reason in look.ended():
                     result = wait_for_store(partial(store.result, address), self.on_message)
                     yield Rendered(address, result, "" if result is not None else reason)
@@ -137,7 +145,7 @@ def open_client(url: str) -> Iterator[Any]:
     try:
         client = DBOSClient(system_database_url=url, application_name=APPLICATION)
     except sqlalchemy.exc.SQLAlchemyError as away:
-        raise BackendError(f"the database cannot be reached ({away}); check its URL") from away
+        raise DatabaseAwayError(f"the database cannot be reached ({away}); check its URL") from away
     try:
         yield client
     finally:
@@ -245,7 +253,7 @@ class _LocalWorkers:
             is_bound = self._engine.n_workers > 1 and len(self._cores) > 0
             core = self._cores[number % len(self._cores)] if is_bound else None
             self._children[number] = (
-                start_worker(self._engine.database, self._engine.store_url, core),
+                start_worker(self._engine.database, self._engine.store_url, core, self._engine.niceness),
                 time.monotonic(),
             )
 
@@ -266,10 +274,11 @@ class _LocalWorkers:
             raise BackendError("the workers end as soon as they start; see their messages above")
 
 
-def start_worker(database: str, store: str, core: int | None) -> "subprocess.Popen[bytes]":
+def start_worker(database: str, store: str, core: int | None, niceness: int = 0) -> "subprocess.Popen[bytes]":
     """A worker as a child process, which ends with this one."""
+    bound = "all" if core is None else str(core)
     return subprocess.Popen(
-        [sys.executable, "-m", "tts2face.jobs.worker", database, store, "all" if core is None else str(core)],
+        [sys.executable, "-m", "tts2face.jobs.worker", database, store, bound, str(niceness)],
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
     )

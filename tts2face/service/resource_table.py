@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from lexicon.errors import BackendError
-from tts2face.jobs.database import open_engine, shown_url
+from tts2face.jobs.connection import open_engine
+from tts2face.jobs.database import shown_url
 
 # The second table has one row; its update is the lock under which names, quotas and contents are changed.
 _TABLES = (

@@ -15,6 +15,7 @@ from tts2face.storage.user_folders import user_data
 PREFIX = "TTS2FACE_SERVE_"  # of environment variables: TTS2FACE_SERVE_PORT
 LOCAL_HOSTS = ("localhost", "127.0.0.1", "::1")
 MAX_SETTINGS_BYTES = 100_000
+SECRETS = ("webhook_secret",)  # settings that are never shown
 Limits = tuple[float, float]
 
 
@@ -48,6 +49,17 @@ class ServiceSettings:
     processes: int = setting(0, "Synthesis processes; 0: one for each core.", (0, 256))
     sessions: int = setting(2, "Sets of talker, face and palette that each process keeps in memory.", (1, 16))
     waiting: int = setting(64, "Requests that may wait for a process; further ones are refused with 429.", (0, 10_000))
+    results_days: float = setting(
+        30.0, "Days after which ended jobs and their results are removed; 0: never.", (0, 36_500)
+    )
+    job_waiting: int = setting(100, "Waiting jobs of a key; further ones are refused with 429.", (1, 1_000_000))
+    job_files: int = setting(20, "Subtitle files of a job.", (1, 1000))
+    job_cues: int = setting(5000, "Cues of a job.", (1, 1_000_000))
+    job_s: float = setting(14_400.0, "Longest subtitle file of a job in seconds.", (1, 1e6))
+    webhook_hosts: tuple[str, ...] = setting(
+        (), "Hosts that may be told of the end of jobs: example.org, a.example:8080."
+    )
+    webhook_secret: str = setting("", "Secret that signs webhooks; never shown.")
     text_characters: int = setting(100_000, "Longest text of a request.", (1, 10_000_000))
     sound_s: float = setting(600.0, "Longest recording that a request may send.", (1, 86_400))
     body_mb: float = setting(20.0, "Largest body of a request in MB.", (0.01, 4096))
@@ -67,6 +79,8 @@ class ServiceSettings:
                 f"the service would be open to everybody who reaches {self.host}; create a key with `tts2face keys add "
                 f"NAME --file keys.toml` and give --keys keys.toml"
             )
+        if self.webhook_hosts and not self.webhook_secret:
+            raise InputError("webhook_hosts needs webhook_secret, which signs the messages; give both or neither")
 
     @property
     def allowed_hosts(self) -> frozenset[str]:
@@ -89,8 +103,9 @@ class ServiceSettings:
         return self.store or str(self.data_folder / "store")
 
     def as_toml(self) -> str:
-        """The settings as a settings file."""
-        return "".join(f"{name} = {_toml(value)}\n" for name, value in asdict(self).items() if value is not None)
+        """The settings as a settings file, without secrets."""
+        shown = {name: value for name, value in asdict(self).items() if value is not None and name not in SECRETS}
+        return "".join(f"{name} = {_toml(value)}\n" for name, value in shown.items())
 
 
 def is_loopback(host: str) -> bool:
