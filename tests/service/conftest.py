@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 
@@ -18,7 +19,10 @@ class RunningService:
 
     def __init__(self, *arguments: str) -> None:
         command = [sys.executable, "-m", "tts2face", "serve", "--port", "0", "--processes", "1", *arguments]
-        environment = {name: value for name, value in os.environ.items() if not name.startswith("TTS2FACE_SERVE_")}
+        self.data = tempfile.TemporaryDirectory(prefix="tts2face-service-")
+        environment = {"TTS2FACE_SERVE_DATA": self.data.name} | {
+            name: value for name, value in os.environ.items() if not name.startswith("TTS2FACE_SERVE_")
+        }
         self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
         assert self.process.stderr is not None
         line = self.process.stderr.readline()
@@ -34,6 +38,7 @@ class RunningService:
         """End the process; the rest of its log."""
         self.process.terminate()
         _, log = self.process.communicate(timeout=60)
+        self.data.cleanup()
         return log
 
 

@@ -1,13 +1,16 @@
 """Connections to the database of jobs: SQLite or PostgreSQL, with transactions whose failures are `BackendError`."""
 
-from collections.abc import Iterator, Mapping
+import time
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 from lexicon.errors import BackendError
 
+CONNECTIONS = {"pool_size": 1, "max_overflow": 2}  # of a process to the table of workers; one of them stays open
 NOW = {"sqlite": "(julianday('now') - 2440587.5) * 86400.0", "postgresql": "EXTRACT(EPOCH FROM clock_timestamp())"}
 CONNECTIONS = {"pool_size": 1, "max_overflow": 2}  # of a process to a table; one of them stays open
+N_CREATE_TRIES, CREATE_PAUSE_S = 5, 0.2  # of tables that another process may be creating
 LOCK_KEY = 5_742_301  # of PostgreSQL's advisory lock for changes of jobs
 # SQLite begins a transaction, and takes its lock for writing, with the first statement that changes something.
 _LOCK = {"sqlite": "DELETE FROM tts2face_jobs WHERE id = ''", "postgresql": f"SELECT pg_advisory_xact_lock({LOCK_KEY})"}
@@ -112,3 +115,19 @@ class Transaction:
     def value(self, statement: str, **values: Any) -> Any:
         """First value of a query; None without a row."""
         return self.connection.execute(self._sql(statement), values).scalar()
+
+
+def create_tables(database: JobDatabase, statements: Sequence[str]) -> None:
+    """Create tables where they are missing; several processes may do so at once."""
+    import sqlalchemy
+
+    for attempt in range(N_CREATE_TRIES):
+        try:
+            with database.transaction() as change:
+                for statement in statements:
+                    change.run(statement)
+            return
+        except (sqlalchemy.exc.DBAPIError, BackendError):
+            if attempt == N_CREATE_TRIES - 1:
+                raise
+            time.sleep(CREATE_PAUSE_S)

@@ -1,13 +1,12 @@
 """Tables of the jobs of the service: jobs, their files, events and segments; read and changed by server and workers."""
 
 import json
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 from lexicon.errors import BackendError, InputError
-from tts2face.jobs.connection import JobDatabase, Transaction
+from tts2face.jobs.connection import JobDatabase, Transaction, create_tables
 from tts2face.jobs.job_records import (
     COLUMNS,
     INPUT,
@@ -43,7 +42,6 @@ _TABLES = (
 )
 _SELECT = f"SELECT {', '.join(COLUMNS)} FROM tts2face_jobs"
 _OPEN = "('waiting', 'running')"
-N_CREATE_TRIES = 5
 CHILD_TABLES = ("tts2face_job_files", "tts2face_job_events", "tts2face_job_segments")
 
 
@@ -69,18 +67,7 @@ class JobTable:
 
     def create(self) -> None:
         """Create the tables where they are missing; several processes may do so at once."""
-        import sqlalchemy
-
-        for attempt in range(N_CREATE_TRIES):
-            try:
-                with self.database.transaction() as change:
-                    for statement in _TABLES:
-                        change.run(statement)
-                return
-            except (sqlalchemy.exc.DBAPIError, BackendError):
-                if attempt == N_CREATE_TRIES - 1:
-                    raise
-                time.sleep(0.2)
+        create_tables(self.database, _TABLES)
 
     def submit(
         self, new: NewJob, enqueue: Callable[[Transaction], None], max_waiting: int | None = None

@@ -30,6 +30,7 @@ def create_app(settings: ServiceSettings) -> FastAPI:
         finally:
             await state.jobs.close()
             await state.pool.close()
+            state.library.close()
 
     app = FastAPI(
         title="tts2face",

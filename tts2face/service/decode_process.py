@@ -19,7 +19,7 @@ from tts2face.service.resource_check import RESOURCE_KINDS, check_resource, draw
 
 SOUND, PICTURE, DRAW, SUBTITLES = "sound", "picture", "draw-", "subtitles-"
 MEMORY_BYTES, CPU_S, FILE_BYTES, N_FILES = 2 << 30, 60, 1 << 30, 64
-RESOURCE_MEMORY_BYTES, RESOURCE_CPU_S = 3 << 30, 180  # with its picture, and the compilation of kernels at first use
+RESOURCE_CPU_S = 180  # a resource with its picture takes 3 to 5 s, at the first time with the compilation of kernels
 NEW_USERS, NEW_NETWORK = 0x10000000, 0x40000000  # flags of unshare in Linux's sched.h
 SOUND_RATE = 48_000  # Hz
 SOUND_FORMATS = "wav,mp3,ogg,flac,aac,mov,mp4,m4a,matroska,webm,aiff,caf"
@@ -28,11 +28,11 @@ REFUSED = 2
 LOW_PRIORITY = 10
 
 
-def limit_process(memory_bytes: int = MEMORY_BYTES, cpu_s: int = CPU_S) -> None:
+def limit_process(cpu_s: int = CPU_S) -> None:
     """Limit memory, processor time and files of this process, and leave the network where the system allows it."""
     import resource
 
-    resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s))
     resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
     resource.setrlimit(resource.RLIMIT_NOFILE, (N_FILES, N_FILES))
@@ -141,7 +141,7 @@ def main() -> int:
     if kind in {SOUND, PICTURE} or kind.startswith(SUBTITLES):
         limit_process()
     else:
-        limit_process(RESOURCE_MEMORY_BYTES, RESOURCE_CPU_S)
+        limit_process(RESOURCE_CPU_S)
         os.nice(LOW_PRIORITY)  # streams go first
     try:
         decode(kind, Path(source), Path(target), float(limit))

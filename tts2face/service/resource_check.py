@@ -4,6 +4,7 @@ What is stored is written here again from what was read, never the bytes of the 
 """
 
 import json
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -24,6 +25,8 @@ MAX_TEXT = 200  # characters of a text of the description
 MAX_ENTRIES = 200  # identities or styles of the description
 PICTURE_SIDE_PX, TILE_SIDE_PX, TILE_COLUMNS, MAX_TILES = 384, 192, 4, 12
 REST_S, STYLE_S = 0.1, 2.0  # of idle motion that is synthesised for a picture
+# CPU seconds: a head takes 0.03 and 0.4. A slower one would hold up the streams of everybody.
+MAX_FRAME_CPU_S, MAX_STYLE_CPU_S = 1.0, 8.0
 # First bytes of files that are sent by mistake, or on purpose.
 FOREIGN = {
     b"PK\x03\x04": "a zip archive", b"\x80\x02": "a Python pickle", b"\x80\x03": "a Python pickle",
@@ -181,7 +184,10 @@ def _draw_palette(content: Path) -> "Image":
     sheet = Image.new("RGB", (TILE_SIDE_PX * min(len(names), TILE_COLUMNS), TILE_SIDE_PX * rows), "white")
     pen = ImageDraw.Draw(sheet)
     for number, name in enumerate(names):
+        began = time.process_time()
         clip = session.clip("", idle=STYLE_S, style=name)
+        if number and time.process_time() - began > MAX_STYLE_CPU_S:  # the first one also compiles kernels
+            raise RefusedFileError(f"{STYLE_S:g} s of a style take more than {MAX_STYLE_CPU_S:g} s to synthesise")
         values = clip.motion.values
         typical = int(np.linalg.norm(values - values.mean(axis=0), axis=1).argmin())
         tile = Image.fromarray(session.renderer(size).frame(clip, typical))
@@ -198,7 +204,13 @@ def _rest_picture(session: "Session") -> "Image":
 
     clip = session.clip("", idle=REST_S, gestures="none")
     size = Picture(size=f"{PICTURE_SIDE_PX}x{PICTURE_SIDE_PX}")
-    return Image.fromarray(session.renderer(size, has_gestures=False).frame(clip, 0))
+    renderer = session.renderer(size, has_gestures=False)
+    renderer.frame(clip, 0)  # compiles kernels
+    began = time.process_time()
+    picture = Image.fromarray(renderer.frame(clip, 1))
+    if time.process_time() - began > MAX_FRAME_CPU_S:
+        raise RefusedFileError(f"a picture of it takes more than {MAX_FRAME_CPU_S:g} s to draw; simplify it")
+    return picture
 
 
 _CHECKS: Mapping[str, Callable[[Path, Path], dict[str, Any]]] = {

@@ -7,9 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from lexicon.errors import BackendError
-from tts2face.jobs.connection import open_engine
-from tts2face.jobs.database import shown_url
+from tts2face.jobs.connection import JobDatabase, Transaction, create_tables
 
 # The second table has one row; its update is the lock under which names, quotas and contents are changed.
 _TABLES = (
@@ -29,7 +27,6 @@ INSERT INTO tts2face_resources ({_COLUMNS})
 VALUES (:owner, :kind, :name, :content, :picture, :n_bytes, :created, :description)"""
 _CHOSEN = "owner = :owner AND kind = :kind AND name = :name"
 _DELETE = f"DELETE FROM tts2face_resources WHERE {_CHOSEN}"
-_TRIES = 5  # to create the tables, which other processes may do at the same time
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,28 +68,33 @@ class Usage:
 class ResourceTable:
     """The table in a database of `tts2face.jobs.database.database_url`; created at the first use.
 
-    All methods raise `BackendError` if the database cannot be reached.
+    All methods raise `DatabaseAwayError` if the database cannot be reached.
     """
 
     def __init__(self, url: str) -> None:
-        self._url, self._engine = url, open_engine(url)
+        self._database = JobDatabase(url)
         self._is_created = False
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._database.close()
 
     def find(self, owner: str, kind: str, name: str) -> StoredResource | None:
         """The resource of a name, if the owner has one."""
-        with self._transaction() as run:
-            return next(iter(_rows(run, _CHOSEN, {"owner": owner, "kind": kind, "name": name})), None)
+        with self._transaction() as look:
+            return next(iter(_rows(look, _CHOSEN, owner=owner, kind=kind, name=name)), None)
 
     def select(self, kind: str, owner: str | None) -> tuple[StoredResource, ...]:
         """Resources of a kind, sorted by name; of all owners if none is given."""
-        chosen = "kind = :kind" + ("" if owner is None else " AND owner = :owner")
-        with self._transaction() as run:
-            return _rows(run, chosen, {"kind": kind, "owner": owner})
+        with self._transaction() as look:
+            if owner is None:
+                return _rows(look, "kind = :kind", kind=kind)
+            return _rows(look, "kind = :kind AND owner = :owner", kind=kind, owner=owner)
 
     def usage(self, owner: str) -> Usage:
         """What an owner stores."""
-        with self._transaction() as run:
-            return _usage(run, owner)
+        with self._transaction() as look:
+            return _usage(look, owner)
 
     def add(self, resource: StoredResource, *, check: Callable[[Usage], None], keep: Callable[[], None]) -> bool:
         """Add a resource unless its owner has one of this name; False if so.
@@ -106,72 +108,49 @@ class ResourceTable:
         """
         row: dict[str, Any] = {name: getattr(resource, name) for name in _COLUMNS.split(", ")}
         row |= {"description": json.dumps(resource.description, ensure_ascii=False), "created": time.time()}
-        with self._transaction() as run:
-            run(_LOCK)
-            if _rows(run, _CHOSEN, row):
+        with self._transaction() as change:
+            change.run(_LOCK)
+            if _rows(change, _CHOSEN, owner=resource.owner, kind=resource.kind, name=resource.name):
                 return False
-            check(_usage(run, resource.owner))
-            run(_INSERT, row)
+            check(_usage(change, resource.owner))
+            change.run(_INSERT, **row)
             keep()
             return True
 
     def remove(self, owner: str, kind: str, name: str, delete: Callable[[str], None]) -> bool:
         """Remove a resource; `delete` is called with each of its contents that no other one has. False if missing."""
-        with self._transaction() as run:
-            run(_LOCK)
-            key = {"owner": owner, "kind": kind, "name": name}
-            old = _rows(run, _CHOSEN, key)
-            run(_DELETE, key)
-            for content in _unused(run, old):
+        with self._transaction() as change:
+            change.run(_LOCK)
+            old = _rows(change, _CHOSEN, owner=owner, kind=kind, name=name)
+            change.run(_DELETE, owner=owner, kind=kind, name=name)
+            for content in _unused(change, old):
                 delete(content)
             return bool(old)
 
     @contextmanager
-    def _transaction(self) -> Iterator[Callable[..., Any]]:
-        """Function that executes a statement in one transaction."""
-        import sqlalchemy
-
-        try:
-            self._create()
-            with self._engine.begin() as connection:
-                yield lambda query, values=None: connection.execute(sqlalchemy.text(query), values or {})
-        except sqlalchemy.exc.SQLAlchemyError as error:
-            reason = " ".join(str(getattr(error, "orig", None) or type(error).__name__).split())[:120]
-            raise BackendError(
-                f"cannot use the database {shown_url(self._url)} ({reason}); repeat the request later"
-            ) from error
-
-    def _create(self) -> None:
-        import sqlalchemy
-
-        for attempt in range(_TRIES):
-            if self._is_created:
-                return
-            try:
-                with self._engine.begin() as connection:
-                    for statement in _TABLES:
-                        connection.execute(sqlalchemy.text(statement))
-                self._is_created = True
-            except sqlalchemy.exc.DBAPIError:
-                if attempt == _TRIES - 1:
-                    raise
-                time.sleep(0.1)
+    def _transaction(self) -> Iterator[Transaction]:
+        """A transaction, in which the tables exist."""
+        if not self._is_created:
+            create_tables(self._database, _TABLES)
+            self._is_created = True
+        with self._database.transaction() as transaction:
+            yield transaction
 
 
-def _usage(run: Callable[..., Any], owner: str) -> Usage:
+def _usage(look: Transaction, owner: str) -> Usage:
     query = "SELECT COUNT(*), COALESCE(SUM(n_bytes), 0) FROM tts2face_resources WHERE owner = :owner"
-    n_resources, n_bytes = run(query, {"owner": owner}).one()
+    ((n_resources, n_bytes),) = look.rows(query, owner=owner)
     return Usage(int(n_resources), int(n_bytes))
 
 
-def _rows(run: Callable[..., Any], chosen: str, values: dict[str, Any]) -> tuple[StoredResource, ...]:
+def _rows(look: Transaction, chosen: str, **values: Any) -> tuple[StoredResource, ...]:
     query = f"SELECT {_COLUMNS} FROM tts2face_resources WHERE {chosen} ORDER BY name, owner"
-    rows = [dict(row._mapping) for row in run(query, values)]
+    rows = [dict(row._mapping) for row in look.rows(query, **values)]
     return tuple(StoredResource(**{**row, "description": json.loads(row["description"])}) for row in rows)
 
 
-def _unused(run: Callable[..., Any], old: tuple[StoredResource, ...]) -> tuple[str, ...]:
+def _unused(look: Transaction, old: tuple[StoredResource, ...]) -> tuple[str, ...]:
     """Contents of removed rows that no row has any more."""
     query = "SELECT COUNT(*) FROM tts2face_resources WHERE content = :content OR picture = :content"
     contents = {content for resource in old for content in (resource.content, resource.picture) if content}
-    return tuple(content for content in sorted(contents) if not run(query, {"content": content}).scalar())
+    return tuple(content for content in sorted(contents) if not look.value(query, content=content))

@@ -159,7 +159,7 @@ async def _store(request: HttpRequest, kind: str) -> StoredResource:
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
         raise RefusedError(422, "invalid_request", "send a form (multipart/form-data) with the parts file and name")
     async with AsyncExitStack() as stack:
-        form = await stack.enter_async_context(request.form(max_files=1, max_fields=1))
+        form = await stack.enter_async_context(request.form(max_files=1, max_fields=2))
         name, file = _read_form(form)
         check_new_name(kind, name)
         await asyncio.to_thread(state.library.check_room, key, kind, name, file.size or 0)
