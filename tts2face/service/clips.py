@@ -10,6 +10,8 @@ from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from starlette.datastructures import FormData
 
+from lexicon.errors import InputError
+from tts2face.render.picture import AUTO_SIZE, parse_size
 from tts2face.service.answers import service_state, stream_work
 from tts2face.service.errors import RefusedError
 from tts2face.service.names import MODEL_FIELDS, check_background, check_models, check_voice
@@ -83,7 +85,7 @@ async def make_clip(request: HttpRequest) -> StreamingResponse:
         return await _answer(request, _parse(await request.body()), {})
     async with AsyncExitStack() as stack:
         form = await stack.enter_async_context(request.form(max_files=len(FILES), max_fields=4))
-        folder = await stack.enter_async_context(upload_folder(service_state(request).settings.sound_s))
+        folder = await stack.enter_async_context(upload_folder(service_state(request).settings))
         clip, files = await _read_form(form, folder)
         return await _answer(request, clip, files, stack.pop_all())  # the files are read until the clip is complete
 
@@ -127,8 +129,19 @@ async def _answer(
     check_models(models)
     check_voice(given.get("voice"))
     check_background(picture.get("background", "studio"))
+    _check_size(picture.get("size", AUTO_SIZE), service_state(request).settings.pixels)
     if "background" in files:
         picture["background"] = files["background"]
     given |= {name: files[name] for name in ("audio", "timeline") if name in files}
     work = service_state(request).work(models=models, request=given, picture=picture, format=format)
     return await stream_work(request, work, MEDIA_TYPES[format], resources=resources)
+
+
+def _check_size(size: str, most: int) -> None:
+    """Refuse pictures that are larger than the settings allow."""
+    try:
+        width, height = parse_size(size)
+    except InputError as wrong:
+        raise RefusedError(400, "invalid_request", str(wrong)) from wrong
+    if width * height > most:
+        raise RefusedError(400, "invalid_request", f"size {size[:20]} has more than {most} pixels; give a smaller one")

@@ -12,9 +12,8 @@ from starlette.datastructures import UploadFile
 
 from tts2face.service.decode_process import PICTURE, REFUSED, SOUND
 from tts2face.service.errors import RefusedError
+from tts2face.service.settings import ServiceSettings
 
-DECODE_TIMEOUT_S = 60.0
-MAX_PIXELS = 40_000_000
 MAX_TEXT_BYTES = 1_000_000
 BLOCK_BYTES = 1 << 20
 
@@ -24,7 +23,7 @@ class UploadFolder:
     """A private folder of one request; it is removed when the request ends."""
 
     path: Path
-    max_sound_s: float
+    settings: ServiceSettings
 
     async def sound(self, name: str, upload: UploadFile) -> Path:
         """Decoded sound of an upload, a .wav file; `name` is the field's name in messages.
@@ -34,11 +33,11 @@ class UploadFolder:
         RefusedError
             It is no sound, or too long.
         """
-        return await self._decode(SOUND, name, upload, ".wav", self.max_sound_s)
+        return await self._decode(SOUND, name, upload, ".wav", self.settings.sound_s)
 
     async def picture(self, name: str, upload: UploadFile) -> Path:
         """Decoded picture of an upload, a .png file; errors as `sound`."""
-        return await self._decode(PICTURE, name, upload, ".png", MAX_PIXELS)
+        return await self._decode(PICTURE, name, upload, ".png", self.settings.upload_pixels)
 
     async def text(self, name: str, upload: UploadFile, suffix: str) -> Path:
         """Text of an upload, at most `MAX_TEXT_BYTES`; its reader checks it."""
@@ -60,10 +59,12 @@ class UploadFolder:
             cwd=self.path,
         )  # fmt: skip
         try:
-            _, written = await asyncio.wait_for(child.communicate(), DECODE_TIMEOUT_S)
+            _, written = await asyncio.wait_for(child.communicate(), self.settings.decode_s)
         except TimeoutError as late:
             raise RefusedError(
-                422, "invalid_data", f"{name} took more than {DECODE_TIMEOUT_S:g} s to decode; send a simpler file"
+                422,
+                "invalid_data",
+                f"{name} took more than {self.settings.decode_s:g} s to decode; send a simpler file",
             ) from late
         finally:
             if child.returncode is None:
@@ -78,7 +79,7 @@ class UploadFolder:
 
 
 @asynccontextmanager
-async def upload_folder(max_sound_s: float) -> AsyncIterator[UploadFolder]:
+async def upload_folder(settings: ServiceSettings) -> AsyncIterator[UploadFolder]:
     """A private folder for the uploads of one request."""
     with tempfile.TemporaryDirectory(prefix="tts2face-upload-") as folder:
-        yield UploadFolder(Path(folder), max_sound_s)
+        yield UploadFolder(Path(folder), settings)
