@@ -3,6 +3,7 @@
 import asyncio
 import signal
 import socket
+import sys
 import time
 from contextlib import suppress
 
@@ -16,6 +17,7 @@ from tts2face.service.state import ServiceState
 from tts2face.telemetry import disable_telemetry
 
 SOCKET_GRACE_S = 3.0  # between the message to the clients of WebSockets and their end
+FORCED_CODE = 143  # exit code after a second signal; 0 after the first
 CUT_S = 2  # in which requests that were cut release what they hold
 
 
@@ -42,6 +44,8 @@ def serve(settings: ServiceSettings) -> None:
         h11_max_incomplete_event_size=1024 * settings.head_kb,
     ), app.state.service)  # fmt: skip
     server.run()
+    if server.force_exit:
+        sys.exit(FORCED_CODE)
 
 
 class DrainingServer(uvicorn.Server):
@@ -77,7 +81,6 @@ class DrainingServer(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: object) -> None:
         """Begin to drain; a second signal ends the server at once."""
-        self._captured_signals.append(sig)
         self.force_exit = self.should_exit
         self.should_exit = self._state.is_draining = True
 
