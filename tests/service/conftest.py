@@ -6,7 +6,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import httpx
@@ -22,10 +22,17 @@ class RunningService:
     ----------
     environment
         Further variables, such as TTS2FACE_SERVE_BODY_S.
+    program
+        Arguments of Python that run the command line.
     """
 
-    def __init__(self, *arguments: str, environment: Mapping[str, str] | None = None) -> None:
-        command = [sys.executable, "-m", "tts2face", "serve", "--port", "0", "--processes", "1", *arguments]
+    def __init__(
+        self,
+        *arguments: str,
+        environment: Mapping[str, str] | None = None,
+        program: Sequence[str] = ("-m", "tts2face"),
+    ) -> None:
+        command = [sys.executable, *program, "serve", "--port", "0", "--processes", "1", *arguments]
         kept = {name: value for name, value in os.environ.items() if not name.startswith(("TTS2FACE_SERVE_", "OTEL_"))}
         self.process = subprocess.Popen(
             command, stderr=subprocess.PIPE, text=True, env=kept | dict(environment or {})

@@ -55,16 +55,18 @@ def create_app(settings: ServiceSettings) -> FastAPI:
     return app
 
 
-async def _answer_refused(_: HttpRequest, error: Exception) -> JSONResponse:
+async def _answer_refused(request: HttpRequest, error: Exception) -> JSONResponse:
     assert isinstance(error, RefusedError)
+    request.state.exchange.code = error.code
     return JSONResponse(error_body(error.code, error.message), error.status, error.headers)
 
 
-async def _answer_invalid(_: HttpRequest, error: Exception) -> JSONResponse:
+async def _answer_invalid(request: HttpRequest, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
     first = error.errors()[0]
     name = ".".join(str(part) for part in first["loc"] if part != "body") or "body"
     message = f"{name}: {first['msg'][:200]}"
+    request.state.exchange.code = "invalid_request"
     return JSONResponse(error_body("invalid_request", message, name), 422)
 
 

@@ -43,7 +43,7 @@ class Guard:
             self._check_draining(scope["path"])
             self._check_host(request)
             key = self._identify(request)
-            scope["state"] = {**scope.get("state", {}), "key": key, "request_id": request.id}
+            scope["state"] = {**scope.get("state", {}), "key": key, "exchange": request}
             if is_counted:
                 self._state.limits.begin(key)
         except RefusedError as refused:
