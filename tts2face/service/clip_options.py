@@ -5,6 +5,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from lexicon.errors import InputError
+from tts2face.render.picture import AUTO_SIZE, parse_size
+from tts2face.service.errors import RefusedError
 from tts2face.service.keys import ApiKey
 from tts2face.service.names import MODEL_FIELDS, check_background, check_voice, resolve_dictionary, resolve_models
 from tts2face.service.state import ServiceState
@@ -64,4 +67,15 @@ async def divide_options(state: ServiceState, key: ApiKey, given: dict[str, Any]
     request = await resolve_dictionary(state.library, key, request)
     check_voice(request.get("voice"))
     check_background(picture.get("background", "studio"))
+    _check_size(picture.get("size", AUTO_SIZE), state.settings.pixels)
     return Fields(models, request, picture)
+
+
+def _check_size(size: str, most: int) -> None:
+    """Refuse pictures that are larger than the settings allow."""
+    try:
+        width, height = parse_size(size)
+    except InputError as wrong:
+        raise RefusedError(400, "invalid_request", str(wrong)) from wrong
+    if width * height > most:
+        raise RefusedError(400, "invalid_request", f"size {size[:20]} has more than {most} pixels; give a smaller one")

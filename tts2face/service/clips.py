@@ -60,7 +60,7 @@ async def make_clip(request: HttpRequest) -> StreamingResponse:
         return await _answer(request, _parse(await request.body()), {})
     async with AsyncExitStack() as stack:
         form = await stack.enter_async_context(request.form(max_files=len(FILES), max_fields=4))
-        folder = await stack.enter_async_context(upload_folder(service_state(request).settings.sound_s))
+        folder = await stack.enter_async_context(upload_folder(service_state(request).settings))
         clip, files = await _read_form(form, folder)
         return await _answer(request, clip, files, stack.pop_all())  # the files are read until the clip is complete
 

@@ -1,12 +1,12 @@
 """Jobs of a running server: the database, the worker processes, webhooks and the removal of what is old."""
 
 import asyncio
-import json
 import logging
 import threading
 from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from functools import partial
 from typing import TypeVar
 
 from lexicon.errors import BackendError, Tts2faceError
@@ -15,18 +15,18 @@ from tts2face.batch.store import open_store
 from tts2face.jobs.blobs import open_blobs
 from tts2face.jobs.connection import DatabaseAwayError
 from tts2face.jobs.control import prune_jobs, unfinished_segments
-from tts2face.jobs.database import database_url, prepare_database
+from tts2face.jobs.database import database_url, prepare_database, shown_url
 from tts2face.jobs.engine import DatabaseEngine, local_workers
 from tts2face.jobs.job_client import JobClient
 from tts2face.jobs.job_records import STATES
 from tts2face.jobs.job_runner import BLOBS
 from tts2face.jobs.job_table import OtherBodyError, QueueFullError
 from tts2face.service.errors import RefusedError, as_refused
+from tts2face.service.logs import log_event
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.webhooks import deliver
 from tts2face.storage.files import translate_disk_errors
 
-LOG = logging.getLogger("tts2face.service")
 Value = TypeVar("Value")
 
 NICENESS = 10  # of the workers, so that streams go first
@@ -122,9 +122,9 @@ class JobService:
             except Tts2faceError as wrong:
                 if self._reason != str(wrong):
                     self._reason = str(wrong)
-                    _log("jobs wait", self._reason)
+                    log_event("jobs not available", level=logging.WARNING, reason=self._reason)
                 await asyncio.sleep(RETRY_S)
-        _log("jobs ready", "")
+        log_event("jobs available", database=shown_url(self._settings.database_place))
         if self._settings.workers:
             self._supervisor = threading.Thread(target=self._supervise, name="supervisor", daemon=True)
             self._supervisor.start()
@@ -146,7 +146,7 @@ class JobService:
         settings = self._settings
         engine = DatabaseEngine(
             settings.database_place, settings.store_place, settings.workers,
-            on_message=lambda text: _log("workers", text), niceness=NICENESS,
+            on_message=partial(_log_worker, "workers"), niceness=NICENESS, on_line=partial(_log_worker, "worker"),
         )  # fmt: skip
         while not self._stopped.is_set():
             with suppress(BackendError), local_workers(engine) as supervise:
@@ -179,7 +179,7 @@ class JobService:
             await self.call(lambda client, job_id=job_id: client.delete(job_id))  # type: ignore[misc]
         n_segments = await self.call(lambda _: self._prune(max(age_s, MIN_SEGMENT_AGE_S)))
         if old or n_segments:
-            _log("jobs swept", f"{len(old)} jobs and {n_segments} segments were older than {age_s / DAY_S:g} days")
+            log_event("old jobs removed", jobs=len(old), segments=n_segments, days=age_s / DAY_S)
 
     def _prune(self, age_s: float) -> int:
         database = self._settings.database_place
@@ -194,5 +194,5 @@ def _unavailable(reason: str) -> RefusedError:
     )
 
 
-def _log(event: str, message: str) -> None:
-    LOG.info(json.dumps({"event": event, "message": message}, ensure_ascii=False))
+def _log_worker(event: str, message: str) -> None:
+    log_event(event, message=message)

@@ -75,7 +75,7 @@ async def create_job(request: HttpRequest, idempotency_key: IdempotencyKey = Non
         key = require_scope(request, kind.scope, f"jobs of kind {asked.kind}")
         if asked.webhook is not None:
             check_webhook(asked.webhook, state.settings)
-        folder = await stack.enter_async_context(upload_folder(state.settings.sound_s))
+        folder = await stack.enter_async_context(upload_folder(state.settings))
         order = JobOrder(state, key, _parse(kind.model, json.dumps(asked.request)), Upload(folder))
         await _add_files(kind, order, form)
         try:

@@ -163,7 +163,7 @@ async def _store(request: HttpRequest, kind: str) -> StoredResource:
         name, file = _read_form(form)
         check_new_name(kind, name)
         await asyncio.to_thread(state.library.check_room, key, kind, name, file.size or 0)
-        folder = await stack.enter_async_context(upload_folder(0.0))
+        folder = await stack.enter_async_context(upload_folder(state.settings))
         await stack.enter_async_context(state.checks)
         checked = await folder.resource(kind, file, state.library.limits(key).n_bytes)
         return await asyncio.to_thread(state.library.add, key, kind, name, checked)

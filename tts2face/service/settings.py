@@ -4,7 +4,7 @@ import ipaddress
 import os
 import tomllib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +19,9 @@ SECRETS = ("webhook_secret",)  # settings that are never shown
 Limits = tuple[float, float]
 
 
-def setting(default: Any, help_text: str, limits: Limits | None = None) -> Any:
-    """Dataclass field with its help text and limits."""
-    return field(default=default, metadata={"help": help_text, "limits": limits})
+def setting(default: Any, help_text: str, limits: Limits | None = None, choices: tuple[str, ...] | None = None) -> Any:
+    """Dataclass field with its help text, limits and choices."""
+    return field(default=default, metadata={"help": help_text, "limits": limits, "choices": choices})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +66,17 @@ class ServiceSettings:
     body_s: float = setting(20.0, "Seconds within which the body of a request must arrive.", (0.1, 3600))
     resources: int = setting(100, "Talkers, faces, palettes and dictionaries that a key may upload.", (0, 100_000))
     resources_mb: float = setting(500.0, "MB of uploads of a key, with their pictures.", (0, 1e9))
+    head_s: float = setting(10.0, "Seconds within which the head of a request must arrive.", (0.1, 3600))
+    stall_s: float = setting(120.0, "Seconds for which a client may take nothing of its answer.", (0.1, 86_400))
+    keep_alive_s: float = setting(15.0, "Seconds that a connection without a request stays open.", (0, 3600))
+    connections: int = setting(1000, "Connections at the same time; further ones get 503.", (1, 100_000))
+    head_kb: int = setting(64, "Largest head of a request in KB: address and headers.", (1, 1024))
+    message_kb: int = setting(1024, "Largest message of a WebSocket in KB.", (1, 65_536))
+    pixels: int = setting(2_100_000, "Largest picture of a clip in pixels.", (262_144, 16_777_216))
+    upload_pixels: int = setting(40_000_000, "Largest picture that a request may send.", (1, 200_000_000))
+    decode_s: float = setting(60.0, "Seconds that the decoding of an upload may take.", (1, 3600))
     drain_s: float = setting(30.0, "Seconds that running requests have to finish after SIGTERM.", (0, 3600))
+    log_format: str = setting("json", "Form of the log: json or text.", choices=("json", "text"))
     log_text: bool = setting(False, "Write the texts of requests to the log.")
 
     def __post_init__(self) -> None:
@@ -74,6 +84,9 @@ class ServiceSettings:
         for one in fields(self):
             if one.metadata["limits"] is not None:
                 check_limits(one.name, getattr(self, one.name), one.metadata["limits"])
+            choices, value = one.metadata["choices"], getattr(self, one.name)
+            if choices is not None and value not in choices:
+                raise InputError(f"{one.name} must be one of {', '.join(choices)}, not {value!r}")
         if self.keys is None and not is_loopback(self.host):
             raise InputError(
                 f"the service would be open to everybody who reaches {self.host}; create a key with `tts2face keys add "
@@ -103,9 +116,15 @@ class ServiceSettings:
         return self.store or str(self.data_folder / "store")
 
     def as_toml(self) -> str:
-        """The settings as a settings file, without secrets."""
-        shown = {name: value for name, value in asdict(self).items() if value is not None and name not in SECRETS}
-        return "".join(f"{name} = {_toml(value)}\n" for name, value in shown.items())
+        """The settings as a settings file, without secrets; a comment says what each means."""
+        lines = []
+        for one in fields(self):
+            if one.name in SECRETS:
+                continue
+            value = getattr(self, one.name)
+            line = f"{one.name} = {_toml(value)}" if value is not None else f'# {one.name} = ""'
+            lines.append(f"# {one.metadata['help']}\n{line}\n")
+        return "".join(lines)
 
 
 def is_loopback(host: str) -> bool:

@@ -13,6 +13,7 @@ from contextlib import suppress
 from typing import Any, BinaryIO
 
 from tts2face.child_process import exit_after
+from tts2face.service.logs import configure_logs
 from tts2face.service.messages import Message, MessageKind
 from tts2face.service.scheduler import Scheduler, Step
 from tts2face.service.tasks import TASKS
@@ -43,7 +44,9 @@ class SynthesisProcess:
         match command["do"]:
             case "start":
                 work = work_from_json(command["work"])
-                self.scheduler.start(number, lambda: self._steps(number, work), command["priority"])
+                self.scheduler.start(
+                    number, lambda: self._steps(number, work), command["priority"], request=command.get("id")
+                )
             case "cancel":
                 self.scheduler.cancel(number)
                 self._inputs.pop(number, None)
@@ -70,6 +73,7 @@ class SynthesisProcess:
 def main() -> None:
     """Execute commands until standard input ends."""
     settings = json.loads(sys.argv[1])
+    configure_logs(settings["log_format"], with_text=settings["log_text"])
     if settings.get("core") is not None and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {settings["core"]})
     messages = os.fdopen(os.dup(1), "wb")

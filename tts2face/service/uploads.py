@@ -14,15 +14,14 @@ from starlette.datastructures import UploadFile
 
 from tts2face.service.decode_process import PICTURE, REFUSED, SOUND, SUBTITLES
 from tts2face.service.errors import RefusedError
+from tts2face.service.settings import ServiceSettings
 
-DECODE_TIMEOUT_S = 60.0
 RESOURCE_TIMEOUT_S = 300.0  # a check takes 3 to 7 s; with other work on the machine, and kernels to compile, longer
 MAX_REASON = 300  # characters
 KEPT_VARIABLES = (
     "PATH", "HOME", "LANG", "LC_", "TMPDIR", "TEMP", "SYSTEMROOT", "LOCALAPPDATA", "XDG_", "PYTHON", "VIRTUAL_ENV",
     "NUMBA_", "TTS2FACE_FACE_MODEL",
 )  # fmt: skip
-MAX_PIXELS = 40_000_000
 MAX_TEXT_BYTES = 1_000_000
 BLOCK_BYTES = 1 << 20
 
@@ -32,7 +31,7 @@ class UploadFolder:
     """A private folder of one request; it is removed when the request ends."""
 
     path: Path
-    max_sound_s: float
+    settings: ServiceSettings
 
     async def sound(self, name: str, upload: UploadFile) -> Path:
         """Decoded sound of an upload, a .wav file; `name` is the field's name in messages.
@@ -42,11 +41,11 @@ class UploadFolder:
         RefusedError
             It is no sound, or too long.
         """
-        return await self._decode(SOUND, name, upload, ".wav", self.max_sound_s)
+        return await self._decode(SOUND, name, upload, ".wav", self.settings.sound_s)
 
     async def picture(self, name: str, upload: UploadFile) -> Path:
         """Decoded picture of an upload, a .png file; errors as `sound`."""
-        return await self._decode(PICTURE, name, upload, ".png", MAX_PIXELS)
+        return await self._decode(PICTURE, name, upload, ".png", self.settings.upload_pixels)
 
     async def text(self, name: str, upload: UploadFile, suffix: str) -> Path:
         """Text of an upload, at most `MAX_TEXT_BYTES`; its reader checks it."""
@@ -86,7 +85,7 @@ class UploadFolder:
 
     async def _decode(self, kind: str, name: str, upload: UploadFile, suffix: str, limit: float) -> Path:
         given, decoded = await self._save(name, upload), self.path / f"{name}{suffix}"
-        await decode_file((kind, given, decoded, limit), name, DECODE_TIMEOUT_S)
+        await decode_file((kind, given, decoded, limit), name, self.settings.decode_s)
         given.unlink(missing_ok=True)
         return decoded
 
@@ -135,7 +134,7 @@ def child_environment() -> dict[str, str]:
 
 
 @asynccontextmanager
-async def upload_folder(max_sound_s: float) -> AsyncIterator[UploadFolder]:
+async def upload_folder(settings: ServiceSettings) -> AsyncIterator[UploadFolder]:
     """A private folder for the uploads of one request."""
     with tempfile.TemporaryDirectory(prefix="tts2face-upload-") as folder:
-        yield UploadFolder(Path(folder), max_sound_s)
+        yield UploadFolder(Path(folder), settings)
