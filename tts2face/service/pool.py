@@ -12,7 +12,9 @@ from typing import Any
 from lexicon.errors import BackendError
 from tts2face.render.movie_stream import MOVIE_KINDS
 from tts2face.render.sound_stream import SOUND_KINDS
+from tts2face.service.logs import JSON_LINES
 from tts2face.service.messages import Message
+from tts2face.service.stages import stage
 from tts2face.service.warm_process import ProcessEndedError, WarmProcess
 from tts2face.service.work import Work
 
@@ -45,12 +47,16 @@ class PoolSettings:
         Requests that may wait; further ones are refused.
     warm
         Works that each process executes before it is ready, as `Work.as_json`.
+    log_format, log_text
+        As in the settings of the service.
     """
 
     n_processes: int = 0
     n_sessions: int = 2
     max_waiting: int = 64
     warm: tuple[dict[str, Any], ...] = ()
+    log_format: str = JSON_LINES
+    log_text: bool = False
 
 
 def work_cost(work: Work) -> float:
@@ -75,7 +81,7 @@ class Pool:
         self.processes = [
             WarmProcess(
                 {"core": cores[number % len(cores)] if cores else None, "n_sessions": settings.n_sessions,
-                 "warm": list(settings.warm)},
+                 "warm": list(settings.warm), "log_format": settings.log_format, "log_text": settings.log_text},
                 self._wake,
             )
             for number in range(count)
@@ -132,13 +138,15 @@ class Pool:
         """
         cost, tries = work_cost(work), 0
         while True:
-            process = await self._take(cost, key)
+            with stage("queue"):
+                process = await self._take(cost, key)
             is_begun = False
             messages = process.stream(work, priority, inputs)
             try:
-                async for message in messages:
-                    is_begun = True
-                    yield message
+                with stage("synthesis"):
+                    async for message in messages:
+                        is_begun = True
+                        yield message
                 return
             except ProcessEndedError:
                 tries += 1

@@ -14,6 +14,7 @@ from contextlib import suppress
 from typing import Any, BinaryIO
 
 from tts2face.child_process import exit_after
+from tts2face.service.logs import configure_logs
 from tts2face.service.messages import CANCELS, Message, MessageKind
 from tts2face.service.remote_aligner import RemoteAligner
 from tts2face.service.scheduler import Scheduler, Step
@@ -55,7 +56,9 @@ class SynthesisProcess:
                 work = work_from_json(command["work"])
                 self._inputs[number] = queue.SimpleQueue()
                 self._turns[number] = TurnSteps(lambda: self._steps(number, work), lambda: self._wake(number))
-                self.scheduler.start(number, lambda: self._turns[number], command["priority"])
+                self.scheduler.start(
+                    number, lambda: self._turns[number], command["priority"], request=command.get("id")
+                )
             case "cancel" if number in self._turns:
                 self.scheduler.cancel(number)
                 self._forget(number)
@@ -91,6 +94,7 @@ class SynthesisProcess:
 def main() -> None:
     """Execute commands until standard input ends."""
     settings = json.loads(sys.argv[1])
+    configure_logs(settings["log_format"], with_text=settings["log_text"])
     if settings.get("core") is not None and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {settings["core"]})
     messages = os.fdopen(os.dup(1), "wb")

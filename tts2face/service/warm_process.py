@@ -10,8 +10,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lexicon.errors import BackendError
-from tts2face.batch.render_process import KINDS, RETURNED_BLOCKS
-from tts2face.service.messages import HEADER, MAX_PAYLOAD_BYTES, Message, MessageKind
+from tts2face.batch.render_process import KINDS as ERROR_KINDS
+from tts2face.batch.render_process import RETURNED_BLOCKS
+from tts2face.service.logs import REQUEST_ID
+from tts2face.service.messages import DEFECT, HEADER, MAX_PAYLOAD_BYTES, Message, MessageKind
 from tts2face.service.work import Work
 
 PAUSE_BYTES = 8 << 20  # of a result that nobody has read yet, beyond which its task is paused
@@ -20,6 +22,13 @@ RESUME_BYTES = 2 << 20
 
 class ProcessEndedError(BackendError):
     """The synthesis process ended; the request may be repeated."""
+
+
+class DefectError(BackendError):
+    """A defect of the synthesis; the log has its traceback."""
+
+
+KINDS = ERROR_KINDS | {DEFECT: DefectError}  # of errors of a synthesis process
 
 
 @dataclass(slots=True)
@@ -94,7 +103,9 @@ class WarmProcess:
         self._results[number] = result
         is_done, forwarding = False, None
         try:
-            await self._command({"do": "start", "task": number, "work": work.as_json(), "priority": priority})
+            await self._command({
+                "do": "start", "task": number, "work": work.as_json(), "priority": priority, "id": REQUEST_ID.get(),
+            })  # fmt: skip
             if inputs is not None:
                 forwarding = asyncio.create_task(self._forward(number, inputs))
             while not is_done:
@@ -132,13 +143,13 @@ class WarmProcess:
         while True:
             try:
                 head = await child.stdout.readexactly(HEADER.size)
-                number, kind, length = HEADER.unpack(head)
+                number, kind, length, seconds = HEADER.unpack(head)
                 if length > MAX_PAYLOAD_BYTES:
                     return
                 payload = await child.stdout.readexactly(length)
             except (asyncio.IncompleteReadError, ConnectionError):
                 return
-            message = Message(number, MessageKind(kind), payload)
+            message = Message(number, MessageKind(kind), payload, seconds)
             if message.kind == MessageKind.READY:
                 self.is_ready = True
                 self._on_change()
