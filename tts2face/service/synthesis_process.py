@@ -110,7 +110,9 @@ def main() -> None:
     aligner.start()
     process = SynthesisProcess(
         messages,
-        SessionCache(settings["n_sessions"], voices=VoicePool(aligner)),
+        SessionCache(
+            settings["n_sessions"], voices=VoicePool(aligner), max_bytes=settings["memory_mb"] * 1_000_000 or None
+        ),
         lambda task: commands.put(({"do": "wake", "task": task}, time.monotonic())),
     )
     process.warm_up(settings["warm"])
