@@ -9,7 +9,7 @@ from typing import Any
 
 from lexicon.errors import BackendError
 from tts2face.service.alignment_process import CANCEL, decode_answer, encode_job
-from tts2face.service.turns import wait_elsewhere
+from tts2face.service.turns import AbandonedError, acquired, wait_elsewhere
 from tts2face.speech.forced_alignment import Alignment, Pronunciations
 from tts2face.types import Waveform
 
@@ -55,18 +55,18 @@ class _Job:
         self._aligner, self._sound, self._words = aligner, sound, words
         self._lock = threading.Lock()
         self._child: subprocess.Popen[bytes] | None = None  # while it works on this sentence
-        self._is_abandoned = False
+        self._is_abandoned = threading.Event()
 
     def run(self) -> dict[str, Any]:
         """Answer of the process."""
-        with self._aligner._lock:
+        with acquired(self._aligner._lock, self._is_abandoned):
             self._aligner.start()
             self._aligner._number += 1
             child, number = self._aligner._child, self._aligner._number
             assert child is not None
             with self._lock:
-                if self._is_abandoned:
-                    raise _cancelled()
+                if self._is_abandoned.is_set():
+                    raise AbandonedError
                 try:
                     _send(child, encode_job(number, self._sound, self._words))
                 finally:
@@ -80,7 +80,7 @@ class _Job:
     def abandon(self) -> None:
         """End the work."""
         with self._lock:
-            self._is_abandoned = True
+            self._is_abandoned.set()
             if self._child is not None:
                 self._aligner._n_cancelled += 1
                 self._child.send_signal(CANCEL)
@@ -95,8 +95,8 @@ class _Job:
                 break  # the worker ended by itself
             if answer is None:
                 self._aligner._n_cancelled -= 1
-                if self._is_abandoned:
-                    raise _cancelled()
+                if self._is_abandoned.is_set():
+                    raise AbandonedError
         raise BackendError("the process that aligns speech ended; repeat the request")
 
 
@@ -107,7 +107,3 @@ def _send(child: "subprocess.Popen[bytes]", content: bytes) -> None:
         child.stdin.flush()
     except OSError as ended:
         raise BackendError("the process that aligns speech ended; repeat the request") from ended
-
-
-def _cancelled() -> BackendError:
-    return BackendError("the alignment has been cancelled; repeat the request")

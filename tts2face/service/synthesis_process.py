@@ -19,7 +19,7 @@ from tts2face.service.messages import CANCELS, Message, MessageKind
 from tts2face.service.remote_aligner import RemoteAligner
 from tts2face.service.scheduler import Scheduler, Step
 from tts2face.service.tasks import TASKS
-from tts2face.service.turns import TurnSteps
+from tts2face.service.turns import OneAtATime, TurnSteps
 from tts2face.service.work import Work, work_from_json
 from tts2face.session_cache import Models, SessionCache
 from tts2face.voice.pool import VoicePool
@@ -111,7 +111,9 @@ def main() -> None:
     process = SynthesisProcess(
         messages,
         SessionCache(
-            settings["n_sessions"], voices=VoicePool(aligner), max_bytes=settings["memory_mb"] * 1_000_000 or None
+            settings["n_sessions"],
+            voices=VoicePool(aligner, OneAtATime()),
+            max_bytes=settings["memory_mb"] * 1_000_000 or None,
         ),
         lambda task: commands.put(({"do": "wake", "task": task}, time.monotonic())),
     )

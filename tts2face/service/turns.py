@@ -2,12 +2,20 @@
 
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from tts2face.service.messages import Wait
 from tts2face.service.scheduler import Step
 
 Result = TypeVar("Result")
+
+
+POLL_S = 0.01  # between looks whether a wait for a lock has been abandoned
+
+
+class AbandonedError(Exception):
+    """A wait that has been abandoned."""
 
 
 class CancelledTaskError(BaseException):
@@ -125,6 +133,50 @@ class TurnSteps:
             if hasattr(steps, "close"):
                 steps.close()
             self._back.release()
+
+
+class OneAtATime:
+    """Runs computations of native code one after another while other tasks have their turns."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+
+    def __call__(self, compute: Callable[[], Result], end: Callable[[], None]) -> Result:
+        """Result of `compute`, which `end` ends early; both are called from different threads."""
+        is_abandoned = threading.Event()
+
+        def run() -> Result:
+            with acquired(self._lock, is_abandoned):
+                return compute()
+
+        def abandon() -> None:
+            is_abandoned.set()
+            end()
+
+        return wait_elsewhere(run, abandon)
+
+
+@contextmanager
+def acquired(lock: threading.Lock, is_abandoned: threading.Event) -> Iterator[None]:
+    """A lock for a ``with`` block, unless the wait for it is abandoned.
+
+    Raises
+    ------
+    AbandonedError
+        It is no longer needed.
+    """
+    while not lock.acquire(timeout=POLL_S):
+        if is_abandoned.is_set():
+            break
+    else:
+        try:
+            if is_abandoned.is_set():
+                raise AbandonedError
+            yield
+        finally:
+            lock.release()
+        return
+    raise AbandonedError
 
 
 _CURRENT = threading.local()

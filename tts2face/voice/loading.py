@@ -5,7 +5,7 @@ from pathlib import Path
 from lexicon.errors import InputError
 from lexicon.languages import language_code
 from tts2face.speech.forced_alignment import SpeechAligner
-from tts2face.voice.engine import ENGLISH_CODES, VOICE_NAMES, PronunciationMap, Voice
+from tts2face.voice.engine import ENGLISH_CODES, VOICE_NAMES, NativeRun, PronunciationMap, Voice
 
 
 def load_voice(
@@ -13,6 +13,7 @@ def load_voice(
     language: str,
     own_words: PronunciationMap | None = None,
     aligner: SpeechAligner | None = None,
+    run: NativeRun | None = None,
 ) -> Voice:
     """Load a voice by name, or the default voice of a language.
 
@@ -26,6 +27,8 @@ def load_voice(
         A user's pronunciations, which take precedence over those of the voice.
     aligner
         Aligns the sound of voices that report no edges; None for an aligner of each voice.
+    run
+        Runs the model of the voice heart; None: within the call.
 
     Raises
     ------
@@ -43,7 +46,7 @@ def load_voice(
             raise InputError(f"the voice heart speaks English, not {language}; choose --voice espeak")
         from tts2face.voice.neural import NeuralVoice
 
-        return NeuralVoice(own_words or {}, aligner)
+        return NeuralVoice(own_words or {}, aligner, run)
     if chosen in {"espeak", "espeak-female"}:
         from tts2face.voice.espeak import EspeakVoice
 

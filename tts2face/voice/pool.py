@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from tts2face.speech.forced_alignment import SpeechAligner
 from tts2face.types import Speech, Waveform
-from tts2face.voice.engine import PronunciationMap, SpeechInput, Voice
+from tts2face.voice.engine import NativeRun, PronunciationMap, SpeechInput, Voice
 from tts2face.voice.loading import load_voice
 
 MAX_VOICES = 2  # unused voices in memory; about 100 MB each
@@ -24,11 +24,13 @@ class VoicePool:
     ----------
     aligner
         Thread-safe aligner of all voices, during whose work other requests may use the same voice: they take turns, and
-        only this wait lies within a call. None: each voice has its own.
+        only this wait, and runs of models, lie within a call. None: each voice has its own.
+    run
+        Runs the models of voices.
     """
 
-    def __init__(self, aligner: SpeechAligner | None = None) -> None:
-        self._aligner = aligner
+    def __init__(self, aligner: SpeechAligner | None = None, run: NativeRun | None = None) -> None:
+        self._aligner, self._native_run = aligner, run
         self._lock = threading.Lock()
         self._unused: list[tuple[Hashable, Voice]] = []  # the newest at the end
         self._kept: OrderedDict[Hashable, Speech] = OrderedDict()
@@ -50,7 +52,7 @@ class VoicePool:
         """
         key = (name, language, frozenset(dictionary.items()))
         shared = _SharedVoice(
-            self, key, lambda: load_voice(name, language, dictionary, self._aligner), keeps_utterances
+            self, key, lambda: load_voice(name, language, dictionary, self._aligner, self._native_run), keeps_utterances
         )
         with self.borrow(key, shared.load):  # an unknown voice is refused at once
             return shared
