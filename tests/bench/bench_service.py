@@ -192,7 +192,7 @@ def main() -> None:
         row(*["---"] * 6)
         for name, one in kinds.items():
             for clients in CLIENTS if not name.startswith("clip") else CLIENTS[:2]:
-                row(name, clients, *percentiles(repeat(url, one, clients, 4 * rounds if clients == 1 else rounds)))
+                row(name, clients, *percentiles(repeat(url, one, clients, max(1, 4 * rounds // clients))))
         for format in ("wav", "curves", "mp4"):
             one = first_byte("/v1/clips", {"text": LONG_TEXT, "format": format, "size": "64x64", "supersampling": 1})
             row(f"200 words without a point ({format})", 1, *percentiles(repeat(url, one, 1, rounds)))

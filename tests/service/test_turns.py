@@ -1,7 +1,9 @@
 """Tasks in threads that take turns, and alignment in another process."""
 
 import threading
+import time
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from lexicon.errors import BackendError, DataError, InputError
 from tts2face.service.messages import Wait
 from tts2face.service.remote_aligner import RemoteAligner
 from tts2face.service.scheduler import Step
-from tts2face.service.turns import InterruptedTaskError, TurnSteps, wait_elsewhere
+from tts2face.service.turns import InterruptedTaskError, OneAtATime, TurnSteps, wait_elsewhere
 from tts2face.speech.forced_alignment import Aligner
 from tts2face.types import Chunk
 from tts2face.voice.loading import load_voice
@@ -144,6 +146,41 @@ def test_a_cancelled_alignment_leaves_the_next_one_alone(aligner: RemoteAligner)
         assert next(steps) == Wait()
         steps.close()
     np.testing.assert_array_equal(aligner.align(sound, WORDS).phones.edges, expected)
+
+
+def test_alignments_may_be_cancelled_at_any_time(aligner: RemoteAligner) -> None:
+    """Before the process has read the sentence, in the middle, and when it is done."""
+    sound = load_voice("heart", "en-us").speak("Bob may read.").waveform
+    expected = aligner.align(sound, WORDS).phones.edges
+    begin = time.monotonic()
+    aligner.align(sound, WORDS)
+    takes_s = time.monotonic() - begin
+    for share in np.linspace(0.0, 1.3, 14):
+        steps = TurnSteps(lambda: iter([Chunk(str(aligner.align(sound, WORDS)).encode())]), lambda: None)
+        assert next(steps) == Wait()
+        time.sleep(share * takes_s)
+        steps.close()
+        np.testing.assert_array_equal(aligner.align(sound, WORDS).phones.edges, expected)
+
+
+def test_tasks_run_models_one_after_another(elsewhere: Elsewhere) -> None:
+    run = OneAtATime()
+    order: list[int] = []
+
+    def task(number: int) -> Iterator[Step]:
+        run(lambda: (order.append(number), elsewhere.end.wait(WAIT_S)), lambda: None)
+        yield Chunk(b"%d" % number)
+
+    first, second = (TurnSteps(partial(task, number), elsewhere.woken.set) for number in (1, 2))
+    assert next(first) == Wait()
+    assert next(second) == Wait()
+    second.close()  # while it waits for the first one
+    assert order == [1]
+    elsewhere.end.set()
+    assert elsewhere.woken.wait(WAIT_S)
+    while (step := next(first)) == Wait():
+        pass
+    assert step == Chunk(b"1")
 
 
 def test_a_process_that_ended_is_started_again(aligner: RemoteAligner) -> None:

@@ -1,9 +1,9 @@
 """Forced alignment in a process of its own, which can be ended in the middle of a sentence.
 
 Started as ``python -m tts2face.service.alignment_process``. A job is a line of JSON (number, rate, number of samples,
-words with pronunciations) and the samples as float32; its answer is a line of JSON with its number. The process loads
-the acoustic model and forks a worker; on `CANCEL` it ends the worker, forks another one within some milliseconds,
-and answers ``null``.
+words with pronunciations) and the samples as float32; its answers are lines of JSON: that it is read, and the result.
+The process loads the acoustic model and forks a worker; on `CANCEL`, which may follow once a job is read, it ends the
+worker, forks another one within some milliseconds, and answers ``null``.
 """
 
 import json
@@ -63,9 +63,14 @@ def _work(aligner: Aligner, answers: BinaryIO) -> None:
     """Execute jobs until standard input ends."""
     while line := sys.stdin.buffer.readline():
         head = json.loads(line)
-        answer = _answer(aligner, head, sys.stdin.buffer.read(SAMPLE_BYTES * head["samples"]))
-        answers.write(json.dumps({"job": head["job"], **answer}).encode() + b"\n")
-        answers.flush()
+        samples = sys.stdin.buffer.read(SAMPLE_BYTES * head["samples"])
+        _write(answers, {"job": head["job"], "is_read": True})  # from now on it may be ended
+        _write(answers, {"job": head["job"], **_answer(aligner, head, samples)})
+
+
+def _write(answers: BinaryIO, answer: Any) -> None:
+    answers.write(json.dumps(answer).encode() + b"\n")
+    answers.flush()
 
 
 def main() -> None:
@@ -76,17 +81,18 @@ def main() -> None:
     worker = 0
     signal.signal(CANCEL, lambda *_: os.kill(worker, signal.SIGKILL) if worker else None)
     while True:
+        signal.pthread_sigmask(signal.SIG_BLOCK, {CANCEL})  # until the worker's number is known
         worker = os.fork()
         if worker == 0:
             signal.signal(CANCEL, signal.SIG_IGN)
             _work(aligner, answers)
             os._exit(0)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {CANCEL})
         _, status = os.waitpid(worker, 0)
         worker = 0
         if not os.WIFSIGNALED(status):
             return
-        answers.write(b"null\n")
-        answers.flush()
+        _write(answers, None)
 
 
 if __name__ == "__main__":

@@ -42,7 +42,7 @@ class RemoteAligner:
 
     def close(self) -> None:
         """End the process."""
-        child, self._child = self._child, None
+        child, self._child, self._n_cancelled = self._child, None, 0
         if child is not None:
             child.kill()
             child.communicate()
@@ -54,7 +54,7 @@ class _Job:
     def __init__(self, aligner: RemoteAligner, sound: Waveform, words: list[tuple[str, Pronunciations]]) -> None:
         self._aligner, self._sound, self._words = aligner, sound, words
         self._lock = threading.Lock()
-        self._child: subprocess.Popen[bytes] | None = None  # while it works on this sentence
+        self._child: subprocess.Popen[bytes] | None = None  # while it may be ended
         self._is_abandoned = threading.Event()
 
     def run(self) -> dict[str, Any]:
@@ -67,37 +67,54 @@ class _Job:
             with self._lock:
                 if self._is_abandoned.is_set():
                     raise AbandonedError
-                try:
-                    _send(child, encode_job(number, self._sound, self._words))
-                finally:
-                    self._child = child
             try:
+                while self._aligner._n_cancelled:  # a worker that is about to end must not read this job
+                    self._read(child)
+                _send(child, encode_job(number, self._sound, self._words))
                 return self._receive(child, number)
+            except BackendError:
+                self._aligner.close()  # what a worker that ended has left unread
+                raise
             finally:
                 with self._lock:
                     self._child = None
 
     def abandon(self) -> None:
-        """End the work."""
+        """End the work, as soon as the process has read it."""
         with self._lock:
             self._is_abandoned.set()
-            if self._child is not None:
-                self._aligner._n_cancelled += 1
-                self._child.send_signal(CANCEL)
+            self._end()
+
+    def _end(self) -> None:
+        if self._child is not None:
+            self._aligner._n_cancelled += 1
+            self._child.send_signal(CANCEL)
+            self._child = None
 
     def _receive(self, child: "subprocess.Popen[bytes]", number: int) -> dict[str, Any]:
-        assert child.stdout is not None
-        while line := child.stdout.readline():
-            answer: dict[str, Any] | None = json.loads(line)
-            if answer is not None and answer["job"] == number:
+        while True:
+            answer = self._read(child)
+            if answer is None and self._is_abandoned.is_set():
+                raise AbandonedError
+            if answer is None or answer["job"] != number:
+                continue
+            if "is_read" not in answer:
                 return answer
-            if answer is None and not self._aligner._n_cancelled:
-                break  # the worker ended by itself
-            if answer is None:
-                self._aligner._n_cancelled -= 1
+            with self._lock:
+                self._child = child
                 if self._is_abandoned.is_set():
-                    raise AbandonedError
-        raise BackendError("the process that aligns speech ended; repeat the request")
+                    self._end()
+
+    def _read(self, child: "subprocess.Popen[bytes]") -> dict[str, Any] | None:
+        """Next answer; None after the end of a cancelled worker."""
+        assert child.stdout is not None
+        line = child.stdout.readline()
+        if not line or (line == b"null\n" and not self._aligner._n_cancelled):
+            raise BackendError("the process that aligns speech ended; repeat the request")
+        answer: dict[str, Any] | None = json.loads(line)
+        if answer is None:
+            self._aligner._n_cancelled -= 1
+        return answer
 
 
 def _send(child: "subprocess.Popen[bytes]", content: bytes) -> None:

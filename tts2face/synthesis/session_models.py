@@ -102,7 +102,7 @@ class SessionModels:
         palette = self.palette if request.has_gestures else None
         if palette is None:
             return None
-        return GestureLayer(prepared, self._fields(palette, request), self.face())
+        return GestureLayer(prepared, self._fields(palette, request), self.face(), self._voices.give_way)
 
     def for_request(self, request: Request, *, keeps_utterances: bool = False) -> SynthesisModels:
         """Models of a request with its own dictionary.
@@ -118,7 +118,7 @@ class SessionModels:
             return self._voices.voice(name, language, dictionary, keeps_utterances=keeps_utterances)
 
         face = self.face(has_gestures=request.has_gestures)
-        return SynthesisModels(self.talker, self._exemplars, face, load_voice)
+        return SynthesisModels(self.talker, self._exemplars, face, load_voice, self._voices.give_way)
 
     def pieces(self, prepared: PreparedRequest) -> Iterator[Piece]:
         """Synthesise the clip of a request piece by piece."""

@@ -57,6 +57,11 @@ class VoicePool:
         with self.borrow(key, shared.load):  # an unknown voice is refused at once
             return shared
 
+    def give_way(self) -> None:
+        """Let other requests take their turn, between two steps of a synthesis."""
+        if self._native_run is not None:
+            self._native_run(_nothing, _nothing)
+
     @contextmanager
     def borrow(self, key: Hashable, load: Callable[[], Voice]) -> Iterator[Voice]:
         """A loaded voice for exclusive use within a ``with`` block."""
@@ -89,6 +94,10 @@ class VoicePool:
         """A kept utterance, which is then forgotten; None if there is none."""
         with self._lock:
             return self._kept.pop(key, None)
+
+
+def _nothing() -> None:
+    pass
 
 
 @dataclass(frozen=True, slots=True, eq=False)
