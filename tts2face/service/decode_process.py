@@ -14,8 +14,8 @@ import shutil
 import sys
 from pathlib import Path
 
-from tts2face.service.refused_file import RefusedFileError
-from tts2face.service.resource_check import RESOURCE_KINDS, check_resource, draw_resource
+from tts2face.jobs.refused_file import RefusedFileError
+from tts2face.jobs.resource_check import RESOURCE_KINDS, check_resource, draw_resource
 
 SOUND, PICTURE, DRAW, SUBTITLES = "sound", "picture", "draw-", "subtitles-"
 MEMORY_BYTES, CPU_S, FILE_BYTES, N_FILES = 2 << 30, 60, 1 << 30, 64

@@ -5,8 +5,6 @@ All methods block; routes call them in threads.
 
 import json
 import re
-import shutil
-import threading
 from dataclasses import asdict
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -15,13 +13,12 @@ from typing import Any
 from tts2face import catalogue
 from tts2face.jobs.blobs import BlobStore, open_blobs
 from tts2face.jobs.database import database_url
-from tts2face.jobs.input_files import place_file
 from tts2face.jobs.job_runner import RESOURCES
+from tts2face.jobs.resource_check import CONTENT, DESCRIPTION, DICTIONARY, FACE, PICTURE, TALKER
+from tts2face.jobs.resource_table import ResourceTable, StoredResource, Usage
 from tts2face.request import OWN_FACE
 from tts2face.service.errors import RefusedError
 from tts2face.service.keys import ApiKey
-from tts2face.service.resource_check import CONTENT, DESCRIPTION, DICTIONARY, FACE, PICTURE, TALKER
-from tts2face.service.resource_table import ResourceTable, StoredResource, Usage
 from tts2face.service.settings import ServiceSettings
 from tts2face.storage.files import find_file, translate_disk_errors
 
@@ -69,7 +66,6 @@ class Library:
 
     def __init__(self, settings: ServiceSettings) -> None:
         self._settings = settings
-        self._placed, self._placing = settings.data_folder / "models", threading.Lock()
 
     @cached_property
     def _table(self) -> ResourceTable:
@@ -105,7 +101,7 @@ class Library:
                 f"there is no {kind} {name[:60]!r}; those of the service are {shipped}, and yours are at "
                 f"/v1/{plural(kind)}",
             )  # fmt: skip
-        return str(self._place(found)), found.description
+        return str(self._blobs.fetch(found.content)), found.description
 
     def uploads(self, kind: str, owner: str | None) -> tuple[StoredResource, ...]:
         """Uploads of a kind of one owner, or of all."""
@@ -186,7 +182,7 @@ class Library:
         """
         if name in shipped_names(kind):
             raise RefusedError(403, "forbidden", f"the {kind} {name} belongs to the service and cannot be deleted")
-        if NAME.fullmatch(name) is None or not self._table.remove(owner, kind, name, self._delete):
+        if NAME.fullmatch(name) is None or not self._table.remove(owner, kind, name, self._blobs.delete):
             raise RefusedError(404, "not_found", f"there is no {kind} {name[:40]!r}; /v1/{plural(kind)} lists yours")
 
     def usage(self, key: ApiKey) -> Usage:
@@ -199,15 +195,6 @@ class Library:
         most = settings.resources if key.resources is None else key.resources
         most_mb = settings.resources_mb if key.resources_mb is None else key.resources_mb
         return Usage(most, int(most_mb * MB))
-
-    def _place(self, resource: StoredResource) -> Path:
-        """Path of a content with a name, as workers on other machines find it too."""
-        with self._placing:
-            return place_file((self._blobs,), resource.content, f"upload.{resource.kind}", self._placed)
-
-    def _delete(self, content: str) -> None:
-        shutil.rmtree(self._placed / content, ignore_errors=True)
-        self._blobs.delete(content)
 
     def _check_quota(self, key: ApiKey, usage: Usage, n_bytes: int) -> None:
         limits = self.limits(key)

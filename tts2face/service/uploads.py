@@ -71,7 +71,7 @@ class UploadFolder:
         return path, numbers
 
     async def resource(self, kind: str, upload: UploadFile, max_bytes: float) -> Path:
-        """Folder with a checked talker, face, palette or dictionary (`tts2face.service.resource_check`).
+        """Folder with a checked talker, face, palette or dictionary (`tts2face.jobs.resource_check`).
 
         Raises
         ------
