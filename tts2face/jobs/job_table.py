@@ -207,9 +207,9 @@ class JobTable:
     def add_event(self, change: Transaction, job_id: str, content: dict[str, Any]) -> None:
         """Add an event to a job; within a transaction that changes jobs."""
         change.run(
-            "INSERT INTO tts2face_job_events (job_id, number, time, content) SELECT :id, coalesce(max(number), 0) + 1, "
-            f"{self.database.now}, :content FROM tts2face_job_events WHERE job_id = :id",
-            id=job_id, content=json.dumps(content, ensure_ascii=False),
+            "INSERT INTO tts2face_job_events (job_id, number, time, content) VALUES (CAST(:id AS VARCHAR(64)), (SELECT "
+            "coalesce(max(number), 0) + 1 FROM tts2face_job_events WHERE job_id = CAST(:id AS VARCHAR(64))), "
+            f"{self.database.now}, :content)", id=job_id, content=json.dumps(content, ensure_ascii=False),
         )  # fmt: skip
 
     @staticmethod
