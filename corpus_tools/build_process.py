@@ -83,8 +83,16 @@ def _result(built: BuiltTalker) -> dict[str, Any]:
 
 
 def _progress(out: TextIO, stage: str) -> Progress:
+    """Progress callback of a stage; equal messages are written once."""
+    written = [(0, 0)]
+
+    def report(done: int, of: int) -> None:
+        if (done, of) != written[0]:
+            written[0] = (done, of)
+            _write(out, {"stage": stage, "done": done, "of": of})
+
     _write(out, {"stage": stage, "done": 0, "of": 0})
-    return lambda done, of: _write(out, {"stage": stage, "done": done, "of": of})
+    return report
 
 
 def _write(out: TextIO, content: Mapping[str, Any]) -> None:
