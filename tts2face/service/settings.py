@@ -73,6 +73,8 @@ class ServiceSettings:
     sound_s: float = setting(600.0, "Longest recording that a request may send.", (1, 86_400))
     body_mb: float = setting(20.0, "Largest body of a request in MB.", (0.01, 4096))
     body_s: float = setting(20.0, "Seconds within which the body of a request must arrive.", (0.1, 3600))
+    video_mb: float = setting(500.0, "Largest body with a recording of a talker in MB.", (1, 1e5))
+    video_s: float = setting(1800.0, "Longest recording of a talker in seconds.", (1, 86_400))
     resources: int = setting(100, "Talkers, faces, palettes and dictionaries that a key may upload.", (0, 100_000))
     resources_mb: float = setting(500.0, "MB of uploads of a key, with their pictures.", (0, 1e9))
     head_s: float = setting(10.0, "Seconds within which the head of a request must arrive.", (0.1, 3600))
