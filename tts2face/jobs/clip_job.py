@@ -22,7 +22,8 @@ def run_clip(task: JobTask) -> Products:
     """
     format = str(task.request["format"])
     segment = clip_segment(task)
-    for rendered in task.engine.render({segment.address: segment}, task.store):
+    missing = {} if task.store.result(segment.address) is not None else {segment.address: segment}
+    for rendered in task.engine.render(missing, task.store):
         if rendered.result is None:
             raise DataError(rendered.reason)
     suffix = LINE_FORMATS[format].suffixes[0] if format in LINE_FORMATS else f".{format}"

@@ -47,7 +47,7 @@ class ServiceState:
         if settings.cache_mb:
             self.cache = ResultCache(settings.data_folder / "cache", settings.cache_mb * 1_000_000)
         self.limits, self.metrics = RateLimits(), Metrics(self.pool, self.jobs, self.cache)
-        self.library, self.checks = Library(settings), Checks()
+        self.library, self.checks, self.video_checks = Library(settings), Checks(), Checks()
         self.tracing = tracing_from_environment(os.environ)
         self.is_draining = False
         self.running: set[Exchange] = set()
