@@ -3,6 +3,7 @@
 import json
 import socket
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 from urllib.parse import urlsplit
@@ -54,10 +55,8 @@ def parse(content: bytes) -> RawAnswer:
 def ask(url: str, content: bytes) -> RawAnswer:
     """Send bytes, and read what comes until the connection is closed."""
     with connect(url) as connection:
-        try:
+        with suppress(ConnectionResetError, BrokenPipeError):
             connection.sendall(content)
-        except (ConnectionResetError, BrokenPipeError):
-            pass
         return parse(read_all(connection))
 
 

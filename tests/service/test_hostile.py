@@ -174,7 +174,7 @@ def test_a_gigabyte_is_refused_before_it_is_sent(attacked: RunningService) -> No
                 n_sent += connection.send(block)
         except (ConnectionResetError, BrokenPipeError):
             pass
-    assert n_sent < 900_000_000
+    assert n_sent < 100_000_000
     with connect(attacked.url) as connection:
         connection.sendall(kept_open + 40 * block)
         answer = parse(read_all(connection))
@@ -213,7 +213,7 @@ def test_idle_connections_are_closed_and_do_not_disturb(attacked: RunningService
 def test_a_client_that_reads_nothing_is_ended(attacked: RunningService) -> None:
     """It would hold its process for ever."""
     body = json.dumps({"text": "We were away a year ago. " * 30, "format": "curves", "fps": 120}).encode()
-    with socket.create_connection(connect(attacked.url).getpeername()) as connection:
+    with connect(attacked.url) as connection:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         connection.sendall(request("POST", "/v1/clips", body, "X-Request-ID: stalled"))
         attacked.wait_for_event("request", id="stalled")
@@ -225,17 +225,18 @@ def test_a_client_that_reads_nothing_is_ended(attacked: RunningService) -> None:
 @pytest.mark.parametrize(
     ("text", "statuses"),
     [
-        ("a" * 10_000, {200}),
-        ("supercalifragilistic" * 500, {200}),
+        ("a" * 10_000, {400}),
+        ("supercalifragilistic" * 500, {400}),
         ("\u0301" * 10_000, {200, 400}),
-        ("1" * 10_000, {200, 400}),
+        ("1" * 10_000, {400}),
+        ("\u0661" * 10_000, {400}),
         ("." * 50_000, {200, 400}),
         ("\x00\x01\x1b[31m\u202e\ufeff", {200, 400}),
         ("[" * 50_000, {200, 400}),
         ("<speak>" * 10_000, {400}),
         ("<!DOCTYPE x [<!ENTITY a 'b'>]><speak>&a;</speak>", {400}),
         ("<?xml version='1.0'?><!DOCTYPE s [<!ENTITY x SYSTEM 'file:///etc/passwd'>]><speak>&x;</speak>", {400}),
-        ("<speak>" + "<emphasis>" * 5000 + "Hi." + "</emphasis>" * 5000 + "</speak>", {400}),
+        ("<speak>" + "<emphasis> " * 4000 + "Hi." + "</emphasis> " * 4000 + "</speak>", {200, 400}),
         ("<speak><break time='1e9s'/>Hi.</speak>", {400}),
         ("<speak><prosody rate='1e-9'>Hi.</prosody></speak>", {200, 400}),
     ],
@@ -305,7 +306,7 @@ def test_a_picture_of_gigabytes_is_refused(attacked: RunningService) -> None:
             {400, 422},
         ),
         (
-            b'--x\r\nContent-Disposition: form-data; name="audio"; filename="../../etc/cron.d/x\x00.wav"\r\n\r\n1\r\n--x--',
+            b'--x\r\nContent-Disposition: form-data; name="audio"; filename="../../etc/x\x00.wav"\r\n\r\n1\r\n--x--',
             "multipart/form-data; boundary=x",
             {400, 422},
         ),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from lexicon.errors import Tts2faceError
 from lexicon.growing_text import GrowingText
 from tts2face.service.messages import Event, Wait
+from tts2face.service.words import check_words
 from tts2face.service.work import Inputs, Work
 from tts2face.types import Chunk, Clip
 
@@ -64,6 +65,7 @@ class LiveTask:
 
     def _say(self, sentence: str) -> Iterator[Event | Chunk]:
         try:
+            check_words(sentence)
             for piece in self._speech.say(sentence):
                 yield _speech_event(piece)
                 yield _sound(piece.clip)

@@ -18,6 +18,7 @@ from tts2face.service.pool import Pool, PoolSettings
 from tts2face.service.rate_limits import RateLimits
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.tracing import tracing_from_environment
+from tts2face.service.words import check_words
 from tts2face.service.work import Work
 
 if TYPE_CHECKING:
@@ -79,6 +80,7 @@ class ServiceState:
         if self.settings.log_text and work.request.get("text"):
             log_event("text", text=work.request["text"])
         try:
+            check_words(str(work.request.get("text", "")))
             async with aclosing(self.pool.stream(work, key.name, inputs=inputs)) as stream:  # type: ignore[type-var]
                 async for message in stream:
                     made += message.seconds
