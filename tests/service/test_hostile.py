@@ -339,7 +339,7 @@ def attack(service: RunningService, path: str, *messages: object, raw: bytes = b
                     await connection.send(message if isinstance(message, str | bytes) else json.dumps(message))
                 if raw:
                     connection.transport.write(raw)
-                async with asyncio.timeout(3):
+                async with asyncio.timeout(1):
                     while True:
                         await connection.recv()
             except websockets.ConnectionClosed as closed:
@@ -357,7 +357,7 @@ def attack(service: RunningService, path: str, *messages: object, raw: bytes = b
         ("x" * 100_000, {1009}),
         (b"x" * 100_000, {1009}),
         (" " * 10_000_000, {1009}),  # 10 kB with compression
-        (b"\x00\xff", {None, 1000, 1003, 1007, 1005}),
+        (b"\x00\xff", {None, 1000, 1003, 1007}),
         ("[" * 30_000, {None, 1000, 1007}),
         ('{"type": "start", "fps": NaN}', {None, 1000, 1007}),
         ('{"type": "synthesize", "id": 1, "data": {"input": [[[]]]}}', {None, 1007}),

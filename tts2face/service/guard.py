@@ -55,6 +55,7 @@ class Guard:
             self._state.running.add(request)
         try:
             await request.run(self._answer(request, receive))
+            await request.close()
             if request.is_cut:
                 await request.refuse(_draining())
         finally:
