@@ -32,7 +32,7 @@ def serve(
 
 
 @keys.command
-def add(
+def add(  # noqa: PLR0913 - one parameter a flag
     name: Annotated[str, Parameter(help="Name of the key, in the log and the metrics.")],
     /,
     *,
@@ -40,13 +40,16 @@ def add(
     scope: Annotated[list[str] | None, Parameter(help="speak, build, admin; several possible.")] = None,
     requests_per_minute: Annotated[int | None, whole_number("Requests a minute.")] = None,
     concurrent: Annotated[int | None, whole_number("Requests at the same time.")] = None,
+    resources: Annotated[int | None, whole_number("Uploads that it may have.")] = None,
+    resources_mb: Annotated[float | None, Parameter(help="MB of its uploads.")] = None,
     speech_s_per_day: Annotated[int | None, whole_number("Seconds of speech a day.")] = None,
 ) -> None:
     """Create a key and print it; the file holds only its hash."""
     from tts2face.service.keys import add_key
 
     limits = {
-        "requests_per_minute": requests_per_minute, "concurrent": concurrent, "speech_s_per_day": speech_s_per_day
+        "requests_per_minute": requests_per_minute, "concurrent": concurrent, "speech_s_per_day": speech_s_per_day,
+        "resources": resources, "resources_mb": resources_mb,
     }  # fmt: skip
     print(add_key(file, name, scope or ["speak"], **limits))  # noqa: T201 - the result
 

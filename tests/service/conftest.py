@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -34,8 +35,10 @@ class RunningService:
     ) -> None:
         command = [sys.executable, *program, "serve", "--port", "0", "--processes", "1", *arguments]
         kept = {name: value for name, value in os.environ.items() if not name.startswith(("TTS2FACE_SERVE_", "OTEL_"))}
+        self.data = tempfile.TemporaryDirectory(prefix="tts2face-service-")
         self.process = subprocess.Popen(
-            command, stderr=subprocess.PIPE, text=True, env=kept | dict(environment or {})
+            command, stderr=subprocess.PIPE, text=True,
+            env=kept | {"TTS2FACE_SERVE_DATA": self.data.name} | dict(environment or {}),
         )  # fmt: skip
         self.lines: list[str] = []
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -75,6 +78,7 @@ class RunningService:
             self.process.terminate()
         self.process.wait(timeout=90)
         self._reader.join(timeout=60)
+        self.data.cleanup()
         return "".join(self.lines)
 
 

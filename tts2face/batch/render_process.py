@@ -78,6 +78,12 @@ class RenderProcess:
             raise KINDS.get(found["error"], BackendError)(found["message"])
         return result_from_json(found["result"])
 
+    def kill(self) -> None:
+        """End the child process while another thread waits for it."""
+        child = self._child
+        if child is not None:
+            child.kill()
+
     def close(self) -> None:
         """End the child process."""
         if self._child is not None:

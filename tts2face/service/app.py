@@ -12,7 +12,7 @@ from fastapi.telemetry import TelemetryConfig
 from starlette.exceptions import HTTPException
 
 from tts2face import __version__
-from tts2face.service import clips, headtts, health, live, openai_speech
+from tts2face.service import clips, headtts, health, jobs, live, openai_speech, resources, results
 from tts2face.service.errors import DOCUMENTED, RefusedError, error_body
 from tts2face.service.guard import Guard
 from tts2face.service.settings import ServiceSettings
@@ -29,10 +29,13 @@ def create_app(settings: ServiceSettings) -> FastAPI:
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         state.pool.start()
+        state.jobs.start()
         try:
             yield
         finally:
+            await state.jobs.close()
             await state.pool.close()
+            state.library.close()
             if state.tracing is not None:
                 await asyncio.to_thread(state.tracing.close)
 
@@ -46,7 +49,7 @@ def create_app(settings: ServiceSettings) -> FastAPI:
         telemetry=NO_TELEMETRY,
     )
     app.state.service = state
-    for part in (openai_speech, clips, headtts, live, health):
+    for part in (openai_speech, clips, headtts, live, jobs, results, resources, health):
         app.include_router(part.router)
     app.add_exception_handler(RefusedError, _answer_refused)
     app.add_exception_handler(RequestValidationError, _answer_invalid)

@@ -18,7 +18,8 @@ SCOPES = ("speak", "build", "admin")  # synthesis; uploads and talkers; everybod
 KEY_PREFIX = "t2f_"
 N_KEY_BYTES = 32
 MAX_FILE_BYTES = 1_000_000
-LIMITS = ("requests_per_minute", "concurrent", "speech_s_per_day")
+LIMITS = ("requests_per_minute", "concurrent", "speech_s_per_day", "resources", "resources_mb")
+MAX_LIMIT = 1e9
 NAMES = {"name", "hash", "scopes", *LIMITS}
 NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
 
@@ -33,6 +34,8 @@ class ApiKey:
         SHA-256 of the key, hexadecimal; a key has 256 random bits, so that no slow hash is needed.
     requests_per_minute, concurrent, speech_s_per_day
         Limits; None: none.
+    resources, resources_mb
+        Uploads and their MB; None: those of the settings.
     """
 
     name: str
@@ -41,6 +44,8 @@ class ApiKey:
     requests_per_minute: int | None = None
     concurrent: int | None = None
     speech_s_per_day: int | None = None
+    resources: int | None = None
+    resources_mb: float | None = None
 
 
 LOCAL_KEY = ApiKey("local", "", SCOPES)  # of requests to a service without keys
@@ -81,7 +86,7 @@ def read_keys(path: Path) -> tuple[ApiKey, ...]:
     return found
 
 
-def add_key(path: Path, name: str, scopes: Sequence[str], **limits: int | None) -> str:
+def add_key(path: Path, name: str, scopes: Sequence[str], **limits: Any) -> str:
     """Add a key to a file, which is created if needed; returns the secret, which is stored nowhere.
 
     Raises
@@ -148,7 +153,10 @@ def _key(path: Path, content: Any) -> ApiKey:
 
 def _check_limits(limits: Mapping[str, Any]) -> None:
     for name, value in limits.items():
-        if value is not None and (type(value) is not int or value < 1):
+        if name.startswith("resources") and value is not None:  # none at all is a limit, too
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= MAX_LIMIT:
+                raise InputError(f"{name} must be a number from 0 to {MAX_LIMIT:g}, not {value!r}")
+        elif value is not None and (type(value) is not int or value < 1):
             raise InputError(f"{name} must be a whole number of at least 1, not {value!r}")
 
 

@@ -11,7 +11,7 @@ from lexicon.errors import DataError
 from lexicon.inputs import parse_json
 from tts2face.service.errors import RefusedError
 from tts2face.service.messages import MessageKind
-from tts2face.service.names import MODEL_FIELDS, check_models, check_voice
+from tts2face.service.names import MODEL_FIELDS, check_voice, resolve_dictionary, resolve_models
 from tts2face.service.state import ServiceState
 
 router = APIRouter(tags=["live"])
@@ -39,6 +39,7 @@ class LiveOptions(BaseModel):
     face: str | None = None
     identity: str | None = None
     palette: str | None = None
+    dictionary: Annotated[str | None, Field(description="A dictionary of GET /v1/dictionaries.")] = None
     with_idle: Annotated[bool, Field(description="Curves of a living face between utterances.")] = True
 
 
@@ -51,7 +52,9 @@ async def stream(connection: WebSocket) -> None:
         options = LiveOptions.model_validate_json(await connection.receive_text())
         given: dict[str, Any] = options.model_dump(exclude_none=True, exclude_defaults=True, exclude={"type"})
         models = {name: given.pop(name) for name in MODEL_FIELDS if name in given}
-        check_models(models)
+        key = connection.state.key
+        models = await resolve_models(state.library, key, models)
+        given = await resolve_dictionary(state.library, key, given)
         check_voice(given.get("voice"))
     except (ValidationError, RefusedError) as wrong:
         await _refuse(connection, _reason(wrong))

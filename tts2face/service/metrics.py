@@ -1,10 +1,12 @@
 """Prometheus metrics of the service."""
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
 
 if TYPE_CHECKING:
+    from tts2face.service.job_service import JobService
     from tts2face.service.pool import Pool
 
 LATENCY_BUCKETS_S = (0.025, 0.05, 0.1, 0.15, 0.25, 0.35, 0.5, 0.75, 1, 2, 5, 10, 30, 120)
@@ -13,7 +15,7 @@ LATENCY_BUCKETS_S = (0.025, 0.05, 0.1, 0.15, 0.25, 0.35, 0.5, 0.75, 1, 2, 5, 10,
 class Metrics:
     """Counters of requests and results; gauges of the pool are read when they are asked for."""
 
-    def __init__(self, pool: "Pool") -> None:
+    def __init__(self, pool: "Pool", jobs: "JobService") -> None:
         self.registry = CollectorRegistry()
         self.requests = Counter(
             "tts2face_requests", "Requests by path and status.", ["path", "status"], registry=self.registry
@@ -30,11 +32,19 @@ class Metrics:
             "tts2face_processes_ready": ("Synthesis processes that are ready.", lambda: pool.n_ready),
             "tts2face_waiting": ("Requests that wait for a process.", lambda: pool.n_waiting),
             "tts2face_oldest_waiting_seconds": ("Age of the oldest of them.", lambda: pool.oldest_waiting_s),
+            "tts2face_jobs_oldest_waiting_seconds": ("Age of the oldest waiting job.", lambda: jobs.oldest_waiting_s),
             "tts2face_load": ("Cost of the running works; 1 is a movie.", lambda: pool.load),
         }
         for name, (text, read) in gauges.items():
             Gauge(name, text, registry=self.registry).set_function(read)
+        by_state = Gauge("tts2face_jobs", "Jobs of the database by state.", ["state"], registry=self.registry)
+        for state in jobs.counts:
+            by_state.labels(state).set_function(partial(_count, jobs, state))
 
     def as_text(self) -> bytes:
         """All metrics in Prometheus' text format."""
         return generate_latest(self.registry)
+
+
+def _count(jobs: "JobService", state: str) -> float:
+    return jobs.counts[state]

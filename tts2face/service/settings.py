@@ -10,10 +10,12 @@ from typing import Any
 
 from lexicon.errors import InputError
 from lexicon.inputs import check_limits, read_text
+from tts2face.storage.user_folders import user_data
 
 PREFIX = "TTS2FACE_SERVE_"  # of environment variables: TTS2FACE_SERVE_PORT
 LOCAL_HOSTS = ("localhost", "127.0.0.1", "::1")
 MAX_SETTINGS_BYTES = 100_000
+SECRETS = ("webhook_secret",)  # settings that are never shown
 Limits = tuple[float, float]
 
 
@@ -40,13 +42,30 @@ class ServiceSettings:
     talker: str = setting("grid_s1", "Talker of requests that name none.")
     face: str = setting("head", "Face of requests that name none.")
     palette: str = setting("starter", "Palette of requests that name none.")
+    data: Path | None = setting(None, "Folder of jobs, results and uploads; by default one of the user's.")
+    database: str = setting("", "SQLite file or postgresql://...; empty: service.sqlite in the data folder.")
+    store: str = setting("", "Folder or s3://, gs://, az:// of segments and results; empty: in the data folder.")
+    workers: int = setting(1, "Job workers of this server; 0: only those of `tts2face worker`.", (0, 256))
     processes: int = setting(0, "Synthesis processes; 0: one for each core.", (0, 256))
     sessions: int = setting(2, "Sets of talker, face and palette that each process keeps in memory.", (1, 16))
     waiting: int = setting(64, "Requests that may wait for a process; further ones are refused with 429.", (0, 10_000))
+    results_days: float = setting(
+        30.0, "Days after which ended jobs and their results are removed; 0: never.", (0, 36_500)
+    )
+    job_waiting: int = setting(100, "Waiting jobs of a key; further ones are refused with 429.", (1, 1_000_000))
+    job_files: int = setting(20, "Subtitle files of a job.", (1, 1000))
+    job_cues: int = setting(5000, "Cues of a job.", (1, 1_000_000))
+    job_s: float = setting(14_400.0, "Longest subtitle file of a job in seconds.", (1, 1e6))
+    webhook_hosts: tuple[str, ...] = setting(
+        (), "Hosts that may be told of the end of jobs: example.org, a.example:8080."
+    )
+    webhook_secret: str = setting("", "Secret that signs webhooks; never shown.")
     text_characters: int = setting(100_000, "Longest text of a request.", (1, 10_000_000))
     sound_s: float = setting(600.0, "Longest recording that a request may send.", (1, 86_400))
     body_mb: float = setting(20.0, "Largest body of a request in MB.", (0.01, 4096))
     body_s: float = setting(20.0, "Seconds within which the body of a request must arrive.", (0.1, 3600))
+    resources: int = setting(100, "Talkers, faces, palettes and dictionaries that a key may upload.", (0, 100_000))
+    resources_mb: float = setting(500.0, "MB of uploads of a key, with their pictures.", (0, 1e9))
     head_s: float = setting(10.0, "Seconds within which the head of a request must arrive.", (0.1, 3600))
     stall_s: float = setting(120.0, "Seconds for which a client may take nothing of its answer.", (0.1, 86_400))
     keep_alive_s: float = setting(15.0, "Seconds that a connection without a request stays open.", (0, 3600))
@@ -74,16 +93,35 @@ class ServiceSettings:
                 f"the service would be open to everybody who reaches {self.host}; create a key with `tts2face keys add "
                 f"NAME --file keys.toml` and give --keys keys.toml"
             )
+        if self.webhook_hosts and not self.webhook_secret:
+            raise InputError("webhook_hosts needs webhook_secret, which signs the messages; give both or neither")
 
     @property
     def allowed_hosts(self) -> frozenset[str]:
         """Host names that requests may name."""
         return frozenset({*LOCAL_HOSTS, self.host, *self.hosts})
 
+    @property
+    def data_folder(self) -> Path:
+        """Folder of the service's data."""
+        return self.data if self.data is not None else user_data() / "service"
+
+    @property
+    def database_place(self) -> str:
+        """SQLite file or PostgreSQL URL of the jobs."""
+        return self.database or str(self.data_folder / "service.sqlite")
+
+    @property
+    def store_place(self) -> str:
+        """Folder or URL of segments and results."""
+        return self.store or str(self.data_folder / "store")
+
     def as_toml(self) -> str:
-        """The settings as a settings file; a comment says what each means."""
+        """The settings as a settings file, without secrets; a comment says what each means."""
         lines = []
         for one in fields(self):
+            if one.name in SECRETS:
+                continue
             value = getattr(self, one.name)
             line = f"{one.name} = {_toml(value)}" if value is not None else f'# {one.name} = ""'
             lines.append(f"# {one.metadata['help']}\n{line}\n")
@@ -173,7 +211,7 @@ def _parse(one: Any, text: str, source: str) -> Any:
 
 
 def _kind(one: Any) -> Any:
-    if one.name == "keys":
+    if one.name in {"keys", "data"}:
         return Path
     return tuple if isinstance(one.default, tuple) else type(one.default)
 

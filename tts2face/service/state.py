@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import Tts2faceError
 from tts2face.service.errors import RefusedError, as_refused
+from tts2face.service.job_service import JobService
 from tts2face.service.keys import ApiKey, read_keys
+from tts2face.service.library import Library
 from tts2face.service.logs import log_event
 from tts2face.service.messages import Message, MessageKind
 from tts2face.service.metrics import Metrics
@@ -18,6 +20,7 @@ from tts2face.service.pool import Pool, PoolSettings
 from tts2face.service.rate_limits import RateLimits
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.tracing import tracing_from_environment
+from tts2face.service.upload_checks import Checks
 from tts2face.service.words import check_words
 from tts2face.service.work import Work
 
@@ -39,7 +42,9 @@ class ServiceState:
              self.work(kind="speech", request={"text": WARM_TEXT}).as_json()),
             settings.log_format, settings.log_text,
         ))  # fmt: skip
-        self.limits, self.metrics = RateLimits(), Metrics(self.pool)
+        self.jobs = JobService(settings)
+        self.limits, self.metrics = RateLimits(), Metrics(self.pool, self.jobs)
+        self.library, self.checks = Library(settings), Checks()
         self.tracing = tracing_from_environment(os.environ)
         self.is_draining = False
         self.running: set[Exchange] = set()

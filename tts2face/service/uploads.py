@@ -1,6 +1,8 @@
 """Uploaded files: never opened by the server itself, never stored under a client's name."""
 
 import asyncio
+import json
+import os
 import sys
 import tempfile
 from collections.abc import AsyncIterator
@@ -10,10 +12,16 @@ from pathlib import Path
 
 from starlette.datastructures import UploadFile
 
-from tts2face.service.decode_process import PICTURE, REFUSED, SOUND
+from tts2face.service.decode_process import PICTURE, REFUSED, SOUND, SUBTITLES
 from tts2face.service.errors import RefusedError
 from tts2face.service.settings import ServiceSettings
 
+RESOURCE_TIMEOUT_S = 300.0  # a check takes 3 to 7 s; with other work on the machine, and kernels to compile, longer
+MAX_REASON = 300  # characters
+KEPT_VARIABLES = (
+    "PATH", "HOME", "LANG", "LC_", "TMPDIR", "TEMP", "SYSTEMROOT", "LOCALAPPDATA", "XDG_", "PYTHON", "VIRTUAL_ENV",
+    "NUMBA_", "TTS2FACE_FACE_MODEL",
+)  # fmt: skip
 MAX_TEXT_BYTES = 1_000_000
 BLOCK_BYTES = 1 << 20
 
@@ -48,34 +56,81 @@ class UploadFolder:
         path.write_bytes(content)
         return path
 
+    async def subtitles(
+        self, name: str, upload: UploadFile, suffix: str, encoding: str | None, max_cues: int
+    ) -> tuple[Path, dict[str, float]]:
+        """Checked subtitles of an upload, and their numbers: cues and seconds.
+
+        Raises
+        ------
+        RefusedError
+            They have no cues, or too many.
+        """
+        path = await self._decode(f"{SUBTITLES}{encoding or ''}", name, upload, suffix, max_cues)
+        numbers: dict[str, float] = json.loads(Path(f"{path}.json").read_text())
+        return path, numbers
+
+    async def resource(self, kind: str, upload: UploadFile, max_bytes: float) -> Path:
+        """Folder with a checked talker, face, palette or dictionary (`tts2face.service.resource_check`).
+
+        Raises
+        ------
+        RefusedError
+            It is none, or larger than `max_bytes`.
+        """
+        given, checked = await self._save(kind, upload), self.path / "checked"
+        checked.mkdir()
+        await decode_file((kind, given, checked, max_bytes), f"the {kind}", RESOURCE_TIMEOUT_S)
+        return checked
+
     async def _decode(self, kind: str, name: str, upload: UploadFile, suffix: str, limit: float) -> Path:
-        given, decoded = self.path / f"{name}.upload", self.path / f"{name}{suffix}"
-        with given.open("wb") as file:
+        given, decoded = await self._save(name, upload), self.path / f"{name}{suffix}"
+        await decode_file((kind, given, decoded, limit), name, self.settings.decode_s)
+        given.unlink(missing_ok=True)
+        return decoded
+
+    async def _save(self, name: str, upload: UploadFile) -> Path:
+        path = self.path / f"{name}.upload"
+        with path.open("wb") as file:
             while block := await upload.read(BLOCK_BYTES):
                 file.write(block)
-        child = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", "tts2face.service.decode_process", kind, str(given), str(decoded), str(limit),
-            stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.PIPE,
-            cwd=self.path,
-        )  # fmt: skip
-        try:
-            _, written = await asyncio.wait_for(child.communicate(), self.settings.decode_s)
-        except TimeoutError as late:
-            raise RefusedError(
-                422,
-                "invalid_data",
-                f"{name} took more than {self.settings.decode_s:g} s to decode; send a simpler file",
-            ) from late
-        finally:
-            if child.returncode is None:
-                with suppress(ProcessLookupError):
-                    child.kill()
-                await child.wait()
-            given.unlink(missing_ok=True)
-        if child.returncode == 0:
-            return decoded
-        reason = written.decode(errors="replace") if child.returncode == REFUSED else "it needs too much memory or time"
-        raise RefusedError(422, "invalid_data", f"{name} cannot be used: {reason[:200]}; send another file")
+        return path
+
+
+async def decode_file(arguments: tuple[str, Path, Path, float], name: str, timeout_s: float) -> None:
+    """Run `tts2face.service.decode_process` with its arguments; `name` names the file in messages.
+
+    Raises
+    ------
+    RefusedError
+        The file is refused, or takes too much memory or time.
+    """
+    child = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "tts2face.service.decode_process", *map(str, arguments),
+        stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.PIPE,
+        cwd=arguments[2].parent, env=child_environment(),
+    )  # fmt: skip
+    try:
+        _, written = await asyncio.wait_for(child.communicate(), timeout_s)
+    except TimeoutError as late:
+        raise RefusedError(
+            422, "invalid_data", f"{name} took more than {timeout_s:g} s to decode; send a simpler file"
+        ) from late
+    finally:
+        if child.returncode is None:
+            with suppress(ProcessLookupError):
+                child.kill()
+            await child.wait()
+    if child.returncode == 0:
+        return
+    reason = written.decode(errors="replace") if child.returncode == REFUSED else "it needs too much memory or time"
+    raise RefusedError(422, "invalid_data", f"{name} cannot be used: {reason[:MAX_REASON]}; send another file")
+
+
+def child_environment() -> dict[str, str]:
+    """Variables of a process that reads uploads: no credentials, one thread for each library."""
+    kept = {name: value for name, value in os.environ.items() if name.startswith(KEPT_VARIABLES)}
+    return {**kept, "NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
 @asynccontextmanager
