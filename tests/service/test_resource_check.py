@@ -19,8 +19,10 @@ from lexicon.errors import BackendError
 from tests.characters.made import write_character_file
 from tests.model_files.made import write_made_face, write_made_palette, write_made_talker
 from tts2face.characters.binding import KEY
+from tts2face.jobs.resource_check import draw_resource
 from tts2face.models.face_file import read_face
 from tts2face.service.decode_process import REFUSED
+from tts2face.storage.files import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.video.landmark_models import find_bundle
 
@@ -54,7 +56,7 @@ def check(kind: str, source: Path, folder: Path, most: float = MOST_BYTES) -> tu
     ("kind", "fact"),
     [
         ("talker", {"n_utterances": 6, "has_own_face": False, "language": "not stated"}),
-        ("face", {"identities": ["older"], "summary": "mesh with 2 shapes"}),
+        ("face", {"identities": ["older"], "summary": "mesh with 4 shapes"}),
         ("palette", {}),
         ("dictionary", {"n_words": 2}),
     ],
@@ -79,6 +81,26 @@ def test_a_talker_with_a_face_needs_the_consent_of_the_person(tmp_path: Path) ->
     assert (code, message) == (
         REFUSED, "it shows a person's face, but states no consent; build it with --consent"
     )  # fmt: skip
+
+
+def test_a_talker_with_a_face_and_consent_is_drawn_with_it(tmp_path: Path) -> None:
+    path = tmp_path / "a.talker"
+    write_made_talker(path, has_face=True)
+    arrays, header = read_tensors(path, "talker", 1)
+    header["consent"] = {"name": "Ada", "statement": "I agree to this.", "date": "2026-01-02"}
+    write_tensors(path, "talker", 1, arrays, header)
+    code, message, checked = check("talker", path, tmp_path)
+    assert (code, message) == (0, "")
+    assert json.loads((checked / "description.json").read_text())["has_own_face"] is True
+    with Image.open(checked / "picture.png") as own, Image.open(_default_picture(tmp_path)) as default:
+        assert np.abs(np.asarray(own).astype(int) - np.asarray(default)).mean() > 10
+
+
+def _default_picture(folder: Path) -> Path:
+    """Picture of the shipped talker, which has no face of its own."""
+    path = folder / "default.png"
+    draw_resource("talker", find_file("grid_s1", "talker"), path)
+    return path
 
 
 def test_a_face_does_not_keep_paths_of_the_machine_that_made_it(files: dict[str, Path], tmp_path: Path) -> None:

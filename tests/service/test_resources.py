@@ -14,10 +14,10 @@ from lexicon.errors import BackendError
 from tests.jobs.conftest import database, postgres  # noqa: F401 - fixtures
 from tests.model_files.made import write_made_face
 from tts2face.jobs.database import database_url
+from tts2face.jobs.resource_table import ResourceTable, StoredResource
 from tts2face.service.app import create_app
 from tts2face.service.keys import add_key
 from tts2face.service.library import Library
-from tts2face.service.resource_table import ResourceTable, StoredResource
 from tts2face.service.settings import ServiceSettings
 
 WORDS = b"Siobhan  SH IH0 V AO1 N\n"

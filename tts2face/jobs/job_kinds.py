@@ -9,10 +9,12 @@ from typing import Any
 from lexicon.errors import DataError
 from tts2face.batch.engine import Engine
 from tts2face.batch.store import Store
+from tts2face.jobs.blobs import BlobStore
 
 RUNNERS: Mapping[str, str] = {
     "clip": "tts2face.jobs.clip_job:run_clip",
     "subtitles": "tts2face.jobs.subtitles_job:run_subtitles",
+    "talker": "tts2face.jobs.talker_job:run_talker",
 }  # name of a kind: module and function
 MEDIA_TYPES = {
     ".mp4": "video/mp4", ".webm": "video/webm", ".mov": "video/quicktime", ".json": "application/json",
@@ -43,6 +45,8 @@ class JobTask:
         Adds an event to the job; ``done`` and ``of`` are its progress.
     check
         Raises `JobCancelledError` if the job is no longer wanted; to be called now and then.
+    database, resources
+        URL of the database, and the files of the uploaded models in the store.
     """
 
     request: Mapping[str, Any]
@@ -52,6 +56,8 @@ class JobTask:
     store: Store
     report: Callable[[dict[str, Any]], None]
     check: Callable[[], None]
+    database: str = ""
+    resources: Callable[[], BlobStore] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -98,8 +98,9 @@ class JobRunner:
                 work = folder.path / "work"
                 work.mkdir()
                 task = JobTask(
-                    self._request(job), inputs, work, self._engine(watch), self._store, watch.report, watch.check
-                )
+                    self._request(job), inputs, work, self._engine(watch), self._store, watch.report, watch.check,
+                    self._url, lambda: self._blobs()[1],
+                )  # fmt: skip
                 products = find_runner(job.kind)(task)
                 ending = Ending(DONE, self._put(products.files), products.error)
                 paths = {one.name: one.path for one in products.files}

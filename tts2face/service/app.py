@@ -10,6 +10,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from fastapi.telemetry import TelemetryConfig
 from starlette.exceptions import HTTPException
+from starlette.routing import Match
 
 from tts2face import __version__
 from tts2face.service import clips, headtts, health, jobs, live, openai_speech, resources, results
@@ -73,6 +74,15 @@ async def _answer_invalid(request: HttpRequest, error: Exception) -> JSONRespons
     return JSONResponse(error_body("invalid_request", message, name), 422)
 
 
-async def _answer_http(_: HttpRequest, error: Exception) -> JSONResponse:
+async def _answer_http(request: HttpRequest, error: Exception) -> JSONResponse:
     assert isinstance(error, HTTPException)
-    return JSONResponse(error_body("http", str(error.detail)), error.status_code, dict(error.headers or {}))
+    headers = dict(error.headers or {})
+    if error.status_code == 405:
+        headers["Allow"] = ", ".join(sorted(_methods(request)))
+    return JSONResponse(error_body("http", str(error.detail)), error.status_code, headers)
+
+
+def _methods(request: HttpRequest) -> set[str]:
+    """Methods of all routes of a path; Starlette names those of the first one only."""
+    routes = (one for one in request.app.routes if one.matches(request.scope)[0] != Match.NONE)
+    return {method for one in routes for method in getattr(one, "methods", None) or ()}

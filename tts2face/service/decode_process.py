@@ -3,42 +3,35 @@
 ``python -m tts2face.service.decode_process KIND SOURCE TARGET LIMIT``: a file becomes a plain one (sound: mono .wav at
 48 kHz; picture: .png); a resource (talker, face, palette, dictionary) is checked and written, with its description and
 picture, into the folder TARGET; ``draw-`` and its kind draw the picture TARGET only; ``subtitles-`` and an encoding
-check subtitles. LIMIT is the largest duration in seconds, number of pixels or cues, or size in bytes. The exit code is
-0, or 2 with one sentence on standard error.
+check subtitles; a video is measured. LIMIT is the largest duration in seconds, number of pixels or cues, or size in
+bytes. The exit code is 0, or 2 with one sentence on standard error.
 """
 
-import ctypes
 import json
 import os
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from tts2face.service.refused_file import RefusedFileError
-from tts2face.service.resource_check import RESOURCE_KINDS, check_resource, draw_resource
+from tts2face.child_process import ProcessLimits, limit_process
+from tts2face.jobs.refused_file import RefusedFileError
+from tts2face.jobs.resource_check import RESOURCE_KINDS, check_resource, draw_resource
 
-SOUND, PICTURE, DRAW, SUBTITLES = "sound", "picture", "draw-", "subtitles-"
-MEMORY_BYTES, CPU_S, FILE_BYTES, N_FILES = 2 << 30, 60, 1 << 30, 64
+SOUND, PICTURE, VIDEO, DRAW, SUBTITLES = "sound", "picture", "video", "draw-", "subtitles-"
+LIMITS = ProcessLimits(memory_bytes=2 << 30, cpu_s=60, file_bytes=1 << 30, n_files=64)
 RESOURCE_CPU_S = 180  # a resource with its picture takes 3 to 5 s, at the first time with the compilation of kernels
-NEW_USERS, NEW_NETWORK = 0x10000000, 0x40000000  # flags of unshare in Linux's sched.h
 SOUND_RATE = 48_000  # Hz
 SOUND_FORMATS = "wav,mp3,ogg,flac,aac,mov,mp4,m4a,matroska,webm,aiff,caf"
+# Formats of recordings, with the endings under which other readers recognise them.
+VIDEO_FORMATS = {
+    "mov": ".mp4", "mp4": ".mp4", "matroska": ".mkv", "webm": ".webm", "avi": ".avi", "mpegps": ".mpg", "mpeg": ".mpg",
+}  # fmt: skip
+MAX_VIDEO_PIXELS, MAX_VIDEO_FPS = 4096 * 2304, 240
 PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TIFF")
 REFUSED = 2
 LOW_PRIORITY = 10
-
-
-def limit_process(cpu_s: int = CPU_S) -> None:
-    """Limit memory, processor time and files of this process, and leave the network where the system allows it."""
-    import resource
-
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-    resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
-    resource.setrlimit(resource.RLIMIT_NOFILE, (N_FILES, N_FILES))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    if sys.platform.startswith("linux"):
-        ctypes.CDLL(None).unshare(NEW_USERS | NEW_NETWORK)  # refused in some containers
 
 
 def decode_sound(source: Path, target: Path, max_seconds: float) -> None:
@@ -95,6 +88,47 @@ def decode_picture(source: Path, target: Path, max_pixels: float) -> None:
         raise RefusedFileError("it is no picture that can be decoded") from error
 
 
+def check_video(source: Path, target: Path, max_seconds: float) -> None:
+    """Write what a video is, JSON with its ending and seconds; its packets are counted and not decoded.
+
+    Raises
+    ------
+    RefusedFileError
+        It is no video, longer than `max_seconds`, or its pictures are too large or too many.
+    """
+    import av
+
+    options = {"format_whitelist": ",".join(VIDEO_FORMATS), "protocol_whitelist": "none"}
+    try:
+        with source.open("rb") as file, av.open(file, "r", options=options) as container:
+            stream = next((one for one in container.streams.video if one.codec_context is not None), None)
+            if stream is None:
+                raise RefusedFileError("it holds no video")
+            if stream.width * stream.height > MAX_VIDEO_PIXELS:
+                raise RefusedFileError(f"it has {stream.width} x {stream.height} pixels, more than 4096 x 2304")
+            suffix = next(VIDEO_FORMATS[name] for name in container.format.name.split(",") if name in VIDEO_FORMATS)
+            seconds = _measure_video(container, stream, max_seconds)
+    except (av.FFmpegError, ValueError, EOFError, StopIteration) as error:
+        raise RefusedFileError("it is no video that can be decoded") from error
+    target.write_text(json.dumps({"suffix": suffix, "seconds": seconds}))
+
+
+def _measure_video(container: Any, stream: Any, max_seconds: float) -> float:
+    """Seconds from the first to the last packet of a video, whatever the file states."""
+    first = last = None
+    for number, packet in enumerate(container.demux(stream)):
+        if number > MAX_VIDEO_FPS * max_seconds:
+            raise RefusedFileError(f"it has more pictures than {max_seconds:g} s of video")
+        if packet.pts is not None and packet.time_base is not None:
+            at = float(packet.pts * packet.time_base)
+            first, last = (at, at) if first is None or last is None else (min(first, at), max(last, at))
+            if last - first > max_seconds:
+                raise RefusedFileError(f"it is longer than {max_seconds:g} s")
+    if first is None or last is None:
+        raise RefusedFileError("it has no pictures")
+    return last - first
+
+
 def check_subtitles(source: Path, target: Path, max_cues: float, encoding: str | None) -> None:
     """Copy a subtitle file, and write its numbers beside it: cues and seconds, as JSON.
 
@@ -132,16 +166,16 @@ def decode(kind: str, source: Path, target: Path, limit: float) -> None:
     elif kind.startswith(DRAW):
         draw_resource(kind.removeprefix(DRAW), source, target)
     else:
-        {SOUND: decode_sound, PICTURE: decode_picture}[kind](source, target, limit)
+        {SOUND: decode_sound, PICTURE: decode_picture, VIDEO: check_video}[kind](source, target, limit)
 
 
 def main() -> int:
     """Decode one file."""
     kind, source, target, limit = sys.argv[1:]
-    if kind in {SOUND, PICTURE} or kind.startswith(SUBTITLES):
-        limit_process()
+    if kind in {SOUND, PICTURE, VIDEO} or kind.startswith(SUBTITLES):
+        limit_process(LIMITS)
     else:
-        limit_process(RESOURCE_CPU_S)
+        limit_process(replace(LIMITS, cpu_s=RESOURCE_CPU_S))
         os.nice(LOW_PRIORITY)  # streams go first
     try:
         decode(kind, Path(source), Path(target), float(limit))

@@ -22,6 +22,7 @@ App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 OPEN_PATHS = frozenset({"/healthz", "/readyz", "/docs", "/openapi.json"})
 UNCOUNTED_PATHS = frozenset({*OPEN_PATHS, "/metrics", "/v1/hello"})
+VIDEO_PATH = "/v1/talkers/build"
 DRAINING_PATHS = frozenset({"/healthz", "/readyz", "/metrics"})  # that are answered until the end
 CLOSE = {"Connection": "close"}
 DRAINING_RETRY_S = 5  # until another server, or this one again, may be asked
@@ -67,7 +68,8 @@ class Guard:
 
     async def _answer(self, request: Exchange, receive: Receive) -> None:
         settings, scope = self._state.settings, request.scope
-        body = _BoundedBody(receive, settings.body_mb * 1e6, settings.body_s)
+        size = settings.video_mb if _brings_video(scope) else settings.body_mb
+        body = _BoundedBody(receive, size * 1e6, settings.body_s * max(1.0, size / settings.body_mb))
         try:
             body.check(request.headers)
             await self._app(scope, body.receive if scope["type"] == "http" else receive, request.send)
@@ -126,6 +128,12 @@ class Guard:
                 {"WWW-Authenticate": "Bearer"},
             )  # fmt: skip
         return found
+
+
+def _brings_video(scope: Scope) -> bool:
+    """Whether a request brings the recording of a talker: only such bodies may be larger than all others."""
+    is_build = scope["type"] == "http" and (scope["method"], scope["path"]) == ("POST", VIDEO_PATH)
+    return is_build and "build" in scope["state"]["key"].scopes
 
 
 def _draining() -> RefusedError:

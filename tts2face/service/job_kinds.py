@@ -4,12 +4,11 @@
 """
 
 import tomllib
-from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 from starlette.datastructures import UploadFile
 
 from lexicon.errors import DataError
@@ -22,10 +21,9 @@ from tts2face.request import Request
 from tts2face.service.clip_options import ClipOptions, divide_options
 from tts2face.service.clips import ClipRequest
 from tts2face.service.errors import RefusedError
-from tts2face.service.keys import ApiKey
+from tts2face.service.job_orders import JobKind, JobOrder
 from tts2face.service.names import check_voice, resolve_dictionary, resolve_models
-from tts2face.service.state import ServiceState
-from tts2face.service.uploads import UploadFolder
+from tts2face.service.talker_kind import TALKER_KIND
 from tts2face.subtitles.reader import SUFFIXES
 
 BATCH_FIELDS = ("per", "overflow", "max_rate", "scene_gap", "format", "exports", "encoding")
@@ -56,51 +54,6 @@ class SubtitlesRequest(ClipOptions):
             examples=[{"role": [{"speaker": "ANN", "identity": "kofi"}]}],
         ),
     ] = None
-
-
-@dataclass(slots=True)
-class Upload:
-    """Files of a new job after their checks: local paths by the names that its function sees."""
-
-    folder: UploadFolder
-    files: dict[str, Path] = field(default_factory=dict)
-    n_cues: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class JobOrder:
-    """What a client has asked for, before it is a job."""
-
-    state: ServiceState
-    key: ApiKey
-    options: Any
-    upload: Upload
-
-
-AddFile = Callable[[JobOrder, str, UploadFile, int], Awaitable[None]]
-
-
-@dataclass(frozen=True, slots=True)
-class JobKind:
-    """A kind of jobs.
-
-    Parameters
-    ----------
-    scope
-        Scope of the keys that may ask for it.
-    model
-        Its options.
-    parts
-        Parts of a form with its files, their descriptions, and what checks one file and notes its path: gets the
-        order, the part's name, the file and its number from 1.
-    prepare
-        Checks an order; JSON for the function that executes it.
-    """
-
-    scope: str
-    model: type[BaseModel]
-    parts: Mapping[str, tuple[str, AddFile]]
-    prepare: Callable[[JobOrder], Awaitable[dict[str, Any]]]
 
 
 async def add_background(order: JobOrder, part: str, file: UploadFile, number: int) -> None:
@@ -244,4 +197,5 @@ JOB_KINDS: dict[str, JobKind] = {
         },
         prepare_subtitles,
     ),
+    "talker": TALKER_KIND,
 }

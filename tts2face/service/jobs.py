@@ -4,7 +4,7 @@ import asyncio
 import json
 import re
 import uuid
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import AsyncExitStack
 from functools import partial
 from pathlib import Path
@@ -22,10 +22,13 @@ from tts2face.batch.address import content_address
 from tts2face.jobs.job_client import JobClient
 from tts2face.jobs.job_kinds import media_type
 from tts2face.jobs.job_records import JobEvent, JobFile, JobRecord, NewJob
+from tts2face.jobs.resource_check import TALKER
 from tts2face.service.answers import service_state
 from tts2face.service.errors import RefusedError, as_refused
-from tts2face.service.job_kinds import JOB_KINDS, JobKind, JobOrder, Upload
+from tts2face.service.guard import VIDEO_PATH
+from tts2face.service.job_kinds import JOB_KINDS
 from tts2face.service.job_models import JobDetail, JobPage, NewJobBody, job_detail, job_view
+from tts2face.service.job_orders import JobKind, JobOrder, Upload
 from tts2face.service.job_schema import new_job_schema
 from tts2face.service.keys import ApiKey
 from tts2face.service.scopes import require_scope
@@ -54,10 +57,32 @@ State = Literal["waiting", "running", "done", "failed", "cancelled"]
     status_code=202,
     summary="Queue a job",
     responses={200: {"model": JobDetail, "description": "The job that this Idempotency-Key has queued before."}},
-    openapi_extra={"requestBody": new_job_schema()},
+    openapi_extra={"requestBody": new_job_schema(tuple(JOB_KINDS))},
 )
 async def create_job(request: HttpRequest, idempotency_key: IdempotencyKey = None) -> JSONResponse:
     """Queue a long clip or a batch of subtitle files; the answer comes at once."""
+    return await _queue(request, idempotency_key, JOB_KINDS)
+
+
+@router.post(
+    VIDEO_PATH.removeprefix("/v1"),
+    response_model=JobDetail,
+    status_code=202,
+    summary="Build a talker",
+    responses={200: {"model": JobDetail, "description": "The job that this Idempotency-Key has queued before."}},
+    openapi_extra={"requestBody": new_job_schema((TALKER,))},
+)
+async def build_talker(request: HttpRequest, idempotency_key: IdempotencyKey = None) -> JSONResponse:
+    """Queue a job of kind `talker`, whose recording may be as large as the setting video_mb; scope build."""
+    require_scope(request, JOB_KINDS[TALKER].scope, "recordings of talkers")
+    if not request.headers.get("content-type", "").startswith("multipart/form-data"):
+        raise RefusedError(422, "invalid_request", "send a form (multipart/form-data) with the parts job and video")
+    async with service_state(request).video_checks:
+        return await _queue(request, idempotency_key, {TALKER: JOB_KINDS[TALKER]})
+
+
+async def _queue(request: HttpRequest, idempotency_key: str | None, kinds: Mapping[str, JobKind]) -> JSONResponse:
+    """Read and check a job of one of some kinds, and queue it."""
     state = service_state(request)
     service = state.jobs
     _ = service.client  # refuses before any work
@@ -71,7 +96,7 @@ async def create_job(request: HttpRequest, idempotency_key: IdempotencyKey = Non
         else:
             body = await request.body()
         asked: NewJobBody = _parse(NewJobBody, body)
-        kind = _kind(asked.kind)
+        kind = _kind(asked.kind, kinds)
         key = require_scope(request, kind.scope, f"jobs of kind {asked.kind}")
         if asked.webhook is not None:
             check_webhook(asked.webhook, state.settings)
@@ -169,12 +194,12 @@ def _parse(model: type[BaseModel], body: bytes | str) -> Any:
         raise RequestValidationError(wrong.errors()) from wrong
 
 
-def _kind(name: str) -> JobKind:
-    if name not in JOB_KINDS:
+def _kind(name: str, kinds: Mapping[str, JobKind]) -> JobKind:
+    if name not in kinds:
         raise RefusedError(
-            422, "invalid_request", f"there is no job of kind {name[:40]!r}; the kinds are {', '.join(JOB_KINDS)}"
+            422, "invalid_request", f"there is no job of kind {name[:40]!r} here; the kinds are {', '.join(kinds)}"
         )
-    return JOB_KINDS[name]
+    return kinds[name]
 
 
 async def _part(form: FormData, name: str) -> bytes | str:

@@ -3,10 +3,7 @@
 All methods block; routes call them in threads.
 """
 
-import json
 import re
-import shutil
-import threading
 from dataclasses import asdict
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -15,20 +12,26 @@ from typing import Any
 from tts2face import catalogue
 from tts2face.jobs.blobs import BlobStore, open_blobs
 from tts2face.jobs.database import database_url
-from tts2face.jobs.input_files import place_file
 from tts2face.jobs.job_runner import RESOURCES
+from tts2face.jobs.resource_check import CONTENT, DICTIONARY, FACE, PICTURE, TALKER
+from tts2face.jobs.resource_table import (
+    MB,
+    ResourceTable,
+    StoredResource,
+    Usage,
+    keep_files,
+    over_quota,
+    resource_from_folder,
+)
 from tts2face.request import OWN_FACE
 from tts2face.service.errors import RefusedError
 from tts2face.service.keys import ApiKey
-from tts2face.service.resource_check import CONTENT, DESCRIPTION, DICTIONARY, FACE, PICTURE, TALKER
-from tts2face.service.resource_table import ResourceTable, StoredResource, Usage
 from tts2face.service.settings import ServiceSettings
 from tts2face.storage.files import find_file, translate_disk_errors
 
 NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,39}")
 OPENAI_MODELS = ("tts-1", "tts-1-hd", "gpt-4o-mini-tts")  # names that clients send; all are the service's talker
 RESERVED = {FACE: (OWN_FACE,), TALKER: OPENAI_MODELS}
-MB = 1e6
 
 
 def shipped_names(kind: str) -> tuple[str, ...]:
@@ -69,7 +72,6 @@ class Library:
 
     def __init__(self, settings: ServiceSettings) -> None:
         self._settings = settings
-        self._placed, self._placing = settings.data_folder / "models", threading.Lock()
 
     @cached_property
     def _table(self) -> ResourceTable:
@@ -105,7 +107,7 @@ class Library:
                 f"there is no {kind} {name[:60]!r}; those of the service are {shipped}, and yours are at "
                 f"/v1/{plural(kind)}",
             )  # fmt: skip
-        return str(self._place(found)), found.description
+        return str(self._blobs.fetch(found.content)), found.description
 
     def uploads(self, kind: str, owner: str | None) -> tuple[StoredResource, ...]:
         """Uploads of a kind of one owner, or of all."""
@@ -158,21 +160,15 @@ class Library:
             As `check_room`.
         """
         check_new_name(kind, name)
-        files = [checked / one for one in (CONTENT, PICTURE) if (checked / one).is_file()]
-        n_bytes = sum(file.stat().st_size for file in files)
-        self._check_quota(key, self._table.usage(key.name), n_bytes)
-        stored = {file.name: self._blobs.put(file) for file in files}
-
-        def keep() -> None:
-            for file in files:
-                if not self._blobs.has(stored[file.name]):  # deleted meanwhile with the last resource that had it
-                    self._blobs.put(file)
-
-        made = StoredResource(
-            key.name, kind, name, stored[CONTENT], stored.get(PICTURE, ""), n_bytes,
-            json.loads((checked / DESCRIPTION).read_text(encoding="utf-8")),
-        )  # fmt: skip
-        if not self._table.add(made, check=lambda usage: self._check_quota(key, usage, n_bytes), keep=keep):
+        size = sum((checked / one).stat().st_size for one in (CONTENT, PICTURE) if (checked / one).is_file())
+        self._check_quota(key, self._table.usage(key.name), size)
+        made = resource_from_folder(key.name, kind, name, checked, self._blobs)
+        is_added = self._table.add(
+            made,
+            check=lambda usage: self._check_quota(key, usage, made.n_bytes),
+            keep=lambda: keep_files(made, checked, self._blobs),
+        )
+        if not is_added:
             raise self._name_taken(kind, name)
         return self.upload(kind, key.name, name)
 
@@ -186,7 +182,7 @@ class Library:
         """
         if name in shipped_names(kind):
             raise RefusedError(403, "forbidden", f"the {kind} {name} belongs to the service and cannot be deleted")
-        if NAME.fullmatch(name) is None or not self._table.remove(owner, kind, name, self._delete):
+        if NAME.fullmatch(name) is None or not self._table.remove(owner, kind, name, self._blobs.delete):
             raise RefusedError(404, "not_found", f"there is no {kind} {name[:40]!r}; /v1/{plural(kind)} lists yours")
 
     def usage(self, key: ApiKey) -> Usage:
@@ -200,27 +196,10 @@ class Library:
         most_mb = settings.resources_mb if key.resources_mb is None else key.resources_mb
         return Usage(most, int(most_mb * MB))
 
-    def _place(self, resource: StoredResource) -> Path:
-        """Path of a content with a name, as workers on other machines find it too."""
-        with self._placing:
-            return place_file((self._blobs,), resource.content, f"upload.{resource.kind}", self._placed)
-
-    def _delete(self, content: str) -> None:
-        shutil.rmtree(self._placed / content, ignore_errors=True)
-        self._blobs.delete(content)
-
     def _check_quota(self, key: ApiKey, usage: Usage, n_bytes: int) -> None:
-        limits = self.limits(key)
-        if usage.n_resources >= limits.n_resources:
-            raise RefusedError(
-                413, "quota", f"the key {key.name} has {usage.n_resources} resources, its limit; delete one first"
-            )
-        if usage.n_bytes + n_bytes > limits.n_bytes:
-            raise RefusedError(
-                413, "quota",
-                f"the key {key.name} stores {usage.n_bytes / MB:.1f} MB, and {n_bytes / MB:.1f} MB more are beyond its "
-                f"{limits.n_bytes / MB:g} MB; delete something first",
-            )  # fmt: skip
+        reason = over_quota(key.name, usage, self.limits(key), n_bytes)
+        if reason is not None:
+            raise RefusedError(413, "quota", reason)
 
     @staticmethod
     def _name_taken(kind: str, name: str) -> RefusedError:

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from tts2face import catalogue
+from tts2face.jobs.resource_check import DICTIONARY, FACE
 from tts2face.render.picture import COLOURS, STUDIO, TRANSPARENT
 from tts2face.request import OWN_FACE
 from tts2face.service.errors import RefusedError
 from tts2face.service.keys import ApiKey
 from tts2face.service.library import Library, shipped_names
-from tts2face.service.resource_check import DICTIONARY, FACE
 
 COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
 MODEL_KINDS = ("talker", "face", "palette")

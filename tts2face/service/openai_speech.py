@@ -11,12 +11,12 @@ from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from tts2face import catalogue
+from tts2face.jobs.resource_check import TALKER
 from tts2face.render.sound_stream import SOUND_KINDS
 from tts2face.service.answers import data_bytes, service_state, stream_work
 from tts2face.service.library import OPENAI_MODELS, shipped_names
 from tts2face.service.messages import Message
 from tts2face.service.names import check_voice, resolve_dictionary, resolve_models
-from tts2face.service.resource_check import TALKER
 from tts2face.synthesis.byte_stream import MEDIA_TYPES
 
 router = APIRouter(prefix="/v1", tags=["speech"])

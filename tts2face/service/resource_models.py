@@ -5,8 +5,8 @@ from typing import Annotated, Generic, TypeVar
 
 from pydantic import BaseModel, Field
 
-from tts2face.service.resource_check import DICTIONARY, FACE, PALETTE, TALKER
-from tts2face.service.resource_table import StoredResource
+from tts2face.jobs.resource_check import DICTIONARY, FACE, PALETTE, TALKER
+from tts2face.jobs.resource_table import StoredResource
 
 
 class TalkerFacts(BaseModel):

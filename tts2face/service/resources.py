@@ -12,11 +12,12 @@ from fastapi import Request as HttpRequest
 from fastapi.responses import JSONResponse, Response
 from starlette.datastructures import FormData, UploadFile
 
+from tts2face.jobs.resource_check import DICTIONARY, RESOURCE_KINDS
+from tts2face.jobs.resource_table import StoredResource
 from tts2face.service.answers import service_state
 from tts2face.service.errors import RefusedError
 from tts2face.service.keys import ApiKey
 from tts2face.service.library import check_new_name, describe_shipped, plural, shipped_names
-from tts2face.service.resource_check import DICTIONARY, RESOURCE_KINDS
 from tts2face.service.resource_models import (
     FACTS,
     Resource,
@@ -25,7 +26,6 @@ from tts2face.service.resource_models import (
     shipped_resource,
     uploaded_resource,
 )
-from tts2face.service.resource_table import StoredResource
 from tts2face.service.scopes import require_scope
 from tts2face.service.shipped_pictures import shipped_picture
 from tts2face.service.uploads import upload_folder

@@ -44,7 +44,7 @@ class ServiceState:
         ))  # fmt: skip
         self.jobs = JobService(settings)
         self.limits, self.metrics = RateLimits(), Metrics(self.pool, self.jobs)
-        self.library, self.checks = Library(settings), Checks()
+        self.library, self.checks, self.video_checks = Library(settings), Checks(), Checks()
         self.tracing = tracing_from_environment(os.environ)
         self.is_draining = False
         self.running: set[Exchange] = set()

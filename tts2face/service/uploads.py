@@ -2,7 +2,6 @@
 
 import asyncio
 import json
-import os
 import sys
 import tempfile
 from collections.abc import AsyncIterator
@@ -12,16 +11,13 @@ from pathlib import Path
 
 from starlette.datastructures import UploadFile
 
-from tts2face.service.decode_process import PICTURE, REFUSED, SOUND, SUBTITLES
+from tts2face.child_process import child_environment
+from tts2face.service.decode_process import PICTURE, REFUSED, SOUND, SUBTITLES, VIDEO
 from tts2face.service.errors import RefusedError
 from tts2face.service.settings import ServiceSettings
 
 RESOURCE_TIMEOUT_S = 300.0  # a check takes 3 to 7 s; with other work on the machine, and kernels to compile, longer
 MAX_REASON = 300  # characters
-KEPT_VARIABLES = (
-    "PATH", "HOME", "LANG", "LC_", "TMPDIR", "TEMP", "SYSTEMROOT", "LOCALAPPDATA", "XDG_", "PYTHON", "VIRTUAL_ENV",
-    "NUMBA_", "TTS2FACE_FACE_MODEL",
-)  # fmt: skip
 MAX_TEXT_BYTES = 1_000_000
 BLOCK_BYTES = 1 << 20
 
@@ -70,8 +66,21 @@ class UploadFolder:
         numbers: dict[str, float] = json.loads(Path(f"{path}.json").read_text())
         return path, numbers
 
+    async def video(self, name: str, upload: UploadFile) -> tuple[Path, float]:
+        """Recording of a talker, as it was sent, and its seconds.
+
+        Raises
+        ------
+        RefusedError
+            It is no video, too long, or its pictures are too large.
+        """
+        given, checked = await self._save(name, upload), self.path / f"{name}.video"
+        await decode_file((VIDEO, given, checked, self.settings.video_s), name, self.settings.decode_s)
+        facts = json.loads(checked.read_text())
+        return given.rename(given.with_suffix(facts["suffix"])), float(facts["seconds"])
+
     async def resource(self, kind: str, upload: UploadFile, max_bytes: float) -> Path:
-        """Folder with a checked talker, face, palette or dictionary (`tts2face.service.resource_check`).
+        """Folder with a checked talker, face, palette or dictionary (`tts2face.jobs.resource_check`).
 
         Raises
         ------
@@ -125,12 +134,6 @@ async def decode_file(arguments: tuple[str, Path, Path, float], name: str, timeo
         return
     reason = written.decode(errors="replace") if child.returncode == REFUSED else "it needs too much memory or time"
     raise RefusedError(422, "invalid_data", f"{name} cannot be used: {reason[:MAX_REASON]}; send another file")
-
-
-def child_environment() -> dict[str, str]:
-    """Variables of a process that reads uploads: no credentials, one thread for each library."""
-    kept = {name: value for name, value in os.environ.items() if name.startswith(KEPT_VARIABLES)}
-    return {**kept, "NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
 @asynccontextmanager

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import BackendError, DataError, InputError
-from tts2face.service.refused_file import RefusedFileError
+from tts2face.jobs.refused_file import RefusedFileError
 
 if TYPE_CHECKING:
     from PIL.Image import Image

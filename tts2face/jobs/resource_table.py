@@ -5,9 +5,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+from tts2face.jobs.blobs import BlobStore
 from tts2face.jobs.connection import JobDatabase, Transaction, create_tables
+from tts2face.jobs.resource_check import CONTENT, DESCRIPTION, PICTURE
 
 # The second table has one row; its update is the lock under which names, quotas and contents are changed.
 _TABLES = (
@@ -25,6 +28,7 @@ _COLUMNS = "owner, kind, name, content, picture, n_bytes, created, description"
 _INSERT = f"""
 INSERT INTO tts2face_resources ({_COLUMNS})
 VALUES (:owner, :kind, :name, :content, :picture, :n_bytes, :created, :description)"""
+MB = 1e6
 _CHOSEN = "owner = :owner AND kind = :kind AND name = :name"
 _DELETE = f"DELETE FROM tts2face_resources WHERE {_CHOSEN}"
 
@@ -63,6 +67,34 @@ class Usage:
 
     n_resources: int
     n_bytes: int
+
+
+def over_quota(owner: str, usage: Usage, limits: Usage, n_bytes: int) -> str | None:
+    """Sentence about the limit that `n_bytes` more would exceed; None if there is room."""
+    if usage.n_resources >= limits.n_resources:
+        return f"the key {owner} has {usage.n_resources} resources, its limit; delete one first"
+    if usage.n_bytes + n_bytes > limits.n_bytes:
+        return (
+            f"the key {owner} stores {usage.n_bytes / MB:.1f} MB, and {n_bytes / MB:.1f} MB more are beyond its "
+            f"{limits.n_bytes / MB:g} MB; delete something first"
+        )
+    return None
+
+
+def resource_from_folder(owner: str, kind: str, name: str, checked: Path, blobs: BlobStore) -> StoredResource:
+    """Row of a resource whose files, which `tts2face.jobs.resource_check` has written, are put into a store."""
+    files = [checked / one for one in (CONTENT, PICTURE) if (checked / one).is_file()]
+    stored = {file.name: blobs.put(file) for file in files}
+    description = json.loads((checked / DESCRIPTION).read_text(encoding="utf-8"))
+    n_bytes = sum(file.stat().st_size for file in files)
+    return StoredResource(owner, kind, name, stored[CONTENT], stored.get(PICTURE, ""), n_bytes, description)
+
+
+def keep_files(resource: StoredResource, checked: Path, blobs: BlobStore) -> None:
+    """Store files of a resource again that were deleted meanwhile with the last resource that had them."""
+    for name, content in ((CONTENT, resource.content), (PICTURE, resource.picture)):
+        if content and not blobs.has(content):
+            blobs.put(checked / name)
 
 
 class ResourceTable:
