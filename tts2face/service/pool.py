@@ -47,7 +47,7 @@ class PoolSettings:
         Requests that may wait; further ones are refused.
     warm
         Works that each process executes before it is ready, as `Work.as_json`.
-    log_format, log_text
+    log_format, log_text, memory_mb
         As in the settings of the service.
     """
 
@@ -57,6 +57,7 @@ class PoolSettings:
     warm: tuple[dict[str, Any], ...] = ()
     log_format: str = JSON_LINES
     log_text: bool = False
+    memory_mb: int = 0
 
 
 def work_cost(work: Work) -> float:
@@ -81,7 +82,8 @@ class Pool:
         self.processes = [
             WarmProcess(
                 {"core": cores[number % len(cores)] if cores else None, "n_sessions": settings.n_sessions,
-                 "warm": list(settings.warm), "log_format": settings.log_format, "log_text": settings.log_text},
+                 "warm": list(settings.warm), "log_format": settings.log_format, "log_text": settings.log_text,
+                 "memory_mb": settings.memory_mb},
                 self._wake,
             )
             for number in range(count)

@@ -57,6 +57,10 @@ class ServiceSettings:
     workers: int = setting(1, "Job workers of this server; 0: only those of `tts2face worker`.", (0, 256))
     processes: int = setting(0, "Synthesis processes; 0: one for each core.", (0, 256))
     sessions: int = setting(2, "Sets of talker, face and palette that each process keeps in memory.", (1, 16))
+    memory_mb: int = setting(
+        0, "Memory of a synthesis process in MB beyond which it releases sessions; 0: any.", (0, 1e6)
+    )
+    cache_mb: int = setting(0, "Finished speech and clips kept in the data folder, in MB; 0: none.", (0, 1e8))
     waiting: int = setting(64, "Requests that may wait for a process; further ones are refused with 429.", (0, 10_000))
     results_days: float = setting(
         30.0, "Days after which ended jobs and their results are removed; 0: never.", (0, 36_500)

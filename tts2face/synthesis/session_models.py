@@ -38,7 +38,7 @@ class SessionModels:
 
     Parameters
     ----------
-    talker, face, identity, palette
+    talker, face, identity, palette, voices
         As for `tts2face.Session`.
 
     Raises
@@ -53,6 +53,7 @@ class SessionModels:
         face: str | Path | Face,
         identity: str | None,
         palette: str | Path | Palette | None,
+        voices: VoicePool | None = None,
     ) -> None:
         self.talker: Talker = talker if isinstance(talker, Talker) else load_talker(str(talker))
         if face == OWN_FACE and identity is not None:
@@ -64,7 +65,7 @@ class SessionModels:
         self._lock = threading.RLock()
         self._cache: dict[Hashable, Any] = {}
         self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
-        self._voices = VoicePool()
+        self._voices = voices or VoicePool()
         self.speech_face: AnimatedFace = self._prepare_face(None)
 
     @property
