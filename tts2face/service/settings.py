@@ -2,6 +2,7 @@
 
 import ipaddress
 import os
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -15,13 +16,21 @@ from tts2face.storage.user_folders import user_data
 PREFIX = "TTS2FACE_SERVE_"  # of environment variables: TTS2FACE_SERVE_PORT
 LOCAL_HOSTS = ("localhost", "127.0.0.1", "::1")
 MAX_SETTINGS_BYTES = 100_000
-SECRETS = ("webhook_secret",)  # settings that are never shown
 Limits = tuple[float, float]
+_PASSWORD = re.compile(r"(?<=://)([^/:@]*):[^/@]*@")  # in the URL of a database
 
 
-def setting(default: Any, help_text: str, limits: Limits | None = None, choices: tuple[str, ...] | None = None) -> Any:
-    """Dataclass field with its help text, limits and choices."""
-    return field(default=default, metadata={"help": help_text, "limits": limits, "choices": choices})
+def setting(
+    default: Any,
+    help_text: str,
+    limits: Limits | None = None,
+    choices: tuple[str, ...] | None = None,
+    *,
+    is_secret: bool = False,
+) -> Any:
+    """Dataclass field with its help text, limits and choices; a secret is never shown."""
+    metadata = {"help": help_text, "limits": limits, "choices": choices, "is_secret": is_secret}
+    return field(default=default, repr=not is_secret, metadata=metadata)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +68,7 @@ class ServiceSettings:
     webhook_hosts: tuple[str, ...] = setting(
         (), "Hosts that may be told of the end of jobs: example.org, a.example:8080."
     )
-    webhook_secret: str = setting("", "Secret that signs webhooks; never shown.")
+    webhook_secret: str = setting("", "Secret that signs webhooks; never shown.", is_secret=True)
     text_characters: int = setting(100_000, "Longest text of a request.", (1, 10_000_000))
     sound_s: float = setting(600.0, "Longest recording that a request may send.", (1, 86_400))
     body_mb: float = setting(20.0, "Largest body of a request in MB.", (0.01, 4096))
@@ -121,9 +130,11 @@ class ServiceSettings:
         """The settings as a settings file, without secrets; a comment says what each means."""
         lines = []
         for one in fields(self):
-            if one.name in SECRETS:
+            if one.metadata["is_secret"]:
                 continue
             value = getattr(self, one.name)
+            if one.name == "database":
+                value = _PASSWORD.sub(r"\1@", value)
             line = f"{one.name} = {_toml(value)}" if value is not None else f'# {one.name} = ""'
             lines.append(f"# {one.metadata['help']}\n{line}\n")
         return "".join(lines)
