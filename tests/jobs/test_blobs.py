@@ -1,6 +1,7 @@
 """Files by the hash of their content, in a folder and in a bucket."""
 
 import hashlib
+import time
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,9 @@ def test_a_file_is_stored_by_its_content(blobs: BlobStore, tmp_path: Path) -> No
     assert blobs.has(SHA256)
     assert blobs.fetch(SHA256).read_bytes() == CONTENT == path.read_bytes()
     assert blobs.fetch(SHA256).name == SHA256
+    ((name, stored_s),) = blobs.entries()
+    assert name == SHA256
+    assert abs(stored_s - time.time()) < 60.0
     blobs.delete(SHA256)
     blobs.delete(SHA256)
     assert not blobs.has(SHA256)

@@ -174,6 +174,22 @@ def test_a_file_is_removed_with_the_last_job_that_has_it(client: JobClient, chan
     assert not client.blobs.has(shared)
 
 
+def test_files_without_a_job_are_removed(client: JobClient, changes: JobChanges) -> None:
+    ended(client, changes, b"used")
+    client.blobs.put(b"of a refused request")
+    assert client.remove_unused_files(3600.0) == 0
+    assert client.remove_unused_files(-10.0) == 1
+    assert [client.blobs.has(client.blobs.put(one)) for one in (b"used",)] == [True]
+    assert len(list(client.blobs.entries())) == 1
+
+
+def test_keys_take_turns(client: JobClient, database: str) -> None:
+    names = [client.submit(new_job(owner))[0].id for owner in ("ann", "ann", "ann", "bob", "bob")]
+    with open_client(database_url(database)) as queue:
+        found = {one.workflow_id: one.priority for one in queue.list_workflows(name="run_job")}
+    assert [found[name] for name in names] == [1, 2, 3, 1, 2]
+
+
 def test_old_jobs_are_found_by_their_age(client: JobClient, changes: JobChanges) -> None:
     name = ended(client, changes)
     client.submit(new_job())

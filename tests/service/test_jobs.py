@@ -235,3 +235,22 @@ def test_old_jobs_and_their_results_are_removed(tmp_path: Path) -> None:
     finally:
         running.close()
     assert not list((tmp_path / "store" / "results").glob("??/*"))
+
+
+def test_jobs_work_with_a_bucket(tmp_path: Path) -> None:
+    """Inputs and results pass through the store of a URL, here a folder by file://."""
+    settings = {"TTS2FACE_SERVE_DATA": str(tmp_path / "data"), "TTS2FACE_SERVE_STORE": f"file://{tmp_path}/bucket"}
+    running = RunningService(environment=settings)
+    try:
+        wait_for_database(running.url)
+        with httpx.Client(base_url=running.url, timeout=60.0) as api:
+            form = {"job": json.dumps({"kind": "subtitles", "request": {**SMALL, "per": "film"}})}
+            job = finished(api, api.post("/v1/jobs", data=form, files={"subtitles": SRT}).json())
+            assert job["state"] == "done", job
+            for result in job["results"]:
+                assert len(api.get(result["url"]).content) == result["bytes"]
+            assert api.delete(f"/v1/jobs/{job['id']}").status_code == 204
+    finally:
+        running.close()
+    assert not list((tmp_path / "bucket" / "results").glob("??/*"))
+    assert len(list((tmp_path / "bucket").glob("??/*.mov"))) == 4

@@ -167,6 +167,13 @@ class ObjectStore:
             return False
         return True
 
+    def list_objects(self, prefix: str) -> Iterator[tuple[str, float]]:
+        """Names of the objects in a folder, with the times at which they were stored, in seconds since 1970."""
+        with self._errors():
+            for page in self._obstore.list(self._store, prefix):
+                for entry in page:
+                    yield str(entry["path"]), entry["last_modified"].timestamp()
+
     def delete_object(self, name: str) -> None:
         """Remove an object, if there is one."""
         with contextlib.suppress(FileNotFoundError), self._errors():

@@ -41,6 +41,9 @@ class BlobStore(Protocol):
     def delete(self, sha256: str) -> None:
         """Remove a file, if it is stored."""
 
+    def entries(self) -> Iterator[tuple[str, float]]:
+        """Hashes of all files, with the times at which they were stored, in seconds since 1970."""
+
 
 def open_blobs(where: str | Path, name: str, *, cache: Path | None = None) -> BlobStore:
     """Files of one kind in a store.
@@ -115,6 +118,13 @@ class FolderBlobs:
         with translate_disk_errors(self.folder):
             self._path(sha256).unlink(missing_ok=True)
 
+    def entries(self) -> Iterator[tuple[str, float]]:
+        """Hashes of all files, with the times at which they were stored, in seconds since 1970."""
+        for path in self.folder.glob("??/*"):
+            with contextlib.suppress(FileNotFoundError):
+                if HASH.fullmatch(path.name):
+                    yield path.name, path.stat().st_mtime
+
     def _path(self, sha256: str) -> Path:
         return self.folder / _checked(sha256)[:2] / sha256
 
@@ -159,6 +169,13 @@ class BucketBlobs:
         """Remove a file and its local copy, if there are such."""
         self._bucket.delete_object(self._object(sha256))
         self._copies.delete(sha256)
+
+    def entries(self) -> Iterator[tuple[str, float]]:
+        """Hashes of all files, with the times at which they were stored, in seconds since 1970."""
+        for name, stored_s in self._bucket.list_objects(f"{self._name}/"):
+            sha256 = name.rpartition("/")[2]
+            if HASH.fullmatch(sha256):
+                yield sha256, stored_s
 
     def _object(self, sha256: str) -> str:
         return f"{self._name}/{_checked(sha256)[:2]}/{sha256}"

@@ -1,20 +1,23 @@
 """Jobs of the service as its server sees them: submit, cancel, delete, webhooks."""
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from tts2face.jobs.blobs import BlobStore
 from tts2face.jobs.connection import JobDatabase, Transaction
-from tts2face.jobs.database import APPLICATION, APPLICATION_VERSION, JOB_QUEUE, JOB_WORKFLOW, QUEUE
+from tts2face.jobs.database import APPLICATION, APPLICATION_VERSION, JOB_QUEUE, JOB_WORKFLOW, QUEUE, TALKER_QUEUE
 from tts2face.jobs.engine import ACTIVE, JOBS_PER_QUERY
 from tts2face.jobs.job_changes import Ending, JobChanges
 from tts2face.jobs.job_records import CANCELLED, JobRecord, NewJob
 from tts2face.jobs.job_table import JobTable
+from tts2face.jobs.resource_check import TALKER
 
 CONNECT_S = 2  # to PostgreSQL; then the request is refused
 SESSION_OPTIONS = "-c statement_timeout=10000 -c lock_timeout=8000"  # ms
 N_CONNECTIONS = 8
+FILES_PER_LOOK = 100  # while all changes of jobs wait
 LEASE_S = 60.0  # within which a server delivers a webhook that it has taken
 FIRST_PAUSE_S, PAUSE_FACTOR, MAX_TRIES = 2.0, 3.0, 10  # of webhooks: the last try comes 8 hours after the first
 
@@ -65,13 +68,14 @@ class JobClient:
             Called within the transaction: stores files that another job's deletion has removed meanwhile.
         """
 
-        def enqueue(change: Transaction) -> None:
+        def enqueue(change: Transaction, n_waiting: int) -> None:
             put_missing()
             options = {
-                "queue_name": JOB_QUEUE,
+                "queue_name": TALKER_QUEUE if new.kind == TALKER else JOB_QUEUE,
                 "workflow_name": JOB_WORKFLOW,
                 "workflow_id": new.id,
                 "app_version": APPLICATION_VERSION,
+                "priority": 1 + n_waiting,  # keys take turns: their first jobs, then their second ones
             }
             self._client.enqueue_in_transaction(change.connection, options, new.id)
 
@@ -82,6 +86,7 @@ class JobClient:
         segments = self.table.own_segments(job_id)
         if not self._changes.end(job_id, Ending(CANCELLED, error="cancelled")):
             return False
+        self._changes.forget_inputs(job_id, self.blobs.delete)
         self._client.cancel_workflows([job_id])
         for at in range(0, len(segments), JOBS_PER_QUERY):
             found = [self._active(address) for address in segments[at : at + JOBS_PER_QUERY]]
@@ -95,6 +100,26 @@ class JobClient:
         self.cancel(job_id)
         self.table.delete(job_id, self.blobs.delete)
         self._client.delete_workflows([job_id])
+
+    def remove_unused_files(self, older_than_s: float) -> int:
+        """Remove files that no job has, such as those of requests that were refused; their number.
+
+        Parameters
+        ----------
+        older_than_s
+            Seconds since they were stored.
+        """
+        before, n_removed = time.time() - older_than_s, 0
+
+        def remove(sha256: str) -> None:
+            nonlocal n_removed
+            self.blobs.delete(sha256)
+            n_removed += 1
+
+        old = [sha256 for sha256, stored_s in self.blobs.entries() if stored_s < before]
+        for at in range(0, len(old), FILES_PER_LOOK):
+            self._changes.remove_unused(set(old[at : at + FILES_PER_LOOK]), remove)
+        return n_removed
 
     def due_webhooks(self, limit: int = 16) -> list[Delivery]:
         """Webhooks that are to be sent now; no other server gets them for `LEASE_S`."""

@@ -70,7 +70,7 @@ class JobTable:
         create_tables(self.database, _TABLES)
 
     def submit(
-        self, new: NewJob, enqueue: Callable[[Transaction], None], max_waiting: int | None = None
+        self, new: NewJob, enqueue: Callable[[Transaction, int], None], max_waiting: int | None = None
     ) -> tuple[JobRecord, bool]:
         """Store and queue a job in one transaction; the job, and whether it is new.
 
@@ -79,7 +79,7 @@ class JobTable:
         Parameters
         ----------
         enqueue
-            Called within the transaction.
+            Called within the transaction, with the number of waiting jobs that the owner had before.
         max_waiting
             Largest number of waiting jobs of the owner; None: any.
 
@@ -97,7 +97,8 @@ class JobTable:
             if found is not None:
                 return found, False
             query = "SELECT count(*) FROM tts2face_jobs WHERE key_name = :key AND state = 'waiting'"
-            if max_waiting is not None and change.value(query, key=new.key_name) >= max_waiting:
+            n_waiting = int(change.value(query, key=new.key_name))
+            if max_waiting is not None and n_waiting >= max_waiting:
                 raise QueueFullError(
                     f"the key {new.key_name} has {max_waiting} waiting jobs; wait until some have ended"
                 )
@@ -111,7 +112,7 @@ class JobTable:
             )  # fmt: skip
             insert_files(change, new.id, INPUT, new.inputs)
             self.add_event(change, new.id, {"type": "state", "state": "waiting"})
-            enqueue(change)
+            enqueue(change, n_waiting)
             return self._read(change, new.id), True
 
     def get(self, job_id: str) -> JobRecord | None:

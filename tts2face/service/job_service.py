@@ -36,7 +36,8 @@ SUPERVISE_S, RESTART_S = 0.5, 10.0  # between two looks at the workers, and afte
 WEBHOOK_S, STATISTICS_S, SWEEP_S = 1.0, 5.0, 3600.0  # between two looks
 PROBE_S = 3.0  # of the database for /readyz
 DAY_S = 86_400.0
-MIN_SEGMENT_AGE_S = DAY_S  # a younger one may belong to a job that is being planned
+MIN_AGE_S = DAY_S  # of files and segments: a younger one may belong to a job that is being queued or planned
+N_SENDERS = 4  # threads that wait for receivers of webhooks
 N_THREADS = 8  # that wait for the database; the other parts of the server never do
 
 
@@ -54,6 +55,7 @@ class JobService:
         self._client: JobClient | None = None
         self._reason = "it is being opened"
         self._threads = ThreadPoolExecutor(N_THREADS, thread_name_prefix="jobs")
+        self._senders = ThreadPoolExecutor(N_SENDERS, thread_name_prefix="webhooks")
         self._tasks: list[asyncio.Task[None]] = []
         self._stopped = threading.Event()
         self._supervisor: threading.Thread | None = None
@@ -71,7 +73,8 @@ class JobService:
         await asyncio.gather(*self._tasks, return_exceptions=True)
         if self._supervisor is not None:
             await asyncio.to_thread(self._supervisor.join)
-        self._threads.shutdown(wait=False, cancel_futures=True)
+        for threads in (self._threads, self._senders):
+            threads.shutdown(wait=False, cancel_futures=True)
         if self._client is not None:
             self._client.close()
 
@@ -88,8 +91,8 @@ class JobService:
             raise _unavailable(self._reason)
         return self._client
 
-    async def call(self, function: Callable[[JobClient], Value]) -> Value:
-        """Value of a function of the client, in a thread.
+    async def call(self, function: Callable[[JobClient], Value], threads: ThreadPoolExecutor | None = None) -> Value:
+        """Value of a function of the client, in a thread of `threads` or of those of the database.
 
         Raises
         ------
@@ -98,7 +101,7 @@ class JobService:
         """
         client = self.client
         try:
-            return await asyncio.get_running_loop().run_in_executor(self._threads, function, client)
+            return await asyncio.get_running_loop().run_in_executor(threads or self._threads, function, client)
         except DatabaseAwayError as away:
             raise _unavailable(str(away)) from away
         except OtherBodyError as other:
@@ -164,7 +167,9 @@ class JobService:
         if not self._settings.webhook_hosts:
             return
         due = await self.call(JobClient.due_webhooks)
-        await asyncio.gather(*(self.call(lambda client, one=one: deliver(client, one, self._settings)) for one in due))  # type: ignore[misc]
+        await asyncio.gather(
+            *(self.call(partial(deliver, delivery=one, settings=self._settings), self._senders) for one in due)
+        )
 
     async def _count(self) -> None:
         self.counts, self.oldest_waiting_s = await self.call(lambda client: client.table.counts())
@@ -177,9 +182,10 @@ class JobService:
         old = await self.call(lambda client: client.table.ended_before(age_s))
         for job_id in old:
             await self.call(lambda client, job_id=job_id: client.delete(job_id))  # type: ignore[misc]
-        n_segments = await self.call(lambda _: self._prune(max(age_s, MIN_SEGMENT_AGE_S)))
-        if old or n_segments:
-            log_event("old jobs removed", jobs=len(old), segments=n_segments, days=age_s / DAY_S)
+        n_files = await self.call(lambda client: client.remove_unused_files(MIN_AGE_S))
+        n_segments = await self.call(lambda _: self._prune(max(age_s, MIN_AGE_S)))
+        if old or n_segments or n_files:
+            log_event("old jobs removed", jobs=len(old), segments=n_segments, files=n_files, days=age_s / DAY_S)
 
     def _prune(self, age_s: float) -> int:
         database = self._settings.database_place
