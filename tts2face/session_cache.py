@@ -60,9 +60,7 @@ class SessionCache:
 
 
 def resident_bytes() -> int:
-    """Memory of this process in bytes; where the system does not tell, its largest so far."""
+    """Memory of this process in bytes; 0 where the system does not tell."""
     with suppress(OSError):
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-    import resource
-
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    return 0

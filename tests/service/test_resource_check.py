@@ -17,7 +17,7 @@ from safetensors.numpy import save
 
 from lexicon.errors import BackendError
 from tests.characters.made import write_character_file
-from tests.model_files.made import write_made_face, write_made_palette, write_made_talker
+from tests.model_files.made import write_made_models, write_made_talker
 from tts2face.characters.binding import KEY
 from tts2face.jobs.resource_check import draw_resource
 from tts2face.models.face_file import read_face
@@ -33,13 +33,7 @@ WORDS = b"Siobhan  SH IH0 V AO1 N\nNguyen /\xc5\x8bwi\xc9\x99n/ # a name\n"
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Small files of each kind."""
-    folder = tmp_path_factory.mktemp("resources")
-    paths = {kind: folder / f"made.{kind}" for kind in ("talker", "face", "palette", "dictionary")}
-    write_made_talker(paths["talker"], has_face=False)
-    write_made_face(paths["face"])
-    write_made_palette(paths["palette"])
-    paths["dictionary"].write_bytes(WORDS)
-    return paths
+    return write_made_models(tmp_path_factory.mktemp("resources"), WORDS)
 
 
 def check(kind: str, source: Path, folder: Path, most: float = MOST_BYTES) -> tuple[int, str, Path]:

@@ -16,9 +16,11 @@ from tests.model_files.made import write_made_face
 from tts2face.jobs.database import database_url
 from tts2face.jobs.resource_table import ResourceTable, StoredResource
 from tts2face.service.app import create_app
+from tts2face.service.errors import RefusedError
 from tts2face.service.keys import add_key
 from tts2face.service.library import Library
 from tts2face.service.settings import ServiceSettings
+from tts2face.service.upload_checks import MAX_CHECKS, MAX_WAITING, Checks
 
 WORDS = b"Siobhan  SH IH0 V AO1 N\n"
 OTHER_WORDS = b"Nguyen  N UW1 Y EH0 N\n"
@@ -271,3 +273,25 @@ def test_a_database_that_is_away_is_said_and_the_services_own_models_do_without(
     assert library.resolve(LOCAL_KEY, "face", "head") == ("head", {})
     with pytest.raises(BackendError, match="the database cannot be reached"):
         library.resolve(LOCAL_KEY, "face", "mine")
+
+
+def test_uploads_take_turns_and_many_are_refused() -> None:
+    async def run() -> tuple[int, list[str]]:
+        checks = Checks()
+        running, most, codes = 0, 0, []
+
+        async def upload() -> None:
+            nonlocal running, most
+            try:
+                async with checks:
+                    running += 1
+                    most = max(most, running)
+                    await asyncio.sleep(0.01)
+                    running -= 1
+            except RefusedError as refused:
+                codes.append(f"{refused.status} {refused.headers['Retry-After']}")
+
+        await asyncio.gather(*(upload() for _ in range(MAX_CHECKS + MAX_WAITING + 3)))
+        return most, codes
+
+    assert asyncio.run(run()) == (MAX_CHECKS, ["429 10"] * 3)

@@ -11,23 +11,17 @@ import pytest
 from websockets.asyncio.client import connect
 
 import tts2face
-from tests.model_files.made import write_made_face, write_made_palette, write_made_talker
+from tests.model_files.made import write_made_models
 from tests.service.conftest import RunningService
 from tts2face.storage.files import find_file
 
 TEXT = "We were away."
-TOMATO = b"away  M AA1 M AA0\n"  # another word than the one that is written
+MAMA = b"away  M AA1 M AA0\n"  # another word than the one that is written
 
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    folder = tmp_path_factory.mktemp("uploads")
-    paths = {kind: folder / f"made.{kind}" for kind in ("talker", "face", "palette", "dictionary")}
-    write_made_talker(paths["talker"], has_face=False)
-    write_made_face(paths["face"])
-    write_made_palette(paths["palette"])
-    paths["dictionary"].write_bytes(TOMATO)
-    return paths
+    return write_made_models(tmp_path_factory.mktemp("uploads"), MAMA)
 
 
 @pytest.fixture(scope="module")

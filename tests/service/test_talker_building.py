@@ -1,5 +1,6 @@
 """Talkers built from uploaded recordings: limits, consent, refusals, and a talker that speaks."""
 
+import hashlib
 import io
 import json
 import wave
@@ -26,6 +27,7 @@ from tts2face.video.media import read_sound
 TEXT = "We were away a year ago. Bob may move. The boy will buy a pie for you. She saw the ship near the shore."
 FPS, RATE = 25, 16_000
 SETTINGS = {"TTS2FACE_SERVE_BODY_MB": "0.02", "TTS2FACE_SERVE_VIDEO_MB": "5", "TTS2FACE_SERVE_VIDEO_S": "60"}
+DATA: list[str] = []  # folder of the service
 Build = Callable[..., httpx.Response]
 
 
@@ -47,6 +49,7 @@ def clients(keys: Path) -> Iterator[dict[str, httpx.Client]]:
     """Clients of two keys, of a service that takes large bodies only as recordings."""
     secrets = {"ann": add_key(keys, "ann", ["speak", "build"]), "reader": add_key(keys, "reader", ["speak"])}
     running = RunningService("--keys", str(keys), environment=SETTINGS)
+    DATA.append(running.data.name)
     wait_for_database(running.url)
     made = {
         name: httpx.Client(base_url=running.url, timeout=60.0, headers={"authorization": f"Bearer {secret}"})
@@ -68,6 +71,11 @@ def build(clients: dict[str, httpx.Client]) -> Build:
         return clients[key].post("/v1/talkers/build", data=form, files=files)
 
     return send
+
+
+def stored_files(content: bytes) -> list[Path]:
+    """Files of the service with a content."""
+    return list(Path(DATA[-1]).rglob(hashlib.sha256(content).hexdigest()))
 
 
 def movie(seconds: float = 2.0, side: int = 128, samples: NDArray[np.int16] | None = None) -> bytes:
@@ -112,6 +120,7 @@ def test_a_recording_becomes_a_talker_that_speaks(
     client = clients["ann"]
     job = finished(client, queued.json())
     assert (job["state"], job["error"]) == ("done", None), job
+    assert stored_files(take.read_bytes()) == []  # the recording itself is not kept
     events = client.get(f"/v1/jobs/{job['id']}/events").text
     assert "reading recordings" in events
     assert '"n_kept": 1' in events
@@ -187,6 +196,17 @@ def test_building_needs_its_scope_and_only_it_may_be_large(clients: dict[str, ht
     clip = {"job": json.dumps({"kind": "clip", "request": {"text": "Hello."}})}
     other = clients["ann"].post("/v1/talkers/build", data=clip, files={"video": ("x", b"x")})
     assert (other.status_code, "the kinds are talker" in other.text) == (422, True)
+
+
+def test_a_key_may_have_some_talkers_in_work(clients: dict[str, httpx.Client], build: Build) -> None:
+    video = movie(0.5)
+    queued = [build(video, name=f"t{number}") for number in range(4)]
+    assert [one.status_code for one in queued] == [202] * 4, queued[-1].text
+    fifth = build(video, name="t5")
+    assert (fifth.status_code, fifth.json()["error"]["code"]) == (429, "queue_full")
+    for one in queued:
+        clients["ann"].post(f"/v1/jobs/{one.json()['id']}/cancel")
+    assert finished(clients["ann"], queued[0].json())["state"] in {"cancelled", "failed"}
 
 
 def test_words_may_be_sent_once(clients: dict[str, httpx.Client]) -> None:

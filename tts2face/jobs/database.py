@@ -18,6 +18,7 @@ APPLICATION = "tts2face"
 APPLICATION_VERSION = f"segments-{SEGMENT_FORMAT}"  # pinned: workers of equal segments share their work
 WORKFLOW = "render_segment"
 JOB_QUEUE, JOB_WORKFLOW = "tts2face-jobs", "run_job"  # of the service; a job waits for its segments
+TALKER_QUEUE = "tts2face-talkers"  # of jobs that compute for minutes; they never occupy the places of others
 BEAT_S = 1.5  # between two signs of life of a worker
 DEAD_AFTER_S = 6.0  # without a sign of life; with the interval of looking this is below 10 s
 POSTGRES_SCHEMES = ("postgresql://", "postgres://", "postgresql+psycopg://")

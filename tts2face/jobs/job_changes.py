@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tts2face.jobs.connection import JobDatabase
-from tts2face.jobs.job_records import OPEN_STATES, OUTPUT, JobFile, JobRecord
+from tts2face.jobs.job_records import INPUT, OPEN_STATES, OUTPUT, JobFile, JobRecord
 from tts2face.jobs.job_table import JobTable, insert_files, remove_unused
 
 _OPEN = "('waiting', 'running')"
@@ -97,6 +97,14 @@ class JobChanges:
             store(ending.outputs)
             also(change)
         return True
+
+    def forget_inputs(self, job_id: str, remove: Callable[[str], None]) -> None:
+        """Forget the files of an ended job, which are somebody's recordings; `remove` gets those of no other job."""
+        with self._database.transaction(is_change=True) as change:
+            query = "SELECT sha256 FROM tts2face_job_files WHERE job_id = :id AND role = :role"
+            hashes = {row[0] for row in change.rows(query, id=job_id, role=INPUT)}
+            change.run("DELETE FROM tts2face_job_files WHERE job_id = :id AND role = :role", id=job_id, role=INPUT)
+            remove_unused(change, hashes, remove)
 
     def remove_unused(self, hashes: set[str], remove: Callable[[str], None]) -> None:
         """Call `remove` with the files that no job uses, while no job can begin to use them."""

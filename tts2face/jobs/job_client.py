@@ -7,11 +7,12 @@ from typing import Any
 
 from tts2face.jobs.blobs import BlobStore
 from tts2face.jobs.connection import JobDatabase, Transaction
-from tts2face.jobs.database import APPLICATION, APPLICATION_VERSION, JOB_QUEUE, JOB_WORKFLOW, QUEUE
+from tts2face.jobs.database import APPLICATION, APPLICATION_VERSION, JOB_QUEUE, JOB_WORKFLOW, QUEUE, TALKER_QUEUE
 from tts2face.jobs.engine import ACTIVE, JOBS_PER_QUERY
 from tts2face.jobs.job_changes import Ending, JobChanges
 from tts2face.jobs.job_records import CANCELLED, JobRecord, NewJob
 from tts2face.jobs.job_table import JobTable
+from tts2face.jobs.resource_check import TALKER
 
 CONNECT_S = 2  # to PostgreSQL; then the request is refused
 SESSION_OPTIONS = "-c statement_timeout=10000 -c lock_timeout=8000"  # ms
@@ -70,7 +71,7 @@ class JobClient:
         def enqueue(change: Transaction, n_waiting: int) -> None:
             put_missing()
             options = {
-                "queue_name": JOB_QUEUE,
+                "queue_name": TALKER_QUEUE if new.kind == TALKER else JOB_QUEUE,
                 "workflow_name": JOB_WORKFLOW,
                 "workflow_id": new.id,
                 "app_version": APPLICATION_VERSION,
@@ -85,6 +86,7 @@ class JobClient:
         segments = self.table.own_segments(job_id)
         if not self._changes.end(job_id, Ending(CANCELLED, error="cancelled")):
             return False
+        self._changes.forget_inputs(job_id, self.blobs.delete)
         self._client.cancel_workflows([job_id])
         for at in range(0, len(segments), JOBS_PER_QUERY):
             found = [self._active(address) for address in segments[at : at + JOBS_PER_QUERY]]

@@ -76,10 +76,11 @@ class JobRunner:
                 part = names[at : at + JOBS_PER_QUERY]
                 found = {one.workflow_id: one for one in client.list_workflows(workflow_ids=part, load_input=False)}
                 for name in part:
-                    if name not in found:
-                        changes.end(name, Ending(FAILED, error="it was removed from the queue; send it again"))
-                    elif found[name].status not in ACTIVE:
-                        changes.end(name, Ending(FAILED, error=failure_reason(found[name])))
+                    reason = "it was removed from the queue; send it again"
+                    if name in found:
+                        reason = "" if found[name].status in ACTIVE else failure_reason(found[name])
+                    if reason and changes.end(name, Ending(FAILED, error=reason)):
+                        changes.forget_inputs(name, self._blobs()[0].delete)
 
     @contextmanager
     def _changes(self) -> Iterator[JobChanges]:
@@ -152,6 +153,7 @@ class JobRunner:
 
         if not changes.end(job.id, ending, put_missing):
             changes.remove_unused({one.sha256 for one in ending.outputs}, store.delete)
+        changes.forget_inputs(job.id, store.delete)
 
 
 class _Watch:

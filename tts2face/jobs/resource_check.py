@@ -25,8 +25,8 @@ MAX_TEXT = 200  # characters of a text of the description
 MAX_ENTRIES = 200  # identities or styles of the description
 PICTURE_SIDE_PX, TILE_SIDE_PX, TILE_COLUMNS, MAX_TILES = 384, 192, 4, 12
 REST_S, STYLE_S = 0.1, 2.0  # of idle motion that is synthesised for a picture
-# CPU seconds: a head takes 0.03 and 0.4. A slower one would hold up the streams of everybody.
-MAX_FRAME_CPU_S, MAX_STYLE_CPU_S = 1.0, 8.0
+# CPU seconds: shipped models take 0.03, 0.4 and 0.02. A slower one would hold up the streams of everybody.
+MAX_FRAME_CPU_S, MAX_STYLE_CPU_S, MAX_SPEECH_CPU_S = 1.0, 8.0, 4.0
 # First bytes of files that are sent by mistake, or on purpose.
 FOREIGN = {
     b"PK\x03\x04": "a zip archive", b"\x80\x02": "a Python pickle", b"\x80\x03": "a Python pickle",
@@ -94,7 +94,20 @@ def _check_talker(source: Path, out: Path) -> dict[str, Any]:
     found = talker.read_talker(out)
     if found.appearance is not None and "consent" not in found.metadata:
         raise DataError("it shows a person's face, but states no consent; build it with --consent")
+    _try_speech(out)
     return _without_name(asdict(describe_talker(out)))
+
+
+def _try_speech(content: Path) -> None:
+    """Synthesise two sentences with a talker; the first one also compiles kernels."""
+    from tts2face.session import Session
+
+    session = Session(str(content), palette=None)
+    session.clip("We were away.", voice="espeak", gestures="none")
+    began = time.process_time()
+    session.clip("Bob may move.", voice="espeak", gestures="none")
+    if time.process_time() - began > MAX_SPEECH_CPU_S:
+        raise RefusedFileError(f"a short sentence takes more than {MAX_SPEECH_CPU_S:g} s to synthesise")
 
 
 def _check_face(source: Path, out: Path) -> dict[str, Any]:

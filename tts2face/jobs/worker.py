@@ -34,6 +34,7 @@ from tts2face.jobs.database import (
     JOB_QUEUE,
     JOB_WORKFLOW,
     QUEUE,
+    TALKER_QUEUE,
     WORKFLOW,
     Workers,
     database_url,
@@ -50,6 +51,7 @@ MAX_JOB_DEATHS = 30  # of workers that executed the same job of the service, whi
 N_TAKEN = 2  # segments that a worker holds: one is rendered, one waits, so that no time is lost between them
 N_JOBS = 4  # of the service, which mostly wait for their segments; they never occupy the places of segments
 START_FAILED = 4  # exit code, as of the command for BackendError
+N_TALKERS = 1  # built at a time: each takes a core and 1 GB
 # Connections of a worker to the database: two stay open, besides that of its signs of life.
 CONNECTIONS = {"pool_size": 2, "max_overflow": 3}
 
@@ -116,7 +118,7 @@ class Worker:
                 "executor_id": self.executor_id,
                 "log_level": "ERROR",
                 "enable_otlp": False,
-                "max_executor_threads": N_TAKEN + N_JOBS + 2,
+                "max_executor_threads": N_TAKEN + N_JOBS + N_TALKERS + 2,
                 "run_migrations": False,
                 "use_listen_notify": False,  # a connection that nothing here needs
                 "db_engine_kwargs": dict(CONNECTIONS),
@@ -158,6 +160,7 @@ class Worker:
             interval_s = poll_interval(len(workers.alive()))
             DBOS.register_queue(QUEUE, worker_concurrency=N_TAKEN, polling_interval_sec=interval_s)
             DBOS.register_queue(JOB_QUEUE, worker_concurrency=N_JOBS, polling_interval_sec=interval_s)
+            DBOS.register_queue(TALKER_QUEUE, worker_concurrency=N_TALKERS, polling_interval_sec=interval_s)
         except (sqlalchemy.exc.SQLAlchemyError, dbos_error.DBOSException) as away:
             reason = " ".join(str(getattr(away, "orig", None) or away).split())
             raise BackendError(f"the worker cannot start: {reason[:200]}; check the database") from away
@@ -218,7 +221,7 @@ class Worker:
 
         alive = set(workers.alive())
         wanted = poll_interval(len(alive))
-        for name in (QUEUE, JOB_QUEUE):
+        for name in (QUEUE, JOB_QUEUE, TALKER_QUEUE):
             queue = DBOS.retrieve_queue(name)
             if queue is not None and not 0.8 < wanted / queue.polling_interval_sec < 1.25:
                 queue.set_polling_interval_sec(wanted)

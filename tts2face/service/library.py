@@ -31,6 +31,7 @@ from tts2face.storage.files import find_file, translate_disk_errors
 
 NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,39}")
 OPENAI_MODELS = ("tts-1", "tts-1-hd", "gpt-4o-mini-tts")  # names that clients send; all are the service's talker
+MAX_FETCHED = 1000  # contents whose files are remembered
 RESERVED = {FACE: (OWN_FACE,), TALKER: OPENAI_MODELS}
 
 
@@ -72,6 +73,7 @@ class Library:
 
     def __init__(self, settings: ServiceSettings) -> None:
         self._settings = settings
+        self._fetched: dict[str, tuple[Path, tuple[int, int] | None]] = {}
 
     @cached_property
     def _table(self) -> ResourceTable:
@@ -107,7 +109,7 @@ class Library:
                 f"there is no {kind} {name[:60]!r}; those of the service are {shipped}, and yours are at "
                 f"/v1/{plural(kind)}",
             )  # fmt: skip
-        return str(self._blobs.fetch(found.content)), found.description
+        return str(self._fetch(found.content)), found.description
 
     def uploads(self, kind: str, owner: str | None) -> tuple[StoredResource, ...]:
         """Uploads of a kind of one owner, or of all."""
@@ -136,7 +138,7 @@ class Library:
         """
         if not resource.picture:
             raise RefusedError(404, "not_found", f"a {resource.kind} has no picture")
-        return self._blobs.fetch(resource.picture)
+        return self._fetch(resource.picture)
 
     def check_room(self, key: ApiKey, kind: str, name: str, n_bytes: int) -> None:
         """Refuse an upload that has no place, before it is read.
@@ -196,6 +198,17 @@ class Library:
         most_mb = settings.resources_mb if key.resources_mb is None else key.resources_mb
         return Usage(most, int(most_mb * MB))
 
+    def _fetch(self, content: str) -> Path:
+        """Path of a content, whose hash is computed again only after a change of its file."""
+        path, before = self._fetched.get(content, (None, None))
+        if path is not None and before == _state_of(path):
+            return path
+        path = self._blobs.fetch(content)
+        if len(self._fetched) >= MAX_FETCHED:
+            self._fetched.clear()
+        self._fetched[content] = path, _state_of(path)
+        return path
+
     def _check_quota(self, key: ApiKey, usage: Usage, n_bytes: int) -> None:
         reason = over_quota(key.name, usage, self.limits(key), n_bytes)
         if reason is not None:
@@ -204,6 +217,15 @@ class Library:
     @staticmethod
     def _name_taken(kind: str, name: str) -> RefusedError:
         return RefusedError(409, "name_taken", f"there is a {kind} {name} already; delete it, or choose another name")
+
+
+def _state_of(path: Path) -> tuple[int, int] | None:
+    """Size and time of change of a file; None if there is none."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_size, status.st_mtime_ns
 
 
 def plural(kind: str) -> str:

@@ -14,6 +14,7 @@ from lexicon.errors import Tts2faceError
 from lexicon.growing_text import GrowingText
 from tts2face.service.messages import CANCELS, Event, Wait
 from tts2face.service.turns import InterruptedTaskError
+from tts2face.service.words import check_words
 from tts2face.service.work import Inputs, Work
 from tts2face.types import Chunk, Clip, Trajectory
 
@@ -71,6 +72,7 @@ class LiveTask:
     def _say(self, sentence: str) -> Iterator[Event | Chunk]:
         n_cancels = self._n_cancels
         try:
+            check_words(sentence)
             for piece in self._speech.say(sentence):
                 yield _speech_event(piece)
                 yield _sound(piece.clip)

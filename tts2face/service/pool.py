@@ -156,8 +156,7 @@ class Pool:
                     raise
             finally:
                 await messages.aclose()  # type: ignore[attr-defined]
-                process.load -= cost
-                self._wake()
+                self._release(process, cost)
 
     async def _take(self, cost: float, key: str) -> WarmProcess:
         found = None if self._waiting else self._free_process(cost)
@@ -172,11 +171,14 @@ class Pool:
             return await future
         except asyncio.CancelledError:
             if future.done() and not future.cancelled():
-                future.result().load -= cost
-                self._wake()
+                self._release(future.result(), cost)
             raise
         finally:
             self._forget(key, future)
+
+    def _release(self, process: WarmProcess, cost: float) -> None:
+        process.load = round(process.load - cost, 6)  # sums of tenths are not exact: the load of no work is zero
+        self._wake()
 
     def _free_process(self, cost: float) -> WarmProcess | None:
         free = [one for one in self.processes if one.is_ready and (one.load == 0 or one.load + cost <= CAPACITY)]

@@ -86,6 +86,7 @@ class ServiceSettings:
     keep_alive_s: float = setting(15.0, "Seconds that a connection without a request stays open.", (0, 3600))
     connections: int = setting(1000, "Connections at the same time; further ones get 503.", (1, 100_000))
     head_kb: int = setting(64, "Largest head of a request in KB: address and headers.", (1, 1024))
+    headers: int = setting(100, "Largest number of headers of a request.", (10, 1000))
     message_kb: int = setting(1024, "Largest message of a WebSocket in KB.", (1, 65_536))
     pixels: int = setting(2_100_000, "Largest picture of a clip in pixels.", (262_144, 16_777_216))
     upload_pixels: int = setting(40_000_000, "Largest picture that a request may send.", (1, 200_000_000))

@@ -22,6 +22,7 @@ from tts2face.service.result_cache import CACHED_KINDS, ResultCache
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.tracing import tracing_from_environment
 from tts2face.service.upload_checks import Checks
+from tts2face.service.words import check_words
 from tts2face.service.work import Work
 
 if TYPE_CHECKING:
@@ -88,6 +89,7 @@ class ServiceState:
         if self.settings.log_text and work.request.get("text"):
             log_event("text", text=work.request["text"])
         try:
+            check_words(str(work.request.get("text", "")))
             async with aclosing(self._stream(work, key, inputs)) as stream:  # type: ignore[type-var]
                 async for message in stream:
                     made += message.seconds

@@ -8,10 +8,13 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.datastructures import UploadFile
 
+from tts2face.jobs.job_client import JobClient
+from tts2face.jobs.job_records import OPEN_STATES
 from tts2face.jobs.resource_check import TALKER
 from tts2face.service.errors import RefusedError
 from tts2face.service.job_orders import JobKind, JobOrder
 
+MAX_OPEN, MAX_LOOKED_AT = 4, 1000  # talkers in work of a key; its newest jobs that are looked at
 RECORDING = "recording"  # of the files of the job, which differ in their endings
 SUBTITLE_SUFFIXES = (".srt", ".vtt")
 
@@ -84,6 +87,7 @@ async def prepare_talker(order: JobOrder) -> dict[str, Any]:
             "a talker with its own face needs the consent of the person shown; give appearance and consent, or neither",
         )  # fmt: skip
     library = order.state.library
+    await _check_open_jobs(order)
     await asyncio.to_thread(library.check_room, order.key, TALKER, asked.name, 0)
     return {
         "owner": order.key.name, "name": asked.name, "appearance": asked.appearance, "consent": asked.consent,
@@ -93,6 +97,21 @@ async def prepare_talker(order: JobOrder) -> dict[str, Any]:
         },
         "seconds": order.upload.seconds, "limits": asdict(library.limits(order.key)), "order": uuid.uuid4().hex,
     }  # fmt: skip
+
+
+async def _check_open_jobs(order: JobOrder) -> None:
+    """Refuse a recording of a key with many that wait: each keeps its file until it is built."""
+
+    def count(client: JobClient) -> int:
+        pages = [client.table.page(order.key.name, state, None, MAX_LOOKED_AT) for state in OPEN_STATES]
+        return sum(one.kind == TALKER for page in pages for one in page)
+
+    n_open = await order.state.jobs.call(count)
+    if n_open >= MAX_OPEN:
+        raise RefusedError(
+            429, "queue_full", f"the key {order.key.name} has {n_open} talkers in work; wait until one is built",
+            {"Retry-After": "60"},
+        )  # fmt: skip
 
 
 TALKER_KIND = JobKind(
