@@ -13,7 +13,7 @@ from typing import Any
 import httpx
 import pytest
 
-START_TIMEOUT_S = 180.0
+START_TIMEOUT_S = 60.0
 
 
 class RunningService:
@@ -32,8 +32,10 @@ class RunningService:
         *arguments: str,
         environment: Mapping[str, str] | None = None,
         program: Sequence[str] = ("-m", "tts2face"),
+        processes: int = 1,
     ) -> None:
-        command = [sys.executable, *program, "serve", "--port", "0", "--processes", "1", *arguments]
+        command = [sys.executable, *program, "serve", "--port", "0", *arguments]
+        command += ["--processes", str(processes)]
         kept = {name: value for name, value in os.environ.items() if not name.startswith(("TTS2FACE_SERVE_", "OTEL_"))}
         self.data = tempfile.TemporaryDirectory(prefix="tts2face-service-")
         self.process = subprocess.Popen(

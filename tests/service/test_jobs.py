@@ -253,4 +253,4 @@ def test_jobs_work_with_a_bucket(tmp_path: Path) -> None:
     finally:
         running.close()
     assert not list((tmp_path / "bucket" / "results").glob("??/*"))
-    assert len(list((tmp_path / "bucket").glob("??/*.mov"))) == 4
+    assert len(list((tmp_path / "bucket").glob("??/*.mov"))) == 3

@@ -19,7 +19,9 @@ from tts2face.synthesis.byte_stream import MEDIA_TYPES
 router = APIRouter(prefix="/v1", tags=["clips"])
 
 FILES = ("audio", "background", "timeline")
-Format = Literal["mp4", "webm", "mp3", "opus", "aac", "flac", "wav", "pcm", "curves", "oculus", "azure", "livelink"]
+Format = Literal[
+    "mp4", "webm", "mp3", "opus", "aac", "flac", "wav", "pcm", "curves", "oculus", "azure", "livelink", "glb"
+]
 
 
 class ClipRequest(ClipOptions):

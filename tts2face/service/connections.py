@@ -15,7 +15,7 @@ from tts2face.service.settings import ServiceSettings
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-LINGER_S = 2.0  # for which the rest of a refused body is read, so that the client reads the answer
+LINGER_S, LINGER_BYTES = 2.0, 8 << 20  # in which the rest of a refused body is read, so that its answer is read
 REASONS = {
     400: "Bad Request",
     408: "Request Timeout",
@@ -50,14 +50,14 @@ class HttpConnection(H11Protocol):
     """A connection of HTTP/1.1 with the limits of the settings.
 
     Every request's head must arrive within `head_s`. What a client does not read of an answer within `stall_s` ends the
-    connection. The rest of the body of a request that is answered already is read for `LINGER_S` only.
+    connection. Of the rest of the body of a request that is answered already, `LINGER_BYTES` are read in `LINGER_S`.
     """
 
     def __init__(self, settings: ServiceSettings, **options: Any) -> None:
         super().__init__(**options)
         self._settings = settings
         self._head, self._stall = _Timer(self._end_slow_head), _Timer(self._abort)
-        self._linger = _Timer(self._abort)
+        self._linger, self._n_lingering = _Timer(self._abort), 0
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Count the connection, and wait for a head."""
@@ -77,6 +77,10 @@ class HttpConnection(H11Protocol):
         """Read a part of a request."""
         if self.transport.is_closing():
             return
+        if self._linger.is_running:
+            self._n_lingering += len(data)
+            if self._n_lingering > LINGER_BYTES:
+                return self._abort()
         super().data_received(data)
         if self.conn.their_state is not h11.IDLE:
             self._head.stop()
@@ -87,6 +91,7 @@ class HttpConnection(H11Protocol):
         """Wait for the next request, or for the rest of this one."""
         super().on_response_complete()
         self._linger.stop()
+        self._n_lingering = 0
         if self.conn.their_state is h11.SEND_BODY and not self.transport.is_closing():
             self._linger.start(LINGER_S)
 

@@ -80,6 +80,7 @@ DOCUMENTED: dict[int | str, dict[str, Any]] = {
         421: "The host is none of this service.",
         422: "The body does not have the form of the schema.",
         429: "Too many requests; Retry-After says when to repeat.",
+        431: "The head of the request is too large.",
         500: "A defect of the service; the log says more.",
         503: "Something is missing on the server, it is not ready, or it is shutting down.",
     }.items()

@@ -20,7 +20,7 @@ Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 REQUEST_ID_FORM = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 HEADERS = ((b"x-content-type-options", b"nosniff"), (b"cache-control", b"no-store"))
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
-CLOSE_REFUSED, CLOSE_RESTART = 1008, 1012  # WebSocket: policy violation; service restart
+CLOSE_NORMAL, CLOSE_REFUSED, CLOSE_RESTART = 1000, 1008, 1012  # WebSocket: policy violation; service restart
 HTTP_FORM = "websocket.http.response"  # extension of ASGI: a refused WebSocket gets an HTTP answer
 
 
@@ -77,6 +77,8 @@ class Exchange:
             ]
         elif message["type"] == "websocket.accept":
             self.status = 101
+        elif message["type"] == "websocket.close":
+            self._is_closed = True
         self._count(message)
         await self._send(message)
 
@@ -118,13 +120,17 @@ class Exchange:
                 text = json.dumps({"type": "error", "code": "draining", "message": message})
                 await self.send({"type": "websocket.send", "text": text})
 
+    async def close(self, code: int = CLOSE_NORMAL, reason: str = "") -> None:
+        """Close a WebSocket that is open."""
+        if self.scope["type"] == "websocket" and self.status == 101 and not self._is_closed:
+            self._is_closed = True
+            with suppress(OSError, RuntimeError):  # the client has left
+                await self._send({"type": "websocket.close", "code": code, "reason": reason})
+
     async def cut(self) -> None:
         """End the request now: a WebSocket with code 1012, a stream incomplete."""
         self.is_cut = True
-        if self.scope["type"] == "websocket" and self.status == 101 and not self._is_closed:
-            with suppress(OSError, RuntimeError):
-                await self._send({"type": "websocket.close", "code": CLOSE_RESTART, "reason": "the service restarts"})
-            self._is_closed = True
+        await self.close(CLOSE_RESTART, "the service restarts")
         if self._task is not None:
             self._task.cancel()
 

@@ -24,6 +24,7 @@ OPEN_PATHS = frozenset({"/healthz", "/readyz", "/docs", "/openapi.json"})
 UNCOUNTED_PATHS = frozenset({*OPEN_PATHS, "/metrics", "/v1/hello"})
 VIDEO_PATH = "/v1/talkers/build"
 DRAINING_PATHS = frozenset({"/healthz", "/readyz", "/metrics"})  # that are answered until the end
+CLOSE = {"Connection": "close"}
 DRAINING_RETRY_S = 5  # until another server, or this one again, may be asked
 
 
@@ -42,6 +43,7 @@ class Guard:
         is_counted = scope["path"] not in UNCOUNTED_PATHS
         try:
             self._check_draining(scope["path"])
+            self._check_head(request)
             self._check_host(request)
             key = self._identify(request)
             scope["state"] = {**scope.get("state", {}), "key": key, "exchange": request}
@@ -54,6 +56,7 @@ class Guard:
             self._state.running.add(request)
         try:
             await request.run(self._answer(request, receive))
+            await request.close()
             if request.is_cut:
                 await request.refuse(_draining())
         finally:
@@ -82,6 +85,17 @@ class Guard:
     def _check_draining(self, path: str) -> None:
         if self._state.is_draining and path not in DRAINING_PATHS:
             raise _draining()
+
+    def _check_head(self, request: "Exchange") -> None:
+        """Refuse heads that are too large, and bodies with two lengths, which proxies may divide differently."""
+        settings, scope, given = self._state.settings, request.scope, request.scope["headers"]
+        size = sum(len(name) + len(value) for name, value in given)
+        size += len(scope.get("raw_path") or b"") + len(scope["query_string"])
+        if len(given) > settings.headers or size > 1024 * settings.head_kb:
+            message = f"the head has more than {settings.headers} headers or {settings.head_kb} KB; send less"
+            raise RefusedError(431, "too_large", message, CLOSE)
+        if {b"transfer-encoding", b"content-length"} <= set(request.headers):
+            raise RefusedError(400, "invalid_request", "the body has two lengths; send one of them", CLOSE)
 
     def _check_host(self, request: "Exchange") -> None:
         """Refuse names of other hosts (DNS rebinding) and pages of other origins."""
@@ -123,7 +137,7 @@ def _brings_video(scope: Scope) -> bool:
 
 
 def _draining() -> RefusedError:
-    headers = {"Retry-After": str(DRAINING_RETRY_S), "Connection": "close"}
+    headers = {"Retry-After": str(DRAINING_RETRY_S)} | CLOSE
     return RefusedError(503, "draining", "the service is shutting down; repeat the request", headers)
 
 

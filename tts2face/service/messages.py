@@ -11,6 +11,7 @@ from typing import Any
 
 HEADER = struct.Struct("<IBIf")
 MAX_PAYLOAD_BYTES = 1 << 28
+CANCELS = frozenset({"cancel", "interrupt"})  # two names of one message of live streams
 DEFECT = "InternalError"  # kind of an error that is none of the project's own
 
 
@@ -22,6 +23,7 @@ class MessageKind(IntEnum):
     EVENT = 2  # JSON object of the result
     END = 3  # the task is done; JSON with its measures
     ERROR = 4  # the task has failed; JSON with kind and message
+    CANCELLED = 5  # the task has been cancelled and has released what it held; JSON with the seconds that took
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,7 @@ OPENAI_VOICES = (
     "alloy", "ash", "ballad", "cedar", "coral", "echo", "fable", "marin", "nova", "onyx", "sage", "shimmer", "verse",
 )  # fmt: skip
 FORMATS = {"jsonl": "curves"}  # further names of formats
-Format = Literal["mp3", "opus", "aac", "flac", "wav", "pcm", "mp4", "webm", "jsonl", "curves", "oculus", "azure"]
+Format = Literal["mp3", "opus", "aac", "flac", "wav", "pcm", "mp4", "webm", "glb", "jsonl", "curves", "oculus", "azure"]
 
 
 class Speech(BaseModel):
@@ -39,7 +39,10 @@ class Speech(BaseModel):
         str | dict[str, Any], Field(description="A voice of GET /v1/voices, or one of OpenAI's for the default voice.")
     ] = "alloy"
     response_format: Annotated[
-        Format, Field(description="Sound; mp4 or webm: the clip; jsonl: ARKit curves; oculus, azure: visemes.")
+        Format,
+        Field(
+            description="Sound; mp4, webm: the clip; glb: animated mesh; jsonl: ARKit curves; oculus, azure: visemes."
+        ),
     ] = "mp3"
     speed: Annotated[float, Field(ge=0.5, le=2.0, description="Factor of the speaking rate.")] = 1.0
     stream_format: Annotated[

@@ -47,7 +47,7 @@ class PoolSettings:
         Requests that may wait; further ones are refused.
     warm
         Works that each process executes before it is ready, as `Work.as_json`.
-    log_format, log_text
+    log_format, log_text, memory_mb
         As in the settings of the service.
     """
 
@@ -57,6 +57,7 @@ class PoolSettings:
     warm: tuple[dict[str, Any], ...] = ()
     log_format: str = JSON_LINES
     log_text: bool = False
+    memory_mb: int = 0
 
 
 def work_cost(work: Work) -> float:
@@ -81,7 +82,8 @@ class Pool:
         self.processes = [
             WarmProcess(
                 {"core": cores[number % len(cores)] if cores else None, "n_sessions": settings.n_sessions,
-                 "warm": list(settings.warm), "log_format": settings.log_format, "log_text": settings.log_text},
+                 "warm": list(settings.warm), "log_format": settings.log_format, "log_text": settings.log_text,
+                 "memory_mb": settings.memory_mb},
                 self._wake,
             )
             for number in range(count)
@@ -154,8 +156,7 @@ class Pool:
                     raise
             finally:
                 await messages.aclose()  # type: ignore[attr-defined]
-                process.load -= cost
-                self._wake()
+                self._release(process, cost)
 
     async def _take(self, cost: float, key: str) -> WarmProcess:
         found = None if self._waiting else self._free_process(cost)
@@ -170,11 +171,14 @@ class Pool:
             return await future
         except asyncio.CancelledError:
             if future.done() and not future.cancelled():
-                future.result().load -= cost
-                self._wake()
+                self._release(future.result(), cost)
             raise
         finally:
             self._forget(key, future)
+
+    def _release(self, process: WarmProcess, cost: float) -> None:
+        process.load = round(process.load - cost, 6)  # sums of tenths are not exact: the load of no work is zero
+        self._wake()
 
     def _free_process(self, cost: float) -> WarmProcess | None:
         free = [one for one in self.processes if one.is_ready and (one.load == 0 or one.load + cost <= CAPACITY)]

@@ -57,6 +57,10 @@ class ServiceSettings:
     workers: int = setting(1, "Job workers of this server; 0: only those of `tts2face worker`.", (0, 256))
     processes: int = setting(0, "Synthesis processes; 0: one for each core.", (0, 256))
     sessions: int = setting(2, "Sets of talker, face and palette that each process keeps in memory.", (1, 16))
+    memory_mb: int = setting(
+        0, "Memory of a synthesis process in MB beyond which it releases sessions; 0: any.", (0, 1e6)
+    )
+    cache_mb: int = setting(0, "Finished speech and clips kept in the data folder, in MB; 0: none.", (0, 1e8))
     waiting: int = setting(64, "Requests that may wait for a process; further ones are refused with 429.", (0, 10_000))
     results_days: float = setting(
         30.0, "Days after which ended jobs and their results are removed; 0: never.", (0, 36_500)
@@ -82,6 +86,7 @@ class ServiceSettings:
     keep_alive_s: float = setting(15.0, "Seconds that a connection without a request stays open.", (0, 3600))
     connections: int = setting(1000, "Connections at the same time; further ones get 503.", (1, 100_000))
     head_kb: int = setting(64, "Largest head of a request in KB: address and headers.", (1, 1024))
+    headers: int = setting(100, "Largest number of headers of a request.", (10, 1000))
     message_kb: int = setting(1024, "Largest message of a WebSocket in KB.", (1, 65_536))
     pixels: int = setting(2_100_000, "Largest picture of a clip in pixels.", (262_144, 16_777_216))
     upload_pixels: int = setting(40_000_000, "Largest picture that a request may send.", (1, 200_000_000))

@@ -18,9 +18,11 @@ from tts2face.service.messages import Message, MessageKind
 from tts2face.service.metrics import Metrics
 from tts2face.service.pool import Pool, PoolSettings
 from tts2face.service.rate_limits import RateLimits
+from tts2face.service.result_cache import CACHED_KINDS, ResultCache
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.tracing import tracing_from_environment
 from tts2face.service.upload_checks import Checks
+from tts2face.service.words import check_words
 from tts2face.service.work import Work
 
 if TYPE_CHECKING:
@@ -39,10 +41,13 @@ class ServiceState:
             settings.processes, settings.sessions, settings.waiting,
             (self.work(format="mp4", request={"text": WARM_TEXT}).as_json(),
              self.work(kind="speech", request={"text": WARM_TEXT}).as_json()),
-            settings.log_format, settings.log_text,
+            settings.log_format, settings.log_text, settings.memory_mb,
         ))  # fmt: skip
         self.jobs = JobService(settings)
-        self.limits, self.metrics = RateLimits(), Metrics(self.pool, self.jobs)
+        self.cache: ResultCache | None = None
+        if settings.cache_mb:
+            self.cache = ResultCache(settings.data_folder / "cache", settings.cache_mb * 1_000_000)
+        self.limits, self.metrics = RateLimits(), Metrics(self.pool, self.jobs, self.cache)
         self.library, self.checks, self.video_checks = Library(settings), Checks(), Checks()
         self.tracing = tracing_from_environment(os.environ)
         self.is_draining = False
@@ -84,7 +89,8 @@ class ServiceState:
         if self.settings.log_text and work.request.get("text"):
             log_event("text", text=work.request["text"])
         try:
-            async with aclosing(self.pool.stream(work, key.name, inputs=inputs)) as stream:  # type: ignore[type-var]
+            check_words(str(work.request.get("text", "")))
+            async with aclosing(self._stream(work, key, inputs)) as stream:  # type: ignore[type-var]
                 async for message in stream:
                     made += message.seconds
                     self.limits.add_speech(key, message.seconds)
@@ -101,6 +107,13 @@ class ServiceState:
             refused = as_refused(error)
             self.metrics.failures.labels(refused.code).inc()
             raise refused from error
+
+    def _stream(self, work: Work, key: ApiKey, inputs: "asyncio.Queue[Any] | None") -> AsyncIterator[Message]:
+        """Messages of a work from the cache, or from a process."""
+        made = self.pool.stream(work, key.name, inputs=inputs)
+        if self.cache is None or work.kind not in CACHED_KINDS:
+            return made
+        return self.cache.messages(work, made)
 
     def record(self, request: "Exchange", key: ApiKey | None) -> None:
         """Log, count and trace a finished request."""

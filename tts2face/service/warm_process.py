@@ -58,6 +58,7 @@ class WarmProcess:
         self._number = 0
         self.is_ready = False
         self.is_closed = False
+        self.on_cancelled: Callable[[float], None] = _ignore  # called with the seconds until a task was released
         self.load = 0.0  # sum of the costs of its tasks
 
     @property
@@ -152,6 +153,8 @@ class WarmProcess:
             if message.kind == MessageKind.READY:
                 self.is_ready = True
                 self._on_change()
+            elif message.kind == MessageKind.CANCELLED:
+                self.on_cancelled(json.loads(payload)["seconds"])
             elif number in self._results:
                 await self._arrived(number, message)
 
@@ -186,6 +189,10 @@ class WarmProcess:
             await child.wait()
         for result in self._results.values():
             result.messages.put_nowait(None)
+
+
+def _ignore(_: float) -> None:
+    pass
 
 
 def _environment(settings: Mapping[str, Any]) -> dict[str, str]:
