@@ -11,12 +11,14 @@ import functools
 import json
 import os
 import random
+import re
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Awaitable, Callable, Sequence
+from pathlib import Path
 
 import httpx
 import numpy as np
@@ -32,13 +34,18 @@ Measure = Callable[[str], Awaitable[float]]
 
 def start_server() -> tuple[subprocess.Popen[bytes], str]:
     """A server and its address, when it is ready."""
-    command, environment = [sys.executable, "-m", "tts2face", "serve", "--port", "0"], {"TTS2FACE_SERVE_WAITING": "256"}
-    log = tempfile.NamedTemporaryFile("r")  # noqa: SIM115 - as long as the server
-    with open(log.name, "w") as file:
-        server = subprocess.Popen(command, stderr=file, env=os.environ | environment)
-    while not (line := log.readline()):
-        time.sleep(0.05)
-    url: str = json.loads(line)["url"]
+    folder = tempfile.mkdtemp(prefix="tts2face-bench-")
+    command = [sys.executable, "-m", "tts2face", "serve", "--port", "0"]
+    settings = {"TTS2FACE_SERVE_WAITING": "256", "TTS2FACE_SERVE_DATA": folder, "TTS2FACE_SERVE_WORKERS": "0"}
+    log = Path(folder, "log")
+    with log.open("w") as file:
+        server = subprocess.Popen(command, stderr=file, env=os.environ | settings)
+    found: list[str] = []
+    while not found:
+        time.sleep(0.1)
+        found = re.findall(r'"url": ?"(http[^"]+)"', log.read_text())
+        assert server.poll() is None, log.read_text()
+    url = found[0]
     while httpx.get(f"{url}/readyz").status_code != 200:
         time.sleep(0.1)
     while measure(url, "tts2face_processes_ready") < (os.cpu_count() or 1):

@@ -9,7 +9,7 @@ from typing import Any
 
 from lexicon.errors import BackendError
 from tts2face.service.alignment_process import CANCEL, decode_answer, encode_job
-from tts2face.service.turns import AbandonedError, acquired, wait_elsewhere
+from tts2face.service.turns import AbandonedError, QueueLock, wait_elsewhere
 from tts2face.speech.forced_alignment import Alignment, Pronunciations
 from tts2face.types import Waveform
 
@@ -18,9 +18,10 @@ class RemoteAligner:
     """Aligner with the results of `tts2face.speech.forced_alignment.Aligner`; thread-safe, one sentence at a time."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()  # held during a job
+        self._lock = QueueLock()  # held during a job
         self._child: subprocess.Popen[bytes] | None = None
         self._number, self._n_cancelled = 0, 0  # jobs; signals that no answer has come to
+        self._counting = threading.Lock()
 
     def start(self) -> None:
         """Start the process, which takes a second, unless it runs."""
@@ -39,6 +40,10 @@ class RemoteAligner:
         """
         job = _Job(self, sound, list(words))
         return decode_answer(wait_elsewhere(job.run, job.abandon))
+
+    def _count_cancelled(self, change: int) -> None:
+        with self._counting:  # signals are sent in one thread, and answers read in another
+            self._n_cancelled += change
 
     def close(self) -> None:
         """End the process."""
@@ -59,7 +64,7 @@ class _Job:
 
     def run(self) -> dict[str, Any]:
         """Answer of the process."""
-        with acquired(self._aligner._lock, self._is_abandoned):
+        with self._aligner._lock.hold(self._is_abandoned):
             self._aligner.start()
             self._aligner._number += 1
             child, number = self._aligner._child, self._aligner._number
@@ -87,7 +92,7 @@ class _Job:
 
     def _end(self) -> None:
         if self._child is not None:
-            self._aligner._n_cancelled += 1
+            self._aligner._count_cancelled(1)
             self._child.send_signal(CANCEL)
             self._child = None
 
@@ -113,7 +118,7 @@ class _Job:
             raise BackendError("the process that aligns speech ended; repeat the request")
         answer: dict[str, Any] | None = json.loads(line)
         if answer is None:
-            self._aligner._n_cancelled -= 1
+            self._aligner._count_cancelled(-1)
         return answer
 
 

@@ -1,6 +1,7 @@
 """Tasks in threads that take turns: one at a time computes, and others go on while it waits for another process."""
 
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
@@ -135,18 +136,50 @@ class TurnSteps:
             self._back.release()
 
 
+class QueueLock:
+    """A lock that threads get in the order in which they ask for it, and for which they need not wait to the end."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._queue: deque[object] = deque()  # who holds it, then who waits
+
+    @contextmanager
+    def hold(self, is_abandoned: threading.Event) -> Iterator[None]:
+        """The lock for a ``with`` block.
+
+        Raises
+        ------
+        AbandonedError
+            `is_abandoned` is set before the lock is free.
+        """
+        place = object()
+        with self._changed:
+            self._queue.append(place)
+        try:
+            with self._changed:
+                while self._queue[0] is not place and not is_abandoned.is_set():
+                    self._changed.wait(POLL_S)
+            if is_abandoned.is_set():
+                raise AbandonedError
+            yield
+        finally:
+            with self._changed:
+                self._queue.remove(place)
+                self._changed.notify_all()
+
+
 class OneAtATime:
     """Runs computations of native code one after another while other tasks have their turns."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
+        self._lock = QueueLock()
 
     def __call__(self, compute: Callable[[], Result], end: Callable[[], None]) -> Result:
         """Result of `compute`, which `end` ends early; both are called from different threads."""
         is_abandoned = threading.Event()
 
         def run() -> Result:
-            with acquired(self._lock, is_abandoned):
+            with self._lock.hold(is_abandoned):
                 return compute()
 
         def abandon() -> None:
@@ -154,29 +187,6 @@ class OneAtATime:
             end()
 
         return wait_elsewhere(run, abandon)
-
-
-@contextmanager
-def acquired(lock: threading.Lock, is_abandoned: threading.Event) -> Iterator[None]:
-    """A lock for a ``with`` block, unless the wait for it is abandoned.
-
-    Raises
-    ------
-    AbandonedError
-        It is no longer needed.
-    """
-    while not lock.acquire(timeout=POLL_S):
-        if is_abandoned.is_set():
-            break
-    else:
-        try:
-            if is_abandoned.is_set():
-                raise AbandonedError
-            yield
-        finally:
-            lock.release()
-        return
-    raise AbandonedError
 
 
 _CURRENT = threading.local()
