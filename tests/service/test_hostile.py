@@ -423,3 +423,16 @@ def test_too_many_connections_get_503() -> None:
             assert time.monotonic() < deadline
     finally:
         running.close()
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_sockets_of_other_pages_are_refused_with_a_status(attacked: RunningService, path: str) -> None:
+    async def open_socket() -> None:
+        address = attacked.url.replace("http", "ws", 1) + path
+        async with websockets.connect(address, origin="https://evil.example"):
+            pass
+
+    with pytest.raises(websockets.InvalidStatus) as refused:
+        asyncio.run(open_socket())
+    assert refused.value.response.status_code == 403
+    assert b"unknown_origin" in refused.value.response.body
