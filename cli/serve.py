@@ -32,7 +32,7 @@ def serve(
 
 
 @keys.command
-def add(
+def add(  # noqa: PLR0913 - one parameter a flag
     name: Annotated[str, Parameter(help="Name of the key, in the log and the metrics.")],
     /,
     *,
@@ -40,9 +40,39 @@ def add(
     scope: Annotated[list[str] | None, Parameter(help="speak, build, admin; several possible.")] = None,
     requests_per_minute: Annotated[int | None, whole_number("Requests a minute.")] = None,
     concurrent: Annotated[int | None, whole_number("Requests at the same time.")] = None,
+    resources: Annotated[int | None, whole_number("Uploads that it may have.")] = None,
+    resources_mb: Annotated[float | None, Parameter(help="MB of its uploads.")] = None,
+    speech_s_per_day: Annotated[int | None, whole_number("Seconds of speech a day.")] = None,
 ) -> None:
     """Create a key and print it; the file holds only its hash."""
     from tts2face.service.keys import add_key
 
-    limits = {"requests_per_minute": requests_per_minute, "concurrent": concurrent}
+    limits = {
+        "requests_per_minute": requests_per_minute, "concurrent": concurrent, "speech_s_per_day": speech_s_per_day,
+        "resources": resources, "resources_mb": resources_mb,
+    }  # fmt: skip
     print(add_key(file, name, scope or ["speak"], **limits))  # noqa: T201 - the result
+
+
+@keys.command(name="list")
+def list_keys(*, file: Annotated[Path, Parameter(help="File of keys (TOML).")]) -> None:
+    """List the keys of a file with their scopes and limits."""
+    from tts2face.service.keys import LIMITS, read_keys
+
+    for key in read_keys(file):
+        limits = [f"{limit}={value}" for limit in LIMITS if (value := getattr(key, limit)) is not None]
+        print("  ".join([key.name, ",".join(key.scopes), *limits]))  # noqa: T201 - the result
+
+
+@keys.command
+def remove(
+    name: Annotated[str, Parameter(help="Name of the key.")],
+    /,
+    *,
+    file: Annotated[Path, Parameter(help="File of keys (TOML).")],
+) -> None:
+    """Remove a key; a running service drops it on SIGHUP."""
+    from tts2face.service.keys import remove_key
+
+    remove_key(file, name)
+    print(f"removed {name}")  # noqa: T201 - the result

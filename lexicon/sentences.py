@@ -9,12 +9,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from lexicon.chunks import split_chunks
+from lexicon.chunks import split_chunks, split_phrase
 from lexicon.given_pronunciations import TextWord, words_with_given_phones
 from lexicon.marked_text import Mark, MarkedText, NodMark, PauseMark, PhoneMark, StyleRun
 from lexicon.spoken_form import spoken_form
 
 MAX_SENTENCE_CHARACTERS = 300  # longer sentences are split at a clause mark or a space
+FIRST_PIECE_CHARACTERS = 90  # of a text; its first sound and picture wait for this piece (docs/decisions)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +62,8 @@ class Sentence:
         Seconds of silence marked before the first sentence.
     n_characters
         Number of characters of the text that it covers.
+    is_cut
+        Whether the written sentence continues, so that little silence follows.
     """
 
     utterances: tuple[Phrase, ...]
@@ -68,6 +71,7 @@ class Sentence:
     marks: tuple[Mark, ...]
     leading_pause: float
     n_characters: int
+    is_cut: bool = False
 
     @property
     def first(self) -> int:
@@ -84,7 +88,8 @@ def split_sentences(text: MarkedText, language: str) -> Iterator[Sentence]:
     """Sentences that contain words, lazily and in linear time.
 
     Sentence boundaries are those of the text without marks. A pause or a change of rate, voice or language within a
-    sentence begins a new phrase.
+    sentence begins a new phrase. A first sentence of more than `FIRST_PIECE_CHARACTERS` is divided after its first
+    phrase.
     """
     placed = index_by_letters(text)
     starts = [run.start for run in placed.runs]
@@ -95,7 +100,7 @@ def split_sentences(text: MarkedText, language: str) -> Iterator[Sentence]:
     others = [mark for mark in placed.marks if not isinstance(mark, PauseMark | PhoneMark)]
     pending: Sentence | None = None
     leading_pause, end, n_used = sum(mark.seconds for mark in pauses[:1] if mark.at == 0), 0, 0
-    for chunk in split_chunks(text.text, MAX_SENTENCE_CHARACTERS, language):
+    for chunk, is_cut in _pieces(text.text, language):
         begin, end = end, end + n_letters(chunk)
         runs = _overlapping_runs(placed.runs, starts, begin, end)
         inside = pauses[bisect_right(pause_positions, begin) : bisect_right(pause_positions, end)]
@@ -114,10 +119,26 @@ def split_sentences(text: MarkedText, language: str) -> Iterator[Sentence]:
         first_mark = n_used
         while n_used < len(others) and others[n_used].at < end:
             n_used += 1
-        pending = Sentence(tuple(utterances), runs, tuple(others[first_mark:n_used]), leading_pause, len(chunk))
+        utterances[-1] = _continued_phrase(utterances[-1], is_cut=is_cut)
+        marks = tuple(others[first_mark:n_used])
+        pending = Sentence(tuple(utterances), runs, marks, leading_pause, len(chunk), is_cut)
         leading_pause = 0.0
     if pending is not None:
         yield replace(pending, marks=(*pending.marks, *others[n_used:]))
+
+
+def _pieces(text: str, language: str) -> Iterator[tuple[str, bool]]:
+    """Parts of a text that become sentences, and whether the written sentence continues after a part."""
+    for number, chunk in enumerate(split_chunks(text, MAX_SENTENCE_CHARACTERS, language)):
+        first, rest = split_phrase(chunk, FIRST_PIECE_CHARACTERS) if number == 0 else (chunk, "")
+        yield first, bool(rest)
+        if rest:
+            yield rest, False
+
+
+def _continued_phrase(phrase: Phrase, *, is_cut: bool) -> Phrase:
+    """A phrase whose spoken form ends with a comma if its sentence continues, so that the voice does not end it."""
+    return replace(phrase, text=f"{phrase.text},") if is_cut and phrase.text[-1:].isalnum() else phrase
 
 
 def n_letters(text: str) -> int:

@@ -128,13 +128,15 @@ def languages() -> tuple[LanguageEntry, ...]:
 
 def faces() -> tuple[FaceEntry, ...]:
     """The shipped faces and the entry ``self`` for the talker's own face."""
-    shipped = []
-    for path in _shipped_files("face"):
-        _, header = _read(path, "face")
-        names = tuple(name for name, _, _ in header["identities"])
-        shipped.append(FaceEntry(path.stem, names, f"mesh with {len(header['shape_names'])} shapes"))
     own = FaceEntry(OWN_FACE, (), "the talker's own face, for talkers learnt with --appearance")
-    return (*shipped, own)
+    return (*(describe_face(path) for path in _shipped_files("face")), own)
+
+
+def describe_face(path: Path) -> FaceEntry:
+    """Entry of a ``.face`` file; raises as `load_face`."""
+    _, header = _read(path, "face")
+    names = tuple(name for name, _, _ in header["identities"])
+    return FaceEntry(path.stem, names, f"mesh with {len(header['shape_names'])} shapes")
 
 
 def identities(face: str = "head") -> tuple[IdentityEntry, ...]:
@@ -175,23 +177,28 @@ def styles(palette: str = "starter") -> tuple[StyleEntry, ...]:
 
 def talkers() -> tuple[TalkerEntry, ...]:
     """The shipped talkers."""
+    return tuple(describe_talker(path) for path in _shipped_files("talker"))
+
+
+def describe_talker(path: Path) -> TalkerEntry:
+    """Entry of a ``.talker`` file; raises as `read_talker`."""
     from tts2face.models.talker import read_talker
 
-    found = []
-    for path in _shipped_files("talker"):
-        talker = read_talker(path)
-        seconds = sum(len(utterance.shape) for utterance in talker.utterances) / talker.fps
-        found.append(
-            TalkerEntry(
-                path.stem,
-                str(talker.metadata.get("language", "not stated")),
-                str(talker.metadata.get("licence", "not stated")),
-                len(talker.utterances),
-                round(seconds / 60, 1),
-                talker.appearance is not None,
-            )
-        )
-    return tuple(found)
+    talker = read_talker(path)
+    seconds = sum(len(utterance.shape) for utterance in talker.utterances) / talker.fps
+    return TalkerEntry(
+        path.stem,
+        str(talker.metadata.get("language", "not stated")),
+        str(talker.metadata.get("licence", "not stated")),
+        len(talker.utterances),
+        round(seconds / 60, 1),
+        talker.appearance is not None,
+    )
+
+
+def shipped_names(kind: str) -> tuple[str, ...]:
+    """Names of the shipped files of a kind (talker, face, palette), without reading them."""
+    return tuple(path.stem for path in _shipped_files(kind))
 
 
 def _shipped_files(kind: str) -> list[Path]:

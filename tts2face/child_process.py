@@ -1,11 +1,13 @@
 """Child processes that answer requests: their cores, environment and pipes, and their end with their parent."""
 
+import json
 import os
 import queue
 import sys
 import threading
+import time
 from collections.abc import Callable
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 # glibc returns blocks of 1 MiB and more to the system, instead of keeping those of each thread (decision 064).
 RETURNED_BLOCKS = {"MALLOC_MMAP_THRESHOLD_": "1048576", "MALLOC_TRIM_THRESHOLD_": "1048576"}
@@ -30,16 +32,19 @@ def claim_standard_output() -> BinaryIO:
     return answers
 
 
-def request_lines() -> "queue.Queue[bytes]":
-    """Lines of standard input as they arrive; this process exits when the input ends."""
-    lines: queue.Queue[bytes] = queue.Queue()
+def received_requests() -> "queue.Queue[tuple[Any, float]]":
+    """Lines of JSON of standard input, each with the second of the monotonic clock at which it arrived.
+
+    This process exits when the input ends.
+    """
+    requests: queue.Queue[tuple[Any, float]] = queue.Queue()
 
     def read_lines() -> None:
         while line := sys.stdin.buffer.readline():
-            lines.put(line)
+            requests.put((json.loads(line), time.monotonic()))
 
     exit_after(read_lines)
-    return lines
+    return requests
 
 
 def exit_after(wait: Callable[[], object]) -> None:

@@ -10,10 +10,12 @@ from tts2face.models.talker import Talker
 from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
 from tts2face.request import Request
+from tts2face.speech.features import FEATURE_RATE
 from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.synthesis.byte_stream import StreamFormat, encode_stream
 from tts2face.synthesis.clip_stream import Piece, SpeechSpan, TimedSpeech, measure_speech, timed_speech
 from tts2face.synthesis.fixed_length import Length, clips_of_length
+from tts2face.synthesis.live_lips import LiveLips
 from tts2face.synthesis.live_speech import LiveSpeech
 from tts2face.synthesis.output_files import OutputFiles, plan_outputs
 from tts2face.synthesis.performance import Performance
@@ -22,6 +24,7 @@ from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, pr
 from tts2face.synthesis.session_models import SessionModels
 from tts2face.synthesis.written_clip import RequestSteps, WrittenClip, write_pieces
 from tts2face.types import Chunk, Clip, Progress, concatenate_clips
+from tts2face.voice.pool import VoicePool
 
 
 class Session:
@@ -41,6 +44,8 @@ class Session:
         Name of a preset of the face's age, sex and ancestry.
     palette
         Name of a shipped palette, path of a .palette file, or a `Palette`; None for clips without gestures.
+    voices
+        Loaded voices shared with other sessions; None for those of this session.
 
     Raises
     ------
@@ -62,8 +67,9 @@ class Session:
         *,
         identity: str | None = None,
         palette: str | Path | Palette | None = "starter",
+        voices: VoicePool | None = None,
     ) -> None:
-        self._models = SessionModels(talker, face, identity, palette)
+        self._models = SessionModels(talker, face, identity, palette, voices)
 
     @property
     def talker(self) -> Talker:
@@ -147,6 +153,10 @@ class Session:
         """A clip without an end, extended by `say` and `idle` of the result; options and errors as `clip`."""
         return LiveSpeech(Request(**options), self._models)
 
+    def listen(self, rate: int = FEATURE_RATE, *, audio_map: str | None = None) -> LiveLips:
+        """Lip motion of speech that is still being spoken; arguments and errors as `LiveLips`."""
+        return LiveLips(self._models, rate, audio_map)
+
     def stream_file(
         self,
         text: str | Request | PreparedRequest,
@@ -164,7 +174,8 @@ class Session:
             As for `write`.
         format
             A movie (mp4 in fragments, webm), sound (wav, mp3, opus, aac, flac, pcm), or lines (curves, oculus, azure,
-            livelink). Sound alone needs neither lips nor phones, and starts sooner.
+            livelink), or glb, whose bytes come when it is complete. Sound alone needs neither lips nor phones, and
+            starts sooner.
         threads
             Number of frames drawn in advance; None for one on each core.
 

@@ -1,12 +1,16 @@
 """Sessions of a process by the names of their models; the least recently used ones are released."""
 
 import gc
+import os
 from collections import OrderedDict
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from tts2face.session import Session
+    from tts2face.voice.pool import VoicePool
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,10 +24,20 @@ class Models:
 
 
 class SessionCache:
-    """Loads sessions at their first use and keeps the last `n_sessions`; a second one takes 250 MB."""
+    """Loads sessions at their first use and keeps the last ones; a second one takes 250 MB.
 
-    def __init__(self, n_sessions: int = 1) -> None:
-        self._n_sessions = n_sessions
+    Parameters
+    ----------
+    n_sessions
+        Sessions to keep.
+    voices
+        Loaded voices that all sessions share; None: each has its own.
+    max_bytes
+        Memory of this process beyond which the least recently used sessions are released, all but one; None: any.
+    """
+
+    def __init__(self, n_sessions: int = 1, *, voices: "VoicePool | None" = None, max_bytes: int | None = None) -> None:
+        self._n_sessions, self._voices, self._max_bytes = n_sessions, voices, max_bytes
         self._sessions: OrderedDict[Models, Session] = OrderedDict()
 
     def get(self, models: Models) -> "Session":
@@ -37,6 +51,16 @@ class SessionCache:
                 self._sessions.popitem(last=False)
             gc.collect()  # sessions hold themselves in circles
             self._sessions[models] = Session(
-                models.talker, models.face, identity=models.identity, palette=models.palette
+                models.talker, models.face, identity=models.identity, palette=models.palette, voices=self._voices
             )
+        while self._max_bytes is not None and len(self._sessions) > 1 and resident_bytes() > self._max_bytes:
+            self._sessions.popitem(last=False)
+            gc.collect()
         return self._sessions[models]
+
+
+def resident_bytes() -> int:
+    """Memory of this process in bytes; 0 where the system does not tell."""
+    with suppress(OSError):
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    return 0

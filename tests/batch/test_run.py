@@ -52,6 +52,17 @@ def manifest(folder: Path) -> dict:
     return json.loads((folder / "manifest.json").read_text())
 
 
+@pytest.mark.parametrize("begin", ["100", "200"])
+def test_a_silence_of_one_or_two_frames_is_joined(
+    plan_of: Planner, voices: list[FakeVoice], tmp_path: Path, begin: str
+) -> None:
+    """Its encoder reorders no frames, in contrast to that of the following segment."""
+    text = f"1\n00:00:00,{begin} --> 00:00:02,000\nHello there.\n"
+    result = run_batch(plan_of(text, per="file"), tmp_path / "out")
+    assert (result.n_made, result.failed) == (1, ())
+    decoded(tmp_path / "out" / "one.mp4")
+
+
 def test_a_file_is_in_sync_at_every_cue(plan_of: Planner, voices: list[FakeVoice], tmp_path: Path) -> None:
     result = run_batch(plan_of(per="file"), tmp_path / "out")
     assert (result.n_made, result.failed) == (1, ())

@@ -262,7 +262,9 @@ def bench_speed(place: Path, database: str, server: Postgres | None, chosen: arg
         plan = plan_of(folder, chosen.jobs)
         where = str(folder / "jobs.sqlite") if server is None else server.database()
         prepare_database(database_url(where))
-        children = [start_worker(where, str(folder / "store"), cores[number]) for number in range(n_workers)]
+        children = [
+            start_worker(DatabaseEngine(where, str(folder / "store")), cores[number]) for number in range(n_workers)
+        ]
         try:
             run_timed(folder, plan, where, n_workers)
         finally:

@@ -18,6 +18,8 @@ NOT_EXECUTED = {  # beginning of a command line: why it is parsed only
     "mimic --camera": WINDOW,
     "worker": "runs until it is interrupted",
     "serve --port": "runs until it is interrupted",
+    "keys list": "needs a file of keys",
+    "keys remove": "needs a file of keys",
     "jobs show": "needs the name of a job",
     "jobs prune --store": "needs a finished batch",
     "corpus setup": "uses the network",

@@ -19,6 +19,16 @@ from tts2face.models.talker import Talker, Utterance, write_talker
 INVENTORY = ("i", "m", "p", "s", SILENCE, "ɑ")
 
 
+def write_made_models(folder: Path, words: bytes) -> dict[str, Path]:
+    """Files of a talker, a face, a palette and a dictionary with the given lines, by their kinds."""
+    paths = {kind: folder / f"made.{kind}" for kind in ("talker", "face", "palette", "dictionary")}
+    write_made_talker(paths["talker"], has_face=False)
+    write_made_face(paths["face"])
+    write_made_palette(paths["palette"])
+    paths["dictionary"].write_bytes(words)
+    return paths
+
+
 def write_made_face(path: Path) -> None:
     """A ball with eyes, all landmarks on its skin, two speech shapes and an identity."""
     face, rng = tiny_face(textured=True), np.random.default_rng(5)

@@ -4,8 +4,11 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import httpx
 import pytest
@@ -14,15 +17,56 @@ START_TIMEOUT_S = 180.0
 
 
 class RunningService:
-    """A ``tts2face serve`` process and its address."""
+    """A ``tts2face serve`` process, its address, and its log, which a thread reads.
 
-    def __init__(self, *arguments: str) -> None:
-        command = [sys.executable, "-m", "tts2face", "serve", "--port", "0", "--processes", "1", *arguments]
-        environment = {name: value for name, value in os.environ.items() if not name.startswith("TTS2FACE_SERVE_")}
-        self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
+    Parameters
+    ----------
+    environment
+        Further variables, such as TTS2FACE_SERVE_BODY_S.
+    program
+        Arguments of Python that run the command line.
+    """
+
+    def __init__(
+        self,
+        *arguments: str,
+        environment: Mapping[str, str] | None = None,
+        program: Sequence[str] = ("-m", "tts2face"),
+        processes: int = 1,
+    ) -> None:
+        command = [sys.executable, *program, "serve", "--port", "0", *arguments]
+        command += ["--processes", str(processes)]
+        kept = {name: value for name, value in os.environ.items() if not name.startswith(("TTS2FACE_SERVE_", "OTEL_"))}
+        self.data = tempfile.TemporaryDirectory(prefix="tts2face-service-")
+        self.process = subprocess.Popen(
+            command, stderr=subprocess.PIPE, text=True,
+            env=kept | {"TTS2FACE_SERVE_DATA": self.data.name} | dict(environment or {}),
+        )  # fmt: skip
+        self.lines: list[str] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        self.url: str = self.wait_for_event("listening")["url"]
+
+    def _read(self) -> None:
         assert self.process.stderr is not None
-        line = self.process.stderr.readline()
-        self.url: str = json.loads(line)["url"]
+        with self.process.stderr as file:
+            for line in file:
+                self.lines.append(line)
+
+    def events(self) -> list[dict[str, Any]]:
+        """The lines of the log."""
+        return [json.loads(line) for line in list(self.lines)]
+
+    def wait_for_event(self, name: str, **fields: Any) -> dict[str, Any]:
+        """The first line of the log with this event and these fields."""
+        deadline = time.monotonic() + START_TIMEOUT_S
+        while True:
+            for event in self.events():
+                if event["event"] == name and fields.items() <= event.items():
+                    return event
+            assert self.process.poll() is None or self._reader.is_alive(), "".join(self.lines)
+            assert time.monotonic() < deadline, f"no event {name}: {''.join(self.lines)[-3000:]}"
+            time.sleep(0.02)
 
     def wait_until_ready(self) -> None:
         deadline = time.monotonic() + START_TIMEOUT_S
@@ -31,10 +75,13 @@ class RunningService:
             time.sleep(0.1)
 
     def close(self) -> str:
-        """End the process; the rest of its log."""
-        self.process.terminate()
-        _, log = self.process.communicate(timeout=60)
-        return log
+        """End the process; its log."""
+        if self.process.poll() is None:
+            self.process.terminate()
+        self.process.wait(timeout=90)
+        self._reader.join(timeout=60)
+        self.data.cleanup()
+        return "".join(self.lines)
 
 
 @pytest.fixture(scope="session")

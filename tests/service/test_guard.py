@@ -13,6 +13,7 @@ import pytest
 from tts2face.service.exchange import Receive, Scope, Send
 from tts2face.service.guard import Guard
 from tts2face.service.keys import add_key
+from tts2face.service.logs import LineFormatter
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.state import ServiceState
 
@@ -151,7 +152,8 @@ def test_the_log_has_one_line_and_no_secret(
     with caplog.at_level(logging.INFO, "tts2face.service"):
         answer(make_client(keys=path), content=b"my words", headers={"authorization": f"Bearer {secret}"})
     (record,) = caplog.records
-    line = json.loads(record.message)
-    assert (line["key"], line["status"], line["method"]) == ("studio", 200, "POST")
-    assert secret not in record.message
-    assert "my words" not in record.message
+    text = LineFormatter().format(record)
+    line = json.loads(text)
+    assert (line["event"], line["key"], line["status"], line["method"]) == ("request", "studio", 200, "POST")
+    assert secret not in text
+    assert "my words" not in text

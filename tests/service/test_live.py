@@ -5,11 +5,14 @@ import json
 import time
 from typing import Any
 
+import httpx
 import numpy as np
 import pytest
 import websockets
 
+import tts2face
 from tests.service.conftest import RunningService
+from tts2face.exports.arkit import arkit_projection
 
 WORDS = ["Hello", "there,", "how", "are", "you?", "I", "am", "well.", "And"]
 
@@ -119,6 +122,117 @@ def test_cancel_forgets_the_text_that_waits(service: RunningService) -> None:
     assert len(spoken) < 20
 
 
+LONG = "The garden behind the old house near the river had been green for years. "
+
+
+@pytest.mark.parametrize("name", ["cancel", "interrupt"])
+def test_cancel_interrupts_a_sentence(service: RunningService, name: str) -> None:
+    """The sentence that is being made is not sent, and the next one is spoken."""
+
+    async def talk(live: Live) -> None:
+        await live.send(type="text", text=LONG)
+        await live.send(type="flush")
+        await asyncio.sleep(0.1)
+        await live.send(type=name)
+        await live.receive_until("cancelled")
+        await live.send(type="text", text="A new one.")
+        await live.send(type="end")
+        await live.receive_until("done")
+
+    live = converse(service, talk, with_idle=False)
+    assert [one["text"] for one in live.events("speech")][-1] == "A new one."
+    assert live.events("error") == []
+    (cancelled,) = live.events("cancelled")
+    assert cancelled["after_ms"] >= 0
+    assert live.events("speech")[-1]["begin"] == pytest.approx(cancelled["at"], abs=1e-3)
+
+
+def test_a_client_that_leaves_frees_its_work(service: RunningService, client: httpx.Client) -> None:
+    def measure(name: str) -> float:
+        lines = client.get("/metrics").text.splitlines()
+        return next(float(line.split()[-1]) for line in lines if line.startswith(name))
+
+    before = measure("tts2face_cancel_seconds_count")
+
+    async def talk(live: Live) -> None:
+        await live.send(type="text", text=LONG * 5)
+        await live.receive_until("speech")
+
+    converse(service, talk, with_idle=False)
+    deadline = time.monotonic() + 30
+    while measure("tts2face_cancel_seconds_count") == before or measure("tts2face_load") > 0:
+        assert time.monotonic() < deadline, "the work of a client that left was not cancelled"
+        time.sleep(0.05)
+
+
+def speech_samples(rate: int) -> np.ndarray:
+    """16-bit samples of a spoken sentence."""
+    import soxr
+
+    sound = tts2face.Session().clip("Bob may move five big maps.", gestures="none").speech.waveform
+    return np.clip(soxr.resample(sound.samples, sound.rate, rate) * 32767, -32768, 32767).astype("<i2")
+
+
+@pytest.mark.parametrize(("rate", "tolerance"), [(16_000, 0.0), (24_000, 0.02)])
+def test_curves_of_a_microphone_are_those_of_python(service: RunningService, rate: int, tolerance: float) -> None:
+    """Equal at 16 kHz; within a fiftieth of a weight at other rates, as resampling depends on the blocks a little."""
+    samples = speech_samples(rate)
+
+    async def talk(live: Live) -> None:
+        for begin in range(0, len(samples), rate // 10):
+            await live.connection.send(samples[begin : begin + rate // 10].tobytes())
+        await live.send(type="end")
+        await live.receive_until("done")
+
+    live = converse(service, talk, input="audio", rate=rate)
+    received = np.concatenate([one["weights"] for one in live.events("curves")])
+    session = tts2face.Session()
+    lips = session.listen(rate)
+    parts = [lips.add_samples(samples.astype(np.float32) / 32768), lips.finish()]
+    motion = np.concatenate([part.values for part in parts if part is not None])
+    channels = next(part.channels for part in parts if part is not None)
+    expected = arkit_projection(channels, session.mesh, "the test").weights(motion)
+    assert np.abs(received - expected).max() <= tolerance + 5e-5  # sent with four decimals
+    assert len(received) == pytest.approx(len(samples) / rate * lips.fps, abs=1.01)
+    assert np.ptp(received[:, live.events("curves")[0]["names"].index("jawOpen")]) > 0.1
+    (listening,) = live.events("listening")
+    assert listening["look_ahead_s"] == pytest.approx(lips.look_ahead_s, abs=1e-4)
+    begins = [one["begin"] for one in live.events("curves")]
+    ends = [one["begin"] + len(one["weights"]) / one["fps"] for one in live.events("curves")]
+    assert begins == pytest.approx([0.0, *ends[:-1]], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("block", "reason"),
+    [
+        (b"123", "a block of sound has 3 bytes; send 16-bit samples"),
+        (bytes(70_000), "a block of sound has 70000 bytes"),
+        ('{"type": "text", "text": "Hello."}', "16-bit samples, or JSON with one of the types end"),
+    ],
+)
+def test_wrong_sound_is_refused_and_the_stream_goes_on(
+    service: RunningService, block: bytes | str, reason: str
+) -> None:
+    async def talk(live: Live) -> None:
+        await live.connection.send(block)
+        await live.connection.send(bytes(32_000))
+        await live.send(type="end")
+        await live.receive_until("done")
+
+    live = converse(service, talk, input="audio")
+    assert [reason in one["message"] for one in live.events("error")] == [True]
+    assert sum(len(one["weights"]) for one in live.events("curves")) == 25
+
+
+def test_a_stream_of_text_refuses_sound(service: RunningService) -> None:
+    async def talk(live: Live) -> None:
+        await live.connection.send(b"1234")
+        await live.receive_until("error")
+
+    live = converse(service, talk, with_idle=False)
+    assert "a message must be JSON with one of the types cancel" in live.events("error")[0]["message"]
+
+
 def test_a_sentence_that_cannot_be_spoken_does_not_end_the_stream(service: RunningService) -> None:
     async def talk(live: Live) -> None:
         await live.send(type="text", text="漢字. Hello there. ")
@@ -130,7 +244,7 @@ def test_a_sentence_that_cannot_be_spoken_does_not_end_the_stream(service: Runni
     assert [one["text"] for one in live.events("speech")] == ["Hello there."]
     messages = " ".join(one["message"] for one in live.events("error"))
     assert "cannot read 漢字" in messages
-    assert "one of the types cancel, end, flush, text" in messages
+    assert "one of the types cancel, end, flush, interrupt, text" in messages
 
 
 @pytest.mark.parametrize(
@@ -139,6 +253,9 @@ def test_a_sentence_that_cannot_be_spoken_does_not_end_the_stream(service: Runni
         ({"fps": 1000}, "fps: Input should be less than"),
         ({"voice": "/tmp/x.onnx"}, "there is no voice"),
         ({"song": "la"}, "song: Extra inputs"),
+        ({"input": "audio", "rate": 1.0}, "rate: Input should be a valid integer"),
+        ({"input": "audio", "voice": "heart"}, "voice: Extra inputs"),
+        ({"input": "pictures"}, "input: Input should be 'text'"),
     ],
 )
 def test_wrong_options_are_refused(service: RunningService, options: dict[str, Any], reason: str) -> None:

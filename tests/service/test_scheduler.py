@@ -123,7 +123,7 @@ def test_a_cancelled_task_releases_what_it_holds(scheduler: Scheduler, sent: lis
     ("error", "kind", "message"),
     [
         (InputError("no such\nvoice"), "InputError", "no such voice"),
-        (RuntimeError("boom"), "InternalError", "RuntimeError: boom"),
+        (RuntimeError("my text"), "InternalError", "internal error: RuntimeError; see the log of the service"),
     ],
 )
 def test_an_error_ends_its_task_only(

@@ -99,6 +99,19 @@ def test_a_clip_has_the_motion_of_python(client: httpx.Client, tmp_path: Path) -
     assert received.headers["content-type"].startswith("application/jsonl")
 
 
+def test_an_animated_mesh_is_that_of_python(client: httpx.Client, tmp_path: Path) -> None:
+    session = tts2face.Session()
+    path = tmp_path / "clip.glb"
+    session.export(TEXT, path)
+    body = {"input": TEXT, "voice": "alloy", "model": "tts-1", "response_format": "glb"}
+    for answer in (
+        client.post("/v1/audio/speech", json=body),
+        client.post("/v1/clips", json={"text": TEXT, "format": "glb"}),
+    ):
+        assert answer.headers["content-type"].startswith("model/gltf-binary")
+        assert answer.content == path.read_bytes()
+
+
 def test_a_clip_arrives_while_it_is_made(client: httpx.Client) -> None:
     body = {"text": TEXT, "size": "64x64", "supersampling": 1, "identity": "kofi"}
     with client.stream("POST", "/v1/clips", json=body) as response:

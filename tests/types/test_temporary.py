@@ -3,7 +3,9 @@
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -83,3 +85,25 @@ def test_it_has_the_permissions_of_a_usual_file(tmp_path: Path) -> None:
 def test_a_name_of_the_greatest_length_can_be_written(tmp_path: Path) -> None:
     write_atomically(tmp_path / ("é" * 127), b"new")
     assert os.listdir(tmp_path) == ["é" * 127]
+
+
+@pytest.mark.parametrize("is_folder", [False, True])
+def test_one_that_another_process_removes_before_it_is_locked_is_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_folder: bool
+) -> None:
+    name = "mkdtemp" if is_folder else "mkstemp"
+    make, n_made = getattr(tempfile, name), 0
+
+    def make_and_remove(**options: Any) -> Any:
+        nonlocal n_made
+        made, n_made = make(**options), n_made + 1
+        if n_made == 1:
+            Path(made).rmdir() if is_folder else Path(made[1]).unlink()
+        return made
+
+    monkeypatch.setattr(tempfile, name, make_and_remove)
+    with Temporary(tmp_path / "job", is_folder=is_folder) as mine:
+        assert mine.path.exists()
+    assert n_made == 2
+    with pytest.raises(FileNotFoundError):
+        Temporary(tmp_path / "missing" / "job")

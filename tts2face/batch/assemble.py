@@ -21,6 +21,9 @@ from tts2face.render.output_path import MOV, MP4, WEBM, make_temporary, move_int
 from tts2face.storage.files import translate_disk_errors
 
 KINDS = {MP4: MP4_MOVIE, MOV: MOV_MOVIE, WEBM: WEBM_MOVIE}
+# Frames by which x264 decodes before it shows. A segment of one or two frames is not reordered: its last times of
+# decoding would lie after the first ones of the next segment.
+DECODE_DELAY = 2
 SAMPLE_BLOCK = 48_000  # samples that are encoded at a time
 
 
@@ -95,12 +98,14 @@ class _Joined:
         if _settings(video) != self._settings:
             raise DataError(f"{path.name} was encoded with other settings than the others; remove it and run again")
         offset = Fraction(self.n_frames) / self._fps / video.time_base
-        n_frames = 0
+        n_frames, earlier = 0, 0
         for packet in source.demux(video):
             if packet.dts is None:
                 continue
+            if n_frames == 0 and video.codec_context.has_b_frames:
+                earlier = min(0, -round(DECODE_DELAY / self._fps / video.time_base) - packet.dts)
             packet.pts += round(offset)
-            packet.dts += round(offset)
+            packet.dts += round(offset) + earlier
             packet.stream = self._video
             self._target.mux(packet)
             n_frames += 1

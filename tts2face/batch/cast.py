@@ -89,19 +89,30 @@ def read_cast(path: Path) -> Cast:
         tables = tomllib.loads(content)
     except (tomllib.TOMLDecodeError, RecursionError) as broken:
         raise DataError(f"{path} is not TOML ({broken}); correct it there") from broken
+    return cast_from_tables(tables, str(path), path.parent)
+
+
+def cast_from_tables(tables: Mapping[str, Any], place: str, folder: Path | None = None) -> Cast:
+    """Cast of the tables of a TOML file; its paths are relative to a folder, without one nothing is a path.
+
+    Raises
+    ------
+    DataError
+        There is an unknown table, key or value; the message names it.
+    """
     for name in tables:
         if name not in ("default", "role"):
-            raise DataError(f"{path}: there is no table {name!r}; use [default] and [[role]]")
+            raise DataError(f"{place}: there is no table {name!r}; use [default] and [[role]]")
     roles, default = tables.get("role", []), tables.get("default", {})
     if not isinstance(roles, list) or not isinstance(default, dict) or not all(isinstance(one, dict) for one in roles):
-        raise DataError(f"{path}: write the defaults as [default], and each role as [[role]]")
+        raise DataError(f"{place}: write the defaults as [default], and each role as [[role]]")
     return Cast(
-        _settings(default, f"{path}, [default]", path.parent),
-        tuple(_role(one, f"{path}, role {number}", path.parent) for number, one in enumerate(roles, start=1)),
+        _settings(default, f"{place}, [default]", folder),
+        tuple(_role(one, f"{place}, role {number}", folder) for number, one in enumerate(roles, start=1)),
     )
 
 
-def _role(table: Mapping[str, Any], place: str, folder: Path) -> Role:
+def _role(table: Mapping[str, Any], place: str, folder: Path | None) -> Role:
     patterns = {name: table[name] for name in PATTERN_NAMES if name in table}
     if not patterns:
         raise DataError(f"{place} has no pattern; give {', '.join(PATTERN_NAMES)}")
@@ -112,7 +123,7 @@ def _role(table: Mapping[str, Any], place: str, folder: Path) -> Role:
     return Role(patterns, _settings(rest, place, folder))
 
 
-def _settings(table: Mapping[str, Any], place: str, folder: Path) -> dict[str, Any]:
+def _settings(table: Mapping[str, Any], place: str, folder: Path | None) -> dict[str, Any]:
     for name, value in table.items():
         if name not in (*MODEL_NAMES, *REQUEST_NAMES):
             known = ", ".join((*PATTERN_NAMES, *MODEL_NAMES, *REQUEST_NAMES))
@@ -129,8 +140,10 @@ def _settings(table: Mapping[str, Any], place: str, folder: Path) -> dict[str, A
     return settings
 
 
-def _resolve(name: str, value: Any, folder: Path) -> Any:
+def _resolve(name: str, value: Any, folder: Path | None) -> Any:
     """A path relative to the folder of the cast, where there is such a file; else the value."""
+    if folder is None:
+        return value
     if name in PATH_NAMES and isinstance(value, str) and Path(value).suffix and (folder / value).exists():
         return str(folder / value)
     return value

@@ -114,12 +114,7 @@ class ObjectStore:
         if path.exists():
             return path
         try:
-            with self._errors(), Temporary(path) as temporary:
-                found = self._obstore.get(self._store, self._name(address, SEGMENT_SUFFIX))
-                with temporary.path.open("wb") as file:
-                    for block in found.stream():
-                        file.write(block)
-                temporary.replace(path)
+            self.get_object(self._name(address, SEGMENT_SUFFIX), path)
         except FileNotFoundError:
             self.remove(address)  # a result without its movie
             raise BackendError(f"the segment {address[:12]} is missing in {self.url}; run again") from None
@@ -147,8 +142,42 @@ class ObjectStore:
     def remove(self, address: str) -> None:
         """Remove a segment, its result first."""
         for suffix in (RESULT_SUFFIX, SEGMENT_SUFFIX):
-            with contextlib.suppress(FileNotFoundError), self._errors():
-                self._obstore.delete(self._store, self._name(address, suffix))
+            self.delete_object(self._name(address, suffix))
+
+    def put_object(self, name: str, path: Path) -> None:
+        """Upload a file under a name unless there is one of this name."""
+        with self._errors(is_put=True):
+            self._put_new(name, path)
+
+    def get_object(self, name: str, path: Path) -> None:
+        """Download an object to a path, where it appears complete; FileNotFoundError if there is none."""
+        with self._errors(), Temporary(path) as temporary:
+            found = self._obstore.get(self._store, name)
+            with temporary.path.open("wb") as file:
+                for block in found.stream():
+                    file.write(block)
+            temporary.replace(path)
+
+    def has_object(self, name: str) -> bool:
+        """Whether there is an object of a name."""
+        try:
+            with self._errors():
+                self._obstore.head(self._store, name)
+        except FileNotFoundError:
+            return False
+        return True
+
+    def list_objects(self, prefix: str) -> Iterator[tuple[str, float]]:
+        """Names of the objects in a folder, with the times at which they were stored, in seconds since 1970."""
+        with self._errors():
+            for page in self._obstore.list(self._store, prefix):
+                for entry in page:
+                    yield str(entry["path"]), entry["last_modified"].timestamp()
+
+    def delete_object(self, name: str) -> None:
+        """Remove an object, if there is one."""
+        with contextlib.suppress(FileNotFoundError), self._errors():
+            self._obstore.delete(self._store, name)
 
     def scratch(self) -> Path | None:
         """Nothing local."""

@@ -56,6 +56,11 @@ def prune_segments(
         if not (folder / JSON_NAME).is_file():
             raise InputError(f"there is no {JSON_NAME} in {folder}; give the folders of --out of `tts2face batch`")
     kept = set(unfinished).union(*(read_segments(folder) for folder in outputs))
+    return prune_unused(store, kept, older_than_s, dry_run=dry_run)
+
+
+def prune_unused(store: Store, kept: Collection[str], older_than_s: float, *, dry_run: bool = False) -> Pruned:
+    """Remove segments and unfinished files stored some seconds ago or earlier, except those that are kept."""
     before = time.time() - older_than_s
     found = list(store.entries())
     removed = [one for one in found if one.address not in kept and one.stored_s <= before]

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
 from tts2face.batch.segment import Segment, segment_from_json
 from tts2face.batch.segment_result import SegmentResult, result_from_json
-from tts2face.child_process import bind_to_core, child_environment, claim_standard_output, request_lines
+from tts2face.child_process import bind_to_core, child_environment, claim_standard_output, received_requests
 
 if TYPE_CHECKING:
     from tts2face.batch.render_segment import SegmentRenderer
@@ -74,6 +74,12 @@ class RenderProcess:
             raise KINDS.get(found["error"], BackendError)(found["message"])
         return result_from_json(found["result"])
 
+    def kill(self) -> None:
+        """End the child process while another thread waits for it."""
+        child = self._child
+        if child is not None:
+            child.kill()
+
     def close(self) -> None:
         """End the child process."""
         if self._child is not None:
@@ -112,12 +118,12 @@ class RenderProcess:
 def main() -> None:
     """Answer requests until standard input ends."""
     bind_to_core(int(sys.argv[1]) if len(sys.argv) > 1 else None)
-    answers, requests = claim_standard_output(), request_lines()
+    answers, requests = claim_standard_output(), received_requests()
     from tts2face.batch.render_segment import SegmentRenderer  # a second of imports, only in the child
 
     renderer = SegmentRenderer()
     while True:
-        request = json.loads(requests.get())
+        request, _ = requests.get()
         answers.write(json.dumps(_answer(renderer, request)).encode() + b"\n")
         answers.flush()
 

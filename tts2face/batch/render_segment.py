@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tts2face.batch.fit import Fit, Limits, fit_speech
 from tts2face.batch.render_recording import excerpt_of, fit_recording
-from tts2face.batch.segment import ALPHA_MOVIE, TRACK, Segment
+from tts2face.batch.segment import ALPHA_MOVIE, FILE_PREFIX, TRACK, Segment
 from tts2face.batch.segment_result import SegmentResult
 from tts2face.clock import exact_rate
 from tts2face.exports.writer import ExportWriter, plan_exports
@@ -17,6 +17,8 @@ from tts2face.render.renderer import FrameRenderer
 from tts2face.request import Request
 from tts2face.session import Session
 from tts2face.session_cache import SessionCache
+from tts2face.storage.files import translate_disk_errors
+from tts2face.storage.temporary import Temporary
 from tts2face.synthesis.prepared_request import prepare
 from tts2face.types import frame_count
 
@@ -37,12 +39,28 @@ class SegmentRenderer:
         """
         began = time.perf_counter()
         session = self._sessions.get(segment.models)
+        if segment.medium.startswith(FILE_PREFIX):
+            return replace(_write_file(session, segment, out), took_s=round(time.perf_counter() - began, 3))
         with excerpt_of(segment, Request(**segment.request)) as request:
             fitted, result = _fit(session, request, segment)
             with _writer(session, segment, fitted, (out, result.n_frames)) as writer:
                 for clip in session.stream_to_length(fitted, result.n_frames):
                     writer.add(clip)
         return replace(result, took_s=round(time.perf_counter() - began, 3))
+
+
+def _write_file(session: Session, segment: Segment, out: Path) -> SegmentResult:
+    """Write a whole clip in the format of a segment's medium."""
+    request, seconds = Request(**segment.request), 0.0
+    format = segment.medium.removeprefix(FILE_PREFIX)
+    with translate_disk_errors(out), Temporary(out) as temporary:
+        with temporary.path.open("wb") as file:
+            for chunk in session.stream_file(request, format, picture=Picture(**segment.picture)):
+                file.write(chunk.content)
+                seconds += chunk.seconds
+        temporary.replace(out)
+    fps = float(exact_rate(request.fps))
+    return SegmentResult(frame_count(max(seconds, 1e-3), fps), fps, request.rate, round(seconds, 4))
 
 
 def _writer(

@@ -13,7 +13,8 @@ from tts2face.request import OWN_FACE, Request
 from tts2face.session_cache import Models
 
 MOVIE, ALPHA_MOVIE, TRACK = "movie", "vp9", "track"  # what a segment is stored as: H.264, VP9, or motion for exports
-REQUEST_FILES = ("audio", "dictionary", "voice")
+FILE_PREFIX = "file."  # of the medium of a whole clip in a format of `Session.stream_file`
+REQUEST_FILES = ("audio", "dictionary", "voice", "timeline")
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,8 @@ class Segment:
         Sample, at `SOUND_RATE`, at which the segment begins in the recording of a whole file; None: the recording is
         one of this segment.
     medium
-        What is stored: `MOVIE` (H.264), `ALPHA_MOVIE` (VP9), or `TRACK`, a lossless track for exports.
+        What is stored: `MOVIE` (H.264), `ALPHA_MOVIE` (VP9), `TRACK`, a lossless track for exports, or a whole clip:
+        `FILE_PREFIX` and a format; its lengths have no effect.
     """
 
     request: Mapping[str, Any]

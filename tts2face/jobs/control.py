@@ -7,7 +7,7 @@ from typing import Any
 
 from lexicon.errors import InputError
 from tts2face.batch.segment import segment_from_json
-from tts2face.jobs.database import WORKFLOW, Workers, database_url, prepare_database
+from tts2face.jobs.database import JOB_WORKFLOW, WORKFLOW, Workers, database_url, prepare_database
 from tts2face.jobs.engine import ACTIVE, JOBS_PER_QUERY, enqueue, failure_reason, open_client
 
 STATES = {
@@ -117,7 +117,7 @@ def prune_jobs(database: str, older_than_s: float = 0.0, *, dry_run: bool = Fals
         before = datetime.fromtimestamp(workers.now() - older_than_s, UTC).isoformat()
         while True:
             ended = client.list_workflows(
-                name=WORKFLOW,
+                name=[WORKFLOW, JOB_WORKFLOW],
                 status=sorted(frozenset(STATES) - ACTIVE),
                 completed_before=before,
                 limit=JOBS_PER_QUERY,

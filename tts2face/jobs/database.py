@@ -9,15 +9,18 @@ from typing import Any
 
 from lexicon.errors import BackendError, InputError
 from tts2face.batch.address import SEGMENT_FORMAT
+from tts2face.jobs.connection import NOW, DatabaseAwayError, JobDatabase, database_kind, open_engine
+from tts2face.jobs.job_table import JobTable
 
 DEFAULT_DATABASE = "tts2face-jobs.sqlite"
 QUEUE = "tts2face-segments"
 APPLICATION = "tts2face"
 APPLICATION_VERSION = f"segments-{SEGMENT_FORMAT}"  # pinned: workers of equal segments share their work
 WORKFLOW = "render_segment"
+JOB_QUEUE, JOB_WORKFLOW = "tts2face-jobs", "run_job"  # of the service; a job waits for its segments
+TALKER_QUEUE = "tts2face-talkers"  # of jobs that compute for minutes; they never occupy the places of others
 BEAT_S = 1.5  # between two signs of life of a worker
 DEAD_AFTER_S = 6.0  # without a sign of life; with the interval of looking this is below 10 s
-CONNECTIONS = {"pool_size": 1, "max_overflow": 2}  # of a process to the table of workers; one of them stays open
 POSTGRES_SCHEMES = ("postgresql://", "postgres://", "postgresql+psycopg://")
 _TABLE = """
 CREATE TABLE IF NOT EXISTS tts2face_workers (
@@ -26,7 +29,6 @@ CREATE TABLE IF NOT EXISTS tts2face_workers (
 _BEAT = """
 INSERT INTO tts2face_workers (executor_id, beat, place) VALUES (:id, {now}, :place)
 ON CONFLICT (executor_id) DO UPDATE SET beat = {now}"""
-_NOW = {"sqlite": "(julianday('now') - 2440587.5) * 86400.0", "postgresql": "EXTRACT(EPOCH FROM clock_timestamp())"}
 
 
 def database_url(where: str | Path) -> str:
@@ -70,9 +72,14 @@ def prepare_database(url: str) -> None:
         DBOS.migrate(url)
         with Workers(url) as workers:
             workers.create()
+        jobs = JobDatabase(url)
+        try:
+            JobTable(jobs).create()
+        finally:
+            jobs.close()
     except (sqlite3.Error, sqlalchemy.exc.SQLAlchemyError, ModuleNotFoundError) as error:
         reason = " ".join(str(getattr(error, "orig", None) or error).split())
-        raise BackendError(f"cannot use the database {shown_url(url)} ({reason[:200]}); check it") from error
+        raise DatabaseAwayError(f"cannot use the database {shown_url(url)} ({reason[:200]}); check it") from error
 
 
 def quiet_dbos(level: int = logging.ERROR) -> None:
@@ -96,11 +103,8 @@ class Workers:
         import sqlalchemy
 
         self._sql = sqlalchemy.text
-        kind = "sqlite" if url.startswith("sqlite") else "postgresql"
-        self._now = _NOW[kind]
-        arguments: dict[str, Any] = {"timeout": 30.0} if kind == "sqlite" else {"connect_timeout": 5}
-        engine_url = url if kind == "sqlite" else url.replace("postgresql://", "postgresql+psycopg://", 1)
-        self._engine = sqlalchemy.create_engine(engine_url, pool_pre_ping=True, connect_args=arguments, **CONNECTIONS)
+        self._now = NOW[database_kind(url)]
+        self._engine = open_engine(url)
 
     def __enter__(self) -> "Workers":
         """Return itself."""

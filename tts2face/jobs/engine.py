@@ -3,18 +3,20 @@
 import os
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import partial
-from typing import Any
+from typing import IO, Any
 
 from lexicon.errors import BackendError
 from tts2face.batch.engine import Message, Rendered
 from tts2face.batch.segment import Segment
 from tts2face.batch.store import Store, wait_for_store
+from tts2face.jobs.connection import DatabaseAwayError
 from tts2face.jobs.database import (
     APPLICATION,
     APPLICATION_VERSION,
@@ -47,6 +49,12 @@ class DatabaseEngine:
         Store as the local workers open it.
     priority
         Jobs with smaller numbers are taken first; from 1.
+    on_wait
+        Called at each look at the jobs; what it raises ends the waiting.
+    niceness
+        What is added to the niceness of the local workers: 10 gives way to other processes.
+    on_line
+        Called, in other threads, with what the local workers write; None: they write to standard error.
     """
 
     database: str
@@ -54,6 +62,9 @@ class DatabaseEngine:
     n_workers: int = 1
     priority: int = 10
     on_message: Message = lambda _: None
+    on_wait: Callable[[], None] = lambda: None
+    niceness: int = 0
+    on_line: Message | None = None
 
     def render(self, segments: Mapping[str, Segment], store: Store) -> Iterator[Rendered]:
         """Yield each segment as soon as it is stored or has failed."""
@@ -68,6 +79,7 @@ class DatabaseEngine:
                 self.on_message("no worker is alive in this database; start `tts2face worker` with it")
             while look.waiting:
                 supervise()
+                self.on_wait()
                 for address, reason in look.ended():
                     result = wait_for_store(partial(store.result, address), self.on_message)
                     yield Rendered(address, result, "" if result is not None else reason)
@@ -137,7 +149,7 @@ def open_client(url: str) -> Iterator[Any]:
     try:
         client = DBOSClient(system_database_url=url, application_name=APPLICATION)
     except sqlalchemy.exc.SQLAlchemyError as away:
-        raise BackendError(f"the database cannot be reached ({away}); check its URL") from away
+        raise DatabaseAwayError(f"the database cannot be reached ({away}); check its URL") from away
     try:
         yield client
     finally:
@@ -244,10 +256,7 @@ class _LocalWorkers:
                 self._note_end(number, child, time.monotonic() - began)
             is_bound = self._engine.n_workers > 1 and len(self._cores) > 0
             core = self._cores[number % len(self._cores)] if is_bound else None
-            self._children[number] = (
-                start_worker(self._engine.database, self._engine.store_url, core),
-                time.monotonic(),
-            )
+            self._children[number] = start_worker(self._engine, core), time.monotonic()
 
     def end(self) -> None:
         """End all workers."""
@@ -266,10 +275,21 @@ class _LocalWorkers:
             raise BackendError("the workers end as soon as they start; see their messages above")
 
 
-def start_worker(database: str, store: str, core: int | None) -> "subprocess.Popen[bytes]":
+def start_worker(engine: DatabaseEngine, core: int | None) -> "subprocess.Popen[bytes]":
     """A worker as a child process, which ends with this one."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "tts2face.jobs.worker", database, store, "all" if core is None else str(core)],
+    bound = "all" if core is None else str(core)
+    child = subprocess.Popen(
+        [sys.executable, "-m", "tts2face.jobs.worker", engine.database, engine.store_url, bound, str(engine.niceness)],
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
+        stderr=None if engine.on_line is None else subprocess.PIPE,
     )
+    if engine.on_line is not None and child.stderr is not None:
+        threading.Thread(target=_pass_lines, args=(child.stderr, engine.on_line), daemon=True).start()
+    return child
+
+
+def _pass_lines(file: IO[bytes], on_line: Message) -> None:
+    with file:
+        for line in file:
+            on_line(line.decode(errors="replace").rstrip())

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tts2face.jobs.database import APPLICATION_VERSION, WORKFLOW
+from tts2face.jobs.database import APPLICATION_VERSION, JOB_WORKFLOW, WORKFLOW
 
 POLL_S = 0.2  # between two looks at the queue
 MAX_LOOKS_PER_S = 200.0  # of all workers together: with more than 40, each looks less often
@@ -33,10 +33,18 @@ def list_running(executor_ids: list[str] | None = None) -> list[Any]:
 
     found: list[Any] = DBOS.list_workflows(
         status="PENDING",
-        name=WORKFLOW,
+        name=[WORKFLOW, JOB_WORKFLOW],
         app_version=APPLICATION_VERSION,
         executor_id=executor_ids,
         load_input=False,
         load_output=False,
     )
     return found
+
+
+def is_cancelled(name: str) -> bool:
+    """Whether a job of the queue was cancelled."""
+    from dbos import DBOS
+
+    found = DBOS.list_workflows(workflow_ids=[name], load_input=False, load_output=False)
+    return any(one.status == "CANCELLED" for one in found)

@@ -1,4 +1,7 @@
-"""A worker: takes segments from the queue of a database, renders them in a child process, and takes over from the dead.
+"""A worker: takes segments and jobs from the queues of a database, and takes over from the dead.
+
+Segments are rendered in a child process. A job of the service plans, queues its segments and waits for them, so that
+all workers share the rendering; the queues have places of their own, so that jobs never block what they wait for.
 
 DBOS keeps the queue. Its open-source package has no fail-over of its own: work of an executor that died waits for an
 executor of the same id. Here every worker has a new id and gives signs of life (`tts2face.jobs.database.Workers`); with
@@ -18,38 +21,39 @@ import threading
 import time
 import uuid
 from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
 from typing import Any
 
-from lexicon.errors import BackendError, DataError, Tts2faceError
-from tts2face.batch.engine import Message, Renders, render_into
-from tts2face.batch.render_process import RenderProcess
-from tts2face.batch.segment import segment_from_json
-from tts2face.batch.store import Store, open_store, wait_for_store
+from lexicon.errors import BackendError, Tts2faceError
+from tts2face.batch.engine import Message, Renders
+from tts2face.batch.store import Store, open_store
+from tts2face.jobs.connection import DatabaseAwayError
 from tts2face.jobs.database import (
     APPLICATION,
     APPLICATION_VERSION,
     BEAT_S,
+    JOB_QUEUE,
+    JOB_WORKFLOW,
     QUEUE,
+    TALKER_QUEUE,
     WORKFLOW,
     Workers,
     database_url,
     prepare_database,
     quiet_dbos,
 )
-from tts2face.jobs.takeover import list_running, poll_interval, return_work
+from tts2face.jobs.job_runner import JobRunner, job_blobs
+from tts2face.jobs.segment_worker import SegmentWorker
+from tts2face.jobs.takeover import is_cancelled, list_running, poll_interval, return_work
 
 MAX_DEATHS = 8  # of workers that had the same segment; then it counts as failed
 ALL_WORK_S = 60.0  # between two looks at all running work
-N_TAKEN = 2  # jobs that a worker holds: one is rendered, one waits, so that no time is lost between them
+MAX_JOB_DEATHS = 30  # of workers that executed the same job of the service, which lasts longer than a segment
+N_TAKEN = 2  # segments that a worker holds: one is rendered, one waits, so that no time is lost between them
+N_JOBS = 4  # of the service, which mostly wait for their segments; they never occupy the places of segments
 START_FAILED = 4  # exit code, as of the command for BackendError
+N_TALKERS = 1  # built at a time: each takes a core and 1 GB
 # Connections of a worker to the database: two stay open, besides that of its signs of life.
 CONNECTIONS = {"pool_size": 2, "max_overflow": 3}
-
-
-class SegmentFailedError(RuntimeError):
-    """A segment that cannot be rendered; the reason is kept in the database."""
 
 
 class Worker:
@@ -83,18 +87,22 @@ class Worker:
     ) -> None:
         self._url = database_url(database)
         self._store: Store = open_store(store)
-        self._process = RenderProcess(core) if renderer is None else None
-        self._renderer: Renders = renderer or self._process  # type: ignore[assignment]
+        blobs = job_blobs(store)
+        self._segments = SegmentWorker(self._store, blobs, renderer=renderer, core=core, on_message=on_message)
+        self._jobs = JobRunner(self._url, store, self._store, blobs)
         self._on_message = on_message
         self.executor_id = f"{uuid.uuid4().hex[:20]}"
         self._place = f"{socket.gethostname()}, process {os.getpid()}"
         self._stopped = threading.Event()
-        self._rendering = threading.Lock()  # one segment at a time
         self._vanished: set[str] = set()
         self._next_all_work_s = 0.0
         self._noting = threading.Lock()
         self._is_reached = True
-        self.n_rendered = 0
+
+    @property
+    def n_rendered(self) -> int:
+        """Number of segments rendered so far."""
+        return self._segments.n_rendered
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
         """Work until `until` returns true, or `stop` is called."""
@@ -110,7 +118,7 @@ class Worker:
                 "executor_id": self.executor_id,
                 "log_level": "ERROR",
                 "enable_otlp": False,
-                "max_executor_threads": 4,
+                "max_executor_threads": N_TAKEN + N_JOBS + N_TALKERS + 2,
                 "run_migrations": False,
                 "use_listen_notify": False,  # a connection that nothing here needs
                 "db_engine_kwargs": dict(CONNECTIONS),
@@ -119,7 +127,11 @@ class Worker:
 
         @DBOS.workflow(name=WORKFLOW, max_recovery_attempts=MAX_DEATHS)
         def render_segment(address: str, content: dict[str, Any]) -> dict[str, Any]:
-            return self._render(address, content)
+            return self._segments.work(str(DBOS.workflow_id), address, content)
+
+        @DBOS.workflow(name=JOB_WORKFLOW, max_recovery_attempts=MAX_JOB_DEATHS)
+        def run_job(job_id: str) -> str:
+            return self._jobs.run(job_id)
 
         with Workers(self._url) as workers:
             self._launch(workers)
@@ -131,8 +143,7 @@ class Worker:
             finally:
                 self._stopped.set()
                 beats.join(2 * BEAT_S)
-                if self._process is not None:
-                    self._process.close()
+                self._segments.close()
                 DBOS.destroy(workflow_completion_timeout_sec=0)
                 with contextlib.suppress(Exception):
                     workers.leave(self.executor_id)
@@ -142,42 +153,21 @@ class Worker:
         from dbos import DBOS
         from dbos import error as dbos_error
 
-        quiet_dbos(logging.CRITICAL)  # a failure is raised
+        quiet_dbos(logging.CRITICAL)  # a failure is raised, or kept in the database with its reason
         try:
             workers.beat(self.executor_id, self._place)
             DBOS.launch()
             interval_s = poll_interval(len(workers.alive()))
             DBOS.register_queue(QUEUE, worker_concurrency=N_TAKEN, polling_interval_sec=interval_s)
+            DBOS.register_queue(JOB_QUEUE, worker_concurrency=N_JOBS, polling_interval_sec=interval_s)
+            DBOS.register_queue(TALKER_QUEUE, worker_concurrency=N_TALKERS, polling_interval_sec=interval_s)
         except (sqlalchemy.exc.SQLAlchemyError, dbos_error.DBOSException) as away:
             reason = " ".join(str(getattr(away, "orig", None) or away).split())
             raise BackendError(f"the worker cannot start: {reason[:200]}; check the database") from away
-        finally:
-            quiet_dbos()
 
     def stop(self) -> None:
         """End `run` soon; a segment in work is taken over by other workers."""
         self._stopped.set()
-
-    def _render(self, address: str, content: dict[str, Any]) -> dict[str, Any]:
-        """Render a segment unless it is stored; after a death it runs again and has no other effect."""
-        segment = segment_from_json(content)
-        try:
-            found = wait_for_store(partial(self._store.result, address), self._on_message)
-            if found is not None:
-                return found.as_json()
-            if replace(segment, file_hashes=segment.input_hashes()).address != address:
-                raise DataError(
-                    "a model, voice, file or program version of this machine differs from that of the batch; "
-                    "install and copy the same ones"
-                )
-        except Tts2faceError as wrong:
-            raise SegmentFailedError(str(wrong)) from None
-        with self._rendering:
-            rendered = render_into(self._store, segment, self._renderer, self._on_message)
-        if rendered.result is None:
-            raise SegmentFailedError(rendered.reason)
-        self.n_rendered += 1
-        return rendered.result.as_json()
 
     def _beat(self, workers: Workers) -> None:
         """Give signs of life, also while the database is away for a time."""
@@ -198,8 +188,10 @@ class Worker:
 
         try:
             dead = set(self._vanished)
+            self._segments.end_cancelled(is_cancelled)
             if time.monotonic() >= self._next_all_work_s:
                 dead |= self._look_at_all_work(workers)
+                self._jobs.end_abandoned()
                 self._next_all_work_s = time.monotonic() + ALL_WORK_S * random.uniform(0.5, 1.5)
             dead.discard(self.executor_id)
             if dead:
@@ -208,7 +200,7 @@ class Worker:
                 self._vanished -= ended
                 if ended:
                     self._on_message(f"took over from {len(ended)} workers without a sign of life")
-        except (sqlalchemy.exc.SQLAlchemyError, dbos_error.DBOSException) as away:
+        except (sqlalchemy.exc.SQLAlchemyError, dbos_error.DBOSException, DatabaseAwayError) as away:
             self._note_database(away)
 
     def _note_database(self, away: Exception | None) -> None:
@@ -228,20 +220,23 @@ class Worker:
         from dbos import DBOS
 
         alive = set(workers.alive())
-        queue = DBOS.retrieve_queue(QUEUE)
         wanted = poll_interval(len(alive))
-        if queue is not None and not 0.8 < wanted / queue.polling_interval_sec < 1.25:
-            queue.set_polling_interval_sec(wanted)
+        for name in (QUEUE, JOB_QUEUE, TALKER_QUEUE):
+            queue = DBOS.retrieve_queue(name)
+            if queue is not None and not 0.8 < wanted / queue.polling_interval_sec < 1.25:
+                queue.set_polling_interval_sec(wanted)
         return {str(one.executor_id) for one in list_running() if one.executor_id} - alive
 
 
 def main() -> None:
-    """Run one worker that ends with its parent: ``python -m tts2face.jobs.worker DATABASE STORE CORE``."""
+    """Run one worker that ends with its parent: ``python -m tts2face.jobs.worker DATABASE STORE CORE NICENESS``."""
     from tts2face.child_process import bind_to_core, exit_after
 
-    database, store, core = sys.argv[1:4]
+    database, store, core, niceness = sys.argv[1:5]
     bound = int(core) if core.isdecimal() else None
     bind_to_core(bound)
+    if hasattr(os, "nice"):
+        os.nice(int(niceness))
 
     def wait_for_parent() -> None:
         while os.read(0, 1):

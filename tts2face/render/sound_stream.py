@@ -15,6 +15,7 @@ from tts2face.types import Chunk, Waveform
 
 UNKNOWN_BYTES = 0xFFFFFFFF  # size of a WAV file that is not yet known; players read to the end of the stream
 OPUS_RATE = 48_000  # Hz
+BLOCK_S = 0.5  # of sound that a codec encodes at a time; a sentence takes up to 0.2 s
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,13 +64,20 @@ def encode_sound(sounds: Iterator[Waveform], format: str) -> Iterator[Chunk]:
                 encoder = _CodecEncoder(kind, rate) if kind.codec else _PcmEncoder(rate, has_header=format == "wav")
             if sound.rate != rate:
                 raise InputError(f"sounds of one file must share the sample rate {rate} Hz; one has {sound.rate} Hz")
-            yield Chunk(encoder.add(sound), sound.duration)
+            for block in _blocks(sound) if kind.codec else [sound]:
+                yield Chunk(encoder.add(block), block.duration)
         if encoder is not None:
             yield Chunk(encoder.finish())
             encoder = None
     finally:
         if encoder is not None:
             encoder.finish()
+
+
+def _blocks(sound: Waveform) -> Iterator[Waveform]:
+    size = round(BLOCK_S * sound.rate)
+    for begin in range(0, len(sound.samples), size):
+        yield Waveform(sound.samples[begin : begin + size], sound.rate)
 
 
 def wav_header(rate: int, n_bytes: int | None) -> bytes:

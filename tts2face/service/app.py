@@ -1,5 +1,6 @@
 """The ASGI application of the service."""
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
@@ -7,14 +8,19 @@ from fastapi import FastAPI
 from fastapi import Request as HttpRequest
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
+from fastapi.telemetry import TelemetryConfig
 from starlette.exceptions import HTTPException
+from starlette.routing import Match
 
 from tts2face import __version__
-from tts2face.service import clips, headtts, health, live, openai_speech
+from tts2face.service import clips, headtts, health, jobs, live, openai_speech, resources, results
 from tts2face.service.errors import DOCUMENTED, RefusedError, error_body
 from tts2face.service.guard import Guard
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.state import ServiceState
+
+# FastAPI's own telemetry exports addresses and messages of errors, which may hold keys and texts (decision 099).
+NO_TELEMETRY: TelemetryConfig = {"tracing": False, "metrics": False, "logs": False, "auto_configure": False}
 
 
 def create_app(settings: ServiceSettings) -> FastAPI:
@@ -24,10 +30,15 @@ def create_app(settings: ServiceSettings) -> FastAPI:
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         state.pool.start()
+        state.jobs.start()
         try:
             yield
         finally:
+            await state.jobs.close()
             await state.pool.close()
+            state.library.close()
+            if state.tracing is not None:
+                await asyncio.to_thread(state.tracing.close)
 
     app = FastAPI(
         title="tts2face",
@@ -36,35 +47,42 @@ def create_app(settings: ServiceSettings) -> FastAPI:
         redoc_url=None,
         description="Text to talking face.",
         responses=DOCUMENTED,
+        telemetry=NO_TELEMETRY,
     )
     app.state.service = state
-    for part in (openai_speech, clips, headtts, live, health):
+    for part in (openai_speech, clips, headtts, live, jobs, results, resources, health):
         app.include_router(part.router)
     app.add_exception_handler(RefusedError, _answer_refused)
     app.add_exception_handler(RequestValidationError, _answer_invalid)
     app.add_exception_handler(HTTPException, _answer_http)
-    app.add_exception_handler(Exception, _answer_internal)
     app.add_middleware(Guard, state=state)
     return app
 
 
-async def _answer_refused(_: HttpRequest, error: Exception) -> JSONResponse:
+async def _answer_refused(request: HttpRequest, error: Exception) -> JSONResponse:
     assert isinstance(error, RefusedError)
+    request.state.exchange.code = error.code
     return JSONResponse(error_body(error.code, error.message), error.status, error.headers)
 
 
-async def _answer_invalid(_: HttpRequest, error: Exception) -> JSONResponse:
+async def _answer_invalid(request: HttpRequest, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
     first = error.errors()[0]
     name = ".".join(str(part) for part in first["loc"] if part != "body") or "body"
     message = f"{name}: {first['msg'][:200]}"
+    request.state.exchange.code = "invalid_request"
     return JSONResponse(error_body("invalid_request", message, name), 422)
 
 
-async def _answer_http(_: HttpRequest, error: Exception) -> JSONResponse:
+async def _answer_http(request: HttpRequest, error: Exception) -> JSONResponse:
     assert isinstance(error, HTTPException)
-    return JSONResponse(error_body("http", str(error.detail)), error.status_code, dict(error.headers or {}))
+    headers = dict(error.headers or {})
+    if error.status_code == 405:
+        headers["Allow"] = ", ".join(sorted(_methods(request)))
+    return JSONResponse(error_body("http", str(error.detail)), error.status_code, headers)
 
 
-async def _answer_internal(_: HttpRequest, error: Exception) -> JSONResponse:
-    return JSONResponse(error_body("internal", f"internal error: {type(error).__name__}; see the log"), 500)
+def _methods(request: HttpRequest) -> set[str]:
+    """Methods of all routes of a path; Starlette names those of the first one only."""
+    routes = (one for one in request.app.routes if one.matches(request.scope)[0] != Match.NONE)
+    return {method for one in routes for method in getattr(one, "methods", None) or ()}

@@ -7,51 +7,30 @@ from fastapi import APIRouter
 from fastapi import Request as HttpRequest
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import StreamingResponse
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 from starlette.datastructures import FormData
 
 from tts2face.service.answers import service_state, stream_work
+from tts2face.service.clip_options import ClipOptions, divide_options
 from tts2face.service.errors import RefusedError
-from tts2face.service.names import MODEL_FIELDS, check_background, check_models, check_voice
 from tts2face.service.uploads import MAX_TEXT_BYTES, UploadFolder, upload_folder
 from tts2face.synthesis.byte_stream import MEDIA_TYPES
 
 router = APIRouter(prefix="/v1", tags=["clips"])
 
 FILES = ("audio", "background", "timeline")
-PICTURE_FIELDS = ("size", "camera", "background", "supersampling")
-Format = Literal["mp4", "webm", "mp3", "opus", "aac", "flac", "wav", "pcm", "curves", "oculus", "azure", "livelink"]
+Format = Literal[
+    "mp4", "webm", "mp3", "opus", "aac", "flac", "wav", "pcm", "curves", "oculus", "azure", "livelink", "glb"
+]
 
 
-class ClipRequest(BaseModel):
+class ClipRequest(ClipOptions):
     """What is said, how the face moves and how it is drawn; meanings as of the flags of the command line."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
 
     text: Annotated[str, Field(description="Text, with marks or SSML.", examples=["Hello there."])] = ""
     format: Annotated[Format, Field(description="Movie, sound, or lines.")] = "mp4"
-    language: Annotated[str, Field(description="Language of the text.")] = "en-us"
-    voice: Annotated[str | None, Field(description="A voice of GET /v1/voices.")] = None
-    rate: Annotated[float, Field(ge=0.5, le=2.0, description="Factor of the speaking rate.")] = 1.0
-    volume: Annotated[float, Field(ge=0.0, le=2.0, description="Factor of the loudness.")] = 1.0
-    seed: Annotated[int, Field(ge=0, le=2**31 - 1, description="Seed of gestures and voice.")] = 0
-    synthesis: Annotated[Literal["exemplar", "theobald2007"], Field(description="Method of lip motion.")] = "exemplar"
-    fps: Annotated[float, Field(ge=1, le=120, description="Frames per second.")] = 30.0
-    gestures: Annotated[Literal["fields", "ju2008", "noise", "none"], Field(description="Method of gestures.")] = (
-        "fields"
-    )
-    style: Annotated[str | None, Field(description="Style of the palette.", examples=["delighted"])] = None
-    gain: Annotated[str | None, Field(description="Gains of features.", examples=["head=1.5"])] = None
     expression: Annotated[str | None, Field(description="Expressions with times.", examples=["happy=0.6"])] = None
     idle: Annotated[float | None, Field(ge=0.1, le=30, description="Seconds of idle animation, no speech.")] = None
-    talker: Annotated[str | None, Field(description="A talker of GET /v1/talkers.")] = None
-    face: Annotated[str | None, Field(description="A face of GET /v1/faces, or self.")] = None
-    identity: Annotated[str | None, Field(description="Identity preset of the face.")] = None
-    palette: Annotated[str | None, Field(description="A palette of GET /v1/palettes.")] = None
-    size: Annotated[str, Field(description="Width x height in pixels.", examples=["512x512"])] = "auto"
-    camera: Annotated[str, Field(description="front, three-quarter, profile, close, or yaw,pitch.")] = "front"
-    background: Annotated[str, Field(description="studio, transparent, or a colour.", examples=["#204060"])] = "studio"
-    supersampling: Annotated[int, Field(ge=1, le=3, description="Samples along each side of a pixel.")] = 2
 
 
 MULTIPART = {
@@ -83,7 +62,7 @@ async def make_clip(request: HttpRequest) -> StreamingResponse:
         return await _answer(request, _parse(await request.body()), {})
     async with AsyncExitStack() as stack:
         form = await stack.enter_async_context(request.form(max_files=len(FILES), max_fields=4))
-        folder = await stack.enter_async_context(upload_folder(service_state(request).settings.sound_s))
+        folder = await stack.enter_async_context(upload_folder(service_state(request).settings))
         clip, files = await _read_form(form, folder)
         return await _answer(request, clip, files, stack.pop_all())  # the files are read until the clip is complete
 
@@ -122,13 +101,9 @@ async def _answer(
 ) -> StreamingResponse:
     given: dict[str, Any] = clip.model_dump(exclude_none=True, exclude_defaults=True)
     format = given.pop("format", "mp4")
-    models = {name: given.pop(name) for name in MODEL_FIELDS if name in given}
-    picture = {name: given.pop(name) for name in PICTURE_FIELDS if name in given}
-    check_models(models)
-    check_voice(given.get("voice"))
-    check_background(picture.get("background", "studio"))
-    if "background" in files:
-        picture["background"] = files["background"]
-    given |= {name: files[name] for name in ("audio", "timeline") if name in files}
-    work = service_state(request).work(models=models, request=given, picture=picture, format=format)
+    state = service_state(request)
+    fields = await divide_options(state, request.state.key, given)
+    picture = fields.picture | {name: files[name] for name in ("background",) if name in files}
+    spoken = fields.request | {name: files[name] for name in ("audio", "timeline") if name in files}
+    work = state.work(models=fields.models, request=spoken, picture=picture, format=format)
     return await stream_work(request, work, MEDIA_TYPES[format], resources=resources)

@@ -1,16 +1,20 @@
 """Errors of the service as answers."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
+from starlette.exceptions import HTTPException
 
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
 from tts2face.service.pool import BusyError
+from tts2face.service.warm_process import DefectError
 
 
-class RefusedError(Exception):
+class RefusedError(HTTPException):
     """A request that is refused before any work.
+
+    It is Starlette's kind of exception, so that FastAPI passes it on when it is raised while a body is read.
 
     Parameters
     ----------
@@ -23,12 +27,18 @@ class RefusedError(Exception):
     """
 
     def __init__(self, status: int, code: str, message: str, headers: Mapping[str, str] | None = None) -> None:
-        super().__init__(message)
-        self.status, self.code, self.message, self.headers = status, code, message, dict(headers or {})
+        self.status, self.code, self.message = status, code, message
+        self.headers: dict[str, str]
+        super().__init__(status, message, dict(headers or {}))
+
+    def __str__(self) -> str:
+        """The message."""
+        return self.message
 
 
 STATUS: Mapping[type[Tts2faceError], tuple[int, str]] = {
     BusyError: (429, "busy"),
+    DefectError: (500, "internal"),
     InputError: (400, "invalid_request"),
     DataError: (422, "invalid_data"),
     BackendError: (503, "unavailable"),
@@ -45,10 +55,10 @@ def as_refused(error: Tts2faceError) -> RefusedError:
 class ErrorDetail(BaseModel):
     """What is wrong."""
 
-    message: str
-    type: str
-    param: str | None
-    code: str
+    message: Annotated[str, Field(description="What is wrong, which value, what to do.")]
+    type: Annotated[str, Field(description="invalid_request_error or server_error.")]
+    param: Annotated[str | None, Field(description="Name of the field, if the form of one is wrong.")]
+    code: Annotated[str, Field(description="Word for programs.", examples=["rate_limited"])]
 
 
 class ErrorBody(BaseModel):
@@ -63,18 +73,21 @@ DOCUMENTED: dict[int | str, dict[str, Any]] = {
         400: "A value is wrong.",
         401: "The API key is missing or unknown.",
         403: "The key lacks the scope, or the page is of another origin.",
+        404: "There is nothing of this name.",
         408: "The body did not arrive in time.",
-        413: "The body or text is too long.",
+        409: "The name is taken.",
+        413: "The body or text is too long, or a quota is used up.",
         421: "The host is none of this service.",
         422: "The body does not have the form of the schema.",
         429: "Too many requests; Retry-After says when to repeat.",
+        431: "The head of the request is too large.",
         500: "A defect of the service; the log says more.",
-        503: "Something is missing on the server, or it is not ready.",
+        503: "Something is missing on the server, it is not ready, or it is shutting down.",
     }.items()
 }
 
 
 def error_body(code: str, message: str, param: str | None = None) -> dict[str, Any]:
     """JSON of an error, in the form of OpenAI's API."""
-    kind = "server_error" if code in {"internal", "unavailable"} else "invalid_request_error"
+    kind = "server_error" if code in {"internal", "unavailable", "draining"} else "invalid_request_error"
     return {"error": {"message": message, "type": kind, "param": param, "code": code}}

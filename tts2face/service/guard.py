@@ -1,14 +1,19 @@
 """Checks of every request before any work: host, origin, key, limits; headers, log and metrics of every answer."""
 
 import asyncio
+import logging
 import time
 from collections.abc import Awaitable, Callable, MutableMapping
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
+from starlette.requests import ClientDisconnect
+from starlette.websockets import WebSocketDisconnect
+
 from tts2face.service.errors import RefusedError
 from tts2face.service.exchange import Exchange, Receive, Scope, Send
 from tts2face.service.keys import LOCAL_KEY, ApiKey, find_key
+from tts2face.service.logs import log_event
 
 if TYPE_CHECKING:
     from tts2face.service.state import ServiceState
@@ -17,6 +22,10 @@ App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 OPEN_PATHS = frozenset({"/healthz", "/readyz", "/docs", "/openapi.json"})
 UNCOUNTED_PATHS = frozenset({*OPEN_PATHS, "/metrics", "/v1/hello"})
+VIDEO_PATH = "/v1/talkers/build"
+DRAINING_PATHS = frozenset({"/healthz", "/readyz", "/metrics"})  # that are answered until the end
+CLOSE = {"Connection": "close"}
+DRAINING_RETRY_S = 5  # until another server, or this one again, may be asked
 
 
 class Guard:
@@ -33,25 +42,60 @@ class Guard:
         key: ApiKey | None = None
         is_counted = scope["path"] not in UNCOUNTED_PATHS
         try:
+            self._check_draining(scope["path"])
+            self._check_head(request)
             self._check_host(request)
             key = self._identify(request)
-            scope["state"] = {**scope.get("state", {}), "key": key, "request_id": request.id, "timing": request.timing}
+            scope["state"] = {**scope.get("state", {}), "key": key, "exchange": request}
             if is_counted:
                 self._state.limits.begin(key)
         except RefusedError as refused:
             await request.refuse(refused)
             return self._state.record(request, key)
+        if is_counted:
+            self._state.running.add(request)
         try:
-            body = _BoundedBody(receive, self._state.settings.body_mb * 1e6, self._state.settings.body_s)
+            await request.run(self._answer(request, receive))
+            await request.close()
+            if request.is_cut:
+                await request.refuse(_draining())
+        finally:
+            if is_counted:
+                self._state.running.discard(request)
+                self._state.limits.end(key)
+            self._state.record(request, key)
+        return None
+
+    async def _answer(self, request: Exchange, receive: Receive) -> None:
+        settings, scope = self._state.settings, request.scope
+        size = settings.video_mb if _brings_video(scope) else settings.body_mb
+        body = _BoundedBody(receive, size * 1e6, settings.body_s * max(1.0, size / settings.body_mb))
+        try:
             body.check(request.headers)
             await self._app(scope, body.receive if scope["type"] == "http" else receive, request.send)
         except RefusedError as refused:
             await request.refuse(refused)
-        finally:
-            if is_counted:
-                self._state.limits.end(key)
-            self._state.record(request, key)
-        return None
+        except (ClientDisconnect, WebSocketDisconnect):
+            pass  # the client has left
+        except Exception as defect:  # noqa: BLE001 - the one place where a defect becomes an answer
+            log_event("defect", level=logging.ERROR, error=defect)
+            message = f"internal error: {type(defect).__name__}; the log has it under the id {request.id}"
+            await request.refuse(RefusedError(500, "internal", message))
+
+    def _check_draining(self, path: str) -> None:
+        if self._state.is_draining and path not in DRAINING_PATHS:
+            raise _draining()
+
+    def _check_head(self, request: "Exchange") -> None:
+        """Refuse heads that are too large, and bodies with two lengths, which proxies may divide differently."""
+        settings, scope, given = self._state.settings, request.scope, request.scope["headers"]
+        size = sum(len(name) + len(value) for name, value in given)
+        size += len(scope.get("raw_path") or b"") + len(scope["query_string"])
+        if len(given) > settings.headers or size > 1024 * settings.head_kb:
+            message = f"the head has more than {settings.headers} headers or {settings.head_kb} KB; send less"
+            raise RefusedError(431, "too_large", message, CLOSE)
+        if {b"transfer-encoding", b"content-length"} <= set(request.headers):
+            raise RefusedError(400, "invalid_request", "the body has two lengths; send one of them", CLOSE)
 
     def _check_host(self, request: "Exchange") -> None:
         """Refuse names of other hosts (DNS rebinding) and pages of other origins."""
@@ -84,6 +128,17 @@ class Guard:
                 {"WWW-Authenticate": "Bearer"},
             )  # fmt: skip
         return found
+
+
+def _brings_video(scope: Scope) -> bool:
+    """Whether a request brings the recording of a talker: only such bodies may be larger than all others."""
+    is_build = scope["type"] == "http" and (scope["method"], scope["path"]) == ("POST", VIDEO_PATH)
+    return is_build and "build" in scope["state"]["key"].scopes
+
+
+def _draining() -> RefusedError:
+    headers = {"Retry-After": str(DRAINING_RETRY_S)} | CLOSE
+    return RefusedError(503, "draining", "the service is shutting down; repeat the request", headers)
 
 
 def _host_name(host: str) -> str:

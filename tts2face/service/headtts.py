@@ -19,7 +19,7 @@ from tts2face.exports.labels import Label
 from tts2face.render.sound_stream import wav_header
 from tts2face.service.answers import service_state, timed_speech
 from tts2face.service.errors import ErrorBody, RefusedError
-from tts2face.service.names import check_voice
+from tts2face.service.names import check_voice, resolve_dictionary
 
 router = APIRouter(tags=["headtts"])
 
@@ -43,6 +43,9 @@ class HeadTtsRequest(BaseModel):
     )
     language: Annotated[str, Field(description="Language of the text.")] = "en-us"
     speed: Annotated[float, Field(ge=0.25, le=4.0, description="Speaking rate; limited to 0.5 to 2.")] = 1.0
+    dictionary: Annotated[
+        str | None, Field(description="A dictionary of GET /v1/dictionaries; not part of HeadTTS.")
+    ] = None
     audioEncoding: Annotated[Literal["wav", "pcm"], Field(description="Sound.")] = "wav"  # noqa: N815
 
 
@@ -55,21 +58,21 @@ def hello() -> str:
 class HeadTtsError(BaseModel):
     """An error as HeadTTS reports it."""
 
-    error: str
+    error: Annotated[str, Field(description="What is wrong, which value, what to do.")]
 
 
 class HeadTtsAudio(BaseModel):
     """Sound with its words and visemes; times in milliseconds."""
 
     audio: Annotated[str, Field(description="Base64 of a .wav file or of 16-bit samples.")]
-    audioEncoding: str  # noqa: N815
-    words: list[str]
-    wtimes: list[int]
-    wdurations: list[int]
-    visemes: list[str]
-    vtimes: list[int]
-    vdurations: list[int]
-    phonemes: list[str]
+    audioEncoding: Annotated[str, Field(description="wav or pcm.")]  # noqa: N815
+    words: Annotated[list[str], Field(description="Words, each but the last with a space behind it.")]
+    wtimes: Annotated[list[int], Field(description="Begin of each word.")]
+    wdurations: Annotated[list[int], Field(description="Duration of each word.")]
+    visemes: Annotated[list[str], Field(description="Oculus visemes.")]
+    vtimes: Annotated[list[int], Field(description="Begin of each viseme.")]
+    vdurations: Annotated[list[int], Field(description="Duration of each viseme.")]
+    phonemes: Annotated[list[str], Field(description="Phone of each viseme.")]
 
 
 OWN_ERRORS: dict[int | str, dict[str, Any]] = {
@@ -142,12 +145,15 @@ async def _speak(request: HttpRequest | WebSocket, body: HeadTtsRequest) -> tupl
     items = body.input if isinstance(body.input, list) else [body.input]
     text, subtitles = items_to_ssml(items)
     fields: dict[str, Any] = {
-        "text": text, "language": body.language, "rate": min(max(body.speed, 0.5), 2.0), "gestures": "none"
+        "text": text, "language": body.language, "rate": min(max(body.speed, 0.5), 2.0), "gestures": "none",
+        "dictionary": body.dictionary,
     }  # fmt: skip
     if not KOKORO_VOICE.fullmatch(body.voice):
         check_voice(body.voice)
         fields["voice"] = body.voice
-    events, pcm = await timed_speech(request, service_state(request).work(kind="speech", request=fields))
+    state = service_state(request)
+    fields = await resolve_dictionary(state.library, request.state.key, fields)
+    events, pcm = await timed_speech(request, state.work(kind="speech", request=fields))
     rate = events[0]["rate"] if events else 24_000
     sound = pcm if body.audioEncoding == "pcm" else wav_header(rate, len(pcm)) + pcm
     return audio_fields(events, subtitles) | {"audioEncoding": body.audioEncoding}, sound

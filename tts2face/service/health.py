@@ -23,12 +23,13 @@ def healthz() -> dict[str, str]:
 
 
 @router.get("/readyz", summary="Whether requests would be served", responses={503: {"description": "Not ready."}})
-def readyz(request: HttpRequest) -> JSONResponse:
-    """Processes, disk, and whether the server is shutting down; 503 unless all are well."""
+async def readyz(request: HttpRequest) -> JSONResponse:
+    """Processes, disk, database, and whether the server is shutting down; 503 unless all are well."""
     state = service_state(request)
     checks: dict[str, Any] = {
         "models": state.pool.n_ready > 0,
         "disk": shutil.disk_usage(tempfile.gettempdir()).free > MIN_FREE_BYTES,
+        "database": await state.jobs.is_reachable(),
         "accepting": not state.is_draining,
     }
     is_ready = all(checks.values())

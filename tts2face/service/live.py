@@ -1,6 +1,8 @@
-"""Live streams for avatars: text comes in word by word, speech, phones and curves go out with their times."""
+"""Live streams for avatars: text or sound comes in, speech, phones and curves go out with their times."""
 
 import asyncio
+import base64
+import time
 from contextlib import aclosing, suppress
 from typing import Annotated, Any, Literal
 
@@ -11,21 +13,26 @@ from lexicon.errors import DataError
 from lexicon.inputs import parse_json
 from tts2face.service.errors import RefusedError
 from tts2face.service.messages import MessageKind
-from tts2face.service.names import MODEL_FIELDS, check_models, check_voice
+from tts2face.service.names import MODEL_FIELDS, check_voice, resolve_dictionary, resolve_models
 from tts2face.service.state import ServiceState
 
 router = APIRouter(tags=["live"])
 
-INPUT_TYPES = frozenset({"text", "flush", "cancel", "end"})
+TEXT_TYPES = frozenset({"text", "flush", "cancel", "interrupt", "end"})  # of messages of a stream of text
+AUDIO_TYPES = frozenset({"end"})  # of a stream of sound, besides the sound
+MAX_BLOCK_BYTES = 1 << 16  # of sound in one message
+MAX_AHEAD_S = 5.0  # by which a client's sound is read ahead of real time
+SAMPLE_BYTES = 2
 INVALID = 1007  # WebSocket close code: a message is not what it should be
 
 
-class LiveOptions(BaseModel):
-    """First message of a live stream."""
+class TextOptions(BaseModel):
+    """First message of a live stream of text."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
     type: Literal["start"]
+    input: Literal["text"] = "text"
     language: Annotated[str, Field(description="Language of the text.")] = "en-us"
     voice: Annotated[str | None, Field(description="A voice of GET /v1/voices.")] = None
     rate: Annotated[float, Field(ge=0.5, le=2.0)] = 1.0
@@ -39,7 +46,21 @@ class LiveOptions(BaseModel):
     face: str | None = None
     identity: str | None = None
     palette: str | None = None
+    dictionary: Annotated[str | None, Field(description="A dictionary of GET /v1/dictionaries.")] = None
     with_idle: Annotated[bool, Field(description="Curves of a living face between utterances.")] = True
+
+
+class AudioOptions(BaseModel):
+    """First message of a live stream of sound."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    type: Literal["start"]
+    input: Literal["audio"]
+    rate: Annotated[int, Field(ge=8_000, le=192_000, description="Sample rate in Hz.")] = 16_000
+    talker: str | None = None
+    face: str | None = None
+    identity: str | None = None
 
 
 @router.websocket("/v1/stream")
@@ -48,10 +69,12 @@ async def stream(connection: WebSocket) -> None:
     await connection.accept()
     state: ServiceState = connection.app.state.service
     try:
-        options = LiveOptions.model_validate_json(await connection.receive_text())
-        given: dict[str, Any] = options.model_dump(exclude_none=True, exclude_defaults=True, exclude={"type"})
+        options = _read_options(await connection.receive_text())
+        given: dict[str, Any] = options.model_dump(exclude_none=True, exclude_defaults=True, exclude={"type", "input"})
         models = {name: given.pop(name) for name in MODEL_FIELDS if name in given}
-        check_models(models)
+        key = connection.state.key
+        models = await resolve_models(state.library, key, models)
+        given = await resolve_dictionary(state.library, key, given)
         check_voice(given.get("voice"))
     except (ValidationError, RefusedError) as wrong:
         await _refuse(connection, _reason(wrong))
@@ -59,13 +82,13 @@ async def stream(connection: WebSocket) -> None:
     except (WebSocketDisconnect, KeyError):
         return
     inputs: asyncio.Queue[Any] = asyncio.Queue(1000)
-    work = state.work(kind="live", models=models, request=given)
+    work = state.work(kind="live" if isinstance(options, TextOptions) else "listen", models=models, request=given)
     sending = asyncio.create_task(_send(connection, state, work, inputs))
-    receiving = asyncio.create_task(_receive(connection, inputs))
+    receiving = asyncio.create_task(_receive(connection, inputs, options))
     try:
         await asyncio.wait({sending, receiving}, return_when=asyncio.FIRST_COMPLETED)
         if receiving.done() and receiving.exception() is None and receiving.result():
-            await sending  # the client ended the text and waits for the rest
+            await sending  # the client ended its input and waits for the rest
     finally:
         for task in (sending, receiving):
             task.cancel()
@@ -74,26 +97,79 @@ async def stream(connection: WebSocket) -> None:
             await connection.close()
 
 
-async def _receive(connection: WebSocket, inputs: "asyncio.Queue[Any]") -> bool:
+def _read_options(message: str) -> TextOptions | AudioOptions:
+    with suppress(DataError):
+        content = parse_json(message, "the message")
+        if isinstance(content, dict) and content.get("input") == "audio":
+            return AudioOptions.model_validate_json(message)
+    return TextOptions.model_validate_json(message)
+
+
+async def _receive(connection: WebSocket, inputs: "asyncio.Queue[Any]", options: TextOptions | AudioOptions) -> bool:
     """Pass the client's messages on; True after ``end``, False when the client has left."""
+    types = TEXT_TYPES if isinstance(options, TextOptions) else AUDIO_TYPES
+    pace = None if isinstance(options, TextOptions) else _Pace(SAMPLE_BYTES * options.rate)
     while True:
         try:
-            content = parse_json(await connection.receive_text(), "the message")
-        except (WebSocketDisconnect, KeyError):
+            content = _read_message(await connection.receive(), types, has_sound=pace is not None)
+        except WebSocketDisconnect:
             return False
-        except DataError:
-            content = None
-        if not isinstance(content, dict) or content.get("type") not in INPUT_TYPES:
-            await connection.send_json(
-                {
-                    "type": "error",
-                    "message": f"a message must be JSON with one of the types {', '.join(sorted(INPUT_TYPES))}",
-                }
-            )
+        except RefusedError as wrong:
+            await connection.send_json({"type": "error", "message": wrong.message})
             continue
+        if pace is not None and "samples" in content:
+            await pace.add(len(content["samples"]))
+            content["samples"] = base64.b64encode(content["samples"]).decode()
         await inputs.put(content)
         if content["type"] == "end":
             return True
+
+
+class _Pace:
+    """Slows a sender of sound down to real time once it is `MAX_AHEAD_S` ahead."""
+
+    def __init__(self, bytes_per_s: float) -> None:
+        self._bytes_per_s, self._seconds, self._began = bytes_per_s, 0.0, time.monotonic()
+
+    async def add(self, n_bytes: int) -> None:
+        self._seconds += n_bytes / self._bytes_per_s
+        ahead = self._seconds - (time.monotonic() - self._began)
+        if ahead < 0:  # a pause of the sender is no credit
+            self._began += -ahead
+        if ahead > MAX_AHEAD_S:
+            await asyncio.sleep(ahead - MAX_AHEAD_S)
+
+
+def _read_message(message: Any, types: frozenset[str], *, has_sound: bool) -> dict[str, Any]:
+    """Content of a message; sound becomes the value ``samples``.
+
+    Raises
+    ------
+    RefusedError
+        It is none of the messages of the stream.
+    WebSocketDisconnect
+        The client has left.
+    """
+    if message["type"] == "websocket.disconnect":
+        raise WebSocketDisconnect
+    samples = message.get("bytes")
+    if samples is not None and has_sound:
+        if len(samples) % SAMPLE_BYTES or len(samples) > MAX_BLOCK_BYTES:
+            raise RefusedError(
+                400, "invalid_request",
+                f"a block of sound has {len(samples)} bytes; send 16-bit samples in up to {MAX_BLOCK_BYTES} bytes",
+            )  # fmt: skip
+        return {"type": "audio", "samples": samples}
+    content: Any = None
+    with suppress(DataError):
+        content = parse_json(message.get("text") or "", "the message")
+    if not isinstance(content, dict) or content.get("type") not in types:
+        raise RefusedError(
+            400, "invalid_request",
+            f"a message must be {'16-bit samples, or ' if has_sound else ''}JSON with one of the types "
+            f"{', '.join(sorted(types))}",
+        )  # fmt: skip
+    return content
 
 
 async def _send(connection: WebSocket, state: ServiceState, work: Any, inputs: "asyncio.Queue[Any]") -> None:

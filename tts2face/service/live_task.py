@@ -1,16 +1,22 @@
-"""Speech for avatars whose text arrives word by word."""
+"""Motion for avatars: of a text that arrives word by word, or of speech that arrives as sound."""
 
+import base64
 import itertools
 import time
 from collections import deque
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lexicon.errors import Tts2faceError
 from lexicon.growing_text import GrowingText
-from tts2face.service.messages import Event, Wait
+from tts2face.service.messages import CANCELS, Event, Wait
+from tts2face.service.turns import InterruptedTaskError
+from tts2face.service.words import check_words
 from tts2face.service.work import Inputs, Work
-from tts2face.types import Chunk, Clip
+from tts2face.types import Chunk, Clip, Trajectory
 
 if TYPE_CHECKING:
     from tts2face.session import Session
@@ -39,23 +45,24 @@ class LiveTask:
         self._text = GrowingText(str(options.get("language", "en-us")))
         self._sentences: deque[str] = deque()
         self._is_ended = False
+        self._began: float | None = None  # of the stream on the clock
+        self._n_cancels = 0
 
     def steps(self) -> Iterator[Event | Chunk | Wait]:
         """Yield results until ``end`` and all its text are done."""
-        began: float | None = None
         while True:
             yield from self._read_inputs()
+            if self._began is None and (self._sentences or self._has_idle):
+                self._began = self._clock() - self._speech.seconds
             if self._sentences:
-                began = self._clock() - self._speech.seconds if began is None else began
                 yield from self._say(self._sentences.popleft())
                 continue
             if self._is_ended:
                 return
-            if not self._has_idle:
+            if not self._has_idle or self._began is None:
                 yield Wait()
                 continue
-            began = self._clock() if began is None else began
-            lead = self._speech.seconds - (self._clock() - began)
+            lead = self._speech.seconds - (self._clock() - self._began)
             if lead > LEAD_S:
                 yield Wait(lead - LEAD_S)
                 continue
@@ -63,11 +70,18 @@ class LiveTask:
                 yield self._curves.event(piece.clip, piece.begin)
 
     def _say(self, sentence: str) -> Iterator[Event | Chunk]:
+        n_cancels = self._n_cancels
         try:
+            check_words(sentence)
             for piece in self._speech.say(sentence):
                 yield _speech_event(piece)
                 yield _sound(piece.clip)
                 yield self._curves.event(piece.clip, piece.begin)
+                yield from self._read_inputs()
+                if self._n_cancels != n_cancels:
+                    return
+        except InterruptedTaskError:
+            return  # by a message that is read next
         except Tts2faceError as error:  # the stream goes on with the next sentence
             yield Event({"type": "error", "text": sentence, "message": " ".join(str(error).split())})
 
@@ -82,15 +96,39 @@ class LiveTask:
                 case "end":
                     self._sentences += self._text.flush()
                     self._is_ended = True
-                case "cancel":
+                case kind if kind in CANCELS:
                     self._sentences.clear()
                     self._text.clear()
-                    yield Event({"type": "cancelled", "at": round(self._speech.seconds, 4)})
+                    self._n_cancels += 1
+                    self._began = self._clock() - self._speech.seconds  # what follows is due now
+                    after_ms = 1000 * (self._clock() - content["arrived"])
+                    yield Event({
+                        "type": "cancelled", "at": round(self._speech.seconds, 4), "after_ms": round(after_ms, 1)
+                    })  # fmt: skip
 
 
 def live(session: "Session", work: Work, inputs: Inputs) -> Iterator[Event | Chunk | Wait]:
     """Events and sound of a live stream."""
     return LiveTask(session, work, inputs).steps()
+
+
+def listen(session: "Session", work: Work, inputs: Inputs) -> Iterator[Event | Wait]:
+    """Curves of sound: inputs are ``audio`` with base64 of 16-bit samples, and ``end``."""
+    lips = session.listen(int(work.request.get("rate", 16_000)))
+    curves, n_frames = _Curves(session), 0
+    yield Event({"type": "listening", "fps": lips.fps, "look_ahead_s": round(lips.look_ahead_s, 4)})
+    is_ended = False
+    while not is_ended:
+        if inputs.empty():
+            yield Wait()
+            continue
+        content = inputs.get()
+        is_ended = content.get("type") == "end"
+        samples = np.frombuffer(base64.b64decode(content.get("samples", "")), "<i2").astype(np.float32) / 32768
+        motion = lips.finish() if is_ended else lips.add_samples(samples)
+        if motion is not None:
+            yield curves.of_motion(motion, n_frames / lips.fps)
+            n_frames += len(motion)
 
 
 class _Curves:
@@ -102,18 +140,26 @@ class _Curves:
 
     def event(self, clip: Clip, begin: float) -> Event:
         """Weights and head pose of all frames of a clip."""
+        return self.of_motion(clip.motion, begin, clip.head)
+
+    def of_motion(self, motion: Trajectory, begin: float, head: Trajectory | None = None) -> Event:
+        """Weights of all frames of a motion, and the head pose if there is one."""
         from tts2face.exports.arkit import ARKIT_SHAPES, arkit_projection
 
-        names: dict[str, Any] = {}
+        content: dict[str, Any] = {"type": "curves", "begin": round(begin, 4), "fps": motion.fps}
         if self._projection is None:
-            self._projection = arkit_projection(clip.motion.channels, self._session.mesh, "the stream")
-            names = {"names": list(ARKIT_SHAPES), "head_names": list(clip.head.channels)}
-        weights = self._projection.weights(clip.motion.values)
-        return Event({
-            "type": "curves", "begin": round(begin, 4), "fps": clip.fps, **names,
-            "weights": [[round(value, 4) for value in row] for row in weights.tolist()],
-            "head": [[round(value, 4) for value in row] for row in clip.head.values.tolist()],
-        }, 0.0)  # fmt: skip
+            self._projection = arkit_projection(motion.channels, self._session.mesh, "the stream")
+            content["names"] = list(ARKIT_SHAPES)
+            if head is not None:
+                content["head_names"] = list(head.channels)
+        content["weights"] = _rounded(self._projection.weights(motion.values))
+        if head is not None:
+            content["head"] = _rounded(head.values)
+        return Event(content, 0.0 if head is not None else len(motion) / motion.fps)
+
+
+def _rounded(values: NDArray[np.floating]) -> list[list[float]]:
+    return [[round(value, 4) for value in row] for row in values.tolist()]
 
 
 def _speech_event(piece: "Piece") -> Event:

@@ -12,7 +12,9 @@ from typing import Any
 from lexicon.errors import BackendError
 from tts2face.render.movie_stream import MOVIE_KINDS
 from tts2face.render.sound_stream import SOUND_KINDS
+from tts2face.service.logs import JSON_LINES
 from tts2face.service.messages import Message
+from tts2face.service.stages import stage
 from tts2face.service.warm_process import ProcessEndedError, WarmProcess
 from tts2face.service.work import Work
 
@@ -45,12 +47,17 @@ class PoolSettings:
         Requests that may wait; further ones are refused.
     warm
         Works that each process executes before it is ready, as `Work.as_json`.
+    log_format, log_text, memory_mb
+        As in the settings of the service.
     """
 
     n_processes: int = 0
     n_sessions: int = 2
     max_waiting: int = 64
     warm: tuple[dict[str, Any], ...] = ()
+    log_format: str = JSON_LINES
+    log_text: bool = False
+    memory_mb: int = 0
 
 
 def work_cost(work: Work) -> float:
@@ -75,7 +82,8 @@ class Pool:
         self.processes = [
             WarmProcess(
                 {"core": cores[number % len(cores)] if cores else None, "n_sessions": settings.n_sessions,
-                 "warm": list(settings.warm)},
+                 "warm": list(settings.warm), "log_format": settings.log_format, "log_text": settings.log_text,
+                 "memory_mb": settings.memory_mb},
                 self._wake,
             )
             for number in range(count)
@@ -132,13 +140,15 @@ class Pool:
         """
         cost, tries = work_cost(work), 0
         while True:
-            process = await self._take(cost, key)
+            with stage("queue"):
+                process = await self._take(cost, key)
             is_begun = False
             messages = process.stream(work, priority, inputs)
             try:
-                async for message in messages:
-                    is_begun = True
-                    yield message
+                with stage("synthesis"):
+                    async for message in messages:
+                        is_begun = True
+                        yield message
                 return
             except ProcessEndedError:
                 tries += 1
@@ -146,8 +156,7 @@ class Pool:
                     raise
             finally:
                 await messages.aclose()  # type: ignore[attr-defined]
-                process.load -= cost
-                self._wake()
+                self._release(process, cost)
 
     async def _take(self, cost: float, key: str) -> WarmProcess:
         found = None if self._waiting else self._free_process(cost)
@@ -162,11 +171,14 @@ class Pool:
             return await future
         except asyncio.CancelledError:
             if future.done() and not future.cancelled():
-                future.result().load -= cost
-                self._wake()
+                self._release(future.result(), cost)
             raise
         finally:
             self._forget(key, future)
+
+    def _release(self, process: WarmProcess, cost: float) -> None:
+        process.load = round(process.load - cost, 6)  # sums of tenths are not exact: the load of no work is zero
+        self._wake()
 
     def _free_process(self, cost: float) -> WarmProcess | None:
         free = [one for one in self.processes if one.is_ready and (one.load == 0 or one.load + cost <= CAPACITY)]

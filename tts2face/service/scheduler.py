@@ -1,6 +1,7 @@
 """Cooperative scheduling of tasks in one process: whoever is nearest to running dry goes next."""
 
 import json
+import logging
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -8,7 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from lexicon.errors import Tts2faceError
-from tts2face.service.messages import Event, Message, MessageKind, Wait
+from tts2face.service.logs import log_event
+from tts2face.service.messages import DEFECT, Event, Message, MessageKind, Wait
 from tts2face.types import Chunk
 
 Step = Chunk | Event | Wait  # a part of the result, or a wait
@@ -27,6 +29,7 @@ class Task:
     cpu_s: float = 0.0
     is_paused: bool = False
     wakes_at: float = 0.0  # seconds of the clock; infinite: only by input
+    request: str | None = None  # id of the request, for the log
 
     def lead(self, now: float) -> float:
         """Seconds by which the result is ahead of a listener who began at the request."""
@@ -53,15 +56,17 @@ class Scheduler:
         """Number of unfinished tasks."""
         return len(self._tasks)
 
-    def start(self, number: int, steps: Callable[[], Iterator[Step]], priority: int = 0) -> None:
-        """Add a task; an error of `steps` becomes its message."""
+    def start(
+        self, number: int, steps: Callable[[], Iterator[Step]], priority: int = 0, request: str | None = None
+    ) -> None:
+        """Add a task of the request with the given id; an error of `steps` becomes its message."""
         began = self._clock()
         try:
             made = steps()
         except Exception as error:  # noqa: BLE001 - reported to the client; other tasks go on
-            self._send_error(number, error)
+            self._send_error(number, error, request)
             return
-        self._tasks[number] = Task(number, made, priority, began, cpu_s=self._clock() - began)
+        self._tasks[number] = Task(number, made, priority, began, cpu_s=self._clock() - began, request=request)
 
     def cancel(self, number: int) -> None:
         """Forget a task and release what it holds."""
@@ -106,7 +111,7 @@ class Scheduler:
             return
         except Exception as error:  # noqa: BLE001 - reported to the client; other tasks go on
             del self._tasks[task.number]
-            self._send_error(task.number, error)
+            self._send_error(task.number, error, task.request)
             return
         task.cpu_s += self._clock() - began
         if isinstance(step, Wait):
@@ -114,18 +119,20 @@ class Scheduler:
             return
         task.seconds += step.seconds
         if isinstance(step, Event):
-            self._send(_json_message(task.number, MessageKind.EVENT, step.content))
+            self._send(_json_message(task.number, MessageKind.EVENT, step.content, step.seconds))
         elif step.content:
-            self._send(Message(task.number, MessageKind.DATA, step.content))
+            self._send(Message(task.number, MessageKind.DATA, step.content, step.seconds))
 
-    def _send_error(self, number: int, error: Exception) -> None:
-        kind = type(error).__name__ if isinstance(error, Tts2faceError) else "InternalError"
-        message = str(error) if isinstance(error, Tts2faceError) else f"{type(error).__name__}: {error}"
+    def _send_error(self, number: int, error: Exception, request: str | None) -> None:
+        kind, message = type(error).__name__, str(error)
+        if not isinstance(error, Tts2faceError):
+            log_event("defect", level=logging.ERROR, error=error, id=request)
+            kind, message = DEFECT, f"internal error: {kind}; see the log of the service"
         self._send(_json_message(number, MessageKind.ERROR, {"kind": kind, "message": " ".join(message.split())}))
 
 
-def _json_message(number: int, kind: MessageKind, content: dict[str, Any]) -> Message:
-    return Message(number, kind, json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode())
+def _json_message(number: int, kind: MessageKind, content: dict[str, Any], seconds: float = 0.0) -> Message:
+    return Message(number, kind, json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode(), seconds)
 
 
 def _close(task: Task) -> None:

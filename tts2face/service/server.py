@@ -1,15 +1,24 @@
 """Running the service with uvicorn."""
 
-import json
-import logging
+import asyncio
+import signal
 import socket
+import sys
+import time
+from contextlib import suppress
 
 import uvicorn
 
 from tts2face.service.app import create_app
+from tts2face.service.connections import connection_classes
+from tts2face.service.logs import configure_logs, log_event
 from tts2face.service.settings import ServiceSettings
-from tts2face.service.state import LOG
+from tts2face.service.state import ServiceState
 from tts2face.telemetry import disable_telemetry
+
+SOCKET_GRACE_S = 3.0  # between the message to the clients of WebSockets and their end
+FORCED_CODE = 143  # exit code after a second signal; 0 after the first
+CUT_S = 2  # in which requests that were cut release what they hold
 
 
 def serve(settings: ServiceSettings) -> None:
@@ -18,31 +27,80 @@ def serve(settings: ServiceSettings) -> None:
     Raises
     ------
     InputError, DataError
-        The file of keys cannot be read.
+        The file of keys cannot be read, or the variables of OpenTelemetry ask for something else than OTLP over HTTP.
+    BackendError
+        Traces are asked for and their libraries are missing.
     """
     disable_telemetry()
-    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    configure_logs(settings.log_format, with_text=settings.log_text)
+    _allow_files(settings.connections)
     app = create_app(settings)
+    http, socket_class = connection_classes(settings)
     server = DrainingServer(uvicorn.Config(
-        app, host=settings.host, port=settings.port, log_level="warning", access_log=False, server_header=False,
-        timeout_graceful_shutdown=int(settings.drain_s), limit_concurrency=4096, ws_max_size=1 << 20, lifespan="on",
-        timeout_keep_alive=15, h11_max_incomplete_event_size=64 << 10,
-    ))  # fmt: skip
+        app, host=settings.host, port=settings.port, http=http, ws=socket_class,  # type: ignore[arg-type]
+        log_config=None, log_level="warning", access_log=False, server_header=False, proxy_headers=False,
+        timeout_graceful_shutdown=CUT_S, ws_max_size=1024 * settings.message_kb, lifespan="on",
+        timeout_keep_alive=settings.keep_alive_s,  # type: ignore[arg-type]
+        h11_max_incomplete_event_size=1024 * settings.head_kb,
+    ), app.state.service)  # fmt: skip
     server.run()
+    if server.force_exit:
+        sys.exit(FORCED_CODE)
 
 
 class DrainingServer(uvicorn.Server):
-    """Server that says where it listens and that it is shutting down."""
+    """Server that says where it listens, and that refuses new requests while the running ones finish."""
+
+    def __init__(self, config: uvicorn.Config, state: ServiceState) -> None:
+        super().__init__(config)
+        self._state = state
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Listen; then write the address, whose port may have been chosen by the system."""
         await super().startup(sockets)
+        if hasattr(signal, "SIGHUP"):
+            asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, self._state.reload_keys)
         for server in self.servers:
             for one in server.sockets:
                 host, port = one.getsockname()[:2]
-                LOG.info(json.dumps({"event": "listening", "url": f"http://{host}:{port}"}))
+                log_event("listening", url=f"http://{host}:{port}")
+
+    async def main_loop(self) -> None:
+        """Serve until a signal comes, then until the running requests are complete, or `drain_s` seconds."""
+        await super().main_loop()
+        state, began = self._state, time.monotonic()
+        state.is_draining = True
+        log_event("draining", running=len(state.running), seconds=state.settings.drain_s)
+        telling = asyncio.create_task(self._end_sockets())
+        while state.running and not self.force_exit and time.monotonic() < began + state.settings.drain_s:
+            await asyncio.sleep(0.05)
+        telling.cancel()
+        for request in list(state.running):
+            await request.cut()
+        log_event("drained", seconds=round(time.monotonic() - began, 3))
 
     def handle_exit(self, sig: int, frame: object) -> None:
-        """Refuse new work while running requests finish."""
-        self.config.app.state.service.is_draining = True  # type: ignore[union-attr]
-        super().handle_exit(sig, frame)  # type: ignore[arg-type]
+        """Begin to drain; a second signal ends the server at once."""
+        self.force_exit = self.should_exit
+        self.should_exit = self._state.is_draining = True
+
+    async def _end_sockets(self) -> None:
+        sockets = [request for request in self._state.running if request.scope["type"] == "websocket"]
+        for request in sockets:
+            await request.announce_end("the service is shutting down; connect again")
+        await asyncio.sleep(min(SOCKET_GRACE_S, self._state.settings.drain_s))
+        for request in sockets:
+            if request in self._state.running:
+                await request.cut()
+
+
+def _allow_files(connections: int) -> None:
+    """Raise the limit of open files to what the connections need, as far as the system allows."""
+    with suppress(ImportError, OSError, ValueError):
+        import resource
+
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        wanted = 2 * connections + 256
+        if soft != resource.RLIM_INFINITY and soft < wanted:
+            most = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+            resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, most), hard))

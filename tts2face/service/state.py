@@ -3,24 +3,31 @@
 import asyncio
 import json
 import logging
+import os
 from collections.abc import AsyncIterator
 from contextlib import aclosing
 from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import Tts2faceError
 from tts2face.service.errors import RefusedError, as_refused
+from tts2face.service.job_service import JobService
 from tts2face.service.keys import ApiKey, read_keys
+from tts2face.service.library import Library
+from tts2face.service.logs import log_event
 from tts2face.service.messages import Message, MessageKind
 from tts2face.service.metrics import Metrics
 from tts2face.service.pool import Pool, PoolSettings
 from tts2face.service.rate_limits import RateLimits
+from tts2face.service.result_cache import CACHED_KINDS, ResultCache
 from tts2face.service.settings import ServiceSettings
+from tts2face.service.tracing import tracing_from_environment
+from tts2face.service.upload_checks import Checks
+from tts2face.service.words import check_words
 from tts2face.service.work import Work
 
 if TYPE_CHECKING:
     from tts2face.service.exchange import Exchange
 
-LOG = logging.getLogger("tts2face.service")
 WARM_TEXT = "Hello there."
 
 
@@ -34,9 +41,27 @@ class ServiceState:
             settings.processes, settings.sessions, settings.waiting,
             (self.work(format="mp4", request={"text": WARM_TEXT}).as_json(),
              self.work(kind="speech", request={"text": WARM_TEXT}).as_json()),
+            settings.log_format, settings.log_text, settings.memory_mb,
         ))  # fmt: skip
-        self.limits, self.metrics = RateLimits(), Metrics(self.pool)
+        self.jobs = JobService(settings)
+        self.cache: ResultCache | None = None
+        if settings.cache_mb:
+            self.cache = ResultCache(settings.data_folder / "cache", settings.cache_mb * 1_000_000)
+        self.limits, self.metrics = RateLimits(), Metrics(self.pool, self.jobs, self.cache)
+        self.library, self.checks, self.video_checks = Library(settings), Checks(), Checks()
+        self.tracing = tracing_from_environment(os.environ)
         self.is_draining = False
+        self.running: set[Exchange] = set()
+
+    def reload_keys(self) -> None:
+        """Read the file of keys again; the present keys stay valid if it cannot be read."""
+        if self.settings.keys is None:
+            return log_event("keys not reloaded", reason="the service has no file of keys")
+        try:
+            self.keys = read_keys(self.settings.keys)
+        except (Tts2faceError, OSError) as error:
+            return log_event("keys not reloaded", level=logging.ERROR, reason=str(error))
+        return log_event("keys reloaded", keys=[key.name for key in self.keys])
 
     def work(self, *, models: dict[str, Any] | None = None, **fields: Any) -> Work:
         """A work with the models of the settings unless it names others."""
@@ -57,31 +82,56 @@ class ServiceState:
             raise RefusedError(
                 413, "too_long", f"the text has more than {self.settings.text_characters} characters; divide it"
             )
+        if "speak" not in key.scopes:
+            raise RefusedError(403, "forbidden", f"the key {key.name} lacks the scope speak; use another key")
+        self.limits.check_speech(key)
+        made = 0.0
+        if self.settings.log_text and work.request.get("text"):
+            log_event("text", text=work.request["text"])
         try:
-            async with aclosing(self.pool.stream(work, key.name, inputs=inputs)) as stream:  # type: ignore[type-var]
+            check_words(str(work.request.get("text", "")))
+            async with aclosing(self._stream(work, key, inputs)) as stream:  # type: ignore[type-var]
                 async for message in stream:
+                    made += message.seconds
+                    self.limits.add_speech(key, message.seconds)
                     if message.kind == MessageKind.END:
                         measures = json.loads(message.payload)
+                        self.limits.add_speech(key, measures["seconds"] - made)  # of parts without content
                         self.metrics.speech.inc(measures["seconds"])
                         self.metrics.cpu.inc(measures["cpu_s"])
                         return
+                    if self.settings.log_text and work.kind == "live" and message.kind == MessageKind.EVENT:
+                        _log_spoken(message)
                     yield message
         except Tts2faceError as error:
             refused = as_refused(error)
             self.metrics.failures.labels(refused.code).inc()
             raise refused from error
 
+    def _stream(self, work: Work, key: ApiKey, inputs: "asyncio.Queue[Any] | None") -> AsyncIterator[Message]:
+        """Messages of a work from the cache, or from a process."""
+        made = self.pool.stream(work, key.name, inputs=inputs)
+        if self.cache is None or work.kind not in CACHED_KINDS:
+            return made
+        return self.cache.messages(work, made)
+
     def record(self, request: "Exchange", key: ApiKey | None) -> None:
-        """Log and count a finished request."""
-        route = request.scope.get("route")
-        path = getattr(route, "path", "other")
-        self.metrics.requests.labels(path, str(request.status)).inc()
+        """Log, count and trace a finished request."""
+        self.metrics.requests.labels(request.route, str(request.status)).inc()
         self.metrics.sent_bytes.inc(request.n_bytes)
         if request.first_byte_s is not None and request.status == 200:
-            self.metrics.first_byte.labels(path).observe(request.first_byte_s)
-        LOG.info(json.dumps({
-            "event": "request", "id": request.id, "method": request.scope.get("method", "WS"), "path": path,
-            "status": request.status, "key": key.name if key else None, "bytes": request.n_bytes,
-            "first_byte_s": round(request.first_byte_s, 4) if request.first_byte_s is not None else None,
-            "seconds": round(request.age_s, 4),
-        }))  # fmt: skip
+            self.metrics.first_byte.labels(request.route).observe(request.first_byte_s)
+        log_event(
+            "request", id=request.id, method=request.method, path=request.route, status=request.status,
+            code=request.code, key=key.name if key else None, bytes=request.n_bytes,
+            first_byte_s=round(request.first_byte_s, 4) if request.first_byte_s is not None else None,
+            seconds=round(request.age_s, 4), cut=request.is_cut,
+        )  # fmt: skip
+        if self.tracing is not None:
+            self.tracing.record(request)
+
+
+def _log_spoken(message: Message) -> None:
+    content = json.loads(message.payload)
+    if content.get("text"):
+        log_event("text", text=content["text"])

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.service.live_task import live
+from tts2face.service.live_task import listen, live
 from tts2face.service.messages import Event, Wait
 from tts2face.service.work import Inputs, Work
 from tts2face.types import Chunk
@@ -44,4 +44,5 @@ TASKS: Mapping[str, Callable[["Session", Work, Inputs], Iterator[Chunk | Event |
     "file": stream_file,
     "speech": timed_speech,
     "live": live,
+    "listen": listen,
 }

@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lexicon.errors import BackendError
-from tts2face.batch.render_process import KINDS
+from tts2face.batch.render_process import KINDS as ERROR_KINDS
 from tts2face.child_process import child_environment
-from tts2face.service.messages import HEADER, MAX_PAYLOAD_BYTES, Message, MessageKind
+from tts2face.service.logs import REQUEST_ID
+from tts2face.service.messages import DEFECT, HEADER, MAX_PAYLOAD_BYTES, Message, MessageKind
 from tts2face.service.work import Work
 
 PAUSE_BYTES = 8 << 20  # of a result that nobody has read yet, beyond which its task is paused
@@ -20,6 +21,13 @@ RESUME_BYTES = 2 << 20
 
 class ProcessEndedError(BackendError):
     """The synthesis process ended; the request may be repeated."""
+
+
+class DefectError(BackendError):
+    """A defect of the synthesis; the log has its traceback."""
+
+
+KINDS = ERROR_KINDS | {DEFECT: DefectError}  # of errors of a synthesis process
 
 
 @dataclass(slots=True)
@@ -49,6 +57,7 @@ class WarmProcess:
         self._number = 0
         self.is_ready = False
         self.is_closed = False
+        self.on_cancelled: Callable[[float], None] = _ignore  # called with the seconds until a task was released
         self.load = 0.0  # sum of the costs of its tasks
 
     @property
@@ -93,7 +102,9 @@ class WarmProcess:
         self._results[number] = result
         is_done, forwarding = False, None
         try:
-            await self._command({"do": "start", "task": number, "work": work.as_json(), "priority": priority})
+            await self._command({
+                "do": "start", "task": number, "work": work.as_json(), "priority": priority, "id": REQUEST_ID.get(),
+            })  # fmt: skip
             if inputs is not None:
                 forwarding = asyncio.create_task(self._forward(number, inputs))
             while not is_done:
@@ -131,16 +142,18 @@ class WarmProcess:
         while True:
             try:
                 head = await child.stdout.readexactly(HEADER.size)
-                number, kind, length = HEADER.unpack(head)
+                number, kind, length, seconds = HEADER.unpack(head)
                 if length > MAX_PAYLOAD_BYTES:
                     return
                 payload = await child.stdout.readexactly(length)
             except (asyncio.IncompleteReadError, ConnectionError):
                 return
-            message = Message(number, MessageKind(kind), payload)
+            message = Message(number, MessageKind(kind), payload, seconds)
             if message.kind == MessageKind.READY:
                 self.is_ready = True
                 self._on_change()
+            elif message.kind == MessageKind.CANCELLED:
+                self.on_cancelled(json.loads(payload)["seconds"])
             elif number in self._results:
                 await self._arrived(number, message)
 
@@ -175,3 +188,7 @@ class WarmProcess:
             await child.wait()
         for result in self._results.values():
             result.messages.put_nowait(None)
+
+
+def _ignore(_: float) -> None:
+    pass

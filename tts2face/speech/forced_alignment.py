@@ -6,7 +6,7 @@ the model. An `Aligner` is not thread-safe.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +53,13 @@ class Alignment:
     words: tuple[WordSpan, ...]
     confidence: float
     scores: NDArray[np.float64]
+
+
+class SpeechAligner(Protocol):
+    """Whatever aligns as `Aligner` does, for instance in another process."""
+
+    def align(self, sound: Waveform, words: Sequence[tuple[str, Pronunciations]]) -> Alignment:
+        """As `Aligner.align`."""
 
 
 class Aligner:

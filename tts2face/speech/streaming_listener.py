@@ -86,6 +86,11 @@ class StreamingAudioMap:
         self._features: NDArray[np.float32] = np.zeros((0, len(audio_map.mean)), np.float32)
 
     @property
+    def n_samples(self) -> int:
+        """Number of samples added so far."""
+        return self._feature_stream.n_samples
+
+    @property
     def look_ahead_s(self) -> float:
         """Seconds of sound after a frame that are needed to compute its parameters."""
         return self._audio_map.after / self._fps + (HALF_WINDOW_SAMPLES + 2) / FEATURE_RATE

@@ -107,6 +107,16 @@ def _name_prefix(target: Path) -> str:
 
 
 def _create(target: Path, is_folder: bool) -> Path:
+    """A new file or folder; another process that takes it for abandoned may remove it before it is locked."""
+    while True:
+        try:
+            return _create_once(target, is_folder)
+        except FileNotFoundError:
+            if not target.parent.is_dir():
+                raise
+
+
+def _create_once(target: Path, is_folder: bool) -> Path:
     if is_folder:
         folder = Path(tempfile.mkdtemp(prefix=_name_prefix(target), dir=target.parent))
         folder.chmod(0o755)

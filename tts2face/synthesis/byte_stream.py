@@ -1,6 +1,7 @@
 """Clips as the bytes of a file that is sent while it is made: a movie, sound, or lines of text."""
 
 import io
+import tempfile
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +9,7 @@ from pathlib import Path
 from lexicon.errors import InputError
 from tts2face.exports.formats import FORMATS
 from tts2face.exports.parts import FormatWriter, FrameGrid
-from tts2face.exports.writer import ExportFile, make_target
+from tts2face.exports.writer import ExportFile, ExportWriter, make_target, plan_exports
 from tts2face.models.face import Face
 from tts2face.render.movie_stream import MOVIE_KINDS, encode_movie, find_movie_kind
 from tts2face.render.picture import Picture
@@ -18,12 +19,14 @@ from tts2face.synthesis.prepared_request import PreparedRequest
 from tts2face.synthesis.session_models import SessionModels
 from tts2face.types import Chunk
 
+BLOCK_BYTES = 1 << 18  # of a file that is read when it is complete
 LINE_FORMATS = {one.name: one for one in FORMATS if one.has_lines}
 MEDIA_TYPES = {
     **{name: kind.media_type for name, kind in MOVIE_KINDS.items()},
     **{name: kind.media_type for name, kind in SOUND_KINDS.items()},
     **dict.fromkeys(LINE_FORMATS, "application/jsonl"),
     "livelink": "text/csv",
+    "glb": "model/gltf-binary",
 }  # of the formats of `Session.stream_file`
 
 
@@ -65,8 +68,29 @@ def encode_stream(prepared: PreparedRequest, models: SessionModels, format: Stre
         if request.audio is None:
             return encode_sound(sounds(prepared, models.for_request(request)), name)
         return encode_sound((piece.clip.speech.waveform for piece in models.pieces(prepared)), name)
+    if name not in LINE_FORMATS:
+        return encode_whole(models.pieces(prepared), name, models.face(has_gestures=request.has_gestures).mesh)
     face = models.face(has_gestures=request.has_gestures) if LINE_FORMATS[name].uses_face else None
     return encode_lines(models.pieces(prepared), name, None if face is None else face.mesh)
+
+
+def encode_whole(pieces: Iterable[Piece], format: str, face: Face) -> Iterator[Chunk]:
+    """Write pieces in a format of a mesh, whose file begins with the number of frames: bytes come after the last one.
+
+    Raises
+    ------
+    InputError, BackendError
+        As `ExportWriter`.
+    """
+    with tempfile.TemporaryDirectory(prefix="tts2face-") as folder:
+        path = Path(folder, f"clip.{format}")
+        with ExportWriter(plan_exports([path]), face=face) as writer:
+            for piece in pieces:
+                writer.add(piece.clip, piece.text)
+                yield Chunk(b"", piece.clip.speech.waveform.duration)
+        with path.open("rb") as file:
+            while block := file.read(BLOCK_BYTES):
+                yield Chunk(block)
 
 
 class LineBuffer(io.StringIO):

@@ -80,13 +80,14 @@ class Piece:
 class SynthesisModels:
     """Models from which clips are synthesised: talker, the talker's exemplars, face, and voices.
 
-    ``voice`` returns the voice of a name and a language.
+    ``voice`` returns the voice of a name and a language; ``give_way`` is called between the steps of a piece.
     """
 
     talker: Talker
     exemplars: ExemplarModel
     face: AnimatedFace
     voice: Voices
+    give_way: Callable[[], None] = lambda: None
 
 
 def pieces(prepared: PreparedRequest, models: SynthesisModels, layer: GestureLayer | None) -> Iterator[Piece]:
@@ -140,8 +141,10 @@ def pieces_from(
         speech, begin = pad_to_frame(spoken.speech, first_frame, fps), float(first_frame / fps)
         timeline = spoken.timeline.restrict(0.0, speech.waveform.duration).shift(begin)
         n_frames = frame_count(speech.waveform.duration, float(fps))
+        models.give_way()
         selection = select_tokens(speech.phones, models.exemplars, prepared.options)
         lips = models.face.motion_of_tokens(selection, fps=float(fps), n_frames=n_frames)
+        models.give_way()
         clip = _with_sound(_with_gestures(speech, lips, timeline, layer), spoken.sound)
         first_frame += n_frames
         explain = _explanation(selection, models.exemplars, begin)

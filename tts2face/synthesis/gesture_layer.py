@@ -1,5 +1,6 @@
 """Gestures of a request, added to the speech motion of its clip."""
 
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
@@ -25,14 +26,25 @@ def default_style(palette: Palette) -> str:
 class GestureLayer:
     """Gestures of one clip, added piece by piece.
 
+    Parameters
+    ----------
+    give_way
+        Called between the steps of a piece.
+
     Raises
     ------
     InputError, DataError
         The palette lacks a style of the request, or the face cannot move a feature for which a gain is given.
     """
 
-    def __init__(self, prepared: PreparedRequest, fields: GestureFields, face: AnimatedFace) -> None:
-        self._requested, self._face = prepared.timeline, face
+    def __init__(
+        self,
+        prepared: PreparedRequest,
+        fields: GestureFields,
+        face: AnimatedFace,
+        give_way: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._requested, self._face, self._give_way = prepared.timeline, face, give_way
         palette, request = fields.palette, prepared.request
         self._requested.check_styles(palette)
         for style in marked_styles(prepared.text):
@@ -64,6 +76,7 @@ class GestureLayer:
         timeline = self._requested.merge(self._marked)
         self._seconds += len(lips) / lips.fps
         gestures = _gaze_relative_to_head(self._stream.result().next(speech.waveform, len(lips), timeline))
+        self._give_way()
         gains = {name: timeline.gains.of(name) for name in SPEECH_GAINS}
         moved = self._face.add_gestures(lips, gestures, gains)
         return Clip(moved.face, moved.head, speech)

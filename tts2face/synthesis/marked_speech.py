@@ -22,7 +22,7 @@ from tts2face.gesture.notation import parse_style
 from tts2face.gesture.spans import Nod, StyleSpan
 from tts2face.gesture.timeline import Timeline
 from tts2face.request import RATE_LIMITS, VOLUME_LIMITS, Request
-from tts2face.synthesis.speech_joining import join_utterances, resampled_speech, silent_speech
+from tts2face.synthesis.speech_joining import join_utterances, resampled_speech, silent_speech, trim_end
 from tts2face.synthesis.word_times import LetterTimes, SentenceTimes, WordTimes
 from tts2face.types import Speech, Waveform, concatenate_speech, frame_count
 from tts2face.voice.engine import ENGLISH_CODES, VOICE_NAMES, SpeechInput, SpokenWord, Voice, apply_volume
@@ -93,7 +93,7 @@ def speak_sentence(voice: Voice, sentence: Sentence, request: Request, voices: V
     for part in sentence.utterances:
         speaker = speaker_of(part, voice, request, voices)
         speech = speaker.speak(_content(part), rate=request.rate * part.rate, seed=request.seed)
-        speech = resampled_speech(speech, voice.sample_rate)
+        speech = _ended(resampled_speech(speech, voice.sample_rate), sentence, part)
         language = part.language or request.language
         times_of_part = WordTimes(part.source, speech.phones, speech.words, language=language, first=part.first)
         spoken.append(speech)
@@ -117,8 +117,14 @@ def sentence_sound(voice: Voice, sentence: Sentence, request: Request, voices: V
     speaker = speaker_of(part, voice, request, voices)
     sound = speaker.sound(_content(part), rate=request.rate * part.rate, seed=request.seed)
     whole = Speech(sound, PhoneSequence([SILENCE], [0.0, sound.duration]), ())
-    levelled = level_speech([resampled_speech(whole, voice.sample_rate)], [request.volume * np.ones(1)])
+    whole = _ended(resampled_speech(whole, voice.sample_rate), sentence, part)
+    levelled = level_speech([whole], [request.volume * np.ones(1)])
     return _join_sentence(levelled, sentence, voice.sample_rate)[0].waveform
+
+
+def _ended(speech: Speech, sentence: Sentence, part: Phrase) -> Speech:
+    """Speech of a phrase with little silence after it if the written sentence continues after its last phrase."""
+    return trim_end(speech) if sentence.is_cut and part is sentence.utterances[-1] else speech
 
 
 def _content(part: Phrase) -> SpeechInput:

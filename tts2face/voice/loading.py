@@ -4,10 +4,17 @@ from pathlib import Path
 
 from lexicon.errors import InputError
 from lexicon.languages import language_code
-from tts2face.voice.engine import ENGLISH_CODES, VOICE_NAMES, PronunciationMap, Voice
+from tts2face.speech.forced_alignment import SpeechAligner
+from tts2face.voice.engine import ENGLISH_CODES, VOICE_NAMES, NativeRun, PronunciationMap, Voice
 
 
-def load_voice(name: str | None, language: str, own_words: PronunciationMap | None = None) -> Voice:
+def load_voice(
+    name: str | None,
+    language: str,
+    own_words: PronunciationMap | None = None,
+    aligner: SpeechAligner | None = None,
+    run: NativeRun | None = None,
+) -> Voice:
     """Load a voice by name, or the default voice of a language.
 
     Parameters
@@ -18,6 +25,10 @@ def load_voice(name: str | None, language: str, own_words: PronunciationMap | No
         Code, tag or English name, see `lexicon.languages.language_code`.
     own_words
         A user's pronunciations, which take precedence over those of the voice.
+    aligner
+        Aligns the sound of voices that report no edges; None for an aligner of each voice.
+    run
+        Runs the model of the voice heart; None: within the call.
 
     Raises
     ------
@@ -35,7 +46,7 @@ def load_voice(name: str | None, language: str, own_words: PronunciationMap | No
             raise InputError(f"the voice heart speaks English, not {language}; choose --voice espeak")
         from tts2face.voice.neural import NeuralVoice
 
-        return NeuralVoice(own_words or {})
+        return NeuralVoice(own_words or {}, aligner, run)
     if chosen in {"espeak", "espeak-female"}:
         from tts2face.voice.espeak import EspeakVoice
 
@@ -43,7 +54,7 @@ def load_voice(name: str | None, language: str, own_words: PronunciationMap | No
     if chosen.endswith(".onnx"):
         from tts2face.voice.piper import PiperVoice
 
-        return PiperVoice(Path(chosen), language, own_words or {})
+        return PiperVoice(Path(chosen), language, own_words or {}, aligner)
     raise InputError(
         f"there is no voice {chosen!r}; give {', '.join(VOICE_NAMES)}, or the path of a Piper voice (.onnx)"
     )

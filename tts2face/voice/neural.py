@@ -14,10 +14,10 @@ from lexicon.errors import BackendError, DataError, InputError
 from lexicon.ipa import Segment
 from lexicon.phones import nearest_phones
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tts2face.speech.forced_alignment import Aligner, enforce_increasing
+from tts2face.speech.forced_alignment import Aligner, SpeechAligner, enforce_increasing
 from tts2face.telemetry import disable_telemetry
 from tts2face.types import Speech, Waveform, concatenate_speech
-from tts2face.voice.engine import PronunciationMap, SpeechInput, SpokenWord, apply_volume
+from tts2face.voice.engine import NativeRun, PronunciationMap, SpeechInput, SpokenWord, apply_volume
 
 MAX_LETTERS = 400  # the model accepts at most this many letters in one call
 DURATION_STEP_S = 0.025  # length of one step of the model's durations
@@ -54,9 +54,19 @@ class _Token:
 
 
 class NeuralVoice:
-    """The voice ``heart``: American English, 24 kHz. Not thread-safe."""
+    """The voice ``heart``: American English, 24 kHz. Not thread-safe.
 
-    def __init__(self, own_words: PronunciationMap) -> None:
+    Parameters
+    ----------
+    aligner
+        Aligns its sound with its phones; None for an aligner of its own.
+    run
+        Runs the model; None: within the call.
+    """
+
+    def __init__(
+        self, own_words: PronunciationMap, aligner: SpeechAligner | None = None, run: NativeRun | None = None
+    ) -> None:
         self._own_words = {word: segments_to_letters(segments) for word, segments in own_words.items()}
         disable_telemetry()
         try:
@@ -64,8 +74,9 @@ class NeuralVoice:
         except ImportError as missing:
             raise BackendError("the voice heart needs hibari-tts; run: pip install hibari-tts") from missing
         self._model: Any = Hibari(voice="heart", threads=1)
-        self._model.sess = _session_without_arena(self._model.model_path)
-        self._aligner = Aligner()
+        session = _session_without_arena(self._model.model_path)
+        self._model.sess = session if run is None else _OwnRun(session, run)
+        self._aligner: SpeechAligner = aligner or Aligner()
 
     @property
     def sample_rate(self) -> int:
@@ -193,6 +204,30 @@ class NeuralVoice:
         }
         steps: NDArray[np.float64] = np.asarray(session.run([DURATION_TENSOR], inputs)[0], np.float64).ravel()
         return steps
+
+
+@dataclass(frozen=True, slots=True)
+class _OwnRun:
+    """An ONNX session whose runs can be ended."""
+
+    session: Any
+    native_run: NativeRun
+
+    def run(self, names: Any, inputs: Any) -> Any:
+        """Outputs of the model."""
+        import onnxruntime
+
+        options = onnxruntime.RunOptions()
+        options.log_severity_level = 4  # fatal errors; an end is none
+
+        def end() -> None:
+            options.terminate = True
+
+        return self.native_run(lambda: self.session.run(names, inputs, options), end)
+
+    def __getattr__(self, name: str) -> Any:
+        """Other attributes of the session."""
+        return getattr(self.session, name)
 
 
 def _session_without_arena(path: str) -> Any:

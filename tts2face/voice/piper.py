@@ -16,7 +16,7 @@ from lexicon.inputs import read_json
 from lexicon.languages import language_code
 from lexicon.phones import PHONES, nearest_phones
 from lexicon.writing_systems import check_script
-from tts2face.speech.forced_alignment import Aligner
+from tts2face.speech.forced_alignment import Aligner, SpeechAligner
 from tts2face.telemetry import disable_telemetry
 from tts2face.types import Speech, Waveform
 from tts2face.voice.engine import PronunciationMap, SpeechInput, SpokenWord, apply_volume
@@ -42,7 +42,9 @@ class PiperVoice:
         piper-tts is not installed.
     """
 
-    def __init__(self, path: Path, language: str, own_words: PronunciationMap) -> None:
+    def __init__(
+        self, path: Path, language: str, own_words: PronunciationMap, aligner: SpeechAligner | None = None
+    ) -> None:
         if not path.is_file():
             raise InputError(f"there is no Piper voice {path}; check the path")
         settings = path.with_name(path.name + ".json")
@@ -59,7 +61,8 @@ class PiperVoice:
         self._path, self._model = path, _load_model(path, settings)
         self._letters = frozenset(content["phoneme_id_map"])
         self._phones = tuple(phone for phone in PHONES if self._letters.issuperset(_letters(phone)))
-        self._own_words, self._aligner = own_words, Aligner()
+        self._own_words = own_words
+        self._aligner: SpeechAligner = aligner or Aligner()
 
     @property
     def sample_rate(self) -> int:

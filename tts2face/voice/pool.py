@@ -6,8 +6,9 @@ from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from tts2face.speech.forced_alignment import SpeechAligner
 from tts2face.types import Speech, Waveform
-from tts2face.voice.engine import PronunciationMap, SpeechInput, Voice
+from tts2face.voice.engine import NativeRun, PronunciationMap, SpeechInput, Voice
 from tts2face.voice.loading import load_voice
 
 MAX_VOICES = 2  # unused voices in memory; about 100 MB each
@@ -18,9 +19,18 @@ class VoicePool:
     """Voices that stay loaded, the last `MAX_VOICES` that nobody uses. Safe from several threads.
 
     Each call of a voice has a loaded voice to itself, so that requests that take turns share one.
+
+    Parameters
+    ----------
+    aligner
+        Thread-safe aligner of all voices, during whose work other requests may use the same voice: they take turns, and
+        only this wait, and runs of models, lie within a call. None: each voice has its own.
+    run
+        Runs the models of voices.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, aligner: SpeechAligner | None = None, run: NativeRun | None = None) -> None:
+        self._aligner, self._native_run = aligner, run
         self._lock = threading.Lock()
         self._unused: list[tuple[Hashable, Voice]] = []  # the newest at the end
         self._kept: OrderedDict[Hashable, Speech] = OrderedDict()
@@ -41,9 +51,16 @@ class VoicePool:
             As `load_voice`.
         """
         key = (name, language, frozenset(dictionary.items()))
-        shared = _SharedVoice(self, key, lambda: load_voice(name, language, dictionary), keeps_utterances)
+        shared = _SharedVoice(
+            self, key, lambda: load_voice(name, language, dictionary, self._aligner, self._native_run), keeps_utterances
+        )
         with self.borrow(key, shared.load):  # an unknown voice is refused at once
             return shared
+
+    def give_way(self) -> None:
+        """Let other requests take their turn, between two steps of a synthesis."""
+        if self._native_run is not None:
+            self._native_run(_nothing, _nothing)
 
     @contextmanager
     def borrow(self, key: Hashable, load: Callable[[], Voice]) -> Iterator[Voice]:
@@ -52,12 +69,19 @@ class VoicePool:
             found = next((at for at, (kept, _) in enumerate(self._unused) if kept == key), None)
             voice = None if found is None else self._unused.pop(found)[1]
         voice = voice or load()
+        if self._aligner is not None:
+            self._put_back(key, voice)
+            yield voice
+            return
         try:
             yield voice
         finally:
-            with self._lock:
-                self._unused.append((key, voice))
-                del self._unused[:-MAX_VOICES]
+            self._put_back(key, voice)
+
+    def _put_back(self, key: Hashable, voice: Voice) -> None:
+        with self._lock:
+            self._unused.append((key, voice))
+            del self._unused[:-MAX_VOICES]
 
     def keep(self, key: Hashable, speech: Speech) -> None:
         """Keep an utterance."""
@@ -70,6 +94,10 @@ class VoicePool:
         """A kept utterance, which is then forgotten; None if there is none."""
         with self._lock:
             return self._kept.pop(key, None)
+
+
+def _nothing() -> None:
+    pass
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,239 @@
+"""Latency and throughput of a running `tts2face serve`: first bytes, live curves, lateness, cancelling.
+
+Run: ``python tests/bench/bench_service.py [--quick]``. It starts a server of its own on this machine, with one process
+for each core, and prints the tables of docs/performance.md. As a reference it measures the same synthesis in this
+process before and after, so that the load of the machine shows.
+"""
+
+import argparse
+import asyncio
+import functools
+import json
+import os
+import random
+import re
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Awaitable, Callable, Sequence
+from pathlib import Path
+
+import httpx
+import numpy as np
+import websockets
+
+VOICE_TEXT = "We were away a year ago, but Bob may move five big maps before we go."  # 5 s of speech
+LONG_TEXT = " ".join(["the garden behind the old house near the river had been green for years and nobody knew"] * 12)
+CLIENTS = (1, 4, 16, 64)
+LEAVE_AFTER_S = 2.0  # clients leave at a random time until then
+LIVE_S = 20.0
+Measure = Callable[[str], Awaitable[float]]
+
+
+def start_server() -> tuple[subprocess.Popen[bytes], str]:
+    """A server and its address, when it is ready."""
+    folder = tempfile.mkdtemp(prefix="tts2face-bench-")
+    command = [sys.executable, "-m", "tts2face", "serve", "--port", "0"]
+    settings = {"TTS2FACE_SERVE_WAITING": "256", "TTS2FACE_SERVE_DATA": folder, "TTS2FACE_SERVE_WORKERS": "0"}
+    log = Path(folder, "log")
+    with log.open("w") as file:
+        server = subprocess.Popen(command, stderr=file, env=os.environ | settings)
+    found: list[str] = []
+    while not found:
+        time.sleep(0.1)
+        found = re.findall(r'"url": ?"(http[^"]+)"', log.read_text())
+        assert server.poll() is None, log.read_text()
+    url = found[0]
+    while httpx.get(f"{url}/readyz").status_code != 200:
+        time.sleep(0.1)
+    while measure(url, "tts2face_processes_ready") < (os.cpu_count() or 1):
+        time.sleep(0.1)
+    return server, url
+
+
+def measure(url: str, name: str) -> float:
+    """Value of a metric."""
+    lines = httpx.get(f"{url}/metrics").text.splitlines()
+    return next(float(line.split()[-1]) for line in lines if line.startswith(name))
+
+
+def first_byte(path: str, body: dict[str, object]) -> Measure:
+    """Measure of the seconds until the first byte of a body; the rest is read, too."""
+
+    async def run(url: str) -> float:
+        begin, found = time.perf_counter(), 0.0
+        async with client().stream("POST", f"{url}{path}", json=body) as answer:
+            assert answer.status_code == 200, await answer.aread()
+            async for chunk in answer.aiter_raw():
+                if chunk and not found:
+                    found = time.perf_counter() - begin
+        return found
+
+    return run
+
+
+@functools.cache
+def _client_of(_: asyncio.AbstractEventLoop) -> httpx.AsyncClient:
+    return httpx.AsyncClient(timeout=600, limits=httpx.Limits(max_connections=None))
+
+
+def client() -> httpx.AsyncClient:
+    """Client of the running event loop: making one takes longer than a short sentence."""
+    return _client_of(asyncio.get_running_loop())
+
+
+async def live_curves(url: str) -> float:
+    """Seconds from the last word of a sentence to its first curves."""
+    async with websockets.connect(f"{url.replace('http', 'ws', 1)}/v1/stream", max_size=None) as connection:
+        await connection.send(json.dumps({"type": "start", "with_idle": False}))
+        for word in ["Hello", "there,", "how", "are", "you", "today?"]:
+            await connection.send(json.dumps({"type": "text", "text": f"{word} "}))
+            await asyncio.sleep(0.02)
+        begin = time.perf_counter()
+        await connection.send('{"type": "flush"}')
+        while True:
+            message = await connection.recv()
+            if isinstance(message, str) and json.loads(message)["type"] == "curves":
+                return time.perf_counter() - begin
+
+
+async def lateness(url: str, seconds: float = LIVE_S) -> list[float]:
+    """Seconds by which the curves of each event come after the instant on the clock of the stream at which they begin.
+
+    A living face, with a sentence every four seconds.
+    """
+    found: list[float] = []
+    async with websockets.connect(f"{url.replace('http', 'ws', 1)}/v1/stream", max_size=None) as connection:
+        await connection.send(json.dumps({"type": "start"}))
+        began, spoken = 0.0, 0
+        while not began or time.perf_counter() < began + seconds:
+            message = await connection.recv()
+            content = {"type": "sound"} if isinstance(message, bytes) else json.loads(message)
+            if content["type"] != "curves":
+                continue
+            now = time.perf_counter()
+            began = began or now - content["begin"]
+            found.append(max(0.0, now - (began + content["begin"])))
+            if now > began + 4.0 * spoken:
+                spoken += 1
+                await connection.send('{"type": "text", "text": "Hello there, how are you today?"}')
+                await connection.send('{"type": "flush"}')
+    return found
+
+
+async def cancel(url: str) -> float:
+    """Seconds from the arrival of `cancel` at a synthesis process to the end of what it cancels."""
+    async with websockets.connect(f"{url.replace('http', 'ws', 1)}/v1/stream", max_size=None) as connection:
+        await connection.send(json.dumps({"type": "start", "with_idle": False}))
+        await connection.send(json.dumps({"type": "text", "text": LONG_TEXT}))
+        await connection.send('{"type": "flush"}')
+        await asyncio.sleep(random.uniform(0.0, LEAVE_AFTER_S))
+        await connection.send('{"type": "cancel"}')
+        while True:
+            message = await connection.recv()
+            if isinstance(message, str) and (content := json.loads(message))["type"] == "cancelled":
+                return float(content["after_ms"]) / 1000
+
+
+async def leave(url: str) -> float:
+    """A client of a clip that leaves; the server measures what follows."""
+    body = {"text": LONG_TEXT, "size": "256x256"}
+    try:
+        async with asyncio.timeout(random.uniform(0.1, LEAVE_AFTER_S)):
+            await first_byte("/v1/clips", body)(url)
+    except TimeoutError:
+        pass
+    return 0.0
+
+
+def repeat(url: str, one: Measure, clients: int, rounds: int) -> list[float]:
+    """Results of a number of clients at once, some rounds one after another."""
+
+    async def run() -> list[float]:
+        client()
+        return [value for _ in range(rounds) for value in await asyncio.gather(*(one(url) for _ in range(clients)))]
+
+    return asyncio.run(run())
+
+
+def row(*cells: object) -> None:
+    """Print a row of a table."""
+    print("|", " | ".join(f"{cell:.3f}" if isinstance(cell, float) else str(cell) for cell in cells), "|", flush=True)
+
+
+def percentiles(values: Sequence[float]) -> list[float]:
+    """50th, 95th and 99th percentile, and the largest value."""
+    return [*(float(np.percentile(values, share)) for share in (50, 95, 99)), max(values)]
+
+
+def reference() -> float:
+    """Seconds that this process takes for the sentence, without server."""
+    import tts2face
+
+    session, found = tts2face.Session(), []
+    for _ in range(4):
+        begin = time.perf_counter()
+        session.clip(VOICE_TEXT)
+        found.append(time.perf_counter() - begin)
+    return statistics.median(found[1:])
+
+
+def main() -> None:
+    """Print the tables of docs/performance.md."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="fewer rounds")
+    rounds = 2 if parser.parse_args().quick else 5
+    print(f"in this process: {reference():.3f} s for 5 s of speech, load {os.getloadavg()[0]:.1f}", flush=True)
+    server, url = start_server()
+    try:
+        speech = {"input": VOICE_TEXT, "voice": "alloy", "model": "tts-1"}
+        kinds: dict[str, Measure] = {
+            "voice, 5 s (wav)": first_byte("/v1/audio/speech", speech | {"response_format": "wav"}),
+            "voice, 5 s (mp3)": first_byte("/v1/audio/speech", speech),
+            "clip, 5 s (mp4)": first_byte("/v1/clips", {"text": VOICE_TEXT, "size": "256x256"}),
+            "live curves after the last word": live_curves,
+        }
+        row("first bytes", "clients", "p50", "p95", "p99", "max")
+        row(*["---"] * 6)
+        for name, one in kinds.items():
+            for clients in CLIENTS if not name.startswith("clip") else CLIENTS[:2]:
+                row(name, clients, *percentiles(repeat(url, one, clients, max(1, 4 * rounds // clients))))
+        for format in ("wav", "curves", "mp4"):
+            one = first_byte("/v1/clips", {"text": LONG_TEXT, "format": format, "size": "64x64", "supersampling": 1})
+            row(f"200 words without a point ({format})", 1, *percentiles(repeat(url, one, 1, rounds)))
+        for streams in (1, 8):
+            found = asyncio.run(_gather_lateness(url, streams))
+            row("lateness of live curves", streams, *percentiles(found))
+        row("cancel in a sentence, at the process", 1, *percentiles(repeat(url, cancel, 1, 8 * rounds)))
+        row("cancel in a sentence, at the process", 8, *percentiles(repeat(url, cancel, 8, rounds)))
+        repeat(url, leave, 4, 4 * rounds)
+        time.sleep(5.0)
+        for bound in ("0.025", "0.05", "0.1"):
+            share = measure(url, f'tts2face_cancel_seconds_bucket{{le="{bound}"}}')
+            print(f"clients that left: {share:g} of {measure(url, 'tts2face_cancel_seconds_count'):g} within {bound} s")
+        for name, body in {
+            "voice": {"format": "wav"},
+            "curves": {"format": "curves"},
+            "movie": {"size": "256x256"},
+        }.items():
+            repeat(url, first_byte("/v1/clips", {"text": VOICE_TEXT} | body), 2, 1)
+            before, begin = measure(url, "tts2face_speech_seconds_total"), time.perf_counter()
+            repeat(url, first_byte("/v1/clips", {"text": VOICE_TEXT} | body), 8, 1 if rounds < 5 else 2)
+            seconds = time.perf_counter() - begin
+            made = measure(url, "tts2face_speech_seconds_total") - before
+            print(f"{name}: {made / seconds / (os.cpu_count() or 1):.2f} streams in real time per core", flush=True)
+    finally:
+        server.terminate()
+        server.wait()
+    print(f"in this process: {reference():.3f} s for 5 s of speech, load {os.getloadavg()[0]:.1f}")
+
+
+async def _gather_lateness(url: str, streams: int) -> list[float]:
+    found = await asyncio.gather(*(lateness(url) for _ in range(streams)))
+    return [value for one in found for value in one]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,248 @@
+"""Jobs of the service in the database: queued once, ended once, files removed with their last job, webhooks leased."""
+
+import threading
+import uuid
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("dbos", reason="needs the extra [batch]")
+
+from tts2face.batch.store import open_store
+from tts2face.jobs import job_client
+from tts2face.jobs.blobs import open_blobs
+from tts2face.jobs.connection import DatabaseAwayError, JobDatabase
+from tts2face.jobs.database import database_url, prepare_database
+from tts2face.jobs.engine import _enqueue_options, open_client
+from tts2face.jobs.job_changes import Ending, JobChanges
+from tts2face.jobs.job_client import JobClient
+from tts2face.jobs.job_records import JobFile, NewJob
+from tts2face.jobs.job_runner import JobRunner, job_blobs
+from tts2face.jobs.job_table import OtherBodyError, QueueFullError
+
+
+@pytest.fixture
+def client(database: str, tmp_path: Path) -> Iterator[JobClient]:
+    url = database_url(database)
+    prepare_database(url)
+    made = JobClient(url, open_blobs(tmp_path / "store", "results"))
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def changes(database: str) -> Iterator[JobChanges]:
+    connections = JobDatabase(database_url(database))
+    yield JobChanges(connections)
+    connections.close()
+
+
+def new_job(owner: str = "ann", **fields: Any) -> NewJob:
+    return replace(NewJob(uuid.uuid4().hex, owner, "clip", {"text": "Hi."}, "0" * 64), **fields)
+
+
+def ended(client: JobClient, changes: JobChanges, *contents: bytes, owner: str = "ann") -> str:
+    """A job that is done, with results of these contents."""
+    record, _ = client.submit(new_job(owner))
+    files = tuple(JobFile(f"{number}.bin", client.blobs.put(one)) for number, one in enumerate(contents))
+    assert changes.begin(record.id) is not None
+    assert changes.end(record.id, Ending("done", files))
+    return record.id
+
+
+def test_a_job_is_queued_with_its_files_and_events(client: JobClient, database: str) -> None:
+    given = new_job(inputs=(JobFile("audio.wav", "ab" * 32, "audio/wav", 7),))
+    record, is_new = client.submit(given)
+    assert is_new
+    assert client.table.get(record.id) == record
+    assert (record.state, record.kind, record.request, record.inputs) == (
+        "waiting",
+        "clip",
+        {"text": "Hi."},
+        given.inputs,
+    )
+    events, may_follow = client.table.events(record.id, 0)
+    assert ([one.number for one in events], may_follow) == ([1], True)
+    with open_client(database_url(database)) as queue:
+        (found,) = queue.list_workflows(workflow_ids=[record.id])
+        assert (found.status, found.name, found.queue_name) == ("ENQUEUED", "run_job", "tts2face-jobs")
+
+
+def test_requests_with_one_idempotency_key_at_once_are_one_job(client: JobClient) -> None:
+    found: list[tuple[str, bool]] = []
+
+    def submit() -> None:
+        record, is_new = client.submit(new_job(idempotency_key="order-17"))
+        found.append((record.id, is_new))
+
+    threads = [threading.Thread(target=submit) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len({name for name, _ in found}) == 1
+    assert [is_new for _, is_new in found].count(True) == 1
+    assert len(client.table.page(None, None, None, 10)) == 1
+    other, is_new = client.submit(new_job("bob", idempotency_key="order-17"))  # of another key
+    assert is_new
+    assert other.id != found[0][0]
+    with pytest.raises(OtherBodyError, match="was sent with another body before; use a new one"):
+        client.submit(new_job(idempotency_key="order-17", body_hash="1" * 64))
+
+
+def test_waiting_jobs_of_an_owner_are_limited(client: JobClient, changes: JobChanges) -> None:
+    first, _ = client.submit(new_job(), 2)
+    client.submit(new_job(), 2)
+    with pytest.raises(QueueFullError, match="the key ann has 2 waiting jobs"):
+        client.submit(new_job(), 2)
+    assert client.submit(new_job("bob"), 2)[1]
+    changes.begin(first.id)
+    assert client.submit(new_job(), 2)[1]
+
+
+def test_pages_follow_each_other(client: JobClient, changes: JobChanges) -> None:
+    names = [client.submit(new_job())[0].id for _ in range(5)]
+    client.submit(new_job("bob"))
+    changes.begin(names[0])
+    pages, before = [], None
+    while page := client.table.page("ann", None, before, 2):
+        pages.append([one.id for one in page])
+        before = page[-1].id
+    assert [len(page) for page in pages] == [2, 2, 1]
+    assert [name for page in pages for name in page] == names[::-1]
+    assert [one.id for one in client.table.page("ann", "running", None, 9)] == names[:1]
+    assert len(client.table.page(None, None, None, 9)) == 6
+
+
+def test_a_job_ends_once(client: JobClient, changes: JobChanges) -> None:
+    record, _ = client.submit(new_job())
+    running = changes.begin(record.id)
+    again = changes.begin(record.id)  # by the worker that takes over
+    assert running is not None
+    assert again is not None
+    assert running.started == again.started
+    assert changes.report(record.id, {"type": "progress", "done": 1, "of": 2})
+    assert changes.end(record.id, Ending("done", (JobFile("clip.mp4", "ab" * 32),)))
+    assert not changes.end(record.id, Ending("failed", error="late"))
+    assert not changes.report(record.id, {"type": "progress", "done": 2, "of": 2})
+    assert not client.cancel(record.id)
+    assert changes.begin(record.id) is None
+    found = client.table.get(record.id)
+    assert found is not None
+    assert (found.state, found.error, found.n_done, len(found.outputs)) == ("done", None, 1, 1)
+    events, may_follow = client.table.events(record.id, 1)
+    assert [one.content.get("state", "progress") for one in events] == ["running", "progress", "done"]
+    assert [one.number for one in events] == [2, 3, 4]
+    assert not may_follow
+
+
+def test_cancelling_ends_the_segments_that_only_this_job_uses(
+    client: JobClient, changes: JobChanges, database: str
+) -> None:
+    first, second = client.submit(new_job())[0].id, client.submit(new_job())[0].id
+    own, shared = "aa" * 32, "bb" * 32
+    with open_client(database_url(database)) as queue:
+        for address in (own, shared):
+            queue.enqueue(_enqueue_options(f"{address}.0", 1), address, {})
+        changes.note_segments(first, [own, shared])
+        changes.note_segments(second, [shared])
+        assert client.table.own_segments(first) == [own]
+        assert client.cancel(first)
+        states = {one.workflow_id: one.status for one in queue.list_workflows()}
+    assert states == {first: "CANCELLED", second: "ENQUEUED", f"{own}.0": "CANCELLED", f"{shared}.0": "ENQUEUED"}
+    found = client.table.get(first)
+    assert found is not None
+    assert found.state == "cancelled"
+    assert changes.begin(first) is None
+
+
+def test_a_file_is_removed_with_the_last_job_that_has_it(client: JobClient, changes: JobChanges) -> None:
+    first = ended(client, changes, b"own", b"shared")
+    second = ended(client, changes, b"shared", owner="bob")
+    own, shared = (client.blobs.put(one) for one in (b"own", b"shared"))
+    assert client.table.file_of(own, "ann") is not None
+    assert client.table.file_of(own, "bob") is None
+    assert client.table.file_of(own, None) is not None
+    client.delete(first)
+    assert client.table.get(first) is None
+    assert (client.blobs.has(own), client.blobs.has(shared)) == (False, True)
+    assert client.table.file_of(shared, "ann") is None
+    client.delete(second)
+    assert not client.blobs.has(shared)
+
+
+def test_files_without_a_job_are_removed(client: JobClient, changes: JobChanges) -> None:
+    ended(client, changes, b"used")
+    client.blobs.put(b"of a refused request")
+    assert client.remove_unused_files(3600.0) == 0
+    assert client.remove_unused_files(-10.0) == 1
+    assert [client.blobs.has(client.blobs.put(one)) for one in (b"used",)] == [True]
+    assert len(list(client.blobs.entries())) == 1
+
+
+def test_keys_take_turns(client: JobClient, database: str) -> None:
+    names = [client.submit(new_job(owner))[0].id for owner in ("ann", "ann", "ann", "bob", "bob")]
+    with open_client(database_url(database)) as queue:
+        found = {one.workflow_id: one.priority for one in queue.list_workflows(name="run_job")}
+    assert [found[name] for name in names] == [1, 2, 3, 1, 2]
+
+
+def test_old_jobs_are_found_by_their_age(client: JobClient, changes: JobChanges) -> None:
+    name = ended(client, changes)
+    client.submit(new_job())
+    assert client.table.ended_before(3600.0) == []
+    assert client.table.ended_before(-1.0) == [name]
+
+
+def test_jobs_are_counted_by_state(client: JobClient, changes: JobChanges) -> None:
+    ended(client, changes)
+    client.submit(new_job())
+    counts, age_s = client.table.counts()
+    assert counts == {"waiting": 1, "running": 0, "done": 1, "failed": 0, "cancelled": 0}
+    assert 0.0 <= age_s < 60.0
+
+
+def test_a_webhook_is_taken_by_one_server_and_sent_again_until_it_arrives(
+    client: JobClient, changes: JobChanges, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(job_client, "FIRST_PAUSE_S", -1.0)  # due at once
+    monkeypatch.setattr(job_client, "MAX_TRIES", 3)
+    record, _ = client.submit(new_job(webhook="https://example.org/done"))
+    assert client.due_webhooks() == []
+    changes.end(record.id, Ending("failed", error="why"))
+    for number in range(3):
+        (delivery,) = client.due_webhooks()
+        assert (delivery.job_id, delivery.n_tries) == (record.id, number)
+        assert client.due_webhooks() == []  # leased
+        client.note_delivery(delivery, is_delivered=False)
+    found = client.table.get(record.id)
+    assert found is not None
+    assert (found.webhook_state, found.webhook_tries) == ("failed", 3)
+    assert client.due_webhooks() == []
+
+
+def test_a_job_whose_workflow_has_ended_without_it_fails_with_the_reason(
+    client: JobClient, database: str, tmp_path: Path
+) -> None:
+    waiting, cancelled, removed = (client.submit(new_job())[0].id for _ in range(3))
+    url, store = database_url(database), str(tmp_path / "store")
+    with open_client(url) as queue:
+        queue.cancel_workflows([cancelled])
+        queue.delete_workflows([removed])
+    JobRunner(url, store, open_store(store), job_blobs(store)).end_abandoned()
+    found = {name: client.table.get(name) for name in (waiting, cancelled, removed)}
+    states = {name: (one.state, one.error) for name, one in found.items() if one is not None}
+    assert states[waiting] == ("waiting", None)
+    assert states[cancelled] == ("failed", "cancelled")
+    assert states[removed] == ("failed", "it was removed from the queue; send it again")
+
+
+def test_a_database_that_is_away_is_named_as_such(tmp_path: Path) -> None:
+    pytest.importorskip("psycopg", reason="needs the extra [postgres]")
+    client = JobClient("postgresql://x@127.0.0.1:1/y", open_blobs(tmp_path, "results"))
+    with pytest.raises(DatabaseAwayError, match=r"the database cannot be reached \("):
+        client.submit(new_job())
+    client.close()

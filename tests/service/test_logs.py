@@ -1,0 +1,160 @@
+"""The log: one safe line for each event, with the id of its request, and without texts unless they are asked for."""
+
+import asyncio
+import json
+import logging
+import signal
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.service.conftest import RunningService
+from tts2face.service.exchange import Receive, Scope, Send
+from tts2face.service.guard import Guard
+from tts2face.service.keys import LOCAL_KEY, add_key, remove_key
+from tts2face.service.logs import LOG, LineFormatter, log_event
+from tts2face.service.messages import Message, MessageKind
+from tts2face.service.settings import ServiceSettings
+from tts2face.service.state import ServiceState
+
+
+def record(message: str, *, name: str = LOG.name, **fields: Any) -> logging.LogRecord:
+    made = logging.LogRecord(name, logging.INFO, "file.py", 1, message, None, None)
+    if fields:
+        made.fields = fields
+    return made
+
+
+def raised(error: Exception) -> Exception:
+    try:
+        raise error
+    except type(error) as caught:
+        return caught
+
+
+HOSTILE = 'a\r\n{"event": "forged"}\x1b[31m\u2028'
+
+
+@pytest.mark.parametrize("format", ["json", "text"])
+def test_nothing_in_a_record_begins_a_line(format: str) -> None:
+    line = LineFormatter(format).format(record("request", path=HOSTILE, code=None))
+    assert line.isascii()
+    assert line.isprintable()
+    library = LineFormatter(format).format(record(HOSTILE, name="uvicorn.error"))
+    assert library.isascii()
+    assert library.isprintable()
+
+
+def test_both_forms_hold_the_same() -> None:
+    made = record("request", status=200, key="studio")
+    as_json = json.loads(LineFormatter("json").format(made))
+    assert (as_json["event"], as_json["level"], as_json["status"], as_json["key"]) == ("request", "info", 200, "studio")
+    assert as_json["time"].endswith("Z")
+    assert LineFormatter("text").format(made) == f'{as_json["time"]} INFO request status=200 key="studio"'
+
+
+def test_messages_of_errors_may_quote_texts_and_are_written_on_request_only(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.INFO, LOG.name):
+        log_event("defect", level=logging.ERROR, error=raised(ValueError("my words")))
+    (made,) = caplog.records
+    plain = json.loads(LineFormatter().format(made))
+    assert plain["error"] == "ValueError"
+    assert any(frame.endswith(" raised") and __file__ in frame for frame in plain["traceback"])
+    assert "my words" not in json.dumps(plain)
+    assert json.loads(LineFormatter(with_text=True).format(made))["error_message"] == "my words"
+    library = record("Task exception was never retrieved\nfuture: my words", name="asyncio")
+    assert "my words" not in LineFormatter().format(library)
+
+
+async def fails(scope: Scope, receive: Receive, send: Send) -> None:
+    """Application with a defect."""
+    raise KeyError("my words")
+
+
+def test_a_defect_is_answered_with_its_id_and_logged_with_its_traceback(caplog: pytest.LogCaptureFixture) -> None:
+    guard = Guard(fails, ServiceState(ServiceSettings(processes=1)))
+
+    async def ask() -> httpx.Response:
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(guard), base_url="http://localhost") as client:
+            return await client.get("/v1/x", headers={"x-request-id": "id-3"})
+
+    with caplog.at_level(logging.INFO, LOG.name):
+        answer = asyncio.run(ask())
+    assert answer.status_code == 500
+    assert answer.headers["x-request-id"] == "id-3"
+    assert answer.json()["error"] == {
+        "message": "internal error: KeyError; the log has it under the id id-3", "type": "server_error",
+        "param": None, "code": "internal",
+    }  # fmt: skip
+    defect, request = caplog.records
+    assert (defect.getMessage(), request.getMessage()) == ("defect", "request")
+    assert any("test_logs.py" in frame for frame in json.loads(LineFormatter().format(defect))["traceback"])
+    assert request.fields["status"] == 500  # type: ignore[attr-defined]
+
+
+class FakePool:
+    """A pool whose works are done at once."""
+
+    async def stream(self, work: Any, key: str, **_: Any) -> AsyncIterator[Message]:
+        yield Message(1, MessageKind.DATA, b"abc", 2.0)
+        yield Message(1, MessageKind.END, b'{"seconds": 2.5, "cpu_s": 0.1}')
+
+
+@pytest.mark.parametrize("log_text", [False, True])
+def test_texts_are_logged_if_the_setting_says_so(caplog: pytest.LogCaptureFixture, log_text: bool) -> None:
+    state = ServiceState(ServiceSettings(processes=1, log_text=log_text))
+    state.pool = FakePool()  # type: ignore[assignment]
+
+    async def make() -> None:
+        async for _ in state.messages(state.work(request={"text": "my words"}), LOCAL_KEY):
+            pass
+
+    with caplog.at_level(logging.INFO, LOG.name):
+        asyncio.run(make())
+    assert [one.fields for one in caplog.records] == ([{"text": "my words"}] if log_text else [])  # type: ignore[attr-defined]
+
+
+def test_every_line_of_a_request_has_its_id_and_none_its_text(service: RunningService) -> None:
+    body = {"text": "Zebras graze quietly.", "style": "gleeful", "format": "curves"}
+    httpx.post(f"{service.url}/v1/clips", json=body, headers={"x-request-id": "id-11"}, timeout=60)
+    made = service.wait_for_event("request", id="id-11")
+    assert (made["status"], made["code"], made["path"]) == (400, "invalid_request", "/v1/clips")
+    assert "Zebras" not in "".join(service.lines)
+    assert all({"time", "level", "event"} <= set(event) for event in service.events())
+
+
+def test_server_timing_names_the_stages(client: httpx.Client) -> None:
+    answer = client.post("/v1/audio/speech", json={"input": "Hello.", "model": "tts-1", "voice": "alloy"})
+    timing = dict(part.split(";dur=") for part in answer.headers["server-timing"].split(", "))
+    assert set(timing) == {"queue", "synthesis", "total"}
+    assert float(timing["queue"]) + float(timing["synthesis"]) <= float(timing["total"]) + 1.0
+
+
+def test_keys_are_read_again_on_sighup(tmp_path: Path) -> None:
+    path = tmp_path / "keys.toml"
+    first = add_key(path, "first", ["speak"])
+    running = RunningService(environment={"TTS2FACE_SERVE_KEYS": str(path)})
+
+    def status(secret: str) -> int:
+        answer = httpx.get(f"{running.url}/v1/models", headers={"authorization": f"Bearer {secret}"})
+        return answer.status_code
+
+    try:
+        second = add_key(path, "second", ["speak"])
+        assert (status(first), status(second)) == (200, 401)
+        running.process.send_signal(signal.SIGHUP)
+        running.wait_for_event("keys reloaded", keys=["first", "second"])
+        assert (status(first), status(second)) == (200, 200)
+        remove_key(path, "first")
+        running.process.send_signal(signal.SIGHUP)
+        running.wait_for_event("keys reloaded", keys=["second"])
+        assert (status(first), status(second)) == (401, 200)
+        path.write_text("[[key]]\nname = 1")
+        running.process.send_signal(signal.SIGHUP)
+        assert "without name or hash" in running.wait_for_event("keys not reloaded")["reason"]
+        assert status(second) == 200
+    finally:
+        running.close()

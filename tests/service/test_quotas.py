@@ -1,0 +1,233 @@
+"""Rights and quotas of keys: scopes, seconds of speech a day, turns of the queues, and the comparison of hashes."""
+
+import asyncio
+import hmac
+from collections.abc import AsyncIterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from cli.main import run
+from lexicon.errors import DataError, InputError
+from tests.service.conftest import RunningService
+from tts2face.service.errors import RefusedError
+from tts2face.service.keys import LOCAL_KEY, ApiKey, add_key, find_key, read_keys, remove_key
+from tts2face.service.messages import Message, MessageKind
+from tts2face.service.pool import Pool, PoolSettings
+from tts2face.service.rate_limits import RateLimits
+from tts2face.service.settings import ServiceSettings
+from tts2face.service.state import ServiceState
+from tts2face.service.work import Work
+
+HOUR_S = 3600.0
+
+
+class Clock:
+    """Seconds that a test sets."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def test_seconds_of_speech_a_day_are_limited() -> None:
+    """A day's seconds may be used at once; they come back evenly, also what was used beyond them."""
+    clock = Clock()
+    limits, key = RateLimits(clock), ApiKey("a", "", speech_s_per_day=240)
+    other = replace(key, name="b")
+    limits.check_speech(key)
+    limits.add_speech(key, 239.0)
+    limits.check_speech(key)
+    limits.add_speech(key, 11.0)  # the last request may use more than is left
+    with pytest.raises(RefusedError, match="the key a has used its 240 seconds of speech a day") as refused:
+        limits.check_speech(key)
+    assert (refused.value.status, refused.value.headers["Retry-After"]) == (429, str(int(1.1 * HOUR_S)))
+    limits.check_speech(other)
+    limits.check_speech(LOCAL_KEY)
+    clock.now = 0.9 * HOUR_S
+    with pytest.raises(RefusedError):
+        limits.check_speech(key)
+    clock.now = 1.1 * HOUR_S
+    limits.check_speech(key)
+    clock.now = 1000 * HOUR_S
+    limits.add_speech(key, 240.0)  # no more than a day's seconds are kept
+    with pytest.raises(RefusedError):
+        limits.check_speech(key)
+
+
+class OnePartPool:
+    """A pool that makes 10 s of speech in a part, and then waits for ever."""
+
+    async def stream(self, work: Work, key: str, **_: Any) -> AsyncIterator[Message]:
+        yield Message(1, MessageKind.DATA, b"abc", 10.0)
+        await asyncio.Event().wait()
+
+
+def make_state() -> ServiceState:
+    state = ServiceState(ServiceSettings(processes=1))
+    state.pool = OnePartPool()  # type: ignore[assignment]
+    return state
+
+
+def first_part(state: ServiceState, key: ApiKey) -> None:
+    """Begin a work and cancel it after its first part."""
+
+    async def begin() -> None:
+        messages = state.messages(state.work(request={"text": "Hello."}), key)
+        await anext(messages)
+        await messages.aclose()  # type: ignore[attr-defined]
+
+    asyncio.run(begin())
+
+
+def test_speech_of_cancelled_requests_counts() -> None:
+    state, key = make_state(), ApiKey("a", "", speech_s_per_day=15)
+    first_part(state, key)
+    first_part(state, key)
+    with pytest.raises(RefusedError, match="15 seconds of speech a day"):
+        first_part(state, key)
+
+
+def test_synthesis_needs_the_scope_speak() -> None:
+    with pytest.raises(RefusedError, match="lacks the scope speak") as refused:
+        first_part(make_state(), ApiKey("a", "", ("build", "admin")))
+    assert refused.value.status == 403
+
+
+def test_long_words_are_refused_before_any_work() -> None:
+    state = make_state()
+
+    async def begin() -> None:
+        await anext(state.messages(state.work(request={"text": "1" * 201}), LOCAL_KEY))
+
+    with pytest.raises(RefusedError, match="a word of more than 200 characters"):
+        asyncio.run(begin())
+
+
+class FakeProcess:
+    """A process that is ready; tests set what it is given."""
+
+    def __init__(self) -> None:
+        self.is_ready, self.load = True, 0.0
+
+
+def test_keys_take_turns() -> None:
+    """A key that asks much more often waits for the others."""
+
+    async def order() -> list[str]:
+        pool = Pool(PoolSettings(n_processes=1))
+        pool.processes = [FakeProcess()]  # type: ignore[list-item]
+        served: list[str] = []
+
+        async def work(key: str) -> None:
+            process = await pool._take(2.0, key)
+            served.append(key)
+            await asyncio.sleep(0)
+            pool._release(process, 2.0)
+
+        greedy = [asyncio.create_task(work("greedy")) for _ in range(6)]
+        await asyncio.sleep(0)
+        modest = [asyncio.create_task(work(key)) for key in ("modest", "modest", "rare")]
+        await asyncio.gather(*greedy, *modest)
+        assert pool.processes[0].load == 0.0
+        return served
+
+    served = asyncio.run(order())
+    assert sorted(served) == ["greedy"] * 6 + ["modest"] * 2 + ["rare"]
+    assert max(number for number, key in enumerate(served) if key != "greedy") <= 6
+
+
+def test_the_load_of_no_work_is_zero() -> None:
+    """Sums of tenths are not exact; a rest would refuse a process its last movie for ever."""
+
+    async def load() -> float:
+        pool = Pool(PoolSettings(n_processes=1))
+        pool.processes = [FakeProcess()]  # type: ignore[list-item]
+        taken = [await pool._take(0.1, "a") for _ in range(7)]
+        for process in taken:
+            pool._release(process, 0.1)
+        return pool.processes[0].load
+
+    assert asyncio.run(load()) == 0.0
+
+
+def test_all_hashes_are_compared_in_constant_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By `hmac.compare_digest`, and also those after the right one."""
+    compared: list[str] = []
+
+    def compare(first: str, second: str) -> bool:
+        compared.append(first)
+        return original(first, second)
+
+    original = hmac.compare_digest
+    path = tmp_path / "keys.toml"
+    secret = add_key(path, "a", ["speak"])
+    add_key(path, "b", ["speak"])
+    keys = read_keys(path)
+    monkeypatch.setattr(hmac, "compare_digest", compare)
+    found = find_key(keys, secret)
+    assert found is not None
+    assert found.name == "a"
+    assert compared == [key.hash for key in keys]
+
+
+def test_keys_are_listed_and_removed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "keys.toml"
+    command = ["keys", "add", "film", "--file", str(path), "--concurrent", "4", "--speech-s-per-day", "36000"]
+    assert run(command) == 0
+    add_key(path, "studio", ["speak", "admin"])
+    capsys.readouterr()
+    assert run(["keys", "list", "--file", str(path)]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "film  speak  concurrent=4  speech_s_per_day=36000", "studio  speak,admin"
+    ]  # fmt: skip
+    assert run(["keys", "remove", "film", "--file", str(path)]) == 0
+    assert [key.name for key in read_keys(path)] == ["studio"]
+    with pytest.raises(InputError, match="has no key named film; its keys are studio"):
+        remove_key(path, "film")
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ("[[key]]\nname = 'a'\nhash = 'x'\nconcurrent = 0", "concurrent must be a whole number of at least 1, not 0"),
+        ("[[key]]\nname = 'a'\nhash = 'x'\nspeech_s_per_day = 1.5", "speech_s_per_day must be a whole number"),
+        ("[[key]]\nname = 'a'\nhash = 'x'\n[[key]]\nname = 'a'\nhash = 'y'", "names a key twice"),
+        ("[[key]]\nname = 'a\"b'\nhash = 'x'", "no plain texts"),
+        ("[[key]]\nname = 'a'\nhash = 1", "no plain texts"),
+        ("[[keys]]\nname = 'a'", "other tables"),
+        ("key = 5", "no table"),
+        ("[[key]]\nname = 'a'\nhash = 'x'\nscopes = ['fly']", "no scope 'fly'"),
+    ],
+)
+def test_wrong_files_of_keys_are_refused(tmp_path: Path, content: str, reason: str) -> None:
+    path = tmp_path / "keys.toml"
+    path.write_text(content)
+    with pytest.raises(DataError, match=reason):
+        read_keys(path)
+
+
+@pytest.mark.parametrize("name", ["", "a b", 'a"\n[[key]]', "x" * 65])
+def test_names_of_keys_are_plain(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match="a key's name consists of"):
+        add_key(tmp_path / "keys.toml", name, ["speak"])
+
+
+def test_jobs_use_the_seconds_of_speech_too(tmp_path: Path) -> None:
+    """By their texts, as they are made later and elsewhere."""
+    path = tmp_path / "keys.toml"
+    headers = {"authorization": f"Bearer {add_key(path, 'a', ['speak'], speech_s_per_day=10)}"}
+    running = RunningService(environment={"TTS2FACE_SERVE_KEYS": str(path), "TTS2FACE_SERVE_WORKERS": "0"})
+    try:
+        running.wait_for_event("jobs available")
+        job = {"kind": "clip", "request": {"text": "We were away a year ago. " * 12}}
+        answers = [httpx.post(f"{running.url}/v1/jobs", json=job, headers=headers, timeout=60) for _ in range(2)]
+        assert [answer.status_code for answer in answers] == [202, 429], answers[0].text
+        assert int(answers[1].headers["retry-after"]) > HOUR_S
+    finally:
+        running.close()

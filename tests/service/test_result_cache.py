@@ -1,0 +1,161 @@
+"""Finished results on disk: hits, completeness, budget, and what an entry depends on."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import aclosing
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from lexicon.errors import BackendError
+from tests.service.conftest import RunningService
+from tts2face.service.messages import Message, MessageKind
+from tts2face.service.result_cache import ResultCache, work_hash
+from tts2face.service.work import Work
+
+END = Message(7, MessageKind.END, b'{"seconds": 1.0}')
+HELLO = Work(request={"text": "Hello."}, models={"talker": "grid_s1"})
+
+
+def result(size: int = 4) -> list[Message]:
+    return [Message(7, MessageKind.EVENT, b"{}", 0.5), Message(7, MessageKind.DATA, bytes(size), 0.5), END]
+
+
+class Maker:
+    """Makes a result and counts how often."""
+
+    def __init__(self, messages: list[Message], *, fails: bool = False) -> None:
+        self.messages, self.fails, self.n_made = messages, fails, 0
+
+    async def make(self) -> AsyncIterator[Message]:
+        self.n_made += 1
+        for message in self.messages:
+            yield message
+        if self.fails:
+            raise BackendError("failed")
+
+
+def read(cache: ResultCache, work: Work, maker: Maker, *, most: int | None = None) -> list[Message]:
+    """Messages of a work, or the first ones of a client that leaves."""
+
+    async def run() -> list[Message]:
+        found: list[Message] = []
+        async with aclosing(cache.messages(work, maker.make())) as messages:  # type: ignore[type-var]
+            async for message in messages:
+                found.append(message)
+                if len(found) == most:
+                    break
+        return found
+
+    return asyncio.run(run())
+
+
+def payloads(messages: list[Message]) -> list[tuple[MessageKind, bytes, float]]:
+    return [(message.kind, message.payload, message.seconds) for message in messages]
+
+
+def test_a_second_request_gets_the_same_messages_without_work(tmp_path: Path) -> None:
+    cache, maker = ResultCache(tmp_path, 1000), Maker(result())
+    first, second = read(cache, HELLO, maker), read(cache, HELLO, maker)
+    assert payloads(first) == payloads(second) == payloads(result())
+    assert (maker.n_made, cache.n_hits, cache.n_misses) == (1, 1, 1)
+    assert payloads(read(ResultCache(tmp_path, 1000), HELLO, maker)) == payloads(first)  # of a new server
+    assert maker.n_made == 1
+
+
+@pytest.mark.parametrize("how", ["left", "failed"])
+def test_a_result_that_is_not_complete_is_not_kept(tmp_path: Path, how: str) -> None:
+    cache = ResultCache(tmp_path, 1000)
+    if how == "left":
+        read(cache, HELLO, Maker(result()), most=2)
+    else:
+        with pytest.raises(BackendError, match="failed"):
+            read(cache, HELLO, Maker(result()[:2], fails=True))
+    assert list(tmp_path.iterdir()) == []
+    maker = Maker(result())
+    read(cache, HELLO, maker)
+    assert maker.n_made == 1
+
+
+def test_the_least_recently_used_entries_are_removed(tmp_path: Path) -> None:
+    cache = ResultCache(tmp_path, 1000)
+    works = [Work(request={"text": f"{number}."}) for number in range(5)]
+    makers = [Maker(result(150)) for _ in works]
+    for number in range(4):
+        read(cache, works[number], makers[number])
+    read(cache, works[0], makers[0])
+    read(cache, works[4], makers[4])
+    assert cache.n_bytes == sum(path.stat().st_size for path in tmp_path.iterdir()) <= 1000
+    for number in (0, 4, 1):
+        read(cache, works[number], makers[number])
+    assert [maker.n_made for maker in makers] == [1, 2, 1, 1, 1]
+
+
+def test_a_large_result_does_not_displace_all_others(tmp_path: Path) -> None:
+    cache = ResultCache(tmp_path, 1000)
+    read(cache, HELLO, Maker(result(500)))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_remains_of_a_server_that_ended_are_removed(tmp_path: Path) -> None:
+    (tmp_path / "x.part").write_bytes(b"begun")
+    assert ResultCache(tmp_path, 1000).n_bytes == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_entry_that_another_server_removed_is_made_again(tmp_path: Path) -> None:
+    cache, maker = ResultCache(tmp_path, 1000), Maker(result())
+    read(cache, HELLO, maker)
+    next(tmp_path.iterdir()).unlink()
+    assert payloads(read(cache, HELLO, maker)) == payloads(result())
+    assert maker.n_made == 2
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"request": {"text": "Hello!"}},
+        {"request": {"text": "Hello.", "seed": 1}},
+        {"format": "webm"},
+        {"picture": {"size": "64x64"}},
+        {"models": {"talker": "grid_s1", "identity": "kofi"}},
+        {"kind": "speech"},
+    ],
+)
+def test_every_part_of_a_work_counts(other: dict[str, Any]) -> None:
+    assert work_hash(Work(**{"request": HELLO.request, "models": HELLO.models, **other})) != work_hash(HELLO)
+    assert work_hash(Work(request=dict(HELLO.request), models=dict(HELLO.models))) == work_hash(HELLO)
+
+
+def test_the_content_of_a_file_counts_and_its_path_does_not(tmp_path: Path) -> None:
+    first, same, other = (tmp_path / name for name in ("a.wav", "b.wav", "c.wav"))
+    for path, content in ((first, b"1"), (same, b"1"), (other, b"2")):
+        path.write_bytes(content)
+    hashes = [work_hash(Work(request={"audio": str(path)})) for path in (first, same, other)]
+    assert hashes[0] == hashes[1] != hashes[2]
+
+
+def test_a_model_file_that_was_replaced_counts(tmp_path: Path) -> None:
+    model = tmp_path / "me.talker"
+    model.write_bytes(b"1")
+    before = work_hash(Work(models={"talker": str(model)}))
+    model.write_bytes(b"12")
+    assert work_hash(Work(models={"talker": str(model)})) != before
+
+
+def test_the_service_answers_from_its_cache(tmp_path: Path) -> None:
+    environment = {"TTS2FACE_SERVE_CACHE_MB": "10", "TTS2FACE_SERVE_DATA": str(tmp_path)}
+    running = RunningService(environment=environment)
+    try:
+        running.wait_until_ready()
+        body = {"text": "Hello there.", "format": "mp4", "size": "64x64", "supersampling": 1}
+        first, second = (httpx.post(f"{running.url}/v1/clips", json=body, timeout=60.0) for _ in range(2))
+        assert first.content == second.content
+        lines = httpx.get(f"{running.url}/metrics").text.splitlines()
+        assert "tts2face_cache_hits 1.0" in lines
+        assert "tts2face_cache_misses 1.0" in lines
+        assert [path.stat().st_size > len(first.content) for path in (tmp_path / "cache").iterdir()] == [True]
+    finally:
+        running.close()

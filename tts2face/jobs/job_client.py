@@ -1,0 +1,166 @@
+"""Jobs of the service as its server sees them: submit, cancel, delete, webhooks."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from tts2face.jobs.blobs import BlobStore
+from tts2face.jobs.connection import JobDatabase, Transaction
+from tts2face.jobs.database import APPLICATION, APPLICATION_VERSION, JOB_QUEUE, JOB_WORKFLOW, QUEUE, TALKER_QUEUE
+from tts2face.jobs.engine import ACTIVE, JOBS_PER_QUERY
+from tts2face.jobs.job_changes import Ending, JobChanges
+from tts2face.jobs.job_records import CANCELLED, JobRecord, NewJob
+from tts2face.jobs.job_table import JobTable
+from tts2face.jobs.resource_check import TALKER
+
+CONNECT_S = 2  # to PostgreSQL; then the request is refused
+SESSION_OPTIONS = "-c statement_timeout=10000 -c lock_timeout=8000"  # ms
+N_CONNECTIONS = 8
+FILES_PER_LOOK = 100  # while all changes of jobs wait
+LEASE_S = 60.0  # within which a server delivers a webhook that it has taken
+FIRST_PAUSE_S, PAUSE_FACTOR, MAX_TRIES = 2.0, 3.0, 10  # of webhooks: the last try comes 8 hours after the first
+
+
+@dataclass(frozen=True, slots=True)
+class Delivery:
+    """A webhook that is to be sent now."""
+
+    job_id: str
+    url: str
+    n_tries: int
+
+
+class JobClient:
+    """Jobs in a prepared database.
+
+    Parameters
+    ----------
+    url
+        URL of the database.
+    blobs
+        Files of the jobs.
+    """
+
+    def __init__(self, url: str, blobs: BlobStore) -> None:
+        from dbos import DBOSClient
+
+        self._database = JobDatabase(url, n_connections=N_CONNECTIONS, connect_s=CONNECT_S, options=SESSION_OPTIONS)
+        self._client: Any = DBOSClient(
+            system_database_url=url, application_name=APPLICATION, retry_connection_errors=False, lazy=True
+        )
+        self.blobs = blobs
+        self.table, self._changes = JobTable(self._database), JobChanges(self._database)
+
+    def close(self) -> None:
+        """Close all connections."""
+        self._client.destroy()
+        self._database.close()
+
+    def submit(
+        self, new: NewJob, max_waiting: int | None = None, put_missing: Callable[[], None] = lambda: None
+    ) -> tuple[JobRecord, bool]:
+        """Queue a job; arguments, result and errors as `JobTable.submit`.
+
+        Parameters
+        ----------
+        put_missing
+            Called within the transaction: stores files that another job's deletion has removed meanwhile.
+        """
+
+        def enqueue(change: Transaction, n_waiting: int) -> None:
+            put_missing()
+            options = {
+                "queue_name": TALKER_QUEUE if new.kind == TALKER else JOB_QUEUE,
+                "workflow_name": JOB_WORKFLOW,
+                "workflow_id": new.id,
+                "app_version": APPLICATION_VERSION,
+                "priority": 1 + n_waiting,  # keys take turns: their first jobs, then their second ones
+            }
+            self._client.enqueue_in_transaction(change.connection, options, new.id)
+
+        return self.table.submit(new, enqueue, max_waiting)
+
+    def cancel(self, job_id: str) -> bool:
+        """Cancel an open job, and the segments that only it uses; false if it has ended before."""
+        segments = self.table.own_segments(job_id)
+        if not self._changes.end(job_id, Ending(CANCELLED, error="cancelled")):
+            return False
+        self._changes.forget_inputs(job_id, self.blobs.delete)
+        self._client.cancel_workflows([job_id])
+        for at in range(0, len(segments), JOBS_PER_QUERY):
+            found = [self._active(address) for address in segments[at : at + JOBS_PER_QUERY]]
+            names = [name for part in found for name in part]
+            if names:
+                self._client.cancel_workflows(names)
+        return True
+
+    def delete(self, job_id: str) -> None:
+        """Delete a job with the files that no other job uses; an open one is cancelled first."""
+        self.cancel(job_id)
+        self.table.delete(job_id, self.blobs.delete)
+        self._client.delete_workflows([job_id])
+
+    def remove_unused_files(self, older_than_s: float) -> int:
+        """Remove files that no job has, such as those of requests that were refused; their number.
+
+        Parameters
+        ----------
+        older_than_s
+            Seconds since they were stored.
+        """
+        before, n_removed = time.time() - older_than_s, 0
+
+        def remove(sha256: str) -> None:
+            nonlocal n_removed
+            self.blobs.delete(sha256)
+            n_removed += 1
+
+        old = [sha256 for sha256, stored_s in self.blobs.entries() if stored_s < before]
+        for at in range(0, len(old), FILES_PER_LOOK):
+            self._changes.remove_unused(set(old[at : at + FILES_PER_LOOK]), remove)
+        return n_removed
+
+    def due_webhooks(self, limit: int = 16) -> list[Delivery]:
+        """Webhooks that are to be sent now; no other server gets them for `LEASE_S`."""
+        query = "SELECT id, webhook, webhook_tries, webhook_due FROM tts2face_jobs WHERE webhook_due <="
+        taken = []
+        with self._database.transaction() as look:
+            found = look.rows(f"{query} {self._database.now} ORDER BY webhook_due LIMIT :limit", limit=limit)
+        for job_id, url, n_tries, due in found:
+            with self._database.transaction(is_change=True) as change:
+                if change.run(
+                    f"UPDATE tts2face_jobs SET webhook_due = {self._database.now} + :lease "
+                    "WHERE id = :id AND webhook_due = :due", id=job_id, due=due, lease=LEASE_S,
+                ):  # fmt: skip
+                    taken.append(Delivery(job_id, url, n_tries))
+        return taken
+
+    def note_delivery(self, delivery: Delivery, *, is_delivered: bool) -> None:
+        """Note that a webhook has arrived, or when it is sent again."""
+        n_tries = delivery.n_tries + 1
+        is_last = is_delivered or n_tries >= MAX_TRIES
+        due = "NULL" if is_last else f"{self._database.now} + :pause"
+        state = "delivered" if is_delivered else "failed" if is_last else "waiting"
+        pause = {} if is_last else {"pause": FIRST_PAUSE_S * PAUSE_FACTOR**delivery.n_tries}
+        with self._database.transaction(is_change=True) as change:
+            change.run(
+                f"UPDATE tts2face_jobs SET webhook_due = {due}, webhook_tries = :tries, webhook_state = :state "
+                "WHERE id = :id", id=delivery.job_id, tries=n_tries, state=state, **pause,
+            )  # fmt: skip
+
+    def is_reachable(self) -> bool:
+        """Whether the database answers; raises `DatabaseAwayError` if not."""
+        with self._database.transaction() as look:
+            return bool(look.value("SELECT 1"))
+
+    def _active(self, address: str) -> list[str]:
+        """Names of the jobs of the queue of a segment that have not ended."""
+        found = self._client.list_workflows(
+            workflow_id_prefix=f"{address}.",
+            queue_name=QUEUE,
+            status=sorted(ACTIVE),
+            load_input=False,
+            load_output=False,
+        )
+        return [one.workflow_id for one in found]

@@ -1,0 +1,102 @@
+"""Kinds of jobs: what executes each, with what, and what it returns."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from lexicon.errors import DataError
+from tts2face.batch.engine import Engine
+from tts2face.batch.store import Store
+from tts2face.jobs.blobs import BlobStore
+
+RUNNERS: Mapping[str, str] = {
+    "clip": "tts2face.jobs.clip_job:run_clip",
+    "subtitles": "tts2face.jobs.subtitles_job:run_subtitles",
+    "talker": "tts2face.jobs.talker_job:run_talker",
+}  # name of a kind: module and function
+MEDIA_TYPES = {
+    ".mp4": "video/mp4", ".webm": "video/webm", ".mov": "video/quicktime", ".json": "application/json",
+    ".csv": "text/csv", ".jsonl": "application/jsonl", ".glb": "model/gltf-binary", ".wav": "audio/wav",
+    ".vtt": "text/vtt", ".txt": "text/plain",
+}  # fmt: skip
+
+
+class JobCancelledError(Exception):
+    """The job was cancelled or deleted while it ran."""
+
+
+@dataclass(frozen=True, slots=True)
+class JobTask:
+    """What a function of `RUNNERS` gets.
+
+    Parameters
+    ----------
+    request
+        JSON of the job, as the service has checked it.
+    inputs
+        Files by name.
+    folder
+        Empty folder, which is removed afterwards.
+    engine, store
+        Engine and store of the segments of a batch.
+    report
+        Adds an event to the job; ``done`` and ``of`` are its progress.
+    check
+        Raises `JobCancelledError` if the job is no longer wanted; to be called now and then.
+    database, resources
+        URL of the database, and the files of the uploaded models in the store.
+    """
+
+    request: Mapping[str, Any]
+    inputs: Mapping[str, Path]
+    folder: Path
+    engine: Engine
+    store: Store
+    report: Callable[[dict[str, Any]], None]
+    check: Callable[[], None]
+    database: str = ""
+    resources: Callable[[], BlobStore] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Product:
+    """A file that a job has made; clients see its name."""
+
+    path: Path
+    name: str
+    media_type: str
+
+
+@dataclass(frozen=True, slots=True)
+class Products:
+    """Files that a job has made, and why some are missing."""
+
+    files: tuple[Product, ...]
+    error: str | None = None
+
+
+def find_runner(kind: str) -> Callable[[JobTask], Products]:
+    """Function that executes the jobs of a kind.
+
+    Raises
+    ------
+    DataError
+        This version has no such kind.
+    """
+    if kind not in RUNNERS:
+        raise DataError(f"this worker cannot execute jobs of kind {kind!r}; install the version of the service")
+    module, name = RUNNERS[kind].split(":")
+    runner: Callable[[JobTask], Products] = getattr(import_module(module), name)
+    return runner
+
+
+def media_type(name: str) -> str:
+    """Media type of a file name."""
+    return MEDIA_TYPES.get(Path(name).suffix.lower(), "application/octet-stream")
+
+
+def products_of(paths: Sequence[Path], error: str | None = None) -> Products:
+    """Products with the names of their files."""
+    return Products(tuple(Product(path, path.name, media_type(path.name)) for path in paths), error)

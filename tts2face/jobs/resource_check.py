@@ -1,0 +1,264 @@
+"""Check of an uploaded talker, face, palette, dictionary or character; runs in `tts2face.service.decode_process`.
+
+What is stored is written here again from what was read, never the bytes of the upload.
+"""
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lexicon.errors import BackendError, DataError, InputError
+from tts2face.jobs.refused_file import RefusedFileError
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+    from tts2face.session import Session
+
+TALKER, FACE, PALETTE, DICTIONARY, CHARACTER = "talker", "face", "palette", "dictionary", "character"
+RESOURCE_KINDS = (TALKER, FACE, PALETTE, DICTIONARY)
+CONTENT, DESCRIPTION, PICTURE = "content", "description.json", "picture.png"  # files of a checked resource
+MAX_TEXT = 200  # characters of a text of the description
+MAX_ENTRIES = 200  # identities or styles of the description
+PICTURE_SIDE_PX, TILE_SIDE_PX, TILE_COLUMNS, MAX_TILES = 384, 192, 4, 12
+REST_S, STYLE_S = 0.1, 2.0  # of idle motion that is synthesised for a picture
+# CPU seconds: shipped models take 0.03, 0.4 and 0.02. A slower one would hold up the streams of everybody.
+MAX_FRAME_CPU_S, MAX_STYLE_CPU_S, MAX_SPEECH_CPU_S = 1.0, 8.0, 4.0
+# First bytes of files that are sent by mistake, or on purpose.
+FOREIGN = {
+    b"PK\x03\x04": "a zip archive", b"\x80\x02": "a Python pickle", b"\x80\x03": "a Python pickle",
+    b"\x80\x04": "a Python pickle", b"\x80\x05": "a Python pickle", b"\x93NUMPY": "a NumPy array",
+    b"\x1f\x8b": "a gzip file", b"\x89PNG": "a picture", b"\xff\xd8\xff": "a picture", b"%PDF": "a PDF",
+    b"glTF": "a glTF character", b"RIFF": "a sound or video", b"\x1aE\xdf\xa3": "a video",
+}  # fmt: skip
+GLTF_MAGIC = b"glTF"
+
+
+def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> None:
+    """Check a file and write `CONTENT`, `DESCRIPTION` and, unless it is a dictionary, `PICTURE` into a folder.
+
+    Parameters
+    ----------
+    kind
+        One of `RESOURCE_KINDS`, or `CHARACTER`: a .glb or .vrm file that becomes a face.
+    max_bytes
+        Largest size of the written content.
+
+    Raises
+    ------
+    RefusedFileError
+        The file is of another type, damaged, or does not work.
+    """
+    if kind == FACE and source.read_bytes()[: len(GLTF_MAGIC)] == GLTF_MAGIC:
+        kind = CHARACTER
+    try:
+        if kind not in {DICTIONARY, CHARACTER}:
+            _check_type(kind, source)
+        _describe(_CHECKS[kind](source, folder / CONTENT), folder)
+        if kind != DICTIONARY:
+            draw_resource(FACE if kind == CHARACTER else kind, folder / CONTENT, folder / PICTURE)
+    except (DataError, InputError, BackendError) as error:
+        raise RefusedFileError(_sentence(error, source, folder)) from error
+    except MemoryError as error:
+        raise RefusedFileError("it needs too much memory") from error
+    except (ValueError, TypeError, KeyError, IndexError, ArithmeticError) as error:  # valid in form, but not usable
+        raise RefusedFileError(f"it is no {kind} that works ({type(error).__name__})") from error
+    if (folder / CONTENT).stat().st_size > max_bytes:
+        raise RefusedFileError(f"it has more than {max_bytes / 1e6:g} MB as a {kind}")
+
+
+def draw_resource(kind: str, source: Path, picture: Path) -> None:
+    """Write the picture of a talker, face or palette that is known to be valid."""
+    _DRAW[kind](source).save(picture, "PNG")
+
+
+def _check_type(kind: str, source: Path) -> None:
+    """Refuse other types of files by their first bytes: model files are safetensors, which hold no code."""
+    with source.open("rb") as file:
+        head = file.read(9)
+    for begin, name in FOREIGN.items():
+        if head.startswith(begin):
+            raise RefusedFileError(f"it is {name}, not a .{kind} file")
+    if len(head) < 9 or head[8:] != b"{" or int.from_bytes(head[:8], "little") > source.stat().st_size:
+        raise RefusedFileError(f"it is not a .{kind} file, or is truncated")
+
+
+def _check_talker(source: Path, out: Path) -> dict[str, Any]:
+    from tts2face.catalogue import describe_talker
+    from tts2face.models import talker
+
+    _rewrite(source, out, TALKER, talker.FORMAT_VERSION)
+    found = talker.read_talker(out)
+    if found.appearance is not None and "consent" not in found.metadata:
+        raise DataError("it shows a person's face, but states no consent; build it with --consent")
+    _try_speech(out)
+    return _without_name(asdict(describe_talker(out)))
+
+
+def _try_speech(content: Path) -> None:
+    """Synthesise two sentences with a talker; the first one also compiles kernels."""
+    from tts2face.session import Session
+
+    session = Session(str(content), palette=None)
+    session.clip("We were away.", voice="espeak", gestures="none")
+    began = time.process_time()
+    session.clip("Bob may move.", voice="espeak", gestures="none")
+    if time.process_time() - began > MAX_SPEECH_CPU_S:
+        raise RefusedFileError(f"a short sentence takes more than {MAX_SPEECH_CPU_S:g} s to synthesise")
+
+
+def _check_face(source: Path, out: Path) -> dict[str, Any]:
+    from tts2face.catalogue import describe_face
+    from tts2face.models import face_file
+
+    _rewrite(source, out, FACE, face_file.FORMAT_VERSION)
+    face = face_file.read_face(out)
+    for identity in describe_face(out).identities:
+        face_file.read_face(out, identity)
+    return _without_name(asdict(describe_face(out))) | {"licence": str(face.metadata.get("licence", "not stated"))}
+
+
+def _check_character(source: Path, out: Path) -> dict[str, Any]:
+    """Make a face of a character whose file holds everything that it needs."""
+    from tts2face.characters.importing import import_face
+    from tts2face.models.face_file import write_face
+
+    named = source.with_name("character.glb")
+    named.hardlink_to(source)
+    imported = import_face(named)
+    made = out.with_name("imported.face")
+    write_face(made, imported.face)
+    return _check_face(made, out) | {"notes": list(imported.report.notes)}
+
+
+def _check_palette(source: Path, out: Path) -> dict[str, Any]:
+    from tts2face.catalogue import styles
+    from tts2face.models import palette
+
+    _rewrite(source, out, PALETTE, palette.FORMAT_VERSION)
+    return {"styles": [{"name": one.name, "summary": one.summary} for one in styles(str(out))]}
+
+
+def _check_dictionary(source: Path, out: Path) -> dict[str, Any]:
+    from lexicon.dictionary import parse_dictionary
+    from lexicon.inputs import read_text
+
+    text = read_text(source)
+    entries = parse_dictionary(text, "the dictionary").entries
+    if not entries:
+        raise DataError("it has no word; write one word and its pronunciation on each line")
+    out.write_text(text, encoding="utf-8")
+    return {"n_words": len(entries)}
+
+
+def _rewrite(source: Path, out: Path, kind: str, version: int) -> None:
+    """Write arrays and metadata again, without links to files of the machine that made them."""
+    from tts2face.characters.binding import KEY
+    from tts2face.models.face_layout import check_face
+    from tts2face.storage.tensors import read_tensors, write_tensors
+
+    arrays, metadata = read_tensors(source, kind, version)
+    if kind == FACE:
+        check_face(source, arrays, metadata)
+        metadata = metadata | {"metadata": {k: v for k, v in metadata["metadata"].items() if k != KEY}}
+    write_tensors(out, kind, version, arrays, metadata)
+
+
+def _draw_talker(content: Path) -> "Image":
+    from tts2face.catalogue import describe_talker
+    from tts2face.request import OWN_FACE
+    from tts2face.session import Session
+
+    face = OWN_FACE if describe_talker(content).has_own_face else "head"
+    return _rest_picture(Session(str(content), face, palette=None))
+
+
+def _draw_face(content: Path) -> "Image":
+    from tts2face.session import Session
+
+    return _rest_picture(Session(face=str(content), palette=None))
+
+
+def _draw_palette(content: Path) -> "Image":
+    """For each style the head in its typical pose: the frame of idle motion that is nearest to the mean."""
+    import numpy as np
+    from PIL import Image, ImageDraw
+
+    from tts2face.render.picture import Picture
+    from tts2face.session import Session
+
+    session = Session(palette=str(content))
+    names = session.palette.names[:MAX_TILES] if session.palette is not None else ()
+    size = Picture(size=f"{TILE_SIDE_PX}x{TILE_SIDE_PX}")
+    rows = -(-len(names) // TILE_COLUMNS)
+    sheet = Image.new("RGB", (TILE_SIDE_PX * min(len(names), TILE_COLUMNS), TILE_SIDE_PX * rows), "white")
+    pen = ImageDraw.Draw(sheet)
+    for number, name in enumerate(names):
+        began = time.process_time()
+        clip = session.clip("", idle=STYLE_S, style=name)
+        if number and time.process_time() - began > MAX_STYLE_CPU_S:  # the first one also compiles kernels
+            raise RefusedFileError(f"{STYLE_S:g} s of a style take more than {MAX_STYLE_CPU_S:g} s to synthesise")
+        values = clip.motion.values
+        typical = int(np.linalg.norm(values - values.mean(axis=0), axis=1).argmin())
+        tile = Image.fromarray(session.renderer(size).frame(clip, typical))
+        place = TILE_SIDE_PX * (number % TILE_COLUMNS), TILE_SIDE_PX * (number // TILE_COLUMNS)
+        sheet.paste(tile, place)
+        pen.text((place[0] + 6, place[1] + 4), name[:24].encode("ascii", "replace").decode(), fill="white")
+    return sheet
+
+
+def _rest_picture(session: "Session") -> "Image":
+    from PIL import Image
+
+    from tts2face.render.picture import Picture
+
+    clip = session.clip("", idle=REST_S, gestures="none")
+    size = Picture(size=f"{PICTURE_SIDE_PX}x{PICTURE_SIDE_PX}")
+    renderer = session.renderer(size, has_gestures=False)
+    renderer.frame(clip, 0)  # compiles kernels
+    began = time.process_time()
+    picture = Image.fromarray(renderer.frame(clip, 1))
+    if time.process_time() - began > MAX_FRAME_CPU_S:
+        raise RefusedFileError(f"a picture of it takes more than {MAX_FRAME_CPU_S:g} s to draw; simplify it")
+    return picture
+
+
+_CHECKS: Mapping[str, Callable[[Path, Path], dict[str, Any]]] = {
+    TALKER: _check_talker,
+    FACE: _check_face,
+    PALETTE: _check_palette,
+    DICTIONARY: _check_dictionary,
+    CHARACTER: _check_character,
+}
+_DRAW: Mapping[str, Callable[[Path], "Image"]] = {TALKER: _draw_talker, FACE: _draw_face, PALETTE: _draw_palette}
+
+
+def _describe(description: dict[str, Any], folder: Path) -> None:
+    text = json.dumps(_bounded(description), ensure_ascii=False)
+    (folder / DESCRIPTION).write_text(text, encoding="utf-8")
+
+
+def _without_name(entry: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in entry.items() if key != "name"}
+
+
+def _bounded(value: Any) -> Any:
+    """JSON with texts and lists of limited length: a file chooses what its description says."""
+    if isinstance(value, str):
+        return value[:MAX_TEXT]
+    if isinstance(value, list | tuple):
+        return [_bounded(item) for item in value[:MAX_ENTRIES]]
+    if isinstance(value, dict):
+        return {str(key)[:MAX_TEXT]: _bounded(item) for key, item in value.items()}
+    return value
+
+
+def _sentence(error: Exception, source: Path, folder: Path) -> str:
+    """The message of an error without paths of this machine."""
+    text = " ".join(str(error).split())
+    for path in (source, folder / CONTENT, source.with_name("character.glb"), folder / "imported.face"):
+        text = text.replace(f"{path}: ", "").replace(str(path), "it")
+    return text
