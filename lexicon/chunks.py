@@ -10,10 +10,12 @@ from lexicon.sentence_ends import ends_sentence
 # of East Asian or Indic writing, or at a blank line.
 _END = re.compile(r"""[.!?…]+["'”’)\]]*(?=\s+[^\sa-z])|[。！？｡।॥؟۔]+["'”’」』）]*|\n\s*\n""")
 _CLAUSE = re.compile(r"[,;:—–、，；：،؛](?=\s)|[、，；：]")
-# Places at which a phrase may end where a sentence has no clause mark: before a conjunction, else between two words.
-_CONJUNCTION = re.compile(
-    r"\s(?=(?:and|but|or|so|because|which|who|whose|where|when|while|until|unless|if|though|although|since|as|that|than)\s)"
+# Words before which an English phrase may end where a sentence has no clause mark, the better places first.
+_PHRASE_BEGINS = (
+    "and but or so because which who whose where when while until unless if though although since that",
+    "about after against around at before behind between by during for from in into near on over through to under with",
 )
+_PHRASE_PLACES = tuple(re.compile(rf"(?<!\d)\s(?=(?:{words.replace(' ', '|')})\s(?!\d))") for words in _PHRASE_BEGINS)
 _BETWEEN_WORDS = re.compile(r"(?<=[^\W\d_A-Z])\s(?=[^\W\d_A-Z])")
 _MIN_PHRASE_CHARACTERS = 20  # of either part; shorter ones sound like words of their own
 _CONTEXT_BEFORE, _CONTEXT_AFTER = 24, 40  # characters around a full stop by which an abbreviation is recognised
@@ -45,8 +47,8 @@ def split_chunks(text: str, limit: int, language: str = "en-us") -> Iterator[str
 def split_phrase(sentence: str, limit: int) -> tuple[str, str]:
     """First phrase of a sentence that is longer than `limit` characters, and the rest; the rest may be empty.
 
-    The phrase ends at the last clause mark within the limit, else before an English conjunction, else between two
-    words; never beside a number, whose reading depends on its neighbours.
+    The phrase ends at the last clause mark within the limit, else before an English conjunction, else before a
+    preposition, else between two words; never beside a number, whose reading depends on its neighbours.
     """
     if len(sentence) <= limit:
         return sentence, ""
@@ -54,9 +56,8 @@ def split_phrase(sentence: str, limit: int) -> tuple[str, str]:
     clauses = (
         at.end() for at in _CLAUSE.finditer(sentence, 0, last + 1) if not sentence[at.end() :].lstrip()[:1].isdigit()
     )
-    conjunctions = (at.start() for at in _CONJUNCTION.finditer(sentence, 0, last + 1))
-    words = (at.start() for at in _BETWEEN_WORDS.finditer(sentence, 0, last + 1))
-    for places in (clauses, conjunctions, words):
+    others = ((at.start() for at in kind.finditer(sentence, 0, last + 1)) for kind in (*_PHRASE_PLACES, _BETWEEN_WORDS))
+    for places in (clauses, *others):
         at = max((place for place in places if _MIN_PHRASE_CHARACTERS <= place <= last), default=0)
         if at:
             return sentence[:at].rstrip(), sentence[at:].lstrip()

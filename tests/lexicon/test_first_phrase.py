@@ -14,13 +14,15 @@ HOUSE = "the garden behind the old house near the river had been green for years
     [
         (f"When we had come home, late in the evening, {HOUSE}.", "When we had come home, late in the evening,"),
         (f"We came home and nobody knew that {HOUSE}.", "We came home and nobody knew"),
-        (f"Most small gardens near rivers like this one {HOUSE}.", "Most small gardens near rivers like this one the"),
+        (f"Most small gardens like this one near rivers {HOUSE}.", "Most small gardens like this one"),
+        (f"Most small gardens have more trees than this {HOUSE}.", "Most small gardens have more trees than this the"),
+        (f"Nearly all large gardens in 5 or 10 towns {HOUSE}.", "Nearly all large gardens in 5 or 10 towns the"),
         (f"We came home on Sunday, May 5, 2024 and {HOUSE}.", "We came home on Sunday,"),
         ("漢字" * 60, "漢字" * 60),
         ("We came home.", "We came home."),
     ],
 )
-def test_a_phrase_ends_at_a_clause_mark_a_conjunction_or_a_word(sentence: str, first: str) -> None:
+def test_a_phrase_ends_at_the_best_place(sentence: str, first: str) -> None:
     assert split_phrase(sentence, 50) == (first, sentence[len(first) :].strip())
 
 
