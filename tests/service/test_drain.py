@@ -48,13 +48,24 @@ def wait_until_gone(pids: list[int]) -> None:
 @pytest.fixture
 def own() -> Iterator[RunningService]:
     """A service of one test, which ends it."""
-    running = RunningService()
+    running = RunningService(environment={"TTS2FACE_SERVE_DRAIN_S": "120", "TTS2FACE_SERVE_WORKERS": "0"})
     try:
         running.wait_until_ready()
         yield running
     finally:
         running.process.kill()
         running.close()
+
+
+def own_children(pid: int) -> list[int]:
+    """Processes that a process has started itself."""
+    return [child for child in children(pid) if Path(f"/proc/{child}/stat").read_text().split()[3] == str(pid)]
+
+
+def send_all(service: RunningService, number: signal.Signals) -> None:
+    """Send a signal to the synthesis processes: SIGSTOP keeps a clip unfinished on any machine."""
+    for pid in own_children(service.process.pid):
+        os.kill(pid, number)
 
 
 class Download(threading.Thread):
@@ -85,6 +96,7 @@ def test_a_running_clip_finishes_after_sigterm(own: RunningService) -> None:
     assert processes
     download = Download(own.url)
     assert download.has_begun.wait(60)
+    send_all(own, signal.SIGSTOP)
     own.process.send_signal(signal.SIGTERM)
     own.wait_for_event("draining")
     ready = httpx.get(f"{own.url}/readyz")
@@ -93,6 +105,7 @@ def test_a_running_clip_finishes_after_sigterm(own: RunningService) -> None:
     refused = httpx.post(f"{own.url}/v1/audio/speech", json={"input": "Hello.", "model": "tts-1", "voice": "alloy"})
     assert (refused.status_code, refused.json()["error"]["code"]) == (503, "draining")
     assert int(refused.headers["retry-after"]) >= 1
+    send_all(own, signal.SIGCONT)
     download.join(120)
     assert download.error is None
     with av.open(io.BytesIO(download.content)) as movie:
@@ -105,6 +118,7 @@ def test_a_second_signal_ends_the_server_at_once(own: RunningService) -> None:
     processes = children(own.process.pid)
     download = Download(own.url)
     assert download.has_begun.wait(60)
+    send_all(own, signal.SIGSTOP)
     own.process.send_signal(signal.SIGTERM)
     own.wait_for_event("draining")
     own.process.send_signal(signal.SIGTERM)
@@ -115,12 +129,13 @@ def test_a_second_signal_ends_the_server_at_once(own: RunningService) -> None:
 
 
 def test_streams_that_take_too_long_are_cut(tmp_path: Path) -> None:
-    own = RunningService(environment={"TTS2FACE_SERVE_DRAIN_S": "0.2"})
+    own = RunningService(environment={"TTS2FACE_SERVE_DRAIN_S": "0.2", "TTS2FACE_SERVE_WORKERS": "0"})
     try:
         own.wait_until_ready()
         processes = children(own.process.pid)
         download = Download(own.url)
         assert download.has_begun.wait(60)
+        send_all(own, signal.SIGSTOP)
         own.close()
         download.join(60)
         assert isinstance(download.error, httpx.RemoteProtocolError)
