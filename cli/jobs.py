@@ -34,7 +34,7 @@ def worker(
     store: Annotated[str, Parameter(help="Store of rendered segments that the batch uses: a folder or a URL.")],
     jobs: Annotated[int, whole_number("Number of workers on this machine.")] = 1,
 ) -> None:
-    """Render segments of a database until interrupted; start one on each machine."""
+    """Render segments and execute jobs of the service until interrupted; start one on each machine."""
     if jobs < 1:
         raise InputError(f"--jobs must be 1 or more, not {jobs}")
     from tts2face.batch.store import open_store

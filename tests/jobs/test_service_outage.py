@@ -39,6 +39,9 @@ def test_jobs_wait_for_the_database_and_streams_go_on(postgres: Postgres, tmp_pa
                 refused = submit(api, {**CLIP, "text": "Now."})
                 assert (refused.status_code, refused.json()["error"]["code"]) == (503, "unavailable")
                 assert int(refused.headers["retry-after"]) > 0
+                assert "127.0.0.1" not in refused.text
+                cancelled = api.post(f"/v1/jobs/{names[-1]}/cancel")
+                assert (cancelled.status_code, api.get("/v1/jobs").status_code) == (503, 503)
                 n_streams = 0
                 while time.monotonic() < stopped + OUTAGE_S:
                     assert len(api.post("/v1/clips", json={**CLIP, "text": "A stream."}).content) > 100
@@ -51,6 +54,10 @@ def test_jobs_wait_for_the_database_and_streams_go_on(postgres: Postgres, tmp_pa
             wait_until(lambda: api.get("/readyz").status_code == 200)
         finally:
             running.close()
+    assert [one["event"] for one in running.events() if one["event"].startswith("jobs ")] == [
+        "jobs not available", "jobs available",
+    ]  # fmt: skip
+    assert not [one for one in running.events() if one["event"] == "defect"]
     assert watch.n_twice == 0
     assert len(watch.stored) == N_JOBS
 

@@ -13,7 +13,7 @@ from typing import Any
 import httpx
 import pytest
 
-START_TIMEOUT_S = 60.0
+START_TIMEOUT_S = 180.0
 
 
 class RunningService:

@@ -79,7 +79,7 @@ def test_waiting_jobs_of_a_key_are_limited(idle: Idle) -> None:
 @pytest.mark.parametrize(
     ("body", "status", "reason"),
     [
-        ({"kind": "fly"}, 422, "no job of kind 'fly'; the kinds are clip, subtitles"),
+        ({"kind": "fly"}, 422, "no job of kind 'fly' here; the kinds are clip, subtitles, talker"),
         ({"kind": "clip"}, 400, "nothing to say"),
         ({"kind": "clip", "request": {**CLIP, "speed": 2}}, 422, "speed: Extra inputs are not permitted"),
         ({"kind": "clip", "request": {**CLIP, "voice": "../x.onnx"}}, 400, "no voice '../x.onnx'"),

@@ -1,9 +1,9 @@
 """Errors of the service as answers."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
@@ -55,10 +55,10 @@ def as_refused(error: Tts2faceError) -> RefusedError:
 class ErrorDetail(BaseModel):
     """What is wrong."""
 
-    message: str
-    type: str
-    param: str | None
-    code: str
+    message: Annotated[str, Field(description="What is wrong, which value, what to do.")]
+    type: Annotated[str, Field(description="invalid_request_error or server_error.")]
+    param: Annotated[str | None, Field(description="Name of the field, if the form of one is wrong.")]
+    code: Annotated[str, Field(description="Word for programs.", examples=["rate_limited"])]
 
 
 class ErrorBody(BaseModel):

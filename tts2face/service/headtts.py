@@ -58,21 +58,21 @@ def hello() -> str:
 class HeadTtsError(BaseModel):
     """An error as HeadTTS reports it."""
 
-    error: str
+    error: Annotated[str, Field(description="What is wrong, which value, what to do.")]
 
 
 class HeadTtsAudio(BaseModel):
     """Sound with its words and visemes; times in milliseconds."""
 
     audio: Annotated[str, Field(description="Base64 of a .wav file or of 16-bit samples.")]
-    audioEncoding: str  # noqa: N815
-    words: list[str]
-    wtimes: list[int]
-    wdurations: list[int]
-    visemes: list[str]
-    vtimes: list[int]
-    vdurations: list[int]
-    phonemes: list[str]
+    audioEncoding: Annotated[str, Field(description="wav or pcm.")]  # noqa: N815
+    words: Annotated[list[str], Field(description="Words, each but the last with a space behind it.")]
+    wtimes: Annotated[list[int], Field(description="Begin of each word.")]
+    wdurations: Annotated[list[int], Field(description="Duration of each word.")]
+    visemes: Annotated[list[str], Field(description="Oculus visemes.")]
+    vtimes: Annotated[list[int], Field(description="Begin of each viseme.")]
+    vdurations: Annotated[list[int], Field(description="Duration of each viseme.")]
+    phonemes: Annotated[list[str], Field(description="Phone of each viseme.")]
 
 
 OWN_ERRORS: dict[int | str, dict[str, Any]] = {

@@ -13,7 +13,7 @@ from lexicon.errors import BackendError, Tts2faceError
 from tts2face.batch.prune import prune_unused
 from tts2face.batch.store import open_store
 from tts2face.jobs.blobs import open_blobs
-from tts2face.jobs.connection import DatabaseAwayError
+from tts2face.jobs.connection import DatabaseAwayError, connection_errors
 from tts2face.jobs.control import prune_jobs, unfinished_segments
 from tts2face.jobs.database import database_url, prepare_database, shown_url
 from tts2face.jobs.engine import DatabaseEngine, local_workers
@@ -53,7 +53,7 @@ class JobService:
     def __init__(self, settings: ServiceSettings) -> None:
         self._settings = settings
         self._client: JobClient | None = None
-        self._reason = "it is being opened"
+        self._reason = ""  # why the database cannot be reached
         self._threads = ThreadPoolExecutor(N_THREADS, thread_name_prefix="jobs")
         self._senders = ThreadPoolExecutor(N_SENDERS, thread_name_prefix="webhooks")
         self._tasks: list[asyncio.Task[None]] = []
@@ -88,7 +88,7 @@ class JobService:
             The database has not been opened yet.
         """
         if self._client is None:
-            raise _unavailable(self._reason)
+            raise _unavailable()
         return self._client
 
     async def call(self, function: Callable[[JobClient], Value], threads: ThreadPoolExecutor | None = None) -> Value:
@@ -100,16 +100,29 @@ class JobService:
             The database cannot be reached (503), or the function raised an error of the project.
         """
         client = self.client
+        away_errors: tuple[type[Exception], ...] = (DatabaseAwayError, *connection_errors())
         try:
-            return await asyncio.get_running_loop().run_in_executor(threads or self._threads, function, client)
-        except DatabaseAwayError as away:
-            raise _unavailable(str(away)) from away
+            value = await asyncio.get_running_loop().run_in_executor(threads or self._threads, function, client)
+        except away_errors as away:
+            self._note_away(str(away))
+            raise _unavailable() from away
         except OtherBodyError as other:
             raise RefusedError(422, "idempotency_conflict", str(other)) from other
         except QueueFullError as full:
             raise RefusedError(429, "queue_full", str(full), {"Retry-After": "30"}) from full
         except Tts2faceError as error:
             raise as_refused(error) from error
+        self._note_away("")
+        return value
+
+    def _note_away(self, reason: str) -> None:
+        """Write once to the log that the database cannot be reached, and once that it can be reached again."""
+        if bool(reason) != bool(self._reason):
+            self._reason = reason
+            if reason:
+                log_event("jobs not available", level=logging.WARNING, reason=reason)
+            else:
+                log_event("jobs available", database=shown_url(self._settings.database_place))
 
     async def is_reachable(self) -> bool:
         """Whether the database answers within `PROBE_S`."""
@@ -123,19 +136,16 @@ class JobService:
             try:
                 self._client = await asyncio.to_thread(self._open)
             except Tts2faceError as wrong:
-                if self._reason != str(wrong):
-                    self._reason = str(wrong)
-                    log_event("jobs not available", level=logging.WARNING, reason=self._reason)
+                self._note_away(str(wrong))
                 await asyncio.sleep(RETRY_S)
-        log_event("jobs available", database=shown_url(self._settings.database_place))
+        self._note_away("")
         if self._settings.workers:
             self._supervisor = threading.Thread(target=self._supervise, name="supervisor", daemon=True)
             self._supervisor.start()
-        await asyncio.gather(
-            self._repeat(self._send_webhooks, WEBHOOK_S),
-            self._repeat(self._count, STATISTICS_S),
-            self._repeat(self._sweep, SWEEP_S),
-        )
+        for action, pause_s in ((self._send_webhooks, WEBHOOK_S), (self._count, STATISTICS_S), (self._sweep, SWEEP_S)):
+            task = asyncio.create_task(self._repeat(action, pause_s))
+            task.add_done_callback(_log_defect)
+            self._tasks.append(task)
 
     def _open(self) -> JobClient:
         folder, settings = self._settings.data_folder, self._settings
@@ -194,11 +204,15 @@ class JobService:
         return pruned.n_removed
 
 
-def _unavailable(reason: str) -> RefusedError:
-    return RefusedError(
-        503, "unavailable", f"the jobs are not available: {reason}", {"Retry-After": str(RETRY_AFTER_S)}
-    )
+def _unavailable() -> RefusedError:
+    message = "the jobs are not available now, as their database cannot be reached; repeat the request later"
+    return RefusedError(503, "unavailable", message, {"Retry-After": str(RETRY_AFTER_S)})
 
 
 def _log_worker(event: str, message: str) -> None:
     log_event(event, message=message)
+
+
+def _log_defect(task: "asyncio.Task[None]") -> None:
+    if not task.cancelled() and (error := task.exception()) is not None:
+        log_event("defect", level=logging.ERROR, error=error)

@@ -28,7 +28,7 @@ from tts2face.service.errors import RefusedError, as_refused
 from tts2face.service.guard import VIDEO_PATH
 from tts2face.service.job_kinds import JOB_KINDS
 from tts2face.service.job_models import JobDetail, JobPage, NewJobBody, job_detail, job_view
-from tts2face.service.job_orders import JobKind, JobOrder, Upload
+from tts2face.service.job_orders import JobKind, JobOrder, Upload, expected_speech_s
 from tts2face.service.job_schema import new_job_schema
 from tts2face.service.keys import ApiKey
 from tts2face.service.scopes import require_scope
@@ -98,6 +98,8 @@ async def _queue(request: HttpRequest, idempotency_key: str | None, kinds: Mappi
         asked: NewJobBody = _parse(NewJobBody, body)
         kind = _kind(asked.kind, kinds)
         key = require_scope(request, kind.scope, f"jobs of kind {asked.kind}")
+        if kind.scope == "speak":
+            state.limits.check_speech(key)
         if asked.webhook is not None:
             check_webhook(asked.webhook, state.settings)
         folder = await stack.enter_async_context(upload_folder(state.settings))
@@ -108,6 +110,8 @@ async def _queue(request: HttpRequest, idempotency_key: str | None, kinds: Mappi
         except Tts2faceError as wrong:
             raise as_refused(wrong) from wrong
         record, is_new = await service.call(lambda client: _submit(client, order, asked, content, idempotency_key))
+        if is_new:
+            state.limits.add_speech(key, expected_speech_s(order))
     return JSONResponse(job_detail(record).model_dump(), 202 if is_new else 200, {"Location": f"/v1/jobs/{record.id}"})
 
 
