@@ -45,7 +45,7 @@ def add(  # noqa: PLR0913 - one parameter a flag
     speech_s_per_day: Annotated[int | None, whole_number("Seconds of speech a day.")] = None,
 ) -> None:
     """Create a key and print it; the file holds only its hash."""
-    from tts2face.service.keys import add_key
+    from tts2face.service.access.keys import add_key
 
     limits = {
         "requests_per_minute": requests_per_minute, "concurrent": concurrent, "speech_s_per_day": speech_s_per_day,
@@ -57,7 +57,7 @@ def add(  # noqa: PLR0913 - one parameter a flag
 @keys.command(name="list")
 def list_keys(*, file: Annotated[Path, Parameter(help="File of keys (TOML).")]) -> None:
     """List the keys of a file with their scopes and limits."""
-    from tts2face.service.keys import LIMITS, read_keys
+    from tts2face.service.access.keys import LIMITS, read_keys
 
     for key in read_keys(file):
         limits = [f"{limit}={value}" for limit in LIMITS if (value := getattr(key, limit)) is not None]
@@ -72,7 +72,7 @@ def remove(
     file: Annotated[Path, Parameter(help="File of keys (TOML).")],
 ) -> None:
     """Remove a key; a running service drops it on SIGHUP."""
-    from tts2face.service.keys import remove_key
+    from tts2face.service.access.keys import remove_key
 
     remove_key(file, name)
     print(f"removed {name}")  # noqa: T201 - the result

@@ -41,7 +41,7 @@ def main() -> None:
 
 def check(kind: str, path: Path, out: Path) -> tuple[float, float]:
     out.mkdir()
-    return cost([sys.executable, "-m", "tts2face.service.decode_process", kind, str(path), str(out), "1e9"], "")
+    return cost([sys.executable, "-m", "tts2face.service.uploads.decode_process", kind, str(path), str(out), "1e9"], "")
 
 
 def build(folder: Path, appearance: bool) -> tuple[tuple[float, float], Path]:

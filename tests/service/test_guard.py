@@ -10,9 +10,9 @@ from typing import Any
 import httpx
 import pytest
 
-from tts2face.service.exchange import Receive, Scope, Send
-from tts2face.service.guard import Guard
-from tts2face.service.keys import add_key
+from tts2face.service.access.exchange import Receive, Scope, Send
+from tts2face.service.access.guard import Guard
+from tts2face.service.access.keys import add_key
 from tts2face.service.logs import LineFormatter
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.state import ServiceState

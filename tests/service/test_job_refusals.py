@@ -9,7 +9,7 @@ import pytest
 
 from tests.service.conftest import RunningService
 from tests.service.job_requests import CLIP, SMALL, submit, wait_for_database
-from tts2face.service.keys import add_key
+from tts2face.service.access.keys import add_key
 
 LIMITS = {
     "TTS2FACE_SERVE_JOB_WAITING": "3",

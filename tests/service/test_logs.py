@@ -12,13 +12,13 @@ import httpx
 import pytest
 
 from tests.service.conftest import RunningService
-from tts2face.service.exchange import Receive, Scope, Send
-from tts2face.service.guard import Guard
-from tts2face.service.keys import LOCAL_KEY, add_key, remove_key
+from tts2face.service.access.exchange import Receive, Scope, Send
+from tts2face.service.access.guard import Guard
+from tts2face.service.access.keys import LOCAL_KEY, add_key, remove_key
 from tts2face.service.logs import LOG, LineFormatter, log_event
-from tts2face.service.messages import Message, MessageKind
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.state import ServiceState
+from tts2face.service.synthesis.messages import Message, MessageKind
 
 
 def record(message: str, *, name: str = LOG.name, **fields: Any) -> logging.LogRecord:

@@ -13,14 +13,14 @@ import pytest
 from cli.main import run
 from lexicon.errors import DataError, InputError
 from tests.service.conftest import RunningService
+from tts2face.service.access.keys import LOCAL_KEY, ApiKey, add_key, find_key, read_keys, remove_key
+from tts2face.service.access.rate_limits import RateLimits
 from tts2face.service.errors import RefusedError
-from tts2face.service.keys import LOCAL_KEY, ApiKey, add_key, find_key, read_keys, remove_key
-from tts2face.service.messages import Message, MessageKind
-from tts2face.service.pool import Pool, PoolSettings
-from tts2face.service.rate_limits import RateLimits
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.state import ServiceState
-from tts2face.service.work import Work
+from tts2face.service.synthesis.messages import Message, MessageKind
+from tts2face.service.synthesis.pool import Pool, PoolSettings
+from tts2face.service.synthesis.work import Work
 
 HOUR_S = 3600.0
 

@@ -21,7 +21,7 @@ from tests.model_files.made import write_made_models, write_made_talker
 from tts2face.characters.binding import KEY
 from tts2face.jobs.resource_check import draw_resource
 from tts2face.models.face_file import read_face
-from tts2face.service.decode_process import REFUSED
+from tts2face.service.uploads.decode_process import REFUSED
 from tts2face.storage.files import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.video.landmark_models import find_bundle
@@ -40,7 +40,7 @@ def check(kind: str, source: Path, folder: Path, most: float = MOST_BYTES) -> tu
     checked = folder / "checked"
     checked.mkdir()
     done = subprocess.run(
-        [sys.executable, "-m", "tts2face.service.decode_process", kind, source, checked, str(most)],
+        [sys.executable, "-m", "tts2face.service.uploads.decode_process", kind, source, checked, str(most)],
         capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
     return done.returncode, done.stderr, checked

@@ -11,9 +11,9 @@ import pytest
 
 from lexicon.errors import BackendError
 from tests.service.conftest import RunningService
-from tts2face.service.messages import Message, MessageKind
-from tts2face.service.result_cache import ResultCache, work_hash
-from tts2face.service.work import Work
+from tts2face.service.synthesis.messages import Message, MessageKind
+from tts2face.service.synthesis.result_cache import ResultCache, work_hash
+from tts2face.service.synthesis.work import Work
 
 END = Message(7, MessageKind.END, b'{"seconds": 1.0}')
 HELLO = Work(request={"text": "Hello."}, models={"talker": "grid_s1"})

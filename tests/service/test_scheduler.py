@@ -6,8 +6,8 @@ from collections.abc import Iterator
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.service.messages import Event, Message, MessageKind, Wait
-from tts2face.service.scheduler import Scheduler, Step
+from tts2face.service.synthesis.messages import Event, Message, MessageKind, Wait
+from tts2face.service.synthesis.scheduler import Scheduler, Step
 from tts2face.types import Chunk
 
 

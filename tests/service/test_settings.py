@@ -9,7 +9,7 @@ import pytest
 
 from cli.main import run
 from lexicon.errors import DataError, InputError
-from tts2face.service.keys import add_key, find_key, read_keys
+from tts2face.service.access.keys import add_key, find_key, read_keys
 from tts2face.service.settings import ServiceSettings, read_settings
 
 

@@ -20,7 +20,7 @@ from tests.rendered_takes import transcript
 from tests.service.conftest import RunningService
 from tests.service.job_requests import finished, wait_for_database
 from tests.service.test_resource_check import WORDS
-from tts2face.service.keys import add_key
+from tts2face.service.access.keys import add_key
 from tts2face.video.landmark_models import find_bundle
 from tts2face.video.media import read_sound
 

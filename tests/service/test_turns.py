@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from lexicon.errors import BackendError, DataError, InputError
-from tts2face.service.messages import Wait
-from tts2face.service.remote_aligner import RemoteAligner
-from tts2face.service.scheduler import Step
-from tts2face.service.turns import InterruptedTaskError, OneAtATime, TurnSteps, wait_elsewhere
+from tts2face.service.synthesis.messages import Wait
+from tts2face.service.synthesis.remote_aligner import RemoteAligner
+from tts2face.service.synthesis.scheduler import Step
+from tts2face.service.synthesis.turns import InterruptedTaskError, OneAtATime, TurnSteps, wait_elsewhere
 from tts2face.speech.forced_alignment import Aligner
 from tts2face.types import Chunk
 from tts2face.voice.loading import load_voice

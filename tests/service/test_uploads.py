@@ -16,7 +16,7 @@ import pytest
 from PIL import Image
 
 import tts2face
-from tts2face.service.decode_process import REFUSED
+from tts2face.service.uploads.decode_process import REFUSED
 
 RATE = 16_000
 
@@ -25,7 +25,7 @@ def decode(kind: str, content: bytes, folder: Path, limit: float) -> tuple[int, 
     given, decoded = folder / "given", folder / "decoded"
     given.write_bytes(content)
     done = subprocess.run(
-        [sys.executable, "-m", "tts2face.service.decode_process", kind, given, decoded, str(limit)],
+        [sys.executable, "-m", "tts2face.service.uploads.decode_process", kind, given, decoded, str(limit)],
         capture_output=True, text=True, timeout=60, check=False,
     )  # fmt: skip
     return done.returncode, done.stderr, decoded

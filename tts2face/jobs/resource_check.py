@@ -1,4 +1,4 @@
-"""Check of an uploaded talker, face, palette, dictionary or character; runs in `tts2face.service.decode_process`.
+"""Check of an uploaded talker, face, palette, dictionary or character, in a limited process.
 
 What is stored is written here again from what was read, never the bytes of the upload.
 """

@@ -13,9 +13,9 @@ from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
 from tts2face import __version__
-from tts2face.service import clips, headtts, health, jobs, live, openai_speech, resources, results
+from tts2face.service.access.guard import Guard
 from tts2face.service.errors import DOCUMENTED, RefusedError, error_body
-from tts2face.service.guard import Guard
+from tts2face.service.routes import clips, headtts, health, jobs, live, openai_speech, resources, results
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.state import ServiceState
 

@@ -7,8 +7,8 @@ from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
-from tts2face.service.pool import BusyError
-from tts2face.service.warm_process import DefectError
+from tts2face.service.synthesis.pool import BusyError
+from tts2face.service.synthesis.warm_process import DefectError
 
 
 class RefusedError(HTTPException):

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
 
 if TYPE_CHECKING:
-    from tts2face.service.job_service import JobService
-    from tts2face.service.pool import Pool
-    from tts2face.service.result_cache import ResultCache
+    from tts2face.service.jobs.job_service import JobService
+    from tts2face.service.synthesis.pool import Pool
+    from tts2face.service.synthesis.result_cache import ResultCache
 
 LATENCY_BUCKETS_S = (0.025, 0.05, 0.1, 0.15, 0.25, 0.35, 0.5, 0.75, 1, 2, 5, 10, 30, 120)
 

@@ -9,8 +9,8 @@ from contextlib import suppress
 
 import uvicorn
 
+from tts2face.service.access.connections import connection_classes
 from tts2face.service.app import create_app
-from tts2face.service.connections import connection_classes
 from tts2face.service.logs import configure_logs, log_event
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.state import ServiceState

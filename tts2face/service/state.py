@@ -9,24 +9,24 @@ from contextlib import aclosing
 from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import Tts2faceError
+from tts2face.service.access.keys import ApiKey, read_keys
+from tts2face.service.access.rate_limits import RateLimits
 from tts2face.service.errors import RefusedError, as_refused
-from tts2face.service.job_service import JobService
-from tts2face.service.keys import ApiKey, read_keys
-from tts2face.service.library import Library
+from tts2face.service.jobs.job_service import JobService
 from tts2face.service.logs import log_event
-from tts2face.service.messages import Message, MessageKind
 from tts2face.service.metrics import Metrics
-from tts2face.service.pool import Pool, PoolSettings
-from tts2face.service.rate_limits import RateLimits
-from tts2face.service.result_cache import CACHED_KINDS, ResultCache
 from tts2face.service.settings import ServiceSettings
+from tts2face.service.synthesis.messages import Message, MessageKind
+from tts2face.service.synthesis.pool import Pool, PoolSettings
+from tts2face.service.synthesis.result_cache import CACHED_KINDS, ResultCache
+from tts2face.service.synthesis.words import check_words
+from tts2face.service.synthesis.work import Work
 from tts2face.service.tracing import tracing_from_environment
-from tts2face.service.upload_checks import Checks
-from tts2face.service.words import check_words
-from tts2face.service.work import Work
+from tts2face.service.uploads.library import Library
+from tts2face.service.uploads.upload_checks import Checks
 
 if TYPE_CHECKING:
-    from tts2face.service.exchange import Exchange
+    from tts2face.service.access.exchange import Exchange
 
 WARM_TEXT = "Hello there."
 

@@ -8,7 +8,7 @@ from lexicon.errors import BackendError, InputError
 from tts2face import __version__
 
 if TYPE_CHECKING:
-    from tts2face.service.exchange import Exchange
+    from tts2face.service.access.exchange import Exchange
 
 ENDPOINTS = ("OTEL_EXPORTER_OTLP_TRACES_ENDPOINT", "OTEL_EXPORTER_OTLP_ENDPOINT")
 PROTOCOLS = ("OTEL_EXPORTER_OTLP_TRACES_PROTOCOL", "OTEL_EXPORTER_OTLP_PROTOCOL")

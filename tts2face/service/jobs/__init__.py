@@ -1,0 +1,1 @@
+"""Jobs of the service: their kinds, their state, webhooks."""

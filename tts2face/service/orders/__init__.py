@@ -1,0 +1,1 @@
+"""What clients ask for: options and files of clips and jobs, and their checks."""

@@ -1,0 +1,200 @@
+"""Kinds of jobs as clients ask for them: their options, their files, and the checks before they are queued.
+
+`tts2face.jobs.job_kinds` executes them.
+"""
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+from starlette.datastructures import UploadFile
+
+from lexicon.errors import DataError
+from lexicon.inputs import check_limits
+from tts2face.batch.cast import MODEL_NAMES, cast_from_tables
+from tts2face.batch.options import BatchOptions
+from tts2face.jobs.clip_job import BACKGROUND, FILES
+from tts2face.render.picture import Picture
+from tts2face.request import Request
+from tts2face.service.errors import RefusedError
+from tts2face.service.orders.clip_options import ClipOptions, ClipRequest, divide_options
+from tts2face.service.orders.job_orders import JobKind, JobOrder
+from tts2face.service.orders.talker_kind import TALKER_KIND
+from tts2face.service.uploads.names import check_voice, resolve_dictionary, resolve_models
+from tts2face.subtitles.reader import SUFFIXES
+
+BATCH_FIELDS = ("per", "overflow", "max_rate", "scene_gap", "format", "exports", "encoding")
+MAX_CAST_CHARACTERS = 1_000_000
+
+
+class SubtitlesRequest(ClipOptions):
+    """How subtitle files become clips; meanings as of the flags of `tts2face batch`."""
+
+    per: Annotated[Literal["cue", "scene", "file", "film"], Field(description="What becomes one clip.")] = "cue"
+    overflow: Annotated[
+        Literal["extend", "cut-pauses", "report"], Field(description="For speech that is longer than its cue.")
+    ] = "extend"
+    max_rate: Annotated[float, Field(ge=1, le=2, description="Largest rate by which speech is fitted.")] = 1.4
+    scene_gap: Annotated[float, Field(gt=0, le=3600, description="Seconds without a cue that divide scenes.")] = 4.0
+    format: Annotated[Literal["mp4", "webm", "mov", "none"], Field(description="Videos; none: only exports.")] = "mp4"
+    exports: Annotated[
+        tuple[str, ...],
+        Field(max_length=20, strict=False, description="Files for other programs by ending.", examples=[["glb"]]),
+    ] = ()
+    encoding: Annotated[
+        str | None, Field(pattern="^[A-Za-z0-9_.:-]{1,40}$", description="Encoding of subtitles that are not UTF-8.")
+    ] = None
+    cast: Annotated[
+        dict[str, Any] | str | None,
+        Field(
+            description="Speakers with their models and voices: the tables of a cast file as JSON, or its TOML.",
+            examples=[{"role": [{"speaker": "ANN", "identity": "kofi"}]}],
+        ),
+    ] = None
+
+
+async def add_background(order: JobOrder, part: str, file: UploadFile, number: int) -> None:
+    """Check and note a background picture."""
+    _refuse_second(part, number)
+    order.upload.files[BACKGROUND] = await order.upload.folder.picture(part, file)
+
+
+async def add_clip_file(order: JobOrder, part: str, file: UploadFile, number: int) -> None:
+    """Check and note the recording or the timeline of a clip."""
+    _refuse_second(part, number)
+    folder = order.upload.folder
+    made = await folder.sound(part, file) if part == "audio" else await folder.text(part, file, ".json")
+    order.upload.files[FILES[part]] = made
+
+
+async def add_subtitles(order: JobOrder, part: str, file: UploadFile, number: int) -> None:
+    """Check and note a subtitle file."""
+    settings, suffix = order.state.settings, Path(file.filename or "").suffix.lower()
+    if number > settings.job_files:
+        raise RefusedError(413, "too_large", f"there are more than {settings.job_files} subtitle files; send less")
+    name = f"{part}-{number:03d}"
+    path, numbers = await order.upload.folder.subtitles(
+        name, file, suffix if suffix in SUFFIXES else ".srt", order.options.encoding, settings.job_cues
+    )
+    order.upload.n_cues += int(numbers["cues"])
+    if order.upload.n_cues > settings.job_cues:
+        raise RefusedError(413, "too_large", f"the files have more than {settings.job_cues} cues; divide them")
+    if numbers["seconds"] > settings.job_s:
+        raise RefusedError(413, "too_large", f"{name} is longer than {settings.job_s:g} s; divide it")
+    order.upload.files[f"{name}{path.suffix}"] = path
+
+
+async def add_track(order: JobOrder, part: str, file: UploadFile, number: int) -> None:
+    """Check and note the recording of a whole subtitle file."""
+    if number > order.state.settings.job_files:
+        raise RefusedError(413, "too_large", f"there are more than {order.state.settings.job_files} recordings")
+    order.upload.files[f"subtitles-{number:03d}.wav"] = await order.upload.folder.sound(f"{part}-{number:03d}", file)
+
+
+async def prepare_clip(order: JobOrder) -> dict[str, Any]:
+    """JSON of a job of kind ``clip``.
+
+    Raises
+    ------
+    InputError, RefusedError
+        An option is wrong.
+    """
+    given: dict[str, Any] = order.options.model_dump(exclude_none=True, exclude_defaults=True)
+    format = given.pop("format", ClipRequest.model_fields["format"].default)
+    fields = await divide_options(order.state, order.key, given)
+    if len(given.get("text", "")) > order.state.settings.text_characters:
+        raise RefusedError(
+            413, "too_long", f"the text has more than {order.state.settings.text_characters} characters; divide it"
+        )
+    has_audio = FILES["audio"] in order.upload.files
+    if not (given.get("text", "").strip() or has_audio or "idle" in given):
+        raise RefusedError(400, "invalid_request", "there is nothing to say; give text, audio or idle")
+    Request(**fields.request | ({"audio": Path("audio.wav")} if has_audio else {}))
+    Picture(**fields.picture)
+    work = order.state.work(models=fields.models, request=fields.request, picture=fields.picture, format=format)
+    return work.as_json()
+
+
+async def prepare_subtitles(order: JobOrder) -> dict[str, Any]:
+    """JSON of a job of kind ``subtitles``; errors as `prepare_clip`."""
+    given: dict[str, Any] = order.options.model_dump(exclude_none=True, exclude_defaults=True)
+    cast = given.pop("cast", {})
+    options: dict[str, Any] = {name: given.pop(name) for name in BATCH_FIELDS if name in given}
+    subtitles = sorted(name for name in order.upload.files if Path(name).suffix in SUFFIXES)
+    n_tracks = sum(name.endswith(".wav") for name in order.upload.files)
+    if not subtitles:
+        raise RefusedError(422, "invalid_request", "there are no subtitles; send them as parts `subtitles` of a form")
+    if n_tracks not in {0, len(subtitles)}:
+        raise RefusedError(
+            422,
+            "invalid_request",
+            f"there are {n_tracks} recordings of {len(subtitles)} subtitle files; send one of each",
+        )
+    BatchOptions(**options)
+    fields = await divide_options(order.state, order.key, given)
+    Request(**fields.request)
+    picture = Picture(**fields.picture)
+    if picture.is_transparent and options.get("format", "mp4") in {"mp4", "mov"}:
+        raise RefusedError(400, "invalid_request", "mp4 and mov have no transparency; choose webm")
+    work = order.state.work(models=fields.models, request=fields.request, picture=fields.picture)
+    tables = _cast_tables(cast)
+    resolved = [await _resolve_role(order, one) for one in (tables.get("default", {}), *tables.get("role", []))]
+    return {
+        **{name: value for name, value in work.as_json().items() if name in {"models", "request", "picture"}},
+        "options": options,
+        "subtitles": subtitles,
+        "has_audio": n_tracks > 0,
+        "cast": {"default": resolved[0], "role": resolved[1:]},
+    }
+
+
+def _cast_tables(cast: dict[str, Any] | str) -> dict[str, Any]:
+    """Tables of a cast after their check."""
+    if isinstance(cast, str):
+        check_limits("characters of cast", len(cast), (0, MAX_CAST_CHARACTERS))
+        try:
+            cast = tomllib.loads(cast)
+        except (tomllib.TOMLDecodeError, RecursionError) as broken:
+            raise DataError(f"cast is not TOML ({broken}); correct it") from broken
+    cast_from_tables(cast, "the cast")
+    return cast
+
+
+async def _resolve_role(order: JobOrder, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings of a role with the paths of uploads in place of their names."""
+    named = {name: settings[name] for name in MODEL_NAMES if name in settings}
+    models = await resolve_models(order.state.library, order.key, named)
+    check_voice(settings.get("voice"))
+    return {**await resolve_dictionary(order.state.library, order.key, settings), **models}
+
+
+def _refuse_second(part: str, number: int) -> None:
+    if number > 1:
+        raise RefusedError(422, "invalid_request", f"{part} was sent twice; send one")
+
+
+JOB_KINDS: dict[str, JobKind] = {
+    "clip": JobKind(
+        "speak",
+        ClipRequest,
+        {
+            "audio": ("Speech in place of a voice.", add_clip_file),
+            "background": ("Picture behind the face.", add_background),
+            "timeline": ("Timeline of gestures, JSON.", add_clip_file),
+        },
+        prepare_clip,
+    ),
+    "subtitles": JobKind(
+        "speak",
+        SubtitlesRequest,
+        {
+            "subtitles": ("Subtitle files: SubRip, WebVTT, ASS, TTML; one or several.", add_subtitles),
+            "audio": ("A recording of each subtitle file in place of a voice, in the same order.", add_track),
+            "background": ("Picture behind the face.", add_background),
+        },
+        prepare_subtitles,
+    ),
+    "talker": TALKER_KIND,
+}

@@ -1,0 +1,198 @@
+"""Live streams for avatars: text or sound comes in, speech, phones and curves go out with their times."""
+
+import asyncio
+import base64
+import time
+from contextlib import aclosing, suppress
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from lexicon.errors import DataError
+from lexicon.inputs import parse_json
+from tts2face.service.errors import RefusedError
+from tts2face.service.state import ServiceState
+from tts2face.service.synthesis.messages import MessageKind
+from tts2face.service.uploads.names import MODEL_FIELDS, check_voice, resolve_dictionary, resolve_models
+
+router = APIRouter(tags=["live"])
+
+TEXT_TYPES = frozenset({"text", "flush", "cancel", "interrupt", "end"})  # of messages of a stream of text
+AUDIO_TYPES = frozenset({"end"})  # of a stream of sound, besides the sound
+MAX_BLOCK_BYTES = 1 << 16  # of sound in one message
+MAX_AHEAD_S = 5.0  # by which a client's sound is read ahead of real time
+SAMPLE_BYTES = 2
+INVALID = 1007  # WebSocket close code: a message is not what it should be
+
+
+class TextOptions(BaseModel):
+    """First message of a live stream of text."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    type: Literal["start"]
+    input: Literal["text"] = "text"
+    language: Annotated[str, Field(description="Language of the text.")] = "en-us"
+    voice: Annotated[str | None, Field(description="A voice of GET /v1/voices.")] = None
+    rate: Annotated[float, Field(ge=0.5, le=2.0)] = 1.0
+    volume: Annotated[float, Field(ge=0.0, le=2.0)] = 1.0
+    seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = 0
+    fps: Annotated[float, Field(ge=1, le=120)] = 30.0
+    gestures: Literal["fields", "ju2008", "noise", "none"] = "fields"
+    style: str | None = None
+    gain: str | None = None
+    talker: str | None = None
+    face: str | None = None
+    identity: str | None = None
+    palette: str | None = None
+    dictionary: Annotated[str | None, Field(description="A dictionary of GET /v1/dictionaries.")] = None
+    with_idle: Annotated[bool, Field(description="Curves of a living face between utterances.")] = True
+
+
+class AudioOptions(BaseModel):
+    """First message of a live stream of sound."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    type: Literal["start"]
+    input: Literal["audio"]
+    rate: Annotated[int, Field(ge=8_000, le=192_000, description="Sample rate in Hz.")] = 16_000
+    talker: str | None = None
+    face: str | None = None
+    identity: str | None = None
+
+
+@router.websocket("/v1/stream")
+async def stream(connection: WebSocket) -> None:
+    """A live stream; docs/http.md describes its messages."""
+    await connection.accept()
+    state: ServiceState = connection.app.state.service
+    try:
+        options = _read_options(await connection.receive_text())
+        given: dict[str, Any] = options.model_dump(exclude_none=True, exclude_defaults=True, exclude={"type", "input"})
+        models = {name: given.pop(name) for name in MODEL_FIELDS if name in given}
+        key = connection.state.key
+        models = await resolve_models(state.library, key, models)
+        given = await resolve_dictionary(state.library, key, given)
+        check_voice(given.get("voice"))
+    except (ValidationError, RefusedError) as wrong:
+        await _refuse(connection, _reason(wrong))
+        return
+    except (WebSocketDisconnect, KeyError):
+        return
+    inputs: asyncio.Queue[Any] = asyncio.Queue(1000)
+    work = state.work(kind="live" if isinstance(options, TextOptions) else "listen", models=models, request=given)
+    sending = asyncio.create_task(_send(connection, state, work, inputs))
+    receiving = asyncio.create_task(_receive(connection, inputs, options))
+    try:
+        await asyncio.wait({sending, receiving}, return_when=asyncio.FIRST_COMPLETED)
+        if receiving.done() and receiving.exception() is None and receiving.result():
+            await sending  # the client ended its input and waits for the rest
+    finally:
+        for task in (sending, receiving):
+            task.cancel()
+        await asyncio.gather(sending, receiving, return_exceptions=True)
+        with suppress(RuntimeError):
+            await connection.close()
+
+
+def _read_options(message: str) -> TextOptions | AudioOptions:
+    with suppress(DataError):
+        content = parse_json(message, "the message")
+        if isinstance(content, dict) and content.get("input") == "audio":
+            return AudioOptions.model_validate_json(message)
+    return TextOptions.model_validate_json(message)
+
+
+async def _receive(connection: WebSocket, inputs: "asyncio.Queue[Any]", options: TextOptions | AudioOptions) -> bool:
+    """Pass the client's messages on; True after ``end``, False when the client has left."""
+    types = TEXT_TYPES if isinstance(options, TextOptions) else AUDIO_TYPES
+    pace = None if isinstance(options, TextOptions) else _Pace(SAMPLE_BYTES * options.rate)
+    while True:
+        try:
+            content = _read_message(await connection.receive(), types, has_sound=pace is not None)
+        except WebSocketDisconnect:
+            return False
+        except RefusedError as wrong:
+            await connection.send_json({"type": "error", "message": wrong.message})
+            continue
+        if pace is not None and "samples" in content:
+            await pace.add(len(content["samples"]))
+            content["samples"] = base64.b64encode(content["samples"]).decode()
+        await inputs.put(content)
+        if content["type"] == "end":
+            return True
+
+
+class _Pace:
+    """Slows a sender of sound down to real time once it is `MAX_AHEAD_S` ahead."""
+
+    def __init__(self, bytes_per_s: float) -> None:
+        self._bytes_per_s, self._seconds, self._began = bytes_per_s, 0.0, time.monotonic()
+
+    async def add(self, n_bytes: int) -> None:
+        self._seconds += n_bytes / self._bytes_per_s
+        ahead = self._seconds - (time.monotonic() - self._began)
+        if ahead < 0:  # a pause of the sender is no credit
+            self._began += -ahead
+        if ahead > MAX_AHEAD_S:
+            await asyncio.sleep(ahead - MAX_AHEAD_S)
+
+
+def _read_message(message: Any, types: frozenset[str], *, has_sound: bool) -> dict[str, Any]:
+    """Content of a message; sound becomes the value ``samples``.
+
+    Raises
+    ------
+    RefusedError
+        It is none of the messages of the stream.
+    WebSocketDisconnect
+        The client has left.
+    """
+    if message["type"] == "websocket.disconnect":
+        raise WebSocketDisconnect
+    samples = message.get("bytes")
+    if samples is not None and has_sound:
+        if len(samples) % SAMPLE_BYTES or len(samples) > MAX_BLOCK_BYTES:
+            raise RefusedError(
+                400, "invalid_request",
+                f"a block of sound has {len(samples)} bytes; send 16-bit samples in up to {MAX_BLOCK_BYTES} bytes",
+            )  # fmt: skip
+        return {"type": "audio", "samples": samples}
+    content: Any = None
+    with suppress(DataError):
+        content = parse_json(message.get("text") or "", "the message")
+    if not isinstance(content, dict) or content.get("type") not in types:
+        raise RefusedError(
+            400, "invalid_request",
+            f"a message must be {'16-bit samples, or ' if has_sound else ''}JSON with one of the types "
+            f"{', '.join(sorted(types))}",
+        )  # fmt: skip
+    return content
+
+
+async def _send(connection: WebSocket, state: ServiceState, work: Any, inputs: "asyncio.Queue[Any]") -> None:
+    """Pass the results on: events as text, sound as binary messages."""
+    try:
+        async with aclosing(state.messages(work, connection.state.key, inputs)) as messages:  # type: ignore[type-var]
+            async for message in messages:
+                if message.kind == MessageKind.EVENT:
+                    await connection.send_text(message.payload.decode())
+                else:
+                    await connection.send_bytes(message.payload)
+        await connection.send_json({"type": "done"})
+    except RefusedError as refused:
+        await connection.send_json({"type": "error", "message": refused.message})
+
+
+async def _refuse(connection: WebSocket, reason: str) -> None:
+    await connection.send_json({"type": "error", "message": reason})
+    await connection.close(INVALID)
+
+
+def _reason(wrong: Exception) -> str:
+    if isinstance(wrong, ValidationError):
+        first = wrong.errors()[0]
+        return f"{'.'.join(map(str, first['loc'])) or 'message'}: {first['msg'][:200]}"
+    return str(wrong)

@@ -1,0 +1,187 @@
+"""Talkers, faces, palettes and dictionaries: list, show, draw, upload and delete; what a key uses."""
+
+import asyncio
+import hashlib
+from contextlib import AsyncExitStack
+from pathlib import Path
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query
+from fastapi import Path as InPath
+from fastapi import Request as HttpRequest
+from fastapi.responses import JSONResponse, Response
+from starlette.datastructures import FormData, UploadFile
+
+from tts2face.jobs.resource_check import DICTIONARY, RESOURCE_KINDS
+from tts2face.jobs.resource_table import StoredResource
+from tts2face.service.access.keys import ApiKey
+from tts2face.service.access.scopes import require_scope
+from tts2face.service.errors import RefusedError
+from tts2face.service.routes.answers import service_state
+from tts2face.service.routes.resource_models import (
+    FACTS,
+    Resource,
+    ResourceList,
+    UsageAnswer,
+    shipped_resource,
+    uploaded_resource,
+)
+from tts2face.service.uploads.library import check_new_name, describe_shipped, plural, shipped_names
+from tts2face.service.uploads.shipped_pictures import shipped_picture
+from tts2face.service.uploads.upload_folder import upload_folder
+
+router = APIRouter(prefix="/v1", tags=["resources"])
+
+MAX_NAME = 40
+Name = Annotated[str, InPath(description="Its name.", max_length=MAX_NAME, examples=["head"])]
+Owner = Annotated[
+    str | None, Query(description="With scope admin: the key that uploaded it.", max_length=200, examples=["studio"])
+]
+PICTURE_ANSWERS: dict[int | str, dict[str, Any]] = {
+    200: {"content": {"image/png": {}}, "description": "PNG."},
+    304: {"description": "The picture has not changed."},
+}
+CONTENTS = {
+    "talker": "A .talker file.", "face": "A .face file, or a character: .glb or .vrm.",
+    "palette": "A .palette file.", "dictionary": "A pronunciation dictionary, UTF-8 text.",
+}  # fmt: skip
+
+
+def _add_reading(kind: str) -> None:
+    one, many, path = Resource[FACTS[kind]], ResourceList[FACTS[kind]], f"/{plural(kind)}"  # type: ignore[valid-type]
+
+    @router.get(path, response_model=many, summary=f"List {plural(kind)}")
+    async def list_resources(request: HttpRequest) -> dict[str, Any]:
+        """The service's own, and those that the key has uploaded; with scope admin those of all keys."""
+        key: ApiKey = request.state.key
+        return {"data": await asyncio.to_thread(_list, request, kind, None if "admin" in key.scopes else key.name)}
+
+    @router.get(f"{path}/{{name}}", response_model=one, summary=f"Show a {kind}")
+    async def show_resource(request: HttpRequest, name: Name, owner: Owner = None) -> dict[str, Any]:
+        """What is known about it."""
+        if name in shipped_names(kind):
+            return shipped_resource(kind, name, await asyncio.to_thread(describe_shipped, kind, name))
+        return uploaded_resource(await _upload(request, kind, name, owner))
+
+
+def _add_writing(kind: str) -> None:
+    one, path = Resource[FACTS[kind]], f"/{plural(kind)}"  # type: ignore[valid-type]
+
+    @router.post(
+        path, response_model=one, status_code=201, summary=f"Upload a {kind}",
+        openapi_extra={"requestBody": _form(kind)},
+    )  # fmt: skip
+    async def add_resource(request: HttpRequest) -> JSONResponse:
+        """Check a file, and store it under a name; needs the scope build."""
+        stored = await _store(request, kind)
+        content = one.model_validate(uploaded_resource(stored)).model_dump(mode="json")
+        return JSONResponse(content, 201, {"Location": f"/v1/{plural(kind)}/{stored.name}"})
+
+    @router.delete(f"{path}/{{name}}", status_code=204, summary=f"Delete a {kind}", response_class=Response)
+    async def delete_resource(request: HttpRequest, name: Name, owner: Owner = None) -> Response:
+        """Delete an upload, whose name is free again then; needs the scope build."""
+        require_scope(request, "build", "deletions")
+        library = service_state(request).library
+        await asyncio.to_thread(library.remove, kind, _owner(request, owner), name)
+        return Response(status_code=204)
+
+
+def _add_picture(kind: str) -> None:
+    @router.get(
+        f"/{plural(kind)}/{{name}}/picture", summary=f"Picture of a {kind}", response_class=Response,
+        responses=PICTURE_ANSWERS,
+    )  # fmt: skip
+    async def draw_resource(request: HttpRequest, name: Name, owner: Owner = None) -> Response:
+        """The face at rest, of a talker or face; of a palette, each style on the head."""
+        state = service_state(request)
+        if name in shipped_names(kind):
+            return await _picture(request, await shipped_picture(state.settings.data_folder, kind, name))
+        stored = await _upload(request, kind, name, owner)
+        return await _picture(request, await asyncio.to_thread(state.library.picture, stored))
+
+
+def _form(kind: str) -> dict[str, Any]:
+    fields = {
+        "file": {"type": "string", "format": "binary", "description": CONTENTS[kind]},
+        "name": {
+            "type": "string", "pattern": "^[a-z0-9][a-z0-9-]{0,39}$", "example": "anna",
+            "description": "Its name in requests: letters a-z, digits and hyphens.",
+        },
+    }  # fmt: skip
+    schema = {"type": "object", "properties": fields, "required": ["file", "name"]}
+    return {"required": True, "content": {"multipart/form-data": {"schema": schema}}}
+
+
+for _kind in RESOURCE_KINDS:
+    _add_reading(_kind)
+    _add_writing(_kind)
+    if _kind != DICTIONARY:
+        _add_picture(_kind)
+
+
+@router.get("/usage", response_model=UsageAnswer, summary="What the key uses and may use")
+async def show_usage(request: HttpRequest) -> dict[str, Any]:
+    """Uploads and limits of the key."""
+    key: ApiKey = request.state.key
+    library = service_state(request).library
+    used, limits = await asyncio.to_thread(library.usage, key), library.limits(key)
+    return {
+        "key": key.name, "scopes": list(key.scopes),
+        "resources": {"used": used.n_resources, "limit": limits.n_resources},
+        "resource_bytes": {"used": used.n_bytes, "limit": limits.n_bytes},
+        "requests_per_minute": key.requests_per_minute, "concurrent": key.concurrent,
+    }  # fmt: skip
+
+
+def _list(request: HttpRequest, kind: str, owner: str | None) -> list[dict[str, object]]:
+    shipped = [shipped_resource(kind, name, describe_shipped(kind, name)) for name in shipped_names(kind)]
+    return [*shipped, *map(uploaded_resource, service_state(request).library.uploads(kind, owner))]
+
+
+def _owner(request: HttpRequest, owner: str | None) -> str:
+    """Owner of the resources that a request names: the key itself, unless it has the scope admin and names another."""
+    key: ApiKey = request.state.key
+    if owner is None or owner == key.name:
+        return key.name
+    require_scope(request, "admin", "resources of other keys")
+    return owner
+
+
+async def _upload(request: HttpRequest, kind: str, name: str, owner: str | None) -> StoredResource:
+    library = service_state(request).library
+    return await asyncio.to_thread(library.upload, kind, _owner(request, owner), name)
+
+
+async def _store(request: HttpRequest, kind: str) -> StoredResource:
+    """Read the form of an upload, check its file in a child process, and store it."""
+    key = require_scope(request, "build", "uploads")
+    state = service_state(request)
+    if not request.headers.get("content-type", "").startswith("multipart/form-data"):
+        raise RefusedError(422, "invalid_request", "send a form (multipart/form-data) with the parts file and name")
+    async with AsyncExitStack() as stack:
+        form = await stack.enter_async_context(request.form(max_files=1, max_fields=2))
+        name, file = _read_form(form)
+        check_new_name(kind, name)
+        await asyncio.to_thread(state.library.check_room, key, kind, name, file.size or 0)
+        folder = await stack.enter_async_context(upload_folder(state.settings))
+        await stack.enter_async_context(state.checks)
+        checked = await folder.resource(kind, file, state.library.limits(key).n_bytes)
+        return await asyncio.to_thread(state.library.add, key, kind, name, checked)
+
+
+def _read_form(form: FormData) -> tuple[str, UploadFile]:
+    unknown = set(form) - {"file", "name"}
+    name, file = form.get("name"), form.get("file")
+    if unknown:
+        raise RefusedError(422, "invalid_request", f"there is no part {min(unknown)[:40]!r}; send file and name")
+    if not isinstance(name, str) or not isinstance(file, UploadFile):
+        raise RefusedError(422, "invalid_request", "the form needs a part file, with a file name, and a part name")
+    return name, file
+
+
+async def _picture(request: HttpRequest, path: Path) -> Response:
+    content = await asyncio.to_thread(path.read_bytes)
+    headers = {"ETag": f'"{hashlib.sha256(content).hexdigest()}"', "Cache-Control": "private, max-age=60"}
+    if request.headers.get("if-none-match") == headers["ETag"]:
+        return Response(status_code=304, headers=headers)
+    return Response(content, media_type="image/png", headers=headers)

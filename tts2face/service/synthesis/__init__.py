@@ -1,0 +1,1 @@
+"""Synthesis processes of the service and what runs in them."""

@@ -1,0 +1,213 @@
+"""The synthesis processes of a server, shared fairly by all keys."""
+
+import asyncio
+import os
+import time
+from collections import OrderedDict, deque
+from collections.abc import AsyncIterator
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from lexicon.errors import BackendError
+from tts2face.render.movie_stream import MOVIE_KINDS
+from tts2face.render.sound_stream import SOUND_KINDS
+from tts2face.service.logs import JSON_LINES
+from tts2face.service.synthesis.messages import Message
+from tts2face.service.synthesis.stages import stage
+from tts2face.service.synthesis.warm_process import ProcessEndedError, WarmProcess
+from tts2face.service.synthesis.work import Work
+
+MOVIE_COST, LINES_COST, SOUND_COST = 1.0, 0.2, 0.1  # shares of a core of a stream in real time, rounded up
+CAPACITY = 2.0  # cost of the tasks that one process takes at a time
+MAX_TRIES = 2  # of a request whose process ended before anything was sent
+STREAM_PRIORITY, JOB_PRIORITY = 0, 1
+
+
+_Waiting = tuple[float, float, "asyncio.Future[WarmProcess]"]  # cost, begin, the process when there is one
+
+
+class BusyError(BackendError):
+    """Too many requests wait; the request may be repeated later."""
+
+    retry_after_s = 2
+
+
+@dataclass(frozen=True, slots=True)
+class PoolSettings:
+    """Size of the pool.
+
+    Parameters
+    ----------
+    n_processes
+        Number of synthesis processes, each bound to a core; 0: one for each core.
+    n_sessions
+        Sessions that each process keeps.
+    max_waiting
+        Requests that may wait; further ones are refused.
+    warm
+        Works that each process executes before it is ready, as `Work.as_json`.
+    log_format, log_text, memory_mb
+        As in the settings of the service.
+    """
+
+    n_processes: int = 0
+    n_sessions: int = 2
+    max_waiting: int = 64
+    warm: tuple[dict[str, Any], ...] = ()
+    log_format: str = JSON_LINES
+    log_text: bool = False
+    memory_mb: int = 0
+
+
+def work_cost(work: Work) -> float:
+    """Share of a core that a work takes."""
+    if work.kind != "file":
+        return LINES_COST
+    if work.format in SOUND_KINDS:
+        return SOUND_COST
+    return MOVIE_COST if work.format in MOVIE_KINDS else LINES_COST
+
+
+class Pool:
+    """Distributes works over synthesis processes.
+
+    While all processes are occupied, works wait in one queue for each key, and the keys take turns.
+    """
+
+    def __init__(self, settings: PoolSettings) -> None:
+        self.settings = settings
+        cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+        count = settings.n_processes or len(cores) or os.cpu_count() or 1
+        self.processes = [
+            WarmProcess(
+                {"core": cores[number % len(cores)] if cores else None, "n_sessions": settings.n_sessions,
+                 "warm": list(settings.warm), "log_format": settings.log_format, "log_text": settings.log_text,
+                 "memory_mb": settings.memory_mb},
+                self._wake,
+            )
+            for number in range(count)
+        ]  # fmt: skip
+        self._waiting: OrderedDict[str, deque[_Waiting]] = OrderedDict()
+        self._runs: list[asyncio.Task[None]] = []
+
+    @property
+    def n_ready(self) -> int:
+        """Number of processes that are ready."""
+        return sum(process.is_ready for process in self.processes)
+
+    @property
+    def n_waiting(self) -> int:
+        """Number of works that wait for a process."""
+        return sum(len(queue) for queue in self._waiting.values())
+
+    @property
+    def oldest_waiting_s(self) -> float:
+        """Age of the work that waits longest."""
+        begins = [begin for queue in self._waiting.values() for _, begin, _ in queue]
+        return time.monotonic() - min(begins) if begins else 0.0
+
+    @property
+    def load(self) -> float:
+        """Cost of all running works."""
+        return sum(process.load for process in self.processes)
+
+    def start(self) -> None:
+        """Start the processes in the running event loop."""
+        self._runs = [asyncio.create_task(process.run()) for process in self.processes]
+
+    async def close(self) -> None:
+        """End all processes."""
+        for process in self.processes:
+            await process.close()
+        await asyncio.gather(*self._runs, return_exceptions=True)
+
+    async def stream(
+        self,
+        work: Work,
+        key: str = "",
+        priority: int = STREAM_PRIORITY,
+        inputs: "asyncio.Queue[Any] | None" = None,
+    ) -> AsyncIterator[Message]:
+        """Messages of a work up to END; leaving the iteration cancels it. `inputs` as for `WarmProcess.stream`.
+
+        Raises
+        ------
+        InputError, DataError, BackendError
+            As the work.
+        BusyError
+            Too many works wait.
+        """
+        cost, tries = work_cost(work), 0
+        while True:
+            with stage("queue"):
+                process = await self._take(cost, key)
+            is_begun = False
+            messages = process.stream(work, priority, inputs)
+            try:
+                with stage("synthesis"):
+                    async for message in messages:
+                        is_begun = True
+                        yield message
+                return
+            except ProcessEndedError:
+                tries += 1
+                if is_begun or tries >= MAX_TRIES:
+                    raise
+            finally:
+                await messages.aclose()  # type: ignore[attr-defined]
+                self._release(process, cost)
+
+    async def _take(self, cost: float, key: str) -> WarmProcess:
+        found = None if self._waiting else self._free_process(cost)
+        if found is not None:
+            found.load += cost
+            return found
+        if self.n_waiting >= self.settings.max_waiting:
+            raise BusyError(f"{self.n_waiting} requests are waiting already; repeat the request later")
+        future: asyncio.Future[WarmProcess] = asyncio.get_running_loop().create_future()
+        self._waiting.setdefault(key, deque()).append((cost, time.monotonic(), future))
+        try:
+            return await future
+        except asyncio.CancelledError:
+            if future.done() and not future.cancelled():
+                self._release(future.result(), cost)
+            raise
+        finally:
+            self._forget(key, future)
+
+    def _release(self, process: WarmProcess, cost: float) -> None:
+        process.load = round(process.load - cost, 6)  # sums of tenths are not exact: the load of no work is zero
+        self._wake()
+
+    def _free_process(self, cost: float) -> WarmProcess | None:
+        free = [one for one in self.processes if one.is_ready and (one.load == 0 or one.load + cost <= CAPACITY)]
+        return min(free, key=lambda one: one.load, default=None)
+
+    def _wake(self) -> None:
+        """Give free processes to waiting works, one key after the other."""
+        for key in list(self._waiting):
+            queue = self._waiting[key]
+            while queue and queue[0][2].done():
+                queue.popleft()
+            if not queue:
+                del self._waiting[key]
+                continue
+            cost, _, future = queue[0]
+            process = self._free_process(cost)
+            if process is None:
+                return
+            process.load += cost
+            queue.popleft()
+            future.set_result(process)
+            self._waiting.move_to_end(key)
+            if not queue:
+                del self._waiting[key]
+
+    def _forget(self, key: str, future: "asyncio.Future[WarmProcess]") -> None:
+        queue = self._waiting.get(key)
+        if queue is not None:
+            with suppress(StopIteration):
+                queue.remove(next(one for one in queue if one[2] is future))
+            if not queue:
+                del self._waiting[key]

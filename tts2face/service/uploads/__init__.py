@@ -1,0 +1,1 @@
+"""Files of clients: checks, storage, names."""

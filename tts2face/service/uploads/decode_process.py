@@ -1,0 +1,189 @@
+"""Decoding of an uploaded file in a process of its own, with limits of memory, time and files, and without a network.
+
+``python -m tts2face.service.uploads.decode_process KIND SOURCE TARGET LIMIT``: a file becomes a plain one (sound: mono
+.wav at 48 kHz; picture: .png); a resource (talker, face, palette, dictionary) is checked and written, with its
+description and picture, into the folder TARGET; ``draw-`` and its kind draw the picture TARGET only; ``subtitles-`` and
+an encoding check subtitles; a video is measured. LIMIT is the largest duration in seconds, number of pixels or cues, or size in
+bytes. The exit code is 0, or 2 with one sentence on standard error.
+"""
+
+import json
+import os
+import shutil
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from tts2face.jobs.refused_file import RefusedFileError
+from tts2face.jobs.resource_check import RESOURCE_KINDS, check_resource, draw_resource
+from tts2face.limited_process import ProcessLimits, limit_process
+
+SOUND, PICTURE, VIDEO, DRAW, SUBTITLES = "sound", "picture", "video", "draw-", "subtitles-"
+LIMITS = ProcessLimits(memory_bytes=2 << 30, cpu_s=60, file_bytes=1 << 30, n_files=64)
+RESOURCE_CPU_S = 180  # a resource with its picture takes 3 to 5 s, at the first time with the compilation of kernels
+SOUND_RATE = 48_000  # Hz
+SOUND_FORMATS = "wav,mp3,ogg,flac,aac,mov,mp4,m4a,matroska,webm,aiff,caf"
+# Formats of recordings, with the endings under which other readers recognise them.
+VIDEO_FORMATS = {
+    "mov": ".mp4", "mp4": ".mp4", "matroska": ".mkv", "webm": ".webm", "avi": ".avi", "mpegps": ".mpg", "mpeg": ".mpg",
+}  # fmt: skip
+MAX_VIDEO_PIXELS, MAX_VIDEO_FPS = 4096 * 2304, 240
+PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TIFF")
+REFUSED = 2
+LOW_PRIORITY = 10
+
+
+def decode_sound(source: Path, target: Path, max_seconds: float) -> None:
+    """Write the first sound stream of a file as mono 16-bit .wav at `SOUND_RATE`.
+
+    Raises
+    ------
+    RefusedFileError
+        It has no sound, more than `max_seconds`, or cannot be decoded.
+    """
+    import wave
+
+    import av
+
+    # A playlist could name other files: only formats without references, and no protocol to open them.
+    options = {"format_whitelist": SOUND_FORMATS, "protocol_whitelist": "none"}
+    try:
+        with source.open("rb") as file, av.open(file, "r", options=options) as container:
+            if not container.streams.audio:
+                raise RefusedFileError("it has no sound")
+            resampler = av.AudioResampler(format="s16", layout="mono", rate=SOUND_RATE)
+            n_left = int(max_seconds * SOUND_RATE)
+            with wave.open(str(target), "wb") as out:
+                out.setparams((1, 2, SOUND_RATE, 0, "NONE", "not compressed"))
+                for frame in container.decode(audio=0):
+                    for part in resampler.resample(frame):
+                        n_left -= part.samples
+                        if n_left < 0:
+                            raise RefusedFileError(f"it is longer than {max_seconds:g} s")
+                        out.writeframesraw(bytes(part.planes[0])[: 2 * part.samples])
+    except (av.FFmpegError, ValueError, EOFError) as error:
+        raise RefusedFileError("it is no sound that can be decoded") from error
+    if n_left == int(max_seconds * SOUND_RATE):
+        raise RefusedFileError("its sound is empty")
+
+
+def decode_picture(source: Path, target: Path, max_pixels: float) -> None:
+    """Write a picture as .png.
+
+    Raises
+    ------
+    RefusedFileError
+        It has more than `max_pixels`, or cannot be decoded.
+    """
+    from PIL import Image
+
+    Image.MAX_IMAGE_PIXELS = None  # the size is checked here, before anything is decoded
+    try:
+        with Image.open(source, formats=PICTURE_FORMATS) as picture:
+            if picture.width * picture.height > max_pixels:
+                raise RefusedFileError(f"it has {picture.width} x {picture.height} pixels, more than {max_pixels:g}")
+            picture.convert("RGB").save(target, "PNG", compress_level=1)
+    except (OSError, ValueError, SyntaxError, MemoryError) as error:
+        raise RefusedFileError("it is no picture that can be decoded") from error
+
+
+def check_video(source: Path, target: Path, max_seconds: float) -> None:
+    """Write what a video is, JSON with its ending and seconds; its packets are counted and not decoded.
+
+    Raises
+    ------
+    RefusedFileError
+        It is no video, longer than `max_seconds`, or its pictures are too large or too many.
+    """
+    import av
+
+    options = {"format_whitelist": ",".join(VIDEO_FORMATS), "protocol_whitelist": "none"}
+    try:
+        with source.open("rb") as file, av.open(file, "r", options=options) as container:
+            stream = next((one for one in container.streams.video if one.codec_context is not None), None)
+            if stream is None:
+                raise RefusedFileError("it holds no video")
+            if stream.width * stream.height > MAX_VIDEO_PIXELS:
+                raise RefusedFileError(f"it has {stream.width} x {stream.height} pixels, more than 4096 x 2304")
+            suffix = next(VIDEO_FORMATS[name] for name in container.format.name.split(",") if name in VIDEO_FORMATS)
+            seconds = _measure_video(container, stream, max_seconds)
+    except (av.FFmpegError, ValueError, EOFError, StopIteration) as error:
+        raise RefusedFileError("it is no video that can be decoded") from error
+    target.write_text(json.dumps({"suffix": suffix, "seconds": seconds}))
+
+
+def _measure_video(container: Any, stream: Any, max_seconds: float) -> float:
+    """Seconds from the first to the last packet of a video, whatever the file states."""
+    first = last = None
+    for number, packet in enumerate(container.demux(stream)):
+        if number > MAX_VIDEO_FPS * max_seconds:
+            raise RefusedFileError(f"it has more pictures than {max_seconds:g} s of video")
+        if packet.pts is not None and packet.time_base is not None:
+            at = float(packet.pts * packet.time_base)
+            first, last = (at, at) if first is None or last is None else (min(first, at), max(last, at))
+            if last - first > max_seconds:
+                raise RefusedFileError(f"it is longer than {max_seconds:g} s")
+    if first is None or last is None:
+        raise RefusedFileError("it has no pictures")
+    return last - first
+
+
+def check_subtitles(source: Path, target: Path, max_cues: float, encoding: str | None) -> None:
+    """Copy a subtitle file, and write its numbers beside it: cues and seconds, as JSON.
+
+    Raises
+    ------
+    RefusedFileError
+        It contains no cues or more than `max_cues`.
+    """
+    from lexicon.errors import Tts2faceError
+    from tts2face.subtitles.reader import read_subtitles
+
+    shutil.copyfile(source, target)
+    try:
+        cues = read_subtitles(target, encoding).cues
+    except Tts2faceError as wrong:
+        raise RefusedFileError(str(wrong).replace(f"{target.parent}/", "")) from wrong
+    if len(cues) > max_cues:
+        raise RefusedFileError(f"it has {len(cues)} cues, more than {max_cues:g}")
+    numbers = {"cues": len(cues), "seconds": max(cue.end_s for cue in cues)}
+    Path(f"{target}.json").write_text(json.dumps(numbers))
+
+
+def decode(kind: str, source: Path, target: Path, limit: float) -> None:
+    """Decode or check one file of a kind.
+
+    Raises
+    ------
+    RefusedFileError
+        It is not what it should be.
+    """
+    if kind in RESOURCE_KINDS:
+        check_resource(kind, source, target, limit)
+    elif kind.startswith(SUBTITLES):
+        check_subtitles(source, target, limit, kind.removeprefix(SUBTITLES) or None)
+    elif kind.startswith(DRAW):
+        draw_resource(kind.removeprefix(DRAW), source, target)
+    else:
+        {SOUND: decode_sound, PICTURE: decode_picture, VIDEO: check_video}[kind](source, target, limit)
+
+
+def main() -> int:
+    """Decode one file."""
+    kind, source, target, limit = sys.argv[1:]
+    if kind in {SOUND, PICTURE, VIDEO} or kind.startswith(SUBTITLES):
+        limit_process(LIMITS)
+    else:
+        limit_process(replace(LIMITS, cpu_s=RESOURCE_CPU_S))
+        os.nice(LOW_PRIORITY)  # streams go first
+    try:
+        decode(kind, Path(source), Path(target), float(limit))
+    except RefusedFileError as refused:
+        sys.stderr.write(str(refused))
+        return REFUSED
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,143 @@
+"""Uploaded files: never opened by the server itself, never stored under a client's name."""
+
+import asyncio
+import json
+import sys
+import tempfile
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from starlette.datastructures import UploadFile
+
+from tts2face.limited_process import bare_environment
+from tts2face.service.errors import RefusedError
+from tts2face.service.settings import ServiceSettings
+from tts2face.service.uploads.decode_process import PICTURE, REFUSED, SOUND, SUBTITLES, VIDEO
+
+RESOURCE_TIMEOUT_S = 300.0  # a check takes 3 to 7 s; with other work on the machine, and kernels to compile, longer
+MAX_REASON = 300  # characters
+MAX_TEXT_BYTES = 1_000_000
+BLOCK_BYTES = 1 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class UploadFolder:
+    """A private folder of one request; it is removed when the request ends."""
+
+    path: Path
+    settings: ServiceSettings
+
+    async def sound(self, name: str, upload: UploadFile) -> Path:
+        """Decoded sound of an upload, a .wav file; `name` is the field's name in messages.
+
+        Raises
+        ------
+        RefusedError
+            It is no sound, or too long.
+        """
+        return await self._decode(SOUND, name, upload, ".wav", self.settings.sound_s)
+
+    async def picture(self, name: str, upload: UploadFile) -> Path:
+        """Decoded picture of an upload, a .png file; errors as `sound`."""
+        return await self._decode(PICTURE, name, upload, ".png", self.settings.upload_pixels)
+
+    async def text(self, name: str, upload: UploadFile, suffix: str) -> Path:
+        """Text of an upload, at most `MAX_TEXT_BYTES`; its reader checks it."""
+        path = self.path / f"{name}{suffix}"
+        content = await upload.read(MAX_TEXT_BYTES + 1)
+        if len(content) > MAX_TEXT_BYTES:
+            raise RefusedError(413, "too_large", f"{name} has more than {MAX_TEXT_BYTES} bytes; send less")
+        path.write_bytes(content)
+        return path
+
+    async def subtitles(
+        self, name: str, upload: UploadFile, suffix: str, encoding: str | None, max_cues: int
+    ) -> tuple[Path, dict[str, float]]:
+        """Checked subtitles of an upload, and their numbers: cues and seconds.
+
+        Raises
+        ------
+        RefusedError
+            They have no cues, or too many.
+        """
+        path = await self._decode(f"{SUBTITLES}{encoding or ''}", name, upload, suffix, max_cues)
+        numbers: dict[str, float] = json.loads(Path(f"{path}.json").read_text())
+        return path, numbers
+
+    async def video(self, name: str, upload: UploadFile) -> tuple[Path, float]:
+        """Recording of a talker, as it was sent, and its seconds.
+
+        Raises
+        ------
+        RefusedError
+            It is no video, too long, or its pictures are too large.
+        """
+        given, checked = await self._save(name, upload), self.path / f"{name}.video"
+        await decode_file((VIDEO, given, checked, self.settings.video_s), name, self.settings.decode_s)
+        facts = json.loads(checked.read_text())
+        return given.rename(given.with_suffix(facts["suffix"])), float(facts["seconds"])
+
+    async def resource(self, kind: str, upload: UploadFile, max_bytes: float) -> Path:
+        """Folder with a checked talker, face, palette or dictionary (`tts2face.jobs.resource_check`).
+
+        Raises
+        ------
+        RefusedError
+            It is none, or larger than `max_bytes`.
+        """
+        given, checked = await self._save(kind, upload), self.path / "checked"
+        checked.mkdir()
+        await decode_file((kind, given, checked, max_bytes), f"the {kind}", RESOURCE_TIMEOUT_S)
+        return checked
+
+    async def _decode(self, kind: str, name: str, upload: UploadFile, suffix: str, limit: float) -> Path:
+        given, decoded = await self._save(name, upload), self.path / f"{name}{suffix}"
+        await decode_file((kind, given, decoded, limit), name, self.settings.decode_s)
+        given.unlink(missing_ok=True)
+        return decoded
+
+    async def _save(self, name: str, upload: UploadFile) -> Path:
+        path = self.path / f"{name}.upload"
+        with path.open("wb") as file:
+            while block := await upload.read(BLOCK_BYTES):
+                file.write(block)
+        return path
+
+
+async def decode_file(arguments: tuple[str, Path, Path, float], name: str, timeout_s: float) -> None:
+    """Run `tts2face.service.uploads.decode_process` with its arguments; `name` names the file in messages.
+
+    Raises
+    ------
+    RefusedError
+        The file is refused, or takes too much memory or time.
+    """
+    child = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "tts2face.service.uploads.decode_process", *map(str, arguments),
+        stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.PIPE,
+        cwd=arguments[2].parent, env=bare_environment(),
+    )  # fmt: skip
+    try:
+        _, written = await asyncio.wait_for(child.communicate(), timeout_s)
+    except TimeoutError as late:
+        raise RefusedError(
+            422, "invalid_data", f"{name} took more than {timeout_s:g} s to decode; send a simpler file"
+        ) from late
+    finally:
+        if child.returncode is None:
+            with suppress(ProcessLookupError):
+                child.kill()
+            await child.wait()
+    if child.returncode == 0:
+        return
+    reason = written.decode(errors="replace") if child.returncode == REFUSED else "it needs too much memory or time"
+    raise RefusedError(422, "invalid_data", f"{name} cannot be used: {reason[:MAX_REASON]}; send another file")
+
+
+@asynccontextmanager
+async def upload_folder(settings: ServiceSettings) -> AsyncIterator[UploadFolder]:
+    """A private folder for the uploads of one request."""
+    with tempfile.TemporaryDirectory(prefix="tts2face-upload-") as folder:
+        yield UploadFolder(Path(folder), settings)
