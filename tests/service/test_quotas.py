@@ -224,7 +224,7 @@ def test_jobs_use_the_seconds_of_speech_too(tmp_path: Path) -> None:
     headers = {"authorization": f"Bearer {add_key(path, 'a', ['speak'], speech_s_per_day=10)}"}
     running = RunningService(environment={"TTS2FACE_SERVE_KEYS": str(path), "TTS2FACE_SERVE_WORKERS": "0"})
     try:
-        running.wait_for_event("jobs available")
+        running.wait_until_ready()
         job = {"kind": "clip", "request": {"text": "We were away a year ago. " * 12}}
         answers = [httpx.post(f"{running.url}/v1/jobs", json=job, headers=headers, timeout=60) for _ in range(2)]
         assert [answer.status_code for answer in answers] == [202, 429], answers[0].text

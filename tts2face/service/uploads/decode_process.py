@@ -3,8 +3,8 @@
 ``python -m tts2face.service.uploads.decode_process KIND SOURCE TARGET LIMIT``: a file becomes a plain one (sound: mono
 .wav at 48 kHz; picture: .png); a resource (talker, face, palette, dictionary) is checked and written, with its
 description and picture, into the folder TARGET; ``draw-`` and its kind draw the picture TARGET only; ``subtitles-`` and
-an encoding check subtitles; a video is measured. LIMIT is the largest duration in seconds, number of pixels or cues, or size in
-bytes. The exit code is 0, or 2 with one sentence on standard error.
+an encoding check subtitles; a video is measured. LIMIT is the largest duration in seconds, number of pixels or cues, or
+size in bytes. The exit code is 0, or 2 with one sentence on standard error.
 """
 
 import json
