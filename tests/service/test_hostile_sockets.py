@@ -78,6 +78,17 @@ def test_broken_frames_close_the_socket(attacked: RunningService, raw: bytes) ->
     assert attack(attacked, "/", raw=raw) in {1002, 1006, 1007, 1009}
 
 
+def test_a_stream_that_never_begins_ends(attacked: RunningService) -> None:
+    async def run() -> str:
+        async with websockets.connect(f"{attacked.url.replace('http', 'ws', 1)}/v1/stream") as connection:
+            said = await connection.recv()
+            with pytest.raises(websockets.ConnectionClosed):
+                await connection.recv()
+            return str(said)
+
+    assert "did not arrive within 2 s" in asyncio.run(run())
+
+
 def test_a_flood_of_pings_takes_no_memory(attacked: RunningService) -> None:
     """A client that sends pings and never reads the answers is not read from any more, and then ended."""
     ping = b"\x89\xfd" + bytes(4) + b"p" * 125

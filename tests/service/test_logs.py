@@ -3,6 +3,7 @@
 import asyncio
 import json
 import logging
+import os
 import signal
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -12,6 +13,7 @@ import httpx
 import pytest
 
 from tests.service.conftest import RunningService
+from tts2face.service import logs
 from tts2face.service.access.exchange import Receive, Scope, Send
 from tts2face.service.access.guard import Guard
 from tts2face.service.access.keys import LOCAL_KEY, add_key, remove_key
@@ -158,3 +160,22 @@ def test_keys_are_read_again_on_sighup(tmp_path: Path) -> None:
         assert status(second) == 200
     finally:
         running.close()
+
+
+def test_nobody_waits_for_a_reader_of_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A full pipe stops the thread that writes, not the service; what was lost is told."""
+    monkeypatch.setattr(logs, "MAX_LINES", 5)
+    reading, writing = os.pipe()
+    with os.fdopen(writing, "w") as file:
+        writer = logs.LineWriter(file)
+        writer.setFormatter(LineFormatter())
+        for number in range(50):
+            writer.handle(record(f"{number} {'x' * 60_000}", n=1))
+        with os.fdopen(reading) as lines:
+            events = [json.loads(lines.readline())]
+            writer.handle(record("after", n=1))
+            while events[-1]["event"] != "after":
+                events.append(json.loads(lines.readline()))
+                writer.handle(record("after", n=1))
+            writer.close()
+    assert sum(event["lines"] for event in events if event["event"] == "lines dropped") >= 40

@@ -13,7 +13,9 @@ from PIL import Image
 from lexicon.errors import BackendError
 from tests.jobs.conftest import database, postgres  # noqa: F401 - fixtures
 from tests.model_files.made import write_made_face
+from tts2face.jobs.blobs import open_blobs
 from tts2face.jobs.database import database_url
+from tts2face.jobs.job_runner import RESOURCES
 from tts2face.jobs.resource_table import ResourceTable, StoredResource
 from tts2face.service.access.keys import add_key
 from tts2face.service.app import create_app
@@ -249,6 +251,21 @@ def test_the_table_holds_in_both_databases(database: str) -> None:  # noqa: F811
         table.remove(owner, "face", name, removed.append)
     table.close()
     assert removed == ["c" * 64]  # with the last that had it
+
+
+def test_files_without_a_resource_are_removed_after_a_time(settings: ServiceSettings, tmp_path: Path) -> None:
+    """As after a crash between the storage of a file and its row."""
+    settings.data_folder.mkdir(parents=True)
+    library = Library(settings)
+    blobs = open_blobs(settings.store_place, RESOURCES, cache=tmp_path / "cache")
+    lost, kept = blobs.put(b"lost"), blobs.put(b"kept")
+    table = ResourceTable(database_url(settings.database_place))
+    table.add(resource(content=kept), check=lambda usage: None, keep=lambda: None)
+    table.close()
+    assert library.remove_unused_files(older_than_s=3600.0) == 0
+    assert library.remove_unused_files(older_than_s=-10.0) == 1
+    assert (blobs.has(lost), blobs.has(kept)) == (False, True)
+    library.close()
 
 
 def test_a_refused_addition_leaves_nothing(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -155,9 +155,18 @@ class ResourceTable:
             change.run(_LOCK)
             old = _rows(change, _CHOSEN, owner=owner, kind=kind, name=name)
             change.run(_DELETE, owner=owner, kind=kind, name=name)
-            for content in _unused(change, old):
+            for content in _unused(change, {one for each in old for one in (each.content, each.picture) if one}):
                 delete(content)
             return bool(old)
+
+    def remove_unused(self, contents: Iterable[str], delete: Callable[[str], None]) -> int:
+        """Call `delete` with each of the contents that no resource has, while none can be added; their number."""
+        with self._transaction() as change:
+            change.run(_LOCK)
+            unused = _unused(change, set(contents))
+            for content in unused:
+                delete(content)
+        return len(unused)
 
     @contextmanager
     def _transaction(self) -> Iterator[Transaction]:
@@ -181,8 +190,7 @@ def _rows(look: Transaction, chosen: str, **values: Any) -> tuple[StoredResource
     return tuple(StoredResource(**{**row, "description": json.loads(row["description"])}) for row in rows)
 
 
-def _unused(look: Transaction, old: tuple[StoredResource, ...]) -> tuple[str, ...]:
-    """Contents of removed rows that no row has any more."""
+def _unused(look: Transaction, contents: set[str]) -> tuple[str, ...]:
+    """Those of some contents that no row has."""
     query = "SELECT COUNT(*) FROM tts2face_resources WHERE content = :content OR picture = :content"
-    contents = {content for resource in old for content in (resource.content, resource.picture) if content}
     return tuple(content for content in sorted(contents) if not look.value(query, content=content))

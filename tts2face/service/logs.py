@@ -1,15 +1,21 @@
 """Log of the service: one line for each event, as JSON or as text, with the id of the request it belongs to."""
 
+import atexit
 import json
 import logging
+import queue
 import sys
+import threading
 import time
 import traceback
+from contextlib import suppress
 from contextvars import ContextVar
-from typing import Any
+from typing import Any, TextIO
 
 LOG = logging.getLogger("tts2face.service")
 REQUEST_ID: ContextVar[str | None] = ContextVar("request_id", default=None)
+MAX_LINES = 10_000  # that wait to be written
+CLOSE_S = 1.0  # in which they are written at the end
 JSON_LINES, TEXT_LINES = FORMATS = ("json", "text")
 
 
@@ -66,9 +72,49 @@ class LineFormatter(logging.Formatter):
         return found
 
 
+class LineWriter(logging.Handler):
+    """Writes lines to a file in a thread of its own, so that nobody waits for a reader of the log.
+
+    While `MAX_LINES` wait, further ones are dropped; their number is written later.
+    """
+
+    def __init__(self, file: TextIO) -> None:
+        super().__init__()
+        self._file, self._n_dropped = file, 0
+        self._lines: queue.Queue[str | None] = queue.Queue(MAX_LINES)
+        self._thread = threading.Thread(target=self._write, name="log", daemon=True)
+        self._thread.start()
+        atexit.register(self.close)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Queue the line of a record."""
+        if self._n_dropped and not self._lines.full():
+            n_dropped, self._n_dropped = self._n_dropped, 0
+            note = logging.LogRecord(LOG.name, logging.WARNING, "", 0, "lines dropped", None, None)
+            note.fields = {"lines": n_dropped}
+            self._lines.put_nowait(self.format(note))
+        try:
+            self._lines.put_nowait(self.format(record))
+        except queue.Full:
+            self._n_dropped += 1
+
+    def close(self) -> None:
+        """Write what waits, for at most `CLOSE_S`."""
+        super().close()
+        with suppress(queue.Full):
+            self._lines.put(None, timeout=CLOSE_S)
+            self._thread.join(CLOSE_S)
+
+    def _write(self) -> None:
+        while (line := self._lines.get()) is not None:
+            with suppress(OSError, ValueError):  # the reader has gone
+                self._file.write(f"{line}\n")
+                self._file.flush()
+
+
 def configure_logs(format: str = JSON_LINES, *, with_text: bool = False) -> None:
     """Write all records of this process to standard error, in the given format."""
-    handler = logging.StreamHandler(sys.stderr)
+    handler = LineWriter(sys.stderr)
     handler.setFormatter(LineFormatter(format, with_text=with_text))
     logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
     for name in ("uvicorn", "uvicorn.error", "uvicorn.access"):  # uvicorn would write lines of its own

@@ -43,12 +43,12 @@ class ServiceState:
              self.work(kind="speech", request={"text": WARM_TEXT}).as_json()),
             settings.log_format, settings.log_text, settings.memory_mb,
         ))  # fmt: skip
-        self.jobs = JobService(settings)
+        self.library, self.checks, self.video_checks = Library(settings), Checks(), Checks()
+        self.jobs = JobService(settings, self.library)
         self.cache: ResultCache | None = None
         if settings.cache_mb:
             self.cache = ResultCache(settings.data_folder / "cache", settings.cache_mb * 1_000_000)
         self.limits, self.metrics = RateLimits(), Metrics(self.pool, self.jobs, self.cache)
-        self.library, self.checks, self.video_checks = Library(settings), Checks(), Checks()
         self.tracing = tracing_from_environment(os.environ)
         self.is_draining = False
         self.running: set[Exchange] = set()

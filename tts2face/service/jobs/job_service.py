@@ -25,6 +25,7 @@ from tts2face.service.errors import RefusedError, as_refused
 from tts2face.service.jobs.webhooks import deliver
 from tts2face.service.logs import log_event
 from tts2face.service.settings import ServiceSettings
+from tts2face.service.uploads.library import Library
 from tts2face.storage.files import translate_disk_errors
 
 Value = TypeVar("Value")
@@ -48,10 +49,12 @@ class JobService:
     ----------
     settings
         Settings of the service.
+    library
+        Uploaded models.
     """
 
-    def __init__(self, settings: ServiceSettings) -> None:
-        self._settings = settings
+    def __init__(self, settings: ServiceSettings, library: Library) -> None:
+        self._settings, self._library = settings, library
         self._client: JobClient | None = None
         self._reason = ""  # why the database cannot be reached
         self._threads = ThreadPoolExecutor(N_THREADS, thread_name_prefix="jobs")
@@ -185,15 +188,16 @@ class JobService:
         self.counts, self.oldest_waiting_s = await self.call(lambda client: client.table.counts())
 
     async def _sweep(self) -> None:
-        """Remove jobs, results and segments that are older than the setting `results_days`."""
-        if not self._settings.results_days:
-            return
-        age_s = self._settings.results_days * DAY_S
-        old = await self.call(lambda client: client.table.ended_before(age_s))
-        for job_id in old:
-            await self.call(lambda client, job_id=job_id: client.delete(job_id))  # type: ignore[misc]
+        """Remove files that nothing has, and jobs, results and segments older than the setting `results_days`."""
         n_files = await self.call(lambda client: client.remove_unused_files(MIN_AGE_S))
-        n_segments = await self.call(lambda _: self._prune(max(age_s, MIN_AGE_S)))
+        n_files += await self.call(lambda _: self._library.remove_unused_files(MIN_AGE_S))
+        old: list[str] = []
+        n_segments, age_s = 0, self._settings.results_days * DAY_S
+        if age_s:
+            old = await self.call(lambda client: client.table.ended_before(age_s))
+            for job_id in old:
+                await self.call(lambda client, job_id=job_id: client.delete(job_id))  # type: ignore[misc]
+            n_segments = await self.call(lambda _: self._prune(max(age_s, MIN_AGE_S)))
         if old or n_segments or n_files:
             log_event("old jobs removed", jobs=len(old), segments=n_segments, files=n_files, days=age_s / DAY_S)
 

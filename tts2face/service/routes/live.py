@@ -69,7 +69,7 @@ async def stream(connection: WebSocket) -> None:
     await connection.accept()
     state: ServiceState = connection.app.state.service
     try:
-        options = _read_options(await connection.receive_text())
+        options = _read_options(await _first_message(connection, state.settings.body_s))
         given: dict[str, Any] = options.model_dump(exclude_none=True, exclude_defaults=True, exclude={"type", "input"})
         models = {name: given.pop(name) for name in MODEL_FIELDS if name in given}
         key = connection.state.key
@@ -95,6 +95,22 @@ async def stream(connection: WebSocket) -> None:
         await asyncio.gather(sending, receiving, return_exceptions=True)
         with suppress(RuntimeError):
             await connection.close()
+
+
+async def _first_message(connection: WebSocket, seconds: float) -> str:
+    """First message of a client.
+
+    Raises
+    ------
+    RefusedError
+        It did not come in time.
+    """
+    try:
+        return await asyncio.wait_for(connection.receive_text(), seconds)
+    except TimeoutError as late:
+        raise RefusedError(
+            408, "too_slow", f"the message `start` did not arrive within {seconds:g} s; send it first"
+        ) from late
 
 
 def _read_options(message: str) -> TextOptions | AudioOptions:

@@ -4,6 +4,7 @@ All methods block; routes call them in threads.
 """
 
 import re
+import time
 from dataclasses import asdict
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -186,6 +187,12 @@ class Library:
             raise RefusedError(403, "forbidden", f"the {kind} {name} belongs to the service and cannot be deleted")
         if NAME.fullmatch(name) is None or not self._table.remove(owner, kind, name, self._blobs.delete):
             raise RefusedError(404, "not_found", f"there is no {kind} {name[:40]!r}; /v1/{plural(kind)} lists yours")
+
+    def remove_unused_files(self, older_than_s: float) -> int:
+        """Remove files stored some seconds ago that no resource has, as after a crash in an upload; their number."""
+        before = time.time() - older_than_s
+        old = [content for content, stored_s in self._blobs.entries() if stored_s < before]
+        return self._table.remove_unused(old, self._blobs.delete) if old else 0
 
     def usage(self, key: ApiKey) -> Usage:
         """What a key stores."""
