@@ -5,11 +5,13 @@ import sys
 from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
 
 from tests.service.conftest import RunningService
+from tts2face.service.app import create_app
 from tts2face.service.settings import ServiceSettings
 
 # Generated texts and pictures at the limits of the schema would take minutes to make: the server under test allows
@@ -71,3 +73,36 @@ def test_every_field_is_described(small: RunningService) -> None:
         for method, route in methods.items():
             assert route["summary"], (path, method)
             assert {"401", "403", "421", "429", "431", "500", "503"} <= set(route["responses"]), (path, method)
+
+
+def fields_of(name: str, schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Fields of an object and of the objects in it, with their places."""
+    for part in ("oneOf", "anyOf"):
+        for number, one in enumerate(schema.get(part, ())):
+            yield from fields_of(f"{name} {number}", one)
+    for field, content in schema.get("properties", {}).items():
+        yield f"{name}.{field}", content
+        yield from fields_of(f"{name}.{field}", content)
+
+
+def has_example(content: dict[str, Any]) -> bool:
+    """Whether a field shows a value; objects and lists show those of their parts, files have none."""
+    if {"example", "examples", "default", "enum", "const", "$ref", "items"} & content.keys():
+        return True
+    return content.get("type") == "object" or content.get("format") == "binary" or "properties" in content or any(
+        map(has_example, content.get("anyOf", ()))
+    )  # fmt: skip
+
+
+def test_every_field_has_a_description_and_an_example(tmp_path: Path) -> None:
+    described = create_app(ServiceSettings(processes=1, data=tmp_path)).openapi()
+    found = [one for name, schema in described["components"]["schemas"].items() for one in fields_of(name, schema)]
+    for path, operations in described["paths"].items():
+        for method, operation in operations.items():
+            place = f"{method} {path}"
+            for kind, body in operation.get("requestBody", {}).get("content", {}).items():
+                found += fields_of(f"{place} {kind}", body["schema"])
+            found += [(f"{place} {one['name']}", {**one["schema"], **one}) for one in operation.get("parameters", ())]
+    assert len(found) > 250
+    assert [name for name, content in found if not content.get("description")] == []
+    assert [name for name, content in found if not has_example(content)] == []

@@ -55,16 +55,26 @@ def as_refused(error: Tts2faceError) -> RefusedError:
 class ErrorDetail(BaseModel):
     """What is wrong."""
 
-    message: Annotated[str, Field(description="What is wrong, which value, what to do.")]
-    type: Annotated[str, Field(description="invalid_request_error or server_error.")]
-    param: Annotated[str | None, Field(description="Name of the field, if the form of one is wrong.")]
+    message: Annotated[
+        str,
+        Field(
+            description="What is wrong, which value, what to do.",
+            examples=["the rate must be from 0.5 to 2, not 3; change it"],
+        ),
+    ]
+    type: Annotated[
+        str, Field(description="invalid_request_error or server_error.", examples=["invalid_request_error"])
+    ]
+    param: Annotated[
+        str | None, Field(description="Name of the field, if the form of one is wrong.", examples=["rate"])
+    ]
     code: Annotated[str, Field(description="Word for programs.", examples=["rate_limited"])]
 
 
 class ErrorBody(BaseModel):
     """An error, in the form of OpenAI's API."""
 
-    error: ErrorDetail
+    error: Annotated[ErrorDetail, Field(description="The error.")]
 
 
 DOCUMENTED: dict[int | str, dict[str, Any]] = {

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from tts2face.jobs.job_records import JobFile, JobRecord
 
 HASH = "ab3f" * 16
+EXAMPLE_ID = "0f8fad5bd9cb469fa16570867728950e"
 
 
 class NewJobBody(BaseModel):
@@ -48,13 +49,13 @@ class WebhookState(BaseModel):
 class Job(BaseModel):
     """A job without its options and results."""
 
-    id: Annotated[str, Field(description="Name of the job.", examples=["0f8fad5bd9cb469fa16570867728950e"])]
+    id: Annotated[str, Field(description="Name of the job.", examples=[EXAMPLE_ID])]
     kind: Annotated[str, Field(description="clip, subtitles, ...", examples=["clip"])]
     state: Annotated[str, Field(description="waiting, running, done, failed or cancelled.", examples=["done"])]
     created: Annotated[float, Field(description="Seconds since 1970.", examples=[1790000000.0])]
     started: Annotated[float | None, Field(description="When a worker took it.", examples=[1790000001.0])]
     finished: Annotated[float | None, Field(description="When it ended.", examples=[1790000009.0])]
-    progress: Annotated[Progress, Field(description="How much is done.")]
+    progress: Annotated[Progress, Field(description="How many of its parts are done.")]
     error: Annotated[str | None, Field(description="Why it failed, or why some results are missing.", examples=[None])]
     webhook: Annotated[WebhookState | None, Field(description="The message about its end.")]
 
@@ -69,7 +70,9 @@ class JobPage(BaseModel):
     """Jobs, the newest first."""
 
     jobs: Annotated[list[Job], Field(description="Jobs of this page.")]
-    next: Annotated[str | None, Field(description="Value of `before` for the next page; null: there is none.")]
+    next: Annotated[
+        str | None, Field(description="Value of `before` for the next page; null: there is none.", examples=[None])
+    ]
 
 
 def job_view(record: JobRecord) -> Job:

@@ -30,7 +30,7 @@ class ClipOptions(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
     language: Annotated[str, Field(description="Language of the text.")] = "en-us"
-    voice: Annotated[str | None, Field(description="A voice of GET /v1/voices.")] = None
+    voice: Annotated[str | None, Field(description="A voice of GET /v1/voices.", examples=["heart"])] = None
     rate: Annotated[float, Field(ge=0.5, le=2.0, description="Factor of the speaking rate.")] = 1.0
     volume: Annotated[float, Field(ge=0.0, le=2.0, description="Factor of the loudness.")] = 1.0
     seed: Annotated[int, Field(ge=0, le=2**31 - 1, description="Seed of gestures and voice.")] = 0
@@ -41,11 +41,13 @@ class ClipOptions(BaseModel):
     )
     style: Annotated[str | None, Field(description="Style of the palette.", examples=["delighted"])] = None
     gain: Annotated[str | None, Field(description="Gains of features.", examples=["head=1.5"])] = None
-    talker: Annotated[str | None, Field(description="A talker of GET /v1/talkers.")] = None
-    face: Annotated[str | None, Field(description="A face of GET /v1/faces, or self.")] = None
-    identity: Annotated[str | None, Field(description="Identity preset of the face.")] = None
-    palette: Annotated[str | None, Field(description="A palette of GET /v1/palettes.")] = None
-    dictionary: Annotated[str | None, Field(description="A dictionary of GET /v1/dictionaries.")] = None
+    talker: Annotated[str | None, Field(description="A talker of GET /v1/talkers.", examples=["grid_s1"])] = None
+    face: Annotated[str | None, Field(description="A face of GET /v1/faces, or self.", examples=["head"])] = None
+    identity: Annotated[str | None, Field(description="Identity preset of the face.", examples=["kofi"])] = None
+    palette: Annotated[str | None, Field(description="A palette of GET /v1/palettes.", examples=["starter"])] = None
+    dictionary: Annotated[str | None, Field(description="A dictionary of GET /v1/dictionaries.", examples=[None])] = (
+        None
+    )
     size: Annotated[str, Field(description="Width x height in pixels.", examples=["512x512"])] = "auto"
     camera: Annotated[str, Field(description="front, three-quarter, profile, close, or yaw,pitch.")] = "front"
     background: Annotated[str, Field(description="studio, transparent, or a colour.", examples=["#204060"])] = "studio"
@@ -58,7 +60,9 @@ class ClipRequest(ClipOptions):
     text: Annotated[str, Field(description="Text, with marks or SSML.", examples=["Hello there."])] = ""
     format: Annotated[Format, Field(description="Movie, sound, or lines.")] = "mp4"
     expression: Annotated[str | None, Field(description="Expressions with times.", examples=["happy=0.6"])] = None
-    idle: Annotated[float | None, Field(ge=0.1, le=30, description="Seconds of idle animation, no speech.")] = None
+    idle: Annotated[
+        float | None, Field(ge=0.1, le=30, description="Seconds of idle animation, no speech.", examples=[2.5])
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,7 +44,12 @@ class SubtitlesRequest(ClipOptions):
         Field(max_length=20, strict=False, description="Files for other programs by ending.", examples=[["glb"]]),
     ] = ()
     encoding: Annotated[
-        str | None, Field(pattern="^[A-Za-z0-9_.:-]{1,40}$", description="Encoding of subtitles that are not UTF-8.")
+        str | None,
+        Field(
+            pattern="^[A-Za-z0-9_.:-]{1,40}$",
+            description="Encoding of subtitles that are not UTF-8.",
+            examples=["windows-1252"],
+        ),
     ] = None
     cast: Annotated[
         dict[str, Any] | str | None,

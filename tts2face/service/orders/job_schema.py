@@ -1,5 +1,6 @@
 """OpenAPI description of the body of a new job, made of the kinds of jobs."""
 
+import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,7 +11,13 @@ from tts2face.service.orders.job_kinds import JOB_KINDS
 def new_job_schema(names: Sequence[str]) -> dict[str, Any]:
     """Body of a new job of some kinds for the OpenAPI description: as JSON, or as a form with files."""
     schemas = [_kind_schema(name) for name in names]
-    parts: dict[str, Any] = {"job": {"type": "string", "description": "The job as JSON: kind, request, webhook."}}
+    parts: dict[str, Any] = {
+        "job": {
+            "type": "string",
+            "description": "The job as JSON: kind, request, webhook.",
+            "examples": [json.dumps({"kind": names[0], "request": {}})],
+        }
+    }
     for kind in (JOB_KINDS[name] for name in names):
         for part, (text, _) in kind.parts.items():
             file = {"type": "string", "format": "binary"}
@@ -45,6 +52,7 @@ def _kind_schema(name: str) -> dict[str, Any]:
                 "type": ["string", "null"],
                 "maxLength": 2000,
                 "description": "URL, of a host in the setting webhook_hosts, that learns of the end of the job.",
+                "examples": ["https://example.org/done"],
             },
         },
     }

@@ -29,7 +29,11 @@ MULTIPART = {
             "schema": {
                 "type": "object",
                 "properties": {
-                    "request": {"type": "string", "description": "The options as JSON."},
+                    "request": {
+                        "type": "string",
+                        "description": "The options as JSON.",
+                        "examples": ['{"text": "Hello there."}'],
+                    },
                     "audio": {"type": "string", "format": "binary", "description": "Speech in place of a voice."},
                     "background": {"type": "string", "format": "binary", "description": "Picture behind the face."},
                     "timeline": {"type": "string", "format": "binary", "description": "Timeline of gestures, JSON."},

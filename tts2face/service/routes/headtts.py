@@ -36,7 +36,10 @@ class HeadTtsRequest(BaseModel):
 
     input: Annotated[
         str | list[str | dict[str, Any]],
-        Field(description="Text, or items of type text, speech, phonetic, characters, number, date, time, break."),
+        Field(
+            description="Text, or items of type text, speech, phonetic, characters, number, date, time, break.",
+            examples=["Hello there."],
+        ),
     ]
     voice: Annotated[str, Field(description="A voice of GET /v1/voices, or one of Kokoro for the default.")] = (
         "af_bella"
@@ -44,7 +47,7 @@ class HeadTtsRequest(BaseModel):
     language: Annotated[str, Field(description="Language of the text.")] = "en-us"
     speed: Annotated[float, Field(ge=0.25, le=4.0, description="Speaking rate; limited to 0.5 to 2.")] = 1.0
     dictionary: Annotated[
-        str | None, Field(description="A dictionary of GET /v1/dictionaries; not part of HeadTTS.")
+        str | None, Field(description="A dictionary of GET /v1/dictionaries; not part of HeadTTS.", examples=[None])
     ] = None
     audioEncoding: Annotated[Literal["wav", "pcm"], Field(description="Sound.")] = "wav"  # noqa: N815
 
@@ -58,14 +61,22 @@ def hello() -> str:
 class HeadTtsError(BaseModel):
     """An error as HeadTTS reports it."""
 
-    error: Annotated[str, Field(description="What is wrong, which value, what to do.")]
+    error: Annotated[
+        str,
+        Field(
+            description="What is wrong, which value, what to do.",
+            examples=["there is no voice 'anna'; GET /v1/voices lists them"],
+        ),
+    ]
 
 
 class HeadTtsAudio(BaseModel):
     """Sound with its words and visemes; times in milliseconds."""
 
-    audio: Annotated[str, Field(description="Base64 of a .wav file or of 16-bit samples.")]
-    audioEncoding: Annotated[str, Field(description="wav or pcm.")]  # noqa: N815
+    audio: Annotated[
+        str, Field(description="Base64 of a .wav file or of 16-bit samples.", examples=["UklGRiQAAABXQVZF"])
+    ]
+    audioEncoding: Annotated[str, Field(description="wav or pcm.", examples=["wav"])]  # noqa: N815
     words: Annotated[list[str], Field(description="Words, each but the last with a space behind it.")]
     wtimes: Annotated[list[int], Field(description="Begin of each word.")]
     wdurations: Annotated[list[int], Field(description="Duration of each word.")]

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Header, Query
+from fastapi import Path as PathParameter
 from fastapi import Request as HttpRequest
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response, StreamingResponse
@@ -27,7 +28,7 @@ from tts2face.service.access.guard import VIDEO_PATH
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.access.scopes import require_scope
 from tts2face.service.errors import RefusedError, as_refused
-from tts2face.service.jobs.job_models import JobDetail, JobPage, NewJobBody, job_detail, job_view
+from tts2face.service.jobs.job_models import EXAMPLE_ID, JobDetail, JobPage, NewJobBody, job_detail, job_view
 from tts2face.service.jobs.webhooks import check_webhook
 from tts2face.service.orders.job_kinds import JOB_KINDS
 from tts2face.service.orders.job_orders import JobKind, JobOrder, Upload, expected_speech_s
@@ -48,6 +49,7 @@ IdempotencyKey = Annotated[
         examples=["order-17"],
     ),
 ]  # fmt: skip
+JobId = Annotated[str, PathParameter(description="Name of the job.", examples=[EXAMPLE_ID])]
 State = Literal["waiting", "running", "done", "failed", "cancelled"]
 
 
@@ -118,8 +120,10 @@ async def _queue(request: HttpRequest, idempotency_key: str | None, kinds: Mappi
 @router.get("/jobs", response_model=JobPage, summary="List jobs")
 async def list_jobs(
     request: HttpRequest,
-    state: Annotated[State | None, Query(description="Only jobs in this state.")] = None,
-    before: Annotated[str | None, Query(pattern="^[0-9a-f]{32}$", description="`next` of the page before.")] = None,
+    state: Annotated[State | None, Query(description="Only jobs in this state.", examples=["done"])] = None,
+    before: Annotated[
+        str | None, Query(pattern="^[0-9a-f]{32}$", description="`next` of the page before.", examples=[EXAMPLE_ID])
+    ] = None,
     limit: Annotated[int, Query(ge=1, le=100, description="Largest number of jobs.")] = 50,
 ) -> JobPage:
     """Jobs of the key, the newest first; those of all keys for the scope admin."""
@@ -130,7 +134,7 @@ async def list_jobs(
 
 
 @router.get("/jobs/{job_id}", response_model=JobDetail, summary="Show a job", responses=NOT_FOUND)
-async def show_job(request: HttpRequest, job_id: str) -> JobDetail:
+async def show_job(request: HttpRequest, job_id: JobId) -> JobDetail:
     """A job with its state, progress and results."""
     return job_detail(await _find(request, job_id))
 
@@ -143,9 +147,10 @@ async def show_job(request: HttpRequest, job_id: str) -> JobDetail:
 )
 async def follow_job(
     request: HttpRequest,
-    job_id: str,
+    job_id: JobId,
     last_event_id: Annotated[
-        str | None, Header(max_length=20, description="Id of the last event received; only later ones are sent.")
+        str | None,
+        Header(max_length=20, description="Id of the last event received; only later ones are sent.", examples=["3"]),
     ] = None,
 ) -> StreamingResponse:
     """Server-sent events of a job, from its begin or after `Last-Event-ID`, up to its end."""
@@ -155,7 +160,7 @@ async def follow_job(
 
 
 @router.post("/jobs/{job_id}/cancel", response_model=JobDetail, summary="Cancel a job", responses=NOT_FOUND)
-async def cancel_job(request: HttpRequest, job_id: str) -> JobDetail:
+async def cancel_job(request: HttpRequest, job_id: JobId) -> JobDetail:
     """Cancel a waiting or running job; one that has ended stays as it is."""
     record = await _find(request, job_id)
     await service_state(request).jobs.call(lambda client: client.cancel(record.id))
@@ -163,7 +168,7 @@ async def cancel_job(request: HttpRequest, job_id: str) -> JobDetail:
 
 
 @router.delete("/jobs/{job_id}", status_code=204, response_class=Response, summary="Delete a job", responses=NOT_FOUND)
-async def delete_job(request: HttpRequest, job_id: str) -> Response:
+async def delete_job(request: HttpRequest, job_id: JobId) -> Response:
     """Delete a job, and its results unless another job has the same; an open job is cancelled first."""
     record = await _find(request, job_id)
     await service_state(request).jobs.call(lambda client: client.delete(record.id))

@@ -48,11 +48,17 @@ class Speech(BaseModel):
     stream_format: Annotated[
         Literal["audio", "sse"], Field(description="Bytes, or server-sent events with base64 (sound only).")
     ] = "audio"
-    instructions: Annotated[str | None, Field(description="Accepted and not used.")] = None
+    instructions: Annotated[str | None, Field(description="Accepted and not used.", examples=["Speak calmly."])] = None
     language: Annotated[str, Field(description="Language of the text; not part of OpenAI's API.")] = "en-us"
-    face: Annotated[str | None, Field(description="A face of GET /v1/faces; not part of OpenAI's API.")] = None
-    palette: Annotated[str | None, Field(description="A palette of GET /v1/palettes; not part of it.")] = None
-    dictionary: Annotated[str | None, Field(description="A dictionary of GET /v1/dictionaries; not part of it.")] = None
+    face: Annotated[
+        str | None, Field(description="A face of GET /v1/faces; not part of OpenAI's API.", examples=["head"])
+    ] = None
+    palette: Annotated[
+        str | None, Field(description="A palette of GET /v1/palettes; not part of it.", examples=["starter"])
+    ] = None
+    dictionary: Annotated[
+        str | None, Field(description="A dictionary of GET /v1/dictionaries; not part of it.", examples=[None])
+    ] = None
 
 
 @router.post("/audio/speech", response_class=StreamingResponse, summary="Speak a text")

@@ -16,7 +16,9 @@ class TalkerFacts(BaseModel):
     licence: Annotated[str, Field(description="Licence that its file states.", examples=["CC BY 4.0"])]
     n_utterances: Annotated[int, Field(description="Number of its recorded utterances.", examples=[804])]
     minutes: Annotated[float, Field(description="Minutes of recorded speech.", examples=[40.2])]
-    has_own_face: Annotated[bool, Field(description="Whether `face: self` shows the talker's own face.")]
+    has_own_face: Annotated[
+        bool, Field(description="Whether `face: self` shows the talker's own face.", examples=[False])
+    ]
 
 
 class FaceFacts(BaseModel):
@@ -58,10 +60,16 @@ class Resource(BaseModel, Generic[Facts]):
 
     name: Annotated[str, Field(description="Its name in requests.", examples=["anna"])]
     kind: Annotated[str, Field(description="talker, face, palette or dictionary.", examples=["face"])]
-    owner: Annotated[str | None, Field(description="Key that uploaded it; null: it is the service's own.")] = None
-    sha256: Annotated[str | None, Field(description="Hash of an upload's content as it is stored.")] = None
+    owner: Annotated[
+        str | None, Field(description="Key that uploaded it; null: it is the service's own.", examples=["studio"])
+    ] = None
+    sha256: Annotated[
+        str | None, Field(description="Hash of an upload's content as it is stored.", examples=["ab3f" * 16])
+    ] = None
     bytes: Annotated[int | None, Field(description="Size of an upload with its picture.", examples=[5272651])] = None
-    created: Annotated[datetime | None, Field(description="When it was uploaded.")] = None
+    created: Annotated[
+        datetime | None, Field(description="When it was uploaded.", examples=["2026-11-22T09:30:00Z"])
+    ] = None
     about: Annotated[Facts, Field(description="What is known about it.")]
 
 

@@ -3,13 +3,14 @@
 import re
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Header
+from fastapi import APIRouter, Header, Path
 from fastapi import Request as HttpRequest
 from fastapi.responses import FileResponse, Response
 
 from tts2face.jobs.job_client import JobClient
 from tts2face.jobs.job_records import JobFile
 from tts2face.service.errors import RefusedError
+from tts2face.service.jobs.job_models import HASH
 from tts2face.service.routes.answers import service_state
 
 router = APIRouter(prefix="/v1", tags=["jobs"])
@@ -28,8 +29,10 @@ ANSWERS: dict[int | str, dict[str, Any]] = {
 @router.get("/results/{sha256}", response_class=Response, summary="Fetch a result", responses=ANSWERS)
 async def fetch_result(
     request: HttpRequest,
-    sha256: str,
-    if_none_match: Annotated[str | None, Header(description="ETags that the client has.")] = None,
+    sha256: Annotated[str, Path(description="Hash of the file, from the results of a job.", examples=[HASH])],
+    if_none_match: Annotated[
+        str | None, Header(description="ETags that the client has.", examples=[f'"{HASH}"'])
+    ] = None,
 ) -> Response:
     """A file that a job of the key has made; its content never changes. Parts of it by `Range`."""
     key = request.state.key
