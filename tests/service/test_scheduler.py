@@ -102,6 +102,27 @@ def test_a_task_without_input_waits_until_it_is_woken(scheduler: Scheduler, sent
     assert json.loads(sent[0].payload) == {"heard": True}
 
 
+def test_an_urgent_task_runs_next(scheduler: Scheduler, sent: list[Message], clock: Clock) -> None:
+    """Even if it is ahead, and first waits for what it has interrupted."""
+
+    def interrupted() -> Iterator[Step]:
+        yield Chunk(b"", 100.0)
+        yield Wait()
+        yield Wait()
+        yield Event({"type": "cancelled"})
+        yield Event({"type": "later"})
+
+    scheduler.start(1, interrupted)
+    for _ in range(2):
+        scheduler.run_step()
+    scheduler.start(2, lambda: speech(clock, 2))
+    for _ in range(2):
+        scheduler.wake(1, is_urgent=True)
+        scheduler.run_step()
+    run(scheduler)
+    assert [one.task for one in sent if one.kind in {MessageKind.DATA, MessageKind.EVENT}] == [1, 2, 2, 1]
+
+
 def test_a_cancelled_task_releases_what_it_holds(scheduler: Scheduler, sent: list[Message], clock: Clock) -> None:
     released: list[bool] = []
 

@@ -29,6 +29,7 @@ class Task:
     cpu_s: float = 0.0
     is_paused: bool = False
     wakes_at: float = 0.0  # seconds of the clock; infinite: only by input
+    is_urgent: bool = False  # it runs before all others, as something is to be ended
     request: str | None = None  # id of the request, for the log
 
     def lead(self, now: float) -> float:
@@ -79,10 +80,11 @@ class Scheduler:
         if number in self._tasks:
             self._tasks[number].is_paused = is_paused
 
-    def wake(self, number: int) -> None:
-        """Continue a task that waited for input."""
+    def wake(self, number: int, *, is_urgent: bool = False) -> None:
+        """Continue a task that waited for input; an urgent one runs before all others until its next result."""
         if number in self._tasks:
             self._tasks[number].wakes_at = 0.0
+            self._tasks[number].is_urgent |= is_urgent
 
     def seconds_to_wait(self) -> float | None:
         """Seconds until a task can run without input; None if none will."""
@@ -95,7 +97,7 @@ class Scheduler:
         ready = [task for task in self._tasks.values() if not task.is_paused and task.wakes_at <= now]
         if not ready:
             return False
-        self._advance(min(ready, key=lambda task: (task.priority, task.lead(now))))
+        self._advance(min(ready, key=lambda task: (not task.is_urgent, task.priority, task.lead(now))))
         return True
 
     def _advance(self, task: Task) -> None:
@@ -117,6 +119,7 @@ class Scheduler:
         if isinstance(step, Wait):
             task.wakes_at = math.inf if step.seconds is None else self._clock() + step.seconds
             return
+        task.is_urgent = False
         task.seconds += step.seconds
         if isinstance(step, Event):
             self._send(_json_message(task.number, MessageKind.EVENT, step.content, step.seconds))

@@ -68,9 +68,10 @@ class SynthesisProcess:
             case "input":
                 if number in self._inputs:
                     self._inputs[number].put(command["content"] | {"arrived": arrived})
-                    if command["content"].get("type") in CANCELS:
+                    is_urgent = command["content"].get("type") in CANCELS
+                    if is_urgent:
                         self._turns[number].interrupt()
-                    self.scheduler.wake(number)
+                    self.scheduler.wake(number, is_urgent=is_urgent)
             case "wake":
                 self.scheduler.wake(number)
 
