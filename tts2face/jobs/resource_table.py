@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from lexicon.inputs import parse_json
 from tts2face.jobs.blobs import BlobStore
 from tts2face.jobs.connection import JobDatabase, Transaction, create_tables
 from tts2face.jobs.resource_check import CONTENT, DESCRIPTION, PICTURE
@@ -85,7 +86,7 @@ def resource_from_folder(owner: str, kind: str, name: str, checked: Path, blobs:
     """Row of a resource whose files, which `tts2face.jobs.resource_check` has written, are put into a store."""
     files = [checked / one for one in (CONTENT, PICTURE) if (checked / one).is_file()]
     stored = {file.name: blobs.put(file) for file in files}
-    description = json.loads((checked / DESCRIPTION).read_text(encoding="utf-8"))
+    description = parse_json((checked / DESCRIPTION).read_text(encoding="utf-8"), name)
     n_bytes = sum(file.stat().st_size for file in files)
     return StoredResource(owner, kind, name, stored[CONTENT], stored.get(PICTURE, ""), n_bytes, description)
 

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import BackendError, DataError
+from lexicon.inputs import parse_json
 from tts2face.batch.render_process import KINDS
 from tts2face.jobs.connection import DatabaseAwayError
 from tts2face.jobs.job_kinds import JobTask, Product, Products
@@ -110,7 +111,7 @@ def _messages(task: JobTask, order: dict[str, Any], deadline: float) -> Iterator
                 continue
             if not line:
                 return
-            yield json.loads(line)
+            yield parse_json(line, "the builder")
     finally:
         child.kill()
         child.wait()

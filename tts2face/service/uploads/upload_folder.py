@@ -1,7 +1,6 @@
 """Uploaded files: never opened by the server itself, never stored under a client's name."""
 
 import asyncio
-import json
 import sys
 import tempfile
 from collections.abc import AsyncIterator
@@ -11,6 +10,7 @@ from pathlib import Path
 
 from starlette.datastructures import UploadFile
 
+from lexicon.inputs import parse_json
 from tts2face.limited_process import bare_environment
 from tts2face.service.errors import RefusedError
 from tts2face.service.settings import ServiceSettings
@@ -63,7 +63,7 @@ class UploadFolder:
             They have no cues, or too many.
         """
         path = await self._decode(f"{SUBTITLES}{encoding or ''}", name, upload, suffix, max_cues)
-        numbers: dict[str, float] = json.loads(Path(f"{path}.json").read_text())
+        numbers: dict[str, float] = parse_json(Path(f"{path}.json").read_text(), name)
         return path, numbers
 
     async def video(self, name: str, upload: UploadFile) -> tuple[Path, float]:
@@ -76,7 +76,7 @@ class UploadFolder:
         """
         given, checked = await self._save(name, upload), self.path / f"{name}.video"
         await decode_file((VIDEO, given, checked, self.settings.video_s), name, self.settings.decode_s)
-        facts = json.loads(checked.read_text())
+        facts = parse_json(checked.read_text(), name)
         return given.rename(given.with_suffix(facts["suffix"])), float(facts["seconds"])
 
     async def resource(self, kind: str, upload: UploadFile, max_bytes: float) -> Path:
