@@ -1,13 +1,12 @@
 """Connections to the database of jobs: SQLite or PostgreSQL, with transactions whose failures are `BackendError`."""
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 from lexicon.errors import BackendError
 
-CONNECTIONS = {"pool_size": 1, "max_overflow": 2}  # of a process to the table of workers; one of them stays open
 NOW = {"sqlite": "(julianday('now') - 2440587.5) * 86400.0", "postgresql": "EXTRACT(EPOCH FROM clock_timestamp())"}
 CONNECTIONS = {"pool_size": 1, "max_overflow": 2}  # of a process to a table; one of them stays open
 N_CREATE_TRIES, CREATE_PAUSE_S = 5, 0.2  # of tables that another process may be creating
@@ -56,6 +55,11 @@ def connection_errors() -> tuple[type[Exception], ...]:
     return exc.OperationalError, exc.InterfaceError, exc.InternalError, exc.TimeoutError
 
 
+def database_reason(error: Exception, n_characters: int = 200) -> str:
+    """The message of the database's own driver, if an error of SQLAlchemy has one, on one line."""
+    return " ".join(str(getattr(error, "orig", None) or error).split())[:n_characters]
+
+
 class JobDatabase:
     """Transactions in the tables of jobs."""
 
@@ -85,8 +89,9 @@ class JobDatabase:
                     transaction.run(_LOCK[self.kind])
                 yield transaction
         except self._away as away:
-            reason = " ".join(str(getattr(away, "orig", None) or away).split())
-            raise DatabaseAwayError(f"the database cannot be reached ({reason[:160]}); try again") from away
+            raise DatabaseAwayError(
+                f"the database cannot be reached ({database_reason(away, 160)}); try again"
+            ) from away
 
     def close(self) -> None:
         """Close all connections."""
@@ -119,13 +124,22 @@ class Transaction:
 
 def create_tables(database: JobDatabase, statements: Sequence[str]) -> None:
     """Create tables where they are missing; several processes may do so at once."""
+
+    def create() -> None:
+        with database.transaction() as change:
+            for statement in statements:
+                change.run(statement)
+
+    repeat_creation(create)
+
+
+def repeat_creation(create: Callable[[], None]) -> None:
+    """Call a function that creates tables again if another process was creating them."""
     import sqlalchemy
 
     for attempt in range(N_CREATE_TRIES):
         try:
-            with database.transaction() as change:
-                for statement in statements:
-                    change.run(statement)
+            create()
             return
         except (sqlalchemy.exc.DBAPIError, BackendError):
             if attempt == N_CREATE_TRIES - 1:

@@ -2,14 +2,21 @@
 
 import logging
 import sqlite3
-import time
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from lexicon.errors import BackendError, InputError
 from tts2face.batch.address import SEGMENT_FORMAT
-from tts2face.jobs.connection import NOW, DatabaseAwayError, JobDatabase, database_kind, open_engine
+from tts2face.jobs.connection import (
+    NOW,
+    DatabaseAwayError,
+    JobDatabase,
+    database_kind,
+    database_reason,
+    open_engine,
+    repeat_creation,
+)
 from tts2face.jobs.job_table import JobTable
 
 DEFAULT_DATABASE = "tts2face-jobs.sqlite"
@@ -78,8 +85,8 @@ def prepare_database(url: str) -> None:
         finally:
             jobs.close()
     except (sqlite3.Error, sqlalchemy.exc.SQLAlchemyError, ModuleNotFoundError) as error:
-        reason = " ".join(str(getattr(error, "orig", None) or error).split())
-        raise DatabaseAwayError(f"cannot use the database {shown_url(url)} ({reason[:200]}); check it") from error
+        reason = database_reason(error)
+        raise DatabaseAwayError(f"cannot use the database {shown_url(url)} ({reason}); check it") from error
 
 
 def quiet_dbos(level: int = logging.ERROR) -> None:
@@ -116,17 +123,12 @@ class Workers:
 
     def create(self) -> None:
         """Create the table where it is missing; several processes may do so at once."""
-        for attempt in range(5):
-            try:
-                with self._engine.begin() as connection:
-                    connection.execute(self._sql(_TABLE))
-                return
-            except Exception as raced:
-                import sqlalchemy
 
-                if not isinstance(raced, sqlalchemy.exc.DBAPIError) or attempt == 4:
-                    raise
-                time.sleep(0.2)
+        def create() -> None:
+            with self._engine.begin() as connection:
+                connection.execute(self._sql(_TABLE))
+
+        repeat_creation(create)
 
     def transaction(self) -> Any:
         """Context of a transaction in the database; the value is its connection."""

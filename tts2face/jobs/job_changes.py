@@ -6,9 +6,7 @@ from typing import Any
 
 from tts2face.jobs.connection import JobDatabase
 from tts2face.jobs.job_records import INPUT, OPEN_STATES, OUTPUT, JobFile, JobRecord
-from tts2face.jobs.job_table import JobTable, insert_files, remove_unused
-
-_OPEN = "('waiting', 'running')"
+from tts2face.jobs.job_table import IS_OPEN, JobTable, insert_files, remove_unused
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +56,7 @@ class JobChanges:
         with self._database.transaction(is_change=True) as change:
             n_open = change.run(
                 f"UPDATE tts2face_jobs SET n_done = coalesce(:done, n_done), n_all = coalesce(:of, n_all) "
-                f"WHERE id = :id AND state IN {_OPEN}", id=job_id, done=content.get("done"), of=content.get("of"),
+                f"WHERE id = :id AND {IS_OPEN}", id=job_id, done=content.get("done"), of=content.get("of"),
             )  # fmt: skip
             if n_open:
                 self.table.add_event(change, job_id, content)
@@ -84,7 +82,7 @@ class JobChanges:
             n_ended = change.run(
                 f"UPDATE tts2face_jobs SET state = :state, error = :error, finished = {self._database.now}, "
                 "webhook_due = CASE WHEN webhook IS NULL THEN NULL ELSE 0 END "
-                f"WHERE id = :id AND state IN {_OPEN}", id=job_id, state=ending.state, error=ending.error,
+                f"WHERE id = :id AND {IS_OPEN}", id=job_id, state=ending.state, error=ending.error,
             )  # fmt: skip
             if not n_ended:
                 return False

@@ -16,6 +16,7 @@ RUNNERS: Mapping[str, str] = {
     "subtitles": "tts2face.jobs.subtitles_job:run_subtitles",
     "talker": "tts2face.jobs.talker_job:run_talker",
 }  # name of a kind: module and function
+# No HTML: a report that ran as a page of the service could use the key of its reader.
 MEDIA_TYPES = {
     ".mp4": "video/mp4", ".webm": "video/webm", ".mov": "video/quicktime", ".json": "application/json",
     ".csv": "text/csv", ".jsonl": "application/jsonl", ".glb": "model/gltf-binary", ".wav": "audio/wav",

@@ -41,7 +41,7 @@ _TABLES = (
     "CREATE INDEX IF NOT EXISTS tts2face_job_segments_by_address ON tts2face_job_segments (address)",
 )
 _SELECT = f"SELECT {', '.join(COLUMNS)} FROM tts2face_jobs"
-_OPEN = "('waiting', 'running')"
+IS_OPEN = f"state IN {OPEN_STATES}"  # condition of a query
 CHILD_TABLES = ("tts2face_job_files", "tts2face_job_events", "tts2face_job_segments")
 
 
@@ -174,7 +174,7 @@ class JobTable:
     def open_jobs(self) -> list[str]:
         """Names of all waiting and running jobs."""
         with self.database.transaction() as look:
-            return [row[0] for row in look.rows(f"SELECT id FROM tts2face_jobs WHERE state IN {_OPEN}")]
+            return [row[0] for row in look.rows(f"SELECT id FROM tts2face_jobs WHERE {IS_OPEN}")]
 
     def ended_before(self, age_s: float) -> list[str]:
         """Names of jobs that ended some seconds ago or earlier."""
@@ -186,7 +186,7 @@ class JobTable:
         """Addresses of the segments of a job that no other waiting or running job uses."""
         query = (
             "SELECT address FROM tts2face_job_segments WHERE job_id = :id AND address NOT IN (SELECT s.address FROM "
-            f"tts2face_job_segments s JOIN tts2face_jobs j ON j.id = s.job_id WHERE j.state IN {_OPEN} AND j.id <> :id)"
+            f"tts2face_job_segments s JOIN tts2face_jobs j ON j.id = s.job_id WHERE j.{IS_OPEN} AND j.id <> :id)"
         )
         with self.database.transaction() as look:
             return [row[0] for row in look.rows(query, id=job_id)]

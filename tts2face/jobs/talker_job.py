@@ -32,7 +32,6 @@ LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=0, file_bytes=2 << 30, n_file
 CPU_S, CPU_S_PER_S = 1200, 40  # of any recording, and for each of its seconds; 256 x 256 pixels take 1 s a second
 SLOWNESS = 5.0  # elapsed time in units of the processor time, on a machine that has other work
 LOOK_S, AWAY_S = 1.0, 2.0  # between two looks whether the job is wanted, and between tries to reach the database
-PLAIN_TYPE = "application/octet-stream"  # not text/html: a report that runs as a page here could use its keys
 N_SHOWN = 20  # reasons of refused parts
 
 

@@ -26,7 +26,7 @@ from typing import Any
 from lexicon.errors import BackendError, Tts2faceError
 from tts2face.batch.engine import Message, Renders
 from tts2face.batch.store import Store, open_store
-from tts2face.jobs.connection import DatabaseAwayError
+from tts2face.jobs.connection import DatabaseAwayError, database_reason
 from tts2face.jobs.database import (
     APPLICATION,
     APPLICATION_VERSION,
@@ -162,8 +162,7 @@ class Worker:
             DBOS.register_queue(JOB_QUEUE, worker_concurrency=N_JOBS, polling_interval_sec=interval_s)
             DBOS.register_queue(TALKER_QUEUE, worker_concurrency=N_TALKERS, polling_interval_sec=interval_s)
         except (sqlalchemy.exc.SQLAlchemyError, dbos_error.DBOSException) as away:
-            reason = " ".join(str(getattr(away, "orig", None) or away).split())
-            raise BackendError(f"the worker cannot start: {reason[:200]}; check the database") from away
+            raise BackendError(f"the worker cannot start: {database_reason(away)}; check the database") from away
 
     def stop(self) -> None:
         """End `run` soon; a segment in work is taken over by other workers."""

@@ -21,7 +21,7 @@ from tts2face.service.synthesis.work import Work
 MOVIE_COST, LINES_COST, SOUND_COST = 1.0, 0.2, 0.1  # shares of a core of a stream in real time, rounded up
 CAPACITY = 2.0  # cost of the tasks that one process takes at a time
 MAX_TRIES = 2  # of a request whose process ended before anything was sent
-STREAM_PRIORITY, JOB_PRIORITY = 0, 1
+STREAM_PRIORITY = 0
 
 
 _Waiting = tuple[float, float, "asyncio.Future[WarmProcess]"]  # cost, begin, the process when there is one

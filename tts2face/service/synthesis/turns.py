@@ -11,7 +11,6 @@ from tts2face.service.synthesis.scheduler import Step
 
 Result = TypeVar("Result")
 
-
 POLL_S = 0.01  # between looks whether a wait for a lock has been abandoned
 
 
