@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 from corpus_tools.head.cage import Cage, build_cage
 from corpus_tools.head.correspondence import TABLE, add_landmarks
 from corpus_tools.head.eyes import EyeStyle
-from corpus_tools.head.hair import Haircut
-from corpus_tools.head.head import ADULT, HeadStyle, assemble_head, build_reference
+from corpus_tools.head.head import DEFAULT_PERSON, HeadStyle, assemble_head, build_reference
 from corpus_tools.head.identity import build_identities
 from corpus_tools.head.piece import assemble_face
 from corpus_tools.head.source import PACKAGE, SourceMesh, fetch_data, read_source
 from corpus_tools.head.texture import HeadColours, paint_texture
-from tts2face.models.face import Face
+from tts2face.models.face import Face, Texture
 from tts2face.models.face_file import Identity, write_face
 from tts2face.numeric import smoothstep
 
@@ -30,13 +29,11 @@ CARTOON_TARGETS = {
 }  # fmt: skip
 CARTOON_STYLE = HeadStyle(
     palette=HeadColours(
-        skin=(0.93, 0.715, 0.60), lips=(0.80, 0.40, 0.38), cavity=(0.42, 0.12, 0.14), hair=(0.50, 0.20, 0.11),
-        variation=0.35, brow_thickness=2.2,
+        skin=(0.93, 0.715, 0.60), lips=(0.80, 0.40, 0.38), cavity=(0.42, 0.12, 0.14), variation=0.35,
     ),
-    cut=Haircut(top=30.0, side=15.0, nape=8.0, n_locks=300),
     eyes=EyeStyle(iris=0.47, pupil=0.22, colour=(0.28, 0.62, 0.50)),
     shirt=(0.95, 0.70, 0.18),
-    skin_material={"specular": 0.10, "shininess": 10.0, "wrap": 0.55, "textured": True},
+    skin_material={"specular": 0.10, "shininess": 10.0, "wrap": 0.55, "texture": 0, "kind": "skin"},
 )  # fmt: skip
 EYE_GAIN, EYE_REACH_MM = 0.56, 31.0  # gain at an eye's centre; a third of it at this distance
 NOSE, NOSE_GAIN, NOSE_REACH_MM = np.array([0.0, -38.0, 34.0]), -0.36, 19.0
@@ -92,10 +89,10 @@ def head_face(data: Path) -> Face:
 
 def head_with_identities(source: SourceMesh, wants_identities: bool = False) -> tuple[Face, dict[str, Identity]]:
     """The default head and, on request, its presets."""
-    ground, look = build_reference(build_cage(source, ADULT)), HeadStyle()
+    ground, look = build_reference(build_cage(source, DEFAULT_PERSON)), HeadStyle()
     built = assemble_head(ground.cage, ground, look)
-    texture = paint_texture(source, ground.skin, look.palette, np.random.default_rng(look.seed))
-    face = assemble_face(built, sorted(ground.cage.units), texture, {"name": "head", **METADATA})
+    texture = Texture(paint_texture(source, ground.skin, look.palette, np.random.default_rng(look.seed)))
+    face = assemble_face(built, sorted(ground.cage.units), (texture,), {"name": "head", **METADATA})
     if TABLE.is_file():
         face = add_landmarks(face, ground.skin.base)
     return face, build_identities(source, ground, look, built) if wants_identities else {}
@@ -103,10 +100,10 @@ def head_with_identities(source: SourceMesh, wants_identities: bool = False) -> 
 
 def cartoon_face(source: SourceMesh) -> Face:
     """The cartoon face; its texture is computed on the default head's skin, so that both have the same layout."""
-    ground, cage = build_reference(build_cage(source, ADULT)), build_cartoon_cage(build_cage(source, CARTOON_TARGETS))
-    texture = paint_texture(source, ground.skin, CARTOON_STYLE.palette, np.random.default_rng(CARTOON_STYLE.seed))
+    ground, cage = build_reference(build_cage(source, DEFAULT_PERSON)), build_cartoon_cage(build_cage(source, CARTOON_TARGETS))
+    texture = Texture(paint_texture(source, ground.skin, CARTOON_STYLE.palette, np.random.default_rng(CARTOON_STYLE.seed)))
     built = assemble_head(cage, ground, CARTOON_STYLE)
-    face = assemble_face(built, sorted(cage.units), texture, {"name": "cartoon", **METADATA})
+    face = assemble_face(built, sorted(cage.units), (texture,), {"name": "cartoon", **METADATA})
     return add_landmarks(face, ground.skin.base) if TABLE.is_file() else face
 
 

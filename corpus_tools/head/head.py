@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from corpus_tools.head.cage import Cage, fit_rotation
 from corpus_tools.head.cloth import shirt_piece
 from corpus_tools.head.eyes import EyeStyle, eyeball_piece, fit_eyeballs
-from corpus_tools.head.hair import MATERIAL as HAIR_MATERIAL
-from corpus_tools.head.hair import Haircut, hair_share, hair_thickness, lock_piece
 from corpus_tools.head.lashes import lash_piece
 from corpus_tools.head.layout import layout_coordinates
 from corpus_tools.head.lips import close_lips, lip_ring
@@ -24,13 +22,23 @@ from corpus_tools.head.texture import HeadColours
 
 Floats = NDArray[np.float64]
 
-SKIN_MATERIAL = {"specular": 0.16, "shininess": 14.0, "wrap": 0.35, "textured": True}
-HAIR_PART_SHARE = 0.66  # of a quad that counts as hair; below it hair is only in the texture
+SKIN_MATERIAL = {"specular": 0.16, "shininess": 14.0, "wrap": 0.35, "texture": 0, "kind": "skin"}
+
 PIVOT = np.array([0.0, -75.0, -95.0])  # where the skull meets the neck
 ADULT = {
     "macrodetails/caucasian-female-young": 1.0,
     "macrodetails/universal-female-young-averagemuscle-averageweight": 1.0,
 }
+# The default person: a woman of about 30 with a friendly face at rest.
+DEFAULT_PERSON = ADULT | {
+    "head/head-oval": 0.35, "chin/chin-width-decr": 0.35, "chin/chin-height-decr": 0.15,
+    "chin/chin-prominent-decr": 0.1, "cheek/l-cheek-bones-incr": 0.25, "cheek/r-cheek-bones-incr": 0.25,
+    "cheek/l-cheek-volume-decr": 0.1, "cheek/r-cheek-volume-decr": 0.1, "eyes/l-eye-scale-incr": 0.15,
+    "eyes/r-eye-scale-incr": 0.15, "eyes/l-eye-corner2-up": 0.2, "eyes/r-eye-corner2-up": 0.2,
+    "mouth/mouth-angles-up": 0.4, "mouth/mouth-cupidsbow-incr": 0.25, "mouth/mouth-lowerlip-volume-incr": 0.15,
+    "mouth/mouth-upperlip-volume-incr": 0.25, "mouth/mouth-scale-horiz-incr": 0.15, "neck/neck-scale-horiz-decr": 0.3,
+    "nose/nose-scale-horiz-decr": 0.35, "nose/nose-point-width-decr": 0.3, "nose/nose-width3-decr": 0.3,
+}  # fmt: skip
 JAW_SHAPES = ("jawOpen", "jawForward", "jawLeft", "jawRight")
 TONGUE_DROP_MM = 2.5  # MakeHuman's tongue reaches the upper teeth and hides them when the jaw opens
 TONGUE_FLATTENING = 0.75
@@ -79,7 +87,6 @@ class HeadStyle:
     """Colours, hair, eyes and material of a head: everything except its shape."""
 
     palette: HeadColours = field(default_factory=HeadColours)
-    cut: Haircut = field(default_factory=Haircut)
     eyes: EyeStyle = field(default_factory=EyeStyle)
     shirt: tuple[float, float, float] = (0.20, 0.29, 0.36)
     skin_material: Mapping[str, Any] = field(default_factory=lambda: SKIN_MATERIAL)
@@ -107,18 +114,16 @@ def assemble_head(cage: Cage, reference: ReferenceHead, style: HeadStyle) -> Hea
     jaw = fit_jaw(cage)
     balls = fit_eyeballs(cage, style.eyes)
     skin = clear_eyeballs(correct_shapes(close_lips(build_skin(cage), reference.lips)), balls)
-    flesh, hairs = _flesh(skin, reference, style)
     eyes = [
         eyeball_piece(ball, side, style.eyes, _generator(style))
         for ball, side in zip(balls, ("Left", "Right"), strict=True)
     ]
     pieces = (
-        flesh,
+        _flesh(skin, style),
         *eyes,
         *_teeth_pieces(cage, reference, jaw),
         tongue_piece(cage, jaw),
         lash_piece(cage, skin, _generator(style)),
-        hairs,
         shirt_piece(reference.shoulders, build_shoulders(cage), np.array(style.shirt)),
     )
     return HeadPieces(pieces, (1, 2), balls, PIVOT)
@@ -128,21 +133,11 @@ def _generator(style: HeadStyle) -> np.random.Generator:
     return np.random.default_rng(style.seed)
 
 
-def _flesh(skin: Skin, reference: ReferenceHead, style: HeadStyle) -> tuple[Piece, Piece]:
-    """The skin with the scalp raised by the hair, and the loose locks."""
-    places = reference.skin.vertices
-    share = hair_share(places)
-    normals = vertex_normals(skin.vertices, skin.quads, skin.base)
-    vertices = skin.vertices + hair_thickness(places, style.cut, _generator(style))[:, None] * normals
-    has_hair = share[skin.quads].mean(axis=1) > HAIR_PART_SHARE
-    spans = (
-        MaterialSpan("skin", triangulate(skin.quads[~has_hair]), style.skin_material),
-        MaterialSpan("hair", triangulate(skin.quads[has_hair]), HAIR_MATERIAL),
-    )
-    colours = np.tile(np.array(style.palette.skin), (len(vertices), 1))
-    colours[np.unique(spans[1].triangles)] = style.palette.hair
-    hairs = lock_piece((vertices, normals, places), share, style.cut, np.array(style.palette.hair), _generator(style))
-    return Piece(vertices, spans, colours, skin.shapes, layout_coordinates(skin.source_uv)), hairs
+def _flesh(skin: Skin, style: HeadStyle) -> Piece:
+    """The skin."""
+    colours = np.tile(np.array(style.palette.skin), (len(skin.vertices), 1))
+    span = MaterialSpan("skin", triangulate(skin.quads), style.skin_material)
+    return Piece(skin.vertices, (span,), colours, skin.shapes, layout_coordinates(skin.source_uv))
 
 
 def _teeth_pieces(cage: Cage, reference: ReferenceHead, jaw: Jaw) -> tuple[Piece, Piece]:
