@@ -25,6 +25,7 @@ AXIS_Z, FRONT_DEG = -60.0, (36.0, 60.0)  # the vertical axis of the head; a frin
 FRINGE_TOP, BROW_Y = 62.0, 25.0  # heights between which a fringe ends up
 HALF_WIDTH = 88.0  # mm, of hair at the sides
 N_BINS, BIN_RAD = 25, 0.09  # of the inner edge of a half
+FOREHEAD_Y, CURTAIN_X = 84.0, 22.0  # below this height no mirrored hair hangs nearer to the middle
 
 
 def trim_fringe(cards: Cards) -> Cards:
@@ -53,6 +54,8 @@ def mirror_half(parting: float) -> Edit:
         start = np.interp(turn, bins, edge)
         half[:, 0] = (half[:, 0] - start) * HALF_WIDTH / (HALF_WIDTH - start)
         n, triangles = len(used), packed.reshape(-1, 3)
+        hangs = (half[:, 1] < FOREHEAD_Y) & (half[:, 0] < CURTAIN_X) & (half[:, 2] > 0)
+        triangles = triangles[~hangs[triangles].any(axis=1)]
         return Cards(
             np.concatenate([half, half * [-1, 1, 1]]),
             np.concatenate([triangles, triangles[:, ::-1] + n]),
