@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, zoom
 
+from tts2face.colour import decode_srgb
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -40,12 +42,6 @@ class StrandStyle:
     upright: float = 0.0
     matte: bool = False
     contrast: float = 0.8
-
-
-def decode_srgb(srgb: NDArray[np.floating]) -> Floats:
-    """Linear light of sRGB in [0, 1]."""
-    light: Floats = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-    return light
 
 
 def strand_coverage(picture: NDArray[np.uint8], style: StrandStyle) -> Floats:
