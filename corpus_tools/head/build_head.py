@@ -15,6 +15,7 @@ from corpus_tools.head.identity import build_identities
 from corpus_tools.head.piece import assemble_face
 from corpus_tools.head.source import PACKAGE, SourceMesh, fetch_data, read_source
 from corpus_tools.head.texture import HeadColours, paint_texture
+from corpus_tools.head.tongue import TONGUE_UP
 from tts2face.models.face import Face, Texture
 from tts2face.models.face_file import Identity, write_face
 from tts2face.numeric import smoothstep
@@ -82,6 +83,11 @@ METADATA = {
 }
 
 
+def shape_names(cage: Cage) -> list[str]:
+    """ARKit's 52 shapes in alphabetical order, then those of this head."""
+    return [*sorted(cage.units), TONGUE_UP]
+
+
 def head_face(data: Path) -> Face:
     """The default head."""
     return head_with_identities(read_source(data))[0]
@@ -92,7 +98,7 @@ def head_with_identities(source: SourceMesh, wants_identities: bool = False) -> 
     ground, look = build_reference(build_cage(source, DEFAULT_PERSON)), HeadStyle()
     built = assemble_head(ground.cage, ground, look)
     texture = Texture(paint_texture(source, ground.skin, look.palette, np.random.default_rng(look.seed)))
-    face = assemble_face(built, sorted(ground.cage.units), (texture,), {"name": "head", **METADATA})
+    face = assemble_face(built, shape_names(ground.cage), (texture,), {"name": "head", **METADATA})
     if TABLE.is_file():
         face = add_landmarks(face, ground.skin.base)
     return face, build_identities(source, ground, look, built) if wants_identities else {}
@@ -103,7 +109,7 @@ def cartoon_face(source: SourceMesh) -> Face:
     ground, cage = build_reference(build_cage(source, DEFAULT_PERSON)), build_cartoon_cage(build_cage(source, CARTOON_TARGETS))
     texture = Texture(paint_texture(source, ground.skin, CARTOON_STYLE.palette, np.random.default_rng(CARTOON_STYLE.seed)))
     built = assemble_head(cage, ground, CARTOON_STYLE)
-    face = assemble_face(built, sorted(cage.units), (texture,), {"name": "cartoon", **METADATA})
+    face = assemble_face(built, shape_names(cage), (texture,), {"name": "cartoon", **METADATA})
     return add_landmarks(face, ground.skin.base) if TABLE.is_file() else face
 
 

@@ -7,18 +7,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.head.cage import Cage, fit_rotation
+from corpus_tools.head.cage import Cage
 from corpus_tools.head.cloth import shirt_piece
 from corpus_tools.head.eyes import EyeStyle, eyeball_piece, fit_eyeballs
+from corpus_tools.head.jaw import Jaw, fit_jaw
 from corpus_tools.head.lashes import lash_piece
 from corpus_tools.head.layout import layout_coordinates
-from corpus_tools.head.lips import close_lips, lip_ring
+from corpus_tools.head.lips import close_lips, lip_front, lip_ring
 from corpus_tools.head.piece import HeadPieces, MaterialSpan, Piece
 from corpus_tools.head.shapes import clear_eyeballs, correct_shapes
 from corpus_tools.head.skin import Skin, build_shoulders, build_skin, vertex_normals
-from corpus_tools.head.subdivide import catmull_clark, triangulate
-from corpus_tools.head.teeth import LOWER, UPPER, arch_piece, fit_teeth
+from corpus_tools.head.subdivide import triangulate
+from corpus_tools.head.teeth import LOWER, UPPER, arch_piece, fit_teeth, follow_lips
 from corpus_tools.head.texture import HeadColours
+from corpus_tools.head.tongue import tongue_piece
 
 Floats = NDArray[np.float64]
 
@@ -39,47 +41,6 @@ DEFAULT_PERSON = ADULT | {
     "mouth/mouth-upperlip-volume-incr": 0.25, "mouth/mouth-scale-horiz-incr": 0.15, "neck/neck-scale-horiz-decr": 0.3,
     "nose/nose-scale-horiz-decr": 0.35, "nose/nose-point-width-decr": 0.3, "nose/nose-width3-decr": 0.3,
 }  # fmt: skip
-JAW_SHAPES = ("jawOpen", "jawForward", "jawLeft", "jawRight")
-TONGUE_DROP_MM = 2.5  # MakeHuman's tongue reaches the upper teeth and hides them when the jaw opens
-TONGUE_FLATTENING = 0.75
-TONGUE_COLOUR, TONGUE_ROOT_COLOUR = np.array([0.72, 0.36, 0.36]), np.array([0.40, 0.13, 0.14])
-TONGUE_MATERIAL = {"specular": 0.35, "shininess": 30.0, "wrap": 0.3}
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Jaw:
-    """Rotation (3, 3) and translation (3,) in mm of the lower jaw by shape, at weight 1."""
-
-    motions: Mapping[str, tuple[Floats, Floats]]
-
-    def shapes(self, points: Floats) -> dict[str, Floats]:
-        """Displacements (N, 3) by shape of points (N, 3) that move with the lower jaw."""
-        return {name: points @ turn.T + shift - points for name, (turn, shift) in self.motions.items()}
-
-
-def fit_jaw(cage: Cage) -> Jaw:
-    """Rigid motion of a cage's lower jaw, fitted to MakeHuman's lower teeth."""
-    teeth = cage.group("helper-lower-teeth")
-    rest = cage.vertices[teeth]
-    return Jaw({name: fit_rotation(rest, rest + cage.units[name][teeth]) for name in JAW_SHAPES})
-
-
-def tongue_piece(cage: Cage, jaw: Jaw) -> Piece:
-    """The tongue with the shapes ``jaw...`` and ``tongueOut``."""
-    used, quads = np.unique(cage.source.groups["helper-tongue"].corners, return_inverse=True)
-    matrix, fine = catmull_clark(len(used), quads.reshape(-1, 4))
-    points = matrix @ cage.vertices[used]
-    out = matrix @ cage.units["tongueOut"][used]
-    middle = float(np.median(points[:, 1]))
-    points[:, 1] = middle + TONGUE_FLATTENING * (points[:, 1] - middle) - TONGUE_DROP_MM
-    out[:, 1] += TONGUE_DROP_MM * np.clip(out[:, 2] / max(float(out[:, 2].max()), 1e-9), 0, 1)
-    depth = np.clip((points[:, 2].max() - points[:, 2]) / 45.0, 0, 1)[:, None]
-    return Piece(
-        points,
-        (MaterialSpan("tongue", triangulate(fine), TONGUE_MATERIAL),),
-        TONGUE_COLOUR + (TONGUE_ROOT_COLOUR - TONGUE_COLOUR) * depth,
-        {**jaw.shapes(points), "tongueOut": out},
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +82,7 @@ def assemble_head(cage: Cage, reference: ReferenceHead, style: HeadStyle) -> Hea
     pieces = (
         _flesh(skin, style),
         *eyes,
-        *_teeth_pieces(cage, reference, jaw),
+        *_teeth_pieces(cage, skin, reference, jaw),
         tongue_piece(cage, jaw),
         lash_piece(cage, skin, _generator(style)),
         shirt_piece(reference.shoulders, build_shoulders(cage), np.array(style.shirt)),
@@ -140,12 +101,14 @@ def _flesh(skin: Skin, style: HeadStyle) -> Piece:
     return Piece(skin.vertices, (span,), colours, skin.shapes, layout_coordinates(skin.source_uv))
 
 
-def _teeth_pieces(cage: Cage, reference: ReferenceHead, jaw: Jaw) -> tuple[Piece, Piece]:
+def _teeth_pieces(cage: Cage, skin: Skin, reference: ReferenceHead, jaw: Jaw) -> tuple[Piece, Piece]:
     pieces = []
+    ahead = lip_front(skin.vertices, reference.lips) - lip_front(reference.skin.vertices, reference.lips)
     for arch, name in ((UPPER, "upper"), (LOWER, "lower")):
         strip = cage.group(f"helper-{name}-teeth")
         piece = arch_piece(arch, name)
         points = fit_teeth(piece.vertices, reference.cage.vertices[strip], cage.vertices[strip])
+        points = follow_lips(points, piece.vertices, ahead)
         moved = jaw.shapes(points) if name == "lower" else {}
         pieces.append(Piece(points, piece.spans, piece.colours, moved))
     return pieces[0], pieces[1]
