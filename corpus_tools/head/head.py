@@ -2,21 +2,25 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.head.brows import BrowCards, bind_brows, brow_piece
 from corpus_tools.head.cage import Cage
+from corpus_tools.head.cards import CardChoice
 from corpus_tools.head.cloth import shirt_piece
 from corpus_tools.head.eyes import EyeStyle, eyeball_piece, fit_eyeballs
 from corpus_tools.head.jaw import Jaw, fit_jaw
-from corpus_tools.head.lashes import lash_piece
+from corpus_tools.head.lashes import LashCards, bind_lashes, lash_piece
 from corpus_tools.head.layout import layout_coordinates
+from corpus_tools.head.lids import LidEdge, find_lid_edges, wet_piece
 from corpus_tools.head.lips import close_lips, lip_front, lip_ring
 from corpus_tools.head.piece import HeadPieces, MaterialSpan, Piece
 from corpus_tools.head.shapes import clear_eyeballs, correct_shapes
-from corpus_tools.head.skin import Skin, build_shoulders, build_skin, vertex_normals
+from corpus_tools.head.skin import Skin, build_shoulders, build_skin
 from corpus_tools.head.subdivide import triangulate
 from corpus_tools.head.teeth import LOWER, UPPER, arch_piece, fit_teeth, follow_lips
 from corpus_tools.head.texture import HeadColours
@@ -37,61 +41,64 @@ DEFAULT_PERSON = ADULT | {
     "chin/chin-prominent-decr": 0.1, "cheek/l-cheek-bones-incr": 0.25, "cheek/r-cheek-bones-incr": 0.25,
     "cheek/l-cheek-volume-decr": 0.1, "cheek/r-cheek-volume-decr": 0.1, "eyes/l-eye-scale-incr": 0.15,
     "eyes/r-eye-scale-incr": 0.15, "eyes/l-eye-corner2-up": 0.2, "eyes/r-eye-corner2-up": 0.2,
-    "mouth/mouth-angles-up": 0.4, "mouth/mouth-cupidsbow-incr": 0.25, "mouth/mouth-lowerlip-volume-incr": 0.15,
+    "mouth/mouth-angles-up": 0.6, "mouth/mouth-cupidsbow-incr": 0.25, "mouth/mouth-lowerlip-volume-incr": 0.15,
     "mouth/mouth-upperlip-volume-incr": 0.25, "mouth/mouth-scale-horiz-incr": 0.15, "neck/neck-scale-horiz-decr": 0.3,
-    "nose/nose-scale-horiz-decr": 0.35, "nose/nose-point-width-decr": 0.3, "nose/nose-width3-decr": 0.3,
+    "eyebrows/eyebrows-trans-up": 0.25, "eyebrows/eyebrows-angle-up": 0.15, "nose/nose-scale-horiz-decr": 0.35, "nose/nose-point-width-decr": 0.3, "nose/nose-width3-decr": 0.3,
 }  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class HeadStyle:
-    """Colours, hair, eyes and material of a head: everything except its shape."""
+    """Colours, eyes, brows, lashes and material of a head: everything except its shape."""
 
     palette: HeadColours = field(default_factory=HeadColours)
     eyes: EyeStyle = field(default_factory=EyeStyle)
     shirt: tuple[float, float, float] = (0.20, 0.29, 0.36)
     skin_material: Mapping[str, Any] = field(default_factory=lambda: SKIN_MATERIAL)
+    cards: CardChoice = field(default_factory=CardChoice)
     seed: int = 7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReferenceHead:
-    """The default identity, on whose skin texture, hair and shirt are defined."""
+    """The default identity, on whose skin texture, cards and shirt are defined."""
 
     cage: Cage
     skin: Skin
     shoulders: Skin
     lips: NDArray[np.int64]
+    lids: tuple[LidEdge, LidEdge]
+    brows: dict[str, BrowCards]
+    lashes: dict[str, LashCards]
 
 
-def build_reference(cage: Cage) -> ReferenceHead:
-    """The reference head of a default identity's cage."""
+def build_reference(cage: Cage, assets: Path) -> ReferenceHead:
+    """The reference head of a default identity's cage, with cards from the folder `assets`."""
     skin = build_skin(cage)
-    return ReferenceHead(cage, skin, build_shoulders(cage), lip_ring(skin))
+    lids = find_lid_edges(skin, fit_eyeballs(cage))
+    lashes = bind_lashes(assets, cage, skin, lids)
+    return ReferenceHead(
+        cage, skin, build_shoulders(cage), lip_ring(skin), lids, bind_brows(assets, cage, skin), lashes
+    )
 
 
 def assemble_head(cage: Cage, reference: ReferenceHead, style: HeadStyle) -> HeadPieces:
-    """Skin with hair, eyeballs, teeth, tongue, lashes, locks and shirt of a cage."""
+    """Skin, eyeballs, teeth, tongue, brows, lashes and shirt of a cage."""
     jaw = fit_jaw(cage)
     balls = fit_eyeballs(cage, style.eyes)
     skin = clear_eyeballs(correct_shapes(close_lips(build_skin(cage), reference.lips)), balls)
-    eyes = [
-        eyeball_piece(ball, side, style.eyes, _generator(style))
-        for ball, side in zip(balls, ("Left", "Right"), strict=True)
-    ]
+    eyes = [eyeball_piece(ball, side, style.eyes) for ball, side in zip(balls, ("Left", "Right"), strict=True)]
     pieces = (
         _flesh(skin, style),
         *eyes,
         *_teeth_pieces(cage, skin, reference, jaw),
         tongue_piece(cage, jaw),
-        lash_piece(cage, skin, _generator(style)),
+        wet_piece(skin, balls, reference.lids),
+        brow_piece(skin, reference.brows, style.cards.brows),
+        lash_piece(cage, skin, balls, reference.lids, (reference.lashes, style.cards.lashes)),
         shirt_piece(reference.shoulders, build_shoulders(cage), np.array(style.shirt)),
     )
     return HeadPieces(pieces, (1, 2), balls, PIVOT)
-
-
-def _generator(style: HeadStyle) -> np.random.Generator:
-    return np.random.default_rng(style.seed)
 
 
 def _flesh(skin: Skin, style: HeadStyle) -> Piece:

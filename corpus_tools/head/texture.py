@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates
 
 from corpus_tools.dense.texels import find_texels
+from corpus_tools.head.cards import BROW_COLOUR
 from corpus_tools.head.layout import SIDE, layout_coordinates
 from corpus_tools.head.noise import gaussian_bump, value_noise
 from corpus_tools.head.skin import Skin
@@ -25,6 +26,7 @@ class HeadColours:
     skin: tuple[float, float, float] = (0.81, 0.615, 0.52)
     lips: tuple[float, float, float] = (0.695, 0.385, 0.36)
     cavity: tuple[float, float, float] = (0.40, 0.16, 0.155)
+    brows: tuple[float, float, float] = BROW_COLOUR
     variation: float = 1.0
 
 
