@@ -48,8 +48,8 @@ def covered_share(skin: Skin, hair: Floats) -> Floats:
     normals = vertex_normals(skin.vertices, skin.quads, skin.base)[scalp]
     heights = np.arange(-STEP_MM, REACH_MM, STEP_MM)
     rays = points[:, None] + heights[:, None] * normals[:, None]
-    distance = cKDTree(hair).query(rays.reshape(-1, 3), distance_upper_bound=BESIDE_MM)[0].reshape(len(points), -1)
-    covered = np.isfinite(distance).any(axis=1).astype(float)
+    distance = np.asarray(cKDTree(hair).query(rays.reshape(-1, 3), distance_upper_bound=BESIDE_MM)[0])
+    covered = np.isfinite(distance).reshape(len(points), -1).any(axis=1).astype(float)
     near = cKDTree(points).sparse_distance_matrix(cKDTree(points), 2.5 * SMOOTH_MM, output_type="coo_matrix").tocsr()
     near.data = np.exp(-((near.data / SMOOTH_MM) ** 2))
     smooth = (near @ covered + covered) / (np.asarray(near.sum(axis=1)).ravel() + 1.0)

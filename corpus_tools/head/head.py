@@ -43,7 +43,8 @@ DEFAULT_PERSON = ADULT | {
     "eyes/r-eye-scale-incr": 0.15, "eyes/l-eye-corner2-up": 0.2, "eyes/r-eye-corner2-up": 0.2,
     "mouth/mouth-angles-up": 0.6, "mouth/mouth-cupidsbow-incr": 0.25, "mouth/mouth-lowerlip-volume-incr": 0.15,
     "mouth/mouth-upperlip-volume-incr": 0.25, "mouth/mouth-scale-horiz-incr": 0.15, "neck/neck-scale-horiz-decr": 0.3,
-    "eyebrows/eyebrows-trans-up": 0.25, "eyebrows/eyebrows-angle-up": 0.15, "nose/nose-scale-horiz-decr": 0.35, "nose/nose-point-width-decr": 0.3, "nose/nose-width3-decr": 0.3,
+    "eyebrows/eyebrows-trans-up": 0.25, "eyebrows/eyebrows-angle-up": 0.15,
+    "nose/nose-scale-horiz-decr": 0.35, "nose/nose-point-width-decr": 0.3, "nose/nose-width3-decr": 0.3,
 }  # fmt: skip
 
 
@@ -95,7 +96,7 @@ def assemble_head(cage: Cage, reference: ReferenceHead, style: HeadStyle) -> Hea
         tongue_piece(cage, jaw),
         wet_piece(skin, balls, reference.lids),
         brow_piece(skin, reference.brows, style.cards.brows),
-        lash_piece(cage, skin, balls, reference.lids, (reference.lashes, style.cards.lashes)),
+        lash_piece(cage, skin, reference.lashes, style.cards.lashes),
         shirt_piece(reference.shoulders, build_shoulders(cage), np.array(style.shirt)),
     )
     return HeadPieces(pieces, (1, 2), balls, PIVOT)

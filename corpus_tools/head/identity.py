@@ -1,4 +1,4 @@
-"""Presets of age, sex and ancestry: MakeHuman's macro targets, blended, with hair, and tints of skin, brows and eyes."""
+"""Presets of age, sex and ancestry: MakeHuman's macro targets, with hair and tints of skin, brows and eyes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -15,6 +15,7 @@ from tts2face.models.face_file import Identity
 
 Tint = tuple[float, float, float]
 PLAIN: Tint = (1.0, 1.0, 1.0)
+FRIENDLY: Mapping[str, float] = {"mouth/mouth-angles-up": 0.3}
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +54,6 @@ class Preset:
         )
 
 
-FRIENDLY = {"mouth/mouth-angles-up": 0.3}
 BROWN, DARK = (0.66, 0.46, 0.33), (0.42, 0.28, 0.20)  # eyes; the iris in the texture is light
 BLACK, BLOND, GREY = (0.42, 0.43, 0.47), (1.9, 2.0, 1.75), (2.1, 2.8, 3.4)  # brows
 YOUNG, OLD, CHILD = {"young": 1.0}, {"old": 1.0}, {"child": 0.85, "young": 0.15}
