@@ -60,7 +60,7 @@ YOUNG, OLD, CHILD = {"young": 1.0}, {"old": 1.0}, {"child": 0.85, "young": 0.15}
 PRESETS: dict[str, Preset] = {
     "erik": Preset(
         "man, about 30, European", "male", YOUNG, {"caucasian": 1}, Hairdo("short02", "dark-blond"),
-        (0.98, 0.95, 0.93), BLOND, (0.85, 0.95, 1.2), (1.2, 0.9, 0.8),
+        (0.98, 0.95, 0.93), BLOND, (0.85, 0.93, 1.02), (1.2, 0.9, 0.8),
     ),
     "amara": Preset(
         "woman, about 30, West African", "female", YOUNG, {"african": 1}, Hairdo("afro01", "black"),
@@ -85,7 +85,7 @@ PRESETS: dict[str, Preset] = {
     ),
     "ravi": Preset(
         "man, about 30, mixed ancestry", "male", YOUNG, {"caucasian": 0.5, "african": 0.2, "asian": 0.3},
-        Hairdo("short03", "black"), (0.70, 0.61, 0.55), BLACK, DARK, (1.7, 1.7, 1.6),
+        Hairdo("short02", "black"), (0.70, 0.61, 0.55), BLACK, DARK, (1.7, 1.7, 1.6),
     ),
     "ingrid": Preset(
         "woman, about 70, European", "female", OLD, {"caucasian": 1}, Hairdo("bob02", "white"),

@@ -7,6 +7,7 @@ import tarfile
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
 from corpus_tools.head import assets
 from corpus_tools.head.assets import Asset, asset_files, parse_asset, unpack_assets
@@ -18,6 +19,7 @@ from corpus_tools.head.tongue import shape_tip
 from lexicon.errors import DataError
 
 BASE = np.array([[-1, 7, 0], [1, 7, 0], [1, 9, 0], [-1, 9, 0], [0, 8, 1], [0, 8, -1]], float)
+AHEAD = np.array([0.0, 0.0, 0.1])
 PICTURE = np.full((4, 4, 4), 255, np.uint8)
 
 
@@ -37,7 +39,7 @@ def square(**changed) -> str:
 
 def test_an_asset_follows_the_mesh_that_it_is_bound_to():
     asset = parse_asset(square(), PICTURE, BASE)
-    assert asset.fit(BASE, BASE) == pytest.approx(BASE[:4] + [0, 0, 0.1], abs=1e-9)
+    assert asset.fit(BASE, BASE) == pytest.approx(BASE[:4] + AHEAD, abs=1e-9)
     assert asset.fit(2 * BASE, BASE) == pytest.approx(
         2 * BASE[:4] + [0, 0, 0.2], abs=1e-9
     )  # offsets grow with the head
@@ -89,7 +91,8 @@ def test_only_files_with_the_pinned_hash_are_taken(tmp_path, monkeypatch):
 def test_only_released_works_are_listed():
     """The works that their owners released under CC0 in 2020; the package also has community uploads."""
     released = {
-        "hair": {"short01", "short02", "short03", "short04", "bob01", "bob02", "long01", "ponytail01", "braid01", "afro01"},
+        "hair": {"short01", "short02", "short03", "short04", "bob01", "bob02", "long01", "ponytail01",
+                 "braid01", "afro01"},
         "brows": {f"eyebrow{number:03d}" for number in range(1, 13)},
         "lashes": {f"eyelashes{number:02d}" for number in range(1, 5)},
         "eyes": {"blue", "lightblue", "deepblue", "green", "bluegreen", "grey", "ice", "brownlight"},
@@ -158,7 +161,7 @@ def test_baked_strands_keep_the_mean_and_lose_wide_highlights():
     relief, alpha, _ = bake_strands(picture, StrandStyle(), 128, np.random.default_rng(1))
     assert relief.mean() == pytest.approx(128, abs=3)
     assert alpha.min() > 240
-    rows = relief.mean(axis=1)[20:-20]
+    rows = gaussian_filter1d(relief.mean(axis=1), 8.0)[20:-20]
     assert rows.max() / rows.min() < 1.5  # 4.9 in the picture's light
 
 
