@@ -7,6 +7,7 @@ thread; each picture is drawn by one thread, so its bytes do not depend on the n
 y down, z ahead, mm. Sources: Pineda 1988 (edge functions), Olano and Greer 1997 (planes of the uncut triangle).
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ NO_TRIANGLE = np.int32(2**31 - 1)  # no triangle at this sample
 BACK_BIAS = np.float32(1.0 - 3e-4)  # back faces are moved 0.3 permille away, so that front faces win at equal depth
 TILE_SAMPLES = 8  # samples along a side of the tiles that cull hidden back faces
 N_LAYERS = 3  # the opaque surface and the two nearest translucent ones before it
+FIRST, LATER, TRANSLUCENT, NOT_DRAWN = range(4)  # phases: the largest opaque part, what it may hide, translucent parts
 
 
 @kernel
@@ -119,18 +121,19 @@ def gather_triangles(
 
 
 @kernel
-def sort_into_bands(corners: Array, count: int, band_rows: int, starts: Array, members: Array) -> None:
+def sort_into_bands(corners: Array, count: int, rows: tuple[int, int], starts: Array, members: Array) -> None:
     """Sort triangles stably into the bands of rows that they overlap (counting sort).
 
-    Band b is ``members[starts[b]:starts[b + 1]]``. With `members` too short, only `starts` is written.
+    `rows` are the rows of a band and the rows beyond it that it draws as well, on either side. Band b is ``members[starts[b]:starts[b + 1]]``. With `members` too short, only `starts` is written.
     """
     n_bands = len(starts) - 1
+    band_rows, beyond = rows
     for band in range(len(starts)):
         starts[band] = 0
     for turn in range(2):
         for i in range(count):
-            low = np.int64(min(corners[i, 1], corners[i, 3], corners[i, 5])) >> GRID_SHIFT
-            high = np.int64(max(corners[i, 1], corners[i, 3], corners[i, 5])) >> GRID_SHIFT
+            low = (np.int64(min(corners[i, 1], corners[i, 3], corners[i, 5])) >> GRID_SHIFT) - beyond
+            high = (np.int64(max(corners[i, 1], corners[i, 3], corners[i, 5])) >> GRID_SHIFT) + beyond
             for band in range(max(low // band_rows, 0), min(high // band_rows, n_bands - 1) + 1):
                 if turn == 0:
                     starts[band + 1] += 1
@@ -192,23 +195,41 @@ def clear_layer(depth: Array, owner: Array, layer: int) -> None:
             depth[layer, r, x], owner[layer, r, x] = np.float32(0), NO_TRIANGLE
 
 
+@inlined_kernel
+def first_sample(low: int, step: int, half: int) -> int:
+    """Index of the first sample whose centre is not below a grid coordinate; samples are `step` grid units apart."""
+    return int(math.ceil((low - half) / step))
+
+
+@inlined_kernel
+def last_sample(high: int, step: int, half: int) -> int:
+    """Index of the last sample whose centre is not above a grid coordinate."""
+    return int(math.floor((high - half) / step))
+
+
 @kernel
-def draw_band(geometry: Any, batch: Any, first_row: int, depth: Array, owner: Array) -> int:
+def draw_band(
+    geometry: Any, batch: Any, place: tuple[int, int], wanted: Array, depth: Array, owner: Array
+) -> int:
     """Clear a band of rows and draw its triangles, translucent ones last; returns the number of translucent ones.
 
     Parameters
     ----------
     geometry
-        Camera coordinates (V, 3 or more), triangles (F, 3), flags of translucent ones (F,), lens.
+        Camera coordinates (V, 3 or more), triangles (F, 3), phase of each triangle (F,), lens.
     batch
         Corners, source, and the rows of both that touch the band.
-    first_row
-        The band's first row of samples.
+    place
+        The band's first row of samples, and their distance in samples of the lens: 1, or the side of a pixel.
+    wanted : (R / 8, W / 8)
+        Whether each tile of samples is drawn; of size 0 for all.
     depth, owner : (3, R, W)
         Out: 1/z and triangle index of the opaque surface and of the two nearest translucent ones in front of it.
     """
-    camera, triangles, translucent, lens = geometry
+    camera, triangles, phase, lens = geometry
     corners, source, members = batch
+    first_row, side = place
+    step, half = side << GRID_SHIFT, (side << GRID_SHIFT) >> 1
     n_rows, width = depth.shape[1], depth.shape[2]
     clear_layer(depth, owner, 0)
     tiles = np.zeros(
@@ -216,46 +237,53 @@ def draw_band(geometry: Any, batch: Any, first_row: int, depth: Array, owner: Ar
     )
     n_translucent = 0
     for turn in range(3):
-        if turn == 1:
+        if turn == LATER:
             tile_depths(depth[0], tiles)
-        if turn == 2 and n_translucent:
+        if turn == TRANSLUCENT and n_translucent:
             clear_layer(depth, owner, 1)
             clear_layer(depth, owner, 2)
+        if turn == TRANSLUCENT and n_translucent == 0:
+            break
         for i in members:
             number = source[i]
             t = number if number >= 0 else ~number
-            if turn == 0:
-                n_translucent += translucent[t]
-            if turn != (2 if translucent[t] else 0 if number >= 0 else 1):
+            if turn == FIRST:
+                n_translucent += phase[t] == TRANSLUCENT
+            if turn != (LATER if number < 0 and phase[t] == FIRST else phase[t]):
                 continue
             x0, y0, x1 = np.int64(corners[i, 0]), np.int64(corners[i, 1]), np.int64(corners[i, 2])
             y1, x2, y2 = np.int64(corners[i, 3]), np.int64(corners[i, 4]), np.int64(corners[i, 5])
-            left = max((min(x0, x1, x2) + HALF_GRID - 1) >> GRID_SHIFT, 0)
-            right = min((max(x0, x1, x2) - HALF_GRID) >> GRID_SHIFT, width - 1)
-            top = max((min(y0, y1, y2) + HALF_GRID - 1) >> GRID_SHIFT, first_row) - first_row
-            bottom = min((max(y0, y1, y2) - HALF_GRID) >> GRID_SHIFT, first_row + n_rows - 1) - first_row
-            if turn == 1:
+            left = max(first_sample(min(x0, x1, x2), step, half), 0)
+            right = min(last_sample(max(x0, x1, x2), step, half), width - 1)
+            top = max(first_sample(min(y0, y1, y2), step, half), first_row) - first_row
+            bottom = min(last_sample(max(y0, y1, y2), step, half), first_row + n_rows - 1) - first_row
+            if left > right or top > bottom:
+                continue
+            if turn == LATER or wanted.size > 0:
                 ahead = min(camera[triangles[t, 0], 2], camera[triangles[t, 1], 2], camera[triangles[t, 2], 2])
                 nearest, hidden = np.float32(1) / max(ahead, np.float32(lens[3])), True
                 for r in range(top // TILE_SAMPLES, bottom // TILE_SAMPLES + 1):
                     for x in range(left // TILE_SAMPLES, right // TILE_SAMPLES + 1):
-                        hidden &= tiles[r, x] >= nearest
+                        hidden &= (turn == LATER and tiles[r, x] >= nearest) or (
+                            wanted.size > 0 and wanted[r, x] == 0
+                        )
                 if hidden:
                     continue
             across, along, origin, least, most = depth_plane(camera, triangles, t, lens)
             bias = np.float32(1) if number >= 0 else BACK_BIAS
-            px, py = (left << GRID_SHIFT) + HALF_GRID, ((top + first_row) << GRID_SHIFT) + HALF_GRID
+            px, py = left * step + half, (top + first_row) * step + half
             row_0, row_1 = edge_function(x1, y1, x2, y2, px, py), edge_function(x2, y2, x0, y0, px, py)
             row_2 = edge_function(x0, y0, x1, y1, px, py)
-            right_0, right_1, right_2 = (y1 - y2) << GRID_SHIFT, (y2 - y0) << GRID_SHIFT, (y0 - y1) << GRID_SHIFT
-            base = origin + along * (top + first_row + 0.5) + across * (left + 0.5)
+            right_0, right_1, right_2 = (y1 - y2) * step, (y2 - y0) * step, (y0 - y1) * step
+            base = origin + along * ((top + first_row + 0.5) * side) + across * ((left + 0.5) * side)
+            across, along = across * side, along * side
             for r in range(top, bottom + 1):
                 e0, e1, e2, value = row_0, row_1, row_2, base
                 for x in range(left, right + 1):
                     if (e0 | e1 | e2) >= 0:
                         near = np.float32(min(max(value, least), most)) * bias
                         if near > depth[0, r, x]:
-                            if turn < 2:
+                            if turn < TRANSLUCENT:
                                 depth[0, r, x], owner[0, r, x] = near, number
                             elif near > depth[1, r, x]:
                                 depth[2, r, x], owner[2, r, x] = depth[1, r, x], owner[1, r, x]
@@ -265,6 +293,6 @@ def draw_band(geometry: Any, batch: Any, first_row: int, depth: Array, owner: Ar
                     value += across
                     e0, e1, e2 = e0 + right_0, e1 + right_1, e2 + right_2
                 base += along
-                row_0, row_1 = row_0 + ((x2 - x1) << GRID_SHIFT), row_1 + ((x0 - x2) << GRID_SHIFT)
-                row_2 += (x1 - x0) << GRID_SHIFT
+                row_0, row_1 = row_0 + (x2 - x1) * step, row_1 + (x0 - x2) * step
+                row_2 += (x1 - x0) * step
     return int(n_translucent)

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from tts2face.compilation import kernel
 from tts2face.models.face import Face
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
-from tts2face.render.fragments import NORMAL, face_normals, vertex_normals
+from tts2face.render.fragment_rows import NORMAL
+from tts2face.render.fragments import face_normals, vertex_normals
 from tts2face.render.picture_kernels import allocate_buffers, draw_samples, project_surface
 from tts2face.render.raster import GRID_SHIFT, transform_to_camera
 from tts2face.render.studio_light import LAMP_RADIUS_RAD

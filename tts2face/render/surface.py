@@ -7,34 +7,45 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.face.deformation import FaceRig, build_rig
-from tts2face.models.face import Face
-
-OPEN_SHARE = 0.05  # parts with a larger share of boundary edges are open sheets, lit from both sides
+from tts2face.models.face import Face, Part, Texture
+from tts2face.render.eyes import EyeGeometry, eye_geometry
+from tts2face.render.materials import STRANDS, Skin, find_skin, material_table, vertex_wrap
+from tts2face.render.raster import FIRST, LATER, NOT_DRAWN, TRANSLUCENT
+from tts2face.render.strand_cards import Strands, find_strands
+from tts2face.render.textures import pack_textures
+from tts2face.render.tone_tables import TONE_TABLES, linear_light
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
     """Constant arrays for drawing a face.
 
-    ``triangles`` (F, 3); ``colours`` (V, 3) linear light; ``uv`` (V, 2), ``texture`` (H, W, 3) sRGB; ``part_of`` and
-    ``translucent`` (F,); ``cut_out`` (F,) marks triangles that are drawn where ``alpha`` (H, W), the coverage of the
-    texture, is; ``materials`` (P, 6) as `tts2face.render.fragments` names its columns; the triangles
-    around vertex v are ``members[starts[v]:starts[v + 1]]``, those of vertices at the same place and of the same
-    part included, so that a seam of the texture does not show.
+    ``triangles`` (F, 3); ``colours`` (V, 3) linear light; ``uv`` (V, 2); ``textures`` their pixels and
+    coverage, ``texels`` and ``levels`` as `tts2face.render.textures` packs them; ``part_of``, ``texture_of`` and ``phase`` (F,) as
+    `tts2face.render.raster` names the phases; ``cut_out`` (F,) marks triangles that are drawn where the coverage of
+    their texture is; ``materials`` (P, 9) as `tts2face.render.fragment_rows` names its columns; ``wrap`` (V,); the
+    triangles around vertex v are ``members[starts[v]:starts[v + 1]]``, those of vertices at the same place and of the
+    same part included, so that a seam of the texture does not show.
     """
 
     rig: FaceRig
     triangles: NDArray[np.int32]
     colours: NDArray[np.float32]
     uv: NDArray[np.float32]
-    texture: NDArray[np.uint8]
+    textures: tuple[Texture, ...]
+    texels: NDArray[np.uint8]
+    levels: NDArray[np.int64]
     part_of: NDArray[np.int32]
-    translucent: NDArray[np.int8]
+    texture_of: NDArray[np.int32]
+    phase: NDArray[np.int8]
     cut_out: NDArray[np.bool_]
-    alpha: NDArray[np.uint8]
     materials: NDArray[np.float32]
+    wrap: NDArray[np.float32]
     starts: NDArray[np.int64]
     members: NDArray[np.int32]
+    skin: Skin
+    strands: Strands
+    eyes: EyeGeometry
 
 
 def build_surface(face: Face) -> Surface:
@@ -42,61 +53,48 @@ def build_surface(face: Face) -> Surface:
     parts = face.parts
     counts = [part.count for part in parts]
     part_of = np.repeat(np.arange(len(parts), dtype=np.int32), counts)
-    translucent = np.repeat([part.opacity < 1 for part in parts], counts)
-    triangles = np.array(face.triangles, np.int32)
-    starts, members = _triangles_by_vertex(face, triangles, part_of)
+    is_strand = np.repeat([part.kind == STRANDS for part in parts], counts).astype(bool)
+    every = np.array(face.triangles, np.int32)
+    starts, members = _triangles_by_vertex(face, every, part_of)
+    texels, levels = pack_textures(face.textures, TONE_TABLES)
+    materials = material_table(face, every, part_of)
+    rig = build_rig(face)
     return Surface(
-        rig=build_rig(face),
-        triangles=triangles,
+        rig=rig,
+        triangles=every,
         colours=linear_light(face.colours),
         uv=np.array(face.uv, np.float32) if face.uv is not None else np.zeros((1, 2), np.float32),
-        texture=np.array(face.texture) if face.texture is not None else np.zeros((1, 1, 3), np.uint8),
+        textures=face.textures,
+        texels=texels,
+        levels=levels,
         part_of=part_of,
-        translucent=translucent.astype(np.int8),
-        cut_out=np.repeat([part.cutout and face.alpha is not None for part in parts], counts),
-        alpha=np.zeros((1, 1), np.uint8) if face.alpha is None else np.array(face.alpha),
-        materials=_materials(face, triangles, part_of),
+        texture_of=np.repeat([max(part.texture, 0) for part in parts], counts).astype(np.int32),
+        phase=_phases(face, part_of, is_strand),
+        cut_out=np.repeat([_is_cut_out(face, part) for part in parts], counts).astype(bool) & ~is_strand,
+        materials=materials,
+        wrap=vertex_wrap(face, every, part_of, materials),
         starts=starts,
         members=members,
+        skin=find_skin(face, every, part_of),
+        strands=find_strands(face, every, is_strand, (texels, levels)),
+        eyes=eye_geometry(face, rig),
     )
 
 
-def linear_light(srgb: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Linear light in [0, 1] of 8-bit sRGB values (IEC 61966-2-1)."""
-    return linear_table()[srgb]
+def _is_cut_out(face: Face, part: Part) -> bool:
+    return part.cutout and part.texture >= 0 and face.textures[part.texture].alpha is not None
 
 
-def linear_table() -> NDArray[np.float32]:
-    """Linear light (256,) of each 8-bit sRGB value."""
-    value = np.arange(256) / 255.0
-    table: NDArray[np.float32] = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4).astype(
-        np.float32
-    )
-    return table
-
-
-def encoding_table(n_steps: int) -> NDArray[np.uint8]:
-    """8-bit sRGB values (n_steps,) of linear light from 0 to 1 in equal steps."""
-    light = np.linspace(0.0, 1.0, n_steps)
-    srgb = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    return np.rint(255.0 * srgb).astype(np.uint8)
-
-
-def _materials(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> NDArray[np.float32]:
-    has_texture = face.uv is not None and face.texture is not None
-    rows = []
-    for number, part in enumerate(face.parts):
-        sheet = _free_edge_share(triangles[part_of == number]) > OPEN_SHARE
-        rows.append((part.specular, part.shininess, part.wrap, part.opacity, part.textured and has_texture, sheet))
-    return np.array(rows, np.float32).reshape(-1, 6)
-
-
-def _free_edge_share(triangles: NDArray[np.int32]) -> float:
-    if not len(triangles):
-        return 0.0
-    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    _, uses = np.unique(edges, axis=0, return_counts=True)
-    return float((uses == 1).mean())
+def _phases(face: Face, part_of: NDArray[np.int32], is_strand: NDArray[np.bool_]) -> NDArray[np.int8]:
+    """Phase (F,) of each triangle: the largest opaque part is drawn first and hides much of the others."""
+    sizes = [part.count if part.opacity == 1 and part.kind != STRANDS else -1 for part in face.parts]
+    phases = np.full(len(face.parts), LATER, np.int8)
+    if sizes:
+        phases[int(np.argmax(sizes))] = FIRST
+    phases[[part.opacity < 1 for part in face.parts]] = TRANSLUCENT
+    chosen = phases[part_of]
+    chosen[is_strand] = NOT_DRAWN
+    return chosen
 
 
 def _triangles_by_vertex(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> tuple[Any, Any]:
