@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.compilation import kernel
+from tts2face.compilation import inlined_kernel, kernel
 from tts2face.render.eyes import light_eye
 from tts2face.render.fragment_rows import (
     AT_ALBEDO,
@@ -30,7 +30,7 @@ from tts2face.render.fragment_rows import (
     UV,
 )
 from tts2face.render.raster import NO_TRIANGLE, TILE_SAMPLES
-from tts2face.render.textures import mip_level, texel
+from tts2face.render.textures import mip_level, read_texel
 
 Array = NDArray[Any]
 
@@ -78,42 +78,54 @@ def is_same_surface(number: int, other: int, flat: Array, part_of: Array) -> boo
 
 
 @kernel
-def find_edges(owner: Array, n_layers: int, facets: tuple[Any, Any], edges: Array) -> None:
-    """Mark the pixels that need more than one sample: those whose surface differs from that of a neighbour.
+def find_edges(centres: tuple[Any, Any], n_layers: int, part_of: Array, mm: float, edges: Array) -> None:
+    """Mark the pixels that need more than one sample.
+
+    These are pixels beside one of another part, of the other side of a part, or beyond a step in depth.
 
     Parameters
     ----------
-    owner : (3, R + 2, W)
-        Visible triangle at the centre of each pixel, with one row of pixels above and below the band.
-    facets
-        Normals of the triangles (F, 3) and part of each (F,).
+    centres
+        1/z and visible triangle at the centre of each pixel (3, R + 2, W), with one row of pixels above and below the
+        band.
+    part_of : (F,)
+        Part of each triangle.
+    mm
+        Depth beyond which a step that does not continue the slope of the surface is an edge.
     edges : (R, W)
         Set to 1; pixels that are marked already stay so.
     """
-    flat, part_of = facets
+    near, owner = centres
     n_rows, width = edges.shape
     for layer in range(n_layers):
         for r in range(n_rows + 1):
             for x in range(width):
-                number = owner[layer, r, x]
-                below = owner[layer, r + 1, x]
-                if number != below and not is_same_pixel_surface(number, below, flat, part_of):
-                    if r > 0:
-                        edges[r - 1, x] = 1
-                    if r < n_rows:
-                        edges[r, x] = 1
-                if x + 1 < width and r > 0:
+                number, below = owner[layer, r, x], owner[layer, r + 1, x]
+                if number != below and not is_same_part(number, below, part_of):
+                    edges[max(r - 1, 0), x] = edges[min(r, n_rows - 1), x] = 1
+                if r == 0:
+                    continue
+                value = near[layer, r, x]
+                limit = value * value * np.float32(mm)
+                if x + 1 < width:
                     beside = owner[layer, r, x + 1]
-                    if number != beside and not is_same_pixel_surface(number, beside, flat, part_of):
+                    if number != beside and not is_same_part(number, beside, part_of):
                         edges[r - 1, x] = edges[r - 1, x + 1] = 1
+                    if x > 0:
+                        bend = near[layer, r, x - 1] - value - value + near[layer, r, x + 1]
+                        if abs(bend) > limit:
+                            edges[r - 1, x - 1] = edges[r - 1, x] = edges[r - 1, x + 1] = 1
+                bend = near[layer, r - 1, x] - value - value + near[layer, r + 1, x]
+                if abs(bend) > limit:
+                    edges[r - 1, x] = edges[max(r - 2, 0), x] = edges[min(r, n_rows - 1), x] = 1
 
 
-@kernel
-def is_same_pixel_surface(number: int, other: int, flat: Array, part_of: Array) -> bool:
-    """As `is_same_surface`, also for samples without a triangle."""
-    if number == NO_TRIANGLE or other == NO_TRIANGLE:
+@inlined_kernel
+def is_same_part(number: int, other: int, part_of: Array) -> bool:
+    """Whether two visible triangles show the same side of the same part; not for samples without a triangle."""
+    if number == NO_TRIANGLE or other == NO_TRIANGLE or (number < 0) != (other < 0):
         return False
-    return is_same_surface(number, other, flat, part_of)
+    return bool(part_of[number if number >= 0 else ~number] == part_of[other if other >= 0 else ~other])
 
 
 @kernel
@@ -245,10 +257,9 @@ def evaluate_fragments(found: Any, n_fragments: int, vertex: Array, scene: Any, 
         wa = one - wb - wc
         material = part_of[t]
         for k in range(3):
-            n, o, d = NORMAL + k, COLOUR + k, DIFFUSE + k
+            n, d = NORMAL + k, DIFFUSE + k
             table[AT_NORMAL + k, g] = wa * vertex[a, n] + wb * vertex[b, n] + wc * vertex[c, n]
             table[AT_DIFFUSE + k, g] = wa * vertex[a, d] + wb * vertex[b, d] + wc * vertex[c, d]
-            table[AT_ALBEDO + k, g] = wa * vertex[a, o] + wb * vertex[b, o] + wc * vertex[c, o]
         texture = int(materials[material, TEXTURE])
         if texture >= 0:
             ua, va = vertex[a, UV], vertex[a, UV + 1]
@@ -256,8 +267,10 @@ def evaluate_fragments(found: Any, n_fragments: int, vertex: Array, scene: Any, 
             area = abs(u1 * v2 - u2 * v1) * np.float32(levels[texture, 0, 1]) * np.float32(levels[texture, 0, 2])
             level = mip_level(area * pixel * sz * sz * abs(inverse), levels.shape[1])
             place = levels[texture, level]
-            for k in range(3):
-                table[AT_ALBEDO + k, g] = texel(texels, place, linear, (ua + wb * u1 + wc * u2, va + wb * v1 + wc * v2), k)
+            read_texel(texels, place, linear, (ua + wb * u1 + wc * u2, va + wb * v1 + wc * v2), table[AT_ALBEDO:, g])
+        else:
+            for k in range(COLOUR, COLOUR + 3):
+                table[AT_ALBEDO + k - COLOUR, g] = wa * vertex[a, k] + wb * vertex[b, k] + wc * vertex[c, k]
         for k in range(N_EXPOSURES):
             e = EXPOSURE + k
             table[AT_EXPOSURE + k, g] = wa * vertex[a, e] + wb * vertex[b, e] + wc * vertex[c, e]

@@ -19,8 +19,11 @@ from tts2face.render.fragments import (
     vertex_normals,
 )
 from tts2face.render.raster import (
+    HOLES,
     N_LAYERS,
+    N_PHASES,
     TILE_SAMPLES,
+    TRANSLUCENT,
     draw_band,
     gather_triangles,
     sort_into_bands,
@@ -34,6 +37,7 @@ from tts2face.render.tone_tables import TONE_TABLES
 
 BAND_SAMPLES = 65_536  # per band of rows; the time is the same from 16,384 to 262,144
 ROW_PADDING = 80  # extra entries per table row, so that rows do not all start in one cache set
+EDGE_STEP_MM = 0.8  # bend of a surface in depth, over two pixels, beyond which a pixel needs its samples
 EVERY_TILE = np.zeros((0, 0), np.uint8)
 
 
@@ -52,6 +56,7 @@ class DrawingBuffers:
     flat: NDArray[np.float32]
     sums: NDArray[np.float32]
     corners: NDArray[np.int32]
+    boxes: NDArray[np.int32]
     source: NDArray[np.int32]
     band_starts: NDArray[np.int64]
     depth: NDArray[np.float32]
@@ -108,8 +113,9 @@ def allocate_buffers(surface: Surface, size: tuple[int, int], side: int) -> Draw
         flat=np.zeros((n_triangles, 3), np.float32),
         sums=np.zeros((n_triangles if len(surface.skin.vertices) else 0, 3), np.float32),
         corners=np.zeros((2 * n_triangles, 6), np.int32),
+        boxes=np.zeros((2 * n_triangles, 5), np.int32),
         source=np.zeros(2 * n_triangles, np.int32),
-        band_starts=np.zeros(-(-height // rows) + 1, np.int64),
+        band_starts=np.zeros(-(-height // rows) * N_PHASES + 1, np.int64),
         depth=np.zeros((N_LAYERS, rows, width), np.float32),
         owner=np.zeros((N_LAYERS, rows, width), np.int32),
         near=np.zeros((N_LAYERS, pixels[0] + 2, pixels[1]), np.float32),
@@ -139,9 +145,9 @@ def draw_surface(
     facets = (buffers.flat, surface.part_of)
     textures = (surface.texels, surface.levels)
     scene = (surface.triangles, surface.part_of, surface.materials, textures, TONE_TABLES[0], side, pose.eyes)
-    for band, (begin, end) in enumerate(zip(buffers.band_starts[:-1], buffers.band_starts[1:], strict=True)):
+    for band in range(len(buffers.band_starts) // N_PHASES):
         place = (band * buffers.band_rows, min(buffers.band_rows, height - band * buffers.band_rows), side)
-        layers = draw_samples(surface, lens, batch[begin:end], place[0], buffers)
+        layers = draw_samples(surface, lens, batch, place[0], buffers)
         blend_strands(surface, order, place[0], pose.lights, buffers)
         owners = (buffers.owner, buffers.centre, buffers.edges)
         n_pixels = find_fragments(owners, layers, place, facets, buffers.found, buffers.through, buffers.pixels)
@@ -173,35 +179,33 @@ def light_surface(pose: Pose, surface: Surface, lens: NDArray[np.float64], buffe
 def draw_samples(
     surface: Surface, lens: NDArray[np.float64], members: NDArray[np.int32], first_row: int, buffers: DrawingBuffers
 ) -> int:
-    """Draw the projected triangles `members` of a band; the number of valid layers.
+    """Draw the band of the projected triangles `members` that begins at a row; the number of valid layers.
 
     Writes ``near`` and ``centre`` at the centres of pixels, ``edges`` where a pixel needs more samples, and ``depth``
     and ``owner`` there. With one sample for each pixel all pixels need it.
     """
     side = buffers.side
-    holes = members[:0]
-    if surface.cut_out.any():
-        source = buffers.source[members]
-        has_holes = surface.cut_out[np.where(source >= 0, source, ~source)]
-        members, holes = members[~has_holes], members[has_holes]
-    geometry = (buffers.vertex, surface.triangles, surface.phase, lens)
-    batch = (buffers.corners, buffers.source, members)
-    buffers.edges[:] = 1
+    phases = first_row // buffers.band_rows * N_PHASES
+    bounds = buffers.band_starts[phases : phases + N_PHASES + 1]
+    geometry = (buffers.vertex, surface.triangles, lens)
+    batch = (buffers.corners, buffers.boxes, buffers.source, members, bounds)
+    has_holes = bounds[HOLES] < bounds[HOLES + 1]
+    layers = N_LAYERS if bounds[TRANSLUCENT] < bounds[TRANSLUCENT + 1] else 1
     wanted = EVERY_TILE
-    if side > 1 and not len(holes):
-        coarse = (first_row // side - 1, side)
-        layers = N_LAYERS if draw_band(geometry, batch, coarse, EVERY_TILE, buffers.near, buffers.centre) else 1
+    buffers.edges[:] = 1
+    if side > 1 and not has_holes:
+        draw_band(geometry, batch, (first_row // side - 1, side), EVERY_TILE, buffers.near, buffers.centre)
         buffers.edges[:] = 0
-        find_edges(buffers.centre, layers, (buffers.flat, surface.part_of), buffers.edges)
+        find_edges((buffers.near, buffers.centre), layers, surface.part_of, EDGE_STEP_MM, buffers.edges)
         mark_tiles(buffers.edges, side, buffers.tiles)
         wanted = buffers.tiles
-    layers = N_LAYERS if draw_band(geometry, batch, (first_row, 1), wanted, buffers.depth, buffers.owner) else 1
-    if len(holes):
+    draw_band(geometry, batch, (first_row, 1), wanted, buffers.depth, buffers.owner)
+    if has_holes:
         textures = (surface.texels, surface.levels, surface.texture_of)
         draw_cutouts(
-            (buffers.vertex, surface.triangles, lens),
+            geometry,
             textures,
-            (buffers.corners, buffers.source, holes),
+            (buffers.corners, buffers.source, members[bounds[HOLES] : bounds[HOLES + 1]]),
             (first_row, side, layers),
             buffers.depth,
             buffers.owner,
@@ -242,13 +246,13 @@ def project_surface(
     """
     view, lens = optics
     transform_to_camera(points, view, lens, buffers.vertex, buffers.grid)
-    count = gather_triangles(
-        buffers.vertex, buffers.grid, surface.triangles, (lens, size), buffers.corners, buffers.source
-    )
+    found = (buffers.corners, buffers.boxes, buffers.source)
+    count = gather_triangles(buffers.vertex, buffers.grid, surface.triangles, (lens, size), found)
     rows = (buffers.band_rows, buffers.side)
     members = np.zeros(2 * len(surface.triangles), np.int32)
-    sort_into_bands(buffers.corners, count, rows, buffers.band_starts, members)
+    triangles = (buffers.boxes, buffers.source, surface.phase)
+    sort_into_bands(triangles, count, rows, buffers.band_starts, members)
     if buffers.band_starts[-1] > len(members):
         members = np.zeros(buffers.band_starts[-1], np.int32)
-        sort_into_bands(buffers.corners, count, rows, buffers.band_starts, members)
+        sort_into_bands(triangles, count, rows, buffers.band_starts, members)
     return members

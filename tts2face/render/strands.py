@@ -14,7 +14,7 @@ from tts2face.compilation import inlined_kernel, kernel
 from tts2face.render.fragment_rows import NORMAL
 from tts2face.render.shade import tone_curve
 from tts2face.render.studio_light import FIRST_LIGHT_ROW, FLOOR_ROW, SKY_ROW, UP_ROW
-from tts2face.render.textures import mip_level
+from tts2face.render.textures import mip_level, read_texel
 
 Array = NDArray[Any]
 
@@ -123,29 +123,6 @@ def strand_light(weights: tuple[float, float, float], rows: Any, albedo: Array, 
             light[k] += lights[row, 3 + k] * (narrow + wide * albedo[k])
     for k in range(3):
         light[k] = tone_curve(light[k])
-
-
-@kernel
-def read_texel(texels: Array, place: Array, linear: Array, uv: tuple[float, float], colour: Array) -> None:
-    """Write the bilinear colour in linear light and the coverage (4,) of a texture at (u, v)."""
-    width, height = place[1], place[2]
-    zero, half = np.float32(0), np.float32(0.5)
-    x = min(max(uv[0] * np.float32(width) - half, zero), np.float32(width - 1))
-    y = min(max(uv[1] * np.float32(height) - half, zero), np.float32(height - 1))
-    left, top = int(x), int(y)
-    across, along = x - np.float32(left), y - np.float32(top)
-    one = np.float32(1)
-    right, below = 1 if left + 1 < width else 0, width if top + 1 < height else 0
-    p = place[0] + top * width + left
-    w0, w1 = (one - across) * (one - along), across * (one - along)
-    w2, w3 = (one - across) * along, across * along
-    q, r, s = p + right, p + below, p + below + right
-    for k in range(3):
-        colour[k] = (
-            linear[texels[p, k]] * w0 + linear[texels[q, k]] * w1 + linear[texels[r, k]] * w2 + linear[texels[s, k]] * w3
-        )
-    coverage = texels[p, 3] * w0 + texels[q, 3] * w1 + texels[r, 3] * w2 + texels[s, 3] * w3
-    colour[3] = coverage * np.float32(1 / 255)
 
 
 @kernel
@@ -269,8 +246,8 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, through: Arr
                 wb = min(max(planes[1, 0] * px + planes[1, 1] * py + planes[1, 2], zero), one)
                 wc = min(max(planes[2, 0] * px + planes[2, 1] * py + planes[2, 2], zero), one - wb)
                 wa = one - wb - wc
-                read_texel(texels, place, linear, (a[AT_U] + wb * u1 + wc * u2, a[AT_V] + wb * v1 + wc * v2), sample)
-                coverage = sample[3]
+                uv = (a[AT_U] + wb * u1 + wc * u2, a[AT_V] + wb * v1 + wc * v2)
+                coverage = read_texel(texels, place, linear, uv, sample)
                 if coverage < LEAST_COVERAGE:
                     continue
                 shift = (sample[0] + sample[1] + sample[2]) * np.float32(1 / 3) / mean_light[number] - one

@@ -10,7 +10,7 @@ from tts2face.face.deformation import FaceRig, build_rig
 from tts2face.models.face import Face, Part, Texture
 from tts2face.render.eyes import EyeGeometry, eye_geometry
 from tts2face.render.materials import STRANDS, Skin, find_skin, material_table, vertex_wrap
-from tts2face.render.raster import FIRST, LATER, NOT_DRAWN, TRANSLUCENT
+from tts2face.render.raster import FIRST, HOLES, LATER, NOT_DRAWN, TRANSLUCENT
 from tts2face.render.strand_cards import Strands, find_strands
 from tts2face.render.textures import pack_textures
 from tts2face.render.tone_tables import TONE_TABLES, linear_light
@@ -22,8 +22,7 @@ class Surface:
 
     ``triangles`` (F, 3); ``colours`` (V, 3) linear light; ``uv`` (V, 2); ``textures`` their pixels and
     coverage, ``texels`` and ``levels`` as `tts2face.render.textures` packs them; ``part_of``, ``texture_of`` and ``phase`` (F,) as
-    `tts2face.render.raster` names the phases; ``cut_out`` (F,) marks triangles that are drawn where the coverage of
-    their texture is; ``materials`` (P, 9) as `tts2face.render.fragment_rows` names its columns; ``wrap`` (V,); the
+    `tts2face.render.raster` names the phases; ``materials`` (P, 9) as `tts2face.render.fragment_rows` names its columns; ``wrap`` (V,); the
     triangles around vertex v are ``members[starts[v]:starts[v + 1]]``, those of vertices at the same place and of the
     same part included, so that a seam of the texture does not show.
     """
@@ -38,7 +37,6 @@ class Surface:
     part_of: NDArray[np.int32]
     texture_of: NDArray[np.int32]
     phase: NDArray[np.int8]
-    cut_out: NDArray[np.bool_]
     materials: NDArray[np.float32]
     wrap: NDArray[np.float32]
     starts: NDArray[np.int64]
@@ -69,8 +67,7 @@ def build_surface(face: Face) -> Surface:
         levels=levels,
         part_of=part_of,
         texture_of=np.repeat([max(part.texture, 0) for part in parts], counts).astype(np.int32),
-        phase=_phases(face, part_of, is_strand),
-        cut_out=np.repeat([_is_cut_out(face, part) for part in parts], counts).astype(bool) & ~is_strand,
+        phase=_phases(face, part_of),
         materials=materials,
         wrap=vertex_wrap(face, every, part_of, materials),
         starts=starts,
@@ -85,16 +82,20 @@ def _is_cut_out(face: Face, part: Part) -> bool:
     return part.cutout and part.texture >= 0 and face.textures[part.texture].alpha is not None
 
 
-def _phases(face: Face, part_of: NDArray[np.int32], is_strand: NDArray[np.bool_]) -> NDArray[np.int8]:
+def _phases(face: Face, part_of: NDArray[np.int32]) -> NDArray[np.int8]:
     """Phase (F,) of each triangle: the largest opaque part is drawn first and hides much of the others."""
-    sizes = [part.count if part.opacity == 1 and part.kind != STRANDS else -1 for part in face.parts]
+    sizes = [-1 if part.opacity < 1 or _is_cut_out(face, part) else part.count for part in face.parts]
     phases = np.full(len(face.parts), LATER, np.int8)
     if sizes:
         phases[int(np.argmax(sizes))] = FIRST
-    phases[[part.opacity < 1 for part in face.parts]] = TRANSLUCENT
-    chosen = phases[part_of]
-    chosen[is_strand] = NOT_DRAWN
-    return chosen
+    for number, part in enumerate(face.parts):
+        if part.kind == STRANDS:
+            phases[number] = NOT_DRAWN
+        elif _is_cut_out(face, part):
+            phases[number] = HOLES
+        elif part.opacity < 1:
+            phases[number] = TRANSLUCENT
+    return phases[part_of]
 
 
 def _triangles_by_vertex(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> tuple[Any, Any]:

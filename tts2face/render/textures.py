@@ -25,22 +25,26 @@ def mip_level(texels_per_pixel: float, n_levels: int) -> int:
 
 
 @kernel
-def texel(texels: Array, place: Array, linear: Array, uv: tuple[float, float], c: int) -> Any:
-    """Bilinear value of channel `c` at (u, v) of the level that begins at ``place[0]`` and has ``place[1:]`` texels.
-
-    Colours are converted to linear light by the table `linear`.
-    """
-    begin, width, height = place[0], place[1], place[2]
-    one, half, zero = np.float32(1), np.float32(0.5), np.float32(0)
+def read_texel(texels: Array, place: Array, linear: Array, uv: tuple[float, float], colour: Array) -> Any:
+    """Write the bilinear colour (3,) in linear light at (u, v) of a level; returns its coverage in [0, 1]."""
+    width, height = place[1], place[2]
+    zero, half = np.float32(0), np.float32(0.5)
     x = min(max(uv[0] * np.float32(width) - half, zero), np.float32(width - 1))
     y = min(max(uv[1] * np.float32(height) - half, zero), np.float32(height - 1))
     left, top = int(x), int(y)
-    right, below = min(left + 1, width - 1), min(top + 1, height - 1)
     across, along = x - np.float32(left), y - np.float32(top)
-    top, below = begin + top * width, begin + below * width
-    upper = linear[texels[top + left, c]] * (one - across) + linear[texels[top + right, c]] * across
-    lower = linear[texels[below + left, c]] * (one - across) + linear[texels[below + right, c]] * across
-    return upper * (one - along) + lower * along
+    one = np.float32(1)
+    right, below = 1 if left + 1 < width else 0, width if top + 1 < height else 0
+    p = place[0] + top * width + left
+    w0, w1 = (one - across) * (one - along), across * (one - along)
+    w2, w3 = (one - across) * along, across * along
+    q, r, s = p + right, p + below, p + below + right
+    for k in range(3):
+        colour[k] = (
+            linear[texels[p, k]] * w0 + linear[texels[q, k]] * w1 + linear[texels[r, k]] * w2 + linear[texels[s, k]] * w3
+        )
+    coverage = texels[p, 3] * w0 + texels[q, 3] * w1 + texels[r, 3] * w2 + texels[s, 3] * w3
+    return coverage * np.float32(1 / 255)
 
 
 def pack_textures(

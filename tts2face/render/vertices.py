@@ -27,7 +27,7 @@ from tts2face.render.fragment_rows import (
 from tts2face.render.fragments import BACK_LIGHT_SHARE, face_normals, vertex_normals
 from tts2face.render.shade import N_SCRATCH_ROWS, light_vertices, scatter_light, shade_fragments
 from tts2face.render.surface import Surface
-from tts2face.render.textures import texel
+from tts2face.render.textures import read_texel
 from tts2face.render.tone_tables import encoding_table, linear_table
 
 SRGB_TABLE = (encoding_table(4096) / 255.0).astype(np.float32)  # sRGB in [0, 1] for equal steps of linear light
@@ -144,5 +144,4 @@ def sample_texture(textures: Any, linear: Any, uv: Any, texture: Any, albedo: An
     texels, levels = textures
     for v in range(len(texture)):
         if texture[v] >= 0:
-            for c in range(3):
-                albedo[v, c] = texel(texels, levels[texture[v], 0], linear, (uv[v, 0], uv[v, 1]), c)
+            read_texel(texels, levels[texture[v], 0], linear, (uv[v, 0], uv[v, 1]), albedo[v])

@@ -20,7 +20,7 @@ from lexicon.errors import BackendError
 from tts2face.compilation import kernel
 from tts2face.render.camera import CameraMatrices
 from tts2face.render.fragment_rows import OPACITY
-from tts2face.render.raster import NOT_DRAWN
+from tts2face.render.raster import HOLES
 from tts2face.render.scene import Scene
 from tts2face.render.surface import Surface
 from tts2face.render.tone_tables import encoding_table, linear_table
@@ -168,7 +168,7 @@ class PlottedFace:
         self._meshes: list[PlottedMesh] = []
         shade = triangle_shades(self._light)
         opacity = surface.materials[surface.part_of, OPACITY]
-        has_holes = surface.cut_out | (surface.phase == NOT_DRAWN)  # cards of strands are drawn as parts with holes
+        has_holes = surface.phase >= HOLES  # cards of strands are drawn as parts with holes
         groups = np.column_stack([-opacity, shade, np.where(shade >= 0, surface.texture_of, -1), has_holes])
         for group in np.unique(groups, axis=0):
             self._add((groups == group).all(axis=1), -float(group[0]), (int(group[2]), bool(group[3])))
