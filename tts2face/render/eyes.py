@@ -25,10 +25,10 @@ IRIS_COSINE = 0.868  # of the angle between gaze and limbus: an iris of 11.9 mm
 # Columns of the eye table: camera space unless stated; the lids as (across, up) from the centre in the eye's own axes.
 CENTRE, GAZE, KEY, FILL, ACROSS, UP, SCALE, IRIS, HAS_LIDS, UPPER, LOWER = 0, 3, 6, 9, 12, 15, 18, 19, 20, 21, 39
 N_EYE_COLUMNS = 57
-SOFTBOX = (0.22, 0.30)  # half width and height of the key lamp's reflection, as components of the reflected ray
+SOFTBOX = (0.17, 0.22)  # half width and height of the key lamp's reflection, as components of the reflected ray
 LID_SHADOW, LID_SHADOW_MM = np.float32(0.55), np.float32(1.5)  # share of light at the upper lid's margin, its fade
 WET_LINE, WET_LINE_MM = np.float32(0.30), np.float32(0.22)  # brightness and half width of the tear line
-CATCHLIGHT, FILL_LIGHT = np.float32(1.0), np.float32(0.2)  # brightness of the reflections of key and fill light
+CATCHLIGHT, FILL_LIGHT = np.float32(1.2), np.float32(0.16)  # brightness of the reflections of key and fill light
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,7 +134,7 @@ def light_eye(eyes: Array, point: tuple[float, float, float], g: int, table: Arr
     nx, ny, nz = ox / length, oy / length, oz / length
     gx, gy, gz = eye[GAZE], eye[GAZE + 1], eye[GAZE + 2]
     ahead = nx * gx + ny * gy + nz * gz
-    bump = min(max((ahead - eye[IRIS] + np.float32(0.008)) * np.float32(20), zero), one) * np.float32(0.55)
+    bump = min(max((ahead - eye[IRIS] + np.float32(0.008)) * np.float32(20), zero), one) * np.float32(0.85)
     cx, cy, cz = nx + bump * (nx - gx * ahead), ny + bump * (ny - gy * ahead), nz + bump * (nz - gz * ahead)
     scale = one / np.sqrt(cx * cx + cy * cy + cz * cz + np.float32(1e-9))
     far = -one / np.sqrt(point[0] * point[0] + point[1] * point[1] + point[2] * point[2] + np.float32(1e-9))

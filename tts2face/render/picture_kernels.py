@@ -222,12 +222,11 @@ def blend_strands(
     cards = surface.strands
     buffers.through[:], buffers.strand_colour[:] = 1, 0
     strands = (buffers.strands, cards.triangles, cards.texture, cards.gloss, cards.mean_light)
-    depths = (buffers.depth[0], buffers.near[0], buffers.edges)
     draw_strands(
         strands,
         order,
         (surface.texels, surface.levels, TONE_TABLES[0], lights),
-        (first_row, buffers.side, depths),
+        (first_row, buffers.side, buffers.depth[0], buffers.near[0], buffers.edges),
         buffers.through,
         buffers.strand_colour,
     )

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.compilation import kernel
+from tts2face.compilation import inlined_kernel, kernel
 from tts2face.render.fragment_rows import AT_OPACITY, AT_SHARE
 from tts2face.render.fragments import PIXEL_ENDS, PIXEL_X, PIXEL_Y, is_same_surface
 from tts2face.render.raster import NO_TRIANGLE
@@ -79,6 +79,16 @@ def mix_samples(
         total[3] += one / np.float32(side * side) - share * (one - coverage)
 
 
+@inlined_kernel
+def mean_and_least(values: Array) -> tuple[float, float]:
+    """Mean and least of a few values."""
+    total, least = np.float32(0), values[0]
+    for s in range(len(values)):
+        total += values[s]
+        least = min(least, values[s])
+    return total / np.float32(len(values)), least
+
+
 @kernel
 def compose_band(
     samples: tuple[Any, Any, Any],
@@ -115,14 +125,22 @@ def compose_band(
         begin, end = row[PIXEL_ENDS], row[PIXEL_ENDS + 3]
         r, x = row[PIXEL_Y] - first_row // side, row[PIXEL_X]
         total[0] = total[1] = total[2] = total[3] = np.float32(0)
-        passing = nothing
+        passing, rest = nothing, np.float32(1)
         if through.size > 0:
-            for s in range(side * side):
-                if through[r, x, s] < np.float32(1):
+            rest, least = mean_and_least(through[r, x])
+            if least < np.float32(1):
+                if samples[2][r, x] or end > begin + 1:
                     passing = through[r, x]
-            for c in range(3):
-                total[c] = strands[r, x, c]
-        if len(passing) > 0 or row[PIXEL_ENDS + 1] < end:
+                for c in range(3):
+                    total[c] = strands[r, x, c]
+        if end == begin or (len(passing) == 0 and end == begin + 1):  # hair only, or all samples alike
+            total[3] = np.float32(1) - rest
+            for g in range(begin, end):
+                weight = table[AT_SHARE, g] * share * rest
+                for c in range(3):
+                    total[c] += colour[c, g] * weight
+                total[3] += weight * table[AT_OPACITY, g]
+        elif len(passing) > 0 or row[PIXEL_ENDS + 1] < end:
             begins = (row[PIXEL_ENDS:], passing)
             mix_samples(samples, (r, x, side), which, (table, colour, begins), total)
         else:

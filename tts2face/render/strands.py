@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.compilation import inlined_kernel, kernel
+from tts2face.compilation import inlined_kernel, kernel, vectorized_kernel
 from tts2face.render.fragment_rows import NORMAL
 from tts2face.render.shade import tone_curve
 from tts2face.render.studio_light import FIRST_LIGHT_ROW, FLOOR_ROW, SKY_ROW, UP_ROW
@@ -27,12 +27,13 @@ FIRST_SHIFT, SECOND_SHIFT = np.float32(-0.08), np.float32(0.14)  # of the highli
 TEXTURE_SHIFT = np.float32(0.12)  # further shift by the brightness of the texture: highlights follow the strands
 FIRST_STRENGTH, SECOND_STRENGTH = np.float32(0.055), np.float32(0.80)  # colourless, and of the hair's own colour
 FADE_BEHIND, FADE_SCALE = np.float32(0.9996), np.float32(1200.0)  # cards fade over 0.6 mm where they enter a surface
-LEAST_COVERAGE = np.float32(0.02)
-SOLID = np.float32(1 / 128)  # passing light below which a pixel is full
+LEAST_COVERAGE = np.float32(0.03)
+SOLID = np.float32(1 / 40)  # passing light below which a sample is full
+TILE_PX = 8  # pixels along a side of the tiles in which cards behind everything are skipped
 CARD_NORMAL = np.float32(0.55)  # share of the card's normal; the rest points away from the middle of the skull
 
 
-@kernel
+@vectorized_kernel
 def light_strands(vertices: Array, normals: Array, tangents: Array, light: Any, vertex: Array, table: Array) -> None:
     """Write the light of the vertices of strands.
 
@@ -96,7 +97,7 @@ def power_8(value: float) -> Any:
     return value * value
 
 
-@kernel
+@vectorized_kernel
 def strand_light(weights: tuple[float, float, float], rows: Any, albedo: Array, lights: Array, gloss: tuple[float, float],
                  light: Array) -> None:
     """Write the display light (3,) of strands at a point between three rows of the strand table.
@@ -125,7 +126,7 @@ def strand_light(weights: tuple[float, float, float], rows: Any, albedo: Array, 
         light[k] = tone_curve(light[k])
 
 
-@kernel
+@vectorized_kernel
 def row_range(plane: Array, low: float, high: float, limits: tuple[float, float]) -> tuple[float, float]:
     """Range of x within `limits` where three half planes (3, 3), a x + b y + c >= 0, hold for some y in a range."""
     least, most = limits
@@ -140,48 +141,103 @@ def row_range(plane: Array, low: float, high: float, limits: tuple[float, float]
     return least, most
 
 
-@kernel
-def visible_share(place: tuple[int, int, int], planes: Array, depths: Any, through: Array, passing: Array) -> Any:
+@inlined_kernel
+def fade_in(near: float, behind: float) -> Any:
+    """Visible share of a card with 1/z `near` before a surface with 1/z `behind`, 0 without a surface."""
+    fade = np.float32(1)
+    if behind > np.float32(0):
+        fade = min(max((near - behind * FADE_BEHIND) * FADE_SCALE / behind, np.float32(0)), np.float32(1))
+    return fade
+
+
+@vectorized_kernel
+def visible_share(place: tuple[int, int, int, int], planes: Array, depth: Any, through: Array, passing: Array) -> Any:
     """Write how much of each sample of a pixel shows a triangle (S,), and return the mean.
 
     Parameters
     ----------
     place
-        Row and column of the pixel in the band, and its first row of samples in the picture.
+        Row and column of the pixel in the band, the band's first row of samples, samples along a pixel's side.
     planes : (4, 3)
         The half planes of the triangle, and its 1/z, as functions of the place in the picture in samples.
-    depths
-        1/z of the samples (R, W), of the centres of pixels (R / side + 2, W / side), and the marks of pixels whose
-        samples are valid.
+    depth
+        1/z of the samples (R, W), or one value for all.
     """
-    r, x, first_row = place
-    depth, centres, edges = depths
-    one, zero = np.float32(1), np.float32(0)
-    n_samples = len(passing)
-    side = 1 if n_samples == 1 else 2 if n_samples == 4 else 3
+    r, x, first_row, side = place
+    zero = np.float32(0)
     total = zero
-    for s in range(n_samples):
+    for s in range(side * side):
         row, column = r * side + s // side, x * side + s % side
         px, py = np.float32(column + 0.5), np.float32(row + first_row + 0.5)
         passing[s] = zero
         if through[s] < SOLID:
             continue
-        inside = True
-        for e in range(3):
-            inside &= planes[e, 0] * px + planes[e, 1] * py + planes[e, 2] >= zero
-        if not inside:
+        if (
+            planes[0, 0] * px + planes[0, 1] * py + planes[0, 2] < zero
+            or planes[1, 0] * px + planes[1, 1] * py + planes[1, 2] < zero
+            or planes[2, 0] * px + planes[2, 1] * py + planes[2, 2] < zero
+        ):
             continue
         near = planes[3, 0] * px + planes[3, 1] * py + planes[3, 2]
-        behind = depth[row, column] if edges[r, x] else centres[r + 1, x]
-        fade = one
-        if behind > zero:
-            fade = min(max((near - behind * FADE_BEHIND) * FADE_SCALE / behind, zero), one)
-        passing[s] = fade * through[s]
-        total += fade * through[s]
-    return total / np.float32(n_samples)
+        behind = depth[1] if depth[1] >= zero else depth[0][row, column]
+        passing[s] = fade_in(near, behind) * through[s]
+        total += passing[s]
+    return total / np.float32(side * side)
 
 
 @kernel
+def find_open_tiles(near: Array, tiles: Array, n_open: Array) -> None:
+    """Write for each tile of pixels the least 1/z of its surface, 0 where a pixel shows none, and its number of pixels."""
+    for r in range(tiles.shape[0]):
+        for x in range(tiles.shape[1]):
+            least, count = np.float32(np.inf), 0
+            for row in range(r * TILE_PX, min((r + 1) * TILE_PX, near.shape[0] - 2)):
+                for column in range(x * TILE_PX, min((x + 1) * TILE_PX, near.shape[1])):
+                    least, count = min(least, near[row + 1, column]), count + 1
+            tiles[r, x], n_open[r, x] = least, count
+
+
+@kernel
+def is_behind(box: tuple[int, int, int, int], nearest: float, tiles: Array, n_open: Array) -> bool:
+    """Whether a card within a box of pixels (first row, last row, first column, last column) cannot be seen."""
+    for r in range(box[0] // TILE_PX, box[1] // TILE_PX + 1):
+        for x in range(box[2] // TILE_PX, box[3] // TILE_PX + 1):
+            if n_open[r, x] > 0 and tiles[r, x] * FADE_BEHIND < nearest:
+                return False
+    return True
+
+
+@inlined_kernel
+def plane_margins(planes: Array, reach: float) -> tuple[float, float, float]:
+    """How far the half planes change within `reach` samples along both axes."""
+    return (
+        (abs(planes[0, 0]) + abs(planes[0, 1])) * reach,
+        (abs(planes[1, 0]) + abs(planes[1, 1])) * reach,
+        (abs(planes[2, 0]) + abs(planes[2, 1])) * reach,
+    )
+
+
+@kernel
+def set_planes(a: Array, b: Array, c: Array, planes: Array) -> float:
+    """Write the half planes of a triangle and its 1/z; returns twice its area, 0 if it is not drawn."""
+    area = (b[AT_X] - a[AT_X]) * (c[AT_Y] - a[AT_Y]) - (c[AT_X] - a[AT_X]) * (b[AT_Y] - a[AT_Y])
+    if abs(area) < np.float32(1e-3) or min(a[AT_NEAR], b[AT_NEAR], c[AT_NEAR]) <= np.float32(0):
+        return 0.0
+    inverse = np.float32(1) / area
+    planes[1, 0], planes[1, 1] = (c[AT_Y] - a[AT_Y]) * inverse, (a[AT_X] - c[AT_X]) * inverse
+    planes[2, 0], planes[2, 1] = (a[AT_Y] - b[AT_Y]) * inverse, (b[AT_X] - a[AT_X]) * inverse
+    for e in (1, 2):
+        planes[e, 2] = -planes[e, 0] * a[AT_X] - planes[e, 1] * a[AT_Y]
+    slope_b, slope_c = b[AT_NEAR] - a[AT_NEAR], c[AT_NEAR] - a[AT_NEAR]
+    for k in range(3):
+        planes[0, k] = -planes[1, k] - planes[2, k]
+        planes[3, k] = slope_b * planes[1, k] + slope_c * planes[2, k]
+    planes[0, 2] += np.float32(1)
+    planes[3, 2] += a[AT_NEAR]
+    return float(area)
+
+
+@vectorized_kernel
 def draw_strands(strands: Any, order: Array, scene: Any, band: Any, through: Array, colour: Array) -> None:
     """Blend the cards of a band of pixels.
 
@@ -195,7 +251,8 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, through: Arr
     scene
         Texels, levels, linear table, lights.
     band
-        First row of samples, samples along a pixel's side, and the depths of `visible_share`.
+        First row of samples, samples along a pixel's side, 1/z of the samples (R, W) and of the centres of pixels
+        (R / side + 2, W / side), and the marks of pixels whose samples are valid.
     through : (R, W, side * side)
         Out: share of light that passes before each sample.
     colour : (R, W, 3)
@@ -203,49 +260,64 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, through: Arr
     """
     table, triangles, texture, gloss, mean_light = strands
     texels, levels, linear, lights = scene
-    first_row, side, depths = band
+    first_row, side, depth, centres, edges = band
     one, zero = np.float32(1), np.float32(0)
     n_rows, width, n_samples = through.shape
+    each = one / np.float32(n_samples)
     planes, passing = np.zeros((4, 3), np.float32), np.zeros(n_samples, np.float32)
     sample, light = np.zeros(4, np.float32), np.zeros(3, np.float32)
+    is_open = np.ones((n_rows, width), np.uint8)
+    tiles = np.zeros(((n_rows + TILE_PX - 1) // TILE_PX, (width + TILE_PX - 1) // TILE_PX), np.float32)
+    n_open = np.zeros(tiles.shape, np.int32)
+    find_open_tiles(centres, tiles, n_open)
     top_px = first_row // side
     for t in order:
         a, b, c = table[triangles[t, 0]], table[triangles[t, 1]], table[triangles[t, 2]]
-        low = min(a[AT_Y], b[AT_Y], c[AT_Y])
-        high = max(a[AT_Y], b[AT_Y], c[AT_Y])
-        first = max(int(np.floor(low / side)) - top_px, 0)
-        last = min(int(np.floor(high / side)) - top_px, n_rows - 1)
-        if first > last or min(a[AT_NEAR], b[AT_NEAR], c[AT_NEAR]) <= zero:
+        first = max(int(np.floor(min(a[AT_Y], b[AT_Y], c[AT_Y]) / side)) - top_px, 0)
+        last = min(int(np.floor(max(a[AT_Y], b[AT_Y], c[AT_Y]) / side)) - top_px, n_rows - 1)
+        left = max(int(np.floor(min(a[AT_X], b[AT_X], c[AT_X]) / side)), 0)
+        right = min(int(np.floor(max(a[AT_X], b[AT_X], c[AT_X]) / side)), width - 1)
+        if first > last or left > right:
             continue
-        area = (b[AT_X] - a[AT_X]) * (c[AT_Y] - a[AT_Y]) - (c[AT_X] - a[AT_X]) * (b[AT_Y] - a[AT_Y])
-        if abs(area) < np.float32(1e-6):
+        if is_behind((first, last, left, right), max(a[AT_NEAR], b[AT_NEAR], c[AT_NEAR]), tiles, n_open):
             continue
-        inverse = one / area
-        planes[1, 0], planes[1, 1] = (c[AT_Y] - a[AT_Y]) * inverse, (a[AT_X] - c[AT_X]) * inverse
-        planes[2, 0], planes[2, 1] = (a[AT_Y] - b[AT_Y]) * inverse, (b[AT_X] - a[AT_X]) * inverse
-        for e in (1, 2):
-            planes[e, 2] = -planes[e, 0] * a[AT_X] - planes[e, 1] * a[AT_Y]
-        slope_b, slope_c = b[AT_NEAR] - a[AT_NEAR], c[AT_NEAR] - a[AT_NEAR]
-        for k in range(3):
-            planes[0, k] = -planes[1, k] - planes[2, k]
-            planes[3, k] = slope_b * planes[1, k] + slope_c * planes[2, k]
-        planes[0, 2] += one
-        planes[3, 2] += a[AT_NEAR]
+        area = set_planes(a, b, c, planes)
+        if area == 0.0:
+            continue
+        margins = plane_margins(planes, np.float32(0.5 * (side - 1)))
         u1, v1, u2, v2 = b[AT_U] - a[AT_U], b[AT_V] - a[AT_V], c[AT_U] - a[AT_U], c[AT_V] - a[AT_V]
         number = texture[t]
         size = np.float32(levels[number, 0, 1] * levels[number, 0, 2] * side * side)
-        place = levels[number, mip_level(abs((u1 * v2 - u2 * v1) * inverse) * size, levels.shape[1])]
+        place = levels[number, mip_level(abs((u1 * v2 - u2 * v1) / area) * size, levels.shape[1])]
         for r in range(first, last + 1):
-            row_low = np.float32((r + top_px) * side) + np.float32(0.5)
-            least, most = row_range(planes, row_low, row_low + np.float32(side - 1), (zero, np.float32(width * side)))
+            low = np.float32((r + top_px) * side) + np.float32(0.5)
+            least, most = row_range(planes, low, low + np.float32(side - 1), (zero, np.float32(width * side)))
+            py = np.float32((r + top_px + 0.5) * side)
             for x in range(int(least) // side, min(int(most) // side, width - 1) + 1):
-                seen = visible_share((r, x, first_row), planes, depths, through[r, x], passing)
-                if seen <= np.float32(1e-3):
+                if is_open[r, x] == 0:
                     continue
-                px, py = np.float32((x + 0.5) * side), np.float32((r + top_px + 0.5) * side)
-                wb = min(max(planes[1, 0] * px + planes[1, 1] * py + planes[1, 2], zero), one)
-                wc = min(max(planes[2, 0] * px + planes[2, 1] * py + planes[2, 2], zero), one - wb)
+                px = np.float32((x + 0.5) * side)
+                wb = planes[1, 0] * px + planes[1, 1] * py + planes[1, 2]
+                wc = planes[2, 0] * px + planes[2, 1] * py + planes[2, 2]
                 wa = one - wb - wc
+                is_whole = edges[r, x] == 0 and wa >= margins[0] and wb >= margins[1] and wc >= margins[2]
+                if is_whole:
+                    fade = fade_in(planes[3, 0] * px + planes[3, 1] * py + planes[3, 2], centres[r + 1, x])
+                    if fade <= zero:
+                        continue
+                    seen = zero
+                    for s in range(n_samples):
+                        passing[s] = fade * through[r, x, s]
+                        seen += passing[s]
+                    seen *= each
+                else:
+                    behind = centres[r + 1, x] if edges[r, x] == 0 else -one
+                    seen = visible_share((r, x, first_row, side), planes, (depth, behind), through[r, x], passing)
+                    wb = min(max(wb, zero), one)
+                    wc = min(max(wc, zero), one - wb)
+                    wa = one - wb - wc
+                if seen <= np.float32(2e-3):
+                    continue
                 uv = (a[AT_U] + wb * u1 + wc * u2, a[AT_V] + wb * v1 + wc * v2)
                 coverage = read_texel(texels, place, linear, uv, sample)
                 if coverage < LEAST_COVERAGE:
@@ -255,5 +327,10 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, through: Arr
                 strand_light((wa, wb, wc), (a, b, c), sample, lights, (shift, gloss[t]), light)
                 for k in range(3):
                     colour[r, x, k] += light[k] * seen * coverage
+                rest = zero
                 for s in range(n_samples):
                     through[r, x, s] -= passing[s] * coverage
+                    rest = max(rest, through[r, x, s])
+                if rest < SOLID:
+                    is_open[r, x] = 0
+                    n_open[r // TILE_PX, x // TILE_PX] -= 1
