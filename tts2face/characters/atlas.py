@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.characters.character import MASK, OPAQUE, Material
-from tts2face.render.surface import encoding_table, linear_light
+from tts2face.render.tone_tables import encoding_table, linear_light
 
 MAX_ATLAS_SIDE = 4096  # pixels
 BORDER = 4  # pixels around each image that repeat its edge, so that neighbours do not bleed into it

@@ -12,7 +12,7 @@ from lexicon.inputs import read_text
 from tts2face.characters.character import BLEND, Material
 from tts2face.characters.gltf import read_bytes
 from tts2face.characters.materials import decode_image
-from tts2face.render.surface import linear_light
+from tts2face.render.tone_tables import linear_light
 
 MAX_TEXT_BYTES = 200_000_000
 GREY = 0.02  # greatest difference between the channels of a colour that exporters write for an unpainted material

@@ -111,6 +111,9 @@ class Face:
         Texture coordinates in [0, 1] from the top left corner of the texture of the vertex's part; None without.
     tangents : (V, 3)
         Unit vectors along the strands, for the vertices of parts of kind strands; None without.
+    occlusion : (P, V, D / 8)
+        Directions from which each vertex is hidden, as packed bits, at rest and with the jaw wide open
+        (`tts2face.render.occlusion`); None where it is not computed.
     landmarks, landmark_vertices, landmark_weights : (L,), (L, 3), (L, 3)
         Landmark `landmarks[i]` of `tts2face.models.landmarks` lies at the barycentric weights of three vertices.
     pivot : (3,)
@@ -138,6 +141,7 @@ class Face:
     metadata: Mapping[str, Any] = field(default_factory=dict)
     tangents: NDArray[np.float32] | None = None
     hairdo: Hairdo | None = None
+    occlusion: NDArray[np.uint8] | None = None
 
     @property
     def synthetic_notice(self) -> str:
@@ -157,6 +161,7 @@ class Face:
             and (self.uv is None or self.uv.shape == (n_vertices, 2))
             and self.landmark_vertices.shape == self.landmark_weights.shape == (len(self.landmarks), 3)
             and (self.tangents is None or self.tangents.shape == (n_vertices, 3))
+            and (self.occlusion is None or self.occlusion.shape[1] == n_vertices)
             and (self.uv is not None or not self.textures)
             and all(part.texture < len(self.textures) for part in self.parts)
             and sum(part.count for part in self.parts) == len(self.triangles)
@@ -167,7 +172,7 @@ class Face:
             raise DataError(
                 f"a triangle of the face has a vertex index beyond its {n_vertices} vertices; build it again"
             )
-        for name in ("vertices", "triangles", "shapes", "limits", "colours", "uv", "tangents", "pivot",
+        for name in ("vertices", "triangles", "shapes", "limits", "colours", "uv", "tangents", "pivot", "occlusion",
                      "landmarks", "landmark_vertices", "landmark_weights"):  # fmt: skip
             array = getattr(self, name)
             if array is not None:

@@ -64,6 +64,8 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
             arrays[f"alpha{number or ''}"] = encode_coverage(texture.alpha)
     if face.tangents is not None:
         arrays["tangents"] = np.rint(face.tangents * TANGENT_STEPS).astype(np.int8)
+    if face.occlusion is not None:
+        arrays["occlusion"] = encode_occlusion(face.occlusion)
     presets = dict(identities or {})
     for number, preset in enumerate(presets.values()):
         steps, step = _quantise(preset.displacement)
@@ -83,6 +85,7 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
         ],
         "identities": [[name, dict(preset.tints), preset.summary] for name, preset in presets.items()],
         "hairdos": _hairdos(face, presets),
+        "occlusion_bytes": 0 if face.occlusion is None else face.occlusion.shape[2],
         "metadata": dict(face.metadata),
     }
     write_tensors(path, KIND, FORMAT_VERSION, arrays, header)
@@ -158,6 +161,16 @@ def _read_part(fields: Mapping[str, Any], n_textures: int) -> Part:
     return Part(**known | {"texture": number if number < n_textures else VERTEX_COLOURS})
 
 
+def _read_occlusion(
+    arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path
+) -> NDArray[np.uint8] | None:
+    if "occlusion" not in arrays:
+        return None
+    n_poses = 2 if WIDE_OPEN in header["shape_names"] else 1
+    shape = (n_poses, len(arrays["vertices"]), int(header["occlusion_bytes"]))
+    return decode_occlusion(arrays["occlusion"], shape, path)
+
+
 def _read_textures(arrays: Mapping[str, NDArray[Any]], path: Path) -> tuple[Texture, ...]:
     textures = []
     for number in range(MAX_TEXTURES):
@@ -197,6 +210,7 @@ def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, A
         textures=textures,
         tangents=(arrays["tangents"] / TANGENT_STEPS).astype(np.float32) if "tangents" in arrays else None,
         hairdo=None if hairdo is None else Hairdo(*hairdo),
+        occlusion=_read_occlusion(arrays, header, path),
         landmarks=arrays["landmarks"],
         landmark_vertices=arrays["landmark_vertices"],
         landmark_weights=arrays["landmark_weights"],

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.face import PART_KINDS
+from tts2face.models.occlusion_coding import MAX_OCCLUSION_BYTES
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.storage.schema import (
     MAX_MM,
@@ -76,6 +77,7 @@ TENSORS: Mapping[str, Tensor] = {
     "colours": Tensor("uint8", ("vertices", 3)),
     "uv": Tensor("uint16", ("vertices", 2), is_optional=True),
     "tangents": Tensor("int8", ("vertices", 3), is_optional=True),
+    "occlusion": Tensor("uint8", ("bytes of occlusion",), is_optional=True),
     "landmarks": Tensor("int32", ("landmarks",), may_be_empty=True),
     "landmark_vertices": Tensor("int32", ("landmarks", N_CORNERS), may_be_empty=True),
     "landmark_weights": Tensor("float32", ("landmarks", N_CORNERS), -SUM_WITHIN, 1 + SUM_WITHIN, may_be_empty=True),
@@ -94,6 +96,7 @@ def check_face(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[s
     contents = Contents(path, "face", arrays, header)
     contents.metadata(METADATA)
     table(row(text, text))(header.get("hairdos", {}), f"{path}: metadata: hairdos")
+    whole(0, MAX_OCCLUSION_BYTES)(header.get("occlusion_bytes", 0), f"{path}: metadata: occlusion_bytes")
     contents.tensors(TENSORS)
     presets = range(len(header["identities"]))
     contents.tensors({f"identity{n}": Tensor("int16", ("vertices", 3)) for n in presets})

@@ -45,6 +45,9 @@ class Hair:
         Coverage of the skin's texture by hair, 0-255, painted in the hair's colour under the cards; None: none.
     metadata
         Name, summary, licence, attribution, and the command that built it.
+    occlusion, skin_occlusion : (V, D / 8), (n_face_vertices, D / 8)
+        Directions from which the vertices of the hair, and by the hair those of the head, are hidden
+        (`tts2face.render.occlusion`); None where they are not computed.
     """
 
     vertices: NDArray[np.float32]
@@ -58,6 +61,8 @@ class Hair:
     n_face_vertices: int
     scalp: NDArray[np.uint8] | None = None
     metadata: Mapping[str, Any] = field(default_factory=dict)
+    occlusion: NDArray[np.uint8] | None = None
+    skin_occlusion: NDArray[np.uint8] | None = None
 
 
 def parse_hair_colour(colour: str) -> NDArray[np.float64]:
@@ -106,7 +111,16 @@ def attach_hair(face: Face, hair: Hair, colour: str) -> Face:
         textures=(*painted, Texture(colour_relief(hair.relief, srgb), hair.alpha)),
         tangents=np.concatenate([tangents, hair.tangents]),
         hairdo=Hairdo(str(hair.metadata.get("name", "")), colour),
+        occlusion=_join_occlusion(face, hair),
     )
+
+
+def _join_occlusion(face: Face, hair: Hair) -> NDArray[np.uint8] | None:
+    """Occlusion (P, V, D / 8) of a face with a haircut; None if either has none, or of other directions."""
+    own, cards, shadow = face.occlusion, hair.occlusion, hair.skin_occlusion
+    if own is None or cards is None or shadow is None or own.shape[2] != cards.shape[1] or cards.shape[1] != shadow.shape[1]:
+        return None
+    return np.concatenate([own | shadow, np.broadcast_to(cards, (len(own), *cards.shape))], axis=1)
 
 
 def fit_hair(face: Face, hair: Hair) -> NDArray[np.float32]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.hair import BALD, Hair
+from tts2face.models.occlusion_coding import MAX_OCCLUSION_BYTES, decode_occlusion, encode_occlusion
 from tts2face.models.picture_coding import decode_colours, decode_coverage, encode_colours, encode_coverage
 from tts2face.storage.files import SHIPPED_FOLDER, find_file
 from tts2face.storage.schema import Check, Contents, Tensor, free, millimetres, whole
@@ -20,6 +21,7 @@ UNIT_STEPS = 127.0
 UV_STEPS = 65535.0
 
 METADATA: Mapping[str, Check] = {"n_face_vertices": whole(1, 2**31 - 1), "metadata": free}
+OCCLUSION_BYTES = whole(0, MAX_OCCLUSION_BYTES)
 TENSORS: Mapping[str, Tensor] = {
     "vertices": millimetres("vertices", 3),
     "triangles": Tensor("int32", ("triangles", 3)),
@@ -30,6 +32,8 @@ TENSORS: Mapping[str, Tensor] = {
     "anchors": Tensor("int32", ("anchors",)),
     "anchor_places": millimetres("anchors", 3),
     "scalp": Tensor("uint8", ("bytes of scalp",), is_optional=True),
+    "occlusion": Tensor("uint8", ("bytes of occlusion",), is_optional=True),
+    "skin_occlusion": Tensor("uint8", ("bytes of skin occlusion",), is_optional=True),
 }
 MIN_ANCHORS = 4  # that are not in one plane: fewer do not determine the fit
 
@@ -48,7 +52,12 @@ def write_hair(path: Path, hair: Hair) -> None:
     }
     if hair.scalp is not None:
         arrays["scalp"] = encode_coverage(hair.scalp)
-    header = {"n_face_vertices": hair.n_face_vertices, "metadata": dict(hair.metadata)}
+    n_bytes = 0
+    for name in ("occlusion", "skin_occlusion"):
+        bits = getattr(hair, name)
+        if bits is not None:
+            arrays[name], n_bytes = encode_occlusion(bits[None]), bits.shape[1]
+    header = {"n_face_vertices": hair.n_face_vertices, "occlusion_bytes": n_bytes, "metadata": dict(hair.metadata)}
     write_tensors(path, KIND, FORMAT_VERSION, arrays, header)
 
 
@@ -79,7 +88,16 @@ def read_hair(path: Path) -> Hair:
         n_face_vertices=header["n_face_vertices"],
         scalp=decode_coverage(arrays["scalp"], path) if "scalp" in arrays else None,
         metadata=header["metadata"],
+        occlusion=_read_occlusion("occlusion", len(arrays["vertices"]), (arrays, header, path)),
+        skin_occlusion=_read_occlusion("skin_occlusion", header["n_face_vertices"], (arrays, header, path)),
     )
+
+
+def _read_occlusion(name: str, n_vertices: int, file: tuple[Any, Any, Path]) -> NDArray[np.uint8] | None:
+    arrays, header, path = file
+    if name not in arrays:
+        return None
+    return decode_occlusion(arrays[name], (1, n_vertices, header.get("occlusion_bytes", 0)), path)[0]
 
 
 def load_hair(name: str) -> Hair:
@@ -105,6 +123,7 @@ def haircut_names() -> tuple[str, ...]:
 def _check_hair(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> None:
     contents = Contents(path, "haircut", arrays, header)
     contents.metadata(METADATA)
+    OCCLUSION_BYTES(header.get("occlusion_bytes", 0), f"{path}: metadata: occlusion_bytes")
     contents.tensors(TENSORS)
     contents.only_known()
     contents.indices("triangles", contents.sizes["vertices"], "vertices")

@@ -10,28 +10,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.compilation import kernel
-from tts2face.render.fragments import UV
+from tts2face.render.fragment_rows import UV
 from tts2face.render.raster import BACK_BIAS, GRID_SHIFT, HALF_GRID, NO_TRIANGLE, depth_plane, edge_function
 
 Array = NDArray[Any]
 
 
 @kernel
-def texel_alpha(alpha: Array, u: float, v: float) -> float:
-    """Bilinear coverage, 0 to 255, of a texture at (u, v)."""
-    height, width = alpha.shape
+def texel_alpha(texels: Array, place: Array, u: float, v: float) -> float:
+    """Bilinear coverage, 0 to 255, at (u, v) of the texture that begins at ``place[0]`` and has ``place[1:]`` texels."""
+    begin, width, height = place[0], place[1], place[2]
     x = min(max(u * width - 0.5, 0.0), width - 1.0)
     y = min(max(v * height - 0.5, 0.0), height - 1.0)
     left, top = int(x), int(y)
     right, below = min(left + 1, width - 1), min(top + 1, height - 1)
     across, along = x - left, y - top
-    upper = alpha[top, left] * (1.0 - across) + alpha[top, right] * across
-    lower = alpha[below, left] * (1.0 - across) + alpha[below, right] * across
+    top, below = begin + top * width, begin + below * width
+    upper = texels[top + left, 3] * (1.0 - across) + texels[top + right, 3] * across
+    lower = texels[below + left, 3] * (1.0 - across) + texels[below + right, 3] * across
     return float(upper * (1.0 - along) + lower * along)
 
 
 @kernel
-def sample_alpha(alpha: Array, vertex: Array, corners: tuple[int, int, int], dx: float, dy: float) -> float:
+def sample_alpha(texture: tuple[Any, Any], vertex: Array, corners: tuple[int, int, int], dx: float, dy: float) -> float:
     """Coverage, 0 to 255, where the ray (dx, dy, 1) meets a triangle (Moeller and Trumbore 1997)."""
     a, b, c = corners
     sx, sy, sz = -np.float64(vertex[a, 0]), -np.float64(vertex[a, 1]), -np.float64(vertex[a, 2])
@@ -46,12 +47,12 @@ def sample_alpha(alpha: Array, vertex: Array, corners: tuple[int, int, int], dx:
     wa = 1.0 - wb - wc
     u = wa * vertex[a, UV] + wb * vertex[b, UV] + wc * vertex[c, UV]
     v = wa * vertex[a, UV + 1] + wb * vertex[b, UV + 1] + wc * vertex[c, UV + 1]
-    return float(texel_alpha(alpha, u, v))
+    return float(texel_alpha(texture[0], texture[1], u, v))
 
 
 @kernel
 def draw_cutouts(
-    geometry: Any, alpha: Array, batch: Any, place: tuple[int, int, int], depth: Array, owner: Array
+    geometry: Any, textures: Any, batch: Any, place: tuple[int, int, int], depth: Array, owner: Array
 ) -> None:
     """Draw triangles with holes onto the opaque surface of a band, after `tts2face.render.raster.draw_band`.
 
@@ -59,8 +60,8 @@ def draw_cutouts(
     ----------
     geometry
         Vertex table, triangles (F, 3), lens.
-    alpha : (H, W)
-        Coverage of the texture, 0 to 255.
+    textures
+        Texels and levels of `tts2face.render.textures`, and the texture of each triangle (F,).
     batch
         Corners, source, and the rows of both that touch the band and have holes.
     place
@@ -69,6 +70,7 @@ def draw_cutouts(
         As `draw_band` writes them, changed in place; translucent layers behind a drawn sample are removed.
     """
     vertex, triangles, lens = geometry
+    texels, levels, texture_of = textures
     corners, source, members = batch
     first_row, side, n_layers = place
     n_rows, width = depth.shape[1], depth.shape[2]
@@ -98,7 +100,7 @@ def draw_cutouts(
                 if near <= depth[0, r, x]:
                     continue
                 rank = ((row % side) * side + x % side + t) % n_samples
-                if sample_alpha(alpha, vertex, which, (x + 0.5 - lens[1]) / lens[0], dy) * n_samples < 255.0 * (
+                if sample_alpha((texels, levels[texture_of[t], 0]), vertex, which, (x + 0.5 - lens[1]) / lens[0], dy) * n_samples < 255.0 * (
                     rank + 0.5
                 ):
                     continue

@@ -104,8 +104,7 @@ class MeshRenderer:
         scene, picture = self.scene, self.picture
         pixels = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
         pixels[:, :, :3] = scene.background
-        points = scene.surface.rig.pose(weights, head)
-        draw_surface(points, scene.surface, scene.optics, (scene.lights, scene.exposure.at(weights)), buffers, pixels)
+        draw_surface(scene.pose(weights, head), scene.surface, scene.optics, buffers, pixels)
         return pixels
 
 

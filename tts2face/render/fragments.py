@@ -8,21 +8,35 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.compilation import kernel
-from tts2face.render.raster import NO_TRIANGLE
+from tts2face.compilation import inlined_kernel, kernel
+from tts2face.render.eyes import light_eye
+from tts2face.render.fragment_rows import (
+    AT_ALBEDO,
+    AT_DIFFUSE,
+    AT_EXPOSURE,
+    AT_GLOSS,
+    AT_GLOW,
+    AT_NORMAL,
+    AT_RAY,
+    AT_SHARE,
+    COLOUR,
+    DIFFUSE,
+    EXPOSURE,
+    EYE,
+    N_EXPOSURES,
+    NORMAL,
+    OPEN_SURFACE,
+    TEXTURE,
+    UV,
+)
+from tts2face.render.raster import NO_TRIANGLE, TILE_SAMPLES
+from tts2face.render.textures import mip_level, read_texel
 
 Array = NDArray[Any]
 
 MIN_NORMAL_COSINE = np.float32(0.85)  # least cosine between the normals of samples that are merged
+HIDDEN_SHARE = np.float32(1 / 512)  # light that passes strands below which nothing behind them is drawn
 BACK_LIGHT_SHARE = np.float32(0.3)  # share of the light that reaches the back of a closed part
-SPECULAR, SHININESS, WRAP, OPACITY, TEXTURED, OPEN_SURFACE = range(6)  # columns of the material table
-CAMERA, NORMAL, EXPOSURE, COLOUR, UV = 0, 3, 6, 10, 13  # columns of the vertex table: 3, 3, 4, 3, 2 numbers
-N_VERTEX_COLUMNS = 16  # one cache line
-# Rows of the fragment table: normal 3, albedo 3, exposure 4, ray 2, material 4, share of the pixel.
-AT_NORMAL, AT_ALBEDO, AT_EXPOSURE, AT_RAY, AT_SPECULAR, AT_SHININESS, AT_WRAP, AT_OPACITY, AT_SHARE = (
-    0, 3, 6, 10, 12, 13, 14, 15, 16,
-)  # fmt: skip
-N_ROWS = 17
 PIXEL_X, PIXEL_Y, PIXEL_ENDS = 0, 1, 2  # columns of the pixel table; from 2 on: begin, then the end of each layer
 
 
@@ -64,51 +78,128 @@ def is_same_surface(number: int, other: int, flat: Array, part_of: Array) -> boo
 
 
 @kernel
+def find_edges(centres: tuple[Any, Any], n_layers: int, part_of: Array, mm: float, edges: Array) -> None:
+    """Mark the pixels that need more than one sample.
+
+    These are pixels beside one of another part, of the other side of a part, or beyond a step in depth.
+
+    Parameters
+    ----------
+    centres
+        1/z and visible triangle at the centre of each pixel (3, R + 2, W), with one row of pixels above and below the
+        band.
+    part_of : (F,)
+        Part of each triangle.
+    mm
+        Depth beyond which a step that does not continue the slope of the surface is an edge.
+    edges : (R, W)
+        Set to 1; pixels that are marked already stay so.
+    """
+    near, owner = centres
+    n_rows, width = edges.shape
+    for layer in range(n_layers):
+        for r in range(n_rows + 1):
+            for x in range(width):
+                number, below = owner[layer, r, x], owner[layer, r + 1, x]
+                if number != below and not is_same_part(number, below, part_of):
+                    edges[max(r - 1, 0), x] = edges[min(r, n_rows - 1), x] = 1
+                if r == 0:
+                    continue
+                value = near[layer, r, x]
+                limit = value * value * np.float32(mm)
+                if x + 1 < width:
+                    beside = owner[layer, r, x + 1]
+                    if number != beside and not is_same_part(number, beside, part_of):
+                        edges[r - 1, x] = edges[r - 1, x + 1] = 1
+                    if x > 0:
+                        bend = near[layer, r, x - 1] - value - value + near[layer, r, x + 1]
+                        if abs(bend) > limit:
+                            edges[r - 1, x - 1] = edges[r - 1, x] = edges[r - 1, x + 1] = 1
+                bend = near[layer, r - 1, x] - value - value + near[layer, r + 1, x]
+                if abs(bend) > limit:
+                    edges[r - 1, x] = edges[max(r - 2, 0), x] = edges[min(r, n_rows - 1), x] = 1
+
+
+@inlined_kernel
+def is_same_part(number: int, other: int, part_of: Array) -> bool:
+    """Whether two visible triangles show the same side of the same part; not for samples without a triangle."""
+    if number == NO_TRIANGLE or other == NO_TRIANGLE or (number < 0) != (other < 0):
+        return False
+    return bool(part_of[number if number >= 0 else ~number] == part_of[other if other >= 0 else ~other])
+
+
+@kernel
+def mark_tiles(edges: Array, side: int, wanted: Array) -> None:
+    """Mark the tiles of samples that hold a pixel which needs them."""
+    for r in range(wanted.shape[0]):
+        for x in range(wanted.shape[1]):
+            wanted[r, x] = 0
+    for r in range(edges.shape[0]):
+        for x in range(edges.shape[1]):
+            if edges[r, x]:
+                for row in (r * side, r * side + side - 1):
+                    for column in (x * side, x * side + side - 1):
+                        wanted[row // TILE_SAMPLES, column // TILE_SAMPLES] = 1
+
+
+@kernel
 def find_fragments(
-    owner: Array, n_layers: int, place: tuple[int, int, int], facets: tuple[Any, Any], found: Any, pixels: Array
+    owners: tuple[Any, Any, Any], n_layers: int, place: tuple[int, int, int], facets: tuple[Any, Any], found: Any,
+    through: Array, pixels: Array,
 ) -> int:
     """Find the fragments of each pixel of a band; returns the number of pixels that are not empty.
 
     Parameters
     ----------
-    owner : (3, R, W)
-        Visible triangle of each sample and layer, as `draw_band` writes it.
+    owners
+        Visible triangles of the samples (3, R, W) and at the centres of pixels (3, R / side + 2, W / side), as
+        `draw_band` writes them, and the marks of `find_edges`: samples are valid in marked pixels only.
     place
         The band's first row of samples, its number of rows, samples along a pixel's side.
     facets
         Normals of the triangles (F, 3) and part of each (F,).
     found
         Out, for each fragment: its first triangle (G,); sums over its samples of column, row and 1 (G, 3).
+    through : (R / side, W / side, side * side)
+        Share of light that passes strands of hair before each sample; of size 0 without strands.
     pixels : (P, 6)
         Out: x, y, first fragment, end of the fragments of each layer.
     """
     first_row, n_rows, side = place
+    owner, centres, edges = owners
     number_of, spread = found
     flat, part_of = facets
     n_fragments = n_pixels = 0
-    one = np.float32(1)
-    for r in range(0, n_rows, side):
-        for x in range(0, owner.shape[2], side):
+    one, n_samples = np.float32(1), side * side
+    for r in range(n_rows // side):
+        for x in range(edges.shape[1]):
             begin = n_fragments
+            seen = one
+            if through.size > 0:
+                seen = np.float32(0)
+                for s in range(n_samples):
+                    seen = max(seen, through[r, x, s])
+            if seen < HIDDEN_SHARE:
+                for layer in range(4):
+                    pixels[n_pixels, PIXEL_ENDS + layer] = begin
+                pixels[n_pixels, PIXEL_X], pixels[n_pixels, PIXEL_Y] = x, r + first_row // side
+                n_pixels += 1
+                continue
             for layer in range(n_layers):
                 first = n_fragments
                 pixels[n_pixels, PIXEL_ENDS + layer] = first
-                number = owner[layer, r, x]
-                n_same = 0
-                for row in range(r, r + side):
-                    for column in range(x, x + side):
-                        n_same += owner[layer, row, column] == number
-                if n_same == side * side:
+                if edges[r, x] == 0:
+                    number = centres[layer, r + 1, x]
                     if number != NO_TRIANGLE:
                         number_of[n_fragments] = number
-                        spread[n_fragments, 0] = (x + 0.5 * (side - 1)) * n_same
-                        spread[n_fragments, 1] = (r + first_row + 0.5 * (side - 1)) * n_same
-                        spread[n_fragments, 2] = n_same
+                        spread[n_fragments, 0] = (x * side + 0.5 * (side - 1)) * n_samples
+                        spread[n_fragments, 1] = (r * side + first_row + 0.5 * (side - 1)) * n_samples
+                        spread[n_fragments, 2] = n_samples
                         n_fragments += 1
                     continue
                 last, g = NO_TRIANGLE, first
-                for row in range(r, r + side):
-                    for column in range(x, x + side):
+                for row in range(r * side, r * side + side):
+                    for column in range(x * side, x * side + side):
                         number = owner[layer, row, column]
                         if number == NO_TRIANGLE:
                             continue
@@ -123,27 +214,12 @@ def find_fragments(
                         spread[g, 0] += np.float32(column)
                         spread[g, 1] += np.float32(row + first_row)
                         spread[g, 2] += one
-            if n_fragments > begin:
+            if n_fragments > begin or seen < one:
                 for layer in range(n_layers, 4):
                     pixels[n_pixels, PIXEL_ENDS + layer] = n_fragments
-                pixels[n_pixels, PIXEL_X], pixels[n_pixels, PIXEL_Y] = x // side, (r + first_row) // side
+                pixels[n_pixels, PIXEL_X], pixels[n_pixels, PIXEL_Y] = x, r + first_row // side
                 n_pixels += 1
     return n_pixels
-
-
-@kernel
-def texel(texture: Array, linear: Array, u: float, v: float, c: int) -> Any:
-    """Bilinear value of channel `c` of a texture at (u, v), in linear light."""
-    height, width = texture.shape[0], texture.shape[1]
-    one, half, zero = np.float32(1), np.float32(0.5), np.float32(0)
-    x = min(max(u * np.float32(width) - half, zero), np.float32(width - 1))
-    y = min(max(v * np.float32(height) - half, zero), np.float32(height - 1))
-    left, top = int(x), int(y)
-    right, below = min(left + 1, width - 1), min(top + 1, height - 1)
-    across, along = x - np.float32(left), y - np.float32(top)
-    upper = linear[texture[top, left, c]] * (one - across) + linear[texture[top, right, c]] * across
-    lower = linear[texture[below, left, c]] * (one - across) + linear[texture[below, right, c]] * across
-    return upper * (one - along) + lower * along
 
 
 @kernel
@@ -153,14 +229,16 @@ def evaluate_fragments(found: Any, n_fragments: int, vertex: Array, scene: Any, 
     Parameters
     ----------
     scene
-        Triangles (F, 3), part of each (F,), materials (P, 6), texture (H, W, 3), linear table (256,).
-    table : (17, G)
+        Triangles (F, 3), part of each (F,), materials (P, 9), textures, linear table (256,), samples along a pixel's
+        side, eyes (E, 12) as `tts2face.render.eyes` names their columns.
+    table : (N_ROWS, G)
         Out: the attributes in the rows named at the top of this module.
     """
     number_of, spread = found
-    triangles, part_of, materials, texture, linear = scene
+    triangles, part_of, materials, (texels, levels), linear, side, eyes = scene
     one, zero = np.float32(1), np.float32(0)
     focal, middle_x, middle_y = np.float32(1 / lens[0]), np.float32(lens[1] - 0.5), np.float32(lens[2] - 0.5)
+    pixel = np.float32((side / lens[0]) ** 2)
     for g in range(n_fragments):
         number = number_of[g]
         t = number if number >= 0 else ~number
@@ -177,24 +255,43 @@ def evaluate_fragments(found: Any, n_fragments: int, vertex: Array, scene: Any, 
         wb = min(max((sx * qx + sy * qy + sz * qz) * inverse, zero), one)
         wc = min(max((dx * rx + dy * ry + rz) * inverse, zero), one - wb)
         wa = one - wb - wc
-        for k in range(3):
-            n, o = NORMAL + k, COLOUR + k
-            table[AT_NORMAL + k, g] = wa * vertex[a, n] + wb * vertex[b, n] + wc * vertex[c, n]
-            table[AT_ALBEDO + k, g] = wa * vertex[a, o] + wb * vertex[b, o] + wc * vertex[c, o]
         material = part_of[t]
-        if materials[material, TEXTURED] != zero:
-            u = wa * vertex[a, UV] + wb * vertex[b, UV] + wc * vertex[c, UV]
-            v = wa * vertex[a, UV + 1] + wb * vertex[b, UV + 1] + wc * vertex[c, UV + 1]
-            for k in range(3):
-                table[AT_ALBEDO + k, g] = texel(texture, linear, u, v, k)
-        turn = one if number >= 0 else -one
-        inner = BACK_LIGHT_SHARE if number < 0 and materials[material, OPEN_SURFACE] == zero else one
         for k in range(3):
-            table[AT_NORMAL + k, g] *= turn
-        for k in range(4):
-            mean = wa * vertex[a, EXPOSURE + k] + wb * vertex[b, EXPOSURE + k] + wc * vertex[c, EXPOSURE + k]
-            table[AT_EXPOSURE + k, g] = mean * inner
+            n, d = NORMAL + k, DIFFUSE + k
+            table[AT_NORMAL + k, g] = wa * vertex[a, n] + wb * vertex[b, n] + wc * vertex[c, n]
+            table[AT_DIFFUSE + k, g] = wa * vertex[a, d] + wb * vertex[b, d] + wc * vertex[c, d]
+        texture = int(materials[material, TEXTURE])
+        if texture >= 0:
+            ua, va = vertex[a, UV], vertex[a, UV + 1]
+            u1, v1, u2, v2 = vertex[b, UV] - ua, vertex[b, UV + 1] - va, vertex[c, UV] - ua, vertex[c, UV + 1] - va
+            area = abs(u1 * v2 - u2 * v1) * np.float32(levels[texture, 0, 1]) * np.float32(levels[texture, 0, 2])
+            level = mip_level(area * pixel * sz * sz * abs(inverse), levels.shape[1])
+            place = levels[texture, level]
+            read_texel(texels, place, linear, (ua + wb * u1 + wc * u2, va + wb * v1 + wc * v2), table[AT_ALBEDO:, g])
+        else:
+            for k in range(COLOUR, COLOUR + 3):
+                table[AT_ALBEDO + k - COLOUR, g] = wa * vertex[a, k] + wb * vertex[b, k] + wc * vertex[c, k]
+        for k in range(N_EXPOSURES):
+            e = EXPOSURE + k
+            table[AT_EXPOSURE + k, g] = wa * vertex[a, e] + wb * vertex[b, e] + wc * vertex[c, e]
         table[AT_RAY, g], table[AT_RAY + 1, g] = dx, dy
-        for k in range(4):
-            table[AT_SPECULAR + k, g] = materials[material, k]
-        table[AT_SHARE, g] = spread[g, 2]
+        for k in range(5):
+            table[AT_GLOSS + k, g] = materials[material, k]
+        table[AT_GLOW, g], table[AT_SHARE, g] = zero, spread[g, 2]
+        if number < 0:
+            turn_back(table, g, materials[material, OPEN_SURFACE] == zero)
+        if materials[material, EYE] > zero and len(eyes) > 0:
+            depth = -sz + wb * e1z + wc * e2z
+            light_eye(eyes, (dx * depth, dy * depth, depth), g, table)
+
+
+@kernel
+def turn_back(table: Array, g: int, is_closed: bool) -> None:
+    """Turn the normal of a fragment that shows the back of its triangle; the inside of a closed part is dark."""
+    for k in range(3):
+        table[AT_NORMAL + k, g] *= np.float32(-1)
+    if is_closed:
+        for k in range(3):
+            table[AT_DIFFUSE + k, g] *= BACK_LIGHT_SHARE
+        for k in range(N_EXPOSURES):
+            table[AT_EXPOSURE + k, g] *= BACK_LIGHT_SHARE

@@ -8,50 +8,89 @@ from numpy.typing import NDArray
 
 from tts2face.render.camera import CameraMatrices
 from tts2face.render.cutouts import draw_cutouts
+from tts2face.render.fragment_rows import COLOUR, N_ROWS, N_VERTEX_COLUMNS, UV
 from tts2face.render.fragments import (
-    COLOUR,
-    EXPOSURE,
-    N_ROWS,
-    N_VERTEX_COLUMNS,
     PIXEL_ENDS,
-    UV,
     evaluate_fragments,
     face_normals,
+    find_edges,
     find_fragments,
+    mark_tiles,
     vertex_normals,
 )
-from tts2face.render.raster import N_LAYERS, draw_band, gather_triangles, sort_into_bands, transform_to_camera
+from tts2face.render.raster import (
+    HOLES,
+    N_LAYERS,
+    N_PHASES,
+    TILE_SAMPLES,
+    TRANSLUCENT,
+    draw_band,
+    gather_triangles,
+    sort_into_bands,
+    transform_to_camera,
+)
 from tts2face.render.resolve import compose_band
-from tts2face.render.shade import N_SCRATCH_ROWS, shade_fragments
-from tts2face.render.surface import Surface, encoding_table, linear_table
+from tts2face.render.shade import N_SCRATCH_ROWS, light_vertices, scatter_light, shade_fragments
+from tts2face.render.strands import AT_NEAR, AT_U, N_STRAND_COLUMNS, draw_strands, light_strands
+from tts2face.render.surface import Surface
+from tts2face.render.tone_tables import TONE_TABLES
 
 BAND_SAMPLES = 65_536  # per band of rows; the time is the same from 16,384 to 262,144
-TONE_STEPS = 8192  # entries of the table from linear light to 8 bits; resolves the darkest step
 ROW_PADDING = 80  # extra entries per table row, so that rows do not all start in one cache set
-TONE_TABLES = (linear_table(), encoding_table(TONE_STEPS))
+EDGE_STEP_MM = 0.8  # bend of a surface in depth, over two pixels, beyond which a pixel needs its samples
+EVERY_TILE = np.zeros((0, 0), np.uint8)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawingBuffers:
     """Buffers for drawing one picture at a time; `tts2face.render.raster` and `fragments` describe the arrays.
 
-    ``side`` is the number of samples along a pixel's side; ``vertex`` is initialised with colours and uv.
+    ``side`` is the number of samples along a pixel's side; ``vertex`` is initialised with colours and uv, ``strands``
+    with uv. ``near`` and ``centre`` are depth and owner at the centres of pixels, with a row of pixels above and below
+    the band. ``through`` and ``strand_colour`` are of size 0 for a face without strands.
     """
 
     side: int
     vertex: NDArray[np.float32]
     grid: NDArray[np.int32]
     flat: NDArray[np.float32]
+    sums: NDArray[np.float32]
     corners: NDArray[np.int32]
+    boxes: NDArray[np.int32]
     source: NDArray[np.int32]
     band_starts: NDArray[np.int64]
     depth: NDArray[np.float32]
     owner: NDArray[np.int32]
+    near: NDArray[np.float32]
+    centre: NDArray[np.int32]
+    edges: NDArray[np.uint8]
+    tiles: NDArray[np.uint8]
     found: tuple[NDArray[np.int32], NDArray[np.float32]]
     fragments: NDArray[np.float32]
     scratch: NDArray[np.float32]
     colour: NDArray[np.float32]
     pixels: NDArray[np.int32]
+    strands: NDArray[np.float32]
+    through: NDArray[np.float32]
+    strand_colour: NDArray[np.float32]
+
+    @property
+    def band_rows(self) -> int:
+        """Rows of samples of a band."""
+        return int(self.depth.shape[1])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose:
+    """A face in one pose: positions ``points`` (V, 3), mm, light table (7, 6), exposure (V, 5), eye table, and the
+    rotation (3, 3) of the strands into camera space.
+    """
+
+    points: NDArray[np.float32]
+    lights: NDArray[np.float32]
+    exposure: NDArray[np.float32]
+    eyes: NDArray[np.float32]
+    turn: NDArray[np.float32]
 
 
 def allocate_buffers(surface: Surface, size: tuple[int, int], side: int) -> DrawingBuffers:
@@ -63,97 +102,134 @@ def allocate_buffers(surface: Surface, size: tuple[int, int], side: int) -> Draw
     vertex = np.zeros((n_vertices, N_VERTEX_COLUMNS), np.float32)
     vertex[:, COLOUR : COLOUR + 3] = surface.colours
     vertex[:, UV : UV + 2] = surface.uv
+    strands = np.zeros((len(surface.strands.vertices), N_STRAND_COLUMNS), np.float32)
+    strands[:, AT_U : AT_U + 2] = surface.strands.uv
+    pixels = (rows // side, size[0])
+    covered = pixels if len(strands) else (0, 0)
     return DrawingBuffers(
         side=side,
         vertex=vertex,
         grid=np.zeros((n_vertices, 2), np.int32),
         flat=np.zeros((n_triangles, 3), np.float32),
+        sums=np.zeros((n_triangles if len(surface.skin.vertices) else 0, 3), np.float32),
         corners=np.zeros((2 * n_triangles, 6), np.int32),
+        boxes=np.zeros((2 * n_triangles, 5), np.int32),
         source=np.zeros(2 * n_triangles, np.int32),
-        band_starts=np.zeros(-(-height // rows) + 1, np.int64),
+        band_starts=np.zeros(-(-height // rows) * N_PHASES + 1, np.int64),
         depth=np.zeros((N_LAYERS, rows, width), np.float32),
         owner=np.zeros((N_LAYERS, rows, width), np.int32),
+        near=np.zeros((N_LAYERS, pixels[0] + 2, pixels[1]), np.float32),
+        centre=np.zeros((N_LAYERS, pixels[0] + 2, pixels[1]), np.int32),
+        edges=np.zeros(pixels, np.uint8),
+        tiles=np.zeros((-(-rows // TILE_SAMPLES), -(-width // TILE_SAMPLES)), np.uint8),
         found=(np.zeros(max_fragments, np.int32), np.zeros((max_fragments, 3), np.float32)),
         fragments=np.zeros((N_ROWS, max_fragments), np.float32),
         scratch=np.zeros((N_SCRATCH_ROWS, max_fragments), np.float32),
         colour=np.zeros((3, max_fragments), np.float32),
-        pixels=np.zeros((width * rows // side**2, PIXEL_ENDS + N_LAYERS + 1), np.int32),
+        pixels=np.zeros((pixels[0] * pixels[1], PIXEL_ENDS + N_LAYERS + 1), np.int32),
+        strands=strands,
+        through=np.zeros((*covered, side * side), np.float32),
+        strand_colour=np.zeros((*covered, 3), np.float32),
     )
 
 
 def draw_surface(
-    points: NDArray[np.float32],
-    surface: Surface,
-    optics: CameraMatrices,
-    lights: tuple[NDArray[np.float32], NDArray[np.float32]],
-    buffers: DrawingBuffers,
-    picture: NDArray[np.uint8],
+    pose: Pose, surface: Surface, optics: CameraMatrices, buffers: DrawingBuffers, picture: NDArray[np.uint8]
 ) -> None:
-    """Draw a surface over the background in `picture`, in place.
-
-    Parameters
-    ----------
-    points : (V, 3)
-        World positions of the vertices, mm.
-    lights
-        Light table of `tts2face.render.shade.shade_fragments`, and the exposure (V, 4) of each vertex.
-    picture : (H, W, 3 or 4)
-        Background on entry, sRGB; the drawn picture on return.
-    """
-    buffers.vertex[:, EXPOSURE : EXPOSURE + 4] = lights[1]
+    """Draw a surface over the background in `picture` (H, W, 3 or 4), sRGB, in place."""
     lens, side = optics.lens, buffers.side
     height, width = picture.shape[0] * side, picture.shape[1] * side
-    batch = project_surface(points, surface, (optics.view, optics.lens), buffers, (width, height))
-    face_normals(buffers.vertex, surface.triangles, buffers.flat)
-    vertex_normals(buffers.flat, surface.starts, surface.members, buffers.vertex)
-    scene = (surface.triangles, surface.part_of, surface.materials, surface.texture, TONE_TABLES[0])
+    batch = project_surface(pose.points, surface, (optics.view, lens), buffers, (width, height))
+    light_surface(pose, surface, lens, buffers)
+    order = np.argsort(-buffers.strands[:, AT_NEAR][surface.strands.triangles].mean(axis=1), kind="stable")
     facets = (buffers.flat, surface.part_of)
-    n_rows = buffers.depth.shape[1]
-    for band, (begin, end) in enumerate(zip(buffers.band_starts[:-1], buffers.band_starts[1:], strict=True)):
-        if begin == end:
-            continue
-        place = (band * n_rows, min(n_rows, height - band * n_rows), side)
-        members = batch[begin:end]
-        layers = draw_samples(surface, lens, members, place[0], buffers)
-        n_pixels = find_fragments(buffers.owner, layers, place, facets, buffers.found, buffers.pixels)
+    textures = (surface.texels, surface.levels)
+    scene = (surface.triangles, surface.part_of, surface.materials, textures, TONE_TABLES[0], side, pose.eyes)
+    for band in range(len(buffers.band_starts) // N_PHASES):
+        place = (band * buffers.band_rows, min(buffers.band_rows, height - band * buffers.band_rows), side)
+        layers = draw_samples(surface, lens, batch, place[0], buffers)
+        blend_strands(surface, order, place[0], pose.lights, buffers)
+        owners = (buffers.owner, buffers.centre, buffers.edges)
+        n_pixels = find_fragments(owners, layers, place, facets, buffers.found, buffers.through, buffers.pixels)
         if n_pixels == 0:
             continue
         n_fragments = int(buffers.pixels[n_pixels - 1, PIXEL_ENDS + N_LAYERS])
         evaluate_fragments(buffers.found, n_fragments, buffers.vertex, scene, lens, buffers.fragments)
-        shade_fragments(buffers.fragments, n_fragments, lights[0], buffers.scratch, buffers.colour)
-        shading = (buffers.fragments, buffers.colour)
-        compose_band(
-            buffers.owner,
-            place,
-            (buffers.pixels, n_pixels),
-            (buffers.found[0], *facets),
-            shading,
-            (picture, TONE_TABLES),
-        )
+        shade_fragments(buffers.fragments, n_fragments, pose.lights, buffers.scratch, buffers.colour)
+        shading = (buffers.fragments, buffers.colour, buffers.through, buffers.strand_colour)
+        which = (buffers.found[0], *facets)
+        compose_band(owners, place, (buffers.pixels, n_pixels), which, shading, (picture, TONE_TABLES))
+
+
+def light_surface(pose: Pose, surface: Surface, lens: NDArray[np.float64], buffers: DrawingBuffers) -> None:
+    """Write normals and light of the projected vertices, and the strand table."""
+    vertex, skin, strands = buffers.vertex, surface.skin, surface.strands
+    face_normals(vertex, surface.triangles, buffers.flat)
+    vertex_normals(buffers.flat, surface.starts, surface.members, vertex)
+    light_vertices(pose.exposure, pose.lights, surface.wrap, vertex)
+    if len(skin.vertices):
+        around = (skin.vertices, surface.starts, surface.members, skin.triangles)
+        scatter_light(surface.triangles, around, skin.share, vertex, buffers.sums)
+    if len(strands.vertices):
+        outward, tangents = strands.outward @ pose.turn.T, strands.tangents @ pose.turn.T
+        light = (pose.exposure, pose.lights, lens)
+        light_strands(strands.vertices, outward, tangents, light, vertex, buffers.strands)
 
 
 def draw_samples(
     surface: Surface, lens: NDArray[np.float64], members: NDArray[np.int32], first_row: int, buffers: DrawingBuffers
 ) -> int:
-    """Draw the projected triangles `members` of a band into ``depth`` and ``owner``; the number of valid layers."""
-    holes = members[:0]
-    if surface.cut_out.any():
-        source = buffers.source[members]
-        has_holes = surface.cut_out[np.where(source >= 0, source, ~source)]
-        members, holes = members[~has_holes], members[has_holes]
-    geometry = (buffers.vertex, surface.triangles, surface.translucent, lens)
-    batch = (buffers.corners, buffers.source, members)
-    layers = N_LAYERS if draw_band(geometry, batch, first_row, buffers.depth, buffers.owner) else 1
-    if len(holes):
+    """Draw the band of the projected triangles `members` that begins at a row; the number of valid layers.
+
+    Writes ``near`` and ``centre`` at the centres of pixels, ``edges`` where a pixel needs more samples, and ``depth``
+    and ``owner`` there. With one sample for each pixel all pixels need it.
+    """
+    side = buffers.side
+    phases = first_row // buffers.band_rows * N_PHASES
+    bounds = buffers.band_starts[phases : phases + N_PHASES + 1]
+    geometry = (buffers.vertex, surface.triangles, lens)
+    batch = (buffers.corners, buffers.boxes, buffers.source, members, bounds)
+    has_holes = bounds[HOLES] < bounds[HOLES + 1]
+    layers = N_LAYERS if bounds[TRANSLUCENT] < bounds[TRANSLUCENT + 1] else 1
+    wanted = EVERY_TILE
+    buffers.edges[:] = 1
+    if side > 1 and not has_holes:
+        draw_band(geometry, batch, (first_row // side - 1, side), EVERY_TILE, buffers.near, buffers.centre)
+        buffers.edges[:] = 0
+        find_edges((buffers.near, buffers.centre), layers, surface.part_of, EDGE_STEP_MM, buffers.edges)
+        mark_tiles(buffers.edges, side, buffers.tiles)
+        wanted = buffers.tiles
+    draw_band(geometry, batch, (first_row, 1), wanted, buffers.depth, buffers.owner)
+    if has_holes:
+        textures = (surface.texels, surface.levels, surface.texture_of)
         draw_cutouts(
-            (buffers.vertex, surface.triangles, lens),
-            surface.alpha,
-            (buffers.corners, buffers.source, holes),
-            (first_row, buffers.side, layers),
+            geometry,
+            textures,
+            (buffers.corners, buffers.source, members[bounds[HOLES] : bounds[HOLES + 1]]),
+            (first_row, side, layers),
             buffers.depth,
             buffers.owner,
         )
     return layers
+
+
+def blend_strands(
+    surface: Surface, order: NDArray[np.intp], first_row: int, lights: NDArray[np.float32], buffers: DrawingBuffers
+) -> None:
+    """Write the passing light and the colour of strands of a band."""
+    if not len(order):
+        return
+    cards = surface.strands
+    buffers.through[:], buffers.strand_colour[:] = 1, 0
+    strands = (buffers.strands, cards.triangles, cards.texture, cards.gloss, cards.mean_light)
+    draw_strands(
+        strands,
+        order,
+        (surface.texels, surface.levels, TONE_TABLES[0], lights),
+        (first_row, buffers.side, buffers.depth[0], buffers.near[0], buffers.edges),
+        buffers.through,
+        buffers.strand_colour,
+    )
 
 
 def project_surface(
@@ -169,13 +245,13 @@ def project_surface(
     """
     view, lens = optics
     transform_to_camera(points, view, lens, buffers.vertex, buffers.grid)
-    count = gather_triangles(
-        buffers.vertex, buffers.grid, surface.triangles, (lens, size), buffers.corners, buffers.source
-    )
-    n_rows = buffers.depth.shape[1]
+    found = (buffers.corners, buffers.boxes, buffers.source)
+    count = gather_triangles(buffers.vertex, buffers.grid, surface.triangles, (lens, size), found)
+    rows = (buffers.band_rows, buffers.side)
     members = np.zeros(2 * len(surface.triangles), np.int32)
-    sort_into_bands(buffers.corners, count, n_rows, buffers.band_starts, members)
+    triangles = (buffers.boxes, buffers.source, surface.phase)
+    sort_into_bands(triangles, count, rows, buffers.band_starts, members)
     if buffers.band_starts[-1] > len(members):
         members = np.zeros(buffers.band_starts[-1], np.int32)
-        sort_into_bands(buffers.corners, count, n_rows, buffers.band_starts, members)
+        sort_into_bands(triangles, count, rows, buffers.band_starts, members)
     return members

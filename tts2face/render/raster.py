@@ -21,8 +21,11 @@ GRID = 1 << GRID_SHIFT  # steps of the snapping grid in one sample
 HALF_GRID = GRID >> 1
 NO_TRIANGLE = np.int32(2**31 - 1)  # no triangle at this sample
 BACK_BIAS = np.float32(1.0 - 3e-4)  # back faces are moved 0.3 permille away, so that front faces win at equal depth
-TILE_SAMPLES = 8  # samples along a side of the tiles that cull hidden back faces
+TILE_SAMPLES = 4  # samples along a side of the tiles that cull hidden back faces
 N_LAYERS = 3  # the opaque surface and the two nearest translucent ones before it
+# Phases of drawing: the largest opaque part, what it may hide, translucent parts, parts with holes; strands in none.
+FIRST, LATER, TRANSLUCENT, HOLES, NOT_DRAWN = range(5)
+N_PHASES = 4
 
 
 @kernel
@@ -76,7 +79,7 @@ def may_be_seen(low: int, high: int, n_samples: int) -> bool:
 
 @kernel
 def gather_triangles(
-    camera: Array, grid: Array, triangles: Array, optics: tuple[Any, Any], corners: Array, source: Array
+    camera: Array, grid: Array, triangles: Array, optics: tuple[Any, Any], found: tuple[Any, Any, Any]
 ) -> int:
     """Write the snapped corners of potentially visible triangles in one winding; returns their number.
 
@@ -84,17 +87,21 @@ def gather_triangles(
     ----------
     optics
         Lens, and (width, height) of the picture in samples.
-    corners : (2 F, 6)
-        Out: x, y of three corners on the grid, positive area.
-    source : (2 F,)
-        Out: the triangle's index t, or ~t where its back faces the camera.
+    found
+        Out, for each triangle: x, y of three corners on the grid, of positive area (2 F, 6); least and greatest x and
+        y, and the bits of the greatest 1/z (2 F, 5); its index t, or ~t where its back faces the camera (2 F,).
     """
     lens, size = optics
+    corners, boxes, source = found
+    nearest = np.zeros(1, np.float32)
+    bits = nearest.view(np.int32)
     count = 0
     polygon = np.zeros((4, 2), np.int64)
     for t in range(len(triangles)):
         n_corners = 3
-        if min(camera[triangles[t, 0], 2], camera[triangles[t, 1], 2], camera[triangles[t, 2], 2]) >= lens[3]:
+        ahead = min(camera[triangles[t, 0], 2], camera[triangles[t, 1], 2], camera[triangles[t, 2], 2])
+        nearest[0] = np.float32(1) / max(ahead, np.float32(lens[3]))
+        if ahead >= lens[3]:
             for c in range(3):
                 polygon[c, 0], polygon[c, 1] = grid[triangles[t, c], 0], grid[triangles[t, c], 1]
         else:
@@ -102,9 +109,9 @@ def gather_triangles(
         for c in range(1, n_corners - 1):
             x0, y0, x1, y1 = polygon[0, 0], polygon[0, 1], polygon[c, 0], polygon[c, 1]
             x2, y2 = polygon[c + 1, 0], polygon[c + 1, 1]
-            if not may_be_seen(min(x0, x1, x2), max(x0, x1, x2), size[0]):
-                continue
-            if not may_be_seen(min(y0, y1, y2), max(y0, y1, y2), size[1]):
+            least_x, most_x = min(x0, x1, x2), max(x0, x1, x2)
+            least_y, most_y = min(y0, y1, y2), max(y0, y1, y2)
+            if not may_be_seen(least_x, most_x, size[0]) or not may_be_seen(least_y, most_y, size[1]):
                 continue
             area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
             if area == 0:
@@ -113,37 +120,54 @@ def gather_triangles(
                 x1, y1, x2, y2 = x2, y2, x1, y1
             corners[count, 0], corners[count, 1], corners[count, 2] = x0, y0, x1
             corners[count, 3], corners[count, 4], corners[count, 5] = y1, x2, y2
+            boxes[count, 0], boxes[count, 1], boxes[count, 2], boxes[count, 3] = least_x, most_x, least_y, most_y
+            boxes[count, 4] = bits[0]
             source[count] = t if area < 0 else ~t
             count += 1
     return count
 
 
 @kernel
-def sort_into_bands(corners: Array, count: int, band_rows: int, starts: Array, members: Array) -> None:
-    """Sort triangles stably into the bands of rows that they overlap (counting sort).
+def sort_into_bands(batch: Any, count: int, rows: tuple[int, int], starts: Array, members: Array) -> None:
+    """Sort triangles stably by the bands of rows that they overlap, and by phase within a band (counting sort).
 
-    Band b is ``members[starts[b]:starts[b + 1]]``. With `members` too short, only `starts` is written.
+    Phase p of band b is ``members[starts[4 * b + p]:starts[4 * b + p + 1]]``. With `members` too short, only `starts`
+    is written.
+
+    Parameters
+    ----------
+    batch
+        Boxes and source of `gather_triangles`, and the phase of each triangle (F,); back faces of the first phase
+        belong to the second.
+    rows
+        Rows of a band, and the rows beyond it that it draws as well, on either side.
     """
-    n_bands = len(starts) - 1
-    for band in range(len(starts)):
-        starts[band] = 0
+    boxes, source, phase = batch
+    n_bands = (len(starts) - 1) // N_PHASES
+    band_rows, beyond = rows
+    for bucket in range(len(starts)):
+        starts[bucket] = 0
     for turn in range(2):
         for i in range(count):
-            low = np.int64(min(corners[i, 1], corners[i, 3], corners[i, 5])) >> GRID_SHIFT
-            high = np.int64(max(corners[i, 1], corners[i, 3], corners[i, 5])) >> GRID_SHIFT
+            own = phase[source[i]] if source[i] >= 0 else max(phase[~source[i]], LATER)
+            if own == NOT_DRAWN:
+                continue
+            low = (np.int64(boxes[i, 2]) >> GRID_SHIFT) - beyond
+            high = (np.int64(boxes[i, 3]) >> GRID_SHIFT) + beyond
             for band in range(max(low // band_rows, 0), min(high // band_rows, n_bands - 1) + 1):
+                bucket = band * N_PHASES + own
                 if turn == 0:
-                    starts[band + 1] += 1
+                    starts[bucket + 1] += 1
                 else:
-                    members[starts[band]] = i
-                    starts[band] += 1
+                    members[starts[bucket]] = i
+                    starts[bucket] += 1
         if turn == 0:
-            for band in range(n_bands):
-                starts[band + 1] += starts[band]
-            if starts[n_bands] > len(members):
+            for bucket in range(len(starts) - 1):
+                starts[bucket + 1] += starts[bucket]
+            if starts[-1] > len(members):
                 return
-    for band in range(n_bands, 0, -1):
-        starts[band] = starts[band - 1]
+    for bucket in range(len(starts) - 1, 0, -1):
+        starts[bucket] = starts[bucket - 1]
     starts[0] = 0
 
 
@@ -173,15 +197,16 @@ def depth_plane(camera: Array, triangles: Array, t: int, lens: Array) -> tuple[f
 
 
 @kernel
-def tile_depths(depth: Array, tiles: Array) -> None:
-    """Write for each tile of samples its least 1/z: 0 where a sample of it is empty."""
+def tile_depths(depth: Array, wanted: Array, tiles: Array) -> None:
+    """Write for each tile of samples its least 1/z: 0 where a sample of it is empty, infinite where it is not wanted."""
     for r in range(tiles.shape[0]):
         for x in range(tiles.shape[1]):
-            tiles[r, x] = np.float32(np.inf)
-    for r in range(depth.shape[0]):
-        for x in range(depth.shape[1]):
-            tile = tiles[r // TILE_SAMPLES, x // TILE_SAMPLES]
-            tiles[r // TILE_SAMPLES, x // TILE_SAMPLES] = min(tile, depth[r, x])
+            least = np.float32(np.inf)
+            if wanted.size == 0 or wanted[r, x]:
+                for row in range(r * TILE_SAMPLES, min((r + 1) * TILE_SAMPLES, depth.shape[0])):
+                    for column in range(x * TILE_SAMPLES, min((x + 1) * TILE_SAMPLES, depth.shape[1])):
+                        least = min(least, depth[row, column])
+            tiles[r, x] = least
 
 
 @kernel
@@ -192,70 +217,90 @@ def clear_layer(depth: Array, owner: Array, layer: int) -> None:
             depth[layer, r, x], owner[layer, r, x] = np.float32(0), NO_TRIANGLE
 
 
+@inlined_kernel
+def samples_below(value: int, side: int) -> int:
+    """Number of samples, `side` samples of the grid apart, whose centres lie below a grid coordinate."""
+    raised = value + ((side << GRID_SHIFT) >> 1) - 1
+    if side == 3:
+        return raised // (side << GRID_SHIFT)
+    return raised >> (GRID_SHIFT + side - 1)
+
+
 @kernel
-def draw_band(geometry: Any, batch: Any, first_row: int, depth: Array, owner: Array) -> int:
-    """Clear a band of rows and draw its triangles, translucent ones last; returns the number of translucent ones.
+def draw_band(geometry: Any, batch: Any, place: tuple[int, int], wanted: Array, depth: Array, owner: Array) -> None:
+    """Clear a band of rows and draw its triangles, translucent ones last.
 
     Parameters
     ----------
     geometry
-        Camera coordinates (V, 3 or more), triangles (F, 3), flags of translucent ones (F,), lens.
+        Camera coordinates (V, 3 or more), triangles (F, 3), lens.
     batch
-        Corners, source, and the rows of both that touch the band.
-    first_row
-        The band's first row of samples.
+        Corners, boxes and source of `gather_triangles`, their rows by bands and phases, and the bounds of the band's
+        phases (4 or more).
+    place
+        The band's first row of samples, and their distance in samples of the lens: 1, or the side of a pixel.
+    wanted : (R / 8, W / 8)
+        Whether each tile of samples is drawn; of size 0 for all.
     depth, owner : (3, R, W)
         Out: 1/z and triangle index of the opaque surface and of the two nearest translucent ones in front of it.
     """
-    camera, triangles, translucent, lens = geometry
-    corners, source, members = batch
+    camera, triangles, lens = geometry
+    corners, boxes, source, members, bounds = batch
+    nearest_of = boxes.view(np.float32)
+    first_row, side = place
+    step, half = side << GRID_SHIFT, (side << GRID_SHIFT) >> 1
     n_rows, width = depth.shape[1], depth.shape[2]
     clear_layer(depth, owner, 0)
     tiles = np.zeros(
         ((n_rows + TILE_SAMPLES - 1) // TILE_SAMPLES, (width + TILE_SAMPLES - 1) // TILE_SAMPLES), np.float32
     )
-    n_translucent = 0
-    for turn in range(3):
-        if turn == 1:
-            tile_depths(depth[0], tiles)
-        if turn == 2 and n_translucent:
+    is_partial = wanted.size > 0
+    if is_partial:
+        for r in range(tiles.shape[0]):
+            for x in range(tiles.shape[1]):
+                tiles[r, x] = np.float32(0) if wanted[r, x] else np.float32(np.inf)
+    for turn in range(TRANSLUCENT + 1):
+        if bounds[turn] == bounds[turn + 1]:
+            continue
+        if turn == LATER:
+            tile_depths(depth[0], wanted, tiles)
+        if turn == TRANSLUCENT:
             clear_layer(depth, owner, 1)
             clear_layer(depth, owner, 2)
-        for i in members:
+        for m in range(bounds[turn], bounds[turn + 1]):
+            i = members[m]
             number = source[i]
             t = number if number >= 0 else ~number
-            if turn == 0:
-                n_translucent += translucent[t]
-            if turn != (2 if translucent[t] else 0 if number >= 0 else 1):
+            left = max(samples_below(np.int64(boxes[i, 0]), side), 0)
+            right = min(samples_below(np.int64(boxes[i, 1]) + 1, side), width) - 1
+            top = max(samples_below(np.int64(boxes[i, 2]), side), first_row) - first_row
+            bottom = min(samples_below(np.int64(boxes[i, 3]) + 1, side), first_row + n_rows) - 1 - first_row
+            if left > right or top > bottom:
                 continue
-            x0, y0, x1 = np.int64(corners[i, 0]), np.int64(corners[i, 1]), np.int64(corners[i, 2])
-            y1, x2, y2 = np.int64(corners[i, 3]), np.int64(corners[i, 4]), np.int64(corners[i, 5])
-            left = max((min(x0, x1, x2) + HALF_GRID - 1) >> GRID_SHIFT, 0)
-            right = min((max(x0, x1, x2) - HALF_GRID) >> GRID_SHIFT, width - 1)
-            top = max((min(y0, y1, y2) + HALF_GRID - 1) >> GRID_SHIFT, first_row) - first_row
-            bottom = min((max(y0, y1, y2) - HALF_GRID) >> GRID_SHIFT, first_row + n_rows - 1) - first_row
-            if turn == 1:
-                ahead = min(camera[triangles[t, 0], 2], camera[triangles[t, 1], 2], camera[triangles[t, 2], 2])
-                nearest, hidden = np.float32(1) / max(ahead, np.float32(lens[3])), True
+            if turn == LATER or is_partial:
+                nearest, hidden = nearest_of[i, 4], True
                 for r in range(top // TILE_SAMPLES, bottom // TILE_SAMPLES + 1):
                     for x in range(left // TILE_SAMPLES, right // TILE_SAMPLES + 1):
                         hidden &= tiles[r, x] >= nearest
                 if hidden:
                     continue
+            x0, y0, x1 = np.int64(corners[i, 0]), np.int64(corners[i, 1]), np.int64(corners[i, 2])
+            y1, x2, y2 = np.int64(corners[i, 3]), np.int64(corners[i, 4]), np.int64(corners[i, 5])
             across, along, origin, least, most = depth_plane(camera, triangles, t, lens)
             bias = np.float32(1) if number >= 0 else BACK_BIAS
-            px, py = (left << GRID_SHIFT) + HALF_GRID, ((top + first_row) << GRID_SHIFT) + HALF_GRID
+            px, py = left * step + half, (top + first_row) * step + half
             row_0, row_1 = edge_function(x1, y1, x2, y2, px, py), edge_function(x2, y2, x0, y0, px, py)
             row_2 = edge_function(x0, y0, x1, y1, px, py)
-            right_0, right_1, right_2 = (y1 - y2) << GRID_SHIFT, (y2 - y0) << GRID_SHIFT, (y0 - y1) << GRID_SHIFT
-            base = origin + along * (top + first_row + 0.5) + across * (left + 0.5)
+            right_0, right_1, right_2 = (y1 - y2) * step, (y2 - y0) * step, (y0 - y1) * step
+            base = origin + along * ((top + first_row + 0.5) * side) + across * ((left + 0.5) * side)
+            across, along = across * side, along * side
             for r in range(top, bottom + 1):
                 e0, e1, e2, value = row_0, row_1, row_2, base
                 for x in range(left, right + 1):
                     if (e0 | e1 | e2) >= 0:
                         near = np.float32(min(max(value, least), most)) * bias
                         if near > depth[0, r, x]:
-                            if turn < 2:
+                            if turn < TRANSLUCENT:
                                 depth[0, r, x], owner[0, r, x] = near, number
                             elif near > depth[1, r, x]:
                                 depth[2, r, x], owner[2, r, x] = depth[1, r, x], owner[1, r, x]
@@ -265,6 +310,5 @@ def draw_band(geometry: Any, batch: Any, first_row: int, depth: Array, owner: Ar
                     value += across
                     e0, e1, e2 = e0 + right_0, e1 + right_1, e2 + right_2
                 base += along
-                row_0, row_1 = row_0 + ((x2 - x1) << GRID_SHIFT), row_1 + ((x0 - x2) << GRID_SHIFT)
-                row_2 += (x1 - x0) << GRID_SHIFT
-    return int(n_translucent)
+                row_0, row_1 = row_0 + (x2 - x1) * step, row_1 + (x0 - x2) * step
+                row_2 += (x1 - x0) * step

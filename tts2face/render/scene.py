@@ -7,21 +7,23 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.face.deformation import head_transform
 from tts2face.models.face import Face
 from tts2face.render.camera import CameraMatrices, camera_matrices
 from tts2face.render.picture import STUDIO, Picture, parse_background
+from tts2face.render.picture_kernels import Pose
 from tts2face.render.soft_shadows import Exposure, compute_exposure
-from tts2face.render.studio_light import lamp_directions, light_table
+from tts2face.render.studio_light import FIRST_LIGHT_ROW, lamp_directions, light_table
 from tts2face.render.surface import Surface, build_surface
 from tts2face.storage.picture_files import open_picture
 
-STUDIO_BRIGHT, STUDIO_DARK = (128.0, 137.0, 148.0), (52.0, 58.0, 67.0)  # sRGB at the centre of the wall and far from it
+STUDIO_BRIGHT, STUDIO_DARK = (112.0, 110.0, 108.0), (36.0, 37.0, 40.0)  # sRGB at the centre of the wall and far from it
 STUDIO_CENTRE = (0.5, 0.42)  # of the bright area, as shares of width and height
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A face with its camera, lights (L, 6), soft shadows and background (H, W, 3); built by `build_scene`."""
+    """A face with its camera, lights (7, 6), soft shadows and background (H, W, 3); built by `build_scene`."""
 
     face: Face
     picture: Picture
@@ -30,6 +32,15 @@ class Scene:
     lights: NDArray[np.float32]
     exposure: Exposure
     background: NDArray[np.uint8]
+
+    def pose(self, weights: NDArray[np.float32], head: NDArray[np.float32]) -> Pose:
+        """The face with shape weights (K,) and a head pose (6,), lit."""
+        surface, view = self.surface, self.optics.view
+        points = surface.rig.pose(weights, head)
+        lamps = self.lights[FIRST_LIGHT_ROW:, :3]
+        turn = (view[:, :3] @ head_transform(head, surface.rig.pivot)[:, :3]).astype(np.float32)
+        eyes = surface.eyes.table((points, weights, head), view, lamps)
+        return Pose(points, self.lights, self.exposure.at(weights), eyes, turn)
 
 
 def build_scene(face: Face, picture: Picture) -> Scene:

@@ -6,113 +6,96 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.colour import decode_srgb, encode_srgb
 from tts2face.face.deformation import FaceRig, build_rig
-from tts2face.models.face import Face, Texture
-
-OPEN_SHARE = 0.05  # parts with a larger share of boundary edges are open sheets, lit from both sides
+from tts2face.models.face import Face, Part, Texture
+from tts2face.render.eyes import EyeGeometry, eye_geometry
+from tts2face.render.materials import STRANDS, Skin, find_skin, material_table, vertex_wrap
+from tts2face.render.raster import FIRST, HOLES, LATER, NOT_DRAWN, TRANSLUCENT
+from tts2face.render.strand_cards import Strands, find_strands
+from tts2face.render.textures import pack_textures
+from tts2face.render.tone_tables import TONE_TABLES, linear_light
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
     """Constant arrays for drawing a face.
 
-    ``triangles`` (F, 3); ``colours`` (V, 3) linear light; ``uv`` (V, 2), ``texture`` (H, W, 3) sRGB; ``part_of`` and
-    ``translucent`` (F,); ``cut_out`` (F,) marks triangles that are drawn where ``alpha`` (H, W), the coverage of the
-    texture, is; ``materials`` (P, 6) as `tts2face.render.fragments` names its columns; the triangles
-    around vertex v are ``members[starts[v]:starts[v + 1]]``, those of vertices at the same place and of the same
-    part included, so that a seam of the texture does not show.
+    ``triangles`` (F, 3); ``colours`` (V, 3) linear light; ``uv`` (V, 2); ``textures`` their pixels and
+    coverage, ``texels`` and ``levels`` as `tts2face.render.textures` packs them; ``part_of``, ``texture_of`` and ``phase`` (F,) as
+    `tts2face.render.raster` names the phases; ``materials`` (P, 9) as `tts2face.render.fragment_rows` names its columns; ``wrap`` (V,); the
+    triangles around vertex v are ``members[starts[v]:starts[v + 1]]``, those of vertices at the same place and of the
+    same part included, so that a seam of the texture does not show.
     """
 
     rig: FaceRig
     triangles: NDArray[np.int32]
     colours: NDArray[np.float32]
     uv: NDArray[np.float32]
-    texture: NDArray[np.uint8]
+    textures: tuple[Texture, ...]
+    texels: NDArray[np.uint8]
+    levels: NDArray[np.int64]
     part_of: NDArray[np.int32]
-    translucent: NDArray[np.int8]
-    cut_out: NDArray[np.bool_]
-    alpha: NDArray[np.uint8]
+    texture_of: NDArray[np.int32]
+    phase: NDArray[np.int8]
     materials: NDArray[np.float32]
+    wrap: NDArray[np.float32]
     starts: NDArray[np.int64]
     members: NDArray[np.int32]
+    skin: Skin
+    strands: Strands
+    eyes: EyeGeometry
 
 
 def build_surface(face: Face) -> Surface:
     """Surface of a face."""
-    parts, (uv, texture) = face.parts, pack_textures(face)
+    parts = face.parts
     counts = [part.count for part in parts]
     part_of = np.repeat(np.arange(len(parts), dtype=np.int32), counts)
-    translucent = np.repeat([part.opacity < 1 for part in parts], counts)
-    triangles = np.array(face.triangles, np.int32)
-    starts, members = _triangles_by_vertex(face, triangles, part_of)
+    is_strand = np.repeat([part.kind == STRANDS for part in parts], counts).astype(bool)
+    every = np.array(face.triangles, np.int32)
+    starts, members = _triangles_by_vertex(face, every, part_of)
+    texels, levels = pack_textures(face.textures, TONE_TABLES)
+    materials = material_table(face, every, part_of)
+    rig = build_rig(face)
     return Surface(
-        rig=build_rig(face),
-        triangles=triangles,
+        rig=rig,
+        triangles=every,
         colours=linear_light(face.colours),
-        uv=uv,
-        texture=np.array(texture.pixels),
+        uv=np.array(face.uv, np.float32) if face.uv is not None else np.zeros((1, 2), np.float32),
+        textures=face.textures,
+        texels=texels,
+        levels=levels,
         part_of=part_of,
-        translucent=translucent.astype(np.int8),
-        cut_out=np.repeat([part.cutout and texture.alpha is not None for part in parts], counts),
-        alpha=np.zeros((1, 1), np.uint8) if texture.alpha is None else np.array(texture.alpha),
-        materials=_materials(face, triangles, part_of),
+        texture_of=np.repeat([max(part.texture, 0) for part in parts], counts).astype(np.int32),
+        phase=_phases(face, part_of),
+        materials=materials,
+        wrap=vertex_wrap(face, every, part_of, materials),
         starts=starts,
         members=members,
+        skin=find_skin(face, every, part_of),
+        strands=find_strands(face, every, is_strand, (texels, levels)),
+        eyes=eye_geometry(face, rig),
     )
 
 
-def pack_textures(face: Face) -> tuple[NDArray[np.float32], Texture]:
-    """Texture coordinates (V, 2) in one texture that holds all of a face's, one below the other, and that texture."""
-    if face.uv is None or not face.textures:
-        return np.zeros((1, 2), np.float32), Texture(np.zeros((1, 1, 3), np.uint8))
-    if len(face.textures) == 1:
-        return np.array(face.uv, np.float32), face.textures[0]
-    heights = [texture.pixels.shape[0] for texture in face.textures]
-    width, tops = max(texture.pixels.shape[1] for texture in face.textures), np.cumsum([0, *heights])
-    pixels, alpha = np.zeros((tops[-1], width, 3), np.uint8), np.full((tops[-1], width), 255, np.uint8)
-    uv = np.array(face.uv, np.float32)
-    for number, (texture, top) in enumerate(zip(face.textures, tops, strict=False)):
-        height, across = texture.pixels.shape[:2]
-        pixels[top : top + height, :across] = texture.pixels
-        if texture.alpha is not None:
-            alpha[top : top + height, :across] = texture.alpha
-        spans = [face.triangles[part.first : part.first + part.count] for part in face.parts if part.texture == number]
-        used = np.unique(np.concatenate([np.zeros((0, 3), np.int32), *spans]))
-        inside = np.clip(face.uv[used], [0.5 / across, 0.5 / height], [1 - 0.5 / across, 1 - 0.5 / height])
-        uv[used] = (inside * [across, height] + [0, top]) / [width, tops[-1]]
-    return uv, Texture(pixels, alpha if any(texture.alpha is not None for texture in face.textures) else None)
+def _is_cut_out(face: Face, part: Part) -> bool:
+    return part.cutout and part.texture >= 0 and face.textures[part.texture].alpha is not None
 
 
-def linear_light(srgb: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Linear light in [0, 1] of 8-bit sRGB values (IEC 61966-2-1)."""
-    return linear_table()[srgb]
-
-
-def linear_table() -> NDArray[np.float32]:
-    """Linear light (256,) of each 8-bit sRGB value."""
-    return decode_srgb(np.arange(256) / 255.0).astype(np.float32)
-
-
-def encoding_table(n_steps: int) -> NDArray[np.uint8]:
-    """8-bit sRGB values (n_steps,) of linear light from 0 to 1 in equal steps."""
-    return encode_srgb(np.linspace(0.0, 1.0, n_steps))
-
-
-def _materials(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> NDArray[np.float32]:
-    rows = []
+def _phases(face: Face, part_of: NDArray[np.int32]) -> NDArray[np.int8]:
+    """Phase (F,) of each triangle: the largest opaque part is drawn first and hides much of the others."""
+    sizes = [-1 if part.opacity < 1 or _is_cut_out(face, part) else part.count for part in face.parts]
+    phases = np.full(len(face.parts), LATER, np.int8)
+    if sizes:
+        phases[int(np.argmax(sizes))] = FIRST
     for number, part in enumerate(face.parts):
-        sheet = _free_edge_share(triangles[part_of == number]) > OPEN_SHARE
-        rows.append((part.specular, part.shininess, part.wrap, part.opacity, part.is_textured, sheet))
-    return np.array(rows, np.float32).reshape(-1, 6)
-
-
-def _free_edge_share(triangles: NDArray[np.int32]) -> float:
-    if not len(triangles):
-        return 0.0
-    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    _, uses = np.unique(edges, axis=0, return_counts=True)
-    return float((uses == 1).mean())
+        if part.kind == STRANDS:
+            phases[number] = NOT_DRAWN
+        elif _is_cut_out(face, part):
+            phases[number] = HOLES
+        elif part.opacity < 1:
+            phases[number] = TRANSLUCENT
+    return phases[part_of]
 
 
 def _triangles_by_vertex(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> tuple[Any, Any]:

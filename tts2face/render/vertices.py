@@ -7,24 +7,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.compilation import kernel
-from tts2face.render.fragments import (
+from tts2face.render.fragment_rows import (
     AT_ALBEDO,
+    AT_DIFFUSE,
     AT_EXPOSURE,
+    AT_GLOSS,
     AT_NORMAL,
     AT_RAY,
     AT_SHARE,
-    AT_SPECULAR,
-    BACK_LIGHT_SHARE,
+    DIFFUSE,
+    EXPOSURE,
+    N_EXPOSURES,
     N_ROWS,
     NORMAL,
+    OPACITY,
     OPEN_SURFACE,
-    TEXTURED,
-    face_normals,
-    texel,
-    vertex_normals,
+    TEXTURE,
 )
-from tts2face.render.shade import N_SCRATCH_ROWS, shade_fragments
-from tts2face.render.surface import Surface, encoding_table, linear_table
+from tts2face.render.fragments import BACK_LIGHT_SHARE, face_normals, vertex_normals
+from tts2face.render.shade import N_SCRATCH_ROWS, light_vertices, scatter_light, shade_fragments
+from tts2face.render.surface import Surface
+from tts2face.render.textures import read_texel
+from tts2face.render.tone_tables import encoding_table, linear_table
 
 SRGB_TABLE = (encoding_table(4096) / 255.0).astype(np.float32)  # sRGB in [0, 1] for equal steps of linear light
 SHADE_STEP, N_SHADES = 1.5, 6  # brightness ratio and number of the copies of a texture
@@ -34,7 +38,7 @@ SHADE_STEP, N_SHADES = 1.5, 6  # brightness ratio and number of the copies of a 
 class VertexLight:
     """Vertex lighting of one surface, with its buffers.
 
-    ``table`` (17, V) holds one fragment per vertex in the rows of `tts2face.render.fragments`; ``albedo`` (V, 3) is the
+    ``table`` (N_ROWS, V) holds one fragment per vertex in the rows of `tts2face.render.fragment_rows`; ``albedo`` (V, 3) is the
     unlit sRGB colour in [0, 1], ``divisor`` (V, 3) that colour on textured vertices, else the opacity; ``front`` and
     ``back`` (V, 3) are the colours of outer and inner sides after the last `update`, sRGB divided by ``divisor``.
     """
@@ -54,21 +58,29 @@ class VertexLight:
     ) -> None:
         """Light the vertices at world positions (V, 3) for a camera `view` (3, 4); writes ``front`` and ``back``.
 
-        `lights` holds the light table of `tts2face.render.shade.shade_fragments` in camera space and exposure (V, 4).
+        `lights` holds the light table of `tts2face.render.shade.light_vertices` in camera space and exposure (V, 5).
+        Strands are lit as plain surfaces.
         """
         self.camera[:, :3] = points @ view[:, :3].T.astype(np.float32) + view[:, 3].astype(np.float32)
         face_normals(self.camera, self.surface.triangles, self.flat)
         vertex_normals(self.flat, self.surface.starts, self.surface.members, self.camera)
+        light_vertices(lights[1], lights[0], self.surface.wrap, self.camera)
+        skin = self.surface.skin
+        if len(skin.vertices):
+            around = (skin.vertices, self.surface.starts, self.surface.members, skin.triangles)
+            scatter_light(self.surface.triangles, around, skin.share, self.camera, np.zeros_like(self.flat))
         for side, colours in ((1.0, self.front), (-1.0, self.back)):
-            self._write(np.float32(side), lights, colours)
+            self._write(np.float32(side), lights[0], colours)
 
-    def _write(self, side: np.float32, lights: tuple[NDArray[Any], NDArray[Any]], colours: NDArray[np.float32]) -> None:
+    def _write(self, side: np.float32, lights: NDArray[Any], colours: NDArray[np.float32]) -> None:
         table, n_vertices = self.table, len(self.camera)
         table[AT_NORMAL : AT_NORMAL + 3] = side * self.camera[:, NORMAL : NORMAL + 3].T
-        table[AT_EXPOSURE : AT_EXPOSURE + 4] = lights[1].T * (np.float32(1) if side > 0 else self.inside)
+        inside = np.float32(1) if side > 0 else self.inside
+        table[AT_DIFFUSE : AT_DIFFUSE + 3] = self.camera[:, DIFFUSE : DIFFUSE + 3].T * inside
+        table[AT_EXPOSURE : AT_EXPOSURE + N_EXPOSURES] = self.camera[:, EXPOSURE : EXPOSURE + N_EXPOSURES].T * inside
         table[AT_RAY : AT_RAY + 2] = (self.camera[:, :2] / np.maximum(self.camera[:, 2:3], np.float32(1))).T
         light_of = np.zeros((3, n_vertices), np.float32)
-        shade_fragments(table, n_vertices, lights[0], np.zeros((N_SCRATCH_ROWS, n_vertices), np.float32), light_of)
+        shade_fragments(table, n_vertices, lights, np.zeros((N_SCRATCH_ROWS, n_vertices), np.float32), light_of)
         colours[:] = encode_srgb(light_of.T) / self.divisor
 
 
@@ -78,23 +90,24 @@ def build_vertex_light(surface: Surface) -> VertexLight:
     part_of = np.zeros(n_vertices, np.int32)
     part_of[surface.triangles.ravel()] = np.repeat(surface.part_of, 3)
     material = surface.materials[part_of]
-    textured = material[:, TEXTURED] > 0
+    texture = material[:, TEXTURE].astype(np.int64)
+    textured = texture >= 0
     linear = surface.colours.copy()
-    sample_texture(surface.texture, linear_table(), surface.uv, textured, linear)
+    sample_texture((surface.texels, surface.levels), linear_table(), surface.uv, texture, linear)
     table = np.zeros((N_ROWS, n_vertices), np.float32)
     table[AT_ALBEDO : AT_ALBEDO + 3] = linear.T
-    table[AT_SPECULAR : AT_SPECULAR + 4] = material[:, :4].T
+    table[AT_GLOSS : AT_GLOSS + 5] = material[:, :5].T
     table[AT_SHARE] = 1
     albedo = np.maximum(encode_srgb(linear), np.float32(1 / 255))
     light_of = np.zeros((2, n_vertices, 3), np.float32)
     return VertexLight(
         surface=surface,
-        camera=np.zeros((n_vertices, NORMAL + 3), np.float32),
+        camera=np.zeros((n_vertices, EXPOSURE + N_EXPOSURES), np.float32),
         flat=np.zeros((len(surface.triangles), 3), np.float32),
         table=table,
         inside=np.where(material[:, OPEN_SURFACE] > 0, np.float32(1), BACK_LIGHT_SHARE),
         albedo=albedo,
-        divisor=np.where(textured[:, None], albedo, np.maximum(material[:, 3:4], np.float32(1 / 255))),
+        divisor=np.where(textured[:, None], albedo, np.maximum(material[:, OPACITY : OPACITY + 1], np.float32(1 / 255))),
         front=light_of[0],
         back=light_of[1],
     )
@@ -121,14 +134,14 @@ def triangle_shades(light_of: VertexLight) -> NDArray[np.int64]:
     surface = light_of.surface
     tone = light_of.albedo.mean(axis=1)[surface.triangles].max(axis=1)
     steps = np.clip(np.floor(-np.log(tone) / np.log(SHADE_STEP)), 0, N_SHADES - 1).astype(np.int64)
-    chosen: NDArray[np.int64] = np.where(surface.materials[surface.part_of, TEXTURED] > 0, steps, -1)
+    chosen: NDArray[np.int64] = np.where(surface.materials[surface.part_of, TEXTURE] >= 0, steps, -1)
     return chosen
 
 
 @kernel
-def sample_texture(texture: Any, linear: Any, uv: Any, textured: Any, albedo: Any) -> None:
-    """Write the linear texture colour of textured vertices to `albedo` (V, 3)."""
-    for v in range(len(textured)):
-        if textured[v]:
-            for c in range(3):
-                albedo[v, c] = texel(texture, linear, uv[v, 0], uv[v, 1], c)
+def sample_texture(textures: Any, linear: Any, uv: Any, texture: Any, albedo: Any) -> None:
+    """Write the linear colour of vertices with a texture (V,), -1 without, to `albedo` (V, 3)."""
+    texels, levels = textures
+    for v in range(len(texture)):
+        if texture[v] >= 0:
+            read_texel(texels, levels[texture[v], 0], linear, (uv[v, 0], uv[v, 1]), albedo[v])

@@ -19,9 +19,11 @@ from numpy.typing import NDArray
 from lexicon.errors import BackendError
 from tts2face.compilation import kernel
 from tts2face.render.camera import CameraMatrices
-from tts2face.render.fragments import OPACITY
+from tts2face.render.fragment_rows import OPACITY
+from tts2face.render.raster import HOLES
 from tts2face.render.scene import Scene
-from tts2face.render.surface import Surface, encoding_table, linear_table
+from tts2face.render.surface import Surface
+from tts2face.render.tone_tables import encoding_table, linear_table
 from tts2face.render.vertices import VertexLight, brighten, build_vertex_light, triangle_shades
 
 OFF_SCREEN, ON_SCREEN = "vtkEGLRenderWindow", "vtkXOpenGLRenderWindow"  # the first falls back to OSMesa automatically
@@ -166,11 +168,10 @@ class PlottedFace:
         self._meshes: list[PlottedMesh] = []
         shade = triangle_shades(self._light)
         opacity = surface.materials[surface.part_of, OPACITY]
-        for share in np.unique(opacity)[::-1]:
-            for number in np.unique(shade):
-                chosen = (shade == number) & (opacity == share)
-                self._add(chosen & ~surface.cut_out, float(share), number >= 0)
-                self._add(chosen & surface.cut_out, float(share), number >= 0)
+        has_holes = surface.phase >= HOLES  # cards of strands are drawn as parts with holes
+        groups = np.column_stack([-opacity, shade, np.where(shade >= 0, surface.texture_of, -1), has_holes])
+        for group in np.unique(groups, axis=0):
+            self._add((groups == group).all(axis=1), -float(group[0]), (int(group[2]), bool(group[3])))
 
     def show(
         self, points: NDArray[np.float32], view: NDArray[np.floating], lights: tuple[NDArray[Any], NDArray[Any]]
@@ -180,23 +181,24 @@ class PlottedFace:
         for mesh in self._meshes:
             mesh.show(points)
 
-    def _add(self, chosen: NDArray[np.bool_], opacity: float, is_textured: bool) -> None:
+    def _add(self, chosen: NDArray[np.bool_], opacity: float, texture: tuple[int, bool]) -> None:
+        """Add triangles with a texture, -1 for vertex colours, and whether it has holes."""
         import pyvista
 
-        if not chosen.any():
-            return
         used, places = np.unique(self._surface.triangles[chosen], return_inverse=True)
         scale, options = np.ones(3, np.float32), {"opacity": opacity}
-        if is_textured:
+        number, has_holes = texture
+        if number >= 0:
+            image = self._surface.textures[number]
             scale = self._light.albedo[used].max(axis=0)
-            pixels = brighten(self._surface.texture, scale)
-            if self._surface.cut_out[chosen].any():
-                pixels = np.dstack([pixels, np.where(self._surface.alpha >= HALF_COVERED, np.uint8(255), np.uint8(0))])
+            pixels = brighten(image.pixels, scale)
+            if has_holes and image.alpha is not None:
+                pixels = np.dstack([pixels, np.where(image.alpha >= HALF_COVERED, np.uint8(255), np.uint8(0))])
             options["texture"] = pyvista.Texture(pixels)
         for culling, light_of in (("front", self._light.back), ("back", self._light.front)):
             mesh = pyvista.PolyData.from_regular_faces(self._surface.rig.rest[used].copy(), places.reshape(-1, 3))
             mesh.point_data["light"] = np.zeros((len(used), 3), np.uint8)
-            if is_textured:
+            if number >= 0:
                 mesh.active_texture_coordinates = self._surface.uv[used] * [1, -1] + np.array([0, 1], np.float32)
             self._plotter.add_mesh(
                 mesh, scalars="light", rgb=True, lighting=False, culling=culling, show_scalar_bar=False, **options
