@@ -57,7 +57,7 @@ def test_a_layer_of_its_own_changes_no_other(with_gestures: Clip, session: Sessi
 def test_the_starter_palette_has_the_moods_of_the_paper_and_its_provenance() -> None:
     palette = load_palette("starter")
     moods = ("neutral", "depressed", "delighted", "annoyed", "exaggerated", "exasperated")
-    assert palette.names == (*moods, "grid_s1")
+    assert palette.names == (*moods, "grid_s1", "measured")
     measured = palette.styles["grid_s1"]
     assert measured.seconds == pytest.approx(40 * 60, rel=0.02)
     assert set(measured.motion) == set(FEATURES)
@@ -124,7 +124,7 @@ def test_another_palette_gives_other_motion(with_gestures: Clip, talker: Talker,
     write_palette(tmp_path / "few.palette", replace(starter, styles={"few": part}, derivations={}))
     clip = Session(talker, face, palette=tmp_path / "few.palette").clip(Request(text=TEXT))
     assert not np.array_equal(clip.head.values, with_gestures.head.values)
-    with pytest.raises(InputError, match="no style 'delighted' in the palette; it has few"):
+    with pytest.raises(InputError, match="no style 'delighted' in the palette; it has few, measured"):
         Session(talker, face, palette=tmp_path / "few.palette").clip(Request(text=TEXT, style="delighted"))
 
 
@@ -176,13 +176,13 @@ def test_a_capture_becomes_a_style_of_the_starter_palette(
         r"wrote live\.palette: style live from 1 recordings, 0\.[23] minutes; modes keep", capsys.readouterr().err
     )
     palette = load_palette("live.palette")
-    assert palette.names[-2:] == ("grid_s1", "live")
+    assert palette.names[-3:] == ("grid_s1", "live", "measured")
     assert palette.styles["live"].intensity.max() > 0  # its sound is in the same folder
     assert run(["Hello.", "--palette", "live.palette", "--style", "live", "--out", "x.mp4", *SMALL]) == 0
     alone = ["--alone", "--estimator", "samples"]
     assert run(["corpus", "gestures", str(capture), "--style", "live", "--out", "a.palette", *alone, *cache]) == 0
     made = load_palette("a.palette")
-    assert made.names[-1] == "live"
+    assert made.names[-2:] == ("live", "measured")
     assert "exasperated" in made.derivations
     assert not np.array_equal(made.styles["live"].motion["expression"], palette.styles["live"].motion["expression"])
 
